@@ -1,0 +1,2 @@
+//! Contact FEM of strain wave (harmonic) drives, and the compensation tables made from it.
+#![forbid(unsafe_code)]

@@ -1,0 +1,2 @@
+//! The command `flexspline`.
+fn main() {}
