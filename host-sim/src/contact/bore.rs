@@ -1,0 +1,165 @@
+//! Wave generator on the bore of the flexspline: unilateral, frictionless (it rolls).
+
+use crate::drive::{GeneratorOutline, OutlineFoot};
+use crate::element::edge_shape;
+use crate::mesh::WheelMesh;
+
+use super::quadrature::gauss_legendre;
+
+/// Stiffness of the contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoreLaw {
+    /// Penalty and, in series, the bearing of the generator: pressure per penetration, N/mm³.
+    pub stiffness: f64,
+}
+
+impl BoreLaw {
+    /// Penalty in series with a bearing stiffness (both N/mm³); no bearing means rigid.
+    pub fn new(penalty: f64, bearing: Option<f64>) -> BoreLaw {
+        BoreLaw { stiffness: bearing.map_or(penalty, |b| 1.0 / (1.0 / penalty + 1.0 / b)) }
+    }
+}
+
+/// Integration points on the bore: the same in every edge.
+#[derive(Debug, Clone)]
+pub struct BoreContact {
+    /// Nodes of each edge around the bore: start, middle, end.
+    pub edges: Vec<[u32; 3]>,
+    /// Angle of the middle of each edge, rad, ascending from that of edge 0.
+    pub middle_angles: Vec<f64>,
+    /// Half the angle of an edge.
+    half_angle: f64,
+    radius: f64,
+    /// Offset from the middle angle, weight (mm), shape functions of each point.
+    points: Vec<(f64, f64, [f64; 3])>,
+    /// Coupling of the wave generator's clearance: how close (mm) a node must be for its edge to be looked at.
+    reach: f64,
+}
+
+/// Contact of one edge.
+#[derive(Debug, Clone)]
+pub struct BorePressure {
+    /// Which edge.
+    pub edge: usize,
+    /// Nodal forces on the flexspline (N/mm), x and y of start, middle, end.
+    pub force: [f64; 6],
+    /// Tangent, packed lower triangle of 6 x 6.
+    pub stiffness: [f64; 21],
+    /// Moment of the contact forces about the axis, on the flexspline (N mm/mm).
+    pub moment: f64,
+    /// Largest pressure (MPa) and where it acts.
+    pub peak: f64,
+    /// Energy stored in the penalty (N mm/mm).
+    pub energy: f64,
+}
+
+impl BoreContact {
+    /// Points on the bore of a mesh, `per_edge` to an edge. Sixteen make the passing of nodes under a roller invisible.
+    pub fn new(mesh: &WheelMesh, per_edge: usize) -> BoreContact {
+        let mut edges = Vec::new();
+        let mut middle_angles = Vec::new();
+        let per_sector = mesh.base_edges.len();
+        let width = mesh.pitch() / per_sector as f64;
+        for sector in 0..mesh.teeth {
+            for (k, edge) in mesh.base_edges.iter().enumerate() {
+                edges.push(mesh.edge_nodes(sector, edge).map(|n| n as u32));
+                middle_angles.push(mesh.sector_angle(sector) + (k as f64 + 0.5 - 0.5 * per_sector as f64) * width);
+            }
+        }
+        let half_angle = 0.5 * width;
+        let points = gauss_legendre(per_edge)
+            .into_iter()
+            .map(|(xi, weight)| (xi * half_angle, weight * half_angle * mesh.base_radius, edge_shape(xi)))
+            .collect();
+        BoreContact { edges, middle_angles, half_angle, radius: mesh.base_radius, points, reach: 0.02 }
+    }
+
+    /// Contact of the bore displaced by `u` (x and y of each node) with the generator turned by `generator_rad`, edge by
+    /// edge; edges without contact are not reported.
+    pub fn evaluate(
+        &self,
+        law: BoreLaw,
+        outline: &GeneratorOutline,
+        generator_rad: f64,
+        u: &[f64],
+        mut report: impl FnMut(&BorePressure),
+    ) {
+        let (sin_g, cos_g) = generator_rad.sin_cos();
+        let foot = |x: [f64; 2]| -> OutlineFoot {
+            let local = [cos_g * x[0] + sin_g * x[1], cos_g * x[1] - sin_g * x[0]];
+            let mut foot = outline.nearest(local);
+            foot.normal = [
+                cos_g * foot.normal[0] - sin_g * foot.normal[1],
+                sin_g * foot.normal[0] + cos_g * foot.normal[1],
+            ];
+            foot
+        };
+        for (edge, nodes) in self.edges.iter().enumerate() {
+            let middle = self.middle_angles[edge];
+            let node_u = nodes.map(|n| [u[2 * n as usize], u[2 * n as usize + 1]]);
+            // Looked at only when near: between two neighbouring nodes the gap changes by less than the reach.
+            let near = [-self.half_angle, 0.0, self.half_angle].iter().zip(&node_u).any(|(offset, du)| {
+                let (s, c) = (middle + offset).sin_cos();
+                foot([self.radius * c + du[0], self.radius * s + du[1]]).distance < self.reach
+            });
+            if !near {
+                continue;
+            }
+            let mut contact = BorePressure {
+                edge,
+                force: [0.0; 6],
+                stiffness: [0.0; 21],
+                moment: 0.0,
+                peak: 0.0,
+                energy: 0.0,
+            };
+            let mut touching = false;
+            for (offset, weight, n) in &self.points {
+                let (s, c) = (middle + offset).sin_cos();
+                let x = [
+                    self.radius * c + n[0] * node_u[0][0] + n[1] * node_u[1][0] + n[2] * node_u[2][0],
+                    self.radius * s + n[0] * node_u[0][1] + n[1] * node_u[1][1] + n[2] * node_u[2][1],
+                ];
+                let foot = foot(x);
+                if foot.distance >= 0.0 {
+                    continue;
+                }
+                touching = true;
+                let pressure = -law.stiffness * foot.distance;
+                let load = pressure * weight;
+                contact.peak = contact.peak.max(pressure);
+                contact.energy -= 0.5 * load * foot.distance;
+                let f = [load * foot.normal[0], load * foot.normal[1]];
+                contact.moment += x[0] * f[1] - x[1] * f[0];
+                // Hessian of the penalty energy: normal stiffness and, from the curvature of the outline, a small
+                // destabilising tangential part.
+                let normal = law.stiffness * weight;
+                let tangential = -load * foot.curvature / (1.0 + foot.curvature * foot.distance);
+                let [nx, ny] = foot.normal;
+                let k = [
+                    normal * nx * nx + tangential * ny * ny,
+                    (normal - tangential) * nx * ny,
+                    normal * ny * ny + tangential * nx * nx,
+                ];
+                for a in 0..3 {
+                    contact.force[2 * a] += n[a] * f[0];
+                    contact.force[2 * a + 1] += n[a] * f[1];
+                    for b in 0..=a {
+                        let nn = n[a] * n[b];
+                        let row_x = a * (2 * a + 1);
+                        let row_y = row_x + 2 * a + 1;
+                        contact.stiffness[row_x + 2 * b] += nn * k[0];
+                        if b < a {
+                            contact.stiffness[row_x + 2 * b + 1] += nn * k[1];
+                        }
+                        contact.stiffness[row_y + 2 * b] += nn * k[1];
+                        contact.stiffness[row_y + 2 * b + 1] += nn * k[2];
+                    }
+                }
+            }
+            if touching {
+                report(&contact);
+            }
+        }
+    }
+}

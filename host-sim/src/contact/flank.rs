@@ -1,0 +1,478 @@
+//! Flexspline flank on circular-spline flank: unilateral, with Coulomb friction.
+//!
+//! Integration points lie on the flexspline flank. A point `X + u`, seen from the frame that turns with the circular
+//! spline, has the gap
+//!
+//! `g = n(s) . (x - V(s) - P(s))`,
+//!
+//! with P(s) the exact outline of the circular spline (involute and tip rounding), V its interpolated displacement, and s
+//! the foot of `x - V`. To first order in the slope of V (1e-3; the neglected second order is below 1e-6 of the gap) all
+//! derivatives of g are those of one vector `c = n - (n . dV/ds) t`: +c on the flexspline, −c on the circular spline, so
+//! that action equals reaction and the moment on the output is that of the forces themselves.
+
+use crate::element::edge_shape;
+use crate::mesh::{FlankMesh, Side, WheelMesh};
+
+use crate::drive::{Foot, InvoluteFlank};
+use super::quadrature::gauss_legendre;
+
+/// Law of the flanks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlankLaw {
+    /// Penalty: pressure per penetration, N/mm³.
+    pub stiffness: f64,
+    /// Tangential stiffness while sticking, N/mm³.
+    pub stick_stiffness: f64,
+    /// Coulomb friction coefficient.
+    pub friction: f64,
+}
+
+/// A flexspline tooth side facing a circular-spline space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct FlankPair {
+    /// Flexspline tooth.
+    pub tooth: usize,
+    /// Circular-spline space.
+    pub space: usize,
+    /// Which side of both.
+    pub side: Side,
+}
+
+/// An integration point on the flexspline flank, in the frame of its tooth, plus side.
+#[derive(Debug, Clone, Copy)]
+pub struct FlankPoint {
+    /// Undeformed position.
+    pub position: [f64; 2],
+    /// Edge of the flank mesh that carries it.
+    pub edge: usize,
+    /// Shape functions there.
+    pub shape: [f64; 3],
+    /// Arc length it stands for, mm.
+    pub weight: f64,
+    /// Arc length along the outline, from root to tip.
+    pub arc: f64,
+    /// Tangential traction at the start of the increment, MPa, along the tangent of the circular-spline flank.
+    pub start_traction: f64,
+    /// Arc length of the foot on the circular spline at the start of the increment.
+    pub start_foot: f64,
+}
+
+/// Tangential tractions along a flank at the end of an increment, by arc length.
+pub type FrictionHistory = Vec<(f64, f64)>;
+
+/// Integration points of a pair, laid out for one increment.
+#[derive(Debug, Clone)]
+pub struct FlankLayout {
+    /// Radius on the tooth that faces the corner of the space, if it lies on the flank.
+    pub corner: Option<f64>,
+    /// The points, from root to tip.
+    pub points: Vec<FlankPoint>,
+}
+
+/// Geometry of both flanks and their meshes.
+pub struct FlankContact<'a> {
+    fs_mesh: &'a WheelMesh,
+    cs_mesh: &'a WheelMesh,
+    /// The flexspline flank.
+    pub tooth: InvoluteFlank,
+    /// The circular-spline flank.
+    pub space: InvoluteFlank,
+    coarse: Vec<f64>,
+    rule: Vec<(f64, f64)>,
+}
+
+/// What one pair contributes. Local nodes: flexspline flank nodes, then circular-spline flank nodes; two unknowns each.
+#[derive(Debug, Clone)]
+pub struct PairContribution {
+    /// Nodal forces on the wheels, global frame for the flexspline, turning frame for the circular spline (N/mm).
+    pub force: Vec<f64>,
+    /// Torque on the circular spline (N mm/mm).
+    pub torque: f64,
+    /// Tangent, n x n by rows, lower triangle filled.
+    pub stiffness: Vec<f64>,
+    /// Coupling with the output angle.
+    pub border: Vec<f64>,
+    /// Stiffness against the output angle alone.
+    pub corner: f64,
+    /// Whether any point touches.
+    pub touching: bool,
+    /// Largest pressure, MPa.
+    pub peak: f64,
+    /// Resultant force on the circular spline in its frame (N/mm) and the moment arm's point of attack (mm).
+    pub resultant: [f64; 2],
+    /// Force-weighted point of attack, in the turning frame.
+    pub attack: [f64; 2],
+}
+
+/// Displacements and output angle at which contact is evaluated.
+#[derive(Clone, Copy)]
+pub struct Configuration<'s> {
+    /// Flexspline, global frame, x and y of each node.
+    pub u: &'s [f64],
+    /// Circular spline, frame turning with it.
+    pub v: &'s [f64],
+    /// Output angle, rad.
+    pub output_rad: f64,
+}
+
+#[inline]
+fn rotate(p: [f64; 2], (sin, cos): (f64, f64)) -> [f64; 2] {
+    [cos * p[0] - sin * p[1], sin * p[0] + cos * p[1]]
+}
+
+/// Displacements of a pair's flank nodes in local frames (tooth frame and space frame, mirrored for the minus side).
+struct LocalField {
+    fs: Vec<[f64; 2]>,
+    cs: Vec<[f64; 2]>,
+    /// Rotation from the tooth frame to the space frame.
+    turn: (f64, f64),
+}
+
+impl<'a> FlankContact<'a> {
+    /// Contact between the flanks of two meshes.
+    pub fn new(fs_mesh: &'a WheelMesh, cs_mesh: &'a WheelMesh, tooth: InvoluteFlank, space: InvoluteFlank) -> Self {
+        let (a, b) = (tooth.start_radius, tooth.junction_radius);
+        let coarse = (0..=6).map(|i| a + (b - a) * f64::from(i) / 6.0).collect();
+        FlankContact { fs_mesh, cs_mesh, tooth, space, coarse, rule: gauss_legendre(4) }
+    }
+
+    /// Flank nodes of the flexspline side of a pair.
+    pub fn fs_nodes(&self, pair: FlankPair) -> impl Iterator<Item = usize> + '_ {
+        self.fs_flank(pair).nodes.iter().map(move |&n| self.fs_mesh.node(pair.tooth as isize, n))
+    }
+
+    /// Flank nodes of the circular-spline side of a pair.
+    pub fn cs_nodes(&self, pair: FlankPair) -> impl Iterator<Item = usize> + '_ {
+        self.cs_flank(pair).nodes.iter().map(move |&n| self.cs_mesh.node(pair.space as isize, n))
+    }
+
+    fn fs_flank(&self, pair: FlankPair) -> &FlankMesh {
+        &self.fs_mesh.flanks[pair.side.index()]
+    }
+
+    fn cs_flank(&self, pair: FlankPair) -> &FlankMesh {
+        &self.cs_mesh.flanks[pair.side.index()]
+    }
+
+    /// Pairs whose flanks are closer than `reach_mm` (or overlap) in this configuration.
+    pub fn near_pairs(&self, at: Configuration, reach_mm: f64) -> Vec<FlankPair> {
+        let mut pairs = Vec::new();
+        let spaces = self.cs_mesh.teeth as isize;
+        for tooth in 0..self.fs_mesh.teeth {
+            for side in Side::BOTH {
+                // The space whose axis is nearest to the tip of the flank.
+                let flank = &self.fs_mesh.flanks[side.index()];
+                let tip = self.fs_mesh.node(tooth as isize, flank.nodes[flank.nodes.len() - 1]);
+                let x = self.fs_mesh.nodes[tip];
+                let p = [x[0] + at.u[2 * tip], x[1] + at.u[2 * tip + 1]];
+                if p[0].hypot(p[1]) < self.space.tip_radius - 0.05 {
+                    continue;
+                }
+                let inset = side.sign() * self.tooth.half_angle(self.tooth.tip_radius);
+                let angle = p[1].atan2(p[0]) - at.output_rad - inset;
+                let space = (angle / self.cs_mesh.pitch()).round() as isize;
+                let pair = FlankPair { tooth, space: space.rem_euclid(spaces) as usize, side };
+                if self.smallest_gap(pair, at) < reach_mm {
+                    pairs.push(pair);
+                }
+            }
+        }
+        pairs
+    }
+
+    /// Smallest gap of a pair at a few points of the flank (mm); points outside the space's flank do not count.
+    pub fn smallest_gap(&self, pair: FlankPair, at: Configuration) -> f64 {
+        let field = self.local_field(pair, at);
+        self.coarse
+            .iter()
+            .map(|&radius| {
+                let (edge, xi) = self.fs_flank(pair).locate(radius);
+                let (foot, _) = self.foot(pair, &field, self.tooth.point(radius), edge, &edge_shape(xi));
+                if foot.radius < self.space.tip_radius + 1e-9 { f64::INFINITY } else { foot.distance }
+            })
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    fn local_field(&self, pair: FlankPair, at: Configuration) -> LocalField {
+        let sign = pair.side.sign();
+        let local = |mesh: &WheelMesh, sector: usize, nodes: &[u32], field: &[f64]| -> Vec<[f64; 2]> {
+            let turn = (-mesh.sector_angle(sector)).sin_cos();
+            nodes
+                .iter()
+                .map(|&n| {
+                    let k = 2 * mesh.node(sector as isize, n);
+                    let d = rotate([field[k], field[k + 1]], turn);
+                    [d[0], sign * d[1]]
+                })
+                .collect()
+        };
+        let angle = self.fs_mesh.sector_angle(pair.tooth) - self.cs_mesh.sector_angle(pair.space) - at.output_rad;
+        LocalField {
+            fs: local(self.fs_mesh, pair.tooth, &self.fs_flank(pair).nodes, at.u),
+            cs: local(self.cs_mesh, pair.space, &self.cs_flank(pair).nodes, at.v),
+            turn: (sign * angle).sin_cos(),
+        }
+    }
+
+    /// Foot of a flank point on the deformed circular spline, and the point itself in the space frame.
+    #[inline]
+    fn foot(
+        &self,
+        pair: FlankPair,
+        field: &LocalField,
+        position: [f64; 2],
+        edge: usize,
+        shape: &[f64; 3],
+    ) -> (Foot, [f64; 2]) {
+        let x = self.seen_from_space(field, position, edge, shape);
+        let cs = self.cs_flank(pair);
+        // The displacement at the foot decides the foot; its slope of 1e-3 makes the second look exact.
+        let mut foot = self.space.foot_internal(x);
+        for _ in 0..2 {
+            let (e, xi) = cs.locate(foot.radius);
+            let n = edge_shape(xi);
+            let v: [f64; 2] = std::array::from_fn(|k| (0..3).map(|i| n[i] * field.cs[2 * e + i][k]).sum());
+            foot = self.space.foot_internal([x[0] - v[0], x[1] - v[1]]);
+        }
+        (foot, x)
+    }
+
+    #[inline]
+    fn seen_from_space(&self, field: &LocalField, position: [f64; 2], edge: usize, shape: &[f64; 3]) -> [f64; 2] {
+        let mut x = position;
+        for (i, n) in shape.iter().enumerate() {
+            let d = field.fs[2 * edge + i];
+            x[0] += n * d[0];
+            x[1] += n * d[1];
+        }
+        rotate(x, field.turn)
+    }
+
+    /// Integration points of a pair for an increment that is expected to end near `at`: panels between the edges of the
+    /// mesh, refined where pressure ends sharply, at the tip of the tooth and where the tip of the space bears on it.
+    pub fn layout(&self, pair: FlankPair, at: Configuration) -> FlankLayout {
+        const REFINEMENT: [f64; 4] = [0.001, 0.004, 0.016, 0.064];
+        let field = self.local_field(pair, at);
+        let flank = self.fs_flank(pair);
+        let (start, end) = (self.tooth.start_radius, self.tooth.junction_radius);
+        let mut breaks: Vec<f64> = flank.radii.iter().step_by(2).copied().filter(|r| *r < end).collect();
+        breaks.push(end);
+        breaks.extend(REFINEMENT[1..].iter().map(|d| end - d));
+        let corner = self.radius_facing_corner(pair, &field);
+        if let Some(corner) = corner {
+            breaks.push(corner);
+            breaks.extend(REFINEMENT.iter().flat_map(|d| [corner - d, corner + d]));
+        }
+        breaks.retain(|r| (start..=end).contains(r));
+        breaks.push(start);
+        breaks.sort_by(f64::total_cmp);
+        breaks.dedup_by(|a, b| *a - *b < 2e-4);
+        if let Some(last) = breaks.last_mut() {
+            *last = end;
+        }
+        let mut points = Vec::with_capacity(4 * (breaks.len() + 3));
+        let arc_of = |r: f64| 0.5 * (r * r - self.tooth.base_radius * self.tooth.base_radius) / self.tooth.base_radius;
+        for panel in breaks.windows(2) {
+            let (middle, half) = (0.5 * (panel[0] + panel[1]), 0.5 * (panel[1] - panel[0]));
+            for (xi, w) in &self.rule {
+                let r = middle + half * xi;
+                let (edge, local) = flank.locate(r);
+                points.push(FlankPoint {
+                    position: self.tooth.point(r),
+                    edge,
+                    shape: edge_shape(local),
+                    weight: w * half * self.tooth.arc_rate(r),
+                    arc: arc_of(r),
+                    start_traction: 0.0,
+                    start_foot: 0.0,
+                });
+            }
+        }
+        // Round the tip, carried by the last edge.
+        let rho = self.tooth.rounding_radius;
+        let full = rho * self.tooth.rounding_sweep;
+        let mut from = 0.0;
+        for to in REFINEMENT[..3].iter().map(|d| d.min(full)) {
+            let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+            if half > 0.0 {
+                for (xi, w) in &self.rule {
+                    let s = middle + half * xi;
+                    let position = self.tooth.rounding_point(s / rho);
+                    let (edge, local) = flank.locate(position[0].hypot(position[1]));
+                    points.push(FlankPoint {
+                        position,
+                        edge,
+                        shape: edge_shape(local),
+                        weight: w * half,
+                        arc: arc_of(end) + s,
+                        start_traction: 0.0,
+                        start_foot: 0.0,
+                    });
+                }
+            }
+            from = to;
+        }
+        FlankLayout { corner, points }
+    }
+
+    /// Radius on the tooth that faces the corner of the space in this configuration.
+    pub fn corner(&self, pair: FlankPair, at: Configuration) -> Option<f64> {
+        self.radius_facing_corner(pair, &self.local_field(pair, at))
+    }
+
+    /// Radius on the tooth that faces the joint of involute and tip rounding of the space.
+    fn radius_facing_corner(&self, pair: FlankPair, field: &LocalField) -> Option<f64> {
+        let flank = self.fs_flank(pair);
+        let corner = self.space.junction_radius;
+        let facing = |r: f64| {
+            let (edge, xi) = flank.locate(r);
+            let x = self.seen_from_space(field, self.tooth.point(r), edge, &edge_shape(xi));
+            self.space.involute_foot_radius(x)
+        };
+        let mut r = corner - (facing(self.tooth.junction_radius) - self.tooth.junction_radius);
+        for _ in 0..4 {
+            r += corner - facing(r);
+        }
+        (self.tooth.start_radius..self.tooth.junction_radius).contains(&r).then_some(r)
+    }
+
+    /// Sets where each point stood at the start of the increment, for friction.
+    pub fn start_friction(&self, pair: FlankPair, at: Configuration, history: &FrictionHistory, points: &mut [FlankPoint]) {
+        let field = self.local_field(pair, at);
+        for point in points {
+            let (foot, _) = self.foot(pair, &field, point.position, point.edge, &point.shape);
+            point.start_foot = foot.arc;
+            point.start_traction = interpolate(history, point.arc);
+        }
+    }
+
+    /// Tangential tractions at the end of an increment.
+    pub fn friction_history(&self, pair: FlankPair, at: Configuration, law: FlankLaw, points: &[FlankPoint]) -> FrictionHistory {
+        let field = self.local_field(pair, at);
+        points
+            .iter()
+            .map(|point| {
+                let (foot, _) = self.foot(pair, &field, point.position, point.edge, &point.shape);
+                let pressure = (-law.stiffness * foot.distance).max(0.0);
+                (point.arc, traction(law, pressure, point, foot.arc).0)
+            })
+            .collect()
+    }
+
+    /// Forces and tangent of a pair.
+    pub fn evaluate(&self, pair: FlankPair, at: Configuration, law: FlankLaw, points: &[FlankPoint]) -> Option<PairContribution> {
+        let field = self.local_field(pair, at);
+        let (nf, nc) = (field.fs.len(), field.cs.len());
+        let n = 2 * (nf + nc);
+        let sign = pair.side.sign();
+        let fs_turn = self.fs_mesh.sector_angle(pair.tooth).sin_cos();
+        let cs_turn = self.cs_mesh.sector_angle(pair.space).sin_cos();
+        let back = (-field.turn.0, field.turn.1);
+        let cs = self.cs_flank(pair);
+        let mut out: Option<PairContribution> = None;
+        for point in points {
+            let (foot, x) = self.foot(pair, &field, point.position, point.edge, &point.shape);
+            if foot.distance >= 0.0 {
+                continue;
+            }
+            let out = out.get_or_insert_with(|| PairContribution {
+                force: vec![0.0; n],
+                torque: 0.0,
+                stiffness: vec![0.0; n * n],
+                border: vec![0.0; n],
+                corner: 0.0,
+                touching: true,
+                peak: 0.0,
+                resultant: [0.0; 2],
+                attack: [0.0; 2],
+            });
+            let pressure = -law.stiffness * foot.distance;
+            out.peak = out.peak.max(pressure);
+            let (cs_edge, xi) = cs.locate(foot.radius);
+            let cs_shape = edge_shape(xi);
+            // Slope of the displacement along the flank; none beyond the ends of the mesh.
+            let slope: f64 = if xi.abs() < 1.0 {
+                let derivative = crate::element::edge_shape_derivative(xi);
+                let span = cs.radii[2 * cs_edge + 2] - cs.radii[2 * cs_edge];
+                let rate = 2.0 / span * foot.radius_rate;
+                (0..3)
+                    .map(|i| {
+                        let v = field.cs[2 * cs_edge + i];
+                        derivative[i] * rate * (foot.normal[0] * v[0] + foot.normal[1] * v[1])
+                    })
+                    .sum()
+            } else {
+                0.0
+            };
+            let direction =
+                [foot.normal[0] - slope * foot.tangent[0], foot.normal[1] - slope * foot.tangent[1]];
+            let (friction, stick) = traction(law, pressure, point, foot.arc);
+
+            // Derivative of the gap (or of the slip) with respect to the twelve nodal unknowns and the output angle.
+            let gradient = |c: [f64; 2]| -> ([f64; 12], f64) {
+                let on_tooth = rotate(c, back);
+                let on_tooth = rotate([on_tooth[0], sign * on_tooth[1]], fs_turn);
+                let on_space = rotate([c[0], sign * c[1]], cs_turn);
+                let mut g = [0.0; 12];
+                for i in 0..3 {
+                    for k in 0..2 {
+                        g[2 * i + k] = point.shape[i] * on_tooth[k];
+                        g[6 + 2 * i + k] = -cs_shape[i] * on_space[k];
+                    }
+                }
+                // x turns backwards as the output turns forwards.
+                let by_output = sign * (c[0] * x[1] - c[1] * x[0]);
+                (g, by_output)
+            };
+            let (g, g_output) = gradient(direction);
+            let (s, s_output) = gradient(foot.tangent);
+            let normal_load = pressure * point.weight;
+            let tangential_load = friction * point.weight;
+            let index: [usize; 12] = std::array::from_fn(|i| {
+                if i < 6 { 2 * (2 * point.edge) + i } else { 2 * (nf + 2 * cs_edge) + i - 6 }
+            });
+            let (kn, kt) = (law.stiffness * point.weight, stick * point.weight);
+            for i in 0..12 {
+                out.force[index[i]] += normal_load * g[i] - tangential_load * s[i];
+                out.border[index[i]] += kn * g[i] * g_output + kt * s[i] * s_output;
+                let row = &mut out.stiffness[index[i] * n..(index[i] + 1) * n];
+                for j in 0..=i {
+                    row[index[j]] += kn * g[i] * g[j] + kt * s[i] * s[j];
+                }
+            }
+            out.torque += normal_load * g_output - tangential_load * s_output;
+            out.corner += kn * g_output * g_output + kt * s_output * s_output;
+            // Force on the circular spline, for reports.
+            let on_space: [f64; 2] =
+                std::array::from_fn(|k| tangential_load * foot.tangent[k] - normal_load * direction[k]);
+            let on_space = rotate([on_space[0], sign * on_space[1]], cs_turn);
+            let x_space = rotate([x[0], sign * x[1]], cs_turn);
+            for k in 0..2 {
+                out.resultant[k] += on_space[k];
+                out.attack[k] += normal_load * x_space[k];
+            }
+        }
+        out
+    }
+}
+
+/// Tangential traction (MPa, positive where it holds the flexspline back from growing arc) and the stiffness it adds.
+#[inline]
+fn traction(law: FlankLaw, pressure: f64, point: &FlankPoint, foot_arc: f64) -> (f64, f64) {
+    if law.friction == 0.0 || pressure <= 0.0 {
+        return (0.0, 0.0);
+    }
+    let limit = law.friction * pressure;
+    let trial = point.start_traction + law.stick_stiffness * (foot_arc - point.start_foot);
+    if trial.abs() <= limit { (trial, law.stick_stiffness) } else { (trial.signum() * limit, 0.0) }
+}
+
+/// Linear interpolation in a history sorted by arc length; nothing beyond its ends.
+fn interpolate(history: &FrictionHistory, arc: f64) -> f64 {
+    let after = history.partition_point(|(s, _)| *s < arc);
+    if after == 0 || after == history.len() {
+        return 0.0;
+    }
+    let ((s0, t0), (s1, t1)) = (history[after - 1], history[after]);
+    if s1 > s0 { t0 + (t1 - t0) * (arc - s0) / (s1 - s0) } else { t0 }
+}

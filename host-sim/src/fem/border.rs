@@ -1,0 +1,181 @@
+//! Solution of a sparse symmetric system with a few dense rows and columns.
+//!
+//! ```text
+//!   [ A    B ] [ x ]   [ f ]        A n x n sparse, factorised; B n x m; D m x m; m at most seven
+//!   [ B^T  D ] [ z ] = [ g ]
+//! ```
+//!
+//! by block elimination: `(D - B^T A^-1 B) z = g - B^T A^-1 f`, then `x = A^-1 f - A^-1 B z`. The output angle, the mean
+//! rotation of the bore and other quantities that couple with many nodes at once enter as borders and leave A sparse.
+
+use super::cholesky::Cholesky;
+
+/// Dense columns B and corner D of a bordered matrix.
+#[derive(Debug, Clone)]
+pub struct Border {
+    /// Columns of B, one after the other.
+    pub columns: Vec<f64>,
+    /// D by rows.
+    pub corner: Vec<f64>,
+    /// Number of columns m.
+    pub width: usize,
+}
+
+impl Border {
+    /// A border of zeros.
+    pub fn zeros(unknowns: usize, width: usize) -> Border {
+        Border { columns: vec![0.0; unknowns * width], corner: vec![0.0; width * width], width }
+    }
+
+    /// Column k of B.
+    pub fn column_mut(&mut self, k: usize) -> &mut [f64] {
+        let n = self.columns.len() / self.width;
+        &mut self.columns[k * n..(k + 1) * n]
+    }
+}
+
+/// A factor with its border, ready to solve.
+pub struct BorderedSystem<'a> {
+    factor: &'a mut Cholesky,
+    border: &'a Border,
+    /// `A^-1 B`.
+    solved: Vec<f64>,
+    /// `D - B^T A^-1 B`.
+    schur: Vec<f64>,
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+impl<'a> BorderedSystem<'a> {
+    /// Eliminates the sparse part.
+    pub fn new(factor: &'a mut Cholesky, border: &'a Border) -> Self {
+        let m = border.width;
+        let n = border.columns.len() / m;
+        let mut solved = border.columns.clone();
+        factor.solve(&mut solved, m);
+        let mut schur = border.corner.clone();
+        for i in 0..m {
+            for j in 0..m {
+                schur[i * m + j] -= dot(&border.columns[i * n..(i + 1) * n], &solved[j * n..(j + 1) * n]);
+            }
+        }
+        BorderedSystem { factor, border, solved, schur }
+    }
+
+    /// Solves in place: `f` becomes x, `g` becomes z. False when the small system is singular.
+    #[must_use]
+    pub fn solve(&mut self, f: &mut [f64], g: &mut [f64]) -> bool {
+        let m = self.border.width;
+        let n = f.len();
+        self.factor.solve(f, 1);
+        for (i, gi) in g.iter_mut().enumerate() {
+            *gi -= dot(&self.border.columns[i * n..(i + 1) * n], f);
+        }
+        if !solve_dense(&mut self.schur.clone(), g, m) {
+            return false;
+        }
+        for (k, z) in g.iter().enumerate() {
+            for (x, s) in f.iter_mut().zip(&self.solved[k * n..(k + 1) * n]) {
+                *x -= s * z;
+            }
+        }
+        true
+    }
+}
+
+/// Gaussian elimination with row pivoting on scaled rows; false when singular.
+fn solve_dense(a: &mut [f64], b: &mut [f64], n: usize) -> bool {
+    for i in 0..n {
+        let scale = a[i * n..(i + 1) * n].iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        if scale == 0.0 || !scale.is_finite() {
+            return false;
+        }
+        a[i * n..(i + 1) * n].iter_mut().for_each(|x| *x /= scale);
+        b[i] /= scale;
+    }
+    for k in 0..n {
+        let pivot = (k..n).max_by(|&i, &j| a[i * n + k].abs().total_cmp(&a[j * n + k].abs())).unwrap_or(k);
+        if a[pivot * n + k].abs() < 1e-14 {
+            return false;
+        }
+        if pivot != k {
+            for j in 0..n {
+                a.swap(k * n + j, pivot * n + j);
+            }
+            b.swap(k, pivot);
+        }
+        for i in k + 1..n {
+            let factor = a[i * n + k] / a[k * n + k];
+            for j in k..n {
+                a[i * n + j] -= factor * a[k * n + j];
+            }
+            b[i] -= factor * b[k];
+        }
+    }
+    for k in (0..n).rev() {
+        for j in k + 1..n {
+            b[k] -= a[k * n + j] * b[j];
+        }
+        b[k] /= a[k * n + k];
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fem::Pattern;
+
+    #[test]
+    fn bordered_system_is_solved() {
+        let groups = [vec![0_u32, 1], vec![1, 2]];
+        let pattern = Pattern::new(3, groups.iter().map(Vec::as_slice), std::iter::empty());
+        let mut values: Vec<f64> = (0..pattern.stored()).map(|i| 0.3 * (i as f64).sin()).collect();
+        for node in 0..3 {
+            for p in pattern.diagonal(node) {
+                values[p as usize] += 4.0;
+            }
+        }
+        let mut factor = Cholesky::new(&pattern);
+        factor.factorise(&pattern, &values).unwrap();
+        let mut border = Border::zeros(6, 2);
+        for i in 0..12 {
+            border.columns[i] = (i as f64 * 1.3).cos();
+        }
+        border.corner = vec![0.0, 0.5, 0.5, -1.0];
+        let f: Vec<f64> = (0..6).map(|i| f64::from(i) - 2.0).collect();
+        let g = [0.7, -0.2];
+        let (mut x, mut z) = (f.clone(), g);
+        assert!(BorderedSystem::new(&mut factor, &border).solve(&mut x, &mut z));
+        let mut residual = f.iter().map(|v| -v).collect::<Vec<_>>();
+        pattern.multiply_add(&values, &x, &mut residual);
+        for k in 0..2 {
+            for i in 0..6 {
+                residual[i] += border.columns[k * 6 + i] * z[k];
+            }
+        }
+        assert!(residual.iter().all(|r| r.abs() < 1e-13), "{residual:?}");
+        for i in 0..2 {
+            let r = dot(&border.columns[i * 6..(i + 1) * 6], &x)
+                + border.corner[i * 2] * z[0]
+                + border.corner[i * 2 + 1] * z[1]
+                - g[i];
+            assert!(r.abs() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn an_indefinite_matrix_is_refused() {
+        let groups = [vec![0_u32, 1]];
+        let pattern = Pattern::new(2, groups.iter().map(Vec::as_slice), std::iter::empty());
+        let mut values = vec![0.0; pattern.stored()];
+        for node in 0..2 {
+            for p in pattern.diagonal(node) {
+                values[p as usize] = if node == 0 { 1.0 } else { -1.0 };
+            }
+        }
+        assert!(Cholesky::new(&pattern).factorise(&pattern, &values).is_err());
+    }
+}

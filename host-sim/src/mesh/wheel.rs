@@ -1,0 +1,366 @@
+//! A whole wheel: the half sector mirrored, and the sector repeated around the ring.
+//!
+//! Sector j of the flexspline is centred on tooth j, sector j of the circular spline on space j; sector 0 on the +x axis,
+//! numbers growing counter-clockwise. Node `k` of sector `j` has the number `j * nodes_per_sector + k` and is the rotated
+//! image of node `k` of sector 0: whatever repeats from tooth to tooth in the drive repeats in the mesh.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+
+use super::density::{MeshDensity, MeshLevel};
+use super::sector::{EdgeTag, HalfOutline, HalfSector, MeshError, Point};
+use crate::drive::{Drive, InvoluteFlank, ToothFlank};
+use crate::element::{GaussPoint, gauss_points};
+
+/// Which wheel a mesh is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WheelKind {
+    /// External teeth on a flexible rim; sectors centred on teeth.
+    Flexspline,
+    /// Internal teeth in a stiff ring; sectors centred on spaces.
+    CircularSpline,
+}
+
+/// A flank of a flexspline tooth or of a circular-spline space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Side {
+    /// The flank on the side of positive angles.
+    Plus,
+    /// Its mirror image.
+    Minus,
+}
+
+impl Side {
+    /// Both sides.
+    pub const BOTH: [Side; 2] = [Side::Plus, Side::Minus];
+
+    /// +1 or −1.
+    pub fn sign(self) -> f64 {
+        match self {
+            Side::Plus => 1.0,
+            Side::Minus => -1.0,
+        }
+    }
+
+    /// 0 or 1.
+    pub fn index(self) -> usize {
+        match self {
+            Side::Plus => 0,
+            Side::Minus => 1,
+        }
+    }
+}
+
+/// Three nodes of an element edge: start, middle, end, by node number within the sector and sector offset (0 or 1).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Edge {
+    /// Local node number and sector offset of each node.
+    pub nodes: [(u32, u32); 3],
+}
+
+/// The flank edges of one sector side: a chain of nodes from root to tip at known radii of the undeformed flank.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlankMesh {
+    /// Local node numbers along the flank, root to tip: corner, midside, corner, …
+    pub nodes: Vec<u32>,
+    /// Radius of each of these nodes, mm (ascending on the flexspline, descending on the circular spline).
+    pub radii: Vec<f64>,
+}
+
+impl FlankMesh {
+    /// Number of element edges.
+    pub fn edges(&self) -> usize {
+        (self.nodes.len() - 1) / 2
+    }
+
+    /// The edge that carries the flank point of radius `radius_mm` and its coordinate in [-1, 1]; points beyond an end are
+    /// carried by the end itself.
+    #[inline]
+    pub fn locate(&self, radius_mm: f64) -> (usize, f64) {
+        let (first, last) = (self.radii[0], self.radii[self.radii.len() - 1]);
+        let edges = self.edges();
+        let along = ((radius_mm - first) / (last - first)).clamp(0.0, 1.0) * edges as f64;
+        let edge = (along as usize).min(edges - 1);
+        (edge, 2.0 * (along - edge as f64) - 1.0)
+    }
+}
+
+/// Mesh of a wheel.
+#[derive(Debug, Clone)]
+pub struct WheelMesh {
+    /// Which wheel.
+    pub kind: WheelKind,
+    /// Teeth, equal to the number of sectors.
+    pub teeth: usize,
+    /// Nodes that a sector owns (those on its far boundary belong to the next).
+    pub nodes_per_sector: usize,
+    /// Node positions, undeformed (mm).
+    pub nodes: Vec<Point>,
+    /// Node numbers of each element, counter-clockwise, corners first.
+    pub elements: Vec<[u32; 8]>,
+    /// Elements of one sector.
+    pub elements_per_sector: usize,
+    /// Integration points of each element.
+    pub gauss: Vec<[GaussPoint; 4]>,
+    /// Flanks of one sector: plus side, minus side.
+    pub flanks: [FlankMesh; 2],
+    /// Edges of one sector on the bore or the outer circle, counter-clockwise.
+    pub base_edges: Vec<Edge>,
+    /// Radius of that circle (mm).
+    pub base_radius: f64,
+}
+
+impl WheelMesh {
+    /// Meshes the flexspline.
+    pub fn flexspline(drive: &Drive, level: MeshLevel) -> Result<WheelMesh, MeshError> {
+        let wheel = &drive.flexspline;
+        WheelMesh::new(
+            WheelKind::Flexspline,
+            &ToothFlank::external(wheel)?,
+            wheel.base_radius_mm(),
+            wheel.bore_radius_mm(),
+            wheel.root_radius_mm - 0.3 * wheel.rim_thickness_mm,
+            &level.flexspline(),
+        )
+    }
+
+    /// Meshes the circular spline.
+    pub fn circular_spline(drive: &Drive, level: MeshLevel) -> Result<WheelMesh, MeshError> {
+        let wheel = &drive.circular_spline;
+        let tooth_height = wheel.root_radius_mm - wheel.tip_radius_mm;
+        let rim = wheel.outer_radius_mm - wheel.root_radius_mm;
+        WheelMesh::new(
+            WheelKind::CircularSpline,
+            &ToothFlank::internal(wheel)?,
+            wheel.base_radius_mm(),
+            wheel.outer_radius_mm,
+            wheel.root_radius_mm + (0.5 * tooth_height).min(0.4 * rim),
+            &level.circular_spline(),
+        )
+    }
+
+    fn new(
+        kind: WheelKind,
+        profile: &ToothFlank,
+        base_circle_radius: f64,
+        base_radius: f64,
+        interface_radius: f64,
+        density: &MeshDensity,
+    ) -> Result<WheelMesh, MeshError> {
+        let half_pitch = profile.half_pitch();
+        let teeth = (std::f64::consts::PI / half_pitch).round() as usize;
+        let involute = InvoluteFlank::new(profile, base_circle_radius);
+        // Profiles are given about the tooth (external) or the space (internal); the half sector wants the tooth axis.
+        let to_tooth_frame = |p: Point| match kind {
+            WheelKind::Flexspline => p,
+            WheelKind::CircularSpline => {
+                let (r, a) = (p[0].hypot(p[1]), half_pitch - p[1].atan2(p[0]));
+                [r * a.cos(), r * a.sin()]
+            }
+        };
+        let root = |t: f64| {
+            let [land, fillet] = [profile.pieces()[0], profile.pieces()[1]];
+            to_tooth_frame(if t < 1.0 { land.point(t) } else { fillet.point(t - 1.0) })
+        };
+        let flank = |r: f64| to_tooth_frame(involute.point(r));
+        let half = HalfSector::new(
+            &HalfOutline {
+                half_pitch,
+                base_radius,
+                interface_radius,
+                root: &root,
+                flank: &flank,
+                flank_start_radius: involute.start_radius,
+                tip_radius: involute.tip_radius,
+            },
+            density,
+        );
+        WheelMesh::assemble(kind, teeth, base_radius, half)
+    }
+
+    fn assemble(kind: WheelKind, teeth: usize, base_radius: f64, half: HalfSector) -> Result<WheelMesh, MeshError> {
+        let half_pitch = std::f64::consts::PI / teeth as f64;
+        let pitch = 2.0 * half_pitch;
+        let rotate = |p: Point, angle: f64| {
+            let (s, c) = angle.sin_cos();
+            [c * p[0] - s * p[1], s * p[0] + c * p[1]]
+        };
+        // The half sector as it stands lies on the plus side of a tooth; about a space it is the minus side, turned by half a
+        // pitch. Its mirror image is the other half.
+        let upper = |p: Point| match kind {
+            WheelKind::Flexspline => p,
+            WheelKind::CircularSpline => {
+                let q = rotate(p, -half_pitch);
+                [q[0], -q[1]]
+            }
+        };
+        let mirror = |p: Point| [p[0], -p[1]];
+        let mut nodes = NodeTable::new(half_pitch, pitch);
+        let mut template: Vec<[(u32, u32); 8]> = Vec::new();
+        let mut base_edges: Vec<(f64, Edge)> = Vec::new();
+        let mut flanks: [Vec<(usize, Edge)>; 2] = [Vec::new(), Vec::new()];
+        for side in Side::BOTH {
+            // Turning a space half over reverses the order of its nodes; so does mirroring.
+            let reversed = (kind == WheelKind::CircularSpline) != (side == Side::Minus);
+            let place = |p: Point| if side == Side::Plus { upper(p) } else { mirror(upper(p)) };
+            let first = template.len();
+            for element in &half.elements {
+                let mut placed = element.map(place);
+                if reversed {
+                    placed = reverse_order(placed);
+                }
+                template.push(placed.map(|p| nodes.find_or_add(p)));
+            }
+            for (element, edge, tag) in &half.edges {
+                let local = if reversed { 3 - edge } else { *edge };
+                let n = template[first + element];
+                let edge = Edge { nodes: [n[local], n[4 + local], n[(local + 1) % 4]] };
+                match tag {
+                    EdgeTag::Base(_) => {
+                        let angle = nodes.angle(edge.nodes[1]);
+                        base_edges.push((angle, edge));
+                    }
+                    EdgeTag::Flank(row) => flanks[side.index()].push((*row, edge)),
+                }
+            }
+        }
+        base_edges.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let base_edges = base_edges.into_iter().map(|(_, edge)| nodes.counter_clockwise(edge)).collect();
+        let flanks = flanks.map(|mut side| {
+            side.sort_by_key(|(row, _)| *row);
+            nodes.flank_chain(kind, &side)
+        });
+
+        let nodes_per_sector = nodes.points.len();
+        let mut all_nodes = Vec::with_capacity(nodes_per_sector * teeth);
+        let mut elements = Vec::with_capacity(template.len() * teeth);
+        let mut gauss = Vec::with_capacity(template.len() * teeth);
+        for sector in 0..teeth {
+            let angle = TAU * sector as f64 / teeth as f64;
+            all_nodes.extend(nodes.points.iter().map(|p| rotate(*p, angle)));
+            for element in &template {
+                elements.push(
+                    element.map(|(node, offset)| {
+                        (((sector + offset as usize) % teeth) * nodes_per_sector) as u32 + node
+                    }),
+                );
+            }
+        }
+        for element in &elements {
+            let coordinates = element.map(|n| all_nodes[n as usize]);
+            gauss.push(gauss_points(&coordinates).map_err(|folded| MeshError::Folded {
+                wheel: match kind {
+                    WheelKind::Flexspline => "flexspline",
+                    WheelKind::CircularSpline => "circular spline",
+                },
+                radius_mm: coordinates[0][0].hypot(coordinates[0][1]),
+                jacobian: folded.jacobian,
+            })?);
+        }
+        Ok(WheelMesh {
+            kind,
+            teeth,
+            nodes_per_sector,
+            nodes: all_nodes,
+            elements,
+            elements_per_sector: template.len(),
+            gauss,
+            flanks,
+            base_edges,
+            base_radius,
+        })
+    }
+
+    /// Number of a node given by sector and local number; the sector may lie beyond either end of the ring.
+    #[inline]
+    pub fn node(&self, sector: isize, local: u32) -> usize {
+        sector.rem_euclid(self.teeth as isize) as usize * self.nodes_per_sector + local as usize
+    }
+
+    /// Nodes of a base edge of a sector.
+    #[inline]
+    pub fn edge_nodes(&self, sector: usize, edge: &Edge) -> [usize; 3] {
+        edge.nodes.map(|(local, offset)| self.node((sector + offset as usize) as isize, local))
+    }
+
+    /// Angle of the axis of a sector, rad.
+    #[inline]
+    pub fn sector_angle(&self, sector: usize) -> f64 {
+        TAU * sector as f64 / self.teeth as f64
+    }
+
+    /// Angular pitch, rad.
+    pub fn pitch(&self) -> f64 {
+        TAU / self.teeth as f64
+    }
+}
+
+/// The same element with its nodes in the opposite sense; local edge e becomes 3 − e.
+fn reverse_order<T: Copy>(n: [T; 8]) -> [T; 8] {
+    [n[0], n[3], n[2], n[1], n[7], n[6], n[5], n[4]]
+}
+
+/// Nodes of a sector, merged by position; those on the far boundary are the next sector's nodes on its near boundary.
+struct NodeTable {
+    half_pitch: f64,
+    pitch: f64,
+    points: Vec<Point>,
+    index: HashMap<(i64, i64), u32>,
+}
+
+impl NodeTable {
+    /// Positions closer than this (mm) are one node.
+    const MERGE: f64 = 1e-6;
+
+    fn new(half_pitch: f64, pitch: f64) -> Self {
+        NodeTable { half_pitch, pitch, points: Vec::new(), index: HashMap::new() }
+    }
+
+    fn find_or_add(&mut self, p: Point) -> (u32, u32) {
+        let (r, angle) = (p[0].hypot(p[1]), p[1].atan2(p[0]));
+        let far = angle > self.half_pitch - Self::MERGE / r;
+        let q = if far { [r * (angle - self.pitch).cos(), r * (angle - self.pitch).sin()] } else { p };
+        let cell = q.map(|x| (x / Self::MERGE).round() as i64);
+        for dx in -1..=1 {
+            for dy in -1..=1 {
+                if let Some(&node) = self.index.get(&(cell[0] + dx, cell[1] + dy)) {
+                    return (node, u32::from(far));
+                }
+            }
+        }
+        let node = self.points.len() as u32;
+        self.points.push(q);
+        self.index.insert((cell[0], cell[1]), node);
+        (node, u32::from(far))
+    }
+
+    fn angle(&self, (node, offset): (u32, u32)) -> f64 {
+        let p = self.points[node as usize];
+        p[1].atan2(p[0]) + f64::from(offset) * self.pitch
+    }
+
+    fn counter_clockwise(&self, edge: Edge) -> Edge {
+        let [a, m, b] = edge.nodes;
+        if self.angle(a) < self.angle(b) { edge } else { Edge { nodes: [b, m, a] } }
+    }
+
+    /// Chains flank edges from root to tip. Their radii are evenly spaced, as the mesher lays them.
+    fn flank_chain(&self, kind: WheelKind, rows: &[(usize, Edge)]) -> FlankMesh {
+        let radius = |(node, _): (u32, u32)| {
+            let p = self.points[node as usize];
+            p[0].hypot(p[1])
+        };
+        let outwards = kind == WheelKind::Flexspline;
+        let mut nodes = Vec::new();
+        let mut radii = Vec::new();
+        for (_, edge) in rows {
+            let [a, m, b] = edge.nodes;
+            let ordered = if (radius(a) < radius(b)) == outwards { [a, m, b] } else { [b, m, a] };
+            for n in ordered.into_iter().skip(usize::from(!nodes.is_empty())) {
+                nodes.push(n.0);
+                radii.push(radius(n));
+            }
+        }
+        FlankMesh { nodes, radii }
+    }
+}

@@ -1,0 +1,44 @@
+//! Why an increment failed.
+
+use crate::drive::DriveError;
+use crate::mesh::MeshError;
+use thiserror::Error;
+
+/// A run that could not be completed. Not converging is an ordinary result and carries its history.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SolveError {
+    /// The drive is impossible.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
+    /// The mesh is impossible.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// Newton did not converge, not even in the smallest increment.
+    #[error(
+        "no equilibrium found at generator angle {generator_rad:.6} rad, load {torque_n_m} N.m: {reason}; \
+         relative residual by iteration: {}",
+        history.iter().map(|r| format!("{r:.1e}")).collect::<Vec<_>>().join(" ")
+    )]
+    NotConverged {
+        /// Where, rad.
+        generator_rad: f64,
+        /// Under which load.
+        torque_n_m: f64,
+        /// What stopped it.
+        reason: &'static str,
+        /// Residual of each iteration relative to the contact forces.
+        history: Vec<f64>,
+    },
+    /// The load pushes the rim out of the range of the model.
+    #[error(
+        "at generator angle {generator_rad:.6} rad and load {torque_n_m} N.m the rim leaves the range of the model: {what}"
+    )]
+    OutOfRange {
+        /// Where, rad.
+        generator_rad: f64,
+        /// Under which load.
+        torque_n_m: f64,
+        /// Which limit, with the value found and the limit.
+        what: String,
+    },
+}

@@ -1,0 +1,216 @@
+//! The drive as a mechanical problem: meshes, contact, holding, at one temperature. Immutable while it is solved.
+
+use crate::contact::{BoreContact, BoreLaw, FlankContact, FlankLaw};
+use crate::drive::{Drive, GeneratorKind, GeneratorOutline, InvoluteFlank, ToothFlank};
+use crate::material::PlaneStrain;
+use crate::mesh::{MeshLevel, WheelMesh};
+
+use super::error::SolveError;
+use super::state::State;
+
+/// Settings of the numerical method.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SolverSettings {
+    /// Mesh of both wheels.
+    pub mesh: MeshLevel,
+    /// Contact penalty on the bore, N/mm³.
+    pub bore_penalty: f64,
+    /// Contact penalty on the flanks, N/mm³.
+    pub flank_penalty: f64,
+    /// Integration points in each bore edge.
+    pub bore_points: usize,
+    /// Residual force, relative to the largest contact force, at which an increment is done.
+    pub tolerance: f64,
+    /// Newton iterations before an increment is halved.
+    pub max_iterations: usize,
+    /// Halvings of an increment before giving up.
+    pub max_halvings: usize,
+}
+
+impl Default for SolverSettings {
+    fn default() -> Self {
+        SolverSettings {
+            mesh: MeshLevel::Standard,
+            bore_penalty: 1e7,
+            flank_penalty: 1e7,
+            bore_points: 16,
+            tolerance: 1e-6,
+            max_iterations: 40,
+            max_halvings: 8,
+        }
+    }
+}
+
+/// Torsional stiffness of the drag while the output sticks, N mm/rad per mm of width: 0.02 N.m on 20 mm is reached after
+/// 1e-9 rad (0.0002″), which is invisible.
+const DRAG_STICK_STIFFNESS: f64 = 1e9;
+
+/// A drive with one generator at one temperature.
+pub struct Problem {
+    /// The drive at this temperature.
+    pub drive: Drive,
+    /// Which generator.
+    pub kind: GeneratorKind,
+    /// Outline of the generator.
+    pub outline: GeneratorOutline,
+    /// Mesh of the flexspline.
+    pub flexspline: WheelMesh,
+    /// Mesh of the circular spline.
+    pub circular_spline: WheelMesh,
+    /// Material of both wheels.
+    pub material: PlaneStrain,
+    /// Settings of the method.
+    pub settings: SolverSettings,
+    pub(super) bore: BoreContact,
+    pub(super) bore_law: BoreLaw,
+    pub(super) flank_law: FlankLaw,
+    tooth: InvoluteFlank,
+    space: InvoluteFlank,
+    /// Weights of the mean rotation of the bore: rotation = rotation_weights . u.
+    pub(super) rotation_weights: Vec<f64>,
+    /// Weights of the mean displacement of the bore in x; that in y follows by symmetry of the nodes.
+    pub(super) mean_weights: Vec<f64>,
+    /// 1 / torsional stiffness of the sleeve per mm of width (rad mm / N mm); zero when rigid.
+    pub(super) sleeve_compliance: f64,
+    /// Lateral stiffness of the sleeve per mm of width (N/mm²).
+    pub(super) lateral_stiffness: f64,
+    /// Coulomb drag of the output per mm of width (N mm/mm).
+    pub(super) drag: f64,
+    pub(super) drag_stiffness: f64,
+    /// Circular-spline nodes held by the housing.
+    pub(super) held: Vec<bool>,
+    /// Their radial displacement, mm.
+    pub(super) seat_displacement: f64,
+}
+
+impl Problem {
+    /// Sets up the drive with generator `kind` at a temperature.
+    pub fn new(
+        drive: &Drive,
+        kind: GeneratorKind,
+        temperature_c: f64,
+        settings: SolverSettings,
+    ) -> Result<Problem, SolveError> {
+        drive.check()?;
+        let drive = drive.at_temperature(temperature_c);
+        let outline = GeneratorOutline::new(&drive, kind)?;
+        let flexspline = WheelMesh::flexspline(&drive, settings.mesh)?;
+        let circular_spline = WheelMesh::circular_spline(&drive, settings.mesh)?;
+        let material = PlaneStrain::new(drive.material.youngs_modulus_mpa, drive.material.poissons_ratio);
+        let width = drive.flexspline.width_mm;
+        let tooth = InvoluteFlank::new(&ToothFlank::external(&drive.flexspline)?, drive.flexspline.base_radius_mm());
+        let space =
+            InvoluteFlank::new(&ToothFlank::internal(&drive.circular_spline)?, drive.circular_spline.base_radius_mm());
+        let bore = BoreContact::new(&flexspline, settings.bore_points);
+        let (rotation_weights, mean_weights) = bore_averages(&flexspline, &bore);
+        let outer = drive.circular_spline.outer_radius_mm;
+        let held = circular_spline.nodes.iter().map(|p| p[0].hypot(p[1]) > outer - 1e-6).collect();
+        let thermal = &drive.thermal_state;
+        Ok(Problem {
+            bore_law: BoreLaw::new(settings.bore_penalty, drive.generator.bearing_stiffness_n_per_mm3),
+            flank_law: FlankLaw {
+                stiffness: settings.flank_penalty,
+                stick_stiffness: 0.1 * settings.flank_penalty,
+                friction: drive.flanks.friction_coefficient,
+            },
+            sleeve_compliance: drive
+                .sleeve
+                .torsion_stiffness_n_m_per_rad
+                .map_or(0.0, |k| width / (1e3 * k)),
+            lateral_stiffness: drive.sleeve.lateral_stiffness_n_per_mm / width,
+            drag: drive.output.drag_torque_n_m * 1e3 / width,
+            drag_stiffness: DRAG_STICK_STIFFNESS,
+            seat_displacement: outer * (thermal.housing_scale / thermal.circular_spline_scale - 1.0),
+            rotation_weights,
+            mean_weights,
+            held,
+            bore,
+            tooth,
+            space,
+            outline,
+            flexspline,
+            circular_spline,
+            material,
+            settings,
+            kind,
+            drive,
+        })
+    }
+
+    /// Contact between the flanks.
+    pub fn flanks(&self) -> FlankContact<'_> {
+        FlankContact::new(&self.flexspline, &self.circular_spline, self.tooth.clone(), self.space.clone())
+    }
+
+    /// Drag torque on the output (N mm/mm) at a displacement from its anchor, and the stiffness with which it holds.
+    pub(super) fn drag_torque(&self, displacement_rad: f64) -> (f64, f64) {
+        let trial = -self.drag_stiffness * displacement_rad;
+        if trial.abs() <= self.drag { (trial, self.drag_stiffness) } else { (trial.signum() * self.drag, 0.0) }
+    }
+
+    /// Torque per mm of width (N mm/mm) of a torque on the drive (N m).
+    pub fn per_width(&self, torque_n_m: f64) -> f64 {
+        torque_n_m * 1e3 / self.drive.flexspline.width_mm
+    }
+
+    /// Unknowns: flexspline nodes, circular-spline nodes that are not held, two each, and the output angle.
+    pub fn degrees_of_freedom(&self) -> usize {
+        2 * (self.flexspline.nodes.len() + self.held.iter().filter(|h| !**h).count()) + 1
+    }
+
+    /// Where the search for the deformed drive starts: every normal of the rim placed on the exact constant-length
+    /// neutral curve of this generator, the circular spline undeformed, `generator_rad` and nominal output angle.
+    pub fn starting_shape(&self, generator_rad: f64) -> State {
+        let neutral = self.outline.neutral();
+        let scale = self.drive.thermal_state.flexspline_scale;
+        let neutral_radius = neutral.radius_mm() * scale;
+        let mut u = Vec::with_capacity(2 * self.flexspline.nodes.len());
+        for x in &self.flexspline.nodes {
+            let (r, phi) = (x[0].hypot(x[1]), x[1].atan2(x[0]));
+            let (p, normal) = neutral.position(phi - generator_rad);
+            let (s, c) = generator_rad.sin_cos();
+            let p = [scale * (c * p[0] - s * p[1]), scale * (s * p[0] + c * p[1])];
+            let (sn, cn) = (normal + generator_rad).sin_cos();
+            let above = r - neutral_radius;
+            u.extend([p[0] + above * cn - x[0], p[1] + above * sn - x[1]]);
+        }
+        let mut v = vec![0.0; 2 * self.circular_spline.nodes.len()];
+        for (n, x) in self.circular_spline.nodes.iter().enumerate().filter(|(n, _)| self.held[*n]) {
+            let stretch = self.seat_displacement / x[0].hypot(x[1]);
+            v[2 * n] = x[0] * stretch;
+            v[2 * n + 1] = x[1] * stretch;
+        }
+        let output_rad = generator_rad / self.drive.ratio();
+        State {
+            u,
+            v,
+            generator_rad,
+            torque_n_m: 0.0,
+            output_rad,
+            drag_anchor_rad: output_rad,
+            sleeve_moment: 0.0,
+            lateral_force: [0.0; 2],
+            friction: Default::default(),
+            output_rate: 1.0 / self.drive.ratio(),
+            travel: 0.0,
+        }
+    }
+}
+
+/// Linear functionals of the bore displacement: mean rotation, and mean x displacement.
+fn bore_averages(mesh: &WheelMesh, bore: &BoreContact) -> (Vec<f64>, Vec<f64>) {
+    let mut rotation = vec![0.0; 2 * mesh.nodes.len()];
+    let mut mean = vec![0.0; 2 * mesh.nodes.len()];
+    let share = 1.0 / bore.edges.len() as f64;
+    for edge in &bore.edges {
+        for (node, simpson) in edge.iter().zip([1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0]) {
+            let n = *node as usize;
+            let x = mesh.nodes[n];
+            let r2 = x[0] * x[0] + x[1] * x[1];
+            rotation[2 * n] -= simpson * share * x[1] / r2;
+            rotation[2 * n + 1] += simpson * share * x[0] / r2;
+            mean[2 * n] += simpson * share;
+        }
+    }
+    (rotation, mean)
+}
