@@ -116,7 +116,7 @@ pub(super) const ALL: &[Field] = fields! {
     temperature.circular_spline_expansion_per_k: Real, from(-1.0e-5, 1.0e-4), "linear expansion of the circular spline, 1/K";
     temperature.generator_expansion_per_k: Real, from(-1.0e-5, 1.0e-4), "linear expansion of the generator, 1/K";
     temperature.housing_expansion_per_k: Real, from(-1.0e-5, 1.0e-4), "linear expansion of the circular spline's seat, 1/K";
-    temperature.youngs_modulus_per_k: Real, from(-0.002, 0.002), "relative change of Young's modulus, 1/K";
+    temperature.youngs_modulus_per_k: Real, from(-0.001, 0.001), "relative change of Young's modulus, 1/K";
 };
 
 impl Field {

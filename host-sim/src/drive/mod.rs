@@ -13,6 +13,7 @@
 
 mod error;
 mod fields;
+mod file;
 mod generator;
 mod neutral;
 mod ring;
