@@ -15,6 +15,7 @@ mod error;
 mod fields;
 mod file;
 mod generator;
+mod interference;
 mod neutral;
 mod ring;
 mod spec;
@@ -22,6 +23,7 @@ mod tooth;
 
 pub use error::{DriveError, Problem};
 pub use generator::{GeneratorOutline, OutlineFoot};
+pub use interference::{FlankGap, MeshReport, RigidMesh, Side};
 pub use neutral::NeutralCurve;
 pub use ring::{GeneratorKind, RingShape, UnknownGenerator};
 pub use spec::{

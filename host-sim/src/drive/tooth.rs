@@ -40,6 +40,19 @@ pub enum PieceKind {
     TipLand,
 }
 
+impl PieceKind {
+    /// In words, for messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            PieceKind::RootLand => "root land",
+            PieceKind::RootFillet => "root fillet",
+            PieceKind::Involute => "involute",
+            PieceKind::TipRounding => "tip rounding",
+            PieceKind::TipLand => "tip land",
+        }
+    }
+}
+
 /// One analytic piece; its parameter `t` runs over `0..=1` from the root side to the tip side, uniform in arc length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutlinePiece {
