@@ -5,8 +5,8 @@
 //! `0..pi/2` and continue with period pi, `w` even and `v` odd. The rollers and the ends of the disc arc are
 //! concentrated radial forces, where `w'''` jumps; `w''` is continuous everywhere.
 //!
-//! The forms are those of ring bending theory (Timoshenko, *Strength of Materials* II, art. 14-16) with the
-//! coefficients of each load; `crate::reference` adds forces and moments and tests them.
+//! Source: inextensional bending of a thin curved bar with circular axis, S. Timoshenko and J. Gere, *Theory of Elastic
+//! Stability*, ch. 7, solved for the loads of each generator; `crate::reference` adds forces and moments and tests both.
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};

@@ -579,3 +579,95 @@ impl Drive {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn built_in_drives_are_sound_and_have_the_sizes_they_say() {
+        for name in Drive::BUILT_IN {
+            let drive = Drive::built_in(name).unwrap();
+            assert_eq!(drive.name, name);
+            assert_eq!(drive.check(), Ok(()));
+            assert_eq!(drive.ratio(), 95.0);
+            let f = &drive.flexspline;
+            assert!(
+                (f.neutral_radius_mm() - 47.275).abs() < 1e-12
+                    && (f.bore_radius_mm() - 46.675).abs() < 1e-12
+            );
+        }
+        assert_eq!(Drive::built_in("hhd"), None);
+        let typical = Drive::hhd_95_typical();
+        let torsion = typical.sleeve.torsion_stiffness_n_m_per_rad.unwrap();
+        assert!((torsion - 4.6e5).abs() < 2e3, "{torsion}");
+        assert!((typical.material.shear_modulus_mpa() - 79_000.0).abs() < 500.0);
+        assert!(
+            (typical.material.plane_strain_modulus_mpa() / 206_000.0 - 1.0 / 0.91).abs() < 1e-12
+        );
+    }
+
+    #[test]
+    fn warming_scales_each_member_by_its_own_expansion() {
+        let mut drive = Drive::hhd_95();
+        drive.temperature.flexspline_expansion_per_k = 1.0e-5;
+        drive.temperature.circular_spline_expansion_per_k = 2.0e-5;
+        let warm = drive.at_temperature(70.0);
+        assert!((warm.flexspline.root_radius_mm / 47.875 - 1.0005).abs() < 1e-12);
+        assert!(
+            (warm.flexspline.base_radius_mm() / drive.flexspline.base_radius_mm() - 1.0005).abs()
+                < 1e-12
+        );
+        assert!((warm.circular_spline.tip_radius_mm / 48.65 - 1.001).abs() < 1e-12);
+        assert!((warm.circular_spline.tip_rounding_mm / 0.03 - 1.001).abs() < 1e-12);
+        assert!((warm.material.youngs_modulus_mpa / 206_000.0 - 0.985).abs() < 1e-12);
+        assert_eq!(warm.generator, drive.generator);
+        // angles and counts stay, and so does the shape of a flank
+        assert_eq!(warm.flexspline.pressure_angle_deg, 20.0);
+        let length = |drive: &Drive| ToothFlank::external(&drive.flexspline).unwrap().length();
+        assert!((length(&warm) / length(&drive) - 1.0005).abs() < 1e-12);
+        assert_eq!(warm.check(), Ok(()));
+        // from one temperature to another is the same as from the reference
+        let again = warm.at_temperature(-40.0);
+        let direct = drive.at_temperature(-40.0);
+        assert_eq!(again.thermal_state, direct.thermal_state);
+        assert!((again.flexspline.tip_radius_mm - direct.flexspline.tip_radius_mm).abs() < 1e-12);
+        assert!(
+            (again.material.youngs_modulus_mpa - direct.material.youngs_modulus_mpa).abs() < 1e-8
+        );
+        assert_eq!(drive.at_temperature(20.0), drive);
+    }
+
+    #[test]
+    fn uniform_warming_of_one_steel_scales_every_outline_alike() {
+        let drive = Drive::hhd_95();
+        let warm_drive = drive.at_temperature(70.0);
+        let s = 1.0 + 11.5e-6 * 50.0;
+        for kind in GeneratorKind::ALL {
+            let cold = GeneratorOutline::new(&drive, kind).unwrap();
+            let warm = GeneratorOutline::new(&warm_drive, kind).unwrap();
+            for p in [[46.9, 3.0], [40.0, 24.0], [-20.0, 41.0]] {
+                let (a, b) = (cold.nearest(p), warm.nearest([p[0] * s, p[1] * s]));
+                assert!(
+                    (a.distance * s - b.distance).abs() < 1e-12,
+                    "{kind}: {} {}",
+                    a.distance,
+                    b.distance
+                );
+                assert!((a.curvature / s - b.curvature).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_drive_made_in_a_program_is_checked_without_a_file() {
+        let mut drive = Drive::hhd_95();
+        drive.flanks.friction_coefficient = f64::NAN;
+        drive.material.poissons_ratio = 0.6;
+        assert_eq!(
+            drive.check().unwrap_err().to_string(),
+            "material.poissons_ratio: found 0.6, allowed: 0 to 0.49\n\
+             flanks.friction_coefficient: found NaN, allowed: 0 to 0.5"
+        );
+    }
+}

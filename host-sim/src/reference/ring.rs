@@ -5,8 +5,8 @@
 //! `E' I (w + w'')' / R³` over its point, and a pressed arc of constant curvature carries its normal force
 //! as a uniform pressure. `E' = E / (1 - nu²)` (plane strain), `I = s³/12`.
 //!
-//! Source: thin-ring theory, Timoshenko, *Strength of Materials* II, art. 14-16; S. Timoshenko and J. Gere, *Theory of
-//! Elastic Stability*, ch. 7. The displacements are [`RingShape`].
+//! Source: bending of a thin curved bar with circular axis, S. Timoshenko and J. Gere, *Theory of Elastic Stability*,
+//! ch. 7. The displacements are [`RingShape`].
 
 use crate::drive::{Drive, GeneratorKind, RingShape};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -100,31 +100,25 @@ mod tests {
         }
     }
 
-    /// Simpson's rule over a quarter, split where the closed form changes.
-    fn quarter(split: f64, f: impl Fn(f64) -> f64) -> f64 {
-        let simpson = |from: f64, to: f64| -> f64 {
-            let n = 400;
-            let h = (to - from) / f64::from(n);
-            let weight = |k| {
-                if k == 0 || k == n {
-                    1.0
-                } else if k % 2 == 1 {
-                    4.0
-                } else {
-                    2.0
-                }
-            };
-            (0..=n)
-                .map(|k| weight(k) * f(from + h * f64::from(k)))
-                .sum::<f64>()
-                * h
-                / 3.0
+    /// Simpson's rule.
+    fn integral(from: f64, to: f64, f: impl Fn(f64) -> f64) -> f64 {
+        let n = 400;
+        let h = (to - from) / f64::from(n);
+        let weight = |k| match k {
+            k if k == 0 || k == n => 1.0,
+            k if k % 2 == 1 => 4.0,
+            _ => 2.0,
         };
-        if split > 0.0 {
-            simpson(0.0, split) + simpson(split, FRAC_PI_2)
-        } else {
-            simpson(0.0, FRAC_PI_2)
-        }
+        (0..=n)
+            .map(|k| weight(k) * f(from + h * f64::from(k)))
+            .sum::<f64>()
+            * h
+            / 3.0
+    }
+
+    /// Over a quarter, split where the closed form changes.
+    fn quarter(split: f64, f: impl Fn(f64) -> f64) -> f64 {
+        integral(0.0, split, &f) + integral(split, FRAC_PI_2, &f)
     }
 
     const CASES: [(GeneratorKind, f64); 8] = [
@@ -258,27 +252,8 @@ mod tests {
                 4.0
             };
             let by_forces = forces * loads.force_n_per_mm * ring.shape.w(loads.force_angle_rad);
-            let pressed = |phi| {
-                if phi <= split {
-                    loads.pressure_mpa * r * ring.shape.w(phi)
-                } else {
-                    0.0
-                }
-            };
-            // Simpson on the arc alone: the pressure ends at the split
-            let arc = quarter(split, |phi| {
-                if (phi - split).abs() < 1e-12 {
-                    0.0
-                } else {
-                    pressed(phi)
-                }
-            });
-            let ends = if split > 0.0 {
-                loads.pressure_mpa * r * ring.shape.w(split) * split / 1200.0
-            } else {
-                0.0
-            };
-            let work = by_forces + 4.0 * (arc + ends);
+            let arc = integral(0.0, split, |phi| loads.pressure_mpa * r * ring.shape.w(phi));
+            let work = by_forces + 4.0 * arc;
             assert!(
                 (work / energy - 1.0).abs() < 1e-9,
                 "{kind}: {work} against {energy}"
