@@ -23,21 +23,21 @@ pub(super) enum Slot<'a> {
 
 /// Allowed values; the lower end belongs to it unless `above`.
 pub(super) struct Range {
-    low: f64,
-    high: f64,
+    pub low: f64,
+    pub high: f64,
     above: bool,
 }
 
 impl Range {
     /// Why `number` is refused, if it is.
     pub fn refusal(&self, number: f64) -> Option<String> {
-        let inside = number.is_finite()
-            && number <= self.high
-            && if self.above {
-                number > self.low
-            } else {
-                number >= self.low
-            };
+        // false for NaN
+        let high_enough = if self.above {
+            number > self.low
+        } else {
+            number >= self.low
+        };
+        let inside = high_enough && number <= self.high;
         (!inside).then(|| format!("found {number}, allowed: {self}"))
     }
 }

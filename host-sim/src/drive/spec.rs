@@ -582,6 +582,7 @@ impl Drive {
 
 #[cfg(test)]
 mod tests {
+    use super::super::interference::RigidMesh;
     use super::*;
 
     #[test]
@@ -668,6 +669,57 @@ mod tests {
             drive.check().unwrap_err().to_string(),
             "material.poissons_ratio: found 0.6, allowed: 0 to 0.49\n\
              flanks.friction_coefficient: found NaN, allowed: 0 to 0.5"
+        );
+    }
+
+    #[test]
+    fn a_temperature_that_moves_only_the_generator_still_changes_the_hash() {
+        let mut drive = Drive::hhd_95();
+        drive.temperature.flexspline_expansion_per_k = 0.0;
+        drive.temperature.circular_spline_expansion_per_k = 0.0;
+        drive.temperature.youngs_modulus_per_k = 0.0;
+        assert_ne!(drive.hash(), drive.at_temperature(50.0).hash());
+    }
+
+    /// Every field at both ends of its range, one at a time: refused with that or a related field named, or a drive whose
+    /// outlines and mesh are finite.
+    #[test]
+    fn the_ends_of_every_range_are_refused_or_work() {
+        let (mut refused, mut sound) = (0, 0);
+        for field in fields::ALL {
+            for end in [field.range.low, field.range.high] {
+                let set = format!("{}={end}", field.path);
+                match Drive::hhd_95().with_set(&set) {
+                    Err(error) => {
+                        refused += 1;
+                        assert!(
+                            error
+                                .problems
+                                .iter()
+                                .all(|problem| !problem.field.is_empty()),
+                            "{error}"
+                        );
+                    }
+                    Ok(drive) => {
+                        sound += 1;
+                        for kind in GeneratorKind::ALL {
+                            let outline = GeneratorOutline::new(&drive, kind).unwrap();
+                            let foot = outline.nearest([46.0, 1.0]);
+                            assert!(
+                                foot.distance.is_finite() && foot.curvature > 0.0,
+                                "{set}: {foot:?}"
+                            );
+                        }
+                        let mesh = RigidMesh::new(&drive, GeneratorKind::Cam).unwrap();
+                        let report = mesh.report(GeneratorKind::Cam).unwrap();
+                        assert!(report.backlash_rad.is_finite(), "{set}: {report:?}");
+                    }
+                }
+            }
+        }
+        assert!(
+            refused > 30 && sound > 20,
+            "{refused} refused, {sound} sound"
         );
     }
 }
