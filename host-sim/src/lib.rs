@@ -7,4 +7,5 @@ pub mod element;
 pub mod fem;
 pub mod material;
 pub mod mesh;
+pub mod reference;
 pub mod stepping;

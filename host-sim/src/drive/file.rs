@@ -1,0 +1,762 @@
+//! Drive files: reading with every mistake named at its line, overriding one field, writing with units.
+//!
+//! ```toml
+//! base = "HHD-95"              # start from a built-in drive; without it every field must be there
+//! name = "thicker rim"
+//! [flexspline]
+//! rim_thickness_mm = 2.0
+//! [sleeve]
+//! torsion_stiffness_n_m_per_rad = "rigid"
+//! ```
+
+use super::error::{DriveError, Problem};
+use super::fields::{self, Field, Slot};
+use super::spec::Drive;
+use serde_spanned::Spanned;
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::ops::Range;
+use toml::de::{DeTable, DeValue};
+
+impl Drive {
+    /// Reads a drive file. Every unknown key, wrong type, value out of range and missing field of the file is
+    /// reported; if there is none, the parts are fitted to one another ([`Drive::check`]).
+    pub fn from_toml(file_name: &str, text: &str) -> Result<Drive, DriveError> {
+        let mut reader = Reader::new(file_name, text);
+        match DeTable::parse(text) {
+            Ok(table) => reader.read(table.get_ref()),
+            Err(error) => {
+                let at = error.span().unwrap_or(0..0);
+                reader.refuse(at, "", format!("not TOML: {}", error.message()));
+                Err(reader.finish())
+            }
+        }
+    }
+
+    /// This drive with one field changed, `flexspline.rim_thickness_mm=2`, and checked.
+    pub fn with_set(&self, assignment: &str) -> Result<Drive, DriveError> {
+        self.with_sets([assignment])
+    }
+
+    /// This drive with several fields changed, checked once all of them are.
+    pub fn with_sets<'a>(
+        &self,
+        assignments: impl IntoIterator<Item = &'a str>,
+    ) -> Result<Drive, DriveError> {
+        let mut drive = self.clone();
+        for assignment in assignments {
+            drive.set(assignment).map_err(|mut problem| {
+                problem.place = format!("--set {assignment}");
+                problem
+            })?;
+        }
+        drive.check().map_err(|mut refused| {
+            for problem in &mut refused.problems {
+                problem.place = "--set".to_owned();
+            }
+            refused
+        })?;
+        Ok(drive)
+    }
+
+    fn set(&mut self, assignment: &str) -> Result<(), Problem> {
+        let Some((path, text)) = assignment.split_once('=') else {
+            return Err(Problem::of(
+                "",
+                "expected PATH=VALUE, for instance flexspline.rim_thickness_mm=2",
+            ));
+        };
+        let (path, text) = (path.trim(), text.trim());
+        if path == "name" {
+            self.name = text.trim_matches('"').to_owned();
+            return Ok(());
+        }
+        let field = fields::ALL
+            .iter()
+            .find(|field| field.path == path)
+            .ok_or_else(|| Problem::of(path, unknown_path(path)))?;
+        // a bare word is a string
+        match DeValue::parse(text) {
+            Ok(value) => field.put(self, value.get_ref()),
+            Err(_) => field.put(self, &DeValue::String(text.into())),
+        }
+        .map_err(|what| Problem::of(path, what))
+    }
+
+    /// The drive as a complete file, with units and meanings; reads back as the same drive.
+    pub fn to_toml(&self) -> String {
+        // a drive at another temperature is written by its sizes at reference temperature
+        let cold;
+        let drive = if self.thermal_state.above_reference_k == 0.0 {
+            self
+        } else {
+            cold = self.at_temperature(self.temperature.reference_c);
+            &cold
+        };
+        let mut text = String::from(
+            "# A harmonic drive: flexspline fixed, circular spline the output, two waves.\n",
+        );
+        let _ = writeln!(text, "name = {}", toml::Value::String(drive.name.clone()));
+        let mut open = "";
+        fields::for_each(drive, |field, value| {
+            let (section, key) = field.split();
+            if section != open {
+                let _ = writeln!(text, "\n[{section}]");
+                open = section;
+            }
+            let value = match value {
+                None => "\"rigid\"".to_owned(),
+                Some(number) if field.is_count() => format!("{number}"),
+                Some(number) => format!("{number:?}"),
+            };
+            let _ = writeln!(
+                text,
+                "{:<44} # {}",
+                format!("{key} = {value}"),
+                field.meaning
+            );
+        });
+        text
+    }
+}
+
+impl Field {
+    /// True for a whole number.
+    fn is_count(&self) -> bool {
+        matches!(self.slot(&mut Drive::hhd_95()), Slot::Count(_))
+    }
+
+    /// Stores `value` in `drive` if its type and range are right; says what is wrong otherwise.
+    fn put(&self, drive: &mut Drive, value: &DeValue) -> Result<(), String> {
+        let number = number(value);
+        let found = || format!("found {}, allowed: ", shown(value));
+        match self.slot(drive) {
+            Slot::RealOrRigid(slot) => match number {
+                None if value.as_str() == Some("rigid") => *slot = None,
+                Some(number) => *slot = Some(self.in_range(number)?),
+                None => return Err(found() + &format!("{} or \"rigid\"", self.range)),
+            },
+            Slot::Real(slot) => {
+                *slot = self.in_range(number.ok_or_else(|| found() + &self.range.to_string())?)?
+            }
+            Slot::Count(slot) => {
+                let whole = number.filter(|_| value.is_integer());
+                let whole =
+                    whole.ok_or_else(|| found() + &format!("a whole number, {}", self.range))?;
+                *slot = self.in_range(whole)? as u32;
+            }
+        }
+        Ok(())
+    }
+
+    fn in_range(&self, number: f64) -> Result<f64, String> {
+        self.range.refusal(number).map_or(Ok(number), Err)
+    }
+}
+
+/// One pass over a file.
+struct Reader<'a> {
+    file_name: &'a str,
+    text: &'a str,
+    /// problems with the byte they start at, for the order
+    problems: Vec<(usize, Problem)>,
+    /// line of every field that the file sets
+    lines: HashMap<&'static str, usize>,
+}
+
+impl<'a> Reader<'a> {
+    fn new(file_name: &'a str, text: &'a str) -> Self {
+        Reader {
+            file_name,
+            text,
+            problems: Vec::new(),
+            lines: HashMap::new(),
+        }
+    }
+
+    fn line(&self, byte: usize) -> usize {
+        1 + self
+            .text
+            .as_bytes()
+            .iter()
+            .take(byte)
+            .filter(|&&b| b == b'\n')
+            .count()
+    }
+
+    fn refuse(&mut self, at: Range<usize>, field: &str, what: String) {
+        let place = format!("{}:{}", self.file_name, self.line(at.start));
+        self.problems.push((
+            at.start,
+            Problem {
+                place,
+                field: field.to_owned(),
+                what,
+            },
+        ));
+    }
+
+    fn finish(mut self) -> DriveError {
+        self.problems.sort_by_key(|(at, _)| *at);
+        DriveError {
+            problems: self
+                .problems
+                .into_iter()
+                .map(|(_, problem)| problem)
+                .collect(),
+        }
+    }
+
+    fn read(mut self, table: &DeTable) -> Result<Drive, DriveError> {
+        let base = self.text_of(table, "base").and_then(|(at, name)| {
+            let drive = Drive::built_in(&name);
+            if drive.is_none() {
+                let what = format!("found {name:?}, allowed: {}", Drive::BUILT_IN.join(", "));
+                self.refuse(at, "base", what + &did_you_mean(&name, Drive::BUILT_IN));
+            }
+            drive
+        });
+        let has_base = table.contains_key("base");
+        // without a base every number is required, so the values started from do not matter
+        let mut drive = base.unwrap_or_else(Drive::hhd_95);
+        drive.name = match self.text_of(table, "name") {
+            Some((_, name)) => name,
+            None => self
+                .file_name
+                .rsplit(['/', '\\'])
+                .next()
+                .unwrap_or_default()
+                .trim_end_matches(".toml")
+                .to_owned(),
+        };
+        for (key, value) in table {
+            let section = key.get_ref().as_ref();
+            if section == "base" || section == "name" {
+                continue;
+            }
+            if !sections().any(|known| known == section) {
+                let hint = match fields::ALL.iter().find(|field| field.split().1 == section) {
+                    Some(field) => format!("; it belongs to [{}]", field.split().0),
+                    None => did_you_mean(section, sections().chain(["base", "name"])),
+                };
+                self.refuse(key.span(), section, format!("unknown key{hint}"));
+                continue;
+            }
+            match value.get_ref().as_table() {
+                Some(entries) => self.read_section(section, entries, &mut drive),
+                None => {
+                    let what = format!(
+                        "found {}, allowed: a table [{section}]",
+                        shown(value.get_ref())
+                    );
+                    self.refuse(value.span(), section, what);
+                }
+            }
+        }
+        if !has_base {
+            self.refuse_missing();
+        }
+        if !self.problems.is_empty() {
+            return Err(self.finish());
+        }
+        drive.check().map_err(|mut refused| {
+            for problem in &mut refused.problems {
+                problem.place = match self.lines.get(problem.field.as_str()) {
+                    Some(line) => format!("{}:{line}", self.file_name),
+                    None => self.file_name.to_owned(),
+                };
+            }
+            refused
+        })?;
+        Ok(drive)
+    }
+
+    fn read_section(&mut self, section: &str, entries: &DeTable, drive: &mut Drive) {
+        for (key, value) in entries {
+            let name = key.get_ref().as_ref();
+            let path = format!("{section}.{name}");
+            match fields::ALL.iter().find(|field| field.path == path) {
+                None => self.refuse(key.span(), &path, unknown_path(&path)),
+                Some(field) => {
+                    self.lines.insert(field.path, self.line(key.span().start));
+                    if let Err(what) = field.put(drive, value.get_ref()) {
+                        self.refuse(key.span(), &path, what);
+                    }
+                }
+            }
+        }
+    }
+
+    /// A top-level string; refuses another type.
+    fn text_of(&mut self, table: &DeTable, key: &str) -> Option<(Range<usize>, String)> {
+        let value: &Spanned<DeValue> = table.get(key)?;
+        match value.get_ref().as_str() {
+            Some(text) => Some((value.span(), text.to_owned())),
+            None => {
+                self.refuse(
+                    value.span(),
+                    key,
+                    format!("found {}, allowed: a string", shown(value.get_ref())),
+                );
+                None
+            }
+        }
+    }
+
+    fn refuse_missing(&mut self) {
+        let at = self.text.len();
+        for field in fields::ALL {
+            let optional = matches!(field.slot(&mut Drive::hhd_95()), Slot::RealOrRigid(_));
+            if !optional && !self.lines.contains_key(field.path) {
+                let what = format!(
+                    "missing ({}); give it, or a base = \"HHD-95\" to start from",
+                    field.meaning
+                );
+                let place = self.file_name.to_owned();
+                self.problems.push((
+                    at,
+                    Problem {
+                        place,
+                        field: field.path.to_owned(),
+                        what,
+                    },
+                ));
+            }
+        }
+    }
+}
+
+fn sections() -> impl Iterator<Item = &'static str> {
+    let mut last = "";
+    fields::ALL
+        .iter()
+        .map(|field| field.split().0)
+        .filter(move |&section| {
+            let new = section != last;
+            last = section;
+            new
+        })
+}
+
+/// What to say of a path that is no field.
+fn unknown_path(path: &str) -> String {
+    let (section, key) = path.split_once('.').unwrap_or(("", path));
+    let known: Vec<&str> = fields::ALL
+        .iter()
+        .map(Field::split)
+        .filter(|(s, _)| *s == section)
+        .map(|(_, key)| key)
+        .collect();
+    if known.is_empty() {
+        if let Some(field) = fields::ALL.iter().find(|field| field.split().1 == key) {
+            return format!("unknown key; did you mean {:?}?", field.path);
+        }
+        return format!(
+            "unknown key{}",
+            did_you_mean(path, fields::ALL.iter().map(|field| field.path))
+        );
+    }
+    let elsewhere = fields::ALL
+        .iter()
+        .map(Field::split)
+        .find(|(s, k)| *k == key && *s != section);
+    let hint = match elsewhere {
+        Some((other, _)) => format!("; it belongs to [{other}]"),
+        None => did_you_mean(key, known.iter().copied()),
+    };
+    format!("unknown key{hint}; allowed: {}", known.join(", "))
+}
+
+/// `; did you mean "…"?` for the likeliest of `known`, or nothing.
+fn did_you_mean(found: &str, known: impl IntoIterator<Item = &'static str>) -> String {
+    // below this Jaro-Winkler similarity suggestions are noise
+    const LIKELY: f64 = 0.8;
+    known
+        .into_iter()
+        .map(|name| (strsim::jaro_winkler(found, name), name))
+        .filter(|(likeness, _)| *likeness > LIKELY)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or(String::new(), |(_, name)| {
+            format!("; did you mean {name:?}?")
+        })
+}
+
+/// The number of a TOML value, if it is one.
+fn number(value: &DeValue) -> Option<f64> {
+    match value {
+        DeValue::Integer(integer) => {
+            i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix())
+                .ok()
+                .map(|n| n as f64)
+        }
+        DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
+        _ => None,
+    }
+}
+
+/// A value as a message shows it.
+fn shown(value: &DeValue) -> String {
+    match value {
+        DeValue::String(text) => format!("{text:?}"),
+        DeValue::Integer(integer) => integer.to_string(),
+        DeValue::Float(float) => float.to_string(),
+        DeValue::Boolean(truth) => truth.to_string(),
+        DeValue::Datetime(_) => "a date".to_owned(),
+        DeValue::Array(_) => "an array".to_owned(),
+        DeValue::Table(_) => "a table".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file on top of the default drive.
+    fn refused(body: &str) -> String {
+        let text = format!("base = \"HHD-95\"\n{body}\n");
+        match Drive::from_toml("wrong.toml", &text) {
+            Ok(_) => "accepted".to_owned(),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn what_is_written_reads_back() {
+        for name in Drive::BUILT_IN {
+            let drive = Drive::built_in(name).unwrap();
+            let text = drive.to_toml();
+            let again = Drive::from_toml("again.toml", &text).unwrap();
+            assert_eq!(again, drive);
+            assert_eq!(again.hash(), drive.hash());
+            assert_eq!(again.to_toml(), text);
+        }
+        let warm = Drive::hhd_95().at_temperature(60.0);
+        let again = Drive::from_toml("again.toml", &warm.to_toml()).unwrap();
+        assert!((again.flexspline.tip_radius_mm - 48.825).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_base_is_overridden_and_the_hash_follows_the_physics_alone() {
+        let plain = Drive::from_toml("a.toml", "base = \"HHD-95\"").unwrap();
+        assert_eq!(plain.name, "a");
+        assert_eq!(plain.hash(), Drive::hhd_95().hash());
+        let text = "base = 'HHD-95' # as built\nname = \"b\"\ngenerator.w0_mm = 5_00e-3\nmaterial = { poissons_ratio = 0.29 }";
+        let drive = Drive::from_toml("b.toml", text).unwrap();
+        assert_eq!(
+            (drive.name.as_str(), drive.material.poissons_ratio),
+            ("b", 0.29)
+        );
+        assert_ne!(drive.hash(), plain.hash());
+        let same = plain.with_set("material.poissons_ratio=0.29").unwrap();
+        assert_eq!(same.hash(), drive.hash());
+        assert_ne!(plain.at_temperature(30.0).hash(), plain.hash());
+        assert_ne!(Drive::hhd_95_typical().hash(), plain.hash());
+    }
+
+    #[test]
+    fn rigid_is_a_value() {
+        let text = "base = \"HHD-95-typical\"\n[sleeve]\ntorsion_stiffness_n_m_per_rad = \"rigid\"";
+        let drive = Drive::from_toml("c.toml", text).unwrap();
+        assert_eq!(drive.sleeve.torsion_stiffness_n_m_per_rad, None);
+        assert_eq!(drive.generator.bearing_stiffness_n_per_mm3, Some(170.0));
+        let soft = Drive::hhd_95()
+            .with_set("sleeve.torsion_stiffness_n_m_per_rad = 4.6e5")
+            .unwrap();
+        assert_eq!(soft.sleeve.torsion_stiffness_n_m_per_rad, Some(4.6e5));
+        let back = soft
+            .with_set("sleeve.torsion_stiffness_n_m_per_rad=rigid")
+            .unwrap();
+        assert_eq!(back, Drive::hhd_95());
+    }
+
+    #[test]
+    fn every_wrong_file_gets_its_own_message() {
+        // body on top of base = "HHD-95" (line 1), and the start of the whole message
+        let cases = [
+            (
+                "[flexspline]\nteeth = 187",
+                "wrong.toml:3: flexspline.teeth: found 187, allowed: an even number",
+            ),
+            (
+                "[flexspline]\nteeth = 188.0",
+                "wrong.toml:3: flexspline.teeth: found 188.0, allowed: a whole number, 20 to 2000",
+            ),
+            (
+                "[flexspline]\nteeth = 4",
+                "wrong.toml:3: flexspline.teeth: found 4, allowed: 20 to 2000",
+            ),
+            (
+                "[flexspline]\nteeth = -188",
+                "wrong.toml:3: flexspline.teeth: found -188, allowed: 20 to 2000",
+            ),
+            (
+                "[circular_spline]\nteeth = 192",
+                "wrong.toml:3: circular_spline.teeth: found 192, allowed: 190, two more",
+            ),
+            (
+                "[flexspline]\nmodule_mm = \"0.5 mm\"",
+                "wrong.toml:3: flexspline.module_mm: found \"0.5 mm\", allowed: 0.05 to 10",
+            ),
+            (
+                "[flexspline]\nmodule = 0.5",
+                "wrong.toml:3: flexspline.module: unknown key; did you mean \"module_mm\"?; allowed: teeth, module_mm",
+            ),
+            (
+                "[flexspline]\nprofile_shift = nan",
+                "wrong.toml:3: flexspline.profile_shift: found NaN, allowed: -2 to 10",
+            ),
+            (
+                "[flexspline]\nwidth_mm = inf",
+                "wrong.toml:3: flexspline.width_mm: found inf, allowed: above 0 to 1000",
+            ),
+            (
+                "[flexspline]\nwidth_mm = 0",
+                "wrong.toml:3: flexspline.width_mm: found 0, allowed: above 0 to 1000",
+            ),
+            (
+                "[flexspline]\npressure_angle_deg = 0.349",
+                "wrong.toml:3: flexspline.pressure_angle_deg: found 0.349, allowed: 10 to 35",
+            ),
+            (
+                "[flexspline]\ntip_radius_mm = 47.5",
+                "wrong.toml:3: flexspline.tip_radius_mm: found 47.5, allowed: above root_radius_mm = 47.875",
+            ),
+            (
+                "[flexspline]\ntip_radius_mm = 48.96",
+                "wrong.toml:3: flexspline.tip_radius_mm: found 48.96: with w0_mm = 0.5 the tip would stand in the circular-spline root",
+            ),
+            (
+                "[flexspline]\nrim_thickness_mm = 12",
+                "wrong.toml:3: flexspline.rim_thickness_mm: found 12, allowed: up to 9.575",
+            ),
+            (
+                "[flexspline]\nrim_thickness_mm = -1.2",
+                "wrong.toml:3: flexspline.rim_thickness_mm: found -1.2, allowed: above 0",
+            ),
+            (
+                "[flexspline]\nroot_fillet_mm = 0.3",
+                "wrong.toml:3: flexspline.root_fillet_mm: 0.3 mm does not fit: the root land would be -",
+            ),
+            (
+                "[flexspline]\ntip_rounding_mm = 0.4",
+                "wrong.toml:3: flexspline.tip_rounding_mm: 0.4 mm does not fit: the tooth would be -",
+            ),
+            (
+                "[flexspline]\ntip_rounding_mm = 0.001",
+                "wrong.toml:3: flexspline.tip_rounding_mm: found 0.001, allowed: 0.002 to 5",
+            ),
+            (
+                "[circular_spline]\nroot_fillet_mm = 0.3",
+                "wrong.toml:3: circular_spline.root_fillet_mm: 0.3 mm does not fit",
+            ),
+            (
+                "[circular_spline]\ntip_radius_mm = 49.6",
+                "wrong.toml:3: circular_spline.tip_radius_mm: found 49.6, allowed: below root_radius_mm = 49.45",
+            ),
+            (
+                "[circular_spline]\ntip_radius_mm = 48.3",
+                "wrong.toml:3: circular_spline.tip_radius_mm: found 48.3: with w0_mm = 0.5 the tip would stand in the flexspline root",
+            ),
+            (
+                "[circular_spline]\nouter_radius_mm = 49.5",
+                "wrong.toml:3: circular_spline.outer_radius_mm: found 49.5, allowed: at least 49.95",
+            ),
+            (
+                "[circular_spline]\nmodule_mm = 0.6",
+                "wrong.toml:3: circular_spline.module_mm: found 0.6, allowed: within 1 % of the flexspline's 0.5",
+            ),
+            (
+                "[material]\npoissons_ratio = 0.5",
+                "wrong.toml:3: material.poissons_ratio: found 0.5, allowed: 0 to 0.49",
+            ),
+            (
+                "[material]\nyoungs_modulus_gpa = 206",
+                "wrong.toml:3: material.youngs_modulus_gpa: unknown key; did you mean \"youngs_modulus_mpa\"?",
+            ),
+            (
+                "[material]\nyoungs_modulus_mpa = 2.06e11",
+                "wrong.toml:3: material.youngs_modulus_mpa: found 206000000000, allowed: 100 to 1000000",
+            ),
+            (
+                "[generator]\nw0_mm = 0.05",
+                "wrong.toml:3: generator.w0_mm: found 0.05: with the two-roller generator the tips meet at the minor axis",
+            ),
+            (
+                "[generator]\nw0_mm = 3.0",
+                "wrong.toml:3: generator.w0_mm: found 3, allowed: up to 2.3638",
+            ),
+            (
+                "[generator]\nroller_diameter_mm = 40",
+                "wrong.toml:3: generator.roller_diameter_mm: 40 mm is too large for the four-roller generator",
+            ),
+            (
+                "[generator]\nfour_roller_angle_deg = 41",
+                "wrong.toml:3: generator.four_roller_angle_deg: found 41, allowed: 15 to 38",
+            ),
+            (
+                "[generator]\nfriction_coefficient = 0.1",
+                "wrong.toml:3: generator.friction_coefficient: unknown key; it belongs to [flanks]; allowed: w0_mm",
+            ),
+            (
+                "[generator]\nbearing_stiffness_n_per_mm3 = 0",
+                "wrong.toml:3: generator.bearing_stiffness_n_per_mm3: found 0, allowed: above 0",
+            ),
+            (
+                "[generator]\nbearing_stiffness_n_per_mm3 = \"soft\"",
+                "wrong.toml:3: generator.bearing_stiffness_n_per_mm3: found \"soft\", allowed: above 0 to 10000000 or \"rigid\"",
+            ),
+            (
+                "[flanks]\nfriction_coefficient = true",
+                "wrong.toml:3: flanks.friction_coefficient: found true, allowed: 0 to 0.5",
+            ),
+            (
+                "[flanks]\nfriction_coefficient = [0.1]",
+                "wrong.toml:3: flanks.friction_coefficient: found an array, allowed: 0 to 0.5",
+            ),
+            (
+                "[output]\ndrag_torque_n_m = -0.1",
+                "wrong.toml:3: output.drag_torque_n_m: found -0.1, allowed: 0 to 10000",
+            ),
+            (
+                "[temperature]\nminimum_c = 30",
+                "wrong.toml: temperature.reference_c: found 20, allowed: 30 to 80, the operating range",
+            ),
+            (
+                "[temperature]\nminimum_c = 90",
+                "wrong.toml:3: temperature.minimum_c: found 90, allowed: below maximum_c = 80",
+            ),
+            (
+                "[temperature]\nreference_c = 293.15",
+                "wrong.toml:3: temperature.reference_c: found 293.15, allowed: -60 to 80",
+            ),
+            (
+                "[temperature]\nflexspline_expansion_per_k = 11.5",
+                "wrong.toml:3: temperature.flexspline_expansion_per_k: found 11.5, allowed: -0.00001 to 0.0001",
+            ),
+            (
+                "[flexpline]\nteeth = 188",
+                "wrong.toml:2: flexpline: unknown key; did you mean \"flexspline\"?",
+            ),
+            ("[qqq]\nteeth = 188", "wrong.toml:2: qqq: unknown key"),
+            (
+                "friction_coefficient = 0.1",
+                "wrong.toml:2: friction_coefficient: unknown key; it belongs to [flanks]",
+            ),
+            (
+                "sleeve = 4.6e5",
+                "wrong.toml:2: sleeve: found 4.6e5, allowed: a table [sleeve]",
+            ),
+            (
+                "name = 95",
+                "wrong.toml:2: name: found 95, allowed: a string",
+            ),
+            (
+                "[flexspline]\nteeth = 188\nteeth = 188",
+                "wrong.toml:4: not TOML: duplicate key",
+            ),
+            (
+                "[flexspline\nteeth = 188",
+                "wrong.toml:2: not TOML: unclosed table",
+            ),
+            ("[flexspline]\nteeth = ", "wrong.toml:3: not TOML: "),
+        ];
+        let mut seen = std::collections::HashSet::new();
+        let mut wrong = Vec::new();
+        for (body, start) in cases {
+            let message = refused(body);
+            if !message.starts_with(start) || !seen.insert(message.clone()) {
+                wrong.push(format!("{body}\n  gave     {message}\n  expected {start}"));
+            }
+        }
+        assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    }
+
+    #[test]
+    fn a_wrong_base_is_named() {
+        let message = Drive::from_toml("d.toml", "base = \"HHD95\"")
+            .unwrap_err()
+            .to_string();
+        assert_eq!(
+            message,
+            "d.toml:1: base: found \"HHD95\", allowed: HHD-95, HHD-95-typical; did you mean \"HHD-95\"?"
+        );
+        let message = Drive::from_toml("d.toml", "base = 95")
+            .unwrap_err()
+            .to_string();
+        assert_eq!(message, "d.toml:1: base: found 95, allowed: a string");
+    }
+
+    #[test]
+    fn without_a_base_every_missing_field_is_named() {
+        let text = Drive::hhd_95().to_toml();
+        let error = Drive::from_toml(
+            "e.toml",
+            &text
+                .replace("rim_thickness_mm", "# ")
+                .replace("w0_mm", "# "),
+        )
+        .unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "e.toml: flexspline.rim_thickness_mm: missing (rim under the root circle, mm); give it, or a base = \"HHD-95\" \
+             to start from\ne.toml: generator.w0_mm: missing (radial displacement of the neutral layer on the major axis, \
+             mm); give it, or a base = \"HHD-95\" to start from"
+        );
+        let empty = Drive::from_toml("f.toml", "").unwrap_err();
+        let rigid = 2;
+        assert_eq!(empty.problems.len(), fields::ALL.len() - rigid);
+        // a stiffness that is not there is rigid
+        let text = text
+            .replace("bearing_stiffness_n_per_mm3", "# ")
+            .replace("torsion_stiffness_n_m_per_rad", "# ");
+        assert_eq!(Drive::from_toml("g.toml", &text).unwrap(), Drive::hhd_95());
+    }
+
+    #[test]
+    fn all_problems_are_told_in_the_order_of_the_file() {
+        let error =
+            refused("[material]\npoissons_ratio = 0.7\n[flexspline]\nteeths = 188\nwidth_mm = 0");
+        let lines: Vec<&str> = error.lines().collect();
+        assert_eq!(lines.len(), 3, "{error}");
+        assert!(lines[0].starts_with("wrong.toml:3: material.poissons_ratio"));
+        assert!(
+            lines[1].starts_with(
+                "wrong.toml:5: flexspline.teeths: unknown key; did you mean \"teeth\"?"
+            )
+        );
+        assert!(lines[2].starts_with("wrong.toml:6: flexspline.width_mm"));
+    }
+
+    #[test]
+    fn wrong_overrides_are_named() {
+        let set = |assignment: &str| {
+            Drive::hhd_95()
+                .with_set(assignment)
+                .unwrap_err()
+                .to_string()
+        };
+        assert!(set("teeth").starts_with("--set teeth: expected PATH=VALUE"));
+        assert!(
+            set("flexspline.teeths=3")
+                .contains("flexspline.teeths: unknown key; did you mean \"teeth\"?")
+        );
+        assert!(set("w0_mm=0.4").contains("w0_mm: unknown key; did you mean \"generator.w0_mm\"?"));
+        assert!(
+            set("generator.w0_mm=abc")
+                .ends_with("generator.w0_mm: found \"abc\", allowed: above 0 to 20")
+        );
+        assert!(
+            set("flexspline.teeth=186")
+                .starts_with("--set: circular_spline.teeth: found 190, allowed: 188")
+        );
+        let both = ["flexspline.teeth=186", "circular_spline.teeth=190"];
+        assert!(
+            Drive::hhd_95()
+                .with_sets(both)
+                .unwrap_err()
+                .to_string()
+                .contains("found 190, allowed: 188")
+        );
+        assert_eq!(Drive::hhd_95().with_set("name=mine").unwrap().name, "mine");
+    }
+}

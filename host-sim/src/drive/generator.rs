@@ -1,0 +1,524 @@
+//! Outlines of the wave generators, as the bore of the flexspline meets them.
+//!
+//! The neutral curve of each generator at exactly constant length, moved inward along its normal by half the rim, is
+//! the bore it is meant to make. The cam is that curve; the rollers and discs are circles placed against it. All are
+//! evaluated analytically, never as facets. The outline is symmetric about both axes.
+
+use super::error::{DriveError, Problem};
+use super::neutral::NeutralCurve;
+use super::ring::{GeneratorKind, RingShape};
+use super::spec::Drive;
+use std::f64::consts::TAU;
+
+/// A Newton step, rad, below which the next one is below round-off: convergence is quadratic, with a factor near one.
+const LAST_STEP: f64 = 1e-8;
+
+/// A wave generator in its own frame (major axis along +x).
+#[derive(Debug, Clone)]
+pub struct GeneratorOutline {
+    kind: GeneratorKind,
+    neutral: NeutralCurve,
+    /// inward offset from the neutral curve to the bore, mm
+    offset: f64,
+    /// thermal expansion against the size at reference temperature
+    scale: f64,
+    contour: Contour,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Contour {
+    /// The offset neutral curve itself.
+    Cam,
+    /// Circles at `(± x, ± y)`: two of them when `y` is zero.
+    Circles { x: f64, y: f64, radius: f64 },
+}
+
+/// The closest point of the outline to some point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OutlineFoot {
+    /// Signed distance from outline to point, mm: positive outside (a gap), negative inside (interference).
+    pub distance: f64,
+    /// Unit outward normal of the outline at the foot.
+    pub normal: [f64; 2],
+    /// Curvature of the outline at the foot, 1/mm, positive where convex.
+    pub curvature: f64,
+}
+
+impl GeneratorOutline {
+    /// The generator of `kind` in `drive`: made to fit the flexspline at reference temperature, then expanded to the
+    /// drive's temperature.
+    pub fn new(drive: &Drive, kind: GeneratorKind) -> Result<Self, DriveError> {
+        let cold = drive.thermal_state.flexspline_scale;
+        let rim = drive.flexspline.rim_thickness_mm / cold;
+        let radius = drive.flexspline.neutral_radius_mm() / cold;
+        let generator = &drive.generator;
+        let offset = 0.5 * rim;
+        let neutral = NeutralCurve::new(generator.shape(kind), radius);
+        let roller = 0.5 * generator.roller_diameter_mm;
+        let contour = match kind {
+            GeneratorKind::Cam => Contour::Cam,
+            GeneratorKind::TwoRoller => Contour::Circles {
+                x: neutral.polar(0.0)[0] - offset - roller,
+                y: 0.0,
+                radius: roller,
+            },
+            GeneratorKind::FourRoller => {
+                let ([x, y], normal) =
+                    neutral.position(generator.four_roller_angle_deg.to_radians());
+                let inward = offset + roller;
+                Contour::Circles {
+                    x: x - inward * normal.cos(),
+                    y: y - inward * normal.sin(),
+                    radius: roller,
+                }
+            }
+            GeneratorKind::DoubleDisc => {
+                // A circle with its centre on the major axis, through the bore there, and as large as the bore lets it
+                // be: it touches the bore again within a few degrees of the end of the arc.
+                let vertex = neutral.polar(0.0)[0] - offset;
+                let through = |phi: f64| {
+                    let [x, y] = bore_point(&neutral, offset, phi);
+                    let sagitta = vertex - x;
+                    (y * y + sagitta * sagitta) / (2.0 * sagitta)
+                };
+                let g = generator.disc_half_angle_deg.to_radians();
+                let radius = least(through, 0.8 * g, g + 10f64.to_radians());
+                Contour::Circles {
+                    x: vertex - radius,
+                    y: 0.0,
+                    radius,
+                }
+            }
+        };
+        if let Contour::Circles { x, y, radius } = contour {
+            let apart = if kind == GeneratorKind::FourRoller {
+                x.min(y)
+            } else {
+                x
+            };
+            let rollers = matches!(kind, GeneratorKind::TwoRoller | GeneratorKind::FourRoller);
+            if rollers && apart <= radius {
+                return Err(Problem::of(
+                    "generator.roller_diameter_mm",
+                    format!(
+                        "{} mm is too large for the {kind} generator in a bore of radius {:.3} mm: the rollers would \
+                         overlap; allowed: below {:.3} mm",
+                        2.0 * radius,
+                        radius_of_bore(&neutral, offset),
+                        2.0 * apart
+                    ),
+                )
+                .into());
+            }
+        }
+        Ok(GeneratorOutline {
+            kind,
+            neutral,
+            offset,
+            scale: drive.thermal_state.generator_scale,
+            contour,
+        })
+    }
+
+    /// Which generator this is.
+    pub fn kind(&self) -> GeneratorKind {
+        self.kind
+    }
+
+    /// The neutral curve the generator is made for, at reference temperature.
+    pub fn neutral(&self) -> &NeutralCurve {
+        &self.neutral
+    }
+
+    /// Circle centres in the first quadrant (or on the axis) and their radius, mm; `None` for the cam.
+    pub fn circle(&self) -> Option<([f64; 2], f64)> {
+        match self.contour {
+            Contour::Cam => None,
+            Contour::Circles { x, y, radius } => {
+                Some(([x * self.scale, y * self.scale], radius * self.scale))
+            }
+        }
+    }
+
+    /// Closest point of the outline to `point`, in the generator frame. For circles, the circle of the quadrant of
+    /// `point`, which is the closest one.
+    pub fn nearest(&self, point: [f64; 2]) -> OutlineFoot {
+        let s = self.scale;
+        let (px, py) = (point[0] / s, point[1] / s);
+        match self.contour {
+            Contour::Circles { x, y, radius } => {
+                let dx = px - x.copysign(px);
+                let dy = py - if y == 0.0 { 0.0 } else { y.copysign(py) };
+                let length = dx.hypot(dy);
+                let normal = if length > 0.0 {
+                    [dx / length, dy / length]
+                } else {
+                    [1.0, 0.0]
+                };
+                OutlineFoot {
+                    distance: (length - radius) * s,
+                    normal,
+                    curvature: 1.0 / (radius * s),
+                }
+            }
+            Contour::Cam => {
+                let alpha = self.foot_on_neutral(px, py);
+                let [r, dr, ddr] = self.neutral.polar(alpha);
+                let (sin, cos) = alpha.sin_cos();
+                let speed = r.hypot(dr);
+                let normal = [(r * cos + dr * sin) / speed, (r * sin - dr * cos) / speed];
+                let from_neutral = (px - r * cos) * normal[0] + (py - r * sin) * normal[1];
+                let bend = (r * r + 2.0 * dr * dr - r * ddr) / (speed * speed * speed);
+                OutlineFoot {
+                    distance: (from_neutral + self.offset) * s,
+                    normal,
+                    curvature: bend / (1.0 - self.offset * bend) / s,
+                }
+            }
+        }
+    }
+
+    /// Closed polylines of `points` points each, for drawing.
+    pub fn polyline(&self, points: usize) -> Vec<Vec<[f64; 2]>> {
+        let turn = |k: usize| TAU * k as f64 / points as f64;
+        match self.contour {
+            Contour::Cam => {
+                let bore =
+                    |k| bore_point(&self.neutral, self.offset, turn(k)).map(|v| v * self.scale);
+                vec![(0..points).map(bore).collect()]
+            }
+            Contour::Circles { x, y, radius } => {
+                let centres: Vec<[f64; 2]> = if y == 0.0 {
+                    vec![[x, 0.0], [-x, 0.0]]
+                } else {
+                    vec![[x, y], [-x, y], [-x, -y], [x, -y]]
+                };
+                let circle = |[x, y]: [f64; 2]| {
+                    let on = |k| {
+                        [
+                            x + radius * f64::cos(turn(k)),
+                            y + radius * f64::sin(turn(k)),
+                        ]
+                    };
+                    (0..points).map(|k| on(k).map(|v| v * self.scale)).collect()
+                };
+                centres.into_iter().map(circle).collect()
+            }
+        }
+    }
+
+    /// Polar angle of the point of the neutral curve closest to `(px, py)`: the cam is parallel to it, so the foot on
+    /// the cam has the same normal. Newton from the polar angle, which at the bore is off by 3e-4 rad; if it strays
+    /// (points near the centre), a scan and bisection.
+    fn foot_on_neutral(&self, px: f64, py: f64) -> f64 {
+        let start = py.atan2(px);
+        let mut alpha = start;
+        for _ in 0..8 {
+            let (f, df) = self.foot_residual(px, py, alpha);
+            if df >= 0.0 {
+                break;
+            }
+            let step = f / df;
+            alpha -= step;
+            if step.abs() < LAST_STEP {
+                return alpha;
+            }
+            if (alpha - start).abs() > 0.5 {
+                break;
+            }
+        }
+        self.foot_by_scan(px, py)
+    }
+
+    /// `(p - P) · P'` and its derivative by the polar angle.
+    fn foot_residual(&self, px: f64, py: f64, alpha: f64) -> (f64, f64) {
+        let [r, dr, ddr] = self.neutral.polar(alpha);
+        let (sin, cos) = alpha.sin_cos();
+        // along and across the radius direction
+        let (a, b) = (px * cos + py * sin, py * cos - px * sin);
+        let f = a * dr + b * r - r * dr;
+        (f, a * (ddr - r) + 2.0 * b * dr - dr * dr - r * ddr)
+    }
+
+    fn foot_by_scan(&self, px: f64, py: f64) -> f64 {
+        const SCAN: usize = 256;
+        let squared = |alpha: f64| {
+            let r = self.neutral.polar(alpha)[0];
+            (px - r * alpha.cos()).powi(2) + (py - r * alpha.sin()).powi(2)
+        };
+        let at = |k: usize| TAU * k as f64 / SCAN as f64;
+        let best = (0..SCAN)
+            .min_by(|&i, &j| squared(at(i)).total_cmp(&squared(at(j))))
+            .unwrap_or(0);
+        let (mut low, mut high) = (at(best) - at(1), at(best) + at(1));
+        // (p - P)·P' falls through zero at the closest point
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if self.foot_residual(px, py, middle).0 > 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
+    }
+}
+
+impl super::spec::Generators {
+    /// First-order shape of the neutral layer under the generator of `kind`.
+    pub fn shape(&self, kind: GeneratorKind) -> RingShape {
+        match kind {
+            GeneratorKind::TwoRoller => RingShape::two_roller(self.w0_mm),
+            GeneratorKind::FourRoller => {
+                RingShape::four_roller(self.w0_mm, self.four_roller_angle_deg.to_radians())
+            }
+            GeneratorKind::DoubleDisc => {
+                RingShape::double_disc(self.w0_mm, self.disc_half_angle_deg.to_radians())
+            }
+            GeneratorKind::Cam => RingShape::cam(self.w0_mm),
+        }
+    }
+}
+
+/// Point of the intended bore under the material point `phi` of the neutral curve.
+fn bore_point(neutral: &NeutralCurve, offset: f64, phi: f64) -> [f64; 2] {
+    let ([x, y], normal) = neutral.position(phi);
+    [x - offset * normal.cos(), y - offset * normal.sin()]
+}
+
+/// Least value of a function with one valley between `low` and `high`, by golden section.
+fn least(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    let section = 0.5 * (5f64.sqrt() - 1.0);
+    // 40 cuts narrow the interval 2e8-fold, which leaves the minimum itself at round-off
+    for _ in 0..40 {
+        let width = section * (high - low);
+        if f(high - width) < f(low + width) {
+            high = low + width;
+        } else {
+            low = high - width;
+        }
+    }
+    f(0.5 * (low + high))
+}
+
+fn radius_of_bore(neutral: &NeutralCurve, offset: f64) -> f64 {
+    neutral.radius_mm() - offset
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outline(kind: GeneratorKind) -> GeneratorOutline {
+        GeneratorOutline::new(&Drive::hhd_95(), kind).unwrap()
+    }
+
+    #[test]
+    fn sizes_of_the_default_design() {
+        let circle = |kind| outline(kind).circle().unwrap();
+        let ([x, _], radius) = circle(GeneratorKind::TwoRoller);
+        assert!(
+            (x - 34.170).abs() < 5e-4 && radius == 13.0,
+            "two-roller at {x}"
+        );
+        let ([x, y], _) = circle(GeneratorKind::FourRoller);
+        assert!(
+            (x - 29.608).abs() < 5e-4 && (y - 16.633).abs() < 5e-4,
+            "four-roller at {x}, {y}"
+        );
+        // the reference figures 1.667 and 45.503, rounded, stand 0.64 µm proud at the vertex
+        let ([x, _], radius) = circle(GeneratorKind::DoubleDisc);
+        assert!(
+            (x - 1.667).abs() < 5e-4 && (x + radius - 47.1694).abs() < 5e-5,
+            "disc {x} {radius}"
+        );
+        let cam = outline(GeneratorKind::Cam);
+        let major = cam.nearest([50.0, 0.0]).distance;
+        let minor = cam.nearest([0.0, 50.0]).distance;
+        assert!(
+            (50.0 - major - 47.1697).abs() < 5e-5 && (50.0 - minor - 46.1697).abs() < 5e-5,
+            "{major} {minor}"
+        );
+    }
+
+    #[test]
+    fn sizes_at_other_angles() {
+        let circle = |kind, roller: f64, disc: f64| {
+            let mut drive = Drive::hhd_95();
+            drive.generator.four_roller_angle_deg = roller;
+            drive.generator.disc_half_angle_deg = disc;
+            GeneratorOutline::new(&drive, kind)
+                .unwrap()
+                .circle()
+                .unwrap()
+        };
+        for (angle, x, y) in [(25.0, 30.972, 14.055), (35.0, 28.038, 19.086)] {
+            let ([found_x, found_y], _) = circle(GeneratorKind::FourRoller, angle, 30.0);
+            assert!(
+                (found_x - x).abs() < 6e-4 && (found_y - y).abs() < 6e-4,
+                "{angle}: {found_x} {found_y}"
+            );
+        }
+        for (angle, e, radius) in [(20.0, 1.837, 45.333), (40.0, 1.549, 45.620)] {
+            let ([found_e, _], found_radius) = circle(GeneratorKind::DoubleDisc, 30.0, angle);
+            assert!(
+                (found_e - e).abs() < 2e-3 && (found_radius - radius).abs() < 2e-3,
+                "{angle}: {found_e} {found_radius}"
+            );
+        }
+    }
+
+    #[test]
+    fn discs_and_rollers_do_not_stand_proud_of_the_bore_they_are_made_for() {
+        for kind in [
+            GeneratorKind::TwoRoller,
+            GeneratorKind::FourRoller,
+            GeneratorKind::DoubleDisc,
+        ] {
+            for disc in [20.0, 30.0, 40.0] {
+                let mut drive = Drive::hhd_95();
+                drive.generator.disc_half_angle_deg = disc;
+                let outline = GeneratorOutline::new(&drive, kind).unwrap();
+                let gap = |k: u32| {
+                    let phi = (0.01 * f64::from(k)).to_radians();
+                    let bore = bore_point(&outline.neutral, outline.offset, phi);
+                    outline.nearest(bore).distance
+                };
+                let least = (0..=9000).map(gap).fold(f64::INFINITY, f64::min);
+                assert!(least.abs() < 1e-8, "{kind} {disc}: {least} mm");
+                // 0.5 µm off over the whole arc that the disc should touch
+                let arc = (0..=(100.0 * disc) as u32).map(gap).fold(0.0, f64::max);
+                assert!(
+                    kind != GeneratorKind::DoubleDisc || arc < 5e-4,
+                    "{disc}: {arc} mm"
+                );
+            }
+        }
+    }
+
+    /// Random-looking points near the bore.
+    fn points() -> impl Iterator<Item = [f64; 2]> {
+        (0..4000).map(|k| {
+            let angle = 2.399_963 * f64::from(k);
+            let r = 46.0 + 1.5 * (0.618_034 * f64::from(k)).fract();
+            [r * angle.cos(), r * angle.sin()]
+        })
+    }
+
+    #[test]
+    fn the_cam_foot_is_a_foot() {
+        let cam = outline(GeneratorKind::Cam);
+        for p in points() {
+            let foot = cam.nearest(p);
+            // the foot lies on the cam: its own distance is zero, and its normal the same
+            let q = [
+                p[0] - foot.distance * foot.normal[0],
+                p[1] - foot.distance * foot.normal[1],
+            ];
+            let again = cam.nearest(q);
+            assert!(again.distance.abs() < 1e-13, "{p:?}: {}", again.distance);
+            let turn = foot.normal[0] * again.normal[1] - foot.normal[1] * again.normal[0];
+            assert!(turn.abs() < 1e-14, "{p:?}: {turn}");
+        }
+    }
+
+    #[test]
+    fn the_foot_is_the_closest_point_and_gradient_and_curvature_agree_with_differences() {
+        let step = 1e-5;
+        for kind in GeneratorKind::ALL {
+            let outline = outline(kind);
+            let line: Vec<[f64; 2]> = outline.polyline(20_000).concat();
+            // not on an axis, where the circles of two quadrants meet
+            for p in points().skip(1).step_by(97) {
+                let foot = outline.nearest(p);
+                let closest = line
+                    .iter()
+                    .map(|q| (p[0] - q[0]).hypot(p[1] - q[1]))
+                    .fold(f64::INFINITY, f64::min);
+                if kind != GeneratorKind::DoubleDisc {
+                    // points of the drawing are 15 µm apart; one disc may hide part of the other,
+                    // and the drawing still shows it
+                    assert!(
+                        closest >= foot.distance.abs() - 1e-9
+                            && closest < foot.distance.hypot(0.01),
+                        "{kind} {p:?}: {} {closest}",
+                        foot.distance
+                    );
+                }
+                let d = |dx, dy| outline.nearest([p[0] + dx, p[1] + dy]).distance;
+                let gradient = [
+                    (d(step, 0.0) - d(-step, 0.0)) / (2.0 * step),
+                    (d(0.0, step) - d(0.0, -step)) / (2.0 * step),
+                ];
+                let error = (gradient[0] - foot.normal[0]).hypot(gradient[1] - foot.normal[1]);
+                assert!(error < 1e-8, "{kind} {p:?}: {error}");
+                // along the outline the normal turns by its curvature
+                let q = [
+                    p[0] - foot.distance * foot.normal[0],
+                    p[1] - foot.distance * foot.normal[1],
+                ];
+                let tangent = [-foot.normal[1], foot.normal[0]];
+                let n = |s: f64| {
+                    outline
+                        .nearest([q[0] + s * tangent[0], q[1] + s * tangent[1]])
+                        .normal
+                };
+                let (a, b) = (n(-step), n(step));
+                let turn = (a[0] * b[1] - a[1] * b[0]) / (2.0 * step);
+                assert!(
+                    (turn - foot.curvature).abs() < 1e-6,
+                    "{kind} {p:?}: {turn} {}",
+                    foot.curvature
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn points_near_the_centre_find_a_foot_too() {
+        let cam = outline(GeneratorKind::Cam);
+        for k in 0..100 {
+            let angle = 0.0628 * f64::from(k) + 0.01;
+            for r in [0.01, 0.5, 1.0, 2.0, 10.0, 40.0] {
+                let p = [r * f64::cos(angle), r * f64::sin(angle)];
+                let foot = cam.nearest(p);
+                let q = [
+                    p[0] - foot.distance * foot.normal[0],
+                    p[1] - foot.distance * foot.normal[1],
+                ];
+                assert!(cam.nearest(q).distance.abs() < 1e-9, "{p:?}");
+                // inside, and no further than the minor axis allows
+                assert!(
+                    foot.distance < 0.0 && foot.distance >= -46.17 - 1e-3,
+                    "{p:?}: {}",
+                    foot.distance
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn rollers_that_overlap_are_refused() {
+        let mut drive = Drive::hhd_95();
+        drive.generator.roller_diameter_mm = 40.0;
+        assert!(GeneratorOutline::new(&drive, GeneratorKind::TwoRoller).is_ok());
+        let message = GeneratorOutline::new(&drive, GeneratorKind::FourRoller)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.starts_with("generator.roller_diameter_mm: 40 mm is too large"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn a_warm_generator_grows_with_its_own_expansion() {
+        let cold = outline(GeneratorKind::Cam);
+        let mut drive = Drive::hhd_95();
+        drive.temperature.generator_expansion_per_k = 2e-5;
+        drive.temperature.flexspline_expansion_per_k = 1e-5;
+        let warm = GeneratorOutline::new(&drive.at_temperature(70.0), GeneratorKind::Cam).unwrap();
+        let growth = cold.nearest([0.0, 50.0]).distance - warm.nearest([0.0, 50.0]).distance;
+        assert!((growth - 46.1697 * 1e-3).abs() < 1e-7, "{growth}");
+    }
+}

@@ -1,0 +1,527 @@
+//! Do the teeth clear one another, and by how much? Rigid teeth on the exactly inextensible neutral curve.
+//!
+//! The generator turns under a fixed flexspline, so in the generator frame a flexspline tooth of material angle `phi`
+//! sits at [`NeutralCurve::position`], its axis along the normal, and the circular-spline space it belongs to has its axis
+//! at `phi z_f / z_c`. The mesh therefore depends on `phi` alone: each tooth goes through the whole cycle
+//! `-pi/2..pi/2` as the generator turns half a turn, tooth `k` being at `phi = 2 pi k / z_f - psi`.
+//!
+//! The gap at a point of the flexspline flank is the angle, seen from the axis, to the flank of the space at the same
+//! radius, fillets and roundings of both wheels included; positive is open. Turning the circular spline by `e` changes
+//! every gap by exactly `e`, so the least gap on each side is what it can turn: their sum is the rigid backlash.
+//!
+//! Not covered: elastic deflection, and tips meeting roots radially ([`super::Drive::check`] asks for clearance there).
+
+use super::error::DriveError;
+use super::neutral::NeutralCurve;
+use super::ring::GeneratorKind;
+use super::spec::Drive;
+use super::tooth::{OutlinePiece, PieceKind, ToothFlank};
+use serde::Serialize;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::fmt;
+
+/// Steps of the scan over the mesh cycle; the least gap found is then refined between its neighbours.
+const CYCLE_STEPS: usize = 720;
+/// Points tried on each piece of a flank before refining.
+const PIECE_STEPS: usize = 12;
+/// Generator angles within one tooth pitch at which the backlash is taken.
+const PITCH_STEPS: usize = 24;
+
+/// Which flank of the flexspline tooth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// The flank on the counter-clockwise side: it limits turning the circular spline backward.
+    Positive,
+    /// The flank on the clockwise side: it limits turning the circular spline forward.
+    Negative,
+}
+
+/// The least gap on one flank of one tooth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FlankGap {
+    /// Circumferential gap, mm, positive where open.
+    pub gap_mm: f64,
+    /// The same as an angle of the circular spline, rad.
+    pub gap_rad: f64,
+    /// Material angle of the tooth from the major axis, rad: tooth `k` is there at generator angle
+    /// `2 pi k / z_f - material_angle_rad`.
+    pub material_angle_rad: f64,
+    /// Flank of the flexspline tooth.
+    pub side: Side,
+    /// Where on the undeformed flexspline tooth, radius in mm.
+    pub flexspline_radius_mm: f64,
+    /// On which piece of its outline.
+    #[serde(serialize_with = "piece_name")]
+    pub flexspline_piece: PieceKind,
+    /// Where on the circular spline, radius in mm.
+    pub circular_spline_radius_mm: f64,
+}
+
+fn piece_name<S: serde::Serializer>(piece: &PieceKind, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(piece.name())
+}
+
+impl FlankGap {
+    /// Generator angle, rad, at which flexspline tooth `tooth` of `teeth` is in this position.
+    pub fn generator_angle_rad(&self, tooth: u32, teeth: u32) -> f64 {
+        TAU * f64::from(tooth) / f64::from(teeth) - self.material_angle_rad
+    }
+}
+
+impl fmt::Display for FlankGap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let side = match self.side {
+            Side::Positive => "positive",
+            Side::Negative => "negative",
+        };
+        let state = if self.gap_mm < 0.0 {
+            "interferes by"
+        } else {
+            "clears by"
+        };
+        write!(
+            f,
+            "flexspline tooth 0, {side} flank, {} at radius {:.3} mm, {state} {:.1} µm at generator angle {:.2}°",
+            self.flexspline_piece.name(),
+            self.flexspline_radius_mm,
+            1e3 * self.gap_mm.abs(),
+            -self.material_angle_rad.to_degrees(),
+        )
+    }
+}
+
+/// The rigid mesh of one generator.
+#[derive(Debug, Clone)]
+pub struct RigidMesh {
+    tooth: ToothFlank,
+    space: ToothFlank,
+    curve: NeutralCurve,
+    flexspline_teeth: f64,
+    circular_spline_teeth: f64,
+}
+
+/// What [`RigidMesh::report`] finds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MeshReport {
+    /// The generator.
+    pub generator: GeneratorKind,
+    /// The least gap of all, over the whole cycle and both flanks.
+    pub least: FlankGap,
+    /// What the circular spline turns between both flanks, rad, mean over one tooth pitch of generator angle;
+    /// negative if the teeth bind.
+    pub backlash_rad: f64,
+    /// Change of the least gap of one flank over one tooth pitch, largest minus smallest, rad: the kinematic error of
+    /// rigid teeth.
+    pub ripple_rad: f64,
+    /// The worst point of every stretch of the cycle where a flank interferes; empty for a sound mesh.
+    pub interferences: Vec<FlankGap>,
+}
+
+impl RigidMesh {
+    /// The mesh of `drive` with the generator of `kind`.
+    ///
+    /// At another than reference temperature the deflection grows with the flexspline; a generator that expands
+    /// otherwise than the flexspline changes its fit in the bore, which takes elasticity and is left out.
+    pub fn new(drive: &Drive, kind: GeneratorKind) -> Result<Self, DriveError> {
+        let mut warm = drive.generator.clone();
+        warm.w0_mm *= drive.thermal_state.flexspline_scale;
+        Ok(RigidMesh {
+            tooth: ToothFlank::external(&drive.flexspline)?,
+            space: ToothFlank::internal(&drive.circular_spline)?,
+            curve: NeutralCurve::new(warm.shape(kind), drive.flexspline.neutral_radius_mm()),
+            flexspline_teeth: f64::from(drive.flexspline.teeth),
+            circular_spline_teeth: f64::from(drive.circular_spline.teeth),
+        })
+    }
+
+    /// Least gap on one flank of the tooth at material angle `phi`; `None` where that flank does not reach past the
+    /// tips of the circular spline.
+    pub fn gap(&self, phi: f64, side: Side) -> Option<FlankGap> {
+        // the place of the tooth seen from the axis of its space
+        let ([x, y], normal) = self.curve.position(phi);
+        let space_axis = phi * self.flexspline_teeth / self.circular_spline_teeth;
+        let (s, c) = space_axis.sin_cos();
+        let foot = [x * c + y * s, y * c - x * s];
+        let (s, c) = (normal - space_axis).sin_cos();
+        let sign = if side == Side::Positive { 1.0 } else { -1.0 };
+        let (_, space_tip) = self.space.root_and_tip_radius();
+
+        let gap_at = |piece: &OutlinePiece, t: f64| -> Option<FlankGap> {
+            let [px, py] = piece.point(t);
+            let (along, across) = (px - self.curve.radius_mm(), sign * py);
+            let place = [
+                foot[0] + along * c - across * s,
+                foot[1] + along * s + across * c,
+            ];
+            let radius = place[0].hypot(place[1]);
+            if radius < space_tip {
+                return None;
+            }
+            // beyond the root circle there is no space left
+            let half_space = self.space.angle_at_radius(radius).unwrap_or(0.0);
+            let gap_rad = half_space - sign * place[1].atan2(place[0]);
+            Some(FlankGap {
+                gap_mm: gap_rad * radius,
+                gap_rad,
+                material_angle_rad: phi,
+                side,
+                flexspline_radius_mm: px.hypot(py),
+                flexspline_piece: piece.kind,
+                circular_spline_radius_mm: radius,
+            })
+        };
+        let lesser = |a: Option<FlankGap>, b: Option<FlankGap>| match (a, b) {
+            (Some(a), Some(b)) => Some(if b.gap_rad < a.gap_rad { b } else { a }),
+            (a, b) => a.or(b),
+        };
+        let value = |gap: &Option<FlankGap>| gap.map_or(f64::INFINITY, |gap| gap.gap_rad);
+
+        let mut best = None;
+        for piece in &self.tooth.pieces()[1..] {
+            let at = |k: usize| k as f64 / PIECE_STEPS as f64;
+            let tried: Vec<Option<FlankGap>> =
+                (0..=PIECE_STEPS).map(|k| gap_at(piece, at(k))).collect();
+            let least =
+                (0..=PIECE_STEPS).min_by(|&i, &j| value(&tried[i]).total_cmp(&value(&tried[j])));
+            let Some(k) = least.filter(|&k| tried[k].is_some()) else {
+                continue;
+            };
+            let refined = golden(
+                |t| value(&gap_at(piece, t)),
+                at(k.saturating_sub(1)),
+                at((k + 1).min(PIECE_STEPS)),
+            );
+            best = lesser(best, lesser(tried[k], gap_at(piece, refined)));
+        }
+        best
+    }
+
+    /// Gaps over the whole mesh cycle, both flanks.
+    pub fn report(&self, generator: GeneratorKind) -> Option<MeshReport> {
+        let step = PI / CYCLE_STEPS as f64;
+        let mut least: Option<FlankGap> = None;
+        let mut interferences = Vec::new();
+        for side in [Side::Positive, Side::Negative] {
+            let cycle: Vec<Option<FlankGap>> = (0..=CYCLE_STEPS)
+                .map(|k| self.gap(-FRAC_PI_2 + step * k as f64, side))
+                .collect();
+            let value = |k: usize| cycle[k].map_or(f64::INFINITY, |gap| gap.gap_rad);
+            let lowest = |stretch: std::ops::Range<usize>| -> Option<FlankGap> {
+                let k = stretch.min_by(|&i, &j| value(i).total_cmp(&value(j)))?;
+                let coarse = cycle[k]?;
+                let angle = |phi: f64| self.gap(phi, side).map_or(f64::INFINITY, |gap| gap.gap_rad);
+                let phi = golden(
+                    angle,
+                    coarse.material_angle_rad - step,
+                    coarse.material_angle_rad + step,
+                );
+                Some(
+                    self.gap(phi, side)
+                        .filter(|fine| fine.gap_rad < coarse.gap_rad)
+                        .unwrap_or(coarse),
+                )
+            };
+            let found = lowest(0..cycle.len())?;
+            if least.is_none_or(|least| found.gap_rad < least.gap_rad) {
+                least = Some(found);
+            }
+            let mut k = 0;
+            while k < cycle.len() {
+                let end = (k..cycle.len())
+                    .find(|&j| value(j) >= 0.0)
+                    .unwrap_or(cycle.len());
+                interferences.extend(lowest(k..end));
+                k = end + 1;
+            }
+        }
+
+        // one pitch of generator angle, all teeth that can touch
+        let pitch = TAU / self.flexspline_teeth;
+        let within = (FRAC_PI_2 / pitch) as i32;
+        let (mut total, mut low, mut high) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
+        for k in 0..PITCH_STEPS {
+            let psi = pitch * k as f64 / PITCH_STEPS as f64;
+            let room = |side| {
+                (-within..=within + 1)
+                    .filter_map(|tooth| self.gap(f64::from(tooth) * pitch - psi, side))
+                    .map(|gap| gap.gap_rad)
+                    .fold(f64::INFINITY, f64::min)
+            };
+            let (backward, forward) = (room(Side::Positive), room(Side::Negative));
+            total += backward + forward;
+            low = low.min(forward);
+            high = high.max(forward);
+        }
+        Some(MeshReport {
+            generator,
+            least: least?,
+            backlash_rad: total / PITCH_STEPS as f64,
+            ripple_rad: high - low,
+            interferences,
+        })
+    }
+}
+
+/// Argument of the least value of a function with one valley between `low` and `high`.
+fn golden(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    let section = 0.5 * (5f64.sqrt() - 1.0);
+    let mut left = high - section * (high - low);
+    let mut right = low + section * (high - low);
+    let (mut at_left, mut at_right) = (f(left), f(right));
+    // 30 cuts narrow the interval 2e6-fold: a minimum is then known to 1e-12 of its depth
+    for _ in 0..30 {
+        if at_left < at_right {
+            (high, right, at_right) = (right, left, at_left);
+            left = high - section * (high - low);
+            at_left = f(left);
+        } else {
+            (low, left, at_left) = (left, right, at_right);
+            right = low + section * (high - low);
+            at_right = f(right);
+        }
+    }
+    0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(drive: &Drive, kind: GeneratorKind) -> MeshReport {
+        RigidMesh::new(drive, kind).unwrap().report(kind).unwrap()
+    }
+
+    fn rounded(tip_rounding_mm: f64) -> Drive {
+        let mut drive = Drive::hhd_95();
+        drive.flexspline.tip_rounding_mm = tip_rounding_mm;
+        drive.circular_spline.tip_rounding_mm = tip_rounding_mm;
+        drive
+    }
+
+    const ARCMIN: f64 = PI / (180.0 * 60.0);
+
+    #[test]
+    fn gaps_backlash_and_ripple_of_the_default_design() {
+        use GeneratorKind::*;
+        // an independent program with sharp tips: least gap (µm), at (degrees), backlash ('), ripple (")
+        let sharp = [
+            (Cam, 6.9, 4.5, 0.98, 0.43),
+            (DoubleDisc, 7.3, 5.0, 1.04, 0.38),
+            (TwoRoller, 6.3, 4.0, 0.89, 0.60),
+            (FourRoller, 7.6, 5.0, 1.08, 0.32),
+        ];
+        for rounding in [0.005, 0.03] {
+            for (kind, gap_um, at_deg, backlash, ripple) in sharp {
+                let found = report(&rounded(rounding), kind);
+                let gap = 1e3 * found.least.gap_mm;
+                assert!((gap - gap_um).abs() < 0.08, "{kind}: {gap} µm");
+                let at = found.least.material_angle_rad.to_degrees().abs();
+                assert!((at - at_deg).abs() < 0.6, "{kind}: {at}°");
+                let play = found.backlash_rad / ARCMIN;
+                assert!((play - backlash).abs() < 0.02, "{kind}: {play}'");
+                let wave = 60.0 * found.ripple_rad / ARCMIN;
+                assert!((wave - ripple).abs() < 0.06, "{kind}: {wave}\"");
+                assert_eq!(found.interferences, []);
+            }
+        }
+    }
+
+    /// Tips 0.125 mm nearer to each other: a working depth of 1.6 modules.
+    #[test]
+    fn a_deeper_mesh_interferes_where_the_tips_pass() {
+        let mut drive = rounded(0.005);
+        drive.circular_spline.tip_radius_mm -= 0.125;
+        let depth = drive.flexspline.tip_radius_mm + drive.generator.w0_mm
+            - drive.circular_spline.tip_radius_mm;
+        assert!((depth - 0.8).abs() < 1e-12);
+        for kind in [
+            GeneratorKind::Cam,
+            GeneratorKind::TwoRoller,
+            GeneratorKind::DoubleDisc,
+        ] {
+            let found = report(&drive, kind);
+            assert_eq!(found.interferences.len(), 2, "{kind}: one on each flank");
+            let [positive, negative] = found.interferences[..] else {
+                unreachable!()
+            };
+            assert_eq!(
+                (positive.side, negative.side),
+                (Side::Positive, Side::Negative)
+            );
+            let at = positive.material_angle_rad.to_degrees();
+            assert!((60.0..64.0).contains(&at), "{kind}: {at}°");
+            assert!(positive.gap_mm < -1e-3, "{kind}: {}", positive.gap_mm);
+            let worst = positive.gap_rad.min(negative.gap_rad);
+            assert!((found.least.gap_rad - worst).abs() < 1e-12);
+            assert_eq!(positive.flexspline_piece, PieceKind::TipRounding);
+            let message = positive.to_string();
+            assert!(
+                message.starts_with(
+                    "flexspline tooth 0, positive flank, tip rounding at radius 48.82"
+                ),
+                "{message}"
+            );
+            assert!(
+                message.contains("interferes by") && message.contains("at generator angle -6"),
+                "{message}"
+            );
+        }
+        assert_eq!(report(&drive, GeneratorKind::FourRoller).interferences, []);
+    }
+
+    /// Both wheels without profile shift, same depth and clearances: 1.5 mm smaller everywhere.
+    fn without_shift() -> Drive {
+        let mut drive = rounded(0.005);
+        let (f, c) = (&mut drive.flexspline, &mut drive.circular_spline);
+        f.profile_shift -= 3.0;
+        c.profile_shift -= 3.0;
+        for radius in [
+            &mut f.root_radius_mm,
+            &mut f.tip_radius_mm,
+            &mut c.root_radius_mm,
+            &mut c.tip_radius_mm,
+        ] {
+            *radius -= 1.5;
+        }
+        drive
+    }
+
+    #[test]
+    fn without_profile_shift_the_teeth_interfere() {
+        let found = report(&without_shift(), GeneratorKind::Cam);
+        let (gap, at) = (
+            1e3 * found.least.gap_mm,
+            found.least.material_angle_rad.to_degrees().abs(),
+        );
+        assert!(
+            (-17.0..-15.0).contains(&gap) && (54.0..56.0).contains(&at),
+            "{gap} µm at {at}°"
+        );
+        // a tenth of a module deeper it is 35 µm at 58 degrees
+        let mut drive = without_shift();
+        drive.circular_spline.tip_radius_mm -= 0.05;
+        let found = report(&drive, GeneratorKind::Cam);
+        let (gap, at) = (
+            1e3 * found.least.gap_mm,
+            found.least.material_angle_rad.to_degrees().abs(),
+        );
+        assert!(
+            (-40.0..-30.0).contains(&gap) && (56.0..59.0).contains(&at),
+            "{gap} µm at {at}°"
+        );
+    }
+
+    #[test]
+    fn the_deflection_that_works_for_every_generator() {
+        // 0.475 to 0.515 mm; below it the two-roller clashes first, above 0.52 all bind at the axis
+        for (w0, sound) in [(0.465, 3), (0.475, 4), (0.5, 4), (0.515, 4), (0.525, 0)] {
+            let mut drive = rounded(0.005);
+            drive.generator.w0_mm = w0;
+            let clear = |kind: &GeneratorKind| report(&drive, *kind).interferences.is_empty();
+            let count = GeneratorKind::ALL.iter().filter(|kind| clear(kind)).count();
+            assert_eq!(count, sound, "w0 = {w0}");
+        }
+    }
+
+    #[test]
+    fn slopes_of_the_backlash() {
+        let backlash = |edit: &dyn Fn(&mut Drive)| {
+            let mut drive = rounded(0.005);
+            edit(&mut drive);
+            report(&drive, GeneratorKind::Cam).backlash_rad / ARCMIN
+        };
+        let per_shift =
+            (backlash(&|d| d.circular_spline.profile_shift += 0.01) - backlash(&|_| ())) / 0.01;
+        assert!(
+            (per_shift - 26.0).abs() < 0.5,
+            "{per_shift}' per unit of shift"
+        );
+        let per_um = (backlash(&|d| d.generator.w0_mm += 0.002)
+            - backlash(&|d| d.generator.w0_mm -= 0.002))
+            / 4.0;
+        assert!((per_um + 0.052).abs() < 0.002, "{per_um}' per µm of w0");
+    }
+
+    #[test]
+    fn both_flanks_mirror_each_other() {
+        let mesh = RigidMesh::new(&Drive::hhd_95(), GeneratorKind::FourRoller).unwrap();
+        for k in 0..80 {
+            let phi = 0.013 * f64::from(k) - 0.4;
+            let (a, b) = (
+                mesh.gap(phi, Side::Positive).unwrap(),
+                mesh.gap(-phi, Side::Negative).unwrap(),
+            );
+            assert!(
+                (a.gap_rad - b.gap_rad).abs() < 1e-13,
+                "{phi}: {} {}",
+                a.gap_rad,
+                b.gap_rad
+            );
+        }
+        assert_eq!(mesh.gap(FRAC_PI_2, Side::Positive), None);
+    }
+
+    /// The gap against the plain distance of two dense polylines, before and after the space is turned to close it.
+    #[test]
+    fn turning_the_space_by_the_gap_makes_the_outlines_touch() {
+        let mesh = RigidMesh::new(&Drive::hhd_95(), GeneratorKind::DoubleDisc).unwrap();
+        for phi in [-0.3, 0.0, 0.08, 0.5, 0.8] {
+            let gap = mesh.gap(phi, Side::Positive).unwrap();
+            let ([x, y], normal) = mesh.curve.position(phi);
+            let (s, c) = normal.sin_cos();
+            let dense = |flank: &ToothFlank| -> Vec<[f64; 2]> {
+                let pieces = flank.pieces().iter();
+                pieces
+                    .flat_map(|piece| (0..=400).map(|k| piece.point(f64::from(k) / 400.0)))
+                    .collect()
+            };
+            let tooth: Vec<[f64; 2]> = dense(&mesh.tooth)
+                .into_iter()
+                .map(|[px, py]| {
+                    [
+                        x + (px - mesh.curve.radius_mm()) * c - py * s,
+                        y + (px - mesh.curve.radius_mm()) * s + py * c,
+                    ]
+                })
+                .collect();
+            let distance = |turn: f64| {
+                let (s, c) = (phi * 188.0 / 190.0 + turn).sin_cos();
+                let space = dense(&mesh.space)
+                    .into_iter()
+                    .map(|[px, py]| [px * c - py * s, px * s + py * c]);
+                space
+                    .flat_map(|p| tooth.iter().map(move |q| (p[0] - q[0]).hypot(p[1] - q[1])))
+                    .fold(f64::INFINITY, f64::min)
+            };
+            assert!(
+                distance(-gap.gap_rad) < 2e-3,
+                "{phi}: {}",
+                distance(-gap.gap_rad)
+            );
+            // half closed, between half the gap and that times the cosine of the steepest pressure angle
+            let half = distance(-0.5 * gap.gap_rad) / gap.gap_mm;
+            assert!(
+                (0.3..0.6).contains(&half),
+                "{phi}: {half} of {} mm",
+                gap.gap_mm
+            );
+        }
+    }
+
+    #[test]
+    fn warming_one_wheel_takes_the_backlash_and_warming_both_does_not() {
+        let mut drive = Drive::hhd_95();
+        let backlash = |drive: &Drive| report(drive, GeneratorKind::Cam).backlash_rad / ARCMIN;
+        let cold = backlash(&drive);
+        assert!((backlash(&drive.at_temperature(60.0)) - cold).abs() < 1e-9);
+        // flexspline warmer: -2 dr tan a / r, with dr = 0.56 µm/K at the teeth and the pressure angle 24.7° there
+        let expected = -2.0 * 11.5e-6 * 24.7f64.to_radians().tan() / ARCMIN;
+        drive.temperature.circular_spline_expansion_per_k = 0.0;
+        let per_k = (backlash(&drive.at_temperature(25.0)) - cold) / 5.0;
+        assert!(
+            (per_k / expected - 1.0).abs() < 0.03,
+            "{per_k}'/K, expected {expected}"
+        );
+    }
+}

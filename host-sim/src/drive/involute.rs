@@ -1,0 +1,231 @@
+//! The active flank of a tooth as a distance field: involute and tip rounding, in closed form.
+//!
+//! Parallel curves of an involute are the same involute turned about the base circle, so the distance of a point at polar
+//! `(rho, theta)` is `r_b (H(rho) - theta)` with `H(rho)` the half angle of the flank at radius rho: exact, without a search.
+
+use super::tooth::{PieceKind, ToothFlank};
+
+/// Involute flank on the positive-angle side, with the rounding at the tip.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InvoluteFlank {
+    /// Base circle radius, mm.
+    pub base_radius: f64,
+    /// Half angle of the flank at the base circle, rad.
+    half_base: f64,
+    /// Radius where the root fillet ends and the involute begins, mm.
+    pub start_radius: f64,
+    /// Radius where the involute ends and the rounding begins, mm.
+    pub junction_radius: f64,
+    /// Radius of the tip circle, mm.
+    pub tip_radius: f64,
+    /// Centre of the rounding.
+    rounding_centre: [f64; 2],
+    /// Radius of the rounding, mm.
+    pub rounding_radius: f64,
+    /// Angle subtended by the rounding, rad.
+    pub rounding_sweep: f64,
+    /// True on the circular spline.
+    internal: bool,
+}
+
+/// Foot of a point on the flank.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Foot {
+    /// Signed distance, positive outside the material, mm.
+    pub distance: f64,
+    /// Unit normal out of the material.
+    pub normal: [f64; 2],
+    /// Unit tangent in the direction of growing radius on the involute, continued round the tip.
+    pub tangent: [f64; 2],
+    /// Radius of the foot (mm); on the rounding, the radius of the foot there.
+    pub radius: f64,
+    /// d(radius)/d(arc length) at the foot along the tangent.
+    pub radius_rate: f64,
+    /// Arc length of the foot along the flank, growing with the tangent, mm (zero where the involute leaves its base circle).
+    pub arc: f64,
+}
+
+impl InvoluteFlank {
+    /// From the outline of a tooth (or space) and its base circle.
+    pub fn new(outline: &ToothFlank, base_radius: f64) -> InvoluteFlank {
+        let involute = outline.piece(PieceKind::Involute);
+        let rounding = outline.piece(PieceKind::TipRounding);
+        let polar = |p: [f64; 2]| (p[0].hypot(p[1]), p[1].atan2(p[0]));
+        let (start_radius, angle) = polar(involute.point(0.0));
+        let (junction_radius, _) = polar(involute.point(1.0));
+        let rounding_radius = 1.0 / rounding.curvature(0.5).abs();
+        let (p, n) = (rounding.point(0.0), rounding.normal(0.0));
+        InvoluteFlank {
+            base_radius,
+            half_base: angle + involute_function(start_radius / base_radius),
+            start_radius,
+            junction_radius,
+            tip_radius: outline.root_and_tip_radius().1,
+            rounding_centre: [p[0] - rounding_radius * n[0], p[1] - rounding_radius * n[1]],
+            rounding_radius,
+            rounding_sweep: rounding.length() / rounding_radius,
+            internal: outline.is_internal(),
+        }
+    }
+
+    /// Half angle of the flank at a radius (the involute, also beyond the junction), rad.
+    pub fn half_angle(&self, radius: f64) -> f64 {
+        self.half_base - involute_function(radius / self.base_radius)
+    }
+
+    /// Point of the involute at a radius (also beyond the junction, up to the sharp tip corner).
+    pub fn point(&self, radius: f64) -> [f64; 2] {
+        let (s, c) = self.half_angle(radius).sin_cos();
+        [radius * c, radius * s]
+    }
+
+    /// d(arc length)/d(radius) of the involute.
+    pub fn arc_rate(&self, radius: f64) -> f64 {
+        radius / self.base_radius
+    }
+
+    /// Point of the rounding at an angle from the junction towards the tip land (0 to `rounding_sweep`).
+    pub fn rounding_point(&self, angle: f64) -> [f64; 2] {
+        let junction = self.point(self.junction_radius);
+        let arm = [junction[0] - self.rounding_centre[0], junction[1] - self.rounding_centre[1]];
+        // On the positive side the tip land of a tooth lies counter-clockwise of its flank, that of a space clockwise.
+        let (s, c) = (if self.internal { -angle } else { angle }).sin_cos();
+        [
+            self.rounding_centre[0] + c * arm[0] - s * arm[1],
+            self.rounding_centre[1] + s * arm[0] + c * arm[1],
+        ]
+    }
+
+    /// Unit normal at the joint of involute and rounding.
+    fn junction_normal(&self) -> [f64; 2] {
+        let p = self.point(self.junction_radius);
+        [
+            (p[0] - self.rounding_centre[0]) / self.rounding_radius,
+            (p[1] - self.rounding_centre[1]) / self.rounding_radius,
+        ]
+    }
+
+    /// Radius of the foot of a point on the involute continued beyond its ends.
+    #[inline]
+    pub fn involute_foot_radius(&self, p: [f64; 2]) -> f64 {
+        let rho_squared = p[0] * p[0] + p[1] * p[1];
+        let along = (rho_squared - self.base_radius * self.base_radius).max(1e-12).sqrt();
+        let roll = along / self.base_radius;
+        let distance = self.base_radius * (self.half_base - (roll - roll.atan()) - p[1].atan2(p[0]));
+        self.base_radius.hypot(along + distance)
+    }
+
+    /// Foot of a point on the flank of a space (internal wheel), in the frame of that space.
+    #[inline]
+    pub fn foot_internal(&self, p: [f64; 2]) -> Foot {
+        let rho_squared = p[0] * p[0] + p[1] * p[1];
+        let rho = rho_squared.sqrt();
+        let along = (rho_squared - self.base_radius * self.base_radius).max(1e-12).sqrt();
+        let roll = along / self.base_radius;
+        let distance = self.base_radius * (self.half_base - (roll - roll.atan()) - p[1].atan2(p[0]));
+        let foot_along = along + distance;
+        let radius = (self.base_radius * self.base_radius + foot_along * foot_along).sqrt();
+        if radius >= self.junction_radius {
+            // Normal into the space: -(sin a e_rho + cos a e_theta), a the pressure angle at rho.
+            let (sin, cos) = (along / rho, self.base_radius / rho);
+            let (ex, ey) = (p[0] / rho, p[1] / rho);
+            let normal = [-(sin * ex - cos * ey), -(sin * ey + cos * ex)];
+            let tangent = [cos * ex + sin * ey, cos * ey - sin * ex];
+            Foot {
+                distance,
+                normal,
+                tangent,
+                radius,
+                radius_rate: self.base_radius / radius,
+                arc: 0.5 * foot_along * foot_along / self.base_radius,
+            }
+        } else {
+            let arm = [p[0] - self.rounding_centre[0], p[1] - self.rounding_centre[1]];
+            let length = arm[0].hypot(arm[1]).max(1e-12);
+            let normal = [arm[0] / length, arm[1] / length];
+            let tangent = [-normal[1], normal[0]];
+            let foot = [
+                self.rounding_centre[0] + self.rounding_radius * normal[0],
+                self.rounding_centre[1] + self.rounding_radius * normal[1],
+            ];
+            let radius = foot[0].hypot(foot[1]);
+            let radius_rate = (foot[0] * tangent[0] + foot[1] * tangent[1]) / radius;
+            // The tangent follows on from that of the involute, which grows in radius.
+            let (tangent, radius_rate) =
+                if radius_rate < 0.0 { (tangent.map(|x| -x), -radius_rate) } else { (tangent, radius_rate) };
+            let junction = self.junction_radius * self.junction_radius - self.base_radius * self.base_radius;
+            let start = self.junction_normal();
+            let turned = (start[0] * normal[1] - start[1] * normal[0]).abs().asin();
+            let arc = 0.5 * junction / self.base_radius - self.rounding_radius * turned;
+            Foot { distance: length - self.rounding_radius, normal, tangent, radius, radius_rate, arc }
+        }
+    }
+}
+
+/// inv a = tan a - a with cos a = 1 / ratio.
+fn involute_function(ratio: f64) -> f64 {
+    let tan = (ratio * ratio - 1.0).max(0.0).sqrt();
+    tan - tan.atan()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drive::Drive;
+
+    fn space() -> (InvoluteFlank, ToothFlank) {
+        let wheel = Drive::hhd_95().circular_spline;
+        let outline = ToothFlank::internal(&wheel).unwrap();
+        (InvoluteFlank::new(&outline, wheel.base_radius_mm()), outline)
+    }
+
+    #[test]
+    fn distance_along_a_normal_is_exact() {
+        let (flank, outline) = space();
+        for kind in [PieceKind::Involute, PieceKind::TipRounding] {
+            let piece = outline.piece(kind);
+            for t in [0.02, 0.3, 0.7, 0.98] {
+                for d in [-0.01, 0.0, 0.004, 0.05] {
+                    let (p, n) = (piece.point(t), piece.normal(t));
+                    let foot = flank.foot_internal([p[0] + d * n[0], p[1] + d * n[1]]);
+                    assert!((foot.distance - d).abs() < 1e-12, "{kind:?} {t} {d}: {}", foot.distance);
+                    assert!((foot.normal[0] - n[0]).abs() + (foot.normal[1] - n[1]).abs() < 1e-12);
+                    assert!((foot.radius - p[0].hypot(p[1])).abs() < 1e-12);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn normal_is_the_gradient_and_continuous_round_the_tip() {
+        let (flank, _) = space();
+        let h = 1e-6;
+        for r in [48.64, 48.66, 48.9, 49.3] {
+            let p = [r, r * (flank.half_angle(r) - 3e-4)];
+            let foot = flank.foot_internal(p);
+            let slope = |dx: f64, dy: f64| {
+                (flank.foot_internal([p[0] + dx, p[1] + dy]).distance
+                    - flank.foot_internal([p[0] - dx, p[1] - dy]).distance)
+                    / (2.0 * h)
+            };
+            assert!((slope(h, 0.0) - foot.normal[0]).abs() < 1e-6, "at {r}");
+            assert!((slope(0.0, h) - foot.normal[1]).abs() < 1e-6, "at {r}");
+            assert!((foot.normal[0] * foot.tangent[0] + foot.normal[1] * foot.tangent[1]).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn rounding_meets_flank_and_tip_circle() {
+        let drive = Drive::hhd_95();
+        let (space, _) = space();
+        let tooth = ToothFlank::external(&drive.flexspline).unwrap();
+        let tooth = InvoluteFlank::new(&tooth, drive.flexspline.base_radius_mm());
+        for (flank, tip) in [(space, drive.circular_spline.tip_radius_mm), (tooth, drive.flexspline.tip_radius_mm)] {
+            let start = flank.rounding_point(0.0);
+            let junction = flank.point(flank.junction_radius);
+            assert!((start[0] - junction[0]).abs() + (start[1] - junction[1]).abs() < 1e-12);
+            let end = flank.rounding_point(flank.rounding_sweep);
+            assert!((end[0].hypot(end[1]) - tip).abs() < 1e-10, "{} {tip}", end[0].hypot(end[1]));
+        }
+    }
+}

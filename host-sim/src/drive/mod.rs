@@ -1,0 +1,35 @@
+//! The drive: what `drive.toml` says, the tooth outlines, and the wave generators.
+//!
+//! Lengths are mm, forces N, stresses MPa, angles rad; a field in another unit says so in its name. The flexspline is
+//! fixed and the circular spline is the output (two waves, ratio `+z_c / (z_c - z_f)`).
+//!
+//! Frames:
+//! * the **generator frame** has the major axis along +x;
+//! * the **tooth frame** has the axis of the flexspline tooth, or of the circular-spline *space*, along +x;
+//! * at output zero and generator angle zero all of them coincide: flexspline tooth 0 stands in circular-spline
+//!   space 0 on the major axis.
+//!
+//! Angles count counter-clockwise.
+
+mod error;
+mod fields;
+mod file;
+mod generator;
+mod interference;
+mod involute;
+mod neutral;
+mod ring;
+mod spec;
+mod tooth;
+
+pub use error::{DriveError, Problem};
+pub use generator::{GeneratorOutline, OutlineFoot};
+pub use interference::{FlankGap, MeshReport, RigidMesh, Side};
+pub use involute::{Foot, InvoluteFlank};
+pub use neutral::NeutralCurve;
+pub use ring::{GeneratorKind, RingShape, UnknownGenerator};
+pub use spec::{
+    CircularSpline, Drive, Flanks, Flexspline, Generators, Material, OutputLoadPath, Sleeve,
+    Temperature, ThermalState,
+};
+pub use tooth::{OutlinePiece, PieceKind, ToothFlank};

@@ -1,0 +1,298 @@
+//! Shape of a thin inextensible ring under each wave generator, to first order in the deflection `w0`.
+//!
+//! With `phi` the angle from the major axis, `w` the radial displacement (outward +) and `v` the circumferential one
+//! (with `phi` +): `v' = -w` (inextensible), the mean of `w` over a quarter is zero, `w(0) = w0`. Both are given on
+//! `0..pi/2` and continue with period pi, `w` even and `v` odd. The rollers and the ends of the disc arc are
+//! concentrated radial forces, where `w'''` jumps; `w''` is continuous everywhere.
+//!
+//! Source: inextensional bending of a thin curved bar with circular axis, S. Timoshenko and J. Gere, *Theory of Elastic
+//! Stability*, ch. 7, solved for the loads of each generator; `crate::reference` adds forces and moments and tests both.
+
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::{fmt, str::FromStr};
+
+/// The four wave generators of the paper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GeneratorKind {
+    /// Two rollers on the major axis.
+    TwoRoller,
+    /// Four rollers, two on each side of the major axis.
+    FourRoller,
+    /// Two discs set off along the major axis, in one plane in this two-dimensional model.
+    DoubleDisc,
+    /// A cam whose neutral curve is `R + w0 cos 2 phi`, at constant length.
+    Cam,
+}
+
+impl GeneratorKind {
+    /// All of them, in the paper's order.
+    pub const ALL: [GeneratorKind; 4] = [
+        Self::TwoRoller,
+        Self::FourRoller,
+        Self::DoubleDisc,
+        Self::Cam,
+    ];
+
+    /// The name used on the command line and in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::TwoRoller => "two-roller",
+            Self::FourRoller => "four-roller",
+            Self::DoubleDisc => "double-disc",
+            Self::Cam => "cam",
+        }
+    }
+}
+
+impl fmt::Display for GeneratorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A generator name that is none of the four.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("generator {0:?} is not known; allowed: two-roller, four-roller, double-disc, cam")]
+pub struct UnknownGenerator(String);
+
+impl FromStr for GeneratorKind {
+    type Err = UnknownGenerator;
+
+    fn from_str(name: &str) -> Result<Self, UnknownGenerator> {
+        Self::ALL
+            .into_iter()
+            .find(|kind| kind.name() == name)
+            .ok_or_else(|| UnknownGenerator(name.to_owned()))
+    }
+}
+
+/// Deformation of the neutral layer under one generator, first order in `w0`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RingShape {
+    amplitude: f64,
+    form: Form,
+}
+
+/// Coefficients of the closed forms for `w0 = 1`.
+#[derive(Debug, Clone, PartialEq)]
+enum Form {
+    /// `w = cos 2 phi`
+    Cam,
+    /// `w = C (A cos phi + sin b phi sin phi - 4/pi)` below the roller angle `b`,
+    /// `w = C (B sin phi + cos b x cos phi - 4/pi)` above, `x = pi/2 - phi`. Two rollers are `b = 0`.
+    Rollers {
+        b: f64,
+        a_cos: f64,
+        b_sin: f64,
+        c: f64,
+    },
+    /// `w = (1 - e) + e cos phi` on the arc below `g`, `w = a + B sin phi + D x cos phi` above.
+    Disc {
+        g: f64,
+        e: f64,
+        a: f64,
+        b_sin: f64,
+        d: f64,
+    },
+}
+
+impl RingShape {
+    /// The cam `w0 cos 2 phi`.
+    pub fn cam(w0_mm: f64) -> Self {
+        RingShape {
+            amplitude: w0_mm,
+            form: Form::Cam,
+        }
+    }
+
+    /// Two opposite rollers.
+    pub fn two_roller(w0_mm: f64) -> Self {
+        Self::four_roller(w0_mm, 0.0)
+    }
+
+    /// Four rollers with equal forces at `± angle_rad` from either end of the major axis (below 0.7 rad: near 41° the
+    /// major axis stops moving).
+    pub fn four_roller(w0_mm: f64, angle_rad: f64) -> Self {
+        let b = angle_rad;
+        let a_cos = b.sin() + (FRAC_PI_2 - b) * b.cos();
+        let b_sin = b.cos() + b * b.sin();
+        RingShape {
+            amplitude: w0_mm,
+            form: Form::Rollers {
+                b,
+                a_cos,
+                b_sin,
+                c: 1.0 / (a_cos - 4.0 / PI),
+            },
+        }
+    }
+
+    /// Two discs, each touching over `± half_angle_rad`.
+    pub fn double_disc(w0_mm: f64, half_angle_rad: f64) -> Self {
+        let g = half_angle_rad;
+        let (s, k) = g.sin_cos();
+        let den =
+            8.0 * g * s + 2.0 * PI * g - 4.0 * PI * s + PI * (2.0 * g).sin() + 8.0 * k - PI * PI;
+        let e = PI * (2.0 * g + (2.0 * g).sin() - PI) / den;
+        let a = 8.0 * (g * s + k) / den;
+        let b_sin = 2.0 * PI * (k * k - 2.0) / den;
+        RingShape {
+            amplitude: w0_mm,
+            form: Form::Disc {
+                g,
+                e,
+                a,
+                b_sin,
+                d: -2.0 * PI / den,
+            },
+        }
+    }
+
+    /// The deflection `w0` on the major axis, mm.
+    pub fn w0_mm(&self) -> f64 {
+        self.amplitude
+    }
+
+    /// Angle in `0..pi/2` where the closed form changes; 0 where it does not.
+    pub fn break_angle(&self) -> f64 {
+        match self.form {
+            Form::Cam => 0.0,
+            Form::Rollers { b, .. } => b,
+            Form::Disc { g, .. } => g,
+        }
+    }
+
+    /// First-order eccentricity of a disc over `w0`; `None` for the other generators.
+    pub fn disc_eccentricity_ratio(&self) -> Option<f64> {
+        match self.form {
+            Form::Disc { e, .. } => Some(e),
+            _ => None,
+        }
+    }
+
+    /// `[w, w', w'']` at `phi`, mm and mm/rad.
+    pub fn radial(&self, phi: f64) -> [f64; 3] {
+        let (p, sign) = fold(phi);
+        let (s, k) = p.sin_cos();
+        let x = FRAC_PI_2 - p;
+        // the closed forms give w, w' and w + w''
+        let [w, dw, bend] = match self.form {
+            Form::Cam => {
+                let w = (k - s) * (k + s);
+                [w, -4.0 * s * k, -3.0 * w]
+            }
+            Form::Rollers { b, a_cos, c, .. } if p < b => {
+                let sb = b.sin();
+                [
+                    c * (a_cos * k + sb * p * s - 4.0 / PI),
+                    c * (-a_cos * s + sb * (s + p * k)),
+                    c * (2.0 * sb * k - 4.0 / PI),
+                ]
+            }
+            Form::Rollers { b, b_sin, c, .. } => {
+                let kb = b.cos();
+                [
+                    c * (b_sin * s + kb * x * k - 4.0 / PI),
+                    c * (b_sin * k - kb * (k + x * s)),
+                    c * (2.0 * kb * s - 4.0 / PI),
+                ]
+            }
+            Form::Disc { g, e, .. } if p < g => [(1.0 - e) + e * k, -e * s, 1.0 - e],
+            Form::Disc { a, b_sin, d, .. } => [
+                a + b_sin * s + d * x * k,
+                b_sin * k - d * (k + x * s),
+                a + 2.0 * d * s,
+            ],
+        };
+        let w0 = self.amplitude;
+        [w0 * w, w0 * sign * dw, w0 * (bend - w)]
+    }
+
+    /// Radial displacement `w`, mm, outward +.
+    pub fn w(&self, phi: f64) -> f64 {
+        self.radial(phi)[0]
+    }
+
+    /// Circumferential displacement `v`, mm, with `phi` +.
+    pub fn v(&self, phi: f64) -> f64 {
+        let (p, sign) = fold(phi);
+        let (s, k) = p.sin_cos();
+        let x = FRAC_PI_2 - p;
+        let v = match self.form {
+            Form::Cam => -s * k,
+            Form::Rollers { b, a_cos, c, .. } if p < b => {
+                -c * (a_cos * s + b.sin() * (s - p * k) - 4.0 * p / PI)
+            }
+            Form::Rollers { b, b_sin, c, .. } => {
+                c * (b_sin * k + b.cos() * (k - x * s) - 4.0 * x / PI)
+            }
+            Form::Disc { g, e, .. } if p < g => -((1.0 - e) * p + e * s),
+            Form::Disc { a, b_sin, d, .. } => a * x + b_sin * k + d * (k - x * s),
+        };
+        self.amplitude * sign * v
+    }
+
+    /// Rotation of the normal `theta = (v - w') / R`, rad, with `phi` +.
+    pub fn theta(&self, phi: f64, radius_mm: f64) -> f64 {
+        (self.v(phi) - self.radial(phi)[1]) / radius_mm
+    }
+
+    /// `w + w''`, mm; the curvature of the ring grows by `-(w + w'') / R^2`.
+    pub fn bending(&self, phi: f64) -> f64 {
+        let [w, _, ddw] = self.radial(phi);
+        w + ddw
+    }
+}
+
+/// `phi` brought to `0..=pi/2` by the symmetry of the shape, and the sign that odd functions take.
+fn fold(phi: f64) -> (f64, f64) {
+    let p = phi - PI * (phi / PI).round();
+    (p.abs().min(FRAC_PI_2), if p < 0.0 { -1.0 } else { 1.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read_back_and_others_refused() {
+        for kind in GeneratorKind::ALL {
+            assert_eq!(kind.to_string().parse(), Ok(kind));
+        }
+        let message = "roller".parse::<GeneratorKind>().unwrap_err().to_string();
+        assert!(
+            message.contains("\"roller\"") && message.contains("two-roller, four-roller"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn derivatives_agree_with_differences() {
+        let step = 1e-4;
+        for shape in [
+            RingShape::cam(0.5),
+            RingShape::two_roller(0.5),
+            RingShape::four_roller(0.5, 0.5),
+            RingShape::double_disc(0.5, 0.5),
+        ] {
+            for k in 0..200 {
+                let phi = -4.0 + 0.0403 * f64::from(k);
+                let [_, dw, ddw] = shape.radial(phi);
+                let slope = (shape.w(phi + step) - shape.w(phi - step)) / (2.0 * step);
+                assert!(
+                    (slope - dw).abs() < 1e-7,
+                    "{shape:?} w' at {phi}: {dw}, difference {slope}"
+                );
+                let slope =
+                    (shape.radial(phi + step)[1] - shape.radial(phi - step)[1]) / (2.0 * step);
+                // the rollers' w'' has a kink
+                assert!(
+                    (slope - ddw).abs() < 1e-3,
+                    "{shape:?} w'' at {phi}: {ddw}, difference {slope}"
+                );
+            }
+        }
+    }
+}

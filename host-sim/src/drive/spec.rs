@@ -1,0 +1,725 @@
+//! The drive as a value: every number of `drive.toml`, the built-in drives, derived sizes, temperature.
+
+use super::error::{DriveError, Problem};
+use super::fields;
+use super::generator::GeneratorOutline;
+use super::ring::GeneratorKind;
+use super::tooth::ToothFlank;
+use serde::Serialize;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// A harmonic drive: flexspline fixed, circular spline the output, two waves.
+///
+/// The nominal drive, without manufacturing errors. Field names are the keys of the file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Drive {
+    /// A label for reports; no part of the physics.
+    pub name: String,
+    /// The flexible, external wheel, fixed to the housing.
+    pub flexspline: Flexspline,
+    /// The stiff, internal wheel, the output.
+    pub circular_spline: CircularSpline,
+    /// Steel of both wheels.
+    pub material: Material,
+    /// Sizes of the four generators that this drive may have.
+    pub generator: Generators,
+    /// Between circular spline and load.
+    pub output: OutputLoadPath,
+    /// Between the toothed rim of the flexspline and its flange.
+    pub sleeve: Sleeve,
+    /// Contact between the flanks.
+    pub flanks: Flanks,
+    /// How sizes and stiffness follow the temperature.
+    pub temperature: Temperature,
+    /// The temperature the sizes above are given for; reference temperature unless [`Drive::at_temperature`] made it.
+    #[serde(skip)]
+    pub thermal_state: ThermalState,
+}
+
+/// The toothed rim of the flexspline, undeformed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Flexspline {
+    /// Number of teeth, even.
+    pub teeth: u32,
+    /// Module, mm.
+    pub module_mm: f64,
+    /// Pressure angle of the basic rack, degrees.
+    pub pressure_angle_deg: f64,
+    /// Profile shift, in modules.
+    pub profile_shift: f64,
+    /// Radius of the root circle, mm.
+    pub root_radius_mm: f64,
+    /// Radius of the tip circle, mm.
+    pub tip_radius_mm: f64,
+    /// Rim under the root circle, mm.
+    pub rim_thickness_mm: f64,
+    /// Face width, mm; the plane-strain model carries torque over it.
+    pub width_mm: f64,
+    /// Radius of the root fillet, mm.
+    pub root_fillet_mm: f64,
+    /// Radius of the tip rounding, mm.
+    pub tip_rounding_mm: f64,
+}
+
+/// The circular spline; profile shift and half-thickness law describe its spaces.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CircularSpline {
+    /// Number of teeth: two more than the flexspline.
+    pub teeth: u32,
+    /// Module, mm.
+    pub module_mm: f64,
+    /// Pressure angle of the basic rack, degrees.
+    pub pressure_angle_deg: f64,
+    /// Profile shift of the space, in modules.
+    pub profile_shift: f64,
+    /// Radius of the root circle, mm (outside the tip circle).
+    pub root_radius_mm: f64,
+    /// Radius of the tip circle, mm.
+    pub tip_radius_mm: f64,
+    /// Outer radius of the ring, mm, where the output holds it.
+    pub outer_radius_mm: f64,
+    /// Radius of the root fillet, mm.
+    pub root_fillet_mm: f64,
+    /// Radius of the tip rounding, mm.
+    pub tip_rounding_mm: f64,
+}
+
+/// Linear elastic steel at reference temperature.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Material {
+    /// Young's modulus, MPa.
+    pub youngs_modulus_mpa: f64,
+    /// Poisson's ratio.
+    pub poissons_ratio: f64,
+    /// Density, kg/m³.
+    pub density_kg_m3: f64,
+}
+
+/// Sizes of the wave generators, at reference temperature.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Generators {
+    /// Radial displacement of the neutral layer on the major axis, mm.
+    pub w0_mm: f64,
+    /// Diameter of each roller, mm (two-roller and four-roller).
+    pub roller_diameter_mm: f64,
+    /// Angle of each of the four rollers from the major axis, degrees, in undeformed material.
+    pub four_roller_angle_deg: f64,
+    /// Half the angle over which a disc touches, degrees.
+    pub disc_half_angle_deg: f64,
+    /// Pressure per approach of the generator's bearing, N/mm³; `None` is rigid.
+    pub bearing_stiffness_n_per_mm3: Option<f64>,
+}
+
+/// The output side.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OutputLoadPath {
+    /// Coulomb drag on the circular spline, N·m, against its motion.
+    pub drag_torque_n_m: f64,
+}
+
+/// The sleeve of the flexspline, as springs on its rim.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sleeve {
+    /// Torsional stiffness from rim to flange, N·m/rad; `None` is rigid.
+    pub torsion_stiffness_n_m_per_rad: Option<f64>,
+    /// Lateral stiffness from rim to flange, N/mm; 0 leaves the rim to the generator.
+    pub lateral_stiffness_n_per_mm: f64,
+}
+
+/// Contact between the flanks.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Flanks {
+    /// Coulomb friction coefficient.
+    pub friction_coefficient: f64,
+}
+
+/// How sizes and stiffness follow the temperature.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Temperature {
+    /// Temperature at which the sizes hold, °C.
+    pub reference_c: f64,
+    /// Lowest operating temperature, °C.
+    pub minimum_c: f64,
+    /// Highest operating temperature, °C.
+    pub maximum_c: f64,
+    /// Linear expansion of the flexspline, 1/K.
+    pub flexspline_expansion_per_k: f64,
+    /// Linear expansion of the circular spline, 1/K.
+    pub circular_spline_expansion_per_k: f64,
+    /// Linear expansion of the generator, 1/K.
+    pub generator_expansion_per_k: f64,
+    /// Linear expansion of the part that holds the circular spline, 1/K.
+    pub housing_expansion_per_k: f64,
+    /// Relative change of Young's modulus, 1/K.
+    pub youngs_modulus_per_k: f64,
+}
+
+/// Where a drive stands against its own reference temperature: size now over size there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ThermalState {
+    /// Temperature minus reference temperature, K.
+    pub above_reference_k: f64,
+    /// Of the flexspline.
+    pub flexspline_scale: f64,
+    /// Of the circular spline, if nothing held it.
+    pub circular_spline_scale: f64,
+    /// Of the generator.
+    pub generator_scale: f64,
+    /// Of the seat that holds the circular spline at its outer radius.
+    pub housing_scale: f64,
+}
+
+impl Default for ThermalState {
+    fn default() -> Self {
+        ThermalState {
+            above_reference_k: 0.0,
+            flexspline_scale: 1.0,
+            circular_spline_scale: 1.0,
+            generator_scale: 1.0,
+            housing_scale: 1.0,
+        }
+    }
+}
+
+impl Flexspline {
+    /// Pressure angle of the basic rack, rad.
+    pub fn pressure_angle_rad(&self) -> f64 {
+        self.pressure_angle_deg.to_radians()
+    }
+
+    /// Radius of the pitch circle, mm.
+    pub fn pitch_radius_mm(&self) -> f64 {
+        0.5 * self.module_mm * f64::from(self.teeth)
+    }
+
+    /// Radius of the base circle, mm.
+    pub fn base_radius_mm(&self) -> f64 {
+        self.pitch_radius_mm() * self.pressure_angle_rad().cos()
+    }
+
+    /// Radius of the bore, mm.
+    pub fn bore_radius_mm(&self) -> f64 {
+        self.root_radius_mm - self.rim_thickness_mm
+    }
+
+    /// Radius `R` of the neutral layer, in the middle of the rim, mm.
+    pub fn neutral_radius_mm(&self) -> f64 {
+        self.root_radius_mm - 0.5 * self.rim_thickness_mm
+    }
+}
+
+impl CircularSpline {
+    /// Pressure angle of the basic rack, rad.
+    pub fn pressure_angle_rad(&self) -> f64 {
+        self.pressure_angle_deg.to_radians()
+    }
+
+    /// Radius of the pitch circle, mm.
+    pub fn pitch_radius_mm(&self) -> f64 {
+        0.5 * self.module_mm * f64::from(self.teeth)
+    }
+
+    /// Radius of the base circle, mm.
+    pub fn base_radius_mm(&self) -> f64 {
+        self.pitch_radius_mm() * self.pressure_angle_rad().cos()
+    }
+}
+
+impl Material {
+    /// Shear modulus, MPa.
+    pub fn shear_modulus_mpa(&self) -> f64 {
+        self.youngs_modulus_mpa / (2.0 * (1.0 + self.poissons_ratio))
+    }
+
+    /// Modulus of a wide plate in bending, `E / (1 - nu²)`, MPa.
+    pub fn plane_strain_modulus_mpa(&self) -> f64 {
+        self.youngs_modulus_mpa / (1.0 - self.poissons_ratio * self.poissons_ratio)
+    }
+}
+
+impl Drive {
+    /// Names of the built-in drives.
+    pub const BUILT_IN: [&'static str; 2] = ["HHD-95", "HHD-95-typical"];
+
+    /// The default drive: ratio 95, module 0.5 mm, ideal geometry, no friction, rigid sleeve and generator bearing.
+    ///
+    /// The tooth shifts are the textbook 20° rack with a large positive shift on both wheels; the circular-spline
+    /// shift sets the clearance so that the rigid backlash of the cam is near one arc-minute, and no tooth of either
+    /// wheel interferes under any of the four generators.
+    pub fn hhd_95() -> Drive {
+        Drive {
+            name: "HHD-95".to_owned(),
+            flexspline: Flexspline {
+                teeth: 188,
+                module_mm: 0.5,
+                pressure_angle_deg: 20.0,
+                profile_shift: 3.0,
+                root_radius_mm: 47.875,
+                tip_radius_mm: 48.825,
+                rim_thickness_mm: 1.2,
+                width_mm: 20.0,
+                root_fillet_mm: 0.12,
+                tip_rounding_mm: 0.03,
+            },
+            circular_spline: CircularSpline {
+                teeth: 190,
+                module_mm: 0.5,
+                pressure_angle_deg: 20.0,
+                profile_shift: 3.034,
+                root_radius_mm: 49.45,
+                tip_radius_mm: 48.65,
+                outer_radius_mm: 53.5,
+                root_fillet_mm: 0.08,
+                tip_rounding_mm: 0.03,
+            },
+            material: Material {
+                youngs_modulus_mpa: 206_000.0,
+                poissons_ratio: 0.3,
+                density_kg_m3: 7850.0,
+            },
+            generator: Generators {
+                w0_mm: 0.5,
+                roller_diameter_mm: 26.0,
+                four_roller_angle_deg: 30.0,
+                disc_half_angle_deg: 30.0,
+                bearing_stiffness_n_per_mm3: None,
+            },
+            output: OutputLoadPath {
+                drag_torque_n_m: 0.02,
+            },
+            sleeve: Sleeve {
+                torsion_stiffness_n_m_per_rad: None,
+                lateral_stiffness_n_per_mm: 0.0,
+            },
+            flanks: Flanks {
+                friction_coefficient: 0.0,
+            },
+            temperature: Temperature {
+                reference_c: 20.0,
+                minimum_c: -60.0,
+                maximum_c: 80.0,
+                flexspline_expansion_per_k: 11.5e-6,
+                circular_spline_expansion_per_k: 11.5e-6,
+                generator_expansion_per_k: 11.5e-6,
+                housing_expansion_per_k: 11.5e-6,
+                youngs_modulus_per_k: -3.0e-4,
+            },
+            thermal_state: ThermalState::default(),
+        }
+    }
+
+    /// [`Drive::hhd_95`] with friction and the compliances of a real one.
+    ///
+    /// * friction 0.08: greased steel, boundary lubrication;
+    /// * sleeve: thin tube, `2 pi G R³ t / L` with wall 0.7 mm and length 80 mm, 4.6e5 N·m/rad;
+    /// * generator bearing: an estimate. 23 balls of 7.1 mm at about 300 N each approach by Palmgren's
+    ///   `4.36e-4 (Q²/D)^(1/3)` mm = 10 µm, a tangent stiffness `1.5 Q / approach` of 4.4e4 N/mm a ball, which over
+    ///   the 12.8 mm of bore and 20 mm of width of each ball is 170 N/mm³;
+    /// * output drag 0.5 N·m: seals and output bearing.
+    pub fn hhd_95_typical() -> Drive {
+        let mut drive = Drive::hhd_95();
+        let (wall_mm, length_mm) = (0.7, 80.0);
+        let torsion_n_mm = 2.0
+            * PI
+            * drive.material.shear_modulus_mpa()
+            * drive.flexspline.neutral_radius_mm().powi(3)
+            * wall_mm
+            / length_mm;
+        drive.name = "HHD-95-typical".to_owned();
+        drive.flanks.friction_coefficient = 0.08;
+        drive.sleeve.torsion_stiffness_n_m_per_rad = Some((torsion_n_mm * 1e-3).round());
+        drive.generator.bearing_stiffness_n_per_mm3 = Some(170.0);
+        drive.output.drag_torque_n_m = 0.5;
+        drive
+    }
+
+    /// The built-in drive of that name, if there is one.
+    pub fn built_in(name: &str) -> Option<Drive> {
+        match name {
+            "HHD-95" => Some(Drive::hhd_95()),
+            "HHD-95-typical" => Some(Drive::hhd_95_typical()),
+            _ => None,
+        }
+    }
+
+    /// Signed ratio generator / output, `+z_c / (z_c - z_f)`: the output turns the same way as the generator.
+    pub fn ratio(&self) -> f64 {
+        let (zf, zc) = (
+            f64::from(self.flexspline.teeth),
+            f64::from(self.circular_spline.teeth),
+        );
+        zc / (zc - zf)
+    }
+
+    /// The drive at another temperature (uniform): every length of a wheel times `1 + expansion * dT` of that wheel,
+    /// Young's modulus times `1 + coefficient * dT`. The `generator` table stays as made; its outline is expanded
+    /// by [`ThermalState::generator_scale`], and the seat of the circular spline by [`ThermalState::housing_scale`].
+    /// `self` must be at reference temperature or made by this function; either way the result is for `temperature_c`.
+    pub fn at_temperature(&self, temperature_c: f64) -> Drive {
+        let mut drive = self.clone();
+        let t = &self.temperature;
+        let rise = temperature_c - t.reference_c;
+        let old = self.thermal_state;
+        let new = ThermalState {
+            above_reference_k: rise,
+            flexspline_scale: 1.0 + t.flexspline_expansion_per_k * rise,
+            circular_spline_scale: 1.0 + t.circular_spline_expansion_per_k * rise,
+            generator_scale: 1.0 + t.generator_expansion_per_k * rise,
+            housing_scale: 1.0 + t.housing_expansion_per_k * rise,
+        };
+        let f = &mut drive.flexspline;
+        for length in [
+            &mut f.module_mm,
+            &mut f.root_radius_mm,
+            &mut f.tip_radius_mm,
+            &mut f.rim_thickness_mm,
+            &mut f.width_mm,
+            &mut f.root_fillet_mm,
+            &mut f.tip_rounding_mm,
+        ] {
+            *length *= new.flexspline_scale / old.flexspline_scale;
+        }
+        let c = &mut drive.circular_spline;
+        for length in [
+            &mut c.module_mm,
+            &mut c.root_radius_mm,
+            &mut c.tip_radius_mm,
+            &mut c.outer_radius_mm,
+            &mut c.root_fillet_mm,
+            &mut c.tip_rounding_mm,
+        ] {
+            *length *= new.circular_spline_scale / old.circular_spline_scale;
+        }
+        drive.material.youngs_modulus_mpa *= (1.0 + t.youngs_modulus_per_k * rise)
+            / (1.0 + t.youngs_modulus_per_k * old.above_reference_k);
+        drive.thermal_state = new;
+        drive
+    }
+
+    /// BLAKE3 of the physics: every field and the thermal state, in a fixed order and binary form. The name and the
+    /// formatting of the file take no part.
+    pub fn hash(&self) -> [u8; 32] {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(b"flexspline drive 1\n");
+        fields::for_each(self, |field, value| {
+            hasher.update(field.path.as_bytes());
+            match value {
+                // zero has one sign
+                Some(number) => hasher.update(b"=").update(&(number + 0.0).to_le_bytes()),
+                None => hasher.update(b" rigid"),
+            };
+            hasher.update(b"\n");
+        });
+        let t = &self.thermal_state;
+        hasher.update(&t.above_reference_k.to_le_bytes());
+        *hasher.finalize().as_bytes()
+    }
+
+    /// Ranges of every field, then whether the parts fit one another. Every problem is reported, but parts are only
+    /// fitted when all ranges hold.
+    pub fn check(&self) -> Result<(), DriveError> {
+        let mut problems = Vec::new();
+        fields::for_each(self, |field, value| {
+            if let Some(number) = value
+                && let Some(what) = field.range.refusal(number)
+            {
+                problems.push(Problem::of(field.path, what));
+            }
+        });
+        if problems.is_empty() {
+            self.fit(&mut problems);
+        }
+        if problems.is_empty() {
+            Ok(())
+        } else {
+            Err(DriveError { problems })
+        }
+    }
+
+    /// The consistency of the parts, each finding with the field to change.
+    fn fit(&self, problems: &mut Vec<Problem>) {
+        let (f, c, g, t) = (
+            &self.flexspline,
+            &self.circular_spline,
+            &self.generator,
+            &self.temperature,
+        );
+        let mut require = |holds: bool, field: &str, what: String| {
+            if !holds {
+                problems.push(Problem::of(field, what));
+            }
+            holds
+        };
+        require(
+            f.teeth % 2 == 0,
+            "flexspline.teeth",
+            format!("found {}, allowed: an even number (two waves)", f.teeth),
+        );
+        require(
+            c.teeth == f.teeth + 2,
+            "circular_spline.teeth",
+            format!(
+                "found {}, allowed: {}, two more than the flexspline (two waves)",
+                c.teeth,
+                f.teeth + 2
+            ),
+        );
+        require(
+            (c.module_mm / f.module_mm - 1.0).abs() <= 0.01,
+            "circular_spline.module_mm",
+            format!(
+                "found {}, allowed: within 1 % of the flexspline's {}",
+                c.module_mm, f.module_mm
+            ),
+        );
+        require(
+            t.minimum_c < t.maximum_c,
+            "temperature.minimum_c",
+            format!(
+                "found {}, allowed: below maximum_c = {}",
+                t.minimum_c, t.maximum_c
+            ),
+        );
+        require(
+            t.minimum_c <= t.reference_c && t.reference_c <= t.maximum_c,
+            "temperature.reference_c",
+            format!(
+                "found {}, allowed: {} to {}, the operating range",
+                t.reference_c, t.minimum_c, t.maximum_c
+            ),
+        );
+        let mut radii = require(
+            f.root_radius_mm < f.tip_radius_mm,
+            "flexspline.tip_radius_mm",
+            format!(
+                "found {}, allowed: above root_radius_mm = {}",
+                f.tip_radius_mm, f.root_radius_mm
+            ),
+        );
+        radii &= require(
+            f.rim_thickness_mm <= 0.2 * f.root_radius_mm,
+            "flexspline.rim_thickness_mm",
+            format!(
+                "found {}, allowed: up to {} (a fifth of root_radius_mm: a thin ring)",
+                f.rim_thickness_mm,
+                0.2 * f.root_radius_mm
+            ),
+        );
+        radii &= require(
+            c.tip_radius_mm < c.root_radius_mm,
+            "circular_spline.tip_radius_mm",
+            format!(
+                "found {}, allowed: below root_radius_mm = {}",
+                c.tip_radius_mm, c.root_radius_mm
+            ),
+        );
+        radii &= require(
+            c.outer_radius_mm - c.root_radius_mm >= c.module_mm,
+            "circular_spline.outer_radius_mm",
+            format!(
+                "found {}, allowed: at least {} (root_radius_mm and one module)",
+                c.outer_radius_mm,
+                c.root_radius_mm + c.module_mm
+            ),
+        );
+        if !radii {
+            return;
+        }
+        require(
+            g.w0_mm <= 0.05 * f.neutral_radius_mm(),
+            "generator.w0_mm",
+            format!(
+                "found {}, allowed: up to {:.4} (a twentieth of the neutral radius)",
+                g.w0_mm,
+                0.05 * f.neutral_radius_mm()
+            ),
+        );
+        require(
+            f.tip_radius_mm + g.w0_mm < c.root_radius_mm,
+            "flexspline.tip_radius_mm",
+            format!(
+                "found {}: with w0_mm = {} the tip would stand in the circular-spline root at the major axis; allowed: below {:.4}",
+                f.tip_radius_mm,
+                g.w0_mm,
+                c.root_radius_mm - g.w0_mm
+            ),
+        );
+        require(
+            f.root_radius_mm + g.w0_mm < c.tip_radius_mm,
+            "circular_spline.tip_radius_mm",
+            format!(
+                "found {}: with w0_mm = {} the tip would stand in the flexspline root at the major axis; allowed: above {:.4}",
+                c.tip_radius_mm,
+                g.w0_mm,
+                f.root_radius_mm + g.w0_mm
+            ),
+        );
+        for kind in GeneratorKind::ALL {
+            let minor = f.tip_radius_mm + g.shape(kind).w(FRAC_PI_2);
+            require(
+                minor < c.tip_radius_mm,
+                "generator.w0_mm",
+                format!(
+                    "found {}: with the {kind} generator the tips meet at the minor axis (flexspline tip at {minor:.4} mm, \
+                     circular-spline tip at {} mm); allowed: a larger w0_mm or lower tips",
+                    g.w0_mm, c.tip_radius_mm
+                ),
+            );
+        }
+        for refused in [ToothFlank::external(f).err(), ToothFlank::internal(c).err()]
+            .into_iter()
+            .flatten()
+        {
+            problems.extend(refused.problems);
+        }
+        for kind in GeneratorKind::ALL {
+            if let Err(refused) = GeneratorOutline::new(self, kind) {
+                problems.extend(refused.problems);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::interference::RigidMesh;
+    use super::*;
+
+    #[test]
+    fn built_in_drives_are_sound_and_have_the_sizes_they_say() {
+        for name in Drive::BUILT_IN {
+            let drive = Drive::built_in(name).unwrap();
+            assert_eq!(drive.name, name);
+            assert_eq!(drive.check(), Ok(()));
+            assert_eq!(drive.ratio(), 95.0);
+            let f = &drive.flexspline;
+            assert!(
+                (f.neutral_radius_mm() - 47.275).abs() < 1e-12
+                    && (f.bore_radius_mm() - 46.675).abs() < 1e-12
+            );
+        }
+        assert_eq!(Drive::built_in("hhd"), None);
+        let typical = Drive::hhd_95_typical();
+        let torsion = typical.sleeve.torsion_stiffness_n_m_per_rad.unwrap();
+        assert!((torsion - 4.6e5).abs() < 2e3, "{torsion}");
+        assert!((typical.material.shear_modulus_mpa() - 79_000.0).abs() < 500.0);
+        assert!(
+            (typical.material.plane_strain_modulus_mpa() / 206_000.0 - 1.0 / 0.91).abs() < 1e-12
+        );
+    }
+
+    #[test]
+    fn warming_scales_each_member_by_its_own_expansion() {
+        let mut drive = Drive::hhd_95();
+        drive.temperature.flexspline_expansion_per_k = 1.0e-5;
+        drive.temperature.circular_spline_expansion_per_k = 2.0e-5;
+        let warm = drive.at_temperature(70.0);
+        assert!((warm.flexspline.root_radius_mm / 47.875 - 1.0005).abs() < 1e-12);
+        assert!(
+            (warm.flexspline.base_radius_mm() / drive.flexspline.base_radius_mm() - 1.0005).abs()
+                < 1e-12
+        );
+        assert!((warm.circular_spline.tip_radius_mm / 48.65 - 1.001).abs() < 1e-12);
+        assert!((warm.circular_spline.tip_rounding_mm / 0.03 - 1.001).abs() < 1e-12);
+        assert!((warm.material.youngs_modulus_mpa / 206_000.0 - 0.985).abs() < 1e-12);
+        assert_eq!(warm.generator, drive.generator);
+        // angles and counts stay, and so does the shape of a flank
+        assert_eq!(warm.flexspline.pressure_angle_deg, 20.0);
+        let length = |drive: &Drive| ToothFlank::external(&drive.flexspline).unwrap().length();
+        assert!((length(&warm) / length(&drive) - 1.0005).abs() < 1e-12);
+        assert_eq!(warm.check(), Ok(()));
+        // from one temperature to another is the same as from the reference
+        let again = warm.at_temperature(-40.0);
+        let direct = drive.at_temperature(-40.0);
+        assert_eq!(again.thermal_state, direct.thermal_state);
+        assert!((again.flexspline.tip_radius_mm - direct.flexspline.tip_radius_mm).abs() < 1e-12);
+        assert!(
+            (again.material.youngs_modulus_mpa - direct.material.youngs_modulus_mpa).abs() < 1e-8
+        );
+        assert_eq!(drive.at_temperature(20.0), drive);
+    }
+
+    #[test]
+    fn uniform_warming_of_one_steel_scales_every_outline_alike() {
+        let drive = Drive::hhd_95();
+        let warm_drive = drive.at_temperature(70.0);
+        let s = 1.0 + 11.5e-6 * 50.0;
+        for kind in GeneratorKind::ALL {
+            let cold = GeneratorOutline::new(&drive, kind).unwrap();
+            let warm = GeneratorOutline::new(&warm_drive, kind).unwrap();
+            for p in [[46.9, 3.0], [40.0, 24.0], [-20.0, 41.0]] {
+                let (a, b) = (cold.nearest(p), warm.nearest([p[0] * s, p[1] * s]));
+                assert!(
+                    (a.distance * s - b.distance).abs() < 1e-12,
+                    "{kind}: {} {}",
+                    a.distance,
+                    b.distance
+                );
+                assert!((a.curvature / s - b.curvature).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_drive_made_in_a_program_is_checked_without_a_file() {
+        let mut drive = Drive::hhd_95();
+        drive.flanks.friction_coefficient = f64::NAN;
+        drive.material.poissons_ratio = 0.6;
+        assert_eq!(
+            drive.check().unwrap_err().to_string(),
+            "material.poissons_ratio: found 0.6, allowed: 0 to 0.49\n\
+             flanks.friction_coefficient: found NaN, allowed: 0 to 0.5"
+        );
+    }
+
+    #[test]
+    fn a_temperature_that_moves_only_the_generator_still_changes_the_hash() {
+        let mut drive = Drive::hhd_95();
+        drive.temperature.flexspline_expansion_per_k = 0.0;
+        drive.temperature.circular_spline_expansion_per_k = 0.0;
+        drive.temperature.youngs_modulus_per_k = 0.0;
+        assert_ne!(drive.hash(), drive.at_temperature(50.0).hash());
+    }
+
+    /// Every field at both ends of its range, one at a time: refused with that or a related field named, or a drive whose
+    /// outlines and mesh are finite.
+    #[test]
+    fn the_ends_of_every_range_are_refused_or_work() {
+        let (mut refused, mut sound) = (0, 0);
+        for field in fields::ALL {
+            for end in [field.range.low, field.range.high] {
+                let set = format!("{}={end}", field.path);
+                match Drive::hhd_95().with_set(&set) {
+                    Err(error) => {
+                        refused += 1;
+                        assert!(
+                            error
+                                .problems
+                                .iter()
+                                .all(|problem| !problem.field.is_empty()),
+                            "{error}"
+                        );
+                    }
+                    Ok(drive) => {
+                        sound += 1;
+                        for kind in GeneratorKind::ALL {
+                            let outline = GeneratorOutline::new(&drive, kind).unwrap();
+                            let foot = outline.nearest([46.0, 1.0]);
+                            assert!(
+                                foot.distance.is_finite() && foot.curvature > 0.0,
+                                "{set}: {foot:?}"
+                            );
+                        }
+                        let mesh = RigidMesh::new(&drive, GeneratorKind::Cam).unwrap();
+                        let report = mesh.report(GeneratorKind::Cam).unwrap();
+                        assert!(report.backlash_rad.is_finite(), "{set}: {report:?}");
+                    }
+                }
+            }
+        }
+        assert!(
+            refused > 30 && sound > 20,
+            "{refused} refused, {sound} sound"
+        );
+    }
+}

@@ -1,0 +1,10 @@
+//! Closed forms to hold the simulation against, each with its source and its own tests.
+//!
+//! Used by tests and by the validation; no part of the simulation itself.
+
+mod ring;
+mod tooth_path;
+
+pub use crate::drive::RingShape;
+pub use ring::{ContactLoads, RingBending};
+pub use tooth_path::{PathPoint, ToothPath};
