@@ -1,0 +1,282 @@
+//! Where table node *i* sits. The only definition: the projection, the image check and the control step all call it.
+//!
+//! * Periodic axis, `n` nodes: node *i* sits at *i/n* of a period, for a phase in 2⁻³² of the period.
+//! * Clamped axis: strictly increasing nodes of any spacing; beyond its ends the end value holds. Two nodes may nearly
+//!   coincide to represent a jump between them.
+//!
+//! Curves on a periodic axis are uniform cubic B-splines, `curve(t) = Σ wᵢ(t)·cᵢ` over the four nodes around `t`. The
+//! weights are never negative and add up to one, so a curve stays between its smallest and largest coefficient and its
+//! slope below `n·max|cᵢ₊₁ − cᵢ|` per period: the image check bounds every value a curve can take from its
+//! coefficients alone. They are twice continuously differentiable across nodes and across the wrap. Coefficients are
+//! not curve values: at a node the curve is `(cᵢ₋₁ + 4cᵢ + cᵢ₊₁)/6`.
+//!
+//! Interpolation error for a harmonic with `m` nodes to its period: `(2π/m)⁴/384` of its amplitude (asserted in the
+//! tests): 6.2e-5 for 16 nodes, 1.0e-3 for 8, 1.6e-2 for 4.
+
+/// Most nodes a clamped axis may have.
+pub const MAX_CLAMPED_NODES: usize = 32;
+/// Fewest nodes of a periodic axis that is present: the four a cubic needs.
+pub const MIN_PERIODIC_NODES: usize = 4;
+/// Most nodes of a periodic axis.
+pub const MAX_PERIODIC_NODES: usize = 128;
+
+/// The four nodes around a phase and their weights.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cell {
+    /// Node numbers, in the order of the weights.
+    pub nodes: [usize; 4],
+    /// B-spline weights, each ≥ 0, together 1.
+    pub weights: [f32; 4],
+}
+
+/// Nodes spread evenly over one period.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PeriodicAxis {
+    nodes: u8,
+}
+
+impl PeriodicAxis {
+    /// An axis of `nodes` nodes; `None` unless 0 (absent) or 4 to 128.
+    #[must_use]
+    pub fn new(nodes: usize) -> Option<Self> {
+        let allowed = nodes == 0 || (MIN_PERIODIC_NODES..=MAX_PERIODIC_NODES).contains(&nodes);
+        if allowed {
+            Some(Self { nodes: nodes as u8 })
+        } else {
+            None
+        }
+    }
+
+    /// Number of nodes; 0 for a part that is absent.
+    #[must_use]
+    pub const fn len(self) -> usize {
+        self.nodes as usize
+    }
+
+    /// Whether the part is absent.
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        self.nodes == 0
+    }
+
+    /// Position of node `node` in 2⁻³² of the period, rounded up: the first phase that [`Self::locate`] gives to it.
+    #[must_use]
+    pub fn node_phase(self, node: usize) -> u32 {
+        let position = ((node as u64) << 32)
+            .checked_add(self.nodes.saturating_sub(1) as u64)
+            .unwrap_or(0);
+        position.checked_div(self.nodes as u64).unwrap_or(0) as u32
+    }
+
+    /// The four nodes around `phase` and their weights. One 32×32 multiplication, no division, no loop over data.
+    #[must_use]
+    pub fn locate(self, phase: u32) -> Cell {
+        let scaled = (phase as u64).wrapping_mul(self.nodes as u64);
+        let here = (scaled >> 32) as usize;
+        let t = (scaled as u32) as f32 * (1.0 / 4_294_967_296.0);
+        let last = self.len().wrapping_sub(1);
+        let next = |node: usize| {
+            if node == last {
+                0
+            } else {
+                node.wrapping_add(1)
+            }
+        };
+        let before = if here == 0 {
+            last
+        } else {
+            here.wrapping_sub(1)
+        };
+        let after = next(here);
+        Cell {
+            nodes: [before, here, after, next(after)],
+            weights: spline_weights(t),
+        }
+    }
+}
+
+/// Uniform cubic B-spline weights at `t` in [0, 1] between the second and the third of four nodes.
+fn spline_weights(t: f32) -> [f32; 4] {
+    let s = 1.0 - t;
+    let first = s * s * s * (1.0 / 6.0);
+    let last = t * t * t * (1.0 / 6.0);
+    let second = (2.0 / 3.0) - t * t * (1.0 - 0.5 * t);
+    let third = (2.0 / 3.0) - s * s * (1.0 - 0.5 * s);
+    [first, second, third, last]
+}
+
+/// A place on a clamped axis: between node `below` and node `above`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Place {
+    /// The node at or below.
+    pub below: usize,
+    /// The next node; the same one if the axis has only one.
+    pub above: usize,
+    /// Weight of `above`, 0 to 1; `below` has the rest.
+    pub weight: f32,
+}
+
+/// Finds `value` among `len` increasing nodes, at most [`MAX_CLAMPED_NODES`].
+///
+/// Always five halvings, whatever the data; the weight costs one division. NaN is placed at the first node.
+pub fn locate_clamped(len: usize, node: impl Fn(usize) -> f32, value: f32) -> Place {
+    let last_interval = len.saturating_sub(2);
+    let mut below = 0usize;
+    for step in [16usize, 8, 4, 2, 1] {
+        let candidate = below.wrapping_add(step);
+        if candidate <= last_interval && node(candidate) <= value {
+            below = candidate;
+        }
+    }
+    let above = if len > 1 {
+        below.wrapping_add(1)
+    } else {
+        below
+    };
+    let (low, high) = (node(below), node(above));
+    let along = (value - low) / (high - low);
+    // Also takes the NaN of an axis with one node, and of a NaN value, to 0.
+    let weight = if along > 0.0 { along.min(1.0) } else { 0.0 };
+    Place {
+        below,
+        above,
+        weight: if above == below { 0.0 } else { weight },
+    }
+}
+
+/// An interval is a jump when both neighbours (or the only one) are at least this many times as wide.
+pub const JUMP_RATIO: f32 = 8.0;
+
+/// Which intervals of a clamped axis are jumps; bit *i* stands for the interval above node *i*.
+///
+/// Decided once, when a table is accepted.
+pub fn jump_intervals(len: usize, node: impl Fn(usize) -> f32) -> u32 {
+    let width = |i: usize| node(i.saturating_add(1)) - node(i);
+    let intervals = len.saturating_sub(1).min(MAX_CLAMPED_NODES);
+    let mut jumps = 0u32;
+    for i in 0..intervals {
+        let own = width(i) * JUMP_RATIO;
+        let left_wide = i == 0 || width(i.saturating_sub(1)) >= own;
+        let right_wide = i.saturating_add(1) == intervals || width(i.saturating_add(1)) >= own;
+        if intervals > 1 && left_wide && right_wide {
+            jumps |= 1u32.checked_shl(i as u32).unwrap_or(0);
+        }
+    }
+    jumps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn evaluate(axis: PeriodicAxis, coefficients: &[f64], phase: u32) -> f64 {
+        let cell = axis.locate(phase);
+        cell.nodes
+            .iter()
+            .zip(cell.weights)
+            .map(|(&node, weight)| coefficients[node] * weight as f64)
+            .sum()
+    }
+
+    #[test]
+    fn every_node_is_found_where_it_is_said_to_sit() {
+        for n in 4..=MAX_PERIODIC_NODES {
+            let axis = PeriodicAxis::new(n).unwrap();
+            for node in 0..n {
+                let phase = axis.node_phase(node);
+                let cell = axis.locate(phase);
+                assert_eq!(cell.nodes[1], node, "{n} nodes");
+                assert!(cell.weights[3] < 1e-9 && (cell.weights[1] - 2.0 / 3.0).abs() < 1e-6);
+                let just_below = axis.locate(phase.wrapping_sub(1));
+                assert_eq!(just_below.nodes[2], node, "{n} nodes, from below");
+            }
+        }
+    }
+
+    #[test]
+    fn a_harmonic_is_interpolated_to_the_stated_error() {
+        use core::f64::consts::TAU;
+        for (n, order) in [(16, 1), (16, 2), (8, 1), (64, 3)] {
+            let axis = PeriodicAxis::new(n).unwrap();
+            let step = TAU * order as f64 / n as f64;
+            let gain = 3.0 / (2.0 + step.cos());
+            let coefficients: Vec<f64> = (0..n).map(|i| gain * (step * i as f64).cos()).collect();
+            let mut worst: f64 = 0.0;
+            for i in 0..10_000u32 {
+                let phase = i.wrapping_mul(429_497);
+                let exact = (TAU * order as f64 * phase as f64 / 4_294_967_296.0).cos();
+                worst = worst.max((evaluate(axis, &coefficients, phase) - exact).abs());
+            }
+            let stated = step.powi(4) / 384.0;
+            assert!(
+                worst < 1.1 * stated + 2e-7,
+                "{n} nodes, order {order}: {worst:e} > {stated:e}"
+            );
+            assert!(
+                worst > 0.5 * stated,
+                "the stated error is far too large: {worst:e} {stated:e}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_curve_is_smooth_across_the_wrap() {
+        let axis = PeriodicAxis::new(5).unwrap();
+        let coefficients = [1.0, -2.0, 0.5, 3.0, -1.0];
+        let at_wrap = evaluate(axis, &coefficients, 0);
+        assert!((evaluate(axis, &coefficients, u32::MAX) - at_wrap).abs() < 1e-6);
+        let h = 1 << 20;
+        let slope_after = evaluate(axis, &coefficients, h) - at_wrap;
+        let slope_before = at_wrap - evaluate(axis, &coefficients, h.wrapping_neg());
+        assert!(
+            (slope_after - slope_before).abs() < 0.02 * slope_after.abs(),
+            "{slope_before} {slope_after}"
+        );
+    }
+
+    #[test]
+    fn nearly_coincident_nodes_are_jumps_and_ordinary_spacing_is_not() {
+        let nodes = [-10.0, -1.001, -0.999, 0.0, 0.999, 1.001, 10.0];
+        assert_eq!(jump_intervals(nodes.len(), |i| nodes[i]), 0b01_0010);
+        let geometric = [0.0, 1.0, 2.0, 4.0, 10.0, 50.0];
+        assert_eq!(jump_intervals(geometric.len(), |i| geometric[i]), 0);
+        assert_eq!(jump_intervals(2, |i| geometric[i]), 0);
+        assert_eq!(jump_intervals(1, |i| geometric[i]), 0);
+    }
+
+    #[test]
+    fn sizes_outside_the_limits_have_no_axis() {
+        for n in [1, 2, 3, 129, 256, 260] {
+            assert_eq!(PeriodicAxis::new(n), None);
+        }
+        assert!(PeriodicAxis::new(0).unwrap().is_empty());
+        let _ = PeriodicAxis::new(0).unwrap().locate(u32::MAX);
+        assert_eq!(PeriodicAxis::new(0).unwrap().node_phase(3), 0);
+    }
+
+    proptest! {
+        #[test]
+        fn weights_are_a_partition_of_unity(phase in any::<u32>(), n in 4usize..=128) {
+            let cell = PeriodicAxis::new(n).unwrap().locate(phase);
+            prop_assert!(cell.weights.iter().all(|&w| (0.0..=0.667).contains(&w)), "{:?}", cell);
+            prop_assert!((cell.weights.iter().sum::<f32>() - 1.0).abs() < 3e-7);
+            prop_assert!(cell.nodes.iter().all(|&i| i < n));
+        }
+
+        #[test]
+        fn a_place_reproduces_the_value_it_was_asked_for(
+            mut nodes in prop::collection::vec(-100.0f32..100.0, 1..=MAX_CLAMPED_NODES), value in -120.0f32..120.0,
+        ) {
+            nodes.sort_by(f32::total_cmp);
+            nodes.dedup();
+            let place = locate_clamped(nodes.len(), |i| nodes[i], value);
+            let found = nodes[place.below] * (1.0 - place.weight) + nodes[place.above] * place.weight;
+            let clamped = value.clamp(nodes[0], nodes[nodes.len() - 1]);
+            prop_assert!((found - clamped).abs() < 1e-4, "{} {}", found, clamped);
+            let inside = nodes[place.below] <= clamped && clamped <= nodes[place.above];
+            prop_assert!(inside);
+        }
+    }
+}
