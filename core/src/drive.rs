@@ -104,6 +104,17 @@ impl Drive {
         self.ratio
     }
 
+    /// The ratio to double precision, for the host.
+    #[must_use]
+    pub fn exact_ratio(&self) -> f64 {
+        let (teeth, waves) = self.turns_and_waves();
+        let magnitude = teeth.get() as f64 / waves.get() as f64;
+        match self.fixed {
+            FixedMember::Flexspline => magnitude,
+            FixedMember::CircularSpline => -magnitude,
+        }
+    }
+
     /// Ripple periods in one generator turn: the teeth of the fixed member.
     #[must_use]
     pub const fn ripple_order(&self) -> u16 {

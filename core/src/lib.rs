@@ -18,10 +18,13 @@ extern crate std;
 mod angle;
 mod drive;
 mod error;
+#[cfg(test)]
+mod fixture;
 pub mod grid;
 mod hysteresis;
 mod image;
 mod model;
+pub mod precompute;
 mod table;
 
 pub use angle::{GeneratorAngle, OutputAngle};

@@ -179,6 +179,17 @@ pub(crate) struct OperatingPoint {
     pub quality: Quality,
 }
 
+impl OperatingPoint {
+    /// The quality here, lowered while the side of the play is not known.
+    pub fn quality_if_known(&self, known: bool) -> Quality {
+        if known {
+            self.quality
+        } else {
+            self.quality.max(Quality::Uncertain)
+        }
+    }
+}
+
 /// The two numbers that a generator position adds: centre and half-width of the play.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Play {
