@@ -168,14 +168,19 @@ impl Drive {
         }
     }
 
-    /// The move of the generator that cancels a predicted error: `command_correction = −predicted_error·ratio`.
+    /// The generator angle that brings an output with this error to `target`, and the nominal output there:
+    /// `target·ratio + command_correction` with `command_correction = −predicted_error·ratio`.
     ///
-    /// `predicted_error_rad` is at the output, positive when the output is ahead of ideal; the result is in counts of the
-    /// generator angle. This is the one place where the sign of the correction is set. NaN corrects nothing.
+    /// The error is at the output, positive when the output is ahead of ideal. This is the one place where the sign of the
+    /// correction is set. NaN corrects nothing.
     #[must_use]
-    pub fn command_correction_counts(&self, predicted_error_rad: f32) -> i64 {
-        let error = OutputAngle::ZERO.offset_rad(predicted_error_rad);
-        self.nominal_generator(error).counts().wrapping_neg()
+    pub fn corrected_command(
+        &self,
+        target: OutputAngle,
+        predicted_error_rad: f32,
+    ) -> (GeneratorAngle, OutputAngle) {
+        let nominal = target.offset_rad(-predicted_error_rad);
+        (self.nominal_generator(nominal), nominal)
     }
 }
 
@@ -295,15 +300,14 @@ mod tests {
 
     #[test]
     fn the_correction_opposes_the_error_for_both_senses() {
-        let forward = hhd_95().command_correction_counts(0.01);
-        let expected = -0.01 * 95.0 / core::f64::consts::TAU * 4_294_967_296.0;
-        assert!(
-            (forward as f64 - expected).abs() < 200.0,
-            "{forward} {expected}"
-        );
+        let (generator, nominal) = hhd_95().corrected_command(OutputAngle::ZERO, 0.01);
+        assert!((nominal.to_rad() + 0.01).abs() < 1e-9);
+        assert!((generator.to_rad() + 0.01 * 95.0).abs() < 1e-7);
         let reversed = Drive::new(190, 192, FixedMember::CircularSpline).unwrap();
-        assert_eq!(reversed.command_correction_counts(0.01), -forward);
-        assert_eq!(reversed.command_correction_counts(f32::NAN), 0);
+        let (generator, _) = reversed.corrected_command(OutputAngle::ZERO, 0.01);
+        assert!((generator.to_rad() - 0.01 * 95.0).abs() < 1e-7);
+        let (generator, _) = reversed.corrected_command(OutputAngle::new(1, 0), f32::NAN);
+        assert_eq!(generator, GeneratorAngle::new(-95, 0));
     }
 
     proptest! {

@@ -194,6 +194,13 @@ pub enum ImageError {
         /// First node not above the one before.
         index: usize,
     },
+    /// A repeated node at the ends of a periodic curve differs from the node it repeats.
+    NotClosed {
+        /// Which curve; both ripples of a record count as ripple of the mean.
+        field: Field,
+        /// Position in the stored curve.
+        index: usize,
+    },
     /// A value outside its limits.
     OutOfRange {
         /// Which field.
@@ -271,6 +278,9 @@ impl fmt::Display for ImageError {
             Self::NotFinite { field, index } => write!(f, "{field}: number {index} is not finite"),
             Self::NotIncreasing { field, index } => {
                 write!(f, "{field}: node {index} is not above the one before it")
+            }
+            Self::NotClosed { field, index } => {
+                write!(f, "{field}: does not close, at stored value {index}")
             }
             Self::OutOfRange {
                 field,

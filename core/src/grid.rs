@@ -20,17 +20,51 @@ pub const MIN_PERIODIC_NODES: usize = 4;
 /// Most nodes of a periodic axis.
 pub const MAX_PERIODIC_NODES: usize = 128;
 
-/// The four nodes around a phase and their weights.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// A place on a periodic axis: the interval above a node, and how far into it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cell {
-    /// Node numbers, in the order of the weights.
-    pub nodes: [usize; 4],
-    /// B-spline weights, each ≥ 0, together 1.
-    pub weights: [f32; 4],
+    /// The node at or below. Also where the four coefficients around the place start in a stored curve
+    /// ([`PeriodicAxis::stored_node`]).
+    pub node: usize,
+    /// How far to the next node, in 2⁻³² of the spacing.
+    pub fraction: u32,
+}
+
+impl Cell {
+    /// B-spline weights of the four nodes around the place, each ≥ 0, together 1 to 1.2e-7.
+    #[must_use]
+    pub fn weights(self) -> [f32; 4] {
+        let t = self.fraction as f32 * (1.0 / 4_294_967_296.0);
+        let s = 1.0 - t;
+        let first = s * s * s * (1.0 / 6.0);
+        let second = (2.0 / 3.0) - t * t * (1.0 - 0.5 * t);
+        let third = (2.0 / 3.0) - s * s * (1.0 - 0.5 * s);
+        let last = t * t * t * (1.0 / 6.0);
+        [first, second, third, last]
+    }
+
+    /// The same weights in 2⁻¹⁵, each within 4 units, together exactly 2¹⁵: for coefficients of 16 bits.
+    #[must_use]
+    pub fn weights_q15(self) -> [i16; 4] {
+        // A sixth of t³ = t³·10923·2⁻¹⁶; every product is below 2³¹.
+        let cube_sixth =
+            |x: u32| ((x.wrapping_mul(x) >> 15).wrapping_mul(x) >> 15).wrapping_mul(10_923) >> 16;
+        let t = self.fraction >> 17;
+        let square = t.wrapping_mul(t) >> 15;
+        let cube = square.wrapping_mul(t) >> 15;
+        let first = cube_sixth(0x8000u32.wrapping_sub(t));
+        let last = cube_sixth(t);
+        let second = 21_845u32.wrapping_sub(square).wrapping_add(cube >> 1);
+        let third = 0x8000u32
+            .wrapping_sub(first)
+            .wrapping_sub(second)
+            .wrapping_sub(last);
+        [first as i16, second as i16, third as i16, last as i16]
+    }
 }
 
 /// Nodes spread evenly over one period.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PeriodicAxis {
     nodes: u8,
 }
@@ -68,41 +102,41 @@ impl PeriodicAxis {
         position.checked_div(self.nodes as u64).unwrap_or(0) as u32
     }
 
-    /// The four nodes around `phase` and their weights. One 32×32 multiplication, no division, no loop over data.
+    /// Where `phase` lies. One 32×32 multiplication, no division, no loop over data.
     #[must_use]
     pub fn locate(self, phase: u32) -> Cell {
         let scaled = (phase as u64).wrapping_mul(self.nodes as u64);
-        let here = (scaled >> 32) as usize;
-        let t = (scaled as u32) as f32 * (1.0 / 4_294_967_296.0);
-        let last = self.len().wrapping_sub(1);
-        let next = |node: usize| {
-            if node == last {
-                0
-            } else {
-                node.wrapping_add(1)
-            }
-        };
-        let before = if here == 0 {
-            last
-        } else {
-            here.wrapping_sub(1)
-        };
-        let after = next(here);
         Cell {
-            nodes: [before, here, after, next(after)],
-            weights: spline_weights(t),
+            node: (scaled >> 32) as usize,
+            fraction: scaled as u32,
         }
     }
-}
 
-/// Uniform cubic B-spline weights at `t` in [0, 1] between the second and the third of four nodes.
-fn spline_weights(t: f32) -> [f32; 4] {
-    let s = 1.0 - t;
-    let first = s * s * s * (1.0 / 6.0);
-    let last = t * t * t * (1.0 / 6.0);
-    let second = (2.0 / 3.0) - t * t * (1.0 - 0.5 * t);
-    let third = (2.0 / 3.0) - s * s * (1.0 - 0.5 * s);
-    [first, second, third, last]
+    /// The four nodes around a place, in the order of the weights.
+    #[must_use]
+    pub fn around(self, cell: Cell) -> [usize; 4] {
+        [0, 1, 2, 3].map(|step| self.stored_node(cell.node.saturating_add(step)))
+    }
+
+    /// Length of a stored curve: its nodes and three repeated, so that the four around any place are neighbours.
+    #[must_use]
+    pub const fn stored_len(self) -> usize {
+        if self.nodes == 0 {
+            0
+        } else {
+            self.len().saturating_add(3)
+        }
+    }
+
+    /// The node at position `position` of a stored curve: the last node, all nodes, the first two.
+    #[must_use]
+    pub fn stored_node(self, position: usize) -> usize {
+        position
+            .saturating_add(self.len())
+            .saturating_sub(1)
+            .checked_rem(self.len())
+            .unwrap_or(0)
+    }
 }
 
 /// A place on a clamped axis: between node `below` and node `above`.
@@ -173,9 +207,9 @@ mod tests {
 
     fn evaluate(axis: PeriodicAxis, coefficients: &[f64], phase: u32) -> f64 {
         let cell = axis.locate(phase);
-        cell.nodes
+        axis.around(cell)
             .iter()
-            .zip(cell.weights)
+            .zip(cell.weights())
             .map(|(&node, weight)| coefficients[node] * weight as f64)
             .sum()
     }
@@ -187,10 +221,10 @@ mod tests {
             for node in 0..n {
                 let phase = axis.node_phase(node);
                 let cell = axis.locate(phase);
-                assert_eq!(cell.nodes[1], node, "{n} nodes");
-                assert!(cell.weights[3] < 1e-9 && (cell.weights[1] - 2.0 / 3.0).abs() < 1e-6);
+                assert_eq!(axis.around(cell)[1], node, "{n} nodes");
+                assert!(cell.weights()[3] < 1e-9 && (cell.weights()[1] - 2.0 / 3.0).abs() < 1e-6);
                 let just_below = axis.locate(phase.wrapping_sub(1));
-                assert_eq!(just_below.nodes[2], node, "{n} nodes, from below");
+                assert_eq!(axis.around(just_below)[2], node, "{n} nodes, from below");
             }
         }
     }
@@ -259,10 +293,16 @@ mod tests {
     proptest! {
         #[test]
         fn weights_are_a_partition_of_unity(phase in any::<u32>(), n in 4usize..=128) {
-            let cell = PeriodicAxis::new(n).unwrap().locate(phase);
-            prop_assert!(cell.weights.iter().all(|&w| (0.0..=0.667).contains(&w)), "{:?}", cell);
-            prop_assert!((cell.weights.iter().sum::<f32>() - 1.0).abs() < 3e-7);
-            prop_assert!(cell.nodes.iter().all(|&i| i < n));
+            let axis = PeriodicAxis::new(n).unwrap();
+            let cell = axis.locate(phase);
+            let coarse = cell.weights_q15();
+            prop_assert_eq!(coarse.iter().map(|&w| w as i32).sum::<i32>(), 32_768);
+            for (coarse, fine) in coarse.into_iter().zip(cell.weights()) {
+                prop_assert!(coarse >= 0 && (coarse as f32 - fine * 32_768.0).abs() <= 4.0, "{} {}", coarse, fine * 32_768.0);
+            }
+            prop_assert!(cell.weights().iter().all(|&w| (0.0..=0.667).contains(&w)), "{:?}", cell);
+            prop_assert!((cell.weights().iter().sum::<f32>() - 1.0).abs() < 3e-7);
+            prop_assert!(axis.around(cell).iter().all(|&i| i < n));
         }
 
         #[test]

@@ -42,6 +42,8 @@ const MAX_HALF_COUNTS: i32 = 34_178_720;
 pub struct PlayState {
     /// Nominal output at the last update.
     nominal: OutputAngle,
+    /// Estimated output at the last update.
+    output: OutputAngle,
     /// Bounds of `p − x` in counts.
     lower: i32,
     upper: i32,
@@ -50,7 +52,8 @@ pub struct PlayState {
 }
 
 /// Size of a saved state.
-pub const SAVED_STATE_BYTES: usize = 24;
+pub const SAVED_STATE_BYTES: usize = 32;
+const SAVED_BEFORE_CRC: usize = 28;
 
 impl Default for PlayState {
     fn default() -> Self {
@@ -64,6 +67,7 @@ impl PlayState {
     pub const fn unknown() -> Self {
         Self {
             nominal: OutputAngle::ZERO,
+            output: OutputAngle::ZERO,
             lower: i32::MIN,
             upper: i32::MAX,
             half: -1,
@@ -79,6 +83,7 @@ impl PlayState {
         };
         Self {
             nominal: OutputAngle::ZERO,
+            output: OutputAngle::ZERO,
             lower: side,
             upper: side,
             half: -1,
@@ -117,17 +122,37 @@ impl PlayState {
         (width >> 1).saturating_add(width & 1) as f32 * RAD_PER_COUNT
     }
 
-    /// Moves the play to nominal output `nominal` with the half-width `half_width_rad` there (clamped to 0..0.05).
-    pub(crate) fn update(&mut self, nominal: OutputAngle, half_width_rad: f32) {
-        self.update_counts(
-            nominal,
-            crate::angle::counts_from_rad(half_width_rad).clamp(0, MAX_HALF_COUNTS),
-        );
+    /// Estimated actual output at the last update; `None` before the first.
+    #[must_use]
+    pub const fn output(&self) -> Option<OutputAngle> {
+        if self.half < 0 {
+            None
+        } else {
+            Some(self.output)
+        }
     }
 
-    /// Follows the motion with the half-width of the last update, for steps in which it cannot be computed.
+    /// Moves the play to `nominal`, with the half-width (clamped to 0..0.05 rad) and centre there; returns the error
+    /// `centre + (p − x)`, rad.
+    pub(crate) fn update(
+        &mut self,
+        nominal: OutputAngle,
+        centre_rad: f32,
+        half_width_rad: f32,
+    ) -> f32 {
+        let half = crate::angle::counts_from_rad(half_width_rad).clamp(0, MAX_HALF_COUNTS);
+        self.update_counts(nominal, half);
+        let error_rad = centre_rad + self.offset_rad();
+        self.output = nominal.offset_rad(error_rad);
+        error_rad
+    }
+
+    /// Follows the motion with the half-width and error of the last update, for steps in which they cannot be computed.
     pub(crate) fn coast(&mut self, nominal: OutputAngle) {
         if self.half >= 0 {
+            self.output = self
+                .output
+                .offset_counts(nominal.minus_counts(self.nominal));
             self.update_counts(nominal, self.half);
         }
     }
@@ -147,6 +172,7 @@ impl PlayState {
         };
         *self = Self {
             nominal,
+            output: self.output,
             lower: clamp(self.lower),
             upper: clamp(self.upper),
             half,
@@ -158,17 +184,24 @@ impl PlayState {
     pub fn save(&self) -> [u8; SAVED_STATE_BYTES] {
         let mut bytes = [0; SAVED_STATE_BYTES];
         let fields = [self.lower, self.upper, self.half];
-        let parts = self
-            .nominal
-            .counts()
-            .to_le_bytes()
+        let angles = [self.nominal.counts(), self.output.counts()];
+        let parts = angles
             .into_iter()
+            .flat_map(i64::to_le_bytes)
             .chain(fields.into_iter().flat_map(i32::to_le_bytes));
         for (to, from) in bytes.iter_mut().zip(parts) {
             *to = from;
         }
-        let crc = crc32(bytes.first_chunk::<20>().unwrap_or(&[0; 20]));
-        for (to, from) in bytes.iter_mut().skip(20).zip(crc.to_le_bytes()) {
+        let crc = crc32(
+            bytes
+                .first_chunk::<SAVED_BEFORE_CRC>()
+                .unwrap_or(&[0; SAVED_BEFORE_CRC]),
+        );
+        for (to, from) in bytes
+            .iter_mut()
+            .skip(SAVED_BEFORE_CRC)
+            .zip(crc.to_le_bytes())
+        {
             *to = from;
         }
         bytes
@@ -180,17 +213,19 @@ impl PlayState {
     #[must_use]
     pub fn restore(bytes: &[u8; SAVED_STATE_BYTES]) -> Option<Self> {
         let (counts, rest) = bytes.split_first_chunk::<8>()?;
+        let (output, rest) = rest.split_first_chunk::<8>()?;
         let (lower, rest) = rest.split_first_chunk::<4>()?;
         let (upper, rest) = rest.split_first_chunk::<4>()?;
         let (half, rest) = rest.split_first_chunk::<4>()?;
         let crc = rest.first_chunk::<4>()?;
         let state = Self {
             nominal: OutputAngle::from_counts(i64::from_le_bytes(*counts)),
+            output: OutputAngle::from_counts(i64::from_le_bytes(*output)),
             lower: i32::from_le_bytes(*lower),
             upper: i32::from_le_bytes(*upper),
             half: i32::from_le_bytes(*half),
         };
-        let intact = u32::from_le_bytes(*crc) == crc32(bytes.first_chunk::<20>()?);
+        let intact = u32::from_le_bytes(*crc) == crc32(bytes.first_chunk::<SAVED_BEFORE_CRC>()?);
         let started = (0..=MAX_HALF_COUNTS).contains(&state.half)
             && state.lower >= state.half.wrapping_neg()
             && state.upper <= state.half;
@@ -253,7 +288,7 @@ mod tests {
     #[test]
     fn uncertainty_is_half_the_interval() {
         let mut state = PlayState::unknown();
-        state.update(OutputAngle::ZERO, 1e-4);
+        state.update(OutputAngle::ZERO, 0.0, 1e-4);
         assert!((state.uncertainty_rad() - 1e-4).abs() < 2e-9);
         assert!(state.offset_rad().abs() < 2e-9);
     }
@@ -262,8 +297,8 @@ mod tests {
     fn hostile_half_widths_stay_in_bounds() {
         for half in [f32::NAN, -1.0, f32::INFINITY, f32::NEG_INFINITY, 1e30] {
             let mut state = PlayState::unknown();
-            state.update(OutputAngle::ZERO, half);
-            state.update(OutputAngle::from_counts(i64::MIN), half);
+            state.update(OutputAngle::ZERO, 0.0, half);
+            state.update(OutputAngle::from_counts(i64::MIN), 0.0, half);
             assert!((0..=MAX_HALF_COUNTS).contains(&state.half), "{half}");
             assert!(
                 -state.half <= state.lower
@@ -293,6 +328,7 @@ mod tests {
             upper: -5,
             half: 10,
             nominal: OutputAngle::ZERO,
+            output: OutputAngle::ZERO,
         };
         assert_eq!(PlayState::restore(&disordered.save()), None);
         let outside = PlayState {
@@ -300,6 +336,7 @@ mod tests {
             upper: 5,
             half: 10,
             nominal: OutputAngle::ZERO,
+            output: OutputAngle::ZERO,
         };
         assert_eq!(PlayState::restore(&outside.save()), None);
     }

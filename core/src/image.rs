@@ -22,19 +22,24 @@
 //! | 136 | 8, 8 | torque range N·m; temperature range °C: least, most |
 //! | 152 | 4 | error limit, rad |
 //! | 156 | 36 | zero |
-//! | 192 | | torque nodes, temperature nodes, A, B, C: `f32` each |
-//! | | | `[temperature][torque]` records: D, H (`f32`, rad), then for each ripple node R, h (`i16`) |
+//! | 192 | | torque nodes, temperature nodes: `f32` each |
+//! | | | A, B, C: `f32` each, stored closed |
+//! | | | `[temperature][torque]` records: D, H (`f32`, rad), then R, h (`i16`) for each ripple node, stored closed |
 //! | | | end of the body |
 //! | | | CRC-32 of each 256-byte page of the body (the last may be shorter) |
 //! | | 4 | CRC-32 of everything before |
 //!
-//! CRC-32 is the one of ISO-HDLC (zlib). Size with 3 temperatures, 25 torques, 16 ripple nodes and 64 nodes each for A,
-//! B, C: 192 + 4·(25 + 3 + 3·64) + 75·(8 + 16·4) = 6472, and 26 pages and the end 4·27 = 108: 6580 bytes, below
-//! 8 KiB. Without A, B, C: 5800.
+//! A periodic curve of n nodes is stored closed, as n + 3 values: the last node, all nodes, the first two; the four around
+//! any place are then neighbours. CRC-32 is the one of ISO-HDLC (zlib).
+//!
+//! Size with 3 temperatures, 25 torques, 16 ripple nodes and 64 nodes each for A, B, C:
+//! 192 + 4·(25 + 3 + 3·67) + 75·(8 + 19·4) = 7408, and 29 pages and the end 4·30 = 120: 7528 bytes, below 8 KiB. Without A,
+//! B, C: 6712.
 
 use crate::drive::{Drive, FixedMember};
 use crate::error::{Field, ImageError};
 use crate::grid::{self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis};
+use crate::model::MAX_INVERSE_ITERATIONS;
 use crate::table::{
     Bounds, GeneratorKind, PeriodicCurve, RECORD_HEAD_WORDS, Table, TableId, Words, f32_at,
     ripple_at,
@@ -202,16 +207,27 @@ pub const fn image_bytes(
 
 const fn body_bytes(torque: usize, temperature: usize, ripple: usize, curves: [usize; 3]) -> usize {
     let [a, b, c] = curves;
-    let curve_nodes = a.saturating_add(b).saturating_add(c);
+    let curve_words = stored(a)
+        .saturating_add(stored(b))
+        .saturating_add(stored(c));
     let numbers = torque
         .saturating_add(temperature)
-        .saturating_add(curve_nodes);
-    let record = ripple.saturating_add(RECORD_HEAD_WORDS);
+        .saturating_add(curve_words);
+    let record = stored(ripple).saturating_add(RECORD_HEAD_WORDS);
     let records = torque.saturating_mul(temperature).saturating_mul(record);
     numbers
         .saturating_add(records)
         .saturating_mul(4)
         .saturating_add(HEADER_BYTES)
+}
+
+/// As [`PeriodicAxis::stored_len`], for any number.
+const fn stored(nodes: usize) -> usize {
+    if nodes == 0 {
+        0
+    } else {
+        nodes.saturating_add(3)
+    }
 }
 
 /// Fills a buffer from the front; what does not fit is only counted.
@@ -337,6 +353,7 @@ impl TableData<'_> {
     }
 
     fn put_records(&self, out: &mut Writer<'_>, mean_scale: f32, half_scale: f32) {
+        let axis = PeriodicAxis::new(self.ripple_nodes).unwrap_or_default();
         // max(1): without ripple the iterators are empty, and a chunk size may not be 0.
         let mut mean_ripples = self.mean_ripple_rad.chunks_exact(self.ripple_nodes.max(1));
         let mut half_ripples = self
@@ -358,9 +375,11 @@ impl TableData<'_> {
                 *half
             };
             out.put_numbers(&[*mean, raised]);
-            for (mean, half) in mean_ripple.iter().zip(half_ripple) {
-                out.put(&quantise(*mean, mean_scale).to_le_bytes());
-                out.put(&quantise(*half, half_scale).to_le_bytes());
+            for position in 0..axis.stored_len() {
+                let node = axis.stored_node(position);
+                let value = |ripple: &[f32]| ripple.get(node).copied().unwrap_or(0.0);
+                out.put(&quantise(value(mean_ripple), mean_scale).to_le_bytes());
+                out.put(&quantise(value(half_ripple), half_scale).to_le_bytes());
             }
         }
     }
@@ -438,9 +457,18 @@ pub fn write_image(
     writer.put(&[0; RESERVED.end - RESERVED.start]);
     writer.put_numbers(data.torque_nodes_n_m);
     writer.put_numbers(data.temperature_nodes_c);
-    curves
-        .into_iter()
-        .for_each(|curve| writer.put_numbers(curve));
+    for curve in curves {
+        let axis = PeriodicAxis::new(curve.len()).unwrap_or_default();
+        for position in 0..axis.stored_len() {
+            writer.put_numbers(
+                curve
+                    .get(axis.stored_node(position)..)
+                    .unwrap_or_default()
+                    .get(..1)
+                    .unwrap_or_default(),
+            );
+        }
+    }
     data.put_records(&mut writer, mean_scale, half_scale);
 
     let body_bytes = writer.needed;
@@ -584,19 +612,26 @@ fn check_range(
     Ok([least, most])
 }
 
-/// Largest |value| and largest step to the next around a period, of `len` coefficients.
+/// Largest |value| and largest step to the next of a stored curve, `len` values with the wrap among them.
 fn extremes(len: usize, value: impl Fn(usize) -> f32) -> (f32, f32) {
     let (mut largest, mut steepest) = (0.0f32, 0.0f32);
     for i in 0..len {
-        let next = if i.saturating_add(1) == len {
-            0
-        } else {
-            i.saturating_add(1)
-        };
         largest = largest.max(value(i).abs());
-        steepest = steepest.max((value(next) - value(i)).abs());
+        steepest = steepest.max((value(i) - value(i.saturating_sub(1))).abs());
     }
     (largest, steepest)
+}
+
+/// Whether the three repeated words of a stored curve equal the nodes they repeat.
+fn check_closed(field: Field, axis: PeriodicAxis, words: Words<'_>) -> Result<(), ImageError> {
+    let word = |position: usize| words.get(position);
+    for index in 0..axis.stored_len() {
+        // Node i is stored at position i + 1.
+        if word(index) != word(axis.stored_node(index).saturating_add(1)) {
+            return Err(ImageError::NotClosed { field, index });
+        }
+    }
+    Ok(())
 }
 
 /// Adds what a curve of A, B, C can give; `periods` of it in one output turn.
@@ -606,7 +641,7 @@ fn add_curve(
     curve: &PeriodicCurve<'_>,
     periods: f32,
 ) -> Result<(), ImageError> {
-    let len = curve.axis.len();
+    let len = curve.axis.stored_len();
     for index in 0..len {
         in_range(
             field,
@@ -616,11 +651,12 @@ fn add_curve(
             MAX_ERROR_RAD,
         )?;
     }
+    check_closed(field, curve.axis, curve.words)?;
     let (largest, steepest) = extremes(len, |i| f32_at(curve.words, i));
     bounds.error_rad += largest;
     bounds.periodic_rad += largest;
     // Slope of a cubic B-spline: at most the largest step between coefficients, per node spacing.
-    bounds.slope += steepest * len as f32 * periods.abs() / core::f32::consts::TAU;
+    bounds.slope += steepest * curve.axis.len() as f32 * periods.abs() / core::f32::consts::TAU;
     Ok(())
 }
 
@@ -630,8 +666,10 @@ impl<'a> Table<'a> {
     /// Verified: length, magic, version, byte order, CRC-32 of the whole and of every page, texts, tooth counts, node
     /// counts; every number finite; axes strictly increasing; half-width of the play ≥ 0 everywhere; the largest error the
     /// table can give within its stated limit and [`MAX_ERROR_RAD`]; `|ratio·de/dψ| < 1` everywhere, so that the inverse
-    /// exists. The last three hold for every input, not only at nodes: a B-spline stays within its coefficients.
-    /// Periodic parts close at the wrap because node 0 is the only one there.
+    /// exists;
+    /// periodic parts closed at the wrap.
+    ///
+    /// Bounds hold for every input, not only at nodes: a B-spline stays within its coefficients.
     ///
     /// Two passes over the image and its CRC-32 twice, once per upload, not in the step.
     ///
@@ -702,15 +740,15 @@ impl<'a> Table<'a> {
         let [a, b, c] = curve_nodes;
         let generator_curve = PeriodicCurve {
             axis: axis(a)?,
-            words: take(a)?,
+            words: take(stored(a))?,
         };
         let material_curve = PeriodicCurve {
             axis: axis(b)?,
-            words: take(b)?,
+            words: take(stored(b))?,
         };
         let output_curve = PeriodicCurve {
             axis: axis(c)?,
-            words: take(c)?,
+            words: take(stored(c))?,
         };
         let records = words;
 
@@ -746,6 +784,7 @@ impl<'a> Table<'a> {
                 MAX_ERROR_RAD,
             )?,
             bounds: Bounds::default(),
+            inverse_iterations: MAX_INVERSE_ITERATIONS,
         };
         check_axis(Field::TorqueNodes, torque)?;
         check_axis(Field::TemperatureNodes, temperature)?;
@@ -771,6 +810,7 @@ impl<'a> Table<'a> {
             header.f32(128),
         )?;
         table.bounds = table.check_bounds()?;
+        table.inverse_iterations = table.bounds.inverse_iterations();
         Ok(table)
     }
 
@@ -810,7 +850,7 @@ impl<'a> Table<'a> {
         let nodes = self.ripple.len();
         let periods = self.drive.ripple_order() as f32 * self.drive.ratio().abs();
         let slope_per_step = nodes as f32 * periods / core::f32::consts::TAU;
-        let stride = nodes.saturating_add(RECORD_HEAD_WORDS);
+        let stride = stored(nodes).saturating_add(RECORD_HEAD_WORDS);
         for (index, record) in self.records.chunks_exact(stride).enumerate() {
             let mean = in_range(
                 Field::Mean,
@@ -829,7 +869,13 @@ impl<'a> Table<'a> {
             let ripple = |node: usize| ripple_at(record, node.saturating_add(RECORD_HEAD_WORDS));
             let mean_ripple = |node: usize| ripple(node).0 as f32 * self.mean_ripple_scale;
             let half_ripple = |node: usize| ripple(node).1 as f32 * self.half_ripple_scale;
-            let least = (0..nodes).fold(half, |least, node| least.min(half + half_ripple(node)));
+            check_closed(
+                Field::MeanRipple,
+                self.ripple,
+                record.get(RECORD_HEAD_WORDS..).unwrap_or_default(),
+            )?;
+            let len = self.ripple.stored_len();
+            let least = (0..len).fold(half, |least, node| least.min(half + half_ripple(node)));
             if least < 0.0 {
                 let torque_nodes = self.torque.len().max(1);
                 return Err(ImageError::NegativeHalfWidth {
@@ -838,8 +884,8 @@ impl<'a> Table<'a> {
                     found_rad: least,
                 });
             }
-            let (mean_most, mean_step) = extremes(nodes, mean_ripple);
-            let (half_most, half_step) = extremes(nodes, half_ripple);
+            let (mean_most, mean_step) = extremes(len, mean_ripple);
+            let (half_most, half_step) = extremes(len, half_ripple);
             bounds.error_rad = bounds
                 .error_rad
                 .max(mean.abs() + mean_most + half + half_most);
@@ -1000,7 +1046,7 @@ mod tests {
     use std::vec::Vec;
 
     const RECORDS: usize = HEADER_BYTES + 4 * (11 + 3);
-    const RECORD_BYTES: usize = 4 * (RECORD_HEAD_WORDS + 16);
+    const RECORD_BYTES: usize = 4 * (RECORD_HEAD_WORDS + 19);
 
     /// A small table with every part; ripple alternates in sign.
     fn data() -> TableData<'static> {
@@ -1073,21 +1119,21 @@ mod tests {
         assert_eq!(table.ripple_axis().len(), 8);
         let words = |curve: &PeriodicCurve<'_>| {
             (0..curve.axis.len())
-                .map(|i| f32_at(curve.words, i))
+                .map(|i| f32_at(curve.words, i + 1))
                 .collect::<Vec<f32>>()
         };
         assert_eq!(words(&table.generator_curve), data().generator_curve_rad);
         assert_eq!(words(&table.material_curve), data().material_curve_rad);
         assert_eq!(words(&table.output_curve), data().output_curve_rad);
         for record in 0..4 {
-            let base = record * (RECORD_HEAD_WORDS + 8);
+            let base = record * (RECORD_HEAD_WORDS + 11);
             assert_eq!(f32_at(table.records, base), data().mean_rad[record]);
             assert_eq!(
                 f32_at(table.records, base + 1),
                 data().half_width_rad[record]
             );
             for node in 0..8 {
-                let (mean, half) = ripple_at(table.records, base + RECORD_HEAD_WORDS + node);
+                let (mean, half) = ripple_at(table.records, base + RECORD_HEAD_WORDS + 1 + node);
                 let expected = data().mean_ripple_rad[record * 8 + node];
                 assert!(
                     (mean as f32 * table.mean_ripple_scale - expected).abs()
@@ -1125,9 +1171,9 @@ mod tests {
 
     #[test]
     fn the_stated_sizes_hold() {
-        assert_eq!(image_bytes(25, 3, 16, [64; 3]), 6580);
-        assert_eq!(image_bytes(25, 3, 16, [0; 3]), 5800);
-        assert!(image_bytes(25, 3, 16, [128; 3]) <= 8192);
+        assert_eq!(image_bytes(25, 3, 16, [64; 3]), 7528);
+        assert_eq!(image_bytes(25, 3, 16, [0; 3]), 6712);
+        assert!(image_bytes(25, 3, 16, [100; 3]) <= 8192);
         assert_eq!(
             fixture::image(false).len(),
             fixture::plan(false).image_bytes()
@@ -1393,6 +1439,18 @@ mod tests {
             ),
             "{error}"
         );
+        // The repeated nodes at either end of a record.
+        for (position, index) in [(0, 0), (17, 17), (18, 18)] {
+            let offset = record(3) + 4 * (RECORD_HEAD_WORDS + position);
+            let error = resealed(|image| image[offset] ^= 1);
+            assert_eq!(
+                error,
+                ImageError::NotClosed {
+                    field: Field::MeanRipple,
+                    index
+                }
+            );
+        }
         let error = resealed(put(record(20), 0.03));
         assert!(
             matches!(

@@ -61,7 +61,7 @@
 //! # Signs and units
 //! * Angles in radians at the interface, positive counter-clockwise; torque N·m, temperature °C.
 //! * `transmission_error = actual − ideal` at the output. `command_correction = −predicted_error·ratio`
-//!   ([`Drive::command_correction_counts`]).
+//!   ([`Drive::corrected_command`]).
 //! * The ratio is signed: `+cs/(cs − fs)` with the flexspline fixed, `−fs/(cs − fs)` with the circular spline fixed.
 //! * Positive load torque turns the output forward and gives positive wind-up.
 //! * A [`Direction`] is that of the output.
@@ -104,5 +104,5 @@ pub use image::{
     FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance,
     TEXT_BYTES, TableData, WriteError, image_bytes, write_image,
 };
-pub use model::{Approach, Command, INVERSE_ITERATIONS, Prediction};
-pub use table::{Bounds, GeneratorKind, Quality, Table, TableId};
+pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ITERATIONS, Prediction};
+pub use table::{Bounds, GeneratorKind, OperatingPoint, Quality, Table, TableId};

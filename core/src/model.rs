@@ -1,17 +1,32 @@
 //! Forward and inverse: what the output does, and what to command so that it does what is wanted.
 //!
 //! Signs: `transmission_error = actual − ideal` at the output; the command correction is its negative times the ratio
-//! ([`Drive::command_correction_counts`](crate::Drive::command_correction_counts)). Positive load torque turns the
+//! ([`Drive::corrected_command`](crate::Drive::corrected_command)). Positive load torque turns the
 //! output forward.
 //!
 //! Both calls do the same work whatever the data: no search that depends on them, no heap, no panic, no libm.
 
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::hysteresis::{Direction, PlayState};
-use crate::table::{OperatingPoint, Play, Quality, Table};
+use crate::table::{Bounds, OperatingPoint, Play, Quality, Table};
 
-/// Table reads of one inverse: the error left is at most `slope³·periodic_rad` of [`Table::bounds`].
-pub const INVERSE_ITERATIONS: u32 = 3;
+/// Error of the inverse that the number of its iterations aims at, rad at the output: 0.02″.
+pub const INVERSE_TOLERANCE_RAD: f32 = 1.0e-7;
+/// Most iterations of an inverse.
+pub const MAX_INVERSE_ITERATIONS: u8 = 8;
+
+impl Bounds {
+    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], 1 to 8; each takes it down to `slope` of itself.
+    pub(crate) fn inverse_iterations(self) -> u8 {
+        let mut error_rad = self.periodic_rad * self.slope;
+        let mut iterations = 1u8;
+        while error_rad > INVERSE_TOLERANCE_RAD && iterations < MAX_INVERSE_ITERATIONS {
+            error_rad *= self.slope;
+            iterations = iterations.saturating_add(1);
+        }
+        iterations
+    }
+}
 
 /// What the output is expected to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +69,7 @@ pub enum Approach<'s> {
     /// that rounding cannot make it cross the play to and fro.
     ///
     /// While the play is crossed the output still moves with the centre of the table. A reversal smaller than that movement
-    /// (at most [`Bounds::slope`](crate::Bounds) times the width of the play) has its target inside the play, where
+    /// (at most [`Bounds::slope`] times the width of the play) has its target inside the play, where
     /// no side is in contact; it is then missed by what [`Command::predicted_error_rad`] says.
     ///
     /// A state that was never updated gives the middle of the play, with its half-width as uncertainty.
@@ -88,10 +103,36 @@ struct Move {
     resting: Option<OutputAngle>,
 }
 
+impl Move {
+    /// How far the play rests beyond the side it is taken up on at `nominal`, signed like the error: 0 if that side is
+    /// reached.
+    fn short_of_contact_rad(&self, nominal: OutputAngle, play: Play) -> f32 {
+        let (Side::Steady(direction), Some(resting)) = (self.side, self.resting) else {
+            return 0.0;
+        };
+        let sign = direction.sign();
+        let reached = nominal.offset_rad(-sign * play.half_width_rad);
+        sign * (sign * resting.minus_rad(reached)).max(0.0)
+    }
+}
+
 /// How a target is reached from where the drive rests.
 enum Departure {
     Hold(Command),
     Move(Move),
+}
+
+impl Prediction {
+    fn disabled(nominal: OutputAngle, uncertainty_rad: f32) -> Self {
+        let quality = Quality::Disabled;
+        Self {
+            output: nominal,
+            nominal,
+            transmission_error_rad: 0.0,
+            uncertainty_rad,
+            quality,
+        }
+    }
 }
 
 impl Table<'_> {
@@ -108,30 +149,50 @@ impl Table<'_> {
         torque_n_m: f32,
         temperature_c: f32,
     ) -> Prediction {
-        let nominal = self.drive.nominal_output(generator);
-        let located = self.operating_point(torque_n_m, temperature_c);
-        let phases = self.drive.phases(generator, nominal);
-        let Some((point, play)) =
-            located.and_then(|point| Some((point, self.play_at(&point, phases)?)))
-        else {
-            state.coast(nominal);
-            return Prediction {
-                output: nominal,
-                nominal,
-                transmission_error_rad: 0.0,
-                uncertainty_rad: self.error_limit_rad,
-                quality: Quality::Disabled,
-            };
-        };
-        state.update(nominal, play.half_width_rad);
-        let transmission_error_rad = play.centre_rad + state.offset_rad();
-        Prediction {
-            output: nominal.offset_rad(transmission_error_rad),
-            nominal,
-            transmission_error_rad,
-            uncertainty_rad: state.uncertainty_rad() + point.jump_rad,
-            quality: point.quality_if_known(state.is_known()),
-        }
+        self.follow(
+            self.at(torque_n_m, temperature_c).as_ref(),
+            state,
+            generator,
+        )
+    }
+
+    /// Generator angle that brings the output to `target`.
+    ///
+    /// Solves `nominal(ψ) + e(ψ) = target` by fixed-point steps from the mean error; that they contract, and how many are
+    /// needed, was found when the table was accepted. If an input is not finite the ideal command is given and marked
+    /// `Disabled`.
+    #[must_use]
+    pub fn inverse(
+        &self,
+        target: OutputAngle,
+        torque_n_m: f32,
+        temperature_c: f32,
+        approach: Approach<'_>,
+    ) -> Command {
+        self.aim(
+            self.at(torque_n_m, temperature_c).as_ref(),
+            target,
+            approach,
+        )
+    }
+
+    /// One tick: [`Self::forward`] at the measured generator angle, then [`Self::inverse`] from there to the target. Locates
+    /// torque and temperature once; the answers are the same.
+    #[must_use]
+    pub fn step(
+        &self,
+        state: &mut PlayState,
+        measured: GeneratorAngle,
+        target: OutputAngle,
+        torque_n_m: f32,
+        temperature_c: f32,
+    ) -> (Prediction, Command) {
+        let point = self.at(torque_n_m, temperature_c);
+        let prediction = self.follow(point.as_ref(), state, measured);
+        (
+            prediction,
+            self.aim(point.as_ref(), target, Approach::From(state)),
+        )
     }
 
     /// Transmission error in steady motion in `direction`, rad; `None` if an input is not finite.
@@ -143,24 +204,60 @@ impl Table<'_> {
         temperature_c: f32,
         direction: Direction,
     ) -> Option<f32> {
-        let point = self.operating_point(torque_n_m, temperature_c)?;
-        Some(Side::Steady(direction).error_rad(self.play_for(&point, generator)?))
+        let point = self.at(torque_n_m, temperature_c)?;
+        let phases = self
+            .drive
+            .phases(generator, self.drive.nominal_output(generator));
+        Some(Side::Steady(direction).error_rad(self.play_at(&point, phases)?))
     }
 
-    /// Generator angle that brings the output to `target`.
-    ///
-    /// Solves `nominal(ψ) + e(ψ) = target` by [`INVERSE_ITERATIONS`] fixed-point steps from the mean error; that they
-    /// contract was checked when the table was accepted. If an input is not finite the ideal command is given and marked
-    /// `Disabled`.
+    /// Iterations of an inverse: fixed when the table was accepted, so that every call does the same work.
     #[must_use]
-    pub fn inverse(
+    pub const fn inverse_iterations(&self) -> u8 {
+        self.inverse_iterations
+    }
+
+    /// Largest error that the iterations leave in the inverse, rad at the output, beyond the rounding of angles (2 counts,
+    /// 3e-9 rad).
+    #[must_use]
+    pub fn inverse_error_bound_rad(&self) -> f32 {
+        (0..self.inverse_iterations).fold(self.bounds.periodic_rad, |error, _| {
+            error * self.bounds.slope
+        })
+    }
+
+    fn follow(
         &self,
+        point: Option<&OperatingPoint>,
+        state: &mut PlayState,
+        generator: GeneratorAngle,
+    ) -> Prediction {
+        let nominal = self.drive.nominal_output(generator);
+        let phases = self.drive.phases(generator, nominal);
+        let Some((point, play)) =
+            point.and_then(|point| Some((point, self.play_at(point, phases)?)))
+        else {
+            state.coast(nominal);
+            return Prediction::disabled(nominal, self.error_limit_rad);
+        };
+        let transmission_error_rad = state.update(nominal, play.centre_rad, play.half_width_rad);
+        Prediction {
+            output: nominal.offset_rad(transmission_error_rad),
+            nominal,
+            transmission_error_rad,
+            uncertainty_rad: state.uncertainty_rad() + point.jump_rad,
+            quality: point.quality_if_known(state.is_known()),
+        }
+    }
+
+    fn aim(
+        &self,
+        point: Option<&OperatingPoint>,
         target: OutputAngle,
-        torque_n_m: f32,
-        temperature_c: f32,
         approach: Approach<'_>,
     ) -> Command {
-        self.solve(target, torque_n_m, temperature_c, approach)
+        point
+            .and_then(|point| self.solve(point, target, approach))
             .unwrap_or(Command {
                 generator: self.drive.nominal_generator(target),
                 predicted_error_rad: 0.0,
@@ -169,78 +266,41 @@ impl Table<'_> {
             })
     }
 
-    /// Largest error that the fixed number of iterations leaves in the inverse, rad at the output, beyond the rounding of
-    /// angles (2 counts, 3e-9 rad).
-    #[must_use]
-    pub fn inverse_error_bound_rad(&self) -> f32 {
-        (0..INVERSE_ITERATIONS).fold(self.bounds.periodic_rad, |error, _| {
-            error * self.bounds.slope
-        })
-    }
-
     fn solve(
         &self,
+        point: &OperatingPoint,
         target: OutputAngle,
-        torque_n_m: f32,
-        temperature_c: f32,
         approach: Approach<'_>,
     ) -> Option<Command> {
-        let point = self.operating_point(torque_n_m, temperature_c)?;
         let motion = match approach {
             Approach::Moving(direction) => Move {
                 side: Side::Steady(direction),
                 uncertainty_rad: 0.0,
                 resting: None,
             },
-            Approach::From(state) => match self.departure(target, &point, state)? {
+            Approach::From(state) => match self.departure(target, point, state) {
                 Departure::Hold(command) => return Some(command),
                 Departure::Move(motion) => motion,
             },
         };
-        let side = motion.side;
         let mut play = Play {
             centre_rad: point.mean_rad,
             half_width_rad: point.half_width_rad,
         };
-        for _ in 0..INVERSE_ITERATIONS {
-            play = self.play_for(&point, self.command_for(target, side.error_rad(play)))?;
+        for _ in 0..self.inverse_iterations {
+            let (generator, nominal) = self
+                .drive
+                .corrected_command(target, motion.side.error_rad(play));
+            play = self.play_at(point, self.drive.phases(generator, nominal))?;
         }
-        let generator = self.command_for(target, side.error_rad(play));
+        let error_rad = motion.side.error_rad(play);
+        let (generator, nominal) = self.drive.corrected_command(target, error_rad);
         Some(Command {
             generator,
-            predicted_error_rad: side.error_rad(play)
-                + self.short_of_contact_rad(&motion, generator, play),
+            predicted_error_rad: error_rad + motion.short_of_contact_rad(nominal, play),
             uncertainty_rad: motion.uncertainty_rad + point.jump_rad,
             quality: point.quality_if_known(motion.uncertainty_rad <= 0.0),
         })
-    }
-
-    fn command_for(&self, target: OutputAngle, predicted_error_rad: f32) -> GeneratorAngle {
-        let correction = self.drive.command_correction_counts(predicted_error_rad);
-        self.drive
-            .nominal_generator(target)
-            .offset_counts(correction)
-    }
-
-    fn play_for(&self, point: &OperatingPoint, generator: GeneratorAngle) -> Option<Play> {
-        self.play_at(
-            point,
-            self.drive
-                .phases(generator, self.drive.nominal_output(generator)),
-        )
-    }
-
-    /// How far the play rests beyond the side it is taken up on, signed like the error: 0 if that side is reached.
-    fn short_of_contact_rad(&self, motion: &Move, generator: GeneratorAngle, play: Play) -> f32 {
-        let (Side::Steady(direction), Some(resting)) = (motion.side, motion.resting) else {
-            return 0.0;
-        };
-        let sign = direction.sign();
-        let reached = self
-            .drive
-            .nominal_output(generator)
-            .offset_rad(-sign * play.half_width_rad);
-        sign * (sign * resting.minus_rad(reached)).max(0.0)
     }
 
     /// Whether and to which side the play must be taken up on the way from `state` to `target`.
@@ -249,43 +309,39 @@ impl Table<'_> {
         target: OutputAngle,
         point: &OperatingPoint,
         state: &PlayState,
-    ) -> Option<Departure> {
-        let Some(nominal) = state.nominal() else {
+    ) -> Departure {
+        let (Some(nominal), Some(output)) = (state.nominal(), state.output()) else {
             let uncertainty_rad = point.half_width_rad;
-            return Some(Departure::Move(Move {
+            return Departure::Move(Move {
                 side: Side::Middle,
                 uncertainty_rad,
                 resting: None,
-            }));
+            });
         };
-        let generator = self.drive.nominal_generator(nominal);
-        let play = self.play_at(point, self.drive.phases(generator, nominal))?;
-        let predicted_error_rad = play.centre_rad + state.offset_rad();
-        let ahead_rad = target.minus_rad(nominal.offset_rad(predicted_error_rad));
+        let ahead_rad = target.minus_rad(output);
         if ahead_rad.abs() <= self.inverse_error_bound_rad() + HOLD_RAD {
-            return Some(Departure::Hold(Command {
-                generator,
-                predicted_error_rad,
+            return Departure::Hold(Command {
+                generator: self.drive.nominal_generator(nominal),
+                predicted_error_rad: output.minus_rad(nominal),
                 uncertainty_rad: state.uncertainty_rad() + point.jump_rad,
                 quality: point.quality_if_known(state.is_known()),
-            }));
+            });
         }
-        let direction = if ahead_rad > 0.0 {
-            Direction::Forward
-        } else {
-            Direction::Backward
-        };
         // A target inside the interval may lie on the other side of the output: then the whole play is in doubt.
         let guess = ahead_rad.abs() <= state.uncertainty_rad();
-        Some(Departure::Move(Move {
-            side: Side::Steady(direction),
+        Departure::Move(Move {
+            side: Side::Steady(if ahead_rad > 0.0 {
+                Direction::Forward
+            } else {
+                Direction::Backward
+            }),
             uncertainty_rad: if guess {
-                2.0 * play.half_width_rad
+                2.0 * point.half_width_rad
             } else {
                 0.0
             },
             resting: Some(nominal.offset_rad(state.offset_rad())),
-        }))
+        })
     }
 }
 

@@ -632,7 +632,7 @@ impl<'a> Plan<'a> {
         let (nodes, weights) = match PeriodicAxis::new(self.ripple_nodes) {
             Some(axis) if !axis.is_empty() => {
                 let cell = axis.locate(phases.tooth);
-                (cell.nodes, cell.weights)
+                (axis.around(cell), cell.weights())
             }
             _ => ([0; 4], [1.0, 0.0, 0.0, 0.0]),
         };

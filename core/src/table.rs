@@ -102,6 +102,25 @@ pub(crate) fn ripple_at(words: Words<'_>, index: usize) -> (i16, i16) {
     })
 }
 
+/// Unit of the ripple weights.
+const Q15: f32 = 1.0 / 32_768.0;
+
+/// Four words in a row; `None` beyond the end, which an accepted table never reaches.
+fn four_at(words: Words<'_>, first: usize) -> Option<[[u8; 4]; 4]> {
+    words.get(first..)?.first_chunk().copied()
+}
+
+/// Ripple of the mean and of the half-width at weights in 2⁻¹⁵: |sum| < 2³¹, since the weights add up to 2¹⁵.
+fn ripple_sum(words: [[u8; 4]; 4], weights: [i16; 4]) -> (f32, f32) {
+    let (mut mean, mut half) = (0i32, 0i32);
+    for ([a, b, c, d], weight) in words.into_iter().zip(weights) {
+        let weight = weight as i32;
+        mean = mean.wrapping_add((i16::from_le_bytes([a, b]) as i32).wrapping_mul(weight));
+        half = half.wrapping_add((i16::from_le_bytes([c, d]) as i32).wrapping_mul(weight));
+    }
+    (mean as f32, half as f32)
+}
+
 /// Words of a record before its ripple: D and H.
 pub(crate) const RECORD_HEAD_WORDS: usize = 2;
 
@@ -118,12 +137,9 @@ impl PeriodicCurve<'_> {
             return 0.0;
         }
         let cell = self.axis.locate(phase);
-        cell.nodes
-            .into_iter()
-            .zip(cell.weights)
-            .fold(0.0, |sum, (node, weight)| {
-                sum + weight * f32_at(self.words, node)
-            })
+        four_at(self.words, cell.node).map_or(0.0, |words| {
+            dot(words.map(f32::from_le_bytes), cell.weights())
+        })
     }
 }
 
@@ -142,7 +158,7 @@ pub struct Table<'a> {
     pub(crate) generator_curve: PeriodicCurve<'a>,
     pub(crate) material_curve: PeriodicCurve<'a>,
     pub(crate) output_curve: PeriodicCurve<'a>,
-    /// `[temperature][torque]` records of `RECORD_HEAD_WORDS + ripple.len()` words.
+    /// `[temperature][torque]` records of `RECORD_HEAD_WORDS + ripple.stored_len()` words.
     pub(crate) records: Words<'a>,
     pub(crate) ripple: PeriodicAxis,
     pub(crate) mean_ripple_scale: f32,
@@ -152,6 +168,7 @@ pub struct Table<'a> {
     pub(crate) temperature_range_c: [f32; 2],
     pub(crate) error_limit_rad: f32,
     pub(crate) bounds: Bounds,
+    pub(crate) inverse_iterations: u8,
 }
 
 /// What a table can give at most, from its coefficients.
@@ -165,23 +182,23 @@ pub struct Bounds {
     pub slope: f32,
 }
 
-/// A torque and temperature, located in the table.
+/// A torque and temperature, located in the table: [`Table::at`]. What forward and inverse of one tick share.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct OperatingPoint {
+pub struct OperatingPoint {
     /// First word of the four records around it.
     rows: [usize; 4],
     weights: [f32; 4],
     /// D and H there.
-    pub mean_rad: f32,
-    pub half_width_rad: f32,
+    pub(crate) mean_rad: f32,
+    pub(crate) half_width_rad: f32,
     /// Height of the jump the torque lies in, else 0.
-    pub jump_rad: f32,
-    pub quality: Quality,
+    pub(crate) jump_rad: f32,
+    pub(crate) quality: Quality,
 }
 
 impl OperatingPoint {
     /// The quality here, lowered while the side of the play is not known.
-    pub fn quality_if_known(&self, known: bool) -> Quality {
+    pub(crate) fn quality_if_known(&self, known: bool) -> Quality {
         if known {
             self.quality
         } else {
@@ -261,12 +278,9 @@ impl<'a> Table<'a> {
         self.bounds
     }
 
-    /// Locates a torque and temperature; `None` if either is not finite.
-    pub(crate) fn operating_point(
-        &self,
-        torque_n_m: f32,
-        temperature_c: f32,
-    ) -> Option<OperatingPoint> {
+    /// Locates a torque (N·m) and temperature (°C); `None` if either is not finite.
+    #[must_use]
+    pub fn at(&self, torque_n_m: f32, temperature_c: f32) -> Option<OperatingPoint> {
         if !(torque_n_m.is_finite() && temperature_c.is_finite()) {
             return None;
         }
@@ -277,7 +291,7 @@ impl<'a> Table<'a> {
             |i| f32_at(self.temperature, i),
             temperature_c,
         );
-        let stride = self.ripple.len().wrapping_add(RECORD_HEAD_WORDS);
+        let stride = self.ripple.stored_len().wrapping_add(RECORD_HEAD_WORDS);
         let row = |temperature: usize, torque: usize| {
             temperature
                 .wrapping_mul(self.torque.len())
@@ -330,21 +344,22 @@ impl<'a> Table<'a> {
         let (mut mean, mut half) = (0.0, 0.0);
         if !self.ripple.is_empty() {
             let cell = self.ripple.locate(phases.tooth);
-            for (row, weight) in point.rows.into_iter().zip(point.weights) {
-                let first = row.wrapping_add(RECORD_HEAD_WORDS);
-                let words = cell
-                    .nodes
-                    .map(|node| ripple_at(self.records, first.wrapping_add(node)));
-                mean += weight * dot(words.map(|(ripple, _)| ripple as f32), cell.weights);
-                half += weight * dot(words.map(|(_, ripple)| ripple as f32), cell.weights);
+            let weights = cell.weights_q15();
+            let first = cell.node.wrapping_add(RECORD_HEAD_WORDS);
+            for (row, share) in point.rows.into_iter().zip(point.weights) {
+                let words = four_at(self.records, row.wrapping_add(first))?;
+                let (mean_here, half_here) = ripple_sum(words, weights);
+                mean += share * mean_here;
+                half += share * half_here;
             }
         }
         let curves = self.generator_curve.at(phases.generator)
             + self.material_curve.at(phases.material)
             + self.output_curve.at(phases.output);
-        let centre_rad = point.mean_rad + mean * self.mean_ripple_scale + curves;
+        let centre_rad = point.mean_rad + mean * (self.mean_ripple_scale * Q15) + curves;
         // Not negative but for rounding: the image check bounds it.
-        let half_width_rad = (point.half_width_rad + half * self.half_ripple_scale).max(0.0);
+        let half_width_rad =
+            (point.half_width_rad + half * (self.half_ripple_scale * Q15)).max(0.0);
         // The per mille takes up rounding; NaN fails the comparison.
         let sane = centre_rad.abs() + half_width_rad <= self.error_limit_rad * 1.001;
         sane.then_some(Play {
