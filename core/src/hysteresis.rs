@@ -331,14 +331,14 @@ mod tests {
             output: OutputAngle::ZERO,
         };
         assert_eq!(PlayState::restore(&disordered.save()), None);
-        let outside = PlayState {
-            lower: -11,
-            upper: 5,
-            half: 10,
-            nominal: OutputAngle::ZERO,
-            output: OutputAngle::ZERO,
-        };
-        assert_eq!(PlayState::restore(&outside.save()), None);
+        for (lower, upper) in [(-11, 5), (5, 11)] {
+            let outside = PlayState {
+                lower,
+                upper,
+                ..disordered
+            };
+            assert_eq!(PlayState::restore(&outside.save()), None);
+        }
     }
 
     proptest! {

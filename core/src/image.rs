@@ -1170,6 +1170,27 @@ mod tests {
     }
 
     #[test]
+    fn a_half_width_that_touches_zero_stays_writable() {
+        for i in 0..500u32 {
+            // Rounding of the lowest ripple goes up for some and down for others.
+            let lowest = 1.0e-9 * (1.0 + 0.618_034 * i as f32);
+            let mut ripple = data().half_width_ripple_rad.to_vec();
+            ripple[3] = -lowest;
+            ripple
+                .iter_mut()
+                .filter(|h| **h < -lowest)
+                .for_each(|h| *h = -lowest);
+            let touching = TableData {
+                half_width_rad: &[lowest; 4],
+                half_width_ripple_rad: &ripple,
+                ..data()
+            };
+            let written = write(&touching, &provenance());
+            assert!(written.is_ok(), "{lowest}: {written:?}");
+        }
+    }
+
+    #[test]
     fn the_stated_sizes_hold() {
         assert_eq!(image_bytes(25, 3, 16, [64; 3]), 7528);
         assert_eq!(image_bytes(25, 3, 16, [0; 3]), 6712);

@@ -10,7 +10,8 @@ use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::hysteresis::{Direction, PlayState};
 use crate::table::{Bounds, OperatingPoint, Play, Quality, Table};
 
-/// Error of the inverse that the number of its iterations aims at, rad at the output: 0.02″.
+/// Error of the inverse that the number of its iterations aims at, rad at the output: 0.02″, far below what a table misses of
+/// its samples.
 pub const INVERSE_TOLERANCE_RAD: f32 = 1.0e-7;
 /// Most iterations of an inverse.
 pub const MAX_INVERSE_ITERATIONS: u8 = 8;
