@@ -14,7 +14,9 @@
 //! tests): 6.2e-5 for 16 nodes, 1.0e-3 for 8, 1.6e-2 for 4.
 
 /// Most nodes a clamped axis may have.
-pub const MAX_CLAMPED_NODES: usize = 32;
+pub const MAX_CLAMPED_NODES: usize = 1 << MAX_HALVINGS;
+/// Comparisons that find a place among [`MAX_CLAMPED_NODES`].
+pub const MAX_HALVINGS: u32 = 5;
 /// Fewest nodes of a periodic axis that is present: the four a cubic needs.
 pub const MIN_PERIODIC_NODES: usize = 4;
 /// Most nodes of a periodic axis.
@@ -150,13 +152,19 @@ pub struct Place {
     pub weight: f32,
 }
 
-/// Finds `value` among `len` increasing nodes, at most [`MAX_CLAMPED_NODES`].
+/// Finds `value` among `len` increasing nodes, at most 2 to the power of `HALVINGS`.
 ///
-/// Always five halvings, whatever the data; the weight costs one division. NaN is placed at the first node.
-pub fn locate_clamped(len: usize, node: impl Fn(usize) -> f32, value: f32) -> Place {
+/// Always `HALVINGS` comparisons, whatever the data; the weight costs one division. NaN is placed at the first node.
+pub fn locate_clamped<const HALVINGS: u32>(
+    len: usize,
+    node: impl Fn(usize) -> f32,
+    value: f32,
+) -> Place {
     let last_interval = len.saturating_sub(2);
     let mut below = 0usize;
-    for step in [16usize, 8, 4, 2, 1] {
+    let mut step = 1usize << HALVINGS;
+    for _ in 0..HALVINGS {
+        step >>= 1;
         let candidate = below.wrapping_add(step);
         if candidate <= last_interval && node(candidate) <= value {
             below = candidate;
@@ -170,7 +178,9 @@ pub fn locate_clamped(len: usize, node: impl Fn(usize) -> f32, value: f32) -> Pl
     let (low, high) = (node(below), node(above));
     let along = (value - low) / (high - low);
     // Also takes the NaN of an axis with one node, and of a NaN value, to 0.
-    let weight = if along > 0.0 { along.min(1.0) } else { 0.0 };
+    // (Comparisons, not `min` and `max`: those are library calls on a Cortex-M4F.)
+    let positive = if along > 0.0 { along } else { 0.0 };
+    let weight = if positive < 1.0 { positive } else { 1.0 };
     Place {
         below,
         above,
@@ -311,7 +321,7 @@ mod tests {
         ) {
             nodes.sort_by(f32::total_cmp);
             nodes.dedup();
-            let place = locate_clamped(nodes.len(), |i| nodes[i], value);
+            let place = locate_clamped::<MAX_HALVINGS>(nodes.len(), |i| nodes[i], value);
             let found = nodes[place.below] * (1.0 - place.weight) + nodes[place.above] * place.weight;
             let clamped = value.clamp(nodes[0], nodes[nodes.len() - 1]);
             prop_assert!((found - clamped).abs() < 1e-4, "{} {}", found, clamped);

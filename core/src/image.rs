@@ -51,7 +51,8 @@ pub const FORMAT_VERSION: u16 = 1;
 /// Bytes of one page, the unit of a scrub and of an upload.
 pub const PAGE_BYTES: usize = 256;
 /// Most temperature nodes.
-pub const MAX_TEMPERATURE_NODES: usize = 8;
+pub const MAX_TEMPERATURE_NODES: usize = 1 << TEMPERATURE_HALVINGS;
+pub(crate) const TEMPERATURE_HALVINGS: u32 = 3;
 /// Most ripple nodes over one tooth pitch.
 pub const MAX_RIPPLE_NODES: usize = 32;
 /// No table may give a larger error, rad (2.9°, one and a half tooth pitches of a 188-tooth drive).

@@ -8,7 +8,7 @@
 
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::hysteresis::{Direction, PlayState};
-use crate::table::{Bounds, OperatingPoint, Play, Quality, Table};
+use crate::table::{Bounds, OperatingPoint, Play, Quality, Table, larger};
 
 /// Error of the inverse that the number of its iterations aims at, rad at the output: 0.02″, far below what a table misses of
 /// its samples.
@@ -113,7 +113,7 @@ impl Move {
         };
         let sign = direction.sign();
         let reached = nominal.offset_rad(-sign * play.half_width_rad);
-        sign * (sign * resting.minus_rad(reached)).max(0.0)
+        sign * larger(sign * resting.minus_rad(reached), 0.0)
     }
 }
 

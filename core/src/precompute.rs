@@ -26,7 +26,8 @@ use crate::angle::GeneratorAngle;
 use crate::drive::Drive;
 use crate::error::{Field, ImageError};
 use crate::grid::{
-    self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis, Place,
+    self, MAX_CLAMPED_NODES, MAX_HALVINGS, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis,
+    Place,
 };
 use crate::hysteresis::Direction;
 use crate::image::{
@@ -570,7 +571,7 @@ impl<'a> Plan<'a> {
     }
 
     fn place(nodes: &[f32], value: f64) -> Place {
-        grid::locate_clamped(
+        grid::locate_clamped::<MAX_HALVINGS>(
             nodes.len(),
             |i| nodes.get(i).copied().unwrap_or(0.0),
             value as f32,

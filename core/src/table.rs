@@ -17,7 +17,8 @@
 //! known only up to the height of the jump, and the [`Quality`] says so.
 
 use crate::drive::{Drive, Phases};
-use crate::grid::{self, PeriodicAxis};
+use crate::grid::{self, MAX_HALVINGS, PeriodicAxis};
+use crate::image::TEMPERATURE_HALVINGS;
 
 /// How far an answer can be trusted, worst last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -108,6 +109,20 @@ const Q15: f32 = 1.0 / 32_768.0;
 /// Four words in a row; `None` beyond the end, which an accepted table never reaches.
 fn four_at(words: Words<'_>, first: usize) -> Option<[[u8; 4]; 4]> {
     words.get(first..)?.first_chunk().copied()
+}
+
+/// D and H of the record at `first`; 0 beyond the end.
+fn head_at(words: Words<'_>, first: usize) -> [f32; RECORD_HEAD_WORDS] {
+    let head = words
+        .get(first..)
+        .and_then(|record| record.first_chunk().copied());
+    head.unwrap_or([[0; 4]; RECORD_HEAD_WORDS])
+        .map(f32::from_le_bytes)
+}
+
+/// The larger of two numbers; the second if the first is NaN. (`f32::max` is a library call on a Cortex-M4F.)
+pub(crate) fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 /// Ripple of the mean and of the half-width at weights in 2⁻¹⁵: |sum| < 2³¹, since the weights add up to 2¹⁵.
@@ -284,9 +299,12 @@ impl<'a> Table<'a> {
         if !(torque_n_m.is_finite() && temperature_c.is_finite()) {
             return None;
         }
-        let torque =
-            grid::locate_clamped(self.torque.len(), |i| f32_at(self.torque, i), torque_n_m);
-        let temperature = grid::locate_clamped(
+        let torque = grid::locate_clamped::<MAX_HALVINGS>(
+            self.torque.len(),
+            |i| f32_at(self.torque, i),
+            torque_n_m,
+        );
+        let temperature = grid::locate_clamped::<TEMPERATURE_HALVINGS>(
             self.temperature.len(),
             |i| f32_at(self.temperature, i),
             temperature_c,
@@ -311,10 +329,10 @@ impl<'a> Table<'a> {
             temperature.weight * low,
             temperature.weight * torque.weight,
         ];
-        let means = rows.map(|row| f32_at(self.records, row));
-        let halves = rows.map(|row| f32_at(self.records, row.wrapping_add(1)));
+        let heads = rows.map(|row| head_at(self.records, row));
+        let (means, halves) = (heads.map(|[mean, _]| mean), heads.map(|[_, half]| half));
         // The height of a jump is taken on both temperature planes; the larger counts.
-        let height = |[a, b, c, d]: [f32; 4]| (b - a).abs().max((d - c).abs());
+        let height = |[a, b, c, d]: [f32; 4]| larger((b - a).abs(), (d - c).abs());
         let in_jump =
             self.is_torque_jump(torque.below) && torque.weight > 0.0 && torque.weight < 1.0;
         let within = |value: f32, [least, most]: [f32; 2]| value >= least && value <= most;
@@ -358,8 +376,10 @@ impl<'a> Table<'a> {
             + self.output_curve.at(phases.output);
         let centre_rad = point.mean_rad + mean * (self.mean_ripple_scale * Q15) + curves;
         // Not negative but for rounding: the image check bounds it.
-        let half_width_rad =
-            (point.half_width_rad + half * (self.half_ripple_scale * Q15)).max(0.0);
+        let half_width_rad = larger(
+            point.half_width_rad + half * (self.half_ripple_scale * Q15),
+            0.0,
+        );
         // The per mille takes up rounding; NaN fails the comparison.
         let sane = centre_rad.abs() + half_width_rad <= self.error_limit_rad * 1.001;
         sane.then_some(Play {
