@@ -49,8 +49,8 @@
 //! ```
 //!
 //! # Promises
-//! * No heap, no panic, no `unsafe`. [`Table::forward`] and [`Table::inverse`] do the same reads and the same arithmetic
-//!   for all data of a table: no search that depends on values, no libm.
+//! * No heap, no panic, no `unsafe`. [`Table::step`], [`Table::forward`] and [`Table::inverse`] loop a number of times that is
+//!   fixed when the table is accepted, search in a fixed number of comparisons, and call no libm.
 //! * A damaged or hostile image gives an [`ImageError`], never a wrong correction. What a table can give at most is bounded
 //!   from its coefficients when it is accepted, for every input and not only at nodes.
 //! * NaN or infinity in torque or temperature gives [`Quality::Disabled`] and no correction.

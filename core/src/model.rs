@@ -4,7 +4,15 @@
 //! ([`Drive::corrected_command`](crate::Drive::corrected_command)). Positive load torque turns the
 //! output forward.
 //!
-//! Both calls do the same work whatever the data: no search that depends on them, no heap, no panic, no libm.
+//! No search or loop whose length depends on the inputs, no heap, no panic, no libm. Instructions on a Cortex-M4F (release,
+//! LTO), for 25 torques, 3 temperatures and 16 ripple nodes; they vary by at most 29 with the inputs, and holding still takes
+//! less:
+//!
+//! | table | iterations | forward | inverse | step |
+//! |---|---|---|---|---|
+//! | ripple only | 1 | 774 | 1009 | 1458 |
+//! | ripple and A, B, C | 1 | 921 | 1156 | 1752 |
+//! | the same with steep curves | 5 | 921 | 2647 | 3234 |
 
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::hysteresis::{Direction, PlayState};

@@ -17,6 +17,48 @@
 //! What samples cannot determine is an error that names the node, never a guess. Samples strictly inside a torque jump
 //! say nothing about either side of it; they are left out and counted.
 //!
+//! ```
+//! use flexspline::precompute::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
+//! use flexspline::{Direction, Drive, FixedMember, GeneratorKind, Provenance, Table};
+//!
+//! let plan = Plan {
+//!     drive: Drive::new(188, 190, FixedMember::Flexspline).unwrap(),
+//!     torque_nodes_n_m: &[-20.0, 20.0],
+//!     temperature_nodes_c: &[20.0],
+//!     ripple_nodes: 8,
+//!     generator: Harmonics::default(),
+//!     material: Harmonics::default(),
+//!     output: Harmonics::default(),
+//!     missing_direction: MissingDirection::Refuse,
+//!     negative_half_width_tolerance_rad: 5e-8,
+//!     deviation_limit_rad: 5e-6,
+//! };
+//! # let provenance = Provenance {
+//! #     generator_kind: GeneratorKind::Cam, drive_hash: [0; 32], tool_version: "doc", mesh_level: "none",
+//! #     solver_residual: 0.0, torque_range_n_m: [-20.0, 20.0], temperature_range_c: [0.0, 40.0],
+//! #     error_limit_rad: 0.02,
+//! # };
+//! // One tooth pitch at every node, both ways: wind-up, a lag of 1e-4 rad, and a ripple.
+//! let mut samples = Vec::new();
+//! for torque_n_m in [-20.0, 20.0] {
+//!     for (direction, lag_rad) in [(Direction::Forward, 1e-4), (Direction::Backward, -1e-4)] {
+//!         for position in 0..8 {
+//!             let generator_rad = position as f64 / 8.0 * std::f64::consts::TAU / 188.0;
+//!             let error_rad = torque_n_m / 3e4 - lag_rad + 1e-6 * (188.0 * generator_rad).sin();
+//!             let output_rad = generator_rad / 95.0 + error_rad;
+//!             samples.push(Sample { generator_rad, torque_n_m, temperature_c: 20.0, direction, output_rad });
+//!         }
+//!     }
+//! }
+//! let (mut numbers, mut marks) = (vec![0.0; plan.numbers_len()], vec![0; plan.marks_len()]);
+//! let (mut values, mut image) = (vec![0.0; plan.values_len()], vec![0; plan.image_bytes()]);
+//! let workspace = Workspace { numbers: &mut numbers, marks: &mut marks, values: &mut values };
+//! let hash = |_contents: &[u8]| [0; 8]; // the first 8 bytes of BLAKE3
+//! let fit = make_image(&plan, &provenance, &samples, workspace, &mut image, hash).unwrap();
+//! assert!(fit.worst_rad < 1e-9);
+//! assert!(Table::check(&image).is_ok());
+//! ```
+//!
 //! Memory is the caller's: [`Plan::numbers_len`], [`Plan::marks_len`] and [`Plan::values_len`]. A pass over the samples
 //! takes one sine and cosine for each harmonic and some 50 multiplications for each sample; well-spread samples need
 //! 10 to 30 passes. Uses libm: not for the control step.
