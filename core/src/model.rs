@@ -670,6 +670,24 @@ mod tests {
     }
 
     #[test]
+    fn a_reversal_within_the_play_says_by_how_much_it_misses() {
+        let table = table();
+        let mut state = PlayState::after_motion(Direction::Forward);
+        let _ = table.forward(&mut state, GeneratorAngle::ZERO, -25.221724, 20.0);
+        let mut off = [0.0; 2];
+        for (target, off) in [0.001_749_479_8, 0.001_747_644_2].into_iter().zip(&mut off) {
+            let target = OutputAngle::from_rad(target).unwrap();
+            let command = table.inverse(target, -25.221724, 20.0, Approach::From(&state));
+            let there = table.forward(&mut state, command.generator, -25.221724, 20.0);
+            let unforeseen = there.transmission_error_rad - command.predicted_error_rad;
+            assert!((unforeseen.abs() as f64) < 0.01 * ARCSEC, "{unforeseen}");
+            *off = there.output.minus_rad(target).abs() as f64 / ARCSEC;
+        }
+        // The first is reached in contact; on the way to the second the centre itself moves the output past it.
+        assert!(off[0] < 0.01 && off[1] > 0.05, "{off:?} arcsec");
+    }
+
+    #[test]
     fn steady_tracking_meets_every_target() {
         let table = table();
         let mut state = PlayState::after_motion(Direction::Forward);
