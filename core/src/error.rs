@@ -1,0 +1,319 @@
+//! What can be wrong with a drive or an image, as small `Copy` values that name the field and what was found.
+
+use core::fmt;
+
+/// Tooth counts that make no drive: `1 ≤ flexspline_teeth < circular_spline_teeth` is required.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DriveError {
+    /// Flexspline teeth found.
+    pub flexspline_teeth: u16,
+    /// Circular spline teeth found.
+    pub circular_spline_teeth: u16,
+}
+
+impl fmt::Display for DriveError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} flexspline teeth and {} circular spline teeth: the flexspline needs at least one, and fewer than the \
+             circular spline",
+            self.flexspline_teeth, self.circular_spline_teeth
+        )
+    }
+}
+
+impl core::error::Error for DriveError {}
+
+/// A field of a table or its image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Field {
+    /// The text that names the program that made the table.
+    ToolVersion,
+    /// The text that names the mesh.
+    MeshLevel,
+    /// Torque nodes, N·m.
+    TorqueNodes,
+    /// Temperature nodes, °C.
+    TemperatureNodes,
+    /// Nodes over one tooth pitch.
+    RippleNodes,
+    /// Curve over the generator angle ψ, rad.
+    GeneratorCurve,
+    /// Curve over the material phase ψ − δ, rad.
+    MaterialCurve,
+    /// Curve over the output angle δ, rad.
+    OutputCurve,
+    /// Mean error (wind-up) at a torque and temperature, rad.
+    Mean,
+    /// Mean half-width of the play, rad.
+    HalfWidth,
+    /// Ripple of the mean over one tooth pitch, rad.
+    MeanRipple,
+    /// Ripple of the half-width over one tooth pitch, rad.
+    HalfWidthRipple,
+    /// Residual the solver reached.
+    SolverResidual,
+    /// Largest deviation of the table from the samples, rad.
+    ProjectionWorst,
+    /// Root mean square deviation of the table from the samples, rad.
+    ProjectionRms,
+    /// Torques the table holds for, N·m.
+    TorqueRange,
+    /// Temperatures the table holds for, °C.
+    TemperatureRange,
+    /// Largest error the table may give, rad.
+    ErrorLimit,
+}
+
+impl Field {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::ToolVersion => "tool version",
+            Self::MeshLevel => "mesh level",
+            Self::TorqueNodes => "torque nodes",
+            Self::TemperatureNodes => "temperature nodes",
+            Self::RippleNodes => "ripple nodes",
+            Self::GeneratorCurve => "curve over the generator angle",
+            Self::MaterialCurve => "curve over the material phase",
+            Self::OutputCurve => "curve over the output angle",
+            Self::Mean => "mean error",
+            Self::HalfWidth => "half-width of the play",
+            Self::MeanRipple => "ripple of the mean",
+            Self::HalfWidthRipple => "ripple of the half-width",
+            Self::SolverResidual => "solver residual",
+            Self::ProjectionWorst => "worst projection error",
+            Self::ProjectionRms => "rms projection error",
+            Self::TorqueRange => "torque range",
+            Self::TemperatureRange => "temperature range",
+            Self::ErrorLimit => "error limit",
+        }
+    }
+}
+
+impl fmt::Display for Field {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Why an image is refused. The first check that fails is reported: the envelope (length, magic, byte order, version,
+/// CRC-32), what it is for, sizes, pages, and last the numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ImageError {
+    /// Fewer bytes than a header and its checksums.
+    TooShort {
+        /// Bytes found.
+        found: usize,
+        /// Fewest bytes an image can have.
+        needed: usize,
+    },
+    /// Not a table image.
+    Magic,
+    /// A format version this program does not read.
+    Version {
+        /// Version found.
+        found: u16,
+        /// Version read.
+        allowed: u16,
+    },
+    /// Bytes were swapped on the way.
+    ByteOrder {
+        /// Mark found.
+        found: u16,
+    },
+    /// The stated length differs from the bytes given.
+    Length {
+        /// Length in the header, bytes.
+        stated: usize,
+        /// Bytes found.
+        found: usize,
+    },
+    /// The CRC-32 of the whole image does not match.
+    Crc {
+        /// In the image.
+        stated: u32,
+        /// Computed.
+        computed: u32,
+    },
+    /// The CRC-32 of one 256-byte page does not match.
+    PageCrc {
+        /// Page number.
+        page: usize,
+    },
+    /// Reserved bytes are not zero.
+    Reserved {
+        /// Offset in the image.
+        offset: usize,
+    },
+    /// A text is not printable ASCII padded with zeros.
+    Text {
+        /// Which text.
+        field: Field,
+    },
+    /// Unknown kind of wave generator.
+    GeneratorKind {
+        /// Code found.
+        found: u8,
+    },
+    /// Unknown fixed member.
+    FixedMember {
+        /// Code found.
+        found: u8,
+    },
+    /// Tooth counts that make no drive.
+    Teeth(DriveError),
+    /// A number of nodes outside its limits.
+    Count {
+        /// Which nodes.
+        field: Field,
+        /// Number found.
+        found: usize,
+        /// Fewest allowed (periodic parts may also have none).
+        least: usize,
+        /// Most allowed.
+        most: usize,
+    },
+    /// The stated counts and the length do not fit together.
+    Size {
+        /// Bytes the counts need.
+        needed: usize,
+        /// Bytes found.
+        found: usize,
+    },
+    /// NaN or infinite.
+    NotFinite {
+        /// Which field.
+        field: Field,
+        /// Index inside the field.
+        index: usize,
+    },
+    /// Axis nodes that do not increase strictly.
+    NotIncreasing {
+        /// Which axis.
+        field: Field,
+        /// First node not above the one before.
+        index: usize,
+    },
+    /// A repeated node at the ends of a periodic curve differs from the node it repeats.
+    NotClosed {
+        /// Which curve; both ripples of a record count as ripple of the mean.
+        field: Field,
+        /// Position in the stored curve.
+        index: usize,
+    },
+    /// A value outside its limits.
+    OutOfRange {
+        /// Which field.
+        field: Field,
+        /// Value found.
+        found: f32,
+        /// Smallest allowed.
+        least: f32,
+        /// Largest allowed.
+        most: f32,
+    },
+    /// The play would have a negative width.
+    NegativeHalfWidth {
+        /// Temperature node.
+        temperature: usize,
+        /// Torque node.
+        torque: usize,
+        /// Smallest half-width there, rad.
+        found_rad: f32,
+    },
+    /// The table can give a larger error than it states as its limit.
+    ErrorBound {
+        /// Largest error it can give, rad.
+        found_rad: f32,
+        /// Its limit, rad.
+        allowed_rad: f32,
+    },
+    /// |ratio·de/dψ| reaches 1: the output would not follow the generator one to one, and the inverse may not exist.
+    Slope {
+        /// Bound of the slope found; below 1 is allowed.
+        found: f32,
+    },
+}
+
+impl fmt::Display for ImageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::TooShort { found, needed } => {
+                write!(f, "{found} bytes, an image has at least {needed}")
+            }
+            Self::Magic => f.write_str("not a table image (first eight bytes)"),
+            Self::Version { found, allowed } => {
+                write!(f, "format version {found}, this program reads {allowed}")
+            }
+            Self::ByteOrder { found } => {
+                write!(f, "byte order mark {found:#06x} instead of 0xfeff")
+            }
+            Self::Length { stated, found } => {
+                write!(f, "the header states {stated} bytes, {found} were given")
+            }
+            Self::Crc { stated, computed } => {
+                write!(
+                    f,
+                    "CRC-32 {computed:#010x}, the image states {stated:#010x}"
+                )
+            }
+            Self::PageCrc { page } => write!(f, "CRC-32 of page {page} does not match"),
+            Self::Reserved { offset } => write!(f, "reserved byte at offset {offset} is not zero"),
+            Self::Text { field } => write!(f, "{field}: not printable ASCII padded with zeros"),
+            Self::GeneratorKind { found } => write!(f, "unknown wave generator kind {found}"),
+            Self::FixedMember { found } => write!(f, "unknown fixed member {found}"),
+            Self::Teeth(error) => error.fmt(f),
+            Self::Count {
+                field,
+                found,
+                least,
+                most,
+            } => {
+                write!(f, "{field}: {found}, allowed are {least} to {most}")
+            }
+            Self::Size { needed, found } => write!(
+                f,
+                "the node counts need {needed} bytes, the image has {found}"
+            ),
+            Self::NotFinite { field, index } => write!(f, "{field}: number {index} is not finite"),
+            Self::NotIncreasing { field, index } => {
+                write!(f, "{field}: node {index} is not above the one before it")
+            }
+            Self::NotClosed { field, index } => {
+                write!(f, "{field}: does not close, at stored value {index}")
+            }
+            Self::OutOfRange {
+                field,
+                found,
+                least,
+                most,
+            } => {
+                write!(f, "{field}: {found}, allowed are {least} to {most}")
+            }
+            Self::NegativeHalfWidth {
+                temperature,
+                torque,
+                found_rad,
+            } => write!(
+                f,
+                "half-width of the play {found_rad} rad at temperature node {temperature}, torque node {torque}: \
+                 below zero"
+            ),
+            Self::ErrorBound {
+                found_rad,
+                allowed_rad,
+            } => {
+                write!(
+                    f,
+                    "the table can give an error of {found_rad} rad, its limit is {allowed_rad}"
+                )
+            }
+            Self::Slope { found } => write!(
+                f,
+                "slope bound |ratio*de/dpsi| = {found}, allowed is below 1"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for ImageError {}

@@ -1,0 +1,416 @@
+//! The play (backlash) operator, as an interval while its position is not known.
+//!
+//! In nominal output angle `x`, with half-width `h ≥ 0`, the play follows `p ← clamp(p, x − h, x + h)`. The output is at
+//! `x + centre + (p − x)`. After steady motion forward `p = x − h`: the output lags the motion by the half-width, so
+//! `e₊ = centre − h` and `e₋ = centre + h`.
+//!
+//! After a reset nobody knows on which side of its play the drive rests. The state therefore is a lower and an upper
+//! bound of `p − x`, both moved by the same operator. Each move and each reversal can only bring them closer; after one
+//! move through the full play they are equal, and from then on they stay equal.
+//!
+//! Everything is in integer counts of 2⁻³² output turn: the result depends on the turning points only, not on how
+//! many steps a motion is cut into, and no rounding builds up.
+
+use crate::angle::{OutputAngle, RAD_PER_COUNT};
+use crate::image::crc32;
+
+/// A direction of motion of the *output*.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// The output angle grows.
+    Forward,
+    /// The output angle shrinks.
+    Backward,
+}
+
+impl Direction {
+    /// +1 forward, −1 backward.
+    #[must_use]
+    pub const fn sign(self) -> f32 {
+        match self {
+            Self::Forward => 1.0,
+            Self::Backward => -1.0,
+        }
+    }
+}
+
+/// Largest half-width in counts, 0.05 rad: far above any play, far below overflow.
+const MAX_HALF_COUNTS: i32 = 34_178_720;
+
+/// Where the drive rests inside its play: all that must survive a reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlayState {
+    /// Nominal output at the last update.
+    nominal: OutputAngle,
+    /// Estimated output at the last update.
+    output: OutputAngle,
+    /// Bounds of `p − x` in counts.
+    lower: i32,
+    upper: i32,
+    /// Half-width at the last update, in counts; −1 before the first.
+    half: i32,
+}
+
+/// Size of a saved state.
+pub const SAVED_STATE_BYTES: usize = 32;
+const SAVED_BEFORE_CRC: usize = 28;
+
+impl Default for PlayState {
+    fn default() -> Self {
+        Self::unknown()
+    }
+}
+
+impl PlayState {
+    /// After a reset: anywhere inside the play.
+    #[must_use]
+    pub const fn unknown() -> Self {
+        Self {
+            nominal: OutputAngle::ZERO,
+            output: OutputAngle::ZERO,
+            lower: i32::MIN,
+            upper: i32::MAX,
+            half: -1,
+        }
+    }
+
+    /// Known to have last moved in `direction` through the full play.
+    #[must_use]
+    pub const fn after_motion(direction: Direction) -> Self {
+        let side = match direction {
+            Direction::Forward => i32::MIN,
+            Direction::Backward => i32::MAX,
+        };
+        Self {
+            nominal: OutputAngle::ZERO,
+            output: OutputAngle::ZERO,
+            lower: side,
+            upper: side,
+            half: -1,
+        }
+    }
+
+    /// The nominal output of the last update; `None` before the first.
+    #[must_use]
+    pub const fn nominal(&self) -> Option<OutputAngle> {
+        if self.half < 0 {
+            None
+        } else {
+            Some(self.nominal)
+        }
+    }
+
+    /// Whether both bounds have met.
+    #[must_use]
+    pub const fn is_known(&self) -> bool {
+        self.lower == self.upper
+    }
+
+    /// Estimate of `p − x` in radians: the middle of the interval, 0 before the first update.
+    #[must_use]
+    pub fn offset_rad(&self) -> f32 {
+        if self.half < 0 {
+            return 0.0;
+        }
+        (self.lower.saturating_add(self.upper) >> 1) as f32 * RAD_PER_COUNT
+    }
+
+    /// Half the width of the interval in radians: the estimate is wrong by no more.
+    #[must_use]
+    pub fn uncertainty_rad(&self) -> f32 {
+        let width = self.upper.saturating_sub(self.lower);
+        (width >> 1).saturating_add(width & 1) as f32 * RAD_PER_COUNT
+    }
+
+    /// Estimated actual output at the last update; `None` before the first.
+    #[must_use]
+    pub const fn output(&self) -> Option<OutputAngle> {
+        if self.half < 0 {
+            None
+        } else {
+            Some(self.output)
+        }
+    }
+
+    /// Moves the play to `nominal`, with the half-width (clamped to 0..0.05 rad) and centre there; returns the error
+    /// `centre + (p − x)`, rad.
+    pub(crate) fn update(
+        &mut self,
+        nominal: OutputAngle,
+        centre_rad: f32,
+        half_width_rad: f32,
+    ) -> f32 {
+        let half = crate::angle::counts_from_rad(half_width_rad).clamp(0, MAX_HALF_COUNTS);
+        self.update_counts(nominal, half);
+        let error_rad = centre_rad + self.offset_rad();
+        self.output = nominal.offset_rad(error_rad);
+        error_rad
+    }
+
+    /// Follows the motion with the half-width and error of the last update, for steps in which they cannot be computed.
+    pub(crate) fn coast(&mut self, nominal: OutputAngle) {
+        if self.half >= 0 {
+            self.output = self
+                .output
+                .offset_counts(nominal.minus_counts(self.nominal));
+            self.update_counts(nominal, self.half);
+        }
+    }
+
+    fn update_counts(&mut self, nominal: OutputAngle, half: i32) {
+        let moved = if self.half < 0 {
+            0
+        } else {
+            nominal.minus_small_counts(self.nominal)
+        };
+        // `half` is in 0..=MAX_HALF_COUNTS, so the bounds are ordered and clamp cannot fail.
+        let clamp = |offset: i32| {
+            offset
+                .saturating_sub(moved)
+                .max(half.wrapping_neg())
+                .min(half)
+        };
+        *self = Self {
+            nominal,
+            output: self.output,
+            lower: clamp(self.lower),
+            upper: clamp(self.upper),
+            half,
+        };
+    }
+
+    /// The state as bytes, with a CRC-32, for storage across a reset.
+    #[must_use]
+    pub fn save(&self) -> [u8; SAVED_STATE_BYTES] {
+        let mut bytes = [0; SAVED_STATE_BYTES];
+        let fields = [self.lower, self.upper, self.half];
+        let angles = [self.nominal.counts(), self.output.counts()];
+        let parts = angles
+            .into_iter()
+            .flat_map(i64::to_le_bytes)
+            .chain(fields.into_iter().flat_map(i32::to_le_bytes));
+        for (to, from) in bytes.iter_mut().zip(parts) {
+            *to = from;
+        }
+        let crc = crc32(
+            bytes
+                .first_chunk::<SAVED_BEFORE_CRC>()
+                .unwrap_or(&[0; SAVED_BEFORE_CRC]),
+        );
+        for (to, from) in bytes
+            .iter_mut()
+            .skip(SAVED_BEFORE_CRC)
+            .zip(crc.to_le_bytes())
+        {
+            *to = from;
+        }
+        bytes
+    }
+
+    /// A state from [`Self::save`]; `None` if the bytes are damaged.
+    ///
+    /// Restore only if the joint cannot have moved meanwhile, else start from [`Self::unknown`].
+    #[must_use]
+    pub fn restore(bytes: &[u8; SAVED_STATE_BYTES]) -> Option<Self> {
+        let (counts, rest) = bytes.split_first_chunk::<8>()?;
+        let (output, rest) = rest.split_first_chunk::<8>()?;
+        let (lower, rest) = rest.split_first_chunk::<4>()?;
+        let (upper, rest) = rest.split_first_chunk::<4>()?;
+        let (half, rest) = rest.split_first_chunk::<4>()?;
+        let crc = rest.first_chunk::<4>()?;
+        let state = Self {
+            nominal: OutputAngle::from_counts(i64::from_le_bytes(*counts)),
+            output: OutputAngle::from_counts(i64::from_le_bytes(*output)),
+            lower: i32::from_le_bytes(*lower),
+            upper: i32::from_le_bytes(*upper),
+            half: i32::from_le_bytes(*half),
+        };
+        let intact = u32::from_le_bytes(*crc) == crc32(bytes.first_chunk::<SAVED_BEFORE_CRC>()?);
+        let started = (0..=MAX_HALF_COUNTS).contains(&state.half)
+            && state.lower >= state.half.wrapping_neg()
+            && state.upper <= state.half;
+        let fresh = state.half == -1 && (state.lower == i32::MIN || state.lower == i32::MAX);
+        (intact && state.lower <= state.upper && (started || fresh)).then_some(state)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    const HALF: i32 = 100_000;
+
+    fn run(state: &mut PlayState, from: i64, path: &[i32]) -> i64 {
+        let mut x = from;
+        for &step in path {
+            x += step as i64;
+            state.update_counts(OutputAngle::from_counts(x), HALF);
+        }
+        x
+    }
+
+    fn known() -> PlayState {
+        let mut state = PlayState::after_motion(Direction::Forward);
+        state.update_counts(OutputAngle::ZERO, HALF);
+        state
+    }
+
+    #[test]
+    fn steady_motion_lags_by_the_half_width() {
+        let mut state = PlayState::unknown();
+        run(&mut state, 0, &[0, 2 * HALF]);
+        assert_eq!((state.lower, state.upper), (-HALF, -HALF));
+        run(&mut state, 2 * HALF as i64, &[-2 * HALF]);
+        assert_eq!((state.lower, state.upper), (HALF, HALF));
+    }
+
+    #[test]
+    fn an_unknown_state_shrinks_with_motion_and_stays_known() {
+        let mut state = PlayState::unknown();
+        assert_eq!(state.offset_rad(), 0.0);
+        run(&mut state, 0, &[0]);
+        assert_eq!((state.lower, state.upper), (-HALF, HALF));
+        let x = run(&mut state, 0, &[HALF / 2]);
+        assert_eq!((state.lower, state.upper), (-HALF, HALF / 2));
+        let x = run(&mut state, x, &[-HALF]);
+        assert_eq!((state.lower, state.upper), (0, HALF));
+        assert!(!state.is_known());
+        let x = run(&mut state, x, &[HALF]);
+        assert_eq!((state.lower, state.upper), (-HALF, 0));
+        // Reversals inside the gap cannot tell more; a stroke through the whole play can.
+        run(&mut state, x, &[-2 * HALF, 17, -5]);
+        assert!(state.is_known());
+        assert_eq!(state.uncertainty_rad(), 0.0);
+    }
+
+    #[test]
+    fn uncertainty_is_half_the_interval() {
+        let mut state = PlayState::unknown();
+        state.update(OutputAngle::ZERO, 0.0, 1e-4);
+        assert!((state.uncertainty_rad() - 1e-4).abs() < 2e-9);
+        assert!(state.offset_rad().abs() < 2e-9);
+    }
+
+    #[test]
+    fn hostile_half_widths_stay_in_bounds() {
+        for half in [f32::NAN, -1.0, f32::INFINITY, f32::NEG_INFINITY, 1e30] {
+            let mut state = PlayState::unknown();
+            state.update(OutputAngle::ZERO, 0.0, half);
+            state.update(OutputAngle::from_counts(i64::MIN), 0.0, half);
+            assert!((0..=MAX_HALF_COUNTS).contains(&state.half), "{half}");
+            assert!(
+                -state.half <= state.lower
+                    && state.lower <= state.upper
+                    && state.upper <= state.half
+            );
+        }
+    }
+
+    #[test]
+    fn damaged_saved_states_are_refused() {
+        for state in [
+            PlayState::unknown(),
+            known(),
+            PlayState::after_motion(Direction::Backward),
+        ] {
+            let saved = state.save();
+            assert_eq!(PlayState::restore(&saved), Some(state));
+            for bit in 0..SAVED_STATE_BYTES * 8 {
+                let mut damaged = saved;
+                damaged[bit / 8] ^= 1 << (bit % 8);
+                assert_eq!(PlayState::restore(&damaged), None, "bit {bit}");
+            }
+        }
+        let disordered = PlayState {
+            lower: 5,
+            upper: -5,
+            half: 10,
+            nominal: OutputAngle::ZERO,
+            output: OutputAngle::ZERO,
+        };
+        assert_eq!(PlayState::restore(&disordered.save()), None);
+        for (lower, upper) in [(-11, 5), (5, 11)] {
+            let outside = PlayState {
+                lower,
+                upper,
+                ..disordered
+            };
+            assert_eq!(PlayState::restore(&outside.save()), None);
+        }
+    }
+
+    proptest! {
+        /// Rate independence: cutting every move into pieces changes nothing.
+        #[test]
+        fn only_the_turning_points_matter(
+            path in prop::collection::vec(-3 * HALF..3 * HALF, 1..30), pieces in 1i32..7,
+        ) {
+            let (mut coarse, mut fine) = (PlayState::unknown(), PlayState::unknown());
+            let cut: Vec<i32> = path.iter()
+                .flat_map(|&step| {
+                    let part = step / pieces;
+                    (0..pieces - 1).map(move |_| part).chain([step - part * (pieces - 1)])
+                })
+                .collect();
+            run(&mut coarse, 0, &[0]);
+            run(&mut fine, 0, &[0]);
+            run(&mut coarse, 0, &path);
+            run(&mut fine, 0, &cut);
+            prop_assert_eq!(coarse, fine);
+        }
+
+        /// Wiping-out: an excursion inside a larger one that returns past its start leaves no memory.
+        #[test]
+        fn a_larger_stroke_wipes_out_a_smaller_one(
+            before in -5 * HALF..5 * HALF, small in 1..5 * HALF, extra in 0..5 * HALF,
+        ) {
+            let (mut with, mut without) = (known(), known());
+            let x = run(&mut with, 0, &[before, small, -small, small + extra]);
+            let y = run(&mut without, 0, &[before, small + extra]);
+            prop_assert_eq!(x, y);
+            prop_assert_eq!(with, without);
+        }
+
+        /// Congruency: closed loops between the same turning points have the same shape, whatever came before.
+        #[test]
+        fn loops_between_the_same_extremes_are_congruent(
+            first in prop::collection::vec(-3 * HALF..3 * HALF, 0..8),
+            second in prop::collection::vec(-3 * HALF..3 * HALF, 0..8),
+            amplitude in 1..4 * HALF, part in 0i32..=100,
+        ) {
+            let mut rise = [0i64; 2];
+            for (history, rise) in [&first, &second].into_iter().zip(&mut rise) {
+                let mut state = known();
+                let back = -history.iter().sum::<i32>();
+                // To the lower extreme, around the loop once so that it is closed, then up a part of it.
+                let mut x = run(&mut state, 0, history);
+                x = run(&mut state, x, &[back, amplitude, -amplitude]);
+                let start = x + state.lower as i64;
+                let step = (amplitude as i64 * part as i64 / 100) as i32;
+                x = run(&mut state, x, &[step]);
+                *rise = x + state.lower as i64 - start;
+            }
+            prop_assert_eq!(rise[0], rise[1]);
+        }
+
+        /// The truth, wherever it started, never leaves the interval; the interval never widens.
+        #[test]
+        fn the_interval_holds_every_possible_truth(
+            start in -HALF..=HALF, path in prop::collection::vec(-3 * HALF..3 * HALF, 1..30),
+        ) {
+            let mut interval = PlayState::unknown();
+            run(&mut interval, 0, &[0]);
+            let mut truth = PlayState { lower: start, upper: start, ..interval };
+            let (mut x, mut width) = (0, 2 * HALF);
+            for step in path {
+                run(&mut truth, x, &[step]);
+                x = run(&mut interval, x, &[step]);
+                prop_assert!(interval.lower <= truth.lower && truth.upper <= interval.upper);
+                prop_assert!(interval.upper - interval.lower <= width);
+                width = interval.upper - interval.lower;
+            }
+        }
+    }
+}

@@ -1,0 +1,1629 @@
+//! The `.fxt` table image: how it is laid out, written, and checked.
+//!
+//! Little-endian throughout, every part at a multiple of four bytes, read in place from any address on any host.
+//!
+//! | offset | bytes | what |
+//! |---|---|---|
+//! | 0 | 8 | magic `89 46 58 54 0d 0a 1a 0a` (`\x89FXT`, then what a text transfer would change) |
+//! | 8 | 2 | format version, 1 |
+//! | 10 | 2 | byte order mark `0xfeff` |
+//! | 12 | 4 | length of the image in bytes |
+//! | 16 | 32 | drive hash (BLAKE3 of the drive the samples came from) |
+//! | 48 | 8 | table id: first 8 bytes of BLAKE3 of the body with these 8 bytes zero |
+//! | 56 | 24 | tool version, printable ASCII padded with zeros |
+//! | 80 | 24 | mesh level, likewise |
+//! | 104 | 1, 1 | generator kind; fixed member (0 flexspline, 1 circular spline) |
+//! | 106 | 2, 2 | flexspline teeth; circular spline teeth |
+//! | 110 | 1, 1 | torque nodes (1 to 32); temperature nodes (1 to 8) |
+//! | 112 | 1, 1, 1, 1 | ripple nodes (0, or 4 to 32); nodes of A, B, C (0, or 4 to 128) |
+//! | 116 | 4, 4 | scale of the mean ripple R and of the half-width ripple h, rad per unit |
+//! | 124 | 4 | residual the solver reached |
+//! | 128 | 4, 4 | projection error, worst and rms, rad |
+//! | 136 | 8, 8 | torque range N·m; temperature range °C: least, most |
+//! | 152 | 4 | error limit, rad |
+//! | 156 | 36 | zero |
+//! | 192 | | torque nodes, temperature nodes: `f32` each |
+//! | | | A, B, C: `f32` each, stored closed |
+//! | | | `[temperature][torque]` records: D, H (`f32`, rad), then R, h (`i16`) for each ripple node, stored closed |
+//! | | | end of the body |
+//! | | | CRC-32 of each 256-byte page of the body (the last may be shorter) |
+//! | | 4 | CRC-32 of everything before |
+//!
+//! A periodic curve of n nodes is stored closed, as n + 3 values: the last node, all nodes, the first two; the four around
+//! any place are then neighbours. CRC-32 is the one of ISO-HDLC (zlib).
+//!
+//! Size with 3 temperatures, 25 torques, 16 ripple nodes and 64 nodes each for A, B, C:
+//! 192 + 4·(25 + 3 + 3·67) + 75·(8 + 19·4) = 7408, and 29 pages and the end 4·30 = 120: 7528 bytes, below 8 KiB. Without A,
+//! B, C: 6712.
+
+use crate::drive::{Drive, FixedMember};
+use crate::error::{Field, ImageError};
+use crate::grid::{self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis};
+use crate::model::MAX_INVERSE_ITERATIONS;
+use crate::table::{
+    Bounds, GeneratorKind, PeriodicCurve, RECORD_HEAD_WORDS, Table, TableId, Words, f32_at,
+    ripple_at,
+};
+use core::fmt;
+
+/// Format version written and read.
+pub const FORMAT_VERSION: u16 = 1;
+/// Bytes of one page, the unit of a scrub and of an upload.
+pub const PAGE_BYTES: usize = 256;
+/// Most temperature nodes.
+pub const MAX_TEMPERATURE_NODES: usize = 1 << TEMPERATURE_HALVINGS;
+pub(crate) const TEMPERATURE_HALVINGS: u32 = 3;
+/// Most ripple nodes over one tooth pitch.
+pub const MAX_RIPPLE_NODES: usize = 32;
+/// No table may give a larger error, rad (2.9°, one and a half tooth pitches of a 188-tooth drive).
+pub const MAX_ERROR_RAD: f32 = 0.05;
+/// Bytes of the tool version and of the mesh level.
+pub const TEXT_BYTES: usize = 24;
+
+const MAGIC: [u8; 8] = *b"\x89FXT\r\n\x1a\n";
+const BYTE_ORDER_MARK: u16 = 0xfeff;
+const HEADER_BYTES: usize = 192;
+const CRC_BYTES: usize = 4;
+const ID_OFFSET: usize = 48;
+const RESERVED: core::ops::Range<usize> = 156..HEADER_BYTES;
+/// |torque| N·m and |temperature| °C of any node or range: keeps differences of nodes finite.
+pub(crate) const MAX_AXIS_VALUE: f32 = 1e6;
+
+/// CRC-32 (ISO-HDLC), 5.3 instructions a byte on a Cortex-M4.
+pub(crate) fn crc32(bytes: &[u8]) -> u32 {
+    static CRC: crc::Crc<u32, crc::Table<1>> =
+        crc::Crc::<u32, crc::Table<1>>::new(&crc::CRC_32_ISO_HDLC);
+    CRC.checksum(bytes)
+}
+
+/// What made a table and how far it holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Provenance<'a> {
+    /// Kind of wave generator.
+    pub generator_kind: GeneratorKind,
+    /// BLAKE3 of the drive description.
+    pub drive_hash: [u8; 32],
+    /// Program and version, at most 24 printable ASCII characters.
+    pub tool_version: &'a str,
+    /// Mesh or data the samples came from, at most 24 printable ASCII characters.
+    pub mesh_level: &'a str,
+    /// Relative residual the solver reached, ≥ 0; 0 for measured samples.
+    pub solver_residual: f32,
+    /// Torques the table holds for, N·m; inside the torque nodes unless there is only one.
+    pub torque_range_n_m: [f32; 2],
+    /// Temperatures the table holds for, °C; inside the temperature nodes unless there is only one.
+    pub temperature_range_c: [f32; 2],
+    /// Largest |error| the table may give, rad, above 0 and at most [`MAX_ERROR_RAD`].
+    pub error_limit_rad: f32,
+}
+
+/// The numbers of a table. All angles are radians at the output; curves and ripple are B-spline coefficients
+/// ([`crate::grid`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TableData<'a> {
+    /// Tooth counts and fixed member.
+    pub drive: Drive,
+    /// Torque nodes, N·m, strictly increasing.
+    pub torque_nodes_n_m: &'a [f32],
+    /// Temperature nodes, °C, strictly increasing.
+    pub temperature_nodes_c: &'a [f32],
+    /// Nodes over one tooth pitch; 0 for no ripple.
+    pub ripple_nodes: usize,
+    /// D, `[temperature][torque]`.
+    pub mean_rad: &'a [f32],
+    /// H, `[temperature][torque]`, ≥ 0.
+    pub half_width_rad: &'a [f32],
+    /// R, `[temperature][torque][ripple node]`.
+    pub mean_ripple_rad: &'a [f32],
+    /// h, `[temperature][torque][ripple node]`, `H + h ≥ 0`.
+    pub half_width_ripple_rad: &'a [f32],
+    /// A over the generator angle; empty if absent.
+    pub generator_curve_rad: &'a [f32],
+    /// B over the material phase; empty if absent.
+    pub material_curve_rad: &'a [f32],
+    /// C over the output angle; empty if absent.
+    pub output_curve_rad: &'a [f32],
+    /// Largest deviation from the samples, rad.
+    pub projection_worst_rad: f32,
+    /// Root mean square deviation from the samples, rad.
+    pub projection_rms_rad: f32,
+}
+
+/// Why no image was written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WriteError {
+    /// The buffer does not hold the image.
+    BufferTooSmall {
+        /// Bytes needed.
+        needed: usize,
+        /// Bytes given.
+        found: usize,
+    },
+    /// An array does not have the length that the axes give.
+    Shape {
+        /// Which array.
+        field: Field,
+        /// Numbers found.
+        found: usize,
+        /// Numbers needed.
+        needed: usize,
+    },
+    /// A text is too long.
+    TextTooLong {
+        /// Which text.
+        field: Field,
+        /// Bytes found; [`TEXT_BYTES`] are allowed.
+        found: usize,
+    },
+    /// The reader would refuse the image.
+    Refused(ImageError),
+}
+
+impl fmt::Display for WriteError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::BufferTooSmall { needed, found } => {
+                write!(f, "the image needs {needed} bytes, the buffer has {found}")
+            }
+            Self::Shape {
+                field,
+                found,
+                needed,
+            } => {
+                write!(f, "{field}: {found} numbers where the axes need {needed}")
+            }
+            Self::TextTooLong { field, found } => {
+                write!(
+                    f,
+                    "{field}: {found} bytes, at most {TEXT_BYTES} are allowed"
+                )
+            }
+            Self::Refused(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for WriteError {}
+
+impl From<ImageError> for WriteError {
+    fn from(error: ImageError) -> Self {
+        Self::Refused(error)
+    }
+}
+
+/// Bytes of the image of a table with these node counts; `curves` are those of A, B, C.
+#[must_use]
+pub const fn image_bytes(
+    torque: usize,
+    temperature: usize,
+    ripple: usize,
+    curves: [usize; 3],
+) -> usize {
+    let body = body_bytes(torque, temperature, ripple, curves);
+    body.div_ceil(PAGE_BYTES)
+        .saturating_add(1)
+        .saturating_mul(CRC_BYTES)
+        .saturating_add(body)
+}
+
+const fn body_bytes(torque: usize, temperature: usize, ripple: usize, curves: [usize; 3]) -> usize {
+    let [a, b, c] = curves;
+    let curve_words = stored(a)
+        .saturating_add(stored(b))
+        .saturating_add(stored(c));
+    let numbers = torque
+        .saturating_add(temperature)
+        .saturating_add(curve_words);
+    let record = stored(ripple).saturating_add(RECORD_HEAD_WORDS);
+    let records = torque.saturating_mul(temperature).saturating_mul(record);
+    numbers
+        .saturating_add(records)
+        .saturating_mul(4)
+        .saturating_add(HEADER_BYTES)
+}
+
+/// As [`PeriodicAxis::stored_len`], for any number.
+const fn stored(nodes: usize) -> usize {
+    if nodes == 0 {
+        0
+    } else {
+        nodes.saturating_add(3)
+    }
+}
+
+/// Fills a buffer from the front; what does not fit is only counted.
+struct Writer<'o> {
+    rest: &'o mut [u8],
+    needed: usize,
+}
+
+impl<'o> Writer<'o> {
+    fn put(&mut self, bytes: &[u8]) {
+        self.needed = self.needed.saturating_add(bytes.len());
+        let room = bytes.len().min(self.rest.len());
+        let (here, rest) = core::mem::take(&mut self.rest)
+            .split_at_mut_checked(room)
+            .unwrap_or_default();
+        here.iter_mut()
+            .zip(bytes)
+            .for_each(|(to, from)| *to = *from);
+        self.rest = rest;
+    }
+
+    fn put_numbers(&mut self, numbers: &[f32]) {
+        numbers
+            .iter()
+            .for_each(|number| self.put(&number.to_le_bytes()));
+    }
+
+    fn put_text(&mut self, text: &str) {
+        let padding = [0u8; TEXT_BYTES];
+        self.put(text.as_bytes());
+        self.put(padding.get(text.len()..).unwrap_or_default());
+    }
+}
+
+/// The one place where ripple is quantised: to nearest, in units of its scale.
+fn quantise(value_rad: f32, scale: f32) -> i16 {
+    let units = if scale > 0.0 { value_rad / scale } else { 0.0 };
+    (units + if units < 0.0 { -0.5 } else { 0.5 }) as i16
+}
+
+fn ripple_scale(field: Field, ripple_rad: &[f32]) -> Result<f32, WriteError> {
+    if let Some(index) = ripple_rad.iter().position(|value| !value.is_finite()) {
+        return Err(ImageError::NotFinite { field, index }.into());
+    }
+    Ok(ripple_rad
+        .iter()
+        .fold(0.0, |most: f32, value| most.max(value.abs()))
+        / i16::MAX as f32)
+}
+
+fn needs(field: Field, values: &[f32], needed: usize) -> Result<(), WriteError> {
+    if values.len() == needed {
+        Ok(())
+    } else {
+        Err(WriteError::Shape {
+            field,
+            found: values.len(),
+            needed,
+        })
+    }
+}
+
+pub(crate) fn counted(
+    field: Field,
+    found: usize,
+    least: usize,
+    most: usize,
+) -> Result<u8, ImageError> {
+    let optional = least == MIN_PERIODIC_NODES && found == 0;
+    if optional || (least..=most).contains(&found) {
+        Ok(found as u8)
+    } else {
+        Err(ImageError::Count {
+            field,
+            found,
+            least,
+            most,
+        })
+    }
+}
+
+impl TableData<'_> {
+    fn check_shapes(&self) -> Result<(), WriteError> {
+        let records = self
+            .torque_nodes_n_m
+            .len()
+            .saturating_mul(self.temperature_nodes_c.len());
+        let ripples = records.saturating_mul(self.ripple_nodes);
+        needs(Field::Mean, self.mean_rad, records)?;
+        needs(Field::HalfWidth, self.half_width_rad, records)?;
+        needs(Field::MeanRipple, self.mean_ripple_rad, ripples)?;
+        needs(Field::HalfWidthRipple, self.half_width_ripple_rad, ripples)
+    }
+
+    /// Node counts as the header holds them: torque, temperature, ripple, A, B, C.
+    fn counts(&self) -> Result<[u8; 6], ImageError> {
+        let curve = |field, values: &[f32]| {
+            counted(field, values.len(), MIN_PERIODIC_NODES, MAX_PERIODIC_NODES)
+        };
+        Ok([
+            counted(
+                Field::TorqueNodes,
+                self.torque_nodes_n_m.len(),
+                1,
+                MAX_CLAMPED_NODES,
+            )?,
+            counted(
+                Field::TemperatureNodes,
+                self.temperature_nodes_c.len(),
+                1,
+                MAX_TEMPERATURE_NODES,
+            )?,
+            counted(
+                Field::RippleNodes,
+                self.ripple_nodes,
+                MIN_PERIODIC_NODES,
+                MAX_RIPPLE_NODES,
+            )?,
+            curve(Field::GeneratorCurve, self.generator_curve_rad)?,
+            curve(Field::MaterialCurve, self.material_curve_rad)?,
+            curve(Field::OutputCurve, self.output_curve_rad)?,
+        ])
+    }
+
+    fn put_records(&self, out: &mut Writer<'_>, mean_scale: f32, half_scale: f32) {
+        let axis = PeriodicAxis::new(self.ripple_nodes).unwrap_or_default();
+        // max(1): without ripple the iterators are empty, and a chunk size may not be 0.
+        let mut mean_ripples = self.mean_ripple_rad.chunks_exact(self.ripple_nodes.max(1));
+        let mut half_ripples = self
+            .half_width_ripple_rad
+            .chunks_exact(self.ripple_nodes.max(1));
+        for (mean, half) in self.mean_rad.iter().zip(self.half_width_rad) {
+            let mean_ripple = mean_ripples.next().unwrap_or_default();
+            let half_ripple = half_ripples.next().unwrap_or_default();
+            // Rounding may take H + h below zero by half a unit: H is raised by as much. What was
+            // negative by more than that stays so, and is refused.
+            let rounded = half_ripple.iter().fold(0.0, |least: f32, h| {
+                least.min(quantise(*h, half_scale) as f32)
+            });
+            let least = half + rounded * half_scale;
+            let rounding = 0.51 * half_scale + half.abs() * f32::EPSILON;
+            let raised = if least < 0.0 && least >= -rounding {
+                -rounded * half_scale
+            } else {
+                *half
+            };
+            out.put_numbers(&[*mean, raised]);
+            for position in 0..axis.stored_len() {
+                let node = axis.stored_node(position);
+                let value = |ripple: &[f32]| ripple.get(node).copied().unwrap_or(0.0);
+                out.put(&quantise(value(mean_ripple), mean_scale).to_le_bytes());
+                out.put(&quantise(value(half_ripple), half_scale).to_le_bytes());
+            }
+        }
+    }
+}
+
+/// Writes the image of a table to the front of `out` and returns its length.
+///
+/// `id` gets the body of the image with the table id zero and returns the first eight bytes of its BLAKE3 hash.
+/// The image written has passed [`Table::check`].
+///
+/// # Errors
+/// [`WriteError`] if the arrays do not fit the axes or the buffer, or if the reader would refuse the table.
+pub fn write_image(
+    data: &TableData<'_>,
+    provenance: &Provenance<'_>,
+    out: &mut [u8],
+    id: impl FnOnce(&[u8]) -> [u8; 8],
+) -> Result<usize, WriteError> {
+    data.check_shapes()?;
+    let counts = data.counts()?;
+    for (field, text) in [
+        (Field::ToolVersion, provenance.tool_version),
+        (Field::MeshLevel, provenance.mesh_level),
+    ] {
+        if text.len() > TEXT_BYTES {
+            return Err(WriteError::TextTooLong {
+                field,
+                found: text.len(),
+            });
+        }
+    }
+    let curves = [
+        data.generator_curve_rad,
+        data.material_curve_rad,
+        data.output_curve_rad,
+    ];
+    let needed = image_bytes(
+        data.torque_nodes_n_m.len(),
+        data.temperature_nodes_c.len(),
+        data.ripple_nodes,
+        curves.map(<[f32]>::len),
+    );
+    let found = out.len();
+    let image = out
+        .get_mut(..needed)
+        .ok_or(WriteError::BufferTooSmall { needed, found })?;
+    let mean_scale = ripple_scale(Field::MeanRipple, data.mean_ripple_rad)?;
+    let half_scale = ripple_scale(Field::HalfWidthRipple, data.half_width_ripple_rad)?;
+
+    let mut writer = Writer {
+        rest: image,
+        needed: 0,
+    };
+    writer.put(&MAGIC);
+    writer.put(&FORMAT_VERSION.to_le_bytes());
+    writer.put(&BYTE_ORDER_MARK.to_le_bytes());
+    writer.put(&(needed as u32).to_le_bytes());
+    writer.put(&provenance.drive_hash);
+    writer.put(&[0; 8]);
+    writer.put_text(provenance.tool_version);
+    writer.put_text(provenance.mesh_level);
+    let fixed = match data.drive.fixed() {
+        FixedMember::Flexspline => 0,
+        FixedMember::CircularSpline => 1,
+    };
+    writer.put(&[provenance.generator_kind.code(), fixed]);
+    writer.put(&data.drive.flexspline_teeth().to_le_bytes());
+    writer.put(&data.drive.circular_spline_teeth().to_le_bytes());
+    writer.put(&counts);
+    writer.put_numbers(&[mean_scale, half_scale, provenance.solver_residual]);
+    writer.put_numbers(&[data.projection_worst_rad, data.projection_rms_rad]);
+    writer.put_numbers(&provenance.torque_range_n_m);
+    writer.put_numbers(&provenance.temperature_range_c);
+    writer.put_numbers(&[provenance.error_limit_rad]);
+    writer.put(&[0; RESERVED.end - RESERVED.start]);
+    writer.put_numbers(data.torque_nodes_n_m);
+    writer.put_numbers(data.temperature_nodes_c);
+    for curve in curves {
+        let axis = PeriodicAxis::new(curve.len()).unwrap_or_default();
+        for position in 0..axis.stored_len() {
+            writer.put_numbers(
+                curve
+                    .get(axis.stored_node(position)..)
+                    .unwrap_or_default()
+                    .get(..1)
+                    .unwrap_or_default(),
+            );
+        }
+    }
+    data.put_records(&mut writer, mean_scale, half_scale);
+
+    let body_bytes = writer.needed;
+    let id = id(image.get(..body_bytes).unwrap_or_default());
+    if let Some(place) = image
+        .get_mut(ID_OFFSET..)
+        .and_then(|rest| rest.first_chunk_mut::<8>())
+    {
+        *place = id;
+    }
+    seal(image, body_bytes);
+    Table::check(image)?;
+    Ok(needed)
+}
+
+/// Computes and stores every checksum of an image whose body is complete.
+fn seal(image: &mut [u8], body_bytes: usize) {
+    let Some((body, sums)) = image.split_at_mut_checked(body_bytes) else {
+        return;
+    };
+    let (sums, _) = sums.as_chunks_mut::<CRC_BYTES>();
+    for (sum, page) in sums.iter_mut().zip(body.chunks(PAGE_BYTES)) {
+        *sum = crc32(page).to_le_bytes();
+    }
+    if let Some((before, last)) = image.split_last_chunk_mut::<CRC_BYTES>() {
+        *last = crc32(before).to_le_bytes();
+    }
+}
+
+/// Reads fields of the header; the offsets are all inside it.
+#[derive(Clone, Copy)]
+struct Header<'a>(&'a [u8; HEADER_BYTES]);
+
+impl<'a> Header<'a> {
+    fn bytes<const N: usize>(self, offset: usize) -> [u8; N] {
+        self.0
+            .get(offset..)
+            .and_then(|rest| rest.first_chunk::<N>())
+            .copied()
+            .unwrap_or([0; N])
+    }
+
+    fn u8(self, offset: usize) -> u8 {
+        u8::from_le_bytes(self.bytes(offset))
+    }
+
+    fn u16(self, offset: usize) -> u16 {
+        u16::from_le_bytes(self.bytes(offset))
+    }
+
+    fn u32(self, offset: usize) -> u32 {
+        u32::from_le_bytes(self.bytes(offset))
+    }
+
+    fn f32(self, offset: usize) -> f32 {
+        f32::from_le_bytes(self.bytes(offset))
+    }
+
+    fn pair(self, offset: usize) -> [f32; 2] {
+        [self.f32(offset), self.f32(offset.saturating_add(4))]
+    }
+
+    /// The text at `offset` without its padding.
+    fn text(self, offset: usize, field: Field) -> Result<&'a str, ImageError> {
+        let bytes = self
+            .0
+            .get(offset..offset.saturating_add(TEXT_BYTES))
+            .unwrap_or_default();
+        let length = bytes
+            .iter()
+            .position(|byte| *byte == 0)
+            .unwrap_or(TEXT_BYTES);
+        let (text, padding) = bytes.split_at_checked(length).unwrap_or_default();
+        let printable = text.iter().all(|byte| (0x20..0x7f).contains(byte))
+            && padding.iter().all(|byte| *byte == 0);
+        match core::str::from_utf8(text) {
+            Ok(text) if printable => Ok(text),
+            _ => Err(ImageError::Text { field }),
+        }
+    }
+}
+
+fn finite(field: Field, index: usize, value: f32) -> Result<f32, ImageError> {
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(ImageError::NotFinite { field, index })
+    }
+}
+
+fn in_range(
+    field: Field,
+    index: usize,
+    found: f32,
+    least: f32,
+    most: f32,
+) -> Result<f32, ImageError> {
+    finite(field, index, found)?;
+    if found >= least && found <= most {
+        Ok(found)
+    } else {
+        Err(ImageError::OutOfRange {
+            field,
+            found,
+            least,
+            most,
+        })
+    }
+}
+
+fn check_axis(field: Field, words: Words<'_>) -> Result<(), ImageError> {
+    let mut before = f32::NEG_INFINITY;
+    for (index, word) in words.iter().enumerate() {
+        let node = in_range(
+            field,
+            index,
+            f32::from_le_bytes(*word),
+            -MAX_AXIS_VALUE,
+            MAX_AXIS_VALUE,
+        )?;
+        if node <= before {
+            return Err(ImageError::NotIncreasing { field, index });
+        }
+        before = node;
+    }
+    Ok(())
+}
+
+/// A range must lie inside the axis; an axis of one node holds wherever its maker says.
+fn check_range(
+    field: Field,
+    [least, most]: [f32; 2],
+    axis: Words<'_>,
+) -> Result<[f32; 2], ImageError> {
+    let (mut from, mut to) = (-MAX_AXIS_VALUE, MAX_AXIS_VALUE);
+    if axis.len() > 1 {
+        (from, to) = (f32_at(axis, 0), f32_at(axis, axis.len().saturating_sub(1)));
+    }
+    in_range(field, 0, least, from, to)?;
+    in_range(field, 1, most, least, to)?;
+    Ok([least, most])
+}
+
+/// Largest |value| and largest step to the next of a stored curve, `len` values with the wrap among them.
+fn extremes(len: usize, value: impl Fn(usize) -> f32) -> (f32, f32) {
+    let (mut largest, mut steepest) = (0.0f32, 0.0f32);
+    for i in 0..len {
+        largest = largest.max(value(i).abs());
+        steepest = steepest.max((value(i) - value(i.saturating_sub(1))).abs());
+    }
+    (largest, steepest)
+}
+
+/// Whether the three repeated words of a stored curve equal the nodes they repeat.
+fn check_closed(field: Field, axis: PeriodicAxis, words: Words<'_>) -> Result<(), ImageError> {
+    let word = |position: usize| words.get(position);
+    for index in 0..axis.stored_len() {
+        // Node i is stored at position i + 1.
+        if word(index) != word(axis.stored_node(index).saturating_add(1)) {
+            return Err(ImageError::NotClosed { field, index });
+        }
+    }
+    Ok(())
+}
+
+/// Adds what a curve of A, B, C can give; `periods` of it in one output turn.
+fn add_curve(
+    bounds: &mut Bounds,
+    field: Field,
+    curve: &PeriodicCurve<'_>,
+    periods: f32,
+) -> Result<(), ImageError> {
+    let len = curve.axis.stored_len();
+    for index in 0..len {
+        in_range(
+            field,
+            index,
+            f32_at(curve.words, index),
+            -MAX_ERROR_RAD,
+            MAX_ERROR_RAD,
+        )?;
+    }
+    check_closed(field, curve.axis, curve.words)?;
+    let (largest, steepest) = extremes(len, |i| f32_at(curve.words, i));
+    bounds.error_rad += largest;
+    bounds.periodic_rad += largest;
+    // Slope of a cubic B-spline: at most the largest step between coefficients, per node spacing.
+    bounds.slope += steepest * curve.axis.len() as f32 * periods.abs() / core::f32::consts::TAU;
+    Ok(())
+}
+
+impl<'a> Table<'a> {
+    /// Checks an image and gives the table in it. Nothing of an image can be used before.
+    ///
+    /// Verified: length, magic, version, byte order, CRC-32 of the whole and of every page, texts, tooth counts, node
+    /// counts; every number finite; axes strictly increasing; half-width of the play ≥ 0 everywhere; the largest error the
+    /// table can give within its stated limit and [`MAX_ERROR_RAD`]; `|ratio·de/dψ| < 1` everywhere, so that the inverse
+    /// exists;
+    /// periodic parts closed at the wrap.
+    ///
+    /// Bounds hold for every input, not only at nodes: a B-spline stays within its coefficients.
+    ///
+    /// Two passes over the image and its CRC-32 twice, once per upload, not in the step.
+    ///
+    /// # Errors
+    /// The first check that fails, in the order of [`ImageError`].
+    pub fn check(image: &'a [u8]) -> Result<Self, ImageError> {
+        let header = check_envelope(image)?;
+        let drive = check_identity(header)?;
+        let generator_kind =
+            GeneratorKind::from_code(header.u8(104)).ok_or(ImageError::GeneratorKind {
+                found: header.u8(104),
+            })?;
+        let count = |offset: usize, field, least, most| {
+            counted(field, header.u8(offset) as usize, least, most).map(usize::from)
+        };
+        let torque_nodes = count(110, Field::TorqueNodes, 1, MAX_CLAMPED_NODES)?;
+        let temperature_nodes = count(111, Field::TemperatureNodes, 1, MAX_TEMPERATURE_NODES)?;
+        let ripple_nodes = count(
+            112,
+            Field::RippleNodes,
+            MIN_PERIODIC_NODES,
+            MAX_RIPPLE_NODES,
+        )?;
+        let curve_nodes = [
+            count(
+                113,
+                Field::GeneratorCurve,
+                MIN_PERIODIC_NODES,
+                MAX_PERIODIC_NODES,
+            )?,
+            count(
+                114,
+                Field::MaterialCurve,
+                MIN_PERIODIC_NODES,
+                MAX_PERIODIC_NODES,
+            )?,
+            count(
+                115,
+                Field::OutputCurve,
+                MIN_PERIODIC_NODES,
+                MAX_PERIODIC_NODES,
+            )?,
+        ];
+        let needed = image_bytes(torque_nodes, temperature_nodes, ripple_nodes, curve_nodes);
+        let size = ImageError::Size {
+            needed,
+            found: image.len(),
+        };
+        if needed != image.len() {
+            return Err(size);
+        }
+        let body_bytes = body_bytes(torque_nodes, temperature_nodes, ripple_nodes, curve_nodes);
+        if let Some(page) =
+            (0..body_bytes.div_ceil(PAGE_BYTES)).find(|&page| !page_intact(image, body_bytes, page))
+        {
+            return Err(ImageError::PageCrc { page });
+        }
+        let body = image.get(HEADER_BYTES..body_bytes).ok_or(size)?;
+        let (mut words, _) = body.as_chunks::<4>();
+        let mut take = |length: usize| {
+            let (here, rest) = words.split_at_checked(length).ok_or(size)?;
+            words = rest;
+            Ok::<Words<'a>, ImageError>(here)
+        };
+        let axis = |nodes: usize| PeriodicAxis::new(nodes).ok_or(size);
+        let torque = take(torque_nodes)?;
+        let temperature = take(temperature_nodes)?;
+        let [a, b, c] = curve_nodes;
+        let generator_curve = PeriodicCurve {
+            axis: axis(a)?,
+            words: take(stored(a))?,
+        };
+        let material_curve = PeriodicCurve {
+            axis: axis(b)?,
+            words: take(stored(b))?,
+        };
+        let output_curve = PeriodicCurve {
+            axis: axis(c)?,
+            words: take(stored(c))?,
+        };
+        let records = words;
+
+        let scale_limit = MAX_ERROR_RAD / i16::MAX as f32;
+        let mut table = Self {
+            image,
+            body_bytes,
+            drive,
+            generator_kind,
+            torque,
+            temperature,
+            generator_curve,
+            material_curve,
+            output_curve,
+            records,
+            ripple: axis(ripple_nodes)?,
+            mean_ripple_scale: in_range(Field::MeanRipple, 0, header.f32(116), 0.0, scale_limit)?,
+            half_ripple_scale: in_range(
+                Field::HalfWidthRipple,
+                0,
+                header.f32(120),
+                0.0,
+                scale_limit,
+            )?,
+            torque_jumps: grid::jump_intervals(torque.len(), |i| f32_at(torque, i)),
+            torque_range_n_m: header.pair(136),
+            temperature_range_c: header.pair(144),
+            error_limit_rad: in_range(
+                Field::ErrorLimit,
+                0,
+                header.f32(152),
+                f32::MIN_POSITIVE,
+                MAX_ERROR_RAD,
+            )?,
+            bounds: Bounds::default(),
+            inverse_iterations: MAX_INVERSE_ITERATIONS,
+        };
+        check_axis(Field::TorqueNodes, torque)?;
+        check_axis(Field::TemperatureNodes, temperature)?;
+        check_range(Field::TorqueRange, table.torque_range_n_m, torque)?;
+        check_range(
+            Field::TemperatureRange,
+            table.temperature_range_c,
+            temperature,
+        )?;
+        in_range(Field::SolverResidual, 0, header.f32(124), 0.0, f32::MAX)?;
+        in_range(
+            Field::ProjectionWorst,
+            0,
+            header.f32(128),
+            0.0,
+            MAX_ERROR_RAD,
+        )?;
+        in_range(
+            Field::ProjectionRms,
+            0,
+            header.f32(132),
+            0.0,
+            header.f32(128),
+        )?;
+        table.bounds = table.check_bounds()?;
+        table.inverse_iterations = table.bounds.inverse_iterations();
+        Ok(table)
+    }
+
+    fn check_bounds(&self) -> Result<Bounds, ImageError> {
+        let mut bounds = self.check_records()?;
+        let ratio = self.drive.ratio();
+        add_curve(
+            &mut bounds,
+            Field::GeneratorCurve,
+            &self.generator_curve,
+            ratio,
+        )?;
+        add_curve(
+            &mut bounds,
+            Field::MaterialCurve,
+            &self.material_curve,
+            ratio - 1.0,
+        )?;
+        add_curve(&mut bounds, Field::OutputCurve, &self.output_curve, 1.0)?;
+        if bounds.error_rad.is_nan() || bounds.error_rad > self.error_limit_rad {
+            return Err(ImageError::ErrorBound {
+                found_rad: bounds.error_rad,
+                allowed_rad: self.error_limit_rad,
+            });
+        }
+        if bounds.slope.is_nan() || bounds.slope >= 1.0 {
+            return Err(ImageError::Slope {
+                found: bounds.slope,
+            });
+        }
+        Ok(bounds)
+    }
+
+    /// What D, H, R, h can give: linear interpolation between records stays within them.
+    fn check_records(&self) -> Result<Bounds, ImageError> {
+        let mut bounds = Bounds::default();
+        let nodes = self.ripple.len();
+        let periods = self.drive.ripple_order() as f32 * self.drive.ratio().abs();
+        let slope_per_step = nodes as f32 * periods / core::f32::consts::TAU;
+        let stride = stored(nodes).saturating_add(RECORD_HEAD_WORDS);
+        for (index, record) in self.records.chunks_exact(stride).enumerate() {
+            let mean = in_range(
+                Field::Mean,
+                index,
+                f32_at(record, 0),
+                -MAX_ERROR_RAD,
+                MAX_ERROR_RAD,
+            )?;
+            let half = in_range(
+                Field::HalfWidth,
+                index,
+                f32_at(record, 1),
+                0.0,
+                MAX_ERROR_RAD,
+            )?;
+            let ripple = |node: usize| ripple_at(record, node.saturating_add(RECORD_HEAD_WORDS));
+            let mean_ripple = |node: usize| ripple(node).0 as f32 * self.mean_ripple_scale;
+            let half_ripple = |node: usize| ripple(node).1 as f32 * self.half_ripple_scale;
+            check_closed(
+                Field::MeanRipple,
+                self.ripple,
+                record.get(RECORD_HEAD_WORDS..).unwrap_or_default(),
+            )?;
+            let len = self.ripple.stored_len();
+            let least = (0..len).fold(half, |least, node| least.min(half + half_ripple(node)));
+            if least < 0.0 {
+                let torque_nodes = self.torque.len().max(1);
+                return Err(ImageError::NegativeHalfWidth {
+                    temperature: index.checked_div(torque_nodes).unwrap_or(0),
+                    torque: index.checked_rem(torque_nodes).unwrap_or(0),
+                    found_rad: least,
+                });
+            }
+            let (mean_most, mean_step) = extremes(len, mean_ripple);
+            let (half_most, half_step) = extremes(len, half_ripple);
+            bounds.error_rad = bounds
+                .error_rad
+                .max(mean.abs() + mean_most + half + half_most);
+            bounds.periodic_rad = bounds.periodic_rad.max(mean_most + half_most);
+            bounds.slope = bounds.slope.max((mean_step + half_step) * slope_per_step);
+        }
+        Ok(bounds)
+    }
+
+    fn header(&self) -> Header<'a> {
+        Header(self.image.first_chunk().unwrap_or(&[0; HEADER_BYTES]))
+    }
+
+    /// The table id: printed by tools, matched with devices in the field.
+    #[must_use]
+    pub fn id(&self) -> TableId {
+        TableId(self.header().bytes(ID_OFFSET))
+    }
+
+    /// BLAKE3 of the drive description the table was made from.
+    #[must_use]
+    pub fn drive_hash(&self) -> [u8; 32] {
+        self.header().bytes(16)
+    }
+
+    /// Program that made the table.
+    #[must_use]
+    pub fn tool_version(&self) -> &'a str {
+        self.header()
+            .text(56, Field::ToolVersion)
+            .unwrap_or_default()
+    }
+
+    /// Mesh or data the samples came from.
+    #[must_use]
+    pub fn mesh_level(&self) -> &'a str {
+        self.header().text(80, Field::MeshLevel).unwrap_or_default()
+    }
+
+    /// Relative residual the solver reached; 0 for measured samples.
+    #[must_use]
+    pub fn solver_residual(&self) -> f32 {
+        self.header().f32(124)
+    }
+
+    /// Largest deviation of the table from the samples it was made of, rad.
+    #[must_use]
+    pub fn projection_worst_rad(&self) -> f32 {
+        self.header().f32(128)
+    }
+
+    /// Root mean square deviation of the table from the samples it was made of, rad.
+    #[must_use]
+    pub fn projection_rms_rad(&self) -> f32 {
+        self.header().f32(132)
+    }
+
+    /// The image the table is read from.
+    #[must_use]
+    pub const fn image(&self) -> &'a [u8] {
+        self.image
+    }
+
+    /// Number of [`PAGE_BYTES`] pages in the body.
+    #[must_use]
+    pub const fn page_count(&self) -> usize {
+        self.body_bytes.div_ceil(PAGE_BYTES)
+    }
+
+    /// The bytes of one page; `None` beyond the last.
+    #[must_use]
+    pub fn page(&self, page: usize) -> Option<&'a [u8]> {
+        page_of(self.image, self.body_bytes, page)
+    }
+
+    /// Whether a page still matches its CRC-32; false beyond the last. At most 256 bytes, 1400 instructions.
+    #[must_use]
+    pub fn is_page_intact(&self, page: usize) -> bool {
+        page_intact(self.image, self.body_bytes, page)
+    }
+}
+
+fn page_of(image: &[u8], body_bytes: usize, page: usize) -> Option<&[u8]> {
+    image.get(..body_bytes)?.chunks(PAGE_BYTES).nth(page)
+}
+
+fn page_intact(image: &[u8], body_bytes: usize, page: usize) -> bool {
+    let sums = image
+        .get(body_bytes..)
+        .map_or(&[][..], |sums| sums.as_chunks::<CRC_BYTES>().0);
+    match (page_of(image, body_bytes, page), sums.get(page)) {
+        (Some(bytes), Some(sum)) => crc32(bytes) == u32::from_le_bytes(*sum),
+        _ => false,
+    }
+}
+
+/// Everything about an image that needs no knowledge of tables.
+fn check_envelope(image: &[u8]) -> Result<Header<'_>, ImageError> {
+    let needed = image_bytes(1, 1, 0, [0; 3]);
+    let found = image.len();
+    let too_short = ImageError::TooShort { found, needed };
+    let header = Header(image.first_chunk().ok_or(too_short)?);
+    if found < needed {
+        return Err(too_short);
+    }
+    if header.bytes(0) != MAGIC {
+        return Err(ImageError::Magic);
+    }
+    // The mark before the version: swapped bytes would make the version look wrong.
+    if header.u16(10) != BYTE_ORDER_MARK {
+        return Err(ImageError::ByteOrder {
+            found: header.u16(10),
+        });
+    }
+    if header.u16(8) != FORMAT_VERSION {
+        return Err(ImageError::Version {
+            found: header.u16(8),
+            allowed: FORMAT_VERSION,
+        });
+    }
+    let stated = header.u32(12) as usize;
+    if stated != found {
+        return Err(ImageError::Length { stated, found });
+    }
+    let (before, sum) = image.split_last_chunk::<CRC_BYTES>().ok_or(too_short)?;
+    let (stated, computed) = (u32::from_le_bytes(*sum), crc32(before));
+    if stated != computed {
+        return Err(ImageError::Crc { stated, computed });
+    }
+    Ok(header)
+}
+
+/// Reserved bytes, texts, and the drive.
+fn check_identity(header: Header<'_>) -> Result<Drive, ImageError> {
+    let reserved = header.0.get(RESERVED).unwrap_or_default();
+    if let Some(at) = reserved.iter().position(|byte| *byte != 0) {
+        return Err(ImageError::Reserved {
+            offset: at.saturating_add(RESERVED.start),
+        });
+    }
+    header.text(56, Field::ToolVersion)?;
+    header.text(80, Field::MeshLevel)?;
+    let fixed = match header.u8(105) {
+        0 => FixedMember::Flexspline,
+        1 => FixedMember::CircularSpline,
+        found => return Err(ImageError::FixedMember { found }),
+    };
+    Drive::new(header.u16(106), header.u16(108), fixed).map_err(ImageError::Teeth)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::DriveError;
+    use crate::fixture;
+    use proptest::prelude::*;
+    use std::vec;
+    use std::vec::Vec;
+
+    const RECORDS: usize = HEADER_BYTES + 4 * (11 + 3);
+    const RECORD_BYTES: usize = 4 * (RECORD_HEAD_WORDS + 19);
+
+    /// A small table with every part; ripple alternates in sign.
+    fn data() -> TableData<'static> {
+        const RIPPLE: [f32; 32] = {
+            let mut ripple = [1.0e-6; 32];
+            let mut i = 0;
+            while i < 32 {
+                ripple[i] = if i % 2 == 0 { 1.0e-6 } else { -0.7e-6 };
+                i += 1;
+            }
+            ripple
+        };
+        TableData {
+            drive: fixture::drive(),
+            torque_nodes_n_m: &[-1.0, 1.0],
+            temperature_nodes_c: &[0.0, 40.0],
+            ripple_nodes: 8,
+            mean_rad: &[-1.0e-3, 1.0e-3, -2.0e-3, 2.0e-3],
+            half_width_rad: &[1.0e-4, 2.0e-4, 3.0e-4, 4.0e-4],
+            mean_ripple_rad: &RIPPLE,
+            half_width_ripple_rad: &RIPPLE,
+            generator_curve_rad: &[1.0e-5, -1.0e-5, 2.0e-5, 0.0],
+            material_curve_rad: &[],
+            output_curve_rad: &[1.0e-4, 0.0, -1.0e-4, 0.0, 0.0],
+            projection_worst_rad: 2.0e-8,
+            projection_rms_rad: 1.0e-8,
+        }
+    }
+
+    fn provenance() -> Provenance<'static> {
+        Provenance {
+            torque_range_n_m: [-1.0, 0.5],
+            temperature_range_c: [0.0, 40.0],
+            ..fixture::provenance()
+        }
+    }
+
+    fn write(data: &TableData<'_>, provenance: &Provenance<'_>) -> Result<Vec<u8>, WriteError> {
+        let mut out = vec![0xff; 4096];
+        let bytes = write_image(data, provenance, &mut out, fixture::id)?;
+        out.truncate(bytes);
+        Ok(out)
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let image = write(&data(), &provenance()).unwrap();
+        assert_eq!(image.len(), image_bytes(2, 2, 8, [4, 0, 5]));
+        let table = Table::check(&image).unwrap();
+        assert_eq!(*table.drive(), fixture::drive());
+        assert_eq!(table.generator_kind(), GeneratorKind::Cam);
+        assert_eq!(table.drive_hash(), [0x5a; 32]);
+        assert_eq!(
+            (table.tool_version(), table.mesh_level()),
+            ("flexspline 0.1.0", "closed form")
+        );
+        assert_eq!(
+            (table.solver_residual(), table.projection_worst_rad()),
+            (1e-9, 2.0e-8)
+        );
+        assert_eq!(table.projection_rms_rad(), 1.0e-8);
+        assert_eq!(
+            (table.torque_range_n_m(), table.temperature_range_c()),
+            ([-1.0, 0.5], [0.0, 40.0])
+        );
+        assert!(
+            table.torque_nodes_n_m().eq([-1.0, 1.0]) && table.temperature_nodes_c().eq([0.0, 40.0])
+        );
+        assert_eq!(table.error_limit_rad(), 0.02);
+        assert_eq!(table.ripple_axis().len(), 8);
+        let words = |curve: &PeriodicCurve<'_>| {
+            (0..curve.axis.len())
+                .map(|i| f32_at(curve.words, i + 1))
+                .collect::<Vec<f32>>()
+        };
+        assert_eq!(words(&table.generator_curve), data().generator_curve_rad);
+        assert_eq!(words(&table.material_curve), data().material_curve_rad);
+        assert_eq!(words(&table.output_curve), data().output_curve_rad);
+        for record in 0..4 {
+            let base = record * (RECORD_HEAD_WORDS + 11);
+            assert_eq!(f32_at(table.records, base), data().mean_rad[record]);
+            assert_eq!(
+                f32_at(table.records, base + 1),
+                data().half_width_rad[record]
+            );
+            for node in 0..8 {
+                let (mean, half) = ripple_at(table.records, base + RECORD_HEAD_WORDS + 1 + node);
+                let expected = data().mean_ripple_rad[record * 8 + node];
+                assert!(
+                    (mean as f32 * table.mean_ripple_scale - expected).abs()
+                        <= 0.51 * table.mean_ripple_scale
+                );
+                assert!(
+                    (half as f32 * table.half_ripple_scale - expected).abs()
+                        <= 0.51 * table.half_ripple_scale
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_id_is_that_of_the_body_with_the_id_zero() {
+        let mut image = write(&data(), &provenance()).unwrap();
+        let table = Table::check(&image).unwrap();
+        let (id, body_bytes) = (table.id(), table.body_bytes);
+        image[ID_OFFSET..ID_OFFSET + 8].fill(0);
+        assert_eq!(id, TableId(fixture::id(&image[..body_bytes])));
+        assert_eq!(
+            std::format!("{}", TableId([0, 1, 2, 0xab, 4, 5, 6, 0xff])),
+            "000102ab040506ff"
+        );
+    }
+
+    #[test]
+    fn quantisation_rounds_to_nearest() {
+        assert_eq!(
+            [0.49, 0.51, -0.49, -0.51, 32767.0].map(|v| quantise(v, 1.0)),
+            [0, 1, 0, -1, 32767]
+        );
+        assert_eq!(quantise(1.0, 0.0), 0);
+    }
+
+    #[test]
+    fn a_half_width_that_touches_zero_stays_writable() {
+        for i in 0..500u32 {
+            // Rounding of the lowest ripple goes up for some and down for others.
+            let lowest = 1.0e-9 * (1.0 + 0.618_034 * i as f32);
+            let mut ripple = data().half_width_ripple_rad.to_vec();
+            ripple[3] = -lowest;
+            ripple
+                .iter_mut()
+                .filter(|h| **h < -lowest)
+                .for_each(|h| *h = -lowest);
+            let touching = TableData {
+                half_width_rad: &[lowest; 4],
+                half_width_ripple_rad: &ripple,
+                ..data()
+            };
+            let written = write(&touching, &provenance());
+            assert!(written.is_ok(), "{lowest}: {written:?}");
+        }
+    }
+
+    #[test]
+    fn the_stated_sizes_hold() {
+        assert_eq!(image_bytes(25, 3, 16, [64; 3]), 7528);
+        assert_eq!(image_bytes(25, 3, 16, [0; 3]), 6712);
+        assert!(image_bytes(25, 3, 16, [100; 3]) <= 8192);
+        assert_eq!(
+            fixture::image(false).len(),
+            fixture::plan(false).image_bytes()
+        );
+    }
+
+    #[test]
+    fn pages_cover_the_body_and_find_their_damage() {
+        let mut image = fixture::image(false);
+        let table = Table::check(&image).unwrap();
+        let (pages, body_bytes) = (table.page_count(), table.body_bytes);
+        assert_eq!(
+            (0..pages)
+                .map(|page| table.page(page).unwrap().len())
+                .sum::<usize>(),
+            body_bytes
+        );
+        assert!((0..pages).all(|page| table.is_page_intact(page)));
+        assert!(!table.is_page_intact(pages) && table.page(pages).is_none());
+        image[2 * PAGE_BYTES] ^= 1;
+        assert!(page_intact(&image, body_bytes, 1) && !page_intact(&image, body_bytes, 2));
+    }
+
+    #[test]
+    fn unaligned_images_are_read() {
+        let image = fixture::image(false);
+        for shift in 0..4 {
+            let mut shifted = vec![0; shift];
+            shifted.extend_from_slice(&image);
+            assert!(Table::check(&shifted[shift..]).is_ok());
+        }
+    }
+
+    #[test]
+    fn no_single_bit_may_flip() {
+        let mut image = write(&data(), &provenance()).unwrap();
+        for bit in 0..image.len() * 8 {
+            image[bit / 8] ^= 1 << (bit % 8);
+            assert!(Table::check(&image).is_err(), "bit {bit}");
+            image[bit / 8] ^= 1 << (bit % 8);
+        }
+        assert!(Table::check(&image).is_ok());
+    }
+
+    /// The error after `damage`, with every checksum made right again: what a broken or hostile writer would send.
+    fn resealed(damage: impl FnOnce(&mut Vec<u8>)) -> ImageError {
+        let mut image = fixture::image(false);
+        let body_bytes = Table::check(&image).unwrap().body_bytes;
+        damage(&mut image);
+        seal(&mut image, body_bytes);
+        Table::check(&image).expect_err("accepted")
+    }
+
+    fn put(offset: usize, value: f32) -> impl FnOnce(&mut Vec<u8>) {
+        move |image| image[offset..offset + 4].copy_from_slice(&value.to_le_bytes())
+    }
+
+    #[test]
+    fn each_damage_of_the_envelope_has_its_own_error() {
+        let image = fixture::image(false);
+        let damaged = |damage: fn(&mut Vec<u8>)| {
+            let mut image = image.clone();
+            damage(&mut image);
+            Table::check(&image).unwrap_err()
+        };
+        let short = damaged(|image| image.truncate(100));
+        assert_eq!(
+            short,
+            ImageError::TooShort {
+                found: 100,
+                needed: image_bytes(1, 1, 0, [0; 3])
+            }
+        );
+        assert_eq!(
+            Table::check(&[]).unwrap_err(),
+            ImageError::TooShort {
+                found: 0,
+                needed: 216
+            }
+        );
+        assert_eq!(damaged(|image| image[0] = 0), ImageError::Magic);
+        // What a text-mode transfer does.
+        assert_eq!(damaged(|image| _ = image.remove(4)), ImageError::Magic);
+        assert_eq!(
+            damaged(|image| image[8] = 2),
+            ImageError::Version {
+                found: 2,
+                allowed: 1
+            }
+        );
+        assert_eq!(
+            damaged(|image| image.swap(10, 11)),
+            ImageError::ByteOrder { found: 0xfffe }
+        );
+        let full = image.len();
+        assert_eq!(
+            damaged(|image| _ = image.pop()),
+            ImageError::Length {
+                stated: full,
+                found: full - 1
+            }
+        );
+        assert_eq!(
+            damaged(|image| image.push(0)),
+            ImageError::Length {
+                stated: full,
+                found: full + 1
+            }
+        );
+        assert!(matches!(
+            damaged(|image| image[300] ^= 4),
+            ImageError::Crc { .. }
+        ));
+        assert!(matches!(
+            damaged(|image| image[16] ^= 4),
+            ImageError::Crc { .. }
+        ));
+        let one_page = damaged(|image| {
+            image[3 * PAGE_BYTES] ^= 4;
+            let (before, last) = image.split_last_chunk_mut::<4>().unwrap();
+            *last = crc32(before).to_le_bytes();
+        });
+        assert_eq!(one_page, ImageError::PageCrc { page: 3 });
+    }
+
+    #[test]
+    fn each_damage_of_the_header_has_its_own_error() {
+        assert_eq!(
+            resealed(|image| image[170] = 1),
+            ImageError::Reserved { offset: 170 }
+        );
+        assert_eq!(
+            resealed(|image| image[57] = 7),
+            ImageError::Text {
+                field: Field::ToolVersion
+            }
+        );
+        assert_eq!(
+            resealed(|image| image[102] = b'x'),
+            ImageError::Text {
+                field: Field::MeshLevel
+            }
+        );
+        assert_eq!(
+            resealed(|image| image[104] = 5),
+            ImageError::GeneratorKind { found: 5 }
+        );
+        assert_eq!(
+            resealed(|image| image[105] = 2),
+            ImageError::FixedMember { found: 2 }
+        );
+        let teeth = DriveError {
+            flexspline_teeth: 190,
+            circular_spline_teeth: 190,
+        };
+        assert_eq!(resealed(|image| image[106] = 190), ImageError::Teeth(teeth));
+        for (offset, found, field, least, most) in [
+            (110, 0, Field::TorqueNodes, 1, 32),
+            (110, 33, Field::TorqueNodes, 1, 32),
+            (111, 9, Field::TemperatureNodes, 1, 8),
+            (112, 3, Field::RippleNodes, 4, 32),
+            (112, 33, Field::RippleNodes, 4, 32),
+            (113, 3, Field::GeneratorCurve, 4, 128),
+            (114, 255, Field::MaterialCurve, 4, 128),
+            (115, 129, Field::OutputCurve, 4, 128),
+        ] {
+            let error = resealed(|image| image[offset] = found);
+            assert_eq!(
+                error,
+                ImageError::Count {
+                    field,
+                    found: found as usize,
+                    least,
+                    most
+                }
+            );
+        }
+        assert!(matches!(
+            resealed(|image| image[110] = 12),
+            ImageError::Size { .. }
+        ));
+        let outside = |offset, value, field| {
+            let error = resealed(put(offset, value));
+            assert!(
+                matches!(error, ImageError::OutOfRange { field: named, .. } if named == field),
+                "{error}"
+            );
+        };
+        outside(116, -1.0, Field::MeanRipple);
+        outside(120, 1.0, Field::HalfWidthRipple);
+        outside(124, -1.0, Field::SolverResidual);
+        outside(128, 0.06, Field::ProjectionWorst);
+        outside(132, 0.01, Field::ProjectionRms);
+        outside(136, -50.1, Field::TorqueRange);
+        outside(140, -50.1, Field::TorqueRange);
+        outside(148, 80.1, Field::TemperatureRange);
+        outside(152, 0.0, Field::ErrorLimit);
+        outside(152, 0.051, Field::ErrorLimit);
+        for (offset, field, index) in [
+            (116, Field::MeanRipple, 0),
+            (124, Field::SolverResidual, 0),
+            (132, Field::ProjectionRms, 0),
+            (140, Field::TorqueRange, 1),
+            (144, Field::TemperatureRange, 0),
+            (152, Field::ErrorLimit, 0),
+        ] {
+            assert_eq!(
+                resealed(put(offset, f32::NAN)),
+                ImageError::NotFinite { field, index }
+            );
+        }
+    }
+
+    #[test]
+    fn each_damage_of_the_numbers_has_its_own_error() {
+        let node = |i: usize| HEADER_BYTES + 4 * i;
+        let infinite = ImageError::NotFinite {
+            field: Field::TorqueNodes,
+            index: 10,
+        };
+        assert_eq!(resealed(put(node(10), f32::INFINITY)), infinite);
+        // Equal nodes are no jump: they have no interval to interpolate in.
+        let equal = ImageError::NotIncreasing {
+            field: Field::TorqueNodes,
+            index: 4,
+        };
+        assert_eq!(resealed(put(node(4), -1.51)), equal);
+        let falling = ImageError::NotIncreasing {
+            field: Field::TemperatureNodes,
+            index: 2,
+        };
+        assert_eq!(resealed(put(node(13), 19.0)), falling);
+        let record = |i: usize| RECORDS + RECORD_BYTES * i;
+        let error = resealed(put(record(5), f32::NEG_INFINITY));
+        assert_eq!(
+            error,
+            ImageError::NotFinite {
+                field: Field::Mean,
+                index: 5
+            }
+        );
+        let error = resealed(put(record(7) + 4, -1.0e-9));
+        assert!(
+            matches!(
+                error,
+                ImageError::OutOfRange {
+                    field: Field::HalfWidth,
+                    ..
+                }
+            ),
+            "{error}"
+        );
+        // Half-width below its own ripple, at temperature 1 and torque 2.
+        let error = resealed(put(record(13) + 4, 1.0e-8));
+        assert!(
+            matches!(
+                error,
+                ImageError::NegativeHalfWidth {
+                    temperature: 1,
+                    torque: 2,
+                    ..
+                }
+            ),
+            "{error}"
+        );
+        // The repeated nodes at either end of a record.
+        for (position, index) in [(0, 0), (17, 17), (18, 18)] {
+            let offset = record(3) + 4 * (RECORD_HEAD_WORDS + position);
+            let error = resealed(|image| image[offset] ^= 1);
+            assert_eq!(
+                error,
+                ImageError::NotClosed {
+                    field: Field::MeanRipple,
+                    index
+                }
+            );
+        }
+        let error = resealed(put(record(20), 0.03));
+        assert!(
+            matches!(
+                error,
+                ImageError::ErrorBound {
+                    allowed_rad: 0.02,
+                    ..
+                }
+            ),
+            "{error}"
+        );
+        // Ripple a hundred times as large, on a half-width that allows it.
+        let error = resealed(|image| put(116, 1.0e-4 / 32767.0)(image));
+        assert!(
+            matches!(error, ImageError::Slope { found } if found > 1.0 && found < 20.0),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn the_bounds_hold_and_are_close() {
+        let image = fixture::image(true);
+        let bounds = Table::check(&image).unwrap().bounds();
+        let (mut steepest, mut largest): (f64, f64) = (0.0, 0.0);
+        for i in 0..100_000 {
+            let generator = 596.9 * (i as f64 * 0.618_033_988).rem_euclid(1.0);
+            for direction in [crate::Direction::Forward, crate::Direction::Backward] {
+                let error = |generator| fixture::error(generator, 50.0, 80.0, direction, true);
+                let slope = (error(generator + 1e-6) - error(generator - 1e-6)) / 2e-6 * 95.0;
+                steepest = steepest.max(slope.abs());
+                largest = largest.max(error(generator).abs());
+            }
+        }
+        let (slope, error) = (bounds.slope as f64, bounds.error_rad as f64);
+        assert!(
+            steepest < slope && slope < 1.3 * steepest,
+            "{steepest} {slope}"
+        );
+        assert!(
+            largest < error && error < 1.1 * largest,
+            "{largest} {error}"
+        );
+    }
+
+    #[test]
+    fn an_axis_of_one_node_holds_where_its_maker_says() {
+        let mut data = data();
+        data.temperature_nodes_c = &[20.0];
+        data.mean_rad = &data.mean_rad[..2];
+        data.half_width_rad = &data.half_width_rad[..2];
+        data.mean_ripple_rad = &data.mean_ripple_rad[..16];
+        data.half_width_ripple_rad = &data.half_width_ripple_rad[..16];
+        assert!(write(&data, &provenance()).is_ok());
+    }
+
+    #[test]
+    fn the_writer_names_what_does_not_fit() {
+        let mut small = [0; 300];
+        let needed = image_bytes(2, 2, 8, [4, 0, 5]);
+        let found = write_image(&data(), &provenance(), &mut small, fixture::id);
+        assert_eq!(
+            found,
+            Err(WriteError::BufferTooSmall { needed, found: 300 })
+        );
+        let short = TableData {
+            half_width_rad: &[1e-4; 3],
+            ..data()
+        };
+        let expected = WriteError::Shape {
+            field: Field::HalfWidth,
+            found: 3,
+            needed: 4,
+        };
+        assert_eq!(write(&short, &provenance()), Err(expected));
+        let long = Provenance {
+            mesh_level: "a mesh that takes too many words",
+            ..provenance()
+        };
+        let expected = WriteError::TextTooLong {
+            field: Field::MeshLevel,
+            found: 32,
+        };
+        assert_eq!(write(&data(), &long), Err(expected));
+        let foreign = Provenance {
+            tool_version: "Σ",
+            ..provenance()
+        };
+        let expected = WriteError::Refused(ImageError::Text {
+            field: Field::ToolVersion,
+        });
+        assert_eq!(write(&data(), &foreign), Err(expected));
+        let many = TableData {
+            torque_nodes_n_m: &[0.0; 33],
+            mean_rad: &[0.0; 66],
+            half_width_rad: &[0.0; 66],
+            mean_ripple_rad: &[],
+            half_width_ripple_rad: &[],
+            ripple_nodes: 0,
+            ..data()
+        };
+        let expected = ImageError::Count {
+            field: Field::TorqueNodes,
+            found: 33,
+            least: 1,
+            most: 32,
+        };
+        assert_eq!(
+            write(&many, &provenance()),
+            Err(WriteError::Refused(expected))
+        );
+        let mut ripple = [0.0; 32];
+        ripple[9] = f32::NAN;
+        let undefined = TableData {
+            mean_ripple_rad: &ripple,
+            ..data()
+        };
+        let expected = ImageError::NotFinite {
+            field: Field::MeanRipple,
+            index: 9,
+        };
+        assert_eq!(
+            write(&undefined, &provenance()),
+            Err(WriteError::Refused(expected))
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn arbitrary_bytes_neither_panic_nor_pass(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
+            prop_assert!(Table::check(&bytes).is_err());
+        }
+
+        /// Past the checksums, any damage is either refused or leaves a table within its stated bounds.
+        #[test]
+        fn resealed_damage_never_gives_more_than_the_table_states(
+            damage in prop::collection::vec((104usize..3000, any::<u8>()), 1..6),
+            generator in any::<i64>(), torque in any::<f32>(), temperature in any::<f32>(),
+        ) {
+            let mut image = write(&data(), &provenance()).unwrap();
+            let body_bytes = Table::check(&image).unwrap().body_bytes;
+            for (offset, value) in damage {
+                image[offset.min(body_bytes - 1)] = value;
+            }
+            seal(&mut image, body_bytes);
+            if let Ok(table) = Table::check(&image) {
+                let generator = crate::GeneratorAngle::from_counts(generator);
+                let mut state = crate::PlayState::unknown();
+                let found = table.forward(&mut state, generator, torque, temperature);
+                prop_assert!(found.transmission_error_rad.abs() <= 1.0001 * table.bounds().error_rad);
+                prop_assert_eq!(found.quality == crate::Quality::Disabled, !(torque.is_finite() && temperature.is_finite()));
+            }
+        }
+    }
+}
