@@ -171,18 +171,9 @@ mod tests {
             assert_eq!(OutputAngle::from_rad(bad), None, "{bad}");
         }
         assert_eq!(OutputAngle::ZERO.offset_rad(f32::NAN), OutputAngle::ZERO);
-        assert_eq!(
-            OutputAngle::ZERO.offset_rad(f32::INFINITY).counts(),
-            i32::MAX as i64
-        );
-        assert_eq!(
-            OutputAngle::new(7, 0).minus_rad(OutputAngle::ZERO),
-            core::f32::consts::PI
-        );
-        assert_eq!(
-            OutputAngle::ZERO.minus_rad(OutputAngle::new(7, 0)),
-            -core::f32::consts::PI
-        );
+        assert_eq!(OutputAngle::ZERO.offset_rad(f32::INFINITY).counts(), i32::MAX as i64);
+        assert_eq!(OutputAngle::new(7, 0).minus_rad(OutputAngle::ZERO), core::f32::consts::PI);
+        assert_eq!(OutputAngle::ZERO.minus_rad(OutputAngle::new(7, 0)), -core::f32::consts::PI);
     }
 
     proptest! {

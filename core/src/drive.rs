@@ -52,32 +52,16 @@ impl Drive {
     ///
     /// # Errors
     /// [`DriveError`] unless `1 ≤ flexspline_teeth < circular_spline_teeth`.
-    pub fn new(
-        flexspline_teeth: u16,
-        circular_spline_teeth: u16,
-        fixed: FixedMember,
-    ) -> Result<Self, DriveError> {
-        let bad = DriveError {
-            flexspline_teeth,
-            circular_spline_teeth,
-        };
+    pub fn new(flexspline_teeth: u16, circular_spline_teeth: u16, fixed: FixedMember) -> Result<Self, DriveError> {
+        let bad = DriveError { flexspline_teeth, circular_spline_teeth };
         let fs = NonZeroU16::new(flexspline_teeth).ok_or(bad)?;
         let cs = NonZeroU16::new(circular_spline_teeth).ok_or(bad)?;
-        let waves = circular_spline_teeth
-            .checked_sub(flexspline_teeth)
-            .and_then(NonZeroU16::new)
-            .ok_or(bad)?;
+        let waves = circular_spline_teeth.checked_sub(flexspline_teeth).and_then(NonZeroU16::new).ok_or(bad)?;
         let ratio = match fixed {
             FixedMember::Flexspline => cs.get() as f32 / waves.get() as f32,
             FixedMember::CircularSpline => -(fs.get() as f32) / waves.get() as f32,
         };
-        Ok(Self {
-            flexspline_teeth: fs,
-            circular_spline_teeth: cs,
-            waves,
-            fixed,
-            ratio,
-        })
+        Ok(Self { flexspline_teeth: fs, circular_spline_teeth: cs, waves, fixed, ratio })
     }
 
     /// Teeth of the flexspline.
@@ -162,9 +146,7 @@ impl Drive {
             generator: generator.fraction(),
             material: generator.fraction().wrapping_sub(nominal.fraction()),
             output: nominal.fraction(),
-            tooth: generator
-                .fraction()
-                .wrapping_mul(self.ripple_order() as u32),
+            tooth: generator.fraction().wrapping_mul(self.ripple_order() as u32),
         }
     }
 
@@ -174,11 +156,7 @@ impl Drive {
     /// The error is at the output, positive when the output is ahead of ideal. This is the one place where the sign of the
     /// correction is set. NaN corrects nothing.
     #[must_use]
-    pub fn corrected_command(
-        &self,
-        target: OutputAngle,
-        predicted_error_rad: f32,
-    ) -> (GeneratorAngle, OutputAngle) {
+    pub fn corrected_command(&self, target: OutputAngle, predicted_error_rad: f32) -> (GeneratorAngle, OutputAngle) {
         let nominal = target.offset_rad(-predicted_error_rad);
         (self.nominal_generator(nominal), nominal)
     }
@@ -194,9 +172,7 @@ fn scale(counts: i64, mul: NonZeroU16, div: NonZeroU16) -> i64 {
     let whole = turns / divisor;
     let rest = ((turns % divisor) as u64) << 32 | (magnitude & 0xffff_ffff);
     // rest < div·2³², so the product is below 2⁶⁴ − 2⁴⁸ and the half divisor cannot overflow it.
-    let product = rest
-        .wrapping_mul(mul.get() as u64)
-        .wrapping_add((div.get() >> 1) as u64);
+    let product = rest.wrapping_mul(mul.get() as u64).wrapping_add((div.get() >> 1) as u64);
     let mut quotient = 0u64;
     let mut remainder = 0u32;
     for digit in [48, 32, 16, 0] {
@@ -206,11 +182,7 @@ fn scale(counts: i64, mul: NonZeroU16, div: NonZeroU16) -> i64 {
     }
     let whole_turns = (whole as u64).wrapping_mul(mul.get() as u64) << 32;
     let scaled = whole_turns.wrapping_add(quotient) as i64;
-    if counts < 0 {
-        scaled.wrapping_neg()
-    } else {
-        scaled
-    }
+    if counts < 0 { scaled.wrapping_neg() } else { scaled }
 }
 
 #[cfg(test)]
@@ -225,60 +197,27 @@ mod tests {
     #[test]
     fn the_ratio_has_the_sign_of_willis() {
         assert_eq!(hhd_95().ratio(), 95.0);
-        assert_eq!(
-            Drive::new(190, 192, FixedMember::CircularSpline)
-                .unwrap()
-                .ratio(),
-            -95.0
-        );
-        assert_eq!(
-            Drive::new(200, 202, FixedMember::Flexspline)
-                .unwrap()
-                .ratio(),
-            101.0
-        );
-        assert_eq!(
-            Drive::new(201, 203, FixedMember::Flexspline)
-                .unwrap()
-                .ratio(),
-            101.5
-        );
+        assert_eq!(Drive::new(190, 192, FixedMember::CircularSpline).unwrap().ratio(), -95.0);
+        assert_eq!(Drive::new(200, 202, FixedMember::Flexspline).unwrap().ratio(), 101.0);
+        assert_eq!(Drive::new(201, 203, FixedMember::Flexspline).unwrap().ratio(), 101.5);
     }
 
     #[test]
     fn impossible_tooth_counts_are_refused() {
         for (fs, cs) in [(0, 2), (190, 188), (188, 188), (0, 0)] {
             let found = Drive::new(fs, cs, FixedMember::Flexspline);
-            assert_eq!(
-                found,
-                Err(DriveError {
-                    flexspline_teeth: fs,
-                    circular_spline_teeth: cs
-                })
-            );
+            assert_eq!(found, Err(DriveError { flexspline_teeth: fs, circular_spline_teeth: cs }));
         }
     }
 
     #[test]
     fn one_output_turn_is_exactly_the_ratio() {
         let drive = hhd_95();
-        assert_eq!(
-            drive.nominal_output(GeneratorAngle::new(95, 0)),
-            OutputAngle::new(1, 0)
-        );
-        assert_eq!(
-            drive.nominal_output(GeneratorAngle::new(-95_000_000, 0)),
-            OutputAngle::new(-1_000_000, 0)
-        );
+        assert_eq!(drive.nominal_output(GeneratorAngle::new(95, 0)), OutputAngle::new(1, 0));
+        assert_eq!(drive.nominal_output(GeneratorAngle::new(-95_000_000, 0)), OutputAngle::new(-1_000_000, 0));
         let reversed = Drive::new(190, 192, FixedMember::CircularSpline).unwrap();
-        assert_eq!(
-            reversed.nominal_output(GeneratorAngle::new(95, 0)),
-            OutputAngle::new(-1, 0)
-        );
-        assert_eq!(
-            reversed.nominal_generator(OutputAngle::new(-2, 0)),
-            GeneratorAngle::new(190, 0)
-        );
+        assert_eq!(reversed.nominal_output(GeneratorAngle::new(95, 0)), OutputAngle::new(-1, 0));
+        assert_eq!(reversed.nominal_generator(OutputAngle::new(-2, 0)), GeneratorAngle::new(190, 0));
     }
 
     #[test]
@@ -292,9 +231,7 @@ mod tests {
         assert!((phases.material as f64 / 4_294_967_296.0 - 0.4).abs() < 2.4e-10);
         assert_eq!(phases.tooth, 0);
         let half_pitch = GeneratorAngle::from_rad(core::f64::consts::PI / 188.0).unwrap();
-        let tooth = drive
-            .phases(half_pitch, drive.nominal_output(half_pitch))
-            .tooth;
+        let tooth = drive.phases(half_pitch, drive.nominal_output(half_pitch)).tooth;
         assert!(tooth.abs_diff(1 << 31) <= 94, "{tooth}");
     }
 

@@ -252,10 +252,7 @@ impl fmt::Display for ImageError {
                 write!(f, "the header states {stated} bytes, {found} were given")
             }
             Self::Crc { stated, computed } => {
-                write!(
-                    f,
-                    "CRC-32 {computed:#010x}, the image states {stated:#010x}"
-                )
+                write!(f, "CRC-32 {computed:#010x}, the image states {stated:#010x}")
             }
             Self::PageCrc { page } => write!(f, "CRC-32 of page {page} does not match"),
             Self::Reserved { offset } => write!(f, "reserved byte at offset {offset} is not zero"),
@@ -263,18 +260,10 @@ impl fmt::Display for ImageError {
             Self::GeneratorKind { found } => write!(f, "unknown wave generator kind {found}"),
             Self::FixedMember { found } => write!(f, "unknown fixed member {found}"),
             Self::Teeth(error) => error.fmt(f),
-            Self::Count {
-                field,
-                found,
-                least,
-                most,
-            } => {
+            Self::Count { field, found, least, most } => {
                 write!(f, "{field}: {found}, allowed are {least} to {most}")
             }
-            Self::Size { needed, found } => write!(
-                f,
-                "the node counts need {needed} bytes, the image has {found}"
-            ),
+            Self::Size { needed, found } => write!(f, "the node counts need {needed} bytes, the image has {found}"),
             Self::NotFinite { field, index } => write!(f, "{field}: number {index} is not finite"),
             Self::NotIncreasing { field, index } => {
                 write!(f, "{field}: node {index} is not above the one before it")
@@ -282,36 +271,18 @@ impl fmt::Display for ImageError {
             Self::NotClosed { field, index } => {
                 write!(f, "{field}: does not close, at stored value {index}")
             }
-            Self::OutOfRange {
-                field,
-                found,
-                least,
-                most,
-            } => {
+            Self::OutOfRange { field, found, least, most } => {
                 write!(f, "{field}: {found}, allowed are {least} to {most}")
             }
-            Self::NegativeHalfWidth {
-                temperature,
-                torque,
-                found_rad,
-            } => write!(
+            Self::NegativeHalfWidth { temperature, torque, found_rad } => write!(
                 f,
                 "half-width of the play {found_rad} rad at temperature node {temperature}, torque node {torque}: \
                  below zero"
             ),
-            Self::ErrorBound {
-                found_rad,
-                allowed_rad,
-            } => {
-                write!(
-                    f,
-                    "the table can give an error of {found_rad} rad, its limit is {allowed_rad}"
-                )
+            Self::ErrorBound { found_rad, allowed_rad } => {
+                write!(f, "the table can give an error of {found_rad} rad, its limit is {allowed_rad}")
             }
-            Self::Slope { found } => write!(
-                f,
-                "slope bound |ratio*de/dpsi| = {found}, allowed is below 1"
-            ),
+            Self::Slope { found } => write!(f, "slope bound |ratio*de/dpsi| = {found}, allowed is below 1"),
         }
     }
 }

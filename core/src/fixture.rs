@@ -14,9 +14,7 @@ pub const ARCSEC: f64 = TAU / 360.0 / 3600.0;
 pub const PITCH: f64 = TAU / 188.0;
 
 /// Jumps at ±the drag torque of 1.5 N·m.
-pub const TORQUES: [f32; 11] = [
-    -50.0, -20.0, -5.0, -1.51, -1.49, 0.0, 1.49, 1.51, 5.0, 20.0, 50.0,
-];
+pub const TORQUES: [f32; 11] = [-50.0, -20.0, -5.0, -1.51, -1.49, 0.0, 1.49, 1.51, 5.0, 20.0, 50.0];
 pub const TEMPERATURES: [f32; 3] = [-40.0, 20.0, 80.0];
 const DRAG_N_M: f64 = 1.5;
 const STIFFNESS: f64 = 3.0e4;
@@ -44,8 +42,7 @@ fn at_node(generator_rad: f64, torque: f64, temperature: f64, direction: Directi
     let pitch = 188.0 * generator_rad;
     let ripple = (0.2 + 0.01 * torque.abs()) * (pitch + 0.3).cos() + 0.02 * (2.0 * pitch).sin();
     let half_ripple = 0.1 * (pitch - 1.0).sin();
-    warm * (load / STIFFNESS + load.signum() * HALF_BACKLASH)
-        + (ripple - sign * half_ripple) * ARCSEC
+    warm * (load / STIFFNESS + load.signum() * HALF_BACKLASH) + (ripple - sign * half_ripple) * ARCSEC
 }
 
 /// Orders 2 and 4 of ψ and ψ·94/95, order 1 of δ.
@@ -53,42 +50,26 @@ pub fn harmonics(generator_rad: f64) -> f64 {
     let material = generator_rad * 94.0 / 95.0;
     let output = generator_rad / 95.0;
     ARCSEC
-        * (20.0 * (2.0 * generator_rad + 0.7).cos() + 4.0 * (4.0 * generator_rad).sin()
-            - 15.0 * (2.0 * material).cos()
+        * (20.0 * (2.0 * generator_rad + 0.7).cos() + 4.0 * (4.0 * generator_rad).sin() - 15.0 * (2.0 * material).cos()
             + 3.0 * (4.0 * material - 0.5).cos()
             + 10.0 * (output + 1.0).sin())
 }
 
 /// The error in steady motion, rad.
-pub fn error(
-    generator_rad: f64,
-    torque: f64,
-    temperature: f64,
-    direction: Direction,
-    long: bool,
-) -> f64 {
+pub fn error(generator_rad: f64, torque: f64, temperature: f64, direction: Direction, long: bool) -> f64 {
     let base = between(&TEMPERATURES, temperature, |temperature| {
-        between(&TORQUES, torque, |torque| {
-            at_node(generator_rad, torque, temperature, direction)
-        })
+        between(&TORQUES, torque, |torque| at_node(generator_rad, torque, temperature, direction))
     });
     base + if long { harmonics(generator_rad) } else { 0.0 }
 }
 
-pub fn sample(
-    generator_rad: f64,
-    torque: f64,
-    temperature: f64,
-    direction: Direction,
-    long: bool,
-) -> Sample {
+pub fn sample(generator_rad: f64, torque: f64, temperature: f64, direction: Direction, long: bool) -> Sample {
     Sample {
         generator_rad,
         torque_n_m: torque,
         temperature_c: temperature,
         direction,
-        output_rad: generator_rad / 95.0
-            + error(generator_rad, torque, temperature, direction, long),
+        output_rad: generator_rad / 95.0 + error(generator_rad, torque, temperature, direction, long),
     }
 }
 
@@ -100,13 +81,7 @@ pub fn samples(long: bool) -> Vec<Sample> {
             for direction in [Direction::Forward, Direction::Backward] {
                 for position in 0..16 {
                     let generator = 1.0 + PITCH * (position as f64 + 0.3) / 16.0;
-                    samples.push(sample(
-                        generator,
-                        torque as f64,
-                        temperature as f64,
-                        direction,
-                        long,
-                    ));
+                    samples.push(sample(generator, torque as f64, temperature as f64, direction, long));
                 }
             }
         }
@@ -114,13 +89,7 @@ pub fn samples(long: bool) -> Vec<Sample> {
     if long {
         for direction in [Direction::Forward, Direction::Backward] {
             for i in 0..3000 {
-                samples.push(sample(
-                    TAU * 96.0 * i as f64 / 2999.0,
-                    5.0,
-                    20.0,
-                    direction,
-                    long,
-                ));
+                samples.push(sample(TAU * 96.0 * i as f64 / 2999.0, 5.0, 20.0, direction, long));
             }
         }
     }
@@ -129,11 +98,7 @@ pub fn samples(long: bool) -> Vec<Sample> {
 
 pub fn plan(long: bool) -> Plan<'static> {
     let curve = |orders, nodes| {
-        if long {
-            Harmonics { orders, nodes }
-        } else {
-            Harmonics::default()
-        }
+        if long { Harmonics { orders, nodes } } else { Harmonics::default() }
     };
     Plan {
         drive: drive(),
@@ -166,9 +131,7 @@ pub fn provenance() -> Provenance<'static> {
 pub fn id(contents: &[u8]) -> [u8; 8] {
     let hash = contents
         .iter()
-        .fold(0xcbf2_9ce4_8422_2325u64, |hash, &byte| {
-            (hash ^ byte as u64).wrapping_mul(0x0100_0000_01b3)
-        });
+        .fold(0xcbf2_9ce4_8422_2325u64, |hash, &byte| (hash ^ byte as u64).wrapping_mul(0x0100_0000_01b3));
     hash.to_be_bytes()
 }
 
@@ -189,11 +152,7 @@ impl Buffers {
     }
 
     pub fn workspace(&mut self) -> Workspace<'_> {
-        Workspace {
-            numbers: &mut self.numbers,
-            marks: &mut self.marks,
-            values: &mut self.values,
-        }
+        Workspace { numbers: &mut self.numbers, marks: &mut self.marks, values: &mut self.values }
     }
 }
 
@@ -203,14 +162,6 @@ pub fn image(long: bool) -> Vec<u8> {
     let mut out = std::vec![0; plan.image_bytes()];
     let mut buffers = Buffers::new(&plan);
     let samples = samples(long);
-    make_image(
-        &plan,
-        &provenance(),
-        &samples,
-        buffers.workspace(),
-        &mut out,
-        id,
-    )
-    .unwrap();
+    make_image(&plan, &provenance(), &samples, buffers.workspace(), &mut out, id).unwrap();
     out
 }

@@ -49,18 +49,14 @@ impl Cell {
     #[must_use]
     pub fn weights_q15(self) -> [i16; 4] {
         // A sixth of t³ = t³·10923·2⁻¹⁶; every product is below 2³¹.
-        let cube_sixth =
-            |x: u32| ((x.wrapping_mul(x) >> 15).wrapping_mul(x) >> 15).wrapping_mul(10_923) >> 16;
+        let cube_sixth = |x: u32| ((x.wrapping_mul(x) >> 15).wrapping_mul(x) >> 15).wrapping_mul(10_923) >> 16;
         let t = self.fraction >> 17;
         let square = t.wrapping_mul(t) >> 15;
         let cube = square.wrapping_mul(t) >> 15;
         let first = cube_sixth(0x8000u32.wrapping_sub(t));
         let last = cube_sixth(t);
         let second = 21_845u32.wrapping_sub(square).wrapping_add(cube >> 1);
-        let third = 0x8000u32
-            .wrapping_sub(first)
-            .wrapping_sub(second)
-            .wrapping_sub(last);
+        let third = 0x8000u32.wrapping_sub(first).wrapping_sub(second).wrapping_sub(last);
         [first as i16, second as i16, third as i16, last as i16]
     }
 }
@@ -76,11 +72,7 @@ impl PeriodicAxis {
     #[must_use]
     pub fn new(nodes: usize) -> Option<Self> {
         let allowed = nodes == 0 || (MIN_PERIODIC_NODES..=MAX_PERIODIC_NODES).contains(&nodes);
-        if allowed {
-            Some(Self { nodes: nodes as u8 })
-        } else {
-            None
-        }
+        if allowed { Some(Self { nodes: nodes as u8 }) } else { None }
     }
 
     /// Number of nodes; 0 for a part that is absent.
@@ -98,9 +90,7 @@ impl PeriodicAxis {
     /// Position of node `node` in 2⁻³² of the period, rounded up: the first phase that [`Self::locate`] gives to it.
     #[must_use]
     pub fn node_phase(self, node: usize) -> u32 {
-        let position = ((node as u64) << 32)
-            .checked_add(self.nodes.saturating_sub(1) as u64)
-            .unwrap_or(0);
+        let position = ((node as u64) << 32).checked_add(self.nodes.saturating_sub(1) as u64).unwrap_or(0);
         position.checked_div(self.nodes as u64).unwrap_or(0) as u32
     }
 
@@ -108,10 +98,7 @@ impl PeriodicAxis {
     #[must_use]
     pub fn locate(self, phase: u32) -> Cell {
         let scaled = (phase as u64).wrapping_mul(self.nodes as u64);
-        Cell {
-            node: (scaled >> 32) as usize,
-            fraction: scaled as u32,
-        }
+        Cell { node: (scaled >> 32) as usize, fraction: scaled as u32 }
     }
 
     /// The four nodes around a place, in the order of the weights.
@@ -123,21 +110,13 @@ impl PeriodicAxis {
     /// Length of a stored curve: its nodes and three repeated, so that the four around any place are neighbours.
     #[must_use]
     pub const fn stored_len(self) -> usize {
-        if self.nodes == 0 {
-            0
-        } else {
-            self.len().saturating_add(3)
-        }
+        if self.nodes == 0 { 0 } else { self.len().saturating_add(3) }
     }
 
     /// The node at position `position` of a stored curve: the last node, all nodes, the first two.
     #[must_use]
     pub fn stored_node(self, position: usize) -> usize {
-        position
-            .saturating_add(self.len())
-            .saturating_sub(1)
-            .checked_rem(self.len())
-            .unwrap_or(0)
+        position.saturating_add(self.len()).saturating_sub(1).checked_rem(self.len()).unwrap_or(0)
     }
 }
 
@@ -155,11 +134,7 @@ pub struct Place {
 /// Finds `value` among `len` increasing nodes, at most 2 to the power of `HALVINGS`.
 ///
 /// Always `HALVINGS` comparisons, whatever the data; the weight costs one division. NaN is placed at the first node.
-pub fn locate_clamped<const HALVINGS: u32>(
-    len: usize,
-    node: impl Fn(usize) -> f32,
-    value: f32,
-) -> Place {
+pub fn locate_clamped<const HALVINGS: u32>(len: usize, node: impl Fn(usize) -> f32, value: f32) -> Place {
     let last_interval = len.saturating_sub(2);
     let mut below = 0usize;
     let mut step = 1usize << HALVINGS;
@@ -170,22 +145,14 @@ pub fn locate_clamped<const HALVINGS: u32>(
             below = candidate;
         }
     }
-    let above = if len > 1 {
-        below.wrapping_add(1)
-    } else {
-        below
-    };
+    let above = if len > 1 { below.wrapping_add(1) } else { below };
     let (low, high) = (node(below), node(above));
     let along = (value - low) / (high - low);
     // Also takes the NaN of an axis with one node, and of a NaN value, to 0.
     // (Comparisons, not `min` and `max`: those are library calls on a Cortex-M4F.)
     let positive = if along > 0.0 { along } else { 0.0 };
     let weight = if positive < 1.0 { positive } else { 1.0 };
-    Place {
-        below,
-        above,
-        weight: if above == below { 0.0 } else { weight },
-    }
+    Place { below, above, weight: if above == below { 0.0 } else { weight } }
 }
 
 /// An interval is a jump when both neighbours (or the only one) are at least this many times as wide.
@@ -217,11 +184,7 @@ mod tests {
 
     fn evaluate(axis: PeriodicAxis, coefficients: &[f64], phase: u32) -> f64 {
         let cell = axis.locate(phase);
-        axis.around(cell)
-            .iter()
-            .zip(cell.weights())
-            .map(|(&node, weight)| coefficients[node] * weight as f64)
-            .sum()
+        axis.around(cell).iter().zip(cell.weights()).map(|(&node, weight)| coefficients[node] * weight as f64).sum()
     }
 
     #[test]
@@ -254,14 +217,8 @@ mod tests {
                 worst = worst.max((evaluate(axis, &coefficients, phase) - exact).abs());
             }
             let stated = step.powi(4) / 384.0;
-            assert!(
-                worst < 1.1 * stated + 2e-7,
-                "{n} nodes, order {order}: {worst:e} > {stated:e}"
-            );
-            assert!(
-                worst > 0.5 * stated,
-                "the stated error is far too large: {worst:e} {stated:e}"
-            );
+            assert!(worst < 1.1 * stated + 2e-7, "{n} nodes, order {order}: {worst:e} > {stated:e}");
+            assert!(worst > 0.5 * stated, "the stated error is far too large: {worst:e} {stated:e}");
         }
     }
 
@@ -274,10 +231,7 @@ mod tests {
         let h = 1 << 20;
         let slope_after = evaluate(axis, &coefficients, h) - at_wrap;
         let slope_before = at_wrap - evaluate(axis, &coefficients, h.wrapping_neg());
-        assert!(
-            (slope_after - slope_before).abs() < 0.02 * slope_after.abs(),
-            "{slope_before} {slope_after}"
-        );
+        assert!((slope_after - slope_before).abs() < 0.02 * slope_after.abs(), "{slope_before} {slope_after}");
     }
 
     #[test]

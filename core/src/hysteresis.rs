@@ -65,13 +65,7 @@ impl PlayState {
     /// After a reset: anywhere inside the play.
     #[must_use]
     pub const fn unknown() -> Self {
-        Self {
-            nominal: OutputAngle::ZERO,
-            output: OutputAngle::ZERO,
-            lower: i32::MIN,
-            upper: i32::MAX,
-            half: -1,
-        }
+        Self { nominal: OutputAngle::ZERO, output: OutputAngle::ZERO, lower: i32::MIN, upper: i32::MAX, half: -1 }
     }
 
     /// Known to have last moved in `direction` through the full play.
@@ -81,23 +75,13 @@ impl PlayState {
             Direction::Forward => i32::MIN,
             Direction::Backward => i32::MAX,
         };
-        Self {
-            nominal: OutputAngle::ZERO,
-            output: OutputAngle::ZERO,
-            lower: side,
-            upper: side,
-            half: -1,
-        }
+        Self { nominal: OutputAngle::ZERO, output: OutputAngle::ZERO, lower: side, upper: side, half: -1 }
     }
 
     /// The nominal output of the last update; `None` before the first.
     #[must_use]
     pub const fn nominal(&self) -> Option<OutputAngle> {
-        if self.half < 0 {
-            None
-        } else {
-            Some(self.nominal)
-        }
+        if self.half < 0 { None } else { Some(self.nominal) }
     }
 
     /// Whether both bounds have met.
@@ -125,21 +109,12 @@ impl PlayState {
     /// Estimated actual output at the last update; `None` before the first.
     #[must_use]
     pub const fn output(&self) -> Option<OutputAngle> {
-        if self.half < 0 {
-            None
-        } else {
-            Some(self.output)
-        }
+        if self.half < 0 { None } else { Some(self.output) }
     }
 
     /// Moves the play to `nominal`, with the half-width (clamped to 0..0.05 rad) and centre there; returns the error
     /// `centre + (p − x)`, rad.
-    pub(crate) fn update(
-        &mut self,
-        nominal: OutputAngle,
-        centre_rad: f32,
-        half_width_rad: f32,
-    ) -> f32 {
+    pub(crate) fn update(&mut self, nominal: OutputAngle, centre_rad: f32, half_width_rad: f32) -> f32 {
         let half = crate::angle::counts_from_rad(half_width_rad).clamp(0, MAX_HALF_COUNTS);
         self.update_counts(nominal, half);
         let error_rad = centre_rad + self.offset_rad();
@@ -150,33 +125,16 @@ impl PlayState {
     /// Follows the motion with the half-width and error of the last update, for steps in which they cannot be computed.
     pub(crate) fn coast(&mut self, nominal: OutputAngle) {
         if self.half >= 0 {
-            self.output = self
-                .output
-                .offset_counts(nominal.minus_counts(self.nominal));
+            self.output = self.output.offset_counts(nominal.minus_counts(self.nominal));
             self.update_counts(nominal, self.half);
         }
     }
 
     fn update_counts(&mut self, nominal: OutputAngle, half: i32) {
-        let moved = if self.half < 0 {
-            0
-        } else {
-            nominal.minus_small_counts(self.nominal)
-        };
+        let moved = if self.half < 0 { 0 } else { nominal.minus_small_counts(self.nominal) };
         // `half` is in 0..=MAX_HALF_COUNTS, so the bounds are ordered and clamp cannot fail.
-        let clamp = |offset: i32| {
-            offset
-                .saturating_sub(moved)
-                .max(half.wrapping_neg())
-                .min(half)
-        };
-        *self = Self {
-            nominal,
-            output: self.output,
-            lower: clamp(self.lower),
-            upper: clamp(self.upper),
-            half,
-        };
+        let clamp = |offset: i32| offset.saturating_sub(moved).max(half.wrapping_neg()).min(half);
+        *self = Self { nominal, output: self.output, lower: clamp(self.lower), upper: clamp(self.upper), half };
     }
 
     /// The state as bytes, with a CRC-32, for storage across a reset.
@@ -185,23 +143,12 @@ impl PlayState {
         let mut bytes = [0; SAVED_STATE_BYTES];
         let fields = [self.lower, self.upper, self.half];
         let angles = [self.nominal.counts(), self.output.counts()];
-        let parts = angles
-            .into_iter()
-            .flat_map(i64::to_le_bytes)
-            .chain(fields.into_iter().flat_map(i32::to_le_bytes));
+        let parts = angles.into_iter().flat_map(i64::to_le_bytes).chain(fields.into_iter().flat_map(i32::to_le_bytes));
         for (to, from) in bytes.iter_mut().zip(parts) {
             *to = from;
         }
-        let crc = crc32(
-            bytes
-                .first_chunk::<SAVED_BEFORE_CRC>()
-                .unwrap_or(&[0; SAVED_BEFORE_CRC]),
-        );
-        for (to, from) in bytes
-            .iter_mut()
-            .skip(SAVED_BEFORE_CRC)
-            .zip(crc.to_le_bytes())
-        {
+        let crc = crc32(bytes.first_chunk::<SAVED_BEFORE_CRC>().unwrap_or(&[0; SAVED_BEFORE_CRC]));
+        for (to, from) in bytes.iter_mut().skip(SAVED_BEFORE_CRC).zip(crc.to_le_bytes()) {
             *to = from;
         }
         bytes
@@ -300,21 +247,13 @@ mod tests {
             state.update(OutputAngle::ZERO, 0.0, half);
             state.update(OutputAngle::from_counts(i64::MIN), 0.0, half);
             assert!((0..=MAX_HALF_COUNTS).contains(&state.half), "{half}");
-            assert!(
-                -state.half <= state.lower
-                    && state.lower <= state.upper
-                    && state.upper <= state.half
-            );
+            assert!(-state.half <= state.lower && state.lower <= state.upper && state.upper <= state.half);
         }
     }
 
     #[test]
     fn damaged_saved_states_are_refused() {
-        for state in [
-            PlayState::unknown(),
-            known(),
-            PlayState::after_motion(Direction::Backward),
-        ] {
+        for state in [PlayState::unknown(), known(), PlayState::after_motion(Direction::Backward)] {
             let saved = state.save();
             assert_eq!(PlayState::restore(&saved), Some(state));
             for bit in 0..SAVED_STATE_BYTES * 8 {
@@ -323,20 +262,11 @@ mod tests {
                 assert_eq!(PlayState::restore(&damaged), None, "bit {bit}");
             }
         }
-        let disordered = PlayState {
-            lower: 5,
-            upper: -5,
-            half: 10,
-            nominal: OutputAngle::ZERO,
-            output: OutputAngle::ZERO,
-        };
+        let disordered =
+            PlayState { lower: 5, upper: -5, half: 10, nominal: OutputAngle::ZERO, output: OutputAngle::ZERO };
         assert_eq!(PlayState::restore(&disordered.save()), None);
         for (lower, upper) in [(-11, 5), (5, 11)] {
-            let outside = PlayState {
-                lower,
-                upper,
-                ..disordered
-            };
+            let outside = PlayState { lower, upper, ..disordered };
             assert_eq!(PlayState::restore(&outside.save()), None);
         }
     }

@@ -40,10 +40,7 @@ use crate::drive::{Drive, FixedMember};
 use crate::error::{Field, ImageError};
 use crate::grid::{self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis};
 use crate::model::MAX_INVERSE_ITERATIONS;
-use crate::table::{
-    Bounds, GeneratorKind, PeriodicCurve, RECORD_HEAD_WORDS, Table, TableId, Words, f32_at,
-    ripple_at,
-};
+use crate::table::{Bounds, GeneratorKind, PeriodicCurve, RECORD_HEAD_WORDS, Table, TableId, Words, f32_at, ripple_at};
 use core::fmt;
 
 /// Format version written and read.
@@ -71,8 +68,7 @@ pub(crate) const MAX_AXIS_VALUE: f32 = 1e6;
 
 /// CRC-32 (ISO-HDLC), 5.3 instructions a byte on a Cortex-M4.
 pub(crate) fn crc32(bytes: &[u8]) -> u32 {
-    static CRC: crc::Crc<u32, crc::Table<1>> =
-        crc::Crc::<u32, crc::Table<1>>::new(&crc::CRC_32_ISO_HDLC);
+    static CRC: crc::Crc<u32, crc::Table<1>> = crc::Crc::<u32, crc::Table<1>>::new(&crc::CRC_32_ISO_HDLC);
     CRC.checksum(bytes)
 }
 
@@ -165,18 +161,11 @@ impl fmt::Display for WriteError {
             Self::BufferTooSmall { needed, found } => {
                 write!(f, "the image needs {needed} bytes, the buffer has {found}")
             }
-            Self::Shape {
-                field,
-                found,
-                needed,
-            } => {
+            Self::Shape { field, found, needed } => {
                 write!(f, "{field}: {found} numbers where the axes need {needed}")
             }
             Self::TextTooLong { field, found } => {
-                write!(
-                    f,
-                    "{field}: {found} bytes, at most {TEXT_BYTES} are allowed"
-                )
+                write!(f, "{field}: {found} bytes, at most {TEXT_BYTES} are allowed")
             }
             Self::Refused(error) => error.fmt(f),
         }
@@ -193,42 +182,23 @@ impl From<ImageError> for WriteError {
 
 /// Bytes of the image of a table with these node counts; `curves` are those of A, B, C.
 #[must_use]
-pub const fn image_bytes(
-    torque: usize,
-    temperature: usize,
-    ripple: usize,
-    curves: [usize; 3],
-) -> usize {
+pub const fn image_bytes(torque: usize, temperature: usize, ripple: usize, curves: [usize; 3]) -> usize {
     let body = body_bytes(torque, temperature, ripple, curves);
-    body.div_ceil(PAGE_BYTES)
-        .saturating_add(1)
-        .saturating_mul(CRC_BYTES)
-        .saturating_add(body)
+    body.div_ceil(PAGE_BYTES).saturating_add(1).saturating_mul(CRC_BYTES).saturating_add(body)
 }
 
 const fn body_bytes(torque: usize, temperature: usize, ripple: usize, curves: [usize; 3]) -> usize {
     let [a, b, c] = curves;
-    let curve_words = stored(a)
-        .saturating_add(stored(b))
-        .saturating_add(stored(c));
-    let numbers = torque
-        .saturating_add(temperature)
-        .saturating_add(curve_words);
+    let curve_words = stored(a).saturating_add(stored(b)).saturating_add(stored(c));
+    let numbers = torque.saturating_add(temperature).saturating_add(curve_words);
     let record = stored(ripple).saturating_add(RECORD_HEAD_WORDS);
     let records = torque.saturating_mul(temperature).saturating_mul(record);
-    numbers
-        .saturating_add(records)
-        .saturating_mul(4)
-        .saturating_add(HEADER_BYTES)
+    numbers.saturating_add(records).saturating_mul(4).saturating_add(HEADER_BYTES)
 }
 
 /// As [`PeriodicAxis::stored_len`], for any number.
 const fn stored(nodes: usize) -> usize {
-    if nodes == 0 {
-        0
-    } else {
-        nodes.saturating_add(3)
-    }
+    if nodes == 0 { 0 } else { nodes.saturating_add(3) }
 }
 
 /// Fills a buffer from the front; what does not fit is only counted.
@@ -241,19 +211,13 @@ impl<'o> Writer<'o> {
     fn put(&mut self, bytes: &[u8]) {
         self.needed = self.needed.saturating_add(bytes.len());
         let room = bytes.len().min(self.rest.len());
-        let (here, rest) = core::mem::take(&mut self.rest)
-            .split_at_mut_checked(room)
-            .unwrap_or_default();
-        here.iter_mut()
-            .zip(bytes)
-            .for_each(|(to, from)| *to = *from);
+        let (here, rest) = core::mem::take(&mut self.rest).split_at_mut_checked(room).unwrap_or_default();
+        here.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
         self.rest = rest;
     }
 
     fn put_numbers(&mut self, numbers: &[f32]) {
-        numbers
-            .iter()
-            .for_each(|number| self.put(&number.to_le_bytes()));
+        numbers.iter().for_each(|number| self.put(&number.to_le_bytes()));
     }
 
     fn put_text(&mut self, text: &str) {
@@ -273,49 +237,25 @@ fn ripple_scale(field: Field, ripple_rad: &[f32]) -> Result<f32, WriteError> {
     if let Some(index) = ripple_rad.iter().position(|value| !value.is_finite()) {
         return Err(ImageError::NotFinite { field, index }.into());
     }
-    Ok(ripple_rad
-        .iter()
-        .fold(0.0, |most: f32, value| most.max(value.abs()))
-        / i16::MAX as f32)
+    Ok(ripple_rad.iter().fold(0.0, |most: f32, value| most.max(value.abs())) / i16::MAX as f32)
 }
 
 fn needs(field: Field, values: &[f32], needed: usize) -> Result<(), WriteError> {
-    if values.len() == needed {
-        Ok(())
-    } else {
-        Err(WriteError::Shape {
-            field,
-            found: values.len(),
-            needed,
-        })
-    }
+    if values.len() == needed { Ok(()) } else { Err(WriteError::Shape { field, found: values.len(), needed }) }
 }
 
-pub(crate) fn counted(
-    field: Field,
-    found: usize,
-    least: usize,
-    most: usize,
-) -> Result<u8, ImageError> {
+pub(crate) fn counted(field: Field, found: usize, least: usize, most: usize) -> Result<u8, ImageError> {
     let optional = least == MIN_PERIODIC_NODES && found == 0;
     if optional || (least..=most).contains(&found) {
         Ok(found as u8)
     } else {
-        Err(ImageError::Count {
-            field,
-            found,
-            least,
-            most,
-        })
+        Err(ImageError::Count { field, found, least, most })
     }
 }
 
 impl TableData<'_> {
     fn check_shapes(&self) -> Result<(), WriteError> {
-        let records = self
-            .torque_nodes_n_m
-            .len()
-            .saturating_mul(self.temperature_nodes_c.len());
+        let records = self.torque_nodes_n_m.len().saturating_mul(self.temperature_nodes_c.len());
         let ripples = records.saturating_mul(self.ripple_nodes);
         needs(Field::Mean, self.mean_rad, records)?;
         needs(Field::HalfWidth, self.half_width_rad, records)?;
@@ -325,28 +265,11 @@ impl TableData<'_> {
 
     /// Node counts as the header holds them: torque, temperature, ripple, A, B, C.
     fn counts(&self) -> Result<[u8; 6], ImageError> {
-        let curve = |field, values: &[f32]| {
-            counted(field, values.len(), MIN_PERIODIC_NODES, MAX_PERIODIC_NODES)
-        };
+        let curve = |field, values: &[f32]| counted(field, values.len(), MIN_PERIODIC_NODES, MAX_PERIODIC_NODES);
         Ok([
-            counted(
-                Field::TorqueNodes,
-                self.torque_nodes_n_m.len(),
-                1,
-                MAX_CLAMPED_NODES,
-            )?,
-            counted(
-                Field::TemperatureNodes,
-                self.temperature_nodes_c.len(),
-                1,
-                MAX_TEMPERATURE_NODES,
-            )?,
-            counted(
-                Field::RippleNodes,
-                self.ripple_nodes,
-                MIN_PERIODIC_NODES,
-                MAX_RIPPLE_NODES,
-            )?,
+            counted(Field::TorqueNodes, self.torque_nodes_n_m.len(), 1, MAX_CLAMPED_NODES)?,
+            counted(Field::TemperatureNodes, self.temperature_nodes_c.len(), 1, MAX_TEMPERATURE_NODES)?,
+            counted(Field::RippleNodes, self.ripple_nodes, MIN_PERIODIC_NODES, MAX_RIPPLE_NODES)?,
             curve(Field::GeneratorCurve, self.generator_curve_rad)?,
             curve(Field::MaterialCurve, self.material_curve_rad)?,
             curve(Field::OutputCurve, self.output_curve_rad)?,
@@ -357,24 +280,16 @@ impl TableData<'_> {
         let axis = PeriodicAxis::new(self.ripple_nodes).unwrap_or_default();
         // max(1): without ripple the iterators are empty, and a chunk size may not be 0.
         let mut mean_ripples = self.mean_ripple_rad.chunks_exact(self.ripple_nodes.max(1));
-        let mut half_ripples = self
-            .half_width_ripple_rad
-            .chunks_exact(self.ripple_nodes.max(1));
+        let mut half_ripples = self.half_width_ripple_rad.chunks_exact(self.ripple_nodes.max(1));
         for (mean, half) in self.mean_rad.iter().zip(self.half_width_rad) {
             let mean_ripple = mean_ripples.next().unwrap_or_default();
             let half_ripple = half_ripples.next().unwrap_or_default();
             // Rounding may take H + h below zero by half a unit: H is raised by as much. What was
             // negative by more than that stays so, and is refused.
-            let rounded = half_ripple.iter().fold(0.0, |least: f32, h| {
-                least.min(quantise(*h, half_scale) as f32)
-            });
+            let rounded = half_ripple.iter().fold(0.0, |least: f32, h| least.min(quantise(*h, half_scale) as f32));
             let least = half + rounded * half_scale;
             let rounding = 0.51 * half_scale + half.abs() * f32::EPSILON;
-            let raised = if least < 0.0 && least >= -rounding {
-                -rounded * half_scale
-            } else {
-                *half
-            };
+            let raised = if least < 0.0 && least >= -rounding { -rounded * half_scale } else { *half };
             out.put_numbers(&[*mean, raised]);
             for position in 0..axis.stored_len() {
                 let node = axis.stored_node(position);
@@ -401,22 +316,12 @@ pub fn write_image(
 ) -> Result<usize, WriteError> {
     data.check_shapes()?;
     let counts = data.counts()?;
-    for (field, text) in [
-        (Field::ToolVersion, provenance.tool_version),
-        (Field::MeshLevel, provenance.mesh_level),
-    ] {
+    for (field, text) in [(Field::ToolVersion, provenance.tool_version), (Field::MeshLevel, provenance.mesh_level)] {
         if text.len() > TEXT_BYTES {
-            return Err(WriteError::TextTooLong {
-                field,
-                found: text.len(),
-            });
+            return Err(WriteError::TextTooLong { field, found: text.len() });
         }
     }
-    let curves = [
-        data.generator_curve_rad,
-        data.material_curve_rad,
-        data.output_curve_rad,
-    ];
+    let curves = [data.generator_curve_rad, data.material_curve_rad, data.output_curve_rad];
     let needed = image_bytes(
         data.torque_nodes_n_m.len(),
         data.temperature_nodes_c.len(),
@@ -424,16 +329,11 @@ pub fn write_image(
         curves.map(<[f32]>::len),
     );
     let found = out.len();
-    let image = out
-        .get_mut(..needed)
-        .ok_or(WriteError::BufferTooSmall { needed, found })?;
+    let image = out.get_mut(..needed).ok_or(WriteError::BufferTooSmall { needed, found })?;
     let mean_scale = ripple_scale(Field::MeanRipple, data.mean_ripple_rad)?;
     let half_scale = ripple_scale(Field::HalfWidthRipple, data.half_width_ripple_rad)?;
 
-    let mut writer = Writer {
-        rest: image,
-        needed: 0,
-    };
+    let mut writer = Writer { rest: image, needed: 0 };
     writer.put(&MAGIC);
     writer.put(&FORMAT_VERSION.to_le_bytes());
     writer.put(&BYTE_ORDER_MARK.to_le_bytes());
@@ -461,23 +361,15 @@ pub fn write_image(
     for curve in curves {
         let axis = PeriodicAxis::new(curve.len()).unwrap_or_default();
         for position in 0..axis.stored_len() {
-            writer.put_numbers(
-                curve
-                    .get(axis.stored_node(position)..)
-                    .unwrap_or_default()
-                    .get(..1)
-                    .unwrap_or_default(),
-            );
+            writer
+                .put_numbers(curve.get(axis.stored_node(position)..).unwrap_or_default().get(..1).unwrap_or_default());
         }
     }
     data.put_records(&mut writer, mean_scale, half_scale);
 
     let body_bytes = writer.needed;
     let id = id(image.get(..body_bytes).unwrap_or_default());
-    if let Some(place) = image
-        .get_mut(ID_OFFSET..)
-        .and_then(|rest| rest.first_chunk_mut::<8>())
-    {
+    if let Some(place) = image.get_mut(ID_OFFSET..).and_then(|rest| rest.first_chunk_mut::<8>()) {
         *place = id;
     }
     seal(image, body_bytes);
@@ -505,11 +397,7 @@ struct Header<'a>(&'a [u8; HEADER_BYTES]);
 
 impl<'a> Header<'a> {
     fn bytes<const N: usize>(self, offset: usize) -> [u8; N] {
-        self.0
-            .get(offset..)
-            .and_then(|rest| rest.first_chunk::<N>())
-            .copied()
-            .unwrap_or([0; N])
+        self.0.get(offset..).and_then(|rest| rest.first_chunk::<N>()).copied().unwrap_or([0; N])
     }
 
     fn u8(self, offset: usize) -> u8 {
@@ -534,17 +422,10 @@ impl<'a> Header<'a> {
 
     /// The text at `offset` without its padding.
     fn text(self, offset: usize, field: Field) -> Result<&'a str, ImageError> {
-        let bytes = self
-            .0
-            .get(offset..offset.saturating_add(TEXT_BYTES))
-            .unwrap_or_default();
-        let length = bytes
-            .iter()
-            .position(|byte| *byte == 0)
-            .unwrap_or(TEXT_BYTES);
+        let bytes = self.0.get(offset..offset.saturating_add(TEXT_BYTES)).unwrap_or_default();
+        let length = bytes.iter().position(|byte| *byte == 0).unwrap_or(TEXT_BYTES);
         let (text, padding) = bytes.split_at_checked(length).unwrap_or_default();
-        let printable = text.iter().all(|byte| (0x20..0x7f).contains(byte))
-            && padding.iter().all(|byte| *byte == 0);
+        let printable = text.iter().all(|byte| (0x20..0x7f).contains(byte)) && padding.iter().all(|byte| *byte == 0);
         match core::str::from_utf8(text) {
             Ok(text) if printable => Ok(text),
             _ => Err(ImageError::Text { field }),
@@ -553,43 +434,18 @@ impl<'a> Header<'a> {
 }
 
 fn finite(field: Field, index: usize, value: f32) -> Result<f32, ImageError> {
-    if value.is_finite() {
-        Ok(value)
-    } else {
-        Err(ImageError::NotFinite { field, index })
-    }
+    if value.is_finite() { Ok(value) } else { Err(ImageError::NotFinite { field, index }) }
 }
 
-fn in_range(
-    field: Field,
-    index: usize,
-    found: f32,
-    least: f32,
-    most: f32,
-) -> Result<f32, ImageError> {
+fn in_range(field: Field, index: usize, found: f32, least: f32, most: f32) -> Result<f32, ImageError> {
     finite(field, index, found)?;
-    if found >= least && found <= most {
-        Ok(found)
-    } else {
-        Err(ImageError::OutOfRange {
-            field,
-            found,
-            least,
-            most,
-        })
-    }
+    if found >= least && found <= most { Ok(found) } else { Err(ImageError::OutOfRange { field, found, least, most }) }
 }
 
 fn check_axis(field: Field, words: Words<'_>) -> Result<(), ImageError> {
     let mut before = f32::NEG_INFINITY;
     for (index, word) in words.iter().enumerate() {
-        let node = in_range(
-            field,
-            index,
-            f32::from_le_bytes(*word),
-            -MAX_AXIS_VALUE,
-            MAX_AXIS_VALUE,
-        )?;
+        let node = in_range(field, index, f32::from_le_bytes(*word), -MAX_AXIS_VALUE, MAX_AXIS_VALUE)?;
         if node <= before {
             return Err(ImageError::NotIncreasing { field, index });
         }
@@ -599,11 +455,7 @@ fn check_axis(field: Field, words: Words<'_>) -> Result<(), ImageError> {
 }
 
 /// A range must lie inside the axis; an axis of one node holds wherever its maker says.
-fn check_range(
-    field: Field,
-    [least, most]: [f32; 2],
-    axis: Words<'_>,
-) -> Result<[f32; 2], ImageError> {
+fn check_range(field: Field, [least, most]: [f32; 2], axis: Words<'_>) -> Result<[f32; 2], ImageError> {
     let (mut from, mut to) = (-MAX_AXIS_VALUE, MAX_AXIS_VALUE);
     if axis.len() > 1 {
         (from, to) = (f32_at(axis, 0), f32_at(axis, axis.len().saturating_sub(1)));
@@ -636,21 +488,10 @@ fn check_closed(field: Field, axis: PeriodicAxis, words: Words<'_>) -> Result<()
 }
 
 /// Adds what a curve of A, B, C can give; `periods` of it in one output turn.
-fn add_curve(
-    bounds: &mut Bounds,
-    field: Field,
-    curve: &PeriodicCurve<'_>,
-    periods: f32,
-) -> Result<(), ImageError> {
+fn add_curve(bounds: &mut Bounds, field: Field, curve: &PeriodicCurve<'_>, periods: f32) -> Result<(), ImageError> {
     let len = curve.axis.stored_len();
     for index in 0..len {
-        in_range(
-            field,
-            index,
-            f32_at(curve.words, index),
-            -MAX_ERROR_RAD,
-            MAX_ERROR_RAD,
-        )?;
+        in_range(field, index, f32_at(curve.words, index), -MAX_ERROR_RAD, MAX_ERROR_RAD)?;
     }
     check_closed(field, curve.axis, curve.words)?;
     let (largest, steepest) = extremes(len, |i| f32_at(curve.words, i));
@@ -680,52 +521,25 @@ impl<'a> Table<'a> {
         let header = check_envelope(image)?;
         let drive = check_identity(header)?;
         let generator_kind =
-            GeneratorKind::from_code(header.u8(104)).ok_or(ImageError::GeneratorKind {
-                found: header.u8(104),
-            })?;
+            GeneratorKind::from_code(header.u8(104)).ok_or(ImageError::GeneratorKind { found: header.u8(104) })?;
         let count = |offset: usize, field, least, most| {
             counted(field, header.u8(offset) as usize, least, most).map(usize::from)
         };
         let torque_nodes = count(110, Field::TorqueNodes, 1, MAX_CLAMPED_NODES)?;
         let temperature_nodes = count(111, Field::TemperatureNodes, 1, MAX_TEMPERATURE_NODES)?;
-        let ripple_nodes = count(
-            112,
-            Field::RippleNodes,
-            MIN_PERIODIC_NODES,
-            MAX_RIPPLE_NODES,
-        )?;
+        let ripple_nodes = count(112, Field::RippleNodes, MIN_PERIODIC_NODES, MAX_RIPPLE_NODES)?;
         let curve_nodes = [
-            count(
-                113,
-                Field::GeneratorCurve,
-                MIN_PERIODIC_NODES,
-                MAX_PERIODIC_NODES,
-            )?,
-            count(
-                114,
-                Field::MaterialCurve,
-                MIN_PERIODIC_NODES,
-                MAX_PERIODIC_NODES,
-            )?,
-            count(
-                115,
-                Field::OutputCurve,
-                MIN_PERIODIC_NODES,
-                MAX_PERIODIC_NODES,
-            )?,
+            count(113, Field::GeneratorCurve, MIN_PERIODIC_NODES, MAX_PERIODIC_NODES)?,
+            count(114, Field::MaterialCurve, MIN_PERIODIC_NODES, MAX_PERIODIC_NODES)?,
+            count(115, Field::OutputCurve, MIN_PERIODIC_NODES, MAX_PERIODIC_NODES)?,
         ];
         let needed = image_bytes(torque_nodes, temperature_nodes, ripple_nodes, curve_nodes);
-        let size = ImageError::Size {
-            needed,
-            found: image.len(),
-        };
+        let size = ImageError::Size { needed, found: image.len() };
         if needed != image.len() {
             return Err(size);
         }
         let body_bytes = body_bytes(torque_nodes, temperature_nodes, ripple_nodes, curve_nodes);
-        if let Some(page) =
-            (0..body_bytes.div_ceil(PAGE_BYTES)).find(|&page| !page_intact(image, body_bytes, page))
-        {
+        if let Some(page) = (0..body_bytes.div_ceil(PAGE_BYTES)).find(|&page| !page_intact(image, body_bytes, page)) {
             return Err(ImageError::PageCrc { page });
         }
         let body = image.get(HEADER_BYTES..body_bytes).ok_or(size)?;
@@ -739,18 +553,9 @@ impl<'a> Table<'a> {
         let torque = take(torque_nodes)?;
         let temperature = take(temperature_nodes)?;
         let [a, b, c] = curve_nodes;
-        let generator_curve = PeriodicCurve {
-            axis: axis(a)?,
-            words: take(stored(a))?,
-        };
-        let material_curve = PeriodicCurve {
-            axis: axis(b)?,
-            words: take(stored(b))?,
-        };
-        let output_curve = PeriodicCurve {
-            axis: axis(c)?,
-            words: take(stored(c))?,
-        };
+        let generator_curve = PeriodicCurve { axis: axis(a)?, words: take(stored(a))? };
+        let material_curve = PeriodicCurve { axis: axis(b)?, words: take(stored(b))? };
+        let output_curve = PeriodicCurve { axis: axis(c)?, words: take(stored(c))? };
         let records = words;
 
         let scale_limit = MAX_ERROR_RAD / i16::MAX as f32;
@@ -767,49 +572,21 @@ impl<'a> Table<'a> {
             records,
             ripple: axis(ripple_nodes)?,
             mean_ripple_scale: in_range(Field::MeanRipple, 0, header.f32(116), 0.0, scale_limit)?,
-            half_ripple_scale: in_range(
-                Field::HalfWidthRipple,
-                0,
-                header.f32(120),
-                0.0,
-                scale_limit,
-            )?,
+            half_ripple_scale: in_range(Field::HalfWidthRipple, 0, header.f32(120), 0.0, scale_limit)?,
             torque_jumps: grid::jump_intervals(torque.len(), |i| f32_at(torque, i)),
             torque_range_n_m: header.pair(136),
             temperature_range_c: header.pair(144),
-            error_limit_rad: in_range(
-                Field::ErrorLimit,
-                0,
-                header.f32(152),
-                f32::MIN_POSITIVE,
-                MAX_ERROR_RAD,
-            )?,
+            error_limit_rad: in_range(Field::ErrorLimit, 0, header.f32(152), f32::MIN_POSITIVE, MAX_ERROR_RAD)?,
             bounds: Bounds::default(),
             inverse_iterations: MAX_INVERSE_ITERATIONS,
         };
         check_axis(Field::TorqueNodes, torque)?;
         check_axis(Field::TemperatureNodes, temperature)?;
         check_range(Field::TorqueRange, table.torque_range_n_m, torque)?;
-        check_range(
-            Field::TemperatureRange,
-            table.temperature_range_c,
-            temperature,
-        )?;
+        check_range(Field::TemperatureRange, table.temperature_range_c, temperature)?;
         in_range(Field::SolverResidual, 0, header.f32(124), 0.0, f32::MAX)?;
-        in_range(
-            Field::ProjectionWorst,
-            0,
-            header.f32(128),
-            0.0,
-            MAX_ERROR_RAD,
-        )?;
-        in_range(
-            Field::ProjectionRms,
-            0,
-            header.f32(132),
-            0.0,
-            header.f32(128),
-        )?;
+        in_range(Field::ProjectionWorst, 0, header.f32(128), 0.0, MAX_ERROR_RAD)?;
+        in_range(Field::ProjectionRms, 0, header.f32(132), 0.0, header.f32(128))?;
         table.bounds = table.check_bounds()?;
         table.inverse_iterations = table.bounds.inverse_iterations();
         Ok(table)
@@ -818,29 +595,14 @@ impl<'a> Table<'a> {
     fn check_bounds(&self) -> Result<Bounds, ImageError> {
         let mut bounds = self.check_records()?;
         let ratio = self.drive.ratio();
-        add_curve(
-            &mut bounds,
-            Field::GeneratorCurve,
-            &self.generator_curve,
-            ratio,
-        )?;
-        add_curve(
-            &mut bounds,
-            Field::MaterialCurve,
-            &self.material_curve,
-            ratio - 1.0,
-        )?;
+        add_curve(&mut bounds, Field::GeneratorCurve, &self.generator_curve, ratio)?;
+        add_curve(&mut bounds, Field::MaterialCurve, &self.material_curve, ratio - 1.0)?;
         add_curve(&mut bounds, Field::OutputCurve, &self.output_curve, 1.0)?;
         if bounds.error_rad.is_nan() || bounds.error_rad > self.error_limit_rad {
-            return Err(ImageError::ErrorBound {
-                found_rad: bounds.error_rad,
-                allowed_rad: self.error_limit_rad,
-            });
+            return Err(ImageError::ErrorBound { found_rad: bounds.error_rad, allowed_rad: self.error_limit_rad });
         }
         if bounds.slope.is_nan() || bounds.slope >= 1.0 {
-            return Err(ImageError::Slope {
-                found: bounds.slope,
-            });
+            return Err(ImageError::Slope { found: bounds.slope });
         }
         Ok(bounds)
     }
@@ -853,28 +615,12 @@ impl<'a> Table<'a> {
         let slope_per_step = nodes as f32 * periods / core::f32::consts::TAU;
         let stride = stored(nodes).saturating_add(RECORD_HEAD_WORDS);
         for (index, record) in self.records.chunks_exact(stride).enumerate() {
-            let mean = in_range(
-                Field::Mean,
-                index,
-                f32_at(record, 0),
-                -MAX_ERROR_RAD,
-                MAX_ERROR_RAD,
-            )?;
-            let half = in_range(
-                Field::HalfWidth,
-                index,
-                f32_at(record, 1),
-                0.0,
-                MAX_ERROR_RAD,
-            )?;
+            let mean = in_range(Field::Mean, index, f32_at(record, 0), -MAX_ERROR_RAD, MAX_ERROR_RAD)?;
+            let half = in_range(Field::HalfWidth, index, f32_at(record, 1), 0.0, MAX_ERROR_RAD)?;
             let ripple = |node: usize| ripple_at(record, node.saturating_add(RECORD_HEAD_WORDS));
             let mean_ripple = |node: usize| ripple(node).0 as f32 * self.mean_ripple_scale;
             let half_ripple = |node: usize| ripple(node).1 as f32 * self.half_ripple_scale;
-            check_closed(
-                Field::MeanRipple,
-                self.ripple,
-                record.get(RECORD_HEAD_WORDS..).unwrap_or_default(),
-            )?;
+            check_closed(Field::MeanRipple, self.ripple, record.get(RECORD_HEAD_WORDS..).unwrap_or_default())?;
             let len = self.ripple.stored_len();
             let least = (0..len).fold(half, |least, node| least.min(half + half_ripple(node)));
             if least < 0.0 {
@@ -887,9 +633,7 @@ impl<'a> Table<'a> {
             }
             let (mean_most, mean_step) = extremes(len, mean_ripple);
             let (half_most, half_step) = extremes(len, half_ripple);
-            bounds.error_rad = bounds
-                .error_rad
-                .max(mean.abs() + mean_most + half + half_most);
+            bounds.error_rad = bounds.error_rad.max(mean.abs() + mean_most + half + half_most);
             bounds.periodic_rad = bounds.periodic_rad.max(mean_most + half_most);
             bounds.slope = bounds.slope.max((mean_step + half_step) * slope_per_step);
         }
@@ -915,9 +659,7 @@ impl<'a> Table<'a> {
     /// Program that made the table.
     #[must_use]
     pub fn tool_version(&self) -> &'a str {
-        self.header()
-            .text(56, Field::ToolVersion)
-            .unwrap_or_default()
+        self.header().text(56, Field::ToolVersion).unwrap_or_default()
     }
 
     /// Mesh or data the samples came from.
@@ -974,9 +716,7 @@ fn page_of(image: &[u8], body_bytes: usize, page: usize) -> Option<&[u8]> {
 }
 
 fn page_intact(image: &[u8], body_bytes: usize, page: usize) -> bool {
-    let sums = image
-        .get(body_bytes..)
-        .map_or(&[][..], |sums| sums.as_chunks::<CRC_BYTES>().0);
+    let sums = image.get(body_bytes..).map_or(&[][..], |sums| sums.as_chunks::<CRC_BYTES>().0);
     match (page_of(image, body_bytes, page), sums.get(page)) {
         (Some(bytes), Some(sum)) => crc32(bytes) == u32::from_le_bytes(*sum),
         _ => false,
@@ -997,15 +737,10 @@ fn check_envelope(image: &[u8]) -> Result<Header<'_>, ImageError> {
     }
     // The mark before the version: swapped bytes would make the version look wrong.
     if header.u16(10) != BYTE_ORDER_MARK {
-        return Err(ImageError::ByteOrder {
-            found: header.u16(10),
-        });
+        return Err(ImageError::ByteOrder { found: header.u16(10) });
     }
     if header.u16(8) != FORMAT_VERSION {
-        return Err(ImageError::Version {
-            found: header.u16(8),
-            allowed: FORMAT_VERSION,
-        });
+        return Err(ImageError::Version { found: header.u16(8), allowed: FORMAT_VERSION });
     }
     let stated = header.u32(12) as usize;
     if stated != found {
@@ -1023,9 +758,7 @@ fn check_envelope(image: &[u8]) -> Result<Header<'_>, ImageError> {
 fn check_identity(header: Header<'_>) -> Result<Drive, ImageError> {
     let reserved = header.0.get(RESERVED).unwrap_or_default();
     if let Some(at) = reserved.iter().position(|byte| *byte != 0) {
-        return Err(ImageError::Reserved {
-            offset: at.saturating_add(RESERVED.start),
-        });
+        return Err(ImageError::Reserved { offset: at.saturating_add(RESERVED.start) });
     }
     header.text(56, Field::ToolVersion)?;
     header.text(80, Field::MeshLevel)?;
@@ -1078,11 +811,7 @@ mod tests {
     }
 
     fn provenance() -> Provenance<'static> {
-        Provenance {
-            torque_range_n_m: [-1.0, 0.5],
-            temperature_range_c: [0.0, 40.0],
-            ..fixture::provenance()
-        }
+        Provenance { torque_range_n_m: [-1.0, 0.5], temperature_range_c: [0.0, 40.0], ..fixture::provenance() }
     }
 
     fn write(data: &TableData<'_>, provenance: &Provenance<'_>) -> Result<Vec<u8>, WriteError> {
@@ -1100,50 +829,27 @@ mod tests {
         assert_eq!(*table.drive(), fixture::drive());
         assert_eq!(table.generator_kind(), GeneratorKind::Cam);
         assert_eq!(table.drive_hash(), [0x5a; 32]);
-        assert_eq!(
-            (table.tool_version(), table.mesh_level()),
-            ("flexspline 0.1.0", "closed form")
-        );
-        assert_eq!(
-            (table.solver_residual(), table.projection_worst_rad()),
-            (1e-9, 2.0e-8)
-        );
+        assert_eq!((table.tool_version(), table.mesh_level()), ("flexspline 0.1.0", "closed form"));
+        assert_eq!((table.solver_residual(), table.projection_worst_rad()), (1e-9, 2.0e-8));
         assert_eq!(table.projection_rms_rad(), 1.0e-8);
-        assert_eq!(
-            (table.torque_range_n_m(), table.temperature_range_c()),
-            ([-1.0, 0.5], [0.0, 40.0])
-        );
-        assert!(
-            table.torque_nodes_n_m().eq([-1.0, 1.0]) && table.temperature_nodes_c().eq([0.0, 40.0])
-        );
+        assert_eq!((table.torque_range_n_m(), table.temperature_range_c()), ([-1.0, 0.5], [0.0, 40.0]));
+        assert!(table.torque_nodes_n_m().eq([-1.0, 1.0]) && table.temperature_nodes_c().eq([0.0, 40.0]));
         assert_eq!(table.error_limit_rad(), 0.02);
         assert_eq!(table.ripple_axis().len(), 8);
-        let words = |curve: &PeriodicCurve<'_>| {
-            (0..curve.axis.len())
-                .map(|i| f32_at(curve.words, i + 1))
-                .collect::<Vec<f32>>()
-        };
+        let words =
+            |curve: &PeriodicCurve<'_>| (0..curve.axis.len()).map(|i| f32_at(curve.words, i + 1)).collect::<Vec<f32>>();
         assert_eq!(words(&table.generator_curve), data().generator_curve_rad);
         assert_eq!(words(&table.material_curve), data().material_curve_rad);
         assert_eq!(words(&table.output_curve), data().output_curve_rad);
         for record in 0..4 {
             let base = record * (RECORD_HEAD_WORDS + 11);
             assert_eq!(f32_at(table.records, base), data().mean_rad[record]);
-            assert_eq!(
-                f32_at(table.records, base + 1),
-                data().half_width_rad[record]
-            );
+            assert_eq!(f32_at(table.records, base + 1), data().half_width_rad[record]);
             for node in 0..8 {
                 let (mean, half) = ripple_at(table.records, base + RECORD_HEAD_WORDS + 1 + node);
                 let expected = data().mean_ripple_rad[record * 8 + node];
-                assert!(
-                    (mean as f32 * table.mean_ripple_scale - expected).abs()
-                        <= 0.51 * table.mean_ripple_scale
-                );
-                assert!(
-                    (half as f32 * table.half_ripple_scale - expected).abs()
-                        <= 0.51 * table.half_ripple_scale
-                );
+                assert!((mean as f32 * table.mean_ripple_scale - expected).abs() <= 0.51 * table.mean_ripple_scale);
+                assert!((half as f32 * table.half_ripple_scale - expected).abs() <= 0.51 * table.half_ripple_scale);
             }
         }
     }
@@ -1155,18 +861,12 @@ mod tests {
         let (id, body_bytes) = (table.id(), table.body_bytes);
         image[ID_OFFSET..ID_OFFSET + 8].fill(0);
         assert_eq!(id, TableId(fixture::id(&image[..body_bytes])));
-        assert_eq!(
-            std::format!("{}", TableId([0, 1, 2, 0xab, 4, 5, 6, 0xff])),
-            "000102ab040506ff"
-        );
+        assert_eq!(std::format!("{}", TableId([0, 1, 2, 0xab, 4, 5, 6, 0xff])), "000102ab040506ff");
     }
 
     #[test]
     fn quantisation_rounds_to_nearest() {
-        assert_eq!(
-            [0.49, 0.51, -0.49, -0.51, 32767.0].map(|v| quantise(v, 1.0)),
-            [0, 1, 0, -1, 32767]
-        );
+        assert_eq!([0.49, 0.51, -0.49, -0.51, 32767.0].map(|v| quantise(v, 1.0)), [0, 1, 0, -1, 32767]);
         assert_eq!(quantise(1.0, 0.0), 0);
     }
 
@@ -1177,15 +877,8 @@ mod tests {
             let lowest = 1.0e-9 * (1.0 + 0.618_034 * i as f32);
             let mut ripple = data().half_width_ripple_rad.to_vec();
             ripple[3] = -lowest;
-            ripple
-                .iter_mut()
-                .filter(|h| **h < -lowest)
-                .for_each(|h| *h = -lowest);
-            let touching = TableData {
-                half_width_rad: &[lowest; 4],
-                half_width_ripple_rad: &ripple,
-                ..data()
-            };
+            ripple.iter_mut().filter(|h| **h < -lowest).for_each(|h| *h = -lowest);
+            let touching = TableData { half_width_rad: &[lowest; 4], half_width_ripple_rad: &ripple, ..data() };
             let written = write(&touching, &provenance());
             assert!(written.is_ok(), "{lowest}: {written:?}");
         }
@@ -1196,10 +889,7 @@ mod tests {
         assert_eq!(image_bytes(25, 3, 16, [64; 3]), 7528);
         assert_eq!(image_bytes(25, 3, 16, [0; 3]), 6712);
         assert!(image_bytes(25, 3, 16, [100; 3]) <= 8192);
-        assert_eq!(
-            fixture::image(false).len(),
-            fixture::plan(false).image_bytes()
-        );
+        assert_eq!(fixture::image(false).len(), fixture::plan(false).image_bytes());
     }
 
     #[test]
@@ -1207,12 +897,7 @@ mod tests {
         let mut image = fixture::image(false);
         let table = Table::check(&image).unwrap();
         let (pages, body_bytes) = (table.page_count(), table.body_bytes);
-        assert_eq!(
-            (0..pages)
-                .map(|page| table.page(page).unwrap().len())
-                .sum::<usize>(),
-            body_bytes
-        );
+        assert_eq!((0..pages).map(|page| table.page(page).unwrap().len()).sum::<usize>(), body_bytes);
         assert!((0..pages).all(|page| table.is_page_intact(page)));
         assert!(!table.is_page_intact(pages) && table.page(pages).is_none());
         image[2 * PAGE_BYTES] ^= 1;
@@ -1262,57 +947,18 @@ mod tests {
             Table::check(&image).unwrap_err()
         };
         let short = damaged(|image| image.truncate(100));
-        assert_eq!(
-            short,
-            ImageError::TooShort {
-                found: 100,
-                needed: image_bytes(1, 1, 0, [0; 3])
-            }
-        );
-        assert_eq!(
-            Table::check(&[]).unwrap_err(),
-            ImageError::TooShort {
-                found: 0,
-                needed: 216
-            }
-        );
+        assert_eq!(short, ImageError::TooShort { found: 100, needed: image_bytes(1, 1, 0, [0; 3]) });
+        assert_eq!(Table::check(&[]).unwrap_err(), ImageError::TooShort { found: 0, needed: 216 });
         assert_eq!(damaged(|image| image[0] = 0), ImageError::Magic);
         // What a text-mode transfer does.
         assert_eq!(damaged(|image| _ = image.remove(4)), ImageError::Magic);
-        assert_eq!(
-            damaged(|image| image[8] = 2),
-            ImageError::Version {
-                found: 2,
-                allowed: 1
-            }
-        );
-        assert_eq!(
-            damaged(|image| image.swap(10, 11)),
-            ImageError::ByteOrder { found: 0xfffe }
-        );
+        assert_eq!(damaged(|image| image[8] = 2), ImageError::Version { found: 2, allowed: 1 });
+        assert_eq!(damaged(|image| image.swap(10, 11)), ImageError::ByteOrder { found: 0xfffe });
         let full = image.len();
-        assert_eq!(
-            damaged(|image| _ = image.pop()),
-            ImageError::Length {
-                stated: full,
-                found: full - 1
-            }
-        );
-        assert_eq!(
-            damaged(|image| image.push(0)),
-            ImageError::Length {
-                stated: full,
-                found: full + 1
-            }
-        );
-        assert!(matches!(
-            damaged(|image| image[300] ^= 4),
-            ImageError::Crc { .. }
-        ));
-        assert!(matches!(
-            damaged(|image| image[16] ^= 4),
-            ImageError::Crc { .. }
-        ));
+        assert_eq!(damaged(|image| _ = image.pop()), ImageError::Length { stated: full, found: full - 1 });
+        assert_eq!(damaged(|image| image.push(0)), ImageError::Length { stated: full, found: full + 1 });
+        assert!(matches!(damaged(|image| image[300] ^= 4), ImageError::Crc { .. }));
+        assert!(matches!(damaged(|image| image[16] ^= 4), ImageError::Crc { .. }));
         let one_page = damaged(|image| {
             image[3 * PAGE_BYTES] ^= 4;
             let (before, last) = image.split_last_chunk_mut::<4>().unwrap();
@@ -1323,34 +969,12 @@ mod tests {
 
     #[test]
     fn each_damage_of_the_header_has_its_own_error() {
-        assert_eq!(
-            resealed(|image| image[170] = 1),
-            ImageError::Reserved { offset: 170 }
-        );
-        assert_eq!(
-            resealed(|image| image[57] = 7),
-            ImageError::Text {
-                field: Field::ToolVersion
-            }
-        );
-        assert_eq!(
-            resealed(|image| image[102] = b'x'),
-            ImageError::Text {
-                field: Field::MeshLevel
-            }
-        );
-        assert_eq!(
-            resealed(|image| image[104] = 5),
-            ImageError::GeneratorKind { found: 5 }
-        );
-        assert_eq!(
-            resealed(|image| image[105] = 2),
-            ImageError::FixedMember { found: 2 }
-        );
-        let teeth = DriveError {
-            flexspline_teeth: 190,
-            circular_spline_teeth: 190,
-        };
+        assert_eq!(resealed(|image| image[170] = 1), ImageError::Reserved { offset: 170 });
+        assert_eq!(resealed(|image| image[57] = 7), ImageError::Text { field: Field::ToolVersion });
+        assert_eq!(resealed(|image| image[102] = b'x'), ImageError::Text { field: Field::MeshLevel });
+        assert_eq!(resealed(|image| image[104] = 5), ImageError::GeneratorKind { found: 5 });
+        assert_eq!(resealed(|image| image[105] = 2), ImageError::FixedMember { found: 2 });
+        let teeth = DriveError { flexspline_teeth: 190, circular_spline_teeth: 190 };
         assert_eq!(resealed(|image| image[106] = 190), ImageError::Teeth(teeth));
         for (offset, found, field, least, most) in [
             (110, 0, Field::TorqueNodes, 1, 32),
@@ -1363,26 +987,12 @@ mod tests {
             (115, 129, Field::OutputCurve, 4, 128),
         ] {
             let error = resealed(|image| image[offset] = found);
-            assert_eq!(
-                error,
-                ImageError::Count {
-                    field,
-                    found: found as usize,
-                    least,
-                    most
-                }
-            );
+            assert_eq!(error, ImageError::Count { field, found: found as usize, least, most });
         }
-        assert!(matches!(
-            resealed(|image| image[110] = 12),
-            ImageError::Size { .. }
-        ));
+        assert!(matches!(resealed(|image| image[110] = 12), ImageError::Size { .. }));
         let outside = |offset, value, field| {
             let error = resealed(put(offset, value));
-            assert!(
-                matches!(error, ImageError::OutOfRange { field: named, .. } if named == field),
-                "{error}"
-            );
+            assert!(matches!(error, ImageError::OutOfRange { field: named, .. } if named == field), "{error}");
         };
         outside(116, -1.0, Field::MeanRipple);
         outside(120, 1.0, Field::HalfWidthRipple);
@@ -1402,94 +1012,39 @@ mod tests {
             (144, Field::TemperatureRange, 0),
             (152, Field::ErrorLimit, 0),
         ] {
-            assert_eq!(
-                resealed(put(offset, f32::NAN)),
-                ImageError::NotFinite { field, index }
-            );
+            assert_eq!(resealed(put(offset, f32::NAN)), ImageError::NotFinite { field, index });
         }
     }
 
     #[test]
     fn each_damage_of_the_numbers_has_its_own_error() {
         let node = |i: usize| HEADER_BYTES + 4 * i;
-        let infinite = ImageError::NotFinite {
-            field: Field::TorqueNodes,
-            index: 10,
-        };
+        let infinite = ImageError::NotFinite { field: Field::TorqueNodes, index: 10 };
         assert_eq!(resealed(put(node(10), f32::INFINITY)), infinite);
         // Equal nodes are no jump: they have no interval to interpolate in.
-        let equal = ImageError::NotIncreasing {
-            field: Field::TorqueNodes,
-            index: 4,
-        };
+        let equal = ImageError::NotIncreasing { field: Field::TorqueNodes, index: 4 };
         assert_eq!(resealed(put(node(4), -1.51)), equal);
-        let falling = ImageError::NotIncreasing {
-            field: Field::TemperatureNodes,
-            index: 2,
-        };
+        let falling = ImageError::NotIncreasing { field: Field::TemperatureNodes, index: 2 };
         assert_eq!(resealed(put(node(13), 19.0)), falling);
         let record = |i: usize| RECORDS + RECORD_BYTES * i;
         let error = resealed(put(record(5), f32::NEG_INFINITY));
-        assert_eq!(
-            error,
-            ImageError::NotFinite {
-                field: Field::Mean,
-                index: 5
-            }
-        );
+        assert_eq!(error, ImageError::NotFinite { field: Field::Mean, index: 5 });
         let error = resealed(put(record(7) + 4, -1.0e-9));
-        assert!(
-            matches!(
-                error,
-                ImageError::OutOfRange {
-                    field: Field::HalfWidth,
-                    ..
-                }
-            ),
-            "{error}"
-        );
+        assert!(matches!(error, ImageError::OutOfRange { field: Field::HalfWidth, .. }), "{error}");
         // Half-width below its own ripple, at temperature 1 and torque 2.
         let error = resealed(put(record(13) + 4, 1.0e-8));
-        assert!(
-            matches!(
-                error,
-                ImageError::NegativeHalfWidth {
-                    temperature: 1,
-                    torque: 2,
-                    ..
-                }
-            ),
-            "{error}"
-        );
+        assert!(matches!(error, ImageError::NegativeHalfWidth { temperature: 1, torque: 2, .. }), "{error}");
         // The repeated nodes at either end of a record.
         for (position, index) in [(0, 0), (17, 17), (18, 18)] {
             let offset = record(3) + 4 * (RECORD_HEAD_WORDS + position);
             let error = resealed(|image| image[offset] ^= 1);
-            assert_eq!(
-                error,
-                ImageError::NotClosed {
-                    field: Field::MeanRipple,
-                    index
-                }
-            );
+            assert_eq!(error, ImageError::NotClosed { field: Field::MeanRipple, index });
         }
         let error = resealed(put(record(20), 0.03));
-        assert!(
-            matches!(
-                error,
-                ImageError::ErrorBound {
-                    allowed_rad: 0.02,
-                    ..
-                }
-            ),
-            "{error}"
-        );
+        assert!(matches!(error, ImageError::ErrorBound { allowed_rad: 0.02, .. }), "{error}");
         // Ripple a hundred times as large, on a half-width that allows it.
         let error = resealed(|image| put(116, 1.0e-4 / 32767.0)(image));
-        assert!(
-            matches!(error, ImageError::Slope { found } if found > 1.0 && found < 20.0),
-            "{error}"
-        );
+        assert!(matches!(error, ImageError::Slope { found } if found > 1.0 && found < 20.0), "{error}");
     }
 
     #[test]
@@ -1507,14 +1062,8 @@ mod tests {
             }
         }
         let (slope, error) = (bounds.slope as f64, bounds.error_rad as f64);
-        assert!(
-            steepest < slope && slope < 1.3 * steepest,
-            "{steepest} {slope}"
-        );
-        assert!(
-            largest < error && error < 1.1 * largest,
-            "{largest} {error}"
-        );
+        assert!(steepest < slope && slope < 1.3 * steepest, "{steepest} {slope}");
+        assert!(largest < error && error < 1.1 * largest, "{largest} {error}");
     }
 
     #[test]
@@ -1533,36 +1082,15 @@ mod tests {
         let mut small = [0; 300];
         let needed = image_bytes(2, 2, 8, [4, 0, 5]);
         let found = write_image(&data(), &provenance(), &mut small, fixture::id);
-        assert_eq!(
-            found,
-            Err(WriteError::BufferTooSmall { needed, found: 300 })
-        );
-        let short = TableData {
-            half_width_rad: &[1e-4; 3],
-            ..data()
-        };
-        let expected = WriteError::Shape {
-            field: Field::HalfWidth,
-            found: 3,
-            needed: 4,
-        };
+        assert_eq!(found, Err(WriteError::BufferTooSmall { needed, found: 300 }));
+        let short = TableData { half_width_rad: &[1e-4; 3], ..data() };
+        let expected = WriteError::Shape { field: Field::HalfWidth, found: 3, needed: 4 };
         assert_eq!(write(&short, &provenance()), Err(expected));
-        let long = Provenance {
-            mesh_level: "a mesh that takes too many words",
-            ..provenance()
-        };
-        let expected = WriteError::TextTooLong {
-            field: Field::MeshLevel,
-            found: 32,
-        };
+        let long = Provenance { mesh_level: "a mesh that takes too many words", ..provenance() };
+        let expected = WriteError::TextTooLong { field: Field::MeshLevel, found: 32 };
         assert_eq!(write(&data(), &long), Err(expected));
-        let foreign = Provenance {
-            tool_version: "Σ",
-            ..provenance()
-        };
-        let expected = WriteError::Refused(ImageError::Text {
-            field: Field::ToolVersion,
-        });
+        let foreign = Provenance { tool_version: "Σ", ..provenance() };
+        let expected = WriteError::Refused(ImageError::Text { field: Field::ToolVersion });
         assert_eq!(write(&data(), &foreign), Err(expected));
         let many = TableData {
             torque_nodes_n_m: &[0.0; 33],
@@ -1573,30 +1101,13 @@ mod tests {
             ripple_nodes: 0,
             ..data()
         };
-        let expected = ImageError::Count {
-            field: Field::TorqueNodes,
-            found: 33,
-            least: 1,
-            most: 32,
-        };
-        assert_eq!(
-            write(&many, &provenance()),
-            Err(WriteError::Refused(expected))
-        );
+        let expected = ImageError::Count { field: Field::TorqueNodes, found: 33, least: 1, most: 32 };
+        assert_eq!(write(&many, &provenance()), Err(WriteError::Refused(expected)));
         let mut ripple = [0.0; 32];
         ripple[9] = f32::NAN;
-        let undefined = TableData {
-            mean_ripple_rad: &ripple,
-            ..data()
-        };
-        let expected = ImageError::NotFinite {
-            field: Field::MeanRipple,
-            index: 9,
-        };
-        assert_eq!(
-            write(&undefined, &provenance()),
-            Err(WriteError::Refused(expected))
-        );
+        let undefined = TableData { mean_ripple_rad: &ripple, ..data() };
+        let expected = ImageError::NotFinite { field: Field::MeanRipple, index: 9 };
+        assert_eq!(write(&undefined, &provenance()), Err(WriteError::Refused(expected)));
     }
 
     proptest! {

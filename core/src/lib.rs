@@ -101,8 +101,8 @@ pub use drive::{Drive, FixedMember, Phases};
 pub use error::{DriveError, Field, ImageError};
 pub use hysteresis::{Direction, PlayState, SAVED_STATE_BYTES};
 pub use image::{
-    FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance,
-    TEXT_BYTES, TableData, WriteError, image_bytes, write_image,
+    FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance, TEXT_BYTES,
+    TableData, WriteError, image_bytes, write_image,
 };
 pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ITERATIONS, Prediction};
 pub use table::{Bounds, GeneratorKind, OperatingPoint, Quality, Table, TableId};

@@ -134,13 +134,7 @@ enum Departure {
 impl Prediction {
     fn disabled(nominal: OutputAngle, uncertainty_rad: f32) -> Self {
         let quality = Quality::Disabled;
-        Self {
-            output: nominal,
-            nominal,
-            transmission_error_rad: 0.0,
-            uncertainty_rad,
-            quality,
-        }
+        Self { output: nominal, nominal, transmission_error_rad: 0.0, uncertainty_rad, quality }
     }
 }
 
@@ -158,11 +152,7 @@ impl Table<'_> {
         torque_n_m: f32,
         temperature_c: f32,
     ) -> Prediction {
-        self.follow(
-            self.at(torque_n_m, temperature_c).as_ref(),
-            state,
-            generator,
-        )
+        self.follow(self.at(torque_n_m, temperature_c).as_ref(), state, generator)
     }
 
     /// Generator angle that brings the output to `target`.
@@ -171,18 +161,8 @@ impl Table<'_> {
     /// needed, was found when the table was accepted. If an input is not finite the ideal command is given and marked
     /// `Disabled`.
     #[must_use]
-    pub fn inverse(
-        &self,
-        target: OutputAngle,
-        torque_n_m: f32,
-        temperature_c: f32,
-        approach: Approach<'_>,
-    ) -> Command {
-        self.aim(
-            self.at(torque_n_m, temperature_c).as_ref(),
-            target,
-            approach,
-        )
+    pub fn inverse(&self, target: OutputAngle, torque_n_m: f32, temperature_c: f32, approach: Approach<'_>) -> Command {
+        self.aim(self.at(torque_n_m, temperature_c).as_ref(), target, approach)
     }
 
     /// One tick: [`Self::forward`] at the measured generator angle, then [`Self::inverse`] from there to the target. Locates
@@ -198,10 +178,7 @@ impl Table<'_> {
     ) -> (Prediction, Command) {
         let point = self.at(torque_n_m, temperature_c);
         let prediction = self.follow(point.as_ref(), state, measured);
-        (
-            prediction,
-            self.aim(point.as_ref(), target, Approach::From(state)),
-        )
+        (prediction, self.aim(point.as_ref(), target, Approach::From(state)))
     }
 
     /// Transmission error in steady motion in `direction`, rad; `None` if an input is not finite.
@@ -214,9 +191,7 @@ impl Table<'_> {
         direction: Direction,
     ) -> Option<f32> {
         let point = self.at(torque_n_m, temperature_c)?;
-        let phases = self
-            .drive
-            .phases(generator, self.drive.nominal_output(generator));
+        let phases = self.drive.phases(generator, self.drive.nominal_output(generator));
         Some(Side::Steady(direction).error_rad(self.play_at(&point, phases)?))
     }
 
@@ -230,22 +205,13 @@ impl Table<'_> {
     /// 3e-9 rad).
     #[must_use]
     pub fn inverse_error_bound_rad(&self) -> f32 {
-        (0..self.inverse_iterations).fold(self.bounds.periodic_rad, |error, _| {
-            error * self.bounds.slope
-        })
+        (0..self.inverse_iterations).fold(self.bounds.periodic_rad, |error, _| error * self.bounds.slope)
     }
 
-    fn follow(
-        &self,
-        point: Option<&OperatingPoint>,
-        state: &mut PlayState,
-        generator: GeneratorAngle,
-    ) -> Prediction {
+    fn follow(&self, point: Option<&OperatingPoint>, state: &mut PlayState, generator: GeneratorAngle) -> Prediction {
         let nominal = self.drive.nominal_output(generator);
         let phases = self.drive.phases(generator, nominal);
-        let Some((point, play)) =
-            point.and_then(|point| Some((point, self.play_at(point, phases)?)))
-        else {
+        let Some((point, play)) = point.and_then(|point| Some((point, self.play_at(point, phases)?))) else {
             state.coast(nominal);
             return Prediction::disabled(nominal, self.error_limit_rad);
         };
@@ -259,47 +225,26 @@ impl Table<'_> {
         }
     }
 
-    fn aim(
-        &self,
-        point: Option<&OperatingPoint>,
-        target: OutputAngle,
-        approach: Approach<'_>,
-    ) -> Command {
-        point
-            .and_then(|point| self.solve(point, target, approach))
-            .unwrap_or(Command {
-                generator: self.drive.nominal_generator(target),
-                predicted_error_rad: 0.0,
-                uncertainty_rad: self.error_limit_rad,
-                quality: Quality::Disabled,
-            })
+    fn aim(&self, point: Option<&OperatingPoint>, target: OutputAngle, approach: Approach<'_>) -> Command {
+        point.and_then(|point| self.solve(point, target, approach)).unwrap_or(Command {
+            generator: self.drive.nominal_generator(target),
+            predicted_error_rad: 0.0,
+            uncertainty_rad: self.error_limit_rad,
+            quality: Quality::Disabled,
+        })
     }
 
-    fn solve(
-        &self,
-        point: &OperatingPoint,
-        target: OutputAngle,
-        approach: Approach<'_>,
-    ) -> Option<Command> {
+    fn solve(&self, point: &OperatingPoint, target: OutputAngle, approach: Approach<'_>) -> Option<Command> {
         let motion = match approach {
-            Approach::Moving(direction) => Move {
-                side: Side::Steady(direction),
-                uncertainty_rad: 0.0,
-                resting: None,
-            },
+            Approach::Moving(direction) => Move { side: Side::Steady(direction), uncertainty_rad: 0.0, resting: None },
             Approach::From(state) => match self.departure(target, point, state) {
                 Departure::Hold(command) => return Some(command),
                 Departure::Move(motion) => motion,
             },
         };
-        let mut play = Play {
-            centre_rad: point.mean_rad,
-            half_width_rad: point.half_width_rad,
-        };
+        let mut play = Play { centre_rad: point.mean_rad, half_width_rad: point.half_width_rad };
         for _ in 0..self.inverse_iterations {
-            let (generator, nominal) = self
-                .drive
-                .corrected_command(target, motion.side.error_rad(play));
+            let (generator, nominal) = self.drive.corrected_command(target, motion.side.error_rad(play));
             play = self.play_at(point, self.drive.phases(generator, nominal))?;
         }
         let error_rad = motion.side.error_rad(play);
@@ -313,19 +258,10 @@ impl Table<'_> {
     }
 
     /// Whether and to which side the play must be taken up on the way from `state` to `target`.
-    fn departure(
-        &self,
-        target: OutputAngle,
-        point: &OperatingPoint,
-        state: &PlayState,
-    ) -> Departure {
+    fn departure(&self, target: OutputAngle, point: &OperatingPoint, state: &PlayState) -> Departure {
         let (Some(nominal), Some(output)) = (state.nominal(), state.output()) else {
             let uncertainty_rad = point.half_width_rad;
-            return Departure::Move(Move {
-                side: Side::Middle,
-                uncertainty_rad,
-                resting: None,
-            });
+            return Departure::Move(Move { side: Side::Middle, uncertainty_rad, resting: None });
         };
         let ahead_rad = target.minus_rad(output);
         if ahead_rad.abs() <= self.inverse_error_bound_rad() + HOLD_RAD {
@@ -339,16 +275,8 @@ impl Table<'_> {
         // A target inside the interval may lie on the other side of the output: then the whole play is in doubt.
         let guess = ahead_rad.abs() <= state.uncertainty_rad();
         Departure::Move(Move {
-            side: Side::Steady(if ahead_rad > 0.0 {
-                Direction::Forward
-            } else {
-                Direction::Backward
-            }),
-            uncertainty_rad: if guess {
-                2.0 * point.half_width_rad
-            } else {
-                0.0
-            },
+            side: Side::Steady(if ahead_rad > 0.0 { Direction::Forward } else { Direction::Backward }),
+            uncertainty_rad: if guess { 2.0 * point.half_width_rad } else { 0.0 },
             resting: Some(nominal.offset_rad(state.offset_rad())),
         })
     }
@@ -382,24 +310,12 @@ mod tests {
                 let mut last = None;
                 for i in 0..4000 {
                     let generator = 40.0 + direction.sign() as f64 * i as f64 * 1e-3;
-                    last = Some((
-                        generator,
-                        table.forward(&mut state, angle(generator), torque, temperature),
-                    ));
+                    last = Some((generator, table.forward(&mut state, angle(generator), torque, temperature)));
                 }
                 let (generator, found) = last.unwrap();
-                let truth = fixture::error(
-                    generator,
-                    torque as f64,
-                    temperature as f64,
-                    direction,
-                    true,
-                );
+                let truth = fixture::error(generator, torque as f64, temperature as f64, direction, true);
                 assert!((found.transmission_error_rad as f64 - truth).abs() < 0.01 * ARCSEC);
-                assert_eq!(
-                    (found.quality, found.uncertainty_rad),
-                    (Quality::InRange, 0.0)
-                );
+                assert_eq!((found.quality, found.uncertainty_rad), (Quality::InRange, 0.0));
                 let output = generator / 95.0 + truth;
                 assert!((found.output.to_rad() - output).abs() < 0.01 * ARCSEC);
                 let moved = found.output.minus_rad(found.nominal);
@@ -435,34 +351,19 @@ mod tests {
         let at = |state: &mut PlayState, torque| table.forward(state, angle(1.0), torque, 20.0);
         let below = at(&mut state, 1.49);
         let above = at(&mut state, 1.51);
-        assert_eq!(
-            (below.quality, above.quality),
-            (Quality::InRange, Quality::InRange)
-        );
+        assert_eq!((below.quality, above.quality), (Quality::InRange, Quality::InRange));
         let inside = at(&mut state, 1.5);
         assert_eq!(inside.quality, Quality::Uncertain);
         // Forward motion changes flank here: the whole backlash of 60″ is in doubt.
         let step = above.transmission_error_rad - below.transmission_error_rad;
-        assert!(
-            (step as f64 - 60.0 * ARCSEC).abs() < 0.2 * ARCSEC,
-            "{}",
-            step as f64 / ARCSEC
-        );
+        assert!((step as f64 - 60.0 * ARCSEC).abs() < 0.2 * ARCSEC, "{}", step as f64 / ARCSEC);
         for side in [below, above] {
             let off = (side.transmission_error_rad - inside.transmission_error_rad).abs();
             assert!(off <= inside.uncertainty_rad);
         }
         assert!(inside.uncertainty_rad < 1.1 * step);
-        let command = table.inverse(
-            OutputAngle::ZERO,
-            1.5,
-            20.0,
-            Approach::Moving(Direction::Forward),
-        );
-        assert_eq!(
-            (command.quality, command.uncertainty_rad > 0.9 * step),
-            (Quality::Uncertain, true)
-        );
+        let command = table.inverse(OutputAngle::ZERO, 1.5, 20.0, Approach::Moving(Direction::Forward));
+        assert_eq!((command.quality, command.uncertainty_rad > 0.9 * step), (Quality::Uncertain, true));
     }
 
     #[test]
@@ -484,31 +385,13 @@ mod tests {
         let mut state = PlayState::after_motion(Direction::Forward);
         let _ = table.forward(&mut state, angle(1.0), 5.0, 20.0);
         let (mut blind, mut seeing) = (state, state);
-        for (torque, temperature) in [
-            (f32::NAN, 20.0),
-            (5.0, f32::INFINITY),
-            (f32::NEG_INFINITY, f32::NAN),
-        ] {
+        for (torque, temperature) in [(f32::NAN, 20.0), (5.0, f32::INFINITY), (f32::NEG_INFINITY, f32::NAN)] {
             let found = table.forward(&mut blind, angle(1.005), torque, temperature);
-            assert_eq!(
-                (found.quality, found.transmission_error_rad),
-                (Quality::Disabled, 0.0)
-            );
+            assert_eq!((found.quality, found.transmission_error_rad), (Quality::Disabled, 0.0));
             assert_eq!(found.output, found.nominal);
-            let command = table.inverse(
-                OutputAngle::new(1, 7),
-                torque,
-                temperature,
-                Approach::From(&blind),
-            );
-            assert_eq!(
-                (command.quality, command.predicted_error_rad),
-                (Quality::Disabled, 0.0)
-            );
-            assert_eq!(
-                command.generator,
-                table.drive().nominal_generator(OutputAngle::new(1, 7))
-            );
+            let command = table.inverse(OutputAngle::new(1, 7), torque, temperature, Approach::From(&blind));
+            assert_eq!((command.quality, command.predicted_error_rad), (Quality::Disabled, 0.0));
+            assert_eq!(command.generator, table.drive().nominal_generator(OutputAngle::new(1, 7)));
         }
         // A motion and its way back while blind leave the play where a seeing step would.
         for generator in [1.005, 0.998] {
@@ -516,11 +399,7 @@ mod tests {
             let _ = table.forward(&mut seeing, angle(generator), 5.0, 20.0);
         }
         let difference = blind.offset_rad() - seeing.offset_rad();
-        assert!(
-            difference.abs() < 0.3 * ARCSEC as f32,
-            "{}",
-            difference as f64 / ARCSEC
-        );
+        assert!(difference.abs() < 0.3 * ARCSEC as f32, "{}", difference as f64 / ARCSEC);
     }
 
     #[test]
@@ -531,16 +410,10 @@ mod tests {
         image[start..].fill(0x7f);
         let records = table.records.len() * 4;
         let first = table.body_bytes - records;
-        let damaged = Table {
-            records: image[first..table.body_bytes].as_chunks().0,
-            ..table
-        };
+        let damaged = Table { records: image[first..table.body_bytes].as_chunks().0, ..table };
         let mut state = PlayState::unknown();
         let found = damaged.forward(&mut state, angle(1.0), 50.0, 80.0);
-        assert_eq!(
-            (found.quality, found.transmission_error_rad),
-            (Quality::Disabled, 0.0)
-        );
+        assert_eq!((found.quality, found.transmission_error_rad), (Quality::Disabled, 0.0));
         assert_eq!(state, PlayState::unknown());
     }
 
@@ -551,11 +424,7 @@ mod tests {
         let start = angle(3.0);
         let here = table.forward(&mut state, start, 5.0, 20.0);
         let held = table.inverse(here.output, 5.0, 20.0, Approach::From(&state));
-        assert!(
-            held.generator.minus_counts(start).abs() <= 48,
-            "{:?}",
-            held.generator.minus_counts(start)
-        );
+        assert!(held.generator.minus_counts(start).abs() <= 48, "{:?}", held.generator.minus_counts(start));
         let difference = held.predicted_error_rad - here.transmission_error_rad;
         assert!(difference.abs() < 1e-9, "{difference}");
 
@@ -571,20 +440,11 @@ mod tests {
     #[test]
     fn a_state_never_updated_gives_the_middle() {
         let table = table();
-        let command = table.inverse(
-            OutputAngle::new(0, 9),
-            5.0,
-            20.0,
-            Approach::From(&PlayState::unknown()),
-        );
+        let command = table.inverse(OutputAngle::new(0, 9), 5.0, 20.0, Approach::From(&PlayState::unknown()));
         assert_eq!(command.quality, Quality::Uncertain);
         assert!((command.uncertainty_rad as f64 - 5.0e-5).abs() < 0.2 * ARCSEC);
         let mean = |target| {
-            let at = |direction| {
-                table
-                    .inverse(target, 5.0, 20.0, Approach::Moving(direction))
-                    .predicted_error_rad
-            };
+            let at = |direction| table.inverse(target, 5.0, 20.0, Approach::Moving(direction)).predicted_error_rad;
             0.5 * (at(Direction::Forward) + at(Direction::Backward))
         };
         let difference = command.predicted_error_rad - mean(OutputAngle::new(0, 9));
@@ -694,11 +554,7 @@ mod tests {
         let _ = table.forward(&mut state, GeneratorAngle::ZERO, 5.0, 20.0);
         for i in 0..20_000i32 {
             // Forward 1000 steps, backward 1000 steps; each step exceeds what the centre moves across the play.
-            let place = if (i / 1000) % 2 == 0 {
-                i % 1000
-            } else {
-                1000 - i % 1000
-            };
+            let place = if (i / 1000) % 2 == 0 { i % 1000 } else { 1000 - i % 1000 };
             let target = OutputAngle::from_rad(1e-3 + place as f64 * 2.0e-5).unwrap();
             let command = table.inverse(target, 5.0, 20.0, Approach::From(&state));
             let there = table.forward(&mut state, command.generator, 5.0, 20.0);
@@ -716,12 +572,7 @@ mod tests {
         let stroke = angle(TAU * 0.003);
         // To and fro inside the play: nothing may creep.
         for _ in 0..500_000 {
-            let _ = table.forward(
-                &mut state,
-                start.offset_counts(-(stroke.counts() >> 4)),
-                5.0,
-                20.0,
-            );
+            let _ = table.forward(&mut state, start.offset_counts(-(stroke.counts() >> 4)), 5.0, 20.0);
             let _ = table.forward(&mut state, start, 5.0, 20.0);
         }
         assert_eq!(table.forward(&mut state, start, 5.0, 20.0), first);

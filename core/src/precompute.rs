@@ -67,14 +67,11 @@
 use crate::angle::GeneratorAngle;
 use crate::drive::Drive;
 use crate::error::{Field, ImageError};
-use crate::grid::{
-    self, MAX_CLAMPED_NODES, MAX_HALVINGS, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis,
-    Place,
-};
+use crate::grid::{self, MAX_CLAMPED_NODES, MAX_HALVINGS, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis, Place};
 use crate::hysteresis::Direction;
 use crate::image::{
-    MAX_AXIS_VALUE, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, Provenance, TableData,
-    WriteError, counted, write_image,
+    MAX_AXIS_VALUE, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, Provenance, TableData, WriteError, counted,
+    write_image,
 };
 use crate::table::Table;
 use core::f64::consts::TAU;
@@ -305,11 +302,7 @@ pub enum ProjectError {
 impl fmt::Display for ProjectError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::Workspace {
-                part,
-                needed,
-                found,
-            } => write!(f, "workspace: {needed} {part} needed, {found} given"),
+            Self::Workspace { part, needed, found } => write!(f, "workspace: {needed} {part} needed, {found} given"),
             Self::Setting { name, found } => {
                 write!(f, "{name} = {found}: must be finite and not negative")
             }
@@ -317,11 +310,7 @@ impl fmt::Display for ProjectError {
             Self::SampleNotFinite { sample } => {
                 write!(f, "sample {sample}: a number is not finite")
             }
-            Self::SampleOutside {
-                sample,
-                axis,
-                found,
-            } => {
+            Self::SampleOutside { sample, axis, found } => {
                 write!(f, "sample {sample}: {found} lies outside the {axis}")
             }
             Self::SampleImplausible { sample, error_rad } => write!(
@@ -329,75 +318,31 @@ impl fmt::Display for ProjectError {
                 "sample {sample}: output is {error_rad} rad from generator/ratio, at most {MAX_ERROR_RAD} is allowed; \
                  check ratio, units and zero"
             ),
-            Self::MissingNode {
-                temperature,
-                torque,
-            } => {
-                write!(
-                    f,
-                    "no samples at temperature node {temperature}, torque node {torque}"
-                )
+            Self::MissingNode { temperature, torque } => {
+                write!(f, "no samples at temperature node {temperature}, torque node {torque}")
             }
-            Self::MissingDirection {
-                temperature,
-                torque,
-                direction,
-            } => {
-                write!(
-                    f,
-                    "no {direction:?} samples at temperature node {temperature}, torque node {torque}"
-                )
+            Self::MissingDirection { temperature, torque, direction } => {
+                write!(f, "no {direction:?} samples at temperature node {temperature}, torque node {torque}")
             }
-            Self::TooFewPositions {
-                temperature,
-                torque,
-                direction,
-                found,
-                needed,
-            } => write!(
+            Self::TooFewPositions { temperature, torque, direction, found, needed } => write!(
                 f,
                 "{direction:?} samples at temperature node {temperature}, torque node {torque}: {found} usable positions \
                  in the tooth pitch, {needed} evenly spread ones are needed"
             ),
-            Self::Order {
-                curve,
-                order,
-                nodes,
-            } => write!(f, "{curve}: order {order} does not fit on {nodes} nodes"),
-            Self::Coverage {
-                needed_turns,
-                found_turns,
-            } => {
-                write!(
-                    f,
-                    "the samples span {found_turns} generator turns, the harmonics need {needed_turns}"
-                )
+            Self::Order { curve, order, nodes } => write!(f, "{curve}: order {order} does not fit on {nodes} nodes"),
+            Self::Coverage { needed_turns, found_turns } => {
+                write!(f, "the samples span {found_turns} generator turns, the harmonics need {needed_turns}")
             }
-            Self::NegativeHalfWidth {
-                temperature,
-                torque,
-                found_rad,
-                tolerance_rad,
-            } => write!(
+            Self::NegativeHalfWidth { temperature, torque, found_rad, tolerance_rad } => write!(
                 f,
                 "half-width of the play {found_rad} rad at temperature node {temperature}, torque node {torque}, \
                  tolerance {tolerance_rad}: are the directions exchanged?"
             ),
             Self::NotConverged { passes, residual } => {
-                write!(
-                    f,
-                    "least squares: relative residual {residual:e} after {passes} passes"
-                )
+                write!(f, "least squares: relative residual {residual:e} after {passes} passes")
             }
-            Self::Deviation {
-                sample,
-                found_rad,
-                limit_rad,
-            } => {
-                write!(
-                    f,
-                    "the table misses sample {sample} by {found_rad} rad, the limit is {limit_rad}"
-                )
+            Self::Deviation { sample, found_rad, limit_rad } => {
+                write!(f, "the table misses sample {sample} by {found_rad} rad, the limit is {limit_rad}")
             }
             Self::Write(error) => error.fmt(f),
         }
@@ -429,9 +374,7 @@ struct Row {
 
 impl<'a> Plan<'a> {
     fn records(&self) -> usize {
-        self.torque_nodes_n_m
-            .len()
-            .saturating_mul(self.temperature_nodes_c.len())
+        self.torque_nodes_n_m.len().saturating_mul(self.temperature_nodes_c.len())
     }
 
     /// Ripple coefficients of a record and direction; one constant if there is no ripple.
@@ -445,16 +388,11 @@ impl<'a> Plan<'a> {
     }
 
     fn harmonics(&self) -> usize {
-        [self.generator, self.material, self.output]
-            .iter()
-            .map(|part| part.orders.len())
-            .sum()
+        [self.generator, self.material, self.output].iter().map(|part| part.orders.len()).sum()
     }
 
     fn unknowns(&self) -> usize {
-        self.block()
-            .saturating_add(self.harmonics())
-            .saturating_mul(2)
+        self.block().saturating_add(self.harmonics()).saturating_mul(2)
     }
 
     /// Length of [`Workspace::numbers`].
@@ -472,19 +410,9 @@ impl<'a> Plan<'a> {
     /// Length of [`Workspace::values`].
     #[must_use]
     pub fn values_len(&self) -> usize {
-        let curves = self
-            .generator
-            .nodes
-            .saturating_add(self.material.nodes)
-            .saturating_add(self.output.nodes);
-        let ripple = self
-            .records()
-            .saturating_mul(self.ripple_nodes)
-            .saturating_mul(2);
-        self.records()
-            .saturating_mul(2)
-            .saturating_add(ripple)
-            .saturating_add(curves)
+        let curves = self.generator.nodes.saturating_add(self.material.nodes).saturating_add(self.output.nodes);
+        let ripple = self.records().saturating_mul(self.ripple_nodes).saturating_mul(2);
+        self.records().saturating_mul(2).saturating_add(ripple).saturating_add(curves)
     }
 
     /// Length of the image.
@@ -509,42 +437,17 @@ impl<'a> Plan<'a> {
     }
 
     fn check(&self) -> Result<(), ProjectError> {
-        counted(
-            Field::TorqueNodes,
-            self.torque_nodes_n_m.len(),
-            1,
-            MAX_CLAMPED_NODES,
-        )?;
-        counted(
-            Field::TemperatureNodes,
-            self.temperature_nodes_c.len(),
-            1,
-            MAX_TEMPERATURE_NODES,
-        )?;
-        counted(
-            Field::RippleNodes,
-            self.ripple_nodes,
-            MIN_PERIODIC_NODES,
-            MAX_RIPPLE_NODES,
-        )?;
+        counted(Field::TorqueNodes, self.torque_nodes_n_m.len(), 1, MAX_CLAMPED_NODES)?;
+        counted(Field::TemperatureNodes, self.temperature_nodes_c.len(), 1, MAX_TEMPERATURE_NODES)?;
+        counted(Field::RippleNodes, self.ripple_nodes, MIN_PERIODIC_NODES, MAX_RIPPLE_NODES)?;
         check_axis(Field::TorqueNodes, self.torque_nodes_n_m)?;
         check_axis(Field::TemperatureNodes, self.temperature_nodes_c)?;
         for (curve, harmonics, _) in self.curves() {
-            counted(
-                curve,
-                harmonics.nodes,
-                MIN_PERIODIC_NODES,
-                MAX_PERIODIC_NODES,
-            )?;
+            counted(curve, harmonics.nodes, MIN_PERIODIC_NODES, MAX_PERIODIC_NODES)?;
             for (number, &order) in harmonics.orders.iter().enumerate() {
-                let fits = order >= 1
-                    && (order as usize).saturating_mul(NODES_PER_PERIOD) <= harmonics.nodes;
+                let fits = order >= 1 && (order as usize).saturating_mul(NODES_PER_PERIOD) <= harmonics.nodes;
                 if !fits || number >= MAX_HARMONICS {
-                    return Err(ProjectError::Order {
-                        curve,
-                        order,
-                        nodes: harmonics.nodes,
-                    });
+                    return Err(ProjectError::Order { curve, order, nodes: harmonics.nodes });
                 }
             }
         }
@@ -554,10 +457,7 @@ impl<'a> Plan<'a> {
         };
         for (name, found) in [
             ("half-width for a missing direction", half_width),
-            (
-                "tolerance of a negative half-width",
-                self.negative_half_width_tolerance_rad,
-            ),
+            ("tolerance of a negative half-width", self.negative_half_width_tolerance_rad),
             ("deviation limit", self.deviation_limit_rad),
         ] {
             if found.is_nan() || found < 0.0 {
@@ -568,42 +468,23 @@ impl<'a> Plan<'a> {
     }
 
     fn check_sample(&self, index: usize, sample: &Sample) -> Result<(), ProjectError> {
-        let numbers = [
-            sample.generator_rad,
-            sample.torque_n_m,
-            sample.temperature_c,
-            sample.output_rad,
-        ];
-        if !numbers.iter().all(|number| number.is_finite())
-            || GeneratorAngle::from_rad(sample.generator_rad).is_none()
+        let numbers = [sample.generator_rad, sample.torque_n_m, sample.temperature_c, sample.output_rad];
+        if !numbers.iter().all(|number| number.is_finite()) || GeneratorAngle::from_rad(sample.generator_rad).is_none()
         {
             return Err(ProjectError::SampleNotFinite { sample: index });
         }
         for (axis, nodes, found) in [
             (Field::TorqueNodes, self.torque_nodes_n_m, sample.torque_n_m),
-            (
-                Field::TemperatureNodes,
-                self.temperature_nodes_c,
-                sample.temperature_c,
-            ),
+            (Field::TemperatureNodes, self.temperature_nodes_c, sample.temperature_c),
         ] {
-            let outside = |edge: Option<&f32>, sign: f32| {
-                edge.is_some_and(|edge| (found as f32 - edge) * sign > 0.0)
-            };
+            let outside = |edge: Option<&f32>, sign: f32| edge.is_some_and(|edge| (found as f32 - edge) * sign > 0.0);
             if nodes.len() > 1 && (outside(nodes.first(), -1.0) || outside(nodes.last(), 1.0)) {
-                return Err(ProjectError::SampleOutside {
-                    sample: index,
-                    axis,
-                    found,
-                });
+                return Err(ProjectError::SampleOutside { sample: index, axis, found });
             }
         }
         let error_rad = self.error_rad(sample);
         if error_rad.abs() > MAX_ERROR_RAD as f64 {
-            return Err(ProjectError::SampleImplausible {
-                sample: index,
-                error_rad,
-            });
+            return Err(ProjectError::SampleImplausible { sample: index, error_rad });
         }
         Ok(())
     }
@@ -613,11 +494,7 @@ impl<'a> Plan<'a> {
     }
 
     fn place(nodes: &[f32], value: f64) -> Place {
-        grid::locate_clamped::<MAX_HALVINGS>(
-            nodes.len(),
-            |i| nodes.get(i).copied().unwrap_or(0.0),
-            value as f32,
-        )
+        grid::locate_clamped::<MAX_HALVINGS>(nodes.len(), |i| nodes.get(i).copied().unwrap_or(0.0), value as f32)
     }
 
     /// Whether the torque lies strictly inside a jump.
@@ -627,35 +504,23 @@ impl<'a> Plan<'a> {
     }
 
     fn jumps(&self) -> u32 {
-        grid::jump_intervals(self.torque_nodes_n_m.len(), |i| {
-            self.torque_nodes_n_m.get(i).copied().unwrap_or(0.0)
-        })
+        grid::jump_intervals(self.torque_nodes_n_m.len(), |i| self.torque_nodes_n_m.get(i).copied().unwrap_or(0.0))
     }
 
     /// Samples that say something about a node, with their index.
-    fn used<'s>(
-        &self,
-        samples: &'s [Sample],
-    ) -> impl Iterator<Item = (usize, &'s Sample)> + use<'s, '_, 'a> {
+    fn used<'s>(&self, samples: &'s [Sample]) -> impl Iterator<Item = (usize, &'s Sample)> + use<'s, '_, 'a> {
         let jumps = self.jumps();
-        samples
-            .iter()
-            .enumerate()
-            .filter(move |(_, sample)| !self.inside_jump(sample, jumps))
+        samples.iter().enumerate().filter(move |(_, sample)| !self.inside_jump(sample, jumps))
     }
 
     /// The records around a sample and their weights.
     fn corners(&self, sample: &Sample) -> [(usize, f64); 4] {
         let torque = Self::place(self.torque_nodes_n_m, sample.torque_n_m);
         let temperature = Self::place(self.temperature_nodes_c, sample.temperature_c);
-        let record =
-            |temperature: usize, torque: usize| temperature * self.torque_nodes_n_m.len() + torque;
+        let record = |temperature: usize, torque: usize| temperature * self.torque_nodes_n_m.len() + torque;
         let (high, hot) = (torque.weight as f64, temperature.weight as f64);
         [
-            (
-                record(temperature.below, torque.below),
-                (1.0 - hot) * (1.0 - high),
-            ),
+            (record(temperature.below, torque.below), (1.0 - hot) * (1.0 - high)),
             (record(temperature.below, torque.above), (1.0 - hot) * high),
             (record(temperature.above, torque.below), hot * (1.0 - high)),
             (record(temperature.above, torque.above), hot * high),
@@ -664,14 +529,8 @@ impl<'a> Plan<'a> {
 
     fn row(&self, sample: &Sample) -> Row {
         let generator = GeneratorAngle::from_rad(sample.generator_rad).unwrap_or_default();
-        let phases = self
-            .drive
-            .phases(generator, self.drive.nominal_output(generator));
-        let mut row = Row {
-            error_rad: self.error_rad(sample),
-            ripple: [(0, 0.0); 16],
-            harmonics: [0.0; 48],
-        };
+        let phases = self.drive.phases(generator, self.drive.nominal_output(generator));
+        let mut row = Row { error_rad: self.error_rad(sample), ripple: [(0, 0.0); 16], harmonics: [0.0; 48] };
         let (nodes, weights) = match PeriodicAxis::new(self.ripple_nodes) {
             Some(axis) if !axis.is_empty() => {
                 let cell = axis.locate(phases.tooth);
@@ -680,35 +539,19 @@ impl<'a> Plan<'a> {
             _ => ([0; 4], [1.0, 0.0, 0.0, 0.0]),
         };
         let first = direction_number(sample.direction) * self.block();
-        let pairs = self
-            .corners(sample)
-            .into_iter()
-            .flat_map(|(record, weight)| {
-                let base = first + record * self.coefficients();
-                nodes
-                    .into_iter()
-                    .zip(weights)
-                    .map(move |(node, share)| (base + node, weight * share as f64))
-            });
-        row.ripple
-            .iter_mut()
-            .zip(pairs)
-            .for_each(|(to, from)| *to = from);
-        let parts = [
-            (self.generator, phases.generator),
-            (self.material, phases.material),
-            (self.output, phases.output),
-        ];
+        let pairs = self.corners(sample).into_iter().flat_map(|(record, weight)| {
+            let base = first + record * self.coefficients();
+            nodes.into_iter().zip(weights).map(move |(node, share)| (base + node, weight * share as f64))
+        });
+        row.ripple.iter_mut().zip(pairs).for_each(|(to, from)| *to = from);
+        let parts =
+            [(self.generator, phases.generator), (self.material, phases.material), (self.output, phases.output)];
         let angles = parts.iter().flat_map(|(part, phase)| {
-            part.orders
-                .iter()
-                .map(|&order| phase.wrapping_mul(order as u32) as f64 * (TAU / 4_294_967_296.0))
+            part.orders.iter().map(|&order| phase.wrapping_mul(order as u32) as f64 * (TAU / 4_294_967_296.0))
         });
         for (pair, angle) in row.harmonics.chunks_exact_mut(2).zip(angles) {
             let (sine, cosine) = libm::sincos(angle);
-            pair.iter_mut()
-                .zip([cosine, sine])
-                .for_each(|(to, from)| *to = from);
+            pair.iter_mut().zip([cosine, sine]).for_each(|(to, from)| *to = from);
         }
         row
     }
@@ -722,9 +565,9 @@ impl<'a> Plan<'a> {
         let found_turns = (last - first) / TAU;
         let curves = self.curves();
         let frequencies = || {
-            let harmonics = curves.iter().flat_map(|(_, part, periods)| {
-                part.orders.iter().map(move |&order| order as f64 * periods)
-            });
+            let harmonics = curves
+                .iter()
+                .flat_map(|(_, part, periods)| part.orders.iter().map(move |&order| order as f64 * periods));
             harmonics.chain([0.0]).enumerate()
         };
         // The closest two of all frequencies, a constant included, beat with the longest period.
@@ -736,35 +579,20 @@ impl<'a> Plan<'a> {
                 }
             }
         }
-        let needed_turns = if closest < 1e-9 {
-            f64::INFINITY
-        } else {
-            PERIOD_NEEDED / closest
-        };
-        if found_turns >= needed_turns {
-            Ok(())
-        } else {
-            Err(ProjectError::Coverage {
-                needed_turns,
-                found_turns,
-            })
-        }
+        let needed_turns = if closest < 1e-9 { f64::INFINITY } else { PERIOD_NEEDED / closest };
+        if found_turns >= needed_turns { Ok(()) } else { Err(ProjectError::Coverage { needed_turns, found_turns }) }
     }
 
     /// Whether every ripple coefficient has the samples it needs; `diagonal` is that of the normal equations.
     fn check_positions(&self, diagonal: &[f64], marks: &[u64]) -> Result<(), ProjectError> {
         let count = self.coefficients();
         for record in 0..self.records() {
-            let (temperature, torque) = (
-                record / self.torque_nodes_n_m.len().max(1),
-                record % self.torque_nodes_n_m.len().max(1),
-            );
+            let (temperature, torque) =
+                (record / self.torque_nodes_n_m.len().max(1), record % self.torque_nodes_n_m.len().max(1));
             let mut sampled = 0;
             for direction in [Direction::Forward, Direction::Backward] {
                 let node = direction_number(direction) * self.records() + record;
-                let weights = diagonal
-                    .get(node * count..(node + 1) * count)
-                    .unwrap_or_default();
+                let weights = diagonal.get(node * count..(node + 1) * count).unwrap_or_default();
                 let total: f64 = weights.iter().sum();
                 if total <= 0.0 {
                     continue;
@@ -776,36 +604,18 @@ impl<'a> Plan<'a> {
                 let needed = count as u32;
                 if positions < needed || gaps > 0 {
                     let found = positions.min(needed.saturating_sub(gaps));
-                    return Err(ProjectError::TooFewPositions {
-                        temperature,
-                        torque,
-                        direction,
-                        found,
-                        needed,
-                    });
+                    return Err(ProjectError::TooFewPositions { temperature, torque, direction, found, needed });
                 }
             }
             if sampled == 0 {
-                return Err(ProjectError::MissingNode {
-                    temperature,
-                    torque,
-                });
+                return Err(ProjectError::MissingNode { temperature, torque });
             }
-            let missing =
-                [Direction::Forward, Direction::Backward]
-                    .into_iter()
-                    .find(|&direction| {
-                        let node = direction_number(direction) * self.records() + record;
-                        diagonal
-                            .get(node * count)
-                            .is_none_or(|weight| *weight <= 0.0)
-                    });
+            let missing = [Direction::Forward, Direction::Backward].into_iter().find(|&direction| {
+                let node = direction_number(direction) * self.records() + record;
+                diagonal.get(node * count).is_none_or(|weight| *weight <= 0.0)
+            });
             if let (Some(direction), MissingDirection::Refuse) = (missing, self.missing_direction) {
-                return Err(ProjectError::MissingDirection {
-                    temperature,
-                    torque,
-                    direction,
-                });
+                return Err(ProjectError::MissingDirection { temperature, torque, direction });
             }
         }
         Ok(())
@@ -827,12 +637,7 @@ fn check_axis(field: Field, nodes: &[f32]) -> Result<(), ImageError> {
         }
         if node.abs() > MAX_AXIS_VALUE {
             let (least, most) = (-MAX_AXIS_VALUE, MAX_AXIS_VALUE);
-            return Err(ImageError::OutOfRange {
-                field,
-                found: node,
-                least,
-                most,
-            });
+            return Err(ImageError::OutOfRange { field, found: node, least, most });
         }
         if node <= before {
             return Err(ImageError::NotIncreasing { field, index });
@@ -843,20 +648,10 @@ fn check_axis(field: Field, nodes: &[f32]) -> Result<(), ImageError> {
 }
 
 /// Takes `needed` elements off the front of a workspace part.
-fn take<'w, T>(
-    rest: &mut &'w mut [T],
-    part: &'static str,
-    needed: usize,
-) -> Result<&'w mut [T], ProjectError> {
+fn take<'w, T>(rest: &mut &'w mut [T], part: &'static str, needed: usize) -> Result<&'w mut [T], ProjectError> {
     let found = rest.len();
     let whole = core::mem::take(rest);
-    let (here, left) = whole
-        .split_at_mut_checked(needed)
-        .ok_or(ProjectError::Workspace {
-            part,
-            needed,
-            found,
-        })?;
+    let (here, left) = whole.split_at_mut_checked(needed).ok_or(ProjectError::Workspace { part, needed, found })?;
     *rest = left;
     Ok(here)
 }
@@ -878,33 +673,20 @@ pub fn project<'a>(
     if samples.is_empty() {
         return Err(ProjectError::NoSamples);
     }
-    samples
-        .iter()
-        .enumerate()
-        .try_for_each(|(index, sample)| plan.check_sample(index, sample))?;
+    samples.iter().enumerate().try_for_each(|(index, sample)| plan.check_sample(index, sample))?;
     plan.check_coverage(samples)?;
 
     let unknowns = plan.unknowns();
-    let (mut numbers, mut marks, mut values) =
-        (workspace.numbers, workspace.marks, workspace.values);
+    let (mut numbers, mut marks, mut values) = (workspace.numbers, workspace.marks, workspace.values);
     if numbers.len() < plan.numbers_len() {
         let (needed, found) = (plan.numbers_len(), numbers.len());
-        return Err(ProjectError::Workspace {
-            part: "numbers",
-            needed,
-            found,
-        });
+        return Err(ProjectError::Workspace { part: "numbers", needed, found });
     }
     let marks = take(&mut marks, "marks", plan.marks_len())?;
     let values = take(&mut values, "values", plan.values_len())?;
     let solution = take(&mut numbers, "numbers", unknowns)?;
     let mut vector = || take(&mut numbers, "numbers", unknowns);
-    let system = System {
-        diagonal: vector()?,
-        residual: vector()?,
-        search: vector()?,
-        product: vector()?,
-    };
+    let system = System { diagonal: vector()?, residual: vector()?, search: vector()?, product: vector()? };
 
     solve(plan, samples, solution, marks, system)?;
     lay_out(plan, solution, marks, values)
@@ -926,12 +708,7 @@ fn solve(
     marks: &mut [u64],
     system: System<'_>,
 ) -> Result<(), ProjectError> {
-    let System {
-        diagonal,
-        residual,
-        search,
-        product,
-    } = system;
+    let System { diagonal, residual, search, product } = system;
     solution.fill(0.0);
     diagonal.fill(0.0);
     residual.fill(0.0);
@@ -943,9 +720,7 @@ fn solve(
             add(residual, unknown, value * row.error_rad);
         });
         let generator = GeneratorAngle::from_rad(sample.generator_rad).unwrap_or_default();
-        let tooth = generator
-            .fraction()
-            .wrapping_mul(plan.drive.ripple_order() as u32);
+        let tooth = generator.fraction().wrapping_mul(plan.drive.ripple_order() as u32);
         for (record, weight) in plan.corners(sample) {
             let node = direction_number(sample.direction) * plan.records() + record;
             if let Some(mark) = marks.get_mut(node).filter(|_| weight >= 0.25) {
@@ -957,11 +732,7 @@ fn solve(
 
     // Unknowns without samples have an empty row: they stay zero, and `lay_out` fills them.
     let scaled = |value: f64, diagonal: f64| {
-        if diagonal > 0.0 {
-            value / diagonal
-        } else {
-            0.0
-        }
+        if diagonal > 0.0 { value / diagonal } else { 0.0 }
     };
     for ((search, residual), diagonal) in search.iter_mut().zip(&*residual).zip(&*diagonal) {
         *search = scaled(*residual, *diagonal);
@@ -971,10 +742,7 @@ fn solve(
     let mut passes = 0;
     while size > RELATIVE_RESIDUAL * RELATIVE_RESIDUAL * start {
         if passes == MAX_PASSES {
-            return Err(ProjectError::NotConverged {
-                passes,
-                residual: libm::sqrt(size / start),
-            });
+            return Err(ProjectError::NotConverged { passes, residual: libm::sqrt(size / start) });
         }
         passes += 1;
         product.fill(0.0);
@@ -984,25 +752,18 @@ fn solve(
             for_each_entry(plan, &row, |unknown, value| {
                 along += value * search.get(unknown).copied().unwrap_or(0.0);
             });
-            for_each_entry(plan, &row, |unknown, value| {
-                add(product, unknown, value * along)
-            });
+            for_each_entry(plan, &row, |unknown, value| add(product, unknown, value * along));
         }
         let step = size / dot(search, product);
-        for ((solution, residual), (search, product)) in solution
-            .iter_mut()
-            .zip(residual.iter_mut())
-            .zip(search.iter().zip(&*product))
+        for ((solution, residual), (search, product)) in
+            solution.iter_mut().zip(residual.iter_mut()).zip(search.iter().zip(&*product))
         {
             *solution += step * search;
             *residual -= step * product;
         }
         let before = size;
-        size = residual
-            .iter()
-            .zip(&*diagonal)
-            .map(|(&residual, &diagonal)| residual * scaled(residual, diagonal))
-            .sum();
+        size =
+            residual.iter().zip(&*diagonal).map(|(&residual, &diagonal)| residual * scaled(residual, diagonal)).sum();
         for ((search, residual), diagonal) in search.iter_mut().zip(&*residual).zip(&*diagonal) {
             *search = scaled(*residual, *diagonal) + size / before * *search;
         }
@@ -1011,17 +772,10 @@ fn solve(
 }
 
 fn for_each_entry(plan: &Plan<'_>, row: &Row, mut visit: impl FnMut(usize, f64)) {
-    row.ripple
-        .iter()
-        .filter(|(_, weight)| *weight != 0.0)
-        .for_each(|&(unknown, weight)| visit(unknown, weight));
+    row.ripple.iter().filter(|(_, weight)| *weight != 0.0).for_each(|&(unknown, weight)| visit(unknown, weight));
     let first = 2 * plan.block();
     let count = 2 * plan.harmonics();
-    row.harmonics
-        .iter()
-        .take(count)
-        .enumerate()
-        .for_each(|(number, &value)| visit(first + number, value));
+    row.harmonics.iter().take(count).enumerate().for_each(|(number, &value)| visit(first + number, value));
 }
 
 fn add(vector: &mut [f64], index: usize, value: f64) {
@@ -1044,14 +798,10 @@ fn lay_out<'a>(
     let half_width_rad = take(&mut values, "values", records)?;
     let mean_ripple_rad = take(&mut values, "values", ripples)?;
     let half_width_ripple_rad = take(&mut values, "values", ripples)?;
-    let (both, harmonics) = solution
-        .split_at_mut_checked(2 * plan.block())
-        .unwrap_or_default();
+    let (both, harmonics) = solution.split_at_mut_checked(2 * plan.block()).unwrap_or_default();
     let (forward, backward) = both.split_at_mut_checked(plan.block()).unwrap_or_default();
     let sampled = |direction, record: usize| {
-        marks
-            .get(direction_number(direction) * records + record)
-            .is_some_and(|mark| *mark != 0)
+        marks.get(direction_number(direction) * records + record).is_some_and(|mark| *mark != 0)
     };
     let one_sided = match plan.missing_direction {
         MissingDirection::Refuse => 0.0,
@@ -1062,18 +812,9 @@ fn lay_out<'a>(
         let range = record * count..(record + 1) * count;
         let forward = forward.get_mut(range.clone()).unwrap_or_default();
         let backward = backward.get_mut(range).unwrap_or_default();
-        match (
-            sampled(Direction::Forward, record),
-            sampled(Direction::Backward, record),
-        ) {
-            (true, false) => backward
-                .iter_mut()
-                .zip(&*forward)
-                .for_each(|(b, f)| *b = f + 2.0 * one_sided),
-            (false, true) => forward
-                .iter_mut()
-                .zip(&*backward)
-                .for_each(|(f, b)| *f = b - 2.0 * one_sided),
+        match (sampled(Direction::Forward, record), sampled(Direction::Backward, record)) {
+            (true, false) => backward.iter_mut().zip(&*forward).for_each(|(b, f)| *b = f + 2.0 * one_sided),
+            (false, true) => forward.iter_mut().zip(&*backward).for_each(|(f, b)| *f = b - 2.0 * one_sided),
             _ => {}
         }
         // From here on `forward` holds the centre and `backward` the half-width.
@@ -1096,22 +837,16 @@ fn lay_out<'a>(
         let (centre, half) = (average(forward), average(backward));
         (*mean, *half_width) = (centre as f32, half as f32);
         let range = record * plan.ripple_nodes..(record + 1) * plan.ripple_nodes;
-        for (ripple, from, middle) in [
-            (&mut *mean_ripple_rad, &*forward, centre),
-            (&mut *half_width_ripple_rad, &*backward, half),
-        ] {
+        for (ripple, from, middle) in
+            [(&mut *mean_ripple_rad, &*forward, centre), (&mut *half_width_ripple_rad, &*backward, half)]
+        {
             let ripple = ripple.get_mut(range.clone()).unwrap_or_default();
-            ripple
-                .iter_mut()
-                .zip(from)
-                .for_each(|(to, from)| *to = (from - middle) as f32);
+            ripple.iter_mut().zip(from).for_each(|(to, from)| *to = (from - middle) as f32);
         }
     }
     let mut harmonics = &*harmonics;
     let mut curve = |part: Harmonics<'_>| {
-        let (mine, rest) = harmonics
-            .split_at_checked(2 * part.orders.len())
-            .unwrap_or_default();
+        let (mine, rest) = harmonics.split_at_checked(2 * part.orders.len()).unwrap_or_default();
         harmonics = rest;
         let curve = take(&mut values, "values", part.nodes)?;
         spread_harmonics(part.orders, mine, curve);
@@ -1169,8 +904,7 @@ pub fn measure(table: &Table<'_>, plan: &Plan<'_>, samples: &[Sample]) -> Fit {
             continue;
         };
         let (torque, temperature) = (sample.torque_n_m as f32, sample.temperature_c as f32);
-        let Some(error) = table.steady_error_rad(generator, torque, temperature, sample.direction)
-        else {
+        let Some(error) = table.steady_error_rad(generator, torque, temperature, sample.direction) else {
             continue;
         };
         let deviation = (error as f64 - plan.error_rad(sample)).abs();
@@ -1201,24 +935,14 @@ pub fn make_image<'a>(
 ) -> Result<Fit, ProjectError> {
     let mut data = project(plan, samples, workspace)?;
     let bytes = write_image(&data, provenance, out, |_| [0; 8])?;
-    let fit = measure(
-        &Table::check(out.get(..bytes).unwrap_or_default())?,
-        plan,
-        samples,
-    );
+    let fit = measure(&Table::check(out.get(..bytes).unwrap_or_default())?, plan, samples);
     if fit.worst_rad.is_nan() || fit.worst_rad > plan.deviation_limit_rad {
         let (sample, found_rad) = (fit.worst_sample, fit.worst_rad);
-        return Err(ProjectError::Deviation {
-            sample,
-            found_rad,
-            limit_rad: plan.deviation_limit_rad,
-        });
+        return Err(ProjectError::Deviation { sample, found_rad, limit_rad: plan.deviation_limit_rad });
     }
     // Rounded up: single precision may not make a bound smaller than it is.
-    (data.projection_worst_rad, data.projection_rms_rad) = (
-        (fit.worst_rad as f32).next_up(),
-        (fit.rms_rad as f32).min(fit.worst_rad as f32),
-    );
+    (data.projection_worst_rad, data.projection_rms_rad) =
+        ((fit.worst_rad as f32).next_up(), (fit.rms_rad as f32).min(fit.worst_rad as f32));
     write_image(&data, provenance, out, id)?;
     Ok(fit)
 }
@@ -1233,14 +957,7 @@ mod tests {
     fn make(plan: &Plan<'_>, samples: &[Sample]) -> Result<(Fit, Vec<u8>), ProjectError> {
         let mut buffers = Buffers::new(plan);
         let mut out = vec![0; plan.image_bytes()];
-        let fit = make_image(
-            plan,
-            &fixture::provenance(),
-            samples,
-            buffers.workspace(),
-            &mut out,
-            fixture::id,
-        )?;
+        let fit = make_image(plan, &fixture::provenance(), samples, buffers.workspace(), &mut out, fixture::id)?;
         Ok((fit, out))
     }
 
@@ -1259,9 +976,7 @@ mod tests {
             let temperature = -40.0 + 120.0 * part(0.569_840_291);
             for direction in [Direction::Forward, Direction::Backward] {
                 let angle = GeneratorAngle::from_rad(generator).unwrap();
-                let found = table
-                    .steady_error_rad(angle, torque as f32, temperature as f32, direction)
-                    .unwrap();
+                let found = table.steady_error_rad(angle, torque as f32, temperature as f32, direction).unwrap();
                 let truth = fixture::error(generator, torque, temperature, direction, long);
                 worst = worst.max((found as f64 - truth).abs() / ARCSEC);
             }
@@ -1272,11 +987,7 @@ mod tests {
     #[test]
     fn one_pitch_recovers_ripple_wind_up_and_both_sides_of_the_jumps() {
         let (fit, image) = make(&fixture::plan(false), &fixture::samples(false)).unwrap();
-        assert!(
-            fit.worst_rad < 0.002 * ARCSEC,
-            "{} arcsec",
-            fit.worst_rad / ARCSEC
-        );
+        assert!(fit.worst_rad < 0.002 * ARCSEC, "{} arcsec", fit.worst_rad / ARCSEC);
         assert!(fit.rms_rad > 0.0 && fit.rms_rad < fit.worst_rad);
         assert_eq!((fit.used, fit.inside_jumps), (3 * 11 * 2 * 16, 0));
         let worst = worst_elsewhere(&image, false);
@@ -1284,21 +995,13 @@ mod tests {
         let table = Table::check(&image).unwrap();
         assert!(table.projection_worst_rad() as f64 >= fit.worst_rad);
         assert!((table.projection_worst_rad() as f64 - fit.worst_rad) < 1e-14);
-        assert!(
-            (0..11)
-                .filter(|&node| table.is_torque_jump(node))
-                .eq([3, 6])
-        );
+        assert!((0..11).filter(|&node| table.is_torque_jump(node)).eq([3, 6]));
     }
 
     #[test]
     fn full_turns_separate_both_families_of_harmonics() {
         let (fit, image) = make(&fixture::plan(true), &fixture::samples(true)).unwrap();
-        assert!(
-            fit.worst_rad < 0.005 * ARCSEC,
-            "{} arcsec",
-            fit.worst_rad / ARCSEC
-        );
+        assert!(fit.worst_rad < 0.005 * ARCSEC, "{} arcsec", fit.worst_rad / ARCSEC);
         let worst = worst_elsewhere(&image, true);
         assert!(worst < 0.01, "{worst} arcsec");
     }
@@ -1313,13 +1016,7 @@ mod tests {
                 let torque = 5.0 + 45.0 * part(0.754_877_666);
                 let temperature = -40.0 + 120.0 * part(0.569_840_291);
                 for torque in [torque, -torque] {
-                    samples.push(fixture::sample(
-                        PITCH * part(0.618),
-                        torque,
-                        temperature,
-                        direction,
-                        false,
-                    ));
+                    samples.push(fixture::sample(PITCH * part(0.618), torque, temperature, direction, false));
                 }
             }
         }
@@ -1342,32 +1039,18 @@ mod tests {
     #[test]
     fn a_missing_direction_is_named_or_filled_with_the_half_width_given() {
         let mut samples = fixture::samples(false);
-        samples.retain(|s| {
-            !(s.torque_n_m == 20.0 && s.temperature_c == 80.0 && s.direction == Direction::Backward)
-        });
+        samples.retain(|s| !(s.torque_n_m == 20.0 && s.temperature_c == 80.0 && s.direction == Direction::Backward));
         let mut plan = fixture::plan(false);
-        let expected = ProjectError::MissingDirection {
-            temperature: 2,
-            torque: 9,
-            direction: Direction::Backward,
-        };
+        let expected = ProjectError::MissingDirection { temperature: 2, torque: 9, direction: Direction::Backward };
         assert_eq!(make(&plan, &samples).unwrap_err(), expected);
 
         plan.missing_direction = MissingDirection::HalfWidth { rad: 3.0 * ARCSEC };
         let (_, image) = make(&plan, &samples).unwrap();
         let table = Table::check(&image).unwrap();
         let generator = GeneratorAngle::from_rad(0.01).unwrap();
-        let at = |direction| {
-            table
-                .steady_error_rad(generator, 20.0, 80.0, direction)
-                .unwrap() as f64
-        };
+        let at = |direction| table.steady_error_rad(generator, 20.0, 80.0, direction).unwrap() as f64;
         let width = at(Direction::Backward) - at(Direction::Forward);
-        assert!(
-            (width - 6.0 * ARCSEC).abs() < 0.001 * ARCSEC,
-            "{} arcsec",
-            width / ARCSEC
-        );
+        assert!((width - 6.0 * ARCSEC).abs() < 0.001 * ARCSEC, "{} arcsec", width / ARCSEC);
         let truth = fixture::error(0.01, 20.0, 80.0, Direction::Forward, false);
         assert!((at(Direction::Forward) - truth).abs() < 0.005 * ARCSEC);
     }
@@ -1377,20 +1060,12 @@ mod tests {
         let plan = fixture::plan(false);
         let mut samples = fixture::samples(false);
         samples.retain(|s| !(s.torque_n_m == -5.0 && s.temperature_c == 20.0));
-        assert_eq!(
-            make(&plan, &samples).unwrap_err(),
-            ProjectError::MissingNode {
-                temperature: 1,
-                torque: 2
-            }
-        );
+        assert_eq!(make(&plan, &samples).unwrap_err(), ProjectError::MissingNode { temperature: 1, torque: 2 });
 
         let mut thinned = fixture::samples(false);
         let mut number = 0;
         thinned.retain(|s| {
-            let here = s.torque_n_m == 0.0
-                && s.temperature_c == -40.0
-                && s.direction == Direction::Forward;
+            let here = s.torque_n_m == 0.0 && s.temperature_c == -40.0 && s.direction == Direction::Forward;
             number += usize::from(here);
             !here || number % 2 == 0
         });
@@ -1405,26 +1080,14 @@ mod tests {
         assert_eq!(found, expected);
         // The same eight positions twice over are still eight.
         let repeated: Vec<Sample> = thinned.iter().chain(&thinned).copied().collect();
-        assert!(matches!(
-            make(&plan, &repeated),
-            Err(ProjectError::TooFewPositions { found: 8, .. })
-        ));
+        assert!(matches!(make(&plan, &repeated), Err(ProjectError::TooFewPositions { found: 8, .. })));
         // All sixteen in one half of the pitch leave a gap.
         let mut bunched = fixture::samples(false);
         for s in &mut bunched {
             let position = (s.generator_rad - 1.0) / 2.0;
-            *s = fixture::sample(
-                1.0 + position,
-                s.torque_n_m,
-                s.temperature_c,
-                s.direction,
-                false,
-            );
+            *s = fixture::sample(1.0 + position, s.torque_n_m, s.temperature_c, s.direction, false);
         }
-        assert!(matches!(
-            make(&plan, &bunched),
-            Err(ProjectError::TooFewPositions { .. })
-        ));
+        assert!(matches!(make(&plan, &bunched), Err(ProjectError::TooFewPositions { .. })));
         assert_eq!(make(&plan, &[]).unwrap_err(), ProjectError::NoSamples);
     }
 
@@ -1434,24 +1097,12 @@ mod tests {
         samples.retain(|s| s.generator_rad < TAU * 40.0);
         let mut plan = fixture::plan(true);
         plan.output = Harmonics::default();
-        let Err(ProjectError::Coverage {
-            needed_turns,
-            found_turns,
-        }) = make(&plan, &samples)
-        else {
-            panic!()
-        };
+        let Err(ProjectError::Coverage { needed_turns, found_turns }) = make(&plan, &samples) else { panic!() };
         assert!((needed_turns - 0.95 * 47.5).abs() < 1e-9, "{needed_turns}");
         assert!((39.0..40.0).contains(&found_turns), "{found_turns}");
 
-        plan.output = Harmonics {
-            orders: &[95],
-            nodes: 128,
-        };
-        assert!(matches!(
-            make(&plan, &samples),
-            Err(ProjectError::Order { order: 95, .. })
-        ));
+        plan.output = Harmonics { orders: &[95], nodes: 128 };
+        assert!(matches!(make(&plan, &samples), Err(ProjectError::Order { order: 95, .. })));
     }
 
     #[test]
@@ -1462,31 +1113,14 @@ mod tests {
             change(&mut samples[7]);
             make(&plan, &samples).unwrap_err()
         };
-        assert_eq!(
-            with(|s| s.output_rad = f64::NAN),
-            ProjectError::SampleNotFinite { sample: 7 }
-        );
-        assert_eq!(
-            with(|s| s.generator_rad = 1e300),
-            ProjectError::SampleNotFinite { sample: 7 }
-        );
-        let expected = ProjectError::SampleOutside {
-            sample: 7,
-            axis: Field::TorqueNodes,
-            found: 51.0,
-        };
+        assert_eq!(with(|s| s.output_rad = f64::NAN), ProjectError::SampleNotFinite { sample: 7 });
+        assert_eq!(with(|s| s.generator_rad = 1e300), ProjectError::SampleNotFinite { sample: 7 });
+        let expected = ProjectError::SampleOutside { sample: 7, axis: Field::TorqueNodes, found: 51.0 };
         assert_eq!(with(|s| s.torque_n_m = 51.0), expected);
-        let expected = ProjectError::SampleOutside {
-            sample: 7,
-            axis: Field::TemperatureNodes,
-            found: -41.0,
-        };
+        let expected = ProjectError::SampleOutside { sample: 7, axis: Field::TemperatureNodes, found: -41.0 };
         assert_eq!(with(|s| s.temperature_c = -41.0), expected);
         // An output angle in degrees.
-        assert!(matches!(
-            with(|s| s.output_rad *= 57.3),
-            ProjectError::SampleImplausible { sample: 7, .. }
-        ));
+        assert!(matches!(with(|s| s.output_rad *= 57.3), ProjectError::SampleImplausible { sample: 7, .. }));
     }
 
     #[test]
@@ -1498,12 +1132,7 @@ mod tests {
         let mut plan = fixture::plan(false);
         plan.deviation_limit_rad = 0.05 * ARCSEC;
         let found = make(&plan, &samples).unwrap_err();
-        let ProjectError::Deviation {
-            sample, found_rad, ..
-        } = found
-        else {
-            panic!("{found}")
-        };
+        let ProjectError::Deviation { sample, found_rad, .. } = found else { panic!("{found}") };
         assert!(sample == 40 || sample == samples.len() - 1, "{sample}");
         assert!((found_rad - 0.1 * ARCSEC).abs() < 0.01 * ARCSEC, "{found}");
     }
@@ -1518,17 +1147,7 @@ mod tests {
             };
         }
         let found = make(&fixture::plan(false), &samples).unwrap_err();
-        assert!(
-            matches!(
-                found,
-                ProjectError::NegativeHalfWidth {
-                    temperature: 0,
-                    torque: 0,
-                    ..
-                }
-            ),
-            "{found}"
-        );
+        assert!(matches!(found, ProjectError::NegativeHalfWidth { temperature: 0, torque: 0, .. }), "{found}");
     }
 
     #[test]
@@ -1537,26 +1156,14 @@ mod tests {
         plan.negative_half_width_tolerance_rad = 0.2 * ARCSEC;
         let mut samples = fixture::samples(false);
         for s in &mut samples {
-            let other = |direction| {
-                fixture::error(
-                    s.generator_rad,
-                    s.torque_n_m,
-                    s.temperature_c,
-                    direction,
-                    false,
-                )
-            };
+            let other = |direction| fixture::error(s.generator_rad, s.torque_n_m, s.temperature_c, direction, false);
             // Only the ripple of the half-width is left, on a half-width that just stays above zero.
             let half = 0.1 * ARCSEC * (1.0 + (188.0 * s.generator_rad).sin());
             let centre = 0.5 * (other(Direction::Forward) + other(Direction::Backward));
             s.output_rad = s.generator_rad / 95.0 + centre - s.direction.sign() as f64 * half;
         }
         let (fit, _) = make(&plan, &samples).unwrap();
-        assert!(
-            fit.worst_rad < 0.005 * ARCSEC,
-            "{} arcsec",
-            fit.worst_rad / ARCSEC
-        );
+        assert!(fit.worst_rad < 0.005 * ARCSEC, "{} arcsec", fit.worst_rad / ARCSEC);
     }
 
     #[test]
@@ -1569,66 +1176,31 @@ mod tests {
         };
         assert!(matches!(
             refused(|p| p.torque_nodes_n_m = &[1.0, 1.0]),
-            ProjectError::Write(WriteError::Refused(ImageError::NotIncreasing {
-                index: 1,
-                ..
-            }))
+            ProjectError::Write(WriteError::Refused(ImageError::NotIncreasing { index: 1, .. }))
         ));
         assert!(matches!(
             refused(|p| p.ripple_nodes = 33),
-            ProjectError::Write(WriteError::Refused(ImageError::Count {
-                field: Field::RippleNodes,
-                found: 33,
-                ..
-            }))
+            ProjectError::Write(WriteError::Refused(ImageError::Count { field: Field::RippleNodes, found: 33, .. }))
         ));
+        assert!(matches!(refused(|p| p.deviation_limit_rad = f64::NAN), ProjectError::Setting { .. }));
         assert!(matches!(
-            refused(|p| p.deviation_limit_rad = f64::NAN),
-            ProjectError::Setting { .. }
-        ));
-        assert!(matches!(
-            refused(|p| p.generator = Harmonics {
-                orders: &[2, 9],
-                nodes: 64
-            }),
-            ProjectError::Order {
-                order: 9,
-                nodes: 64,
-                ..
-            }
+            refused(|p| p.generator = Harmonics { orders: &[2, 9], nodes: 64 }),
+            ProjectError::Order { order: 9, nodes: 64, .. }
         ));
 
         let plan = fixture::plan(false);
         let mut buffers = Buffers::new(&plan);
         let mut out = vec![0; plan.image_bytes()];
         for part in ["numbers", "marks", "values"] {
-            let Workspace {
-                mut numbers,
-                mut marks,
-                mut values,
-            } = buffers.workspace();
+            let Workspace { mut numbers, mut marks, mut values } = buffers.workspace();
             match part {
                 "numbers" => numbers = numbers.split_last_mut().unwrap().1,
                 "marks" => marks = marks.split_last_mut().unwrap().1,
                 _ => values = values.split_last_mut().unwrap().1,
             }
-            let workspace = Workspace {
-                numbers,
-                marks,
-                values,
-            };
-            let found = make_image(
-                &plan,
-                &fixture::provenance(),
-                &samples,
-                workspace,
-                &mut out,
-                fixture::id,
-            );
-            assert!(
-                matches!(found, Err(ProjectError::Workspace { part: named, .. }) if named == part),
-                "{found:?}"
-            );
+            let workspace = Workspace { numbers, marks, values };
+            let found = make_image(&plan, &fixture::provenance(), &samples, workspace, &mut out, fixture::id);
+            assert!(matches!(found, Err(ProjectError::Workspace { part: named, .. }) if named == part), "{found:?}");
         }
     }
 }

@@ -91,16 +91,12 @@ pub(crate) type Words<'a> = &'a [[u8; 4]];
 
 /// Word `index` as a number; 0 beyond the end, which an accepted table never reaches.
 pub(crate) fn f32_at(words: Words<'_>, index: usize) -> f32 {
-    words
-        .get(index)
-        .map_or(0.0, |word| f32::from_le_bytes(*word))
+    words.get(index).map_or(0.0, |word| f32::from_le_bytes(*word))
 }
 
 /// A ripple word: ripple of the mean and of the half-width in units of their scales.
 pub(crate) fn ripple_at(words: Words<'_>, index: usize) -> (i16, i16) {
-    words.get(index).map_or((0, 0), |&[a, b, c, d]| {
-        (i16::from_le_bytes([a, b]), i16::from_le_bytes([c, d]))
-    })
+    words.get(index).map_or((0, 0), |&[a, b, c, d]| (i16::from_le_bytes([a, b]), i16::from_le_bytes([c, d])))
 }
 
 /// Unit of the ripple weights.
@@ -113,11 +109,8 @@ fn four_at(words: Words<'_>, first: usize) -> Option<[[u8; 4]; 4]> {
 
 /// D and H of the record at `first`; 0 beyond the end.
 fn head_at(words: Words<'_>, first: usize) -> [f32; RECORD_HEAD_WORDS] {
-    let head = words
-        .get(first..)
-        .and_then(|record| record.first_chunk().copied());
-    head.unwrap_or([[0; 4]; RECORD_HEAD_WORDS])
-        .map(f32::from_le_bytes)
+    let head = words.get(first..).and_then(|record| record.first_chunk().copied());
+    head.unwrap_or([[0; 4]; RECORD_HEAD_WORDS]).map(f32::from_le_bytes)
 }
 
 /// The larger of two numbers; the second if the first is NaN. (`f32::max` is a library call on a Cortex-M4F.)
@@ -152,9 +145,7 @@ impl PeriodicCurve<'_> {
             return 0.0;
         }
         let cell = self.axis.locate(phase);
-        four_at(self.words, cell.node).map_or(0.0, |words| {
-            dot(words.map(f32::from_le_bytes), cell.weights())
-        })
+        four_at(self.words, cell.node).map_or(0.0, |words| dot(words.map(f32::from_le_bytes), cell.weights()))
     }
 }
 
@@ -214,11 +205,7 @@ pub struct OperatingPoint {
 impl OperatingPoint {
     /// The quality here, lowered while the side of the play is not known.
     pub(crate) fn quality_if_known(&self, known: bool) -> Quality {
-        if known {
-            self.quality
-        } else {
-            self.quality.max(Quality::Uncertain)
-        }
+        if known { self.quality } else { self.quality.max(Quality::Uncertain) }
     }
 }
 
@@ -261,18 +248,13 @@ impl<'a> Table<'a> {
 
     /// Temperature nodes, °C.
     pub fn temperature_nodes_c(&self) -> impl ExactSizeIterator<Item = f32> + use<'a> {
-        self.temperature
-            .iter()
-            .map(|word| f32::from_le_bytes(*word))
+        self.temperature.iter().map(|word| f32::from_le_bytes(*word))
     }
 
     /// Whether the interval above torque node `node` is a jump.
     #[must_use]
     pub fn is_torque_jump(&self, node: usize) -> bool {
-        u32::try_from(node)
-            .ok()
-            .and_then(|bit| self.torque_jumps.checked_shr(bit))
-            .is_some_and(|bits| bits & 1 == 1)
+        u32::try_from(node).ok().and_then(|bit| self.torque_jumps.checked_shr(bit)).is_some_and(|bits| bits & 1 == 1)
     }
 
     /// Axis of the ripple over one tooth pitch.
@@ -299,11 +281,7 @@ impl<'a> Table<'a> {
         if !(torque_n_m.is_finite() && temperature_c.is_finite()) {
             return None;
         }
-        let torque = grid::locate_clamped::<MAX_HALVINGS>(
-            self.torque.len(),
-            |i| f32_at(self.torque, i),
-            torque_n_m,
-        );
+        let torque = grid::locate_clamped::<MAX_HALVINGS>(self.torque.len(), |i| f32_at(self.torque, i), torque_n_m);
         let temperature = grid::locate_clamped::<TEMPERATURE_HALVINGS>(
             self.temperature.len(),
             |i| f32_at(self.temperature, i),
@@ -311,10 +289,7 @@ impl<'a> Table<'a> {
         );
         let stride = self.ripple.stored_len().wrapping_add(RECORD_HEAD_WORDS);
         let row = |temperature: usize, torque: usize| {
-            temperature
-                .wrapping_mul(self.torque.len())
-                .wrapping_add(torque)
-                .wrapping_mul(stride)
+            temperature.wrapping_mul(self.torque.len()).wrapping_add(torque).wrapping_mul(stride)
         };
         let rows = [
             row(temperature.below, torque.below),
@@ -323,31 +298,20 @@ impl<'a> Table<'a> {
             row(temperature.above, torque.above),
         ];
         let (cold, low) = (1.0 - temperature.weight, 1.0 - torque.weight);
-        let weights = [
-            cold * low,
-            cold * torque.weight,
-            temperature.weight * low,
-            temperature.weight * torque.weight,
-        ];
+        let weights = [cold * low, cold * torque.weight, temperature.weight * low, temperature.weight * torque.weight];
         let heads = rows.map(|row| head_at(self.records, row));
         let (means, halves) = (heads.map(|[mean, _]| mean), heads.map(|[_, half]| half));
         // The height of a jump is taken on both temperature planes; the larger counts.
         let height = |[a, b, c, d]: [f32; 4]| larger((b - a).abs(), (d - c).abs());
-        let in_jump =
-            self.is_torque_jump(torque.below) && torque.weight > 0.0 && torque.weight < 1.0;
+        let in_jump = self.is_torque_jump(torque.below) && torque.weight > 0.0 && torque.weight < 1.0;
         let within = |value: f32, [least, most]: [f32; 2]| value >= least && value <= most;
-        let in_range = within(torque_n_m, self.torque_range_n_m)
-            && within(temperature_c, self.temperature_range_c);
+        let in_range = within(torque_n_m, self.torque_range_n_m) && within(temperature_c, self.temperature_range_c);
         Some(OperatingPoint {
             rows,
             weights,
             mean_rad: dot(means, weights),
             half_width_rad: dot(halves, weights),
-            jump_rad: if in_jump {
-                height(means) + height(halves)
-            } else {
-                0.0
-            },
+            jump_rad: if in_jump { height(means) + height(halves) } else { 0.0 },
             quality: match (in_range, in_jump) {
                 (false, _) => Quality::Extrapolated,
                 (true, true) => Quality::Uncertain,
@@ -376,16 +340,10 @@ impl<'a> Table<'a> {
             + self.output_curve.at(phases.output);
         let centre_rad = point.mean_rad + mean * (self.mean_ripple_scale * Q15) + curves;
         // Not negative but for rounding: the image check bounds it.
-        let half_width_rad = larger(
-            point.half_width_rad + half * (self.half_ripple_scale * Q15),
-            0.0,
-        );
+        let half_width_rad = larger(point.half_width_rad + half * (self.half_ripple_scale * Q15), 0.0);
         // The per mille takes up rounding; NaN fails the comparison.
         let sane = centre_rad.abs() + half_width_rad <= self.error_limit_rad * 1.001;
-        sane.then_some(Play {
-            centre_rad,
-            half_width_rad,
-        })
+        sane.then_some(Play { centre_rad, half_width_rad })
     }
 }
 

@@ -58,10 +58,7 @@ pub fn shape(xi: f64, eta: f64) -> [f64; 8] {
 /// Derivatives of the shape functions with respect to `(xi, eta)`.
 pub fn shape_gradient(xi: f64, eta: f64) -> [[f64; 2]; 8] {
     let corner = |a: f64, b: f64| {
-        [
-            0.25 * a * (1.0 + b * eta) * (2.0 * a * xi + b * eta),
-            0.25 * b * (1.0 + a * xi) * (a * xi + 2.0 * b * eta),
-        ]
+        [0.25 * a * (1.0 + b * eta) * (2.0 * a * xi + b * eta), 0.25 * b * (1.0 + a * xi) * (a * xi + 2.0 * b * eta)]
     };
     [
         corner(-1.0, -1.0),
@@ -319,8 +316,7 @@ mod tests {
             let (mut up, mut down) = (u, u);
             up[i] += step;
             down[i] -= step;
-            let slope =
-                (strain_energy(&points, &STEEL, &up) - strain_energy(&points, &STEEL, &down)) / (2.0 * step);
+            let slope = (strain_energy(&points, &STEEL, &up) - strain_energy(&points, &STEEL, &down)) / (2.0 * step);
             assert!((slope - f[i]).abs() < 1e-5 * STEEL.mu, "force {i}: {slope} against {}", f[i]);
             let (mut f_up, mut f_down) = ([0.0; 16], [0.0; 16]);
             add_internal_force(&points, &STEEL, &up, &mut f_up);

@@ -88,10 +88,8 @@ impl BoreContact {
         let foot = |x: [f64; 2]| -> OutlineFoot {
             let local = [cos_g * x[0] + sin_g * x[1], cos_g * x[1] - sin_g * x[0]];
             let mut foot = outline.nearest(local);
-            foot.normal = [
-                cos_g * foot.normal[0] - sin_g * foot.normal[1],
-                sin_g * foot.normal[0] + cos_g * foot.normal[1],
-            ];
+            foot.normal =
+                [cos_g * foot.normal[0] - sin_g * foot.normal[1], sin_g * foot.normal[0] + cos_g * foot.normal[1]];
             foot
         };
         for (edge, nodes) in self.edges.iter().enumerate() {
@@ -105,14 +103,8 @@ impl BoreContact {
             if !near {
                 continue;
             }
-            let mut contact = BorePressure {
-                edge,
-                force: [0.0; 6],
-                stiffness: [0.0; 21],
-                moment: 0.0,
-                peak: 0.0,
-                energy: 0.0,
-            };
+            let mut contact =
+                BorePressure { edge, force: [0.0; 6], stiffness: [0.0; 21], moment: 0.0, peak: 0.0, energy: 0.0 };
             let mut touching = false;
             for (offset, weight, n) in &self.points {
                 let (s, c) = (middle + offset).sin_cos();

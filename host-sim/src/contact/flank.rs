@@ -13,8 +13,8 @@
 use crate::element::edge_shape;
 use crate::mesh::{FlankMesh, Side, WheelMesh};
 
-use crate::drive::{Foot, InvoluteFlank};
 use super::quadrature::gauss_legendre;
+use crate::drive::{Foot, InvoluteFlank};
 
 /// Law of the flanks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -161,8 +161,10 @@ impl<'a> FlankContact<'a> {
         for tooth in 0..self.fs_mesh.teeth {
             for side in Side::BOTH {
                 // The space whose axis is nearest to the tip of the flank.
-                let flank = &self.fs_mesh.flanks[side.index()];
-                let tip = self.fs_mesh.node(tooth as isize, flank.nodes[flank.nodes.len() - 1]);
+                let Some(&tip) = self.fs_mesh.flanks[side.index()].nodes.last() else {
+                    continue;
+                };
+                let tip = self.fs_mesh.node(tooth as isize, tip);
                 let x = self.fs_mesh.nodes[tip];
                 let p = [x[0] + at.u[2 * tip], x[1] + at.u[2 * tip + 1]];
                 if p[0].hypot(p[1]) < self.space.tip_radius - 0.05 {
@@ -337,7 +339,13 @@ impl<'a> FlankContact<'a> {
     }
 
     /// Sets where each point stood at the start of the increment, for friction.
-    pub fn start_friction(&self, pair: FlankPair, at: Configuration, history: &FrictionHistory, points: &mut [FlankPoint]) {
+    pub fn start_friction(
+        &self,
+        pair: FlankPair,
+        at: Configuration,
+        history: &FrictionHistory,
+        points: &mut [FlankPoint],
+    ) {
         let field = self.local_field(pair, at);
         for point in points {
             let (foot, _) = self.foot(pair, &field, point.position, point.edge, &point.shape);
@@ -347,7 +355,13 @@ impl<'a> FlankContact<'a> {
     }
 
     /// Tangential tractions at the end of an increment.
-    pub fn friction_history(&self, pair: FlankPair, at: Configuration, law: FlankLaw, points: &[FlankPoint]) -> FrictionHistory {
+    pub fn friction_history(
+        &self,
+        pair: FlankPair,
+        at: Configuration,
+        law: FlankLaw,
+        points: &[FlankPoint],
+    ) -> FrictionHistory {
         let field = self.local_field(pair, at);
         points
             .iter()
@@ -360,7 +374,13 @@ impl<'a> FlankContact<'a> {
     }
 
     /// Forces and tangent of a pair.
-    pub fn evaluate(&self, pair: FlankPair, at: Configuration, law: FlankLaw, points: &[FlankPoint]) -> Option<PairContribution> {
+    pub fn evaluate(
+        &self,
+        pair: FlankPair,
+        at: Configuration,
+        law: FlankLaw,
+        points: &[FlankPoint],
+    ) -> Option<PairContribution> {
         let field = self.local_field(pair, at);
         let (nf, nc) = (field.fs.len(), field.cs.len());
         let n = 2 * (nf + nc);
@@ -404,8 +424,7 @@ impl<'a> FlankContact<'a> {
             } else {
                 0.0
             };
-            let direction =
-                [foot.normal[0] - slope * foot.tangent[0], foot.normal[1] - slope * foot.tangent[1]];
+            let direction = [foot.normal[0] - slope * foot.tangent[0], foot.normal[1] - slope * foot.tangent[1]];
             let (friction, stick) = traction(law, pressure, point, foot.arc);
 
             // Derivative of the gap (or of the slip) with respect to the twelve nodal unknowns and the output angle.
@@ -428,9 +447,8 @@ impl<'a> FlankContact<'a> {
             let (s, s_output) = gradient(foot.tangent);
             let normal_load = pressure * point.weight;
             let tangential_load = friction * point.weight;
-            let index: [usize; 12] = std::array::from_fn(|i| {
-                if i < 6 { 2 * (2 * point.edge) + i } else { 2 * (nf + 2 * cs_edge) + i - 6 }
-            });
+            let index: [usize; 12] =
+                std::array::from_fn(|i| if i < 6 { 2 * (2 * point.edge) + i } else { 2 * (nf + 2 * cs_edge) + i - 6 });
             let (kn, kt) = (law.stiffness * point.weight, stick * point.weight);
             for i in 0..12 {
                 out.force[index[i]] += normal_load * g[i] - tangential_load * s[i];

@@ -12,5 +12,7 @@ mod flank;
 mod quadrature;
 
 pub use bore::{BoreContact, BoreLaw, BorePressure};
-pub use flank::{Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPoint, FrictionHistory, PairContribution};
+pub use flank::{
+    Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPoint, FrictionHistory, PairContribution,
+};
 pub use quadrature::gauss_legendre;

@@ -24,19 +24,13 @@ pub struct Problem {
 impl Problem {
     /// A problem of `field`, its place not known yet.
     pub fn of(field: &str, what: impl Into<String>) -> Self {
-        Problem {
-            place: String::new(),
-            field: field.to_owned(),
-            what: what.into(),
-        }
+        Problem { place: String::new(), field: field.to_owned(), what: what.into() }
     }
 }
 
 impl From<Problem> for DriveError {
     fn from(problem: Problem) -> Self {
-        DriveError {
-            problems: vec![problem],
-        }
+        DriveError { problems: vec![problem] }
     }
 }
 
@@ -52,9 +46,5 @@ impl fmt::Display for Problem {
 }
 
 fn lines(problems: &[Problem]) -> String {
-    problems
-        .iter()
-        .map(Problem::to_string)
-        .collect::<Vec<_>>()
-        .join("\n")
+    problems.iter().map(Problem::to_string).collect::<Vec<_>>().join("\n")
 }

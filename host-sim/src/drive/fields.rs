@@ -32,11 +32,7 @@ impl Range {
     /// Why `number` is refused, if it is.
     pub fn refusal(&self, number: f64) -> Option<String> {
         // false for NaN
-        let high_enough = if self.above {
-            number > self.low
-        } else {
-            number >= self.low
-        };
+        let high_enough = if self.above { number > self.low } else { number >= self.low };
         let inside = high_enough && number <= self.high;
         (!inside).then(|| format!("found {number}, allowed: {self}"))
     }
@@ -50,19 +46,11 @@ impl std::fmt::Display for Range {
 }
 
 const fn from(low: f64, high: f64) -> Range {
-    Range {
-        low,
-        high,
-        above: false,
-    }
+    Range { low, high, above: false }
 }
 
 const fn above(low: f64, high: f64) -> Range {
-    Range {
-        low,
-        high,
-        above: true,
-    }
+    Range { low, high, above: true }
 }
 
 macro_rules! fields {

@@ -39,10 +39,7 @@ impl Drive {
     }
 
     /// This drive with several fields changed, checked once all of them are.
-    pub fn with_sets<'a>(
-        &self,
-        assignments: impl IntoIterator<Item = &'a str>,
-    ) -> Result<Drive, DriveError> {
+    pub fn with_sets<'a>(&self, assignments: impl IntoIterator<Item = &'a str>) -> Result<Drive, DriveError> {
         let mut drive = self.clone();
         for assignment in assignments {
             drive.set(assignment).map_err(|mut problem| {
@@ -61,20 +58,15 @@ impl Drive {
 
     fn set(&mut self, assignment: &str) -> Result<(), Problem> {
         let Some((path, text)) = assignment.split_once('=') else {
-            return Err(Problem::of(
-                "",
-                "expected PATH=VALUE, for instance flexspline.rim_thickness_mm=2",
-            ));
+            return Err(Problem::of("", "expected PATH=VALUE, for instance flexspline.rim_thickness_mm=2"));
         };
         let (path, text) = (path.trim(), text.trim());
         if path == "name" {
             self.name = text.trim_matches('"').to_owned();
             return Ok(());
         }
-        let field = fields::ALL
-            .iter()
-            .find(|field| field.path == path)
-            .ok_or_else(|| Problem::of(path, unknown_path(path)))?;
+        let field =
+            fields::ALL.iter().find(|field| field.path == path).ok_or_else(|| Problem::of(path, unknown_path(path)))?;
         // a bare word is a string
         match DeValue::parse(text) {
             Ok(value) => field.put(self, value.get_ref()),
@@ -93,9 +85,7 @@ impl Drive {
             cold = self.at_temperature(self.temperature.reference_c);
             &cold
         };
-        let mut text = String::from(
-            "# A harmonic drive: flexspline fixed, circular spline the output, two waves.\n",
-        );
+        let mut text = String::from("# A harmonic drive: flexspline fixed, circular spline the output, two waves.\n");
         let _ = writeln!(text, "name = {}", toml::Value::String(drive.name.clone()));
         let mut open = "";
         fields::for_each(drive, |field, value| {
@@ -109,12 +99,7 @@ impl Drive {
                 Some(number) if field.is_count() => format!("{number}"),
                 Some(number) => format!("{number:?}"),
             };
-            let _ = writeln!(
-                text,
-                "{:<44} # {}",
-                format!("{key} = {value}"),
-                field.meaning
-            );
+            let _ = writeln!(text, "{:<44} # {}", format!("{key} = {value}"), field.meaning);
         });
         text
     }
@@ -136,13 +121,10 @@ impl Field {
                 Some(number) => *slot = Some(self.in_range(number)?),
                 None => return Err(found() + &format!("{} or \"rigid\"", self.range)),
             },
-            Slot::Real(slot) => {
-                *slot = self.in_range(number.ok_or_else(|| found() + &self.range.to_string())?)?
-            }
+            Slot::Real(slot) => *slot = self.in_range(number.ok_or_else(|| found() + &self.range.to_string())?)?,
             Slot::Count(slot) => {
                 let whole = number.filter(|_| value.is_integer());
-                let whole =
-                    whole.ok_or_else(|| found() + &format!("a whole number, {}", self.range))?;
+                let whole = whole.ok_or_else(|| found() + &format!("a whole number, {}", self.range))?;
                 *slot = self.in_range(whole)? as u32;
             }
         }
@@ -166,45 +148,21 @@ struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     fn new(file_name: &'a str, text: &'a str) -> Self {
-        Reader {
-            file_name,
-            text,
-            problems: Vec::new(),
-            lines: HashMap::new(),
-        }
+        Reader { file_name, text, problems: Vec::new(), lines: HashMap::new() }
     }
 
     fn line(&self, byte: usize) -> usize {
-        1 + self
-            .text
-            .as_bytes()
-            .iter()
-            .take(byte)
-            .filter(|&&b| b == b'\n')
-            .count()
+        1 + self.text.as_bytes().iter().take(byte).filter(|&&b| b == b'\n').count()
     }
 
     fn refuse(&mut self, at: Range<usize>, field: &str, what: String) {
         let place = format!("{}:{}", self.file_name, self.line(at.start));
-        self.problems.push((
-            at.start,
-            Problem {
-                place,
-                field: field.to_owned(),
-                what,
-            },
-        ));
+        self.problems.push((at.start, Problem { place, field: field.to_owned(), what }));
     }
 
     fn finish(mut self) -> DriveError {
         self.problems.sort_by_key(|(at, _)| *at);
-        DriveError {
-            problems: self
-                .problems
-                .into_iter()
-                .map(|(_, problem)| problem)
-                .collect(),
-        }
+        DriveError { problems: self.problems.into_iter().map(|(_, problem)| problem).collect() }
     }
 
     fn read(mut self, table: &DeTable) -> Result<Drive, DriveError> {
@@ -221,13 +179,7 @@ impl<'a> Reader<'a> {
         let mut drive = base.unwrap_or_else(Drive::hhd_95);
         drive.name = match self.text_of(table, "name") {
             Some((_, name)) => name,
-            None => self
-                .file_name
-                .rsplit(['/', '\\'])
-                .next()
-                .unwrap_or_default()
-                .trim_end_matches(".toml")
-                .to_owned(),
+            None => self.file_name.rsplit(['/', '\\']).next().unwrap_or_default().trim_end_matches(".toml").to_owned(),
         };
         for (key, value) in table {
             let section = key.get_ref().as_ref();
@@ -245,10 +197,7 @@ impl<'a> Reader<'a> {
             match value.get_ref().as_table() {
                 Some(entries) => self.read_section(section, entries, &mut drive),
                 None => {
-                    let what = format!(
-                        "found {}, allowed: a table [{section}]",
-                        shown(value.get_ref())
-                    );
+                    let what = format!("found {}, allowed: a table [{section}]", shown(value.get_ref()));
                     self.refuse(value.span(), section, what);
                 }
             }
@@ -293,11 +242,7 @@ impl<'a> Reader<'a> {
         match value.get_ref().as_str() {
             Some(text) => Some((value.span(), text.to_owned())),
             None => {
-                self.refuse(
-                    value.span(),
-                    key,
-                    format!("found {}, allowed: a string", shown(value.get_ref())),
-                );
+                self.refuse(value.span(), key, format!("found {}, allowed: a string", shown(value.get_ref())));
                 None
             }
         }
@@ -308,19 +253,9 @@ impl<'a> Reader<'a> {
         for field in fields::ALL {
             let optional = matches!(field.slot(&mut Drive::hhd_95()), Slot::RealOrRigid(_));
             if !optional && !self.lines.contains_key(field.path) {
-                let what = format!(
-                    "missing ({}); give it, or a base = \"HHD-95\" to start from",
-                    field.meaning
-                );
+                let what = format!("missing ({}); give it, or a base = \"HHD-95\" to start from", field.meaning);
                 let place = self.file_name.to_owned();
-                self.problems.push((
-                    at,
-                    Problem {
-                        place,
-                        field: field.path.to_owned(),
-                        what,
-                    },
-                ));
+                self.problems.push((at, Problem { place, field: field.path.to_owned(), what }));
             }
         }
     }
@@ -328,38 +263,25 @@ impl<'a> Reader<'a> {
 
 fn sections() -> impl Iterator<Item = &'static str> {
     let mut last = "";
-    fields::ALL
-        .iter()
-        .map(|field| field.split().0)
-        .filter(move |&section| {
-            let new = section != last;
-            last = section;
-            new
-        })
+    fields::ALL.iter().map(|field| field.split().0).filter(move |&section| {
+        let new = section != last;
+        last = section;
+        new
+    })
 }
 
 /// What to say of a path that is no field.
 fn unknown_path(path: &str) -> String {
     let (section, key) = path.split_once('.').unwrap_or(("", path));
-    let known: Vec<&str> = fields::ALL
-        .iter()
-        .map(Field::split)
-        .filter(|(s, _)| *s == section)
-        .map(|(_, key)| key)
-        .collect();
+    let known: Vec<&str> =
+        fields::ALL.iter().map(Field::split).filter(|(s, _)| *s == section).map(|(_, key)| key).collect();
     if known.is_empty() {
         if let Some(field) = fields::ALL.iter().find(|field| field.split().1 == key) {
             return format!("unknown key; did you mean {:?}?", field.path);
         }
-        return format!(
-            "unknown key{}",
-            did_you_mean(path, fields::ALL.iter().map(|field| field.path))
-        );
+        return format!("unknown key{}", did_you_mean(path, fields::ALL.iter().map(|field| field.path)));
     }
-    let elsewhere = fields::ALL
-        .iter()
-        .map(Field::split)
-        .find(|(s, k)| *k == key && *s != section);
+    let elsewhere = fields::ALL.iter().map(Field::split).find(|(s, k)| *k == key && *s != section);
     let hint = match elsewhere {
         Some((other, _)) => format!("; it belongs to [{other}]"),
         None => did_you_mean(key, known.iter().copied()),
@@ -376,18 +298,14 @@ fn did_you_mean(found: &str, known: impl IntoIterator<Item = &'static str>) -> S
         .map(|name| (strsim::jaro_winkler(found, name), name))
         .filter(|(likeness, _)| *likeness > LIKELY)
         .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or(String::new(), |(_, name)| {
-            format!("; did you mean {name:?}?")
-        })
+        .map_or(String::new(), |(_, name)| format!("; did you mean {name:?}?"))
 }
 
 /// The number of a TOML value, if it is one.
 fn number(value: &DeValue) -> Option<f64> {
     match value {
         DeValue::Integer(integer) => {
-            i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix())
-                .ok()
-                .map(|n| n as f64)
+            i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix()).ok().map(|n| n as f64)
         }
         DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
         _ => None,
@@ -440,12 +358,10 @@ mod tests {
         let plain = Drive::from_toml("a.toml", "base = \"HHD-95\"").unwrap();
         assert_eq!(plain.name, "a");
         assert_eq!(plain.hash(), Drive::hhd_95().hash());
-        let text = "base = 'HHD-95' # as built\nname = \"b\"\ngenerator.w0_mm = 5_00e-3\nmaterial = { poissons_ratio = 0.29 }";
+        let text =
+            "base = 'HHD-95' # as built\nname = \"b\"\ngenerator.w0_mm = 5_00e-3\nmaterial = { poissons_ratio = 0.29 }";
         let drive = Drive::from_toml("b.toml", text).unwrap();
-        assert_eq!(
-            (drive.name.as_str(), drive.material.poissons_ratio),
-            ("b", 0.29)
-        );
+        assert_eq!((drive.name.as_str(), drive.material.poissons_ratio), ("b", 0.29));
         assert_ne!(drive.hash(), plain.hash());
         let same = plain.with_set("material.poissons_ratio=0.29").unwrap();
         assert_eq!(same.hash(), drive.hash());
@@ -459,13 +375,9 @@ mod tests {
         let drive = Drive::from_toml("c.toml", text).unwrap();
         assert_eq!(drive.sleeve.torsion_stiffness_n_m_per_rad, None);
         assert_eq!(drive.generator.bearing_stiffness_n_per_mm3, Some(170.0));
-        let soft = Drive::hhd_95()
-            .with_set("sleeve.torsion_stiffness_n_m_per_rad = 4.6e5")
-            .unwrap();
+        let soft = Drive::hhd_95().with_set("sleeve.torsion_stiffness_n_m_per_rad = 4.6e5").unwrap();
         assert_eq!(soft.sleeve.torsion_stiffness_n_m_per_rad, Some(4.6e5));
-        let back = soft
-            .with_set("sleeve.torsion_stiffness_n_m_per_rad=rigid")
-            .unwrap();
+        let back = soft.with_set("sleeve.torsion_stiffness_n_m_per_rad=rigid").unwrap();
         assert_eq!(back, Drive::hhd_95());
     }
 
@@ -473,22 +385,13 @@ mod tests {
     fn every_wrong_file_gets_its_own_message() {
         // body on top of base = "HHD-95" (line 1), and the start of the whole message
         let cases = [
-            (
-                "[flexspline]\nteeth = 187",
-                "wrong.toml:3: flexspline.teeth: found 187, allowed: an even number",
-            ),
+            ("[flexspline]\nteeth = 187", "wrong.toml:3: flexspline.teeth: found 187, allowed: an even number"),
             (
                 "[flexspline]\nteeth = 188.0",
                 "wrong.toml:3: flexspline.teeth: found 188.0, allowed: a whole number, 20 to 2000",
             ),
-            (
-                "[flexspline]\nteeth = 4",
-                "wrong.toml:3: flexspline.teeth: found 4, allowed: 20 to 2000",
-            ),
-            (
-                "[flexspline]\nteeth = -188",
-                "wrong.toml:3: flexspline.teeth: found -188, allowed: 20 to 2000",
-            ),
+            ("[flexspline]\nteeth = 4", "wrong.toml:3: flexspline.teeth: found 4, allowed: 20 to 2000"),
+            ("[flexspline]\nteeth = -188", "wrong.toml:3: flexspline.teeth: found -188, allowed: 20 to 2000"),
             (
                 "[circular_spline]\nteeth = 192",
                 "wrong.toml:3: circular_spline.teeth: found 192, allowed: 190, two more",
@@ -505,14 +408,8 @@ mod tests {
                 "[flexspline]\nprofile_shift = nan",
                 "wrong.toml:3: flexspline.profile_shift: found NaN, allowed: -2 to 10",
             ),
-            (
-                "[flexspline]\nwidth_mm = inf",
-                "wrong.toml:3: flexspline.width_mm: found inf, allowed: above 0 to 1000",
-            ),
-            (
-                "[flexspline]\nwidth_mm = 0",
-                "wrong.toml:3: flexspline.width_mm: found 0, allowed: above 0 to 1000",
-            ),
+            ("[flexspline]\nwidth_mm = inf", "wrong.toml:3: flexspline.width_mm: found inf, allowed: above 0 to 1000"),
+            ("[flexspline]\nwidth_mm = 0", "wrong.toml:3: flexspline.width_mm: found 0, allowed: above 0 to 1000"),
             (
                 "[flexspline]\npressure_angle_deg = 0.349",
                 "wrong.toml:3: flexspline.pressure_angle_deg: found 0.349, allowed: 10 to 35",
@@ -581,10 +478,7 @@ mod tests {
                 "[generator]\nw0_mm = 0.05",
                 "wrong.toml:3: generator.w0_mm: found 0.05: with the two-roller generator the tips meet at the minor axis",
             ),
-            (
-                "[generator]\nw0_mm = 3.0",
-                "wrong.toml:3: generator.w0_mm: found 3, allowed: up to 2.3638",
-            ),
+            ("[generator]\nw0_mm = 3.0", "wrong.toml:3: generator.w0_mm: found 3, allowed: up to 2.3638"),
             (
                 "[generator]\nroller_diameter_mm = 40",
                 "wrong.toml:3: generator.roller_diameter_mm: 40 mm is too large for the four-roller generator",
@@ -633,31 +527,13 @@ mod tests {
                 "[temperature]\nflexspline_expansion_per_k = 11.5",
                 "wrong.toml:3: temperature.flexspline_expansion_per_k: found 11.5, allowed: -0.00001 to 0.0001",
             ),
-            (
-                "[flexpline]\nteeth = 188",
-                "wrong.toml:2: flexpline: unknown key; did you mean \"flexspline\"?",
-            ),
+            ("[flexpline]\nteeth = 188", "wrong.toml:2: flexpline: unknown key; did you mean \"flexspline\"?"),
             ("[qqq]\nteeth = 188", "wrong.toml:2: qqq: unknown key"),
-            (
-                "friction_coefficient = 0.1",
-                "wrong.toml:2: friction_coefficient: unknown key; it belongs to [flanks]",
-            ),
-            (
-                "sleeve = 4.6e5",
-                "wrong.toml:2: sleeve: found 4.6e5, allowed: a table [sleeve]",
-            ),
-            (
-                "name = 95",
-                "wrong.toml:2: name: found 95, allowed: a string",
-            ),
-            (
-                "[flexspline]\nteeth = 188\nteeth = 188",
-                "wrong.toml:4: not TOML: duplicate key",
-            ),
-            (
-                "[flexspline\nteeth = 188",
-                "wrong.toml:2: not TOML: unclosed table",
-            ),
+            ("friction_coefficient = 0.1", "wrong.toml:2: friction_coefficient: unknown key; it belongs to [flanks]"),
+            ("sleeve = 4.6e5", "wrong.toml:2: sleeve: found 4.6e5, allowed: a table [sleeve]"),
+            ("name = 95", "wrong.toml:2: name: found 95, allowed: a string"),
+            ("[flexspline]\nteeth = 188\nteeth = 188", "wrong.toml:4: not TOML: duplicate key"),
+            ("[flexspline\nteeth = 188", "wrong.toml:2: not TOML: unclosed table"),
             ("[flexspline]\nteeth = ", "wrong.toml:3: not TOML: "),
         ];
         let mut seen = std::collections::HashSet::new();
@@ -673,29 +549,20 @@ mod tests {
 
     #[test]
     fn a_wrong_base_is_named() {
-        let message = Drive::from_toml("d.toml", "base = \"HHD95\"")
-            .unwrap_err()
-            .to_string();
+        let message = Drive::from_toml("d.toml", "base = \"HHD95\"").unwrap_err().to_string();
         assert_eq!(
             message,
             "d.toml:1: base: found \"HHD95\", allowed: HHD-95, HHD-95-typical; did you mean \"HHD-95\"?"
         );
-        let message = Drive::from_toml("d.toml", "base = 95")
-            .unwrap_err()
-            .to_string();
+        let message = Drive::from_toml("d.toml", "base = 95").unwrap_err().to_string();
         assert_eq!(message, "d.toml:1: base: found 95, allowed: a string");
     }
 
     #[test]
     fn without_a_base_every_missing_field_is_named() {
         let text = Drive::hhd_95().to_toml();
-        let error = Drive::from_toml(
-            "e.toml",
-            &text
-                .replace("rim_thickness_mm", "# ")
-                .replace("w0_mm", "# "),
-        )
-        .unwrap_err();
+        let error =
+            Drive::from_toml("e.toml", &text.replace("rim_thickness_mm", "# ").replace("w0_mm", "# ")).unwrap_err();
         assert_eq!(
             error.to_string(),
             "e.toml: flexspline.rim_thickness_mm: missing (rim under the root circle, mm); give it, or a base = \"HHD-95\" \
@@ -706,57 +573,30 @@ mod tests {
         let rigid = 2;
         assert_eq!(empty.problems.len(), fields::ALL.len() - rigid);
         // a stiffness that is not there is rigid
-        let text = text
-            .replace("bearing_stiffness_n_per_mm3", "# ")
-            .replace("torsion_stiffness_n_m_per_rad", "# ");
+        let text = text.replace("bearing_stiffness_n_per_mm3", "# ").replace("torsion_stiffness_n_m_per_rad", "# ");
         assert_eq!(Drive::from_toml("g.toml", &text).unwrap(), Drive::hhd_95());
     }
 
     #[test]
     fn all_problems_are_told_in_the_order_of_the_file() {
-        let error =
-            refused("[material]\npoissons_ratio = 0.7\n[flexspline]\nteeths = 188\nwidth_mm = 0");
+        let error = refused("[material]\npoissons_ratio = 0.7\n[flexspline]\nteeths = 188\nwidth_mm = 0");
         let lines: Vec<&str> = error.lines().collect();
         assert_eq!(lines.len(), 3, "{error}");
         assert!(lines[0].starts_with("wrong.toml:3: material.poissons_ratio"));
-        assert!(
-            lines[1].starts_with(
-                "wrong.toml:5: flexspline.teeths: unknown key; did you mean \"teeth\"?"
-            )
-        );
+        assert!(lines[1].starts_with("wrong.toml:5: flexspline.teeths: unknown key; did you mean \"teeth\"?"));
         assert!(lines[2].starts_with("wrong.toml:6: flexspline.width_mm"));
     }
 
     #[test]
     fn wrong_overrides_are_named() {
-        let set = |assignment: &str| {
-            Drive::hhd_95()
-                .with_set(assignment)
-                .unwrap_err()
-                .to_string()
-        };
+        let set = |assignment: &str| Drive::hhd_95().with_set(assignment).unwrap_err().to_string();
         assert!(set("teeth").starts_with("--set teeth: expected PATH=VALUE"));
-        assert!(
-            set("flexspline.teeths=3")
-                .contains("flexspline.teeths: unknown key; did you mean \"teeth\"?")
-        );
+        assert!(set("flexspline.teeths=3").contains("flexspline.teeths: unknown key; did you mean \"teeth\"?"));
         assert!(set("w0_mm=0.4").contains("w0_mm: unknown key; did you mean \"generator.w0_mm\"?"));
-        assert!(
-            set("generator.w0_mm=abc")
-                .ends_with("generator.w0_mm: found \"abc\", allowed: above 0 to 20")
-        );
-        assert!(
-            set("flexspline.teeth=186")
-                .starts_with("--set: circular_spline.teeth: found 190, allowed: 188")
-        );
+        assert!(set("generator.w0_mm=abc").ends_with("generator.w0_mm: found \"abc\", allowed: above 0 to 20"));
+        assert!(set("flexspline.teeth=186").starts_with("--set: circular_spline.teeth: found 190, allowed: 188"));
         let both = ["flexspline.teeth=186", "circular_spline.teeth=190"];
-        assert!(
-            Drive::hhd_95()
-                .with_sets(both)
-                .unwrap_err()
-                .to_string()
-                .contains("found 190, allowed: 188")
-        );
+        assert!(Drive::hhd_95().with_sets(both).unwrap_err().to_string().contains("found 190, allowed: 188"));
         assert_eq!(Drive::hhd_95().with_set("name=mine").unwrap().name, "mine");
     }
 }

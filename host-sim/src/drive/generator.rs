@@ -57,20 +57,13 @@ impl GeneratorOutline {
         let roller = 0.5 * generator.roller_diameter_mm;
         let contour = match kind {
             GeneratorKind::Cam => Contour::Cam,
-            GeneratorKind::TwoRoller => Contour::Circles {
-                x: neutral.polar(0.0)[0] - offset - roller,
-                y: 0.0,
-                radius: roller,
-            },
+            GeneratorKind::TwoRoller => {
+                Contour::Circles { x: neutral.polar(0.0)[0] - offset - roller, y: 0.0, radius: roller }
+            }
             GeneratorKind::FourRoller => {
-                let ([x, y], normal) =
-                    neutral.position(generator.four_roller_angle_deg.to_radians());
+                let ([x, y], normal) = neutral.position(generator.four_roller_angle_deg.to_radians());
                 let inward = offset + roller;
-                Contour::Circles {
-                    x: x - inward * normal.cos(),
-                    y: y - inward * normal.sin(),
-                    radius: roller,
-                }
+                Contour::Circles { x: x - inward * normal.cos(), y: y - inward * normal.sin(), radius: roller }
             }
             GeneratorKind::DoubleDisc => {
                 // A circle with its centre on the major axis, through the bore there, and as large as the bore lets it
@@ -83,19 +76,11 @@ impl GeneratorOutline {
                 };
                 let g = generator.disc_half_angle_deg.to_radians();
                 let radius = least(through, 0.8 * g, g + 10f64.to_radians());
-                Contour::Circles {
-                    x: vertex - radius,
-                    y: 0.0,
-                    radius,
-                }
+                Contour::Circles { x: vertex - radius, y: 0.0, radius }
             }
         };
         if let Contour::Circles { x, y, radius } = contour {
-            let apart = if kind == GeneratorKind::FourRoller {
-                x.min(y)
-            } else {
-                x
-            };
+            let apart = if kind == GeneratorKind::FourRoller { x.min(y) } else { x };
             let rollers = matches!(kind, GeneratorKind::TwoRoller | GeneratorKind::FourRoller);
             if rollers && apart <= radius {
                 return Err(Problem::of(
@@ -111,13 +96,7 @@ impl GeneratorOutline {
                 .into());
             }
         }
-        Ok(GeneratorOutline {
-            kind,
-            neutral,
-            offset,
-            scale: drive.thermal_state.generator_scale,
-            contour,
-        })
+        Ok(GeneratorOutline { kind, neutral, offset, scale: drive.thermal_state.generator_scale, contour })
     }
 
     /// Which generator this is.
@@ -134,9 +113,7 @@ impl GeneratorOutline {
     pub fn circle(&self) -> Option<([f64; 2], f64)> {
         match self.contour {
             Contour::Cam => None,
-            Contour::Circles { x, y, radius } => {
-                Some(([x * self.scale, y * self.scale], radius * self.scale))
-            }
+            Contour::Circles { x, y, radius } => Some(([x * self.scale, y * self.scale], radius * self.scale)),
         }
     }
 
@@ -150,16 +127,8 @@ impl GeneratorOutline {
                 let dx = px - x.copysign(px);
                 let dy = py - if y == 0.0 { 0.0 } else { y.copysign(py) };
                 let length = dx.hypot(dy);
-                let normal = if length > 0.0 {
-                    [dx / length, dy / length]
-                } else {
-                    [1.0, 0.0]
-                };
-                OutlineFoot {
-                    distance: (length - radius) * s,
-                    normal,
-                    curvature: 1.0 / (radius * s),
-                }
+                let normal = if length > 0.0 { [dx / length, dy / length] } else { [1.0, 0.0] };
+                OutlineFoot { distance: (length - radius) * s, normal, curvature: 1.0 / (radius * s) }
             }
             Contour::Cam => {
                 let alpha = self.foot_on_neutral(px, py);
@@ -183,23 +152,14 @@ impl GeneratorOutline {
         let turn = |k: usize| TAU * k as f64 / points as f64;
         match self.contour {
             Contour::Cam => {
-                let bore =
-                    |k| bore_point(&self.neutral, self.offset, turn(k)).map(|v| v * self.scale);
+                let bore = |k| bore_point(&self.neutral, self.offset, turn(k)).map(|v| v * self.scale);
                 vec![(0..points).map(bore).collect()]
             }
             Contour::Circles { x, y, radius } => {
-                let centres: Vec<[f64; 2]> = if y == 0.0 {
-                    vec![[x, 0.0], [-x, 0.0]]
-                } else {
-                    vec![[x, y], [-x, y], [-x, -y], [x, -y]]
-                };
+                let centres: Vec<[f64; 2]> =
+                    if y == 0.0 { vec![[x, 0.0], [-x, 0.0]] } else { vec![[x, y], [-x, y], [-x, -y], [x, -y]] };
                 let circle = |[x, y]: [f64; 2]| {
-                    let on = |k| {
-                        [
-                            x + radius * f64::cos(turn(k)),
-                            y + radius * f64::sin(turn(k)),
-                        ]
-                    };
+                    let on = |k| [x + radius * f64::cos(turn(k)), y + radius * f64::sin(turn(k))];
                     (0..points).map(|k| on(k).map(|v| v * self.scale)).collect()
                 };
                 centres.into_iter().map(circle).collect()
@@ -247,9 +207,7 @@ impl GeneratorOutline {
             (px - r * alpha.cos()).powi(2) + (py - r * alpha.sin()).powi(2)
         };
         let at = |k: usize| TAU * k as f64 / SCAN as f64;
-        let best = (0..SCAN)
-            .min_by(|&i, &j| squared(at(i)).total_cmp(&squared(at(j))))
-            .unwrap_or(0);
+        let best = (0..SCAN).min_by(|&i, &j| squared(at(i)).total_cmp(&squared(at(j)))).unwrap_or(0);
         let (mut low, mut high) = (at(best) - at(1), at(best) + at(1));
         // (p - P)·P' falls through zero at the closest point
         for _ in 0..60 {
@@ -269,12 +227,8 @@ impl super::spec::Generators {
     pub fn shape(&self, kind: GeneratorKind) -> RingShape {
         match kind {
             GeneratorKind::TwoRoller => RingShape::two_roller(self.w0_mm),
-            GeneratorKind::FourRoller => {
-                RingShape::four_roller(self.w0_mm, self.four_roller_angle_deg.to_radians())
-            }
-            GeneratorKind::DoubleDisc => {
-                RingShape::double_disc(self.w0_mm, self.disc_half_angle_deg.to_radians())
-            }
+            GeneratorKind::FourRoller => RingShape::four_roller(self.w0_mm, self.four_roller_angle_deg.to_radians()),
+            GeneratorKind::DoubleDisc => RingShape::double_disc(self.w0_mm, self.disc_half_angle_deg.to_radians()),
             GeneratorKind::Cam => RingShape::cam(self.w0_mm),
         }
     }
@@ -317,28 +271,16 @@ mod tests {
     fn sizes_of_the_default_design() {
         let circle = |kind| outline(kind).circle().unwrap();
         let ([x, _], radius) = circle(GeneratorKind::TwoRoller);
-        assert!(
-            (x - 34.170).abs() < 5e-4 && radius == 13.0,
-            "two-roller at {x}"
-        );
+        assert!((x - 34.170).abs() < 5e-4 && radius == 13.0, "two-roller at {x}");
         let ([x, y], _) = circle(GeneratorKind::FourRoller);
-        assert!(
-            (x - 29.608).abs() < 5e-4 && (y - 16.633).abs() < 5e-4,
-            "four-roller at {x}, {y}"
-        );
+        assert!((x - 29.608).abs() < 5e-4 && (y - 16.633).abs() < 5e-4, "four-roller at {x}, {y}");
         // the reference figures 1.667 and 45.503, rounded, stand 0.64 µm proud at the vertex
         let ([x, _], radius) = circle(GeneratorKind::DoubleDisc);
-        assert!(
-            (x - 1.667).abs() < 5e-4 && (x + radius - 47.1694).abs() < 5e-5,
-            "disc {x} {radius}"
-        );
+        assert!((x - 1.667).abs() < 5e-4 && (x + radius - 47.1694).abs() < 5e-5, "disc {x} {radius}");
         let cam = outline(GeneratorKind::Cam);
         let major = cam.nearest([50.0, 0.0]).distance;
         let minor = cam.nearest([0.0, 50.0]).distance;
-        assert!(
-            (50.0 - major - 47.1697).abs() < 5e-5 && (50.0 - minor - 46.1697).abs() < 5e-5,
-            "{major} {minor}"
-        );
+        assert!((50.0 - major - 47.1697).abs() < 5e-5 && (50.0 - minor - 46.1697).abs() < 5e-5, "{major} {minor}");
     }
 
     #[test]
@@ -347,17 +289,11 @@ mod tests {
             let mut drive = Drive::hhd_95();
             drive.generator.four_roller_angle_deg = roller;
             drive.generator.disc_half_angle_deg = disc;
-            GeneratorOutline::new(&drive, kind)
-                .unwrap()
-                .circle()
-                .unwrap()
+            GeneratorOutline::new(&drive, kind).unwrap().circle().unwrap()
         };
         for (angle, x, y) in [(25.0, 30.972, 14.055), (35.0, 28.038, 19.086)] {
             let ([found_x, found_y], _) = circle(GeneratorKind::FourRoller, angle, 30.0);
-            assert!(
-                (found_x - x).abs() < 6e-4 && (found_y - y).abs() < 6e-4,
-                "{angle}: {found_x} {found_y}"
-            );
+            assert!((found_x - x).abs() < 6e-4 && (found_y - y).abs() < 6e-4, "{angle}: {found_x} {found_y}");
         }
         for (angle, e, radius) in [(20.0, 1.837, 45.333), (40.0, 1.549, 45.620)] {
             let ([found_e, _], found_radius) = circle(GeneratorKind::DoubleDisc, 30.0, angle);
@@ -370,11 +306,7 @@ mod tests {
 
     #[test]
     fn discs_and_rollers_do_not_stand_proud_of_the_bore_they_are_made_for() {
-        for kind in [
-            GeneratorKind::TwoRoller,
-            GeneratorKind::FourRoller,
-            GeneratorKind::DoubleDisc,
-        ] {
+        for kind in [GeneratorKind::TwoRoller, GeneratorKind::FourRoller, GeneratorKind::DoubleDisc] {
             for disc in [20.0, 30.0, 40.0] {
                 let mut drive = Drive::hhd_95();
                 drive.generator.disc_half_angle_deg = disc;
@@ -388,10 +320,7 @@ mod tests {
                 assert!(least.abs() < 1e-8, "{kind} {disc}: {least} mm");
                 // 0.5 µm off over the whole arc that the disc should touch
                 let arc = (0..=(100.0 * disc) as u32).map(gap).fold(0.0, f64::max);
-                assert!(
-                    kind != GeneratorKind::DoubleDisc || arc < 5e-4,
-                    "{disc}: {arc} mm"
-                );
+                assert!(kind != GeneratorKind::DoubleDisc || arc < 5e-4, "{disc}: {arc} mm");
             }
         }
     }
@@ -411,10 +340,7 @@ mod tests {
         for p in points() {
             let foot = cam.nearest(p);
             // the foot lies on the cam: its own distance is zero, and its normal the same
-            let q = [
-                p[0] - foot.distance * foot.normal[0],
-                p[1] - foot.distance * foot.normal[1],
-            ];
+            let q = [p[0] - foot.distance * foot.normal[0], p[1] - foot.distance * foot.normal[1]];
             let again = cam.nearest(q);
             assert!(again.distance.abs() < 1e-13, "{p:?}: {}", again.distance);
             let turn = foot.normal[0] * again.normal[1] - foot.normal[1] * again.normal[0];
@@ -431,45 +357,28 @@ mod tests {
             // not on an axis, where the circles of two quadrants meet
             for p in points().skip(1).step_by(97) {
                 let foot = outline.nearest(p);
-                let closest = line
-                    .iter()
-                    .map(|q| (p[0] - q[0]).hypot(p[1] - q[1]))
-                    .fold(f64::INFINITY, f64::min);
+                let closest = line.iter().map(|q| (p[0] - q[0]).hypot(p[1] - q[1])).fold(f64::INFINITY, f64::min);
                 if kind != GeneratorKind::DoubleDisc {
                     // points of the drawing are 15 µm apart; one disc may hide part of the other,
                     // and the drawing still shows it
                     assert!(
-                        closest >= foot.distance.abs() - 1e-9
-                            && closest < foot.distance.hypot(0.01),
+                        closest >= foot.distance.abs() - 1e-9 && closest < foot.distance.hypot(0.01),
                         "{kind} {p:?}: {} {closest}",
                         foot.distance
                     );
                 }
                 let d = |dx, dy| outline.nearest([p[0] + dx, p[1] + dy]).distance;
-                let gradient = [
-                    (d(step, 0.0) - d(-step, 0.0)) / (2.0 * step),
-                    (d(0.0, step) - d(0.0, -step)) / (2.0 * step),
-                ];
+                let gradient =
+                    [(d(step, 0.0) - d(-step, 0.0)) / (2.0 * step), (d(0.0, step) - d(0.0, -step)) / (2.0 * step)];
                 let error = (gradient[0] - foot.normal[0]).hypot(gradient[1] - foot.normal[1]);
                 assert!(error < 1e-8, "{kind} {p:?}: {error}");
                 // along the outline the normal turns by its curvature
-                let q = [
-                    p[0] - foot.distance * foot.normal[0],
-                    p[1] - foot.distance * foot.normal[1],
-                ];
+                let q = [p[0] - foot.distance * foot.normal[0], p[1] - foot.distance * foot.normal[1]];
                 let tangent = [-foot.normal[1], foot.normal[0]];
-                let n = |s: f64| {
-                    outline
-                        .nearest([q[0] + s * tangent[0], q[1] + s * tangent[1]])
-                        .normal
-                };
+                let n = |s: f64| outline.nearest([q[0] + s * tangent[0], q[1] + s * tangent[1]]).normal;
                 let (a, b) = (n(-step), n(step));
                 let turn = (a[0] * b[1] - a[1] * b[0]) / (2.0 * step);
-                assert!(
-                    (turn - foot.curvature).abs() < 1e-6,
-                    "{kind} {p:?}: {turn} {}",
-                    foot.curvature
-                );
+                assert!((turn - foot.curvature).abs() < 1e-6, "{kind} {p:?}: {turn} {}", foot.curvature);
             }
         }
     }
@@ -482,17 +391,10 @@ mod tests {
             for r in [0.01, 0.5, 1.0, 2.0, 10.0, 40.0] {
                 let p = [r * f64::cos(angle), r * f64::sin(angle)];
                 let foot = cam.nearest(p);
-                let q = [
-                    p[0] - foot.distance * foot.normal[0],
-                    p[1] - foot.distance * foot.normal[1],
-                ];
+                let q = [p[0] - foot.distance * foot.normal[0], p[1] - foot.distance * foot.normal[1]];
                 assert!(cam.nearest(q).distance.abs() < 1e-9, "{p:?}");
                 // inside, and no further than the minor axis allows
-                assert!(
-                    foot.distance < 0.0 && foot.distance >= -46.17 - 1e-3,
-                    "{p:?}: {}",
-                    foot.distance
-                );
+                assert!(foot.distance < 0.0 && foot.distance >= -46.17 - 1e-3, "{p:?}: {}", foot.distance);
             }
         }
     }
@@ -502,13 +404,8 @@ mod tests {
         let mut drive = Drive::hhd_95();
         drive.generator.roller_diameter_mm = 40.0;
         assert!(GeneratorOutline::new(&drive, GeneratorKind::TwoRoller).is_ok());
-        let message = GeneratorOutline::new(&drive, GeneratorKind::FourRoller)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            message.starts_with("generator.roller_diameter_mm: 40 mm is too large"),
-            "{message}"
-        );
+        let message = GeneratorOutline::new(&drive, GeneratorKind::FourRoller).unwrap_err().to_string();
+        assert!(message.starts_with("generator.roller_diameter_mm: 40 mm is too large"), "{message}");
     }
 
     #[test]

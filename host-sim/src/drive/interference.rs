@@ -75,11 +75,7 @@ impl fmt::Display for FlankGap {
             Side::Positive => "positive",
             Side::Negative => "negative",
         };
-        let state = if self.gap_mm < 0.0 {
-            "interferes by"
-        } else {
-            "clears by"
-        };
+        let state = if self.gap_mm < 0.0 { "interferes by" } else { "clears by" };
         write!(
             f,
             "flexspline tooth 0, {side} flank, {} at radius {:.3} mm, {state} {:.1} µm at generator angle {:.2}°",
@@ -150,10 +146,7 @@ impl RigidMesh {
         let gap_at = |piece: &OutlinePiece, t: f64| -> Option<FlankGap> {
             let [px, py] = piece.point(t);
             let (along, across) = (px - self.curve.radius_mm(), sign * py);
-            let place = [
-                foot[0] + along * c - across * s,
-                foot[1] + along * s + across * c,
-            ];
+            let place = [foot[0] + along * c - across * s, foot[1] + along * s + across * c];
             let radius = place[0].hypot(place[1]);
             if radius < space_tip {
                 return None;
@@ -180,18 +173,12 @@ impl RigidMesh {
         let mut best = None;
         for piece in &self.tooth.pieces()[1..] {
             let at = |k: usize| k as f64 / PIECE_STEPS as f64;
-            let tried: Vec<Option<FlankGap>> =
-                (0..=PIECE_STEPS).map(|k| gap_at(piece, at(k))).collect();
-            let least =
-                (0..=PIECE_STEPS).min_by(|&i, &j| value(&tried[i]).total_cmp(&value(&tried[j])));
+            let tried: Vec<Option<FlankGap>> = (0..=PIECE_STEPS).map(|k| gap_at(piece, at(k))).collect();
+            let least = (0..=PIECE_STEPS).min_by(|&i, &j| value(&tried[i]).total_cmp(&value(&tried[j])));
             let Some(k) = least.filter(|&k| tried[k].is_some()) else {
                 continue;
             };
-            let refined = golden(
-                |t| value(&gap_at(piece, t)),
-                at(k.saturating_sub(1)),
-                at((k + 1).min(PIECE_STEPS)),
-            );
+            let refined = golden(|t| value(&gap_at(piece, t)), at(k.saturating_sub(1)), at((k + 1).min(PIECE_STEPS)));
             best = lesser(best, lesser(tried[k], gap_at(piece, refined)));
         }
         best
@@ -203,24 +190,15 @@ impl RigidMesh {
         let mut least: Option<FlankGap> = None;
         let mut interferences = Vec::new();
         for side in [Side::Positive, Side::Negative] {
-            let cycle: Vec<Option<FlankGap>> = (0..=CYCLE_STEPS)
-                .map(|k| self.gap(-FRAC_PI_2 + step * k as f64, side))
-                .collect();
+            let cycle: Vec<Option<FlankGap>> =
+                (0..=CYCLE_STEPS).map(|k| self.gap(-FRAC_PI_2 + step * k as f64, side)).collect();
             let value = |k: usize| cycle[k].map_or(f64::INFINITY, |gap| gap.gap_rad);
             let lowest = |stretch: std::ops::Range<usize>| -> Option<FlankGap> {
                 let k = stretch.min_by(|&i, &j| value(i).total_cmp(&value(j)))?;
                 let coarse = cycle[k]?;
                 let angle = |phi: f64| self.gap(phi, side).map_or(f64::INFINITY, |gap| gap.gap_rad);
-                let phi = golden(
-                    angle,
-                    coarse.material_angle_rad - step,
-                    coarse.material_angle_rad + step,
-                );
-                Some(
-                    self.gap(phi, side)
-                        .filter(|fine| fine.gap_rad < coarse.gap_rad)
-                        .unwrap_or(coarse),
-                )
+                let phi = golden(angle, coarse.material_angle_rad - step, coarse.material_angle_rad + step);
+                Some(self.gap(phi, side).filter(|fine| fine.gap_rad < coarse.gap_rad).unwrap_or(coarse))
             };
             let found = lowest(0..cycle.len())?;
             if least.is_none_or(|least| found.gap_rad < least.gap_rad) {
@@ -228,9 +206,7 @@ impl RigidMesh {
             }
             let mut k = 0;
             while k < cycle.len() {
-                let end = (k..cycle.len())
-                    .find(|&j| value(j) >= 0.0)
-                    .unwrap_or(cycle.len());
+                let end = (k..cycle.len()).find(|&j| value(j) >= 0.0).unwrap_or(cycle.len());
                 interferences.extend(lowest(k..end));
                 k = end + 1;
             }
@@ -332,23 +308,13 @@ mod tests {
     fn a_deeper_mesh_interferes_where_the_tips_pass() {
         let mut drive = rounded(0.005);
         drive.circular_spline.tip_radius_mm -= 0.125;
-        let depth = drive.flexspline.tip_radius_mm + drive.generator.w0_mm
-            - drive.circular_spline.tip_radius_mm;
+        let depth = drive.flexspline.tip_radius_mm + drive.generator.w0_mm - drive.circular_spline.tip_radius_mm;
         assert!((depth - 0.8).abs() < 1e-12);
-        for kind in [
-            GeneratorKind::Cam,
-            GeneratorKind::TwoRoller,
-            GeneratorKind::DoubleDisc,
-        ] {
+        for kind in [GeneratorKind::Cam, GeneratorKind::TwoRoller, GeneratorKind::DoubleDisc] {
             let found = report(&drive, kind);
             assert_eq!(found.interferences.len(), 2, "{kind}: one on each flank");
-            let [positive, negative] = found.interferences[..] else {
-                unreachable!()
-            };
-            assert_eq!(
-                (positive.side, negative.side),
-                (Side::Positive, Side::Negative)
-            );
+            let [positive, negative] = found.interferences[..] else { unreachable!() };
+            assert_eq!((positive.side, negative.side), (Side::Positive, Side::Negative));
             let at = positive.material_angle_rad.to_degrees();
             assert!((60.0..64.0).contains(&at), "{kind}: {at}°");
             assert!(positive.gap_mm < -1e-3, "{kind}: {}", positive.gap_mm);
@@ -357,15 +323,10 @@ mod tests {
             assert_eq!(positive.flexspline_piece, PieceKind::TipRounding);
             let message = positive.to_string();
             assert!(
-                message.starts_with(
-                    "flexspline tooth 0, positive flank, tip rounding at radius 48.82"
-                ),
+                message.starts_with("flexspline tooth 0, positive flank, tip rounding at radius 48.82"),
                 "{message}"
             );
-            assert!(
-                message.contains("interferes by") && message.contains("at generator angle -6"),
-                "{message}"
-            );
+            assert!(message.contains("interferes by") && message.contains("at generator angle -6"), "{message}");
         }
         assert_eq!(report(&drive, GeneratorKind::FourRoller).interferences, []);
     }
@@ -376,12 +337,7 @@ mod tests {
         let (f, c) = (&mut drive.flexspline, &mut drive.circular_spline);
         f.profile_shift -= 3.0;
         c.profile_shift -= 3.0;
-        for radius in [
-            &mut f.root_radius_mm,
-            &mut f.tip_radius_mm,
-            &mut c.root_radius_mm,
-            &mut c.tip_radius_mm,
-        ] {
+        for radius in [&mut f.root_radius_mm, &mut f.tip_radius_mm, &mut c.root_radius_mm, &mut c.tip_radius_mm] {
             *radius -= 1.5;
         }
         drive
@@ -390,26 +346,14 @@ mod tests {
     #[test]
     fn without_profile_shift_the_teeth_interfere() {
         let found = report(&without_shift(), GeneratorKind::Cam);
-        let (gap, at) = (
-            1e3 * found.least.gap_mm,
-            found.least.material_angle_rad.to_degrees().abs(),
-        );
-        assert!(
-            (-17.0..-15.0).contains(&gap) && (54.0..56.0).contains(&at),
-            "{gap} µm at {at}°"
-        );
+        let (gap, at) = (1e3 * found.least.gap_mm, found.least.material_angle_rad.to_degrees().abs());
+        assert!((-17.0..-15.0).contains(&gap) && (54.0..56.0).contains(&at), "{gap} µm at {at}°");
         // a tenth of a module deeper it is 35 µm at 58 degrees
         let mut drive = without_shift();
         drive.circular_spline.tip_radius_mm -= 0.05;
         let found = report(&drive, GeneratorKind::Cam);
-        let (gap, at) = (
-            1e3 * found.least.gap_mm,
-            found.least.material_angle_rad.to_degrees().abs(),
-        );
-        assert!(
-            (-40.0..-30.0).contains(&gap) && (56.0..59.0).contains(&at),
-            "{gap} µm at {at}°"
-        );
+        let (gap, at) = (1e3 * found.least.gap_mm, found.least.material_angle_rad.to_degrees().abs());
+        assert!((-40.0..-30.0).contains(&gap) && (56.0..59.0).contains(&at), "{gap} µm at {at}°");
     }
 
     #[test]
@@ -431,15 +375,9 @@ mod tests {
             edit(&mut drive);
             report(&drive, GeneratorKind::Cam).backlash_rad / ARCMIN
         };
-        let per_shift =
-            (backlash(&|d| d.circular_spline.profile_shift += 0.01) - backlash(&|_| ())) / 0.01;
-        assert!(
-            (per_shift - 26.0).abs() < 0.5,
-            "{per_shift}' per unit of shift"
-        );
-        let per_um = (backlash(&|d| d.generator.w0_mm += 0.002)
-            - backlash(&|d| d.generator.w0_mm -= 0.002))
-            / 4.0;
+        let per_shift = (backlash(&|d| d.circular_spline.profile_shift += 0.01) - backlash(&|_| ())) / 0.01;
+        assert!((per_shift - 26.0).abs() < 0.5, "{per_shift}' per unit of shift");
+        let per_um = (backlash(&|d| d.generator.w0_mm += 0.002) - backlash(&|d| d.generator.w0_mm -= 0.002)) / 4.0;
         assert!((per_um + 0.052).abs() < 0.002, "{per_um}' per µm of w0");
     }
 
@@ -448,16 +386,8 @@ mod tests {
         let mesh = RigidMesh::new(&Drive::hhd_95(), GeneratorKind::FourRoller).unwrap();
         for k in 0..80 {
             let phi = 0.013 * f64::from(k) - 0.4;
-            let (a, b) = (
-                mesh.gap(phi, Side::Positive).unwrap(),
-                mesh.gap(-phi, Side::Negative).unwrap(),
-            );
-            assert!(
-                (a.gap_rad - b.gap_rad).abs() < 1e-13,
-                "{phi}: {} {}",
-                a.gap_rad,
-                b.gap_rad
-            );
+            let (a, b) = (mesh.gap(phi, Side::Positive).unwrap(), mesh.gap(-phi, Side::Negative).unwrap());
+            assert!((a.gap_rad - b.gap_rad).abs() < 1e-13, "{phi}: {} {}", a.gap_rad, b.gap_rad);
         }
         assert_eq!(mesh.gap(FRAC_PI_2, Side::Positive), None);
     }
@@ -472,40 +402,25 @@ mod tests {
             let (s, c) = normal.sin_cos();
             let dense = |flank: &ToothFlank| -> Vec<[f64; 2]> {
                 let pieces = flank.pieces().iter();
-                pieces
-                    .flat_map(|piece| (0..=400).map(|k| piece.point(f64::from(k) / 400.0)))
-                    .collect()
+                pieces.flat_map(|piece| (0..=400).map(|k| piece.point(f64::from(k) / 400.0))).collect()
             };
             let tooth: Vec<[f64; 2]> = dense(&mesh.tooth)
                 .into_iter()
                 .map(|[px, py]| {
-                    [
-                        x + (px - mesh.curve.radius_mm()) * c - py * s,
-                        y + (px - mesh.curve.radius_mm()) * s + py * c,
-                    ]
+                    [x + (px - mesh.curve.radius_mm()) * c - py * s, y + (px - mesh.curve.radius_mm()) * s + py * c]
                 })
                 .collect();
             let distance = |turn: f64| {
                 let (s, c) = (phi * 188.0 / 190.0 + turn).sin_cos();
-                let space = dense(&mesh.space)
-                    .into_iter()
-                    .map(|[px, py]| [px * c - py * s, px * s + py * c]);
+                let space = dense(&mesh.space).into_iter().map(|[px, py]| [px * c - py * s, px * s + py * c]);
                 space
                     .flat_map(|p| tooth.iter().map(move |q| (p[0] - q[0]).hypot(p[1] - q[1])))
                     .fold(f64::INFINITY, f64::min)
             };
-            assert!(
-                distance(-gap.gap_rad) < 2e-3,
-                "{phi}: {}",
-                distance(-gap.gap_rad)
-            );
+            assert!(distance(-gap.gap_rad) < 2e-3, "{phi}: {}", distance(-gap.gap_rad));
             // half closed, between half the gap and that times the cosine of the steepest pressure angle
             let half = distance(-0.5 * gap.gap_rad) / gap.gap_mm;
-            assert!(
-                (0.3..0.6).contains(&half),
-                "{phi}: {half} of {} mm",
-                gap.gap_mm
-            );
+            assert!((0.3..0.6).contains(&half), "{phi}: {half} of {} mm", gap.gap_mm);
         }
     }
 
@@ -519,9 +434,6 @@ mod tests {
         let expected = -2.0 * 11.5e-6 * 24.7f64.to_radians().tan() / ARCMIN;
         drive.temperature.circular_spline_expansion_per_k = 0.0;
         let per_k = (backlash(&drive.at_temperature(25.0)) - cold) / 5.0;
-        assert!(
-            (per_k / expected - 1.0).abs() < 0.03,
-            "{per_k}'/K, expected {expected}"
-        );
+        assert!((per_k / expected - 1.0).abs() < 0.03, "{per_k}'/K, expected {expected}");
     }
 }

@@ -29,7 +29,6 @@ pub use involute::{Foot, InvoluteFlank};
 pub use neutral::NeutralCurve;
 pub use ring::{GeneratorKind, RingShape, UnknownGenerator};
 pub use spec::{
-    CircularSpline, Drive, Flanks, Flexspline, Generators, Material, OutputLoadPath, Sleeve,
-    Temperature, ThermalState,
+    CircularSpline, Drive, Flanks, Flexspline, Generators, Material, OutputLoadPath, Sleeve, Temperature, ThermalState,
 };
 pub use tooth::{OutlinePiece, PieceKind, ToothFlank};

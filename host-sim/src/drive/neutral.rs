@@ -33,22 +33,14 @@ struct Part {
 impl NeutralCurve {
     /// The curve of a ring with neutral radius `radius_mm` under `shape`.
     pub fn new(shape: RingShape, radius_mm: f64) -> Self {
-        let mut curve = NeutralCurve {
-            shape,
-            radius_mm,
-            constant_mm: 0.0,
-            parts: Vec::new(),
-        };
+        let mut curve = NeutralCurve { shape, radius_mm, constant_mm: 0.0, parts: Vec::new() };
         let breaks: Vec<f64> = match curve.shape.break_angle() {
             b if b > 0.0 => vec![0.0, b, FRAC_PI_2],
             _ => vec![0.0, FRAC_PI_2],
         };
         // Newton on the perimeter; its derivative by c is the mean cosine of the slope, close to one
         for _ in 0..6 {
-            let quarter: f64 = breaks
-                .windows(2)
-                .map(|ab| curve.length_between(ab[0], ab[1]))
-                .sum();
+            let quarter: f64 = breaks.windows(2).map(|ab| curve.length_between(ab[0], ab[1])).sum();
             curve.constant_mm += radius_mm - quarter / FRAC_PI_2;
         }
         let mut start = 0.0;
@@ -112,12 +104,7 @@ impl NeutralCurve {
         let turns = (phi / PI).round();
         let p = phi - PI * turns;
         let q = p.abs().min(FRAC_PI_2);
-        let part = self
-            .parts
-            .iter()
-            .rev()
-            .find(|part| q >= part.start)
-            .unwrap_or(&self.parts[0]);
+        let part = self.parts.iter().rev().find(|part| q >= part.start).unwrap_or(&self.parts[0]);
         let position = (q - part.start) / part.cell;
         let k = (position as usize).min(part.nodes.len() - 2);
         let alpha = quintic(part.nodes[k], part.nodes[k + 1], position - k as f64);
@@ -154,9 +141,7 @@ impl NeutralCurve {
     /// Arc length between two polar angles inside one smooth part.
     fn length_between(&self, from: f64, to: f64) -> f64 {
         let step = (to - from) / CELLS as f64;
-        (0..CELLS)
-            .map(|k| self.gauss(from + step * k as f64, from + step * (k + 1) as f64))
-            .sum()
+        (0..CELLS).map(|k| self.gauss(from + step * k as f64, from + step * (k + 1) as f64)).sum()
     }
 
     /// Five-point Gauss integral of the speed over a short interval.
@@ -164,10 +149,7 @@ impl NeutralCurve {
         let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
         let root = 2.0 * (10.0_f64 / 7.0).sqrt();
         let (x1, x2) = ((5.0 - root).sqrt() / 3.0, (5.0 + root).sqrt() / 3.0);
-        let (w1, w2) = (
-            (322.0 + 13.0 * 70.0_f64.sqrt()) / 900.0,
-            (322.0 - 13.0 * 70.0_f64.sqrt()) / 900.0,
-        );
+        let (w1, w2) = ((322.0 + 13.0 * 70.0_f64.sqrt()) / 900.0, (322.0 - 13.0 * 70.0_f64.sqrt()) / 900.0);
         let pair = |x: f64| self.speed(middle - half * x) + self.speed(middle + half * x);
         half * (self.speed(middle) * 128.0 / 225.0 + w1 * pair(x1) + w2 * pair(x2))
     }
@@ -192,9 +174,7 @@ mod tests {
     fn curves() -> Vec<NeutralCurve> {
         let drive = Drive::hhd_95();
         let radius = drive.flexspline.neutral_radius_mm();
-        GeneratorKind::ALL
-            .map(|kind| NeutralCurve::new(drive.generator.shape(kind), radius))
-            .into()
+        GeneratorKind::ALL.map(|kind| NeutralCurve::new(drive.generator.shape(kind), radius)).into()
     }
 
     /// Perimeter by a fine polygon, corrected by Richardson extrapolation: shares nothing with the Gauss rule.
@@ -205,9 +185,7 @@ mod tests {
                 let r = curve.polar(alpha)[0];
                 [r * alpha.cos(), r * alpha.sin()]
             };
-            (0..n)
-                .map(|k| (at(k + 1)[0] - at(k)[0]).hypot(at(k + 1)[1] - at(k)[1]))
-                .sum()
+            (0..n).map(|k| (at(k + 1)[0] - at(k)[0]).hypot(at(k + 1)[1] - at(k)[1])).sum()
         };
         // 30 degrees, where the shapes change, is a corner of both polygons
         let (coarse, fine) = (polygon(3600), polygon(7200));
@@ -262,21 +240,11 @@ mod tests {
                 let ([xm, ym], mirrored) = curve.position(-phi);
                 assert!((x - xm).abs() + (y + ym).abs() + (normal + mirrored).abs() < 1e-13);
                 let ([xp, yp], turned) = curve.position(phi + 3.0 * PI);
-                assert!(
-                    (x + xp).abs() + (y + yp).abs() + (turned - normal - 3.0 * PI).abs() < 1e-12
-                );
+                assert!((x + xp).abs() + (y + yp).abs() + (turned - normal - 3.0 * PI).abs() < 1e-12);
                 // w0²/R is 5 µm; positions and rotation differ by a few of those
                 let alpha = y.atan2(x);
-                assert!(
-                    (alpha * curve.radius_mm() - phi * curve.radius_mm() - curve.v(phi)).abs()
-                        < 0.012
-                );
-                assert!(
-                    (normal - phi - curve.theta(phi)).abs() < 6e-4,
-                    "{} {}",
-                    normal - phi,
-                    curve.theta(phi)
-                );
+                assert!((alpha * curve.radius_mm() - phi * curve.radius_mm() - curve.v(phi)).abs() < 0.012);
+                assert!((normal - phi - curve.theta(phi)).abs() < 6e-4, "{} {}", normal - phi, curve.theta(phi));
             }
         }
     }

@@ -28,12 +28,7 @@ pub enum GeneratorKind {
 
 impl GeneratorKind {
     /// All of them, in the paper's order.
-    pub const ALL: [GeneratorKind; 4] = [
-        Self::TwoRoller,
-        Self::FourRoller,
-        Self::DoubleDisc,
-        Self::Cam,
-    ];
+    pub const ALL: [GeneratorKind; 4] = [Self::TwoRoller, Self::FourRoller, Self::DoubleDisc, Self::Cam];
 
     /// The name used on the command line and in files.
     pub const fn name(self) -> &'static str {
@@ -61,10 +56,7 @@ impl FromStr for GeneratorKind {
     type Err = UnknownGenerator;
 
     fn from_str(name: &str) -> Result<Self, UnknownGenerator> {
-        Self::ALL
-            .into_iter()
-            .find(|kind| kind.name() == name)
-            .ok_or_else(|| UnknownGenerator(name.to_owned()))
+        Self::ALL.into_iter().find(|kind| kind.name() == name).ok_or_else(|| UnknownGenerator(name.to_owned()))
     }
 }
 
@@ -82,29 +74,15 @@ enum Form {
     Cam,
     /// `w = C (A cos phi + sin b phi sin phi - 4/pi)` below the roller angle `b`,
     /// `w = C (B sin phi + cos b x cos phi - 4/pi)` above, `x = pi/2 - phi`. Two rollers are `b = 0`.
-    Rollers {
-        b: f64,
-        a_cos: f64,
-        b_sin: f64,
-        c: f64,
-    },
+    Rollers { b: f64, a_cos: f64, b_sin: f64, c: f64 },
     /// `w = (1 - e) + e cos phi` on the arc below `g`, `w = a + B sin phi + D x cos phi` above.
-    Disc {
-        g: f64,
-        e: f64,
-        a: f64,
-        b_sin: f64,
-        d: f64,
-    },
+    Disc { g: f64, e: f64, a: f64, b_sin: f64, d: f64 },
 }
 
 impl RingShape {
     /// The cam `w0 cos 2 phi`.
     pub fn cam(w0_mm: f64) -> Self {
-        RingShape {
-            amplitude: w0_mm,
-            form: Form::Cam,
-        }
+        RingShape { amplitude: w0_mm, form: Form::Cam }
     }
 
     /// Two opposite rollers.
@@ -118,36 +96,18 @@ impl RingShape {
         let b = angle_rad;
         let a_cos = b.sin() + (FRAC_PI_2 - b) * b.cos();
         let b_sin = b.cos() + b * b.sin();
-        RingShape {
-            amplitude: w0_mm,
-            form: Form::Rollers {
-                b,
-                a_cos,
-                b_sin,
-                c: 1.0 / (a_cos - 4.0 / PI),
-            },
-        }
+        RingShape { amplitude: w0_mm, form: Form::Rollers { b, a_cos, b_sin, c: 1.0 / (a_cos - 4.0 / PI) } }
     }
 
     /// Two discs, each touching over `± half_angle_rad`.
     pub fn double_disc(w0_mm: f64, half_angle_rad: f64) -> Self {
         let g = half_angle_rad;
         let (s, k) = g.sin_cos();
-        let den =
-            8.0 * g * s + 2.0 * PI * g - 4.0 * PI * s + PI * (2.0 * g).sin() + 8.0 * k - PI * PI;
+        let den = 8.0 * g * s + 2.0 * PI * g - 4.0 * PI * s + PI * (2.0 * g).sin() + 8.0 * k - PI * PI;
         let e = PI * (2.0 * g + (2.0 * g).sin() - PI) / den;
         let a = 8.0 * (g * s + k) / den;
         let b_sin = 2.0 * PI * (k * k - 2.0) / den;
-        RingShape {
-            amplitude: w0_mm,
-            form: Form::Disc {
-                g,
-                e,
-                a,
-                b_sin,
-                d: -2.0 * PI / den,
-            },
-        }
+        RingShape { amplitude: w0_mm, form: Form::Disc { g, e, a, b_sin, d: -2.0 * PI / den } }
     }
 
     /// The deflection `w0` on the major axis, mm.
@@ -200,11 +160,7 @@ impl RingShape {
                 ]
             }
             Form::Disc { g, e, .. } if p < g => [(1.0 - e) + e * k, -e * s, 1.0 - e],
-            Form::Disc { a, b_sin, d, .. } => [
-                a + b_sin * s + d * x * k,
-                b_sin * k - d * (k + x * s),
-                a + 2.0 * d * s,
-            ],
+            Form::Disc { a, b_sin, d, .. } => [a + b_sin * s + d * x * k, b_sin * k - d * (k + x * s), a + 2.0 * d * s],
         };
         let w0 = self.amplitude;
         [w0 * w, w0 * sign * dw, w0 * (bend - w)]
@@ -222,12 +178,8 @@ impl RingShape {
         let x = FRAC_PI_2 - p;
         let v = match self.form {
             Form::Cam => -s * k,
-            Form::Rollers { b, a_cos, c, .. } if p < b => {
-                -c * (a_cos * s + b.sin() * (s - p * k) - 4.0 * p / PI)
-            }
-            Form::Rollers { b, b_sin, c, .. } => {
-                c * (b_sin * k + b.cos() * (k - x * s) - 4.0 * x / PI)
-            }
+            Form::Rollers { b, a_cos, c, .. } if p < b => -c * (a_cos * s + b.sin() * (s - p * k) - 4.0 * p / PI),
+            Form::Rollers { b, b_sin, c, .. } => c * (b_sin * k + b.cos() * (k - x * s) - 4.0 * x / PI),
             Form::Disc { g, e, .. } if p < g => -((1.0 - e) * p + e * s),
             Form::Disc { a, b_sin, d, .. } => a * x + b_sin * k + d * (k - x * s),
         };
@@ -262,10 +214,7 @@ mod tests {
             assert_eq!(kind.to_string().parse(), Ok(kind));
         }
         let message = "roller".parse::<GeneratorKind>().unwrap_err().to_string();
-        assert!(
-            message.contains("\"roller\"") && message.contains("two-roller, four-roller"),
-            "{message}"
-        );
+        assert!(message.contains("\"roller\"") && message.contains("two-roller, four-roller"), "{message}");
     }
 
     #[test]
@@ -281,17 +230,10 @@ mod tests {
                 let phi = -4.0 + 0.0403 * f64::from(k);
                 let [_, dw, ddw] = shape.radial(phi);
                 let slope = (shape.w(phi + step) - shape.w(phi - step)) / (2.0 * step);
-                assert!(
-                    (slope - dw).abs() < 1e-7,
-                    "{shape:?} w' at {phi}: {dw}, difference {slope}"
-                );
-                let slope =
-                    (shape.radial(phi + step)[1] - shape.radial(phi - step)[1]) / (2.0 * step);
+                assert!((slope - dw).abs() < 1e-7, "{shape:?} w' at {phi}: {dw}, difference {slope}");
+                let slope = (shape.radial(phi + step)[1] - shape.radial(phi - step)[1]) / (2.0 * step);
                 // the rollers' w'' has a kink
-                assert!(
-                    (slope - ddw).abs() < 1e-3,
-                    "{shape:?} w'' at {phi}: {ddw}, difference {slope}"
-                );
+                assert!((slope - ddw).abs() < 1e-3, "{shape:?} w'' at {phi}: {ddw}, difference {slope}");
             }
         }
     }

@@ -272,11 +272,7 @@ impl Drive {
                 root_fillet_mm: 0.08,
                 tip_rounding_mm: 0.03,
             },
-            material: Material {
-                youngs_modulus_mpa: 206_000.0,
-                poissons_ratio: 0.3,
-                density_kg_m3: 7850.0,
-            },
+            material: Material { youngs_modulus_mpa: 206_000.0, poissons_ratio: 0.3, density_kg_m3: 7850.0 },
             generator: Generators {
                 w0_mm: 0.5,
                 roller_diameter_mm: 26.0,
@@ -284,16 +280,9 @@ impl Drive {
                 disc_half_angle_deg: 30.0,
                 bearing_stiffness_n_per_mm3: None,
             },
-            output: OutputLoadPath {
-                drag_torque_n_m: 0.02,
-            },
-            sleeve: Sleeve {
-                torsion_stiffness_n_m_per_rad: None,
-                lateral_stiffness_n_per_mm: 0.0,
-            },
-            flanks: Flanks {
-                friction_coefficient: 0.0,
-            },
+            output: OutputLoadPath { drag_torque_n_m: 0.02 },
+            sleeve: Sleeve { torsion_stiffness_n_m_per_rad: None, lateral_stiffness_n_per_mm: 0.0 },
+            flanks: Flanks { friction_coefficient: 0.0 },
             temperature: Temperature {
                 reference_c: 20.0,
                 minimum_c: -60.0,
@@ -319,12 +308,9 @@ impl Drive {
     pub fn hhd_95_typical() -> Drive {
         let mut drive = Drive::hhd_95();
         let (wall_mm, length_mm) = (0.7, 80.0);
-        let torsion_n_mm = 2.0
-            * PI
-            * drive.material.shear_modulus_mpa()
-            * drive.flexspline.neutral_radius_mm().powi(3)
-            * wall_mm
-            / length_mm;
+        let torsion_n_mm =
+            2.0 * PI * drive.material.shear_modulus_mpa() * drive.flexspline.neutral_radius_mm().powi(3) * wall_mm
+                / length_mm;
         drive.name = "HHD-95-typical".to_owned();
         drive.flanks.friction_coefficient = 0.08;
         drive.sleeve.torsion_stiffness_n_m_per_rad = Some((torsion_n_mm * 1e-3).round());
@@ -344,10 +330,7 @@ impl Drive {
 
     /// Signed ratio generator / output, `+z_c / (z_c - z_f)`: the output turns the same way as the generator.
     pub fn ratio(&self) -> f64 {
-        let (zf, zc) = (
-            f64::from(self.flexspline.teeth),
-            f64::from(self.circular_spline.teeth),
-        );
+        let (zf, zc) = (f64::from(self.flexspline.teeth), f64::from(self.circular_spline.teeth));
         zc / (zc - zf)
     }
 
@@ -390,8 +373,8 @@ impl Drive {
         ] {
             *length *= new.circular_spline_scale / old.circular_spline_scale;
         }
-        drive.material.youngs_modulus_mpa *= (1.0 + t.youngs_modulus_per_k * rise)
-            / (1.0 + t.youngs_modulus_per_k * old.above_reference_k);
+        drive.material.youngs_modulus_mpa *=
+            (1.0 + t.youngs_modulus_per_k * rise) / (1.0 + t.youngs_modulus_per_k * old.above_reference_k);
         drive.thermal_state = new;
         drive
     }
@@ -429,21 +412,12 @@ impl Drive {
         if problems.is_empty() {
             self.fit(&mut problems);
         }
-        if problems.is_empty() {
-            Ok(())
-        } else {
-            Err(DriveError { problems })
-        }
+        if problems.is_empty() { Ok(()) } else { Err(DriveError { problems }) }
     }
 
     /// The consistency of the parts, each finding with the field to change.
     fn fit(&self, problems: &mut Vec<Problem>) {
-        let (f, c, g, t) = (
-            &self.flexspline,
-            &self.circular_spline,
-            &self.generator,
-            &self.temperature,
-        );
+        let (f, c, g, t) = (&self.flexspline, &self.circular_spline, &self.generator, &self.temperature);
         let mut require = |holds: bool, field: &str, what: String| {
             if !holds {
                 problems.push(Problem::of(field, what));
@@ -458,43 +432,27 @@ impl Drive {
         require(
             c.teeth == f.teeth + 2,
             "circular_spline.teeth",
-            format!(
-                "found {}, allowed: {}, two more than the flexspline (two waves)",
-                c.teeth,
-                f.teeth + 2
-            ),
+            format!("found {}, allowed: {}, two more than the flexspline (two waves)", c.teeth, f.teeth + 2),
         );
         require(
             (c.module_mm / f.module_mm - 1.0).abs() <= 0.01,
             "circular_spline.module_mm",
-            format!(
-                "found {}, allowed: within 1 % of the flexspline's {}",
-                c.module_mm, f.module_mm
-            ),
+            format!("found {}, allowed: within 1 % of the flexspline's {}", c.module_mm, f.module_mm),
         );
         require(
             t.minimum_c < t.maximum_c,
             "temperature.minimum_c",
-            format!(
-                "found {}, allowed: below maximum_c = {}",
-                t.minimum_c, t.maximum_c
-            ),
+            format!("found {}, allowed: below maximum_c = {}", t.minimum_c, t.maximum_c),
         );
         require(
             t.minimum_c <= t.reference_c && t.reference_c <= t.maximum_c,
             "temperature.reference_c",
-            format!(
-                "found {}, allowed: {} to {}, the operating range",
-                t.reference_c, t.minimum_c, t.maximum_c
-            ),
+            format!("found {}, allowed: {} to {}, the operating range", t.reference_c, t.minimum_c, t.maximum_c),
         );
         let mut radii = require(
             f.root_radius_mm < f.tip_radius_mm,
             "flexspline.tip_radius_mm",
-            format!(
-                "found {}, allowed: above root_radius_mm = {}",
-                f.tip_radius_mm, f.root_radius_mm
-            ),
+            format!("found {}, allowed: above root_radius_mm = {}", f.tip_radius_mm, f.root_radius_mm),
         );
         radii &= require(
             f.rim_thickness_mm <= 0.2 * f.root_radius_mm,
@@ -508,10 +466,7 @@ impl Drive {
         radii &= require(
             c.tip_radius_mm < c.root_radius_mm,
             "circular_spline.tip_radius_mm",
-            format!(
-                "found {}, allowed: below root_radius_mm = {}",
-                c.tip_radius_mm, c.root_radius_mm
-            ),
+            format!("found {}, allowed: below root_radius_mm = {}", c.tip_radius_mm, c.root_radius_mm),
         );
         radii &= require(
             c.outer_radius_mm - c.root_radius_mm >= c.module_mm,
@@ -566,10 +521,7 @@ impl Drive {
                 ),
             );
         }
-        for refused in [ToothFlank::external(f).err(), ToothFlank::internal(c).err()]
-            .into_iter()
-            .flatten()
-        {
+        for refused in [ToothFlank::external(f).err(), ToothFlank::internal(c).err()].into_iter().flatten() {
             problems.extend(refused.problems);
         }
         for kind in GeneratorKind::ALL {
@@ -593,19 +545,14 @@ mod tests {
             assert_eq!(drive.check(), Ok(()));
             assert_eq!(drive.ratio(), 95.0);
             let f = &drive.flexspline;
-            assert!(
-                (f.neutral_radius_mm() - 47.275).abs() < 1e-12
-                    && (f.bore_radius_mm() - 46.675).abs() < 1e-12
-            );
+            assert!((f.neutral_radius_mm() - 47.275).abs() < 1e-12 && (f.bore_radius_mm() - 46.675).abs() < 1e-12);
         }
         assert_eq!(Drive::built_in("hhd"), None);
         let typical = Drive::hhd_95_typical();
         let torsion = typical.sleeve.torsion_stiffness_n_m_per_rad.unwrap();
         assert!((torsion - 4.6e5).abs() < 2e3, "{torsion}");
         assert!((typical.material.shear_modulus_mpa() - 79_000.0).abs() < 500.0);
-        assert!(
-            (typical.material.plane_strain_modulus_mpa() / 206_000.0 - 1.0 / 0.91).abs() < 1e-12
-        );
+        assert!((typical.material.plane_strain_modulus_mpa() / 206_000.0 - 1.0 / 0.91).abs() < 1e-12);
     }
 
     #[test]
@@ -615,10 +562,7 @@ mod tests {
         drive.temperature.circular_spline_expansion_per_k = 2.0e-5;
         let warm = drive.at_temperature(70.0);
         assert!((warm.flexspline.root_radius_mm / 47.875 - 1.0005).abs() < 1e-12);
-        assert!(
-            (warm.flexspline.base_radius_mm() / drive.flexspline.base_radius_mm() - 1.0005).abs()
-                < 1e-12
-        );
+        assert!((warm.flexspline.base_radius_mm() / drive.flexspline.base_radius_mm() - 1.0005).abs() < 1e-12);
         assert!((warm.circular_spline.tip_radius_mm / 48.65 - 1.001).abs() < 1e-12);
         assert!((warm.circular_spline.tip_rounding_mm / 0.03 - 1.001).abs() < 1e-12);
         assert!((warm.material.youngs_modulus_mpa / 206_000.0 - 0.985).abs() < 1e-12);
@@ -633,9 +577,7 @@ mod tests {
         let direct = drive.at_temperature(-40.0);
         assert_eq!(again.thermal_state, direct.thermal_state);
         assert!((again.flexspline.tip_radius_mm - direct.flexspline.tip_radius_mm).abs() < 1e-12);
-        assert!(
-            (again.material.youngs_modulus_mpa - direct.material.youngs_modulus_mpa).abs() < 1e-8
-        );
+        assert!((again.material.youngs_modulus_mpa - direct.material.youngs_modulus_mpa).abs() < 1e-8);
         assert_eq!(drive.at_temperature(20.0), drive);
     }
 
@@ -649,12 +591,7 @@ mod tests {
             let warm = GeneratorOutline::new(&warm_drive, kind).unwrap();
             for p in [[46.9, 3.0], [40.0, 24.0], [-20.0, 41.0]] {
                 let (a, b) = (cold.nearest(p), warm.nearest([p[0] * s, p[1] * s]));
-                assert!(
-                    (a.distance * s - b.distance).abs() < 1e-12,
-                    "{kind}: {} {}",
-                    a.distance,
-                    b.distance
-                );
+                assert!((a.distance * s - b.distance).abs() < 1e-12, "{kind}: {} {}", a.distance, b.distance);
                 assert!((a.curvature / s - b.curvature).abs() < 1e-12);
             }
         }
@@ -692,23 +629,14 @@ mod tests {
                 match Drive::hhd_95().with_set(&set) {
                     Err(error) => {
                         refused += 1;
-                        assert!(
-                            error
-                                .problems
-                                .iter()
-                                .all(|problem| !problem.field.is_empty()),
-                            "{error}"
-                        );
+                        assert!(error.problems.iter().all(|problem| !problem.field.is_empty()), "{error}");
                     }
                     Ok(drive) => {
                         sound += 1;
                         for kind in GeneratorKind::ALL {
                             let outline = GeneratorOutline::new(&drive, kind).unwrap();
                             let foot = outline.nearest([46.0, 1.0]);
-                            assert!(
-                                foot.distance.is_finite() && foot.curvature > 0.0,
-                                "{set}: {foot:?}"
-                            );
+                            assert!(foot.distance.is_finite() && foot.curvature > 0.0, "{set}: {foot:?}");
                         }
                         let mesh = RigidMesh::new(&drive, GeneratorKind::Cam).unwrap();
                         let report = mesh.report(GeneratorKind::Cam).unwrap();
@@ -717,9 +645,6 @@ mod tests {
                 }
             }
         }
-        assert!(
-            refused > 30 && sound > 20,
-            "{refused} refused, {sound} sound"
-        );
+        assert!(refused > 30 && sound > 20, "{refused} refused, {sound} sound");
     }
 }

@@ -82,20 +82,11 @@ impl OutlinePiece {
     /// Point, mm.
     pub fn point(&self, t: f64) -> [f64; 2] {
         match self.curve {
-            Curve::Arc {
-                centre,
-                radius,
-                start,
-                sweep,
-            } => {
+            Curve::Arc { centre, radius, start, sweep } => {
                 let (s, c) = (start + t * sweep).sin_cos();
                 [centre[0] + radius * c, centre[1] + radius * s]
             }
-            Curve::Involute {
-                base_radius,
-                half_base,
-                ..
-            } => {
+            Curve::Involute { base_radius, half_base, .. } => {
                 let u = self.roll(t);
                 let (s, c) = (half_base - u).sin_cos();
                 [base_radius * (c - u * s), base_radius * (s + u * c)]
@@ -111,12 +102,7 @@ impl OutlinePiece {
                 let sign = sweep.signum();
                 [-sign * s, sign * c]
             }
-            Curve::Involute {
-                half_base,
-                from,
-                to,
-                ..
-            } => {
+            Curve::Involute { half_base, from, to, .. } => {
                 let (s, c) = (half_base - self.roll(t)).sin_cos();
                 let sign = (to - from).signum();
                 [sign * c, sign * s]
@@ -134,12 +120,7 @@ impl OutlinePiece {
     pub fn curvature(&self, t: f64) -> f64 {
         match self.curve {
             Curve::Arc { radius, sweep, .. } => -sweep.signum() / radius,
-            Curve::Involute {
-                base_radius,
-                from,
-                to,
-                ..
-            } => (to - from).signum() / (base_radius * self.roll(t)),
+            Curve::Involute { base_radius, from, to, .. } => (to - from).signum() / (base_radius * self.roll(t)),
         }
     }
 
@@ -147,12 +128,7 @@ impl OutlinePiece {
     pub fn length(&self) -> f64 {
         match self.curve {
             Curve::Arc { radius, sweep, .. } => radius * sweep.abs(),
-            Curve::Involute {
-                base_radius,
-                from,
-                to,
-                ..
-            } => 0.5 * base_radius * (to * to - from * from).abs(),
+            Curve::Involute { base_radius, from, to, .. } => 0.5 * base_radius * (to * to - from * from).abs(),
         }
     }
 
@@ -180,11 +156,7 @@ impl ToothFlank {
             internal: false,
             teeth: wheel.teeth,
             base_radius: wheel.base_radius_mm(),
-            half_base: half_angle_at_base(
-                wheel.teeth,
-                wheel.profile_shift,
-                wheel.pressure_angle_rad(),
-            ),
+            half_base: half_angle_at_base(wheel.teeth, wheel.profile_shift, wheel.pressure_angle_rad()),
             root_radius: wheel.root_radius_mm,
             tip_radius: wheel.tip_radius_mm,
             fillet: wheel.root_fillet_mm,
@@ -199,11 +171,7 @@ impl ToothFlank {
             internal: true,
             teeth: wheel.teeth,
             base_radius: wheel.base_radius_mm(),
-            half_base: half_angle_at_base(
-                wheel.teeth,
-                wheel.profile_shift,
-                wheel.pressure_angle_rad(),
-            ),
+            half_base: half_angle_at_base(wheel.teeth, wheel.profile_shift, wheel.pressure_angle_rad()),
             root_radius: wheel.root_radius_mm,
             tip_radius: wheel.tip_radius_mm,
             fillet: wheel.root_fillet_mm,
@@ -212,16 +180,7 @@ impl ToothFlank {
     }
 
     fn new(wheel: &Wheel) -> Result<Self, DriveError> {
-        let &Wheel {
-            internal,
-            base_radius: rb,
-            half_base,
-            root_radius,
-            tip_radius,
-            fillet,
-            rounding,
-            ..
-        } = wheel;
+        let &Wheel { internal, base_radius: rb, half_base, root_radius, tip_radius, fillet, rounding, .. } = wheel;
         let half_pitch = PI / f64::from(wheel.teeth);
         // seen from the free side a fillet centre, from the material a rounding centre; both are one offset of the
         // involute and of a circle, on the higher-angle side (+1) or the lower one (-1)
@@ -236,11 +195,8 @@ impl ToothFlank {
             ));
         }
         // where the lands meet the corners, measured from the tooth or space axis
-        let (land_at_root, land_at_tip) = if internal {
-            (root.angle, half_pitch - tip.angle)
-        } else {
-            (half_pitch - root.angle, tip.angle)
-        };
+        let (land_at_root, land_at_tip) =
+            if internal { (root.angle, half_pitch - tip.angle) } else { (half_pitch - root.angle, tip.angle) };
         if land_at_root <= 0.0 {
             return Err(wheel.refuse(
                 "root_fillet_mm",
@@ -264,82 +220,32 @@ impl ToothFlank {
         }
         let arc = |kind, centre, radius, start: f64, end: f64| OutlinePiece {
             kind,
-            curve: Curve::Arc {
-                centre,
-                radius,
-                start,
-                sweep: end - start,
-            },
+            curve: Curve::Arc { centre, radius, start, sweep: end - start },
         };
         let involute = OutlinePiece {
             kind: PieceKind::Involute,
-            curve: Curve::Involute {
-                base_radius: rb,
-                half_base,
-                from: root.roll,
-                to: tip.roll,
-            },
+            curve: Curve::Involute { base_radius: rb, half_base, from: root.roll, to: tip.roll },
         };
         let (root_beta, tip_beta) = (half_base - root.roll, half_base - tip.roll);
         let origin = [0.0, 0.0];
         let pieces = if internal {
             [
                 arc(PieceKind::RootLand, origin, root_radius, 0.0, root.angle),
-                arc(
-                    PieceKind::RootFillet,
-                    root.centre,
-                    fillet,
-                    root.angle,
-                    root_beta + FRAC_PI_2,
-                ),
+                arc(PieceKind::RootFillet, root.centre, fillet, root.angle, root_beta + FRAC_PI_2),
                 involute,
-                arc(
-                    PieceKind::TipRounding,
-                    tip.centre,
-                    rounding,
-                    tip_beta - FRAC_PI_2,
-                    tip.angle - PI,
-                ),
-                arc(
-                    PieceKind::TipLand,
-                    origin,
-                    tip_radius,
-                    tip.angle,
-                    half_pitch,
-                ),
+                arc(PieceKind::TipRounding, tip.centre, rounding, tip_beta - FRAC_PI_2, tip.angle - PI),
+                arc(PieceKind::TipLand, origin, tip_radius, tip.angle, half_pitch),
             ]
         } else {
             [
-                arc(
-                    PieceKind::RootLand,
-                    origin,
-                    root_radius,
-                    half_pitch,
-                    root.angle,
-                ),
-                arc(
-                    PieceKind::RootFillet,
-                    root.centre,
-                    fillet,
-                    root.angle - PI,
-                    root_beta - FRAC_PI_2,
-                ),
+                arc(PieceKind::RootLand, origin, root_radius, half_pitch, root.angle),
+                arc(PieceKind::RootFillet, root.centre, fillet, root.angle - PI, root_beta - FRAC_PI_2),
                 involute,
-                arc(
-                    PieceKind::TipRounding,
-                    tip.centre,
-                    rounding,
-                    tip_beta + FRAC_PI_2,
-                    tip.angle,
-                ),
+                arc(PieceKind::TipRounding, tip.centre, rounding, tip_beta + FRAC_PI_2, tip.angle),
                 arc(PieceKind::TipLand, origin, tip_radius, tip.angle, 0.0),
             ]
         };
-        Ok(ToothFlank {
-            pieces,
-            internal,
-            teeth: wheel.teeth,
-        })
+        Ok(ToothFlank { pieces, internal, teeth: wheel.teeth })
     }
 
     /// The five pieces, root to tip; each starts where the one before ends, with the same tangent.
@@ -391,25 +297,15 @@ impl ToothFlank {
             })
             .unwrap_or(&self.pieces[3]);
         Some(match piece.curve {
-            Curve::Involute {
-                base_radius,
-                half_base,
-                ..
-            } => {
+            Curve::Involute { base_radius, half_base, .. } => {
                 let u = ((radius / base_radius).powi(2) - 1.0).max(0.0).sqrt();
                 half_base - (u - u.atan())
             }
-            Curve::Arc {
-                centre: [x, y],
-                radius: rho,
-                ..
-            } => {
+            Curve::Arc { centre: [x, y], radius: rho, .. } => {
                 // the fillet of a tooth and the rounding of a space bulge toward lower angles
                 let lower = (piece.kind == PieceKind::RootFillet) != self.internal;
                 let c = x.hypot(y);
-                let off = ((radius * radius + c * c - rho * rho) / (2.0 * radius * c))
-                    .clamp(-1.0, 1.0)
-                    .acos();
+                let off = ((radius * radius + c * c - rho * rho) / (2.0 * radius * c)).clamp(-1.0, 1.0).acos();
                 y.atan2(x) + if lower { -off } else { off }
             }
         })
@@ -452,26 +348,16 @@ impl Wheel {
             return Err(self.refuse(
                 field,
                 rho,
-                &format!(
-                    "meets no involute: base circle radius {rb:.4} mm, circle radius {radius:.4} mm"
-                ),
+                &format!("meets no involute: base circle radius {rb:.4} mm, circle radius {radius:.4} mm"),
             ));
         }
         let beta = self.half_base - roll;
         let angle = beta + along.sqrt().atan2(rb);
-        Ok(Corner {
-            centre: [distance * angle.cos(), distance * angle.sin()],
-            angle,
-            roll,
-        })
+        Ok(Corner { centre: [distance * angle.cos(), distance * angle.sin()], angle, roll })
     }
 
     fn refuse(&self, field: &str, value: f64, what: &str) -> DriveError {
-        Problem::of(
-            &format!("{}.{field}", self.section),
-            format!("{value} mm {what}"),
-        )
-        .into()
+        Problem::of(&format!("{}.{field}", self.section), format!("{value} mm {what}")).into()
     }
 }
 
@@ -488,10 +374,7 @@ mod tests {
 
     fn flanks() -> [ToothFlank; 2] {
         let drive = Drive::hhd_95();
-        [
-            ToothFlank::external(&drive.flexspline).unwrap(),
-            ToothFlank::internal(&drive.circular_spline).unwrap(),
-        ]
+        [ToothFlank::external(&drive.flexspline).unwrap(), ToothFlank::internal(&drive.circular_spline).unwrap()]
     }
 
     fn polar([x, y]: [f64; 2]) -> (f64, f64) {
@@ -504,20 +387,10 @@ mod tests {
             for pair in flank.pieces().windows(2) {
                 let (a, b) = (pair[0].point(1.0), pair[1].point(0.0));
                 let gap = (a[0] - b[0]).hypot(a[1] - b[1]);
-                assert!(
-                    gap < 1e-13,
-                    "{:?} to {:?}: {gap} mm",
-                    pair[0].kind,
-                    pair[1].kind
-                );
+                assert!(gap < 1e-13, "{:?} to {:?}: {gap} mm", pair[0].kind, pair[1].kind);
                 let (a, b) = (pair[0].tangent(1.0), pair[1].tangent(0.0));
                 let kink = (a[0] - b[0]).hypot(a[1] - b[1]);
-                assert!(
-                    kink < 1e-12,
-                    "{:?} to {:?}: {kink} rad",
-                    pair[0].kind,
-                    pair[1].kind
-                );
+                assert!(kink < 1e-12, "{:?} to {:?}: {kink} rad", pair[0].kind, pair[1].kind);
             }
         }
     }
@@ -543,11 +416,7 @@ mod tests {
                 for t in [0.1, 0.5, 0.9] {
                     let (a, b) = (piece.point(t - step), piece.point(t + step));
                     let chord = (b[0] - a[0]).hypot(b[1] - a[1]);
-                    assert!(
-                        (chord / (2.0 * step) / piece.length() - 1.0).abs() < 1e-7,
-                        "{:?}",
-                        piece.kind
-                    );
+                    assert!((chord / (2.0 * step) / piece.length() - 1.0).abs() < 1e-7, "{:?}", piece.kind);
                     let tangent = piece.tangent(t);
                     let cross = (b[0] - a[0]) * tangent[1] - (b[1] - a[1]) * tangent[0];
                     let dot = (b[0] - a[0]) * tangent[0] + (b[1] - a[1]) * tangent[1];
@@ -557,8 +426,7 @@ mod tests {
                     let turn = a[0] * b[1] - a[1] * b[0];
                     let curvature = -turn / chord;
                     assert!(
-                        (curvature - piece.curvature(t)).abs()
-                            < 1e-5 * piece.curvature(t).abs() + 1e-6,
+                        (curvature - piece.curvature(t)).abs() < 1e-5 * piece.curvature(t).abs() + 1e-6,
                         "{:?}: {curvature} {}",
                         piece.kind,
                         piece.curvature(t)
@@ -578,10 +446,7 @@ mod tests {
             2.0 * r * (half_angle_at_base(teeth, shift, 20f64.to_radians()) - (u - u.atan()))
         };
         let (f, c) = (&drive.flexspline, &drive.circular_spline);
-        assert!(
-            (f.base_radius_mm() - 44.16555).abs() < 1e-5
-                && (c.base_radius_mm() - 44.63540).abs() < 1e-5
-        );
+        assert!((f.base_radius_mm() - 44.16555).abs() < 1e-5 && (c.base_radius_mm() - 44.63540).abs() < 1e-5);
         let tooth = |r| width(f.teeth, f.profile_shift, f.base_radius_mm(), r);
         let space = |r| width(c.teeth, c.profile_shift, c.base_radius_mm(), r);
         assert!((tooth(48.825) - 0.391).abs() < 6e-4, "{}", tooth(48.825));
@@ -598,16 +463,10 @@ mod tests {
                 for k in 0..=20 {
                     let (r, angle) = polar(piece.point(f64::from(k) / 20.0));
                     let (root, tip) = flank.root_and_tip_radius();
-                    let found = flank
-                        .angle_at_radius(r.clamp(root.min(tip), root.max(tip)))
-                        .unwrap();
+                    let found = flank.angle_at_radius(r.clamp(root.min(tip), root.max(tip))).unwrap();
                     // at the circles the outline is tangent to them, which halves the digits
                     let tolerance = if k == 0 || k == 20 { 1e-8 } else { 1e-11 };
-                    assert!(
-                        (found - angle).abs() < tolerance,
-                        "{:?} at {r}: {found} {angle}",
-                        piece.kind
-                    );
+                    assert!((found - angle).abs() < tolerance, "{:?} at {r}: {found} {angle}", piece.kind);
                 }
             }
             assert_eq!(flank.angle_at_radius(50.0), None);
@@ -621,30 +480,16 @@ mod tests {
         drive.flexspline.tip_rounding_mm = 0.005;
         drive.circular_spline.tip_rounding_mm = 0.005;
         assert!(
-            (ToothFlank::external(&drive.flexspline)
-                .unwrap()
-                .piece(PieceKind::TipRounding)
-                .curvature(0.5)
-                - 200.0)
+            (ToothFlank::external(&drive.flexspline).unwrap().piece(PieceKind::TipRounding).curvature(0.5) - 200.0)
                 .abs()
                 < 1e-9
         );
         assert!(ToothFlank::internal(&drive.circular_spline).is_ok());
         drive.flexspline.tip_rounding_mm = 0.4;
-        let message = ToothFlank::external(&drive.flexspline)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            message.starts_with("flexspline.tip_rounding_mm: 0.4 mm does not fit"),
-            "{message}"
-        );
+        let message = ToothFlank::external(&drive.flexspline).unwrap_err().to_string();
+        assert!(message.starts_with("flexspline.tip_rounding_mm: 0.4 mm does not fit"), "{message}");
         drive.circular_spline.root_fillet_mm = 0.3;
-        let message = ToothFlank::internal(&drive.circular_spline)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            message.starts_with("circular_spline.root_fillet_mm: 0.3 mm does not fit"),
-            "{message}"
-        );
+        let message = ToothFlank::internal(&drive.circular_spline).unwrap_err().to_string();
+        assert!(message.starts_with("circular_spline.root_fillet_mm: 0.3 mm does not fit"), "{message}");
     }
 }

@@ -34,10 +34,10 @@ impl Border {
     }
 }
 
-/// A factor with its border, ready to solve.
-pub struct BorderedSystem<'a> {
-    factor: &'a mut Cholesky,
-    border: &'a Border,
+/// A border eliminated with the factor of its sparse part, ready to solve with that factor.
+#[derive(Debug, Clone)]
+pub struct BorderedSystem {
+    border: Border,
     /// `A^-1 B`.
     solved: Vec<f64>,
     /// `D - B^T A^-1 B`.
@@ -48,9 +48,9 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-impl<'a> BorderedSystem<'a> {
+impl BorderedSystem {
     /// Eliminates the sparse part.
-    pub fn new(factor: &'a mut Cholesky, border: &'a Border) -> Self {
+    pub fn new(factor: &mut Cholesky, border: &Border) -> Self {
         let m = border.width;
         let n = border.columns.len() / m;
         let mut solved = border.columns.clone();
@@ -61,15 +61,15 @@ impl<'a> BorderedSystem<'a> {
                 schur[i * m + j] -= dot(&border.columns[i * n..(i + 1) * n], &solved[j * n..(j + 1) * n]);
             }
         }
-        BorderedSystem { factor, border, solved, schur }
+        BorderedSystem { border: border.clone(), solved, schur }
     }
 
-    /// Solves in place: `f` becomes x, `g` becomes z. False when the small system is singular.
+    /// Solves in place, with the factor it was made with: `f` becomes x, `g` becomes z. False when the small system is singular.
     #[must_use]
-    pub fn solve(&mut self, f: &mut [f64], g: &mut [f64]) -> bool {
+    pub fn solve(&self, factor: &mut Cholesky, f: &mut [f64], g: &mut [f64]) -> bool {
         let m = self.border.width;
         let n = f.len();
-        self.factor.solve(f, 1);
+        factor.solve(f, 1);
         for (i, gi) in g.iter_mut().enumerate() {
             *gi -= dot(&self.border.columns[i * n..(i + 1) * n], f);
         }
@@ -148,7 +148,8 @@ mod tests {
         let f: Vec<f64> = (0..6).map(|i| f64::from(i) - 2.0).collect();
         let g = [0.7, -0.2];
         let (mut x, mut z) = (f.clone(), g);
-        assert!(BorderedSystem::new(&mut factor, &border).solve(&mut x, &mut z));
+        let system = BorderedSystem::new(&mut factor, &border);
+        assert!(system.solve(&mut factor, &mut x, &mut z));
         let mut residual = f.iter().map(|v| -v).collect::<Vec<_>>();
         pattern.multiply_add(&values, &x, &mut residual);
         for k in 0..2 {

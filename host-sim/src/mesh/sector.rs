@@ -116,7 +116,8 @@ fn transfinite(bottom: &[Point], top: &[Point], left: &[Point], right: &[Point])
 impl HalfSector {
     /// Meshes the half sector.
     pub fn new(outline: &HalfOutline, density: &MeshDensity) -> HalfSector {
-        let MeshDensity { tooth_columns, space_columns, rim_rows, root_rows, fillet_elements, flank_elements } = *density;
+        let MeshDensity { tooth_columns, space_columns, rim_rows, root_rows, fillet_elements, flank_elements } =
+            *density;
         let columns = tooth_columns + space_columns;
 
         // The fillet is cut in its middle, where a line normal to it leads down to the interface circle.
@@ -213,17 +214,9 @@ impl HalfSector {
                 let element = self.elements.len();
                 let (nodes, right_edge, bottom_edge) = if external {
                     // Corners in order: inner-left, outer-left, outer-right, inner-right.
-                    (
-                        [at(0, 0), at(0, 2), at(2, 2), at(2, 0), at(0, 1), at(1, 2), at(2, 1), at(1, 0)],
-                        2,
-                        3,
-                    )
+                    ([at(0, 0), at(0, 2), at(2, 2), at(2, 0), at(0, 1), at(1, 2), at(2, 1), at(1, 0)], 2, 3)
                 } else {
-                    (
-                        [at(0, 0), at(2, 0), at(2, 2), at(0, 2), at(1, 0), at(2, 1), at(1, 2), at(0, 1)],
-                        1,
-                        0,
-                    )
+                    ([at(0, 0), at(2, 0), at(2, 2), at(0, 2), at(1, 0), at(2, 1), at(1, 2), at(0, 1)], 1, 0)
                 };
                 self.elements.push(nodes);
                 if let Some(tag) = right_tag(i, j) {

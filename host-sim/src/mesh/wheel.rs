@@ -139,6 +139,32 @@ impl WheelMesh {
         )
     }
 
+    /// A smooth ring: `sectors` elements around, `rows` through its thickness, no flanks.
+    pub fn smooth_ring(bore_radius: f64, thickness: f64, sectors: usize, rows: usize) -> Result<WheelMesh, MeshError> {
+        let half_pitch = std::f64::consts::PI / sectors as f64;
+        let at = |row: f64, angle: f64| {
+            let r = bore_radius + thickness * row / rows as f64;
+            [r * angle.cos(), r * angle.sin()]
+        };
+        let elements = (0..rows)
+            .map(|row| {
+                let (inner, outer, middle) = (row as f64, row as f64 + 1.0, row as f64 + 0.5);
+                [
+                    at(inner, 0.0),
+                    at(outer, 0.0),
+                    at(outer, half_pitch),
+                    at(inner, half_pitch),
+                    at(middle, 0.0),
+                    at(outer, 0.5 * half_pitch),
+                    at(middle, half_pitch),
+                    at(inner, 0.5 * half_pitch),
+                ]
+            })
+            .collect();
+        let half = HalfSector { elements, edges: vec![(0, 3, EdgeTag::Base(0))] };
+        WheelMesh::assemble(WheelKind::Flexspline, sectors, bore_radius, half)
+    }
+
     fn new(
         kind: WheelKind,
         profile: &ToothFlank,
@@ -202,7 +228,9 @@ impl WheelMesh {
         for side in Side::BOTH {
             // Turning a space half over reverses the order of its nodes; so does mirroring.
             let reversed = (kind == WheelKind::CircularSpline) != (side == Side::Minus);
-            let place = |p: Point| if side == Side::Plus { upper(p) } else { mirror(upper(p)) };
+            let place = |p: Point| {
+                if side == Side::Plus { upper(p) } else { mirror(upper(p)) }
+            };
             let first = template.len();
             for element in &half.elements {
                 let mut placed = element.map(place);
@@ -240,9 +268,8 @@ impl WheelMesh {
             all_nodes.extend(nodes.points.iter().map(|p| rotate(*p, angle)));
             for element in &template {
                 elements.push(
-                    element.map(|(node, offset)| {
-                        (((sector + offset as usize) % teeth) * nodes_per_sector) as u32 + node
-                    }),
+                    element
+                        .map(|(node, offset)| (((sector + offset as usize) % teeth) * nodes_per_sector) as u32 + node),
                 );
             }
         }

@@ -74,16 +74,11 @@ impl RingBending {
             }
             GeneratorKind::DoubleDisc => {
                 // w + w'' = a + 2 D sin phi beyond the arc
-                let two_d =
-                    (self.shape.bending(FRAC_PI_2) - self.shape.bending(b)) / (1.0 - b.sin());
+                let two_d = (self.shape.bending(FRAC_PI_2) - self.shape.bending(b)) / (1.0 - b.sin());
                 (two_d * b.cos(), two_d * b.sin() / self.radius_mm)
             }
         };
-        Some(ContactLoads {
-            force_n_per_mm: unit * force,
-            force_angle_rad: b,
-            pressure_mpa: unit * pressure,
-        })
+        Some(ContactLoads { force_n_per_mm: unit * force, force_angle_rad: b, pressure_mpa: unit * pressure })
     }
 }
 
@@ -109,11 +104,7 @@ mod tests {
             k if k % 2 == 1 => 4.0,
             _ => 2.0,
         };
-        (0..=n)
-            .map(|k| weight(k) * f(from + h * f64::from(k)))
-            .sum::<f64>()
-            * h
-            / 3.0
+        (0..=n).map(|k| weight(k) * f(from + h * f64::from(k))).sum::<f64>() * h / 3.0
     }
 
     /// Over a quarter, split where the closed form changes.
@@ -137,10 +128,7 @@ mod tests {
         for (kind, angle) in CASES {
             let ring = shape(kind, angle);
             assert!((ring.w(0.0) - 1.0).abs() < 1e-13, "{kind} {angle}: w(0)");
-            assert!(
-                ring.v(0.0).abs() + ring.v(FRAC_PI_2).abs() < 1e-13,
-                "{kind} {angle}: v at the axes"
-            );
+            assert!(ring.v(0.0).abs() + ring.v(FRAC_PI_2).abs() < 1e-13, "{kind} {angle}: v at the axes");
             let slope = ring.radial(0.0)[1].abs() + ring.radial(FRAC_PI_2)[1].abs();
             assert!(slope < 1e-13, "{kind} {angle}: w' at the axes");
             let mean = quarter(ring.break_angle(), |phi| ring.w(phi));
@@ -150,18 +138,12 @@ mod tests {
             for k in 0..300 {
                 let phi = 0.0052 * f64::from(k) + 3e-4;
                 let dv = (ring.v(phi + h) - ring.v(phi - h)) / (2.0 * h);
-                assert!(
-                    (dv + ring.w(phi)).abs() < 1e-7,
-                    "{kind} {angle}: v' + w at {phi}"
-                );
+                assert!((dv + ring.w(phi)).abs() < 1e-7, "{kind} {angle}: v' + w at {phi}");
             }
             let b = ring.break_angle();
             for j in 0..3 {
                 let jump = ring.radial(b + 1e-9)[j] - ring.radial(b - 1e-9)[j];
-                assert!(
-                    jump.abs() < 1e-7,
-                    "{kind} {angle}: derivative {j} jumps by {jump}"
-                );
+                assert!(jump.abs() < 1e-7, "{kind} {angle}: derivative {j} jumps by {jump}");
             }
         }
     }
@@ -180,40 +162,18 @@ mod tests {
             (-1.044, 2.447, 0.0, 3.165, 4.91, [1.031, -0.021, -0.010]),
             (-1.121, 2.192, 0.0, 3.805, 5.66, [1.068, -0.063, -0.008]),
         ];
-        for ((kind, angle), (minor, most, at, outward, square, cosines)) in
-            CASES.into_iter().zip(table)
-        {
+        for ((kind, angle), (minor, most, at, outward, square, cosines)) in CASES.into_iter().zip(table) {
             let ring = shape(kind, angle);
             let near = |found: f64, expected: f64, tolerance: f64, what: &str| {
-                assert!(
-                    (found - expected).abs() <= tolerance,
-                    "{kind} {angle}: {what} {found}, expected {expected}"
-                );
+                assert!((found - expected).abs() <= tolerance, "{kind} {angle}: {what} {found}, expected {expected}");
             };
             near(ring.w(FRAC_PI_2), minor, 6e-4, "w(90)");
-            let tightest = (0..=9000)
-                .map(|k| -ring.bending((0.01 * f64::from(k)).to_radians()))
-                .fold(0.0, f64::max);
+            let tightest = (0..=9000).map(|k| -ring.bending((0.01 * f64::from(k)).to_radians())).fold(0.0, f64::max);
             near(tightest, most, 6e-4, "largest curvature change");
-            near(
-                -ring.bending(at.to_radians()),
-                most,
-                6e-4,
-                "curvature change at its place",
-            );
-            near(
-                ring.bending(FRAC_PI_2),
-                outward,
-                6e-4,
-                "curvature change at 90",
-            );
+            near(-ring.bending(at.to_radians()), most, 6e-4, "curvature change at its place");
+            near(ring.bending(FRAC_PI_2), outward, 6e-4, "curvature change at 90");
             let split = ring.break_angle();
-            near(
-                quarter(split, |phi| ring.bending(phi).powi(2)) / FRAC_PI_2,
-                square,
-                6e-3,
-                "mean square",
-            );
+            near(quarter(split, |phi| ring.bending(phi).powi(2)) / FRAC_PI_2, square, 6e-3, "mean square");
             for (order, expected) in [2.0, 4.0, 6.0].into_iter().zip(cosines) {
                 let found = quarter(split, |phi| ring.w(phi) * (order * phi).cos()) * 4.0 / PI;
                 near(found, expected, 6e-4, "cosine coefficient");
@@ -224,9 +184,7 @@ mod tests {
     #[test]
     fn disc_eccentricities() {
         for (angle, expected) in [(20.0, 3.8164), (30.0, 3.4467), (40.0, 3.1925)] {
-            let found = shape(GeneratorKind::DoubleDisc, angle)
-                .disc_eccentricity_ratio()
-                .unwrap();
+            let found = shape(GeneratorKind::DoubleDisc, angle).disc_eccentricity_ratio().unwrap();
             assert!((found - expected).abs() < 6e-5, "{angle}: {found}");
         }
     }
@@ -234,30 +192,18 @@ mod tests {
     #[test]
     fn the_loads_do_the_work_that_bends_the_ring() {
         // Clapeyron: sum of force times displacement = integral of E' I (w + w'')² / R³
-        for kind in [
-            GeneratorKind::TwoRoller,
-            GeneratorKind::FourRoller,
-            GeneratorKind::DoubleDisc,
-        ] {
+        for kind in [GeneratorKind::TwoRoller, GeneratorKind::FourRoller, GeneratorKind::DoubleDisc] {
             let ring = RingBending::of_rim(&Drive::hhd_95(), kind);
             let loads = ring.contact_loads().unwrap();
             let split = ring.shape.break_angle();
             let r = ring.radius_mm;
             let energy =
-                4.0 * quarter(split, |phi| ring.shape.bending(phi).powi(2)) * ring.stiffness_n_mm()
-                    / r.powi(3);
-            let forces = if kind == GeneratorKind::TwoRoller {
-                2.0
-            } else {
-                4.0
-            };
+                4.0 * quarter(split, |phi| ring.shape.bending(phi).powi(2)) * ring.stiffness_n_mm() / r.powi(3);
+            let forces = if kind == GeneratorKind::TwoRoller { 2.0 } else { 4.0 };
             let by_forces = forces * loads.force_n_per_mm * ring.shape.w(loads.force_angle_rad);
             let arc = integral(0.0, split, |phi| loads.pressure_mpa * r * ring.shape.w(phi));
             let work = by_forces + 4.0 * arc;
-            assert!(
-                (work / energy - 1.0).abs() < 1e-9,
-                "{kind}: {work} against {energy}"
-            );
+            assert!((work / energy - 1.0).abs() < 1e-9, "{kind}: {work} against {energy}");
         }
     }
 
@@ -272,12 +218,7 @@ mod tests {
         assert!(ring(GeneratorKind::Cam).contact_loads().is_none());
         let largest = |kind| {
             let ring = ring(kind);
-            (0..=900)
-                .map(|k| {
-                    ring.outer_stress_mpa((0.1 * f64::from(k)).to_radians())
-                        .abs()
-                })
-                .fold(0.0, f64::max)
+            (0..=900).map(|k| ring.outer_stress_mpa((0.1 * f64::from(k)).to_radians()).abs()).fold(0.0, f64::max)
         };
         for (kind, mpa) in [
             (GeneratorKind::Cam, 91.0),
@@ -285,11 +226,7 @@ mod tests {
             (GeneratorKind::FourRoller, 104.0),
             (GeneratorKind::DoubleDisc, 96.0),
         ] {
-            assert!(
-                (largest(kind) - mpa).abs() < 0.7,
-                "{kind}: {} MPa",
-                largest(kind)
-            );
+            assert!((largest(kind) - mpa).abs() < 0.7, "{kind}: {} MPa", largest(kind));
         }
         // on the major axis the ring is bent tighter: tension outside
         assert!(two.outer_stress_mpa(0.0) > 0.0 && two.outer_stress_mpa(FRAC_PI_2) < 0.0);

@@ -53,18 +53,12 @@ impl ToothPath {
 
     /// Tip of the circular-spline tooth, (1) and (3).
     pub fn circular_spline_tip(&self) -> PathPoint {
-        PathPoint {
-            w_mm: self.circular_spline_tip - self.neutral_radius,
-            v_mm: 0.0,
-        }
+        PathPoint { w_mm: self.circular_spline_tip - self.neutral_radius, v_mm: 0.0 }
     }
 
     /// Root of the circular-spline tooth, (2) and (4).
     pub fn circular_spline_root(&self) -> PathPoint {
-        PathPoint {
-            w_mm: self.circular_spline_root - self.neutral_radius,
-            v_mm: 0.0,
-        }
+        PathPoint { w_mm: self.circular_spline_root - self.neutral_radius, v_mm: 0.0 }
     }
 
     /// Angle of the tooth from the major axis when the generator has turned by `turned_rad` from the minor axis, (5).
@@ -115,23 +109,11 @@ mod tests {
             );
             let major = path.flexspline_tip(ToothPath::angle_after(FRAC_PI_2));
             let half_pitch = std::f64::consts::PI / 190.0;
-            assert!(
-                (major.v_mm + (48.825 + 0.5) * half_pitch).abs() < 1e-9,
-                "{kind}: {major:?}"
-            );
+            assert!((major.v_mm + (48.825 + 0.5) * half_pitch).abs() < 1e-9, "{kind}: {major:?}");
             // working depth 0.675, clearance to the root 0.125
-            assert!(
-                (major.w_mm - path.circular_spline_tip().w_mm - 0.675).abs() < 0.007,
-                "{kind}: {major:?}"
-            );
-            assert!(
-                (path.circular_spline_root().w_mm - major.w_mm - 0.125).abs() < 0.007,
-                "{kind}: {major:?}"
-            );
-            assert!(
-                (path.flexspline_tip(0.3).w_mm - path.flexspline_root(0.3).w_mm - 0.95).abs()
-                    < 1e-3
-            );
+            assert!((major.w_mm - path.circular_spline_tip().w_mm - 0.675).abs() < 0.007, "{kind}: {major:?}");
+            assert!((path.circular_spline_root().w_mm - major.w_mm - 0.125).abs() < 0.007, "{kind}: {major:?}");
+            assert!((path.flexspline_tip(0.3).w_mm - path.flexspline_root(0.3).w_mm - 0.95).abs() < 1e-3);
         }
     }
 
@@ -148,18 +130,12 @@ mod tests {
             let height = drive.flexspline.tip_radius_mm - radius;
             let (x, y) = (x + height * normal.cos(), y + height * normal.sin());
             let from_tooth_axis = y.atan2(x) - phi - path.output_angle(phi);
-            let exact = [
-                x.hypot(y) * from_tooth_axis.cos() - radius,
-                x.hypot(y) * from_tooth_axis.sin(),
-            ];
+            let exact = [x.hypot(y) * from_tooth_axis.cos() - radius, x.hypot(y) * from_tooth_axis.sin()];
             let paper = path.flexspline_tip(phi);
             radial = radial.max((paper.w_mm - exact[0]).abs());
             tangential = tangential.max((paper.v_mm - exact[1]).abs());
         }
         assert!((5.3e-3..=5.95e-3).contains(&radial), "radially {radial} mm");
-        assert!(
-            (0.5e-3..=1.25e-3).contains(&tangential),
-            "tangentially {tangential} mm"
-        );
+        assert!((0.5e-3..=1.25e-3).contains(&tangential), "tangentially {tangential} mm");
     }
 }

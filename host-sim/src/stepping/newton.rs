@@ -5,7 +5,7 @@
 //!
 //! predict, lay out the contact; repeat { assemble; done? factorise; solve; update } until done.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
 use crate::contact::{BoreLaw, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair};
@@ -28,7 +28,9 @@ const GROUNDED_SPRINGS: [f64; 3] = [1e1, 1e3, 1e5];
 /// Largest change of a displacement that an undamped Newton step may make, mm.
 const LARGEST_STEP: f64 = 0.1;
 /// Largest first step of a changing load, N m.
-const LARGEST_LOAD_STEP: f64 = 20.0;
+const LARGEST_LOAD_STEP: f64 = 100.0;
+/// Factor on the penalties while the way to a new load is found.
+const LOADING_SOFTNESS: f64 = 1e-3;
 /// Iterations after which the next part of an increment may be twice as large.
 const EASY: usize = 10;
 
@@ -40,6 +42,13 @@ const TOUCH: f64 = 1e-7;
 const CORNER_DRIFT: f64 = 1e-4;
 /// Relative residual below which steps are taken whole: what is left is near round-off.
 const ROUND_OFF: f64 = 1e-6;
+
+/// Relative residual below which the last factor may serve again, and the gain that the last iteration must have made.
+const CHORD_BELOW: f64 = 1e-2;
+const CHORD_GAIN: f64 = 0.2;
+
+/// States of steady motion that the predictor remembers: a fine sampling of one pitch.
+const REMEMBERED: usize = 48;
 
 type Layouts = BTreeMap<FlankPair, FlankLayout>;
 
@@ -91,6 +100,8 @@ pub struct Solver<'p> {
     system: Option<System>,
     /// Factor on the penalties, below 1 only while the drive is first deformed.
     softening: f64,
+    /// The last states of steady motion, oldest first.
+    passed: VecDeque<State>,
     /// Time spent so far.
     pub effort: Effort,
 }
@@ -104,6 +115,8 @@ struct System {
     /// Values of the circular spline, which do not change.
     cs_values: Vec<f64>,
     factor: Cholesky,
+    /// The border eliminated with the factor, once there is one.
+    eliminated: Option<BorderedSystem>,
     values: Vec<f64>,
     border: Border,
 }
@@ -159,10 +172,10 @@ impl Residual {
         }
     }
 
-    /// Relative to the contact forces.
+    /// Relative to the contact forces; the torque, which everything serves, ten times as strictly.
     fn relative(&self) -> f64 {
         let force = self.force.iter().fold(0.0_f64, |m, x| m.max(x.abs())) / self.scale;
-        force.max(self.border[OUTPUT].abs() / self.torque_scale)
+        force.max(10.0 * self.border[OUTPUT].abs() / self.torque_scale)
     }
 }
 
@@ -192,6 +205,7 @@ impl<'p> Solver<'p> {
             cs_template,
             system: None,
             softening: 1.0,
+            passed: VecDeque::new(),
             effort: Effort::default(),
         }
     }
@@ -232,7 +246,7 @@ impl<'p> Solver<'p> {
         let (mut done, mut part, mut halvings) = (0.0_f64, first, 0);
         loop {
             let to = (done + part).min(1.0);
-            match self.newton(&state, from.generator_rad + turn * to, from.torque_n_m + load * to) {
+            match self.solve_part(&state, from.generator_rad + turn * to, from.torque_n_m + load * to) {
                 Ok((next, mut increment)) => {
                     iterations += increment.iterations;
                     state = next;
@@ -257,31 +271,97 @@ impl<'p> Solver<'p> {
         }
     }
 
-    /// State predicted for a generator angle: the wave turned, the output going on as it did before. An output that carries
+    /// One part of an increment. A load that changes has no predictor: a soft contact finds the way first.
+    fn solve_part(
+        &mut self,
+        from: &State,
+        generator_rad: f64,
+        torque_n_m: f64,
+    ) -> Result<(State, Increment), SolveError> {
+        if torque_n_m == from.torque_n_m {
+            return self.newton(from, generator_rad, torque_n_m);
+        }
+        self.softening = LOADING_SOFTNESS;
+        let soft = self.newton(from, generator_rad, torque_n_m);
+        self.softening = 1.0;
+        let (mut guess, first) = soft?;
+        // History is that of the start, not of the guess.
+        guess.drag_anchor_rad = from.drag_anchor_rad;
+        guess.friction = from.friction.clone();
+        let (state, mut increment) = self.newton(&guess, generator_rad, torque_n_m)?;
+        increment.iterations += first.iterations;
+        Ok((state, increment))
+    }
+
+    /// State predicted for a generator angle: the wave turned, the output going on as it did before.
+    ///
+    /// A drive in steady motion passes through the same state after every flexspline pitch, one tooth further. Of the last
+    /// states the one is turned that needs the smallest fraction of a pitch, whole teeth being exact. An output that carries
     /// no load stays where it is when the generator reverses: it has the clearance to cross.
     fn predict(&self, from: &State, generator_rad: f64, torque_n_m: f64) -> State {
         let turn = generator_rad - from.generator_rad;
-        let mut state = from.clone();
-        state.generator_rad = generator_rad;
-        state.torque_n_m = torque_n_m;
-        if turn != 0.0 {
-            let idle = self.problem.per_width(torque_n_m).abs() <= self.problem.drag;
-            let reversing = turn.signum() * from.travel < 0.0;
-            let output_turn = match (idle, reversing) {
-                (true, true) => 0.0,
-                (false, true) => turn / self.problem.drive.ratio(),
-                _ => from.output_rate * turn,
-            };
-            state.u = turn_field(&self.problem.flexspline, &from.u, turn);
-            state.v = turn_field(&self.problem.circular_spline, &from.v, turn - output_turn);
-            state.output_rad += output_turn;
+        if turn == 0.0 {
+            return State { torque_n_m, ..from.clone() };
         }
-        state
+        let problem = self.problem;
+        let idle = problem.per_width(torque_n_m).abs() <= problem.drag;
+        let reversing = turn.signum() * from.travel < 0.0;
+        let nominal = 1.0 / problem.drive.ratio();
+        let pitch = problem.flexspline.pitch();
+        let fraction = |state: &State| {
+            let turns = (generator_rad - state.generator_rad) / pitch;
+            (turns - turns.round()).abs()
+        };
+        let steady = !reversing && (from.output_rate / nominal - 1.0).abs() < 0.2;
+        let base = self
+            .passed
+            .iter()
+            .filter(|state| steady && state.torque_n_m == torque_n_m && state.travel == from.travel)
+            .min_by(|a, b| fraction(a).total_cmp(&fraction(b)))
+            .filter(|state| fraction(state) < 0.5 * fraction(from))
+            .unwrap_or(from);
+        let turn = generator_rad - base.generator_rad;
+        let output_turn = match (idle, reversing) {
+            (true, true) => 0.0,
+            (false, true) => turn * nominal,
+            _ if std::ptr::eq(base, from) => from.output_rate * turn,
+            _ => turn * nominal,
+        };
+        State {
+            u: turn_field(&problem.flexspline, &base.u, turn),
+            v: turn_field(&problem.circular_spline, &base.v, turn - output_turn),
+            output_rad: base.output_rad + output_turn,
+            generator_rad,
+            torque_n_m,
+            sleeve_moment: base.sleeve_moment,
+            drag_anchor_rad: from.drag_anchor_rad,
+            lateral_force: base.lateral_force,
+            friction: from.friction.clone(),
+            output_rate: from.output_rate,
+            travel: from.travel,
+        }
+    }
+
+    /// Remembers a state of steady motion for the predictor.
+    fn remember(&mut self, state: &State) {
+        let nominal = 1.0 / self.problem.drive.ratio();
+        let steady = (state.output_rate / nominal - 1.0).abs() < 0.2;
+        let fits = |old: &State| old.torque_n_m == state.torque_n_m && old.travel == state.travel;
+        if !steady || self.passed.front().is_some_and(|old| !fits(old)) {
+            self.passed.clear();
+        }
+        if steady {
+            if self.passed.len() == REMEMBERED {
+                self.passed.pop_front();
+            }
+            self.passed.push_back(State { friction: BTreeMap::new(), ..state.clone() });
+        }
     }
 
     fn newton(&mut self, from: &State, generator_rad: f64, torque_n_m: f64) -> Result<(State, Increment), SolveError> {
         let settings = self.problem.settings;
-        let failed = |history: Vec<f64>, reason| SolveError::NotConverged { generator_rad, torque_n_m, reason, history };
+        let failed =
+            |history: Vec<f64>, reason| SolveError::NotConverged { generator_rad, torque_n_m, reason, history };
         let mut state = self.predict(from, generator_rad, torque_n_m);
         let clock = Instant::now();
         self.balance_output(&mut state, torque_n_m);
@@ -289,20 +369,21 @@ impl<'p> Solver<'p> {
         let mut layouts = Layouts::new();
         let mut residual = self.assemble(&state, from, torque_n_m, &mut layouts);
         let mut history = Vec::new();
+        let mut last_length = 1.0;
         while history.len() <= settings.max_iterations {
             let relative = residual.relative();
             history.push(relative);
-            if std::env::var_os("FLEX_DEBUG").is_some() {
-                eprintln!("  it {} rel {relative:.2e} scale {:.2e} torque {:.2e}/{:.2e} fl {} gen {} free {} delta {:.9e} drag {:.3e}", history.len(), residual.scale, residual.border[OUTPUT], residual.torque_scale, residual.flank_contacts, residual.generator_contacts, residual.free_output, state.output_rad, residual.drag_torque);
-            }
             if !relative.is_finite() {
                 return Err(failed(history, "the residual is not finite"));
             }
-            if relative < settings.tolerance {
+            if relative <= settings.tolerance {
                 // The contact was laid out for the predicted state; where the corner of a space ended elsewhere, again.
                 if self.layouts_fit(&state, &layouts) {
                     let increment = self.report(&residual, history.len() - 1);
                     self.finish(&mut state, from, &layouts);
+                    if generator_rad != from.generator_rad {
+                        self.remember(&state);
+                    }
                     return Ok((state, increment));
                 }
                 layouts.clear();
@@ -314,18 +395,17 @@ impl<'p> Solver<'p> {
                 residual = self.assemble(&state, from, torque_n_m, &mut layouts);
                 continue;
             }
-            let Some(step) = self.solve(&residual) else {
+            // Near the end the last factor still points the right way, and a step with it costs a tenth.
+            let chord = relative < CHORD_BELOW && last_gain(&history) < CHORD_GAIN;
+            let Some(step) = self.solve(&residual, chord) else {
                 return Err(failed(history, "the stiffness matrix is not positive definite"));
             };
             // The force along the step falls from `before` to nothing at the end of a perfect step; far beyond, halve it.
             let before = step.work(&residual);
-            let mut length = (LARGEST_STEP / step.largest()).min(1.0);
+            let mut length = (LARGEST_STEP / step.largest()).min(1.0).min(8.0 * last_length);
             for trial in 0.. {
                 let candidate = step.applied_to(&state, length);
                 residual = self.assemble(&candidate, from, torque_n_m, &mut layouts);
-                if std::env::var_os("FLEX_DEBUG").is_some() {
-                    eprintln!("     trial {trial} length {length:.3e} work {before:.3e} -> {:.3e} largest {:.2e} d-delta {:.2e}", step.work(&residual), step.largest(), step.border[OUTPUT]);
-                }
                 let overshoot = before > 0.0 && step.work(&residual) < -0.9 * before;
                 if !overshoot || relative < ROUND_OFF || trial == 10 {
                     state = candidate;
@@ -333,6 +413,7 @@ impl<'p> Solver<'p> {
                 }
                 length *= 0.5;
             }
+            last_length = length;
         }
         Err(failed(history, "the iterations ran out"))
     }
@@ -445,12 +526,8 @@ impl<'p> Solver<'p> {
 
     fn analyse(&self, pairs: &[FlankPair]) -> System {
         let problem = self.problem;
-        let cs_nodes: Vec<[Option<u32>; 8]> = problem
-            .circular_spline
-            .elements
-            .iter()
-            .map(|element| element.map(|n| self.cs_index[n as usize]))
-            .collect();
+        let cs_nodes: Vec<[Option<u32>; 8]> =
+            problem.circular_spline.elements.iter().map(|element| element.map(|n| self.cs_index[n as usize])).collect();
         let cs_groups: Vec<Vec<u32>> = cs_nodes.iter().map(|e| e.iter().flatten().copied().collect()).collect();
         let pair_nodes: Vec<(Vec<u32>, Vec<u32>)> = pairs
             .iter()
@@ -460,12 +537,8 @@ impl<'p> Solver<'p> {
                 (fs, cs)
             })
             .collect();
-        let groups = problem
-            .flexspline
-            .elements
-            .iter()
-            .map(|e| e.as_slice())
-            .chain(cs_groups.iter().map(Vec::as_slice));
+        let groups =
+            problem.flexspline.elements.iter().map(|e| e.as_slice()).chain(cs_groups.iter().map(Vec::as_slice));
         let across = pair_nodes.iter().map(|(fs, cs)| (fs.as_slice(), cs.as_slice()));
         let pattern = Pattern::new(self.free_nodes, groups, across);
         let factor = Cholesky::new(&pattern);
@@ -474,8 +547,7 @@ impl<'p> Solver<'p> {
         for (nodes, points) in cs_nodes.iter().zip(&problem.circular_spline.gauss) {
             pattern.element(nodes).scatter(&linear_stiffness(points, &problem.material), &mut cs_values);
         }
-        let fs_positions =
-            problem.flexspline.elements.iter().map(|e| pattern.element(&e.map(Some))).collect();
+        let fs_positions = problem.flexspline.elements.iter().map(|e| pattern.element(&e.map(Some))).collect();
         let bore_positions = problem
             .bore
             .edges
@@ -508,7 +580,7 @@ impl<'p> Solver<'p> {
             }
         }
         let values = vec![0.0; pattern.stored()];
-        System { pairs, pattern, fs_positions, bore_positions, cs_values, factor, values, border }
+        System { pairs, pattern, fs_positions, bore_positions, cs_values, factor, eliminated: None, values, border }
     }
 
     /// The tangential unknown of a bore node at angle ~0.
@@ -600,7 +672,9 @@ impl<'p> Solver<'p> {
         let at = configuration(state);
         let mut corner = 0.0;
         for (&pair, layout) in layouts {
-            let Some(contact) = self.flanks.evaluate(pair, at, self.flank_law(), &layout.points) else { continue };
+            let Some(contact) = self.flanks.evaluate(pair, at, self.flank_law(), &layout.points) else {
+                continue;
+            };
             let positions = &system.pairs[&pair];
             let n = contact.force.len();
             let column = system.border.column_mut(OUTPUT);
@@ -677,30 +751,39 @@ impl<'p> Solver<'p> {
     }
 
     /// One Newton step, or nothing when the tangent is not positive definite.
-    fn solve(&mut self, residual: &Residual) -> Option<Step> {
+    ///
+    /// With `chord` the last tangent serves again.
+    fn solve(&mut self, residual: &Residual, chord: bool) -> Option<Step> {
         let system = self.system.as_mut()?;
-        let clock = Instant::now();
-        let mut definite = system.factor.factorise(&system.pattern, &system.values).is_ok();
-        // Far from equilibrium the rim may resist no sliding along the generator; a grounded spring at every node then
-        // shortens the step and leaves its direction downhill.
-        for spring in GROUNDED_SPRINGS {
-            if definite {
-                break;
+        if !chord || system.eliminated.is_none() {
+            let clock = Instant::now();
+            system.eliminated = None;
+            let mut definite = system.factor.factorise(&system.pattern, &system.values).is_ok();
+            // Far from equilibrium the rim may resist no sliding along the generator; a grounded spring at every node then
+            // shortens the step and leaves its direction downhill.
+            for spring in GROUNDED_SPRINGS {
+                if definite {
+                    break;
+                }
+                for &start in &system.pattern.column_starts[..system.pattern.unknowns()] {
+                    system.values[start as usize] += spring;
+                }
+                definite = system.factor.factorise(&system.pattern, &system.values).is_ok();
             }
-            for &start in &system.pattern.column_starts[..system.pattern.unknowns()] {
-                system.values[start as usize] += spring;
+            self.effort.factorisation += clock.elapsed();
+            if !definite {
+                return None;
             }
-            definite = system.factor.factorise(&system.pattern, &system.values).is_ok();
+            let clock = Instant::now();
+            system.eliminated = Some(BorderedSystem::new(&mut system.factor, &system.border));
+            self.effort.solution += clock.elapsed();
         }
-        if !definite {
-            return None;
-        }
-        self.effort.factorisation += clock.elapsed();
         let clock = Instant::now();
         let mut free = residual.force.clone();
         let mut border = residual.border;
         let width = system.border.width;
-        let solved = BorderedSystem::new(&mut system.factor, &system.border).solve(&mut free, &mut border[..width]);
+        let eliminated = system.eliminated.as_ref()?;
+        let solved = eliminated.solve(&mut system.factor, &mut free, &mut border[..width]);
         self.effort.solution += clock.elapsed();
         if !solved {
             return None;
@@ -720,17 +803,16 @@ impl<'p> Solver<'p> {
     /// Whether the corners of the spaces still face the places they were laid out for.
     fn layouts_fit(&self, state: &State, layouts: &Layouts) -> bool {
         let at = configuration(state);
-        layouts
-            .iter()
-            .filter(|(pair, _)| self.flanks.smallest_gap(**pair, at) < TOUCH)
-            .all(|(pair, layout)| match (layout.corner, self.flanks.corner(*pair, at)) {
+        layouts.iter().filter(|(pair, _)| self.flanks.smallest_gap(**pair, at) < TOUCH).all(|(pair, layout)| {
+            match (layout.corner, self.flanks.corner(*pair, at)) {
                 (Some(a), Some(b)) => (a - b).abs() < CORNER_DRIFT,
                 (None, None) => true,
                 (Some(r), None) | (None, Some(r)) => {
                     (r - self.flanks.tooth.start_radius).abs().min((r - self.flanks.tooth.junction_radius).abs())
                         < CORNER_DRIFT
                 }
-            })
+            }
+        })
     }
 
     /// Carries the history over the end of an increment.
@@ -791,6 +873,14 @@ fn packed_times(packed: &[f64; PACKED], x: &[f64; 16]) -> [f64; 16] {
         k += 1;
     }
     y
+}
+
+/// How far the last iteration brought the residual down.
+fn last_gain(history: &[f64]) -> f64 {
+    match history {
+        [.., before, after] => after / before,
+        _ => 1.0,
+    }
 }
 
 /// A Newton step in all unknowns.

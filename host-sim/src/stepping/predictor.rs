@@ -17,9 +17,8 @@ pub fn turn_field(mesh: &WheelMesh, field: &[f64], angle_rad: f64) -> Vec<f64> {
     for sector in 0..mesh.teeth {
         let (sin, cos) = turns[sector];
         // Value at sector - shift, from six sectors around it.
-        let sources: [usize; 6] = std::array::from_fn(|i| {
-            (sector as isize - whole as isize - 1 + 3 - i as isize).rem_euclid(teeth) as usize
-        });
+        let sources: [usize; 6] =
+            std::array::from_fn(|i| (sector as isize - whole as isize - 1 + 3 - i as isize).rem_euclid(teeth) as usize);
         for k in 0..per_sector {
             let mut local = [0.0; 2];
             for (source, weight) in sources.iter().zip(&weights) {
@@ -42,7 +41,5 @@ pub fn turn_field(mesh: &WheelMesh, field: &[f64], angle_rad: f64) -> Vec<f64> {
 fn lagrange6(fraction: f64) -> [f64; 6] {
     let nodes = [2.0, 1.0, 0.0, -1.0, -2.0, -3.0];
     let x = -fraction;
-    std::array::from_fn(|i| {
-        (0..6).filter(|&j| j != i).map(|j| (x - nodes[j]) / (nodes[i] - nodes[j])).product()
-    })
+    std::array::from_fn(|i| (0..6).filter(|&j| j != i).map(|j| (x - nodes[j]) / (nodes[i] - nodes[j])).product())
 }
