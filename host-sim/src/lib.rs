@@ -9,3 +9,5 @@ pub mod material;
 pub mod mesh;
 pub mod reference;
 pub mod stepping;
+pub mod samples;
+pub mod sweep;
