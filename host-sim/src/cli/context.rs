@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
 
-use super::{Common, Failure};
+use super::{Common, Failure, Outcome};
 use crate::drive::Drive;
 use crate::output::prepare_folder;
 use crate::progress::Progress;
@@ -109,12 +109,17 @@ impl Context {
         Ok(())
     }
 
-    /// Whether the user has pressed Ctrl-C. From the first call on it no longer ends the process.
+    /// Whether the user has pressed Ctrl-C. From the first call on that no longer ends the process, so that the run can stop
+    /// between two increments and clear up; pressing it again ends it at once and may leave a hidden temporary file.
     pub(super) fn watch_interrupt(&self) -> impl Fn() -> bool + use<> {
         static WATCH: Once = Once::new();
-        // Without a handler Ctrl-C ends the process at once, which leaves at worst a temporary file.
         WATCH.call_once(|| {
-            let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed));
+            // Without a handler the first Ctrl-C acts as the second would.
+            let _ = ctrlc::set_handler(|| {
+                if INTERRUPTED.swap(true, Ordering::Relaxed) {
+                    std::process::exit(i32::from(Outcome::Failed as u8));
+                }
+            });
         });
         || INTERRUPTED.load(Ordering::Relaxed)
     }

@@ -7,7 +7,7 @@ use std::path::Path as FilePath;
 use clap::{Args, ValueEnum};
 
 use super::{Context, Failure};
-use crate::drive::GeneratorKind;
+use crate::drive::{Drive, GeneratorKind};
 use crate::export::{Frame, write_pvd, write_vtu};
 use crate::mesh::MeshLevel;
 use crate::output::{OutputError, WholeFolder, write_csv, write_json, write_whole};
@@ -116,7 +116,7 @@ enum SolverOption {
 impl Simulate {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let drive = context.drive()?;
-        let settings = self.settings()?;
+        let settings = self.settings(&drive)?;
         settings
             .check(&drive)
             .map_err(|error| Failure::BadInput(error.to_string()))?;
@@ -162,10 +162,10 @@ impl Simulate {
         context.print(&simulation.summary, || report(&simulation.summary, out))
     }
 
-    fn settings(&self) -> Result<SimulationSettings, Failure> {
+    fn settings(&self, drive: &Drive) -> Result<SimulationSettings, Failure> {
         let path = match Path::built_in(&self.path) {
             Some(path) => path,
-            None => Path::Points(self.read_path()?),
+            None => Path::Points(self.read_path(drive)?),
         };
         if self.direction.is_some() && !matches!(path, Path::Pitch | Path::Turn) {
             return Err(Failure::BadInput(
@@ -184,15 +184,16 @@ impl Simulate {
         })
     }
 
-    fn read_path(&self) -> Result<Vec<PathPoint>, Failure> {
+    fn read_path(&self, drive: &Drive) -> Result<Vec<PathPoint>, Failure> {
         let name = &self.path;
         let text = std::fs::read_to_string(name).map_err(|error| {
             Failure::BadInput(format!(
                 "--path: found {name:?}, which cannot be read as a file ({error}); allowed: paper, pitch, turn or a CSV file"
             ))
         })?;
-        let points =
-            read_path(name, &text).map_err(|error| Failure::BadInput(error.to_string()))?;
+        let temperatures_c = drive.temperature.minimum_c..=drive.temperature.maximum_c;
+        let points = read_path(name, &text, temperatures_c)
+            .map_err(|error| Failure::BadInput(error.to_string()))?;
         let twice = [
             (
                 "--torque-n-m",
@@ -220,10 +221,10 @@ impl Simulate {
 
 /// Bad input or failed run.
 pub(super) fn refused_or_failed(error: SimulateError) -> Failure {
-    if error.is_bad_input() {
-        Failure::BadInput(error.to_string())
-    } else {
-        Failure::Failed(error.to_string())
+    match error {
+        SimulateError::Stopped { .. } => Failure::Failed(format!("{error}; nothing was written")),
+        _ if error.is_bad_input() => Failure::BadInput(error.to_string()),
+        _ => Failure::Failed(error.to_string()),
     }
 }
 

@@ -210,7 +210,7 @@ pub enum SimulateError {
         travelled_rad: f64,
     },
     /// The observer asked to stop.
-    #[error("stopped after {done} of {total} increments; nothing was written")]
+    #[error("stopped after {done} of {total} increments")]
     Stopped {
         /// Increments solved.
         done: usize,

@@ -1,6 +1,7 @@
 //! Where the generator goes: the built-in paths, and paths from a CSV file.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use thiserror::Error;
 
@@ -68,16 +69,21 @@ pub struct PathError {
 const REPORTED: usize = 10;
 
 /// Columns of a path file.
-const COLUMNS: [(&str, f64); 3] = [
-    ("generator_rad", LARGEST_ANGLE_RAD),
-    ("torque_n_m", LARGEST_TORQUE_N_M),
-    ("temperature_c", 1e3),
-];
+const COLUMNS: [&str; 3] = ["generator_rad", "torque_n_m", "temperature_c"];
 
 /// Reads a path: CSV with a header, `generator_rad` and, if wanted, `torque_n_m` and `temperature_c`, in any order. Lines
 /// that begin with `#` are comments. Other columns are ignored, so that a `results.csv` is a path too, unless their name
-/// is nearly one of the three.
-pub fn read_path(file_name: &str, text: &str) -> Result<Vec<PathPoint>, PathError> {
+/// is nearly one of the three. `temperatures_c` are those that the drive is made for.
+pub fn read_path(
+    file_name: &str,
+    text: &str,
+    temperatures_c: RangeInclusive<f64>,
+) -> Result<Vec<PathPoint>, PathError> {
+    let allowed = [
+        -LARGEST_ANGLE_RAD..=LARGEST_ANGLE_RAD,
+        -LARGEST_TORQUE_N_M..=LARGEST_TORQUE_N_M,
+        temperatures_c,
+    ];
     let mut lines = (1..)
         .zip(text.trim_start_matches('\u{feff}').lines())
         .filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
@@ -100,13 +106,16 @@ pub fn read_path(file_name: &str, text: &str) -> Result<Vec<PathPoint>, PathErro
             continue;
         }
         let mut values = [None; 3];
-        for ((column, value), (name, largest)) in columns.iter().zip(&mut values).zip(COLUMNS) {
-            let Some(column) = column else { continue };
-            match row[*column].parse::<f64>() {
-                Ok(number) if number.abs() <= largest => *value = Some(number),
+        for (k, name) in COLUMNS.iter().enumerate() {
+            let Some(cell) = columns[k].map(|column| row[column]) else {
+                continue;
+            };
+            match cell.parse::<f64>() {
+                Ok(number) if allowed[k].contains(&number) => values[k] = Some(number),
                 _ => problems.push(format!(
-                    "{place}: {name}: found {:?}, allowed: a number from {} to {largest}",
-                    row[*column], -largest
+                    "{place}: {name}: found {cell:?}, allowed: a number from {} to {}",
+                    allowed[k].start(),
+                    allowed[k].end()
                 )),
             }
         }
@@ -146,14 +155,14 @@ fn cells(line: &str) -> Vec<&str> {
 fn find_columns(header: &[&str]) -> Result<[Option<usize>; 3], String> {
     let mut found = [None; 3];
     for (position, name) in header.iter().enumerate() {
-        if let Some(known) = COLUMNS.iter().position(|(known, _)| known == name)
+        if let Some(known) = COLUMNS.iter().position(|known| known == name)
             && found[known].replace(position).is_some()
         {
             return Err(format!("column {name} stands there twice"));
         }
     }
     // A column that was meant but misspelt would silently not act.
-    for ((known, _), _) in COLUMNS
+    for (known, _) in COLUMNS
         .iter()
         .zip(found)
         .filter(|(_, found)| found.is_none())
@@ -177,17 +186,21 @@ fn find_columns(header: &[&str]) -> Result<[Option<usize>; 3], String> {
 mod tests {
     use super::*;
 
+    fn read(name: &str, text: &str) -> Result<Vec<PathPoint>, PathError> {
+        read_path(name, text, -60.0..=80.0)
+    }
+
     #[test]
     fn columns_come_in_any_order_with_comments_between() {
         let text = "\u{feff}# warm, loaded\ntemperature_c, other ,generator_rad,torque_n_m\n20, x, 0.0, 5\n# on\n60,y,-0.5,-5e0\n";
-        let points = read_path("p.csv", text).unwrap();
+        let points = read("p.csv", text).unwrap();
         let point = |generator_rad, torque, temperature| PathPoint {
             generator_rad,
             torque_n_m: Some(torque),
             temperature_c: Some(temperature),
         };
         assert_eq!(points, [point(0.0, 5.0, 20.0), point(-0.5, -5.0, 60.0)]);
-        let bare = read_path("p.csv", "generator_rad\n1\n").unwrap();
+        let bare = read("p.csv", "generator_rad\n1\n").unwrap();
         assert_eq!(
             bare,
             [PathPoint {
@@ -243,12 +256,16 @@ mod tests {
                 "p.csv:3: found 1 fields, allowed: 2",
             ),
             (
+                "generator_rad,temperature_c\n0,81\n",
+                "p.csv:2: temperature_c: found \"81\", allowed: a number from -60 to 80",
+            ),
+            (
                 "generator_rad\n0,01\n",
                 "p.csv:2: found 2 fields, allowed: 1",
             ),
         ];
         for (text, start) in cases {
-            let message = read_path("p.csv", text).unwrap_err().to_string();
+            let message = read("p.csv", text).unwrap_err().to_string();
             assert!(message.starts_with(start), "{text:?} gave {message}");
         }
     }
@@ -256,9 +273,9 @@ mod tests {
     #[test]
     fn all_problems_come_at_once_and_many_are_counted() {
         let text = "generator_rad,torque_n_m\na,b\n0,c\n";
-        assert_eq!(read_path("p.csv", text).unwrap_err().problems.len(), 3);
+        assert_eq!(read("p.csv", text).unwrap_err().problems.len(), 3);
         let text = format!("generator_rad\n{}", "x\n".repeat(50));
-        let problems = read_path("p.csv", &text).unwrap_err().problems;
+        let problems = read("p.csv", &text).unwrap_err().problems;
         assert_eq!(
             (problems.len(), problems[10].as_str()),
             (11, "p.csv: and 40 more")
