@@ -24,8 +24,6 @@ pub struct InvoluteFlank {
     pub rounding_radius: f64,
     /// Angle subtended by the rounding, rad.
     pub rounding_sweep: f64,
-    /// True on the circular spline.
-    internal: bool,
 }
 
 /// Foot of a point on the flank.
@@ -64,7 +62,6 @@ impl InvoluteFlank {
             rounding_centre: [p[0] - rounding_radius * n[0], p[1] - rounding_radius * n[1]],
             rounding_radius,
             rounding_sweep: rounding.length() / rounding_radius,
-            internal: outline.is_internal(),
         }
     }
 
@@ -88,8 +85,8 @@ impl InvoluteFlank {
     pub fn rounding_point(&self, angle: f64) -> [f64; 2] {
         let junction = self.point(self.junction_radius);
         let arm = [junction[0] - self.rounding_centre[0], junction[1] - self.rounding_centre[1]];
-        // On the positive side the tip land of a tooth lies counter-clockwise of its flank, that of a space clockwise.
-        let (s, c) = (if self.internal { -angle } else { angle }).sin_cos();
+        // From flank to tip land the outward normal turns clockwise: on a tooth from +y to +x, on a space from −y to −x.
+        let (s, c) = (-angle).sin_cos();
         [
             self.rounding_centre[0] + c * arm[0] - s * arm[1],
             self.rounding_centre[1] + s * arm[0] + c * arm[1],
