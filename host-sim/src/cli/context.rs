@@ -109,7 +109,7 @@ impl Context {
         Ok(())
     }
 
-    /// Whether the user has pressed Ctrl-C. From the first call on that no longer ends the process, so that the run can stop
+    /// Whether the user has pressed Ctrl-C (or ended the process politely). From the first call on that no longer ends the process, so that the run can stop
     /// between two increments and clear up; pressing it again ends it at once and may leave a hidden temporary file.
     pub(super) fn watch_interrupt(&self) -> impl Fn() -> bool + use<> {
         static WATCH: Once = Once::new();
