@@ -69,11 +69,8 @@ pub fn read(path: &Path) -> Result<Vec<Sample>, SampleError> {
 /// Reads samples from the bytes of a file called `file`.
 pub fn parse(file: &str, text: &[u8]) -> Result<Vec<Sample>, SampleError> {
     let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .flexible(true)
-        .from_reader(text);
+    let mut reader =
+        csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).flexible(true).from_reader(text);
     let line_of = |position: Option<&csv::Position>| position.map_or(1, csv::Position::line);
     let not_text = |error: &csv::Error| SampleError::Row {
         file: file.to_owned(),
@@ -96,11 +93,11 @@ pub fn parse(file: &str, text: &[u8]) -> Result<Vec<Sample>, SampleError> {
         let record = record.map_err(|e| not_text(&e))?;
         let line = line_of(record.position());
         let row = |what: String| SampleError::Row { file: file.to_owned(), line, what };
-        let mut numbers = [0.0; 5];
+        let mut numbers = [0.0_f64; 5];
         for ((number, place), name) in numbers.iter_mut().zip(places).zip(COLUMNS) {
-            let text = record.get(place).ok_or_else(|| {
-                row(format!("{} fields, but {name} is field {}", record.len(), place + 1))
-            })?;
+            let text = record
+                .get(place)
+                .ok_or_else(|| row(format!("{} fields, but {name} is field {}", record.len(), place + 1)))?;
             *number = text.parse().map_err(|_| row(format!("{name} is \"{text}\", not a number")))?;
             if !number.is_finite() {
                 return Err(row(format!("{name} is {number}; a finite number is needed")));
@@ -164,7 +161,8 @@ mod tests {
 
     #[test]
     fn columns_may_come_in_any_order_with_others_among_them() {
-        let text = "# from a bench\noutput_rad, note ,direction,temperature_c,torque_n_m,generator_rad\n0.01,x,1,20,5,0.95\n";
+        let text =
+            "# from a bench\noutput_rad, note ,direction,temperature_c,torque_n_m,generator_rad\n0.01,x,1,20,5,0.95\n";
         let read = parse("s.csv", text.as_bytes()).unwrap();
         assert_eq!(read[0].generator_rad, 0.95);
         assert_eq!(read[0].output_rad, 0.01);
