@@ -17,3 +17,5 @@ pub mod simulate;
 pub mod stepping;
 pub mod stress;
 pub mod sweep;
+pub mod tables;
+pub mod validate;

@@ -85,6 +85,9 @@ pub fn torque_nodes(drag_n_m: f64, largest_n_m: f64, steps: usize) -> Vec<f32> {
     positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).map(|t| t as f32).collect()
 }
 
+/// Pitches within which the output must follow the generator.
+const MOST_SETTLING_PITCHES: usize = 10;
+
 /// Progress of a sweep.
 #[derive(Debug, Clone, Copy)]
 pub struct SweepProgress {
@@ -123,6 +126,14 @@ pub enum SweepError {
     /// The FEM failed.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// The output does not follow.
+    #[error("under {torque_n_m} N.m the output does not follow the generator within {pitches} tooth pitches")]
+    NeverMoves {
+        /// Load, N m.
+        torque_n_m: f64,
+        /// Travel of the generator.
+        pitches: usize,
+    },
     /// The observer asked to stop.
     #[error("stopped")]
     Stopped,
@@ -173,8 +184,17 @@ pub fn sweep(
                     }
                 };
                 state = advance(&state, 0.0)?;
-                for _ in 0..plan.settling_increments() {
+                // Under a load below the drag the output stands still until the clearance is crossed.
+                let mut settled = 0;
+                while settled < plan.settling_increments() || state.output_rate < 0.5 / drive.ratio() {
                     state = advance(&state, step)?;
+                    settled += 1;
+                    if settled > MOST_SETTLING_PITCHES * plan.positions {
+                        return Err(SweepError::NeverMoves {
+                            torque_n_m: f64::from(torque),
+                            pitches: MOST_SETTLING_PITCHES,
+                        });
+                    }
                 }
                 for _ in 0..plan.positions {
                     state = advance(&state, step)?;

@@ -7,6 +7,8 @@ mod context;
 mod drive;
 mod export;
 mod simulate;
+mod tables;
+mod validate;
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -54,6 +56,8 @@ impl From<OutputError> for Failure {
 #[command(name = "flexspline", version, propagate_version = true, max_term_width = 100)]
 #[command(after_help = "\
 Examples:
+  flexspline tables
+  flexspline validate --tables out
   flexspline simulate --generator cam --path pitch --torque-n-m 50
   flexspline drive > my-drive.toml
   flexspline drive --check --drive my-drive.toml
@@ -72,6 +76,8 @@ enum Command {
     Simulate(simulate::Simulate),
     Drive(drive::DriveCommand),
     Export(export::Export),
+    Tables(tables::Tables),
+    Validate(validate::Validate),
 }
 
 /// Options of every command.
@@ -131,6 +137,8 @@ impl Command {
             Command::Simulate(command) => command.run(context),
             Command::Drive(command) => command.run(context),
             Command::Export(command) => command.run(context),
+            Command::Tables(command) => command.run(context),
+            Command::Validate(command) => command.run(context),
         }
     }
 }
