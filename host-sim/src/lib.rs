@@ -12,6 +12,7 @@ pub mod mesh;
 pub mod output;
 pub mod progress;
 pub mod reference;
+pub mod replay;
 pub mod samples;
 pub mod simulate;
 pub mod stepping;

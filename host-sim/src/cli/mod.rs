@@ -6,6 +6,7 @@
 mod context;
 mod drive;
 mod export;
+mod replay;
 mod simulate;
 mod tables;
 mod validate;
@@ -78,6 +79,7 @@ enum Command {
     Export(export::Export),
     Tables(tables::Tables),
     Validate(validate::Validate),
+    Replay(replay::Replay),
 }
 
 /// Options of every command.
@@ -139,6 +141,7 @@ impl Command {
             Command::Export(command) => command.run(context),
             Command::Tables(command) => command.run(context),
             Command::Validate(command) => command.run(context),
+            Command::Replay(command) => command.run(context),
         }
     }
 }
