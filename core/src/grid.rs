@@ -176,6 +176,11 @@ pub fn jump_intervals(len: usize, node: impl Fn(usize) -> f32) -> u32 {
     jumps
 }
 
+/// Whether bit `node` of [`jump_intervals`] is set.
+pub(crate) fn is_jump(jumps: u32, node: usize) -> bool {
+    u32::try_from(node).ok().and_then(|bit| jumps.checked_shr(bit)).is_some_and(|bits| bits & 1 == 1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,8 +8,9 @@
 //! e          = centre + (p − x),   p = clamp(p, x − half-width, x + half-width),   x = nominal output
 //! ```
 //!
-//! D, H, R, h are linear in torque and temperature between nodes and constant beyond the ends; R, h, A, B, C are
-//! periodic cubic B-splines ([`crate::grid`]). R and h are kept in 16 bits with one scale each.
+//! Between torque nodes D is a cubic through the values and slopes of the two around the torque, straight inside a jump; so its
+//! slope is continuous everywhere else. H, R, h are linear in torque. All are linear in temperature and constant beyond the
+//! ends. R, h, A, B, C are periodic cubic B-splines ([`crate::grid`]); R and h are kept in 16 bits with one scale each.
 //!
 //! A run fixes the torque axis: with frictionless flanks and a drag torque `Td` at the output, steady motion in direction
 //! `d` loads the flanks by `τ − d·Td`, and the error jumps by the backlash where that load changes sign. So the tables
@@ -19,6 +20,7 @@
 use crate::drive::{Drive, Phases};
 use crate::grid::{self, MAX_HALVINGS, PeriodicAxis};
 use crate::image::TEMPERATURE_HALVINGS;
+use crate::windup;
 
 /// How far an answer can be trusted, worst last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -107,7 +109,7 @@ fn four_at(words: Words<'_>, first: usize) -> Option<[[u8; 4]; 4]> {
     words.get(first..)?.first_chunk().copied()
 }
 
-/// D and H of the record at `first`; 0 beyond the end.
+/// D, H and the slope of D of the record at `first`; 0 beyond the end.
 fn head_at(words: Words<'_>, first: usize) -> [f32; RECORD_HEAD_WORDS] {
     let head = words.get(first..).and_then(|record| record.first_chunk().copied());
     head.unwrap_or([[0; 4]; RECORD_HEAD_WORDS]).map(f32::from_le_bytes)
@@ -129,8 +131,8 @@ fn ripple_sum(words: [[u8; 4]; 4], weights: [i16; 4]) -> (f32, f32) {
     (mean as f32, half as f32)
 }
 
-/// Words of a record before its ripple: D and H.
-pub(crate) const RECORD_HEAD_WORDS: usize = 2;
+/// Words of a record before its ripple: D, H, slope of D.
+pub(crate) const RECORD_HEAD_WORDS: usize = 3;
 
 /// A periodic curve in an image.
 #[derive(Clone, Copy, Debug)]
@@ -254,7 +256,7 @@ impl<'a> Table<'a> {
     /// Whether the interval above torque node `node` is a jump.
     #[must_use]
     pub fn is_torque_jump(&self, node: usize) -> bool {
-        u32::try_from(node).ok().and_then(|bit| self.torque_jumps.checked_shr(bit)).is_some_and(|bits| bits & 1 == 1)
+        grid::is_jump(self.torque_jumps, node)
     }
 
     /// Axis of the ripple over one tooth pitch.
@@ -300,16 +302,21 @@ impl<'a> Table<'a> {
         let (cold, low) = (1.0 - temperature.weight, 1.0 - torque.weight);
         let weights = [cold * low, cold * torque.weight, temperature.weight * low, temperature.weight * torque.weight];
         let heads = rows.map(|row| head_at(self.records, row));
-        let (means, halves) = (heads.map(|[mean, _]| mean), heads.map(|[_, half]| half));
+        let (means, halves) = (heads.map(|[mean, ..]| mean), heads.map(|[_, half, _]| half));
         // The height of a jump is taken on both temperature planes; the larger counts.
         let height = |[a, b, c, d]: [f32; 4]| larger((b - a).abs(), (d - c).abs());
         let in_jump = self.is_torque_jump(torque.below) && torque.weight > 0.0 && torque.weight < 1.0;
+        let width = f32_at(self.torque, torque.above) - f32_at(self.torque, torque.below);
+        let [rise, below, above] = if in_jump { [0.0; 3] } else { windup::bend(torque.weight, width) };
+        let (low, high) = (low - rise, torque.weight + rise);
+        let mean_weights = [cold * low, cold * high, temperature.weight * low, temperature.weight * high];
+        let slope_weights = [cold * below, cold * above, temperature.weight * below, temperature.weight * above];
         let within = |value: f32, [least, most]: [f32; 2]| value >= least && value <= most;
         let in_range = within(torque_n_m, self.torque_range_n_m) && within(temperature_c, self.temperature_range_c);
         Some(OperatingPoint {
             rows,
             weights,
-            mean_rad: dot(means, weights),
+            mean_rad: dot(means, mean_weights) + dot(heads.map(|[.., slope]| slope), slope_weights),
             half_width_rad: dot(halves, weights),
             jump_rad: if in_jump { height(means) + height(halves) } else { 0.0 },
             quality: match (in_range, in_jump) {
