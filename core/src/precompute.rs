@@ -1178,6 +1178,98 @@ mod tests {
         assert!(worst < 0.01, "{worst} arcsec");
     }
 
+    /// A drive with curved wind-up, one parabola beyond each jump, and a half-width of 3″.
+    mod curved {
+        use super::*;
+
+        pub const TORQUES: [f32; 12] = [-50.0, -20.0, -8.0, -3.0, -1.51, -1.49, 1.49, 1.51, 3.0, 8.0, 20.0, 50.0];
+
+        pub fn error(generator_rad: f64, torque: f64, temperature: f64, direction: Direction) -> f64 {
+            let (load, warm) = (torque.abs(), 1.0 + 1.0e-3 * temperature);
+            let wind_up = if load > 1.5 { torque.signum() * (30.0 + load * (20.0 - 0.2 * load)) } else { 5.0 * torque };
+            let ripple = 0.3 * (188.0 * generator_rad).cos();
+            (warm * wind_up + ripple - 3.0 * direction.sign() as f64) * ARCSEC
+        }
+
+        pub fn plan() -> Plan<'static> {
+            Plan { torque_nodes_n_m: &TORQUES, ..fixture::plan(false) }
+        }
+
+        /// Places spread over everything but the jumps; none on a torque node.
+        pub fn places(count: usize) -> impl Iterator<Item = Sample> {
+            (0..count).filter_map(|i| {
+                let part = |k: f64| (i as f64 * k).rem_euclid(1.0);
+                let torque_n_m = (100.0 * part(0.754_877_666) - 50.0) * part(0.618_033_988);
+                let (generator_rad, temperature_c) = (PITCH * part(0.414_213_56), 120.0 * part(0.569_840_291) - 40.0);
+                let direction = if part(0.302_775_6) < 0.5 { Direction::Forward } else { Direction::Backward };
+                let output_rad = generator_rad / 95.0 + error(generator_rad, torque_n_m, temperature_c, direction);
+                let outside = (torque_n_m.abs() - 1.5).abs() > 0.02;
+                outside.then_some(Sample { generator_rad, torque_n_m, temperature_c, direction, output_rad })
+            })
+        }
+
+        /// Samples at the nodes of one direction.
+        pub fn at_nodes(direction: Direction) -> impl Iterator<Item = Sample> {
+            let nodes =
+                fixture::TEMPERATURES.into_iter().flat_map(|hot| TORQUES.map(|torque| (hot as f64, torque as f64)));
+            nodes.flat_map(move |(temperature_c, torque_n_m)| {
+                (0..16).map(move |position| {
+                    let generator_rad = PITCH * (position as f64 + 0.4) / 16.0;
+                    let output_rad = generator_rad / 95.0 + error(generator_rad, torque_n_m, temperature_c, direction);
+                    Sample { generator_rad, torque_n_m, temperature_c, direction, output_rad }
+                })
+            })
+        }
+
+        pub fn worst_elsewhere(image: &[u8]) -> f64 {
+            let table = Table::check(image).unwrap();
+            places(31_000).skip(11_000).fold(0.0, |worst: f64, place| {
+                let angle = GeneratorAngle::from_rad(place.generator_rad).unwrap();
+                let (torque, temperature) = (place.torque_n_m as f32, place.temperature_c as f32);
+                [Direction::Forward, Direction::Backward].into_iter().fold(worst, |worst, direction| {
+                    let found = table.steady_error_rad(angle, torque, temperature, direction).unwrap() as f64;
+                    let truth = error(place.generator_rad, place.torque_n_m, place.temperature_c, direction);
+                    worst.max((found - truth).abs() / ARCSEC)
+                })
+            })
+        }
+    }
+
+    #[test]
+    fn curved_wind_up_is_recovered_from_samples_between_the_nodes() {
+        // The inner nodes of the jumps get samples of their own: little else lies there.
+        let inner = |direction| curved::at_nodes(direction).filter(|sample| sample.torque_n_m.abs() < 1.55);
+        let mut samples: Vec<Sample> = curved::places(11_000).collect();
+        samples.extend(inner(Direction::Forward).chain(inner(Direction::Backward)));
+        let (fit, image) = make(&curved::plan(), &samples).unwrap();
+        assert!(fit.worst_rad < 0.005 * ARCSEC, "{} arcsec", fit.worst_rad / ARCSEC);
+        let worst = curved::worst_elsewhere(&image);
+        assert!(worst < 0.01, "{worst} arcsec");
+    }
+
+    #[test]
+    fn curved_wind_up_is_recovered_from_samples_at_the_nodes() {
+        let samples: Vec<Sample> =
+            curved::at_nodes(Direction::Forward).chain(curved::at_nodes(Direction::Backward)).collect();
+        let (_, image) = make(&curved::plan(), &samples).unwrap();
+        let worst = curved::worst_elsewhere(&image);
+        assert!(worst < 0.01, "{worst} arcsec");
+    }
+
+    #[test]
+    fn a_missing_direction_between_the_nodes_counts_with_the_half_width_given() {
+        let kept = |sample: &Sample| sample.direction == Direction::Forward || sample.torque_n_m.abs() < 7.9;
+        let nodes = curved::at_nodes(Direction::Forward).chain(curved::at_nodes(Direction::Backward));
+        // Node 3 at ±8 has backward samples from below; those at ±20 and ±50 have none.
+        let samples: Vec<Sample> = curved::places(11_000).chain(nodes).filter(kept).collect();
+        let mut plan = curved::plan();
+        plan.missing_direction = MissingDirection::HalfWidth { rad: 3.0 * ARCSEC };
+        let (fit, image) = make(&plan, &samples).unwrap();
+        assert!(fit.worst_rad < 0.005 * ARCSEC, "{} arcsec", fit.worst_rad / ARCSEC);
+        let worst = curved::worst_elsewhere(&image);
+        assert!(worst < 0.01, "{worst} arcsec");
+    }
+
     #[test]
     fn samples_inside_a_jump_are_left_out_and_counted() {
         let mut samples = fixture::samples(false);
