@@ -1258,16 +1258,18 @@ mod tests {
 
     #[test]
     fn a_missing_direction_between_the_nodes_counts_with_the_half_width_given() {
-        let kept = |sample: &Sample| sample.direction == Direction::Forward || sample.torque_n_m.abs() < 7.9;
-        let nodes = curved::at_nodes(Direction::Forward).chain(curved::at_nodes(Direction::Backward));
-        // Node 3 at ±8 has backward samples from below; those at ±20 and ±50 have none.
-        let samples: Vec<Sample> = curved::places(11_000).chain(nodes).filter(kept).collect();
         let mut plan = curved::plan();
         plan.missing_direction = MissingDirection::HalfWidth { rad: 3.0 * ARCSEC };
-        let (fit, image) = make(&plan, &samples).unwrap();
-        assert!(fit.worst_rad < 0.005 * ARCSEC, "{} arcsec", fit.worst_rad / ARCSEC);
-        let worst = curved::worst_elsewhere(&image);
-        assert!(worst < 0.01, "{worst} arcsec");
+        for present in [Direction::Forward, Direction::Backward] {
+            // The nodes at ±8 have samples of the other direction from one side, those at ±20 and ±50 have none.
+            let kept = |sample: &Sample| sample.direction == present || sample.torque_n_m.abs() < 7.9;
+            let nodes = curved::at_nodes(Direction::Forward).chain(curved::at_nodes(Direction::Backward));
+            let samples: Vec<Sample> = curved::places(11_000).chain(nodes).filter(kept).collect();
+            let (fit, image) = make(&plan, &samples).unwrap();
+            assert!(fit.worst_rad < 0.005 * ARCSEC, "{} arcsec", fit.worst_rad / ARCSEC);
+            let worst = curved::worst_elsewhere(&image);
+            assert!(worst < 0.01, "{worst} arcsec");
+        }
     }
 
     #[test]
