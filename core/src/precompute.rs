@@ -591,8 +591,9 @@ impl<'a> Plan<'a> {
         let (low, high) = (slopes.at(torque.below), slopes.at(torque.above));
         let mut bend = Bend { first: low.first.min(high.first), ..Bend::default() };
         let mut add = |node: usize, value: f64| add(&mut bend.weights, node - bend.first, value);
-        let [rise, below, above] =
-            windup::bend(torque.weight, node(torque.above) - node(torque.below)).map(|part| part as f64);
+        let width = node(torque.above) - node(torque.below);
+        let [rise, below, above] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+            .map(|unit| windup::bend(torque.weight, width, unit) as f64);
         add(torque.above, rise);
         add(torque.below, -rise);
         for (slope, part) in [(low, below), (high, above)] {

@@ -109,10 +109,9 @@ fn four_at(words: Words<'_>, first: usize) -> Option<[[u8; 4]; 4]> {
     words.get(first..)?.first_chunk().copied()
 }
 
-/// D, H and the slope of D of the record at `first`; 0 beyond the end.
-fn head_at(words: Words<'_>, first: usize) -> [f32; RECORD_HEAD_WORDS] {
-    let head = words.get(first..).and_then(|record| record.first_chunk().copied());
-    head.unwrap_or([[0; 4]; RECORD_HEAD_WORDS]).map(f32::from_le_bytes)
+/// D, H and the slope of D of the record at `first`; `None` beyond the end, which an accepted table never reaches.
+fn head_at(words: Words<'_>, first: usize) -> Option<[f32; RECORD_HEAD_WORDS]> {
+    Some(words.get(first..)?.first_chunk::<RECORD_HEAD_WORDS>()?.map(f32::from_le_bytes))
 }
 
 /// The larger of two numbers; the second if the first is NaN. (`f32::max` is a library call on a Cortex-M4F.)
@@ -283,7 +282,8 @@ impl<'a> Table<'a> {
         if !(torque_n_m.is_finite() && temperature_c.is_finite()) {
             return None;
         }
-        let torque = grid::locate_clamped::<MAX_HALVINGS>(self.torque.len(), |i| f32_at(self.torque, i), torque_n_m);
+        let (torque, width) =
+            grid::locate_with_width::<MAX_HALVINGS>(self.torque.len(), |i| f32_at(self.torque, i), torque_n_m);
         let temperature = grid::locate_clamped::<TEMPERATURE_HALVINGS>(
             self.temperature.len(),
             |i| f32_at(self.temperature, i),
@@ -301,22 +301,26 @@ impl<'a> Table<'a> {
         ];
         let (cold, low) = (1.0 - temperature.weight, 1.0 - torque.weight);
         let weights = [cold * low, cold * torque.weight, temperature.weight * low, temperature.weight * torque.weight];
-        let heads = rows.map(|row| head_at(self.records, row));
-        let (means, halves) = (heads.map(|[mean, ..]| mean), heads.map(|[_, half, _]| half));
+        let [a, b, c, d] = rows;
+        let (a, b) = (head_at(self.records, a)?, head_at(self.records, b)?);
+        let (c, d) = (head_at(self.records, c)?, head_at(self.records, d)?);
+        let (means, halves) = ([a, b, c, d].map(|[mean, ..]| mean), [a, b, c, d].map(|[_, half, _]| half));
+        let blend = |[mean, _, slope]: [f32; RECORD_HEAD_WORDS], [mean_hot, _, slope_hot]: [f32; RECORD_HEAD_WORDS]| {
+            let hot = temperature.weight;
+            (cold * mean + hot * mean_hot, cold * slope + hot * slope_hot)
+        };
+        let ((mean_low, slope_low), (mean_high, slope_high)) = (blend(a, c), blend(b, d));
         // The height of a jump is taken on both temperature planes; the larger counts.
         let height = |[a, b, c, d]: [f32; 4]| larger((b - a).abs(), (d - c).abs());
         let in_jump = self.is_torque_jump(torque.below) && torque.weight > 0.0 && torque.weight < 1.0;
-        let width = f32_at(self.torque, torque.above) - f32_at(self.torque, torque.below);
-        let [rise, below, above] = if in_jump { [0.0; 3] } else { windup::bend(torque.weight, width) };
-        let (low, high) = (low - rise, torque.weight + rise);
-        let mean_weights = [cold * low, cold * high, temperature.weight * low, temperature.weight * high];
-        let slope_weights = [cold * below, cold * above, temperature.weight * below, temperature.weight * above];
+        let straight = low * mean_low + torque.weight * mean_high;
+        let bend = windup::bend(torque.weight, width, [mean_high - mean_low, slope_low, slope_high]);
         let within = |value: f32, [least, most]: [f32; 2]| value >= least && value <= most;
         let in_range = within(torque_n_m, self.torque_range_n_m) && within(temperature_c, self.temperature_range_c);
         Some(OperatingPoint {
             rows,
             weights,
-            mean_rad: dot(means, mean_weights) + dot(heads.map(|[.., slope]| slope), slope_weights),
+            mean_rad: straight + if in_jump { 0.0 } else { bend },
             half_width_rad: dot(halves, weights),
             jump_rad: if in_jump { height(means) + height(halves) } else { 0.0 },
             quality: match (in_range, in_jump) {
