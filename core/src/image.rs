@@ -24,7 +24,8 @@
 //! | 156 | 36 | zero |
 //! | 192 | | torque nodes, temperature nodes: `f32` each |
 //! | | | A, B, C: `f32` each, stored closed |
-//! | | | `[temperature][torque]` records: D, H, slope of D (`f32`; rad, rad, rad/(N·m)), then R, h (`i16`) for each ripple node, stored closed |
+//! | | | `[temperature][torque]` records: D and H, rad, slope of D, rad/(N·m) (`f32` each), |
+//! | | | then R, h (`i16`) for each ripple node, stored closed |
 //! | | | end of the body |
 //! | | | CRC-32 of each 256-byte page of the body (the last may be shorter) |
 //! | | 4 | CRC-32 of everything before |
@@ -109,7 +110,7 @@ pub struct TableData<'a> {
     pub temperature_nodes_c: &'a [f32],
     /// Nodes over one tooth pitch; 0 for no ripple.
     pub ripple_nodes: usize,
-    /// D, `[temperature][torque]`.
+    /// D, `[temperature][torque]`; its slopes follow from it ([`crate::precompute`]).
     pub mean_rad: &'a [f32],
     /// H, `[temperature][torque]`, ≥ 0.
     pub half_width_rad: &'a [f32],
@@ -1108,6 +1109,33 @@ mod tests {
         data.mean_ripple_rad = &data.mean_ripple_rad[..16];
         data.half_width_ripple_rad = &data.half_width_ripple_rad[..16];
         assert!(write(&data, &provenance()).is_ok());
+    }
+
+    #[test]
+    fn a_slope_that_no_interval_uses_does_no_harm() {
+        // One node alone, and an end of the axis that a jump cuts off.
+        for nodes in [&[0.0][..], &[0.0, 2.0, 20.0, 40.0]] {
+            let flat = TableData {
+                torque_nodes_n_m: nodes,
+                temperature_nodes_c: &[20.0],
+                ripple_nodes: 0,
+                mean_rad: &[1.0e-3; 4][..nodes.len()],
+                half_width_rad: &[1.0e-4; 4][..nodes.len()],
+                mean_ripple_rad: &[],
+                half_width_ripple_rad: &[],
+                generator_curve_rad: &[],
+                output_curve_rad: &[],
+                ..data()
+            };
+            let mut image = write(&flat, &Provenance { torque_range_n_m: [0.0; 2], ..provenance() }).unwrap();
+            let body_bytes = Table::check(&image).unwrap().body_bytes;
+            put(HEADER_BYTES + 4 * (nodes.len() + 1) + 8, f32::MAX)(&mut image);
+            seal(&mut image, body_bytes);
+            let table = Table::check(&image).unwrap();
+            for torque in [-1.0, 0.0, 0.5, 1.9, 2.0, 7.0, 40.0, 50.0] {
+                assert_eq!(table.at(torque, 20.0).unwrap().mean_rad, 1.0e-3, "{torque}");
+            }
+        }
     }
 
     #[test]

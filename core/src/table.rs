@@ -8,9 +8,10 @@
 //! e          = centre + (p − x),   p = clamp(p, x − half-width, x + half-width),   x = nominal output
 //! ```
 //!
-//! Between torque nodes D is a cubic through the values and slopes of the two around the torque, straight inside a jump; so its
-//! slope is continuous everywhere else. H, R, h are linear in torque. All are linear in temperature and constant beyond the
-//! ends. R, h, A, B, C are periodic cubic B-splines ([`crate::grid`]); R and h are kept in 16 bits with one scale each.
+//! Between torque nodes D is a cubic through the values and slopes of the two around the torque, but straight inside a jump:
+//! D and its slope are continuous from one jump, or end of the axis, to the next. H, R, h are linear in torque. All are
+//! linear in temperature and constant beyond the ends. R, h, A, B, C are periodic cubic B-splines ([`crate::grid`]); R and
+//! h are kept in 16 bits with one scale each.
 //!
 //! A run fixes the torque axis: with frictionless flanks and a drag torque `Td` at the output, steady motion in direction
 //! `d` loads the flanks by `τ − d·Td`, and the error jumps by the backlash where that load changes sign. So the tables
@@ -277,6 +278,8 @@ impl<'a> Table<'a> {
     }
 
     /// Locates a torque (N·m) and temperature (°C); `None` if either is not finite.
+    ///
+    /// (Or if the table ended before its records, which no accepted table does.)
     #[must_use]
     pub fn at(&self, torque_n_m: f32, temperature_c: f32) -> Option<OperatingPoint> {
         if !(torque_n_m.is_finite() && temperature_c.is_finite()) {
@@ -312,7 +315,8 @@ impl<'a> Table<'a> {
         let ((mean_low, slope_low), (mean_high, slope_high)) = (blend(a, c), blend(b, d));
         // The height of a jump is taken on both temperature planes; the larger counts.
         let height = |[a, b, c, d]: [f32; 4]| larger((b - a).abs(), (d - c).abs());
-        let in_jump = self.is_torque_jump(torque.below) && torque.weight > 0.0 && torque.weight < 1.0;
+        let is_jump = self.is_torque_jump(torque.below);
+        let in_jump = is_jump && torque.weight > 0.0 && torque.weight < 1.0;
         let straight = low * mean_low + torque.weight * mean_high;
         let bend = windup::bend(torque.weight, width, [mean_high - mean_low, slope_low, slope_high]);
         let within = |value: f32, [least, most]: [f32; 2]| value >= least && value <= most;
@@ -320,7 +324,7 @@ impl<'a> Table<'a> {
         Some(OperatingPoint {
             rows,
             weights,
-            mean_rad: straight + if in_jump { 0.0 } else { bend },
+            mean_rad: straight + if is_jump { 0.0 } else { bend },
             half_width_rad: dot(halves, weights),
             jump_rad: if in_jump { height(means) + height(halves) } else { 0.0 },
             quality: match (in_range, in_jump) {

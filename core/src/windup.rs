@@ -340,9 +340,10 @@ mod tests {
         assert_eq!(Slopes::new(&[3.0]).at(0).of(&[1.0]), 0.0);
         let two = Slopes::new(&[1.0, 3.0]);
         assert!((0..2).all(|node| two.at(node).of(&[5.0, 9.0]) == 2.0));
-        // A node between two jumps has no side to take a slope from.
+        // Two nodes between two jumps, and an end that is cut off by one.
         let lone = [-9.0, -5.01, -4.99, 5.0, 5.02, 9.0];
         assert_eq!(Slopes::new(&lone).at(2).of(&[0.0, 1.0, 2.0, 4.0, 8.0, 16.0]), 2.0 / (5.0 + 4.99f32) as f64);
+        assert_eq!(Slopes::new(&[0.0, 2.0, 20.0, 40.0]).at(0).of(&[1.0, 2.0, 3.0, 4.0]), 0.0);
         assert_eq!(Slopes::new(&[]).at(0).of(&[]), 0.0);
     }
 
