@@ -16,7 +16,7 @@
 /// Most nodes a clamped axis may have.
 pub const MAX_CLAMPED_NODES: usize = 1 << MAX_HALVINGS;
 /// Comparisons that find a place among [`MAX_CLAMPED_NODES`].
-pub const MAX_HALVINGS: u32 = 5;
+pub const MAX_HALVINGS: u32 = 6;
 /// Fewest nodes of a periodic axis that is present: the four a cubic needs.
 pub const MIN_PERIODIC_NODES: usize = 4;
 /// Most nodes of a periodic axis.
@@ -171,23 +171,23 @@ pub const JUMP_RATIO: f32 = 8.0;
 /// Which intervals of a clamped axis are jumps; bit *i* stands for the interval above node *i*.
 ///
 /// Decided once, when a table is accepted.
-pub fn jump_intervals(len: usize, node: impl Fn(usize) -> f32) -> u32 {
+pub fn jump_intervals(len: usize, node: impl Fn(usize) -> f32) -> u64 {
     let width = |i: usize| node(i.saturating_add(1)) - node(i);
     let intervals = len.saturating_sub(1).min(MAX_CLAMPED_NODES);
-    let mut jumps = 0u32;
+    let mut jumps = 0u64;
     for i in 0..intervals {
         let own = width(i) * JUMP_RATIO;
         let left_wide = i == 0 || width(i.saturating_sub(1)) >= own;
         let right_wide = i.saturating_add(1) == intervals || width(i.saturating_add(1)) >= own;
         if intervals > 1 && left_wide && right_wide {
-            jumps |= 1u32.checked_shl(i as u32).unwrap_or(0);
+            jumps |= 1u64.checked_shl(i as u32).unwrap_or(0);
         }
     }
     jumps
 }
 
 /// Whether bit `node` of [`jump_intervals`] is set.
-pub(crate) fn is_jump(jumps: u32, node: usize) -> bool {
+pub(crate) fn is_jump(jumps: u64, node: usize) -> bool {
     u32::try_from(node).ok().and_then(|bit| jumps.checked_shr(bit)).is_some_and(|bits| bits & 1 == 1)
 }
 

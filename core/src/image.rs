@@ -14,7 +14,7 @@
 //! | 80 | 24 | mesh level, likewise |
 //! | 104 | 1, 1 | generator kind; fixed member (0 flexspline, 1 circular spline) |
 //! | 106 | 2, 2 | flexspline teeth; circular spline teeth |
-//! | 110 | 1, 1 | torque nodes (1 to 32); temperature nodes (1 to 8) |
+//! | 110 | 1, 1 | torque nodes (1 to 64); temperature nodes (1 to 8) |
 //! | 112 | 1, 1, 1, 1 | ripple nodes (0, or 4 to 32); nodes of A, B, C (0, or 4 to 128) |
 //! | 116 | 4, 4 | scale of the mean ripple R and of the half-width ripple h, rad per unit |
 //! | 124 | 4 | residual the solver reached |
@@ -1002,8 +1002,8 @@ mod tests {
         let teeth = DriveError { flexspline_teeth: 190, circular_spline_teeth: 190 };
         assert_eq!(resealed(|image| image[106] = 190), ImageError::Teeth(teeth));
         for (offset, found, field, least, most) in [
-            (110, 0, Field::TorqueNodes, 1, 32),
-            (110, 33, Field::TorqueNodes, 1, 32),
+            (110, 0, Field::TorqueNodes, 1, 64),
+            (110, 65, Field::TorqueNodes, 1, 64),
             (111, 9, Field::TemperatureNodes, 1, 8),
             (112, 3, Field::RippleNodes, 4, 32),
             (112, 33, Field::RippleNodes, 4, 32),
@@ -1154,15 +1154,15 @@ mod tests {
         let expected = WriteError::Refused(ImageError::Text { field: Field::ToolVersion });
         assert_eq!(write(&data(), &foreign), Err(expected));
         let many = TableData {
-            torque_nodes_n_m: &[0.0; 33],
-            mean_rad: &[0.0; 66],
-            half_width_rad: &[0.0; 66],
+            torque_nodes_n_m: &[0.0; 65],
+            mean_rad: &[0.0; 130],
+            half_width_rad: &[0.0; 130],
             mean_ripple_rad: &[],
             half_width_ripple_rad: &[],
             ripple_nodes: 0,
             ..data()
         };
-        let expected = ImageError::Count { field: Field::TorqueNodes, found: 33, least: 1, most: 32 };
+        let expected = ImageError::Count { field: Field::TorqueNodes, found: 65, least: 1, most: 64 };
         assert_eq!(write(&many, &provenance()), Err(WriteError::Refused(expected)));
         let mut ripple = [0.0; 32];
         ripple[9] = f32::NAN;

@@ -553,12 +553,12 @@ impl<'a> Plan<'a> {
     }
 
     /// Whether the torque lies strictly inside a jump.
-    fn inside_jump(&self, sample: &Sample, jumps: u32) -> bool {
+    fn inside_jump(&self, sample: &Sample, jumps: u64) -> bool {
         let place = Self::place(self.torque_nodes_n_m, sample.torque_n_m);
         place.weight > 0.0 && place.weight < 1.0 && (jumps >> place.below) & 1 == 1
     }
 
-    fn jumps(&self) -> u32 {
+    fn jumps(&self) -> u64 {
         grid::jump_intervals(self.torque_nodes_n_m.len(), |i| self.torque_nodes_n_m.get(i).copied().unwrap_or(0.0))
     }
 

@@ -171,7 +171,7 @@ pub struct Table<'a> {
     pub(crate) ripple: PeriodicAxis,
     pub(crate) mean_ripple_scale: f32,
     pub(crate) half_ripple_scale: f32,
-    pub(crate) torque_jumps: u32,
+    pub(crate) torque_jumps: u64,
     pub(crate) torque_range_n_m: [f32; 2],
     pub(crate) temperature_range_c: [f32; 2],
     pub(crate) error_limit_rad: f32,

@@ -9,6 +9,7 @@ pub mod export;
 pub mod fem;
 pub mod material;
 pub mod mesh;
+pub mod nodes;
 pub mod output;
 pub mod progress;
 pub mod reference;

@@ -1,8 +1,13 @@
 //! FEM sweeps that sample what a table holds: steady motion over one tooth pitch at every torque and temperature node.
 //!
-//! An ideal drive repeats every flexspline pitch (PHYSICS of the mesh: `2 pi / z_f` of generator angle), so one pitch says
-//! all. It is also its own mirror image: backward motion under a torque T is the reflection of forward motion under −T, so
-//! only forward motion is computed, and `e_backward(-psi, -T) = -e_forward(psi, T)` gives the other direction.
+//! An ideal drive repeats every flexspline pitch (`2 pi / z_f` of generator angle), so one pitch says all. It is also its own
+//! mirror image: backward motion under a torque T is the reflection of forward motion under −T, so only forward motion is
+//! computed, and `e_backward(-psi, -T) = -e_forward(psi, T)` gives the other direction.
+//!
+//! Frictionless flanks leave nothing but the drag of the output to tell the directions apart: the flanks carry `T - d` in
+//! forward and `T + d` in backward motion, and the state is an elastic one that depends on nothing else. So one torque sign
+//! is enough too: from a forward state under T the backward one follows by the compliance c of the output,
+//! `e_backward(psi, T) = e_forward(psi, T) + 2 d c`. The drag is small (0.02 N.m; the second order is below 0.05″).
 
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -30,17 +35,16 @@ pub struct SweepPlan {
 const JUMP_HALF_WIDTH: f64 = 0.05;
 
 impl SweepPlan {
-    /// The default: one pair of nodes at each end of the dead zone of the drag, from there geometric steps to the rated
-    /// torque of the generator, three temperatures over the operating range, eight positions.
+    /// The default: one pair of nodes at each end of the dead zone of the drag, from there nine steps to the rated
+    /// torque of the generator; eight positions; the ends of the operating temperatures, between which wind-up is linear
+    /// to 0.05″, because Young's modulus is.
     pub fn for_generator(drive: &Drive, kind: GeneratorKind) -> SweepPlan {
         let temperature = &drive.temperature;
         SweepPlan {
-            torque_nodes_n_m: torque_nodes(drive.output.drag_torque_n_m, rated_torque_n_m(kind), 8),
-            temperature_nodes_c: [temperature.minimum_c, temperature.reference_c, temperature.maximum_c]
-                .map(|t| t as f32)
-                .to_vec(),
-            positions: 8,
-            settling_pitches: if drive.flanks.friction_coefficient > 0.0 { 2.0 } else { 0.125 },
+            torque_nodes_n_m: symmetric_nodes(drive.output.drag_torque_n_m, rated_torque_n_m(kind), 9),
+            temperature_nodes_c: [temperature.minimum_c, temperature.maximum_c].map(|t| t as f32).to_vec(),
+            positions: 12,
+            settling_pitches: if drive.flanks.friction_coefficient > 0.0 { 2.0 } else { 0.0 },
         }
     }
 
@@ -63,25 +67,25 @@ impl SweepPlan {
 /// Torque up to which the model of a generator holds with the rim of HHD-95: rollers leave the rim unsupported.
 pub fn rated_torque_n_m(kind: GeneratorKind) -> f64 {
     match kind {
-        GeneratorKind::TwoRoller => 50.0,
+        GeneratorKind::TwoRoller => 20.0,
         GeneratorKind::FourRoller => 100.0,
         GeneratorKind::DoubleDisc | GeneratorKind::Cam => 200.0,
     }
 }
 
 /// Nodes symmetric about zero: a nearly coincident pair at ± the drag torque, where the loaded flank changes, and `steps`
-/// further nodes on each side, whose spacing grows geometrically up to `largest_n_m`.
-pub fn torque_nodes(drag_n_m: f64, largest_n_m: f64, steps: usize) -> Vec<f32> {
+/// further nodes on each side up to `largest_n_m`, dense where wind-up is steep: node k of n at `(k/n)^3.2` of the way. (On
+/// nodes like these the cubic of the core leaves below 0.6″ of curves that rise by 870″ as a root or a tanh does.)
+pub fn symmetric_nodes(drag_n_m: f64, largest_n_m: f64, steps: usize) -> Vec<f32> {
+    const CROWDING: f64 = 3.2;
     let half = JUMP_HALF_WIDTH * drag_n_m;
     let first = drag_n_m + half;
-    // Distances from the jump: d, d q, d q^2, ... with the first as wide as twice the drag, so that the jump stands out.
-    let start = (2.0 * drag_n_m).max(largest_n_m / 1e3);
-    let ratio = ((largest_n_m - first) / start).powf(1.0 / (steps as f64 - 1.0));
+    // The interval next to the jump must dwarf it, or it is not known for a jump.
+    let least = 40.0 * half;
     let mut positive = vec![drag_n_m - half, first];
-    positive.extend((0..steps).map(|k| first + start * ratio.powi(k as i32)));
-    if let Some(last) = positive.last_mut() {
-        *last = largest_n_m;
-    }
+    positive.extend(
+        (1..=steps).map(|k| first + ((largest_n_m - first) * (k as f64 / steps as f64).powf(CROWDING)).max(least)),
+    );
     positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).map(|t| t as f32).collect()
 }
 
@@ -91,10 +95,6 @@ const MOST_SETTLING_PITCHES: usize = 10;
 /// Progress of a sweep.
 #[derive(Debug, Clone, Copy)]
 pub struct SweepProgress {
-    /// Increments done.
-    pub done: usize,
-    /// Increments in all.
-    pub total: usize,
     /// Newton iterations of the last increment.
     pub iterations: usize,
     /// Torque of the last increment, N m.
@@ -126,6 +126,9 @@ pub enum SweepError {
     /// The FEM failed.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// The samples make no trial table.
+    #[error(transparent)]
+    Table(#[from] crate::tables::TableError),
     /// The output does not follow.
     #[error("under {torque_n_m} N.m the output does not follow the generator within {pitches} tooth pitches")]
     NeverMoves {
@@ -139,11 +142,13 @@ pub enum SweepError {
     Stopped,
 }
 
-/// Runs the sweep of one generator; torque of either sign is a chain of its own, from light to heavy.
+/// Runs the sweep of one generator; torque of either sign is a chain of its own, from light to heavy. Nodes that are `known`
+/// are not computed again.
 pub fn sweep(
     drive: &Drive,
     kind: GeneratorKind,
     plan: &SweepPlan,
+    known: &[KnownNode],
     settings: SolverSettings,
     observe: &mut dyn FnMut(SweepProgress) -> ControlFlow<()>,
 ) -> Result<Sweep, SweepError> {
@@ -155,67 +160,195 @@ pub fn sweep(
         worst_residual: 0.0,
         degrees_of_freedom: 0,
     };
-    let pitch = TAU / f64::from(drive.flexspline.teeth);
-    let step = pitch / plan.positions as f64;
-    let (negative, positive): (Vec<f32>, Vec<f32>) = plan.torque_nodes_n_m.iter().partition(|t| **t < 0.0);
+    let half = Half::of(drive);
     for &temperature in &plan.temperature_nodes_c {
         let problem = Problem::new(drive, kind, f64::from(temperature), settings)?;
         result.degrees_of_freedom = problem.degrees_of_freedom();
         let mut solver = Solver::new(&problem);
         let (unloaded, _) = solver.deform(0.0)?;
-        for chain in [negative.iter().rev().copied().collect::<Vec<_>>(), positive.clone()] {
+        let mut chain = Chain::new(drive, plan, f64::from(temperature), observe);
+        for torques in half.chains(plan, drive.output.drag_torque_n_m) {
             let mut state = unloaded.clone();
-            for torque in chain {
-                let mut advance = |state: &State, turn: f64| -> Result<State, SweepError> {
-                    let (next, increment) = solver.increment(state, state.generator_rad + turn, f64::from(torque))?;
-                    result.increments += 1;
-                    result.iterations += increment.iterations;
-                    result.worst_residual = result.worst_residual.max(increment.residual);
-                    let progress = SweepProgress {
-                        done: result.increments,
-                        total: plan.increments(),
-                        iterations: increment.iterations,
-                        torque_n_m: f64::from(torque),
-                        temperature_c: f64::from(temperature),
-                    };
-                    match observe(progress) {
-                        ControlFlow::Continue(()) => Ok(next),
-                        ControlFlow::Break(()) => Err(SweepError::Stopped),
-                    }
-                };
-                state = advance(&state, 0.0)?;
-                // Under a load below the drag the output stands still until the clearance is crossed.
-                let mut settled = 0;
-                while settled < plan.settling_increments() || state.output_rate < 0.5 / drive.ratio() {
-                    state = advance(&state, step)?;
-                    settled += 1;
-                    if settled > MOST_SETTLING_PITCHES * plan.positions {
-                        return Err(SweepError::NeverMoves {
-                            torque_n_m: f64::from(torque),
-                            pitches: MOST_SETTLING_PITCHES,
-                        });
-                    }
-                }
-                for _ in 0..plan.positions {
-                    state = advance(&state, step)?;
-                    result.samples.push(Sample {
-                        generator_rad: state.generator_rad,
-                        torque_n_m: f64::from(torque),
-                        temperature_c: f64::from(temperature),
-                        direction: Direction::Forward,
-                        output_rad: state.output_rad,
-                    });
+            for torque in torques {
+                let reused = known.iter().find(|k| k.torque == torque && k.temperature == temperature);
+                match reused {
+                    Some(known) => chain.points.extend(known.points.iter().copied()),
+                    None => state = chain.sample(&mut solver, state, torque)?,
                 }
             }
         }
+        result.increments += chain.increments;
+        result.iterations += chain.iterations;
+        result.worst_residual = result.worst_residual.max(chain.worst_residual);
+        result.samples.extend(half.complete(&chain.points, drive.output.drag_torque_n_m));
     }
-    let mirrored: Vec<Sample> = result.samples.iter().map(mirror).collect();
-    result.samples.extend(mirrored);
     Ok(result)
 }
 
+/// Which part of the plane of torque and direction is computed; the rest follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Half {
+    /// Forward motion at every torque.
+    Forward,
+    /// Forward motion at torques above the drag: all that frictionless flanks need.
+    ForwardLoaded,
+}
+
+impl Half {
+    fn of(drive: &Drive) -> Half {
+        if drive.flanks.friction_coefficient > 0.0 { Half::Forward } else { Half::ForwardLoaded }
+    }
+
+    /// Torques to compute, each sign from light to heavy.
+    fn chains(self, plan: &SweepPlan, drag_n_m: f64) -> Vec<Vec<f32>> {
+        let nodes = &plan.torque_nodes_n_m;
+        let positive = nodes.iter().copied().filter(|t| f64::from(*t) > drag_n_m).collect();
+        match self {
+            Half::ForwardLoaded => vec![positive],
+            Half::Forward => {
+                let below = nodes.iter().rev().copied().filter(|t| f64::from(*t) < 0.0).collect();
+                vec![below, nodes.iter().copied().filter(|t| *t > 0.0).collect()]
+            }
+        }
+    }
+
+    /// All samples: those computed and those that follow.
+    fn complete(self, points: &[Computed], drag_n_m: f64) -> Vec<Sample> {
+        let mut samples: Vec<Sample> = points.iter().map(|point| point.sample).collect();
+        if self == Half::ForwardLoaded {
+            for point in points {
+                let sample = point.sample;
+                samples.push(point.carried(Direction::Backward, sample.torque_n_m, 2.0 * drag_n_m));
+            }
+            // The node below the jump: light lag under forward motion, the mirror image of the light lead above it.
+            if let Some(first) = points.iter().map(|point| point.sample.torque_n_m).reduce(f64::min) {
+                let below = f64::from((2.0 * drag_n_m - first) as f32);
+                for point in points.iter().filter(|point| point.sample.torque_n_m == first) {
+                    let lead = first - drag_n_m;
+                    samples.push(Sample { torque_n_m: below, direction: Direction::Forward, ..mirror(&point.sample) });
+                    samples.push(point.carried(Direction::Backward, below, below + drag_n_m - lead));
+                }
+            }
+        }
+        let mirrored: Vec<Sample> = samples.iter().map(mirror).collect();
+        samples.extend(mirrored);
+        samples
+    }
+}
+
+/// A point of steady motion as the FEM gave it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Computed {
+    /// The sample.
+    pub sample: Sample,
+    /// Compliance of the output there, rad/(N m).
+    compliance: f64,
+}
+
+impl Computed {
+    /// The elastic state under `more` load on the flanks.
+    fn carried(&self, direction: Direction, torque_n_m: f64, more_n_m: f64) -> Sample {
+        let output_rad = self.sample.output_rad + more_n_m * self.compliance;
+        Sample { direction, torque_n_m, output_rad, ..self.sample }
+    }
+}
+
+/// Points of one node that are there already.
+#[derive(Debug, Clone)]
+pub struct KnownNode {
+    pub(crate) torque: f32,
+    pub(crate) temperature: f32,
+    pub(crate) points: Vec<Computed>,
+}
+
+/// Samples at one torque after the other, the drive moving on forward.
+pub struct Chain<'a> {
+    drive: &'a Drive,
+    plan: &'a SweepPlan,
+    temperature_c: f64,
+    observe: &'a mut dyn FnMut(SweepProgress) -> ControlFlow<()>,
+    points: Vec<Computed>,
+    increments: usize,
+    iterations: usize,
+    worst_residual: f64,
+}
+
+impl<'a> Chain<'a> {
+    /// A chain at one temperature.
+    pub fn new(
+        drive: &'a Drive,
+        plan: &'a SweepPlan,
+        temperature_c: f64,
+        observe: &'a mut dyn FnMut(SweepProgress) -> ControlFlow<()>,
+    ) -> Self {
+        Chain {
+            drive,
+            plan,
+            temperature_c,
+            observe,
+            points: Vec::new(),
+            increments: 0,
+            iterations: 0,
+            worst_residual: 0.0,
+        }
+    }
+
+    /// The points so far, which are then forgotten.
+    pub(crate) fn take_points(&mut self) -> Vec<Computed> {
+        std::mem::take(&mut self.points)
+    }
+
+    fn advance(
+        &mut self,
+        solver: &mut Solver<'_>,
+        state: &State,
+        turn: f64,
+        torque_n_m: f64,
+    ) -> Result<(State, f64), SweepError> {
+        let (next, increment) = solver.increment(state, state.generator_rad + turn, torque_n_m)?;
+        self.increments += 1;
+        self.iterations += increment.iterations;
+        self.worst_residual = self.worst_residual.max(increment.residual);
+        let progress =
+            SweepProgress { iterations: increment.iterations, torque_n_m, temperature_c: self.temperature_c };
+        match (self.observe)(progress) {
+            ControlFlow::Continue(()) => Ok((next, increment.compliance_rad_per_n_m)),
+            ControlFlow::Break(()) => Err(SweepError::Stopped),
+        }
+    }
+
+    /// Brings the load on, settles, and samples one pitch; the state at its end.
+    pub fn sample(&mut self, solver: &mut Solver<'_>, state: State, torque: f32) -> Result<State, SweepError> {
+        let torque_n_m = f64::from(torque);
+        let step = TAU / f64::from(self.drive.flexspline.teeth) / self.plan.positions as f64;
+        let (mut state, _) = self.advance(solver, &state, 0.0, torque_n_m)?;
+        // Under a load below the drag the output stands still until the clearance is crossed.
+        let mut settled = 0;
+        while settled < self.plan.settling_increments() || state.output_rate < 0.5 / self.drive.ratio() {
+            (state, _) = self.advance(solver, &state, step, torque_n_m)?;
+            settled += 1;
+            if settled > MOST_SETTLING_PITCHES * self.plan.positions {
+                return Err(SweepError::NeverMoves { torque_n_m, pitches: MOST_SETTLING_PITCHES });
+            }
+        }
+        for _ in 0..self.plan.positions {
+            let (next, compliance) = self.advance(solver, &state, step, torque_n_m)?;
+            state = next;
+            let sample = Sample {
+                generator_rad: state.generator_rad,
+                torque_n_m,
+                temperature_c: self.temperature_c,
+                direction: Direction::Forward,
+                output_rad: state.output_rad,
+            };
+            self.points.push(Computed { sample, compliance });
+        }
+        Ok(state)
+    }
+}
+
 /// The mirror image of a sample of a mirror-symmetric drive.
-fn mirror(sample: &Sample) -> Sample {
+pub(crate) fn mirror(sample: &Sample) -> Sample {
     Sample {
         generator_rad: -sample.generator_rad,
         torque_n_m: -sample.torque_n_m,
@@ -234,13 +367,14 @@ mod tests {
 
     #[test]
     fn torque_nodes_are_symmetric_and_rise_to_the_largest() {
-        let nodes = torque_nodes(0.02, 50.0, 8);
-        assert_eq!(nodes.len(), 20);
+        let nodes = symmetric_nodes(0.02, 50.0, 9);
+        assert_eq!(nodes.len(), 22);
         assert!(nodes.windows(2).all(|w| w[0] < w[1]));
         assert!(nodes.iter().zip(nodes.iter().rev()).all(|(a, b)| *a == -*b));
-        assert_eq!(nodes[19], 50.0);
+        assert_eq!(nodes[21], 50.0);
         // The pairs at the drag torque stand out: their neighbours are at least eight times as wide.
         let width = |k: usize| nodes[k + 1] - nodes[k];
-        assert!(width(9) > 8.0 * width(10) && width(11) > 8.0 * width(10));
+        assert!((f64::from(nodes[11]) - 0.019).abs() < 1e-6 && (f64::from(nodes[12]) - 0.021).abs() < 1e-6);
+        assert!(width(10) > 8.0 * width(11) && width(12) > 8.0 * width(11));
     }
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::drive::{Drive, GeneratorKind};
-use crate::sweep::{Sweep, SweepPlan};
+use crate::sweep::{KnownNode, Sweep, SweepPlan, mirror};
 
 /// Arc-seconds in a radian.
 pub const ARCSEC_PER_RAD: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
@@ -178,7 +178,51 @@ pub fn from_sweep(
         worst_residual: sweep.worst_residual,
         cpu_s,
     };
+    let core_plan = fem_plan(drive, plan)?;
+    make(drive, sweep.kind, &core_plan, &sweep.samples, source, mesh, sweep.worst_residual)
+}
+
+/// A table of forward samples at positive torque `nodes` alone, for choosing nodes: the other quadrants are filled by mirror
+/// images that neglect the drag. Only its image is wanted.
+pub(crate) fn trial_table(
+    drive: &Drive,
+    kind: GeneratorKind,
+    plan: &SweepPlan,
+    nodes: &[f32],
+    known: &[KnownNode],
+) -> Result<Vec<u8>, TableError> {
+    let both = [flexspline::Direction::Forward, flexspline::Direction::Backward];
+    let before_jump = 2.0 * drive.output.drag_torque_n_m as f32 - nodes[0];
+    let mut samples = Vec::new();
+    for node in known {
+        for sample in node.points.iter().map(|point| &point.sample) {
+            let mirrored = mirror(sample);
+            for direction in both {
+                samples.push(Sample { direction, ..*sample });
+                samples.push(Sample { direction, ..mirrored });
+                if node.torque == nodes[0] {
+                    samples.push(Sample { direction, torque_n_m: -f64::from(before_jump), ..*sample });
+                    samples.push(Sample { direction, torque_n_m: f64::from(before_jump), ..mirrored });
+                }
+            }
+        }
+    }
+    // The jump of the trial lies between the middle pair, where no middle is ever asked.
+    let positive: Vec<f32> = std::iter::once(before_jump).chain(nodes.iter().copied()).collect();
+    let torque_nodes: Vec<f32> = positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).collect();
     let core_plan = Plan {
+        torque_nodes_n_m: &torque_nodes,
+        temperature_nodes_c: &plan.temperature_nodes_c[..1],
+        deviation_limit_rad: f64::from(flexspline::MAX_ERROR_RAD),
+        ..fem_plan(drive, plan)?
+    };
+    let source = Source::File { name: String::new(), blake3: String::new() };
+    make(drive, kind, &core_plan, &samples, source, "trial", 0.0).map(|table| table.image)
+}
+
+/// What a table of FEM samples is projected with.
+fn fem_plan<'a>(drive: &Drive, plan: &'a SweepPlan) -> Result<Plan<'a>, TableError> {
+    Ok(Plan {
         drive: core_drive(drive)?,
         torque_nodes_n_m: &plan.torque_nodes_n_m,
         temperature_nodes_c: &plan.temperature_nodes_c,
@@ -189,8 +233,7 @@ pub fn from_sweep(
         missing_direction: MissingDirection::Refuse,
         negative_half_width_tolerance_rad: HALF_WIDTH_NOISE_RAD,
         deviation_limit_rad: FEM_DEVIATION_RAD,
-    };
-    make(drive, sweep.kind, &core_plan, &sweep.samples, source, mesh, sweep.worst_residual)
+    })
 }
 
 /// The table of samples from elsewhere: every torque and temperature that occurs is a node, the ripple has as many nodes as

@@ -13,10 +13,11 @@ use super::Failure;
 use super::context::Context;
 use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
+use crate::nodes::{NodeChoice, choose_torque_nodes};
 use crate::output::{write_json, write_whole};
 use crate::samples;
 use crate::stepping::SolverSettings;
-use crate::sweep::{SweepError, SweepPlan, sweep, torque_nodes};
+use crate::sweep::{SweepError, SweepPlan, SweepProgress, sweep};
 use crate::tables::{
     ARCSEC_PER_RAD, MadeTable, SampleOptions, TableError, TableInfo, c_header, from_samples, from_sweep, rust_source,
 };
@@ -33,7 +34,7 @@ Examples:
   flexspline tables
   flexspline tables --generator cam --drive my-drive.toml --out tables
   flexspline tables --generator cam --from-samples bench.csv
-  flexspline tables --generator double-disc --steps 12 --positions 16
+  flexspline tables --generator double-disc --positions 8 --node-tolerance-arcsec 0.2
 
 Sample files have the columns generator_rad, torque_n_m, temperature_c, direction (1 or -1), output_rad.")]
 pub(super) struct Tables {
@@ -52,11 +53,20 @@ pub(super) struct Tables {
     /// Largest torque, N.m [default: 200; four-roller 100, two-roller 50]
     #[arg(long, value_name = "T", conflicts_with = "from_samples", allow_negative_numbers = true)]
     torque_n_m: Option<f64>,
-    /// Torque steps on each side of zero, beside the pair at the drag torque
-    #[arg(long, value_name = "N", default_value_t = 8, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(2..=14))]
-    steps: u8,
+    /// Torque nodes on each side of zero, at most, beside the pair at the drag torque
+    #[arg(long, value_name = "N", default_value_t = 20, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(5..=30))]
+    most_nodes: u8,
+    /// Add a torque node where the table misses the FEM by more than this, arcsec
+    #[arg(
+        long,
+        value_name = "ARCSEC",
+        default_value_t = 0.6,
+        conflicts_with = "from_samples",
+        allow_negative_numbers = true
+    )]
+    node_tolerance_arcsec: f64,
     /// Samples over one tooth pitch
-    #[arg(long, value_name = "N", default_value_t = 8, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(4..=16))]
+    #[arg(long, value_name = "N", default_value_t = 12, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(4..=32))]
     positions: u8,
     /// Temperature nodes, degrees C [default: ends and reference of the operating range]
     #[arg(
@@ -135,7 +145,7 @@ impl Tables {
         from_samples(drive, kind, &read, &name, &bytes, options).map_err(|e| bad(format!("{name}: {e}")))
     }
 
-    fn plan(&self, drive: &Drive, kind: GeneratorKind) -> Result<SweepPlan, Failure> {
+    fn plan(&self, drive: &Drive, kind: GeneratorKind) -> Result<(SweepPlan, NodeChoice), Failure> {
         let mut plan = SweepPlan::for_generator(drive, kind);
         let drag = drive.output.drag_torque_n_m;
         let largest = self.torque_n_m.unwrap_or(crate::sweep::rated_torque_n_m(kind));
@@ -145,7 +155,15 @@ impl Tables {
                 20.0 * drag
             )));
         }
-        plan.torque_nodes_n_m = torque_nodes(drag, largest, usize::from(self.steps));
+        let tolerance = self.node_tolerance_arcsec;
+        if !(0.01..=60.0).contains(&tolerance) {
+            return Err(Failure::BadInput(format!("--node-tolerance-arcsec: found {tolerance}; allowed: 0.01 to 60")));
+        }
+        let choice = NodeChoice {
+            largest_n_m: largest,
+            most: usize::from(self.most_nodes),
+            tolerance_rad: tolerance / ARCSEC_PER_RAD,
+        };
         plan.positions = usize::from(self.positions);
         if let Some(temperatures) = &self.temperatures_c {
             let range = &drive.temperature;
@@ -160,7 +178,7 @@ impl Tables {
             }
             plan.temperature_nodes_c = nodes;
         }
-        Ok(plan)
+        Ok((plan, choice))
     }
 
     fn sweep(
@@ -172,18 +190,28 @@ impl Tables {
         let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
         let plans =
             generators.iter().map(|kind| Ok((*kind, self.plan(drive, *kind)?))).collect::<Result<Vec<_>, Failure>>()?;
-        let total: usize = plans.iter().map(|(_, plan)| plan.increments()).sum();
-        let progress = Mutex::new((context.progress("tables"), 0_usize));
+        // How many nodes there will be is known only once they are chosen; until then the most is assumed.
+        let expected = |plan: &SweepPlan, choice: &NodeChoice| {
+            let a_node = plan.positions + 2;
+            choice.most * (plan.temperature_nodes_c.len() + 1) * a_node
+        };
+        let totals = plans.iter().map(|(_, (plan, choice))| expected(plan, choice)).collect::<Vec<usize>>();
+        let progress = Mutex::new((context.progress("tables"), 0_usize, totals));
         let interrupted = context.watch_interrupt();
         let verbose = context.verbose();
         plans
             .par_iter()
-            .map(|(kind, plan)| {
+            .enumerate()
+            .map(|(k, (kind, (plan, choice)))| {
                 let clock = Instant::now();
-                let swept = sweep(drive, *kind, plan, settings, &mut |now| {
+                let mut mine = 0;
+                let mut observe = |now: SweepProgress| {
+                    mine += 1;
                     if let Ok(mut guard) = progress.lock() {
-                        let (bar, done) = &mut *guard;
+                        let (bar, done, totals) = &mut *guard;
                         *done += 1;
+                        totals[k] = totals[k].max(mine);
+                        let total: usize = totals.iter().sum();
                         let note = format!(
                             "{kind} {:+.3} N.m {:+.0} °C, {} iterations",
                             now.torque_n_m, now.temperature_c, now.iterations
@@ -194,13 +222,21 @@ impl Tables {
                         bar.set(*done, total, &note);
                     }
                     if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-                })
-                .map_err(|error| match error {
+                };
+                let failed = |error: SweepError| match error {
                     SweepError::Stopped => Failure::Failed("stopped; nothing was written".into()),
                     error => Failure::Failed(format!("{kind}: {error}")),
-                })?;
+                };
+                let mut plan = plan.clone();
+                let (nodes, known) =
+                    choose_torque_nodes(drive, *kind, &plan, *choice, settings, &mut observe).map_err(failed)?;
+                plan.torque_nodes_n_m = nodes;
+                let swept = sweep(drive, *kind, &plan, &known, settings, &mut observe).map_err(failed)?;
+                if let Ok(mut guard) = progress.lock() {
+                    guard.2[k] = mine;
+                }
                 let cpu_s = clock.elapsed().as_secs_f64();
-                let table = from_sweep(drive, plan, &swept, &self.mesh.to_string(), cpu_s)
+                let table = from_sweep(drive, &plan, &swept, &self.mesh.to_string(), cpu_s)
                     .map_err(|error: TableError| Failure::Failed(format!("{kind}: {error}")))?;
                 Ok((table, Some(samples::to_csv(&swept.samples))))
             })

@@ -69,6 +69,8 @@ pub struct Increment {
     pub flank_torque_n_m: f64,
     /// Drag torque on the output, N m.
     pub drag_torque_n_m: f64,
+    /// How far the output turns for one more N m of load, the generator held: rad/(N m).
+    pub compliance_rad_per_n_m: f64,
     /// Largest contact pressure on a flank and on the bore, MPa.
     pub peak_pressure_mpa: [f64; 2],
 }
@@ -381,7 +383,10 @@ impl<'p> Solver<'p> {
             if relative <= settings.tolerance {
                 // The contact was laid out for the predicted state; where the corner of a space ended elsewhere, again.
                 if self.layouts_fit(&state, &layouts) {
-                    let increment = self.report(&residual, history.len() - 1);
+                    let Some(compliance) = self.compliance(&residual) else {
+                        return Err(failed(history, "the stiffness matrix is not positive definite"));
+                    };
+                    let increment = self.report(&residual, compliance, history.len() - 1);
                     self.finish(&mut state, from, &layouts);
                     if generator_rad != from.generator_rad {
                         self.remember(&state);
@@ -802,6 +807,20 @@ impl<'p> Solver<'p> {
         Some(Step { free, u, v, border })
     }
 
+    /// Turn of the output for a unit torque on it (rad mm / N mm), by the last tangent.
+    fn compliance(&mut self, residual: &Residual) -> Option<f64> {
+        if self.system.as_ref()?.eliminated.is_none() {
+            self.solve(residual, false)?;
+        }
+        let system = self.system.as_mut()?;
+        let mut free = vec![0.0; residual.force.len()];
+        let mut border = [0.0; BORDERS];
+        border[OUTPUT] = 1.0;
+        let width = system.border.width;
+        let solved = system.eliminated.as_ref()?.solve(&mut system.factor, &mut free, &mut border[..width]);
+        solved.then_some(border[OUTPUT])
+    }
+
     /// Whether the corners of the spaces still face the places they were laid out for.
     fn layouts_fit(&self, state: &State, layouts: &Layouts) -> bool {
         let at = configuration(state);
@@ -842,7 +861,7 @@ impl<'p> Solver<'p> {
         }
     }
 
-    fn report(&self, residual: &Residual, iterations: usize) -> Increment {
+    fn report(&self, residual: &Residual, compliance: f64, iterations: usize) -> Increment {
         let to_n_m = self.problem.drive.flexspline.width_mm / 1e3;
         Increment {
             iterations,
@@ -852,6 +871,8 @@ impl<'p> Solver<'p> {
             generator_torque_n_m: residual.generator_moment * to_n_m,
             flank_torque_n_m: residual.flank_torque * to_n_m,
             drag_torque_n_m: residual.drag_torque * to_n_m,
+            // Per width: rad per (N mm/mm); a torque in N m is 1 / to_n_m of that.
+            compliance_rad_per_n_m: compliance / to_n_m,
             peak_pressure_mpa: residual.peak,
         }
     }

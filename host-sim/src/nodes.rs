@@ -1,0 +1,101 @@
+//! Torque nodes where the drive needs them.
+//!
+//! Wind-up and ripple change where further teeth take load: under rollers several times below a tenth of the rated torque,
+//! under a cam hardly at all. So the nodes are not guessed: between two nodes the FEM is asked at the middle (of the square
+//! roots), and where the table made so far misses it, the middle becomes a node. The same core code reads the trial table as
+//! will read the final one.
+
+use std::ops::ControlFlow;
+
+use flexspline::{Direction, GeneratorAngle, Table};
+
+use crate::drive::{Drive, GeneratorKind};
+use crate::stepping::{Problem, Solver, SolverSettings, State};
+use crate::sweep::{Chain, Computed, KnownNode, SweepError, SweepPlan, SweepProgress, symmetric_nodes};
+use crate::tables::trial_table;
+
+/// How nodes are chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NodeChoice {
+    /// Largest torque, N m.
+    pub largest_n_m: f64,
+    /// Nodes on each side of zero, beside the pair at the drag torque, at most.
+    pub most: usize,
+    /// Difference between table and FEM, rad, above which a node is added.
+    pub tolerance_rad: f64,
+}
+
+/// Nodes on each side that the choice starts with.
+const FIRST_NODES: usize = 5;
+
+/// Chooses the torque nodes of a generator at the first temperature of the plan, whose other fields stay; gives them with the
+/// points computed on the way.
+pub fn choose_torque_nodes(
+    drive: &Drive,
+    kind: GeneratorKind,
+    plan: &SweepPlan,
+    choice: NodeChoice,
+    settings: SolverSettings,
+    observe: &mut dyn FnMut(SweepProgress) -> ControlFlow<()>,
+) -> Result<(Vec<f32>, Vec<KnownNode>), SweepError> {
+    let temperature = plan.temperature_nodes_c[0];
+    let temperature_c = f64::from(temperature);
+    let problem = Problem::new(drive, kind, temperature_c, settings)?;
+    let mut solver = Solver::new(&problem);
+    let (unloaded, _) = solver.deform(0.0)?;
+    let mut chain = Chain::new(drive, plan, temperature_c, observe);
+    let all = symmetric_nodes(drive.output.drag_torque_n_m, choice.largest_n_m, FIRST_NODES);
+    let mut nodes: Vec<f32> = all.into_iter().filter(|t| f64::from(*t) > drive.output.drag_torque_n_m).collect();
+
+    let mut known: Vec<KnownNode> = Vec::new();
+    let mut state: State = unloaded.clone();
+    for torque in &nodes {
+        state = chain.sample(&mut solver, state, *torque)?;
+        known.push(KnownNode { torque: *torque, temperature, points: chain.take_points() });
+    }
+    // Intervals not yet looked into, by their lower node.
+    let mut open: Vec<(f32, f32)> = nodes.windows(2).map(|w| (w[0], w[1])).collect();
+    while !open.is_empty() && nodes.len() - 1 < choice.most {
+        let mut missed: Vec<(f64, KnownNode)> = Vec::new();
+        open.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut state = unloaded.clone();
+        for (low, high) in &open {
+            let middle = (0.5 * (f64::from(*low).sqrt() + f64::from(*high).sqrt())).powi(2) as f32;
+            state = chain.sample(&mut solver, state, middle)?;
+            let points = chain.take_points();
+            let image = trial_table(drive, kind, plan, &nodes, &known)?;
+            missed.push((worst_miss(&image, &points), KnownNode { torque: middle, temperature, points }));
+        }
+        missed.sort_by(|a, b| b.0.total_cmp(&a.0));
+        open.clear();
+        for (miss, node) in missed {
+            let middle = node.torque;
+            if miss > choice.tolerance_rad && nodes.len() - 1 < choice.most {
+                let place = nodes.partition_point(|t| *t < middle);
+                open.extend([(nodes[place - 1], middle), (middle, nodes[place])]);
+                nodes.insert(place, middle);
+                known.push(node);
+            }
+        }
+    }
+    let drag = drive.output.drag_torque_n_m;
+    let before_jump = (2.0 * drag - f64::from(nodes[0])) as f32;
+    let positive: Vec<f32> = std::iter::once(before_jump).chain(nodes).collect();
+    Ok((positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).collect(), known))
+}
+
+/// Largest difference between a trial table and samples of one torque, rad.
+fn worst_miss(image: &[u8], points: &[Computed]) -> f64 {
+    let Ok(table) = Table::check(image) else { return f64::INFINITY };
+    points
+        .iter()
+        .map(|point| {
+            let s = point.sample;
+            let said = GeneratorAngle::from_rad(s.generator_rad).and_then(|g| {
+                table.steady_error_rad(g, s.torque_n_m as f32, s.temperature_c as f32, Direction::Forward)
+            });
+            let error = s.output_rad - s.generator_rad / table.drive().exact_ratio();
+            said.map_or(f64::INFINITY, |said| (f64::from(said) - error).abs())
+        })
+        .fold(0.0, f64::max)
+}
