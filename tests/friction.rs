@@ -45,8 +45,7 @@ fn loop_of(kind: GeneratorKind, friction: f64, increments: usize) -> [(f64, f64)
 }
 
 fn makes_a_loop(kind: GeneratorKind) {
-    let increments = 7;
-    let [forward, backward] = loop_of(kind, 0.1, increments);
+    let [forward, backward] = loop_of(kind, 0.1, 5);
     let ideal = TORQUE_N_M / 95.0;
     let width = forward.0 - backward.0;
     // Work that goes in over a pitch of either sense, over the work of the load: -M_g / (T/95) forward is what comes out.
