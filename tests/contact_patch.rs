@@ -127,7 +127,8 @@ fn bore_derivatives(kind: GeneratorKind) {
         (nodal - here.moment).abs() / arm
     );
     assert!(force_error <= 1e-6);
-    assert!(tangent_error <= 1e-5);
+    // Tight enough to see the part that comes from the curvature of the outline, penetration over radius: 8e-6 under rollers.
+    assert!(tangent_error <= 1e-6);
     assert!((moment_by_difference - here.moment).abs() <= 1e-6 * arm);
     assert!((nodal - here.moment).abs() <= 1e-8 * arm);
 }

@@ -267,6 +267,21 @@ fn the_thick_ring_converges_with_the_third_power_of_the_element() {
             })
             .sum();
         let energy = (energy / exact_energy - 1.0).abs();
+        // The linear solution, made small, also balances the forces of the full, non-linear element.
+        let small: Vec<f64> = u.iter().map(|x| 1e-4 * x).collect();
+        let mut force = vec![0.0; u.len()];
+        for (e, nodes) in mesh.elements.iter().enumerate() {
+            let mut local = [0.0; 16];
+            add_internal_force(&mesh.gauss[e], &steel(), &mesh.local(e, &small), &mut local);
+            for i in 0..16 {
+                force[2 * nodes[i / 2] as usize + i % 2] += local[i];
+            }
+        }
+        let largest = force.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+        for node in (0..mesh.nodes.len()).filter(|n| !mesh.boundary[*n]) {
+            let left = force[2 * node].hypot(force[2 * node + 1]) / largest;
+            assert!(left < 1e-5, "node {node} is out of balance by {left} of the largest force");
+        }
         if let Some((displacement_before, energy_before)) = before {
             let rate = [f64::log2(displacement_before / displacement), f64::log2(energy_before / energy)];
             println!(

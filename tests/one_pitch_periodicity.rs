@@ -35,7 +35,8 @@ fn repeats(kind: GeneratorKind, mesh: MeshLevel, torque_n_m: f64) {
         range(errors().collect::<Vec<_>>()),
         first[0].error_arcsec
     );
-    assert!(difference <= 1e-3, "{kind}, {torque_n_m} N.m: e(psi + 2 pi/188) differs from e(psi) by {difference}\"");
+    // Equilibrium is found to 1e-6 of the forces; one element of 9024 that is 5 % too stiff shows with 1e-3".
+    assert!(difference <= 2e-4, "{kind}, {torque_n_m} N.m: e(psi + 2 pi/188) differs from e(psi) by {difference}\"");
     // A ripple there must be: an output that does not move repeats perfectly.
     let ripple = range(errors().collect::<Vec<_>>());
     assert!((0.05..5.0).contains(&ripple), "{kind}, {torque_n_m} N.m: ripple {ripple}\"");
