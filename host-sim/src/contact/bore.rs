@@ -155,3 +155,62 @@ impl BoreContact {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drive::{Drive, GeneratorKind};
+    use crate::mesh::MeshLevel;
+
+    #[test]
+    fn a_bearing_acts_in_series() {
+        assert_eq!(BoreLaw::new(1e6, None).stiffness, 1e6);
+        assert!((BoreLaw::new(1e6, Some(1e6)).stiffness - 5e5).abs() < 1e-6);
+        assert!((BoreLaw::new(1e9, Some(170.0)).stiffness - 170.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn edges_and_weights_go_once_around_the_bore() {
+        let mesh = WheelMesh::flexspline(&Drive::hhd_95(), MeshLevel::Coarse).unwrap();
+        let bore = BoreContact::new(&mesh, 16);
+        for (edge, next) in bore.edges.iter().zip(bore.edges.iter().cycle().skip(1)) {
+            assert_eq!(edge[2], next[0]);
+        }
+        for (nodes, angle) in bore.edges.iter().zip(&bore.middle_angles) {
+            let x = mesh.nodes[nodes[1] as usize];
+            let (s, c) = angle.sin_cos();
+            assert!((x[0] * s - x[1] * c).abs() < 1e-12 && x[0] * c + x[1] * s > 0.0);
+        }
+        let around = bore.points.iter().map(|(_, weight, _)| weight).sum::<f64>() * bore.edges.len() as f64;
+        assert!((around - std::f64::consts::TAU * mesh.base_radius).abs() < 1e-10);
+    }
+
+    /// An undeformed bore stands on the rollers only: on the major axis of wherever the generator points.
+    #[test]
+    fn rollers_push_outward_where_they_stand() {
+        let drive = Drive::hhd_95();
+        let mesh = WheelMesh::flexspline(&drive, MeshLevel::Coarse).unwrap();
+        let bore = BoreContact::new(&mesh, 16);
+        let outline = GeneratorOutline::new(&drive, GeneratorKind::TwoRoller).unwrap();
+        let u = vec![0.0; 2 * mesh.nodes.len()];
+        for turned in [0.0, 0.7, 0.7 + std::f64::consts::PI] {
+            let (mut sum, mut outward, mut moment) = ([0.0; 2], 0.0, 0.0);
+            bore.evaluate(BoreLaw::new(1e4, None), &outline, turned, &u, |edge| {
+                let angle = bore.middle_angles[edge.edge];
+                assert!((2.0 * (angle - turned)).cos() > 0.9, "contact at {angle}, generator at {turned}");
+                let (s, c) = angle.sin_cos();
+                for a in 0..3 {
+                    sum = [sum[0] + edge.force[2 * a], sum[1] + edge.force[2 * a + 1]];
+                    outward += c * edge.force[2 * a] + s * edge.force[2 * a + 1];
+                }
+                moment += edge.moment;
+            });
+            assert!(outward > 1e3, "{outward} N/mm");
+            let unbalanced = sum[0].hypot(sum[1]) / outward;
+            assert!(unbalanced < 1e-9, "the two rollers differ by {unbalanced}");
+            // Every force points at the axis of its roller, and the rollers stand on the major axis.
+            let arm = moment / outward;
+            assert!(arm.abs() < 1e-3, "the forces of one roller miss the axis of the drive by {arm} mm");
+        }
+    }
+}

@@ -494,3 +494,114 @@ fn interpolate(history: &FrictionHistory, arc: f64) -> f64 {
     let ((s0, t0), (s1, t1)) = (history[after - 1], history[after]);
     if s1 > s0 { t0 + (t1 - t0) * (arc - s0) / (s1 - s0) } else { t0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drive::{Drive, ToothFlank};
+    use crate::mesh::MeshLevel;
+
+    fn with_flanks(test: impl Fn(&FlankContact, &WheelMesh, &WheelMesh)) {
+        let drive = Drive::hhd_95();
+        let fs = WheelMesh::flexspline(&drive, MeshLevel::Coarse).unwrap();
+        let cs = WheelMesh::circular_spline(&drive, MeshLevel::Coarse).unwrap();
+        let tooth = ToothFlank::external(&drive.flexspline).unwrap();
+        let space = ToothFlank::internal(&drive.circular_spline).unwrap();
+        let tooth = InvoluteFlank::new(&tooth, drive.flexspline.base_radius_mm());
+        let space = InvoluteFlank::new(&space, drive.circular_spline.base_radius_mm());
+        test(&FlankContact::new(&fs, &cs, tooth, space), &fs, &cs);
+    }
+
+    const PAIR: FlankPair = FlankPair { tooth: 0, space: 0, side: Side::Plus };
+
+    /// Parallel curves of an involute are the involute turned: the gap of an involute falls by base radius times angle.
+    #[test]
+    fn turning_the_space_changes_the_gap_by_the_base_radius() {
+        with_flanks(|flanks, fs, cs| {
+            let (u, v) = (vec![0.0; 2 * fs.nodes.len()], vec![0.0; 2 * cs.nodes.len()]);
+            let gap = |side, output_rad| {
+                flanks.smallest_gap(FlankPair { side, ..PAIR }, Configuration { u: &u, v: &v, output_rad })
+            };
+            let start = gap(Side::Plus, 0.0);
+            assert!(start > 0.0 && start < 0.5, "tooth 0 stands in space 0 with {start} mm");
+            for turn in [1e-5, 1e-4, -1e-4] {
+                let change = gap(Side::Plus, turn) - start;
+                assert!((change - turn * flanks.space.base_radius).abs() < 1e-9, "{turn}: {change}");
+                assert!((gap(Side::Minus, -turn) - gap(Side::Plus, turn)).abs() < 1e-12, "not mirrored at {turn}");
+            }
+        });
+    }
+
+    #[test]
+    fn pressed_flanks_push_back_and_open_flanks_do_not() {
+        with_flanks(|flanks, fs, cs| {
+            let (u, v) = (vec![0.0; 2 * fs.nodes.len()], vec![0.0; 2 * cs.nodes.len()]);
+            let law = FlankLaw { stiffness: 1e6, stick_stiffness: 1e5, friction: 0.0 };
+            let at = |output_rad| Configuration { u: &u, v: &v, output_rad };
+            let gap = flanks.smallest_gap(PAIR, at(0.0));
+            let closing = -(gap + 1e-4) / flanks.space.base_radius;
+            let layout = flanks.layout(PAIR, at(closing));
+            assert!(flanks.evaluate(PAIR, at(0.0), law, &layout.points).is_none());
+            let pressed = flanks.evaluate(PAIR, at(closing), law, &layout.points).unwrap();
+            // The space was turned back onto the plus side of the tooth: it is pushed forward.
+            assert!(pressed.torque > 0.0 && pressed.corner > 0.0 && pressed.peak > 0.0);
+            assert!(pressed.peak <= 1e6 * 1.01e-4, "{} MPa", pressed.peak);
+            let moment = pressed.attack[0] * pressed.resultant[1] - pressed.attack[1] * pressed.resultant[0];
+            assert!(moment.is_finite());
+            // Twice the penalty, twice the force.
+            let stiffer = FlankLaw { stiffness: 2e6, ..law };
+            let twice = flanks.evaluate(PAIR, at(closing), stiffer, &layout.points).unwrap();
+            assert!((twice.torque / pressed.torque - 2.0).abs() < 1e-12);
+        });
+    }
+
+    /// The weights of a layout add up to the length of the flank and of the first part of the rounding.
+    #[test]
+    fn the_points_of_a_layout_cover_the_flank() {
+        with_flanks(|flanks, fs, cs| {
+            let (u, v) = (vec![0.0; 2 * fs.nodes.len()], vec![0.0; 2 * cs.nodes.len()]);
+            for output_rad in [0.0, -1e-3, 2e-3] {
+                let layout = flanks.layout(PAIR, Configuration { u: &u, v: &v, output_rad });
+                let tooth = &flanks.tooth;
+                let (a, b) = (tooth.start_radius, tooth.junction_radius);
+                let rounding = (tooth.rounding_radius * tooth.rounding_sweep).min(0.016);
+                let expected = 0.5 * (b * b - a * a) / tooth.base_radius + rounding;
+                let found: f64 = layout.points.iter().map(|p| p.weight).sum();
+                assert!((found - expected).abs() < 1e-12, "{found} mm of {expected} mm");
+                assert!(layout.points.windows(2).all(|p| p[0].arc < p[1].arc), "not from root to tip");
+                for p in &layout.points {
+                    assert!((p.shape.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn friction_sticks_up_to_its_limit() {
+        let law = FlankLaw { stiffness: 1e7, stick_stiffness: 1e6, friction: 0.1 };
+        let point = FlankPoint {
+            position: [0.0; 2],
+            edge: 0,
+            shape: [0.0; 3],
+            weight: 1.0,
+            arc: 0.0,
+            start_traction: 2.0,
+            start_foot: 0.5,
+        };
+        let (sticking, stiffness) = traction(law, 100.0, &point, 0.5 + 3e-6);
+        assert!((sticking - 5.0).abs() < 1e-9 && stiffness == 1e6);
+        assert_eq!(traction(law, 100.0, &point, 0.5 + 3e-5), (10.0, 0.0));
+        assert_eq!(traction(law, 100.0, &point, 0.5 - 3e-5), (-10.0, 0.0));
+        assert_eq!(traction(law, -1.0, &point, 0.6), (0.0, 0.0));
+        assert_eq!(traction(FlankLaw { friction: 0.0, ..law }, 100.0, &point, 0.6), (0.0, 0.0));
+    }
+
+    #[test]
+    fn history_is_interpolated_within_and_forgotten_without() {
+        let history = vec![(1.0, 10.0), (2.0, 20.0)];
+        assert!((interpolate(&history, 1.25) - 12.5).abs() < 1e-12);
+        assert_eq!(interpolate(&history, 0.5), 0.0);
+        assert_eq!(interpolate(&history, 2.5), 0.0);
+        assert_eq!(interpolate(&Vec::new(), 1.0), 0.0);
+    }
+}

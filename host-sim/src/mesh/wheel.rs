@@ -391,3 +391,160 @@ impl NodeTable {
         FlankMesh { nodes, radii }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::{BTreeMap, BTreeSet};
+
+    fn meshes(level: MeshLevel) -> [WheelMesh; 2] {
+        let drive = Drive::hhd_95();
+        [WheelMesh::flexspline(&drive, level).unwrap(), WheelMesh::circular_spline(&drive, level).unwrap()]
+    }
+
+    fn profile(kind: WheelKind) -> (ToothFlank, InvoluteFlank) {
+        let drive = Drive::hhd_95();
+        let (profile, base) = match kind {
+            WheelKind::Flexspline => {
+                (ToothFlank::external(&drive.flexspline).unwrap(), drive.flexspline.base_radius_mm())
+            }
+            WheelKind::CircularSpline => {
+                (ToothFlank::internal(&drive.circular_spline).unwrap(), drive.circular_spline.base_radius_mm())
+            }
+        };
+        let involute = InvoluteFlank::new(&profile, base);
+        (profile, involute)
+    }
+
+    /// Area between the base circle and the outline: root land, fillet, involute, and the tip circle, half a pitch of it by
+    /// `r² dθ / 2`, times the number of halves.
+    fn area_of_outline(mesh: &WheelMesh) -> f64 {
+        let (profile, involute) = profile(mesh.kind);
+        let mut outline: Vec<Point> = Vec::new();
+        for piece in &profile.pieces()[..2] {
+            outline.extend((0..=2000).map(|k| piece.point(f64::from(k) / 2000.0)));
+        }
+        let (start, tip) = (involute.start_radius, involute.tip_radius);
+        outline.extend((0..=2000).map(|k| involute.point(start + (tip - start) * f64::from(k) / 2000.0)));
+        let swept: f64 = outline.windows(2).map(|p| 0.5 * (p[0][0] * p[1][1] - p[0][1] * p[1][0])).sum::<f64>().abs();
+        // The tip land is a circle: from the axis of the tooth, or to the edge of the space.
+        let land = match mesh.kind {
+            WheelKind::Flexspline => involute.half_angle(tip),
+            WheelKind::CircularSpline => profile.half_pitch() - involute.half_angle(tip),
+        };
+        let half = swept + 0.5 * tip * tip * land;
+        let base = 0.5 * mesh.base_radius * mesh.base_radius * profile.half_pitch();
+        2.0 * mesh.teeth as f64 * (half - base).abs()
+    }
+
+    #[test]
+    fn areas_are_those_of_the_outlines() {
+        for (level, allowed) in [(MeshLevel::Coarse, 1e-4), (MeshLevel::Standard, 1e-4), (MeshLevel::Fine, 1e-5)] {
+            for mesh in meshes(level) {
+                let found: f64 = mesh.gauss.iter().flatten().map(|point| point.area).sum();
+                let expected = area_of_outline(&mesh);
+                let error = found / expected - 1.0;
+                println!("{level} {:?}: {found:.6} mm², outline {expected:.6} mm², {error:.1e}", mesh.kind);
+                assert!(error.abs() <= allowed, "{level} {:?}: {found} mm², outline {expected} mm²", mesh.kind);
+            }
+        }
+    }
+
+    #[test]
+    fn sectors_repeat_exactly() {
+        for mesh in meshes(MeshLevel::Standard) {
+            for sector in 0..mesh.teeth {
+                let (s, c) = mesh.sector_angle(sector).sin_cos();
+                for local in 0..mesh.nodes_per_sector {
+                    let (p, q) = (mesh.nodes[local], mesh.nodes[sector * mesh.nodes_per_sector + local]);
+                    let turned = [c * p[0] - s * p[1], s * p[0] + c * p[1]];
+                    assert!((turned[0] - q[0]).hypot(turned[1] - q[1]) < 1e-12);
+                }
+                for e in 0..mesh.elements_per_sector {
+                    let (first, here) = (&mesh.gauss[e], &mesh.gauss[sector * mesh.elements_per_sector + e]);
+                    assert!(first.iter().zip(here).all(|(a, b)| (a.area / b.area - 1.0).abs() < 1e-10));
+                    for (a, b) in mesh.elements[e].iter().zip(mesh.elements[sector * mesh.elements_per_sector + e]) {
+                        let shifted = (*a as usize + sector * mesh.nodes_per_sector) % mesh.nodes.len();
+                        assert_eq!(shifted, b as usize);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn edges_lie_on_circle_and_involute() {
+        for level in MeshLevel::ALL {
+            for mesh in meshes(level) {
+                let (_, involute) = profile(mesh.kind);
+                let mut end = None;
+                for edge in &mesh.base_edges {
+                    let [a, _, b] = mesh.edge_nodes(0, edge);
+                    for n in mesh.edge_nodes(0, edge) {
+                        let p = mesh.nodes[n];
+                        assert!((p[0].hypot(p[1]) - mesh.base_radius).abs() < 1e-12);
+                    }
+                    assert!(end.is_none_or(|end| end == a), "base edges do not follow one another");
+                    end = Some(b);
+                }
+                for side in Side::BOTH {
+                    let flank = &mesh.flanks[side.index()];
+                    assert_eq!(flank.nodes.len(), flank.radii.len());
+                    for (&node, &radius) in flank.nodes.iter().zip(&flank.radii) {
+                        let p = mesh.nodes[node as usize];
+                        assert!((p[0].hypot(p[1]) - radius).abs() < 1e-12);
+                        let off = radius * (side.sign() * p[1].atan2(p[0]) - involute.half_angle(radius));
+                        assert!(off.abs() < 1e-12, "{level} {:?} {side:?}: {off} mm off at {radius} mm", mesh.kind);
+                    }
+                    for (k, &radius) in flank.radii.iter().enumerate() {
+                        let (edge, xi) = flank.locate(radius);
+                        assert!(
+                            (2.0 * edge as f64 + xi + 1.0 - k as f64).abs() < 1e-9,
+                            "node {k} found at {edge} {xi}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nodes_are_shared_by_neighbours_and_by_nobody_else() {
+        for level in MeshLevel::ALL {
+            for mesh in meshes(level) {
+                let mut corners: BTreeSet<u32> = BTreeSet::new();
+                let mut edges: BTreeMap<u32, (BTreeSet<u32>, usize)> = BTreeMap::new();
+                for element in &mesh.elements {
+                    assert_eq!(element.iter().collect::<BTreeSet<_>>().len(), 8, "an element uses a node twice");
+                    corners.extend(element[..4].iter());
+                    for k in 0..4 {
+                        let ends = BTreeSet::from([element[k], element[(k + 1) % 4]]);
+                        let edge = edges.entry(element[4 + k]).or_insert((ends.clone(), 0));
+                        assert_eq!(edge.0, ends, "a midside node serves two edges");
+                        edge.1 += 1;
+                    }
+                }
+                assert!(edges.keys().all(|middle| !corners.contains(middle)));
+                assert_eq!(corners.len() + edges.len(), mesh.nodes.len(), "nodes that no element uses");
+                assert!(edges.values().all(|(_, users)| *users <= 2), "an edge of three elements");
+                // A ring: corners - edges + elements = 0, and two closed boundaries.
+                assert_eq!(corners.len() + mesh.elements.len(), edges.len());
+                let single = edges.values().filter(|(_, users)| *users == 1).count();
+                assert_eq!(single % mesh.teeth, 0);
+                // Midside nodes lie near the middle of their edges: nothing is shared across the ring.
+                for (middle, (ends, _)) in &edges {
+                    let at = |n: &u32| mesh.nodes[*n as usize];
+                    let ends: Vec<Point> = ends.iter().map(at).collect();
+                    let length = (ends[0][0] - ends[1][0]).hypot(ends[0][1] - ends[1][1]);
+                    let p = at(middle);
+                    let off = (p[0] - 0.5 * (ends[0][0] + ends[1][0])).hypot(p[1] - 0.5 * (ends[0][1] + ends[1][1]));
+                    assert!(
+                        off < 0.3 * length,
+                        "{level} {:?}: midside node {off} mm off an edge of {length} mm",
+                        mesh.kind
+                    );
+                }
+            }
+        }
+    }
+}

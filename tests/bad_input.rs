@@ -1,0 +1,154 @@
+//! Wrong drive files, sample files, table images and measurements: each is refused with its own clear message, exit code 2,
+//! and nothing is left behind.
+//!
+//! The messages themselves are held by the tests beside the readers; here a user meets them at the command.
+
+use std::collections::BTreeSet;
+use std::fs;
+
+use flexspline_tests::command::{Desk, names};
+
+/// Runs a command that must be refused; the message, without the name of the file.
+#[track_caller]
+fn refused(desk: &Desk, line: &str, said: &str) -> String {
+    let before = names(&desk.path("."));
+    let run = desk.line(line);
+    assert_eq!(run.code, 2, "{line}: exit code {}, said {}", run.code, run.stderr);
+    assert_eq!(run.stdout, "", "{line}");
+    assert!(run.stderr.contains(said), "{line}\n  said   {}\n  wanted {said}", run.stderr);
+    assert_eq!(names(&desk.path(".")), before, "{line} left something behind");
+    run.stderr
+}
+
+#[test]
+fn wrong_drive_files_are_refused() {
+    let desk = Desk::new();
+    let good = desk.line("drive").done().stdout;
+    let changed = |from: &str, to: &str| {
+        assert!(good.contains(from), "the drive file has no {from:?}");
+        good.replacen(from, to, 1)
+    };
+    let cases = [
+        ("teeth = 188".to_owned(), "teeth = 187", "teeth"),
+        ("teeth = 188".to_owned(), "teeth = -188", "teeth"),
+        ("teeth = 188".to_owned(), "teeth = 188.5", "teeth"),
+        ("teeth = 188".to_owned(), "teeht = 188", "teeht"),
+        ("teeth = 188".to_owned(), "teeth = \"many\"", "teeth"),
+        ("teeth = 188".to_owned(), "teeth = 188\nteeth = 188", "teeth"),
+        ("w0_mm = ".to_owned(), "w0_mm = nan # ", "w0_mm"),
+        ("w0_mm = ".to_owned(), "w0_mm = 40 # ", "w0_mm"),
+        ("poissons_ratio = ".to_owned(), "poissons_ratio = 0.5 # ", "poissons_ratio"),
+        ("youngs_modulus_mpa = ".to_owned(), "youngs_modulus_mpa = 0 # ", "youngs_modulus_mpa"),
+        ("friction_coefficient = ".to_owned(), "friction_coefficient = -0.1 # ", "friction_coefficient"),
+        ("root_fillet_mm = ".to_owned(), "root_fillet_mm = 2 # ", "root_fillet_mm"),
+        ("[flanks]".to_owned(), "[flanks", "line"),
+    ];
+    let mut messages = BTreeSet::new();
+    for (k, (from, to, said)) in cases.iter().enumerate() {
+        desk.write("wrong.toml", &changed(from, to));
+        let said = if *said == "line" { "wrong.toml" } else { said };
+        let message = refused(&desk, "tables --drive wrong.toml --out wrong", said);
+        assert!(message.contains("wrong.toml"), "case {k} names no file: {message}");
+        messages.insert(message);
+    }
+    assert_eq!(messages.len(), cases.len(), "two mistakes got the same message");
+}
+
+#[test]
+fn wrong_sample_files_are_refused() {
+    let desk = Desk::new();
+    let header = "generator_rad,torque_n_m,temperature_c,direction,output_rad\n";
+    // Forward motion alone; a torque with too few positions; directions exchanged; a jump of a whole turn.
+    let rows = |directions: &[i32], positions: usize, lag: f64| {
+        let mut text = header.to_owned();
+        for torque in [-10, 10] {
+            for direction in directions {
+                for k in 0..positions {
+                    let psi = k as f64 * 0.033_421_2 / 8.0;
+                    let output = psi / 95.0 - lag * f64::from(*direction);
+                    text.push_str(&format!("{psi},{torque},20,{direction},{output}\n"));
+                }
+            }
+        }
+        text
+    };
+    let cases = [
+        (String::new(), "column generator_rad is missing"),
+        (header.to_owned(), "no samples"),
+        (header.replace("torque_n_m", "torque"), "column torque_n_m is missing"),
+        (format!("{header}0,0,20,1\n"), "line 2: 4 fields"),
+        (format!("{header}0,0,20,1,zero\n"), "output_rad is \"zero\", not a number"),
+        (format!("{header}0,0,20,1,inf\n"), "output_rad is inf"),
+        (format!("{header}0,0,20,2,0\n"), "direction is 2; allowed are 1 and -1"),
+        (format!("{header}0,0,20,1,1e9\n"), "output_rad is 1000000000 rad"),
+        (format!("{header}0,1e7,20,1,0\n"), "torque_n_m is 10000000 N.m"),
+        (rows(&[1], 8, 1e-4), "direction"),
+        (rows(&[1, -1], 8, -1e-4), "half"),
+        (rows(&[1, -1], 8, 0.4), "rad"),
+    ];
+    let mut messages = BTreeSet::new();
+    for (text, said) in &cases {
+        desk.write("wrong.csv", text);
+        let message = refused(&desk, "tables --generator cam --from-samples wrong.csv --out wrong", said);
+        assert!(message.contains("wrong.csv"), "{message}");
+        messages.insert(message);
+    }
+    assert_eq!(messages.len(), cases.len(), "two mistakes got the same message: {messages:#?}");
+    desk.write("good.csv", &rows(&[1, -1], 8, 1e-4));
+    refused(&desk, "tables --from-samples good.csv --out wrong", "--generator");
+    refused(&desk, "tables --generator cam --from-samples missing.csv --out wrong", "missing.csv");
+    refused(&desk, "tables --generator cam --from-samples good.csv --half-width-arcsec -1 --out wrong", "-1");
+    desk.line("tables --generator cam --from-samples good.csv").done();
+}
+
+#[test]
+fn wrong_table_images_are_refused() {
+    let desk = Desk::new();
+    let mut text = "generator_rad,torque_n_m,temperature_c,direction,output_rad\n".to_owned();
+    for direction in [1, -1] {
+        for k in 0..8 {
+            let psi = f64::from(k) * 0.033_421_2 / 8.0;
+            text.push_str(&format!("{psi},0,20,{direction},{}\n", psi / 95.0 - 1e-4 * f64::from(direction)));
+        }
+    }
+    desk.write("good.csv", &text);
+    desk.line("tables --generator cam --from-samples good.csv --out good").done();
+    desk.write("measured.csv", "generator_rad,output_rad\n0,0\n1,0.0105\n");
+    let good = fs::read(desk.path("good/cam.fxt")).unwrap();
+    let damage = |f: &dyn Fn(&mut Vec<u8>)| {
+        let mut image = good.clone();
+        f(&mut image);
+        image
+    };
+    let images: Vec<(&str, Vec<u8>)> = vec![
+        ("empty", Vec::new()),
+        ("a text", b"generator_rad,output_rad".to_vec()),
+        ("a byte short", damage(&|i| i.truncate(good.len() - 1))),
+        ("half", damage(&|i| i.truncate(good.len() / 2))),
+        ("a byte long", damage(&|i| i.push(0))),
+        ("other magic", damage(&|i| i[0] ^= 0x20)),
+        ("other version", damage(&|i| i[8] = 99)),
+        ("one bit in the header", damage(&|i| i[40] ^= 1)),
+        ("one bit in the numbers", damage(&|i| i[good.len() - 60] ^= 0x80)),
+        ("one bit in the check sum", damage(&|i| i[good.len() - 1] ^= 1)),
+        ("bytes swapped", damage(&|i| i.chunks_exact_mut(4).for_each(<[u8]>::reverse))),
+    ];
+    fs::create_dir(desk.path("wrong")).unwrap();
+    for (name, image) in &images {
+        fs::write(desk.path("wrong/cam.fxt"), image).unwrap();
+        let message = refused(&desk, "replay --tables wrong/cam.fxt measured.csv --out nothing", "cam.fxt");
+        assert!(message.len() > "error: wrong/cam.fxt: ".len() + 8, "{name}: {message}");
+        refused(&desk, "validate --tables wrong --out nothing", "cam.fxt");
+    }
+    // Sound, but of another drive than the one given.
+    refused(&desk, "validate --tables good --drive HHD-95-typical --out nothing", "BLAKE3");
+    refused(&desk, "validate --tables . --out nothing", "--tables");
+    for (text, said) in [
+        ("generator_rad\n0\n", "output_rad nor error_arcsec"),
+        ("output_rad,generator_rad\n0,x\n", "generator_rad: found \"x\""),
+        ("output_rad,generator_rad\n", "no rows"),
+    ] {
+        desk.write("measured.csv", text);
+        refused(&desk, "replay --tables good/cam.fxt measured.csv --out nothing", said);
+    }
+}
