@@ -4,12 +4,11 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
-use std::process::{Command, Output, Stdio};
 
-use flexspline_tests::command::{Desk, Output as Run, names};
+use std::process::{Command, Stdio};
+
+use flexspline_tests::command::{Desk, names};
 use serde_json::Value;
-use tempfile::TempDir;
 
 /// Columns of `results.csv` that others rely on, in this order.
 const COLUMNS: &str = "step,generator_rad,output_rad,error_arcsec,torque_n_m,flank_contacts,generator_contacts,\
@@ -75,7 +74,7 @@ fn a_run_writes_the_columns_and_fields_that_others_rely_on() {
     assert_eq!(summary["schema_version"], 1);
     assert_eq!(summary["generator"], "cam");
     assert_eq!(summary["torque_n_m"], Value::Null, "the load changes along this path");
-    assert!(summary["degrees_of_freedom"].as_u64().unwrap() > 50_000);
+    assert!(summary["degrees_of_freedom"].as_u64().unwrap() > 30_000);
     let worst = rows.iter().map(|row| row[7]).fold(0.0, f64::max);
     assert_eq!(summary["max_von_mises_mpa"].as_f64().unwrap(), worst);
     let iterations: f64 = rows.iter().map(|row| row[8]).sum();
@@ -179,7 +178,7 @@ fn bad_input_is_refused_with_its_place_and_leaves_nothing() {
         ("export --generator cam --format csv --generator-rad 1", "--generator-rad: outlines are undeformed"),
         ("export --generator cam --format vtu --generator-rad inf", "generator angle: found inf"),
     ];
-    let before = names(desk.0.path());
+    let before = names(&desk.path("."));
     for (line, expected) in cases {
         let run = desk.line(line);
         assert_eq!(run.code, 2, "{line}: {}{}", run.stdout, run.stderr);
@@ -187,7 +186,7 @@ fn bad_input_is_refused_with_its_place_and_leaves_nothing() {
         assert_eq!(run.stdout, "", "{line}");
         assert!(names(&desk.path("out")).is_empty(), "{line} left {:?}", names(&desk.path("out")));
     }
-    assert_eq!(names(desk.0.path()), before);
+    assert_eq!(names(&desk.path(".")), before);
 }
 
 #[test]

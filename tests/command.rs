@@ -36,28 +36,34 @@ pub fn flexspline() -> &'static Path {
 pub struct Desk(TempDir);
 
 impl Desk {
+    /// An empty folder, removed at the end.
     pub fn new() -> Desk {
         Desk(tempfile::tempdir().unwrap())
     }
 
+    /// Path of a file in it.
     pub fn path(&self, name: &str) -> std::path::PathBuf {
         self.0.path().join(name)
     }
 
+    /// Writes a file.
     pub fn write(&self, name: &str, text: &str) {
         fs::write(self.path(name), text).unwrap();
     }
 
+    /// Reads a file.
     pub fn read(&self, name: &str) -> String {
         fs::read_to_string(self.path(name)).unwrap()
     }
 
+    /// The command with these arguments, to be run in the folder.
     pub fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(flexspline());
         command.args(args).current_dir(self.0.path()).stdin(Stdio::null());
         command
     }
 
+    /// Runs the command with these arguments.
     pub fn run(&self, args: &[&str]) -> Output {
         Output::of(self.command(args).output().unwrap())
     }
@@ -78,13 +84,18 @@ pub fn names(folder: &Path) -> Vec<String> {
     names
 }
 
+/// What a run of the command said and how it ended.
 pub struct Output {
+    /// Exit code.
     pub code: i32,
+    /// Standard output.
     pub stdout: String,
+    /// Standard error.
     pub stderr: String,
 }
 
 impl Output {
+    /// From a finished process.
     pub fn of(output: std::process::Output) -> Output {
         Output {
             code: output.status.code().expect("the program ended by itself"),
@@ -93,12 +104,14 @@ impl Output {
         }
     }
 
+    /// The same, which must have ended well.
     #[track_caller]
     pub fn done(self) -> Output {
         assert_eq!(self.code, 0, "{}", self.stderr);
         self
     }
 
+    /// Standard output as one JSON value.
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.stdout)
             .unwrap_or_else(|error| panic!("stdout is not one JSON value ({error}): {}", self.stdout))

@@ -129,13 +129,8 @@ pub fn generator_of(table: &Table<'_>) -> Option<GeneratorKind> {
     GeneratorKind::ALL.into_iter().find(|kind| core_kind(*kind) == table.generator_kind())
 }
 
-/// Compares a table with fresh FEM. `observe` is told the increments done and about how many there will be.
-pub fn validate(
-    drive: &Drive,
-    table: &Table<'_>,
-    settings: &ValidationSettings,
-    observe: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
-) -> Result<Validation, ValidateError> {
+/// The generator of a table, if the table is of this drive.
+pub fn check_drive(drive: &Drive, table: &Table<'_>) -> Result<GeneratorKind, ValidateError> {
     let kind = generator_of(table).ok_or(ValidateError::UnknownGenerator)?;
     if table.drive_hash() != drive.hash() {
         return Err(ValidateError::OtherDrive {
@@ -144,6 +139,17 @@ pub fn validate(
             given: blake3::Hash::from(drive.hash()).to_hex().to_string(),
         });
     }
+    Ok(kind)
+}
+
+/// Compares a table with fresh FEM. `observe` is told the increments done and about how many there will be.
+pub fn validate(
+    drive: &Drive,
+    table: &Table<'_>,
+    settings: &ValidationSettings,
+    observe: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<Validation, ValidateError> {
+    let kind = check_drive(drive, table)?;
     let mut random = fastrand::Rng::with_seed(settings.seed);
     let draws = draw(&mut random, drive, table, settings);
     let total = settings.torques * (settings.positions + 3) + settings.temperatures + REVERSAL_STEPS + 6;

@@ -16,7 +16,8 @@ use crate::mesh::MeshLevel;
 use crate::output::write_json;
 use crate::stepping::SolverSettings;
 use crate::validate::{
-    MAX_BOUND_ARCSEC, RMS_BOUND_ARCSEC, ValidateError, Validation, ValidationSettings, generator_of, validate,
+    MAX_BOUND_ARCSEC, RMS_BOUND_ARCSEC, ValidateError, Validation, ValidationSettings, check_drive, generator_of,
+    validate,
 };
 
 /// Compare tables with fresh FEM at points that made none of them
@@ -72,6 +73,11 @@ impl Validate {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let drive = context.drive()?;
         let images = self.images()?;
+        for (path, image) in &images {
+            let refuse = |what: String| Failure::BadInput(format!("{}: {what}", path.display()));
+            let table = Table::check(image).map_err(|error| refuse(error.to_string()))?;
+            check_drive(&drive, &table).map_err(|error| refuse(error.to_string()))?;
+        }
         let out = context.out()?;
         let settings = ValidationSettings {
             torques: usize::from(self.torques),

@@ -27,7 +27,9 @@ impl Drive {
             Ok(table) => reader.read(table.get_ref()),
             Err(error) => {
                 let at = error.span().unwrap_or(0..0);
-                reader.refuse(at, "", format!("not TOML: {}", error.message()));
+                let found = text.get(at.clone()).filter(|t| !t.trim().is_empty() && t.len() < 40 && !t.contains('\n'));
+                let found = found.map(|t| format!(" {t:?}")).unwrap_or_default();
+                reader.refuse(at, "", format!("not TOML: {}{found}", error.message()));
                 Err(reader.finish())
             }
         }

@@ -5,6 +5,7 @@
 //!
 //! predict, lay out the contact; repeat { assemble; done? factorise; solve; update } until done.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
@@ -492,14 +493,14 @@ impl<'p> Solver<'p> {
         let clock = Instant::now();
         let at = configuration(state);
         for pair in self.flanks.near_pairs(at, CONTACT_REACH) {
-            if !layouts.contains_key(&pair) {
+            if let Entry::Vacant(place) = layouts.entry(pair) {
                 let mut layout = self.flanks.layout(pair, at);
                 if self.problem.flank_law.friction > 0.0 {
                     let empty = Vec::new();
                     let history = from.friction.get(&(pair.tooth, pair.side)).unwrap_or(&empty);
                     self.flanks.start_friction(pair, configuration(from), history, &mut layout.points);
                 }
-                layouts.insert(pair, layout);
+                place.insert(layout);
             }
         }
         self.effort.contact += clock.elapsed();
