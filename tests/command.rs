@@ -37,6 +37,7 @@ pub struct Desk(TempDir);
 
 impl Desk {
     /// An empty folder, removed at the end.
+    #[allow(clippy::new_without_default)]
     pub fn new() -> Desk {
         Desk(tempfile::tempdir().unwrap())
     }
