@@ -25,7 +25,7 @@ const DRAG_N_M: f64 = 0.02;
 
 /// Backlash as the torque goes to nothing, arc-minutes, and its slope, arc-minutes per N m.
 fn backlash(drive: &Drive, kind: GeneratorKind) -> (f64, f64) {
-    let problem = problem(drive, kind, flexspline_tests::on(MeshLevel::Standard));
+    let problem = problem(drive, kind, flexspline_tests::motion::on(MeshLevel::Standard));
     let mut run = Run::new(&problem);
     run.turn(run.pitch(), 2);
     let [high, low] = [0.02, 0.01].map(|net_n_m| {
