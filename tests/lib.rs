@@ -1,6 +1,9 @@
-//! Helpers shared by the claim tests: a drive taken through a path, with the errors it makes on the way.
+//! Helpers shared by the claim tests: the command, and a drive taken through a path with the errors it makes on the way.
 
 use std::f64::consts::{PI, TAU};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
 
 use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::mesh::MeshLevel;
@@ -130,4 +133,28 @@ pub fn mean_generator_torque(samples: &[Sample]) -> f64 {
 /// Mean Newton iterations of a stretch.
 pub fn mean_iterations(samples: &[Sample]) -> f64 {
     mean(samples.iter().map(|sample| sample.increment.iterations as f64))
+}
+
+/// The command `flexspline`, built in the profile that the tests were built in.
+pub fn flexspline() -> &'static Path {
+    static BINARY: OnceLock<PathBuf> = OnceLock::new();
+    BINARY.get_or_init(|| {
+        let mut build = Command::new(env!("CARGO"));
+        build
+            .args(["build", "--package", "flexspline-sim", "--bin", "flexspline"])
+            .arg("--message-format=json-render-diagnostics")
+            .current_dir(env!("CARGO_MANIFEST_DIR"));
+        if !cfg!(debug_assertions) {
+            build.arg("--release");
+        }
+        let built = build.output().expect("cargo can be run");
+        let log = String::from_utf8_lossy(&built.stderr);
+        assert!(built.status.success(), "the command does not build:\n{log}");
+        let messages = serde_json::Deserializer::from_slice(&built.stdout);
+        messages
+            .into_iter::<serde_json::Value>()
+            .map(|message| message.expect("cargo writes JSON"))
+            .find_map(|message| Some(PathBuf::from(message["executable"].as_str()?)))
+            .expect("cargo names the program it built")
+    })
 }

@@ -47,6 +47,8 @@ pub enum Field {
     Mean,
     /// Mean half-width of the play, rad.
     HalfWidth,
+    /// Slope of the mean error over the torque, rad/(N·m).
+    MeanSlope,
     /// Ripple of the mean over one tooth pitch, rad.
     MeanRipple,
     /// Ripple of the half-width over one tooth pitch, rad.
@@ -78,6 +80,7 @@ impl Field {
             Self::OutputCurve => "curve over the output angle",
             Self::Mean => "mean error",
             Self::HalfWidth => "half-width of the play",
+            Self::MeanSlope => "slope of the mean error",
             Self::MeanRipple => "ripple of the mean",
             Self::HalfWidthRipple => "ripple of the half-width",
             Self::SolverResidual => "solver residual",

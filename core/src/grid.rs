@@ -135,6 +135,15 @@ pub struct Place {
 ///
 /// Always `HALVINGS` comparisons, whatever the data; the weight costs one division. NaN is placed at the first node.
 pub fn locate_clamped<const HALVINGS: u32>(len: usize, node: impl Fn(usize) -> f32, value: f32) -> Place {
+    locate_with_width::<HALVINGS>(len, node, value).0
+}
+
+/// As [`locate_clamped`], and the width of the interval.
+pub(crate) fn locate_with_width<const HALVINGS: u32>(
+    len: usize,
+    node: impl Fn(usize) -> f32,
+    value: f32,
+) -> (Place, f32) {
     let last_interval = len.saturating_sub(2);
     let mut below = 0usize;
     let mut step = 1usize << HALVINGS;
@@ -147,12 +156,13 @@ pub fn locate_clamped<const HALVINGS: u32>(len: usize, node: impl Fn(usize) -> f
     }
     let above = if len > 1 { below.wrapping_add(1) } else { below };
     let (low, high) = (node(below), node(above));
-    let along = (value - low) / (high - low);
+    let width = high - low;
+    let along = (value - low) / width;
     // Also takes the NaN of an axis with one node, and of a NaN value, to 0.
     // (Comparisons, not `min` and `max`: those are library calls on a Cortex-M4F.)
     let positive = if along > 0.0 { along } else { 0.0 };
     let weight = if positive < 1.0 { positive } else { 1.0 };
-    Place { below, above, weight: if above == below { 0.0 } else { weight } }
+    (Place { below, above, weight: if above == below { 0.0 } else { weight } }, width)
 }
 
 /// An interval is a jump when both neighbours (or the only one) are at least this many times as wide.
@@ -174,6 +184,11 @@ pub fn jump_intervals(len: usize, node: impl Fn(usize) -> f32) -> u32 {
         }
     }
     jumps
+}
+
+/// Whether bit `node` of [`jump_intervals`] is set.
+pub(crate) fn is_jump(jumps: u32, node: usize) -> bool {
+    u32::try_from(node).ok().and_then(|bit| jumps.checked_shr(bit)).is_some_and(|bits| bits & 1 == 1)
 }
 
 #[cfg(test)]

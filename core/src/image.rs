@@ -5,7 +5,7 @@
 //! | offset | bytes | what |
 //! |---|---|---|
 //! | 0 | 8 | magic `89 46 58 54 0d 0a 1a 0a` (`\x89FXT`, then what a text transfer would change) |
-//! | 8 | 2 | format version, 1 |
+//! | 8 | 2 | format version, 2 |
 //! | 10 | 2 | byte order mark `0xfeff` |
 //! | 12 | 4 | length of the image in bytes |
 //! | 16 | 32 | drive hash (BLAKE3 of the drive the samples came from) |
@@ -24,7 +24,8 @@
 //! | 156 | 36 | zero |
 //! | 192 | | torque nodes, temperature nodes: `f32` each |
 //! | | | A, B, C: `f32` each, stored closed |
-//! | | | `[temperature][torque]` records: D, H (`f32`, rad), then R, h (`i16`) for each ripple node, stored closed |
+//! | | | `[temperature][torque]` records: D and H, rad, slope of D, rad/(N·m) (`f32` each), |
+//! | | | then R, h (`i16`) for each ripple node, stored closed |
 //! | | | end of the body |
 //! | | | CRC-32 of each 256-byte page of the body (the last may be shorter) |
 //! | | 4 | CRC-32 of everything before |
@@ -32,19 +33,23 @@
 //! A periodic curve of n nodes is stored closed, as n + 3 values: the last node, all nodes, the first two; the four around
 //! any place are then neighbours. CRC-32 is the one of ISO-HDLC (zlib).
 //!
+//! The slope of D at a node is that of the curve on its smooth side or sides, one number: an interval that is a jump uses none.
+//! [`write_image`] computes it from D and the torque nodes.
+//!
 //! Size with 3 temperatures, 25 torques, 16 ripple nodes and 64 nodes each for A, B, C:
-//! 192 + 4·(25 + 3 + 3·67) + 75·(8 + 19·4) = 7408, and 29 pages and the end 4·30 = 120: 7528 bytes, below 8 KiB. Without A,
-//! B, C: 6712.
+//! 192 + 4·(25 + 3 + 3·67) + 75·(12 + 19·4) = 7708, and 31 pages and the end 4·32 = 128: 7836 bytes, below 8 KiB. Without A,
+//! B, C: 7016. With 8 ripple nodes: 5396 and 4580.
 
 use crate::drive::{Drive, FixedMember};
 use crate::error::{Field, ImageError};
 use crate::grid::{self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis};
 use crate::model::MAX_INVERSE_ITERATIONS;
 use crate::table::{Bounds, GeneratorKind, PeriodicCurve, RECORD_HEAD_WORDS, Table, TableId, Words, f32_at, ripple_at};
+use crate::windup::{self, Slopes};
 use core::fmt;
 
 /// Format version written and read.
-pub const FORMAT_VERSION: u16 = 1;
+pub const FORMAT_VERSION: u16 = 2;
 /// Bytes of one page, the unit of a scrub and of an upload.
 pub const PAGE_BYTES: usize = 256;
 /// Most temperature nodes.
@@ -105,7 +110,7 @@ pub struct TableData<'a> {
     pub temperature_nodes_c: &'a [f32],
     /// Nodes over one tooth pitch; 0 for no ripple.
     pub ripple_nodes: usize,
-    /// D, `[temperature][torque]`.
+    /// D, `[temperature][torque]`; its slopes follow from it ([`crate::precompute`]).
     pub mean_rad: &'a [f32],
     /// H, `[temperature][torque]`, ≥ 0.
     pub half_width_rad: &'a [f32],
@@ -281,7 +286,13 @@ impl TableData<'_> {
         // max(1): without ripple the iterators are empty, and a chunk size may not be 0.
         let mut mean_ripples = self.mean_ripple_rad.chunks_exact(self.ripple_nodes.max(1));
         let mut half_ripples = self.half_width_ripple_rad.chunks_exact(self.ripple_nodes.max(1));
-        for (mean, half) in self.mean_rad.iter().zip(self.half_width_rad) {
+        let slopes = &Slopes::new(self.torque_nodes_n_m);
+        let torque_nodes = self.torque_nodes_n_m.len().max(1);
+        let mean_slopes = self
+            .mean_rad
+            .chunks_exact(torque_nodes)
+            .flat_map(|means| (0..torque_nodes).map(move |node| slopes.at(node).of(means) as f32));
+        for ((mean, half), mean_slope) in self.mean_rad.iter().zip(self.half_width_rad).zip(mean_slopes) {
             let mean_ripple = mean_ripples.next().unwrap_or_default();
             let half_ripple = half_ripples.next().unwrap_or_default();
             // Rounding may take H + h below zero by half a unit: H is raised by as much. What was
@@ -290,7 +301,7 @@ impl TableData<'_> {
             let least = half + rounded * half_scale;
             let rounding = 0.51 * half_scale + half.abs() * f32::EPSILON;
             let raised = if least < 0.0 && least >= -rounding { -rounded * half_scale } else { *half };
-            out.put_numbers(&[*mean, raised]);
+            out.put_numbers(&[*mean, raised, mean_slope]);
             for position in 0..axis.stored_len() {
                 let node = axis.stored_node(position);
                 let value = |ripple: &[f32]| ripple.get(node).copied().unwrap_or(0.0);
@@ -511,7 +522,8 @@ impl<'a> Table<'a> {
     /// exists;
     /// periodic parts closed at the wrap.
     ///
-    /// Bounds hold for every input, not only at nodes: a B-spline stays within its coefficients.
+    /// Bounds hold for every input, not only at nodes: a B-spline stays within its coefficients, and what the cubic of the
+    /// wind-up departs from the straight line between two nodes counts in full.
     ///
     /// Two passes over the image and its CRC-32 twice, once per upload, not in the step.
     ///
@@ -607,16 +619,21 @@ impl<'a> Table<'a> {
         Ok(bounds)
     }
 
-    /// What D, H, R, h can give: linear interpolation between records stays within them.
+    /// What D, H, R, h can give: linear interpolation between records stays within them, the cubic of D within what it bends.
     fn check_records(&self) -> Result<Bounds, ImageError> {
         let mut bounds = Bounds::default();
         let nodes = self.ripple.len();
         let periods = self.drive.ripple_order() as f32 * self.drive.ratio().abs();
         let slope_per_step = nodes as f32 * periods / core::f32::consts::TAU;
         let stride = stored(nodes).saturating_add(RECORD_HEAD_WORDS);
+        let torque_nodes = self.torque.len().max(1);
+        // Torque, D, slope of D and largest |e| of the record before; none at the first torque.
+        let mut before: Option<[f32; 4]> = None;
         for (index, record) in self.records.chunks_exact(stride).enumerate() {
+            let node = index.checked_rem(torque_nodes).unwrap_or(0);
             let mean = in_range(Field::Mean, index, f32_at(record, 0), -MAX_ERROR_RAD, MAX_ERROR_RAD)?;
             let half = in_range(Field::HalfWidth, index, f32_at(record, 1), 0.0, MAX_ERROR_RAD)?;
+            let slope = finite(Field::MeanSlope, index, f32_at(record, 2))?;
             let ripple = |node: usize| ripple_at(record, node.saturating_add(RECORD_HEAD_WORDS));
             let mean_ripple = |node: usize| ripple(node).0 as f32 * self.mean_ripple_scale;
             let half_ripple = |node: usize| ripple(node).1 as f32 * self.half_ripple_scale;
@@ -624,16 +641,22 @@ impl<'a> Table<'a> {
             let len = self.ripple.stored_len();
             let least = (0..len).fold(half, |least, node| least.min(half + half_ripple(node)));
             if least < 0.0 {
-                let torque_nodes = self.torque.len().max(1);
                 return Err(ImageError::NegativeHalfWidth {
                     temperature: index.checked_div(torque_nodes).unwrap_or(0),
-                    torque: index.checked_rem(torque_nodes).unwrap_or(0),
+                    torque: node,
                     found_rad: least,
                 });
             }
             let (mean_most, mean_step) = extremes(len, mean_ripple);
             let (half_most, half_step) = extremes(len, half_ripple);
-            bounds.error_rad = bounds.error_rad.max(mean.abs() + mean_most + half + half_most);
+            let (torque, largest) = (f32_at(self.torque, node), mean.abs() + mean_most + half + half_most);
+            bounds.error_rad = bounds.error_rad.max(largest);
+            let below = before.filter(|_| node > 0 && !self.is_torque_jump(node.saturating_sub(1)));
+            if let Some([torque_below, mean_below, slope_below, largest_below]) = below {
+                let bend = windup::most_bend(mean - mean_below, torque - torque_below, slope_below, slope);
+                bounds.error_rad = bounds.error_rad.max(largest.max(largest_below) + bend);
+            }
+            before = Some([torque, mean, slope, largest]);
             bounds.periodic_rad = bounds.periodic_rad.max(mean_most + half_most);
             bounds.slope = bounds.slope.max((mean_step + half_step) * slope_per_step);
         }
@@ -886,9 +909,11 @@ mod tests {
 
     #[test]
     fn the_stated_sizes_hold() {
-        assert_eq!(image_bytes(25, 3, 16, [64; 3]), 7528);
-        assert_eq!(image_bytes(25, 3, 16, [0; 3]), 6712);
-        assert!(image_bytes(25, 3, 16, [100; 3]) <= 8192);
+        assert_eq!(image_bytes(25, 3, 16, [64; 3]), 7836);
+        assert_eq!(image_bytes(25, 3, 16, [0; 3]), 7016);
+        assert_eq!(image_bytes(25, 3, 8, [64; 3]), 5396);
+        assert_eq!(image_bytes(25, 3, 8, [0; 3]), 4580);
+        assert!(image_bytes(25, 3, 16, [93; 3]) <= 8192);
         assert_eq!(fixture::image(false).len(), fixture::plan(false).image_bytes());
     }
 
@@ -948,11 +973,11 @@ mod tests {
         };
         let short = damaged(|image| image.truncate(100));
         assert_eq!(short, ImageError::TooShort { found: 100, needed: image_bytes(1, 1, 0, [0; 3]) });
-        assert_eq!(Table::check(&[]).unwrap_err(), ImageError::TooShort { found: 0, needed: 216 });
+        assert_eq!(Table::check(&[]).unwrap_err(), ImageError::TooShort { found: 0, needed: 220 });
         assert_eq!(damaged(|image| image[0] = 0), ImageError::Magic);
         // What a text-mode transfer does.
         assert_eq!(damaged(|image| _ = image.remove(4)), ImageError::Magic);
-        assert_eq!(damaged(|image| image[8] = 2), ImageError::Version { found: 2, allowed: 1 });
+        assert_eq!(damaged(|image| image[8] = 1), ImageError::Version { found: 1, allowed: 2 });
         assert_eq!(damaged(|image| image.swap(10, 11)), ImageError::ByteOrder { found: 0xfffe });
         let full = image.len();
         assert_eq!(damaged(|image| _ = image.pop()), ImageError::Length { stated: full, found: full - 1 });
@@ -1029,6 +1054,15 @@ mod tests {
         let record = |i: usize| RECORDS + RECORD_BYTES * i;
         let error = resealed(put(record(5), f32::NEG_INFINITY));
         assert_eq!(error, ImageError::NotFinite { field: Field::Mean, index: 5 });
+        for slope in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let error = resealed(put(record(12) + 8, slope));
+            assert_eq!(error, ImageError::NotFinite { field: Field::MeanSlope, index: 12 });
+        }
+        // At the end of the axis, in the middle, and a slope that overflows: 30 N·m on, a quarter of it is too much.
+        for (index, slope) in [(0, 3.0e-3), (9, 3.0e-3), (10, -3.0e-3), (4, f32::MAX), (32, -f32::MAX)] {
+            let error = resealed(put(record(index) + 8, slope));
+            assert!(matches!(error, ImageError::ErrorBound { allowed_rad: 0.02, .. }), "{index}: {error}");
+        }
         let error = resealed(put(record(7) + 4, -1.0e-9));
         assert!(matches!(error, ImageError::OutOfRange { field: Field::HalfWidth, .. }), "{error}");
         // Half-width below its own ripple, at temperature 1 and torque 2.
@@ -1078,6 +1112,33 @@ mod tests {
     }
 
     #[test]
+    fn a_slope_that_no_interval_uses_does_no_harm() {
+        // One node alone, and an end of the axis that a jump cuts off.
+        for nodes in [&[0.0][..], &[0.0, 2.0, 20.0, 40.0]] {
+            let flat = TableData {
+                torque_nodes_n_m: nodes,
+                temperature_nodes_c: &[20.0],
+                ripple_nodes: 0,
+                mean_rad: &[1.0e-3; 4][..nodes.len()],
+                half_width_rad: &[1.0e-4; 4][..nodes.len()],
+                mean_ripple_rad: &[],
+                half_width_ripple_rad: &[],
+                generator_curve_rad: &[],
+                output_curve_rad: &[],
+                ..data()
+            };
+            let mut image = write(&flat, &Provenance { torque_range_n_m: [0.0; 2], ..provenance() }).unwrap();
+            let body_bytes = Table::check(&image).unwrap().body_bytes;
+            put(HEADER_BYTES + 4 * (nodes.len() + 1) + 8, f32::MAX)(&mut image);
+            seal(&mut image, body_bytes);
+            let table = Table::check(&image).unwrap();
+            for torque in [-1.0, 0.0, 0.5, 1.9, 2.0, 7.0, 40.0, 50.0] {
+                assert_eq!(table.at(torque, 20.0).unwrap().mean_rad, 1.0e-3, "{torque}");
+            }
+        }
+    }
+
+    #[test]
     fn the_writer_names_what_does_not_fit() {
         let mut small = [0; 300];
         let needed = image_bytes(2, 2, 8, [4, 0, 5]);
@@ -1114,6 +1175,27 @@ mod tests {
         #[test]
         fn arbitrary_bytes_neither_panic_nor_pass(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
             prop_assert!(Table::check(&bytes).is_err());
+        }
+
+        /// Slopes of any size and sign are either refused or leave every torque within the stated bounds.
+        #[test]
+        fn slopes_never_give_more_than_the_table_states(
+            slopes in prop::collection::vec((0usize..33, -1.0f32..1.0, -4i32..8), 1..12),
+            torque in -60.0f32..60.0, temperature in -50.0f32..90.0,
+        ) {
+            let mut image = fixture::image(false);
+            let body_bytes = Table::check(&image).unwrap().body_bytes;
+            for (record, mantissa, decade) in slopes {
+                put(RECORDS + RECORD_BYTES * record + 8, mantissa * 1.0e-3 * 10.0f32.powi(-decade))(&mut image);
+            }
+            seal(&mut image, body_bytes);
+            if let Ok(table) = Table::check(&image) {
+                for torque in [torque, 0.3 * torque, 0.05 * torque] {
+                    let found = table.at(torque, temperature).unwrap();
+                    let reached = found.mean_rad.abs() + found.half_width_rad;
+                    prop_assert!(reached <= 1.0001 * table.bounds().error_rad, "{} at {}", reached, torque);
+                }
+            }
         }
 
         /// Past the checksums, any damage is either refused or leaves a table within its stated bounds.

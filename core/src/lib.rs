@@ -64,7 +64,8 @@
 //!   ([`Drive::corrected_command`]).
 //! * The ratio is signed: `+cs/(cs − fs)` with the flexspline fixed, `−fs/(cs − fs)` with the circular spline fixed.
 //! * Positive load torque turns the output forward and gives positive wind-up.
-//! * A [`Direction`] is that of the output.
+//! * A [`Direction`] is that of the output, in samples ([`precompute::Sample::direction`], a column `direction`: +1 where the
+//!   output turns forward, −1 where backward) as in the play; with the circular spline fixed the generator turns against it.
 //!
 //! # Not in here
 //! Elastic oscillation and rate-dependent friction: the table is quasi-static. The rate of a correction is not limited.
@@ -95,6 +96,7 @@ mod image;
 mod model;
 pub mod precompute;
 mod table;
+mod windup;
 
 pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};

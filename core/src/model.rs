@@ -10,9 +10,9 @@
 //!
 //! | table | iterations | forward | inverse | step |
 //! |---|---|---|---|---|
-//! | ripple only | 1 | 774 | 1009 | 1458 |
-//! | ripple and A, B, C | 1 | 921 | 1156 | 1752 |
-//! | the same with steep curves | 5 | 921 | 2647 | 3234 |
+//! | ripple only | 1 | 793 | 1028 | 1477 |
+//! | ripple and A, B, C | 1 | 940 | 1175 | 1771 |
+//! | the same with steep curves | 5 | 940 | 2666 | 3253 |
 
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::hysteresis::{Direction, PlayState};

@@ -8,8 +8,10 @@
 //! e          = centre + (p − x),   p = clamp(p, x − half-width, x + half-width),   x = nominal output
 //! ```
 //!
-//! D, H, R, h are linear in torque and temperature between nodes and constant beyond the ends; R, h, A, B, C are
-//! periodic cubic B-splines ([`crate::grid`]). R and h are kept in 16 bits with one scale each.
+//! Between torque nodes D is a cubic through the values and slopes of the two around the torque, but straight inside a jump:
+//! D and its slope are continuous from one jump, or end of the axis, to the next. H, R, h are linear in torque. All are
+//! linear in temperature and constant beyond the ends. R, h, A, B, C are periodic cubic B-splines ([`crate::grid`]); R and
+//! h are kept in 16 bits with one scale each.
 //!
 //! A run fixes the torque axis: with frictionless flanks and a drag torque `Td` at the output, steady motion in direction
 //! `d` loads the flanks by `τ − d·Td`, and the error jumps by the backlash where that load changes sign. So the tables
@@ -19,6 +21,7 @@
 use crate::drive::{Drive, Phases};
 use crate::grid::{self, MAX_HALVINGS, PeriodicAxis};
 use crate::image::TEMPERATURE_HALVINGS;
+use crate::windup;
 
 /// How far an answer can be trusted, worst last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -107,10 +110,9 @@ fn four_at(words: Words<'_>, first: usize) -> Option<[[u8; 4]; 4]> {
     words.get(first..)?.first_chunk().copied()
 }
 
-/// D and H of the record at `first`; 0 beyond the end.
-fn head_at(words: Words<'_>, first: usize) -> [f32; RECORD_HEAD_WORDS] {
-    let head = words.get(first..).and_then(|record| record.first_chunk().copied());
-    head.unwrap_or([[0; 4]; RECORD_HEAD_WORDS]).map(f32::from_le_bytes)
+/// D, H and the slope of D of the record at `first`; `None` beyond the end, which an accepted table never reaches.
+fn head_at(words: Words<'_>, first: usize) -> Option<[f32; RECORD_HEAD_WORDS]> {
+    Some(words.get(first..)?.first_chunk::<RECORD_HEAD_WORDS>()?.map(f32::from_le_bytes))
 }
 
 /// The larger of two numbers; the second if the first is NaN. (`f32::max` is a library call on a Cortex-M4F.)
@@ -129,8 +131,8 @@ fn ripple_sum(words: [[u8; 4]; 4], weights: [i16; 4]) -> (f32, f32) {
     (mean as f32, half as f32)
 }
 
-/// Words of a record before its ripple: D and H.
-pub(crate) const RECORD_HEAD_WORDS: usize = 2;
+/// Words of a record before its ripple: D, H, slope of D.
+pub(crate) const RECORD_HEAD_WORDS: usize = 3;
 
 /// A periodic curve in an image.
 #[derive(Clone, Copy, Debug)]
@@ -254,7 +256,7 @@ impl<'a> Table<'a> {
     /// Whether the interval above torque node `node` is a jump.
     #[must_use]
     pub fn is_torque_jump(&self, node: usize) -> bool {
-        u32::try_from(node).ok().and_then(|bit| self.torque_jumps.checked_shr(bit)).is_some_and(|bits| bits & 1 == 1)
+        grid::is_jump(self.torque_jumps, node)
     }
 
     /// Axis of the ripple over one tooth pitch.
@@ -276,12 +278,15 @@ impl<'a> Table<'a> {
     }
 
     /// Locates a torque (N·m) and temperature (°C); `None` if either is not finite.
+    ///
+    /// (Or if the table ended before its records, which no accepted table does.)
     #[must_use]
     pub fn at(&self, torque_n_m: f32, temperature_c: f32) -> Option<OperatingPoint> {
         if !(torque_n_m.is_finite() && temperature_c.is_finite()) {
             return None;
         }
-        let torque = grid::locate_clamped::<MAX_HALVINGS>(self.torque.len(), |i| f32_at(self.torque, i), torque_n_m);
+        let (torque, width) =
+            grid::locate_with_width::<MAX_HALVINGS>(self.torque.len(), |i| f32_at(self.torque, i), torque_n_m);
         let temperature = grid::locate_clamped::<TEMPERATURE_HALVINGS>(
             self.temperature.len(),
             |i| f32_at(self.temperature, i),
@@ -299,17 +304,27 @@ impl<'a> Table<'a> {
         ];
         let (cold, low) = (1.0 - temperature.weight, 1.0 - torque.weight);
         let weights = [cold * low, cold * torque.weight, temperature.weight * low, temperature.weight * torque.weight];
-        let heads = rows.map(|row| head_at(self.records, row));
-        let (means, halves) = (heads.map(|[mean, _]| mean), heads.map(|[_, half]| half));
+        let [a, b, c, d] = rows;
+        let (a, b) = (head_at(self.records, a)?, head_at(self.records, b)?);
+        let (c, d) = (head_at(self.records, c)?, head_at(self.records, d)?);
+        let (means, halves) = ([a, b, c, d].map(|[mean, ..]| mean), [a, b, c, d].map(|[_, half, _]| half));
+        let blend = |[mean, _, slope]: [f32; RECORD_HEAD_WORDS], [mean_hot, _, slope_hot]: [f32; RECORD_HEAD_WORDS]| {
+            let hot = temperature.weight;
+            (cold * mean + hot * mean_hot, cold * slope + hot * slope_hot)
+        };
+        let ((mean_low, slope_low), (mean_high, slope_high)) = (blend(a, c), blend(b, d));
         // The height of a jump is taken on both temperature planes; the larger counts.
         let height = |[a, b, c, d]: [f32; 4]| larger((b - a).abs(), (d - c).abs());
-        let in_jump = self.is_torque_jump(torque.below) && torque.weight > 0.0 && torque.weight < 1.0;
+        let is_jump = self.is_torque_jump(torque.below);
+        let in_jump = is_jump && torque.weight > 0.0 && torque.weight < 1.0;
+        let straight = low * mean_low + torque.weight * mean_high;
+        let bend = windup::bend(torque.weight, width, [mean_high - mean_low, slope_low, slope_high]);
         let within = |value: f32, [least, most]: [f32; 2]| value >= least && value <= most;
         let in_range = within(torque_n_m, self.torque_range_n_m) && within(temperature_c, self.temperature_range_c);
         Some(OperatingPoint {
             rows,
             weights,
-            mean_rad: dot(means, weights),
+            mean_rad: straight + if is_jump { 0.0 } else { bend },
             half_width_rad: dot(halves, weights),
             jump_rad: if in_jump { height(means) + height(halves) } else { 0.0 },
             quality: match (in_range, in_jump) {

@@ -103,7 +103,7 @@ fn parts(criterion: &mut Criterion) {
             black_box(sum)
         });
     });
-    let bore = BoreContact::new(&problem.flexspline, problem.settings.bore_points);
+    let bore = BoreContact::new(&problem.flexspline, problem.settings.bore_points(problem.kind));
     let law = BoreLaw::new(problem.settings.bore_penalty(problem.kind), None);
     group.bench_function("contact/bore on cam", |bencher| {
         bencher.iter(|| {

@@ -14,7 +14,7 @@ fn main() {
         bore_penalty: std::env::var("BP").ok().map(|x| x.parse().unwrap()),
         flank_penalty: ev("FP", 5e7),
         tolerance: ev("TOL", 1e-6),
-        bore_points: ev("BN", 16.0) as usize,
+        bore_points: std::env::var("BN").ok().map(|x| x.parse().unwrap()),
         ..Default::default()
     };
     let p = Problem::new(&Drive::hhd_95(), kind, 20.0, settings).unwrap();

@@ -1,11 +1,22 @@
 //! Contact FEM of strain wave (harmonic) drives, and the compensation tables made from it.
 #![forbid(unsafe_code)]
 
+pub mod cli;
 pub mod contact;
 pub mod drive;
 pub mod element;
+pub mod export;
 pub mod fem;
 pub mod material;
 pub mod mesh;
+pub mod output;
+pub mod progress;
 pub mod reference;
+pub mod replay;
+pub mod samples;
+pub mod simulate;
 pub mod stepping;
+pub mod stress;
+pub mod sweep;
+pub mod tables;
+pub mod validate;

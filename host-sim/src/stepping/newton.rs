@@ -24,7 +24,7 @@ const CONTACT_REACH: f64 = 0.015;
 /// Stiffness (N/mm per mm) that anchors one bore node while the matrix is factorised; the border takes it out again.
 const ANCHOR: f64 = 1e5;
 /// Springs (N/mm per mm) that are tried in turn when the tangent is not positive definite.
-const GROUNDED_SPRINGS: [f64; 3] = [1e1, 1e3, 1e5];
+const GROUNDED_SPRINGS: [f64; 4] = [1e-3, 1e-1, 1e1, 1e3];
 /// Largest change of a displacement that an undamped Newton step may make, mm.
 const LARGEST_STEP: f64 = 0.1;
 /// Largest first step of a changing load, N m.
@@ -243,12 +243,13 @@ impl<'p> Solver<'p> {
         let (turn, load) = (generator_rad - from.generator_rad, torque_n_m - from.torque_n_m);
         // A load that comes on from nothing is best brought on in a few steps.
         let first = if load.abs() > LARGEST_LOAD_STEP { LARGEST_LOAD_STEP / load.abs() } else { 1.0 };
-        let (mut done, mut part, mut halvings) = (0.0_f64, first, 0);
+        let (mut done, mut part, mut halvings) = (0.0_f64, first, 0_usize);
         loop {
             let to = (done + part).min(1.0);
             match self.solve_part(&state, from.generator_rad + turn * to, from.torque_n_m + load * to) {
                 Ok((next, mut increment)) => {
                     iterations += increment.iterations;
+                    self.problem.check_range(&next)?;
                     state = next;
                     done = to;
                     if done >= 1.0 {
@@ -257,6 +258,7 @@ impl<'p> Solver<'p> {
                     }
                     if increment.iterations <= EASY {
                         part *= 2.0;
+                        halvings = halvings.saturating_sub(1);
                     }
                 }
                 Err(SolveError::NotConverged { history, .. })

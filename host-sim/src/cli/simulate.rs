@@ -1,0 +1,293 @@
+//! `flexspline simulate`: a quasi-static contact FEM run along a generator path.
+
+use std::fmt::Write;
+use std::ops::ControlFlow;
+use std::path::Path as FilePath;
+
+use clap::{Args, ValueEnum};
+
+use super::{Context, Failure};
+use crate::drive::{Drive, GeneratorKind};
+use crate::export::{Frame, write_pvd, write_vtu};
+use crate::mesh::MeshLevel;
+use crate::output::{OutputError, WholeFolder, write_csv, write_json, write_whole};
+use crate::progress::Progress;
+use crate::simulate::{
+    Direction, Observation, Path, PathPoint, Phase, SimulateError, SimulationSettings, Summary, read_path, simulate,
+};
+use crate::stepping::SolverSettings;
+
+/// Simulate the drive along a generator path by contact FEM
+///
+/// Writes results.csv (one row to each increment) and summary.json (kinematic error, backlash, wind-up, stress) into the
+/// output folder, and frames/ with --frames. The drive is deformed, then loaded, then turned.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  flexspline simulate --generator cam --path pitch --torque-n-m 50
+  flexspline simulate --generator double-disc --path paper --mesh coarse --out disc
+  flexspline simulate --generator cam --path pitch --set flanks.friction_coefficient=0.08 --json
+
+A path FILE is a CSV with a column generator_rad and, if wanted, torque_n_m and temperature_c: one
+increment, or more where the solver needs them, and one result row for each of its rows. The drive is
+deformed where the first row says.")]
+pub(super) struct Simulate {
+    #[command(flatten)]
+    model: ModelOptions,
+    /// Where the generator goes: paper (+1 rad, then -2 rad), pitch (settled, then one flexspline tooth pitch), turn
+    /// (settled, then one turn), or a CSV file
+    #[arg(long, value_name = "paper|pitch|turn|FILE", default_value = "paper")]
+    path: String,
+    /// Largest increment of the generator, rad [default: 0.01 on paper, an eighth of a tooth pitch on pitch and turn]
+    #[arg(long, value_name = "RAD", allow_negative_numbers = true)]
+    increment: Option<f64>,
+    /// Which way pitch and turn go [default: forward]
+    #[arg(long, value_enum)]
+    direction: Option<DirectionOption>,
+    /// Solver
+    #[arg(long, value_enum, default_value = "reference")]
+    solver: SolverOption,
+    /// Write the deformed mesh of every row to frames/, for ParaView
+    #[arg(long)]
+    frames: bool,
+}
+
+/// What is solved and how, for every command that solves.
+#[derive(Debug, Args)]
+pub(super) struct ModelOptions {
+    /// Wave generator: two-roller, four-roller, double-disc or cam
+    #[arg(long, value_name = "G", value_parser = str::parse::<GeneratorKind>)]
+    pub(super) generator: GeneratorKind,
+    /// Load torque on the output, N.m; positive turns it forward [default: 0]
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    pub(super) torque_n_m: Option<f64>,
+    /// Temperature, degrees C [default: the drive's reference temperature]
+    #[arg(long, value_name = "C", allow_negative_numbers = true)]
+    pub(super) temperature_c: Option<f64>,
+    /// Mesh: coarse, standard or fine
+    #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = str::parse::<MeshLevel>)]
+    pub(super) mesh: MeshLevel,
+    /// Contact penalty on the flanks, N/mm^3
+    #[arg(long, value_name = "K", default_value_t = SolverSettings::default().flank_penalty, allow_negative_numbers = true, help_heading = "Numerical method")]
+    flank_penalty: f64,
+    /// Contact penalty on the bore, N/mm^3 [default: 1e7 under rollers, 1e6 under discs and cam]
+    #[arg(long, value_name = "K", allow_negative_numbers = true, help_heading = "Numerical method")]
+    bore_penalty: Option<f64>,
+    /// Residual force, relative to the largest contact force, at which an increment is done
+    #[arg(long, value_name = "R", default_value_t = SolverSettings::default().tolerance, allow_negative_numbers = true, help_heading = "Numerical method")]
+    tolerance: f64,
+    /// Newton iterations before an increment is halved
+    #[arg(long, value_name = "N", default_value_t = SolverSettings::default().max_iterations, help_heading = "Numerical method")]
+    max_iterations: usize,
+}
+
+impl ModelOptions {
+    /// Settings of a run along a path.
+    pub(super) fn settings(&self, path: Path) -> SimulationSettings {
+        SimulationSettings {
+            torque_n_m: self.torque_n_m.unwrap_or(0.0),
+            temperature_c: self.temperature_c,
+            solver: SolverSettings {
+                mesh: self.mesh,
+                flank_penalty: self.flank_penalty,
+                bore_penalty: self.bore_penalty,
+                tolerance: self.tolerance,
+                max_iterations: self.max_iterations,
+                ..SolverSettings::default()
+            },
+            ..SimulationSettings::new(self.generator, path)
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum DirectionOption {
+    Forward,
+    Backward,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum SolverOption {
+    /// Full sparse Newton on the whole mesh
+    Reference,
+}
+
+impl Simulate {
+    pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
+        let drive = context.drive()?;
+        let settings = self.settings(&drive)?;
+        settings.check(&drive).map_err(|error| Failure::BadInput(error.to_string()))?;
+        let out = context.out()?;
+
+        let mut frames = if self.frames { Some(Frames::new(&out.join("frames"))?) } else { None };
+        let mut progress = context.progress(settings.generator.name());
+        let interrupted = context.watch_interrupt();
+        let mut lost: Option<OutputError> = None;
+        let run = simulate(&drive, &settings, &mut |now| {
+            if context.verbose() {
+                progress.line(&line(now));
+            }
+            show(&mut progress, now);
+            if let (Some(frames), Some(row)) = (&mut frames, now.row)
+                && let Err(error) = frames.add(row.step, now)
+            {
+                lost = Some(error);
+                return ControlFlow::Break(());
+            }
+            if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        drop(progress);
+        if let Some(error) = lost {
+            return Err(error.into());
+        }
+        let mut simulation = run.map_err(refused_or_failed)?;
+        simulation.summary.command = context.command.clone();
+
+        write_csv(&out.join("results.csv"), &simulation.rows)?;
+        write_json(&out.join("summary.json"), &simulation.summary)?;
+        if let Some(frames) = frames {
+            frames.finish()?;
+        }
+        context.print(&simulation.summary, || report(&simulation.summary, out))
+    }
+
+    fn settings(&self, drive: &Drive) -> Result<SimulationSettings, Failure> {
+        let path = match Path::built_in(&self.path) {
+            Some(path) => path,
+            None => Path::Points(self.read_path(drive)?),
+        };
+        if self.direction.is_some() && !matches!(path, Path::Pitch | Path::Turn) {
+            return Err(Failure::BadInput(
+                "--direction: the path has its own; allowed with --path pitch and turn".into(),
+            ));
+        }
+        let direction = match self.direction {
+            Some(DirectionOption::Backward) => Direction::Backward,
+            Some(DirectionOption::Forward) | None => Direction::Forward,
+        };
+        let SolverOption::Reference = self.solver;
+        Ok(SimulationSettings { increment_rad: self.increment, direction, ..self.model.settings(path) })
+    }
+
+    fn read_path(&self, drive: &Drive) -> Result<Vec<PathPoint>, Failure> {
+        let name = &self.path;
+        let text = std::fs::read_to_string(name).map_err(|error| {
+            Failure::BadInput(format!(
+                "--path: found {name:?}, which cannot be read as a file ({error}); allowed: paper, pitch, turn or a CSV file"
+            ))
+        })?;
+        let temperatures_c = drive.temperature.minimum_c..=drive.temperature.maximum_c;
+        let points = read_path(name, &text, temperatures_c).map_err(|error| Failure::BadInput(error.to_string()))?;
+        let twice = [
+            ("--torque-n-m", "torque_n_m", self.model.torque_n_m, points[0].torque_n_m),
+            ("--temperature-c", "temperature_c", self.model.temperature_c, points[0].temperature_c),
+        ];
+        for (option, column, given, in_file) in twice {
+            if let (Some(given), Some(_)) = (given, in_file) {
+                return Err(Failure::BadInput(format!(
+                    "{option}: found {given}, but {name} has a column {column}; give one of the two"
+                )));
+            }
+        }
+        Ok(points)
+    }
+}
+
+/// Bad input or failed run.
+pub(super) fn refused_or_failed(error: SimulateError) -> Failure {
+    match error {
+        SimulateError::Stopped { .. } => Failure::Failed(format!("{error}; nothing was written")),
+        _ if error.is_bad_input() => Failure::BadInput(error.to_string()),
+        _ => Failure::Failed(error.to_string()),
+    }
+}
+
+/// Moves the progress bar.
+pub(super) fn show(progress: &mut Progress, now: &Observation) {
+    progress.set(now.done, now.total, &format!("{}, {} iterations", phase(now.phase), now.iterations));
+}
+
+fn phase(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Deforming => "deforming",
+        Phase::Touching => "touching",
+        Phase::Loading => "loading",
+        Phase::Settling => "settling",
+        Phase::ChangingTemperature => "changing temperature",
+        Phase::Following => "turning",
+    }
+}
+
+/// An increment in one line.
+fn line(now: &Observation) -> String {
+    let state = now.state;
+    let error = (state.output_rad - state.generator_rad / now.problem.drive.ratio()).to_degrees() * 3600.0;
+    format!(
+        "{:<20} {:>5}/{}  generator {:+.6} rad  load {:+.3} N.m  error {error:+.4}\"  {} iterations",
+        phase(now.phase),
+        now.done,
+        now.total,
+        state.generator_rad,
+        state.torque_n_m,
+        now.iterations
+    )
+}
+
+/// The folder of frames while it fills.
+struct Frames {
+    folder: WholeFolder,
+    list: Vec<Frame>,
+}
+
+impl Frames {
+    fn new(target: &FilePath) -> Result<Frames, OutputError> {
+        Ok(Frames { folder: WholeFolder::new(target)?, list: Vec::new() })
+    }
+
+    fn add(&mut self, step: usize, now: &Observation) -> Result<(), OutputError> {
+        let file = format!("frame-{step:05}.vtu");
+        write_whole(&self.folder.path().join(&file), |out| write_vtu(out, now.problem, now.state))?;
+        self.list.push(Frame { step, file });
+        Ok(())
+    }
+
+    fn finish(self) -> Result<(), OutputError> {
+        write_whole(&self.folder.path().join("frames.pvd"), |out| write_pvd(out, &self.list))?;
+        self.folder.finish()
+    }
+}
+
+/// The summary for reading.
+fn report(summary: &Summary, out: &FilePath) -> String {
+    let mut text = format!(
+        "{} with {} generator, path {}, {} mesh, {} degrees of freedom\n",
+        summary.drive, summary.generator, summary.path, summary.mesh, summary.degrees_of_freedom
+    );
+    let mut put = |name: &str, value: Option<f64>, unit: &str, digits: usize| {
+        if let Some(value) = value {
+            let _ = writeln!(text, "  {name:<34} {value:>12.digits$} {unit}");
+        }
+    };
+    put("load torque", summary.torque_n_m, "N.m", 3);
+    put("kinematic error, peak to peak", summary.kinematic_error_pp_arcsec, "arcsec", 3);
+    put("mean error forward", summary.mean_error_forward_arcsec, "arcsec", 3);
+    put("mean error backward", summary.mean_error_backward_arcsec, "arcsec", 3);
+    put("backlash", summary.backlash_arcsec, "arcsec", 3);
+    put("lost motion at the reversal", summary.reversal_lost_motion_arcsec, "arcsec", 3);
+    put("dwell of the output at the reversal", summary.dwell_generator_rad, "rad of generator", 6);
+    put("wind-up from mid-backlash", summary.wind_up_arcsec, "arcsec", 3);
+    put("wind-up, elastic part", summary.wind_up_elastic_arcsec, "arcsec", 3);
+    put("largest von Mises stress", Some(summary.max_von_mises_mpa), "MPa", 1);
+    put("largest flank pressure", Some(summary.peak_flank_pressure_mpa), "MPa", 1);
+    put("largest generator pressure", Some(summary.peak_generator_pressure_mpa), "MPa", 1);
+    put("time", Some(summary.wall_s), "s", 2);
+    let _ = writeln!(
+        text,
+        "{} increments, {} iterations; wrote {} and {}",
+        summary.increments,
+        summary.iterations,
+        out.join("results.csv").display(),
+        out.join("summary.json").display()
+    );
+    text
+}

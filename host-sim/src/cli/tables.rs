@@ -1,0 +1,250 @@
+//! `flexspline tables`: FEM sweeps, or samples from elsewhere, to compensation tables.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::time::Instant;
+
+use clap::Args;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::Failure;
+use super::context::Context;
+use crate::drive::{Drive, GeneratorKind};
+use crate::mesh::MeshLevel;
+use crate::output::{write_json, write_whole};
+use crate::samples;
+use crate::stepping::SolverSettings;
+use crate::sweep::{SweepError, SweepPlan, sweep, torque_nodes};
+use crate::tables::{
+    ARCSEC_PER_RAD, MadeTable, SampleOptions, TableError, TableInfo, c_header, from_samples, from_sweep, rust_source,
+};
+
+/// Make compensation tables: from FEM sweeps of the drive, or from samples of another program or a bench
+///
+/// For each generator the drive is swept by contact FEM over one tooth pitch at every torque and temperature node, and the
+/// samples are projected onto the table by the code that also runs on board. Written are <G>.fxt (the image that firmware
+/// reads in place), <G>.json (what made it and how good it is), <G>.rs and <G>.h (the same bytes as source), and
+/// <G>.samples.csv.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  flexspline tables
+  flexspline tables --generator cam --drive my-drive.toml --out tables
+  flexspline tables --generator cam --from-samples bench.csv
+  flexspline tables --generator double-disc --steps 12 --positions 16
+
+Sample files have the columns generator_rad, torque_n_m, temperature_c, direction (1 or -1), output_rad.")]
+pub(super) struct Tables {
+    /// Generator, or all: two-roller, four-roller, double-disc, cam
+    #[arg(short, long, value_name = "G", default_value = "all")]
+    generator: String,
+    /// Make the table from this file of samples instead of FEM; needs one --generator
+    #[arg(long, value_name = "FILE.csv")]
+    from_samples: Option<PathBuf>,
+    /// Half-width of the play in arcsec where a sample file has one direction only
+    #[arg(long, value_name = "ARCSEC", requires = "from_samples", allow_negative_numbers = true)]
+    half_width_arcsec: Option<f64>,
+    /// How far, in arcsec, a sample of a file may lie from the table [default: 20]
+    #[arg(long, value_name = "ARCSEC", requires = "from_samples", allow_negative_numbers = true)]
+    deviation_arcsec: Option<f64>,
+    /// Largest torque, N.m [default: 200; four-roller 100, two-roller 50]
+    #[arg(long, value_name = "T", conflicts_with = "from_samples", allow_negative_numbers = true)]
+    torque_n_m: Option<f64>,
+    /// Torque steps on each side of zero, beside the pair at the drag torque
+    #[arg(long, value_name = "N", default_value_t = 8, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(2..=14))]
+    steps: u8,
+    /// Samples over one tooth pitch
+    #[arg(long, value_name = "N", default_value_t = 8, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(4..=16))]
+    positions: u8,
+    /// Temperature nodes, degrees C [default: ends and reference of the operating range]
+    #[arg(
+        long,
+        value_name = "T,T,...",
+        value_delimiter = ',',
+        conflicts_with = "from_samples",
+        allow_negative_numbers = true
+    )]
+    temperatures_c: Option<Vec<f64>>,
+    /// Mesh: coarse, standard or fine
+    #[arg(long, value_name = "LEVEL", default_value = "standard", conflicts_with = "from_samples", value_parser = str::parse::<MeshLevel>)]
+    mesh: MeshLevel,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report<'a> {
+    schema_version: u32,
+    status: &'static str,
+    tables: Vec<&'a TableInfo>,
+    wall_s: f64,
+}
+
+impl Tables {
+    pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
+        let clock = Instant::now();
+        let drive = context.drive()?;
+        let generators = generators(&self.generator)?;
+        let mut made = match &self.from_samples {
+            Some(file) => vec![(self.project(&drive, &generators, file)?, None)],
+            None => self.sweep(context, &drive, &generators)?,
+        };
+        let out = context.out()?;
+        for (table, samples_csv) in &mut made {
+            table.info.command.clone_from(&context.command);
+            let path = |ending: &str| out.join(format!("{}.{ending}", table.kind));
+            write_whole(&path("fxt"), |file| file.write_all(&table.image))?;
+            write_json(&path("json"), &table.info)?;
+            write_whole(&path("rs"), |file| file.write_all(rust_source(table).as_bytes()))?;
+            write_whole(&path("h"), |file| file.write_all(c_header(table).as_bytes()))?;
+            if let Some(samples_csv) = samples_csv {
+                write_whole(&path("samples.csv"), |file| file.write_all(samples_csv.as_bytes()))?;
+            }
+        }
+        let report = Report {
+            schema_version: 1,
+            status: "made",
+            tables: made.iter().map(|(table, _)| &table.info).collect(),
+            wall_s: clock.elapsed().as_secs_f64(),
+        };
+        context.print(&report, || text(&report, out))
+    }
+
+    fn project(&self, drive: &Drive, generators: &[GeneratorKind], file: &PathBuf) -> Result<MadeTable, Failure> {
+        let &[kind] = generators else {
+            return Err(Failure::BadInput(
+                "--from-samples: a sample file is of one generator; name it with --generator".into(),
+            ));
+        };
+        let not_negative = |option: &str, value: Option<f64>| match value {
+            Some(v) if !(0.0..=3600.0).contains(&v) => {
+                Err(Failure::BadInput(format!("{option}: found {v}; allowed: 0 to 3600 arcsec")))
+            }
+            other => Ok(other.map(|v| v / ARCSEC_PER_RAD)),
+        };
+        let options = SampleOptions {
+            half_width_rad: not_negative("--half-width-arcsec", self.half_width_arcsec)?,
+            deviation_limit_rad: not_negative("--deviation-arcsec", self.deviation_arcsec)?
+                .unwrap_or(SampleOptions::default().deviation_limit_rad),
+        };
+        let bad = |message: String| Failure::BadInput(message);
+        let read = samples::read(file).map_err(|e| bad(e.to_string()))?;
+        let bytes = std::fs::read(file).map_err(|e| bad(format!("{}: {e}", file.display())))?;
+        let name = file.display().to_string();
+        from_samples(drive, kind, &read, &name, &bytes, options).map_err(|e| bad(format!("{name}: {e}")))
+    }
+
+    fn plan(&self, drive: &Drive, kind: GeneratorKind) -> Result<SweepPlan, Failure> {
+        let mut plan = SweepPlan::for_generator(drive, kind);
+        let drag = drive.output.drag_torque_n_m;
+        let largest = self.torque_n_m.unwrap_or(crate::sweep::rated_torque_n_m(kind));
+        if !(largest > 20.0 * drag && largest <= 1e4) {
+            return Err(Failure::BadInput(format!(
+                "--torque-n-m: found {largest}; allowed: more than {} (20 times the drag of the output), at most 10000",
+                20.0 * drag
+            )));
+        }
+        plan.torque_nodes_n_m = torque_nodes(drag, largest, usize::from(self.steps));
+        plan.positions = usize::from(self.positions);
+        if let Some(temperatures) = &self.temperatures_c {
+            let range = &drive.temperature;
+            let mut nodes: Vec<f32> = temperatures.iter().map(|t| *t as f32).collect();
+            nodes.sort_by(f32::total_cmp);
+            nodes.dedup();
+            if let Some(wrong) = temperatures.iter().find(|t| !(range.minimum_c..=range.maximum_c).contains(*t)) {
+                return Err(Failure::BadInput(format!(
+                    "--temperatures-c: found {wrong}; allowed: {} to {} C, the operating range of the drive",
+                    range.minimum_c, range.maximum_c
+                )));
+            }
+            plan.temperature_nodes_c = nodes;
+        }
+        Ok(plan)
+    }
+
+    fn sweep(
+        &self,
+        context: &Context,
+        drive: &Drive,
+        generators: &[GeneratorKind],
+    ) -> Result<Vec<(MadeTable, Option<String>)>, Failure> {
+        let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
+        let plans =
+            generators.iter().map(|kind| Ok((*kind, self.plan(drive, *kind)?))).collect::<Result<Vec<_>, Failure>>()?;
+        let total: usize = plans.iter().map(|(_, plan)| plan.increments()).sum();
+        let progress = Mutex::new((context.progress("tables"), 0_usize));
+        let interrupted = context.watch_interrupt();
+        let verbose = context.verbose();
+        plans
+            .par_iter()
+            .map(|(kind, plan)| {
+                let clock = Instant::now();
+                let swept = sweep(drive, *kind, plan, settings, &mut |now| {
+                    if let Ok(mut guard) = progress.lock() {
+                        let (bar, done) = &mut *guard;
+                        *done += 1;
+                        let note = format!(
+                            "{kind} {:+.3} N.m {:+.0} °C, {} iterations",
+                            now.torque_n_m, now.temperature_c, now.iterations
+                        );
+                        if verbose {
+                            bar.line(&format!("{:>5}/{total}  {note}", *done));
+                        }
+                        bar.set(*done, total, &note);
+                    }
+                    if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                })
+                .map_err(|error| match error {
+                    SweepError::Stopped => Failure::Failed("stopped; nothing was written".into()),
+                    error => Failure::Failed(format!("{kind}: {error}")),
+                })?;
+                let cpu_s = clock.elapsed().as_secs_f64();
+                let table = from_sweep(drive, plan, &swept, &self.mesh.to_string(), cpu_s)
+                    .map_err(|error: TableError| Failure::Failed(format!("{kind}: {error}")))?;
+                Ok((table, Some(samples::to_csv(&swept.samples))))
+            })
+            .collect()
+    }
+}
+
+/// The generators of `--generator`.
+pub(super) fn generators(name: &str) -> Result<Vec<GeneratorKind>, Failure> {
+    if name == "all" {
+        return Ok(GeneratorKind::ALL.to_vec());
+    }
+    name.parse().map(|kind| vec![kind]).map_err(|_| {
+        let known = GeneratorKind::ALL.map(|kind| kind.to_string()).join(", ");
+        Failure::BadInput(format!("--generator: found {name:?}; allowed: {known}, all"))
+    })
+}
+
+fn text(report: &Report<'_>, out: &std::path::Path) -> String {
+    let mut text = String::from(
+        "generator    table_id          bytes  torque N.m   backlash\"  wind-up\" at the ends   slope  worst deviation\"\n",
+    );
+    for info in &report.tables {
+        let [first, last] = [info.torque_nodes_n_m[0], info.torque_nodes_n_m[info.torque_nodes_n_m.len() - 1]];
+        text.push_str(&format!(
+            "{:<12} {:<17} {:>5}  {:>4} .. {:<4} {:>9.2}  {:>9.2} .. {:<8.2} {:>7.4}  {:.4}\n",
+            info.generator,
+            info.table_id,
+            info.image_bytes,
+            first,
+            last,
+            info.backlash_arcsec,
+            info.wind_up_arcsec[0],
+            info.wind_up_arcsec[1],
+            info.slope_bound,
+            info.projection_worst_arcsec,
+        ));
+    }
+    text.push_str(&format!(
+        "wrote {} table{} to {} in {:.0} s",
+        report.tables.len(),
+        if report.tables.len() == 1 { "" } else { "s" },
+        out.display(),
+        report.wall_s
+    ));
+    text
+}

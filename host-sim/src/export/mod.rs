@@ -1,0 +1,7 @@
+//! The same mesh, state and outlines for other programs.
+
+mod outlines;
+mod vtu;
+
+pub use outlines::{OutlinePoint, outlines};
+pub use vtu::{Frame, write_pvd, write_vtu};

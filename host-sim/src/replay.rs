@@ -1,0 +1,228 @@
+//! The core run over measured rows, open loop: what it would have predicted, row by row.
+//!
+//! CSV with a header, columns in any order, further columns ignored, `#` lines comments. Needed are `generator_rad` and one of
+//! `output_rad` and `error_arcsec`; `torque_n_m` (else 0) and `temperature_c` (else that given) are used where present.
+
+use flexspline::{GeneratorAngle, PlayState, Quality, Table};
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::tables::ARCSEC_PER_RAD;
+
+/// A measured row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredRow {
+    /// Generator angle, rad.
+    pub generator_rad: f64,
+    /// Output error, arcsec.
+    pub error_arcsec: f64,
+    /// Load torque, N m.
+    pub torque_n_m: f64,
+    /// Temperature, °C.
+    pub temperature_c: f64,
+}
+
+/// A row of `replay.csv`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ReplayedRow {
+    /// Generator angle, rad.
+    pub generator_rad: f64,
+    /// Load torque, N m.
+    pub torque_n_m: f64,
+    /// Temperature, °C.
+    pub temperature_c: f64,
+    /// Output error as measured, arcsec.
+    pub measured_arcsec: f64,
+    /// Output error as the core predicts it, arcsec.
+    pub predicted_arcsec: f64,
+    /// Measured less predicted, arcsec.
+    pub residual_arcsec: f64,
+    /// What the core says it does not know, arcsec.
+    pub uncertainty_arcsec: f64,
+    /// Quality of the prediction.
+    pub quality: &'static str,
+}
+
+/// `summary.json` of a replay.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReplaySummary {
+    /// Version of this object.
+    pub schema_version: u32,
+    /// "in range", or "extrapolated" if any row lies outside the table.
+    pub status: &'static str,
+    /// Table.
+    pub table_id: String,
+    /// Rows.
+    pub rows: usize,
+    /// Root mean square of the measured error about its mean, arcsec.
+    pub rms_measured_arcsec: f64,
+    /// Root mean square of the residual about its mean, arcsec.
+    pub rms_residual_arcsec: f64,
+    /// Largest residual about the mean, arcsec.
+    pub max_residual_arcsec: f64,
+    /// Mean residual: the zero of the output encoder, which no table can know, arcsec.
+    pub mean_residual_arcsec: f64,
+    /// Rows by quality: in range, uncertain, extrapolated, disabled.
+    pub rows_by_quality: [usize; 4],
+    /// Command line, once known.
+    pub command: String,
+}
+
+/// Rows that cannot be used.
+#[derive(Debug, Error, PartialEq, Eq)]
+#[error("{file}:{line}: {what}")]
+pub struct MeasurementError {
+    /// File.
+    pub file: String,
+    /// Line, from 1.
+    pub line: u64,
+    /// Field, value, what is allowed.
+    pub what: String,
+}
+
+/// Reads measured rows; `temperature_c` stands where the file has no such column.
+pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result<Vec<MeasuredRow>, MeasurementError> {
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    let mut reader =
+        csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).flexible(true).from_reader(bytes);
+    let refuse = |line: u64, what: String| MeasurementError { file: file.to_owned(), line, what };
+    let line_of = |position: Option<&csv::Position>| position.map_or(1, csv::Position::line);
+    let unreadable = |e: &csv::Error| refuse(line_of(e.position()), "not readable as UTF-8 text with commas".into());
+    let header = reader.headers().map_err(|e| unreadable(&e))?.clone();
+    let header_line = line_of(header.position());
+    let column = |name: &str| -> Result<Option<usize>, MeasurementError> {
+        let mut found = header.iter().enumerate().filter(|(_, c)| *c == name).map(|(i, _)| i);
+        let first = found.next();
+        match found.next() {
+            Some(_) => Err(refuse(header_line, format!("column {name} is there twice"))),
+            None => Ok(first),
+        }
+    };
+    let generator =
+        column("generator_rad")?.ok_or_else(|| refuse(header_line, "column generator_rad is missing".into()))?;
+    let (output, error) = match (column("output_rad")?, column("error_arcsec")?) {
+        (None, None) => {
+            return Err(refuse(
+                header_line,
+                "neither column output_rad nor error_arcsec is there; one is needed".into(),
+            ));
+        }
+        both => both,
+    };
+    let (torque, temperature) = (column("torque_n_m")?, column("temperature_c")?);
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|e| unreadable(&e))?;
+        let line = line_of(record.position());
+        let number = |place: usize| -> Result<f64, MeasurementError> {
+            let name = &header[place];
+            let text =
+                record.get(place).ok_or_else(|| refuse(line, format!("{name} is missing: {} fields", record.len())))?;
+            match text.parse::<f64>() {
+                Ok(value) if value.is_finite() && value.abs() < 1e9 => Ok(value),
+                _ => Err(refuse(line, format!("{name}: found \"{text}\", allowed: a finite number below 1e9"))),
+            }
+        };
+        let generator_rad = number(generator)?;
+        let error_arcsec = match (output, error) {
+            (Some(output), _) => (number(output)? - generator_rad / ratio) * ARCSEC_PER_RAD,
+            (None, Some(error)) => number(error)?,
+            (None, None) => 0.0,
+        };
+        rows.push(MeasuredRow {
+            generator_rad,
+            error_arcsec,
+            torque_n_m: torque.map_or(Ok(0.0), number)?,
+            temperature_c: temperature.map_or(Ok(temperature_c), number)?,
+        });
+    }
+    if rows.is_empty() {
+        return Err(refuse(header_line, "no rows after the header".into()));
+    }
+    Ok(rows)
+}
+
+/// Runs the core over the rows, from a state it does not know.
+pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, ReplaySummary) {
+    let mut play = PlayState::unknown();
+    let mut by_quality = [0; 4];
+    let replayed: Vec<ReplayedRow> = rows
+        .iter()
+        .map(|row| {
+            // The reader bounds the angle, far inside the range of the angle type.
+            let generator = GeneratorAngle::from_rad(row.generator_rad).unwrap_or(GeneratorAngle::ZERO);
+            let said = table.forward(&mut play, generator, row.torque_n_m as f32, row.temperature_c as f32);
+            by_quality[said.quality as usize] += 1;
+            let predicted_arcsec = f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD;
+            ReplayedRow {
+                generator_rad: row.generator_rad,
+                torque_n_m: row.torque_n_m,
+                temperature_c: row.temperature_c,
+                measured_arcsec: row.error_arcsec,
+                predicted_arcsec,
+                residual_arcsec: row.error_arcsec - predicted_arcsec,
+                uncertainty_arcsec: f64::from(said.uncertainty_rad) * ARCSEC_PER_RAD,
+                quality: match said.quality {
+                    Quality::InRange => "in range",
+                    Quality::Uncertain => "uncertain",
+                    Quality::Extrapolated => "extrapolated",
+                    Quality::Disabled => "disabled",
+                },
+            }
+        })
+        .collect();
+    let count = replayed.len().max(1) as f64;
+    let mean = |value: fn(&ReplayedRow) -> f64| replayed.iter().map(value).sum::<f64>() / count;
+    let about = |value: fn(&ReplayedRow) -> f64| {
+        let mean = mean(value);
+        (replayed.iter().map(|row| (value(row) - mean).powi(2)).sum::<f64>() / count).sqrt()
+    };
+    let mean_residual = mean(|row| row.residual_arcsec);
+    let summary = ReplaySummary {
+        schema_version: 1,
+        status: if by_quality[2] + by_quality[3] == 0 { "in range" } else { "extrapolated" },
+        table_id: table.id().to_string(),
+        rows: replayed.len(),
+        rms_measured_arcsec: about(|row| row.measured_arcsec),
+        rms_residual_arcsec: about(|row| row.residual_arcsec),
+        max_residual_arcsec: replayed
+            .iter()
+            .fold(0.0, |m, row| f64::max(m, (row.residual_arcsec - mean_residual).abs())),
+        mean_residual_arcsec: mean_residual,
+        rows_by_quality: by_quality,
+        command: String::new(),
+    };
+    (replayed, summary)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn error_and_output_columns_say_the_same() {
+        let by_error = parse("a.csv", b"error_arcsec,generator_rad\n12.5,0.5\n", 95.0, 20.0).unwrap();
+        let output = 0.5 / 95.0 + 12.5 / ARCSEC_PER_RAD;
+        let text = format!("generator_rad,output_rad,torque_n_m\n0.5,{output},3\n");
+        let by_output = parse("b.csv", text.as_bytes(), 95.0, 20.0).unwrap();
+        assert!((by_error[0].error_arcsec - by_output[0].error_arcsec).abs() < 1e-9);
+        assert_eq!((by_output[0].torque_n_m, by_output[0].temperature_c), (3.0, 20.0));
+    }
+
+    #[test]
+    fn wrong_files_are_refused_each_with_its_own_message() {
+        for (text, message) in [
+            ("", "column generator_rad is missing"),
+            ("generator_rad,torque_n_m\n1,2\n", "neither column output_rad nor error_arcsec"),
+            ("generator_rad,generator_rad,output_rad\n1,1,1\n", "generator_rad is there twice"),
+            ("generator_rad,output_rad\n", "no rows"),
+            ("generator_rad,output_rad\n1\n", "output_rad is missing: 1 fields"),
+            ("generator_rad,output_rad\n1,abc\n", "output_rad: found \"abc\""),
+            ("generator_rad,output_rad\n1,nan\n", "output_rad: found \"nan\""),
+            ("generator_rad,output_rad\n1e12,0\n", "generator_rad: found \"1e12\""),
+        ] {
+            let error = parse("m.csv", text.as_bytes(), 95.0, 20.0).unwrap_err().to_string();
+            assert!(error.starts_with("m.csv:") && error.contains(message), "{text:?} gave {error:?}");
+        }
+    }
+}

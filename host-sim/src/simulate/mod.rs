@@ -1,0 +1,829 @@
+//! A quasi-static run: the drive deformed by its generator, loaded, and turned along a path.
+//!
+//! 1. Deform: the generator stands where the path begins, no load, the output in the middle of its clearance.
+//! 2. If the path is loaded throughout: a light touch either way, which finds the middle of the clearance.
+//! 3. Bring on the load.
+//! 4. `pitch` and `turn`: move on until the drive has settled. No rows.
+//! 5. Follow the path, one row to each point.
+//!
+//! What comes out is quasi-static and two-dimensional: no inertia, no viscosity, no speed.
+
+mod path;
+mod row;
+mod summary;
+
+use std::f64::consts::TAU;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use thiserror::Error;
+
+use crate::drive::{Drive, GeneratorKind, ThermalState};
+use crate::stepping::{Increment, Problem, SolveError, Solver, SolverSettings, State};
+use crate::stress::{PeakStress, peak_stress};
+
+pub use path::{Path, PathError, PathPoint, read_path};
+pub use row::Row;
+pub use summary::{SUMMARY_SCHEMA, Summary};
+
+use path::LARGEST_TORQUE_N_M;
+use row::Motion;
+use summary::{ARCSEC, Metrics, Touches, largest, shared, wheel_name};
+
+/// Increment of the paper's path, rad.
+const PAPER_INCREMENT_RAD: f64 = 0.01;
+/// Increments to a flexspline tooth pitch on the other paths: ripple is sampled eight times and no order folds onto another.
+const INCREMENTS_PER_PITCH: f64 = 8.0;
+/// Pitches after which an output that still does not follow the generator is an error.
+const LONGEST_START_UP: f64 = 40.0;
+/// Torque of a light touch, N m, at least; and in terms of the drag.
+const LIGHT_TOUCH: (f64, f64) = (0.02, 2.0);
+/// Halvings of a change of temperature before giving up.
+const TEMPERATURE_HALVINGS: usize = 5;
+
+/// Which way a one-way path goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Direction {
+    /// Generator angle grows.
+    #[default]
+    Forward,
+    /// Generator angle falls.
+    Backward,
+}
+
+impl Direction {
+    fn sign(self) -> f64 {
+        match self {
+            Direction::Forward => 1.0,
+            Direction::Backward => -1.0,
+        }
+    }
+}
+
+/// What to simulate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimulationSettings {
+    /// Which wave generator.
+    pub generator: GeneratorKind,
+    /// Where it goes.
+    pub path: Path,
+    /// Largest increment, rad; by default 0.01 on `paper` and an eighth of a tooth pitch on `pitch` and `turn`. Paths given
+    /// by points have their own.
+    pub increment_rad: Option<f64>,
+    /// Which way `pitch` and `turn` go.
+    pub direction: Direction,
+    /// Load torque, N m, where the path does not say; positive turns the output forward.
+    pub torque_n_m: f64,
+    /// Temperature, °C, where the path does not say; by default the drive's reference temperature.
+    pub temperature_c: Option<f64>,
+    /// The numerical method.
+    pub solver: SolverSettings,
+}
+
+impl SimulationSettings {
+    /// A path at no load and reference temperature.
+    pub fn new(generator: GeneratorKind, path: Path) -> Self {
+        SimulationSettings {
+            generator,
+            path,
+            increment_rad: None,
+            direction: Direction::Forward,
+            torque_n_m: 0.0,
+            temperature_c: None,
+            solver: SolverSettings::default(),
+        }
+    }
+
+    /// Refuses settings that cannot be run with this drive.
+    pub fn check(&self, drive: &Drive) -> Result<(), SimulateError> {
+        let refuse = |setting: &'static str, found: String, allowed: String| {
+            Err(SimulateError::Setting { setting, found, allowed })
+        };
+        if let Some(increment) = self.increment_rad {
+            if matches!(self.path, Path::Points(_)) {
+                return refuse("increment", increment.to_string(), "none, as the path gives its own points".into());
+            }
+            if !(1e-5..=0.5).contains(&increment) {
+                return refuse("increment", increment.to_string(), "0.00001 to 0.5 rad".into());
+            }
+        }
+        let (coldest, warmest) = (drive.temperature.minimum_c, drive.temperature.maximum_c);
+        let within = |temperature: f64| (coldest..=warmest).contains(&temperature);
+        let points = match &self.path {
+            Path::Points(points) => points.as_slice(),
+            _ => &[],
+        };
+        if let Path::Points(points) = &self.path
+            && points.is_empty()
+        {
+            return refuse("path", "no points".into(), "at least one".into());
+        }
+        let torques = points.iter().filter_map(|p| p.torque_n_m).chain([self.torque_n_m]);
+        for torque in torques {
+            if torque.is_nan() || torque.abs() > LARGEST_TORQUE_N_M {
+                let allowed = format!("-{LARGEST_TORQUE_N_M} to {LARGEST_TORQUE_N_M} N.m");
+                return refuse("torque", torque.to_string(), allowed);
+            }
+        }
+        if let Some(angle) = points.iter().map(|p| p.generator_rad).find(|angle| !angle.is_finite()) {
+            return refuse("generator angle", angle.to_string(), "a finite number".into());
+        }
+        let temperatures = points.iter().filter_map(|p| p.temperature_c).chain(self.temperature_c);
+        for temperature in temperatures {
+            if !within(temperature) {
+                let allowed = format!("{coldest} to {warmest} C, the operating range of the drive");
+                return refuse("temperature", temperature.to_string(), allowed);
+            }
+        }
+        let solver = &self.solver;
+        for (setting, penalty) in
+            [("flank penalty", solver.flank_penalty), ("bore penalty", solver.bore_penalty(self.generator))]
+        {
+            if !(1e3..=1e10).contains(&penalty) {
+                return refuse(setting, penalty.to_string(), "1e3 to 1e10 N/mm^3".into());
+            }
+        }
+        if !(1e-12..=1e-2).contains(&solver.tolerance) {
+            return refuse("tolerance", solver.tolerance.to_string(), "1e-12 to 1e-2".into());
+        }
+        if solver.max_iterations == 0 {
+            return refuse("iterations", "0".into(), "1 or more".into());
+        }
+        Ok(())
+    }
+}
+
+/// A run that gave no result.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SimulateError {
+    /// A setting is out of its range.
+    #[error("{setting}: found {found}, allowed: {allowed}")]
+    Setting {
+        /// Which.
+        setting: &'static str,
+        /// Its value.
+        found: String,
+        /// What is allowed.
+        allowed: String,
+    },
+    /// The drive is impossible, or an increment did not converge.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The output does not follow the generator.
+    #[error(
+        "the output does not follow: the generator has turned {travelled_rad:.3} rad and the teeth have not taken up \
+         their clearance; check the clearance between the teeth, or the drag, of the drive"
+    )]
+    NotFollowing {
+        /// Generator travel so far, rad.
+        travelled_rad: f64,
+    },
+    /// The observer asked to stop.
+    #[error("stopped after {done} of {total} increments")]
+    Stopped {
+        /// Increments solved.
+        done: usize,
+        /// Increments expected.
+        total: usize,
+    },
+}
+
+impl SimulateError {
+    /// Whether the input is to blame, not the run.
+    pub fn is_bad_input(&self) -> bool {
+        matches!(self, SimulateError::Setting { .. } | SimulateError::Solve(SolveError::Drive(_) | SolveError::Mesh(_)))
+    }
+}
+
+/// What the run is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// The generator deforms the flexspline.
+    Deforming,
+    /// A light touch finds the middle of the clearance.
+    Touching,
+    /// The load comes on.
+    Loading,
+    /// Moving until start-up is over.
+    Settling,
+    /// Another temperature at the same angle.
+    ChangingTemperature,
+    /// On the path.
+    Following,
+}
+
+/// What the observer sees after every increment.
+pub struct Observation<'a> {
+    /// What the run is doing.
+    pub phase: Phase,
+    /// Increments solved.
+    pub done: usize,
+    /// Increments expected in all; may grow while the drive settles.
+    pub total: usize,
+    /// Newton iterations of this increment.
+    pub iterations: usize,
+    /// The row of the results that this increment made, if it made one.
+    pub row: Option<&'a Row>,
+    /// The mechanical problem.
+    pub problem: &'a Problem,
+    /// The drive now.
+    pub state: &'a State,
+}
+
+/// What a run gives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulation {
+    /// `results.csv`.
+    pub rows: Vec<Row>,
+    /// `summary.json`.
+    pub summary: Summary,
+}
+
+/// Runs `drive` along a path. `observer` is called after every increment and may stop the run by breaking.
+pub fn simulate(
+    drive: &Drive,
+    settings: &SimulationSettings,
+    observer: &mut dyn FnMut(&Observation) -> ControlFlow<()>,
+) -> Result<Simulation, SimulateError> {
+    settings.check(drive)?;
+    Run::new(drive, settings, observer).run()
+}
+
+/// A point of the path with nothing left open.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Target {
+    generator_rad: f64,
+    torque_n_m: f64,
+    temperature_c: f64,
+}
+
+struct Run<'a> {
+    drive: &'a Drive,
+    settings: &'a SimulationSettings,
+    observer: &'a mut dyn FnMut(&Observation) -> ControlFlow<()>,
+    begun: Instant,
+    pitch: f64,
+    temperature_c: f64,
+    motion: Motion,
+    rows: Vec<Row>,
+    peak: Option<(PeakStress, usize)>,
+    touches: Option<Touches>,
+    degrees_of_freedom: usize,
+    increments: usize,
+    iterations: usize,
+    total: usize,
+    /// Iterations of changes of temperature, which the next row counts.
+    pending_iterations: usize,
+}
+
+impl<'a> Run<'a> {
+    fn new(
+        drive: &'a Drive,
+        settings: &'a SimulationSettings,
+        observer: &'a mut dyn FnMut(&Observation) -> ControlFlow<()>,
+    ) -> Self {
+        Run {
+            drive,
+            settings,
+            observer,
+            begun: Instant::now(),
+            pitch: TAU / f64::from(drive.flexspline.teeth),
+            temperature_c: settings.temperature_c.unwrap_or(drive.temperature.reference_c),
+            motion: Motion::default(),
+            rows: Vec::new(),
+            peak: None,
+            touches: None,
+            degrees_of_freedom: 0,
+            increments: 0,
+            iterations: 0,
+            total: 0,
+            pending_iterations: 0,
+        }
+    }
+
+    fn run(mut self) -> Result<Simulation, SimulateError> {
+        match &self.settings.path {
+            Path::Paper => {
+                let increment = self.settings.increment_rad.unwrap_or(PAPER_INCREMENT_RAD);
+                let angles = [line(0.0, 1.0, increment), line(1.0, -1.0, increment)].concat();
+                let targets: Vec<Target> = [0.0].into_iter().chain(angles).map(|angle| self.target(angle)).collect();
+                self.follow(&targets)?;
+            }
+            Path::Points(points) => {
+                let targets: Vec<Target> = points
+                    .iter()
+                    .map(|point| Target {
+                        generator_rad: point.generator_rad,
+                        torque_n_m: point.torque_n_m.unwrap_or(self.settings.torque_n_m),
+                        temperature_c: point.temperature_c.unwrap_or(self.temperature_c),
+                    })
+                    .collect();
+                self.follow(&targets)?;
+            }
+            Path::Pitch => self.settle_and_turn(self.pitch)?,
+            Path::Turn => self.settle_and_turn(TAU)?,
+        }
+        Ok(self.finish())
+    }
+
+    fn target(&self, generator_rad: f64) -> Target {
+        Target { generator_rad, torque_n_m: self.settings.torque_n_m, temperature_c: self.temperature_c }
+    }
+
+    /// Paths that begin where the drive is deformed; the first point makes a row too.
+    fn follow(&mut self, targets: &[Target]) -> Result<(), SimulateError> {
+        let one_load = targets.iter().all(|target| target.torque_n_m == targets[0].torque_n_m);
+        self.total = targets.len() + self.increments_to_start(targets[0].torque_n_m, one_load) - 1;
+        let mut carried: Option<State> = None;
+        for group in targets.chunk_by(|a, b| a.temperature_c == b.temperature_c) {
+            let temperature_c = group[0].temperature_c;
+            let (problem, warmed) = match carried.take() {
+                None => (self.problem(temperature_c)?, None),
+                Some(state) => {
+                    let from_c = self.temperature_c;
+                    let (problem, state) =
+                        self.change_temperature(state, from_c, temperature_c, TEMPERATURE_HALVINGS)?;
+                    (problem, Some(state))
+                }
+            };
+            self.temperature_c = temperature_c;
+            let mut solver = Solver::new(&problem);
+            let (mut state, rest) = match warmed {
+                Some(state) => (state, group),
+                None => {
+                    let (state, increment) = self.start(&problem, &mut solver, group[0], one_load)?;
+                    self.record(&problem, &state, &increment, 0.0)?;
+                    (state, &group[1..])
+                }
+            };
+            for target in rest {
+                state = self.advance(&problem, &mut solver, &state, *target)?;
+            }
+            carried = Some(state);
+        }
+        Ok(())
+    }
+
+    /// Paths of a settled drive: `travel_rad` in one direction, after start-up.
+    fn settle_and_turn(&mut self, travel_rad: f64) -> Result<(), SimulateError> {
+        let sign = self.settings.direction.sign();
+        let eighth = self.pitch / INCREMENTS_PER_PITCH;
+        let mut increment = self.settings.increment_rad.unwrap_or(eighth);
+        if self.settings.path == Path::Pitch {
+            increment = increment.min(eighth);
+        }
+        let path = |from: f64| line(from, from + sign * travel_rad, increment);
+        let start = self.target(0.0);
+        self.total = self.increments_to_start(start.torque_n_m, true) + INCREMENTS_PER_PITCH as usize + path(0.0).len();
+        let problem = self.problem(start.temperature_c)?;
+        let mut solver = Solver::new(&problem);
+        let (mut state, _) = self.start(&problem, &mut solver, start, true)?;
+        let expected = INCREMENTS_PER_PITCH as usize;
+        for i in 1.. {
+            if self.motion.settled(self.pitch) {
+                break;
+            }
+            if self.motion.travelled_rad() > LONGEST_START_UP * self.pitch {
+                return Err(SimulateError::NotFollowing { travelled_rad: self.motion.travelled_rad() });
+            }
+            if i > expected {
+                self.total += 1;
+            }
+            let (next, increment) = solver.increment(&state, sign * eighth * i as f64, start.torque_n_m)?;
+            self.motion.go(&state, &next, problem.drive.ratio());
+            self.solved(Phase::Settling, &increment, &problem, &next)?;
+            state = next;
+        }
+        for angle in path(state.generator_rad) {
+            state = self.advance(&problem, &mut solver, &state, self.target(angle))?;
+        }
+        Ok(())
+    }
+
+    fn problem(&mut self, temperature_c: f64) -> Result<Problem, SimulateError> {
+        let problem = Problem::new(self.drive, self.settings.generator, temperature_c, self.settings.solver)?;
+        self.degrees_of_freedom = problem.degrees_of_freedom();
+        Ok(problem)
+    }
+
+    /// Whether the clearance takes part in nothing but the start: the load holds the flanks of one side together.
+    fn exceeds_drag(&self, torque_n_m: f64) -> bool {
+        torque_n_m.abs() > self.drive.output.drag_torque_n_m
+    }
+
+    fn increments_to_start(&self, torque_n_m: f64, one_load: bool) -> usize {
+        let touches = if one_load && self.exceeds_drag(torque_n_m) { 2 } else { 0 };
+        1 + touches + usize::from(torque_n_m != 0.0)
+    }
+
+    /// Deforms the drive, touches, loads. Gives the last increment with the iterations of deforming and loading.
+    fn start(
+        &mut self,
+        problem: &Problem,
+        solver: &mut Solver,
+        at: Target,
+        one_load: bool,
+    ) -> Result<(State, Increment), SimulateError> {
+        let (mut state, mut increment) = solver.deform(at.generator_rad)?;
+        self.solved(Phase::Deforming, &increment, problem, &state)?;
+        if one_load && self.exceeds_drag(at.torque_n_m) {
+            let (least, of_drag) = LIGHT_TOUCH;
+            let torque = least.max(of_drag * self.drive.output.drag_torque_n_m);
+            let mut touch = |torque_n_m: f64| -> Result<f64, SimulateError> {
+                let (touched, increment) = solver.increment(&state, at.generator_rad, torque_n_m)?;
+                self.solved(Phase::Touching, &increment, problem, &touched)?;
+                Ok(error_arcsec(problem, &touched))
+            };
+            self.touches = Some(Touches { forward: touch(torque)?, backward: touch(-torque)? });
+        }
+        if at.torque_n_m != 0.0 {
+            let deforming = increment.iterations;
+            (state, increment) = solver.increment(&state, at.generator_rad, at.torque_n_m)?;
+            self.solved(Phase::Loading, &increment, problem, &state)?;
+            increment.iterations += deforming;
+        }
+        Ok((state, increment))
+    }
+
+    /// One increment along the path, with its row.
+    fn advance(
+        &mut self,
+        problem: &Problem,
+        solver: &mut Solver,
+        from: &State,
+        to: Target,
+    ) -> Result<State, SimulateError> {
+        let (state, increment) = solver.increment(from, to.generator_rad, to.torque_n_m)?;
+        self.motion.go(from, &state, problem.drive.ratio());
+        self.increments += 1;
+        self.iterations += increment.iterations;
+        self.record(problem, &state, &increment, to.generator_rad - from.generator_rad)?;
+        Ok(state)
+    }
+
+    /// Adds a row and shows it.
+    fn record(
+        &mut self,
+        problem: &Problem,
+        state: &State,
+        increment: &Increment,
+        turn_rad: f64,
+    ) -> Result<(), SimulateError> {
+        let peak = peak_stress(problem, state);
+        // Rows of a path that begins with the deformed drive count from 0, others from 1.
+        let step = match self.rows.last() {
+            Some(row) => row.step + 1,
+            None => usize::from(turn_rad != 0.0),
+        };
+        let row = Row {
+            step,
+            generator_rad: state.generator_rad,
+            output_rad: state.output_rad,
+            error_arcsec: error_arcsec(problem, state),
+            torque_n_m: state.torque_n_m,
+            flank_contacts: increment.flank_contacts,
+            generator_contacts: increment.generator_contacts,
+            max_von_mises_mpa: peak.von_mises_mpa,
+            iterations: increment.iterations + std::mem::take(&mut self.pending_iterations),
+            temperature_c: self.temperature_c,
+            generator_torque_n_m: increment.generator_torque_n_m,
+            drag_torque_n_m: increment.drag_torque_n_m,
+            torque_balance_n_m: state.torque_n_m + increment.drag_torque_n_m + increment.flank_torque_n_m,
+            peak_flank_pressure_mpa: increment.peak_pressure_mpa[0],
+            peak_generator_pressure_mpa: increment.peak_pressure_mpa[1],
+            residual: increment.residual,
+            settled: self.motion.settled(self.pitch),
+            turn_rad,
+        };
+        if self.peak.is_none_or(|(highest, _)| peak.von_mises_mpa > highest.von_mises_mpa) {
+            self.peak = Some((peak, step));
+        }
+        self.show(Phase::Following, increment.iterations, problem, state, Some(&row))?;
+        self.rows.push(row);
+        Ok(())
+    }
+
+    /// Counts an increment that makes no row, and shows it.
+    fn solved(
+        &mut self,
+        phase: Phase,
+        increment: &Increment,
+        problem: &Problem,
+        state: &State,
+    ) -> Result<(), SimulateError> {
+        self.increments += 1;
+        self.iterations += increment.iterations;
+        self.show(phase, increment.iterations, problem, state, None)
+    }
+
+    fn show(
+        &mut self,
+        phase: Phase,
+        iterations: usize,
+        problem: &Problem,
+        state: &State,
+        row: Option<&Row>,
+    ) -> Result<(), SimulateError> {
+        let (done, total) = (self.increments, self.total.max(self.increments));
+        let seen = Observation { phase, done, total, iterations, row, problem, state };
+        match (self.observer)(&seen) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(SimulateError::Stopped { done, total }),
+        }
+    }
+
+    /// The drive brought from one temperature to another where it stands; in parts where one part is too much.
+    fn change_temperature(
+        &mut self,
+        state: State,
+        from_c: f64,
+        to_c: f64,
+        halvings: usize,
+    ) -> Result<(Problem, State), SimulateError> {
+        let problem = self.problem(to_c)?;
+        let guess = resized(&state, &self.drive.at_temperature(from_c).thermal_state, &problem);
+        match Solver::new(&problem).increment(&guess, guess.generator_rad, guess.torque_n_m) {
+            Ok((state, increment)) => {
+                self.motion = Motion::default();
+                self.pending_iterations += increment.iterations;
+                self.total += 1;
+                self.solved(Phase::ChangingTemperature, &increment, &problem, &state)?;
+                Ok((problem, state))
+            }
+            Err(SolveError::NotConverged { history, .. }) if halvings > 0 => {
+                self.pending_iterations += history.len();
+                self.iterations += history.len();
+                let middle_c = 0.5 * (from_c + to_c);
+                let (_, state) = self.change_temperature(state, from_c, middle_c, halvings - 1)?;
+                self.change_temperature(state, middle_c, to_c, halvings - 1)
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn finish(self) -> Simulation {
+        let (settings, rows) = (self.settings, &self.rows);
+        let metrics = Metrics::new(rows, self.pitch, self.drive.ratio());
+        let torque_n_m = shared(rows, |row| row.torque_n_m);
+        let loaded = torque_n_m.is_some_and(|torque| self.exceeds_drag(torque));
+        let never_loaded = rows.iter().all(|row| !self.exceeds_drag(row.torque_n_m));
+        let middle = self.touches.map(|touches| 0.5 * (touches.forward + touches.backward));
+        let against = |zero: Option<f64>| Some(metrics.mean_error()? - zero?);
+        let touched = self
+            .touches
+            .map(|touches| if torque_n_m.unwrap_or(0.0) > 0.0 { touches.forward } else { touches.backward });
+        let (peak, peak_step) = self.peak.expect("every path has a row");
+        let summary = Summary {
+            schema_version: SUMMARY_SCHEMA,
+            tool_version: env!("CARGO_PKG_VERSION"),
+            command: String::new(),
+            status: "converged",
+            drive: self.drive.name.clone(),
+            drive_hash: blake3::Hash::from_bytes(self.drive.hash()).to_hex().to_string(),
+            generator: settings.generator.to_string(),
+            path: settings.path.to_string(),
+            mesh: settings.solver.mesh.to_string(),
+            solver: "reference",
+            flank_penalty_n_per_mm3: settings.solver.flank_penalty,
+            bore_penalty_n_per_mm3: settings.solver.bore_penalty(settings.generator),
+            degrees_of_freedom: self.degrees_of_freedom,
+            torque_n_m,
+            temperature_c: shared(rows, |row| row.temperature_c),
+            rows: rows.len(),
+            kinematic_error_pp_arcsec: metrics.kinematic_error_pp,
+            mean_error_forward_arcsec: metrics.mean_forward,
+            mean_error_backward_arcsec: metrics.mean_backward,
+            backlash_arcsec: metrics.reversal.filter(|_| never_loaded),
+            reversal_lost_motion_arcsec: metrics.reversal.filter(|_| loaded),
+            dwell_generator_rad: metrics.dwell_rad,
+            wind_up_arcsec: against(middle).filter(|_| loaded),
+            wind_up_elastic_arcsec: against(touched).filter(|_| loaded),
+            backlash_middle_arcsec: middle,
+            max_von_mises_mpa: peak.von_mises_mpa,
+            max_von_mises_wheel: wheel_name(&peak),
+            max_von_mises_position_mm: peak.position_mm,
+            max_von_mises_step: peak_step,
+            peak_flank_pressure_mpa: largest(rows, |row| row.peak_flank_pressure_mpa),
+            peak_generator_pressure_mpa: largest(rows, |row| row.peak_generator_pressure_mpa),
+            generator_torque_mean_n_m: metrics.generator_torque,
+            generator_torque_virtual_work_n_m: metrics.generator_torque_expected,
+            torque_balance_worst_n_m: largest(rows, |row| row.torque_balance_n_m.abs()),
+            residual_worst: largest(rows, |row| row.residual),
+            increments: self.increments,
+            iterations: self.iterations,
+            wall_s: self.begun.elapsed().as_secs_f64(),
+        };
+        Simulation { rows: self.rows, summary }
+    }
+}
+
+/// Output angle minus nominal, arc-seconds.
+fn error_arcsec(problem: &Problem, state: &State) -> f64 {
+    (state.output_rad - state.generator_rad / problem.drive.ratio()) * ARCSEC
+}
+
+/// Equally spaced angles from `from` (left out) to `to` (exactly), `increment` apart or less.
+fn line(from: f64, to: f64, increment: f64) -> Vec<f64> {
+    let count = ((to - from).abs() / increment - 1e-6).ceil().max(1.0);
+    (1..=count as usize).map(|i| from + (to - from) * (i as f64 / count)).collect()
+}
+
+/// A first guess of the state at another temperature: displacements grow with the sizes of the wheels, the seat holds the
+/// circular spline where the new temperature has it.
+fn resized(state: &State, old: &ThermalState, problem: &Problem) -> State {
+    let new = &problem.drive.thermal_state;
+    let mut guess = state.clone();
+    let fs = new.flexspline_scale / old.flexspline_scale;
+    guess.u.iter_mut().for_each(|x| *x *= fs);
+    let cs = new.circular_spline_scale / old.circular_spline_scale;
+    guess.v.iter_mut().for_each(|x| *x *= cs);
+    let seated = problem.starting_shape(state.generator_rad).v;
+    let ring = &problem.circular_spline;
+    for (n, x) in ring.nodes.iter().enumerate() {
+        if x[0].hypot(x[1]) > ring.base_radius - 1e-6 {
+            guess.v[2 * n] = seated[2 * n];
+            guess.v[2 * n + 1] = seated[2 * n + 1];
+        }
+    }
+    guess
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::MeshLevel;
+
+    fn coarse(path: Path) -> SimulationSettings {
+        let solver = SolverSettings { mesh: MeshLevel::Coarse, ..Default::default() };
+        SimulationSettings { solver, ..SimulationSettings::new(GeneratorKind::Cam, path) }
+    }
+
+    fn run(settings: &SimulationSettings) -> Simulation {
+        simulate(&Drive::hhd_95(), settings, &mut |_| ControlFlow::Continue(())).unwrap()
+    }
+
+    fn points(angles: &[f64]) -> Path {
+        let point = |&generator_rad| PathPoint { generator_rad, ..Default::default() };
+        Path::Points(angles.iter().map(point).collect())
+    }
+
+    #[test]
+    fn lines_end_where_they_are_to_end_and_never_step_too_far() {
+        assert_eq!(line(0.0, 1.0, 0.01).len(), 100);
+        assert_eq!(line(1.0, -1.0, 0.01).len(), 200);
+        let back = line(1.0, -1.0, 0.3);
+        assert_eq!((back.len(), back[6]), (7, -1.0));
+        assert!((back[0] - (1.0 - 2.0 / 7.0)).abs() < 1e-15);
+        assert_eq!(line(0.0, 0.001, 0.5), [0.001]);
+    }
+
+    #[test]
+    fn a_pitch_gives_eight_settled_rows_either_way_and_mirror_images() {
+        let forward = run(&coarse(Path::Pitch));
+        let backward = run(&SimulationSettings { direction: Direction::Backward, ..coarse(Path::Pitch) });
+        for run in [&forward, &backward] {
+            assert_eq!(run.rows.len(), 8);
+            assert!(run.rows.iter().all(|row| row.settled));
+            let steps: Vec<usize> = run.rows.iter().map(|row| row.step).collect();
+            assert_eq!(steps, [1, 2, 3, 4, 5, 6, 7, 8]);
+        }
+        let travel = forward.rows[7].generator_rad - forward.rows[0].generator_rad;
+        assert!((travel - TAU / 188.0 * 7.0 / 8.0).abs() < 1e-12);
+        for (f, b) in forward.rows.iter().zip(&backward.rows) {
+            assert!((f.error_arcsec + b.error_arcsec).abs() < 0.01, "{} {}", f.error_arcsec, b.error_arcsec);
+        }
+        let summary = &forward.summary;
+        // Half the clearance of about an arc-minute, behind; ripple of less than an arc-second.
+        let mean = summary.mean_error_forward_arcsec.unwrap();
+        assert!((-33.0..-26.0).contains(&mean), "{mean}");
+        let ripple = summary.kinematic_error_pp_arcsec.unwrap();
+        assert!((0.05..1.5).contains(&ripple), "{ripple}");
+        assert_eq!((summary.backlash_arcsec, summary.wind_up_arcsec), (None, None));
+        assert!(summary.torque_balance_worst_n_m < 1e-6);
+        let (found, expected) =
+            (summary.generator_torque_mean_n_m.unwrap(), summary.generator_torque_virtual_work_n_m.unwrap());
+        assert!((found / expected - 1.0).abs() < 0.02, "{found}, by virtual work {expected}");
+        assert_eq!(summary.increments, 17);
+    }
+
+    #[test]
+    fn wind_up_is_counted_from_the_middle_of_the_clearance() {
+        let summary = run(&SimulationSettings { torque_n_m: 10.0, ..coarse(Path::Pitch) }).summary;
+        // On the major axis the middle is there by symmetry.
+        assert!(summary.backlash_middle_arcsec.unwrap().abs() < 0.01);
+        let (whole, elastic) = (summary.wind_up_arcsec.unwrap(), summary.wind_up_elastic_arcsec.unwrap());
+        assert!(elastic > 0.0, "{elastic}");
+        assert!(((whole - elastic) - 29.6).abs() < 2.0, "half the clearance: {}", whole - elastic);
+        assert_eq!(summary.backlash_arcsec, None);
+        let (found, expected) =
+            (summary.generator_torque_mean_n_m.unwrap(), summary.generator_torque_virtual_work_n_m.unwrap());
+        assert!(expected < 0.0 && (found / expected - 1.0).abs() < 0.02, "{found}, by virtual work {expected}");
+    }
+
+    #[test]
+    fn a_path_by_points_has_a_row_for_each_and_crosses_its_clearance_at_a_reversal() {
+        let there: Vec<f64> = (0..=10).map(|i| 0.01 * f64::from(i)).collect();
+        let back: Vec<f64> = (1..=8).map(|i| 0.1 - 0.01 * f64::from(i)).collect();
+        let run = run(&coarse(points(&[there, back].concat())));
+        assert_eq!(run.rows.len(), 19);
+        assert_eq!((run.rows[0].step, run.rows[18].step), (0, 18));
+        let summary = &run.summary;
+        let backlash = summary.backlash_arcsec.unwrap();
+        assert!((54.0..64.0).contains(&backlash), "{backlash}");
+        let dwell = summary.dwell_generator_rad.unwrap() * ARCSEC / 95.0;
+        assert!((dwell - backlash).abs() < 1.0, "{dwell}, {backlash}");
+        assert_eq!(summary.reversal_lost_motion_arcsec, None);
+    }
+
+    /// All of one steel: warming the whole drive scales it, and no angle changes; warming the flexspline alone takes up
+    /// clearance.
+    #[test]
+    fn warming_goes_on_from_the_state_it_finds() {
+        let warm = |temperature: [f64; 6]| {
+            let angles = [0.0, 0.02, 0.04, 0.04, 0.05, 0.06];
+            let point = |(generator_rad, temperature_c): (f64, f64)| PathPoint {
+                generator_rad,
+                torque_n_m: None,
+                temperature_c: Some(temperature_c),
+            };
+            coarse(Path::Points(angles.into_iter().zip(temperature).map(point).collect()))
+        };
+        let even = run(&warm([20.0; 6]));
+        let warmed = run(&warm([20.0, 20.0, 20.0, 60.0, 60.0, 60.0]));
+        assert_eq!(warmed.rows[3].temperature_c, 60.0);
+        assert_eq!(warmed.summary.temperature_c, None);
+        for (a, b) in even.rows.iter().zip(&warmed.rows) {
+            assert!((a.error_arcsec - b.error_arcsec).abs() < 0.02, "{} {}", a.error_arcsec, b.error_arcsec);
+        }
+        let drive = Drive::hhd_95().with_set("temperature.circular_spline_expansion_per_k=10e-6").unwrap();
+        let drive = drive.with_set("temperature.housing_expansion_per_k=10e-6").unwrap();
+        let tight =
+            simulate(&drive, &warm([20.0, 20.0, 20.0, 60.0, 60.0, 60.0]), &mut |_| ControlFlow::Continue(())).unwrap();
+        // The flexspline grows 2.9 µm on the other wheel: 2 dr tan a / r less clearance, half of it on this side.
+        let gained = tight.rows[5].error_arcsec - even.rows[5].error_arcsec;
+        assert!((2.0..10.0).contains(&gained), "{gained}");
+    }
+
+    #[test]
+    fn the_observer_sees_every_increment_and_can_stop() {
+        let mut seen = Vec::new();
+        let settings = coarse(points(&[0.0, 0.004, 0.008]));
+        let stopped = simulate(&Drive::hhd_95(), &settings, &mut |now| {
+            seen.push((now.phase, now.done, now.total, now.row.map(|row| row.step)));
+            if now.done == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        assert_eq!(stopped.unwrap_err(), SimulateError::Stopped { done: 2, total: 3 });
+        assert_eq!(
+            seen,
+            [(Phase::Deforming, 1, 3, None), (Phase::Following, 1, 3, Some(0)), (Phase::Following, 2, 3, Some(1))]
+        );
+    }
+
+    #[test]
+    fn not_converging_is_an_error_with_its_history() {
+        let mut settings = coarse(Path::Pitch);
+        settings.solver.max_iterations = 1;
+        let error = simulate(&Drive::hhd_95(), &settings, &mut |_| ControlFlow::Continue(())).unwrap_err();
+        assert!(!error.is_bad_input());
+        assert!(error.to_string().contains("residual by iteration"), "{error}");
+    }
+
+    #[test]
+    fn settings_out_of_range_are_refused_before_any_work() {
+        let good = coarse(Path::Paper);
+        let hot = Path::Points(vec![PathPoint { temperature_c: Some(200.0), ..Default::default() }]);
+        let solver = |solver| SimulationSettings { solver, ..good.clone() };
+        let cases = [
+            (SimulationSettings { increment_rad: Some(0.0), ..good.clone() }, "increment: found 0"),
+            (SimulationSettings { increment_rad: Some(f64::NAN), ..good.clone() }, "increment: found NaN"),
+            (SimulationSettings { increment_rad: Some(0.1), ..coarse(points(&[0.0])) }, "increment: found 0.1"),
+            (SimulationSettings { torque_n_m: f64::NAN, ..good.clone() }, "torque: found NaN"),
+            (SimulationSettings { torque_n_m: 1e6, ..good.clone() }, "torque: found 1000000"),
+            (SimulationSettings { temperature_c: Some(-300.0), ..good.clone() }, "temperature: found -300"),
+            (coarse(hot), "temperature: found 200, allowed: -60 to 80"),
+            (coarse(points(&[])), "path: found no points"),
+            (coarse(points(&[f64::INFINITY])), "generator angle: found inf"),
+            (solver(SolverSettings { flank_penalty: 0.0, ..good.solver }), "flank penalty: found 0"),
+            (solver(SolverSettings { bore_penalty: Some(1e20), ..good.solver }), "bore penalty"),
+            (solver(SolverSettings { tolerance: 0.5, ..good.solver }), "tolerance: found 0.5"),
+            (solver(SolverSettings { max_iterations: 0, ..good.solver }), "iterations: found 0"),
+        ];
+        for (settings, start) in cases {
+            let mut increments = 0;
+            let error = simulate(&Drive::hhd_95(), &settings, &mut |_| {
+                increments += 1;
+                ControlFlow::Continue(())
+            })
+            .unwrap_err();
+            assert!(error.is_bad_input() && increments == 0);
+            assert!(error.to_string().starts_with(start), "{error}");
+        }
+    }
+
+    #[test]
+    fn the_papers_path_is_three_hundred_increments_of_a_hundredth() {
+        let angles = [line(0.0, 1.0, PAPER_INCREMENT_RAD), line(1.0, -1.0, PAPER_INCREMENT_RAD)].concat();
+        assert_eq!((angles.len(), angles[99], angles[299]), (300, 1.0, -1.0));
+        assert!(angles.windows(2).all(|w| ((w[1] - w[0]).abs() - 0.01).abs() < 1e-12));
+    }
+}

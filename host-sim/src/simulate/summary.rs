@@ -1,0 +1,442 @@
+//! What a run comes to: the metrics of `summary.json`.
+//!
+//! Each is taken where it means what its name says, and is `null` where the path cannot give it.
+
+use serde::Serialize;
+use std::ops::Range;
+
+use super::row::Row;
+use crate::mesh::WheelKind;
+use crate::stress::PeakStress;
+
+/// Version of the layout of `summary.json`; grows when a field changes its meaning or goes.
+pub const SUMMARY_SCHEMA: u32 = 1;
+
+/// Output travel, arc-seconds, within which the output counts as standing still at a reversal.
+const STANDING_ARCSEC: f64 = 0.05;
+/// Rows that a peak-to-peak value needs at least.
+const ROWS_OF_A_RIPPLE: usize = 8;
+/// Arc-seconds in a radian.
+pub(super) const ARCSEC: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
+
+/// The content of `summary.json`.
+///
+/// Means are taken over the last whole number of flexspline tooth pitches (`2 pi / z_f` of generator angle) of the settled
+/// rows of a one-way stretch: a perfect drive repeats with that period, so its ripple drops out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Layout of this object.
+    pub schema_version: u32,
+    /// Version of the program.
+    pub tool_version: &'static str,
+    /// The command that made it; empty when made by a program.
+    pub command: String,
+    /// `converged`: every increment of the path reached equilibrium. A run that does not is an error and leaves no summary.
+    pub status: &'static str,
+    /// Name of the drive.
+    pub drive: String,
+    /// BLAKE3 of the drive's physics at reference temperature, hexadecimal.
+    pub drive_hash: String,
+    /// Wave generator.
+    pub generator: String,
+    /// Path: `paper`, `pitch`, `turn` or `points`.
+    pub path: String,
+    /// Mesh level.
+    pub mesh: String,
+    /// Solver.
+    pub solver: &'static str,
+    /// Contact penalty on the flanks, N/mm³.
+    pub flank_penalty_n_per_mm3: f64,
+    /// Contact penalty on the bore, N/mm³.
+    pub bore_penalty_n_per_mm3: f64,
+    /// Unknowns of the system.
+    pub degrees_of_freedom: usize,
+    /// Load torque, N m; `null` when it changes along the path.
+    pub torque_n_m: Option<f64>,
+    /// Temperature, °C; `null` when it changes along the path.
+    pub temperature_c: Option<f64>,
+    /// Rows of the results.
+    pub rows: usize,
+
+    /// Ripple: largest minus smallest error of a settled one-way stretch at constant load and temperature; the largest if
+    /// there are several. Needs a whole tooth pitch and eight rows.
+    pub kinematic_error_pp_arcsec: Option<f64>,
+    /// Mean error while the generator turns forward (the first such stretch).
+    pub mean_error_forward_arcsec: Option<f64>,
+    /// Mean error while it turns backward.
+    pub mean_error_backward_arcsec: Option<f64>,
+    /// What the output has lost between turning forward and turning backward, at the first reversal and the same load:
+    /// mean error backward minus mean error forward. Without load it is the clearance of the mesh, pushed to either side
+    /// by the drag on the output, so `null` when the load exceeds the drag.
+    pub backlash_arcsec: Option<f64>,
+    /// The same difference under a load that exceeds the drag and keeps the flanks of one side together: what friction
+    /// and the drag leave. `null` when the load does not exceed the drag.
+    pub reversal_lost_motion_arcsec: Option<f64>,
+    /// Generator travel from the first reversal during which the output stays within 0.05″ of where it stood. Between two
+    /// rows, the output is taken to go at its nominal rate once it goes.
+    pub dwell_generator_rad: Option<f64>,
+    /// Error under load relative to the middle of the backlash at zero load: what a joint that was zeroed in the middle
+    /// of its play turns when it is loaded, the usual reading of a torsion curve. It includes half the backlash. The error
+    /// under load is the mean of both directions where both are known, so that the drag drops out, else of the one. The
+    /// middle is that of two light touches (twice the drag, at least 0.02 N m) either way on the freshly deformed drive.
+    /// `null` when the load changes or does not exceed the drag.
+    pub wind_up_arcsec: Option<f64>,
+    /// The elastic part: the same error relative to the light touch on the side that the load pushes to.
+    pub wind_up_elastic_arcsec: Option<f64>,
+    /// Middle of the backlash at zero load on which `wind_up_arcsec` rests.
+    pub backlash_middle_arcsec: Option<f64>,
+
+    /// Largest von Mises stress of all rows.
+    pub max_von_mises_mpa: f64,
+    /// Where: `flexspline` or `circular_spline`.
+    pub max_von_mises_wheel: &'static str,
+    /// Where: global position, mm.
+    pub max_von_mises_position_mm: [f64; 2],
+    /// When: step of the results.
+    pub max_von_mises_step: usize,
+    /// Largest pressure between flanks.
+    pub peak_flank_pressure_mpa: f64,
+    /// Largest pressure between generator and bore.
+    pub peak_generator_pressure_mpa: f64,
+    /// Mean torque of the generator over the first settled stretch.
+    pub generator_torque_mean_n_m: Option<f64>,
+    /// What that mean is without friction, by virtual work: minus load and drag, over the ratio.
+    pub generator_torque_virtual_work_n_m: Option<f64>,
+    /// Largest sum of load, drag and flank torques on the output of all rows: what equilibrium leaves.
+    pub torque_balance_worst_n_m: f64,
+    /// Largest residual of all rows, relative to the largest contact force.
+    pub residual_worst: f64,
+
+    /// Increments solved, all of them: deforming, loading, settling, light touches, path.
+    pub increments: usize,
+    /// Newton iterations of all increments.
+    pub iterations: usize,
+    /// Time from start to end, s.
+    pub wall_s: f64,
+}
+
+/// Light touches on the freshly deformed drive, error in arc-seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Touches {
+    pub forward: f64,
+    pub backward: f64,
+}
+
+/// Metrics that come from the rows alone.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Metrics {
+    pub kinematic_error_pp: Option<f64>,
+    pub mean_forward: Option<f64>,
+    pub mean_backward: Option<f64>,
+    /// Error backward minus forward at the first reversal.
+    pub reversal: Option<f64>,
+    pub dwell_rad: Option<f64>,
+    pub generator_torque: Option<f64>,
+    pub generator_torque_expected: Option<f64>,
+}
+
+/// Settled rows of a one-way stretch at one load and temperature.
+struct Stretch<'a> {
+    range: Range<usize>,
+    rows: &'a [Row],
+    /// Those of them that cover the last whole number of pitches; empty when there is not one.
+    whole: &'a [Row],
+}
+
+impl<'a> Stretch<'a> {
+    fn new(all: &'a [Row], range: Range<usize>, pitch: f64) -> Self {
+        let rows = &all[range.clone()];
+        let (first, last) = (&rows[0], &rows[rows.len() - 1]);
+        let covered = (last.generator_rad - first.generator_rad).abs() + first.turn_rad.abs();
+        let window = (covered / pitch + 1e-6).floor() * pitch;
+        let begin = rows
+            .iter()
+            .position(|row| (last.generator_rad - row.generator_rad).abs() < window - 1e-6 * pitch)
+            .unwrap_or(rows.len());
+        Stretch { range, rows, whole: &rows[begin..] }
+    }
+
+    fn forward(&self) -> bool {
+        self.rows[0].turn_rad > 0.0
+    }
+
+    /// Mean by generator travel.
+    fn mean(&self, value: impl Fn(&Row) -> f64) -> Option<f64> {
+        let travel: f64 = self.whole.iter().map(|row| row.turn_rad.abs()).sum();
+        let sum: f64 = self.whole.iter().map(|row| row.turn_rad.abs() * value(row)).sum();
+        (travel > 0.0).then(|| sum / travel)
+    }
+
+    fn ripple(&self) -> Option<f64> {
+        let errors = || self.rows.iter().map(|row| row.error_arcsec);
+        let enough = !self.whole.is_empty() && self.rows.len() >= ROWS_OF_A_RIPPLE;
+        enough.then(|| errors().fold(f64::MIN, f64::max) - errors().fold(f64::MAX, f64::min))
+    }
+}
+
+/// Settled one-way stretches, in order.
+fn stretches(rows: &[Row], pitch: f64) -> Vec<Stretch<'_>> {
+    let mut found = Vec::new();
+    let mut begin = 0;
+    let same = |a: &Row, b: &Row| {
+        a.turn_rad.signum() == b.turn_rad.signum() && a.torque_n_m == b.torque_n_m && a.temperature_c == b.temperature_c
+    };
+    while begin < rows.len() {
+        let mut end = begin + 1;
+        if rows[begin].settled {
+            while end < rows.len() && rows[end].settled && same(&rows[begin], &rows[end]) {
+                end += 1;
+            }
+            found.push(Stretch::new(rows, begin..end, pitch));
+        }
+        begin = end;
+    }
+    found
+}
+
+/// The row at which the generator first reverses under a constant load and temperature.
+fn first_reversal(rows: &[Row]) -> Option<usize> {
+    (1..rows.len()).map(|next| next - 1).find(|&at| {
+        let (here, next) = (&rows[at], &rows[at + 1]);
+        here.turn_rad * next.turn_rad < 0.0
+            && here.torque_n_m == next.torque_n_m
+            && here.temperature_c == next.temperature_c
+    })
+}
+
+/// Generator travel from row `at` until the output leaves.
+fn dwell(rows: &[Row], at: usize, ratio: f64) -> Option<f64> {
+    let here = &rows[at];
+    let way = rows[at + 1].turn_rad.signum();
+    let onward = rows[at + 1..].iter().take_while(|row| row.turn_rad * way > 0.0);
+    let mut stood = 0.0;
+    for row in onward {
+        let travelled = (row.generator_rad - here.generator_rad).abs();
+        let moved = row.output_rad - here.output_rad;
+        if moved.abs() * ARCSEC > STANDING_ARCSEC {
+            return Some((travelled - (moved * way * ratio)).clamp(stood, travelled));
+        }
+        stood = travelled;
+    }
+    None
+}
+
+impl Metrics {
+    pub(super) fn new(rows: &[Row], pitch: f64, ratio: f64) -> Metrics {
+        let stretches = stretches(rows, pitch);
+        let error = |stretch: &Stretch| stretch.mean(|row| row.error_arcsec);
+        let mean_of = |forward: bool| stretches.iter().filter(|stretch| stretch.forward() == forward).find_map(error);
+        let reversed_at = first_reversal(rows);
+        let reversal = reversed_at.and_then(|at| {
+            let before = stretches.iter().rfind(|stretch| stretch.range.contains(&at))?;
+            let after = stretches.iter().find(|stretch| stretch.range.start > at)?;
+            // The stretch after it must not lie beyond another reversal or another load.
+            let undisturbed = rows[at + 1..after.range.end].iter().all(|row| {
+                row.turn_rad * before.rows[0].turn_rad < 0.0
+                    && row.torque_n_m == rows[at].torque_n_m
+                    && row.temperature_c == rows[at].temperature_c
+            });
+            let (before_mean, after_mean) = (error(before)?, error(after)?);
+            let (forward, backward) =
+                if before.forward() { (before_mean, after_mean) } else { (after_mean, before_mean) };
+            undisturbed.then_some(backward - forward)
+        });
+        let measured = stretches.iter().find(|stretch| !stretch.whole.is_empty());
+        Metrics {
+            kinematic_error_pp: stretches.iter().filter_map(Stretch::ripple).reduce(f64::max),
+            mean_forward: mean_of(true),
+            mean_backward: mean_of(false),
+            reversal,
+            dwell_rad: reversed_at.and_then(|at| dwell(rows, at, ratio)),
+            generator_torque: measured.and_then(|s| s.mean(|row| row.generator_torque_n_m)),
+            generator_torque_expected: measured
+                .and_then(|s| s.mean(|row| -(row.torque_n_m + row.drag_torque_n_m) / ratio)),
+        }
+    }
+
+    /// Mean of the directions that are known.
+    pub(super) fn mean_error(&self) -> Option<f64> {
+        match (self.mean_forward, self.mean_backward) {
+            (Some(a), Some(b)) => Some(0.5 * (a + b)),
+            (a, b) => a.or(b),
+        }
+    }
+}
+
+/// The value that all rows share, if they do.
+pub(super) fn shared(rows: &[Row], value: impl Fn(&Row) -> f64) -> Option<f64> {
+    let first = value(rows.first()?);
+    rows.iter().all(|row| value(row) == first).then_some(first)
+}
+
+/// The largest of a value over all rows.
+pub(super) fn largest(rows: &[Row], value: impl Fn(&Row) -> f64) -> f64 {
+    rows.iter().map(value).fold(0.0, f64::max)
+}
+
+pub(super) fn wheel_name(peak: &PeakStress) -> &'static str {
+    match peak.wheel {
+        WheelKind::Flexspline => "flexspline",
+        WheelKind::CircularSpline => "circular_spline",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::row::Motion;
+    use std::f64::consts::TAU;
+
+    const PITCH: f64 = TAU / 188.0;
+    const RATIO: f64 = 95.0;
+
+    /// A drive with play, ripple and wind-up, without any mechanics.
+    struct Toy {
+        backlash: f64,
+        ripple: f64,
+        wind_up: f64,
+        drag: f64,
+    }
+
+    impl Toy {
+        /// Rows along generator angles and torques; the first is the start, in the middle of the play.
+        fn walk(&self, path: &[(f64, f64)]) -> Vec<Row> {
+            let mut motion = Motion::default();
+            let mut output = path[0].0 / RATIO;
+            let mut rows: Vec<Row> = Vec::new();
+            for (step, &(generator, torque)) in path.iter().enumerate() {
+                let nominal = generator / RATIO;
+                let wave = 0.5 * self.ripple * (188.0 * generator).sin() / ARCSEC;
+                let half = 0.5 * self.backlash / ARCSEC;
+                let loaded = torque.abs() > self.drag;
+                let before = output;
+                output = if loaded {
+                    nominal + wave + torque.signum() * half + self.wind_up * torque / ARCSEC
+                } else {
+                    output.clamp(nominal + wave - half, nominal + wave + half)
+                };
+                let from = rows.last().map_or(generator, |row| row.generator_rad);
+                let state = |generator_rad: f64, torque_n_m: f64, output_rad: f64| crate::stepping::State {
+                    u: vec![],
+                    v: vec![],
+                    generator_rad,
+                    torque_n_m,
+                    output_rad,
+                    drag_anchor_rad: 0.0,
+                    sleeve_moment: 0.0,
+                    lateral_force: [0.0; 2],
+                    friction: Default::default(),
+                    output_rate: 0.0,
+                    travel: 0.0,
+                };
+                let torque_before = rows.last().map_or(torque, |row| row.torque_n_m);
+                motion.go(&state(from, torque_before, before), &state(generator, torque, output), RATIO);
+                rows.push(Row {
+                    step,
+                    generator_rad: generator,
+                    output_rad: output,
+                    error_arcsec: (output - nominal) * ARCSEC,
+                    torque_n_m: torque,
+                    flank_contacts: 0,
+                    generator_contacts: 0,
+                    max_von_mises_mpa: 0.0,
+                    iterations: 1,
+                    temperature_c: 20.0,
+                    generator_torque_n_m: -torque / RATIO,
+                    drag_torque_n_m: 0.0,
+                    torque_balance_n_m: 0.0,
+                    peak_flank_pressure_mpa: 0.0,
+                    peak_generator_pressure_mpa: 0.0,
+                    residual: 0.0,
+                    settled: motion.settled(PITCH),
+                    turn_rad: generator - from,
+                });
+            }
+            rows
+        }
+    }
+
+    const TOY: Toy = Toy { backlash: 60.0, ripple: 0.8, wind_up: 0.3, drag: 0.02 };
+
+    /// The paper's path in increments.
+    fn paper(increment: f64, torque: f64) -> Vec<(f64, f64)> {
+        let n = (1.0 / increment).round() as i32;
+        let there = (0..=n).map(|i| f64::from(i) / f64::from(n));
+        let back = (1..=2 * n).map(|i| 1.0 - f64::from(i) / f64::from(n));
+        there.chain(back).map(|generator| (generator, torque)).collect()
+    }
+
+    #[test]
+    fn backlash_dwell_and_ripple_of_a_drive_that_has_them() {
+        let rows = TOY.walk(&paper(0.01, 0.0));
+        let metrics = Metrics::new(&rows, PITCH, RATIO);
+        // 0.01 rad is a third of a pitch: means over whole pitches leave a few hundredths.
+        assert!((metrics.mean_forward.unwrap() + 30.0).abs() < 0.02, "{metrics:?}");
+        assert!((metrics.mean_backward.unwrap() - 30.0).abs() < 0.02);
+        assert!((metrics.reversal.unwrap() - 60.0).abs() < 0.04);
+        assert!((metrics.kinematic_error_pp.unwrap() - 0.8).abs() < 0.01);
+        // The clearance, and up to the ripple before and after, at the ratio.
+        let dwell = metrics.dwell_rad.unwrap() * ARCSEC / RATIO;
+        assert!((dwell - 60.0).abs() < 0.8, "{dwell}");
+        // Much finer than the increment of 0.01 rad, which is 21.7″.
+        let fine = Metrics::new(&TOY.walk(&paper(0.001, 0.0)), PITCH, RATIO).dwell_rad.unwrap();
+        assert!((fine * ARCSEC / RATIO - dwell).abs() < 0.8);
+    }
+
+    #[test]
+    fn a_reversal_the_other_way_gives_the_same_backlash() {
+        let mirrored: Vec<_> = paper(0.01, 0.0).iter().map(|(g, t)| (-g, *t)).collect();
+        let metrics = Metrics::new(&TOY.walk(&mirrored), PITCH, RATIO);
+        assert!((metrics.reversal.unwrap() - 60.0).abs() < 0.04);
+    }
+
+    #[test]
+    fn under_load_nothing_is_lost_at_the_reversal_and_the_error_is_wound_up() {
+        let rows = TOY.walk(&paper(0.01, 50.0));
+        let metrics = Metrics::new(&rows, PITCH, RATIO);
+        assert!(metrics.reversal.unwrap().abs() < 0.04);
+        assert!(metrics.dwell_rad.unwrap() < 1e-3);
+        assert!((metrics.mean_error().unwrap() - (30.0 + 15.0)).abs() < 0.02);
+        let expected = metrics.generator_torque_expected.unwrap();
+        assert!((metrics.generator_torque.unwrap() - expected).abs() < 1e-12);
+        assert!((expected + 50.0 / 95.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn eight_rows_of_one_pitch_give_ripple_and_an_exact_mean_but_no_backlash() {
+        let path: Vec<_> = (0..=24).map(|i| (PITCH * f64::from(i) / 8.0, 0.0)).collect();
+        let rows = TOY.walk(&path);
+        let last_pitch = &rows[17..];
+        assert_eq!(last_pitch.len(), 8);
+        let metrics = Metrics::new(last_pitch, PITCH, RATIO);
+        assert!((metrics.mean_forward.unwrap() + 30.0).abs() < 1e-9);
+        assert!((metrics.kinematic_error_pp.unwrap() - 0.8).abs() < 1e-9);
+        assert_eq!((metrics.reversal, metrics.dwell_rad, metrics.mean_backward), (None, None, None));
+        let short = Metrics::new(&rows[18..], PITCH, RATIO);
+        assert_eq!((short.mean_forward, short.kinematic_error_pp), (None, None));
+    }
+
+    #[test]
+    fn start_up_and_clearance_are_not_settled() {
+        // A wide clearance: the output stands for more than two pitches.
+        let wide = Toy { backlash: 300.0, ..TOY };
+        let rows = wide.walk(&paper(0.01, 0.0));
+        let first = rows.iter().find(|row| row.settled).unwrap();
+        assert!((first.error_arcsec + 150.0).abs() < 0.5, "{}", first.error_arcsec);
+        let metrics = Metrics::new(&rows, PITCH, RATIO);
+        assert!((metrics.reversal.unwrap() - 300.0).abs() < 0.04);
+        assert!(metrics.kinematic_error_pp.unwrap() < 0.81);
+        // Where the load changes in every row nothing settles.
+        let changing: Vec<_> = (0..200).map(|i| (0.01 * f64::from(i), f64::from(i))).collect();
+        let metrics = Metrics::new(&TOY.walk(&changing), PITCH, RATIO);
+        assert_eq!(metrics, Metrics::default());
+    }
+
+    #[test]
+    fn a_load_that_changes_at_the_reversal_gives_no_backlash() {
+        let mut path = paper(0.01, 0.0);
+        path.iter_mut().skip(101).for_each(|point| point.1 = 5.0);
+        let metrics = Metrics::new(&TOY.walk(&path), PITCH, RATIO);
+        assert_eq!((metrics.reversal, metrics.dwell_rad), (None, None));
+    }
+}

@@ -1,0 +1,444 @@
+//! From samples to the table image that firmware reads, and to the files that carry it.
+//!
+//! The projection itself is the core's ([`flexspline::precompute`]), the same code on the host and on board. Here its plan is
+//! laid: which nodes, which harmonics the samples can tell apart, and where the table came from.
+
+use std::fmt::Write as _;
+
+use flexspline::precompute::{Harmonics, MissingDirection, Plan, ProjectError, Sample, Workspace, make_image};
+use flexspline::{FixedMember, MAX_RIPPLE_NODES, Provenance, Table};
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::drive::{Drive, GeneratorKind};
+use crate::sweep::{Sweep, SweepPlan};
+
+/// Arc-seconds in a radian.
+pub const ARCSEC_PER_RAD: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
+
+/// Full turns that separate 2 per generator turn from 2 per turn of the generator against the output, less a margin.
+const TURNS_FOR_HARMONICS: f64 = 47.5;
+/// Orders fitted where the samples cover enough turns: per generator turn, per turn against the output, per output turn.
+const GENERATOR_ORDERS: [u16; 4] = [1, 2, 3, 4];
+const MATERIAL_ORDERS: [u16; 4] = [1, 2, 3, 4];
+const OUTPUT_ORDERS: [u16; 2] = [1, 2];
+/// Torques of a sample file closer than this share of the largest are one node.
+const SAME_TORQUE: f64 = 1e-6;
+/// Deviation (rad) that FEM samples may have from the table; they are exact but for rounding.
+const FEM_DEVIATION_RAD: f64 = 1e-6;
+/// Negative half-width (rad) taken for the noise of the contact discretisation: 0.1″.
+const HALF_WIDTH_NOISE_RAD: f64 = 5e-7;
+
+/// A finished table.
+#[derive(Debug, Clone)]
+pub struct MadeTable {
+    /// Which generator.
+    pub kind: GeneratorKind,
+    /// The `.fxt` image.
+    pub image: Vec<u8>,
+    /// What is said about it in JSON.
+    pub info: TableInfo,
+}
+
+/// What made a table, what is in it and how far it holds.
+#[derive(Debug, Clone, Serialize)]
+pub struct TableInfo {
+    /// Version of this object.
+    pub schema_version: u32,
+    /// "made": every check of the core passed.
+    pub status: &'static str,
+    /// First 16 hex digits of the BLAKE3 of the image's contents.
+    pub table_id: String,
+    /// Generator.
+    pub generator: String,
+    /// Name of the drive.
+    pub drive: String,
+    /// BLAKE3 of the drive, hex.
+    pub drive_blake3: String,
+    /// Program that made the table.
+    pub tool: String,
+    /// Where the samples come from.
+    pub source: Source,
+    /// Size of the image, bytes.
+    pub image_bytes: usize,
+    /// Torque nodes, N m.
+    pub torque_nodes_n_m: Vec<f32>,
+    /// Temperature nodes, °C.
+    pub temperature_nodes_c: Vec<f32>,
+    /// Nodes over one tooth pitch.
+    pub ripple_nodes: usize,
+    /// Samples used, both directions.
+    pub samples: usize,
+    /// Largest deviation of the table from its samples, arcsec.
+    pub projection_worst_arcsec: f64,
+    /// Root mean square of that deviation, arcsec.
+    pub projection_rms_arcsec: f64,
+    /// Bound of |N de/dpsi| in steady motion; below 1 the inverse exists.
+    pub slope_bound: f32,
+    /// Iterations of the inverse and the error they leave, arcsec.
+    pub inverse_iterations: u8,
+    /// Error left by these iterations, arcsec.
+    pub inverse_error_arcsec: f64,
+    /// Largest backlash (both half-widths) of any node, arcsec.
+    pub backlash_arcsec: f64,
+    /// Error in the middle of the play at the ends of the torque axis, arcsec.
+    pub wind_up_arcsec: [f64; 2],
+    /// Command line, once known.
+    pub command: String,
+}
+
+/// Where samples come from.
+#[derive(Debug, Clone, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Source {
+    /// Contact FEM.
+    Fem {
+        /// Solver.
+        solver: &'static str,
+        /// Mesh level.
+        mesh: String,
+        /// Unknowns.
+        degrees_of_freedom: usize,
+        /// Positions over one pitch at each torque and temperature.
+        positions: usize,
+        /// Which samples were computed and which mirrored.
+        sampled: String,
+        /// Increments solved.
+        increments: usize,
+        /// Newton iterations.
+        iterations: usize,
+        /// Largest residual, relative to the contact forces.
+        worst_residual: f64,
+        /// CPU seconds of the sweep.
+        cpu_s: f64,
+    },
+    /// A file.
+    File {
+        /// Its name.
+        name: String,
+        /// BLAKE3 of its bytes, hex.
+        blake3: String,
+    },
+}
+
+/// Why no table was made.
+#[derive(Debug, Error)]
+pub enum TableError {
+    /// The samples make no table.
+    #[error("the samples make no table: {0}")]
+    Project(ProjectError),
+    /// Drive not of the kind that tables are for.
+    #[error("drive {drive}: tooth counts {flexspline} and {circular_spline} make no drive of two waves: {reason}")]
+    Teeth {
+        /// Name of the drive.
+        drive: String,
+        /// Teeth.
+        flexspline: u32,
+        /// Teeth.
+        circular_spline: u32,
+        /// Why.
+        reason: String,
+    },
+}
+
+/// Options for samples that are not ours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SampleOptions {
+    /// Half-width (rad) where only one direction was sampled; without it that is an error.
+    pub half_width_rad: Option<f64>,
+    /// Deviation (rad) from the table that a sample may have.
+    pub deviation_limit_rad: f64,
+}
+
+impl Default for SampleOptions {
+    fn default() -> Self {
+        SampleOptions { half_width_rad: None, deviation_limit_rad: 20.0 / ARCSEC_PER_RAD }
+    }
+}
+
+/// The table of a FEM sweep.
+pub fn from_sweep(
+    drive: &Drive,
+    plan: &SweepPlan,
+    sweep: &Sweep,
+    mesh: &str,
+    cpu_s: f64,
+) -> Result<MadeTable, TableError> {
+    let source = Source::Fem {
+        solver: "reference",
+        mesh: mesh.to_owned(),
+        degrees_of_freedom: sweep.degrees_of_freedom,
+        positions: plan.positions,
+        sampled:
+            "forward motion over one flexspline pitch at every torque and temperature node; backward motion is its \
+                  mirror image"
+                .to_owned(),
+        increments: sweep.increments,
+        iterations: sweep.iterations,
+        worst_residual: sweep.worst_residual,
+        cpu_s,
+    };
+    let core_plan = Plan {
+        drive: core_drive(drive)?,
+        torque_nodes_n_m: &plan.torque_nodes_n_m,
+        temperature_nodes_c: &plan.temperature_nodes_c,
+        ripple_nodes: plan.positions.min(MAX_RIPPLE_NODES),
+        generator: Harmonics::default(),
+        material: Harmonics::default(),
+        output: Harmonics::default(),
+        missing_direction: MissingDirection::Refuse,
+        negative_half_width_tolerance_rad: HALF_WIDTH_NOISE_RAD,
+        deviation_limit_rad: FEM_DEVIATION_RAD,
+    };
+    make(drive, sweep.kind, &core_plan, &sweep.samples, source, mesh, sweep.worst_residual)
+}
+
+/// The table of samples from elsewhere: every torque and temperature that occurs is a node, the ripple has as many nodes as
+/// every node has positions, and harmonics are fitted where the samples cover enough turns to tell them apart.
+pub fn from_samples(
+    drive: &Drive,
+    kind: GeneratorKind,
+    samples: &[Sample],
+    name: &str,
+    bytes: &[u8],
+    options: SampleOptions,
+) -> Result<MadeTable, TableError> {
+    let torques = distinct(samples.iter().map(|s| s.torque_n_m));
+    let temperatures = distinct(samples.iter().map(|s| s.temperature_c));
+    let snapped: Vec<Sample> = samples
+        .iter()
+        .map(|s| Sample {
+            torque_n_m: f64::from(nearest(&torques, s.torque_n_m)),
+            temperature_c: f64::from(nearest(&temperatures, s.temperature_c)),
+            ..*s
+        })
+        .collect();
+    let (least, most) = snapped
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), s| (a.min(s.generator_rad), b.max(s.generator_rad)));
+    let long = (most - least) / std::f64::consts::TAU >= TURNS_FOR_HARMONICS;
+    let harmonics = |orders: &'static [u16]| {
+        if long {
+            let highest = usize::from(orders.iter().copied().max().unwrap_or(1));
+            Harmonics { orders, nodes: flexspline::precompute::NODES_PER_PERIOD * highest }
+        } else {
+            Harmonics::default()
+        }
+    };
+    let plan = Plan {
+        drive: core_drive(drive)?,
+        torque_nodes_n_m: &torques,
+        temperature_nodes_c: &temperatures,
+        ripple_nodes: ripple_nodes(drive, &snapped),
+        generator: harmonics(&GENERATOR_ORDERS),
+        material: harmonics(&MATERIAL_ORDERS),
+        output: harmonics(&OUTPUT_ORDERS),
+        missing_direction: options
+            .half_width_rad
+            .map_or(MissingDirection::Refuse, |rad| MissingDirection::HalfWidth { rad }),
+        negative_half_width_tolerance_rad: options.deviation_limit_rad,
+        deviation_limit_rad: options.deviation_limit_rad,
+    };
+    let source = Source::File { name: name.to_owned(), blake3: blake3::hash(bytes).to_hex().to_string() };
+    make(drive, kind, &plan, &snapped, source, "samples", 0.0)
+}
+
+fn make(
+    drive: &Drive,
+    kind: GeneratorKind,
+    plan: &Plan<'_>,
+    samples: &[Sample],
+    source: Source,
+    mesh: &str,
+    residual: f64,
+) -> Result<MadeTable, TableError> {
+    let mut numbers = vec![0.0; plan.numbers_len()];
+    let mut marks = vec![0; plan.marks_len()];
+    let mut values = vec![0.0; plan.values_len()];
+    let mut image = vec![0; plan.image_bytes()];
+    let workspace = Workspace { numbers: &mut numbers, marks: &mut marks, values: &mut values };
+    let span = |nodes: &[f32]| [nodes[0], nodes[nodes.len() - 1]];
+    let largest =
+        samples.iter().map(|s| (s.output_rad - s.generator_rad / plan.drive.exact_ratio()).abs()).fold(0.0, f64::max);
+    let provenance = Provenance {
+        generator_kind: core_kind(kind),
+        drive_hash: drive.hash(),
+        tool_version: concat!("flexspline ", env!("CARGO_PKG_VERSION")),
+        mesh_level: mesh,
+        solver_residual: residual as f32,
+        torque_range_n_m: span(plan.torque_nodes_n_m),
+        temperature_range_c: span(plan.temperature_nodes_c),
+        error_limit_rad: (1.5 * largest + 1e-4).min(f64::from(flexspline::MAX_ERROR_RAD)) as f32,
+    };
+    let id = |contents: &[u8]| {
+        let mut id = [0; 8];
+        id.copy_from_slice(&blake3::hash(contents).as_bytes()[..8]);
+        id
+    };
+    let fit = make_image(plan, &provenance, samples, workspace, &mut image, id).map_err(TableError::Project)?;
+    image.truncate(fit.image_bytes);
+    let table = Table::check(&image).map_err(|e| TableError::Project(e.into()))?;
+    let at = |torque: f32| {
+        let temperature = plan.temperature_nodes_c[plan.temperature_nodes_c.len() / 2];
+        let error = |direction| {
+            f64::from(
+                table
+                    .steady_error_rad(flexspline::GeneratorAngle::ZERO, torque, temperature, direction)
+                    .unwrap_or(f32::NAN),
+            ) * ARCSEC_PER_RAD
+        };
+        [error(flexspline::Direction::Forward), error(flexspline::Direction::Backward)]
+    };
+    let [first, last] = span(plan.torque_nodes_n_m);
+    let backlash = plan.torque_nodes_n_m.iter().map(|t| at(*t)).map(|[f, b]| b - f).fold(0.0, f64::max);
+    let info = TableInfo {
+        schema_version: 1,
+        status: "made",
+        table_id: table.id().to_string(),
+        generator: kind.to_string(),
+        drive: drive.name.clone(),
+        drive_blake3: blake3::Hash::from(drive.hash()).to_hex().to_string(),
+        tool: provenance.tool_version.to_owned(),
+        source,
+        image_bytes: fit.image_bytes,
+        torque_nodes_n_m: plan.torque_nodes_n_m.to_vec(),
+        temperature_nodes_c: plan.temperature_nodes_c.to_vec(),
+        ripple_nodes: plan.ripple_nodes,
+        samples: fit.used,
+        projection_worst_arcsec: fit.worst_rad * ARCSEC_PER_RAD,
+        projection_rms_arcsec: fit.rms_rad * ARCSEC_PER_RAD,
+        slope_bound: table.bounds().slope,
+        inverse_iterations: table.inverse_iterations(),
+        inverse_error_arcsec: f64::from(table.inverse_error_bound_rad()) * ARCSEC_PER_RAD,
+        backlash_arcsec: backlash,
+        wind_up_arcsec: [first, last].map(|t| 0.5 * at(t).iter().sum::<f64>()),
+        command: String::new(),
+    };
+    Ok(MadeTable { kind, info, image })
+}
+
+/// The drive as the core knows it.
+pub fn core_drive(drive: &Drive) -> Result<flexspline::Drive, TableError> {
+    let (fs, cs) = (drive.flexspline.teeth, drive.circular_spline.teeth);
+    let refuse =
+        |reason: String| TableError::Teeth { drive: drive.name.clone(), flexspline: fs, circular_spline: cs, reason };
+    let narrow = |teeth: u32| u16::try_from(teeth).map_err(|_| refuse(format!("{teeth} teeth; at most {}", u16::MAX)));
+    flexspline::Drive::new(narrow(fs)?, narrow(cs)?, FixedMember::Flexspline).map_err(|e| refuse(e.to_string()))
+}
+
+/// The generator as the core knows it.
+pub fn core_kind(kind: GeneratorKind) -> flexspline::GeneratorKind {
+    match kind {
+        GeneratorKind::TwoRoller => flexspline::GeneratorKind::TwoRoller,
+        GeneratorKind::FourRoller => flexspline::GeneratorKind::FourRoller,
+        GeneratorKind::DoubleDisc => flexspline::GeneratorKind::DoubleDisc,
+        GeneratorKind::Cam => flexspline::GeneratorKind::Cam,
+    }
+}
+
+/// Distinct values, ascending, as table nodes.
+fn distinct(values: impl Iterator<Item = f64>) -> Vec<f32> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    let scale = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let mut nodes: Vec<f32> = Vec::new();
+    for value in values {
+        if nodes.last().is_none_or(|last| value - f64::from(*last) > SAME_TORQUE * scale) {
+            nodes.push(value as f32);
+        }
+    }
+    nodes
+}
+
+fn nearest(nodes: &[f32], value: f64) -> f32 {
+    let distance = |node: f32| (f64::from(node) - value).abs();
+    nodes.iter().copied().min_by(|a, b| distance(*a).total_cmp(&distance(*b))).unwrap_or(value as f32)
+}
+
+/// As many nodes over the pitch as the poorest node and direction has different positions; none below four.
+fn ripple_nodes(drive: &Drive, samples: &[Sample]) -> usize {
+    let teeth = f64::from(drive.flexspline.teeth);
+    let mut positions = std::collections::BTreeMap::<(u64, u64, bool), Vec<f64>>::new();
+    for s in samples {
+        let key = (s.torque_n_m.to_bits(), s.temperature_c.to_bits(), s.direction == flexspline::Direction::Forward);
+        positions.entry(key).or_default().push((s.generator_rad * teeth / std::f64::consts::TAU).rem_euclid(1.0));
+    }
+    let poorest = positions
+        .into_values()
+        .map(|mut phases| {
+            phases.sort_by(f64::total_cmp);
+            phases.dedup_by(|a, b| *a - *b < 1e-3);
+            // A first and a last that meet across the wrap are one.
+            let wrapped = phases.len() > 1 && phases[0] + 1.0 - phases[phases.len() - 1] < 1e-3;
+            phases.len() - usize::from(wrapped)
+        })
+        .min()
+        .unwrap_or(0);
+    match poorest {
+        0..4 => 0,
+        4.. => poorest.min(16),
+    }
+}
+
+/// The image as a Rust source file: a constant to link.
+pub fn rust_source(table: &MadeTable) -> String {
+    let name = constant_name(table.kind);
+    let mut text = header_comment(table, "//!");
+    let _ =
+        writeln!(text, "\n/// Identity of the table.\npub const {name}_TABLE_ID: &str = \"{}\";", table.info.table_id);
+    let _ = writeln!(text, "/// The `.fxt` image, for `flexspline::Table::check`.");
+    let _ = writeln!(text, "pub static {name}_TABLE: [u8; {}] = [", table.image.len());
+    put_bytes(&mut text, &table.image);
+    text.push_str("];\n");
+    text
+}
+
+/// The image as a C header.
+pub fn c_header(table: &MadeTable) -> String {
+    let name = constant_name(table.kind);
+    let lower = name.to_lowercase();
+    let mut text = header_comment(table, "//");
+    let _ = writeln!(
+        text,
+        "\n#ifndef FLEXSPLINE_{name}_TABLE_H\n#define FLEXSPLINE_{name}_TABLE_H\n\n#include <stdint.h>\n"
+    );
+    let _ = writeln!(text, "#define FLEXSPLINE_{name}_TABLE_ID \"{}\"", table.info.table_id);
+    let _ = writeln!(text, "#define FLEXSPLINE_{name}_TABLE_BYTES {}u\n", table.image.len());
+    let _ = writeln!(text, "static const uint8_t flexspline_{lower}_table[FLEXSPLINE_{name}_TABLE_BYTES] = {{");
+    put_bytes(&mut text, &table.image);
+    text.push_str("};\n\n#endif\n");
+    text
+}
+
+fn constant_name(kind: GeneratorKind) -> String {
+    kind.to_string().replace('-', "_").to_uppercase()
+}
+
+fn header_comment(table: &MadeTable, mark: &str) -> String {
+    let info = &table.info;
+    let mut text = String::new();
+    let mut line = |words: String| {
+        let _ = writeln!(text, "{mark} {words}");
+    };
+    line(format!("Compensation table {} of drive {}, {} generator.", info.table_id, info.drive, info.generator));
+    line(format!("Made by {}; drive BLAKE3 {}.", info.tool, info.drive_blake3));
+    line(format!(
+        "Holds for {} to {} N.m, {} to {} degrees C; worst deviation from its samples {:.4} arcsec.",
+        info.torque_nodes_n_m[0],
+        info.torque_nodes_n_m[info.torque_nodes_n_m.len() - 1],
+        info.temperature_nodes_c[0],
+        info.temperature_nodes_c[info.temperature_nodes_c.len() - 1],
+        info.projection_worst_arcsec
+    ));
+    text
+}
+
+fn put_bytes(text: &mut String, bytes: &[u8]) {
+    for row in bytes.chunks(16) {
+        text.push_str("   ");
+        for byte in row {
+            let _ = write!(text, " 0x{byte:02x},");
+        }
+        text.push('\n');
+    }
+}

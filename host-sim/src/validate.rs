@@ -1,0 +1,341 @@
+//! Tables against fresh FEM at points that made none of them, through the core code that firmware links.
+//!
+//! Torques, temperatures, directions and positions are drawn between the nodes; each torque is settled and then followed over
+//! a few positions. A run at zero torque is also reversed, so that the play operator is seen crossing the backlash.
+
+use std::ops::ControlFlow;
+
+use flexspline::{Direction, GeneratorAngle, PlayState, Quality, Table};
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::drive::{Drive, GeneratorKind};
+use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
+use crate::tables::{ARCSEC_PER_RAD, core_kind};
+
+/// What a table may miss fresh FEM by, arcsec: root mean square and largest.
+pub const RMS_BOUND_ARCSEC: f64 = 0.5;
+/// Largest difference, arcsec.
+pub const MAX_BOUND_ARCSEC: f64 = 2.0;
+
+/// How to validate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ValidationSettings {
+    /// Torques drawn.
+    pub torques: usize,
+    /// Temperatures drawn; the torques are shared among them.
+    pub temperatures: usize,
+    /// Positions at each torque.
+    pub positions: usize,
+    /// Seed of the draw.
+    pub seed: u64,
+    /// Numerical method of the fresh FEM.
+    pub solver: SolverSettings,
+}
+
+impl Default for ValidationSettings {
+    fn default() -> Self {
+        ValidationSettings { torques: 12, temperatures: 3, positions: 4, seed: 1, solver: SolverSettings::default() }
+    }
+}
+
+/// One point.
+#[derive(Debug, Clone, Serialize)]
+pub struct Point {
+    /// "steady" or "reversal".
+    pub kind: &'static str,
+    /// Generator angle, rad.
+    pub generator_rad: f64,
+    /// Torque, N m.
+    pub torque_n_m: f64,
+    /// Temperature, °C.
+    pub temperature_c: f64,
+    /// +1 forward, −1 backward.
+    pub direction: i8,
+    /// Output error by FEM, arcsec.
+    pub fem_arcsec: f64,
+    /// Output error by the table, arcsec.
+    pub table_arcsec: f64,
+}
+
+impl Point {
+    fn difference(&self) -> f64 {
+        self.table_arcsec - self.fem_arcsec
+    }
+}
+
+/// How a table did.
+#[derive(Debug, Clone, Serialize)]
+pub struct Validation {
+    /// Generator.
+    pub generator: String,
+    /// Table.
+    pub table_id: String,
+    /// "passed" or "bound missed".
+    pub status: &'static str,
+    /// Root mean square difference at all points, arcsec.
+    pub rms_arcsec: f64,
+    /// Largest difference, arcsec.
+    pub max_arcsec: f64,
+    /// The same in the reversal alone.
+    pub reversal_rms_arcsec: f64,
+    /// Largest difference in the reversal, arcsec.
+    pub reversal_max_arcsec: f64,
+    /// Root mean square error of the drive itself at these points: what is left without any table, arcsec.
+    pub uncompensated_rms_arcsec: f64,
+    /// Increments solved.
+    pub increments: usize,
+    /// The points.
+    pub points: Vec<Point>,
+}
+
+/// Why a table could not be validated.
+#[derive(Debug, Error)]
+pub enum ValidateError {
+    /// The FEM failed.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The table is of another drive.
+    #[error(
+        "the table is of a drive with BLAKE3 {found}, the drive given ({name}) has {given}; name the drive with --drive \
+         and --set"
+    )]
+    OtherDrive {
+        /// Hash in the table, hex.
+        found: String,
+        /// Name of the drive given.
+        name: String,
+        /// Its hash.
+        given: String,
+    },
+    /// The generator is not one that is simulated.
+    #[error("the table names no generator that can be simulated")]
+    UnknownGenerator,
+    /// The core gave no correction where it should.
+    #[error("the table gives no correction at {torque_n_m} N.m and {temperature_c} °C")]
+    Disabled {
+        /// Torque, N m.
+        torque_n_m: f64,
+        /// Temperature, °C.
+        temperature_c: f64,
+    },
+    /// The observer asked to stop.
+    #[error("stopped")]
+    Stopped,
+}
+
+/// The generator that a table is of.
+pub fn generator_of(table: &Table<'_>) -> Option<GeneratorKind> {
+    GeneratorKind::ALL.into_iter().find(|kind| core_kind(*kind) == table.generator_kind())
+}
+
+/// Compares a table with fresh FEM. `observe` is told the increments done and about how many there will be.
+pub fn validate(
+    drive: &Drive,
+    table: &Table<'_>,
+    settings: &ValidationSettings,
+    observe: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<Validation, ValidateError> {
+    let kind = generator_of(table).ok_or(ValidateError::UnknownGenerator)?;
+    if table.drive_hash() != drive.hash() {
+        return Err(ValidateError::OtherDrive {
+            found: blake3::Hash::from(table.drive_hash()).to_hex().to_string(),
+            name: drive.name.clone(),
+            given: blake3::Hash::from(drive.hash()).to_hex().to_string(),
+        });
+    }
+    let mut random = fastrand::Rng::with_seed(settings.seed);
+    let draws = draw(&mut random, drive, table, settings);
+    let total = settings.torques * (settings.positions + 3) + settings.temperatures + REVERSAL_STEPS + 6;
+    let mut fresh = Fresh { drive, table, observe, increments: 0, total, points: Vec::new() };
+    for (k, (temperature_c, torques)) in draws.iter().enumerate() {
+        let problem = Problem::new(drive, kind, *temperature_c, settings.solver)?;
+        let mut solver = Solver::new(&problem);
+        let (unloaded, _) = solver.deform(random.f64())?;
+        if k == 0 {
+            fresh.reversal(&mut solver, unloaded.clone(), *temperature_c)?;
+        }
+        // Either sign is a chain from light to heavy.
+        for sign in [1.0, -1.0] {
+            let mut state = unloaded.clone();
+            let mut chain: Vec<f64> = torques.iter().copied().filter(|t| t * sign > 0.0).collect();
+            chain.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+            for torque_n_m in chain {
+                state =
+                    fresh.steady(&mut solver, state, torque_n_m, *temperature_c, settings.positions, &mut random)?;
+            }
+        }
+    }
+    Ok(fresh.conclude(kind))
+}
+
+/// Torques to look at, by temperature: half of them spread evenly, half by orders of magnitude, either sign.
+fn draw(
+    random: &mut fastrand::Rng,
+    drive: &Drive,
+    table: &Table<'_>,
+    settings: &ValidationSettings,
+) -> Vec<(f64, Vec<f64>)> {
+    let [lowest, highest] = table.torque_range_n_m().map(f64::from);
+    let [coldest, warmest] = table.temperature_range_c().map(f64::from);
+    let drag = drive.output.drag_torque_n_m;
+    let mut draws: Vec<(f64, Vec<f64>)> =
+        (0..settings.temperatures).map(|_| (coldest + (warmest - coldest) * random.f64(), Vec::new())).collect();
+    for k in 0..settings.torques {
+        let limit = if k % 2 == 0 { highest } else { lowest };
+        let share = if k % 4 < 2 {
+            random.f64()
+        } else {
+            let least = (2.0 * drag / limit.abs()).clamp(1e-6, 1.0);
+            least.powf(random.f64())
+        };
+        let slot = k % settings.temperatures;
+        draws[slot].1.push(limit * share.max(1e-3));
+    }
+    draws
+}
+
+/// Increments of the reversal.
+const REVERSAL_STEPS: usize = 16;
+/// Increments within which the output must follow the generator.
+const MOST_SETTLING: usize = 80;
+
+struct Fresh<'a> {
+    drive: &'a Drive,
+    table: &'a Table<'a>,
+    observe: &'a mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+    increments: usize,
+    total: usize,
+    points: Vec<Point>,
+}
+
+impl Fresh<'_> {
+    fn advance(
+        &mut self,
+        solver: &mut Solver<'_>,
+        state: &State,
+        turn: f64,
+        torque_n_m: f64,
+    ) -> Result<State, ValidateError> {
+        let (next, _) = solver.increment(state, state.generator_rad + turn, torque_n_m)?;
+        self.increments += 1;
+        match (self.observe)(self.increments, self.total.max(self.increments)) {
+            ControlFlow::Continue(()) => Ok(next),
+            ControlFlow::Break(()) => Err(ValidateError::Stopped),
+        }
+    }
+
+    fn pitch(&self) -> f64 {
+        std::f64::consts::TAU / f64::from(self.drive.flexspline.teeth)
+    }
+
+    /// Moves until the output follows.
+    fn settle(
+        &mut self,
+        solver: &mut Solver<'_>,
+        mut state: State,
+        turn: f64,
+        torque_n_m: f64,
+    ) -> Result<State, ValidateError> {
+        let pitches = if self.drive.flanks.friction_coefficient > 0.0 { 2.0 } else { 0.0 };
+        let least = (pitches * self.pitch() / turn.abs()).ceil() as usize;
+        for k in 0..MOST_SETTLING {
+            state = self.advance(solver, &state, turn, torque_n_m)?;
+            if k >= least && state.output_rate > 0.5 / self.drive.ratio() {
+                return Ok(state);
+            }
+        }
+        Ok(state)
+    }
+
+    fn steady(
+        &mut self,
+        solver: &mut Solver<'_>,
+        state: State,
+        torque_n_m: f64,
+        temperature_c: f64,
+        positions: usize,
+        random: &mut fastrand::Rng,
+    ) -> Result<State, ValidateError> {
+        let sign = if random.bool() { 1.0 } else { -1.0 };
+        let state = self.advance(solver, &state, 0.0, torque_n_m)?;
+        let mut state = self.settle(solver, state, sign * self.pitch() / 8.0, torque_n_m)?;
+        for _ in 0..positions {
+            let turn = sign * self.pitch() * (0.1 + 0.2 * random.f64());
+            state = self.advance(solver, &state, turn, torque_n_m)?;
+            let mut play = PlayState::after_motion(if sign > 0.0 { Direction::Forward } else { Direction::Backward });
+            self.compare("steady", &state, temperature_c, sign, &mut play)?;
+        }
+        Ok(state)
+    }
+
+    /// Unloaded, forward, then backward through the backlash and on.
+    fn reversal(&mut self, solver: &mut Solver<'_>, state: State, temperature_c: f64) -> Result<(), ValidateError> {
+        let [lowest, highest] = self.table.torque_range_n_m();
+        if lowest > 0.0 || highest < 0.0 {
+            return Ok(());
+        }
+        let mut state = self.settle(solver, state, self.pitch() / 8.0, 0.0)?;
+        let mut play = PlayState::after_motion(Direction::Forward);
+        self.compare("reversal", &state, temperature_c, 1.0, &mut play)?;
+        let steady = |direction| {
+            self.table
+                .steady_error_rad(GeneratorAngle::ZERO, 0.0, temperature_c as f32, direction)
+                .map_or(0.0, f64::from)
+        };
+        let backlash = steady(Direction::Backward) - steady(Direction::Forward);
+        let turn = -1.6 * backlash * self.drive.ratio() / REVERSAL_STEPS as f64;
+        for _ in 0..REVERSAL_STEPS {
+            state = self.advance(solver, &state, turn, 0.0)?;
+            self.compare("reversal", &state, temperature_c, -1.0, &mut play)?;
+        }
+        Ok(())
+    }
+
+    fn compare(
+        &mut self,
+        kind: &'static str,
+        state: &State,
+        temperature_c: f64,
+        sign: f64,
+        play: &mut PlayState,
+    ) -> Result<(), ValidateError> {
+        let disabled = ValidateError::Disabled { torque_n_m: state.torque_n_m, temperature_c };
+        let Some(generator) = GeneratorAngle::from_rad(state.generator_rad) else { return Err(disabled) };
+        let prediction = self.table.forward(play, generator, state.torque_n_m as f32, temperature_c as f32);
+        if prediction.quality == Quality::Disabled {
+            return Err(disabled);
+        }
+        self.points.push(Point {
+            kind,
+            generator_rad: state.generator_rad,
+            torque_n_m: state.torque_n_m,
+            temperature_c,
+            direction: if sign > 0.0 { 1 } else { -1 },
+            fem_arcsec: (state.output_rad - state.generator_rad / self.drive.ratio()) * ARCSEC_PER_RAD,
+            table_arcsec: f64::from(prediction.transmission_error_rad) * ARCSEC_PER_RAD,
+        });
+        Ok(())
+    }
+
+    fn conclude(self, kind: GeneratorKind) -> Validation {
+        let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt();
+        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let all: Vec<f64> = self.points.iter().map(Point::difference).collect();
+        let reversal: Vec<f64> = self.points.iter().filter(|p| p.kind == "reversal").map(Point::difference).collect();
+        let bare: Vec<f64> = self.points.iter().map(|p| p.fem_arcsec).collect();
+        let passed = rms(&all) <= RMS_BOUND_ARCSEC && largest(&all) <= MAX_BOUND_ARCSEC;
+        Validation {
+            generator: kind.to_string(),
+            table_id: self.table.id().to_string(),
+            status: if passed { "passed" } else { "bound missed" },
+            rms_arcsec: rms(&all),
+            max_arcsec: largest(&all),
+            reversal_rms_arcsec: rms(&reversal),
+            reversal_max_arcsec: largest(&reversal),
+            uncompensated_rms_arcsec: rms(&bare),
+            increments: self.increments,
+            points: self.points,
+        }
+    }
+}

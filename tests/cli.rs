@@ -1,0 +1,355 @@
+//! The command as a user meets it: what it writes, what it says, how it ends.
+//!
+//! Every run here is the real program in a folder of its own. Runs that solve anything use the coarse mesh and few points.
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use flexspline_tests::flexspline;
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Columns of `results.csv` that others rely on, in this order.
+const COLUMNS: &str = "step,generator_rad,output_rad,error_arcsec,torque_n_m,flank_contacts,generator_contacts,\
+                       max_von_mises_mpa,iterations";
+/// Fields of `summary.json` that others rely on.
+const SUMMARY: [&str; 10] = [
+    "generator",
+    "torque_n_m",
+    "backlash_arcsec",
+    "kinematic_error_pp_arcsec",
+    "wind_up_arcsec",
+    "max_von_mises_mpa",
+    "degrees_of_freedom",
+    "increments",
+    "iterations",
+    "wall_s",
+];
+
+/// A folder of its own to run in.
+struct Desk(TempDir);
+
+impl Desk {
+    fn new() -> Desk {
+        Desk(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).unwrap();
+    }
+
+    fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    fn command(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(flexspline());
+        command.args(args).current_dir(self.0.path()).stdin(Stdio::null());
+        command
+    }
+
+    fn run(&self, args: &[&str]) -> Run {
+        Run::of(self.command(args).output().unwrap())
+    }
+
+    /// Runs a line of words.
+    fn line(&self, line: &str) -> Run {
+        self.run(&line.split_whitespace().collect::<Vec<_>>())
+    }
+}
+
+/// Everything in a folder, hidden files too, in order.
+fn names(folder: &Path) -> Vec<String> {
+    let Ok(entries) = fs::read_dir(folder) else {
+        return Vec::new();
+    };
+    let mut names: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+struct Run {
+    code: i32,
+    stdout: String,
+    stderr: String,
+}
+
+impl Run {
+    fn of(output: Output) -> Run {
+        Run {
+            code: output.status.code().expect("the program ended by itself"),
+            stdout: String::from_utf8(output.stdout).unwrap(),
+            stderr: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+
+    #[track_caller]
+    fn done(self) -> Run {
+        assert_eq!(self.code, 0, "{}", self.stderr);
+        self
+    }
+
+    fn json(&self) -> Value {
+        serde_json::from_str(&self.stdout)
+            .unwrap_or_else(|error| panic!("stdout is not one JSON value ({error}): {}", self.stdout))
+    }
+}
+
+const SHORT_PATH: &str = "generator_rad,torque_n_m\n0,0\n0.01,0\n0.02,0\n0.02,5\n";
+
+/// A table of a result file: header, then rows of numbers (`true` is 1).
+fn table(text: &str) -> (String, Vec<Vec<f64>>) {
+    let mut lines = text.lines();
+    let header = lines.next().unwrap().to_owned();
+    let number = |cell: &str| match cell {
+        "true" => 1.0,
+        "false" => 0.0,
+        _ => cell.parse().unwrap(),
+    };
+    (header, lines.map(|line| line.split(',').map(number).collect()).collect())
+}
+
+#[test]
+fn a_run_writes_the_columns_and_fields_that_others_rely_on() {
+    let desk = Desk::new();
+    desk.write("path.csv", SHORT_PATH);
+    let run = desk.line("simulate --generator cam --mesh coarse --path path.csv --json --frames").done();
+    assert_eq!(run.stderr, "");
+    assert_eq!(names(&desk.path("out")), ["frames", "results.csv", "summary.json"]);
+
+    let (header, rows) = table(&desk.read("out/results.csv"));
+    assert!(header.starts_with(&format!("{COLUMNS},")), "{header}");
+    assert_eq!(rows.len(), 4);
+    for (k, row) in rows.iter().enumerate() {
+        assert_eq!(row.len(), header.split(',').count());
+        assert_eq!(row[0], k as f64);
+        // error = output - generator / 95, in arc-seconds
+        let error = (row[2] - row[1] / 95.0).to_degrees() * 3600.0;
+        assert!((row[3] - error).abs() < 1e-6, "{row:?}");
+    }
+    assert_eq!(rows.iter().map(|row| row[1]).collect::<Vec<_>>(), [0.0, 0.01, 0.02, 0.02]);
+    assert_eq!(rows.iter().map(|row| row[4]).collect::<Vec<_>>(), [0.0, 0.0, 0.0, 5.0]);
+    // At no load the output lags by half the clearance, under a forward load it leads.
+    assert!(rows[2][3] < -20.0 && rows[3][3] > 20.0, "{rows:?}");
+    let pressure = header.split(',').position(|name| name == "peak_flank_pressure_mpa").unwrap();
+    assert!(rows[3][5] >= 2.0 && rows[3][pressure] > 2.0 * rows[2][pressure], "{rows:?}");
+
+    let summary: Value = serde_json::from_str(&desk.read("out/summary.json")).unwrap();
+    assert_eq!(run.json(), summary, "--json prints what it writes");
+    for field in SUMMARY {
+        assert!(summary.get(field).is_some(), "no {field}");
+    }
+    assert_eq!(summary["schema_version"], 1);
+    assert_eq!(summary["generator"], "cam");
+    assert_eq!(summary["torque_n_m"], Value::Null, "the load changes along this path");
+    assert!(summary["degrees_of_freedom"].as_u64().unwrap() > 50_000);
+    let worst = rows.iter().map(|row| row[7]).fold(0.0, f64::max);
+    assert_eq!(summary["max_von_mises_mpa"].as_f64().unwrap(), worst);
+    let iterations: f64 = rows.iter().map(|row| row[8]).sum();
+    assert_eq!(summary["iterations"].as_f64().unwrap(), iterations);
+    assert_eq!(summary["drive_hash"].as_str().unwrap().len(), 64);
+    assert!(summary["command"].as_str().unwrap().starts_with("flexspline simulate --generator cam"));
+
+    let frames = names(&desk.path("out/frames"));
+    assert_eq!(frames.len(), 5);
+    let series = desk.read("out/frames/frames.pvd");
+    for name in frames.iter().filter(|name| name.ends_with(".vtu")) {
+        assert!(series.contains(name.as_str()));
+        assert!(desk.read(&format!("out/frames/{name}")).trim_end().ends_with("</VTKFile>"));
+    }
+}
+
+#[test]
+fn a_result_file_is_a_path_that_gives_the_same_result() {
+    let desk = Desk::new();
+    desk.write("path.csv", SHORT_PATH);
+    desk.line("simulate --generator double-disc --mesh coarse --path path.csv --out first -q").done();
+    let again = "simulate --generator double-disc --mesh coarse --path first/results.csv --out second -q";
+    desk.line(again).done();
+    let errors = |name: &str| -> Vec<f64> { table(&desk.read(name)).1.iter().map(|row| row[3]).collect() };
+    assert_eq!(errors("first/results.csv"), errors("second/results.csv"));
+}
+
+#[test]
+fn quiet_is_silent_and_verbose_speaks_on_stderr() {
+    let desk = Desk::new();
+    desk.write("path.csv", "generator_rad\n0\n");
+    let base = "simulate --generator cam --mesh coarse --path path.csv";
+    let quiet = desk.line(&format!("{base} -q")).done();
+    assert_eq!((quiet.stdout.as_str(), quiet.stderr.as_str()), ("", ""));
+    let plain = desk.line(base).done();
+    assert!(plain.stdout.contains("largest von Mises stress") && plain.stderr.is_empty());
+    let verbose = desk.line(&format!("{base} -v --json")).done();
+    assert!(verbose.stderr.contains("deforming"), "{}", verbose.stderr);
+    assert!(verbose.json().is_object());
+}
+
+#[test]
+fn bad_input_is_refused_with_its_place_and_leaves_nothing() {
+    let desk = Desk::new();
+    desk.write("angle.csv", "angle\n0\n");
+    desk.write("short.csv", "generator_rad,torque_n_m\n0,1\n0.1\n");
+    desk.write("nan.csv", "# from the bench\ngenerator_rad\n0\nNaN\n");
+    desk.write("hot.csv", "generator_rad,temperature_c\n0,20\n0,500\n");
+    desk.write("loaded.csv", "generator_rad,torque_n_m\n0,1\n");
+    desk.write("empty.csv", "");
+    desk.write("wrong.toml", "base = \"HHD-95\"\n[flexspline]\nteeth = 187\n");
+    desk.write("broken.toml", "base = \n");
+    desk.write("file", "");
+    fs::write(desk.path("binary.csv"), [0xff, 0xfe, 0x00]).unwrap();
+    let cases: &[(&str, &str)] = &[
+        ("", "Usage"),
+        ("solve", "unrecognized subcommand 'solve'"),
+        ("simulate", "--generator"),
+        ("simulate --generator cog", "allowed: two-roller, four-roller, double-disc, cam"),
+        ("simulate --generator cam --mesh huge", "allowed are coarse, standard, fine"),
+        ("simulate --generator cam --speed 3", "unexpected argument '--speed'"),
+        ("simulate --generator cam --solver magic", "reference"),
+        ("simulate --generator cam --path absent.csv", "--path: found \"absent.csv\""),
+        ("simulate --generator cam --path angle.csv", "angle.csv:1: found columns \"angle\", required: generator_rad"),
+        ("simulate --generator cam --path short.csv", "short.csv:3: found 1 fields, allowed: 2"),
+        ("simulate --generator cam --path nan.csv", "nan.csv:4: generator_rad: found \"NaN\""),
+        (
+            "simulate --generator cam --path hot.csv",
+            "hot.csv:3: temperature_c: found \"500\", allowed: a number from -60 to 80",
+        ),
+        ("simulate --generator cam --path empty.csv", "required: generator_rad"),
+        ("simulate --generator cam --path binary.csv", "binary.csv"),
+        ("simulate --generator cam --path loaded.csv --torque-n-m 3", "give one of the two"),
+        ("simulate --generator cam --path loaded.csv --increment 0.01", "increment: found 0.01"),
+        ("simulate --generator cam --path paper --direction backward", "--direction"),
+        ("simulate --generator cam --path pitch --direction up", "forward, backward"),
+        ("simulate --generator cam --torque-n-m much", "'much'"),
+        ("simulate --generator cam --torque-n-m NaN", "torque: found NaN, allowed: -100000 to 100000"),
+        ("simulate --generator cam --torque-n-m=-inf", "torque: found -inf"),
+        ("simulate --generator cam --temperature-c 500", "temperature: found 500, allowed: -60 to 80"),
+        ("simulate --generator cam --increment 0", "increment: found 0, allowed: 0.00001 to 0.5"),
+        ("simulate --generator cam --increment -0.1", "increment: found -0.1"),
+        ("simulate --generator cam --flank-penalty -1", "flank penalty: found -1"),
+        ("simulate --generator cam --max-iterations 0", "iterations: found 0"),
+        ("simulate --generator cam --set flexspline.teth=188", "did you mean \"teeth\"?"),
+        ("simulate --generator cam --set flexspline.teeth", "expected PATH=VALUE"),
+        ("simulate --generator cam --set flexspline.width_mm=nan", "flexspline.width_mm: found"),
+        ("simulate --generator cam --set flexspline.teeth=190", "circular_spline.teeth: found 190, allowed: 192"),
+        ("simulate --generator cam --drive absent.toml", "--drive: found \"absent.toml\""),
+        (
+            "simulate --generator cam --drive wrong.toml",
+            "wrong.toml:3: flexspline.teeth: found 187, allowed: an even number",
+        ),
+        ("simulate --generator cam --drive broken.toml", "broken.toml:1: not TOML"),
+        ("simulate --generator cam --out file/out", "--out: cannot write file/out"),
+        ("simulate --generator cam --threads 0", "--threads"),
+        ("simulate --generator cam -q -v", "cannot be used with"),
+        ("drive --drive HHD-96", "HHD-95, HHD-95-typical"),
+        ("export --generator cam", "--format"),
+        ("export --generator cam --format stl", "vtu, csv"),
+        ("export --generator cam --format csv --generator-rad 1", "--generator-rad: outlines are undeformed"),
+        ("export --generator cam --format vtu --generator-rad inf", "generator angle: found inf"),
+    ];
+    let before = names(desk.0.path());
+    for (line, expected) in cases {
+        let run = desk.line(line);
+        assert_eq!(run.code, 2, "{line}: {}{}", run.stdout, run.stderr);
+        assert!(run.stderr.contains(expected), "{line}: {}", run.stderr);
+        assert_eq!(run.stdout, "", "{line}");
+        assert!(names(&desk.path("out")).is_empty(), "{line} left {:?}", names(&desk.path("out")));
+    }
+    assert_eq!(names(desk.0.path()), before);
+}
+
+#[test]
+fn a_run_that_does_not_converge_ends_with_1_and_touches_no_file() {
+    let desk = Desk::new();
+    desk.write("path.csv", "generator_rad\n0\n");
+    let base = "simulate --generator cam --mesh coarse --path path.csv --frames --json";
+    desk.line(base).done();
+    let before = (desk.read("out/results.csv"), desk.read("out/summary.json"), names(&desk.path("out/frames")));
+    let run = desk.line(&format!("{base} --max-iterations 2"));
+    assert_eq!(run.code, 1, "{}", run.stderr);
+    assert_eq!(run.stdout, "");
+    assert!(run.stderr.starts_with("error: no equilibrium found at generator angle 0.000000 rad"), "{}", run.stderr);
+    assert!(run.stderr.contains("residual by iteration"), "{}", run.stderr);
+    let after = (desk.read("out/results.csv"), desk.read("out/summary.json"), names(&desk.path("out/frames")));
+    assert_eq!(before, after);
+    assert_eq!(names(&desk.path("out")), ["frames", "results.csv", "summary.json"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_stops_between_increments_and_leaves_nothing() {
+    let desk = Desk::new();
+    let args = ["simulate", "--generator", "cam", "--mesh", "coarse", "--path", "paper", "--frames", "-v"];
+    let mut child = desk.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut stderr = BufReader::new(child.stderr.take().unwrap());
+    let mut said = String::new();
+    while !said.contains("turning") {
+        assert_ne!(stderr.read_line(&mut said).unwrap(), 0, "{said}");
+    }
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    for line in stderr.lines() {
+        said += &line.unwrap();
+    }
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("error: stopped after") && said.contains("nothing was written"), "{said}");
+    assert!(output.stdout.is_empty());
+    assert_eq!(names(&desk.path("out")), Vec::<String>::new());
+}
+
+#[test]
+fn the_drive_that_is_printed_reads_back_as_itself() {
+    let desk = Desk::new();
+    let typical = desk.line("drive --drive HHD-95-typical --set generator.w0_mm=0.49").done().stdout;
+    assert!(typical.contains("w0_mm = 0.49") && typical.contains("# "));
+    desk.write("mine.toml", &typical);
+    assert_eq!(desk.line("drive --drive mine.toml").done().stdout, typical);
+    let hash = |line: &str| desk.line(line).done().json()["drive_hash"].as_str().unwrap().to_owned();
+    assert_ne!(hash("drive --json"), hash("drive --drive mine.toml --json"));
+    assert_eq!(hash("drive --json"), hash("drive --drive HHD-95 --json"));
+}
+
+#[test]
+fn a_drive_whose_teeth_interfere_ends_with_1_and_says_where() {
+    let desk = Desk::new();
+    let sound = desk.line("drive --check --json").done().json();
+    let generators: Vec<&str> =
+        sound["mesh"].as_array().unwrap().iter().map(|m| m["generator"].as_str().unwrap()).collect();
+    assert_eq!(generators, ["two-roller", "four-roller", "double-disc", "cam"]);
+    let shallow = desk.line("drive --check --set generator.w0_mm=0.45");
+    assert_eq!(shallow.code, 1);
+    assert!(shallow.stdout.contains("interferes by"), "{}", shallow.stdout);
+    assert!(shallow.stderr.contains("teeth interfere with"), "{}", shallow.stderr);
+}
+
+#[test]
+fn export_writes_what_it_says() {
+    let desk = Desk::new();
+    let outlines = desk.line("export --format csv --generator two-roller --json").done().json();
+    assert_eq!(outlines["written"][0], "out/two-roller-outlines.csv");
+    let text = desk.read("out/two-roller-outlines.csv");
+    assert!(text.starts_with("part,piece,x_mm,y_mm\nflexspline_tooth,root land,"), "{text:.80}");
+    for part in ["circular_spline_space", "generator"] {
+        assert!(text.contains(part));
+    }
+    let mesh = "export --format vtu --generator cam --mesh coarse --generator-rad 0.3 --torque-n-m -5";
+    desk.line(mesh).done();
+    assert!(desk.read("out/cam.vtu").trim_end().ends_with("</VTKFile>"));
+    assert_eq!(names(&desk.path("out")), ["cam.vtu", "two-roller-outlines.csv"]);
+}
+
+#[test]
+fn help_and_version_are_no_errors() {
+    let desk = Desk::new();
+    for line in ["--help", "help", "simulate --help", "drive --help", "export --help", "--version"] {
+        let run = desk.line(line).done();
+        assert!(!run.stdout.is_empty() && run.stderr.is_empty(), "{line}");
+    }
+    assert!(desk.line("--version").stdout.starts_with("flexspline "));
+}
