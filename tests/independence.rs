@@ -6,8 +6,8 @@
 //!   e with more increments     - e  |
 //! ```
 //!
-//! Loads: none but the drag, 0.7 and 1.3 pitches after the start, and 50 N.m; all generators. The bound is 0.1", under loaded
-//! rollers 0.3".
+//! Loads: none but the drag, 0.7 and 1.3 pitches after the start, and 50 N.m; all generators. The bound is 0.1", for the
+//! loaded two-roller, which winds up by 15', 0.3".
 //! Reference: the same drive with the next finer choice. Physics wrong if this fails: something that sets the answer is
 //! not in drive.toml.
 
@@ -18,7 +18,7 @@ use flexspline_tests::{Run, on, problem};
 
 const TORQUE_N_M: f64 = 50.0;
 const ALLOWED_ARCSEC: f64 = 0.1;
-const ALLOWED_LOADED_ROLLER_ARCSEC: f64 = 0.3;
+const ALLOWED_LOADED_TWO_ROLLER_ARCSEC: f64 = 0.3;
 
 /// Errors (arc-seconds) at two points without load and at one with it.
 fn errors(kind: GeneratorKind, settings: SolverSettings) -> ([f64; 2], f64) {
@@ -38,15 +38,11 @@ fn apart(kind: GeneratorKind, standard: &([f64; 2], f64), finer: &([f64; 2], f64
     [idle, loaded]
 }
 
-fn is_roller(kind: GeneratorKind) -> bool {
-    matches!(kind, GeneratorKind::FourRoller | GeneratorKind::TwoRoller)
-}
-
 fn independent(kind: GeneratorKind) {
     let settings = on(MeshLevel::Standard);
     let standard = errors(kind, settings);
     let bore_penalty = settings.bore_penalty(kind);
-    let loaded_bound = if is_roller(kind) { ALLOWED_LOADED_ROLLER_ARCSEC } else { ALLOWED_ARCSEC };
+    let loaded_bound = if kind == GeneratorKind::TwoRoller { ALLOWED_LOADED_TWO_ROLLER_ARCSEC } else { ALLOWED_ARCSEC };
     for (what, other) in [
         ("bore penalty x 10", SolverSettings { bore_penalty: Some(10.0 * bore_penalty), ..settings }),
         ("flank penalty x 2", SolverSettings { flank_penalty: 2.0 * settings.flank_penalty, ..settings }),
