@@ -14,6 +14,7 @@
 
 use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::mesh::MeshLevel;
+use flexspline_sim::stepping::SolverSettings;
 use flexspline_tests::motion::{Run, Sample, mean, mean_error, mean_generator_torque, mean_iterations, on, problem};
 
 const TORQUE_N_M: f64 = 50.0;
@@ -23,10 +24,13 @@ fn loop_of(kind: GeneratorKind, friction: f64, increments: usize) -> [(f64, f64)
     let mut drive = Drive::hhd_95();
     drive.flanks.friction_coefficient = friction;
     drive.output.drag_torque_n_m = 0.0;
-    let problem = problem(&drive, kind, on(MeshLevel::Standard));
+    // With 48 points to an edge, as rollers have by default, the two-roller finds no equilibrium beyond 48.6 N.m when the load
+    // comes on with friction at standstill.
+    let settings = SolverSettings { bore_points: Some(16), ..on(MeshLevel::Standard) };
+    let problem = problem(&drive, kind, settings);
     let mut run = Run::loaded(&problem, TORQUE_N_M);
     let pitch = run.pitch();
-    let mut describe = |way: &str, samples: &[Sample]| {
+    let describe = |way: &str, samples: &[Sample]| {
         let (error, torque) = (mean_error(samples), mean_generator_torque(samples));
         println!(
             "{kind}, friction {friction}, {way}: e {error:.4}\", generator {torque:.5} N.m, {:.1} iterations, at most {}",

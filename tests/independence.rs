@@ -6,9 +6,8 @@
 //!   e with more increments     - e  |
 //! ```
 //!
-//! Loads: none but the drag, 0.7 and 1.3 pitches after the start, and 50 N.m; all generators. The bound is 0.1", under
-//! loaded rollers 0.3". A roller without load touches the bore over 0.04 mm, three of the 16 points of an edge: that shows
-//! as a false ripple of up to 0.2", which is stated by a test of its own and kept out of the others with 64 points.
+//! Loads: none but the drag, 0.7 and 1.3 pitches after the start, and 50 N.m; all generators. The bound is 0.1", for the
+//! loaded two-roller, which winds up by 15', 0.3".
 //! Reference: the same drive with the next finer choice. Physics wrong if this fails: something that sets the answer is
 //! not in drive.toml.
 
@@ -19,9 +18,7 @@ use flexspline_tests::motion::{Run, on, problem};
 
 const TORQUE_N_M: f64 = 50.0;
 const ALLOWED_ARCSEC: f64 = 0.1;
-/// For the coarse integration under an unloaded roller.
-const ALLOWED_POINTS_ARCSEC: f64 = 0.25;
-const ALLOWED_LOADED_ROLLER_ARCSEC: f64 = 0.3;
+const ALLOWED_LOADED_TWO_ROLLER_ARCSEC: f64 = 0.3;
 
 /// Errors (arc-seconds) at two points without load and at one with it.
 fn errors(kind: GeneratorKind, settings: SolverSettings) -> ([f64; 2], f64) {
@@ -41,31 +38,23 @@ fn apart(kind: GeneratorKind, standard: &([f64; 2], f64), finer: &([f64; 2], f64
     [idle, loaded]
 }
 
-fn is_roller(kind: GeneratorKind) -> bool {
-    matches!(kind, GeneratorKind::FourRoller | GeneratorKind::TwoRoller)
-}
-
 fn independent(kind: GeneratorKind) {
-    let shipped = on(MeshLevel::Standard);
-    let settings = if is_roller(kind) { SolverSettings { bore_points: 64, ..shipped } } else { shipped };
+    let settings = on(MeshLevel::Standard);
     let standard = errors(kind, settings);
     let bore_penalty = settings.bore_penalty(kind);
-    let loaded_bound = if is_roller(kind) { ALLOWED_LOADED_ROLLER_ARCSEC } else { ALLOWED_ARCSEC };
+    let loaded_bound = if kind == GeneratorKind::TwoRoller { ALLOWED_LOADED_TWO_ROLLER_ARCSEC } else { ALLOWED_ARCSEC };
     for (what, other) in [
         ("bore penalty x 10", SolverSettings { bore_penalty: Some(10.0 * bore_penalty), ..settings }),
         ("flank penalty x 2", SolverSettings { flank_penalty: 2.0 * settings.flank_penalty, ..settings }),
         ("flank penalty x 10", SolverSettings { flank_penalty: 10.0 * settings.flank_penalty, ..settings }),
         ("tolerance / 5", SolverSettings { tolerance: 0.2 * settings.tolerance, ..settings }),
+        ("points on the bore x 4", SolverSettings { bore_points: Some(4 * settings.bore_points(kind)), ..settings }),
         ("fine mesh", SolverSettings { mesh: MeshLevel::Fine, ..settings }),
     ] {
         let [idle, loaded] = apart(kind, &standard, &errors(kind, other), what);
         assert!(idle <= ALLOWED_ARCSEC, "{kind}, {what}: {idle}\" without load");
         assert!(loaded <= loaded_bound, "{kind}, {what}: {loaded}\" at {TORQUE_N_M} N.m");
     }
-    let points = SolverSettings { bore_points: 4 * shipped.bore_points, ..shipped };
-    let [idle, loaded] = apart(kind, &errors(kind, shipped), &errors(kind, points), "points on the bore x 4");
-    let idle_bound = if is_roller(kind) { ALLOWED_POINTS_ARCSEC } else { ALLOWED_ARCSEC };
-    assert!(idle <= idle_bound && loaded <= loaded_bound, "{kind}, points on the bore: {idle}\", {loaded}\"");
 }
 
 #[test]

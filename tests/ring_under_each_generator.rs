@@ -36,7 +36,7 @@ fn with_rim(w0_mm: f64, rim_thickness_mm: f64) -> Drive {
 
 /// Enough points on the bore for the narrow contact of a roller under a light load.
 fn settings() -> SolverSettings {
-    SolverSettings { bore_points: 32, ..on(MeshLevel::Coarse) }
+    SolverSettings { bore_points: Some(32), ..on(MeshLevel::Coarse) }
 }
 
 /// A node of the neutral layer: undeformed angle, and deformed polar radius and angle.
@@ -69,7 +69,7 @@ fn neutral_layer(problem: &Problem, state: &State) -> Vec<Neutral> {
 /// Bore and force of the generator: sum of contact forces in the quadrant of positive x and y (both rollers of the
 /// two-roller stand half in it).
 fn quadrant_force(problem: &Problem, settings: &SolverSettings, state: &State) -> f64 {
-    let bore = BoreContact::new(&problem.flexspline, settings.bore_points);
+    let bore = BoreContact::new(&problem.flexspline, settings.bore_points(problem.kind));
     let law = BoreLaw::new(settings.bore_penalty(problem.kind), None);
     let mut sum = 0.0;
     bore.evaluate(law, &problem.outline, 0.0, &state.u, |edge| {
@@ -102,7 +102,7 @@ fn small_deflection(kind: GeneratorKind) {
     let drive = with_rim(0.005, 0.4);
     // A roller is pressed with a thousandth of a newton here: its contact needs many points, and a softer law, to be wide
     // enough to be integrated.
-    let settings = SolverSettings { bore_points: 64, bore_penalty: Some(1e5), ..settings() };
+    let settings = SolverSettings { bore_points: Some(64), bore_penalty: Some(1e5), ..settings() };
     let (problem, state) = ring(&drive, kind, settings);
     let shape = drive.generator.shape(kind);
     let radius = drive.flexspline.neutral_radius_mm();
