@@ -9,7 +9,7 @@ use flexspline::{Direction, GeneratorAngle, Table};
 use flexspline_tests::command::{Desk, names};
 use serde_json::Value;
 
-const SHORT: &str = "--mesh coarse --temperatures-c 20 --positions 8 --most-nodes 8";
+const SHORT: &str = "--mesh coarse --temperatures-c 20 --positions 8 --most-nodes 14";
 
 fn json(desk: &Desk, name: &str) -> Value {
     serde_json::from_str(&desk.read(name)).unwrap()

@@ -25,11 +25,21 @@ pub struct NodeChoice {
     pub tolerance_rad: f64,
 }
 
+/// The nodes and what was computed to find them.
+#[derive(Debug, Clone)]
+pub struct ChosenNodes {
+    /// Torque nodes, symmetric about zero, ascending, N m.
+    pub torque_nodes_n_m: Vec<f32>,
+    /// Points at these nodes.
+    pub known: Vec<KnownNode>,
+    /// Whether the table meets the tolerance at the middle of every interval; if not, the nodes ran out.
+    pub resolved: bool,
+}
+
 /// Nodes on each side that the choice starts with.
 const FIRST_NODES: usize = 5;
 
-/// Chooses the torque nodes of a generator at the first temperature of the plan, whose other fields stay; gives them with the
-/// points computed on the way.
+/// Chooses the torque nodes of a generator at the first temperature of the plan, whose other fields stay.
 pub fn choose_torque_nodes(
     drive: &Drive,
     kind: GeneratorKind,
@@ -37,7 +47,7 @@ pub fn choose_torque_nodes(
     choice: NodeChoice,
     settings: SolverSettings,
     observe: &mut dyn FnMut(SweepProgress) -> ControlFlow<()>,
-) -> Result<(Vec<f32>, Vec<KnownNode>), SweepError> {
+) -> Result<ChosenNodes, SweepError> {
     let temperature = plan.temperature_nodes_c[0];
     let temperature_c = f64::from(temperature);
     let problem = Problem::new(drive, kind, temperature_c, settings)?;
@@ -81,7 +91,11 @@ pub fn choose_torque_nodes(
     let drag = drive.output.drag_torque_n_m;
     let before_jump = (2.0 * drag - f64::from(nodes[0])) as f32;
     let positive: Vec<f32> = std::iter::once(before_jump).chain(nodes).collect();
-    Ok((positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).collect(), known))
+    Ok(ChosenNodes {
+        torque_nodes_n_m: positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).collect(),
+        known,
+        resolved: open.is_empty(),
+    })
 }
 
 /// Largest difference between a trial table and samples of one torque, rad.

@@ -63,6 +63,8 @@ pub struct TableInfo {
     pub image_bytes: usize,
     /// Torque nodes, N m.
     pub torque_nodes_n_m: Vec<f32>,
+    /// Whether the FEM was met between all torque nodes when they were chosen; null where they were given.
+    pub torque_nodes_resolved: Option<bool>,
     /// Temperature nodes, °C.
     pub temperature_nodes_c: Vec<f32>,
     /// Nodes over one tooth pitch.
@@ -345,6 +347,7 @@ fn make(
         source,
         image_bytes: fit.image_bytes,
         torque_nodes_n_m: plan.torque_nodes_n_m.to_vec(),
+        torque_nodes_resolved: None,
         temperature_nodes_c: plan.temperature_nodes_c.to_vec(),
         ripple_nodes: plan.ripple_nodes,
         samples: fit.used,

@@ -228,16 +228,18 @@ impl Tables {
                     error => Failure::Failed(format!("{kind}: {error}")),
                 };
                 let mut plan = plan.clone();
-                let (nodes, known) =
+                let chosen =
                     choose_torque_nodes(drive, *kind, &plan, *choice, settings, &mut observe).map_err(failed)?;
-                plan.torque_nodes_n_m = nodes;
-                let swept = sweep(drive, *kind, &plan, &known, settings, &mut observe).map_err(failed)?;
+                plan.torque_nodes_n_m = chosen.torque_nodes_n_m;
+                let swept = sweep(drive, *kind, &plan, &chosen.known, settings, &mut observe).map_err(failed)?;
                 if let Ok(mut guard) = progress.lock() {
                     guard.2[k] = mine;
                 }
                 let cpu_s = clock.elapsed().as_secs_f64();
                 let table = from_sweep(drive, &plan, &swept, &self.mesh.to_string(), cpu_s)
                     .map_err(|error: TableError| Failure::Failed(format!("{kind}: {error}")))?;
+                let mut table = table;
+                table.info.torque_nodes_resolved = Some(chosen.resolved);
                 Ok((table, Some(samples::to_csv(&swept.samples))))
             })
             .collect()
@@ -273,6 +275,12 @@ fn text(report: &Report<'_>, out: &std::path::Path) -> String {
             info.wind_up_arcsec[1],
             info.slope_bound,
             info.projection_worst_arcsec,
+        ));
+    }
+    for info in report.tables.iter().filter(|info| info.torque_nodes_resolved == Some(false)) {
+        text.push_str(&format!(
+            "{}: the torque nodes ran out before the table met the FEM everywhere; see --most-nodes, --torque-n-m\n",
+            info.generator
         ));
     }
     text.push_str(&format!(

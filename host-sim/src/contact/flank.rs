@@ -11,10 +11,10 @@
 //! that action equals reaction and the moment on the output is that of the forces themselves.
 
 use crate::element::edge_shape;
-use crate::mesh::{FlankMesh, Side, WheelMesh};
+use crate::mesh::{FlankMesh, WheelMesh};
 
 use super::quadrature::gauss_legendre;
-use crate::drive::{Foot, InvoluteFlank};
+use crate::drive::{Foot, InvoluteFlank, Side};
 
 /// Law of the flanks.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -27,14 +27,35 @@ const PIECE_STEPS: usize = 12;
 /// Generator angles within one tooth pitch at which the backlash is taken.
 const PITCH_STEPS: usize = 24;
 
-/// Which flank of the flexspline tooth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+/// A flank of a flexspline tooth or of a circular-spline space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
     /// The flank on the counter-clockwise side: it limits turning the circular spline backward.
-    Positive,
-    /// The flank on the clockwise side: it limits turning the circular spline forward.
-    Negative,
+    Plus,
+    /// Its mirror image on the clockwise side: it limits turning the circular spline forward.
+    Minus,
+}
+
+impl Side {
+    /// Both sides.
+    pub const BOTH: [Side; 2] = [Side::Plus, Side::Minus];
+
+    /// +1 or −1.
+    pub fn sign(self) -> f64 {
+        match self {
+            Side::Plus => 1.0,
+            Side::Minus => -1.0,
+        }
+    }
+
+    /// 0 or 1.
+    pub fn index(self) -> usize {
+        match self {
+            Side::Plus => 0,
+            Side::Minus => 1,
+        }
+    }
 }
 
 /// The least gap on one flank of one tooth.
@@ -72,8 +93,8 @@ impl FlankGap {
 impl fmt::Display for FlankGap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let side = match self.side {
-            Side::Positive => "positive",
-            Side::Negative => "negative",
+            Side::Plus => "positive",
+            Side::Minus => "negative",
         };
         let state = if self.gap_mm < 0.0 { "interferes by" } else { "clears by" };
         write!(
@@ -140,7 +161,7 @@ impl RigidMesh {
         let (s, c) = space_axis.sin_cos();
         let foot = [x * c + y * s, y * c - x * s];
         let (s, c) = (normal - space_axis).sin_cos();
-        let sign = if side == Side::Positive { 1.0 } else { -1.0 };
+        let sign = if side == Side::Plus { 1.0 } else { -1.0 };
         let (_, space_tip) = self.space.root_and_tip_radius();
 
         let gap_at = |piece: &OutlinePiece, t: f64| -> Option<FlankGap> {
@@ -189,7 +210,7 @@ impl RigidMesh {
         let step = PI / CYCLE_STEPS as f64;
         let mut least: Option<FlankGap> = None;
         let mut interferences = Vec::new();
-        for side in [Side::Positive, Side::Negative] {
+        for side in [Side::Plus, Side::Minus] {
             let cycle: Vec<Option<FlankGap>> =
                 (0..=CYCLE_STEPS).map(|k| self.gap(-FRAC_PI_2 + step * k as f64, side)).collect();
             let value = |k: usize| cycle[k].map_or(f64::INFINITY, |gap| gap.gap_rad);
@@ -224,7 +245,7 @@ impl RigidMesh {
                     .map(|gap| gap.gap_rad)
                     .fold(f64::INFINITY, f64::min)
             };
-            let (backward, forward) = (room(Side::Positive), room(Side::Negative));
+            let (backward, forward) = (room(Side::Plus), room(Side::Minus));
             total += backward + forward;
             low = low.min(forward);
             high = high.max(forward);
@@ -314,7 +335,7 @@ mod tests {
             let found = report(&drive, kind);
             assert_eq!(found.interferences.len(), 2, "{kind}: one on each flank");
             let [positive, negative] = found.interferences[..] else { unreachable!() };
-            assert_eq!((positive.side, negative.side), (Side::Positive, Side::Negative));
+            assert_eq!((positive.side, negative.side), (Side::Plus, Side::Minus));
             let at = positive.material_angle_rad.to_degrees();
             assert!((60.0..64.0).contains(&at), "{kind}: {at}°");
             assert!(positive.gap_mm < -1e-3, "{kind}: {}", positive.gap_mm);
@@ -386,10 +407,10 @@ mod tests {
         let mesh = RigidMesh::new(&Drive::hhd_95(), GeneratorKind::FourRoller).unwrap();
         for k in 0..80 {
             let phi = 0.013 * f64::from(k) - 0.4;
-            let (a, b) = (mesh.gap(phi, Side::Positive).unwrap(), mesh.gap(-phi, Side::Negative).unwrap());
+            let (a, b) = (mesh.gap(phi, Side::Plus).unwrap(), mesh.gap(-phi, Side::Minus).unwrap());
             assert!((a.gap_rad - b.gap_rad).abs() < 1e-13, "{phi}: {} {}", a.gap_rad, b.gap_rad);
         }
-        assert_eq!(mesh.gap(FRAC_PI_2, Side::Positive), None);
+        assert_eq!(mesh.gap(FRAC_PI_2, Side::Plus), None);
     }
 
     /// The gap against the plain distance of two dense polylines, before and after the space is turned to close it.
@@ -397,7 +418,7 @@ mod tests {
     fn turning_the_space_by_the_gap_makes_the_outlines_touch() {
         let mesh = RigidMesh::new(&Drive::hhd_95(), GeneratorKind::DoubleDisc).unwrap();
         for phi in [-0.3, 0.0, 0.08, 0.5, 0.8] {
-            let gap = mesh.gap(phi, Side::Positive).unwrap();
+            let gap = mesh.gap(phi, Side::Plus).unwrap();
             let ([x, y], normal) = mesh.curve.position(phi);
             let (s, c) = normal.sin_cos();
             let dense = |flank: &ToothFlank| -> Vec<[f64; 2]> {

@@ -6,4 +6,4 @@ mod wheel;
 
 pub use density::{MeshDensity, MeshLevel};
 pub use sector::MeshError;
-pub use wheel::{Edge, FlankMesh, Side, WheelKind, WheelMesh};
+pub use wheel::{Edge, FlankMesh, WheelKind, WheelMesh};

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use super::density::{MeshDensity, MeshLevel};
 use super::sector::{EdgeTag, HalfOutline, HalfSector, MeshError, Point};
-use crate::drive::{Drive, InvoluteFlank, ToothFlank};
+use crate::drive::{Drive, InvoluteFlank, Side, ToothFlank};
 use crate::element::{GaussPoint, gauss_points};
 
 /// Which wheel a mesh is of.
@@ -19,36 +19,6 @@ pub enum WheelKind {
     Flexspline,
     /// Internal teeth in a stiff ring; sectors centred on spaces.
     CircularSpline,
-}
-
-/// A flank of a flexspline tooth or of a circular-spline space.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Side {
-    /// The flank on the side of positive angles.
-    Plus,
-    /// Its mirror image.
-    Minus,
-}
-
-impl Side {
-    /// Both sides.
-    pub const BOTH: [Side; 2] = [Side::Plus, Side::Minus];
-
-    /// +1 or −1.
-    pub fn sign(self) -> f64 {
-        match self {
-            Side::Plus => 1.0,
-            Side::Minus => -1.0,
-        }
-    }
-
-    /// 0 or 1.
-    pub fn index(self) -> usize {
-        match self {
-            Side::Plus => 0,
-            Side::Minus => 1,
-        }
-    }
 }
 
 /// Three nodes of an element edge: start, middle, end, by node number within the sector and sector offset (0 or 1).

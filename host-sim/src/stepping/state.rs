@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::contact::FrictionHistory;
-use crate::mesh::Side;
+use crate::drive::Side;
 
 /// Configuration and history after a converged increment.
 #[derive(Debug, Clone)]
