@@ -44,7 +44,9 @@ use crate::drive::{Drive, FixedMember};
 use crate::error::{Field, ImageError};
 use crate::grid::{self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis};
 use crate::model::MAX_INVERSE_ITERATIONS;
-use crate::table::{Bounds, GeneratorKind, PeriodicCurve, RECORD_HEAD_WORDS, Table, TableId, Words, f32_at, ripple_at};
+use crate::table::{
+    Bounds, GeneratorKind, PeriodicCurve, RECORD_HEAD_WORDS, Table, TableId, Words, f32_at, larger, ripple_at,
+};
 use crate::windup::{self, Slopes};
 use core::fmt;
 
@@ -476,14 +478,25 @@ fn check_range(field: Field, [least, most]: [f32; 2], axis: Words<'_>) -> Result
     Ok([least, most])
 }
 
-/// Largest |value| and largest step to the next of a stored curve, `len` values with the wrap among them.
-fn extremes(len: usize, value: impl Fn(usize) -> f32) -> (f32, f32) {
-    let (mut largest, mut steepest) = (0.0f32, 0.0f32);
-    for i in 0..len {
-        largest = largest.max(value(i).abs());
-        steepest = steepest.max((value(i) - value(i.saturating_sub(1))).abs());
-    }
-    (largest, steepest)
+/// Largest absolute value.
+fn largest_of(len: usize, value: impl Fn(usize) -> f32) -> f32 {
+    (0..len).fold(0.0, |largest, i| larger(largest, value(i).abs()))
+}
+
+/// Largest absolute slope, per node spacing, of the cubic B-spline with these stored coefficients.
+///
+/// Between two nodes the slope is the quadratic `(1-t)²/2 a + (1/2 + t - t²) b + t²/2 c` of the three steps between the four
+/// coefficients: largest at an end or where its own slope `(b - a) + t (a - 2b + c)` vanishes.
+fn steepest_of(stored: usize, value: impl Fn(usize) -> f32) -> f32 {
+    let step = |i: usize| value(i.saturating_add(1)) - value(i);
+    (0..stored.saturating_sub(3)).fold(0.0, |steepest, i| {
+        let (a, b, c) = (step(i), step(i.saturating_add(1)), step(i.saturating_add(2)));
+        let at = |t: f32| (0.5 * (1.0 - t) * (1.0 - t) * a + (0.5 + t - t * t) * b + 0.5 * t * t * c).abs();
+        let bend = a - 2.0 * b + c;
+        let turn = (a - b) / bend;
+        let inside = if turn > 0.0 && turn < 1.0 { at(turn) } else { 0.0 };
+        larger(steepest, larger(larger(at(0.0), at(1.0)), inside))
+    })
 }
 
 /// Whether the three repeated words of a stored curve equal the nodes they repeat.
@@ -505,10 +518,10 @@ fn add_curve(bounds: &mut Bounds, field: Field, curve: &PeriodicCurve<'_>, perio
         in_range(field, index, f32_at(curve.words, index), -MAX_ERROR_RAD, MAX_ERROR_RAD)?;
     }
     check_closed(field, curve.axis, curve.words)?;
-    let (largest, steepest) = extremes(len, |i| f32_at(curve.words, i));
+    let (largest, steepest) =
+        (largest_of(len, |i| f32_at(curve.words, i)), steepest_of(len, |i| f32_at(curve.words, i)));
     bounds.error_rad += largest;
     bounds.periodic_rad += largest;
-    // Slope of a cubic B-spline: at most the largest step between coefficients, per node spacing.
     bounds.slope += steepest * curve.axis.len() as f32 * periods.abs() / core::f32::consts::TAU;
     Ok(())
 }
@@ -647,8 +660,10 @@ impl<'a> Table<'a> {
                     found_rad: least,
                 });
             }
-            let (mean_most, mean_step) = extremes(len, mean_ripple);
-            let (half_most, half_step) = extremes(len, half_ripple);
+            let (mean_most, half_most) = (largest_of(len, mean_ripple), largest_of(len, half_ripple));
+            // Steady motion follows centre − half-width forward and centre + half-width backward.
+            let forward = steepest_of(len, |i| mean_ripple(i) - half_ripple(i));
+            let backward = steepest_of(len, |i| mean_ripple(i) + half_ripple(i));
             let (torque, largest) = (f32_at(self.torque, node), mean.abs() + mean_most + half + half_most);
             bounds.error_rad = bounds.error_rad.max(largest);
             let below = before.filter(|_| node > 0 && !self.is_torque_jump(node.saturating_sub(1)));
@@ -658,7 +673,7 @@ impl<'a> Table<'a> {
             }
             before = Some([torque, mean, slope, largest]);
             bounds.periodic_rad = bounds.periodic_rad.max(mean_most + half_most);
-            bounds.slope = bounds.slope.max((mean_step + half_step) * slope_per_step);
+            bounds.slope = bounds.slope.max(larger(forward, backward) * slope_per_step);
         }
         Ok(bounds)
     }
