@@ -54,7 +54,7 @@ pub(super) struct Tables {
     #[arg(long, value_name = "T", conflicts_with = "from_samples", allow_negative_numbers = true)]
     torque_n_m: Option<f64>,
     /// Torque nodes on each side of zero, at most, beside the pair at the drag torque
-    #[arg(long, value_name = "N", default_value_t = 20, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(5..=30))]
+    #[arg(long, value_name = "N", default_value_t = 24, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(5..=30))]
     most_nodes: u8,
     /// Add a torque node where the table misses the FEM by more than this, arcsec
     #[arg(
