@@ -643,7 +643,11 @@ impl<'p> Solver<'p> {
 
     fn flank_law(&self) -> FlankLaw {
         let law = self.problem.flank_law;
-        FlankLaw { stiffness: self.softening * law.stiffness, ..law }
+        FlankLaw {
+            stiffness: self.softening * law.stiffness,
+            stick_stiffness: self.softening * law.stick_stiffness,
+            ..law
+        }
     }
 
     fn assemble_contact(&self, state: &State, layouts: &Layouts, system: &mut System, residual: &mut Residual) {

@@ -59,7 +59,7 @@ impl Default for SolverSettings {
             flank_penalty: 5e7,
             bore_points: None,
             tolerance: 1e-6,
-            max_iterations: 40,
+            max_iterations: 60,
             max_halvings: 8,
         }
     }
