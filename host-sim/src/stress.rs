@@ -142,7 +142,7 @@ mod tests {
     /// `u = b r + d / r` has hoop and radial stress `2 (lambda + mu) b ± 2 mu d / r²`.
     #[test]
     fn nodal_stress_of_lames_ring_is_that_of_the_closed_form() {
-        let mesh = WheelMesh::circular_spline(&Drive::hhd_95(), MeshLevel::Standard).unwrap();
+        let mesh = WheelMesh::circular_spline(&Drive::hhd_95(), MeshLevel::Fine).unwrap();
         let (b, d) = (1e-6, 5e-3);
         let field = field_of(&mesh, |x| {
             let r2 = x[0] * x[0] + x[1] * x[1];
