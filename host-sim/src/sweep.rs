@@ -43,7 +43,7 @@ impl SweepPlan {
         SweepPlan {
             torque_nodes_n_m: symmetric_nodes(drive.output.drag_torque_n_m, rated_torque_n_m(kind), 9),
             temperature_nodes_c: [temperature.minimum_c, temperature.maximum_c].map(|t| t as f32).to_vec(),
-            positions: 12,
+            positions: 8,
             settling_pitches: if drive.flanks.friction_coefficient > 0.0 { 2.0 } else { 0.0 },
         }
     }

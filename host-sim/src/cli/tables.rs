@@ -34,7 +34,7 @@ Examples:
   flexspline tables
   flexspline tables --generator cam --drive my-drive.toml --out tables
   flexspline tables --generator cam --from-samples bench.csv
-  flexspline tables --generator double-disc --positions 8 --node-tolerance-arcsec 0.2
+  flexspline tables --generator double-disc --positions 12 --node-tolerance-arcsec 0.2
 
 Sample files have the columns generator_rad, torque_n_m, temperature_c, direction (1 or -1), output_rad.")]
 pub(super) struct Tables {
@@ -54,7 +54,7 @@ pub(super) struct Tables {
     #[arg(long, value_name = "T", conflicts_with = "from_samples", allow_negative_numbers = true)]
     torque_n_m: Option<f64>,
     /// Torque nodes on each side of zero, at most, beside the pair at the drag torque
-    #[arg(long, value_name = "N", default_value_t = 24, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(5..=30))]
+    #[arg(long, value_name = "N", default_value_t = 28, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(5..=30))]
     most_nodes: u8,
     /// Add a torque node where the table misses the FEM by more than this, arcsec
     #[arg(
@@ -66,7 +66,7 @@ pub(super) struct Tables {
     )]
     node_tolerance_arcsec: f64,
     /// Samples over one tooth pitch
-    #[arg(long, value_name = "N", default_value_t = 12, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(4..=32))]
+    #[arg(long, value_name = "N", default_value_t = 8, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(4..=32))]
     positions: u8,
     /// Temperature nodes, degrees C [default: ends and reference of the operating range]
     #[arg(
