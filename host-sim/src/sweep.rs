@@ -53,12 +53,6 @@ impl SweepPlan {
         self.torque_nodes_n_m.len() * self.temperature_nodes_c.len() * self.positions
     }
 
-    /// Increments in all, settling included: what progress counts.
-    pub fn increments(&self) -> usize {
-        let states = self.torque_nodes_n_m.len() * self.temperature_nodes_c.len();
-        states * (self.positions + self.settling_increments() + 1)
-    }
-
     fn settling_increments(&self) -> usize {
         ((self.settling_pitches * self.positions as f64).ceil() as usize).max(1)
     }

@@ -94,8 +94,6 @@ pub struct PairContribution {
     pub border: Vec<f64>,
     /// Stiffness against the output angle alone.
     pub corner: f64,
-    /// Whether any point touches.
-    pub touching: bool,
     /// Largest pressure, MPa.
     pub peak: f64,
     /// Resultant force on the circular spline in its frame (N/mm) and the moment arm's point of attack (mm).
@@ -401,7 +399,6 @@ impl<'a> FlankContact<'a> {
                 stiffness: vec![0.0; n * n],
                 border: vec![0.0; n],
                 corner: 0.0,
-                touching: true,
                 peak: 0.0,
                 resultant: [0.0; 2],
                 attack: [0.0; 2],

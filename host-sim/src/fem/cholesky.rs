@@ -42,11 +42,6 @@ impl Cholesky {
         Cholesky { symbolic, factor, memory: MemBuffer::new(scratch) }
     }
 
-    /// Non-zeros of the factor, as stored.
-    pub fn factor_entries(&self) -> usize {
-        self.factor.len()
-    }
-
     /// Computes the factor of the matrix with these values.
     pub fn factorise(&mut self, pattern: &Pattern, values: &[f64]) -> Result<(), NotPositiveDefinite> {
         let n = pattern.unknowns();
