@@ -542,7 +542,8 @@ impl<'a> Run<'a> {
     ) -> Result<(Problem, State), SimulateError> {
         let problem = self.problem(to_c)?;
         let guess = resized(&state, &self.drive.at_temperature(from_c).thermal_state, &problem);
-        match Solver::new(&problem).increment(&guess, guess.generator_rad, guess.torque_n_m) {
+        let solved = Solver::new(&problem).increment(&guess, guess.generator_rad, guess.torque_n_m);
+        match solved {
             Ok((state, increment)) => {
                 self.motion = Motion::default();
                 self.pending_iterations += increment.iterations;

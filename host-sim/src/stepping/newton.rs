@@ -1,4 +1,4 @@
-//! The `reference` solver: full sparse Newton on the whole mesh.
+//! Newton's method on the whole drive, the same for both solvers; only the wheels differ (see [`Wheels`]).
 //!
 //! Unknowns are the displacements of both wheels and, as a dense border, the output angle, the moment of the sleeve (a
 //! Lagrange multiplier when the sleeve is rigid) and its lateral force. One increment:
@@ -10,20 +10,23 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
 use crate::contact::{BoreLaw, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair};
-use crate::element::{PACKED, add_tangent_and_force, linear_stiffness};
-use crate::fem::{BlockPosition, Border, BorderedSystem, Cholesky, ElementPositions, Pattern};
+use crate::fem::{Border, BorderedSystem};
 
 use super::error::SolveError;
 use super::predictor::turn_field;
+use super::fast::CondensedWheels;
 use super::problem::Problem;
+use super::reference::SparseWheels;
 use super::state::State;
+use super::wheels::Wheels;
 
 /// Pairs closer than this (mm) get a place in the sparsity pattern.
 const PATTERN_REACH: f64 = 0.04;
 /// Pairs closer than this (mm) are evaluated in every iteration of an increment.
 const CONTACT_REACH: f64 = 0.015;
-/// Stiffness (N/mm per mm) that anchors one bore node while the matrix is factorised; the border takes it out again.
-const ANCHOR: f64 = 1e5;
+/// Stiffness (N/mm per mm) that anchors one node of the flexspline while the matrix is factorised; the border takes it out
+/// again.
+pub(super) const ANCHOR: f64 = 1e5;
 /// Springs (N/mm per mm) that are tried in turn when the tangent is not positive definite.
 const GROUNDED_SPRINGS: [f64; 4] = [1e-3, 1e-1, 1e1, 1e3];
 /// Largest change of a displacement that an undamped Newton step may make, mm.
@@ -95,41 +98,18 @@ pub struct Effort {
 pub struct Solver<'p> {
     problem: &'p Problem,
     flanks: FlankContact<'p>,
+    wheels: Box<dyn Wheels + 'p>,
     /// Number of each circular-spline node among the free nodes of the system.
     cs_index: Vec<Option<u32>>,
-    free_nodes: usize,
-    /// Small-strain stiffness of the circular-spline elements of sector 0.
-    cs_template: Vec<[f64; PACKED]>,
-    system: Option<System>,
+    border: Border,
+    /// The border eliminated with the last factor, once there is one.
+    eliminated: Option<BorderedSystem>,
     /// Factor on the penalties, below 1 only while the drive is first deformed.
     softening: f64,
     /// The last states of steady motion, oldest first.
     passed: VecDeque<State>,
     /// Time spent so far.
     pub effort: Effort,
-}
-
-/// The sparse system for one set of flank pairs.
-struct System {
-    pairs: BTreeMap<FlankPair, PairPositions>,
-    pattern: Pattern,
-    fs_positions: Vec<ElementPositions>,
-    bore_positions: Vec<[Option<BlockPosition>; 3]>,
-    /// Values of the circular spline, which do not change.
-    cs_values: Vec<f64>,
-    factor: Cholesky,
-    /// The border eliminated with the factor, once there is one.
-    eliminated: Option<BorderedSystem>,
-    values: Vec<f64>,
-    border: Border,
-}
-
-/// Where a pair's contribution goes.
-struct PairPositions {
-    /// Free node of each local node.
-    nodes: Vec<u32>,
-    /// Blocks of local node pairs (a, b < a) that the pattern holds.
-    blocks: Vec<(usize, usize, BlockPosition)>,
 }
 
 /// Out-of-balance forces at a configuration.
@@ -185,28 +165,19 @@ impl Residual {
 impl<'p> Solver<'p> {
     /// A solver for a problem.
     pub fn new(problem: &'p Problem) -> Self {
-        let mut next = problem.flexspline.nodes.len() as u32;
-        let cs_index = problem
-            .held
-            .iter()
-            .map(|held| {
-                (!held).then(|| {
-                    next += 1;
-                    next - 1
-                })
-            })
-            .collect();
-        let cs_template = problem.circular_spline.gauss[..problem.circular_spline.elements_per_sector]
-            .iter()
-            .map(|points| linear_stiffness(points, &problem.material))
-            .collect();
+        let cs_index = problem.free_circular_spline_nodes();
+        let wheels: Box<dyn Wheels + 'p> = match &problem.condensed {
+            Some(condensed) => Box::new(CondensedWheels::new(problem, condensed)),
+            None => Box::new(SparseWheels::new(problem, &cs_index)),
+        };
+        let border = fixed_border(problem, wheels.as_ref());
         Solver {
             problem,
             flanks: problem.flanks(),
+            wheels,
             cs_index,
-            free_nodes: next as usize,
-            cs_template,
-            system: None,
+            border,
+            eliminated: None,
             softening: 1.0,
             passed: VecDeque::new(),
             effort: Effort::default(),
@@ -332,9 +303,10 @@ impl<'p> Solver<'p> {
             _ if std::ptr::eq(base, from) => from.output_rate * turn,
             _ => turn * nominal,
         };
+        let (fs, cs) = problem.wheels();
         State {
-            u: turn_field(&problem.flexspline, &base.u, turn),
-            v: turn_field(&problem.circular_spline, &base.v, turn - output_turn),
+            u: turn_field(fs, &base.u, turn),
+            v: turn_field(cs, &base.v, turn - output_turn),
             output_rad: base.output_rad + output_turn,
             generator_rad,
             torque_n_m,
@@ -504,23 +476,21 @@ impl<'p> Solver<'p> {
             }
         }
         self.effort.contact += clock.elapsed();
-        self.prepare_system(at, layouts);
-        let mut system = self.system.take().expect("the system was just prepared");
-        let mut residual = Residual::zero(2 * self.free_nodes);
-        self.assemble_wheels(state, &mut system, &mut residual);
+        self.make_room(at, layouts);
         let clock = Instant::now();
-        self.assemble_contact(state, layouts, &mut system, &mut residual);
-        self.assemble_holding(state, torque_n_m, &mut system, &mut residual);
+        let mut residual = Residual::zero(self.wheels.unknowns());
+        self.wheels.assemble(state, &mut residual.force);
+        self.effort.assembly += clock.elapsed();
+        let clock = Instant::now();
+        self.assemble_contact(state, layouts, &mut residual);
+        self.assemble_holding(state, torque_n_m, &mut residual);
         self.effort.contact += clock.elapsed();
-        self.system = Some(system);
         residual
     }
 
-    /// Makes sure that the sparsity pattern has room for these pairs.
-    fn prepare_system(&mut self, at: Configuration, layouts: &Layouts) {
-        if let Some(system) = &self.system
-            && layouts.keys().all(|pair| system.pairs.contains_key(pair))
-        {
+    /// Makes sure that the tangent has room for these pairs.
+    fn make_room(&mut self, at: Configuration, layouts: &Layouts) {
+        if layouts.keys().all(|pair| self.wheels.has_room(*pair)) {
             return;
         }
         let clock = Instant::now();
@@ -528,113 +498,9 @@ impl<'p> Solver<'p> {
         pairs.extend(layouts.keys());
         pairs.sort_unstable();
         pairs.dedup();
-        self.system = Some(self.analyse(&pairs));
+        self.wheels.make_room(&pairs);
+        self.eliminated = None;
         self.effort.analysis += clock.elapsed();
-    }
-
-    fn analyse(&self, pairs: &[FlankPair]) -> System {
-        let problem = self.problem;
-        let cs_nodes: Vec<[Option<u32>; 8]> =
-            problem.circular_spline.elements.iter().map(|element| element.map(|n| self.cs_index[n as usize])).collect();
-        let cs_groups: Vec<Vec<u32>> = cs_nodes.iter().map(|e| e.iter().flatten().copied().collect()).collect();
-        let pair_nodes: Vec<(Vec<u32>, Vec<u32>)> = pairs
-            .iter()
-            .map(|&pair| {
-                let fs = self.flanks.fs_nodes(pair).map(|n| n as u32).collect();
-                let cs = self.flanks.cs_nodes(pair).map(|n| self.cs_index[n].expect("flank nodes are free")).collect();
-                (fs, cs)
-            })
-            .collect();
-        let groups =
-            problem.flexspline.elements.iter().map(|e| e.as_slice()).chain(cs_groups.iter().map(Vec::as_slice));
-        let across = pair_nodes.iter().map(|(fs, cs)| (fs.as_slice(), cs.as_slice()));
-        let pattern = Pattern::new(self.free_nodes, groups, across);
-        let factor = Cholesky::new(&pattern);
-
-        let mut cs_values = vec![0.0; pattern.stored()];
-        for (nodes, points) in cs_nodes.iter().zip(&problem.circular_spline.gauss) {
-            pattern.element(nodes).scatter(&linear_stiffness(points, &problem.material), &mut cs_values);
-        }
-        let fs_positions = problem.flexspline.elements.iter().map(|e| pattern.element(&e.map(Some))).collect();
-        let bore_positions = problem
-            .bore
-            .edges
-            .iter()
-            .map(|[a, m, b]| [pattern.block(*m, *a), pattern.block(*b, *a), pattern.block(*b, *m)])
-            .collect();
-        let pairs = pairs
-            .iter()
-            .zip(pair_nodes)
-            .map(|(&pair, (fs, cs))| {
-                let nodes: Vec<u32> = fs.into_iter().chain(cs).collect();
-                let blocks = (0..nodes.len())
-                    .flat_map(|a| (0..a).map(move |b| (a, b)))
-                    .filter_map(|(a, b)| Some((a, b, pattern.block(nodes[a], nodes[b])?)))
-                    .collect();
-                (pair, PairPositions { nodes, blocks })
-            })
-            .collect();
-        let unknowns = pattern.unknowns();
-        let width = if problem.lateral_stiffness > 0.0 { BORDERS } else { LATERAL };
-        let mut border = Border::zeros(unknowns, width);
-        border.column_mut(SLEEVE)[..problem.rotation_weights.len()].copy_from_slice(&problem.rotation_weights);
-        border.column_mut(ANCHORED)[self.anchored_unknown()] = 1.0;
-        if width == BORDERS {
-            for (i, w) in problem.mean_weights.iter().enumerate() {
-                border.column_mut(LATERAL)[i] = *w;
-                if i % 2 == 0 {
-                    border.column_mut(LATERAL + 1)[i + 1] = *w;
-                }
-            }
-        }
-        let values = vec![0.0; pattern.stored()];
-        System { pairs, pattern, fs_positions, bore_positions, cs_values, factor, eliminated: None, values, border }
-    }
-
-    /// The tangential unknown of a bore node at angle ~0.
-    fn anchored_unknown(&self) -> usize {
-        2 * self.problem.bore.edges[0][1] as usize + 1
-    }
-
-    fn assemble_wheels(&mut self, state: &State, system: &mut System, residual: &mut Residual) {
-        let clock = Instant::now();
-        let problem = self.problem;
-        system.values.copy_from_slice(&system.cs_values);
-        let fs = &problem.flexspline;
-        for ((element, points), positions) in fs.elements.iter().zip(&fs.gauss).zip(&system.fs_positions) {
-            let mut local = [0.0; 16];
-            for (a, &n) in element.iter().enumerate() {
-                local[2 * a] = state.u[2 * n as usize];
-                local[2 * a + 1] = state.u[2 * n as usize + 1];
-            }
-            let (mut stiffness, mut force) = ([0.0; PACKED], [0.0; 16]);
-            add_tangent_and_force(points, &problem.material, &local, &mut stiffness, &mut force);
-            positions.scatter(&stiffness, &mut system.values);
-            for (a, &n) in element.iter().enumerate() {
-                residual.force[2 * n as usize] -= force[2 * a];
-                residual.force[2 * n as usize + 1] -= force[2 * a + 1];
-            }
-        }
-        let cs = &problem.circular_spline;
-        for (e, element) in cs.elements.iter().enumerate() {
-            let (sin, cos) = cs.sector_angle(e / cs.elements_per_sector).sin_cos();
-            let stiffness = &self.cs_template[e % cs.elements_per_sector];
-            let mut local = [0.0; 16];
-            for (a, &n) in element.iter().enumerate() {
-                let (x, y) = (state.v[2 * n as usize], state.v[2 * n as usize + 1]);
-                local[2 * a] = cos * x + sin * y;
-                local[2 * a + 1] = cos * y - sin * x;
-            }
-            let force = packed_times(stiffness, &local);
-            for (a, &n) in element.iter().enumerate() {
-                if let Some(free) = self.cs_index[n as usize] {
-                    let k = 2 * free as usize;
-                    residual.force[k] -= cos * force[2 * a] - sin * force[2 * a + 1];
-                    residual.force[k + 1] -= sin * force[2 * a] + cos * force[2 * a + 1];
-                }
-            }
-        }
-        self.effort.assembly += clock.elapsed();
     }
 
     fn bore_law(&self) -> BoreLaw {
@@ -650,81 +516,56 @@ impl<'p> Solver<'p> {
         }
     }
 
-    fn assemble_contact(&self, state: &State, layouts: &Layouts, system: &mut System, residual: &mut Residual) {
+    fn assemble_contact(&mut self, state: &State, layouts: &Layouts, residual: &mut Residual) {
         let problem = self.problem;
-        system.border.column_mut(OUTPUT).fill(0.0);
-        let (values, pattern, bore_positions) = (&mut system.values, &system.pattern, &system.bore_positions);
-        problem.bore.evaluate(self.bore_law(), &problem.outline, state.generator_rad, &state.u, |contact| {
-            let nodes = problem.bore.edges[contact.edge];
-            for (a, &n) in nodes.iter().enumerate() {
+        let (bore_law, flank_law) = (self.bore_law(), self.flank_law());
+        let wheels = self.wheels.as_mut();
+        problem.bore.evaluate(bore_law, &problem.outline, state.generator_rad, &state.u, |contact| {
+            for (a, &n) in problem.bore.edges[contact.edge].iter().enumerate() {
                 for k in 0..2 {
                     let f = contact.force[2 * a + k];
                     residual.force[2 * n as usize + k] += f;
                     residual.scale = residual.scale.max(f.abs());
                 }
-                let row_x = a * (2 * a + 1);
-                let row_y = row_x + 2 * a + 1;
-                let [xx, yy] = pattern.diagonal(n).map(|p| p as usize);
-                values[xx] += contact.stiffness[row_x + 2 * a];
-                values[xx + 1] += contact.stiffness[row_y + 2 * a];
-                values[yy] += contact.stiffness[row_y + 2 * a + 1];
-                for b in 0..a {
-                    let p = bore_positions[contact.edge][a * (a - 1) / 2 + b].expect("bore nodes share an element");
-                    let (base, row, column) = (p.base as usize, p.row as usize, p.column as usize);
-                    values[base] += contact.stiffness[row_x + 2 * b];
-                    values[base + column] += contact.stiffness[row_x + 2 * b + 1];
-                    values[base + row] += contact.stiffness[row_y + 2 * b];
-                    values[base + row + column] += contact.stiffness[row_y + 2 * b + 1];
-                }
             }
+            wheels.add_bore(contact);
             residual.generator_moment += contact.moment;
             residual.generator_contacts += 1;
             residual.peak[1] = residual.peak[1].max(contact.peak);
         });
         let at = configuration(state);
+        let column = self.border.column_mut(OUTPUT);
+        column.fill(0.0);
         let mut corner = 0.0;
         for (&pair, layout) in layouts {
-            let Some(contact) = self.flanks.evaluate(pair, at, self.flank_law(), &layout.points) else {
+            let Some(contact) = self.flanks.evaluate(pair, at, flank_law, &layout.points) else {
                 continue;
             };
-            let positions = &system.pairs[&pair];
-            let n = contact.force.len();
-            let column = system.border.column_mut(OUTPUT);
-            for (a, &node) in positions.nodes.iter().enumerate() {
+            let cs_node = |n: usize| self.cs_index[n].expect("flank nodes are free") as usize;
+            let nodes = self.flanks.fs_nodes(pair).chain(self.flanks.cs_nodes(pair).map(cs_node));
+            for (a, node) in nodes.enumerate() {
                 for k in 0..2 {
                     let i = 2 * a + k;
-                    residual.force[2 * node as usize + k] += contact.force[i];
+                    residual.force[2 * node + k] += contact.force[i];
                     residual.scale = residual.scale.max(contact.force[i].abs());
-                    column[2 * node as usize + k] += contact.border[i];
-                }
-                let [xx, yy] = system.pattern.diagonal(node).map(|p| p as usize);
-                system.values[xx] += contact.stiffness[2 * a * n + 2 * a];
-                system.values[xx + 1] += contact.stiffness[(2 * a + 1) * n + 2 * a];
-                system.values[yy] += contact.stiffness[(2 * a + 1) * n + 2 * a + 1];
-            }
-            for &(a, b, p) in &positions.blocks {
-                for i in 0..2 {
-                    for j in 0..2 {
-                        let position = p.base as usize + i * p.row as usize + j * p.column as usize;
-                        system.values[position] += contact.stiffness[(2 * a + i) * n + 2 * b + j];
-                    }
+                    column[2 * node + k] += contact.border[i];
                 }
             }
+            wheels.add_flank(pair, &contact);
             corner += contact.corner;
             residual.flank_torque += contact.torque;
             residual.torque_scale += contact.torque.abs();
             residual.flank_contacts += 1;
             residual.peak[0] = residual.peak[0].max(contact.peak);
         }
-        let width = system.border.width;
-        system.border.corner.fill(0.0);
-        system.border.corner[OUTPUT * width + OUTPUT] = corner;
+        self.border.corner.fill(0.0);
+        self.border.corner[0] = corner;
     }
 
     /// Load and drag on the output, sleeve on the bore, and the anchor.
-    fn assemble_holding(&self, state: &State, torque_n_m: f64, system: &mut System, residual: &mut Residual) {
+    fn assemble_holding(&mut self, state: &State, torque_n_m: f64, residual: &mut Residual) {
         let problem = self.problem;
-        let width = system.border.width;
+        let width = self.border.width;
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let load = problem.per_width(torque_n_m);
         let (drag, drag_stiffness) = problem.drag_torque(state.output_rad - state.drag_anchor_rad);
@@ -732,7 +573,7 @@ impl<'p> Solver<'p> {
         residual.border[OUTPUT] = load + residual.flank_torque + residual.drag_torque;
         residual.torque_scale += load.abs() + problem.drag;
         residual.free_output = residual.flank_contacts == 0 && drag_stiffness == 0.0;
-        let corner = &mut system.border.corner;
+        let corner = &mut self.border.corner;
         corner[OUTPUT * width + OUTPUT] += drag_stiffness;
 
         for (f, w) in residual.force.iter_mut().zip(&problem.rotation_weights) {
@@ -741,9 +582,6 @@ impl<'p> Solver<'p> {
         let rotation = dot(&problem.rotation_weights, &state.u);
         residual.border[SLEEVE] = -(rotation - problem.sleeve_compliance * state.sleeve_moment);
         corner[SLEEVE * width + SLEEVE] = -problem.sleeve_compliance;
-
-        let anchored = self.anchored_unknown();
-        system.values[system.pattern.column_starts[anchored] as usize] += ANCHOR;
         corner[ANCHORED * width + ANCHORED] = 1.0 / ANCHOR;
 
         if width == BORDERS {
@@ -766,41 +604,30 @@ impl<'p> Solver<'p> {
     ///
     /// With `chord` the last tangent serves again.
     fn solve(&mut self, residual: &Residual, chord: bool) -> Option<Step> {
-        let system = self.system.as_mut()?;
-        if !chord || system.eliminated.is_none() {
+        if !chord || self.eliminated.is_none() {
             let clock = Instant::now();
-            system.eliminated = None;
-            let mut definite = system.factor.factorise(&system.pattern, &system.values).is_ok();
+            self.eliminated = None;
             // Far from equilibrium the rim may resist no sliding along the generator; a grounded spring at every node then
             // shortens the step and leaves its direction downhill.
-            for spring in GROUNDED_SPRINGS {
-                if definite {
-                    break;
-                }
-                for &start in &system.pattern.column_starts[..system.pattern.unknowns()] {
-                    system.values[start as usize] += spring;
-                }
-                definite = system.factor.factorise(&system.pattern, &system.values).is_ok();
-            }
+            let definite = std::iter::once(0.0).chain(GROUNDED_SPRINGS).any(|spring| self.wheels.factorise(spring));
             self.effort.factorisation += clock.elapsed();
             if !definite {
                 return None;
             }
             let clock = Instant::now();
-            system.eliminated = Some(BorderedSystem::new(&mut system.factor, &system.border));
+            self.eliminated = Some(BorderedSystem::new(self.wheels.as_mut(), &self.border));
             self.effort.solution += clock.elapsed();
         }
         let clock = Instant::now();
         let mut free = residual.force.clone();
         let mut border = residual.border;
-        let width = system.border.width;
-        let eliminated = system.eliminated.as_ref()?;
-        let solved = eliminated.solve(&mut system.factor, &mut free, &mut border[..width]);
+        let solved = self.eliminated.as_ref()?.solve(self.wheels.as_mut(), &mut free, &mut border[..self.border.width]);
         self.effort.solution += clock.elapsed();
         if !solved {
             return None;
         }
-        let fs = 2 * self.problem.flexspline.nodes.len();
+        let (fs, _) = self.problem.wheels();
+        let u = free[..2 * fs.nodes.len()].to_vec();
         let mut v = vec![0.0; 2 * self.cs_index.len()];
         for (n, index) in self.cs_index.iter().enumerate() {
             if let Some(free_node) = index {
@@ -808,21 +635,18 @@ impl<'p> Solver<'p> {
                 v[2 * n + 1] = free[2 * *free_node as usize + 1];
             }
         }
-        let u = free[..fs].to_vec();
         Some(Step { free, u, v, border })
     }
 
     /// Turn of the output for a unit torque on it (rad mm / N mm), by the last tangent.
     fn compliance(&mut self, residual: &Residual) -> Option<f64> {
-        if self.system.as_ref()?.eliminated.is_none() {
+        if self.eliminated.is_none() {
             self.solve(residual, false)?;
         }
-        let system = self.system.as_mut()?;
         let mut free = vec![0.0; residual.force.len()];
         let mut border = [0.0; BORDERS];
         border[OUTPUT] = 1.0;
-        let width = system.border.width;
-        let solved = system.eliminated.as_ref()?.solve(&mut system.factor, &mut free, &mut border[..width]);
+        let solved = self.eliminated.as_ref()?.solve(self.wheels.as_mut(), &mut free, &mut border[..self.border.width]);
         solved.then_some(border[OUTPUT])
     }
 
@@ -887,20 +711,21 @@ fn configuration(state: &State) -> Configuration<'_> {
     Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad }
 }
 
-/// Product of a packed symmetric 16 x 16 matrix with a vector.
-fn packed_times(packed: &[f64; PACKED], x: &[f64; 16]) -> [f64; 16] {
-    let mut y = [0.0; 16];
-    let mut k = 0;
-    for i in 0..16 {
-        for j in 0..i {
-            y[i] += packed[k] * x[j];
-            y[j] += packed[k] * x[i];
-            k += 1;
-        }
-        y[i] += packed[k] * x[i];
-        k += 1;
+/// The border of this drive; the column of the output angle and the corner change with the contact.
+fn fixed_border(problem: &Problem, wheels: &dyn Wheels) -> Border {
+    let width = if problem.lateral_stiffness > 0.0 { BORDERS } else { LATERAL };
+    let mut border = Border::zeros(wheels.unknowns(), width);
+    border.column_mut(SLEEVE)[..problem.rotation_weights.len()].copy_from_slice(&problem.rotation_weights);
+    for (unknown, weight) in wheels.anchor() {
+        border.column_mut(ANCHORED)[unknown] = weight;
     }
-    y
+    if width == BORDERS {
+        for (i, w) in problem.mean_weights.iter().enumerate().step_by(2) {
+            border.column_mut(LATERAL)[i] = *w;
+            border.column_mut(LATERAL + 1)[i + 1] = *w;
+        }
+    }
+    border
 }
 
 /// How far the last iteration brought the residual down.
