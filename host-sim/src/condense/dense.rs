@@ -106,7 +106,7 @@ fn subtract(y: &mut [f64], x: &[f64], factor: f64) {
 
 /// Dot product in eight strands, which a vector unit can keep apart.
 #[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut strands = [0.0; 8];
     let (mut a8, mut b8) = (a.chunks_exact(8), b.chunks_exact(8));
     for (a, b) in (&mut a8).zip(&mut b8) {

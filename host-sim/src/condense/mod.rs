@@ -12,6 +12,7 @@ mod dense;
 mod model;
 mod skin;
 mod superelement;
+mod tangent;
 
 pub use chain::{Block, Chain, Contribution};
 pub use corotation::{CellState, CoRotation};
@@ -19,3 +20,4 @@ pub use dense::Kernels;
 pub use model::{Cell, CondensedWheel};
 pub use skin::Skin;
 pub use superelement::{CellNodes, Superelement};
+pub use tangent::{CellTangent, Geometric, Local, Placement, Traction, back, rotate_pairs};

@@ -8,6 +8,7 @@ use crate::material::PlaneStrain;
 use crate::mesh::WheelMesh;
 
 use super::corotation::CoRotation;
+use super::dense::Kernels;
 use super::skin::Skin;
 use super::superelement::Superelement;
 
@@ -26,6 +27,8 @@ pub struct Cell {
     pub flank_coupling: Vec<f64>,
     /// Stiffness of the other nodes while no force acts on the flanks, r x r.
     pub body: Vec<f64>,
+    /// The same with the bore nodes eliminated, nothing touching them (see [`Kernels::eliminate`]).
+    pub free_body: Vec<f64>,
 }
 
 impl Cell {
@@ -37,13 +40,18 @@ impl Cell {
         let flexibility = factor.solve(Mat::<f64>::identity(f, f));
         let coupling = factor.solve(k.submatrix(0, f, f, r));
         let body = k.submatrix(f, f, r, r) - k.submatrix(f, 0, r, f) * &coupling;
-        let columns = |m: &Mat<f64>| m.col_iter().flat_map(|c| c.iter().copied().collect::<Vec<_>>()).collect();
+        let b = element.unknowns[1];
+        let columns = |m: &Mat<f64>| -> Vec<f64> { m.col_iter().flat_map(|c| c.iter().copied().collect::<Vec<_>>()).collect() };
+        let body: Vec<f64> = columns(&body);
+        let mut free_body = body.clone();
+        assert!(Kernels::default().eliminate(&mut free_body, r, b, 1.0), "a cell held at its faces is stiff");
         Cell {
             frame: CoRotation::new(&element),
             stiffness: columns(&element.stiffness),
             flank_flexibility: columns(&flexibility),
             flank_coupling: columns(&coupling),
-            body: columns(&body),
+            body,
+            free_body,
             element,
         }
     }
@@ -73,19 +81,27 @@ pub struct CondensedWheel {
     pub cells: Vec<Cell>,
     /// Which of them each cell of the ring is.
     pub class: Vec<usize>,
-    /// Unknowns of the skin of every cell, in the order of the cell.
+    /// Unknowns of every cell among those of both wheels, in the order of the cell.
     pub unknowns: Vec<Vec<u32>>,
+    /// First unknown of this wheel.
+    pub first_unknown: usize,
 }
 
 impl CondensedWheel {
-    /// Condenses a wheel; `held` are the nodes that the housing holds.
-    pub fn new(whole: &WheelMesh, material: &PlaneStrain, held: impl Fn(u32) -> bool) -> CondensedWheel {
+    /// Condenses a wheel whose unknowns begin with `first_unknown`; `held` are the nodes that the housing holds.
+    pub fn new(
+        whole: &WheelMesh,
+        material: &PlaneStrain,
+        first_unknown: usize,
+        held: impl Fn(u32) -> bool,
+    ) -> CondensedWheel {
         let skin = Skin::new(whole, &held);
         let class = vec![0; whole.teeth];
         let cells = vec![Cell::new(Superelement::new(whole, material, &skin.cell_nodes(whole, 0, &held)))];
-        let unknowns =
-            (0..whole.teeth).map(|j| skin.cell(j).iter().flat_map(|n| [2 * n, 2 * n + 1]).collect()).collect();
-        CondensedWheel { skin, cells, class, unknowns }
+        let first = first_unknown as u32;
+        let of_cell = |j: usize| skin.cell(j).iter().flat_map(|n| [first + 2 * n, first + 2 * n + 1]).collect();
+        let unknowns = (0..whole.teeth).map(of_cell).collect();
+        CondensedWheel { skin, cells, class, unknowns, first_unknown }
     }
 
     /// The condensed cell at a place of the ring.

@@ -1,6 +1,5 @@
 //! The drive as a mechanical problem: meshes, contact, holding, at one temperature. Immutable while it is solved.
 
-use crate::condense::CondensedWheel;
 use crate::contact::{BoreContact, BoreLaw, FlankContact, FlankLaw};
 use crate::drive::{Drive, GeneratorKind, GeneratorOutline, InvoluteFlank, ToothFlank};
 use crate::material::PlaneStrain;
@@ -146,10 +145,8 @@ impl Problem {
         let mut held: Vec<bool> = circular_spline.nodes.iter().map(|p| p[0].hypot(p[1]) > outer - 1e-6).collect();
         let free = held.iter().filter(|held| !**held).count();
         let degrees_of_freedom = 2 * (flexspline.nodes.len() + free) + 1;
-        let condensed = (settings.method == Method::Fast).then(|| CondensedDrive {
-            flexspline: CondensedWheel::new(&flexspline, &material, |_| false),
-            circular_spline: CondensedWheel::new(&circular_spline, &material, |n| held[n as usize]),
-        });
+        let condensed = (settings.method == Method::Fast)
+            .then(|| CondensedDrive::new(&flexspline, &circular_spline, &material, |n| held[n as usize]));
         let mut fs = &flexspline;
         if let Some(condensed) = &condensed {
             fs = &condensed.flexspline.skin.mesh;
