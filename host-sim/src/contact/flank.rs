@@ -371,13 +371,24 @@ impl<'a> FlankContact<'a> {
             .collect()
     }
 
-    /// Forces and tangent of a pair.
+    /// Gap of every integration point, how it changes as the output alone turns (mm/rad), and its weight.
+    pub fn gaps(&self, pair: FlankPair, at: Configuration, points: &[FlankPoint], report: &mut impl FnMut(f64, f64, f64)) {
+        let field = self.local_field(pair, at);
+        for point in points {
+            let (foot, x) = self.foot(pair, &field, point.position, point.edge, &point.shape);
+            let [nx, ny] = foot.normal;
+            report(foot.distance, pair.side.sign() * (nx * x[1] - ny * x[0]), point.weight);
+        }
+    }
+
+    /// Forces and tangent of a pair; nothing while it is open. The smallest gap of its points goes to `smallest_gap`.
     pub fn evaluate(
         &self,
         pair: FlankPair,
         at: Configuration,
         law: FlankLaw,
         points: &[FlankPoint],
+        smallest_gap: &mut f64,
     ) -> Option<PairContribution> {
         let field = self.local_field(pair, at);
         let (nf, nc) = (field.fs.len(), field.cs.len());
@@ -390,6 +401,7 @@ impl<'a> FlankContact<'a> {
         let mut out: Option<PairContribution> = None;
         for point in points {
             let (foot, x) = self.foot(pair, &field, point.position, point.edge, &point.shape);
+            *smallest_gap = smallest_gap.min(foot.distance);
             if foot.distance >= 0.0 {
                 continue;
             }

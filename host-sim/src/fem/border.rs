@@ -77,7 +77,7 @@ impl BorderedSystem {
         for (i, gi) in g.iter_mut().enumerate() {
             *gi -= dot(&self.border.columns[i * n..(i + 1) * n], f);
         }
-        if !solve_dense(&mut self.schur.clone(), g, m) {
+        if !self.solve_border(g) {
             return false;
         }
         for (k, z) in g.iter().enumerate() {
@@ -86,6 +86,11 @@ impl BorderedSystem {
             }
         }
         true
+    }
+    /// z alone, for f = 0, in place of g.
+    #[must_use]
+    pub fn solve_border(&self, g: &mut [f64]) -> bool {
+        solve_dense(&mut self.schur.clone(), g, self.border.width)
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod error;
 mod fast;
+mod near;
 mod newton;
 mod predictor;
 mod problem;

@@ -5,16 +5,16 @@
 //!
 //! predict, lay out the contact; repeat { assemble; done? factorise; solve; update } until done.
 
-use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
-use crate::contact::{BoreLaw, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair};
+use crate::contact::{BoreLaw, Configuration, FlankContact, FlankLaw, FlankPair};
 use crate::fem::{Border, BorderedSystem};
 
 use super::error::SolveError;
 use super::predictor::turn_field;
 use super::fast::CondensedWheels;
+use super::near::{NearPairs, configuration};
 use super::problem::Problem;
 use super::reference::SparseWheels;
 use super::state::State;
@@ -22,8 +22,6 @@ use super::wheels::Wheels;
 
 /// Pairs closer than this (mm) get a place in the sparsity pattern.
 const PATTERN_REACH: f64 = 0.04;
-/// Pairs closer than this (mm) are evaluated in every iteration of an increment.
-const CONTACT_REACH: f64 = 0.015;
 /// Stiffness (N/mm per mm) that anchors one node of the flexspline while the matrix is factorised; the border takes it out
 /// again.
 pub(super) const ANCHOR: f64 = 1e5;
@@ -38,12 +36,6 @@ const LOADING_SOFTNESS: f64 = 1e-3;
 /// Iterations after which the next part of an increment may be twice as large.
 const EASY: usize = 10;
 
-/// How far (mm) flanks are looked for when the output is balanced.
-const CLEARANCE_REACH: f64 = 0.06;
-/// Gap (mm) below which a pair counts as touching when its layout is checked.
-const TOUCH: f64 = 1e-7;
-/// Shift (mm) of a corner on the flank up to which the integration points stay.
-const CORNER_DRIFT: f64 = 1e-4;
 /// Relative residual below which steps are taken whole: what is left is near round-off.
 const ROUND_OFF: f64 = 1e-6;
 
@@ -53,8 +45,6 @@ const CHORD_GAIN: f64 = 0.2;
 
 /// States of steady motion that the predictor remembers: a fine sampling of one pitch.
 const REMEMBERED: usize = 48;
-
-type Layouts = BTreeMap<FlankPair, FlankLayout>;
 
 /// A converged increment.
 #[derive(Debug, Clone)]
@@ -340,11 +330,9 @@ impl<'p> Solver<'p> {
         let failed =
             |history: Vec<f64>, reason| SolveError::NotConverged { generator_rad, torque_n_m, reason, history };
         let mut state = self.predict(from, generator_rad, torque_n_m);
-        let clock = Instant::now();
-        self.balance_output(&mut state, torque_n_m);
-        self.effort.contact += clock.elapsed();
-        let mut layouts = Layouts::new();
-        let mut residual = self.assemble(&state, from, torque_n_m, &mut layouts);
+        let mut near = NearPairs::default();
+        self.balance_output(&mut state, from, torque_n_m, &mut near);
+        let mut residual = self.assemble(&state, from, torque_n_m, &mut near);
         let mut history = Vec::new();
         let mut last_length = 1.0;
         while history.len() <= settings.max_iterations {
@@ -355,24 +343,24 @@ impl<'p> Solver<'p> {
             }
             if relative <= settings.tolerance {
                 // The contact was laid out for the predicted state; where the corner of a space ended elsewhere, again.
-                if self.layouts_fit(&state, &layouts) {
+                if near.layouts_fit(&self.flanks, configuration(&state)) {
                     let Some(compliance) = self.compliance(&residual) else {
                         return Err(failed(history, "the stiffness matrix is not positive definite"));
                     };
                     let increment = self.report(&residual, compliance, history.len() - 1);
-                    self.finish(&mut state, from, &layouts);
+                    self.finish(&mut state, from, &near);
                     if generator_rad != from.generator_rad {
                         self.remember(&state);
                     }
                     return Ok((state, increment));
                 }
-                layouts.clear();
-                residual = self.assemble(&state, from, torque_n_m, &mut layouts);
+                near.clear();
+                residual = self.assemble(&state, from, torque_n_m, &mut near);
                 continue;
             }
             if residual.free_output {
-                self.balance_output(&mut state, torque_n_m);
-                residual = self.assemble(&state, from, torque_n_m, &mut layouts);
+                self.balance_output(&mut state, from, torque_n_m, &mut near);
+                residual = self.assemble(&state, from, torque_n_m, &mut near);
                 continue;
             }
             // Near the end the last factor still points the right way, and a step with it costs a tenth.
@@ -383,119 +371,75 @@ impl<'p> Solver<'p> {
             // The force along the step falls from `before` to nothing at the end of a perfect step; far beyond, halve it.
             let before = step.work(&residual);
             let mut length = (LARGEST_STEP / step.largest()).min(1.0).min(8.0 * last_length);
+            near.advance(length * self.motion(&step));
             for trial in 0.. {
                 let candidate = step.applied_to(&state, length);
-                residual = self.assemble(&candidate, from, torque_n_m, &mut layouts);
+                residual = self.assemble(&candidate, from, torque_n_m, &mut near);
                 let overshoot = before > 0.0 && step.work(&residual) < -0.9 * before;
                 if !overshoot || relative < ROUND_OFF || trial == 10 {
                     state = candidate;
                     break;
                 }
                 length *= 0.5;
+                near.advance(length * self.motion(&step));
             }
             last_length = length;
         }
         Err(failed(history, "the iterations ran out"))
     }
 
-    /// Turns the output to where load, drag and flanks balance while the wheels keep their shape. The torque falls as the
-    /// output turns forward, so the balance is bracketed and then found by Newton safeguarded with bisection.
-    fn balance_output(&self, state: &mut State, torque_n_m: f64) {
-        let load = self.problem.per_width(torque_n_m);
-        let start = configuration(state);
-        let layouts: Vec<_> = self
-            .flanks
-            .near_pairs(start, CLEARANCE_REACH)
-            .into_iter()
-            .map(|pair| (pair, self.flanks.layout(pair, start)))
-            .collect();
-        let law = FlankLaw { friction: 0.0, ..self.flank_law() };
-        let balance = |output_rad: f64| -> (f64, f64) {
-            let at = Configuration { output_rad, ..start };
-            let (drag, drag_slope) = self.problem.drag_torque(output_rad - state.drag_anchor_rad);
-            let (mut torque, mut slope) = (load + drag, -drag_slope);
-            for (pair, layout) in &layouts {
-                if let Some(contact) = self.flanks.evaluate(*pair, at, law, &layout.points) {
-                    torque += contact.torque;
-                    slope -= contact.corner;
-                }
-            }
-            (torque, slope)
-        };
-        let tolerance = 1e-3 * (load.abs() + self.problem.drag);
-        let (mut torque, mut slope) = balance(state.output_rad);
-        let mut output_rad = state.output_rad;
-        // `behind` has a positive torque, `ahead` a negative one.
-        let (mut behind, mut ahead) = (None::<f64>, None::<f64>);
-        let mut stride = 1e-6_f64;
-        for _ in 0..60 {
-            if torque.abs() <= tolerance {
-                break;
-            }
-            if torque > 0.0 {
-                behind = Some(output_rad);
-            } else {
-                ahead = Some(output_rad);
-            }
-            let newton = if slope < 0.0 { output_rad - torque / slope } else { f64::NAN };
-            output_rad = match (behind, ahead) {
-                (Some(low), Some(high)) => {
-                    if newton > low && newton < high {
-                        newton
-                    } else {
-                        0.5 * (low + high)
-                    }
-                }
-                _ => {
-                    stride *= 4.0;
-                    let stride = stride.copysign(torque);
-                    if (newton - output_rad).abs() < stride.abs() { newton } else { output_rad + stride }
-                }
-            };
-            if (output_rad - state.output_rad).abs() > CLEARANCE_REACH / self.flanks.space.base_radius {
-                return;
-            }
-            (torque, slope) = balance(output_rad);
-        }
-        state.output_rad = output_rad;
+    /// Bound on the motion of flanks against one another in a step, mm. Nodal displacements bound those between them to 1.25
+    /// (the Lebesgue constant of a quadratic).
+    fn motion(&self, step: &Step) -> f64 {
+        let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let nodes = largest(&step.u) + largest(&step.v);
+        1.25 * std::f64::consts::SQRT_2 * nodes + self.problem.drive.circular_spline.root_radius_mm * step.border[OUTPUT].abs()
     }
 
-    /// Assembles the out-of-balance forces and, into the system, the tangent.
-    fn assemble(&mut self, state: &State, from: &State, torque_n_m: f64, layouts: &mut Layouts) -> Residual {
+    /// Turns the output to where load, drag and flanks balance while the wheels keep their shape.
+    fn balance_output(&mut self, state: &mut State, from: &State, torque_n_m: f64, near: &mut NearPairs) {
         let clock = Instant::now();
-        let at = configuration(state);
-        for pair in self.flanks.near_pairs(at, CONTACT_REACH) {
-            if let Entry::Vacant(place) = layouts.entry(pair) {
-                let mut layout = self.flanks.layout(pair, at);
-                if self.problem.flank_law.friction > 0.0 {
-                    let empty = Vec::new();
-                    let history = from.friction.get(&(pair.tooth, pair.side)).unwrap_or(&empty);
-                    self.flanks.start_friction(pair, configuration(from), history, &mut layout.points);
-                }
-                place.insert(layout);
-            }
+        let load = self.problem.per_width(torque_n_m);
+        let others = |output_rad: f64| {
+            let (drag, slope) = self.problem.drag_torque(output_rad - state.drag_anchor_rad);
+            (load + drag, -slope)
+        };
+        near.search(&self.flanks, configuration(state), from, self.problem.flank_law.friction > 0.0);
+        let law = FlankLaw { friction: 0.0, ..self.flank_law() };
+        let tolerance = 1e-3 * (load.abs() + self.problem.drag);
+        if let Some(output_rad) = near.balance(&self.flanks, state, law, tolerance, others) {
+            near.advance((output_rad - state.output_rad).abs() * self.problem.drive.circular_spline.root_radius_mm);
+            state.output_rad = output_rad;
         }
         self.effort.contact += clock.elapsed();
-        self.make_room(at, layouts);
+    }
+
+    /// Assembles the out-of-balance forces and the tangent.
+    fn assemble(&mut self, state: &State, from: &State, torque_n_m: f64, near: &mut NearPairs) -> Residual {
+        let clock = Instant::now();
+        let at = configuration(state);
+        near.search(&self.flanks, at, from, self.problem.flank_law.friction > 0.0);
+        self.effort.contact += clock.elapsed();
+        self.make_room(at, near);
         let clock = Instant::now();
         let mut residual = Residual::zero(self.wheels.unknowns());
         self.wheels.assemble(state, &mut residual.force);
         self.effort.assembly += clock.elapsed();
         let clock = Instant::now();
-        self.assemble_contact(state, layouts, &mut residual);
+        self.assemble_contact(state, near, &mut residual);
         self.assemble_holding(state, torque_n_m, &mut residual);
         self.effort.contact += clock.elapsed();
         residual
     }
 
     /// Makes sure that the tangent has room for these pairs.
-    fn make_room(&mut self, at: Configuration, layouts: &Layouts) {
-        if layouts.keys().all(|pair| self.wheels.has_room(*pair)) {
+    fn make_room(&mut self, at: Configuration, near: &NearPairs) {
+        if near.pairs().all(|pair| self.wheels.has_room(pair)) {
             return;
         }
         let clock = Instant::now();
         let mut pairs: Vec<FlankPair> = self.flanks.near_pairs(at, PATTERN_REACH);
-        pairs.extend(layouts.keys());
+        pairs.extend(near.pairs());
         pairs.sort_unstable();
         pairs.dedup();
         self.wheels.make_room(&pairs);
@@ -516,7 +460,7 @@ impl<'p> Solver<'p> {
         }
     }
 
-    fn assemble_contact(&mut self, state: &State, layouts: &Layouts, residual: &mut Residual) {
+    fn assemble_contact(&mut self, state: &State, near: &mut NearPairs, residual: &mut Residual) {
         let problem = self.problem;
         let (bore_law, flank_law) = (self.bore_law(), self.flank_law());
         let wheels = self.wheels.as_mut();
@@ -537,10 +481,7 @@ impl<'p> Solver<'p> {
         let column = self.border.column_mut(OUTPUT);
         column.fill(0.0);
         let mut corner = 0.0;
-        for (&pair, layout) in layouts {
-            let Some(contact) = self.flanks.evaluate(pair, at, flank_law, &layout.points) else {
-                continue;
-            };
+        near.evaluate(&self.flanks, at, flank_law, |pair, contact| {
             let cs_node = |n: usize| self.cs_index[n].expect("flank nodes are free") as usize;
             let nodes = self.flanks.fs_nodes(pair).chain(self.flanks.cs_nodes(pair).map(cs_node));
             for (a, node) in nodes.enumerate() {
@@ -551,13 +492,13 @@ impl<'p> Solver<'p> {
                     column[2 * node + k] += contact.border[i];
                 }
             }
-            wheels.add_flank(pair, &contact);
+            wheels.add_flank(pair, contact);
             corner += contact.corner;
             residual.flank_torque += contact.torque;
             residual.torque_scale += contact.torque.abs();
             residual.flank_contacts += 1;
             residual.peak[0] = residual.peak[0].max(contact.peak);
-        }
+        });
         self.border.corner.fill(0.0);
         self.border.corner[0] = corner;
     }
@@ -643,30 +584,14 @@ impl<'p> Solver<'p> {
         if self.eliminated.is_none() {
             self.solve(residual, false)?;
         }
-        let mut free = vec![0.0; residual.force.len()];
         let mut border = [0.0; BORDERS];
         border[OUTPUT] = 1.0;
-        let solved = self.eliminated.as_ref()?.solve(self.wheels.as_mut(), &mut free, &mut border[..self.border.width]);
+        let solved = self.eliminated.as_ref()?.solve_border(&mut border[..self.border.width]);
         solved.then_some(border[OUTPUT])
     }
 
-    /// Whether the corners of the spaces still face the places they were laid out for.
-    fn layouts_fit(&self, state: &State, layouts: &Layouts) -> bool {
-        let at = configuration(state);
-        layouts.iter().filter(|(pair, _)| self.flanks.smallest_gap(**pair, at) < TOUCH).all(|(pair, layout)| {
-            match (layout.corner, self.flanks.corner(*pair, at)) {
-                (Some(a), Some(b)) => (a - b).abs() < CORNER_DRIFT,
-                (None, None) => true,
-                (Some(r), None) | (None, Some(r)) => {
-                    (r - self.flanks.tooth.start_radius).abs().min((r - self.flanks.tooth.junction_radius).abs())
-                        < CORNER_DRIFT
-                }
-            }
-        })
-    }
-
     /// Carries the history over the end of an increment.
-    fn finish(&self, state: &mut State, from: &State, layouts: &Layouts) {
+    fn finish(&self, state: &mut State, from: &State, near: &NearPairs) {
         let problem = self.problem;
         let reach = problem.drag / problem.drag_stiffness;
         let stretched = state.output_rad - state.drag_anchor_rad;
@@ -678,15 +603,7 @@ impl<'p> Solver<'p> {
             state.travel = turn.signum();
         }
         if problem.flank_law.friction > 0.0 {
-            let at = configuration(state);
-            state.friction = layouts
-                .iter()
-                .map(|(&pair, layout)| {
-                    let history = self.flanks.friction_history(pair, at, problem.flank_law, &layout.points);
-                    ((pair.tooth, pair.side), history)
-                })
-                .filter(|(_, history)| history.iter().any(|(_, t)| *t != 0.0))
-                .collect();
+            state.friction = near.friction(&self.flanks, configuration(state), problem.flank_law);
         }
     }
 
@@ -705,10 +622,6 @@ impl<'p> Solver<'p> {
             peak_pressure_mpa: residual.peak,
         }
     }
-}
-
-fn configuration(state: &State) -> Configuration<'_> {
-    Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad }
 }
 
 /// The border of this drive; the column of the output angle and the corner change with the contact.
