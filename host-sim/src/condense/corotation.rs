@@ -14,7 +14,7 @@
 //!
 //! After Felippa and Haugen, A unified formulation of small-strain corotational finite elements, 2005.
 
-use super::superelement::{Superelement, rotate};
+use super::superelement::rotate;
 
 /// Kinematics of the frame of a cell.
 #[derive(Debug, Clone)]
@@ -30,6 +30,8 @@ pub struct CoRotation {
 pub struct CellState {
     /// Rotation of the frame, rad.
     pub turn: f64,
+    /// Displacement of the middle of the faces, in the frame of the cell at rest.
+    pub middle: [f64; 2],
     /// Displacements in the frame, x and y of each kept node, from the middle of the faces.
     pub q: Vec<f64>,
     /// Derivative of the rotation by the displacements of the nodes of both faces, in the frame.
@@ -37,12 +39,14 @@ pub struct CellState {
 }
 
 impl CoRotation {
-    /// Frame of a condensed cell.
-    pub fn new(cell: &Superelement) -> CoRotation {
-        CoRotation {
-            position: cell.position.clone(),
-            first_face: (cell.unknowns[0] + cell.unknowns[1]) / 2,
-        }
+    /// Frame of a cell with nodes at these positions from the middle of its faces, face nodes from `first_face` on.
+    pub fn new(position: &[[f64; 2]], first_face: usize) -> CoRotation {
+        CoRotation { position: position.to_vec(), first_face }
+    }
+
+    /// The same frame without the first `nodes` nodes, which are not on a face.
+    pub fn without(&self, nodes: usize) -> CoRotation {
+        CoRotation { position: self.position[nodes..].to_vec(), first_face: self.first_face - nodes }
     }
 
     /// The frame and what is left of the displacements `d` (x and y of each kept node, in the frame of the cell at rest).
@@ -67,6 +71,7 @@ impl CoRotation {
         // cos - 1 without cancellation.
         let shortening = -2.0 * (0.5 * turn).sin().powi(2);
         state.turn = turn;
+        state.middle = middle;
         state.q.clear();
         for (n, [px, py]) in self.position.iter().enumerate() {
             let moved = rotate([d[2 * n] - middle[0], d[2 * n + 1] - middle[1]], back);
@@ -78,6 +83,23 @@ impl CoRotation {
         for [px, py] in &self.position[faces] {
             state.turn_rate.extend([-py / length, px / length]);
         }
+    }
+
+    /// The other way: displacement (in the frame of the cell at rest) of a node at `position` from the middle of the faces,
+    /// displaced by `q` in the turned frame.
+    pub fn join(state: &CellState, position: [f64; 2], q: [f64; 2]) -> [f64; 2] {
+        let forth @ (sin, _) = state.turn.sin_cos();
+        let shortening = -2.0 * (0.5 * state.turn).sin().powi(2);
+        let moved = rotate(q, forth);
+        [
+            state.middle[0] + moved[0] + shortening * position[0] - sin * position[1],
+            state.middle[1] + moved[1] + sin * position[0] + shortening * position[1],
+        ]
+    }
+
+    /// Positions of the nodes, from the middle of the faces.
+    pub fn positions(&self) -> &[[f64; 2]] {
+        &self.position
     }
 
     /// Forces of the nodes on the cell in its turned frame: `F - (F . S q) a`, in place of F.

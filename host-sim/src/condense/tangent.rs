@@ -171,9 +171,8 @@ impl CellTangent {
         self.turn_rate.clear();
         self.flank_geometric.clear();
         if let Some(Geometric { a, g, c }) = geometric {
-            for ((x, t), g) in follow.iter_mut().zip(cell.flank_coupling.chunks_exact(f)).zip(&g[f..]) {
-                *x = g - dot(geometric_flank, t);
-            }
+            follow.copy_from_slice(&g[f..]);
+            kernels.multiply_transposed_add(&cell.flank_coupling, geometric_flank, -1.0, &mut follow);
             yielded.fill(0.0);
             kernels.multiply_add(&cell.flank_flexibility, geometric_flank, 1.0, &mut yielded);
             let mut c = c - dot(geometric_flank, &yielded);

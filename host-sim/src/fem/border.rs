@@ -71,7 +71,6 @@ impl BorderedSystem {
     /// Solves in place, with the factor it was made with: `f` becomes x, `g` becomes z. False when the small system is singular.
     #[must_use]
     pub fn solve(&self, factor: &mut (impl Factor + ?Sized), f: &mut [f64], g: &mut [f64]) -> bool {
-        let m = self.border.width;
         let n = f.len();
         factor.solve(f, 1);
         for (i, gi) in g.iter_mut().enumerate() {

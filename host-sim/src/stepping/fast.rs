@@ -6,7 +6,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::condense::{
-    Block, CellState, CellTangent, Chain, CondensedWheel, Contribution, Geometric, Kernels, Local, Placement, Traction,
+    Block, CellState, CellTangent, Chain, CoRotation, CondensedWheel, Contribution, Geometric, Kernels, Local, Placement, Traction,
     back, rotate_pairs,
 };
 use crate::contact::{BorePressure, FlankPair, PairContribution};
@@ -78,6 +78,8 @@ impl CondensedDrive {
 /// A factorised tangent.
 #[derive(Debug, Clone, Default)]
 struct Factorisation {
+    /// Cells whose flank nodes took part.
+    live: Vec<bool>,
     /// Cells of the flexspline, then of the circular spline.
     cells: Vec<CellTangent>,
     chain: Chain,
@@ -87,6 +89,8 @@ pub(super) struct CondensedWheels<'p> {
     problem: &'p Problem,
     model: &'p CondensedDrive,
     kernels: Kernels,
+    /// Cells with a flank that touches or may soon; the flank nodes of the others follow when all is done.
+    live: Vec<bool>,
     /// The flexspline cells of this state, and their forces before balancing.
     states: Vec<CellState>,
     forces: Vec<Vec<f64>>,
@@ -102,19 +106,20 @@ pub(super) struct CondensedWheels<'p> {
 
 impl<'p> CondensedWheels<'p> {
     pub fn new(problem: &'p Problem, model: &'p CondensedDrive) -> Self {
-        let teeth = model.flexspline.class.len();
-        let cells = teeth + model.circular_spline.class.len();
+        let teeth = model.flexspline.count();
+        let cells = teeth + model.circular_spline.count();
         CondensedWheels {
             problem,
             model,
             kernels: Kernels::default(),
+            live: vec![false; cells],
             states: vec![CellState::default(); teeth],
             forces: vec![Vec::new(); teeth],
             generator_rad: 0.0,
             output_rad: 0.0,
             bore: Vec::new(),
             flanks: Vec::new(),
-            factor: Factorisation { cells: vec![CellTangent::default(); cells], chain: Chain::default() },
+            factor: Factorisation { cells: vec![CellTangent::default(); cells], ..Default::default() },
             locals: vec![Local::default(); cells],
         }
     }
@@ -154,7 +159,7 @@ impl<'p> CondensedWheels<'p> {
         tractions: Vec<Traction>,
     ) -> Option<Contribution> {
         let mesh = self.model.fs_mesh();
-        let cell = self.model.flexspline.cell(j);
+        let (cell, _) = self.model.flexspline.cell(j, self.live[j]);
         let state = &self.states[j];
         let quarter: Vec<f64> = state.q.chunks_exact(2).flat_map(|q| [-q[1], q[0]]).collect();
         let mut turned = vec![0.0; quarter.len()];
@@ -174,7 +179,7 @@ impl<'p> CondensedWheels<'p> {
     /// Adds the contact on the bore of a cell to the matrix of its bore and face nodes; whether there is any.
     fn add_bore_contact(&self, j: usize, matrix: &mut [f64], order: usize) -> bool {
         let mesh = self.model.fs_mesh();
-        let cell = self.model.flexspline.cell(j);
+        let (cell, _) = self.model.flexspline.cell(j, false);
         let (b, face) = (cell.bore(), cell.face());
         let per_cell = mesh.base_edges.len();
         let (sin, cos) = (mesh.sector_angle(j) + self.states[j].turn).sin_cos();
@@ -227,7 +232,39 @@ impl<'p> CondensedWheels<'p> {
             faces: [0.5 * mesh.pitch(), -0.5 * mesh.pitch()],
             blocks: [(first + t) as u32, (first + (t + 1) % mesh.teeth) as u32],
         };
-        tangent.reduce(self.kernels, self.model.circular_spline.cell(t), place, tractions, None, |_, _| false)
+        let (cell, _) = self.model.circular_spline.cell(t, self.live[first + t]);
+        tangent.reduce(self.kernels, cell, place, tractions, None, |_, _| false)
+    }
+
+    /// Places the flank nodes that no force acts on.
+    fn fill_flanks(&self, state: &mut State) {
+        let fs = &self.model.flexspline;
+        for j in (0..fs.count()).filter(|j| !self.live[*j]) {
+            let ((bare, others), (cell, all)) = (fs.cell(j, false), fs.cell(j, true));
+            let angle = fs.skin.mesh.sector_angle(j);
+            let mut d: Vec<f64> = others.iter().map(|u| state.u[*u as usize]).collect();
+            rotate_pairs(&mut d, (-angle).sin_cos());
+            let mut inner = CellState::default();
+            bare.frame.split(&d, &mut inner);
+            let q = cell.free_flanks(self.kernels, &inner.q, 0.0);
+            let mut flanks: Vec<f64> = q
+                .chunks_exact(2)
+                .zip(cell.frame.positions())
+                .flat_map(|(q, position)| CoRotation::join(&inner, *position, [q[0], q[1]]))
+                .collect();
+            rotate_pairs(&mut flanks, angle.sin_cos());
+            all.iter().zip(&flanks).for_each(|(u, x)| state.u[*u as usize] = *x);
+        }
+        let cs = &self.model.circular_spline;
+        for t in (0..cs.count()).filter(|t| !self.live[fs.count() + t]) {
+            let ((_, others), (cell, all)) = (cs.cell(t, false), cs.cell(t, true));
+            let frame = self.model.cs_frame(t).sin_cos();
+            let mut d: Vec<f64> = others.iter().map(|u| state.v[*u as usize - cs.first_unknown]).collect();
+            rotate_pairs(&mut d, back(frame));
+            let mut flanks = cell.free_flanks(self.kernels, &d, self.problem.seat_displacement);
+            rotate_pairs(&mut flanks, frame);
+            all.iter().zip(&flanks).for_each(|(u, x)| state.v[*u as usize - cs.first_unknown] = *x);
+        }
     }
 
     /// Blocks around the rings, ordered by their angle from the minor axis of the generator, where no flanks touch.
@@ -236,8 +273,7 @@ impl<'p> CondensedWheels<'p> {
         let from_cut = |angle: f64| (angle - cut).rem_euclid(TAU);
         let (fs, cs) = (self.model.fs_mesh(), self.model.cs_mesh());
         let block = |size, angle| Block { size, sign: 1.0, key: from_cut(angle) };
-        let fs_size = self.model.flexspline.cell(0).face();
-        let cs_size = self.model.circular_spline.cell(0).face();
+        let (fs_size, cs_size) = (self.model.flexspline.face(), self.model.circular_spline.face());
         let fs_blocks = (0..fs.teeth).map(|j| block(fs_size, (j as f64 - 0.5) * fs.pitch()));
         let cs_blocks = (0..cs.teeth).map(|t| block(cs_size, t as f64 * cs.pitch() + self.output_rad));
         let mut blocks: Vec<Block> = fs_blocks.chain(cs_blocks).collect();
@@ -293,11 +329,14 @@ impl Factor for CondensedWheels<'_> {
         let CondensedWheels { model, kernels, factor, locals, .. } = self;
         let faces = model.faces();
         let (fs, cs) = (&model.flexspline, &model.circular_spline);
-        let cells: Vec<_> = (0..fs.class.len())
-            .map(|j| (fs.cell(j), &fs.unknowns[j]))
-            .chain((0..cs.class.len()).map(|t| (cs.cell(t), &cs.unknowns[t])))
+        let (fs_live, cs_live) = factor.live.split_at(fs.count());
+        let cells: Vec<_> = fs_live
+            .iter()
+            .enumerate()
+            .map(|(j, live)| fs.cell(j, *live))
+            .chain(cs_live.iter().enumerate().map(|(t, live)| cs.cell(t, *live)))
             .collect();
-        let size = |block: usize| if block < fs.class.len() { fs.cell(0).face() } else { cs.cell(0).face() };
+        let size = |block: usize| if block < fs.count() { fs.face() } else { cs.face() };
         let mut chain = vec![0.0; factor.chain.unknowns()];
         for x in columns.chunks_exact_mut(n) {
             chain.fill(0.0);
@@ -327,11 +366,19 @@ impl Wheels for CondensedWheels<'_> {
         2 * (self.model.fs_mesh().nodes.len() + self.model.cs_mesh().nodes.len())
     }
 
-    fn has_room(&self, _pair: FlankPair) -> bool {
-        true
+    fn prepare(&mut self, near: &[FlankPair], _widely: &dyn Fn() -> Vec<FlankPair>) -> bool {
+        self.live.fill(false);
+        for &pair in near {
+            let cs_cell = self.model.cs_cell(pair);
+            self.live[pair.tooth] = true;
+            self.live[self.model.flexspline.count() + cs_cell] = true;
+        }
+        false
     }
 
-    fn make_room(&mut self, _pairs: &[FlankPair]) {}
+    fn complete(&self, state: &mut State) {
+        self.fill_flanks(state);
+    }
 
     fn assemble(&mut self, state: &State, force: &mut [f64]) {
         self.bore.clear();
@@ -340,8 +387,8 @@ impl Wheels for CondensedWheels<'_> {
         self.output_rad = state.output_rad;
         let fs = &self.model.flexspline;
         let mut d = Vec::new();
-        for j in 0..fs.class.len() {
-            let (cell, unknowns) = (fs.cell(j), &fs.unknowns[j]);
+        for j in 0..fs.count() {
+            let (cell, unknowns) = fs.cell(j, self.live[j]);
             let (inner, f) = (&mut self.states[j], &mut self.forces[j]);
             let angle = fs.skin.mesh.sector_angle(j);
             d.clear();
@@ -360,14 +407,14 @@ impl Wheels for CondensedWheels<'_> {
         }
         let cs = &self.model.circular_spline;
         let mut f = Vec::new();
-        for t in 0..cs.class.len() {
-            let (cell, unknowns) = (cs.cell(t), &cs.unknowns[t]);
+        for t in 0..cs.count() {
+            let (cell, unknowns) = cs.cell(t, self.live[fs.count() + t]);
             let frame = self.model.cs_frame(t).sin_cos();
             d.clear();
             d.extend(unknowns.iter().map(|u| state.v[*u as usize - cs.first_unknown]));
             rotate_pairs(&mut d, back(frame));
             f.clear();
-            f.extend(cell.element.seat.col(0).iter().map(|s| s * self.problem.seat_displacement));
+            f.extend(cell.seat.iter().map(|s| s * self.problem.seat_displacement));
             self.kernels.multiply_add(&cell.stiffness, &d, 1.0, &mut f);
             rotate_pairs(&mut f, frame);
             for (u, f) in unknowns.iter().zip(&f) {
@@ -393,7 +440,8 @@ impl Wheels for CondensedWheels<'_> {
     fn factorise(&mut self, spring: f64) -> bool {
         let (mut tractions, ranks) = self.tractions();
         let mut factor = std::mem::take(&mut self.factor);
-        let fs_cells = self.model.flexspline.class.len();
+        let fs_cells = self.model.flexspline.count();
+        factor.live.clone_from(&self.live);
         let mut contributions = Vec::with_capacity(2 * factor.cells.len());
         let mut definite = true;
         for (c, tangent) in factor.cells.iter_mut().enumerate() {

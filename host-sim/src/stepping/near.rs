@@ -44,11 +44,13 @@ impl NearPairs {
         *self = NearPairs::default();
     }
 
+    /// Whether pairs that were out of reach may have come near.
+    pub fn must_search(&self) -> bool {
+        self.moved >= self.searched_until
+    }
+
     /// Looks for pairs that may touch from here on. Friction begins where the pair stood in the state `from`.
     pub fn search(&mut self, flanks: &FlankContact, at: Configuration, from: &State, friction: bool) {
-        if self.moved < self.searched_until {
-            return;
-        }
         self.searched_until = self.moved + 0.5 * REACH;
         for pair in flanks.near_pairs(at, REACH) {
             if let Entry::Vacant(place) = self.pairs.entry(pair) {

@@ -332,7 +332,7 @@ impl<'p> Solver<'p> {
         let mut state = self.predict(from, generator_rad, torque_n_m);
         let mut near = NearPairs::default();
         self.balance_output(&mut state, from, torque_n_m, &mut near);
-        let mut residual = self.assemble(&state, from, torque_n_m, &mut near);
+        let mut residual = self.assemble(&mut state, from, torque_n_m, &mut near);
         let mut history = Vec::new();
         let mut last_length = 1.0;
         while history.len() <= settings.max_iterations {
@@ -348,6 +348,7 @@ impl<'p> Solver<'p> {
                         return Err(failed(history, "the stiffness matrix is not positive definite"));
                     };
                     let increment = self.report(&residual, compliance, history.len() - 1);
+                    self.wheels.complete(&mut state);
                     self.finish(&mut state, from, &near);
                     if generator_rad != from.generator_rad {
                         self.remember(&state);
@@ -355,12 +356,12 @@ impl<'p> Solver<'p> {
                     return Ok((state, increment));
                 }
                 near.clear();
-                residual = self.assemble(&state, from, torque_n_m, &mut near);
+                residual = self.assemble(&mut state, from, torque_n_m, &mut near);
                 continue;
             }
             if residual.free_output {
                 self.balance_output(&mut state, from, torque_n_m, &mut near);
-                residual = self.assemble(&state, from, torque_n_m, &mut near);
+                residual = self.assemble(&mut state, from, torque_n_m, &mut near);
                 continue;
             }
             // Near the end the last factor still points the right way, and a step with it costs a tenth.
@@ -373,8 +374,8 @@ impl<'p> Solver<'p> {
             let mut length = (LARGEST_STEP / step.largest()).min(1.0).min(8.0 * last_length);
             near.advance(length * self.motion(&step));
             for trial in 0.. {
-                let candidate = step.applied_to(&state, length);
-                residual = self.assemble(&candidate, from, torque_n_m, &mut near);
+                let mut candidate = step.applied_to(&state, length);
+                residual = self.assemble(&mut candidate, from, torque_n_m, &mut near);
                 let overshoot = before > 0.0 && step.work(&residual) < -0.9 * before;
                 if !overshoot || relative < ROUND_OFF || trial == 10 {
                     state = candidate;
@@ -400,11 +401,15 @@ impl<'p> Solver<'p> {
     fn balance_output(&mut self, state: &mut State, from: &State, torque_n_m: f64, near: &mut NearPairs) {
         let clock = Instant::now();
         let load = self.problem.per_width(torque_n_m);
+        let anchor_rad = state.drag_anchor_rad;
         let others = |output_rad: f64| {
-            let (drag, slope) = self.problem.drag_torque(output_rad - state.drag_anchor_rad);
+            let (drag, slope) = self.problem.drag_torque(output_rad - anchor_rad);
             (load + drag, -slope)
         };
-        near.search(&self.flanks, configuration(state), from, self.problem.flank_law.friction > 0.0);
+        if near.must_search() {
+            self.wheels.complete(state);
+            near.search(&self.flanks, configuration(state), from, self.problem.flank_law.friction > 0.0);
+        }
         let law = FlankLaw { friction: 0.0, ..self.flank_law() };
         let tolerance = 1e-3 * (load.abs() + self.problem.drag);
         if let Some(output_rad) = near.balance(&self.flanks, state, law, tolerance, others) {
@@ -415,12 +420,14 @@ impl<'p> Solver<'p> {
     }
 
     /// Assembles the out-of-balance forces and the tangent.
-    fn assemble(&mut self, state: &State, from: &State, torque_n_m: f64, near: &mut NearPairs) -> Residual {
+    fn assemble(&mut self, state: &mut State, from: &State, torque_n_m: f64, near: &mut NearPairs) -> Residual {
         let clock = Instant::now();
-        let at = configuration(state);
-        near.search(&self.flanks, at, from, self.problem.flank_law.friction > 0.0);
+        if near.must_search() {
+            self.wheels.complete(state);
+            near.search(&self.flanks, configuration(state), from, self.problem.flank_law.friction > 0.0);
+        }
         self.effort.contact += clock.elapsed();
-        self.make_room(at, near);
+        self.make_room(configuration(state), near);
         let clock = Instant::now();
         let mut residual = Residual::zero(self.wheels.unknowns());
         self.wheels.assemble(state, &mut residual.force);
@@ -434,16 +441,11 @@ impl<'p> Solver<'p> {
 
     /// Makes sure that the tangent has room for these pairs.
     fn make_room(&mut self, at: Configuration, near: &NearPairs) {
-        if near.pairs().all(|pair| self.wheels.has_room(pair)) {
-            return;
-        }
         let clock = Instant::now();
-        let mut pairs: Vec<FlankPair> = self.flanks.near_pairs(at, PATTERN_REACH);
-        pairs.extend(near.pairs());
-        pairs.sort_unstable();
-        pairs.dedup();
-        self.wheels.make_room(&pairs);
-        self.eliminated = None;
+        let pairs: Vec<FlankPair> = near.pairs().collect();
+        if self.wheels.prepare(&pairs, &|| self.flanks.near_pairs(at, PATTERN_REACH)) {
+            self.eliminated = None;
+        }
         self.effort.analysis += clock.elapsed();
     }
 

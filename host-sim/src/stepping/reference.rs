@@ -123,19 +123,22 @@ impl Wheels for SparseWheels<'_> {
         2 * self.free_nodes
     }
 
-    fn has_room(&self, pair: FlankPair) -> bool {
-        self.system.as_ref().is_some_and(|system| system.pairs.contains_key(&pair))
+    fn prepare(&mut self, near: &[FlankPair], widely: &dyn Fn() -> Vec<FlankPair>) -> bool {
+        if self.system.as_ref().is_some_and(|system| near.iter().all(|pair| system.pairs.contains_key(pair))) {
+            return false;
+        }
+        let mut pairs = widely();
+        pairs.extend(near);
+        pairs.sort_unstable();
+        pairs.dedup();
+        self.system = Some(self.analyse(&pairs));
+        true
     }
 
-    fn make_room(&mut self, pairs: &[FlankPair]) {
-        self.system = Some(self.analyse(pairs));
-    }
+    fn complete(&self, _state: &mut State) {}
 
     fn assemble(&mut self, state: &State, force: &mut [f64]) {
-        if self.system.is_none() {
-            self.make_room(&[]);
-        }
-        let system = self.system.as_mut().expect("just made");
+        let system = self.system.as_mut().expect("room was made for the pairs");
         let problem = self.problem;
         system.values.copy_from_slice(&system.cs_values);
         let fs = &problem.flexspline;

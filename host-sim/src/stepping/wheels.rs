@@ -13,11 +13,11 @@ pub(super) trait Wheels: Factor {
     /// Number of unknowns.
     fn unknowns(&self) -> usize;
 
-    /// Whether the tangent has room for the contact of this pair.
-    fn has_room(&self, pair: FlankPair) -> bool;
+    /// Prepares for the contact of pairs that are near; `widely` looks further. Whether the factor there was has become void.
+    fn prepare(&mut self, near: &[FlankPair], widely: &dyn Fn() -> Vec<FlankPair>) -> bool;
 
-    /// Makes room for these pairs.
-    fn make_room(&mut self, pairs: &[FlankPair]);
+    /// Places the nodes of a state that [`Wheels::assemble`] leaves aside, being far from any contact.
+    fn complete(&self, state: &mut State);
 
     /// Begins anew at this state: subtracts the internal forces of both wheels from `force`. The tangent that
     /// [`Wheels::factorise`] factorises is the one of this state and of the contact added since.
