@@ -32,8 +32,19 @@ pub struct BoreContact {
     radius: f64,
     /// Offset from the middle angle, weight (mm), shape functions of each point.
     points: Vec<(f64, f64, [f64; 3])>,
-    /// Coupling of the wave generator's clearance: how close (mm) a node must be for its edge to be looked at.
-    reach: f64,
+}
+
+/// What the gap along an edge of 0.4 mm may differ by from a quadratic, mm: of the distance from a circle of 13 mm the fourth
+/// order is 1e-7 mm.
+const BORE_SMOOTHNESS: f64 = 1e-6;
+
+/// Edges known to be open, and for how long.
+#[derive(Debug, Clone, Default)]
+pub struct OpenEdges {
+    /// How far (mm) any node may have moved, all steps added up; the generator stands still.
+    pub moved: f64,
+    /// Each edge is open until the nodes have moved this far.
+    until: Vec<f64>,
 }
 
 /// Contact of one edge.
@@ -71,17 +82,18 @@ impl BoreContact {
             .into_iter()
             .map(|(xi, weight)| (xi * half_angle, weight * half_angle * mesh.base_radius, edge_shape(xi)))
             .collect();
-        BoreContact { edges, middle_angles, half_angle, radius: mesh.base_radius, points, reach: 0.02 }
+        BoreContact { edges, middle_angles, half_angle, radius: mesh.base_radius, points }
     }
 
     /// Contact of the bore displaced by `u` (x and y of each node) with the generator turned by `generator_rad`, edge by
-    /// edge; edges without contact are not reported.
+    /// edge; edges without contact are not reported. Edges that `open` knows to be open are passed over.
     pub fn evaluate(
         &self,
         law: BoreLaw,
         outline: &GeneratorOutline,
         generator_rad: f64,
         u: &[f64],
+        open: &mut OpenEdges,
         mut report: impl FnMut(&BorePressure),
     ) {
         let (sin_g, cos_g) = generator_rad.sin_cos();
@@ -92,15 +104,26 @@ impl BoreContact {
                 [cos_g * foot.normal[0] - sin_g * foot.normal[1], sin_g * foot.normal[0] + cos_g * foot.normal[1]];
             foot
         };
+        open.until.resize(self.edges.len(), 0.0);
+        // Gap at the end of the edge before, if it was looked at.
+        let mut shared = None;
         for (edge, nodes) in self.edges.iter().enumerate() {
+            if open.moved < open.until[edge] {
+                shared = None;
+                continue;
+            }
             let middle = self.middle_angles[edge];
             let node_u = nodes.map(|n| [u[2 * n as usize], u[2 * n as usize + 1]]);
-            // Looked at only when near: between two neighbouring nodes the gap changes by less than the reach.
-            let near = [-self.half_angle, 0.0, self.half_angle].iter().zip(&node_u).any(|(offset, du)| {
-                let (s, c) = (middle + offset).sin_cos();
-                foot([self.radius * c + du[0], self.radius * s + du[1]]).distance < self.reach
-            });
-            if !near {
+            let gap = |k: usize| {
+                let (s, c) = (middle + (k as f64 - 1.0) * self.half_angle).sin_cos();
+                foot([self.radius * c + node_u[k][0], self.radius * s + node_u[k][1]]).distance
+            };
+            let gaps = [shared.unwrap_or_else(|| gap(0)), gap(1), gap(2)];
+            shared = Some(gaps[2]);
+            // Along the edge the gap is quadratic to BORE_SMOOTHNESS, and a quadratic lies above its Bernstein coefficients.
+            let bound = gaps[0].min(gaps[2]).min(2.0 * gaps[1] - 0.5 * (gaps[0] + gaps[2])) - BORE_SMOOTHNESS;
+            if bound > 0.0 {
+                open.until[edge] = open.moved + bound;
                 continue;
             }
             let mut contact =
@@ -195,7 +218,7 @@ mod tests {
         let u = vec![0.0; 2 * mesh.nodes.len()];
         for turned in [0.0, 0.7, 0.7 + std::f64::consts::PI] {
             let (mut sum, mut outward, mut moment) = ([0.0; 2], 0.0, 0.0);
-            bore.evaluate(BoreLaw::new(1e4, None), &outline, turned, &u, |edge| {
+            bore.evaluate(BoreLaw::new(1e4, None), &outline, turned, &u, &mut OpenEdges::default(), |edge| {
                 let angle = bore.middle_angles[edge.edge];
                 assert!((2.0 * (angle - turned)).cos() > 0.9, "contact at {angle}, generator at {turned}");
                 let (s, c) = angle.sin_cos();

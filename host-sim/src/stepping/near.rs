@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-use crate::contact::{Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, PairContribution};
+use crate::contact::{Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, OpenEdges, PairContribution};
 
 use super::state::State;
 
@@ -29,6 +29,8 @@ pub(super) struct NearPairs {
     pairs: BTreeMap<FlankPair, NearPair>,
     /// How far (mm) any two flanks may have moved against one another, all steps added up.
     moved: f64,
+    /// Edges of the bore.
+    pub bore: OpenEdges,
     /// Pairs beyond the reach come no closer than this motion allows.
     searched_until: f64,
 }
@@ -37,6 +39,7 @@ impl NearPairs {
     /// The drive moves: no gap changes by more than `distance_mm`.
     pub fn advance(&mut self, distance_mm: f64) {
         self.moved += distance_mm;
+        self.bore.moved += distance_mm;
     }
 
     /// Forgets all pairs.
@@ -136,19 +139,18 @@ impl NearPairs {
         let radius = flanks.space.base_radius;
         let start = configuration(state);
         let mut output_rad = state.output_rad;
+        // The pairs that are looked after anyway mostly suffice.
+        let mut reach = REACH;
         for _ in 0..20 {
             let at = Configuration { output_rad, ..start };
             let mut points = Vec::new();
-            for pair in flanks.near_pairs(at, CLEARANCE_REACH) {
-                let own;
-                let layout = match self.pairs.get(&pair) {
-                    Some(near) => &near.layout,
-                    None => {
-                        own = flanks.layout(pair, at);
-                        &own
-                    }
-                };
+            let mut add = |pair, layout: &FlankLayout| {
                 flanks.gaps(pair, at, &layout.points, &mut |gap, rate, weight| points.push((gap, rate, weight)));
+            };
+            if reach == REACH {
+                self.pairs.iter().for_each(|(pair, near)| add(*pair, &near.layout));
+            } else {
+                flanks.near_pairs(at, reach).into_iter().for_each(|pair| add(pair, &flanks.layout(pair, at)));
             }
             let torque = |turn: f64| {
                 let (mut torque, mut slope) = others(output_rad + turn);
@@ -161,9 +163,14 @@ impl NearPairs {
                 }
                 (torque, slope)
             };
-            let turn = balance(torque, tolerance, CLEARANCE_REACH / radius)?;
-            output_rad += turn;
-            if (turn * radius).abs() < SMALL {
+            let turn = balance(torque, tolerance, reach / radius);
+            let small = turn.is_some_and(|turn| (turn * radius).abs() < SMALL);
+            if reach == REACH && !small {
+                reach = CLEARANCE_REACH;
+                continue;
+            }
+            output_rad += turn?;
+            if small {
                 break;
             }
             self.clear();
