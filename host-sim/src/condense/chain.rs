@@ -52,7 +52,6 @@ pub struct Chain {
     unknowns: usize,
     /// Work space.
     front: Vec<f64>,
-    gathered: Vec<f64>,
 }
 
 impl Chain {
@@ -138,41 +137,35 @@ impl Chain {
     }
 
     /// Solves in place for one right-hand side.
-    pub fn solve(&mut self, x: &mut [f64]) {
+    pub fn solve(&self, x: &mut [f64]) {
         assert_eq!(x.len(), self.unknowns);
+        let end = |block: u32| self.offsets.get(block as usize + 1).copied().unwrap_or(self.unknowns);
+        let range = |block: u32| self.offsets[block as usize]..end(block);
+        let (mut own, mut later) = (Vec::new(), Vec::new());
         for panel in &self.panels {
-            let values = &self.values[panel.start..panel.start + panel.order * panel.size];
-            let (start, rest) = (self.offsets[panel.block as usize], panel.order - panel.size);
-            self.gathered.clear();
-            self.gathered.resize(rest, 0.0);
-            let mut own = std::mem::take(&mut self.front);
             own.clear();
-            own.extend_from_slice(&x[start..start + panel.size]);
-            self.kernels.forward(values, panel.order, panel.size, panel.sign, &mut own, &mut self.gathered);
-            x[start..start + panel.size].copy_from_slice(&own);
-            self.front = own;
-            let mut from = 0;
+            own.extend_from_slice(&x[range(panel.block)]);
+            later.clear();
+            later.resize(panel.order - panel.size, 0.0);
+            self.kernels.forward(self.values(panel), panel.order, panel.size, panel.sign, &mut own, &mut later);
+            x[range(panel.block)].copy_from_slice(&own);
+            let mut rest = later.as_slice();
             for &b in &panel.later {
-                let to = self.offsets[b as usize];
-                let size = self.offsets.get(b as usize + 1).copied().unwrap_or(self.unknowns) - to;
-                for (x, g) in x[to..to + size].iter_mut().zip(&self.gathered[from..from + size]) {
-                    *x += g;
-                }
-                from += size;
+                let (part, others) = rest.split_at(range(b).len());
+                x[range(b)].iter_mut().zip(part).for_each(|(x, g)| *x += g);
+                rest = others;
             }
         }
         for panel in self.panels.iter().rev() {
-            let values = &self.values[panel.start..panel.start + panel.order * panel.size];
-            let start = self.offsets[panel.block as usize];
-            self.gathered.clear();
-            for &b in &panel.later {
-                let to = self.offsets[b as usize];
-                let size = self.offsets.get(b as usize + 1).copied().unwrap_or(self.unknowns) - to;
-                self.gathered.extend_from_slice(&x[to..to + size]);
-            }
-            let own = &mut x[start..start + panel.size];
-            self.kernels.backward(values, panel.order, panel.size, panel.sign, own, &self.gathered);
+            later.clear();
+            panel.later.iter().for_each(|b| later.extend_from_slice(&x[range(*b)]));
+            let own = &mut x[range(panel.block)];
+            self.kernels.backward(self.values(panel), panel.order, panel.size, panel.sign, own, &later);
         }
+    }
+
+    fn values(&self, panel: &Panel) -> &[f64] {
+        &self.values[panel.start..panel.start + panel.order * panel.size]
     }
 }
 

@@ -4,6 +4,7 @@
 //! faces and tractions around both rings ([`Chain`]).
 
 use std::f64::consts::{FRAC_PI_2, TAU};
+use std::rc::Rc;
 
 use crate::condense::{
     Block, CellState, CellTangent, Chain, CoRotation, CondensedWheel, Contribution, Geometric, Kernels, Local, Placement, Traction,
@@ -77,13 +78,16 @@ impl CondensedDrive {
 
 /// A factorised tangent.
 #[derive(Debug, Clone, Default)]
-struct Factorisation {
+pub(super) struct Factorisation {
     /// Cells whose flank nodes took part.
     live: Vec<bool>,
     /// Cells of the flexspline, then of the circular spline.
     cells: Vec<CellTangent>,
     chain: Chain,
 }
+
+/// A factorised tangent that others hold too.
+pub(super) type Kept = Rc<Factorisation>;
 
 pub(super) struct CondensedWheels<'p> {
     problem: &'p Problem,
@@ -100,7 +104,9 @@ pub(super) struct CondensedWheels<'p> {
     /// Contact of this state: edges of the bore; pairs of flanks with their nodal tangent.
     bore: Vec<(usize, [f64; 21])>,
     flanks: Vec<(FlankPair, Vec<f64>)>,
-    factor: Factorisation,
+    factor: Kept,
+    /// Pitches by which the state is turned against the one that the factor was made for.
+    turned: isize,
     locals: Vec<Local>,
 }
 
@@ -119,7 +125,8 @@ impl<'p> CondensedWheels<'p> {
             output_rad: 0.0,
             bore: Vec::new(),
             flanks: Vec::new(),
-            factor: Factorisation { cells: vec![CellTangent::default(); cells], ..Default::default() },
+            factor: Rc::default(),
+            turned: 0,
             locals: vec![Local::default(); cells],
         }
     }
@@ -326,15 +333,16 @@ fn low_rank(stiffness: &[f64]) -> (usize, Vec<f64>) {
 impl Factor for CondensedWheels<'_> {
     fn solve(&mut self, columns: &mut [f64], count: usize) {
         let n = columns.len() / count;
-        let CondensedWheels { model, kernels, factor, locals, .. } = self;
+        let CondensedWheels { model, kernels, factor, locals, live, turned, .. } = self;
+        let factor = factor.as_ref();
         let faces = model.faces();
         let (fs, cs) = (&model.flexspline, &model.circular_spline);
-        let (fs_live, cs_live) = factor.live.split_at(fs.count());
-        let cells: Vec<_> = fs_live
-            .iter()
-            .enumerate()
-            .map(|(j, live)| fs.cell(j, *live))
-            .chain(cs_live.iter().enumerate().map(|(t, live)| cs.cell(t, *live)))
+        // A cell that is near contact now has forces on its flanks, even if it had not where the factor was made.
+        let (fs_live, cs_live) = live.split_at(fs.count());
+        let now = |ring: &[bool], cell: usize| ring[(cell as isize + *turned).rem_euclid(ring.len() as isize) as usize];
+        let cells: Vec<_> = (0..fs.count())
+            .map(|j| fs.cell(j, factor.live[j] || now(fs_live, j)))
+            .chain((0..cs.count()).map(|t| cs.cell(t, factor.live[fs.count() + t] || now(cs_live, t))))
             .collect();
         let size = |block: usize| if block < fs.count() { fs.face() } else { cs.face() };
         let mut chain = vec![0.0; factor.chain.unknowns()];
@@ -439,7 +447,8 @@ impl Wheels for CondensedWheels<'_> {
 
     fn factorise(&mut self, spring: f64) -> bool {
         let (mut tractions, ranks) = self.tractions();
-        let mut factor = std::mem::take(&mut self.factor);
+        let mut factor = Rc::try_unwrap(std::mem::take(&mut self.factor)).unwrap_or_default();
+        factor.cells.resize_with(self.live.len(), CellTangent::default);
         let fs_cells = self.model.flexspline.count();
         factor.live.clone_from(&self.live);
         let mut contributions = Vec::with_capacity(2 * factor.cells.len());
@@ -476,7 +485,26 @@ impl Wheels for CondensedWheels<'_> {
             }
             definite = factor.chain.factorise(&blocks, &contributions);
         }
-        self.factor = factor;
+        self.factor = Rc::new(factor);
+        self.turned = 0;
         definite
+    }
+
+    fn keep(&self) -> Option<Kept> {
+        Some(self.factor.clone())
+    }
+
+    fn recall(&mut self, kept: &Kept, pitches: isize) {
+        self.factor = kept.clone();
+        self.turned = pitches;
+    }
+
+    fn turn(&self, x: &mut [f64], pitches: isize) {
+        let (fs, cs) = x.split_at_mut(self.model.circular_spline.first_unknown);
+        for (mesh, part) in [(self.model.fs_mesh(), fs), (self.model.cs_mesh(), cs)] {
+            let sector = 2 * mesh.nodes_per_sector;
+            part.rotate_right(pitches.rem_euclid(mesh.teeth as isize) as usize * sector);
+            rotate_pairs(part, (pitches as f64 * mesh.pitch()).sin_cos());
+        }
     }
 }

@@ -6,6 +6,7 @@
 //! predict, lay out the contact; repeat { assemble; done? factorise; solve; update } until done.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use crate::contact::{BoreLaw, Configuration, FlankContact, FlankLaw, FlankPair};
@@ -13,7 +14,7 @@ use crate::fem::{Border, BorderedSystem};
 
 use super::error::SolveError;
 use super::predictor::turn_field;
-use super::fast::CondensedWheels;
+use super::fast::{CondensedWheels, Kept};
 use super::near::{NearPairs, configuration};
 use super::problem::Problem;
 use super::reference::SparseWheels;
@@ -42,6 +43,12 @@ const ROUND_OFF: f64 = 1e-6;
 /// Relative residual below which the last factor may serve again, and the gain that the last iteration must have made.
 const CHORD_BELOW: f64 = 1e-2;
 const CHORD_GAIN: f64 = 0.2;
+
+/// Fraction of a pitch off which a tangent of an earlier pitch still serves, and the gain that each iteration must then make.
+const RECALL_WITHIN: f64 = 0.06;
+const RECALL_GAIN: f64 = 0.3;
+/// Tangents remembered.
+const TANGENTS: usize = 12;
 
 /// States of steady motion that the predictor remembers: a fine sampling of one pitch.
 const REMEMBERED: usize = 48;
@@ -93,13 +100,24 @@ pub struct Solver<'p> {
     cs_index: Vec<Option<u32>>,
     border: Border,
     /// The border eliminated with the last factor, once there is one.
-    eliminated: Option<BorderedSystem>,
+    eliminated: Option<Rc<BorderedSystem>>,
+    /// Pitches by which the state is turned against the one that the factor was made for.
+    turned: isize,
+    /// Tangents of steady motion, oldest first.
+    tangents: VecDeque<Tangent>,
     /// Factor on the penalties, below 1 only while the drive is first deformed.
     softening: f64,
     /// The last states of steady motion, oldest first.
     passed: VecDeque<State>,
     /// Time spent so far.
     pub effort: Effort,
+}
+
+/// A tangent of steady motion: the drive passes through it again after every pitch.
+struct Tangent {
+    generator_rad: f64,
+    kept: Kept,
+    eliminated: Rc<BorderedSystem>,
 }
 
 /// Out-of-balance forces at a configuration.
@@ -168,6 +186,8 @@ impl<'p> Solver<'p> {
             cs_index,
             border,
             eliminated: None,
+            turned: 0,
+            tangents: VecDeque::new(),
             softening: 1.0,
             passed: VecDeque::new(),
             effort: Effort::default(),
@@ -316,8 +336,10 @@ impl<'p> Solver<'p> {
         let fits = |old: &State| old.torque_n_m == state.torque_n_m && old.travel == state.travel;
         if !steady || self.passed.front().is_some_and(|old| !fits(old)) {
             self.passed.clear();
+            self.tangents.clear();
         }
         if steady {
+            self.keep_tangent(state.generator_rad);
             if self.passed.len() == REMEMBERED {
                 self.passed.pop_front();
             }
@@ -335,6 +357,8 @@ impl<'p> Solver<'p> {
         let mut residual = self.assemble(&mut state, from, torque_n_m, &mut near);
         let mut history = Vec::new();
         let mut last_length = 1.0;
+        let steady = self.softening == 1.0 && self.passed.back().is_some_and(|last| goes_on(last, from, torque_n_m));
+        let mut recalled = steady && generator_rad != from.generator_rad && self.recall(generator_rad);
         while history.len() <= settings.max_iterations {
             let relative = residual.relative();
             history.push(relative);
@@ -365,7 +389,8 @@ impl<'p> Solver<'p> {
                 continue;
             }
             // Near the end the last factor still points the right way, and a step with it costs a tenth.
-            let chord = relative < CHORD_BELOW && last_gain(&history) < CHORD_GAIN;
+            recalled &= history.len() == 1 || last_gain(&history) < RECALL_GAIN;
+            let chord = recalled || (relative < CHORD_BELOW && last_gain(&history) < CHORD_GAIN);
             let Some(step) = self.solve(&residual, chord) else {
                 return Err(failed(history, "the stiffness matrix is not positive definite"));
             };
@@ -558,13 +583,16 @@ impl<'p> Solver<'p> {
                 return None;
             }
             let clock = Instant::now();
-            self.eliminated = Some(BorderedSystem::new(self.wheels.as_mut(), &self.border));
+            self.eliminated = Some(Rc::new(BorderedSystem::new(self.wheels.as_mut(), &self.border)));
+            self.turned = 0;
             self.effort.solution += clock.elapsed();
         }
         let clock = Instant::now();
         let mut free = residual.force.clone();
         let mut border = residual.border;
+        self.turn(&mut free, &mut border, -self.turned);
         let solved = self.eliminated.as_ref()?.solve(self.wheels.as_mut(), &mut free, &mut border[..self.border.width]);
+        self.turn(&mut free, &mut border, self.turned);
         self.effort.solution += clock.elapsed();
         if !solved {
             return None;
@@ -579,6 +607,43 @@ impl<'p> Solver<'p> {
             }
         }
         Some(Step { free, u, v, border })
+    }
+
+    /// Turns forces or displacements by so many pitches.
+    fn turn(&self, free: &mut [f64], border: &mut [f64; BORDERS], pitches: isize) {
+        if pitches != 0 {
+            self.wheels.turn(free, pitches);
+            let (sin, cos) = (pitches as f64 * self.problem.flexspline.pitch()).sin_cos();
+            let [x, y] = [border[LATERAL], border[LATERAL + 1]];
+            (border[LATERAL], border[LATERAL + 1]) = (cos * x - sin * y, sin * x + cos * y);
+        }
+    }
+
+    /// Takes up a tangent that was passed whole pitches ago, or nearly; whether there is one.
+    fn recall(&mut self, generator_rad: f64) -> bool {
+        let pitch = self.problem.flexspline.pitch();
+        let pitches = |tangent: &Tangent| (generator_rad - tangent.generator_rad) / pitch;
+        let off = |tangent: &Tangent| (pitches(tangent) - pitches(tangent).round()).abs();
+        let Some(tangent) = self.tangents.iter().min_by(|a, b| off(a).total_cmp(&off(b))) else {
+            return false;
+        };
+        if off(tangent) > RECALL_WITHIN {
+            return false;
+        }
+        self.turned = pitches(tangent).round() as isize;
+        self.wheels.recall(&tangent.kept, self.turned);
+        self.eliminated = Some(tangent.eliminated.clone());
+        true
+    }
+
+    /// Keeps the tangent just made for the next pitches.
+    fn keep_tangent(&mut self, generator_rad: f64) {
+        if let (0, Some(kept), Some(eliminated)) = (self.turned, self.wheels.keep(), &self.eliminated) {
+            if self.tangents.len() == TANGENTS {
+                self.tangents.pop_front();
+            }
+            self.tangents.push_back(Tangent { generator_rad, kept, eliminated: eliminated.clone() });
+        }
     }
 
     /// Turn of the output for a unit torque on it (rad mm / N mm), by the last tangent.
@@ -641,6 +706,11 @@ fn fixed_border(problem: &Problem, wheels: &dyn Wheels) -> Border {
         }
     }
     border
+}
+
+/// Whether the motion under a load goes on as it was.
+fn goes_on(last: &State, from: &State, torque_n_m: f64) -> bool {
+    last.torque_n_m == torque_n_m && from.torque_n_m == torque_n_m && last.travel == from.travel
 }
 
 /// How far the last iteration brought the residual down.

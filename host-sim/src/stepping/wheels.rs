@@ -3,6 +3,7 @@
 use crate::contact::{BorePressure, FlankPair, PairContribution};
 use crate::fem::Factor;
 
+use super::fast::Kept;
 use super::state::State;
 
 /// Elasticity of both wheels, with the contact that acts on them in the tangent.
@@ -35,4 +36,16 @@ pub(super) trait Wheels: Factor {
     /// Factorises the tangent, stiffened by `spring` (N/mm per mm) at every node or at some that hold the rest; false when it
     /// is not positive definite.
     fn factorise(&mut self, spring: f64) -> bool;
+
+    /// The factor, to be used again in a state like the one it was made for; `None` where that is not worth while.
+    fn keep(&self) -> Option<Kept> {
+        None
+    }
+
+    /// Uses a kept factor in a state that is turned by so many flexspline pitches against its own: it solves in the numbering of
+    /// its own state.
+    fn recall(&mut self, _kept: &Kept, _pitches: isize) {}
+
+    /// Turns a vector of forces or displacements by so many pitches of each wheel.
+    fn turn(&self, _x: &mut [f64], _pitches: isize) {}
 }
