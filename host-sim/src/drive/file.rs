@@ -510,6 +510,53 @@ mod tests {
     }
 
     #[test]
+    fn imperfections_are_read_written_and_hashed_and_none_is_the_ideal_drive() {
+        let ideal = Drive::hhd_95();
+        // The hash of the ideal drive from before there were imperfections: tables made then are of this drive still.
+        let hash = blake3::Hash::from_bytes(ideal.hash()).to_hex();
+        assert_eq!(hash.as_str(), "137827daaec6b8161369acdb8b4a3d4f1cd1392483cc42d2d990f2a92df89bd6");
+        let list: Vec<String> = (0..190).map(|k| format!("{:.1}", 0.1 * f64::from(k % 7))).collect();
+        let text = format!(
+            "base = \"HHD-95\"\n[as_built]\ncircular_spline_eccentricity_um = 10\ncircular_spline_pitch_error_um = [{}]\n\
+             flexspline_pitch_harmonics = [{{ order = 2, amplitude_um = 5.0, phase_deg = 30.0 }}, {{ order = 1, amplitude_um = 3 }}]\n\
+             [[as_built.damaged_teeth]]\nwheel = \"circular_spline\"\ntooth = 189\ndepth_um = 20.5\n",
+            list.join(", ")
+        );
+        let drive = Drive::from_toml("d.toml", &text).unwrap();
+        let built = &drive.as_built;
+        assert_eq!(built.circular_spline_eccentricity_um, 10.0);
+        assert_eq!((built.circular_spline_pitch_error_um.len(), built.circular_spline_pitch_error_um[6]), (190, 0.6));
+        assert_eq!(built.flexspline_pitch_harmonics[1], Harmonic { order: 1, amplitude_um: 3.0, phase_deg: 0.0 });
+        let damaged =
+            DamagedTooth { wheel: Wheel::CircularSpline, tooth: 189, flank: DamagedFlank::Both, depth_um: 20.5 };
+        assert_eq!(built.damaged_teeth, [damaged]);
+        let written = drive.to_toml();
+        let again = Drive::from_toml("d.toml", &written).unwrap();
+        assert_eq!((&again, again.to_toml()), (&drive, written));
+        assert_eq!(again.hash(), drive.hash());
+        // Every part of it is in the hash.
+        let sets = [
+            "as_built.circular_spline_eccentricity_um=0",
+            "as_built.circular_spline_pitch_error_um=[]",
+            "as_built.flexspline_pitch_harmonics=[{order=2,amplitude_um=5,phase_deg=30}]",
+            "as_built.flexspline_pitch_harmonics=[{order=2,amplitude_um=5,phase_deg=31},{order=1,amplitude_um=3}]",
+            "as_built.damaged_teeth=[]",
+            "as_built.damaged_teeth=[{wheel='circular_spline',tooth=189,flank='plus',depth_um=20.5}]",
+            "as_built.damaged_teeth=[{wheel='flexspline',tooth=187,depth_um=20.5}]",
+            "as_built.generator_warmer_k=1",
+        ];
+        let mut hashes = std::collections::HashSet::from([drive.hash(), ideal.hash()]);
+        for set in sets {
+            assert!(hashes.insert(drive.with_set(set).unwrap().hash()), "{set} is not in the hash");
+        }
+        // At another temperature it is written by the sizes of its file.
+        let uneven = drive.with_set("as_built.circular_spline_warmer_k=-30").unwrap();
+        let warm = uneven.at_temperature(60.0);
+        let again = Drive::from_toml("d.toml", &warm.to_toml()).unwrap();
+        assert!((again.circular_spline.tip_radius_mm - 48.65).abs() < 1e-12);
+    }
+
+    #[test]
     fn rigid_is_a_value() {
         let text = "base = \"HHD-95-typical\"\n[sleeve]\ntorsion_stiffness_n_m_per_rad = \"rigid\"";
         let drive = Drive::from_toml("c.toml", text).unwrap();
@@ -667,6 +714,91 @@ mod tests {
                 "[temperature]\nflexspline_expansion_per_k = 11.5",
                 "wrong.toml:3: temperature.flexspline_expansion_per_k: found 11.5, allowed: -0.00001 to 0.0001",
             ),
+            (
+                "[as_built]\nflexspline_runout_um = -1",
+                "wrong.toml:3: as_built.flexspline_runout_um: found -1, allowed: 0 to 100",
+            ),
+            (
+                "[as_built]\nflexspline_wear_um = inf",
+                "wrong.toml:3: as_built.flexspline_wear_um: found inf, allowed: 0 to 200",
+            ),
+            (
+                "[as_built]\nflexspline_runout_mm = 0.01",
+                "wrong.toml:3: as_built.flexspline_runout_mm: unknown key; did you mean \"flexspline_runout_um\"?",
+            ),
+            (
+                "[as_built]\ncircular_spline_ovality_phase_deg = 400",
+                "wrong.toml:3: as_built.circular_spline_ovality_phase_deg: found 400, allowed: -360 to 360",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_error_um = [1.0, 2.0]",
+                "wrong.toml:3: as_built.flexspline_pitch_error_um: found 2 numbers, allowed: none, or 188, one for each tooth",
+            ),
+            (
+                "[as_built]\ncircular_spline_pitch_error_um = [1.0,\n nan]",
+                "wrong.toml:3: as_built.circular_spline_pitch_error_um[1]: found NaN, allowed: -100 to 100",
+            ),
+            (
+                "[as_built]\ncircular_spline_pitch_error_um = [1.0, \"2\"]",
+                "wrong.toml:3: as_built.circular_spline_pitch_error_um[1]: found \"2\", allowed: -100 to 100",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_error_um = 3.0",
+                "wrong.toml:3: as_built.flexspline_pitch_error_um: found 3.0, allowed: an array of numbers, -100 to 100 each",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_harmonics = [{ order = 0, amplitude_um = 1.0 }]",
+                "wrong.toml:3: as_built.flexspline_pitch_harmonics[0].order: found 0, allowed: 1 to 1000",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_harmonics = [{ order = 2.5, amplitude_um = 1.0 }]",
+                "wrong.toml:3: as_built.flexspline_pitch_harmonics[0].order: found 2.5, allowed: a whole number, 1 to 1000",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_harmonics = [{ order = 2, amplitude_um = 1 }, { order = 95, amplitude_um = 1 }]",
+                "wrong.toml:3: as_built.flexspline_pitch_harmonics[1].order: found 95, allowed: 1 to 94 (two teeth",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_harmonics = [{ order = 2, amplitude_um = -1.0 }]",
+                "wrong.toml:3: as_built.flexspline_pitch_harmonics[0].amplitude_um: found -1, allowed: 0 to 100",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_harmonics = [{ order = 2, amplitude_um = nan }]",
+                "wrong.toml:3: as_built.flexspline_pitch_harmonics[0].amplitude_um: found NaN, allowed: 0 to 100",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_harmonics = [{ order = 2 }]",
+                "wrong.toml:3: as_built.flexspline_pitch_harmonics[0].amplitude_um: missing",
+            ),
+            (
+                "[as_built]\ncam_form_harmonics = [{ order = 2, amplitude = 1.0 }]",
+                "wrong.toml:3: as_built.cam_form_harmonics[0].amplitude: unknown key; did you mean \"amplitude_um\"?",
+            ),
+            (
+                "[as_built]\ncam_form_harmonics = [2, 1.0]",
+                "wrong.toml:3: as_built.cam_form_harmonics[0]: found 2, allowed: { order, amplitude_um, phase_deg }",
+            ),
+            (
+                "[as_built]\nrim_thickness_harmonics = [{ order = 2, amplitude_um = 150 }, { order = 3, amplitude_um = 100 }]",
+                "wrong.toml:3: as_built.rim_thickness_harmonics: found 250.0 µm in all, allowed: up to 240.0 µm",
+            ),
+            (
+                "[as_built]\ndamaged_teeth = [{ wheel = \"generator\", tooth = 1, depth_um = 1 }]",
+                "wrong.toml:3: as_built.damaged_teeth[0].wheel: found \"generator\", allowed: \"flexspline\", \"circular_spline\"",
+            ),
+            (
+                "[as_built]\ndamaged_teeth = [{ wheel = \"flexspline\", tooth = 188, depth_um = 1 }]",
+                "wrong.toml:3: as_built.damaged_teeth[0].tooth: found 188, allowed: 0 to 187",
+            ),
+            (
+                "[as_built]\ndamaged_teeth = [{ wheel = \"flexspline\", tooth = 1, flank = \"left\", depth_um = 1 }]",
+                "wrong.toml:3: as_built.damaged_teeth[0].flank: found \"left\", allowed: \"plus\", \"minus\", \"both\"",
+            ),
+            (
+                "[[as_built.damaged_teeth]]\nwheel = \"flexspline\"\ntooth = 1\ndepth_um = 501",
+                "wrong.toml:2: as_built.damaged_teeth[0].depth_um: found 501, allowed: 0 to 500",
+            ),
+            ("as_built = 3", "wrong.toml:2: as_built: found 3, allowed: a table [as_built]"),
             ("[flexpline]\nteeth = 188", "wrong.toml:2: flexpline: unknown key; did you mean \"flexspline\"?"),
             ("[qqq]\nteeth = 188", "wrong.toml:2: qqq: unknown key"),
             ("friction_coefficient = 0.1", "wrong.toml:2: friction_coefficient: unknown key; it belongs to [flanks]"),
@@ -736,6 +868,10 @@ mod tests {
         assert!(set("w0_mm=0.4").contains("w0_mm: unknown key; did you mean \"generator.w0_mm\"?"));
         assert!(set("generator.w0_mm=abc").ends_with("generator.w0_mm: found \"abc\", allowed: above 0 to 20"));
         assert!(set("flexspline.teeth=186").starts_with("--set: circular_spline.teeth: found 190, allowed: 188"));
+        assert!(
+            set("as_built.cam_form_harmonics=[{order=0,amplitude_um=1}]")
+                .ends_with("as_built.cam_form_harmonics[0].order: found 0, allowed: 1 to 1000")
+        );
         let both = ["flexspline.teeth=186", "circular_spline.teeth=190"];
         assert!(Drive::hhd_95().with_sets(both).unwrap_err().to_string().contains("found 190, allowed: 188"));
         assert_eq!(Drive::hhd_95().with_set("name=mine").unwrap().name, "mine");

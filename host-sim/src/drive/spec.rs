@@ -583,6 +583,7 @@ impl Drive {
 
 #[cfg(test)]
 mod tests {
+    use super::super::as_built::Harmonic;
     use super::super::interference::RigidMesh;
     use super::*;
 
@@ -628,6 +629,34 @@ mod tests {
         assert!((again.flexspline.tip_radius_mm - direct.flexspline.tip_radius_mm).abs() < 1e-12);
         assert!((again.material.youngs_modulus_mpa - direct.material.youngs_modulus_mpa).abs() < 1e-8);
         assert_eq!(drive.at_temperature(20.0), drive);
+    }
+
+    #[test]
+    fn a_part_that_is_warmer_than_the_flexspline_grows_at_reference_temperature_too() {
+        let mut drive = Drive::hhd_95();
+        drive.as_built.generator_warmer_k = 10.0;
+        drive.as_built.circular_spline_warmer_k = -20.0;
+        let there = drive.at_temperature(20.0);
+        assert!((there.thermal_state.generator_scale - 1.0 - 1.15e-4).abs() < 1e-15);
+        assert!((there.circular_spline.root_radius_mm / 49.45 - 1.0 + 2.3e-4).abs() < 1e-12);
+        assert_eq!(there.thermal_state.housing_scale, there.thermal_state.circular_spline_scale);
+        assert_eq!((there.flexspline.root_radius_mm, there.material.youngs_modulus_mpa), (47.875, 206_000.0));
+        let back = there.as_dimensioned();
+        assert!((back.circular_spline.root_radius_mm - 49.45).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_drive_made_in_a_program_is_checked_with_its_imperfections() {
+        let mut drive = Drive::hhd_95();
+        drive.as_built.flexspline_pitch_error_um = vec![0.0; 188];
+        drive.as_built.flexspline_pitch_error_um[7] = f64::INFINITY;
+        drive.as_built.cam_form_harmonics = vec![Harmonic { order: 0, amplitude_um: f64::NAN, phase_deg: 0.0 }];
+        assert_eq!(
+            drive.check().unwrap_err().to_string(),
+            "as_built.flexspline_pitch_error_um[7]: found inf, allowed: -100 to 100\n\
+             as_built.cam_form_harmonics[0].order: found 0, allowed: 1 to 1000\n\
+             as_built.cam_form_harmonics[0].amplitude_um: found NaN, allowed: 0 to 100"
+        );
     }
 
     #[test]
