@@ -16,7 +16,7 @@ use flexspline_sim::contact::{BoreContact, BoreLaw, Configuration, FlankLaw, Fla
 use flexspline_sim::drive::{Drive, GeneratorKind, GeneratorOutline};
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::stepping::{Problem, Solver};
-use flexspline_tests::motion::{Run, hhd_95, mean, on};
+use flexspline_tests::motion::{Run, imperfect, mean, on, problem};
 
 /// Numbers in [-1, 1] that look random and are always the same.
 struct Noise(u64);
@@ -79,8 +79,8 @@ fn bore(contact: &BoreContact, law: BoreLaw, outline: &GeneratorOutline, psi: f6
     all
 }
 
-fn bore_derivatives(kind: GeneratorKind) {
-    let problem = hhd_95(kind, MeshLevel::Coarse);
+fn bore_derivatives(drive: &Drive, kind: GeneratorKind) {
+    let problem = problem(drive, kind, on(MeshLevel::Coarse));
     let contact = BoreContact::new(&problem.flexspline, 16);
     let law = BoreLaw::new(1e6, None);
     let psi = 0.0123;
@@ -136,7 +136,14 @@ fn bore_derivatives(kind: GeneratorKind) {
 #[test]
 fn bore_forces_are_derivatives_of_the_energy() {
     for kind in GeneratorKind::ALL {
-        bore_derivatives(kind);
+        bore_derivatives(&Drive::hhd_95(), kind);
+    }
+}
+
+#[test]
+fn bore_forces_of_a_malformed_generator_are_derivatives_of_the_energy() {
+    for kind in GeneratorKind::ALL {
+        bore_derivatives(&imperfect(), kind);
     }
 }
 
@@ -186,7 +193,18 @@ struct Flank {
 
 #[test]
 fn flank_forces_are_derivatives_of_the_energy_and_balance() {
-    let problem = hhd_95(GeneratorKind::TwoRoller, MeshLevel::Standard);
+    flank_derivatives(&Drive::hhd_95(), 1e-5);
+}
+
+/// Flanks displaced, turned and worn, on an axis beside that of the housing. The moment about the axis of the output is that of
+/// the forces where they act, 20 um beside the nodes that carry them: 4e-4 of 45 mm.
+#[test]
+fn as_built_flank_forces_are_derivatives_of_the_energy_and_balance() {
+    flank_derivatives(&imperfect(), 1e-3);
+}
+
+fn flank_derivatives(drive: &Drive, moment_bound: f64) {
+    let problem = problem(drive, GeneratorKind::TwoRoller, on(MeshLevel::Standard));
     let run = Run::loaded(&problem, 20.0);
     let flanks = problem.flanks();
     let mut noise = Noise(7);
@@ -310,5 +328,5 @@ fn flank_forces_are_derivatives_of_the_energy_and_balance() {
     // The tangent leaves out how the normal turns with the foot: pressure over radius of curvature, against the penalty, is
     // a few thousandths on the tip rounding of the space.
     assert!(worst[0] <= 1e-5 && worst[1] <= 1e-2 && worst[2] <= 1e-2 && worst[3] <= 1e-12);
-    assert!(worst[4] <= 1e-5 && worst[5] <= 1e-5);
+    assert!(worst[4] <= moment_bound && worst[5] <= moment_bound);
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use flexspline_sim::drive::{Drive, GeneratorKind};
+use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::stepping::{Increment, Problem, Solver, SolverSettings, State};
 
@@ -24,6 +24,38 @@ pub fn hhd_95(kind: GeneratorKind, mesh: MeshLevel) -> Problem {
 /// A drive with a generator at its reference temperature.
 pub fn problem(drive: &Drive, kind: GeneratorKind, settings: SolverSettings) -> Problem {
     Problem::new(drive, kind, drive.temperature.reference_c, settings).unwrap_or_else(|error| panic!("{kind}: {error}"))
+}
+
+/// HHD-95 with every imperfection there is, each of a few micrometres.
+pub fn imperfect() -> Drive {
+    let mut drive = Drive::hhd_95();
+    let built = &mut drive.as_built;
+    built.circular_spline_eccentricity_um = 2.0;
+    built.circular_spline_eccentricity_phase_deg = 50.0;
+    built.circular_spline_ovality_um = 2.0;
+    built.circular_spline_ovality_phase_deg = 25.0;
+    built.circular_spline_pitch_harmonics = vec![Harmonic { order: 3, amplitude_um: 1.5, phase_deg: 12.0 }];
+    built.circular_spline_pitch_error_um = (0..190).map(|k| 0.5 * (1.9 * f64::from(k)).sin()).collect();
+    built.circular_spline_offset_um = 2.0;
+    built.circular_spline_offset_direction_deg = -70.0;
+    built.flexspline_runout_um = 1.5;
+    built.flexspline_runout_phase_deg = 100.0;
+    built.flexspline_pitch_harmonics = vec![Harmonic { order: 2, amplitude_um: 2.0, phase_deg: 30.0 }];
+    built.flexspline_pitch_error_um = (0..188).map(|k| 0.5 * (2.3 * f64::from(k)).cos()).collect();
+    built.rim_thickness_harmonics = vec![Harmonic { order: 3, amplitude_um: 3.0, phase_deg: -40.0 }];
+    built.generator_eccentricity_um = 3.0;
+    built.generator_eccentricity_phase_deg = 20.0;
+    built.generator_lobe_asymmetry_um = 2.0;
+    built.cam_form_harmonics = vec![Harmonic { order: 5, amplitude_um: 1.0, phase_deg: 8.0 }];
+    built.flexspline_wear_um = 1.0;
+    built.circular_spline_wear_um = 1.5;
+    built.damaged_teeth = vec![
+        DamagedTooth { wheel: Wheel::Flexspline, tooth: 2, flank: DamagedFlank::Minus, depth_um: 2.0 },
+        DamagedTooth { wheel: Wheel::CircularSpline, tooth: 187, flank: DamagedFlank::Both, depth_um: 2.0 },
+    ];
+    built.generator_warmer_k = 2.0;
+    built.circular_spline_warmer_k = -3.0;
+    drive
 }
 
 /// Mean of some numbers.

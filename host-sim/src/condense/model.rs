@@ -3,6 +3,7 @@
 use faer::Side as Triangle;
 use faer::{Mat, MatRef};
 use faer::linalg::solvers::Solve;
+use rayon::prelude::*;
 
 use crate::material::PlaneStrain;
 use crate::mesh::WheelMesh;
@@ -124,11 +125,13 @@ impl CondensedWheel {
         whole: &WheelMesh,
         material: &PlaneStrain,
         first_unknown: usize,
-        held: impl Fn(u32) -> bool,
+        held: impl Fn(u32) -> bool + Sync,
     ) -> CondensedWheel {
         let skin = Skin::new(whole, &held);
-        let class = vec![0; whole.teeth];
-        let elements = vec![Superelement::new(whole, material, &skin.cell_nodes(whole, 0, &held))];
+        let class = (0..whole.teeth).map(|j| whole.sector_class(j)).collect();
+        let representatives: Vec<usize> = (0..whole.sector_classes()).collect();
+        let condense = |j: &usize| Superelement::new(whole, material, &skin.cell_nodes(whole, *j, &held));
+        let elements: Vec<Superelement> = representatives.par_iter().map(condense).collect();
         let cells = elements
             .iter()
             .map(|element| {

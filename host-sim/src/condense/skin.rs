@@ -71,6 +71,7 @@ impl Skin {
             flanks,
             base_edges,
             base_radius: whole.base_radius,
+            rim: whole.rim.clone(),
         };
         Skin { mesh, original, face: face.len(), bore }
     }

@@ -27,11 +27,12 @@ pub struct BoreContact {
     pub edges: Vec<[u32; 3]>,
     /// Angle of the middle of each edge, rad, ascending from that of edge 0.
     pub middle_angles: Vec<f64>,
-    /// Half the angle of an edge.
-    half_angle: f64,
-    radius: f64,
-    /// Offset from the middle angle, weight (mm), shape functions of each point.
-    points: Vec<(f64, f64, [f64; 3])>,
+    /// Undeformed place of start, middle and end of each edge, on the exact bore.
+    places: Vec<[[f64; 2]; 3]>,
+    /// Undeformed place of each integration point, edge by edge.
+    point_places: Vec<[f64; 2]>,
+    /// Weight (mm) and shape functions of each point of an edge.
+    points: Vec<(f64, [f64; 3])>,
 }
 
 /// What the gap along an edge of 0.4 mm may differ by from a quadratic, mm: of the distance from a circle of 13 mm the fourth
@@ -78,11 +79,22 @@ impl BoreContact {
             }
         }
         let half_angle = 0.5 * width;
-        let points = gauss_legendre(per_edge)
-            .into_iter()
-            .map(|(xi, weight)| (xi * half_angle, weight * half_angle * mesh.base_radius, edge_shape(xi)))
+        let rule = gauss_legendre(per_edge);
+        // Where the rim is thicker the bore stands further in.
+        let on_bore = |angle: f64| -> [f64; 2] {
+            let radius = if mesh.rim.is_none() { mesh.base_radius } else { mesh.base_radius - mesh.rim.at(angle) };
+            let (s, c) = angle.sin_cos();
+            [radius * c, radius * s]
+        };
+        let places = middle_angles.iter().map(|m| [m - half_angle, m + 0.0, m + half_angle].map(on_bore)).collect();
+        let point_places = middle_angles
+            .iter()
+            .flat_map(|m| rule.iter().map(move |(xi, _)| m + xi * half_angle))
+            .map(on_bore)
             .collect();
-        BoreContact { edges, middle_angles, half_angle, radius: mesh.base_radius, points }
+        let points =
+            rule.iter().map(|(xi, weight)| (weight * half_angle * mesh.base_radius, edge_shape(*xi))).collect();
+        BoreContact { edges, middle_angles, places, point_places, points }
     }
 
     /// Contact of the bore displaced by `u` (x and y of each node) with the generator turned by `generator_rad`, edge by
@@ -112,11 +124,10 @@ impl BoreContact {
                 shared = None;
                 continue;
             }
-            let middle = self.middle_angles[edge];
             let node_u = nodes.map(|n| [u[2 * n as usize], u[2 * n as usize + 1]]);
             let gap = |k: usize| {
-                let (s, c) = (middle + (k as f64 - 1.0) * self.half_angle).sin_cos();
-                foot([self.radius * c + node_u[k][0], self.radius * s + node_u[k][1]]).distance
+                let ([x, y], [dx, dy]) = (self.places[edge][k], node_u[k]);
+                foot([x + dx, y + dy]).distance
             };
             let gaps = [shared.unwrap_or_else(|| gap(0)), gap(1), gap(2)];
             shared = Some(gaps[2]);
@@ -129,11 +140,11 @@ impl BoreContact {
             let mut contact =
                 BorePressure { edge, force: [0.0; 6], stiffness: [0.0; 21], moment: 0.0, peak: 0.0, energy: 0.0 };
             let mut touching = false;
-            for (offset, weight, n) in &self.points {
-                let (s, c) = (middle + offset).sin_cos();
+            let places = &self.point_places[edge * self.points.len()..];
+            for ((weight, n), place) in self.points.iter().zip(places) {
                 let x = [
-                    self.radius * c + n[0] * node_u[0][0] + n[1] * node_u[1][0] + n[2] * node_u[2][0],
-                    self.radius * s + n[0] * node_u[0][1] + n[1] * node_u[1][1] + n[2] * node_u[2][1],
+                    place[0] + n[0] * node_u[0][0] + n[1] * node_u[1][0] + n[2] * node_u[2][0],
+                    place[1] + n[0] * node_u[0][1] + n[1] * node_u[1][1] + n[2] * node_u[2][1],
                 ];
                 let foot = foot(x);
                 if foot.distance >= 0.0 {
@@ -204,7 +215,7 @@ mod tests {
             let (s, c) = angle.sin_cos();
             assert!((x[0] * s - x[1] * c).abs() < 1e-12 && x[0] * c + x[1] * s > 0.0);
         }
-        let around = bore.points.iter().map(|(_, weight, _)| weight).sum::<f64>() * bore.edges.len() as f64;
+        let around = bore.points.iter().map(|(weight, _)| weight).sum::<f64>() * bore.edges.len() as f64;
         assert!((around - std::f64::consts::TAU * mesh.base_radius).abs() < 1e-10);
     }
 

@@ -9,12 +9,18 @@
 //! the foot of `x - V`. To first order in the slope of V (1e-3; the neglected second order is below 1e-6 of the gap) all
 //! derivatives of g are those of one vector `c = n - (n . dV/ds) t`: +c on the flexspline, −c on the circular spline, so
 //! that action equals reaction and the moment on the output is that of the forces themselves.
+//!
+//! As built ([`FlankDeviations`]) the point becomes that of a tooth displaced as a rigid body, and P(s) the outline of a space
+//! displaced likewise; the axis of the circular spline may stand beside that of the housing, and a worn flank adds its depth to
+//! g. All are constants, so that c and its work stay what they were. The frame that turns with the circular spline has its
+//! origin on the axis of the output bearing: `x` counts from there, and the torque on the output is the moment about it, wherever
+//! toothing and housing have theirs.
 
 use crate::element::edge_shape;
 use crate::mesh::{FlankMesh, WheelMesh};
 
 use super::quadrature::gauss_legendre;
-use crate::drive::{Foot, InvoluteFlank, Side};
+use crate::drive::{FlankDeviations, Foot, InvoluteFlank, Placement, Side};
 
 /// Law of the flanks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,6 +83,7 @@ pub struct FlankContact<'a> {
     pub tooth: InvoluteFlank,
     /// The circular-spline flank.
     pub space: InvoluteFlank,
+    deviations: &'a FlankDeviations,
     coarse: Vec<f64>,
     rule: Vec<(f64, f64)>,
 }
@@ -124,14 +131,26 @@ struct LocalField {
     cs: Vec<[f64; 2]>,
     /// Rotation from the tooth frame to the space frame.
     turn: (f64, f64),
+    /// Where the tooth stands in its frame, seen from the axis of the circular spline.
+    tooth: Placement,
+    /// Where the space stands in its frame.
+    space: Placement,
+    /// Depth missing on both flanks.
+    depth: f64,
 }
 
 impl<'a> FlankContact<'a> {
-    /// Contact between the flanks of two meshes.
-    pub fn new(fs_mesh: &'a WheelMesh, cs_mesh: &'a WheelMesh, tooth: InvoluteFlank, space: InvoluteFlank) -> Self {
+    /// Contact between the flanks of two meshes, the flanks standing beside their nominal places by `deviations`.
+    pub fn new(
+        fs_mesh: &'a WheelMesh,
+        cs_mesh: &'a WheelMesh,
+        tooth: InvoluteFlank,
+        space: InvoluteFlank,
+        deviations: &'a FlankDeviations,
+    ) -> Self {
         let (a, b) = (tooth.start_radius, tooth.junction_radius);
         let coarse = (0..=6).map(|i| a + (b - a) * f64::from(i) / 6.0).collect();
-        FlankContact { fs_mesh, cs_mesh, tooth, space, coarse, rule: gauss_legendre(4) }
+        FlankContact { fs_mesh, cs_mesh, tooth, space, deviations, coarse, rule: gauss_legendre(4) }
     }
 
     /// Flank nodes of the flexspline side of a pair.
@@ -165,7 +184,7 @@ impl<'a> FlankContact<'a> {
                 let tip = self.fs_mesh.node(tooth as isize, tip);
                 let x = self.fs_mesh.nodes[tip];
                 let p = [x[0] + at.u[2 * tip], x[1] + at.u[2 * tip + 1]];
-                if p[0].hypot(p[1]) < self.space.tip_radius - 0.05 {
+                if p[0].hypot(p[1]) < self.space.tip_radius - 0.05 - self.deviations.largest {
                     continue;
                 }
                 let inset = side.sign() * self.tooth.half_angle(self.tooth.tip_radius);
@@ -206,15 +225,26 @@ impl<'a> FlankContact<'a> {
                 })
                 .collect()
         };
-        let angle = self.fs_mesh.sector_angle(pair.tooth) - self.cs_mesh.sector_angle(pair.space) - at.output_rad;
+        let tooth_angle = self.fs_mesh.sector_angle(pair.tooth);
+        let angle = tooth_angle - self.cs_mesh.sector_angle(pair.space) - at.output_rad;
+        let deviations = self.deviations;
+        let (mut tooth, side) = (deviations.teeth[pair.tooth], pair.side.index());
+        if deviations.axis != [0.0; 2] {
+            let axis = rotate(deviations.axis, (-tooth_angle).sin_cos());
+            tooth.translation = [tooth.translation[0] - axis[0], tooth.translation[1] - axis[1]];
+        }
         LocalField {
             fs: local(self.fs_mesh, pair.tooth, &self.fs_flank(pair).nodes, at.u),
             cs: local(self.cs_mesh, pair.space, &self.cs_flank(pair).nodes, at.v),
             turn: (sign * angle).sin_cos(),
+            tooth: tooth.seen_from(pair.side),
+            space: deviations.spaces[pair.space].seen_from(pair.side),
+            depth: deviations.tooth_depth[pair.tooth][side] + deviations.space_depth[pair.space][side],
         }
     }
 
-    /// Foot of a flank point on the deformed circular spline, and the point itself in the space frame.
+    /// Foot of a flank point on the deformed circular spline, and the point itself in the space frame, whose origin lies on the
+    /// axis of the output.
     #[inline]
     fn foot(
         &self,
@@ -227,19 +257,22 @@ impl<'a> FlankContact<'a> {
         let x = self.seen_from_space(field, position, edge, shape);
         let cs = self.cs_flank(pair);
         // The displacement at the foot decides the foot; its slope of 1e-3 makes the second look exact.
-        let mut foot = self.space.foot_internal(x);
+        let mut foot = self.space.foot_internal(field.space.recover(x));
         for _ in 0..2 {
             let (e, xi) = cs.locate(foot.radius);
             let n = edge_shape(xi);
             let v: [f64; 2] = std::array::from_fn(|k| (0..3).map(|i| n[i] * field.cs[2 * e + i][k]).sum());
-            foot = self.space.foot_internal([x[0] - v[0], x[1] - v[1]]);
+            foot = self.space.foot_internal(field.space.recover([x[0] - v[0], x[1] - v[1]]));
         }
+        foot.distance += field.depth;
+        foot.normal = field.space.turned(foot.normal);
+        foot.tangent = field.space.turned(foot.tangent);
         (foot, x)
     }
 
     #[inline]
     fn seen_from_space(&self, field: &LocalField, position: [f64; 2], edge: usize, shape: &[f64; 3]) -> [f64; 2] {
-        let mut x = position;
+        let mut x = field.tooth.place(position);
         for (i, n) in shape.iter().enumerate() {
             let d = field.fs[2 * edge + i];
             x[0] += n * d[0];
@@ -327,7 +360,7 @@ impl<'a> FlankContact<'a> {
         let facing = |r: f64| {
             let (edge, xi) = flank.locate(r);
             let x = self.seen_from_space(field, self.tooth.point(r), edge, &edge_shape(xi));
-            self.space.involute_foot_radius(x)
+            self.space.involute_foot_radius(field.space.recover(x))
         };
         let mut r = corner - (facing(self.tooth.junction_radius) - self.tooth.junction_radius);
         for _ in 0..4 {
@@ -518,7 +551,8 @@ mod tests {
         let space = ToothFlank::internal(&drive.circular_spline).unwrap();
         let tooth = InvoluteFlank::new(&tooth, drive.flexspline.base_radius_mm());
         let space = InvoluteFlank::new(&space, drive.circular_spline.base_radius_mm());
-        test(&FlankContact::new(&fs, &cs, tooth, space), &fs, &cs);
+        let deviations = FlankDeviations::new(&drive);
+        test(&FlankContact::new(&fs, &cs, tooth, space, &deviations), &fs, &cs);
     }
 
     const PAIR: FlankPair = FlankPair { tooth: 0, space: 0, side: Side::Plus };

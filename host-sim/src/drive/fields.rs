@@ -1,6 +1,7 @@
 //! Every number of a drive file, once: path, unit, meaning, range, and where it lives in [`Drive`]. Reading, writing,
 //! overriding, checking and hashing all walk this list.
 
+use super::as_built::{DamagedTooth, Harmonic};
 use super::spec::Drive;
 
 /// One number of the file.
@@ -19,7 +20,43 @@ pub(super) enum Slot<'a> {
     /// `"rigid"` in a file is `None`.
     RealOrRigid(&'a mut Option<f64>),
     Count(&'a mut u32),
+    /// One number for each tooth, or none.
+    List(&'a mut Vec<f64>),
+    Harmonics(&'a mut Vec<Harmonic>),
+    Damage(&'a mut Vec<DamagedTooth>),
 }
+
+/// A copy of what a field holds.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Value {
+    Number(f64),
+    Rigid,
+    List(Vec<f64>),
+    Harmonics(Vec<Harmonic>),
+    Damage(Vec<DamagedTooth>),
+}
+
+impl Value {
+    /// True for zero and for an empty list.
+    pub fn is_zero(&self) -> bool {
+        match self {
+            Value::Number(number) => *number == 0.0,
+            Value::Rigid => false,
+            Value::List(list) => list.is_empty(),
+            Value::Harmonics(list) => list.is_empty(),
+            Value::Damage(list) => list.is_empty(),
+        }
+    }
+}
+
+/// Allowed phases, degrees.
+pub(super) const PHASE: Range = from(-360.0, 360.0);
+/// Allowed orders of a harmonic; the drive narrows them.
+pub(super) const ORDER: Range = from(1.0, 1000.0);
+/// Allowed depths of a damage, µm.
+pub(super) const DEPTH: Range = from(0.0, 500.0);
+/// Allowed numbers of a damaged tooth; the drive narrows them.
+pub(super) const TOOTH: Range = from(0.0, 2001.0);
 
 /// Allowed values; the lower end belongs to it unless `above`.
 pub(super) struct Range {
@@ -105,6 +142,28 @@ pub(super) const ALL: &[Field] = fields! {
     temperature.generator_expansion_per_k: Real, from(-1.0e-5, 1.0e-4), "linear expansion of the generator, 1/K";
     temperature.housing_expansion_per_k: Real, from(-1.0e-5, 1.0e-4), "linear expansion of the circular spline's seat, 1/K";
     temperature.youngs_modulus_per_k: Real, from(-0.001, 0.001), "relative change of Young's modulus, 1/K";
+    as_built.circular_spline_eccentricity_um: Real, from(0.0, 100.0), "toothing beside the axis it turns about, µm";
+    as_built.circular_spline_eccentricity_phase_deg: Real, PHASE, "whereto, degrees on the circular spline";
+    as_built.circular_spline_ovality_um: Real, from(0.0, 100.0), "amplitude of the oval, length kept, µm";
+    as_built.circular_spline_ovality_phase_deg: Real, PHASE, "angle of a crest, degrees on the circular spline";
+    as_built.circular_spline_pitch_harmonics: Harmonics, from(0.0, 100.0), "cumulative pitch error, [{ order, amplitude_um, phase_deg }, ...]";
+    as_built.circular_spline_pitch_error_um: List, from(-100.0, 100.0), "the same of each space, or none, µm";
+    as_built.circular_spline_offset_um: Real, from(0.0, 100.0), "its axis beside that of the housing, µm";
+    as_built.circular_spline_offset_direction_deg: Real, PHASE, "whereto, degrees in the housing";
+    as_built.flexspline_runout_um: Real, from(0.0, 100.0), "toothing beside the axis of the bore, µm";
+    as_built.flexspline_runout_phase_deg: Real, PHASE, "whereto, degrees on the flexspline";
+    as_built.flexspline_pitch_harmonics: Harmonics, from(0.0, 100.0), "cumulative pitch error, [{ order, amplitude_um, phase_deg }, ...]";
+    as_built.flexspline_pitch_error_um: List, from(-100.0, 100.0), "the same of each tooth, or none, µm";
+    as_built.rim_thickness_harmonics: Harmonics, from(0.0, 1000.0), "thickness of the rim, [{ order, amplitude_um, phase_deg }, ...]";
+    as_built.generator_eccentricity_um: Real, from(0.0, 100.0), "generator beside the axis it turns about, µm";
+    as_built.generator_eccentricity_phase_deg: Real, PHASE, "whereto, degrees on the generator";
+    as_built.generator_lobe_asymmetry_um: Real, from(-100.0, 100.0), "lobe at 0 degrees higher than that at 180, µm";
+    as_built.cam_form_harmonics: Harmonics, from(0.0, 100.0), "form error of the cam, [{ order, amplitude_um, phase_deg }, ...]";
+    as_built.flexspline_wear_um: Real, from(0.0, 200.0), "depth worn off every flank, µm";
+    as_built.circular_spline_wear_um: Real, from(0.0, 200.0), "depth worn off every flank, µm";
+    as_built.damaged_teeth: Damage, DEPTH, "[{ wheel, tooth, flank = \"plus\", \"minus\" or \"both\", depth_um }, ...]";
+    as_built.generator_warmer_k: Real, from(-100.0, 100.0), "generator warmer than the flexspline, K";
+    as_built.circular_spline_warmer_k: Real, from(-100.0, 100.0), "circular spline and its seat warmer than the flexspline, K";
 };
 
 impl Field {
@@ -113,20 +172,58 @@ impl Field {
         self.path.split_once('.').expect("every path has a section")
     }
 
+    /// True if a file may leave it out: a stiffness that is not there is rigid, an imperfection that is not there is none.
+    pub fn is_optional(&self) -> bool {
+        self.is_imperfection() || matches!(self.slot(&mut Drive::hhd_95()), Slot::RealOrRigid(_))
+    }
+
+    /// True for what an ideal drive has not.
+    pub fn is_imperfection(&self) -> bool {
+        self.split().0 == "as_built"
+    }
+
     pub fn slot<'a>(&self, drive: &'a mut Drive) -> Slot<'a> {
         (self.slot)(drive)
     }
 }
 
-/// Calls `visit` with every field and its value, `None` for rigid.
-pub(super) fn for_each(drive: &Drive, mut visit: impl FnMut(&Field, Option<f64>)) {
+/// Calls `visit` with every field and its value.
+pub(super) fn for_each(drive: &Drive, mut visit: impl FnMut(&Field, &Value)) {
     let mut drive = drive.clone();
     for field in ALL {
         let value = match field.slot(&mut drive) {
-            Slot::Real(number) => Some(*number),
-            Slot::RealOrRigid(number) => *number,
-            Slot::Count(number) => Some(f64::from(*number)),
+            Slot::Real(number) => Value::Number(*number),
+            Slot::RealOrRigid(number) => number.map_or(Value::Rigid, Value::Number),
+            Slot::Count(number) => Value::Number(f64::from(*number)),
+            Slot::List(list) => Value::List(list.clone()),
+            Slot::Harmonics(list) => Value::Harmonics(list.clone()),
+            Slot::Damage(list) => Value::Damage(list.clone()),
         };
-        visit(field, value);
+        visit(field, &value);
+    }
+}
+
+/// Every number of a value that has a range of its own: where it stands within the value, the number, the range.
+pub(super) fn ranged<'f>(field: &'f Field, value: &Value) -> Vec<(String, f64, &'f Range)> {
+    match value {
+        Value::Number(number) => vec![(String::new(), *number, &field.range)],
+        Value::Rigid => Vec::new(),
+        Value::List(list) => list.iter().enumerate().map(|(k, x)| (format!("[{k}]"), *x, &field.range)).collect(),
+        Value::Harmonics(list) => list
+            .iter()
+            .enumerate()
+            .flat_map(|(k, harmonic)| {
+                [
+                    (format!("[{k}].order"), f64::from(harmonic.order), &ORDER),
+                    (format!("[{k}].amplitude_um"), harmonic.amplitude_um, &field.range),
+                    (format!("[{k}].phase_deg"), harmonic.phase_deg, &PHASE),
+                ]
+            })
+            .collect(),
+        Value::Damage(list) => list
+            .iter()
+            .enumerate()
+            .map(|(k, tooth)| (format!("[{k}].depth_um"), tooth.depth_um, &field.range))
+            .collect(),
     }
 }

@@ -7,11 +7,16 @@
 //! rim_thickness_mm = 2.0
 //! [sleeve]
 //! torsion_stiffness_n_m_per_rad = "rigid"
+//! [as_built]                   # what is not said is ideal
+//! circular_spline_eccentricity_um = 10.0
+//! flexspline_pitch_harmonics = [{ order = 2, amplitude_um = 5.0, phase_deg = 30.0 }]
+//! damaged_teeth = [{ wheel = "flexspline", tooth = 12, flank = "plus", depth_um = 30.0 }]
 //! ```
 
+use super::as_built::{DamagedFlank, DamagedTooth, Harmonic, Wheel};
 use super::error::{DriveError, Problem};
-use super::fields::{self, Field, Slot};
-use super::spec::Drive;
+use super::fields::{self, DEPTH, Field, ORDER, PHASE, Range as Allowed, Slot, TOOTH, Value};
+use super::spec::{Drive, ThermalState};
 use serde_spanned::Spanned;
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -74,17 +79,17 @@ impl Drive {
             Ok(value) => field.put(self, value.get_ref()),
             Err(_) => field.put(self, &DeValue::String(text.into())),
         }
-        .map_err(|what| Problem::of(path, what))
+        .map_err(|refused| refused.of(path))
     }
 
     /// The drive as a complete file, with units and meanings; reads back as the same drive.
     pub fn to_toml(&self) -> String {
         // a drive at another temperature is written by its sizes at reference temperature
         let cold;
-        let drive = if self.thermal_state.above_reference_k == 0.0 {
+        let drive = if self.thermal_state == ThermalState::default() {
             self
         } else {
-            cold = self.at_temperature(self.temperature.reference_c);
+            cold = self.as_dimensioned();
             &cold
         };
         let mut text = String::from("# A harmonic drive: flexspline fixed, circular spline the output, two waves.\n");
@@ -97,9 +102,26 @@ impl Drive {
                 open = section;
             }
             let value = match value {
-                None => "\"rigid\"".to_owned(),
-                Some(number) if field.is_count() => format!("{number}"),
-                Some(number) => format!("{number:?}"),
+                Value::Rigid => "\"rigid\"".to_owned(),
+                Value::Number(number) if field.is_count() => format!("{number}"),
+                Value::Number(number) => format!("{number:?}"),
+                Value::List(list) => {
+                    // ten to a line: as many as there are teeth
+                    let lines: Vec<String> = list
+                        .chunks(10)
+                        .map(|line| line.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(", "))
+                        .collect();
+                    if lines.is_empty() { "[]".to_owned() } else { format!("[\n    {},\n]", lines.join(",\n    ")) }
+                }
+                Value::Harmonics(list) => array(list.iter().map(|harmonic| {
+                    let Harmonic { order, amplitude_um, phase_deg } = harmonic;
+                    format!("{{ order = {order}, amplitude_um = {amplitude_um:?}, phase_deg = {phase_deg:?} }}")
+                })),
+                Value::Damage(list) => array(list.iter().map(|damaged| {
+                    let DamagedTooth { wheel, tooth, flank, depth_um } = damaged;
+                    let (wheel, flank) = (wheel.name(), flank.name());
+                    format!("{{ wheel = \"{wheel}\", tooth = {tooth}, flank = \"{flank}\", depth_um = {depth_um:?} }}")
+                })),
             };
             let _ = writeln!(text, "{:<44} # {}", format!("{key} = {value}"), field.meaning);
         });
@@ -114,27 +136,142 @@ impl Field {
     }
 
     /// Stores `value` in `drive` if its type and range are right; says what is wrong otherwise.
-    fn put(&self, drive: &mut Drive, value: &DeValue) -> Result<(), String> {
-        let number = number(value);
-        let found = || format!("found {}, allowed: ", shown(value));
+    fn put(&self, drive: &mut Drive, value: &DeValue) -> Result<(), Refused> {
         match self.slot(drive) {
-            Slot::RealOrRigid(slot) => match number {
-                None if value.as_str() == Some("rigid") => *slot = None,
-                Some(number) => *slot = Some(self.in_range(number)?),
-                None => return Err(found() + &format!("{} or \"rigid\"", self.range)),
-            },
-            Slot::Real(slot) => *slot = self.in_range(number.ok_or_else(|| found() + &self.range.to_string())?)?,
-            Slot::Count(slot) => {
-                let whole = number.filter(|_| value.is_integer());
-                let whole = whole.ok_or_else(|| found() + &format!("a whole number, {}", self.range))?;
-                *slot = self.in_range(whole)? as u32;
+            Slot::RealOrRigid(slot) => {
+                *slot = match number(value) {
+                    None if value.as_str() == Some("rigid") => None,
+                    Some(number) => Some(in_range(&self.range, number)?),
+                    None => return Err(Refused::found(value, format!("{} or \"rigid\"", self.range))),
+                }
+            }
+            Slot::Real(slot) => *slot = real(&self.range, value)?,
+            Slot::Count(slot) => *slot = whole(&self.range, value)?,
+            Slot::List(slot) => {
+                let each = format!("an array of numbers, {} each", self.range);
+                *slot = each_of(value, &each, |entry| real(&self.range, entry))?;
+            }
+            Slot::Harmonics(slot) => {
+                *slot = each_of(value, "an array of { order, amplitude_um, phase_deg }", |entry| {
+                    let entry = Entries::of(entry, &["order", "amplitude_um", "phase_deg"])?;
+                    Ok(Harmonic {
+                        order: entry.needed("order", |v| whole(&ORDER, v))?,
+                        amplitude_um: entry.needed("amplitude_um", |v| real(&self.range, v))?,
+                        phase_deg: entry.given("phase_deg", |v| real(&PHASE, v))?.unwrap_or(0.0),
+                    })
+                })?;
+            }
+            Slot::Damage(slot) => {
+                *slot = each_of(value, "an array of { wheel, tooth, flank, depth_um }", |entry| {
+                    let entry = Entries::of(entry, &["wheel", "tooth", "flank", "depth_um"])?;
+                    let wheels = [Wheel::Flexspline, Wheel::CircularSpline].map(|wheel| (wheel.name(), wheel));
+                    let flanks = [DamagedFlank::Plus, DamagedFlank::Minus, DamagedFlank::Both];
+                    Ok(DamagedTooth {
+                        wheel: entry.needed("wheel", |v| one_of(&wheels, v))?,
+                        tooth: entry.needed("tooth", |v| whole(&TOOTH, v))?,
+                        flank: entry
+                            .given("flank", |v| one_of(&flanks.map(|flank| (flank.name(), flank)), v))?
+                            .unwrap_or(DamagedFlank::Both),
+                        depth_um: entry.needed("depth_um", |v| real(&DEPTH, v))?,
+                    })
+                })?;
             }
         }
         Ok(())
     }
+}
 
-    fn in_range(&self, number: f64) -> Result<f64, String> {
-        self.range.refusal(number).map_or(Ok(number), Err)
+/// Why a value is refused.
+struct Refused {
+    /// Where within the value, `[1].order`; empty for the value itself.
+    at: String,
+    what: String,
+}
+
+impl Refused {
+    fn found(value: &DeValue, allowed: impl std::fmt::Display) -> Refused {
+        Refused { at: String::new(), what: format!("found {}, allowed: {allowed}", shown(value)) }
+    }
+
+    /// The same, seen from outside of the part `at`.
+    fn within(self, at: impl std::fmt::Display) -> Refused {
+        Refused { at: format!("{at}{}", self.at), ..self }
+    }
+
+    fn of(self, path: &str) -> Problem {
+        Problem::of(&format!("{path}{}", self.at), self.what)
+    }
+}
+
+fn in_range(range: &Allowed, number: f64) -> Result<f64, Refused> {
+    range.refusal(number).map_or(Ok(number), |what| Err(Refused { at: String::new(), what }))
+}
+
+fn real(range: &Allowed, value: &DeValue) -> Result<f64, Refused> {
+    in_range(range, number(value).ok_or_else(|| Refused::found(value, range))?)
+}
+
+fn whole(range: &Allowed, value: &DeValue) -> Result<u32, Refused> {
+    let whole = number(value).filter(|_| value.is_integer());
+    let whole = whole.ok_or_else(|| Refused::found(value, format!("a whole number, {range}")))?;
+    Ok(in_range(range, whole)? as u32)
+}
+
+fn one_of<T: Copy>(known: &[(&'static str, T)], value: &DeValue) -> Result<T, Refused> {
+    let found = known.iter().find(|(name, _)| value.as_str() == Some(name));
+    found.map(|(_, meant)| *meant).ok_or_else(|| {
+        let names: Vec<String> = known.iter().map(|(name, _)| format!("{name:?}")).collect();
+        Refused::found(value, names.join(", "))
+    })
+}
+
+/// The elements of an array, each read by `read`.
+fn each_of<T>(
+    value: &DeValue,
+    allowed: &str,
+    mut read: impl FnMut(&DeValue) -> Result<T, Refused>,
+) -> Result<Vec<T>, Refused> {
+    let array = value.as_array().ok_or_else(|| Refused::found(value, allowed))?;
+    let element = |(k, element): (usize, &Spanned<DeValue>)| {
+        read(element.get_ref()).map_err(|refused| refused.within(format!("[{k}]")))
+    };
+    array.iter().enumerate().map(element).collect()
+}
+
+/// The entries of a small table within an array.
+struct Entries<'a, 'i>(&'a DeTable<'i>);
+
+impl<'a, 'i> Entries<'a, 'i> {
+    fn of(value: &'a DeValue<'i>, known: &[&'static str]) -> Result<Self, Refused> {
+        let table = value.as_table().ok_or_else(|| Refused::found(value, format!("{{ {} }}", known.join(", "))))?;
+        for key in table.keys() {
+            let name = key.get_ref().as_ref();
+            if !known.contains(&name) {
+                let hint = did_you_mean(name, known.iter().copied());
+                let what = format!("unknown key{hint}; allowed: {}", known.join(", "));
+                return Err(Refused { at: format!(".{name}"), what });
+            }
+        }
+        Ok(Entries(table))
+    }
+
+    fn given<T>(&self, key: &str, read: impl Fn(&DeValue) -> Result<T, Refused>) -> Result<Option<T>, Refused> {
+        let value: Option<&Spanned<DeValue>> = self.0.get(key);
+        value.map(|value| read(value.get_ref()).map_err(|refused| refused.within(format!(".{key}")))).transpose()
+    }
+
+    fn needed<T>(&self, key: &str, read: impl Fn(&DeValue) -> Result<T, Refused>) -> Result<T, Refused> {
+        self.given(key, read)?.ok_or_else(|| Refused { at: format!(".{key}"), what: "missing".to_owned() })
+    }
+}
+
+/// A TOML array of tables, one to a line where there are several.
+fn array(entries: impl Iterator<Item = String>) -> String {
+    let entries: Vec<String> = entries.collect();
+    match entries.len() {
+        0 => "[]".to_owned(),
+        1 => format!("[{}]", entries[0]),
+        _ => format!("[\n    {},\n]", entries.join(",\n    ")),
     }
 }
 
@@ -212,7 +349,8 @@ impl<'a> Reader<'a> {
         }
         drive.check().map_err(|mut refused| {
             for problem in &mut refused.problems {
-                problem.place = match self.lines.get(problem.field.as_str()) {
+                let field = problem.field.split('[').next().unwrap_or_default();
+                problem.place = match self.lines.get(field) {
                     Some(line) => format!("{}:{line}", self.file_name),
                     None => self.file_name.to_owned(),
                 };
@@ -230,8 +368,9 @@ impl<'a> Reader<'a> {
                 None => self.refuse(key.span(), &path, unknown_path(&path)),
                 Some(field) => {
                     self.lines.insert(field.path, self.line(key.span().start));
-                    if let Err(what) = field.put(drive, value.get_ref()) {
-                        self.refuse(key.span(), &path, what);
+                    if let Err(refused) = field.put(drive, value.get_ref()) {
+                        let Problem { field, what, .. } = refused.of(&path);
+                        self.refuse(key.span(), &field, what);
                     }
                 }
             }
@@ -253,8 +392,7 @@ impl<'a> Reader<'a> {
     fn refuse_missing(&mut self) {
         let at = self.text.len();
         for field in fields::ALL {
-            let optional = matches!(field.slot(&mut Drive::hhd_95()), Slot::RealOrRigid(_));
-            if !optional && !self.lines.contains_key(field.path) {
+            if !field.is_optional() && !self.lines.contains_key(field.path) {
                 let what = format!("missing ({}); give it, or a base = \"HHD-95\" to start from", field.meaning);
                 let place = self.file_name.to_owned();
                 self.problems.push((at, Problem { place, field: field.path.to_owned(), what }));
@@ -369,6 +507,53 @@ mod tests {
         assert_eq!(same.hash(), drive.hash());
         assert_ne!(plain.at_temperature(30.0).hash(), plain.hash());
         assert_ne!(Drive::hhd_95_typical().hash(), plain.hash());
+    }
+
+    #[test]
+    fn imperfections_are_read_written_and_hashed_and_none_is_the_ideal_drive() {
+        let ideal = Drive::hhd_95();
+        // The hash of the ideal drive from before there were imperfections: tables made then are of this drive still.
+        let hash = blake3::Hash::from_bytes(ideal.hash()).to_hex();
+        assert_eq!(hash.as_str(), "137827daaec6b8161369acdb8b4a3d4f1cd1392483cc42d2d990f2a92df89bd6");
+        let list: Vec<String> = (0..190).map(|k| format!("{:.1}", 0.1 * f64::from(k % 7))).collect();
+        let text = format!(
+            "base = \"HHD-95\"\n[as_built]\ncircular_spline_eccentricity_um = 10\ncircular_spline_pitch_error_um = [{}]\n\
+             flexspline_pitch_harmonics = [{{ order = 2, amplitude_um = 5.0, phase_deg = 30.0 }}, {{ order = 1, amplitude_um = 3 }}]\n\
+             [[as_built.damaged_teeth]]\nwheel = \"circular_spline\"\ntooth = 189\ndepth_um = 20.5\n",
+            list.join(", ")
+        );
+        let drive = Drive::from_toml("d.toml", &text).unwrap();
+        let built = &drive.as_built;
+        assert_eq!(built.circular_spline_eccentricity_um, 10.0);
+        assert_eq!((built.circular_spline_pitch_error_um.len(), built.circular_spline_pitch_error_um[6]), (190, 0.6));
+        assert_eq!(built.flexspline_pitch_harmonics[1], Harmonic { order: 1, amplitude_um: 3.0, phase_deg: 0.0 });
+        let damaged =
+            DamagedTooth { wheel: Wheel::CircularSpline, tooth: 189, flank: DamagedFlank::Both, depth_um: 20.5 };
+        assert_eq!(built.damaged_teeth, [damaged]);
+        let written = drive.to_toml();
+        let again = Drive::from_toml("d.toml", &written).unwrap();
+        assert_eq!((&again, again.to_toml()), (&drive, written));
+        assert_eq!(again.hash(), drive.hash());
+        // Every part of it is in the hash.
+        let sets = [
+            "as_built.circular_spline_eccentricity_um=0",
+            "as_built.circular_spline_pitch_error_um=[]",
+            "as_built.flexspline_pitch_harmonics=[{order=2,amplitude_um=5,phase_deg=30}]",
+            "as_built.flexspline_pitch_harmonics=[{order=2,amplitude_um=5,phase_deg=31},{order=1,amplitude_um=3}]",
+            "as_built.damaged_teeth=[]",
+            "as_built.damaged_teeth=[{wheel='circular_spline',tooth=189,flank='plus',depth_um=20.5}]",
+            "as_built.damaged_teeth=[{wheel='flexspline',tooth=187,depth_um=20.5}]",
+            "as_built.generator_warmer_k=1",
+        ];
+        let mut hashes = std::collections::HashSet::from([drive.hash(), ideal.hash()]);
+        for set in sets {
+            assert!(hashes.insert(drive.with_set(set).unwrap().hash()), "{set} is not in the hash");
+        }
+        // At another temperature it is written by the sizes of its file.
+        let uneven = drive.with_set("as_built.circular_spline_warmer_k=-30").unwrap();
+        let warm = uneven.at_temperature(60.0);
+        let again = Drive::from_toml("d.toml", &warm.to_toml()).unwrap();
+        assert!((again.circular_spline.tip_radius_mm - 48.65).abs() < 1e-12);
     }
 
     #[test]
@@ -529,6 +714,91 @@ mod tests {
                 "[temperature]\nflexspline_expansion_per_k = 11.5",
                 "wrong.toml:3: temperature.flexspline_expansion_per_k: found 11.5, allowed: -0.00001 to 0.0001",
             ),
+            (
+                "[as_built]\nflexspline_runout_um = -1",
+                "wrong.toml:3: as_built.flexspline_runout_um: found -1, allowed: 0 to 100",
+            ),
+            (
+                "[as_built]\nflexspline_wear_um = inf",
+                "wrong.toml:3: as_built.flexspline_wear_um: found inf, allowed: 0 to 200",
+            ),
+            (
+                "[as_built]\nflexspline_runout_mm = 0.01",
+                "wrong.toml:3: as_built.flexspline_runout_mm: unknown key; did you mean \"flexspline_runout_um\"?",
+            ),
+            (
+                "[as_built]\ncircular_spline_ovality_phase_deg = 400",
+                "wrong.toml:3: as_built.circular_spline_ovality_phase_deg: found 400, allowed: -360 to 360",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_error_um = [1.0, 2.0]",
+                "wrong.toml:3: as_built.flexspline_pitch_error_um: found 2 numbers, allowed: none, or 188, one for each tooth",
+            ),
+            (
+                "[as_built]\ncircular_spline_pitch_error_um = [1.0,\n nan]",
+                "wrong.toml:3: as_built.circular_spline_pitch_error_um[1]: found NaN, allowed: -100 to 100",
+            ),
+            (
+                "[as_built]\ncircular_spline_pitch_error_um = [1.0, \"2\"]",
+                "wrong.toml:3: as_built.circular_spline_pitch_error_um[1]: found \"2\", allowed: -100 to 100",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_error_um = 3.0",
+                "wrong.toml:3: as_built.flexspline_pitch_error_um: found 3.0, allowed: an array of numbers, -100 to 100 each",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_harmonics = [{ order = 0, amplitude_um = 1.0 }]",
+                "wrong.toml:3: as_built.flexspline_pitch_harmonics[0].order: found 0, allowed: 1 to 1000",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_harmonics = [{ order = 2.5, amplitude_um = 1.0 }]",
+                "wrong.toml:3: as_built.flexspline_pitch_harmonics[0].order: found 2.5, allowed: a whole number, 1 to 1000",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_harmonics = [{ order = 2, amplitude_um = 1 }, { order = 95, amplitude_um = 1 }]",
+                "wrong.toml:3: as_built.flexspline_pitch_harmonics[1].order: found 95, allowed: 1 to 94 (two teeth",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_harmonics = [{ order = 2, amplitude_um = -1.0 }]",
+                "wrong.toml:3: as_built.flexspline_pitch_harmonics[0].amplitude_um: found -1, allowed: 0 to 100",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_harmonics = [{ order = 2, amplitude_um = nan }]",
+                "wrong.toml:3: as_built.flexspline_pitch_harmonics[0].amplitude_um: found NaN, allowed: 0 to 100",
+            ),
+            (
+                "[as_built]\nflexspline_pitch_harmonics = [{ order = 2 }]",
+                "wrong.toml:3: as_built.flexspline_pitch_harmonics[0].amplitude_um: missing",
+            ),
+            (
+                "[as_built]\ncam_form_harmonics = [{ order = 2, amplitude = 1.0 }]",
+                "wrong.toml:3: as_built.cam_form_harmonics[0].amplitude: unknown key; did you mean \"amplitude_um\"?",
+            ),
+            (
+                "[as_built]\ncam_form_harmonics = [2, 1.0]",
+                "wrong.toml:3: as_built.cam_form_harmonics[0]: found 2, allowed: { order, amplitude_um, phase_deg }",
+            ),
+            (
+                "[as_built]\nrim_thickness_harmonics = [{ order = 2, amplitude_um = 150 }, { order = 3, amplitude_um = 100 }]",
+                "wrong.toml:3: as_built.rim_thickness_harmonics: found 250.0 µm in all, allowed: up to 240.0 µm",
+            ),
+            (
+                "[as_built]\ndamaged_teeth = [{ wheel = \"generator\", tooth = 1, depth_um = 1 }]",
+                "wrong.toml:3: as_built.damaged_teeth[0].wheel: found \"generator\", allowed: \"flexspline\", \"circular_spline\"",
+            ),
+            (
+                "[as_built]\ndamaged_teeth = [{ wheel = \"flexspline\", tooth = 188, depth_um = 1 }]",
+                "wrong.toml:3: as_built.damaged_teeth[0].tooth: found 188, allowed: 0 to 187",
+            ),
+            (
+                "[as_built]\ndamaged_teeth = [{ wheel = \"flexspline\", tooth = 1, flank = \"left\", depth_um = 1 }]",
+                "wrong.toml:3: as_built.damaged_teeth[0].flank: found \"left\", allowed: \"plus\", \"minus\", \"both\"",
+            ),
+            (
+                "[[as_built.damaged_teeth]]\nwheel = \"flexspline\"\ntooth = 1\ndepth_um = 501",
+                "wrong.toml:2: as_built.damaged_teeth[0].depth_um: found 501, allowed: 0 to 500",
+            ),
+            ("as_built = 3", "wrong.toml:2: as_built: found 3, allowed: a table [as_built]"),
             ("[flexpline]\nteeth = 188", "wrong.toml:2: flexpline: unknown key; did you mean \"flexspline\"?"),
             ("[qqq]\nteeth = 188", "wrong.toml:2: qqq: unknown key"),
             ("friction_coefficient = 0.1", "wrong.toml:2: friction_coefficient: unknown key; it belongs to [flanks]"),
@@ -572,8 +842,9 @@ mod tests {
              mm); give it, or a base = \"HHD-95\" to start from"
         );
         let empty = Drive::from_toml("f.toml", "").unwrap_err();
-        let rigid = 2;
-        assert_eq!(empty.problems.len(), fields::ALL.len() - rigid);
+        let optional = fields::ALL.iter().filter(|field| field.is_optional()).count();
+        assert_eq!(optional, 2 + fields::ALL.iter().filter(|field| field.is_imperfection()).count());
+        assert_eq!(empty.problems.len(), fields::ALL.len() - optional);
         // a stiffness that is not there is rigid
         let text = text.replace("bearing_stiffness_n_per_mm3", "# ").replace("torsion_stiffness_n_m_per_rad", "# ");
         assert_eq!(Drive::from_toml("g.toml", &text).unwrap(), Drive::hhd_95());
@@ -597,6 +868,10 @@ mod tests {
         assert!(set("w0_mm=0.4").contains("w0_mm: unknown key; did you mean \"generator.w0_mm\"?"));
         assert!(set("generator.w0_mm=abc").ends_with("generator.w0_mm: found \"abc\", allowed: above 0 to 20"));
         assert!(set("flexspline.teeth=186").starts_with("--set: circular_spline.teeth: found 190, allowed: 188"));
+        assert!(
+            set("as_built.cam_form_harmonics=[{order=0,amplitude_um=1}]")
+                .ends_with("as_built.cam_form_harmonics[0].order: found 0, allowed: 1 to 1000")
+        );
         let both = ["flexspline.teeth=186", "circular_spline.teeth=190"];
         assert!(Drive::hhd_95().with_sets(both).unwrap_err().to_string().contains("found 190, allowed: 188"));
         assert_eq!(Drive::hhd_95().with_set("name=mine").unwrap().name, "mine");

@@ -11,6 +11,7 @@
 //!
 //! Angles count counter-clockwise.
 
+mod as_built;
 mod error;
 mod fields;
 mod file;
@@ -18,15 +19,18 @@ mod generator;
 mod interference;
 mod involute;
 mod neutral;
+mod placement;
 mod ring;
 mod spec;
 mod tooth;
 
+pub use as_built::{AsBuilt, DamagedFlank, DamagedTooth, Harmonic, RimVariation, Wheel};
 pub use error::{DriveError, Problem};
 pub use generator::{GeneratorOutline, OutlineFoot};
 pub use interference::{FlankGap, MeshReport, RigidMesh, Side};
 pub use involute::{Foot, InvoluteFlank};
 pub use neutral::NeutralCurve;
+pub use placement::{FlankDeviations, Placement};
 pub use ring::{GeneratorKind, RingShape, UnknownGenerator};
 pub use spec::{
     CircularSpline, Drive, Flanks, Flexspline, Generators, Material, OutputLoadPath, Sleeve, Temperature, ThermalState,

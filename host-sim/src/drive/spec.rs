@@ -1,7 +1,8 @@
 //! The drive as a value: every number of `drive.toml`, the built-in drives, derived sizes, temperature.
 
+use super::as_built::{AsBuilt, DamagedFlank, Wheel};
 use super::error::{DriveError, Problem};
-use super::fields;
+use super::fields::{self, Value};
 use super::generator::GeneratorOutline;
 use super::ring::GeneratorKind;
 use super::tooth::ToothFlank;
@@ -10,7 +11,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 /// A harmonic drive: flexspline fixed, circular spline the output, two waves.
 ///
-/// The nominal drive, without manufacturing errors. Field names are the keys of the file.
+/// Nominal sizes, and what the drive as built has beside them. Field names are the keys of the file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Drive {
     /// A label for reports; no part of the physics.
@@ -31,6 +32,8 @@ pub struct Drive {
     pub flanks: Flanks,
     /// How sizes and stiffness follow the temperature.
     pub temperature: Temperature,
+    /// What the drive as built has beside its nominal sizes; nothing in an ideal drive.
+    pub as_built: AsBuilt,
     /// The temperature the sizes above are given for; reference temperature unless [`Drive::at_temperature`] made it.
     #[serde(skip)]
     pub thermal_state: ThermalState,
@@ -293,6 +296,7 @@ impl Drive {
                 housing_expansion_per_k: 11.5e-6,
                 youngs_modulus_per_k: -3.0e-4,
             },
+            as_built: AsBuilt::default(),
             thermal_state: ThermalState::default(),
         }
     }
@@ -334,22 +338,32 @@ impl Drive {
         zc / (zc - zf)
     }
 
-    /// The drive at another temperature (uniform): every length of a wheel times `1 + expansion * dT` of that wheel,
+    /// The drive at another temperature (uniform, but for what [`AsBuilt`] says is warmer than the flexspline): every length of a wheel times `1 + expansion * dT` of that wheel,
     /// Young's modulus times `1 + coefficient * dT`. The `generator` table stays as made; its outline is expanded
     /// by [`ThermalState::generator_scale`], and the seat of the circular spline by [`ThermalState::housing_scale`].
     /// `self` must be at reference temperature or made by this function; either way the result is for `temperature_c`.
     pub fn at_temperature(&self, temperature_c: f64) -> Drive {
-        let mut drive = self.clone();
         let t = &self.temperature;
         let rise = temperature_c - t.reference_c;
-        let old = self.thermal_state;
-        let new = ThermalState {
+        let generator = rise + self.as_built.generator_warmer_k;
+        let circular_spline = rise + self.as_built.circular_spline_warmer_k;
+        self.in_thermal_state(ThermalState {
             above_reference_k: rise,
             flexspline_scale: 1.0 + t.flexspline_expansion_per_k * rise,
-            circular_spline_scale: 1.0 + t.circular_spline_expansion_per_k * rise,
-            generator_scale: 1.0 + t.generator_expansion_per_k * rise,
-            housing_scale: 1.0 + t.housing_expansion_per_k * rise,
-        };
+            circular_spline_scale: 1.0 + t.circular_spline_expansion_per_k * circular_spline,
+            generator_scale: 1.0 + t.generator_expansion_per_k * generator,
+            housing_scale: 1.0 + t.housing_expansion_per_k * circular_spline,
+        })
+    }
+
+    /// The drive by the sizes of its file: all of it at reference temperature.
+    pub(super) fn as_dimensioned(&self) -> Drive {
+        self.in_thermal_state(ThermalState::default())
+    }
+
+    fn in_thermal_state(&self, new: ThermalState) -> Drive {
+        let mut drive = self.clone();
+        let (t, old, rise) = (&self.temperature, self.thermal_state, new.above_reference_k);
         let f = &mut drive.flexspline;
         for length in [
             &mut f.module_mm,
@@ -385,12 +399,41 @@ impl Drive {
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"flexspline drive 1\n");
         fields::for_each(self, |field, value| {
+            // an imperfection that is not there leaves the hash of the ideal drive
+            if field.is_imperfection() && value.is_zero() {
+                return;
+            }
             hasher.update(field.path.as_bytes());
-            match value {
-                // zero has one sign
-                Some(number) => hasher.update(b"=").update(&(number + 0.0).to_le_bytes()),
-                None => hasher.update(b" rigid"),
+            // zero has one sign
+            let number = |hasher: &mut blake3::Hasher, number: f64| {
+                hasher.update(&(number + 0.0).to_le_bytes());
             };
+            let mark: &[u8] = if *value == Value::Rigid { b" rigid" } else { b"=" };
+            hasher.update(mark);
+            match value {
+                Value::Number(x) => number(&mut hasher, *x),
+                Value::Rigid => {}
+                Value::List(list) => list.iter().for_each(|x| number(&mut hasher, *x)),
+                Value::Harmonics(list) => {
+                    for harmonic in list {
+                        hasher.update(&harmonic.order.to_le_bytes());
+                        number(&mut hasher, harmonic.amplitude_um);
+                        number(&mut hasher, harmonic.phase_deg);
+                    }
+                }
+                Value::Damage(list) => {
+                    for tooth in list {
+                        let wheel = u8::from(tooth.wheel == Wheel::CircularSpline);
+                        let flank = match tooth.flank {
+                            DamagedFlank::Plus => 0,
+                            DamagedFlank::Minus => 1,
+                            DamagedFlank::Both => 2,
+                        };
+                        hasher.update(&[wheel, flank]).update(&tooth.tooth.to_le_bytes());
+                        number(&mut hasher, tooth.depth_um);
+                    }
+                }
+            }
             hasher.update(b"\n");
         });
         let t = &self.thermal_state;
@@ -403,10 +446,10 @@ impl Drive {
     pub fn check(&self) -> Result<(), DriveError> {
         let mut problems = Vec::new();
         fields::for_each(self, |field, value| {
-            if let Some(number) = value
-                && let Some(what) = field.range.refusal(number)
-            {
-                problems.push(Problem::of(field.path, what));
+            for (at, number, range) in fields::ranged(field, value) {
+                if let Some(what) = range.refusal(number) {
+                    problems.push(Problem::of(&format!("{}{at}", field.path), what));
+                }
             }
         });
         if problems.is_empty() {
@@ -477,9 +520,15 @@ impl Drive {
                 c.root_radius_mm + c.module_mm
             ),
         );
+        self.as_built.fit(self, problems);
         if !radii {
             return;
         }
+        let mut require = |holds: bool, field: &str, what: String| {
+            if !holds {
+                problems.push(Problem::of(field, what));
+            }
+        };
         require(
             g.w0_mm <= 0.05 * f.neutral_radius_mm(),
             "generator.w0_mm",
@@ -534,6 +583,7 @@ impl Drive {
 
 #[cfg(test)]
 mod tests {
+    use super::super::as_built::Harmonic;
     use super::super::interference::RigidMesh;
     use super::*;
 
@@ -579,6 +629,34 @@ mod tests {
         assert!((again.flexspline.tip_radius_mm - direct.flexspline.tip_radius_mm).abs() < 1e-12);
         assert!((again.material.youngs_modulus_mpa - direct.material.youngs_modulus_mpa).abs() < 1e-8);
         assert_eq!(drive.at_temperature(20.0), drive);
+    }
+
+    #[test]
+    fn a_part_that_is_warmer_than_the_flexspline_grows_at_reference_temperature_too() {
+        let mut drive = Drive::hhd_95();
+        drive.as_built.generator_warmer_k = 10.0;
+        drive.as_built.circular_spline_warmer_k = -20.0;
+        let there = drive.at_temperature(20.0);
+        assert!((there.thermal_state.generator_scale - 1.0 - 1.15e-4).abs() < 1e-15);
+        assert!((there.circular_spline.root_radius_mm / 49.45 - 1.0 + 2.3e-4).abs() < 1e-12);
+        assert_eq!(there.thermal_state.housing_scale, there.thermal_state.circular_spline_scale);
+        assert_eq!((there.flexspline.root_radius_mm, there.material.youngs_modulus_mpa), (47.875, 206_000.0));
+        let back = there.as_dimensioned();
+        assert!((back.circular_spline.root_radius_mm - 49.45).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_drive_made_in_a_program_is_checked_with_its_imperfections() {
+        let mut drive = Drive::hhd_95();
+        drive.as_built.flexspline_pitch_error_um = vec![0.0; 188];
+        drive.as_built.flexspline_pitch_error_um[7] = f64::INFINITY;
+        drive.as_built.cam_form_harmonics = vec![Harmonic { order: 0, amplitude_um: f64::NAN, phase_deg: 0.0 }];
+        assert_eq!(
+            drive.check().unwrap_err().to_string(),
+            "as_built.flexspline_pitch_error_um[7]: found inf, allowed: -100 to 100\n\
+             as_built.cam_form_harmonics[0].order: found 0, allowed: 1 to 1000\n\
+             as_built.cam_form_harmonics[0].amplitude_um: found NaN, allowed: 0 to 100"
+        );
     }
 
     #[test]

@@ -3,13 +3,16 @@
 //! Sector j of the flexspline is centred on tooth j, sector j of the circular spline on space j; sector 0 on the +x axis,
 //! numbers growing counter-clockwise. Node `k` of sector `j` has the number `j * nodes_per_sector + k` and is the rotated
 //! image of node `k` of sector 0: whatever repeats from tooth to tooth in the drive repeats in the mesh.
+//!
+//! A rim of varying thickness ([`RimVariation`]) moves the nodes between bore and interface circle along their radii; numbers
+//! and elements stay what they are, and [`WheelMesh::sector_class`] says which sectors are images of one another still.
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 use super::density::{MeshDensity, MeshLevel};
 use super::sector::{EdgeTag, HalfOutline, HalfSector, MeshError, Point};
-use crate::drive::{Drive, InvoluteFlank, Side, ToothFlank};
+use crate::drive::{Drive, InvoluteFlank, RimVariation, Side, ToothFlank};
 use crate::element::{GaussPoint, gauss_points};
 
 /// Which wheel a mesh is of.
@@ -76,22 +79,26 @@ pub struct WheelMesh {
     pub flanks: [FlankMesh; 2],
     /// Edges of one sector on the bore or the outer circle, counter-clockwise.
     pub base_edges: Vec<Edge>,
-    /// Radius of that circle (mm).
+    /// Radius of that circle (mm), for a rim of nominal thickness.
     pub base_radius: f64,
+    /// How the rim varies around the wheel.
+    pub rim: RimVariation,
 }
 
 impl WheelMesh {
     /// Meshes the flexspline.
     pub fn flexspline(drive: &Drive, level: MeshLevel) -> Result<WheelMesh, MeshError> {
         let wheel = &drive.flexspline;
+        let interface_radius = wheel.root_radius_mm - 0.3 * wheel.rim_thickness_mm;
         WheelMesh::new(
             WheelKind::Flexspline,
             &ToothFlank::external(wheel)?,
             wheel.base_radius_mm(),
             wheel.bore_radius_mm(),
-            wheel.root_radius_mm - 0.3 * wheel.rim_thickness_mm,
+            interface_radius,
             &level.flexspline(),
-        )
+        )?
+        .with_rim(RimVariation::of(drive), interface_radius)
     }
 
     /// Meshes the circular spline.
@@ -107,6 +114,22 @@ impl WheelMesh {
             wheel.root_radius_mm + (0.5 * tooth_height).min(0.4 * rim),
             &level.circular_spline(),
         )
+    }
+
+    /// The mesh with a rim that varies: its base circle moved inward by the thickness added, what lies between it and
+    /// `fixed_radius` by a part that falls linearly.
+    pub fn with_rim(mut self, rim: RimVariation, fixed_radius: f64) -> Result<WheelMesh, MeshError> {
+        if !rim.is_none() {
+            for p in &mut self.nodes {
+                let r = p[0].hypot(p[1]);
+                let part = ((fixed_radius - r) / (fixed_radius - self.base_radius)).max(0.0);
+                let stretch = 1.0 - part * rim.at(p[1].atan2(p[0])) / r;
+                *p = [p[0] * stretch, p[1] * stretch];
+            }
+            self.gauss = integration_points(self.kind, &self.elements, &self.nodes)?;
+        }
+        self.rim = rim;
+        Ok(self)
     }
 
     /// A smooth ring: `sectors` elements around, `rows` through its thickness, no flanks.
@@ -232,7 +255,6 @@ impl WheelMesh {
         let nodes_per_sector = nodes.points.len();
         let mut all_nodes = Vec::with_capacity(nodes_per_sector * teeth);
         let mut elements = Vec::with_capacity(template.len() * teeth);
-        let mut gauss = Vec::with_capacity(template.len() * teeth);
         for sector in 0..teeth {
             let angle = TAU * sector as f64 / teeth as f64;
             all_nodes.extend(nodes.points.iter().map(|p| rotate(*p, angle)));
@@ -243,17 +265,7 @@ impl WheelMesh {
                 );
             }
         }
-        for element in &elements {
-            let coordinates = element.map(|n| all_nodes[n as usize]);
-            gauss.push(gauss_points(&coordinates).map_err(|folded| MeshError::Folded {
-                wheel: match kind {
-                    WheelKind::Flexspline => "flexspline",
-                    WheelKind::CircularSpline => "circular spline",
-                },
-                radius_mm: coordinates[0][0].hypot(coordinates[0][1]),
-                jacobian: folded.jacobian,
-            })?);
-        }
+        let gauss = integration_points(kind, &elements, &all_nodes)?;
         Ok(WheelMesh {
             kind,
             teeth,
@@ -265,7 +277,20 @@ impl WheelMesh {
             flanks,
             base_edges,
             base_radius,
+            rim: RimVariation::default(),
         })
+    }
+
+    /// Sectors of the same class are congruent: one is the other turned by their distance around the ring. Classes count from 0
+    /// and sector `c` is of class `c`, so that each can be treated once, at its first sector.
+    #[inline]
+    pub fn sector_class(&self, sector: usize) -> usize {
+        sector % self.sector_classes()
+    }
+
+    /// How many classes of sectors there are: one, unless the rim varies.
+    pub fn sector_classes(&self) -> usize {
+        self.rim.repeats_after(self.teeth)
     }
 
     /// Number of a node given by sector and local number; the sector may lie beyond either end of the ring.
@@ -290,6 +315,28 @@ impl WheelMesh {
     pub fn pitch(&self) -> f64 {
         TAU / self.teeth as f64
     }
+}
+
+/// Integration points of every element.
+fn integration_points(
+    kind: WheelKind,
+    elements: &[[u32; 8]],
+    nodes: &[Point],
+) -> Result<Vec<[GaussPoint; 4]>, MeshError> {
+    elements
+        .iter()
+        .map(|element| {
+            let coordinates = element.map(|n| nodes[n as usize]);
+            gauss_points(&coordinates).map_err(|folded| MeshError::Folded {
+                wheel: match kind {
+                    WheelKind::Flexspline => "flexspline",
+                    WheelKind::CircularSpline => "circular spline",
+                },
+                radius_mm: coordinates[0][0].hypot(coordinates[0][1]),
+                jacobian: folded.jacobian,
+            })
+        })
+        .collect()
 }
 
 /// The same element with its nodes in the opposite sense; local edge e becomes 3 − e.
@@ -365,6 +412,7 @@ impl NodeTable {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::drive::Harmonic;
     use std::collections::{BTreeMap, BTreeSet};
 
     fn meshes(level: MeshLevel) -> [WheelMesh; 2] {
@@ -440,6 +488,41 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_varying_rim_moves_the_bore_and_repeats_by_classes() {
+        let mut drive = Drive::hhd_95();
+        drive.as_built.rim_thickness_harmonics = vec![
+            Harmonic { order: 4, amplitude_um: 30.0, phase_deg: 11.0 },
+            Harmonic { order: 8, amplitude_um: 5.0, phase_deg: 0.0 },
+        ];
+        let plain = WheelMesh::flexspline(&Drive::hhd_95(), MeshLevel::Standard).unwrap();
+        let mesh = WheelMesh::flexspline(&drive, MeshLevel::Standard).unwrap();
+        assert_eq!((plain.sector_classes(), plain.sector_class(100)), (1, 0));
+        assert_eq!(mesh.sector_classes(), 47);
+        for (p, q) in plain.nodes.iter().zip(&mesh.nodes) {
+            let (r, angle) = (p[0].hypot(p[1]), p[1].atan2(p[0]));
+            let inward = r - q[0].hypot(q[1]);
+            let thicker = 0.03 * (4.0 * (angle - 11f64.to_radians())).cos() + 0.005 * (8.0 * angle).cos();
+            let part = ((47.515 - r) / (47.515 - 46.675)).max(0.0);
+            assert!((inward - part * thicker).abs() < 1e-12, "at {r}, {angle}: {inward}");
+        }
+        for sector in 0..mesh.teeth {
+            let class = mesh.sector_class(sector);
+            let (s, c) = (mesh.sector_angle(sector) - mesh.sector_angle(class)).sin_cos();
+            for local in 0..mesh.nodes_per_sector {
+                let p = mesh.nodes[class * mesh.nodes_per_sector + local];
+                let q = mesh.nodes[sector * mesh.nodes_per_sector + local];
+                assert!((c * p[0] - s * p[1] - q[0]).hypot(s * p[0] + c * p[1] - q[1]) < 1e-12);
+            }
+        }
+        // Between classes they are not.
+        let radius = |sector: usize| {
+            let [a, _, _] = mesh.edge_nodes(sector, &mesh.base_edges[0]);
+            mesh.nodes[a][0].hypot(mesh.nodes[a][1])
+        };
+        assert!((radius(0) - radius(20)).abs() > 1e-3);
     }
 
     #[test]

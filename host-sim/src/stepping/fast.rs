@@ -36,7 +36,7 @@ impl CondensedDrive {
         flexspline: &WheelMesh,
         circular_spline: &WheelMesh,
         material: &PlaneStrain,
-        held: impl Fn(u32) -> bool,
+        held: impl Fn(u32) -> bool + Sync,
     ) -> CondensedDrive {
         let flexspline = CondensedWheel::new(flexspline, material, 0, |_| false);
         let first = 2 * flexspline.skin.mesh.nodes.len();

@@ -1,7 +1,7 @@
 //! The drive as a mechanical problem: meshes, contact, holding, at one temperature. Immutable while it is solved.
 
 use crate::contact::{BoreContact, BoreLaw, FlankContact, FlankLaw};
-use crate::drive::{Drive, GeneratorKind, GeneratorOutline, InvoluteFlank, ToothFlank};
+use crate::drive::{Drive, FlankDeviations, GeneratorKind, GeneratorOutline, InvoluteFlank, RimVariation, ToothFlank};
 use crate::material::PlaneStrain;
 use crate::mesh::{MeshLevel, WheelMesh};
 
@@ -105,6 +105,7 @@ pub struct Problem {
     pub(super) flank_law: FlankLaw,
     tooth: InvoluteFlank,
     space: InvoluteFlank,
+    deviations: FlankDeviations,
     /// Weights of the mean rotation of the bore: rotation = rotation_weights . u.
     pub(super) rotation_weights: Vec<f64>,
     /// Weights of the mean displacement of the bore in x; that in y follows by symmetry of the nodes.
@@ -141,6 +142,7 @@ impl Problem {
         let tooth = InvoluteFlank::new(&ToothFlank::external(&drive.flexspline)?, drive.flexspline.base_radius_mm());
         let space =
             InvoluteFlank::new(&ToothFlank::internal(&drive.circular_spline)?, drive.circular_spline.base_radius_mm());
+        let deviations = FlankDeviations::new(&drive);
         let outer = drive.circular_spline.outer_radius_mm;
         let mut held: Vec<bool> = circular_spline.nodes.iter().map(|p| p[0].hypot(p[1]) > outer - 1e-6).collect();
         let free = held.iter().filter(|held| !**held).count();
@@ -175,6 +177,7 @@ impl Problem {
             bore,
             tooth,
             space,
+            deviations,
             outline,
             flexspline,
             circular_spline,
@@ -197,7 +200,8 @@ impl Problem {
         let settings = SolverSettings { method: Method::Reference, ..settings };
         let mut problem = Problem::new(drive, kind, drive.temperature.reference_c, settings)?;
         let bore_radius = drive.flexspline.bore_radius_mm();
-        problem.flexspline = WheelMesh::smooth_ring(bore_radius, drive.flexspline.rim_thickness_mm, sectors, rows)?;
+        problem.flexspline = WheelMesh::smooth_ring(bore_radius, drive.flexspline.rim_thickness_mm, sectors, rows)?
+            .with_rim(RimVariation::of(drive), drive.flexspline.root_radius_mm)?;
         problem.bore = BoreContact::new(&problem.flexspline, settings.bore_points(kind));
         (problem.rotation_weights, problem.mean_weights) = bore_averages(&problem.flexspline, &problem.bore);
         Ok(problem)
@@ -206,7 +210,12 @@ impl Problem {
     /// Contact between the flanks.
     pub fn flanks(&self) -> FlankContact<'_> {
         let (fs, cs) = self.wheels();
-        FlankContact::new(fs, cs, self.tooth.clone(), self.space.clone())
+        self.flanks_on(fs, cs)
+    }
+
+    /// Contact between the flanks as other meshes carry them, of the same sectors and flanks.
+    pub fn flanks_on<'a>(&'a self, flexspline: &'a WheelMesh, circular_spline: &'a WheelMesh) -> FlankContact<'a> {
+        FlankContact::new(flexspline, circular_spline, self.tooth.clone(), self.space.clone(), &self.deviations)
     }
 
     /// Drag torque on the output (N mm/mm) at a displacement from its anchor, and the stiffness with which it holds.
@@ -223,13 +232,19 @@ impl Problem {
     /// Refuses a state in which wheels touch where no contact is modelled: a tooth of the flexspline in the root of a space.
     pub(super) fn check_range(&self, state: &State) -> Result<(), SolveError> {
         let (mesh, _) = self.wheels();
-        let root = self.drive.circular_spline.root_radius_mm;
+        // As built, some root of a space may stand further in, and the tooth and the axis beside their places.
+        let further_in = self.deviations.spaces.iter().map(|space| -space.translation[0]).fold(0.0, f64::max);
+        let root = self.drive.circular_spline.root_radius_mm - further_in;
+        let axis = self.deviations.axis;
         for tooth in 0..mesh.teeth {
             for flank in &mesh.flanks {
                 let Some(&tip) = flank.nodes.last() else { continue };
                 let n = mesh.node(tooth as isize, tip);
                 let x = mesh.nodes[n];
-                let radius = (x[0] + state.u[2 * n]).hypot(x[1] + state.u[2 * n + 1]);
+                let [dx, dy] = self.deviations.teeth[tooth].translation;
+                let (s, c) = mesh.sector_angle(tooth).sin_cos();
+                let beside = [c * dx - s * dy - axis[0], s * dx + c * dy - axis[1]];
+                let radius = (x[0] + state.u[2 * n] + beside[0]).hypot(x[1] + state.u[2 * n + 1] + beside[1]);
                 if radius > root {
                     return Err(SolveError::OutOfRange {
                         generator_rad: state.generator_rad,
@@ -277,12 +292,15 @@ impl Problem {
         let neutral = self.outline.neutral();
         let scale = self.drive.thermal_state.flexspline_scale;
         let neutral_radius = neutral.radius_mm() * scale;
+        // The rim follows its generator sideways.
+        let [cx, cy] = self.outline.centre();
         let mut u = Vec::with_capacity(2 * fs.nodes.len());
         for x in &fs.nodes {
             let (r, phi) = (x[0].hypot(x[1]), x[1].atan2(x[0]));
             let (p, normal) = neutral.position(phi - generator_rad);
             let (s, c) = generator_rad.sin_cos();
-            let p = [scale * (c * p[0] - s * p[1]), scale * (s * p[0] + c * p[1])];
+            let p =
+                [scale * (c * p[0] - s * p[1]) + (c * cx - s * cy), scale * (s * p[0] + c * p[1]) + (s * cx + c * cy)];
             let (sn, cn) = (normal + generator_rad).sin_cos();
             let above = r - neutral_radius;
             u.extend([p[0] + above * cn - x[0], p[1] + above * sn - x[1]]);

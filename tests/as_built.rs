@@ -1,0 +1,402 @@
+//! What a drive as built does to the output: each imperfection by the law it is known to follow.
+//!
+//! ```text
+//!   e ^   .--.        .--.        FS pitch, k = 2: order 2          CS pitch, k = 2: order 2 * 94/95
+//!     | _/    \_    _/    \_      FS runout, CS offset: 2, 4, ..    CS eccentricity: |sin(psi 94/95 - eps + a)|
+//!     |         \__/              generator alone: 188 only         damaged tooth: where that tooth bears
+//!     +-----------------> psi
+//! ```
+//!
+//! HHD-95 with the cam, coarse mesh, without friction: the drive is deformed afresh at each generator angle and then loaded,
+//! so that positions far apart cost no way between them. Positions lie whole flexspline pitches (`2 pi / 188`) apart, where
+//! the ideal drive is in one state; what differs is the imperfection. Loads: 2 N.m unless said otherwise.
+//! References: the kinematics of rigid teeth in two lobes that share the load (harmonic drive theory: an error `p` along the
+//! pitch of one wheel turns the output by `p / r`; an eccentricity `e` of the toothing, seen by the one flank that bears, by the
+//! rectified sine `e / (r cos a) |sin(psi 94/95 - eps + a)|`, whose Fourier amplitudes are `4 / pi / (4 n^2 - 1)`); the
+//! bending of a thin ring of varying thickness (Castigliano); Maxwell's reciprocity.
+//! Physics wrong if this fails: a sign, a phase, a wheel taken for the other, a moment about the wrong axis, a rim that is thicker
+//! and no stiffer.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use flexspline_sim::contact::{BoreContact, BoreLaw};
+use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
+use flexspline_sim::mesh::MeshLevel;
+use flexspline_sim::stepping::{Increment, Problem, Solver, SolverSettings, State};
+use flexspline_tests::command::Desk;
+use flexspline_tests::motion::{ARCSEC, imperfect, on, problem};
+
+const LOAD_N_M: f64 = 2.0;
+/// Flexspline pitch of generator angle, rad.
+const PITCH: f64 = TAU / 188.0;
+
+fn cam(change: impl FnOnce(&mut Drive)) -> Problem {
+    let mut drive = Drive::hhd_95();
+    change(&mut drive);
+    problem(&drive, GeneratorKind::Cam, on(MeshLevel::Coarse))
+}
+
+/// The drive deformed at a generator angle, then loaded.
+fn stands(problem: &Problem, generator_rad: f64, torque_n_m: f64) -> (State, Increment) {
+    let mut solver = Solver::new(problem);
+    let (state, _) = solver.deform(generator_rad).unwrap_or_else(|error| panic!("{error}"));
+    solver.increment(&state, generator_rad, torque_n_m).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Transmission error, arc-seconds.
+fn error(problem: &Problem, generator_rad: f64, torque_n_m: f64) -> f64 {
+    let (state, _) = stands(problem, generator_rad, torque_n_m);
+    (state.output_rad - generator_rad / problem.drive.ratio()) * ARCSEC
+}
+
+/// The error that an imperfect drive has beyond the ideal one, at `whole` flexspline pitches, arc-seconds.
+fn beyond_ideal(change: impl FnOnce(&mut Drive), whole: &[u32], torque_n_m: f64) -> Vec<f64> {
+    let ideal = error(&cam(|_| {}), 0.0, torque_n_m);
+    let problem = cam(change);
+    whole.iter().map(|k| error(&problem, f64::from(*k) * PITCH, torque_n_m) - ideal).collect()
+}
+
+/// Mean, and amplitude and phase (rad) of the orders 1 and 2 of samples that divide a period evenly: `A cos(n x - phase)`.
+fn harmonics(samples: &[f64]) -> (f64, [(f64, f64); 2]) {
+    let n = samples.len() as f64;
+    let mean = samples.iter().sum::<f64>() / n;
+    let of = |order: f64| {
+        let (mut c, mut s) = (0.0, 0.0);
+        for (k, sample) in samples.iter().enumerate() {
+            let x = TAU * order * k as f64 / n;
+            c += 2.0 / n * sample * x.cos();
+            s += 2.0 / n * sample * x.sin();
+        }
+        (c.hypot(s), s.atan2(c))
+    };
+    (mean, [of(1.0), of(2.0)])
+}
+
+fn second(amplitude_um: f64) -> Vec<Harmonic> {
+    vec![Harmonic { order: 2, amplitude_um, phase_deg: 0.0 }]
+}
+
+/// 95 flexspline pitches are the generator angle `pi 95/94` after which space `k + 95` stands where space `k` did: the period of
+/// order 2 * 94/95.
+#[test]
+fn a_second_harmonic_of_the_circular_spline_pitch_has_order_2_times_94_95() {
+    let positions: Vec<u32> = (0..5).map(|k| 19 * k).chain([94, 95]).collect();
+    let found =
+        beyond_ideal(|drive| drive.as_built.circular_spline_pitch_harmonics = second(5.0), &positions, LOAD_N_M);
+    let (mean, [(amplitude, phase), (twice, _)]) = harmonics(&found[..5]);
+    let rigid = 5e-3 / 49.05 * ARCSEC;
+    let lobe = (phase.to_degrees() / 2.0).abs();
+    println!(
+        "circular-spline pitch, k = 2, 5 um: {amplitude:.2}\" of p/r = {rigid:.2}\", crest {:.1} deg, mean {mean:.3}\", order 4 \
+         {twice:.3}\"; after 94 pitches {:+.4}\", after 95 {:+.1e}\"",
+        phase.to_degrees() / 2.0,
+        found[5] - found[0],
+        found[6] - found[0]
+    );
+    assert!(amplitude / rigid > 0.93 && amplitude / rigid < 1.0, "{amplitude}\" of {rigid}\"");
+    // Spaces displaced forward let the output lag: the crest of e is where the trough of p stands in the zone of contact, a few
+    // degrees beside the major axis.
+    assert!(lobe > 75.0 && lobe < 105.0, "crest at {lobe} degrees from the major axis");
+    assert!(mean.abs() < 0.05 * amplitude && twice < 0.05 * amplitude);
+    assert!((found[6] - found[0]).abs() < 1e-3, "not periodic after 95 pitches: {}", found[6] - found[0]);
+    assert!((found[5] - found[0]).abs() > 0.01, "periodic after 94 pitches, as an error of the flexspline would be");
+}
+
+#[test]
+fn a_second_harmonic_of_the_flexspline_pitch_has_order_2_and_the_other_sign() {
+    let positions: Vec<u32> = vec![0, 47, 94, 95];
+    let found = beyond_ideal(|drive| drive.as_built.flexspline_pitch_harmonics = second(5.0), &positions, LOAD_N_M);
+    let rigid = 5e-3 / 48.35 * ARCSEC;
+    println!("flexspline pitch, k = 2, 5 um: {found:.3?}\" at {positions:?} pitches, p/r = {rigid:.2}\"");
+    // Crest and trough of the error stand on the major axis: teeth displaced forward push the output ahead.
+    assert!(found[0] > 0.85 * rigid && found[0] < rigid && found[1] < -0.85 * rigid && found[1] > -rigid);
+    assert!((found[2] - found[0]).abs() < 1e-3, "not periodic after 94 pitches: {}", found[2] - found[0]);
+    assert!((found[3] - found[0]).abs() > 0.01);
+}
+
+#[test]
+fn teeth_all_displaced_alike_turn_the_output_by_just_that() {
+    for (wheel, expected) in
+        [(Wheel::Flexspline, 3e-3 / 48.35 * ARCSEC), (Wheel::CircularSpline, -3e-3 / 49.05 * ARCSEC)]
+    {
+        let change = |drive: &mut Drive| match wheel {
+            Wheel::Flexspline => drive.as_built.flexspline_pitch_error_um = vec![3.0; 188],
+            Wheel::CircularSpline => drive.as_built.circular_spline_pitch_error_um = vec![3.0; 190],
+        };
+        let found = beyond_ideal(change, &[0, 30], LOAD_N_M);
+        println!("every pitch error of the {wheel:?} 3 um: {found:.5?}\", rigid {expected:.5}\"");
+        assert!(found.iter().all(|e| (e - expected).abs() < 2e-3), "{found:?}\"");
+    }
+}
+
+/// An oval moves the spaces along the pitch by half its amplitude and opens and closes them by its radius.
+#[test]
+fn an_oval_circular_spline_has_order_2_times_94_95() {
+    let positions: Vec<u32> = (0..5).map(|k| 19 * k).chain([95]).collect();
+    let found = beyond_ideal(|drive| drive.as_built.circular_spline_ovality_um = 5.0, &positions, LOAD_N_M);
+    let (mean, [(amplitude, phase), (twice, _)]) = harmonics(&found[..5]);
+    // Radius and tangent together, flank at a = 24 deg: (w tan a) cos 2x against (w/2) sin 2x.
+    let a = 24f64.to_radians();
+    let rigid = 5e-3 / 48.7 * 0.5f64.hypot(a.tan()) * ARCSEC;
+    println!(
+        "circular-spline ovality 5 um: {amplitude:.2}\", rigid {rigid:.2}\", crest {:.1} deg, mean {mean:.2}\", order 4 {twice:.2}\"",
+        phase.to_degrees() / 2.0
+    );
+    assert!((amplitude / rigid - 1.0).abs() < 0.12, "{amplitude}\" of {rigid}\"");
+    assert!(twice < 0.1 * amplitude);
+    assert!((found[5] - found[0]).abs() < 1e-3);
+}
+
+#[test]
+fn an_eccentric_circular_spline_is_seen_as_a_rectified_sine() {
+    let positions: Vec<u32> = (0..19).map(|k| 5 * k).collect();
+    let found = beyond_ideal(|drive| drive.as_built.circular_spline_eccentricity_um = 5.0, &positions, 0.5);
+    let (mean, [(second, phase), (fourth, _)]) = harmonics(&found);
+    // r cos a is the base radius.
+    let rigid = 5e-3 / 44.635 * ARCSEC;
+    let angle = -0.5 * phase;
+    println!(
+        "circular-spline eccentricity 5 um: mean {mean:.2}\" ({:.2}), order 2*94/95 {second:.2}\" ({:.2}), order 4*94/95 {fourth:.2}\" \
+         ({:.2}), a {:.1} deg",
+        -2.0 / PI * rigid,
+        4.0 / PI / 3.0 * rigid,
+        4.0 / PI / 15.0 * rigid,
+        angle.to_degrees()
+    );
+    assert!((second / (4.0 / PI / 3.0 * rigid) - 1.0).abs() < 0.08, "{second}\"");
+    assert!((fourth / (4.0 / PI / 15.0 * rigid) - 1.0).abs() < 0.25, "{fourth}\"");
+    // Both lobes bear where the sine goes through zero, and round its corner off.
+    assert!((mean / (-2.0 / PI * rigid) - 1.0).abs() < 0.15, "{mean}\"");
+    assert!((angle.to_degrees() - 22.5).abs() < 4.0, "flank at {} degrees", angle.to_degrees());
+}
+
+/// Displacing the axis of the circular spline one way is displacing the teeth of the flexspline the other way, and turning the whole
+/// half round changes nothing but the lobe that bears.
+#[test]
+fn a_displaced_axis_is_a_flexspline_displaced_the_other_way() {
+    let at = [0, 23, 60, 94];
+    let offset = |direction: f64| {
+        let change = |drive: &mut Drive| {
+            drive.as_built.circular_spline_offset_um = 5.0;
+            drive.as_built.circular_spline_offset_direction_deg = direction;
+        };
+        beyond_ideal(change, &at, LOAD_N_M)
+    };
+    let runout = beyond_ideal(
+        |drive| {
+            drive.as_built.flexspline_runout_um = 5.0;
+            drive.as_built.flexspline_runout_phase_deg = 220.0;
+        },
+        &at,
+        LOAD_N_M,
+    );
+    let (one, other) = (offset(40.0), offset(220.0));
+    println!(
+        "axis displaced by 5 um to 40 deg {one:.4?}\", flexspline to 220 deg {runout:.4?}\", axis to 220 deg {other:.4?}\""
+    );
+    assert!(one.iter().zip(&runout).all(|(a, b)| (a - b).abs() < 1e-3));
+    assert!(one.iter().zip(&other).all(|(a, b)| (a - b).abs() < 1e-3));
+    assert!((one[3] - one[0]).abs() < 1e-3, "order 2 in the housing: 94 pitches are half a turn");
+    let spread = one.iter().copied().fold(f64::MIN, f64::max) - one.iter().copied().fold(f64::MAX, f64::min);
+    assert!(spread > 5.0, "a displaced axis is not seen: {one:?}\"");
+}
+
+/// The bore is displaced against the teeth either way; the thicker wall is the difference.
+#[test]
+fn a_rim_of_order_1_is_a_runout() {
+    let at = [0, 23, 47, 70];
+    let by = |change: &dyn Fn(&mut Drive)| beyond_ideal(change, &at, LOAD_N_M);
+    let runout = by(&|drive| {
+        drive.as_built.flexspline_runout_um = 5.0;
+        drive.as_built.flexspline_runout_phase_deg = 30.0;
+    });
+    let rim = by(&|drive| {
+        drive.as_built.rim_thickness_harmonics = vec![Harmonic { order: 1, amplitude_um: 5.0, phase_deg: 30.0 }];
+    });
+    println!("runout of 5 um {runout:.3?}\", rim thicker by 5 um on that side {rim:.3?}\"");
+    assert!(runout.iter().zip(&rim).all(|(a, b)| (a - b).abs() < 0.3), "{runout:?} {rim:?}");
+    assert!(runout.iter().any(|e| e.abs() > 5.0));
+}
+
+#[test]
+fn wear_widens_the_backlash_by_its_depth_over_the_base_radius() {
+    let backlash = |problem: &Problem| error(problem, 0.0, LOAD_N_M) - error(problem, 0.0, -LOAD_N_M);
+    let ideal = backlash(&cam(|_| {}));
+    for (flexspline, circular_spline) in [(3.0, 0.0), (0.0, 3.0), (2.0, 5.0)] {
+        let worn = backlash(&cam(|drive| {
+            drive.as_built.flexspline_wear_um = flexspline;
+            drive.as_built.circular_spline_wear_um = circular_spline;
+        }));
+        let expected = 2.0 * 1e-3 * (flexspline + circular_spline) / 44.6354 * ARCSEC;
+        println!(
+            "wear {flexspline} + {circular_spline} um: backlash wider by {:.4}\", 2w/(r cos a) = {expected:.4}\"",
+            worn - ideal
+        );
+        assert!(((worn - ideal) / expected - 1.0).abs() < 1e-3, "{} of {expected}", worn - ideal);
+    }
+}
+
+#[test]
+fn a_damaged_tooth_is_felt_where_it_bears_and_nowhere_else() {
+    // On the wave at 2 N.m about eight teeth bear on each lobe, on the minus flank: the output is turned forward.
+    let change = |wheel, tooth, flank| {
+        move |drive: &mut Drive| {
+            drive.as_built.damaged_teeth = vec![DamagedTooth { wheel, tooth, flank, depth_um: 12.0 }];
+        }
+    };
+    let at: Vec<u32> = vec![0, 20, 23, 25, 27, 30, 47, 94, 114, 117, 119, 121, 124, 141];
+    let minus = beyond_ideal(change(Wheel::Flexspline, 25, DamagedFlank::Minus), &at, LOAD_N_M);
+    let plus = beyond_ideal(change(Wheel::Flexspline, 25, DamagedFlank::Plus), &at, LOAD_N_M);
+    println!("flexspline tooth 25, minus flank, at {at:?} pitches:\n{minus:.4?}\"\nits plus flank:\n{plus:.5?}\"");
+    assert!(plus.iter().all(|e| e.abs() < 1e-3), "a flank that does not bear is felt: {plus:?}");
+    let felt: Vec<u32> = at.iter().zip(&minus).filter(|(_, e)| **e > 0.02).map(|(k, _)| *k).collect();
+    assert!(!felt.is_empty() && felt.iter().all(|k| (20..=30).contains(&(k % 94))), "felt at {felt:?}");
+    assert!(felt.iter().any(|k| *k < 94) && felt.iter().any(|k| *k > 94), "felt on one lobe only: {felt:?}");
+    assert!(minus.iter().all(|e| *e > -1e-3), "less material cannot hold the output back");
+
+    // Circular-spline tooth k bears with its plus flank on the minus flank of the flexspline tooth in space k + 1: at 25 pitches
+    // flexspline tooth 25 + j is in space 25 + j. Where tooth 25 was felt, tooth 24 of the circular spline is.
+    let position = felt.iter().copied().find(|k| *k < 94).unwrap();
+    let circular = |tooth, flank| beyond_ideal(change(Wheel::CircularSpline, tooth, flank), &[position], LOAD_N_M)[0];
+    let same = at.iter().position(|k| *k == position).unwrap();
+    let (plus, minus_flank, other) =
+        (circular(24, DamagedFlank::Plus), circular(24, DamagedFlank::Minus), circular(24 + 60, DamagedFlank::Both));
+    println!(
+        "at {position} pitches: flexspline tooth 25 {:.4}\", circular-spline tooth 24, plus flank {plus:.4}\", minus flank \
+         {minus_flank:.5}\", tooth 84 {other:.5}\"",
+        minus[same]
+    );
+    assert!((plus - minus[same]).abs() < 1e-3, "{plus}\" and {}\"", minus[same]);
+    assert!(minus_flank.abs() < 1e-3 && other.abs() < 1e-3);
+}
+
+/// Any generator of constant shape turns an ideal pair of wheels the same way in every pitch.
+#[test]
+fn a_malformed_generator_alone_leaves_the_period_of_one_pitch() {
+    let changes: [(&str, fn(&mut Drive)); 3] = [
+        ("eccentricity 10 um", |drive| {
+            drive.as_built.generator_eccentricity_um = 10.0;
+            drive.as_built.generator_eccentricity_phase_deg = 35.0;
+        }),
+        ("lobe asymmetry 8 um", |drive| drive.as_built.generator_lobe_asymmetry_um = 8.0),
+        ("form error 5 um, k = 5", |drive| {
+            drive.as_built.cam_form_harmonics = vec![Harmonic { order: 5, amplitude_um: 5.0, phase_deg: 10.0 }];
+        }),
+    ];
+    for (what, change) in changes {
+        let found = beyond_ideal(change, &[0, 1, 40, 101], LOAD_N_M);
+        println!("generator, {what}: {found:.5?}\" at 0, 1, 40, 101 pitches");
+        assert!(found.iter().all(|e| (e - found[0]).abs() < 1e-3), "{what}: {found:?}");
+        assert!(found[0].abs() > 0.01, "{what} is not felt");
+    }
+}
+
+/// Two rollers on a smooth ring whose thickness varies four times around: pressed where it is thick and where it is thin.
+///
+/// With `M = F R/2 (sin x - c)`, c such that the ends do not turn, the rollers are apart by twice
+/// `w = F R^3/2 int_0^(pi/2) (sin x - c)^2 / EI dx`.
+#[test]
+fn a_thicker_rim_is_stiffer_by_the_cube_of_its_thickness() {
+    let thickness = 1.2;
+    let amplitude = 0.06;
+    let mut drive = Drive::hhd_95();
+    // Small, so that the closed form, which is linear, holds.
+    drive.generator.w0_mm = 0.2;
+    drive.flexspline.tip_radius_mm = 48.7;
+    let settings = SolverSettings { bore_penalty: Some(1e6), bore_points: Some(64), ..on(MeshLevel::Coarse) };
+    let force = |drive: &Drive, turned: f64| -> f64 {
+        let problem = Problem::smooth_ring(drive, GeneratorKind::TwoRoller, settings, 188, 2).unwrap();
+        let (state, _) = Solver::new(&problem).deform(turned).unwrap();
+        let bore = BoreContact::new(&problem.flexspline, 64);
+        let mut outward = 0.0;
+        bore.evaluate(BoreLaw::new(1e6, None), &problem.outline, turned, &state.u, |edge| {
+            let (s, c) = bore.middle_angles[edge.edge].sin_cos();
+            outward += (0..3).map(|a| c * edge.force[2 * a] + s * edge.force[2 * a + 1]).sum::<f64>();
+        });
+        0.5 * outward
+    };
+    // Compliance of a quarter, relative to 1/EI = 1 for the nominal thickness; x from 0 between the rollers to 90 degrees
+    // under one. `thick` is the thickness under the roller.
+    let compliance = |thick: f64| {
+        let n = 2000;
+        let (mut c, mut total) = (0.0, 0.0);
+        let flexibility = |x: f64| (1.0 + thick * (4.0 * (FRAC_PI_2 - x)).cos() / thickness).powi(-3);
+        let points: Vec<f64> = (0..n).map(|k| (f64::from(k) + 0.5) / f64::from(n) * FRAC_PI_2).collect();
+        for x in &points {
+            // M is -F R/2 (sin y - c), y from the load: sin y = cos x.
+            c += flexibility(*x) * x.sin();
+            total += flexibility(*x);
+        }
+        c /= total;
+        points.iter().map(|x| flexibility(*x) * (x.sin() - c).powi(2)).sum::<f64>() / f64::from(n)
+    };
+    let plain = force(&drive, 0.0);
+    drive.as_built.rim_thickness_harmonics = vec![Harmonic { order: 4, amplitude_um: 1e3 * amplitude, phase_deg: 0.0 }];
+    for (what, turned, thick) in [("thick", 0.0, amplitude), ("thin", PI / 4.0, -amplitude)] {
+        let found = force(&drive, turned) / plain;
+        // The bore stands further in where the rim is thicker, and the roller where it stood.
+        let deflection = (0.2 + thick) / 0.2;
+        let expected = deflection * compliance(0.0) / compliance(thick);
+        println!(
+            "rim {:+.0} um under the rollers ({what}): force {found:.4} of the even rim, bending theory {expected:.4}, deflection \
+             alone {deflection:.4}",
+            1e3 * thick
+        );
+        assert!((found / expected - 1.0).abs() < 0.02, "{what}: {found}, expected {expected}");
+        assert!((compliance(0.0) / compliance(thick) - 1.0).abs() > 0.05, "the law says nothing here");
+    }
+}
+
+/// The generator of a drive as imperfect as can be still takes just the torque that its output gives, and the work it puts in
+/// does not depend on the way: `d(M_g)/dT = -d(delta)/d(psi)`, both at their own axes.
+#[test]
+fn with_every_imperfection_forces_balance_and_work_is_reciprocal() {
+    for kind in [GeneratorKind::Cam, GeneratorKind::FourRoller] {
+        let problem = problem(&imperfect(), kind, SolverSettings { tolerance: 2e-7, ..on(MeshLevel::Coarse) });
+        for psi in [0.3, 2.0] {
+            let (turn, load) = (2e-4, 0.05);
+            let at = |psi: f64, torque: f64| stands(&problem, psi, torque);
+            let torque = 10.0;
+            let (state, here) = at(psi, torque);
+            let unbalanced = here.flank_torque_n_m + here.drag_torque_n_m + torque;
+            let rate = (at(psi + turn, torque).0.output_rad - at(psi - turn, torque).0.output_rad) / (2.0 * turn);
+            let (more, less) = (at(psi, torque + load), at(psi, torque - load));
+            let torque_rate = (more.1.generator_torque_n_m - less.1.generator_torque_n_m) / (2.0 * load);
+            let softness = (more.0.output_rad - less.0.output_rad) / (2.0 * load);
+            println!(
+                "{kind}, all imperfections, psi {psi}: e {:.2}\", {} flanks, torque out of balance {unbalanced:.1e} N.m; 95 dM/dT \
+                 {:.5}, 95 d(delta)/d(psi) {:.5}; compliance by difference over tangent {:.5}",
+                (state.output_rad - psi / 95.0) * ARCSEC,
+                here.flank_contacts,
+                95.0 * torque_rate,
+                95.0 * rate,
+                softness / here.compliance_rad_per_n_m
+            );
+            assert!(unbalanced.abs() < 1e-6);
+            assert!((95.0 * (torque_rate + rate)).abs() < 2e-3, "{torque_rate} {rate}");
+        }
+    }
+}
+
+#[test]
+fn tables_of_an_imperfect_drive_are_refused_and_name_the_field() {
+    let desk = Desk::new();
+    for (set, field) in [
+        ("circular_spline_eccentricity_um=5", "as_built.circular_spline_eccentricity_um"),
+        ("flexspline_pitch_harmonics=[{order=2,amplitude_um=5}]", "as_built.flexspline_pitch_harmonics"),
+        ("damaged_teeth=[{wheel='flexspline',tooth=3,depth_um=5}]", "as_built.damaged_teeth"),
+    ] {
+        let run = desk.run(&["tables", "--generator", "cam", "--set", &format!("as_built.{set}")]);
+        assert_eq!(run.code, 2, "{}", run.stderr);
+        assert!(run.stderr.contains(field) && run.stderr.contains("whole turns"), "{}", run.stderr);
+    }
+}
+
+#[test]
+fn an_imperfect_drive_is_written_and_read_back_by_the_command() {
+    let desk = Desk::new();
+    desk.write("imperfect.toml", &imperfect().to_toml());
+    let run = desk.run(&["drive", "--drive", "imperfect.toml"]);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    assert_eq!(run.stdout.trim_end(), imperfect().to_toml().trim_end());
+}
