@@ -17,7 +17,7 @@
 //! eliminated.
 
 use super::chain::{Chain, Contribution};
-use super::dense::{Kernels, dot};
+use super::dense::Kernels;
 use super::model::Cell;
 
 /// Contact of a pair of flanks as this cell sees it: columns of G on its flank nodes, in its frame.
@@ -316,6 +316,20 @@ pub fn rotate_pairs(x: &mut [f64], (sin, cos): Turn) {
     for p in x.chunks_exact_mut(2) {
         (p[0], p[1]) = (cos * p[0] - sin * p[1], sin * p[0] + cos * p[1]);
     }
+}
+
+/// Dot product in four strands: at these lengths a kernel is not worth its call.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len().min(b.len());
+    let (a4, b4) = (a[..n].chunks_exact(4), b[..n].chunks_exact(4));
+    let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
+    let mut strands = [0.0; 4];
+    for (a, b) in a4.zip(b4) {
+        for i in 0..4 {
+            strands[i] += a[i] * b[i];
+        }
+    }
+    strands.iter().sum::<f64>() + tail
 }
 
 /// The opposite turn.

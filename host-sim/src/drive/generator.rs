@@ -177,9 +177,8 @@ impl GeneratorOutline {
                 OutlineFoot { distance: (length - radius) * s, normal, curvature: 1.0 / (radius * s) }
             }
             Contour::Cam { form } => {
-                let alpha = self.foot_on_neutral(px, py);
-                let [r, dr, ddr] = self.neutral.polar(alpha);
-                let (sin, cos) = alpha.sin_cos();
+                let [cos, sin] = self.foot_on_neutral(px, py);
+                let [r, dr, ddr] = self.neutral.polar_towards([cos, sin]);
                 let speed = r.hypot(dr);
                 let normal = [(r * cos + dr * sin) / speed, (r * sin - dr * cos) / speed];
                 let from_neutral = (px - r * cos) * normal[0] + (py - r * sin) * normal[1];
@@ -192,7 +191,7 @@ impl GeneratorOutline {
                 if form.is_empty() {
                     return foot;
                 }
-                let [error, rate, bent] = form_error(form, alpha);
+                let [error, rate, bent] = form_error(form, sin.atan2(cos));
                 // Arc per angle through the point, and along the outline.
                 let (at_point, at_outline) = (speed * (1.0 + bend * from_neutral), speed * (1.0 - bend * self.offset));
                 let slope = rate / at_point;
@@ -235,33 +234,37 @@ impl GeneratorOutline {
         }
     }
 
-    /// Polar angle of the point of the neutral curve closest to `(px, py)`: the cam is parallel to it, so the foot on
-    /// the cam has the same normal. Newton from the polar angle, which at the bore is off by 3e-4 rad; if it strays
-    /// (points near the centre), a scan and bisection.
-    fn foot_on_neutral(&self, px: f64, py: f64) -> f64 {
-        let start = py.atan2(px);
-        let mut alpha = start;
+    /// Direction (cosine and sine of the polar angle) of the point of the neutral curve closest to `(px, py)`: the cam is
+    /// parallel to it, so the foot on the cam has the same normal. Newton from the direction of the point, which at the bore
+    /// is off by 3e-4 rad; if it strays (points near the centre), a scan and bisection.
+    fn foot_on_neutral(&self, px: f64, py: f64) -> [f64; 2] {
+        let rho = (px * px + py * py).sqrt();
+        let mut direction = [px / rho, py / rho];
+        let mut strayed = 0.0_f64;
         for _ in 0..8 {
-            let (f, df) = self.foot_residual(px, py, alpha);
-            if df >= 0.0 {
+            let (f, df) = self.foot_residual(px, py, direction);
+            if df.is_nan() || df >= 0.0 {
                 break;
             }
             let step = f / df;
-            alpha -= step;
+            let (sin, cos) = sin_cos_of_small(-step);
+            direction = [direction[0] * cos - direction[1] * sin, direction[1] * cos + direction[0] * sin];
             if step.abs() < LAST_STEP {
-                return alpha;
+                return direction;
             }
-            if (alpha - start).abs() > 0.5 {
+            strayed += step;
+            if strayed.abs() > 0.5 {
                 break;
             }
         }
-        self.foot_by_scan(px, py)
+        let (sin, cos) = self.foot_by_scan(px, py).sin_cos();
+        [cos, sin]
     }
 
     /// `(p - P) · P'` and its derivative by the polar angle.
-    fn foot_residual(&self, px: f64, py: f64, alpha: f64) -> (f64, f64) {
-        let [r, dr, ddr] = self.neutral.polar(alpha);
-        let (sin, cos) = alpha.sin_cos();
+    #[inline]
+    fn foot_residual(&self, px: f64, py: f64, [cos, sin]: [f64; 2]) -> (f64, f64) {
+        let [r, dr, ddr] = self.neutral.polar_towards([cos, sin]);
         // along and across the radius direction
         let (a, b) = (px * cos + py * sin, py * cos - px * sin);
         let f = a * dr + b * r - r * dr;
@@ -280,7 +283,7 @@ impl GeneratorOutline {
         // (p - P)·P' falls through zero at the closest point
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if self.foot_residual(px, py, middle).0 > 0.0 {
+            if self.foot_residual(px, py, [middle.cos(), middle.sin()]).0 > 0.0 {
                 low = middle;
             } else {
                 high = middle;
@@ -299,6 +302,18 @@ impl super::spec::Generators {
             GeneratorKind::DoubleDisc => RingShape::double_disc(self.w0_mm, self.disc_half_angle_deg.to_radians()),
             GeneratorKind::Cam => RingShape::cam(self.w0_mm),
         }
+    }
+}
+
+/// Sine and cosine, quick for the small angles that Newton steps are.
+#[inline]
+fn sin_cos_of_small(x: f64) -> (f64, f64) {
+    let xx = x * x;
+    // The next terms are x^7/5040 and x^8/40320: below 2e-18 at this bound.
+    if xx < 2e-5 {
+        (x * (1.0 - xx / 6.0 * (1.0 - xx / 20.0)), 1.0 - 0.5 * xx * (1.0 - xx / 12.0 * (1.0 - xx / 30.0)))
+    } else {
+        x.sin_cos()
     }
 }
 

@@ -99,6 +99,13 @@ impl NeutralCurve {
         [self.radius_mm + self.constant_mm + w, dw, ddw]
     }
 
+    /// [`NeutralCurve::polar`] at the angle whose cosine and sine are given.
+    #[inline]
+    pub fn polar_towards(&self, direction: [f64; 2]) -> [f64; 3] {
+        let [w, dw, ddw] = self.shape.radial_towards(direction);
+        [self.radius_mm + self.constant_mm + w, dw, ddw]
+    }
+
     /// Polar angle of the material point at undeformed angle `phi`.
     pub fn polar_angle(&self, phi: f64) -> f64 {
         let turns = (phi / PI).round();

@@ -166,6 +166,18 @@ impl RingShape {
         [w0 * w, w0 * sign * dw, w0 * (bend - w)]
     }
 
+    /// [`RingShape::radial`] at the angle whose cosine and sine are given.
+    #[inline]
+    pub fn radial_towards(&self, [cos, sin]: [f64; 2]) -> [f64; 3] {
+        match self.form {
+            Form::Cam => {
+                let w = self.amplitude * (cos - sin) * (cos + sin);
+                [w, -4.0 * self.amplitude * sin * cos, -4.0 * w]
+            }
+            _ => self.radial(sin.atan2(cos)),
+        }
+    }
+
     /// Radial displacement `w`, mm, outward +.
     pub fn w(&self, phi: f64) -> f64 {
         self.radial(phi)[0]
