@@ -136,31 +136,39 @@ impl Chain {
         self.offsets[block]
     }
 
-    /// Solves in place for one right-hand side.
-    pub fn solve(&self, x: &mut [f64]) {
-        assert_eq!(x.len(), self.unknowns);
+    /// Solves in place for right-hand sides, one after the other.
+    pub fn solve(&self, sides: &mut [f64]) {
+        if self.unknowns == 0 {
+            return;
+        }
+        assert_eq!(sides.len() % self.unknowns, 0);
         let end = |block: u32| self.offsets.get(block as usize + 1).copied().unwrap_or(self.unknowns);
         let range = |block: u32| self.offsets[block as usize]..end(block);
-        let (mut own, mut later) = (Vec::new(), Vec::new());
+        let mut later = Vec::new();
+        let mut own = Vec::new();
         for panel in &self.panels {
-            own.clear();
-            own.extend_from_slice(&x[range(panel.block)]);
-            later.clear();
-            later.resize(panel.order - panel.size, 0.0);
-            self.kernels.forward(self.values(panel), panel.order, panel.size, panel.sign, &mut own, &mut later);
-            x[range(panel.block)].copy_from_slice(&own);
-            let mut rest = later.as_slice();
-            for &b in &panel.later {
-                let (part, others) = rest.split_at(range(b).len());
-                x[range(b)].iter_mut().zip(part).for_each(|(x, g)| *x += g);
-                rest = others;
+            for x in sides.chunks_exact_mut(self.unknowns) {
+                own.clear();
+                own.extend_from_slice(&x[range(panel.block)]);
+                later.clear();
+                later.resize(panel.order - panel.size, 0.0);
+                self.kernels.forward(self.values(panel), panel.order, panel.size, panel.sign, &mut own, &mut later);
+                x[range(panel.block)].copy_from_slice(&own);
+                let mut rest = later.as_slice();
+                for &b in &panel.later {
+                    let (part, others) = rest.split_at(range(b).len());
+                    x[range(b)].iter_mut().zip(part).for_each(|(x, g)| *x += g);
+                    rest = others;
+                }
             }
         }
         for panel in self.panels.iter().rev() {
-            later.clear();
-            panel.later.iter().for_each(|b| later.extend_from_slice(&x[range(*b)]));
-            let own = &mut x[range(panel.block)];
-            self.kernels.backward(self.values(panel), panel.order, panel.size, panel.sign, own, &later);
+            for x in sides.chunks_exact_mut(self.unknowns) {
+                later.clear();
+                panel.later.iter().for_each(|b| later.extend_from_slice(&x[range(*b)]));
+                let own = &mut x[range(panel.block)];
+                self.kernels.backward(self.values(panel), panel.order, panel.size, panel.sign, own, &later);
+            }
         }
     }
 

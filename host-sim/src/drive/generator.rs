@@ -172,14 +172,14 @@ impl GeneratorOutline {
                 let [x, y] = if px.is_sign_negative() { *other_lobe } else { *lobe };
                 let dx = px - x.copysign(px);
                 let dy = py - if y == 0.0 { 0.0 } else { y.copysign(py) };
-                let length = dx.hypot(dy);
+                let length = (dx * dx + dy * dy).sqrt();
                 let normal = if length > 0.0 { [dx / length, dy / length] } else { [1.0, 0.0] };
                 OutlineFoot { distance: (length - radius) * s, normal, curvature: 1.0 / (radius * s) }
             }
             Contour::Cam { form } => {
                 let [cos, sin] = self.foot_on_neutral(px, py);
                 let [r, dr, ddr] = self.neutral.polar_towards([cos, sin]);
-                let speed = r.hypot(dr);
+                let speed = (r * r + dr * dr).sqrt();
                 let normal = [(r * cos + dr * sin) / speed, (r * sin - dr * cos) / speed];
                 let from_neutral = (px - r * cos) * normal[0] + (py - r * sin) * normal[1];
                 let bend = (r * r + 2.0 * dr * dr - r * ddr) / (speed * speed * speed);

@@ -135,14 +135,14 @@ impl InvoluteFlank {
             }
         } else {
             let arm = [p[0] - self.rounding_centre[0], p[1] - self.rounding_centre[1]];
-            let length = arm[0].hypot(arm[1]).max(1e-12);
+            let length = (arm[0] * arm[0] + arm[1] * arm[1]).sqrt().max(1e-12);
             let normal = [arm[0] / length, arm[1] / length];
             let tangent = [-normal[1], normal[0]];
             let foot = [
                 self.rounding_centre[0] + self.rounding_radius * normal[0],
                 self.rounding_centre[1] + self.rounding_radius * normal[1],
             ];
-            let radius = foot[0].hypot(foot[1]);
+            let radius = (foot[0] * foot[0] + foot[1] * foot[1]).sqrt();
             let radius_rate = (foot[0] * tangent[0] + foot[1] * tangent[1]) / radius;
             // The tangent follows on from that of the involute, which grows in radius.
             let (tangent, radius_rate) =

@@ -127,7 +127,7 @@ impl<'p> CondensedWheels<'p> {
             flanks: Vec::new(),
             factor: Rc::default(),
             turned: 0,
-            locals: vec![Local::default(); cells],
+            locals: Vec::new(),
         }
     }
 
@@ -345,21 +345,34 @@ impl Factor for CondensedWheels<'_> {
             .chain((0..cs.count()).map(|t| cs.cell(t, factor.live[fs.count() + t] || now(cs_live, t))))
             .collect();
         let size = |block: usize| if block < fs.count() { fs.face() } else { cs.face() };
-        let mut chain = vec![0.0; factor.chain.unknowns()];
-        for x in columns.chunks_exact_mut(n) {
-            chain.fill(0.0);
-            for (((cell, unknowns), tangent), local) in cells.iter().zip(&factor.cells).zip(locals.iter_mut()) {
-                tangent.forward(*kernels, cell, unknowns, x, &factor.chain, &mut chain, local);
+        let unknowns = factor.chain.unknowns();
+        let mut chains = vec![0.0; unknowns * count];
+        locals.resize_with(cells.len() * count, Local::default);
+        for (c, ((cell, unknowns_of), tangent)) in cells.iter().zip(&factor.cells).enumerate() {
+            let sides = columns.chunks_exact(n).zip(chains.chunks_exact_mut(unknowns));
+            for ((x, chain), local) in sides.zip(&mut locals[c * count..]) {
+                tangent.forward(*kernels, cell, unknowns_of, x, &factor.chain, chain, local);
             }
+        }
+        for (x, chain) in columns.chunks_exact(n).zip(chains.chunks_exact_mut(unknowns)) {
             for &(block, start, angle) in &faces {
-                let mut own = x[start..start + size(block)].to_vec();
-                rotate_pairs(&mut own, (-angle).sin_cos());
-                chain[factor.chain.offset(block)..].iter_mut().zip(&own).for_each(|(c, x)| *c += x);
+                let turn = (-angle).sin_cos();
+                let to = &mut chain[factor.chain.offset(block)..][..size(block)];
+                for (c, own) in to.chunks_exact_mut(2).zip(x[start..].chunks_exact(2)) {
+                    let mut own = [own[0], own[1]];
+                    rotate_pairs(&mut own, turn);
+                    (c[0], c[1]) = (c[0] + own[0], c[1] + own[1]);
+                }
             }
-            factor.chain.solve(&mut chain);
-            for (((cell, unknowns), tangent), local) in cells.iter().zip(&factor.cells).zip(locals.iter_mut()) {
-                tangent.backward(*kernels, cell, unknowns, x, &factor.chain, &chain, local);
+        }
+        factor.chain.solve(&mut chains);
+        for (c, ((cell, unknowns_of), tangent)) in cells.iter().zip(&factor.cells).enumerate() {
+            let sides = columns.chunks_exact_mut(n).zip(chains.chunks_exact(unknowns));
+            for ((x, chain), local) in sides.zip(&mut locals[c * count..]) {
+                tangent.backward(*kernels, cell, unknowns_of, x, &factor.chain, chain, local);
             }
+        }
+        for (x, chain) in columns.chunks_exact_mut(n).zip(chains.chunks_exact(unknowns)) {
             for &(block, start, angle) in &faces {
                 let (from, size) = (factor.chain.offset(block), size(block));
                 x[start..start + size].copy_from_slice(&chain[from..from + size]);

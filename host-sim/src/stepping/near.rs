@@ -44,7 +44,8 @@ impl NearPairs {
 
     /// Forgets all pairs.
     pub fn clear(&mut self) {
-        *self = NearPairs::default();
+        self.pairs.clear();
+        self.searched_until = self.moved;
     }
 
     /// Whether pairs that were out of reach may have come near.

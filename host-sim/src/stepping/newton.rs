@@ -41,7 +41,7 @@ const EASY: usize = 10;
 const ROUND_OFF: f64 = 1e-6;
 
 /// Relative residual below which the last factor may serve again, and the gain that the last iteration must have made.
-const CHORD_BELOW: f64 = 1e-2;
+const CHORD_BELOW: f64 = 1.0;
 const CHORD_GAIN: f64 = 0.2;
 
 /// Fraction of a pitch off which a tangent of an earlier pitch still serves, and the gain that each iteration must then make.
@@ -49,6 +49,13 @@ const RECALL_WITHIN: f64 = 0.06;
 const RECALL_GAIN: f64 = 0.3;
 /// Tangents remembered.
 const TANGENTS: usize = 12;
+
+/// Number of states that the predictor interpolates in phase, how far off they may be and must be apart (pitches), and the
+/// largest weight.
+const PHASES: usize = 3;
+const PHASE_REACH: f64 = 0.06;
+const PHASES_APART: f64 = 1e-3;
+const LARGEST_WEIGHT: f64 = 6.0;
 
 /// States of steady motion that the predictor remembers: a fine sampling of one pitch.
 const REMEMBERED: usize = 48;
@@ -89,6 +96,8 @@ pub struct Effort {
     pub factorisation: Duration,
     /// Triangular solves.
     pub solution: Duration,
+    /// Number of factorisations.
+    pub factorisations: usize,
 }
 
 /// Newton solver with its work space: one per thread.
@@ -109,6 +118,8 @@ pub struct Solver<'p> {
     softening: f64,
     /// The last states of steady motion, oldest first.
     passed: VecDeque<State>,
+    /// Generator angle at which the motion became steady.
+    steady_since: f64,
     /// Time spent so far.
     pub effort: Effort,
 }
@@ -190,6 +201,7 @@ impl<'p> Solver<'p> {
             tangents: VecDeque::new(),
             softening: 1.0,
             passed: VecDeque::new(),
+            steady_since: 0.0,
             effort: Effort::default(),
         }
     }
@@ -281,9 +293,10 @@ impl<'p> Solver<'p> {
 
     /// State predicted for a generator angle: the wave turned, the output going on as it did before.
     ///
-    /// A drive in steady motion passes through the same state after every flexspline pitch, one tooth further. Of the last
-    /// states the one is turned that needs the smallest fraction of a pitch, whole teeth being exact. An output that carries
-    /// no load stays where it is when the generator reverses: it has the clearance to cross.
+    /// A drive in steady motion passes through the same state after every flexspline pitch, one tooth further: states that
+    /// stood nearly there, whole pitches ago, are interpolated. Otherwise the last state is turned, whichever fraction of a
+    /// pitch it takes. An output that carries no load stays where it is when the generator reverses: it has the clearance to
+    /// cross.
     fn predict(&self, from: &State, generator_rad: f64, torque_n_m: f64) -> State {
         let turn = generator_rad - from.generator_rad;
         if turn == 0.0 {
@@ -294,38 +307,59 @@ impl<'p> Solver<'p> {
         let reversing = turn.signum() * from.travel < 0.0;
         let nominal = 1.0 / problem.drive.ratio();
         let pitch = problem.flexspline.pitch();
-        let fraction = |state: &State| {
-            let turns = (generator_rad - state.generator_rad) / pitch;
-            (turns - turns.round()).abs()
-        };
-        let steady = !reversing && (from.output_rate / nominal - 1.0).abs() < 0.2;
-        let base = self
-            .passed
-            .iter()
-            .filter(|state| steady && state.torque_n_m == torque_n_m && state.travel == from.travel)
-            .min_by(|a, b| fraction(a).total_cmp(&fraction(b)))
-            .filter(|state| fraction(state) < 0.5 * fraction(from))
-            .unwrap_or(from);
-        let turn = generator_rad - base.generator_rad;
+        let steady = !reversing
+            && (from.output_rate / nominal - 1.0).abs() < 0.2
+            && self.passed.back().is_some_and(|last| goes_on(last, from, torque_n_m));
+        let (fs, cs) = problem.wheels();
+        if steady {
+            // What was passed in the first pitch may not have settled yet.
+            let settled = |state: &State| (state.generator_rad - self.steady_since).abs() > pitch;
+            let passed: Vec<&State> = self.passed.iter().filter(|state| settled(state)).collect();
+            let pitches = |state: &State| (generator_rad - state.generator_rad) / pitch;
+            let weights = phase_weights(&passed.iter().map(|state| pitches(state)).collect::<Vec<_>>());
+            let own = (pitches(from) - pitches(from).round()).abs();
+            if let Some(weights) = weights.filter(|w| w.nearest < 0.5 * own) {
+                let mut predicted = State {
+                    u: vec![0.0; from.u.len()],
+                    v: vec![0.0; from.v.len()],
+                    output_rad: 0.0,
+                    sleeve_moment: 0.0,
+                    lateral_force: [0.0; 2],
+                    generator_rad,
+                    torque_n_m,
+                    ..from.clone()
+                };
+                for (k, weight) in weights.states {
+                    let state = passed[k];
+                    let whole = pitches(state).round();
+                    let add = |sum: &mut [f64], part: &[f64]| {
+                        sum.iter_mut().zip(part).for_each(|(x, p)| *x += weight * p);
+                    };
+                    add(&mut predicted.u, &turn_field(fs, &state.u, whole * fs.pitch()));
+                    add(&mut predicted.v, &turn_field(cs, &state.v, whole * cs.pitch()));
+                    // Off its own place by less than a pitch, where the output goes on as in the mean.
+                    let place = state.output_rad + (generator_rad - state.generator_rad) * nominal;
+                    predicted.output_rad += weight * place;
+                    predicted.sleeve_moment += weight * state.sleeve_moment;
+                    let (sin, cos) = (whole * pitch).sin_cos();
+                    let [x, y] = state.lateral_force;
+                    add(&mut predicted.lateral_force, &[cos * x - sin * y, sin * x + cos * y]);
+                }
+                return predicted;
+            }
+        }
         let output_turn = match (idle, reversing) {
             (true, true) => 0.0,
             (false, true) => turn * nominal,
-            _ if std::ptr::eq(base, from) => from.output_rate * turn,
-            _ => turn * nominal,
+            _ => from.output_rate * turn,
         };
-        let (fs, cs) = problem.wheels();
         State {
-            u: turn_field(fs, &base.u, turn),
-            v: turn_field(cs, &base.v, turn - output_turn),
-            output_rad: base.output_rad + output_turn,
+            u: turn_field(fs, &from.u, turn),
+            v: turn_field(cs, &from.v, turn - output_turn),
+            output_rad: from.output_rad + output_turn,
             generator_rad,
             torque_n_m,
-            sleeve_moment: base.sleeve_moment,
-            drag_anchor_rad: from.drag_anchor_rad,
-            lateral_force: base.lateral_force,
-            friction: from.friction.clone(),
-            output_rate: from.output_rate,
-            travel: from.travel,
+            ..from.clone()
         }
     }
 
@@ -340,6 +374,9 @@ impl<'p> Solver<'p> {
         }
         if steady {
             self.keep_tangent(state.generator_rad);
+            if self.passed.is_empty() {
+                self.steady_since = state.generator_rad;
+            }
             if self.passed.len() == REMEMBERED {
                 self.passed.pop_front();
             }
@@ -357,6 +394,7 @@ impl<'p> Solver<'p> {
         let mut residual = self.assemble(&mut state, from, torque_n_m, &mut near);
         let mut history = Vec::new();
         let mut last_length = 1.0;
+        let mut chords: Vec<Step> = Vec::new();
         let steady = self.softening == 1.0 && self.passed.back().is_some_and(|last| goes_on(last, from, torque_n_m));
         let mut recalled = steady && generator_rad != from.generator_rad && self.recall(generator_rad);
         while history.len() <= settings.max_iterations {
@@ -391,9 +429,14 @@ impl<'p> Solver<'p> {
             // Near the end the last factor still points the right way, and a step with it costs a tenth.
             recalled &= history.len() == 1 || last_gain(&history) < RECALL_GAIN;
             let chord = recalled || (relative < CHORD_BELOW && last_gain(&history) < CHORD_GAIN);
-            let Some(step) = self.solve(&residual, chord) else {
+            let Some(mut step) = self.solve(&residual, chord) else {
                 return Err(failed(history, "the stiffness matrix is not positive definite"));
             };
+            if chord {
+                improve(&mut step, &chords);
+            } else {
+                chords.clear();
+            }
             // The force along the step falls from `before` to nothing at the end of a perfect step; far beyond, halve it.
             let before = step.work(&residual);
             let mut length = (LARGEST_STEP / step.largest()).min(1.0).min(8.0 * last_length);
@@ -410,6 +453,12 @@ impl<'p> Solver<'p> {
                 near.advance(length * self.motion(&step));
             }
             last_length = length;
+            // A shortened step says nothing about the tangent.
+            if length == 1.0 {
+                chords.push(step);
+            } else {
+                chords.clear();
+            }
         }
         Err(failed(history, "the iterations ran out"))
     }
@@ -579,6 +628,7 @@ impl<'p> Solver<'p> {
             // shortens the step and leaves its direction downhill.
             let definite = std::iter::once(0.0).chain(GROUNDED_SPRINGS).any(|spring| self.wheels.factorise(spring));
             self.effort.factorisation += clock.elapsed();
+            self.effort.factorisations += 1;
             if !definite {
                 return None;
             }
@@ -708,9 +758,58 @@ fn fixed_border(problem: &Problem, wheels: &dyn Wheels) -> Border {
     border
 }
 
+/// States and their weights, and how far (pitches) the nearest of them is.
+struct PhaseWeights {
+    states: Vec<(usize, f64)>,
+    nearest: f64,
+}
+
+/// Interpolates (or goes on from) the few states whose distance in pitches is nearest to a whole number; the latest of those
+/// that coincide.
+fn phase_weights(pitches: &[f64]) -> Option<PhaseWeights> {
+    let off = |k: usize| pitches[k] - pitches[k].round();
+    let mut order: Vec<usize> = (0..pitches.len()).collect();
+    order.sort_by(|a, b| off(*a).abs().total_cmp(&off(*b).abs()).then(b.cmp(a)));
+    let mut chosen: Vec<usize> = Vec::new();
+    for k in order {
+        let apart = chosen.iter().all(|c| (off(*c) - off(k)).abs() > PHASES_APART);
+        if apart && off(k).abs() < PHASE_REACH && chosen.len() < PHASES {
+            chosen.push(k);
+        }
+    }
+    let nearest = off(*chosen.first()?).abs();
+    let weight = |k: usize| -> f64 {
+        chosen.iter().filter(|c| **c != k).map(|c| -off(*c) / (off(k) - off(*c))).product()
+    };
+    let mut states: Vec<(usize, f64)> = chosen.iter().map(|k| (*k, weight(*k))).collect();
+    // Going on too far from states too close together magnifies what they have not settled.
+    if states.iter().any(|(_, weight)| weight.abs() > LARGEST_WEIGHT) {
+        states = vec![(chosen[0], 1.0)];
+    }
+    Some(PhaseWeights { states, nearest })
+}
+
 /// Whether the motion under a load goes on as it was.
 fn goes_on(last: &State, from: &State, torque_n_m: f64) -> bool {
     last.torque_n_m == torque_n_m && from.torque_n_m == torque_n_m && last.travel == from.travel
+}
+
+/// Broyden's update of an old tangent by the steps that were taken with it (Kelley, Iterative Methods for Linear and Nonlinear
+/// Equations, 1995, section 7.3): `step` is the old tangent's.
+fn improve(step: &mut Step, taken: &[Step]) {
+    for pair in taken.windows(2) {
+        let part = pair[0].dot(step) / pair[0].dot(&pair[0]);
+        step.add(part, &pair[1]);
+    }
+    if let Some(last) = taken.last() {
+        let part = last.dot(step) / last.dot(last);
+        // Beyond this the secant says more about the contact than about the tangent.
+        if part.abs() < 0.5 {
+            let more = part / (1.0 - part);
+            let own = Step { free: step.free.clone(), u: step.u.clone(), v: step.v.clone(), border: step.border };
+            step.add(more, &own);
+        }
+    }
 }
 
 /// How far the last iteration brought the residual down.
@@ -734,6 +833,21 @@ impl Step {
     fn work(&self, residual: &Residual) -> f64 {
         residual.force.iter().zip(&self.free).map(|(f, d)| f * d).sum::<f64>()
             + residual.border[OUTPUT] * self.border[OUTPUT]
+    }
+
+    /// Scalar product of displacements (mm²), the turn of the output counted at a radius.
+    fn dot(&self, other: &Step) -> f64 {
+        const RADIUS: f64 = 50.0;
+        let nodes = self.free.iter().zip(&other.free).map(|(a, b)| a * b).sum::<f64>();
+        nodes + RADIUS * RADIUS * self.border[OUTPUT] * other.border[OUTPUT]
+    }
+
+    fn add(&mut self, factor: f64, other: &Step) {
+        let add = |x: &mut [f64], y: &[f64]| x.iter_mut().zip(y).for_each(|(x, y)| *x += factor * y);
+        add(&mut self.free, &other.free);
+        add(&mut self.u, &other.u);
+        add(&mut self.v, &other.v);
+        add(&mut self.border, &other.border);
     }
 
     /// Largest displacement, mm.
