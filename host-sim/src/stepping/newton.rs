@@ -47,6 +47,8 @@ const CHORD_GAIN: f64 = 0.2;
 /// Fraction of a pitch off which a tangent of an earlier pitch still serves, and the gain that each iteration must then make.
 const RECALL_WITHIN: f64 = 0.06;
 const RECALL_GAIN: f64 = 0.3;
+/// A tangent made further from equilibrium than this (relative residual) knows the wrong contact.
+const KEEP_BELOW: f64 = 0.1;
 /// Tangents remembered.
 const TANGENTS: usize = 12;
 
@@ -112,6 +114,8 @@ pub struct Solver<'p> {
     eliminated: Option<Rc<BorderedSystem>>,
     /// Pitches by which the state is turned against the one that the factor was made for.
     turned: isize,
+    /// Relative residual of the state that the factor was made for.
+    made_at: f64,
     /// Tangents of steady motion, oldest first.
     tangents: VecDeque<Tangent>,
     /// Factor on the penalties, below 1 only while the drive is first deformed.
@@ -198,6 +202,7 @@ impl<'p> Solver<'p> {
             border,
             eliminated: None,
             turned: 0,
+            made_at: f64::INFINITY,
             tangents: VecDeque::new(),
             softening: 1.0,
             passed: VecDeque::new(),
@@ -294,8 +299,8 @@ impl<'p> Solver<'p> {
     /// State predicted for a generator angle: the wave turned, the output going on as it did before.
     ///
     /// A drive in steady motion passes through the same state after every flexspline pitch, one tooth further: states that
-    /// stood nearly there, whole pitches ago, are interpolated. Otherwise the last state is turned, whichever fraction of a
-    /// pitch it takes. An output that carries no load stays where it is when the generator reverses: it has the clearance to
+    /// stood nearly there, whole pitches ago, are interpolated. Otherwise the last state, or one that needs a smaller fraction
+    /// of a pitch, is turned. An output that carries no load stays where it is when the generator reverses: it has the clearance to
     /// cross.
     fn predict(&self, from: &State, generator_rad: f64, torque_n_m: f64) -> State {
         let turn = generator_rad - from.generator_rad;
@@ -348,15 +353,27 @@ impl<'p> Solver<'p> {
                 return predicted;
             }
         }
+        let off = |state: &State| {
+            let pitches = (generator_rad - state.generator_rad) / pitch;
+            (pitches - pitches.round()).abs()
+        };
+        let nearest = self.passed.iter().filter(|_| steady).min_by(|a, b| off(a).total_cmp(&off(b)));
+        let base = nearest.filter(|state| off(state) < 0.5 * off(from)).unwrap_or(from);
+        let turn = generator_rad - base.generator_rad;
         let output_turn = match (idle, reversing) {
             (true, true) => 0.0,
             (false, true) => turn * nominal,
-            _ => from.output_rate * turn,
+            _ if std::ptr::eq(base, from) => from.output_rate * turn,
+            _ => turn * nominal,
         };
+        let (sin, cos) = turn.sin_cos();
+        let [x, y] = base.lateral_force;
         State {
-            u: turn_field(fs, &from.u, turn),
-            v: turn_field(cs, &from.v, turn - output_turn),
-            output_rad: from.output_rad + output_turn,
+            u: turn_field(fs, &base.u, turn),
+            v: turn_field(cs, &base.v, turn - output_turn),
+            output_rad: base.output_rad + output_turn,
+            sleeve_moment: base.sleeve_moment,
+            lateral_force: [cos * x - sin * y, sin * x + cos * y],
             generator_rad,
             torque_n_m,
             ..from.clone()
@@ -436,11 +453,13 @@ impl<'p> Solver<'p> {
                 improve(&mut step, &chords);
             } else {
                 chords.clear();
+                self.made_at = relative;
             }
             // The force along the step falls from `before` to nothing at the end of a perfect step; far beyond, halve it.
             let before = step.work(&residual);
             let mut length = (LARGEST_STEP / step.largest()).min(1.0).min(8.0 * last_length);
             near.advance(length * self.motion(&step));
+            let mut mistaken = false;
             for trial in 0.. {
                 let mut candidate = step.applied_to(&state, length);
                 residual = self.assemble(&mut candidate, from, torque_n_m, &mut near);
@@ -449,8 +468,18 @@ impl<'p> Solver<'p> {
                     state = candidate;
                     break;
                 }
+                if recalled {
+                    mistaken = true;
+                    break;
+                }
                 length *= 0.5;
                 near.advance(length * self.motion(&step));
+            }
+            if mistaken {
+                recalled = false;
+                near.advance(length * self.motion(&step));
+                residual = self.assemble(&mut state, from, torque_n_m, &mut near);
+                continue;
             }
             last_length = length;
             // A shortened step says nothing about the tangent.
@@ -688,6 +717,9 @@ impl<'p> Solver<'p> {
 
     /// Keeps the tangent just made for the next pitches.
     fn keep_tangent(&mut self, generator_rad: f64) {
+        if self.made_at > KEEP_BELOW {
+            return;
+        }
         if let (0, Some(kept), Some(eliminated)) = (self.turned, self.wheels.keep(), &self.eliminated) {
             if self.tangents.len() == TANGENTS {
                 self.tangents.pop_front();
