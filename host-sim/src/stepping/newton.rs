@@ -299,7 +299,7 @@ impl<'p> Solver<'p> {
     /// State predicted for a generator angle: the wave turned, the output going on as it did before.
     ///
     /// A drive in steady motion passes through the same state after every flexspline pitch, one tooth further: states that
-    /// stood nearly there, whole pitches ago, are interpolated. Otherwise the last state, or one that needs a smaller fraction
+    /// stood nearly there, whole pitches ago, are turned and interpolated. Otherwise the last state, or one that needs a smaller fraction
     /// of a pitch, is turned. An output that carries no load stays where it is when the generator reverses: it has the clearance to
     /// cross.
     fn predict(&self, from: &State, generator_rad: f64, torque_n_m: f64) -> State {
@@ -336,17 +336,15 @@ impl<'p> Solver<'p> {
                 };
                 for (k, weight) in weights.states {
                     let state = passed[k];
-                    let whole = pitches(state).round();
+                    let turn = generator_rad - state.generator_rad;
                     let add = |sum: &mut [f64], part: &[f64]| {
                         sum.iter_mut().zip(part).for_each(|(x, p)| *x += weight * p);
                     };
-                    add(&mut predicted.u, &turn_field(fs, &state.u, whole * fs.pitch()));
-                    add(&mut predicted.v, &turn_field(cs, &state.v, whole * cs.pitch()));
-                    // Off its own place by less than a pitch, where the output goes on as in the mean.
-                    let place = state.output_rad + (generator_rad - state.generator_rad) * nominal;
-                    predicted.output_rad += weight * place;
+                    add(&mut predicted.u, &turn_field(fs, &state.u, turn));
+                    add(&mut predicted.v, &turn_field(cs, &state.v, turn - turn * nominal));
+                    predicted.output_rad += weight * (state.output_rad + turn * nominal);
                     predicted.sleeve_moment += weight * state.sleeve_moment;
-                    let (sin, cos) = (whole * pitch).sin_cos();
+                    let (sin, cos) = turn.sin_cos();
                     let [x, y] = state.lateral_force;
                     add(&mut predicted.lateral_force, &[cos * x - sin * y, sin * x + cos * y]);
                 }
