@@ -163,8 +163,21 @@ impl CondensedWheel {
         if flanks { (whole, unknowns) } else { (bare, &unknowns[whole.flank()..]) }
     }
 
-    /// How the nodes of a cell that were condensed away follow.
-    pub fn element(&self, place: usize) -> &Superelement {
-        &self.elements[self.class[place]]
+    /// How the nodes of a cell that were condensed away follow, and by how many sectors this cell stands further than the one
+    /// that was condensed.
+    pub fn element(&self, place: usize) -> (&Superelement, usize) {
+        let class = self.class[place];
+        (&self.elements[class], place - class)
+    }
+
+    /// All nodes of the wheel `whole`, those of the skin in place: the displacements `kept` of the skin.
+    pub fn spread(&self, whole: &WheelMesh, kept: &[f64]) -> Vec<f64> {
+        let per_sector = self.skin.mesh.nodes_per_sector;
+        let mut field = vec![0.0; 2 * whole.nodes.len()];
+        for (n, u) in kept.chunks_exact(2).enumerate() {
+            let node = whole.node((n / per_sector) as isize, self.skin.original[n % per_sector]);
+            field[2 * node..2 * node + 2].copy_from_slice(u);
+        }
+        field
     }
 }

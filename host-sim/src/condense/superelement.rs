@@ -48,6 +48,8 @@ pub struct Superelement {
     pub seat: Mat<f64>,
     /// Nodes that go, by number in the mesh.
     interior: Vec<u32>,
+    /// Their positions, as those of the kept nodes.
+    interior_position: Vec<[f64; 2]>,
     /// Their displacements for displacements of the kept nodes, and for the held nodes displaced outwards.
     recovery: Mat<f64>,
     seat_recovery: Mat<f64>,
@@ -111,13 +113,19 @@ impl Superelement {
         let faces = cell.flank + cell.bore;
         let middle = cell.kept[faces..].iter().map(in_frame).fold([0.0; 2], |m, x| [m[0] + x[0], m[1] + x[1]]);
         let middle = middle.map(|m| m / (2 * cell.face) as f64);
-        let position = cell.kept.iter().map(in_frame).map(|x| [x[0] - middle[0], x[1] - middle[1]]).collect();
+        let from_middle = |n: &u32| {
+            let x = in_frame(n);
+            [x[0] - middle[0], x[1] - middle[1]]
+        };
+        let position = cell.kept.iter().map(from_middle).collect();
+        let interior_position = interior.iter().map(from_middle).collect();
         Superelement {
             position,
             unknowns: [2 * cell.flank, 2 * cell.bore, 2 * cell.face],
             stiffness,
             seat,
             interior,
+            interior_position,
             recovery,
             seat_recovery,
         }
@@ -128,9 +136,9 @@ impl Superelement {
         self.stiffness.nrows()
     }
 
-    /// Nodes that were condensed away, by number in the mesh, in the cell that was condensed.
-    pub fn interior(&self) -> &[u32] {
-        &self.interior
+    /// Nodes that were condensed away, by number in the mesh, in the cell that was condensed; and their positions.
+    pub fn interior(&self) -> (&[u32], &[[f64; 2]]) {
+        (&self.interior, &self.interior_position)
     }
 
     /// Displacements of the interior nodes, in the frame of the cell, for displacements `kept` and a seat moved by `seat_mm`.

@@ -414,8 +414,20 @@ impl<'a> FlankContact<'a> {
         }
     }
 
-    /// Forces and tangent of a pair; nothing while it is open. The smallest gap of its points goes to `smallest_gap`.
+    /// Forces and tangent of a pair; nothing while it is open.
     pub fn evaluate(
+        &self,
+        pair: FlankPair,
+        at: Configuration,
+        law: FlankLaw,
+        points: &[FlankPoint],
+    ) -> Option<PairContribution> {
+        let mut smallest_gap = f64::INFINITY;
+        self.evaluate_with_gap(pair, at, law, points, &mut smallest_gap)
+    }
+
+    /// [`FlankContact::evaluate`], and the smallest gap of the points in `smallest_gap` (mm).
+    pub fn evaluate_with_gap(
         &self,
         pair: FlankPair,
         at: Configuration,

@@ -43,6 +43,45 @@ impl CondensedDrive {
         CondensedDrive { circular_spline: CondensedWheel::new(circular_spline, material, first, held), flexspline }
     }
 
+    /// The state on all nodes of the wheels of `problem`, which this was made of.
+    pub(super) fn recover(&self, problem: &Problem, state: &State) -> State {
+        let (fs, whole) = (&self.flexspline, &problem.flexspline);
+        let mut u = fs.spread(whole, &state.u);
+        for j in 0..fs.count() {
+            let (cell, unknowns) = fs.cell(j, true);
+            let (element, further) = fs.element(j);
+            let angle = whole.sector_angle(j);
+            let mut d: Vec<f64> = unknowns.iter().map(|k| state.u[*k as usize]).collect();
+            rotate_pairs(&mut d, (-angle).sin_cos());
+            let mut inner = CellState::default();
+            cell.frame.split(&d, &mut inner);
+            let q = element.recover(&inner.q, 0.0);
+            let (nodes, positions) = element.interior();
+            for ((n, position), q) in nodes.iter().zip(positions).zip(q.chunks_exact(2)) {
+                let mut moved = CoRotation::join(&inner, *position, [q[0], q[1]]);
+                rotate_pairs(&mut moved, angle.sin_cos());
+                place(whole, *n, further, &mut u, moved);
+            }
+        }
+        let (cs, whole) = (&self.circular_spline, &problem.circular_spline);
+        let mut v = cs.spread(whole, &state.v);
+        for t in 0..cs.count() {
+            let (_, unknowns) = cs.cell(t, true);
+            let (element, further) = cs.element(t);
+            let frame = self.cs_frame(t).sin_cos();
+            let mut d: Vec<f64> = unknowns.iter().map(|k| state.v[*k as usize - cs.first_unknown]).collect();
+            rotate_pairs(&mut d, back(frame));
+            let q = element.recover(&d, problem.seat_displacement);
+            for (n, q) in element.interior().0.iter().zip(q.chunks_exact(2)) {
+                let mut moved = [q[0], q[1]];
+                rotate_pairs(&mut moved, frame);
+                place(whole, *n, further, &mut v, moved);
+            }
+        }
+        problem.seat(&mut v);
+        State { u, v, ..state.clone() }
+    }
+
     fn fs_mesh(&self) -> &WheelMesh {
         &self.flexspline.skin.mesh
     }
@@ -74,6 +113,13 @@ impl CondensedDrive {
             (0..cs.teeth).map(|t| (fs.teeth + t, first + 2 * t * cs.nodes_per_sector, t as f64 * cs.pitch()));
         fs_faces.chain(cs_faces).collect()
     }
+}
+
+/// Writes the displacement of a node given in another cell, `further` sectors back.
+fn place(mesh: &WheelMesh, node: u32, further: usize, field: &mut [f64], displacement: [f64; 2]) {
+    let (sector, local) = (node as usize / mesh.nodes_per_sector, node % mesh.nodes_per_sector as u32);
+    let n = mesh.node((sector + further) as isize, local);
+    field[2 * n..2 * n + 2].copy_from_slice(&displacement);
 }
 
 /// A factorised tangent.

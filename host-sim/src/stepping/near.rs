@@ -87,7 +87,7 @@ impl NearPairs {
                 continue;
             }
             let mut gap = f64::INFINITY;
-            match flanks.evaluate(pair, at, law, &near.layout.points, &mut gap) {
+            match flanks.evaluate_with_gap(pair, at, law, &near.layout.points, &mut gap) {
                 Some(contact) => report(pair, &contact),
                 None => near.open_until = self.moved + gap,
             }

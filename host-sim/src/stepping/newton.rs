@@ -567,7 +567,7 @@ impl<'p> Solver<'p> {
         let problem = self.problem;
         let (bore_law, flank_law) = (self.bore_law(), self.flank_law());
         let wheels = self.wheels.as_mut();
-        problem.bore.evaluate(bore_law, &problem.outline, state.generator_rad, &state.u, &mut near.bore, |contact| {
+        problem.bore.evaluate_near(bore_law, &problem.outline, state.generator_rad, &state.u, &mut near.bore, |contact| {
             for (a, &n) in problem.bore.edges[contact.edge].iter().enumerate() {
                 for k in 0..2 {
                     let f = contact.force[2 * a + k];

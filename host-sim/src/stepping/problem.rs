@@ -1,5 +1,9 @@
 //! The drive as a mechanical problem: meshes, contact, holding, at one temperature. Immutable while it is solved.
 
+use std::borrow::Cow;
+use std::fmt;
+use std::str::FromStr;
+
 use crate::contact::{BoreContact, BoreLaw, FlankContact, FlankLaw};
 use crate::drive::{Drive, FlankDeviations, GeneratorKind, GeneratorOutline, InvoluteFlank, RimVariation, ToothFlank};
 use crate::material::PlaneStrain;
@@ -16,6 +20,26 @@ pub enum Method {
     Reference,
     /// Teeth condensed onto the nodes that touch something, in frames that turn with them.
     Fast,
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Method::Reference => "reference",
+            Method::Fast => "fast",
+        })
+    }
+}
+
+impl FromStr for Method {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        [Method::Reference, Method::Fast]
+            .into_iter()
+            .find(|method| method.to_string() == text)
+            .ok_or_else(|| format!("solver \"{text}\": allowed are reference, fast"))
+    }
 }
 
 /// Settings of the numerical method.
@@ -280,6 +304,28 @@ impl Problem {
         self.held.iter().map(&mut number).collect()
     }
 
+    /// A state of this problem on all nodes of both wheels ([`Problem::flexspline`], [`Problem::circular_spline`]): itself, or,
+    /// from the fast solver, with the nodes that were condensed away.
+    pub fn whole_state<'s>(&self, state: &'s State) -> Cow<'s, State> {
+        match &self.condensed {
+            Some(condensed) => Cow::Owned(condensed.recover(self, state)),
+            None => Cow::Borrowed(state),
+        }
+    }
+
+    /// Displaces the circular-spline nodes that the housing holds, in a field of all its nodes.
+    pub(super) fn seat(&self, v: &mut [f64]) {
+        let outer = self.drive.circular_spline.outer_radius_mm;
+        for (n, x) in self.circular_spline.nodes.iter().enumerate() {
+            let r = x[0].hypot(x[1]);
+            if r > outer - 1e-6 {
+                let stretch = self.seat_displacement / r;
+                v[2 * n] = x[0] * stretch;
+                v[2 * n + 1] = x[1] * stretch;
+            }
+        }
+    }
+
     /// Unknowns of the whole model: flexspline nodes, circular-spline nodes that are not held, two each, and the output angle.
     pub fn degrees_of_freedom(&self) -> usize {
         self.degrees_of_freedom
@@ -306,10 +352,8 @@ impl Problem {
             u.extend([p[0] + above * cn - x[0], p[1] + above * sn - x[1]]);
         }
         let mut v = vec![0.0; 2 * cs.nodes.len()];
-        for (n, x) in cs.nodes.iter().enumerate().filter(|(n, _)| self.held[*n]) {
-            let stretch = self.seat_displacement / x[0].hypot(x[1]);
-            v[2 * n] = x[0] * stretch;
-            v[2 * n + 1] = x[1] * stretch;
+        if self.condensed.is_none() {
+            self.seat(&mut v);
         }
         let output_rad = generator_rad / self.drive.ratio();
         State {
