@@ -116,8 +116,9 @@ fn a_second_harmonic_of_the_flexspline_pitch_has_order_2_and_the_other_sign() {
 
 #[test]
 fn teeth_all_displaced_alike_turn_the_output_by_just_that() {
+    // An arc on the flexspline is an arc on the radius of the lobe, where the tooth bears.
     for (wheel, expected) in
-        [(Wheel::Flexspline, 3e-3 / 48.35 * ARCSEC), (Wheel::CircularSpline, -3e-3 / 49.05 * ARCSEC)]
+        [(Wheel::Flexspline, 3e-3 / (48.35 + 0.5) * ARCSEC), (Wheel::CircularSpline, -3e-3 / 49.05 * ARCSEC)]
     {
         let change = |drive: &mut Drive| match wheel {
             Wheel::Flexspline => drive.as_built.flexspline_pitch_error_um = vec![3.0; 188],
@@ -351,10 +352,12 @@ fn a_thicker_rim_is_stiffer_by_the_cube_of_its_thickness() {
 /// does not depend on the way: `d(M_g)/dT = -d(delta)/d(psi)`, both at their own axes.
 #[test]
 fn with_every_imperfection_forces_balance_and_work_is_reciprocal() {
-    for kind in [GeneratorKind::Cam, GeneratorKind::FourRoller] {
+    // Where a point of the bore begins to bear under a roller within the step, the ideal drive too is out by up to 0.005.
+    for (kind, bound) in [(GeneratorKind::Cam, 1e-4), (GeneratorKind::FourRoller, 1e-2)] {
         let problem = problem(&imperfect(), kind, SolverSettings { tolerance: 2e-7, ..on(MeshLevel::Coarse) });
         for psi in [0.3, 2.0] {
-            let (turn, load) = (2e-4, 0.05);
+            // Under a roller points of the bore come and go every 8 um: the difference is taken within them.
+            let (turn, load) = (1e-5, 0.005);
             let at = |psi: f64, torque: f64| stands(&problem, psi, torque);
             let torque = 10.0;
             let (state, here) = at(psi, torque);
@@ -373,7 +376,7 @@ fn with_every_imperfection_forces_balance_and_work_is_reciprocal() {
                 softness / here.compliance_rad_per_n_m
             );
             assert!(unbalanced.abs() < 1e-6);
-            assert!((95.0 * (torque_rate + rate)).abs() < 2e-3, "{torque_rate} {rate}");
+            assert!((95.0 * (torque_rate + rate)).abs() < bound, "{torque_rate} {rate}");
         }
     }
 }
