@@ -27,8 +27,8 @@ pub struct BoreContact {
     pub edges: Vec<[u32; 3]>,
     /// Angle of the middle of each edge, rad, ascending from that of edge 0.
     pub middle_angles: Vec<f64>,
-    /// Undeformed place of start, middle and end of each edge, on the exact bore.
-    places: Vec<[[f64; 2]; 3]>,
+    /// Undeformed place of start and middle of each edge, on the exact bore.
+    places: Vec<[[f64; 2]; 2]>,
     /// Undeformed place of each integration point, edge by edge.
     point_places: Vec<[f64; 2]>,
     /// Weight (mm) and shape functions of each point of an edge.
@@ -75,7 +75,7 @@ impl BoreContact {
             let (s, c) = angle.sin_cos();
             [radius * c, radius * s]
         };
-        let places = middle_angles.iter().map(|m| [m - half_angle, m + 0.0, m + half_angle].map(on_bore)).collect();
+        let places = middle_angles.iter().map(|m| [m - half_angle, *m].map(on_bore)).collect();
         let point_places = middle_angles
             .iter()
             .flat_map(|m| rule.iter().map(move |(xi, _)| m + xi * half_angle))
@@ -104,16 +104,21 @@ impl BoreContact {
                 [cos_g * foot.normal[0] - sin_g * foot.normal[1], sin_g * foot.normal[0] + cos_g * foot.normal[1]];
             foot
         };
+        // An edge is looked at only when one of its nodes is near: between two neighbours the gap changes by less than the reach.
+        // Edges follow one another round the bore, so the end of each is the start of the next.
+        let near = |edge: usize, k: usize| {
+            let (place, n) = (self.places[edge][k], self.edges[edge][k] as usize);
+            foot([place[0] + u[2 * n], place[1] + u[2 * n + 1]]).distance < self.reach
+        };
+        let first_near = near(0, 0);
+        let mut end_near = first_near;
         for (edge, nodes) in self.edges.iter().enumerate() {
-            let node_u = nodes.map(|n| [u[2 * n as usize], u[2 * n as usize + 1]]);
-            // Looked at only when near: between two neighbouring nodes the gap changes by less than the reach.
-            let near = self.places[edge]
-                .iter()
-                .zip(&node_u)
-                .any(|(place, du)| foot([place[0] + du[0], place[1] + du[1]]).distance < self.reach);
-            if !near {
+            let start_near = end_near;
+            end_near = if edge + 1 < self.edges.len() { near(edge + 1, 0) } else { first_near };
+            if !(start_near || end_near || near(edge, 1)) {
                 continue;
             }
+            let node_u = nodes.map(|n| [u[2 * n as usize], u[2 * n as usize + 1]]);
             let mut contact =
                 BorePressure { edge, force: [0.0; 6], stiffness: [0.0; 21], moment: 0.0, peak: 0.0, energy: 0.0 };
             let mut touching = false;

@@ -172,15 +172,14 @@ impl GeneratorOutline {
                 let [x, y] = if px.is_sign_negative() { *other_lobe } else { *lobe };
                 let dx = px - x.copysign(px);
                 let dy = py - if y == 0.0 { 0.0 } else { y.copysign(py) };
-                let length = dx.hypot(dy);
+                let length = (dx * dx + dy * dy).sqrt();
                 let normal = if length > 0.0 { [dx / length, dy / length] } else { [1.0, 0.0] };
                 OutlineFoot { distance: (length - radius) * s, normal, curvature: 1.0 / (radius * s) }
             }
             Contour::Cam { form } => {
-                let alpha = self.foot_on_neutral(px, py);
-                let [r, dr, ddr] = self.neutral.polar(alpha);
-                let (sin, cos) = alpha.sin_cos();
-                let speed = r.hypot(dr);
+                let (sin, cos) = self.foot_on_neutral(px, py);
+                let [r, dr, ddr] = self.neutral.polar_at((sin, cos));
+                let speed = (r * r + dr * dr).sqrt();
                 let normal = [(r * cos + dr * sin) / speed, (r * sin - dr * cos) / speed];
                 let from_neutral = (px - r * cos) * normal[0] + (py - r * sin) * normal[1];
                 let bend = (r * r + 2.0 * dr * dr - r * ddr) / (speed * speed * speed);
@@ -192,7 +191,7 @@ impl GeneratorOutline {
                 if form.is_empty() {
                     return foot;
                 }
-                let [error, rate, bent] = form_error(form, alpha);
+                let [error, rate, bent] = form_error(form, sin.atan2(cos));
                 // Arc per angle through the point, and along the outline.
                 let (at_point, at_outline) = (speed * (1.0 + bend * from_neutral), speed * (1.0 - bend * self.offset));
                 let slope = rate / at_point;
@@ -235,33 +234,35 @@ impl GeneratorOutline {
         }
     }
 
-    /// Polar angle of the point of the neutral curve closest to `(px, py)`: the cam is parallel to it, so the foot on
-    /// the cam has the same normal. Newton from the polar angle, which at the bore is off by 3e-4 rad; if it strays
-    /// (points near the centre), a scan and bisection.
-    fn foot_on_neutral(&self, px: f64, py: f64) -> f64 {
-        let start = py.atan2(px);
-        let mut alpha = start;
+    /// Sine and cosine of the polar angle of the point of the neutral curve closest to `(px, py)`: the cam is parallel to it, so
+    /// the foot on the cam has the same normal. Newton from the direction of the point, which at the bore is off by 3e-4 rad; if it
+    /// strays (points near the centre), a scan and bisection.
+    fn foot_on_neutral(&self, px: f64, py: f64) -> (f64, f64) {
+        let rho = (px * px + py * py).sqrt();
+        let mut foot = (py / rho, px / rho);
+        let mut turned = 0.0;
         for _ in 0..8 {
-            let (f, df) = self.foot_residual(px, py, alpha);
-            if df >= 0.0 {
+            let (f, df) = self.foot_residual(px, py, foot);
+            // also for a point in the centre, where all is NaN
+            if df.is_nan() || df >= 0.0 {
                 break;
             }
             let step = f / df;
-            alpha -= step;
+            foot = turned_by(foot, -step);
+            turned -= step;
             if step.abs() < LAST_STEP {
-                return alpha;
+                return foot;
             }
-            if (alpha - start).abs() > 0.5 {
+            if turned.abs() > 0.5 {
                 break;
             }
         }
-        self.foot_by_scan(px, py)
+        self.foot_by_scan(px, py).sin_cos()
     }
 
-    /// `(p - P) · P'` and its derivative by the polar angle.
-    fn foot_residual(&self, px: f64, py: f64, alpha: f64) -> (f64, f64) {
-        let [r, dr, ddr] = self.neutral.polar(alpha);
-        let (sin, cos) = alpha.sin_cos();
+    /// `(p - P) · P'` and its derivative by the polar angle, given by its sine and cosine.
+    fn foot_residual(&self, px: f64, py: f64, (sin, cos): (f64, f64)) -> (f64, f64) {
+        let [r, dr, ddr] = self.neutral.polar_at((sin, cos));
         // along and across the radius direction
         let (a, b) = (px * cos + py * sin, py * cos - px * sin);
         let f = a * dr + b * r - r * dr;
@@ -280,7 +281,7 @@ impl GeneratorOutline {
         // (p - P)·P' falls through zero at the closest point
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if self.foot_residual(px, py, middle).0 > 0.0 {
+            if self.foot_residual(px, py, middle.sin_cos()).0 > 0.0 {
                 low = middle;
             } else {
                 high = middle;
@@ -300,6 +301,20 @@ impl super::spec::Generators {
             GeneratorKind::Cam => RingShape::cam(self.w0_mm),
         }
     }
+}
+
+/// Sine and cosine of an angle turned by another.
+#[inline]
+fn turned_by((sin, cos): (f64, f64), by: f64) -> (f64, f64) {
+    // below this the series are exact to round-off
+    const SMALL: f64 = 1e-3;
+    let square = by * by;
+    let (s, c) = if by.abs() < SMALL {
+        (by * (1.0 - square / 6.0 * (1.0 - square / 20.0)), 1.0 - 0.5 * square * (1.0 - square / 12.0))
+    } else {
+        by.sin_cos()
+    };
+    (sin * c + cos * s, cos * c - sin * s)
 }
 
 /// Point of the intended bore under the material point `phi` of the neutral curve.

@@ -99,6 +99,13 @@ impl NeutralCurve {
         [self.radius_mm + self.constant_mm + w, dw, ddw]
     }
 
+    /// [`NeutralCurve::polar`] at the angle of this sine and cosine.
+    #[inline]
+    pub fn polar_at(&self, direction: (f64, f64)) -> [f64; 3] {
+        let [w, dw, ddw] = self.shape.radial_at(direction);
+        [self.radius_mm + self.constant_mm + w, dw, ddw]
+    }
+
     /// Polar angle of the material point at undeformed angle `phi`.
     pub fn polar_angle(&self, phi: f64) -> f64 {
         let turns = (phi / PI).round();
