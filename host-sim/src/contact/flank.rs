@@ -180,7 +180,9 @@ impl<'a> FlankContact<'a> {
                 let (edge, xi) = fs_mesh.flanks[side.index()].locate(radius);
                 CoarsePoint { position: tooth.point(radius), edge, shape: edge_shape(xi) }
             };
-            (0..=6).map(point).collect()
+            // a smooth ring has no flanks
+            let points = if fs_mesh.flanks[side.index()].nodes.is_empty() { 0..0 } else { 0..7 };
+            points.map(point).collect()
         });
         let turns = |mesh: &WheelMesh| (0..mesh.teeth).map(|sector| mesh.sector_angle(sector).sin_cos()).collect();
         let (fs_turns, cs_turns) = (turns(fs_mesh), turns(cs_mesh));
