@@ -116,8 +116,9 @@ fn a_second_harmonic_of_the_flexspline_pitch_has_order_2_and_the_other_sign() {
 
 #[test]
 fn teeth_all_displaced_alike_turn_the_output_by_just_that() {
+    // An arc on the flexspline is an arc on the radius of the lobe, where the tooth bears.
     for (wheel, expected) in
-        [(Wheel::Flexspline, 3e-3 / 48.35 * ARCSEC), (Wheel::CircularSpline, -3e-3 / 49.05 * ARCSEC)]
+        [(Wheel::Flexspline, 3e-3 / (48.35 + 0.5) * ARCSEC), (Wheel::CircularSpline, -3e-3 / 49.05 * ARCSEC)]
     {
         let change = |drive: &mut Drive| match wheel {
             Wheel::Flexspline => drive.as_built.flexspline_pitch_error_um = vec![3.0; 188],
@@ -236,6 +237,22 @@ fn wear_widens_the_backlash_by_its_depth_over_the_base_radius() {
     }
 }
 
+/// The mesh keeps its nominal teeth under an offset of their flanks. Here a mesh that does not: the same involutes, 5 um thinner
+/// on every flank, by a smaller profile shift (half thickness `(pi/2 + 2 x tan a) / z + inv a - inv a_r`).
+#[test]
+fn what_an_offset_of_the_flanks_misses_is_hundredths_of_an_arc_second() {
+    let worn = cam(|drive| drive.as_built.flexspline_wear_um = 5.0);
+    let base_radius = worn.drive.flexspline.base_radius_mm();
+    let thinner = 5e-3 / base_radius * 188.0 / (2.0 * 20f64.to_radians().tan());
+    let meshed = cam(|drive| drive.flexspline.profile_shift -= thinner);
+    let [offset, mesh] = [&worn, &meshed].map(|problem| [LOAD_N_M, 100.0].map(|load| error(problem, 0.0, load)));
+    println!(
+        "5 um off every flank at 2 and 100 N.m: as an offset {offset:.3?}\", in the mesh {mesh:.3?}\", wind-up {:.4}\" apart",
+        (offset[1] - offset[0]) - (mesh[1] - mesh[0])
+    );
+    assert!(offset.iter().zip(&mesh).all(|(a, b)| (a - b).abs() < 0.15), "{offset:?} {mesh:?}");
+}
+
 #[test]
 fn a_damaged_tooth_is_felt_where_it_bears_and_nowhere_else() {
     // On the wave at 2 N.m about eight teeth bear on each lobe, on the minus flank: the output is turned forward.
@@ -273,7 +290,8 @@ fn a_damaged_tooth_is_felt_where_it_bears_and_nowhere_else() {
 /// Any generator of constant shape turns an ideal pair of wheels the same way in every pitch.
 #[test]
 fn a_malformed_generator_alone_leaves_the_period_of_one_pitch() {
-    let changes: [(&str, fn(&mut Drive)); 3] = [
+    type Change = fn(&mut Drive);
+    let changes: [(&str, Change); 3] = [
         ("eccentricity 10 um", |drive| {
             drive.as_built.generator_eccentricity_um = 10.0;
             drive.as_built.generator_eccentricity_phase_deg = 35.0;
@@ -351,10 +369,12 @@ fn a_thicker_rim_is_stiffer_by_the_cube_of_its_thickness() {
 /// does not depend on the way: `d(M_g)/dT = -d(delta)/d(psi)`, both at their own axes.
 #[test]
 fn with_every_imperfection_forces_balance_and_work_is_reciprocal() {
-    for kind in [GeneratorKind::Cam, GeneratorKind::FourRoller] {
+    // Where a point of the bore begins to bear under a roller within the step, the ideal drive too is out by up to 0.005.
+    for (kind, bound) in [(GeneratorKind::Cam, 1e-4), (GeneratorKind::FourRoller, 1e-2)] {
         let problem = problem(&imperfect(), kind, SolverSettings { tolerance: 2e-7, ..on(MeshLevel::Coarse) });
         for psi in [0.3, 2.0] {
-            let (turn, load) = (2e-4, 0.05);
+            // Under a roller points of the bore come and go every 8 um: the difference is taken within them.
+            let (turn, load) = (1e-5, 0.005);
             let at = |psi: f64, torque: f64| stands(&problem, psi, torque);
             let torque = 10.0;
             let (state, here) = at(psi, torque);
@@ -373,7 +393,7 @@ fn with_every_imperfection_forces_balance_and_work_is_reciprocal() {
                 softness / here.compliance_rad_per_n_m
             );
             assert!(unbalanced.abs() < 1e-6);
-            assert!((95.0 * (torque_rate + rate)).abs() < 2e-3, "{torque_rate} {rate}");
+            assert!((95.0 * (torque_rate + rate)).abs() < bound, "{torque_rate} {rate}");
         }
     }
 }

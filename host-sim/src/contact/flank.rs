@@ -84,8 +84,19 @@ pub struct FlankContact<'a> {
     /// The circular-spline flank.
     pub space: InvoluteFlank,
     deviations: &'a FlankDeviations,
-    coarse: Vec<f64>,
+    /// A few points of the plus and of the minus flank of a tooth.
+    coarse: [Vec<CoarsePoint>; 2],
+    /// Sine and cosine of the angle of each flexspline tooth and of each circular-spline space.
+    fs_turns: Vec<(f64, f64)>,
+    cs_turns: Vec<(f64, f64)>,
     rule: Vec<(f64, f64)>,
+}
+
+/// Where the gap of a pair is looked at in the search.
+struct CoarsePoint {
+    position: [f64; 2],
+    edge: usize,
+    shape: [f64; 3],
 }
 
 /// What one pair contributes. Local nodes: flexspline flank nodes, then circular-spline flank nodes; two unknowns each.
@@ -137,6 +148,20 @@ struct LocalField {
     space: Placement,
     /// Depth missing on both flanks.
     depth: f64,
+    /// No point of the circular-spline flank is displaced by more.
+    largest_cs: f64,
+}
+
+impl LocalField {
+    const EMPTY: LocalField = LocalField {
+        fs: Vec::new(),
+        cs: Vec::new(),
+        turn: (0.0, 1.0),
+        tooth: Placement::NOMINAL,
+        space: Placement::NOMINAL,
+        depth: 0.0,
+        largest_cs: 0.0,
+    };
 }
 
 impl<'a> FlankContact<'a> {
@@ -149,8 +174,20 @@ impl<'a> FlankContact<'a> {
         deviations: &'a FlankDeviations,
     ) -> Self {
         let (a, b) = (tooth.start_radius, tooth.junction_radius);
-        let coarse = (0..=6).map(|i| a + (b - a) * f64::from(i) / 6.0).collect();
-        FlankContact { fs_mesh, cs_mesh, tooth, space, deviations, coarse, rule: gauss_legendre(4) }
+        let coarse = Side::BOTH.map(|side| {
+            let point = |i: i32| {
+                let radius = a + (b - a) * f64::from(i) / 6.0;
+                let (edge, xi) = fs_mesh.flanks[side.index()].locate(radius);
+                CoarsePoint { position: tooth.point(radius), edge, shape: edge_shape(xi) }
+            };
+            // a smooth ring has no flanks
+            let points = if fs_mesh.flanks[side.index()].nodes.is_empty() { 0..0 } else { 0..7 };
+            points.map(point).collect()
+        });
+        let turns = |mesh: &WheelMesh| (0..mesh.teeth).map(|sector| mesh.sector_angle(sector).sin_cos()).collect();
+        let (fs_turns, cs_turns) = (turns(fs_mesh), turns(cs_mesh));
+        let rule = gauss_legendre(4);
+        FlankContact { fs_mesh, cs_mesh, tooth, space, deviations, coarse, fs_turns, cs_turns, rule }
     }
 
     /// Flank nodes of the flexspline side of a pair.
@@ -174,6 +211,9 @@ impl<'a> FlankContact<'a> {
     /// Pairs whose flanks are closer than `reach_mm` (or overlap) in this configuration.
     pub fn near_pairs(&self, at: Configuration, reach_mm: f64) -> Vec<FlankPair> {
         let mut pairs = Vec::new();
+        let mut field = LocalField::EMPTY;
+        let insets = self.tooth.half_angle(self.tooth.tip_radius);
+        let lowest = self.space.tip_radius - 0.05 - self.deviations.largest;
         let spaces = self.cs_mesh.teeth as isize;
         for tooth in 0..self.fs_mesh.teeth {
             for side in Side::BOTH {
@@ -184,14 +224,14 @@ impl<'a> FlankContact<'a> {
                 let tip = self.fs_mesh.node(tooth as isize, tip);
                 let x = self.fs_mesh.nodes[tip];
                 let p = [x[0] + at.u[2 * tip], x[1] + at.u[2 * tip + 1]];
-                if p[0].hypot(p[1]) < self.space.tip_radius - 0.05 - self.deviations.largest {
+                if p[0] * p[0] + p[1] * p[1] < lowest * lowest {
                     continue;
                 }
-                let inset = side.sign() * self.tooth.half_angle(self.tooth.tip_radius);
-                let angle = p[1].atan2(p[0]) - at.output_rad - inset;
+                let angle = p[1].atan2(p[0]) - at.output_rad - side.sign() * insets;
                 let space = (angle / self.cs_mesh.pitch()).round() as isize;
                 let pair = FlankPair { tooth, space: space.rem_euclid(spaces) as usize, side };
-                if self.smallest_gap(pair, at) < reach_mm {
+                self.fill(&mut field, pair, at);
+                if !self.is_farther(pair, &field, reach_mm) && self.smallest_gap_in(pair, &field) < reach_mm {
                     pairs.push(pair);
                 }
             }
@@ -201,60 +241,74 @@ impl<'a> FlankContact<'a> {
 
     /// Smallest gap of a pair at a few points of the flank (mm); points outside the space's flank do not count.
     pub fn smallest_gap(&self, pair: FlankPair, at: Configuration) -> f64 {
-        let field = self.local_field(pair, at);
-        self.coarse
+        self.smallest_gap_in(pair, &self.local_field(pair, at))
+    }
+
+    fn smallest_gap_in(&self, pair: FlankPair, field: &LocalField) -> f64 {
+        self.coarse[pair.side.index()]
             .iter()
-            .map(|&radius| {
-                let (edge, xi) = self.fs_flank(pair).locate(radius);
-                let (foot, _) = self.foot(pair, &field, self.tooth.point(radius), edge, &edge_shape(xi));
+            .map(|point| {
+                let foot =
+                    self.foot(pair, field, self.seen_from_space(field, point.position, point.edge, &point.shape));
                 if foot.radius < self.space.tip_radius + 1e-9 { f64::INFINITY } else { foot.distance }
             })
             .fold(f64::INFINITY, f64::min)
     }
 
+    /// True where it is plain at a glance that the smallest gap is not below `reach_mm`.
+    fn is_farther(&self, pair: FlankPair, field: &LocalField, reach_mm: f64) -> bool {
+        self.coarse[pair.side.index()].iter().all(|point| {
+            let x = self.seen_from_space(field, point.position, point.edge, &point.shape);
+            self.least_distance(field, x) > reach_mm
+        })
+    }
+
+    /// A lower bound of the gap at a point: it leaves out the rounding of the tip, and no displacement of the circular spline
+    /// brings the flank nearer than its own length.
+    #[inline]
+    fn least_distance(&self, field: &LocalField, x: [f64; 2]) -> f64 {
+        self.space.involute_distance(field.space.recover(x)).1 + field.depth - field.largest_cs
+    }
+
     fn local_field(&self, pair: FlankPair, at: Configuration) -> LocalField {
+        let mut field = LocalField::EMPTY;
+        self.fill(&mut field, pair, at);
+        field
+    }
+
+    fn fill(&self, field: &mut LocalField, pair: FlankPair, at: Configuration) {
         let sign = pair.side.sign();
-        let local = |mesh: &WheelMesh, sector: usize, nodes: &[u32], field: &[f64]| -> Vec<[f64; 2]> {
-            let turn = (-mesh.sector_angle(sector)).sin_cos();
-            nodes
-                .iter()
-                .map(|&n| {
-                    let k = 2 * mesh.node(sector as isize, n);
-                    let d = rotate([field[k], field[k + 1]], turn);
-                    [d[0], sign * d[1]]
-                })
-                .collect()
+        let local = |to: &mut Vec<[f64; 2]>, mesh: &WheelMesh, sector: usize, turn: (f64, f64), u: &[f64]| {
+            let first = mesh.node(sector as isize, 0);
+            to.clear();
+            to.extend(mesh.flanks[pair.side.index()].nodes.iter().map(|&n| {
+                let k = 2 * (first + n as usize);
+                let d = rotate([u[k], u[k + 1]], (-turn.0, turn.1));
+                [d[0], sign * d[1]]
+            }));
         };
-        let tooth_angle = self.fs_mesh.sector_angle(pair.tooth);
-        let angle = tooth_angle - self.cs_mesh.sector_angle(pair.space) - at.output_rad;
+        let (fs_turn, cs_turn) = (self.fs_turns[pair.tooth], self.cs_turns[pair.space]);
+        local(&mut field.fs, self.fs_mesh, pair.tooth, fs_turn, at.u);
+        local(&mut field.cs, self.cs_mesh, pair.space, cs_turn, at.v);
+        let longest = field.cs.iter().map(|v| v[0] * v[0] + v[1] * v[1]).fold(0.0, f64::max).sqrt();
+        // Between three nodes a parabola goes beyond them by a quarter at most.
+        field.largest_cs = 1.25 * longest;
+        let angle = self.fs_mesh.sector_angle(pair.tooth) - self.cs_mesh.sector_angle(pair.space) - at.output_rad;
+        field.turn = (sign * angle).sin_cos();
         let deviations = self.deviations;
         let (mut tooth, side) = (deviations.teeth[pair.tooth], pair.side.index());
         if deviations.axis != [0.0; 2] {
-            let axis = rotate(deviations.axis, (-tooth_angle).sin_cos());
+            let axis = rotate(deviations.axis, (-fs_turn.0, fs_turn.1));
             tooth.translation = [tooth.translation[0] - axis[0], tooth.translation[1] - axis[1]];
         }
-        LocalField {
-            fs: local(self.fs_mesh, pair.tooth, &self.fs_flank(pair).nodes, at.u),
-            cs: local(self.cs_mesh, pair.space, &self.cs_flank(pair).nodes, at.v),
-            turn: (sign * angle).sin_cos(),
-            tooth: tooth.seen_from(pair.side),
-            space: deviations.spaces[pair.space].seen_from(pair.side),
-            depth: deviations.tooth_depth[pair.tooth][side] + deviations.space_depth[pair.space][side],
-        }
+        field.tooth = tooth.seen_from(pair.side);
+        field.space = deviations.spaces[pair.space].seen_from(pair.side);
+        field.depth = deviations.tooth_depth[pair.tooth][side] + deviations.space_depth[pair.space][side];
     }
 
-    /// Foot of a flank point on the deformed circular spline, and the point itself in the space frame, whose origin lies on the
-    /// axis of the output.
+    /// Foot, on the deformed circular spline, of a point given in the space frame, whose origin lies on the axis of the output.
     #[inline]
-    fn foot(
-        &self,
-        pair: FlankPair,
-        field: &LocalField,
-        position: [f64; 2],
-        edge: usize,
-        shape: &[f64; 3],
-    ) -> (Foot, [f64; 2]) {
-        let x = self.seen_from_space(field, position, edge, shape);
+    fn foot(&self, pair: FlankPair, field: &LocalField, x: [f64; 2]) -> Foot {
         let cs = self.cs_flank(pair);
         // The displacement at the foot decides the foot; its slope of 1e-3 makes the second look exact.
         let mut foot = self.space.foot_internal(field.space.recover(x));
@@ -267,9 +321,10 @@ impl<'a> FlankContact<'a> {
         foot.distance += field.depth;
         foot.normal = field.space.turned(foot.normal);
         foot.tangent = field.space.turned(foot.tangent);
-        (foot, x)
+        foot
     }
 
+    /// A point of the flexspline flank in the space frame.
     #[inline]
     fn seen_from_space(&self, field: &LocalField, position: [f64; 2], edge: usize, shape: &[f64; 3]) -> [f64; 2] {
         let mut x = field.tooth.place(position);
@@ -379,7 +434,8 @@ impl<'a> FlankContact<'a> {
     ) {
         let field = self.local_field(pair, at);
         for point in points {
-            let (foot, _) = self.foot(pair, &field, point.position, point.edge, &point.shape);
+            let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
+            let foot = self.foot(pair, &field, x);
             point.start_foot = foot.arc;
             point.start_traction = interpolate(history, point.arc);
         }
@@ -397,7 +453,8 @@ impl<'a> FlankContact<'a> {
         points
             .iter()
             .map(|point| {
-                let (foot, _) = self.foot(pair, &field, point.position, point.edge, &point.shape);
+                let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
+                let foot = self.foot(pair, &field, x);
                 let pressure = (-law.stiffness * foot.distance).max(0.0);
                 (point.arc, traction(law, pressure, point, foot.arc).0)
             })
@@ -408,7 +465,8 @@ impl<'a> FlankContact<'a> {
     pub fn gaps(&self, pair: FlankPair, at: Configuration, points: &[FlankPoint], report: &mut impl FnMut(f64, f64, f64)) {
         let field = self.local_field(pair, at);
         for point in points {
-            let (foot, x) = self.foot(pair, &field, point.position, point.edge, &point.shape);
+            let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
+            let foot = self.foot(pair, &field, x);
             let [nx, ny] = foot.normal;
             report(foot.distance, pair.side.sign() * (nx * x[1] - ny * x[0]), point.weight);
         }
@@ -439,13 +497,19 @@ impl<'a> FlankContact<'a> {
         let (nf, nc) = (field.fs.len(), field.cs.len());
         let n = 2 * (nf + nc);
         let sign = pair.side.sign();
-        let fs_turn = self.fs_mesh.sector_angle(pair.tooth).sin_cos();
-        let cs_turn = self.cs_mesh.sector_angle(pair.space).sin_cos();
+        let (fs_turn, cs_turn) = (self.fs_turns[pair.tooth], self.cs_turns[pair.space]);
         let back = (-field.turn.0, field.turn.1);
         let cs = self.cs_flank(pair);
         let mut out: Option<PairContribution> = None;
         for point in points {
-            let (foot, x) = self.foot(pair, &field, point.position, point.edge, &point.shape);
+            let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
+            // Most points are open, and a glance says so.
+            let least = self.least_distance(&field, x);
+            if least > 0.0 {
+                *smallest_gap = smallest_gap.min(least);
+                continue;
+            }
+            let foot = self.foot(pair, &field, x);
             *smallest_gap = smallest_gap.min(foot.distance);
             if foot.distance >= 0.0 {
                 continue;

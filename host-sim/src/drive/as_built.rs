@@ -14,11 +14,11 @@
 //! All of them but one are exact offsets of the surfaces in contact, against meshes that stay nominal: teeth and spaces are
 //! displaced and turned as rigid bodies ([`super::FlankDeviations`]), a worn flank lies deeper along its normal, the outline of
 //! the generator is displaced and deformed ([`super::GeneratorOutline`]), the axis of the circular spline stands beside that of
-//! the housing. What the mesh then misses is the change of stiffness by a change of shape: an error of 5 µm over half a
-//! pitch of 0.8 mm strains the outline by 0.6 %, and only the deflection of the one tooth, 1 to 2 µm at rated load, changes by
-//! that: 10 nm, 0.04″ on that tooth and a tenth of it on the output, which ten teeth share; an error that varies along the ring
-//! (orders below ten) strains it a hundred times less. Thickness of the rim is the exception: it bends with the cube, 10 µm of
-//! 1.2 mm is 2.5 %. It goes into the mesh, sector by sector ([`RimVariation`]).
+//! the housing. What the mesh then misses is the change of stiffness by a change of shape, and that is small: a tooth is 0.8 mm
+//! thick and gives way by 1 to 2 µm at rated load, so that 5 µm of shape are below a hundredth of nearly nothing. Measured (cam,
+//! coarse mesh, `tests/as_built.rs`): 5 µm taken off every flank, once as an offset and once in the mesh, leave the output 0.02″
+//! apart at 2 N·m and 0.04″ apart at 100 N·m, where it stands at 78″. Thickness of the rim is the exception: it bends with the
+//! cube, 10 µm of 1.2 mm is 2.5 %. It goes into the mesh, sector by sector ([`RimVariation`]).
 //!
 //! An imperfect drive does not repeat from tooth to tooth any more. What still does, with period `2 pi / z_f` in the generator
 //! angle: any generator (a constant shape), uniform wear, a difference in temperature.

@@ -177,8 +177,8 @@ impl GeneratorOutline {
                 OutlineFoot { distance: (length - radius) * s, normal, curvature: 1.0 / (radius * s) }
             }
             Contour::Cam { form } => {
-                let [cos, sin] = self.foot_on_neutral(px, py);
-                let [r, dr, ddr] = self.neutral.polar_towards([cos, sin]);
+                let (sin, cos) = self.foot_on_neutral(px, py);
+                let [r, dr, ddr] = self.neutral.polar_at((sin, cos));
                 let speed = (r * r + dr * dr).sqrt();
                 let normal = [(r * cos + dr * sin) / speed, (r * sin - dr * cos) / speed];
                 let from_neutral = (px - r * cos) * normal[0] + (py - r * sin) * normal[1];
@@ -234,37 +234,35 @@ impl GeneratorOutline {
         }
     }
 
-    /// Direction (cosine and sine of the polar angle) of the point of the neutral curve closest to `(px, py)`: the cam is
-    /// parallel to it, so the foot on the cam has the same normal. Newton from the direction of the point, which at the bore
-    /// is off by 3e-4 rad; if it strays (points near the centre), a scan and bisection.
-    fn foot_on_neutral(&self, px: f64, py: f64) -> [f64; 2] {
+    /// Sine and cosine of the polar angle of the point of the neutral curve closest to `(px, py)`: the cam is parallel to it, so
+    /// the foot on the cam has the same normal. Newton from the direction of the point, which at the bore is off by 3e-4 rad; if it
+    /// strays (points near the centre), a scan and bisection.
+    fn foot_on_neutral(&self, px: f64, py: f64) -> (f64, f64) {
         let rho = (px * px + py * py).sqrt();
-        let mut direction = [px / rho, py / rho];
-        let mut strayed = 0.0_f64;
+        let mut foot = (py / rho, px / rho);
+        let mut turned = 0.0;
         for _ in 0..8 {
-            let (f, df) = self.foot_residual(px, py, direction);
+            let (f, df) = self.foot_residual(px, py, foot);
+            // also for a point in the centre, where all is NaN
             if df.is_nan() || df >= 0.0 {
                 break;
             }
             let step = f / df;
-            let (sin, cos) = sin_cos_of_small(-step);
-            direction = [direction[0] * cos - direction[1] * sin, direction[1] * cos + direction[0] * sin];
+            foot = turned_by(foot, -step);
+            turned -= step;
             if step.abs() < LAST_STEP {
-                return direction;
+                return foot;
             }
-            strayed += step;
-            if strayed.abs() > 0.5 {
+            if turned.abs() > 0.5 {
                 break;
             }
         }
-        let (sin, cos) = self.foot_by_scan(px, py).sin_cos();
-        [cos, sin]
+        self.foot_by_scan(px, py).sin_cos()
     }
 
-    /// `(p - P) · P'` and its derivative by the polar angle.
-    #[inline]
-    fn foot_residual(&self, px: f64, py: f64, [cos, sin]: [f64; 2]) -> (f64, f64) {
-        let [r, dr, ddr] = self.neutral.polar_towards([cos, sin]);
+    /// `(p - P) · P'` and its derivative by the polar angle, given by its sine and cosine.
+    fn foot_residual(&self, px: f64, py: f64, (sin, cos): (f64, f64)) -> (f64, f64) {
+        let [r, dr, ddr] = self.neutral.polar_at((sin, cos));
         // along and across the radius direction
         let (a, b) = (px * cos + py * sin, py * cos - px * sin);
         let f = a * dr + b * r - r * dr;
@@ -283,7 +281,7 @@ impl GeneratorOutline {
         // (p - P)·P' falls through zero at the closest point
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if self.foot_residual(px, py, [middle.cos(), middle.sin()]).0 > 0.0 {
+            if self.foot_residual(px, py, middle.sin_cos()).0 > 0.0 {
                 low = middle;
             } else {
                 high = middle;
@@ -305,16 +303,18 @@ impl super::spec::Generators {
     }
 }
 
-/// Sine and cosine, quick for the small angles that Newton steps are.
+/// Sine and cosine of an angle turned by another.
 #[inline]
-fn sin_cos_of_small(x: f64) -> (f64, f64) {
-    let xx = x * x;
-    // The next terms are x^7/5040 and x^8/40320: below 2e-18 at this bound.
-    if xx < 2e-5 {
-        (x * (1.0 - xx / 6.0 * (1.0 - xx / 20.0)), 1.0 - 0.5 * xx * (1.0 - xx / 12.0 * (1.0 - xx / 30.0)))
+fn turned_by((sin, cos): (f64, f64), by: f64) -> (f64, f64) {
+    // below this the series are exact to round-off
+    const SMALL: f64 = 1e-3;
+    let square = by * by;
+    let (s, c) = if by.abs() < SMALL {
+        (by * (1.0 - square / 6.0 * (1.0 - square / 20.0)), 1.0 - 0.5 * square * (1.0 - square / 12.0))
     } else {
-        x.sin_cos()
-    }
+        by.sin_cos()
+    };
+    (sin * c + cos * s, cos * c - sin * s)
 }
 
 /// Point of the intended bore under the material point `phi` of the neutral curve.

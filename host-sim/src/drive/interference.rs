@@ -9,7 +9,8 @@
 //! radius, fillets and roundings of both wheels included; positive is open. Turning the circular spline by `e` changes
 //! every gap by exactly `e`, so the least gap on each side is what it can turn: their sum is the rigid backlash.
 //!
-//! Not covered: elastic deflection, and tips meeting roots radially ([`super::Drive::check`] asks for clearance there).
+//! Not covered: elastic deflection, imperfections ([`super::AsBuilt`]; these are the nominal teeth), and tips meeting roots
+//! radially ([`super::Drive::check`] asks for clearance there).
 
 use super::error::DriveError;
 use super::neutral::NeutralCurve;

@@ -12,6 +12,9 @@ pub struct InvoluteFlank {
     pub base_radius: f64,
     /// Half angle of the flank at the base circle, rad.
     half_base: f64,
+    /// Roll angle half way up the flank, tangent of the pressure angle there, and `half_base` plus that pressure angle.
+    middle_roll: f64,
+    half_base_and_middle: f64,
     /// Radius where the root fillet ends and the involute begins, mm.
     pub start_radius: f64,
     /// Radius where the involute ends and the rounding begins, mm.
@@ -53,9 +56,14 @@ impl InvoluteFlank {
         let (junction_radius, _) = polar(involute.point(1.0));
         let rounding_radius = 1.0 / rounding.curvature(0.5).abs();
         let (p, n) = (rounding.point(0.0), rounding.normal(0.0));
+        let half_base = angle + involute_function(start_radius / base_radius);
+        let middle = 0.5 * (start_radius + junction_radius) / base_radius;
+        let middle_roll = (middle * middle - 1.0).max(0.0).sqrt();
         InvoluteFlank {
             base_radius,
-            half_base: angle + involute_function(start_radius / base_radius),
+            half_base,
+            middle_roll,
+            half_base_and_middle: half_base + middle_roll.atan(),
             start_radius,
             junction_radius,
             tip_radius: outline.root_and_tip_radius().1,
@@ -99,32 +107,46 @@ impl InvoluteFlank {
         ]
     }
 
-    /// Radius of the foot of a point on the involute continued beyond its ends.
+    /// Length of the tangent from a point to the base circle, and signed distance of the point from the involute continued
+    /// beyond its ends. A tip rounding lies behind it: the distance to the flank with its rounding is at least this.
+    ///
+    /// `r_b (H(rho) - theta)`, `H = half_base - roll + atan roll`, the two arc tangents taken as one of a small argument:
+    /// `atan roll - theta = atan(middle) + atan z`.
     #[inline]
-    pub fn involute_foot_radius(&self, p: [f64; 2]) -> f64 {
+    pub fn involute_distance(&self, p: [f64; 2]) -> (f64, f64) {
         let rho_squared = p[0] * p[0] + p[1] * p[1];
         let along = (rho_squared - self.base_radius * self.base_radius).max(1e-12).sqrt();
         let roll = along / self.base_radius;
-        let distance = self.base_radius * (self.half_base - (roll - roll.atan()) - p[1].atan2(p[0]));
-        self.base_radius.hypot(along + distance)
+        let (beyond, both) = (roll - self.middle_roll, 1.0 + roll * self.middle_roll);
+        let z = (beyond * p[0] - both * p[1]) / (both * p[0] + beyond * p[1]);
+        let angle = if z.abs() < SMALL_TANGENT && p[0] > 0.0 {
+            self.half_base_and_middle - roll + small_arc_tangent(z)
+        } else {
+            self.half_base - (roll - roll.atan()) - p[1].atan2(p[0])
+        };
+        (along, self.base_radius * angle)
+    }
+
+    /// Radius of the foot of a point on the involute continued beyond its ends.
+    #[inline]
+    pub fn involute_foot_radius(&self, p: [f64; 2]) -> f64 {
+        let (along, distance) = self.involute_distance(p);
+        let foot_along = along + distance;
+        (self.base_radius * self.base_radius + foot_along * foot_along).sqrt()
     }
 
     /// Foot of a point on the flank of a space (internal wheel), in the frame of that space.
     #[inline]
     pub fn foot_internal(&self, p: [f64; 2]) -> Foot {
-        let rho_squared = p[0] * p[0] + p[1] * p[1];
-        let rho = rho_squared.sqrt();
-        let along = (rho_squared - self.base_radius * self.base_radius).max(1e-12).sqrt();
-        let roll = along / self.base_radius;
-        let distance = self.base_radius * (self.half_base - (roll - roll.atan()) - p[1].atan2(p[0]));
+        let (along, distance) = self.involute_distance(p);
         let foot_along = along + distance;
         let radius = (self.base_radius * self.base_radius + foot_along * foot_along).sqrt();
         if radius >= self.junction_radius {
-            // Normal into the space: -(sin a e_rho + cos a e_theta), a the pressure angle at rho.
-            let (sin, cos) = (along / rho, self.base_radius / rho);
-            let (ex, ey) = (p[0] / rho, p[1] / rho);
-            let normal = [-(sin * ex - cos * ey), -(sin * ey + cos * ex)];
-            let tangent = [cos * ex + sin * ey, cos * ey - sin * ex];
+            // Normal into the space: -(sin a e_rho + cos a e_theta), a the pressure angle at rho; sine and cosine over rho.
+            let rho_squared = p[0] * p[0] + p[1] * p[1];
+            let (sin, cos) = (along / rho_squared, self.base_radius / rho_squared);
+            let normal = [-(sin * p[0] - cos * p[1]), -(sin * p[1] + cos * p[0])];
+            let tangent = [cos * p[0] + sin * p[1], cos * p[1] - sin * p[0]];
             Foot {
                 distance,
                 normal,
@@ -154,6 +176,16 @@ impl InvoluteFlank {
             Foot { distance: length - self.rounding_radius, normal, tangent, radius, radius_rate, arc }
         }
     }
+}
+
+/// Tangents below which the series of [`small_arc_tangent`] is exact to round-off: the first term left out is 2e-21.
+const SMALL_TANGENT: f64 = 0.05;
+
+/// Arc tangent of a small number.
+#[inline]
+fn small_arc_tangent(z: f64) -> f64 {
+    let s = z * z;
+    z * (1.0 - s * (1.0 / 3.0 - s * (1.0 / 5.0 - s * (1.0 / 7.0 - s * (1.0 / 9.0 - s * (1.0 / 11.0 - s / 13.0))))))
 }
 
 /// inv a = tan a - a with cos a = 1 / ratio.
@@ -187,6 +219,30 @@ mod tests {
                     assert!((foot.radius - p[0].hypot(p[1])).abs() < 1e-12);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn the_distance_by_series_is_the_distance_by_arc_tangents() {
+        let (flank, _) = space();
+        let mut by_series = 0;
+        for k in 0..400 {
+            let (r, angle) = (47.5 + 0.006 * f64::from(k), 0.05 * (2.4 * f64::from(k)).sin());
+            let p = [r * angle.cos(), r * angle.sin()];
+            let along = (r * r - flank.base_radius * flank.base_radius).sqrt();
+            let roll = along / flank.base_radius;
+            let expected = flank.base_radius * (flank.half_base - (roll - roll.atan()) - angle);
+            let (tangent, distance) = flank.involute_distance(p);
+            assert!(
+                (distance - expected).abs() < 2e-14 && (tangent - along).abs() < 1e-11,
+                "{p:?}: {distance} {expected}"
+            );
+            by_series += usize::from((roll.atan() - flank.middle_roll.atan() - angle).abs() < SMALL_TANGENT);
+        }
+        assert!(by_series > 250 && by_series < 400);
+        for k in -10..=10 {
+            let z = 0.005 * f64::from(k);
+            assert!((small_arc_tangent(z) - z.atan()).abs() < 1e-17);
         }
     }
 

@@ -99,10 +99,10 @@ impl NeutralCurve {
         [self.radius_mm + self.constant_mm + w, dw, ddw]
     }
 
-    /// [`NeutralCurve::polar`] at the angle whose cosine and sine are given.
+    /// [`NeutralCurve::polar`] at the angle of this sine and cosine.
     #[inline]
-    pub fn polar_towards(&self, direction: [f64; 2]) -> [f64; 3] {
-        let [w, dw, ddw] = self.shape.radial_towards(direction);
+    pub fn polar_at(&self, direction: (f64, f64)) -> [f64; 3] {
+        let [w, dw, ddw] = self.shape.radial_at(direction);
         [self.radius_mm + self.constant_mm + w, dw, ddw]
     }
 

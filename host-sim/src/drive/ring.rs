@@ -166,9 +166,9 @@ impl RingShape {
         [w0 * w, w0 * sign * dw, w0 * (bend - w)]
     }
 
-    /// [`RingShape::radial`] at the angle whose cosine and sine are given.
+    /// [`RingShape::radial`] at the angle of this sine and cosine: for the cam without another look at them.
     #[inline]
-    pub fn radial_towards(&self, [cos, sin]: [f64; 2]) -> [f64; 3] {
+    pub fn radial_at(&self, (sin, cos): (f64, f64)) -> [f64; 3] {
         match self.form {
             Form::Cam => {
                 let w = self.amplitude * (cos - sin) * (cos + sin);
@@ -219,6 +219,18 @@ fn fold(phi: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_shape_by_sine_and_cosine_is_the_shape_by_angle() {
+        let shapes = [RingShape::cam(0.5), RingShape::two_roller(0.5), RingShape::double_disc(0.5, 0.5)];
+        for shape in shapes {
+            for k in 0..70 {
+                let phi = 0.1 * f64::from(k) - 3.0;
+                let (a, b) = (shape.radial(phi), shape.radial_at(phi.sin_cos()));
+                assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-14), "{shape:?} at {phi}: {a:?} {b:?}");
+            }
+        }
+    }
 
     #[test]
     fn names_are_read_back_and_others_refused() {
