@@ -32,23 +32,28 @@ const GROUNDED_SPRINGS: [f64; 4] = [1e-3, 1e-1, 1e1, 1e3];
 const LARGEST_STEP: f64 = 0.1;
 /// Largest first step of a changing load, N m.
 const LARGEST_LOAD_STEP: f64 = 100.0;
-/// Factor on the penalties while the way to a new load is found.
-const LOADING_SOFTNESS: f64 = 1e-3;
+/// Factors on the penalties while the way to a new load is found.
+const LOADING_SOFTNESS: [f64; 3] = [1e-3, 3e-2, 1.0];
 /// Iterations after which the next part of an increment may be twice as large.
 const EASY: usize = 10;
 
 /// Relative residual below which steps are taken whole: what is left is near round-off.
 const ROUND_OFF: f64 = 1e-6;
 
-/// Relative residual below which the last factor may serve again, and the gain that the last iteration must have made.
-const CHORD_BELOW: f64 = 1.0;
+/// Gain of an iteration after which the last factor serves again.
 const CHORD_GAIN: f64 = 0.2;
+/// Under friction: relative residual and gain from which the last factor is kept and improved, so many times.
+const SLUGGISH_BELOW: f64 = 0.3;
+const SLUGGISH_GAIN: f64 = 0.3;
+const MOST_CHORDS: usize = 12;
 
 /// Fraction of a pitch off which a tangent of an earlier pitch still serves, and the gain that each iteration must then make.
 const RECALL_WITHIN: f64 = 0.06;
 const RECALL_GAIN: f64 = 0.3;
 /// A tangent made further from equilibrium than this (relative residual) knows the wrong contact.
 const KEEP_BELOW: f64 = 0.1;
+/// Layouts of the contact in one increment.
+const MOST_LAYOUTS: usize = 3;
 /// Tangents remembered.
 const TANGENTS: usize = 12;
 
@@ -284,16 +289,22 @@ impl<'p> Solver<'p> {
         if torque_n_m == from.torque_n_m {
             return self.newton(from, generator_rad, torque_n_m);
         }
-        self.softening = LOADING_SOFTNESS;
-        let soft = self.newton(from, generator_rad, torque_n_m);
-        self.softening = 1.0;
-        let (mut guess, first) = soft?;
-        // History is that of the start, not of the guess.
-        guess.drag_anchor_rad = from.drag_anchor_rad;
-        guess.friction = from.friction.clone();
-        let (state, mut increment) = self.newton(&guess, generator_rad, torque_n_m)?;
-        increment.iterations += first.iterations;
-        Ok((state, increment))
+        let mut guess = from.clone();
+        let mut iterations = 0;
+        for softening in LOADING_SOFTNESS {
+            self.softening = softening;
+            let solved = self.newton(&guess, generator_rad, torque_n_m);
+            self.softening = 1.0;
+            let (state, mut increment) = solved?;
+            iterations += increment.iterations;
+            if softening == 1.0 {
+                increment.iterations = iterations;
+                return Ok((state, increment));
+            }
+            // History is that of the start, not of the guess.
+            guess = State { drag_anchor_rad: from.drag_anchor_rad, friction: from.friction.clone(), ..state };
+        }
+        unreachable!("the last softening is 1")
     }
 
     /// State predicted for a generator angle: the wave turned, the output going on as it did before.
@@ -412,7 +423,9 @@ impl<'p> Solver<'p> {
         let mut chords: Vec<Step> = Vec::new();
         let steady = self.softening == 1.0 && self.passed.back().is_some_and(|last| goes_on(last, from, torque_n_m));
         let mut recalled = steady && generator_rad != from.generator_rad && self.recall(generator_rad);
-        while history.len() <= settings.max_iterations {
+        // A new layout of the contact is a new start, up to a few times.
+        let (mut last_iteration, mut layouts) = (settings.max_iterations, 0);
+        while history.len() <= last_iteration {
             let relative = residual.relative();
             history.push(relative);
             if !relative.is_finite() {
@@ -432,6 +445,10 @@ impl<'p> Solver<'p> {
                     }
                     return Ok((state, increment));
                 }
+                layouts += 1;
+                if layouts <= MOST_LAYOUTS {
+                    last_iteration = history.len() + settings.max_iterations;
+                }
                 near.clear();
                 residual = self.assemble(&mut state, from, torque_n_m, &mut near);
                 continue;
@@ -443,7 +460,13 @@ impl<'p> Solver<'p> {
             }
             // Near the end the last factor still points the right way, and a step with it costs a tenth.
             recalled &= history.len() == 1 || last_gain(&history) < RECALL_GAIN;
-            let chord = recalled || (relative < CHORD_BELOW && last_gain(&history) < CHORD_GAIN);
+            let gain = last_gain(&history);
+            // The tangent of friction leaves out that slip follows pressure: made anew it is no better, improved it is.
+            let sluggish = self.problem.flank_law.friction > 0.0
+                && relative < SLUGGISH_BELOW
+                && (SLUGGISH_GAIN..1.0).contains(&gain)
+                && chords.len() < MOST_CHORDS;
+            let chord = recalled || gain < CHORD_GAIN || sluggish;
             let Some(mut step) = self.solve(&residual, chord) else {
                 return Err(failed(history, "the stiffness matrix is not positive definite"));
             };
@@ -459,6 +482,10 @@ impl<'p> Solver<'p> {
             near.advance(length * self.motion(&step));
             let mut mistaken = false;
             for trial in 0.. {
+                // Teeth that come near from here on need their flanks in this state, too: the next candidate starts from it.
+                if near.must_search() {
+                    self.wheels.complete(&mut state);
+                }
                 let mut candidate = step.applied_to(&state, length);
                 residual = self.assemble(&mut candidate, from, torque_n_m, &mut near);
                 let overshoot = before > 0.0 && step.work(&residual) < -0.9 * before;
