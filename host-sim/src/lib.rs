@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod cli;
+pub mod condense;
 pub mod contact;
 pub mod drive;
 pub mod element;

@@ -5,13 +5,11 @@
 //! roots), and where the table made so far misses it, the middle becomes a node. The same core code reads the trial table as
 //! will read the final one.
 
-use std::ops::ControlFlow;
-
 use flexspline::{Direction, GeneratorAngle, Table};
 
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::{Problem, Solver, SolverSettings, State};
-use crate::sweep::{Chain, Computed, KnownNode, SweepError, SweepPlan, SweepProgress, symmetric_nodes};
+use crate::sweep::{Chain, Computed, KnownNode, Observer, SweepError, SweepPlan, symmetric_nodes};
 use crate::tables::trial_table;
 
 /// How nodes are chosen.
@@ -46,7 +44,7 @@ pub fn choose_torque_nodes(
     plan: &SweepPlan,
     choice: NodeChoice,
     settings: SolverSettings,
-    observe: &mut dyn FnMut(SweepProgress) -> ControlFlow<()>,
+    observe: &Observer,
 ) -> Result<ChosenNodes, SweepError> {
     let temperature = plan.temperature_nodes_c[0];
     let temperature_c = f64::from(temperature);

@@ -63,6 +63,7 @@ pub struct PeakStress {
 
 /// The most stressed node of the whole drive.
 pub fn peak_stress(problem: &Problem, state: &State) -> PeakStress {
+    let state = &*problem.whole_state(state);
     let most = |mesh: &WheelMesh, field: &[f64]| {
         nodal_von_mises(mesh, &problem.material, field)
             .into_iter()

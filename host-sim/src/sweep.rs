@@ -15,6 +15,8 @@ use std::ops::ControlFlow;
 use flexspline::Direction;
 use flexspline::precompute::Sample;
 
+use rayon::prelude::*;
+
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
 
@@ -97,6 +99,9 @@ pub struct SweepProgress {
     pub temperature_c: f64,
 }
 
+/// Told of every increment, from any thread; may ask to stop.
+pub type Observer<'a> = dyn Fn(SweepProgress) -> ControlFlow<()> + Sync + 'a;
+
 /// Samples of a sweep and how they came about.
 #[derive(Debug, Clone)]
 pub struct Sweep {
@@ -144,39 +149,46 @@ pub fn sweep(
     plan: &SweepPlan,
     known: &[KnownNode],
     settings: SolverSettings,
-    observe: &mut dyn FnMut(SweepProgress) -> ControlFlow<()>,
+    observe: &Observer,
 ) -> Result<Sweep, SweepError> {
-    let mut result = Sweep {
-        kind,
-        samples: Vec::with_capacity(2 * plan.sampled_increments()),
-        increments: 0,
-        iterations: 0,
-        worst_residual: 0.0,
-        degrees_of_freedom: 0,
-    };
     let half = Half::of(drive);
-    for &temperature in &plan.temperature_nodes_c {
-        let problem = Problem::new(drive, kind, f64::from(temperature), settings)?;
-        result.degrees_of_freedom = problem.degrees_of_freedom();
-        let mut solver = Solver::new(&problem);
-        let (unloaded, _) = solver.deform(0.0)?;
-        let mut chain = Chain::new(drive, plan, f64::from(temperature), observe);
-        for torques in half.chains(plan, drive.output.drag_torque_n_m) {
-            let mut state = unloaded.clone();
-            for torque in torques {
-                let reused = known.iter().find(|k| k.torque == torque && k.temperature == temperature);
-                match reused {
-                    Some(known) => chain.points.extend(known.points.iter().copied()),
-                    None => state = chain.sample(&mut solver, state, torque)?,
+    // Temperatures are independent of one another; they are put together in their order.
+    let parts = plan
+        .temperature_nodes_c
+        .par_iter()
+        .map(|&temperature| {
+            let problem = Problem::new(drive, kind, f64::from(temperature), settings)?;
+            let mut solver = Solver::new(&problem);
+            let (unloaded, _) = solver.deform(0.0)?;
+            let mut chain = Chain::new(drive, plan, f64::from(temperature), observe);
+            for torques in half.chains(plan, drive.output.drag_torque_n_m) {
+                let mut state = unloaded.clone();
+                for torque in torques {
+                    let reused = known.iter().find(|k| k.torque == torque && k.temperature == temperature);
+                    match reused {
+                        Some(known) => chain.points.extend(known.points.iter().copied()),
+                        None => state = chain.sample(&mut solver, state, torque)?,
+                    }
                 }
             }
-        }
-        result.increments += chain.increments;
-        result.iterations += chain.iterations;
-        result.worst_residual = result.worst_residual.max(chain.worst_residual);
-        result.samples.extend(half.complete(&chain.points, drive.output.drag_torque_n_m));
-    }
-    Ok(result)
+            Ok(Sweep {
+                kind,
+                samples: half.complete(&chain.points, drive.output.drag_torque_n_m),
+                increments: chain.increments,
+                iterations: chain.iterations,
+                worst_residual: chain.worst_residual,
+                degrees_of_freedom: problem.degrees_of_freedom(),
+            })
+        })
+        .collect::<Result<Vec<Sweep>, SweepError>>()?;
+    let joined = parts.into_iter().reduce(|mut all, part| {
+        all.samples.extend(part.samples);
+        all.increments += part.increments;
+        all.iterations += part.iterations;
+        all.worst_residual = all.worst_residual.max(part.worst_residual);
+        all
+    });
+    Ok(joined.expect("a plan has temperatures"))
 }
 
 /// Which part of the plane of torque and direction is computed; the rest follows.
@@ -260,7 +272,7 @@ pub struct Chain<'a> {
     drive: &'a Drive,
     plan: &'a SweepPlan,
     temperature_c: f64,
-    observe: &'a mut dyn FnMut(SweepProgress) -> ControlFlow<()>,
+    observe: &'a Observer<'a>,
     points: Vec<Computed>,
     increments: usize,
     iterations: usize,
@@ -273,7 +285,7 @@ impl<'a> Chain<'a> {
         drive: &'a Drive,
         plan: &'a SweepPlan,
         temperature_c: f64,
-        observe: &'a mut dyn FnMut(SweepProgress) -> ControlFlow<()>,
+        observe: &'a Observer<'a>,
     ) -> Self {
         Chain {
             drive,

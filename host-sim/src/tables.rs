@@ -11,6 +11,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::drive::{Drive, GeneratorKind};
+use crate::stepping::SolverSettings;
 use crate::sweep::{KnownNode, Sweep, SweepPlan, mirror};
 
 /// Arc-seconds in a radian.
@@ -96,7 +97,7 @@ pub enum Source {
     /// Contact FEM.
     Fem {
         /// Solver.
-        solver: &'static str,
+        solver: String,
         /// Mesh level.
         mesh: String,
         /// Unknowns.
@@ -111,8 +112,8 @@ pub enum Source {
         iterations: usize,
         /// Largest residual, relative to the contact forces.
         worst_residual: f64,
-        /// CPU seconds of the sweep.
-        cpu_s: f64,
+        /// Wall seconds of the sweep, other sweeps running beside it.
+        wall_s: f64,
     },
     /// A file.
     File {
@@ -163,11 +164,12 @@ pub fn from_sweep(
     drive: &Drive,
     plan: &SweepPlan,
     sweep: &Sweep,
-    mesh: &str,
-    cpu_s: f64,
+    solver: SolverSettings,
+    wall_s: f64,
 ) -> Result<MadeTable, TableError> {
+    let mesh = solver.mesh.to_string();
     let source = Source::Fem {
-        solver: "reference",
+        solver: solver.method.to_string(),
         mesh: mesh.to_owned(),
         degrees_of_freedom: sweep.degrees_of_freedom,
         positions: plan.positions,
@@ -178,10 +180,10 @@ pub fn from_sweep(
         increments: sweep.increments,
         iterations: sweep.iterations,
         worst_residual: sweep.worst_residual,
-        cpu_s,
+        wall_s,
     };
     let core_plan = fem_plan(drive, plan)?;
-    make(drive, sweep.kind, &core_plan, &sweep.samples, source, mesh, sweep.worst_residual)
+    make(drive, sweep.kind, &core_plan, &sweep.samples, source, &mesh, sweep.worst_residual)
 }
 
 /// A table of forward samples at positive torque `nodes` alone, for choosing nodes: the other quadrants are filled by mirror

@@ -15,7 +15,7 @@ use crate::progress::Progress;
 use crate::simulate::{
     Direction, Observation, Path, PathPoint, Phase, SimulateError, SimulationSettings, Summary, read_path, simulate,
 };
-use crate::stepping::SolverSettings;
+use crate::stepping::{Method, SolverSettings};
 
 /// Simulate the drive along a generator path by contact FEM
 ///
@@ -44,9 +44,6 @@ pub(super) struct Simulate {
     /// Which way pitch and turn go [default: forward]
     #[arg(long, value_enum)]
     direction: Option<DirectionOption>,
-    /// Solver
-    #[arg(long, value_enum, default_value = "reference")]
-    solver: SolverOption,
     /// Write the deformed mesh of every row to frames/, for ParaView
     #[arg(long)]
     frames: bool,
@@ -67,6 +64,9 @@ pub(super) struct ModelOptions {
     /// Mesh: coarse, standard or fine
     #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = str::parse::<MeshLevel>)]
     pub(super) mesh: MeshLevel,
+    /// Solver: fast condenses the teeth onto the nodes that touch something, reference keeps every node; they agree to 0.1 arcsec
+    #[arg(long, value_name = "SOLVER", default_value = "fast", value_parser = str::parse::<Method>)]
+    pub(super) solver: Method,
     /// Contact penalty on the flanks, N/mm^3
     #[arg(long, value_name = "K", default_value_t = SolverSettings::default().flank_penalty, allow_negative_numbers = true, help_heading = "Numerical method")]
     flank_penalty: f64,
@@ -88,6 +88,7 @@ impl ModelOptions {
             torque_n_m: self.torque_n_m.unwrap_or(0.0),
             temperature_c: self.temperature_c,
             solver: SolverSettings {
+                method: self.solver,
                 mesh: self.mesh,
                 flank_penalty: self.flank_penalty,
                 bore_penalty: self.bore_penalty,
@@ -104,12 +105,6 @@ impl ModelOptions {
 enum DirectionOption {
     Forward,
     Backward,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum SolverOption {
-    /// Full sparse Newton on the whole mesh
-    Reference,
 }
 
 impl Simulate {
@@ -165,7 +160,6 @@ impl Simulate {
             Some(DirectionOption::Backward) => Direction::Backward,
             Some(DirectionOption::Forward) | None => Direction::Forward,
         };
-        let SolverOption::Reference = self.solver;
         Ok(SimulationSettings { increment_rad: self.increment, direction, ..self.model.settings(path) })
     }
 

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use clap::Args;
@@ -16,7 +17,7 @@ use crate::mesh::MeshLevel;
 use crate::nodes::{NodeChoice, choose_torque_nodes};
 use crate::output::{write_json, write_whole};
 use crate::samples;
-use crate::stepping::SolverSettings;
+use crate::stepping::{Method, SolverSettings};
 use crate::sweep::{SweepError, SweepPlan, SweepProgress, sweep};
 use crate::tables::{
     ARCSEC_PER_RAD, MadeTable, SampleOptions, TableError, TableInfo, c_header, from_samples, from_sweep, rust_source,
@@ -80,6 +81,9 @@ pub(super) struct Tables {
     /// Mesh: coarse, standard or fine
     #[arg(long, value_name = "LEVEL", default_value = "standard", conflicts_with = "from_samples", value_parser = str::parse::<MeshLevel>)]
     mesh: MeshLevel,
+    /// Solver: fast or reference
+    #[arg(long, value_name = "SOLVER", default_value = "fast", conflicts_with = "from_samples", value_parser = str::parse::<Method>)]
+    solver: Method,
 }
 
 /// What `--json` prints.
@@ -195,7 +199,7 @@ impl Tables {
         drive: &Drive,
         generators: &[GeneratorKind],
     ) -> Result<Vec<(MadeTable, Option<String>)>, Failure> {
-        let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
+        let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
         let plans =
             generators.iter().map(|kind| Ok((*kind, self.plan(drive, *kind)?))).collect::<Result<Vec<_>, Failure>>()?;
         // How many nodes there will be is known only once they are chosen; until then the most is assumed.
@@ -212,9 +216,9 @@ impl Tables {
             .enumerate()
             .map(|(k, (kind, (plan, choice)))| {
                 let clock = Instant::now();
-                let mut mine = 0;
-                let mut observe = |now: SweepProgress| {
-                    mine += 1;
+                let mine = AtomicUsize::new(0);
+                let observe = |now: SweepProgress| {
+                    let mine = mine.fetch_add(1, Ordering::Relaxed) + 1;
                     if let Ok(mut guard) = progress.lock() {
                         let (bar, done, totals) = &mut *guard;
                         *done += 1;
@@ -237,14 +241,14 @@ impl Tables {
                 };
                 let mut plan = plan.clone();
                 let chosen =
-                    choose_torque_nodes(drive, *kind, &plan, *choice, settings, &mut observe).map_err(failed)?;
+                    choose_torque_nodes(drive, *kind, &plan, *choice, settings, &observe).map_err(failed)?;
                 plan.torque_nodes_n_m = chosen.torque_nodes_n_m;
-                let swept = sweep(drive, *kind, &plan, &chosen.known, settings, &mut observe).map_err(failed)?;
+                let swept = sweep(drive, *kind, &plan, &chosen.known, settings, &observe).map_err(failed)?;
                 if let Ok(mut guard) = progress.lock() {
-                    guard.2[k] = mine;
+                    guard.2[k] = mine.load(Ordering::Relaxed);
                 }
-                let cpu_s = clock.elapsed().as_secs_f64();
-                let table = from_sweep(drive, &plan, &swept, &self.mesh.to_string(), cpu_s)
+                let wall_s = clock.elapsed().as_secs_f64();
+                let table = from_sweep(drive, &plan, &swept, settings, wall_s)
                     .map_err(|error: TableError| Failure::Failed(format!("{kind}: {error}")))?;
                 let mut table = table;
                 table.info.torque_nodes_resolved = Some(chosen.resolved);

@@ -14,7 +14,7 @@ use super::{Failure, tables::generators};
 use crate::drive::GeneratorKind;
 use crate::mesh::MeshLevel;
 use crate::output::write_json;
-use crate::stepping::SolverSettings;
+use crate::stepping::{Method, SolverSettings};
 use crate::validate::{
     MAX_BOUND_ARCSEC, RMS_BOUND_ARCSEC, ValidateError, Validation, ValidationSettings, check_drive, generator_of,
     validate,
@@ -52,6 +52,9 @@ pub(super) struct Validate {
     /// Mesh of the fresh FEM: coarse, standard or fine
     #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = str::parse::<MeshLevel>)]
     mesh: MeshLevel,
+    /// Solver of the fresh FEM: reference or fast
+    #[arg(long, value_name = "SOLVER", default_value = "reference", value_parser = str::parse::<Method>)]
+    solver: Method,
 }
 
 /// `validation.json`.
@@ -84,7 +87,7 @@ impl Validate {
             temperatures: usize::from(self.temperatures),
             positions: usize::from(self.positions),
             seed: self.seed,
-            solver: SolverSettings { mesh: self.mesh, ..SolverSettings::default() },
+            solver: SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() },
         };
         let progress = Mutex::new((context.progress("validate"), vec![(0, 0); images.len()]));
         let interrupted = context.watch_interrupt();

@@ -27,14 +27,25 @@ pub struct BoreContact {
     pub edges: Vec<[u32; 3]>,
     /// Angle of the middle of each edge, rad, ascending from that of edge 0.
     pub middle_angles: Vec<f64>,
-    /// Undeformed place of start and middle of each edge, on the exact bore.
-    places: Vec<[[f64; 2]; 2]>,
+    /// Undeformed place of start, middle and end of each edge, on the exact bore.
+    places: Vec<[[f64; 2]; 3]>,
     /// Undeformed place of each integration point, edge by edge.
     point_places: Vec<[f64; 2]>,
     /// Weight (mm) and shape functions of each point of an edge.
     points: Vec<(f64, [f64; 3])>,
-    /// Coupling of the wave generator's clearance: how close (mm) a node must be for its edge to be looked at.
-    reach: f64,
+}
+
+/// What the gap along an edge of 0.4 mm may differ by from a quadratic, mm: of the distance from a circle of 13 mm the fourth
+/// order is 1e-7 mm.
+const BORE_SMOOTHNESS: f64 = 1e-6;
+
+/// Edges known to be open, and for how long.
+#[derive(Debug, Clone, Default)]
+pub struct OpenEdges {
+    /// How far (mm) any node may have moved, all steps added up; the generator stands still.
+    pub moved: f64,
+    /// Each edge is open until the nodes have moved this far.
+    until: Vec<f64>,
 }
 
 /// Contact of one edge.
@@ -75,7 +86,7 @@ impl BoreContact {
             let (s, c) = angle.sin_cos();
             [radius * c, radius * s]
         };
-        let places = middle_angles.iter().map(|m| [m - half_angle, *m].map(on_bore)).collect();
+        let places = middle_angles.iter().map(|m| [m - half_angle, m + 0.0, m + half_angle].map(on_bore)).collect();
         let point_places = middle_angles
             .iter()
             .flat_map(|m| rule.iter().map(move |(xi, _)| m + xi * half_angle))
@@ -83,7 +94,7 @@ impl BoreContact {
             .collect();
         let points =
             rule.iter().map(|(xi, weight)| (weight * half_angle * mesh.base_radius, edge_shape(*xi))).collect();
-        BoreContact { edges, middle_angles, places, point_places, points, reach: 0.02 }
+        BoreContact { edges, middle_angles, places, point_places, points }
     }
 
     /// Contact of the bore displaced by `u` (x and y of each node) with the generator turned by `generator_rad`, edge by
@@ -94,6 +105,19 @@ impl BoreContact {
         outline: &GeneratorOutline,
         generator_rad: f64,
         u: &[f64],
+        report: impl FnMut(&BorePressure),
+    ) {
+        self.evaluate_near(law, outline, generator_rad, u, &mut OpenEdges::default(), report);
+    }
+
+    /// [`BoreContact::evaluate`] that passes over edges that `open` knows to be open, and tells it of others.
+    pub fn evaluate_near(
+        &self,
+        law: BoreLaw,
+        outline: &GeneratorOutline,
+        generator_rad: f64,
+        u: &[f64],
+        open: &mut OpenEdges,
         mut report: impl FnMut(&BorePressure),
     ) {
         let (sin_g, cos_g) = generator_rad.sin_cos();
@@ -104,21 +128,27 @@ impl BoreContact {
                 [cos_g * foot.normal[0] - sin_g * foot.normal[1], sin_g * foot.normal[0] + cos_g * foot.normal[1]];
             foot
         };
-        // An edge is looked at only when one of its nodes is near: between two neighbours the gap changes by less than the reach.
-        // Edges follow one another round the bore, so the end of each is the start of the next.
-        let near = |edge: usize, k: usize| {
-            let (place, n) = (self.places[edge][k], self.edges[edge][k] as usize);
-            foot([place[0] + u[2 * n], place[1] + u[2 * n + 1]]).distance < self.reach
-        };
-        let first_near = near(0, 0);
-        let mut end_near = first_near;
+        open.until.resize(self.edges.len(), 0.0);
+        // Gap at the end of the edge before, if it was looked at.
+        let mut shared = None;
         for (edge, nodes) in self.edges.iter().enumerate() {
-            let start_near = end_near;
-            end_near = if edge + 1 < self.edges.len() { near(edge + 1, 0) } else { first_near };
-            if !(start_near || end_near || near(edge, 1)) {
+            if open.moved < open.until[edge] {
+                shared = None;
                 continue;
             }
             let node_u = nodes.map(|n| [u[2 * n as usize], u[2 * n as usize + 1]]);
+            let gap = |k: usize| {
+                let ([x, y], [dx, dy]) = (self.places[edge][k], node_u[k]);
+                foot([x + dx, y + dy]).distance
+            };
+            let gaps = [shared.unwrap_or_else(|| gap(0)), gap(1), gap(2)];
+            shared = Some(gaps[2]);
+            // Along the edge the gap is quadratic to BORE_SMOOTHNESS, and a quadratic lies above its Bernstein coefficients.
+            let bound = gaps[0].min(gaps[2]).min(2.0 * gaps[1] - 0.5 * (gaps[0] + gaps[2])) - BORE_SMOOTHNESS;
+            if bound > 0.0 {
+                open.until[edge] = open.moved + bound;
+                continue;
+            }
             let mut contact =
                 BorePressure { edge, force: [0.0; 6], stiffness: [0.0; 21], moment: 0.0, peak: 0.0, energy: 0.0 };
             let mut touching = false;

@@ -461,13 +461,37 @@ impl<'a> FlankContact<'a> {
             .collect()
     }
 
-    /// Forces and tangent of a pair.
+    /// Gap of every integration point, how it changes as the output alone turns (mm/rad), and its weight.
+    pub fn gaps(&self, pair: FlankPair, at: Configuration, points: &[FlankPoint], report: &mut impl FnMut(f64, f64, f64)) {
+        let field = self.local_field(pair, at);
+        for point in points {
+            let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
+            let foot = self.foot(pair, &field, x);
+            let [nx, ny] = foot.normal;
+            report(foot.distance, pair.side.sign() * (nx * x[1] - ny * x[0]), point.weight);
+        }
+    }
+
+    /// Forces and tangent of a pair; nothing while it is open.
     pub fn evaluate(
         &self,
         pair: FlankPair,
         at: Configuration,
         law: FlankLaw,
         points: &[FlankPoint],
+    ) -> Option<PairContribution> {
+        let mut smallest_gap = f64::INFINITY;
+        self.evaluate_with_gap(pair, at, law, points, &mut smallest_gap)
+    }
+
+    /// [`FlankContact::evaluate`], and the smallest gap of the points in `smallest_gap` (mm).
+    pub fn evaluate_with_gap(
+        &self,
+        pair: FlankPair,
+        at: Configuration,
+        law: FlankLaw,
+        points: &[FlankPoint],
+        smallest_gap: &mut f64,
     ) -> Option<PairContribution> {
         let field = self.local_field(pair, at);
         let (nf, nc) = (field.fs.len(), field.cs.len());
@@ -480,10 +504,13 @@ impl<'a> FlankContact<'a> {
         for point in points {
             let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
             // Most points are open, and a glance says so.
-            if self.least_distance(&field, x) > 0.0 {
+            let least = self.least_distance(&field, x);
+            if least > 0.0 {
+                *smallest_gap = smallest_gap.min(least);
                 continue;
             }
             let foot = self.foot(pair, &field, x);
+            *smallest_gap = smallest_gap.min(foot.distance);
             if foot.distance >= 0.0 {
                 continue;
             }

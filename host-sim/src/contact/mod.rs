@@ -11,7 +11,7 @@ mod bore;
 mod flank;
 mod quadrature;
 
-pub use bore::{BoreContact, BoreLaw, BorePressure};
+pub use bore::{BoreContact, BoreLaw, BorePressure, OpenEdges};
 pub use flank::{
     Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPoint, FrictionHistory, PairContribution,
 };

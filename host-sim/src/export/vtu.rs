@@ -36,6 +36,7 @@ pub struct Frame {
 
 /// Writes the drive in a state.
 pub fn write_vtu(out: &mut dyn Write, problem: &Problem, state: &State) -> io::Result<()> {
+    let state = &*problem.whole_state(state);
     let wheels = [
         Wheel::new(&problem.flexspline, &state.u, 0.0),
         Wheel::new(&problem.circular_spline, &state.v, state.output_rad),

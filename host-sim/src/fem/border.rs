@@ -8,7 +8,11 @@
 //! by block elimination: `(D - B^T A^-1 B) z = g - B^T A^-1 f`, then `x = A^-1 f - A^-1 B z`. The output angle, the mean
 //! rotation of the bore and other quantities that couple with many nodes at once enter as borders and leave A sparse.
 
-use super::cholesky::Cholesky;
+/// A factorised matrix that solves.
+pub trait Factor {
+    /// Solves in place for `count` right-hand sides, one after the other in `columns`; at most eight.
+    fn solve(&mut self, columns: &mut [f64], count: usize);
+}
 
 /// Dense columns B and corner D of a bordered matrix.
 #[derive(Debug, Clone)]
@@ -50,7 +54,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 impl BorderedSystem {
     /// Eliminates the sparse part.
-    pub fn new(factor: &mut Cholesky, border: &Border) -> Self {
+    pub fn new(factor: &mut (impl Factor + ?Sized), border: &Border) -> Self {
         let m = border.width;
         let n = border.columns.len() / m;
         let mut solved = border.columns.clone();
@@ -66,14 +70,13 @@ impl BorderedSystem {
 
     /// Solves in place, with the factor it was made with: `f` becomes x, `g` becomes z. False when the small system is singular.
     #[must_use]
-    pub fn solve(&self, factor: &mut Cholesky, f: &mut [f64], g: &mut [f64]) -> bool {
-        let m = self.border.width;
+    pub fn solve(&self, factor: &mut (impl Factor + ?Sized), f: &mut [f64], g: &mut [f64]) -> bool {
         let n = f.len();
         factor.solve(f, 1);
         for (i, gi) in g.iter_mut().enumerate() {
             *gi -= dot(&self.border.columns[i * n..(i + 1) * n], f);
         }
-        if !solve_dense(&mut self.schur.clone(), g, m) {
+        if !self.solve_border(g) {
             return false;
         }
         for (k, z) in g.iter().enumerate() {
@@ -82,6 +85,11 @@ impl BorderedSystem {
             }
         }
         true
+    }
+    /// z alone, for f = 0, in place of g.
+    #[must_use]
+    pub fn solve_border(&self, g: &mut [f64]) -> bool {
+        solve_dense(&mut self.schur.clone(), g, self.border.width)
     }
 }
 
@@ -126,7 +134,7 @@ fn solve_dense(a: &mut [f64], b: &mut [f64], n: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::Pattern;
+    use crate::fem::{Cholesky, Pattern};
 
     #[test]
     fn bordered_system_is_solved() {

@@ -8,6 +8,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 use thiserror::Error;
 
+use super::border::Factor;
 use super::pattern::Pattern;
 
 /// The matrix has a direction of no or negative stiffness.
@@ -61,9 +62,10 @@ impl Cholesky {
             .map(|_| ())
             .map_err(|_| NotPositiveDefinite)
     }
+}
 
-    /// Solves for `columns` right-hand sides stored one after the other (at most eight).
-    pub fn solve(&mut self, right_hand_sides: &mut [f64], columns: usize) {
+impl Factor for Cholesky {
+    fn solve(&mut self, right_hand_sides: &mut [f64], columns: usize) {
         assert!(columns <= 8, "the work space is sized for eight right-hand sides");
         let rows = right_hand_sides.len() / columns;
         let matrix = MatMut::from_column_major_slice_mut(right_hand_sides, rows, columns);

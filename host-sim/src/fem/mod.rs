@@ -4,6 +4,6 @@ mod border;
 mod cholesky;
 mod pattern;
 
-pub use border::{Border, BorderedSystem};
+pub use border::{Border, BorderedSystem, Factor};
 pub use cholesky::{Cholesky, NotPositiveDefinite};
 pub use pattern::{BlockPosition, ElementPositions, Pattern};

@@ -542,7 +542,8 @@ impl<'a> Run<'a> {
     ) -> Result<(Problem, State), SimulateError> {
         let problem = self.problem(to_c)?;
         let guess = resized(&state, &self.drive.at_temperature(from_c).thermal_state, &problem);
-        match Solver::new(&problem).increment(&guess, guess.generator_rad, guess.torque_n_m) {
+        let solved = Solver::new(&problem).increment(&guess, guess.generator_rad, guess.torque_n_m);
+        match solved {
             Ok((state, increment)) => {
                 self.motion = Motion::default();
                 self.pending_iterations += increment.iterations;
@@ -638,7 +639,7 @@ fn resized(state: &State, old: &ThermalState, problem: &Problem) -> State {
     let cs = new.circular_spline_scale / old.circular_spline_scale;
     guess.v.iter_mut().for_each(|x| *x *= cs);
     let seated = problem.starting_shape(state.generator_rad).v;
-    let ring = &problem.circular_spline;
+    let (_, ring) = problem.wheels();
     for (n, x) in ring.nodes.iter().enumerate() {
         if x[0].hypot(x[1]) > ring.base_radius - 1e-6 {
             guess.v[2 * n] = seated[2 * n];

@@ -1,12 +1,17 @@
 //! Quasi-static stepping of the whole drive: state, travelling-wave predictor, Newton, paths.
 
 mod error;
+mod fast;
+mod near;
 mod newton;
 mod predictor;
 mod problem;
+mod reference;
 mod state;
+mod wheels;
 
 pub use error::SolveError;
 pub use newton::{Effort, Increment, Solver};
-pub use problem::{Problem, SolverSettings};
+pub use fast::CondensedDrive;
+pub use problem::{Method, Problem, SolverSettings};
 pub use state::State;

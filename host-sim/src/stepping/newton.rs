@@ -1,29 +1,31 @@
-//! The `reference` solver: full sparse Newton on the whole mesh.
+//! Newton's method on the whole drive, the same for both solvers; only the wheels differ (see [`Wheels`]).
 //!
 //! Unknowns are the displacements of both wheels and, as a dense border, the output angle, the moment of the sleeve (a
 //! Lagrange multiplier when the sleeve is rigid) and its lateral force. One increment:
 //!
 //! predict, lay out the contact; repeat { assemble; done? factorise; solve; update } until done.
 
-use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, VecDeque};
+use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-use crate::contact::{BoreLaw, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair};
-use crate::element::{PACKED, add_tangent_and_force, linear_stiffness};
-use crate::fem::{BlockPosition, Border, BorderedSystem, Cholesky, ElementPositions, Pattern};
+use crate::contact::{BoreLaw, Configuration, FlankContact, FlankLaw, FlankPair};
+use crate::fem::{Border, BorderedSystem};
 
 use super::error::SolveError;
 use super::predictor::turn_field;
+use super::fast::{CondensedWheels, Kept};
+use super::near::{NearPairs, configuration};
 use super::problem::Problem;
+use super::reference::SparseWheels;
 use super::state::State;
+use super::wheels::Wheels;
 
 /// Pairs closer than this (mm) get a place in the sparsity pattern.
 const PATTERN_REACH: f64 = 0.04;
-/// Pairs closer than this (mm) are evaluated in every iteration of an increment.
-const CONTACT_REACH: f64 = 0.015;
-/// Stiffness (N/mm per mm) that anchors one bore node while the matrix is factorised; the border takes it out again.
-const ANCHOR: f64 = 1e5;
+/// Stiffness (N/mm per mm) that anchors one node of the flexspline while the matrix is factorised; the border takes it out
+/// again.
+pub(super) const ANCHOR: f64 = 1e5;
 /// Springs (N/mm per mm) that are tried in turn when the tangent is not positive definite.
 const GROUNDED_SPRINGS: [f64; 4] = [1e-3, 1e-1, 1e1, 1e3];
 /// Largest change of a displacement that an undamped Newton step may make, mm.
@@ -35,23 +37,30 @@ const LOADING_SOFTNESS: f64 = 1e-3;
 /// Iterations after which the next part of an increment may be twice as large.
 const EASY: usize = 10;
 
-/// How far (mm) flanks are looked for when the output is balanced.
-const CLEARANCE_REACH: f64 = 0.06;
-/// Gap (mm) below which a pair counts as touching when its layout is checked.
-const TOUCH: f64 = 1e-7;
-/// Shift (mm) of a corner on the flank up to which the integration points stay.
-const CORNER_DRIFT: f64 = 1e-4;
 /// Relative residual below which steps are taken whole: what is left is near round-off.
 const ROUND_OFF: f64 = 1e-6;
 
 /// Relative residual below which the last factor may serve again, and the gain that the last iteration must have made.
-const CHORD_BELOW: f64 = 1e-2;
+const CHORD_BELOW: f64 = 1.0;
 const CHORD_GAIN: f64 = 0.2;
+
+/// Fraction of a pitch off which a tangent of an earlier pitch still serves, and the gain that each iteration must then make.
+const RECALL_WITHIN: f64 = 0.06;
+const RECALL_GAIN: f64 = 0.3;
+/// A tangent made further from equilibrium than this (relative residual) knows the wrong contact.
+const KEEP_BELOW: f64 = 0.1;
+/// Tangents remembered.
+const TANGENTS: usize = 12;
+
+/// Number of states that the predictor interpolates in phase, how far off they may be and must be apart (pitches), and the
+/// largest weight.
+const PHASES: usize = 3;
+const PHASE_REACH: f64 = 0.06;
+const PHASES_APART: f64 = 1e-3;
+const LARGEST_WEIGHT: f64 = 6.0;
 
 /// States of steady motion that the predictor remembers: a fine sampling of one pitch.
 const REMEMBERED: usize = 48;
-
-type Layouts = BTreeMap<FlankPair, FlankLayout>;
 
 /// A converged increment.
 #[derive(Debug, Clone)]
@@ -89,47 +98,41 @@ pub struct Effort {
     pub factorisation: Duration,
     /// Triangular solves.
     pub solution: Duration,
+    /// Number of factorisations.
+    pub factorisations: usize,
 }
 
 /// Newton solver with its work space: one per thread.
 pub struct Solver<'p> {
     problem: &'p Problem,
     flanks: FlankContact<'p>,
+    wheels: Box<dyn Wheels + 'p>,
     /// Number of each circular-spline node among the free nodes of the system.
     cs_index: Vec<Option<u32>>,
-    free_nodes: usize,
-    /// Small-strain stiffness of the circular-spline elements of sector 0.
-    cs_template: Vec<[f64; PACKED]>,
-    system: Option<System>,
+    border: Border,
+    /// The border eliminated with the last factor, once there is one.
+    eliminated: Option<Rc<BorderedSystem>>,
+    /// Pitches by which the state is turned against the one that the factor was made for.
+    turned: isize,
+    /// Relative residual of the state that the factor was made for.
+    made_at: f64,
+    /// Tangents of steady motion, oldest first.
+    tangents: VecDeque<Tangent>,
     /// Factor on the penalties, below 1 only while the drive is first deformed.
     softening: f64,
     /// The last states of steady motion, oldest first.
     passed: VecDeque<State>,
+    /// Generator angle at which the motion became steady.
+    steady_since: f64,
     /// Time spent so far.
     pub effort: Effort,
 }
 
-/// The sparse system for one set of flank pairs.
-struct System {
-    pairs: BTreeMap<FlankPair, PairPositions>,
-    pattern: Pattern,
-    fs_positions: Vec<ElementPositions>,
-    bore_positions: Vec<[Option<BlockPosition>; 3]>,
-    /// Values of the circular spline, which do not change.
-    cs_values: Vec<f64>,
-    factor: Cholesky,
-    /// The border eliminated with the factor, once there is one.
-    eliminated: Option<BorderedSystem>,
-    values: Vec<f64>,
-    border: Border,
-}
-
-/// Where a pair's contribution goes.
-struct PairPositions {
-    /// Free node of each local node.
-    nodes: Vec<u32>,
-    /// Blocks of local node pairs (a, b < a) that the pattern holds.
-    blocks: Vec<(usize, usize, BlockPosition)>,
+/// A tangent of steady motion: the drive passes through it again after every pitch.
+struct Tangent {
+    generator_rad: f64,
+    kept: Kept,
+    eliminated: Rc<BorderedSystem>,
 }
 
 /// Out-of-balance forces at a configuration.
@@ -185,30 +188,25 @@ impl Residual {
 impl<'p> Solver<'p> {
     /// A solver for a problem.
     pub fn new(problem: &'p Problem) -> Self {
-        let mut next = problem.flexspline.nodes.len() as u32;
-        let cs_index = problem
-            .held
-            .iter()
-            .map(|held| {
-                (!held).then(|| {
-                    next += 1;
-                    next - 1
-                })
-            })
-            .collect();
-        let cs_template = problem.circular_spline.gauss[..problem.circular_spline.elements_per_sector]
-            .iter()
-            .map(|points| linear_stiffness(points, &problem.material))
-            .collect();
+        let cs_index = problem.free_circular_spline_nodes();
+        let wheels: Box<dyn Wheels + 'p> = match &problem.condensed {
+            Some(condensed) => Box::new(CondensedWheels::new(problem, condensed)),
+            None => Box::new(SparseWheels::new(problem, &cs_index)),
+        };
+        let border = fixed_border(problem, wheels.as_ref());
         Solver {
             problem,
             flanks: problem.flanks(),
+            wheels,
             cs_index,
-            free_nodes: next as usize,
-            cs_template,
-            system: None,
+            border,
+            eliminated: None,
+            turned: 0,
+            made_at: f64::INFINITY,
+            tangents: VecDeque::new(),
             softening: 1.0,
             passed: VecDeque::new(),
+            steady_since: 0.0,
             effort: Effort::default(),
         }
     }
@@ -300,9 +298,10 @@ impl<'p> Solver<'p> {
 
     /// State predicted for a generator angle: the wave turned, the output going on as it did before.
     ///
-    /// A drive in steady motion passes through the same state after every flexspline pitch, one tooth further. Of the last
-    /// states the one is turned that needs the smallest fraction of a pitch, whole teeth being exact. An output that carries
-    /// no load stays where it is when the generator reverses: it has the clearance to cross.
+    /// A drive in steady motion passes through the same state after every flexspline pitch, one tooth further: states that
+    /// stood nearly there, whole pitches ago, are turned and interpolated. Otherwise the last state, or one that needs a smaller fraction
+    /// of a pitch, is turned. An output that carries no load stays where it is when the generator reverses: it has the clearance to
+    /// cross.
     fn predict(&self, from: &State, generator_rad: f64, torque_n_m: f64) -> State {
         let turn = generator_rad - from.generator_rad;
         if turn == 0.0 {
@@ -313,18 +312,51 @@ impl<'p> Solver<'p> {
         let reversing = turn.signum() * from.travel < 0.0;
         let nominal = 1.0 / problem.drive.ratio();
         let pitch = problem.flexspline.pitch();
-        let fraction = |state: &State| {
-            let turns = (generator_rad - state.generator_rad) / pitch;
-            (turns - turns.round()).abs()
+        let steady = !reversing
+            && (from.output_rate / nominal - 1.0).abs() < 0.2
+            && self.passed.back().is_some_and(|last| goes_on(last, from, torque_n_m));
+        let (fs, cs) = problem.wheels();
+        if steady {
+            // What was passed in the first pitch may not have settled yet.
+            let settled = |state: &State| (state.generator_rad - self.steady_since).abs() > pitch;
+            let passed: Vec<&State> = self.passed.iter().filter(|state| settled(state)).collect();
+            let pitches = |state: &State| (generator_rad - state.generator_rad) / pitch;
+            let weights = phase_weights(&passed.iter().map(|state| pitches(state)).collect::<Vec<_>>());
+            let own = (pitches(from) - pitches(from).round()).abs();
+            if let Some(weights) = weights.filter(|w| w.nearest < 0.5 * own) {
+                let mut predicted = State {
+                    u: vec![0.0; from.u.len()],
+                    v: vec![0.0; from.v.len()],
+                    output_rad: 0.0,
+                    sleeve_moment: 0.0,
+                    lateral_force: [0.0; 2],
+                    generator_rad,
+                    torque_n_m,
+                    ..from.clone()
+                };
+                for (k, weight) in weights.states {
+                    let state = passed[k];
+                    let turn = generator_rad - state.generator_rad;
+                    let add = |sum: &mut [f64], part: &[f64]| {
+                        sum.iter_mut().zip(part).for_each(|(x, p)| *x += weight * p);
+                    };
+                    add(&mut predicted.u, &turn_field(fs, &state.u, turn));
+                    add(&mut predicted.v, &turn_field(cs, &state.v, turn - turn * nominal));
+                    predicted.output_rad += weight * (state.output_rad + turn * nominal);
+                    predicted.sleeve_moment += weight * state.sleeve_moment;
+                    let (sin, cos) = turn.sin_cos();
+                    let [x, y] = state.lateral_force;
+                    add(&mut predicted.lateral_force, &[cos * x - sin * y, sin * x + cos * y]);
+                }
+                return predicted;
+            }
+        }
+        let off = |state: &State| {
+            let pitches = (generator_rad - state.generator_rad) / pitch;
+            (pitches - pitches.round()).abs()
         };
-        let steady = !reversing && (from.output_rate / nominal - 1.0).abs() < 0.2;
-        let base = self
-            .passed
-            .iter()
-            .filter(|state| steady && state.torque_n_m == torque_n_m && state.travel == from.travel)
-            .min_by(|a, b| fraction(a).total_cmp(&fraction(b)))
-            .filter(|state| fraction(state) < 0.5 * fraction(from))
-            .unwrap_or(from);
+        let nearest = self.passed.iter().filter(|_| steady).min_by(|a, b| off(a).total_cmp(&off(b)));
+        let base = nearest.filter(|state| off(state) < 0.5 * off(from)).unwrap_or(from);
         let turn = generator_rad - base.generator_rad;
         let output_turn = match (idle, reversing) {
             (true, true) => 0.0,
@@ -332,18 +364,17 @@ impl<'p> Solver<'p> {
             _ if std::ptr::eq(base, from) => from.output_rate * turn,
             _ => turn * nominal,
         };
+        let (sin, cos) = turn.sin_cos();
+        let [x, y] = base.lateral_force;
         State {
-            u: turn_field(&problem.flexspline, &base.u, turn),
-            v: turn_field(&problem.circular_spline, &base.v, turn - output_turn),
+            u: turn_field(fs, &base.u, turn),
+            v: turn_field(cs, &base.v, turn - output_turn),
             output_rad: base.output_rad + output_turn,
+            sleeve_moment: base.sleeve_moment,
+            lateral_force: [cos * x - sin * y, sin * x + cos * y],
             generator_rad,
             torque_n_m,
-            sleeve_moment: base.sleeve_moment,
-            drag_anchor_rad: from.drag_anchor_rad,
-            lateral_force: base.lateral_force,
-            friction: from.friction.clone(),
-            output_rate: from.output_rate,
-            travel: from.travel,
+            ..from.clone()
         }
     }
 
@@ -354,8 +385,13 @@ impl<'p> Solver<'p> {
         let fits = |old: &State| old.torque_n_m == state.torque_n_m && old.travel == state.travel;
         if !steady || self.passed.front().is_some_and(|old| !fits(old)) {
             self.passed.clear();
+            self.tangents.clear();
         }
         if steady {
+            self.keep_tangent(state.generator_rad);
+            if self.passed.is_empty() {
+                self.steady_since = state.generator_rad;
+            }
             if self.passed.len() == REMEMBERED {
                 self.passed.pop_front();
             }
@@ -368,13 +404,14 @@ impl<'p> Solver<'p> {
         let failed =
             |history: Vec<f64>, reason| SolveError::NotConverged { generator_rad, torque_n_m, reason, history };
         let mut state = self.predict(from, generator_rad, torque_n_m);
-        let clock = Instant::now();
-        self.balance_output(&mut state, torque_n_m);
-        self.effort.contact += clock.elapsed();
-        let mut layouts = Layouts::new();
-        let mut residual = self.assemble(&state, from, torque_n_m, &mut layouts);
+        let mut near = NearPairs::default();
+        self.balance_output(&mut state, from, torque_n_m, &mut near);
+        let mut residual = self.assemble(&mut state, from, torque_n_m, &mut near);
         let mut history = Vec::new();
         let mut last_length = 1.0;
+        let mut chords: Vec<Step> = Vec::new();
+        let steady = self.softening == 1.0 && self.passed.back().is_some_and(|last| goes_on(last, from, torque_n_m));
+        let mut recalled = steady && generator_rad != from.generator_rad && self.recall(generator_rad);
         while history.len() <= settings.max_iterations {
             let relative = residual.relative();
             history.push(relative);
@@ -383,258 +420,134 @@ impl<'p> Solver<'p> {
             }
             if relative <= settings.tolerance {
                 // The contact was laid out for the predicted state; where the corner of a space ended elsewhere, again.
-                if self.layouts_fit(&state, &layouts) {
+                if near.layouts_fit(&self.flanks, configuration(&state)) {
                     let Some(compliance) = self.compliance(&residual) else {
                         return Err(failed(history, "the stiffness matrix is not positive definite"));
                     };
                     let increment = self.report(&residual, compliance, history.len() - 1);
-                    self.finish(&mut state, from, &layouts);
+                    self.wheels.complete(&mut state);
+                    self.finish(&mut state, from, &near);
                     if generator_rad != from.generator_rad {
                         self.remember(&state);
                     }
                     return Ok((state, increment));
                 }
-                layouts.clear();
-                residual = self.assemble(&state, from, torque_n_m, &mut layouts);
+                near.clear();
+                residual = self.assemble(&mut state, from, torque_n_m, &mut near);
                 continue;
             }
             if residual.free_output {
-                self.balance_output(&mut state, torque_n_m);
-                residual = self.assemble(&state, from, torque_n_m, &mut layouts);
+                self.balance_output(&mut state, from, torque_n_m, &mut near);
+                residual = self.assemble(&mut state, from, torque_n_m, &mut near);
                 continue;
             }
             // Near the end the last factor still points the right way, and a step with it costs a tenth.
-            let chord = relative < CHORD_BELOW && last_gain(&history) < CHORD_GAIN;
-            let Some(step) = self.solve(&residual, chord) else {
+            recalled &= history.len() == 1 || last_gain(&history) < RECALL_GAIN;
+            let chord = recalled || (relative < CHORD_BELOW && last_gain(&history) < CHORD_GAIN);
+            let Some(mut step) = self.solve(&residual, chord) else {
                 return Err(failed(history, "the stiffness matrix is not positive definite"));
             };
+            if chord {
+                improve(&mut step, &chords);
+            } else {
+                chords.clear();
+                self.made_at = relative;
+            }
             // The force along the step falls from `before` to nothing at the end of a perfect step; far beyond, halve it.
             let before = step.work(&residual);
             let mut length = (LARGEST_STEP / step.largest()).min(1.0).min(8.0 * last_length);
+            near.advance(length * self.motion(&step));
+            let mut mistaken = false;
             for trial in 0.. {
-                let candidate = step.applied_to(&state, length);
-                residual = self.assemble(&candidate, from, torque_n_m, &mut layouts);
+                let mut candidate = step.applied_to(&state, length);
+                residual = self.assemble(&mut candidate, from, torque_n_m, &mut near);
                 let overshoot = before > 0.0 && step.work(&residual) < -0.9 * before;
                 if !overshoot || relative < ROUND_OFF || trial == 10 {
                     state = candidate;
                     break;
                 }
+                if recalled {
+                    mistaken = true;
+                    break;
+                }
                 length *= 0.5;
+                near.advance(length * self.motion(&step));
+            }
+            if mistaken {
+                recalled = false;
+                near.advance(length * self.motion(&step));
+                residual = self.assemble(&mut state, from, torque_n_m, &mut near);
+                continue;
             }
             last_length = length;
+            // A shortened step says nothing about the tangent.
+            if length == 1.0 {
+                chords.push(step);
+            } else {
+                chords.clear();
+            }
         }
         Err(failed(history, "the iterations ran out"))
     }
 
-    /// Turns the output to where load, drag and flanks balance while the wheels keep their shape. The torque falls as the
-    /// output turns forward, so the balance is bracketed and then found by Newton safeguarded with bisection.
-    fn balance_output(&self, state: &mut State, torque_n_m: f64) {
-        let load = self.problem.per_width(torque_n_m);
-        let start = configuration(state);
-        let layouts: Vec<_> = self
-            .flanks
-            .near_pairs(start, CLEARANCE_REACH)
-            .into_iter()
-            .map(|pair| (pair, self.flanks.layout(pair, start)))
-            .collect();
-        let law = FlankLaw { friction: 0.0, ..self.flank_law() };
-        let balance = |output_rad: f64| -> (f64, f64) {
-            let at = Configuration { output_rad, ..start };
-            let (drag, drag_slope) = self.problem.drag_torque(output_rad - state.drag_anchor_rad);
-            let (mut torque, mut slope) = (load + drag, -drag_slope);
-            for (pair, layout) in &layouts {
-                if let Some(contact) = self.flanks.evaluate(*pair, at, law, &layout.points) {
-                    torque += contact.torque;
-                    slope -= contact.corner;
-                }
-            }
-            (torque, slope)
-        };
-        let tolerance = 1e-3 * (load.abs() + self.problem.drag);
-        let (mut torque, mut slope) = balance(state.output_rad);
-        let mut output_rad = state.output_rad;
-        // `behind` has a positive torque, `ahead` a negative one.
-        let (mut behind, mut ahead) = (None::<f64>, None::<f64>);
-        let mut stride = 1e-6_f64;
-        for _ in 0..60 {
-            if torque.abs() <= tolerance {
-                break;
-            }
-            if torque > 0.0 {
-                behind = Some(output_rad);
-            } else {
-                ahead = Some(output_rad);
-            }
-            let newton = if slope < 0.0 { output_rad - torque / slope } else { f64::NAN };
-            output_rad = match (behind, ahead) {
-                (Some(low), Some(high)) => {
-                    if newton > low && newton < high {
-                        newton
-                    } else {
-                        0.5 * (low + high)
-                    }
-                }
-                _ => {
-                    stride *= 4.0;
-                    let stride = stride.copysign(torque);
-                    if (newton - output_rad).abs() < stride.abs() { newton } else { output_rad + stride }
-                }
-            };
-            if (output_rad - state.output_rad).abs() > CLEARANCE_REACH / self.flanks.space.base_radius {
-                return;
-            }
-            (torque, slope) = balance(output_rad);
-        }
-        state.output_rad = output_rad;
+    /// Bound on the motion of flanks against one another in a step, mm. Nodal displacements bound those between them to 1.25
+    /// (the Lebesgue constant of a quadratic).
+    fn motion(&self, step: &Step) -> f64 {
+        let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let nodes = largest(&step.u) + largest(&step.v);
+        1.25 * std::f64::consts::SQRT_2 * nodes + self.problem.drive.circular_spline.root_radius_mm * step.border[OUTPUT].abs()
     }
 
-    /// Assembles the out-of-balance forces and, into the system, the tangent.
-    fn assemble(&mut self, state: &State, from: &State, torque_n_m: f64, layouts: &mut Layouts) -> Residual {
+    /// Turns the output to where load, drag and flanks balance while the wheels keep their shape.
+    fn balance_output(&mut self, state: &mut State, from: &State, torque_n_m: f64, near: &mut NearPairs) {
         let clock = Instant::now();
-        let at = configuration(state);
-        for pair in self.flanks.near_pairs(at, CONTACT_REACH) {
-            if let Entry::Vacant(place) = layouts.entry(pair) {
-                let mut layout = self.flanks.layout(pair, at);
-                if self.problem.flank_law.friction > 0.0 {
-                    let empty = Vec::new();
-                    let history = from.friction.get(&(pair.tooth, pair.side)).unwrap_or(&empty);
-                    self.flanks.start_friction(pair, configuration(from), history, &mut layout.points);
-                }
-                place.insert(layout);
-            }
+        let load = self.problem.per_width(torque_n_m);
+        let anchor_rad = state.drag_anchor_rad;
+        let others = |output_rad: f64| {
+            let (drag, slope) = self.problem.drag_torque(output_rad - anchor_rad);
+            (load + drag, -slope)
+        };
+        if near.must_search() {
+            self.wheels.complete(state);
+            near.search(&self.flanks, configuration(state), from, self.problem.flank_law.friction > 0.0);
+        }
+        let law = FlankLaw { friction: 0.0, ..self.flank_law() };
+        let tolerance = 1e-3 * (load.abs() + self.problem.drag);
+        if let Some(output_rad) = near.balance(&self.flanks, state, law, tolerance, others) {
+            near.advance((output_rad - state.output_rad).abs() * self.problem.drive.circular_spline.root_radius_mm);
+            state.output_rad = output_rad;
         }
         self.effort.contact += clock.elapsed();
-        self.prepare_system(at, layouts);
-        let mut system = self.system.take().expect("the system was just prepared");
-        let mut residual = Residual::zero(2 * self.free_nodes);
-        self.assemble_wheels(state, &mut system, &mut residual);
+    }
+
+    /// Assembles the out-of-balance forces and the tangent.
+    fn assemble(&mut self, state: &mut State, from: &State, torque_n_m: f64, near: &mut NearPairs) -> Residual {
         let clock = Instant::now();
-        self.assemble_contact(state, layouts, &mut system, &mut residual);
-        self.assemble_holding(state, torque_n_m, &mut system, &mut residual);
+        if near.must_search() {
+            self.wheels.complete(state);
+            near.search(&self.flanks, configuration(state), from, self.problem.flank_law.friction > 0.0);
+        }
         self.effort.contact += clock.elapsed();
-        self.system = Some(system);
+        self.make_room(configuration(state), near);
+        let clock = Instant::now();
+        let mut residual = Residual::zero(self.wheels.unknowns());
+        self.wheels.assemble(state, &mut residual.force);
+        self.effort.assembly += clock.elapsed();
+        let clock = Instant::now();
+        self.assemble_contact(state, near, &mut residual);
+        self.assemble_holding(state, torque_n_m, &mut residual);
+        self.effort.contact += clock.elapsed();
         residual
     }
 
-    /// Makes sure that the sparsity pattern has room for these pairs.
-    fn prepare_system(&mut self, at: Configuration, layouts: &Layouts) {
-        if let Some(system) = &self.system
-            && layouts.keys().all(|pair| system.pairs.contains_key(pair))
-        {
-            return;
-        }
+    /// Makes sure that the tangent has room for these pairs.
+    fn make_room(&mut self, at: Configuration, near: &NearPairs) {
         let clock = Instant::now();
-        let mut pairs: Vec<FlankPair> = self.flanks.near_pairs(at, PATTERN_REACH);
-        pairs.extend(layouts.keys());
-        pairs.sort_unstable();
-        pairs.dedup();
-        self.system = Some(self.analyse(&pairs));
+        let pairs: Vec<FlankPair> = near.pairs().collect();
+        if self.wheels.prepare(&pairs, &|| self.flanks.near_pairs(at, PATTERN_REACH)) {
+            self.eliminated = None;
+        }
         self.effort.analysis += clock.elapsed();
-    }
-
-    fn analyse(&self, pairs: &[FlankPair]) -> System {
-        let problem = self.problem;
-        let cs_nodes: Vec<[Option<u32>; 8]> =
-            problem.circular_spline.elements.iter().map(|element| element.map(|n| self.cs_index[n as usize])).collect();
-        let cs_groups: Vec<Vec<u32>> = cs_nodes.iter().map(|e| e.iter().flatten().copied().collect()).collect();
-        let pair_nodes: Vec<(Vec<u32>, Vec<u32>)> = pairs
-            .iter()
-            .map(|&pair| {
-                let fs = self.flanks.fs_nodes(pair).map(|n| n as u32).collect();
-                let cs = self.flanks.cs_nodes(pair).map(|n| self.cs_index[n].expect("flank nodes are free")).collect();
-                (fs, cs)
-            })
-            .collect();
-        let groups =
-            problem.flexspline.elements.iter().map(|e| e.as_slice()).chain(cs_groups.iter().map(Vec::as_slice));
-        let across = pair_nodes.iter().map(|(fs, cs)| (fs.as_slice(), cs.as_slice()));
-        let pattern = Pattern::new(self.free_nodes, groups, across);
-        let factor = Cholesky::new(&pattern);
-
-        let mut cs_values = vec![0.0; pattern.stored()];
-        for (nodes, points) in cs_nodes.iter().zip(&problem.circular_spline.gauss) {
-            pattern.element(nodes).scatter(&linear_stiffness(points, &problem.material), &mut cs_values);
-        }
-        let fs_positions = problem.flexspline.elements.iter().map(|e| pattern.element(&e.map(Some))).collect();
-        let bore_positions = problem
-            .bore
-            .edges
-            .iter()
-            .map(|[a, m, b]| [pattern.block(*m, *a), pattern.block(*b, *a), pattern.block(*b, *m)])
-            .collect();
-        let pairs = pairs
-            .iter()
-            .zip(pair_nodes)
-            .map(|(&pair, (fs, cs))| {
-                let nodes: Vec<u32> = fs.into_iter().chain(cs).collect();
-                let blocks = (0..nodes.len())
-                    .flat_map(|a| (0..a).map(move |b| (a, b)))
-                    .filter_map(|(a, b)| Some((a, b, pattern.block(nodes[a], nodes[b])?)))
-                    .collect();
-                (pair, PairPositions { nodes, blocks })
-            })
-            .collect();
-        let unknowns = pattern.unknowns();
-        let width = if problem.lateral_stiffness > 0.0 { BORDERS } else { LATERAL };
-        let mut border = Border::zeros(unknowns, width);
-        border.column_mut(SLEEVE)[..problem.rotation_weights.len()].copy_from_slice(&problem.rotation_weights);
-        border.column_mut(ANCHORED)[self.anchored_unknown()] = 1.0;
-        if width == BORDERS {
-            for (i, w) in problem.mean_weights.iter().enumerate() {
-                border.column_mut(LATERAL)[i] = *w;
-                if i % 2 == 0 {
-                    border.column_mut(LATERAL + 1)[i + 1] = *w;
-                }
-            }
-        }
-        let values = vec![0.0; pattern.stored()];
-        System { pairs, pattern, fs_positions, bore_positions, cs_values, factor, eliminated: None, values, border }
-    }
-
-    /// The tangential unknown of a bore node at angle ~0.
-    fn anchored_unknown(&self) -> usize {
-        2 * self.problem.bore.edges[0][1] as usize + 1
-    }
-
-    fn assemble_wheels(&mut self, state: &State, system: &mut System, residual: &mut Residual) {
-        let clock = Instant::now();
-        let problem = self.problem;
-        system.values.copy_from_slice(&system.cs_values);
-        let fs = &problem.flexspline;
-        for ((element, points), positions) in fs.elements.iter().zip(&fs.gauss).zip(&system.fs_positions) {
-            let mut local = [0.0; 16];
-            for (a, &n) in element.iter().enumerate() {
-                local[2 * a] = state.u[2 * n as usize];
-                local[2 * a + 1] = state.u[2 * n as usize + 1];
-            }
-            let (mut stiffness, mut force) = ([0.0; PACKED], [0.0; 16]);
-            add_tangent_and_force(points, &problem.material, &local, &mut stiffness, &mut force);
-            positions.scatter(&stiffness, &mut system.values);
-            for (a, &n) in element.iter().enumerate() {
-                residual.force[2 * n as usize] -= force[2 * a];
-                residual.force[2 * n as usize + 1] -= force[2 * a + 1];
-            }
-        }
-        let cs = &problem.circular_spline;
-        for (e, element) in cs.elements.iter().enumerate() {
-            let (sin, cos) = cs.sector_angle(e / cs.elements_per_sector).sin_cos();
-            let stiffness = &self.cs_template[e % cs.elements_per_sector];
-            let mut local = [0.0; 16];
-            for (a, &n) in element.iter().enumerate() {
-                let (x, y) = (state.v[2 * n as usize], state.v[2 * n as usize + 1]);
-                local[2 * a] = cos * x + sin * y;
-                local[2 * a + 1] = cos * y - sin * x;
-            }
-            let force = packed_times(stiffness, &local);
-            for (a, &n) in element.iter().enumerate() {
-                if let Some(free) = self.cs_index[n as usize] {
-                    let k = 2 * free as usize;
-                    residual.force[k] -= cos * force[2 * a] - sin * force[2 * a + 1];
-                    residual.force[k + 1] -= sin * force[2 * a] + cos * force[2 * a + 1];
-                }
-            }
-        }
-        self.effort.assembly += clock.elapsed();
     }
 
     fn bore_law(&self) -> BoreLaw {
@@ -650,81 +563,53 @@ impl<'p> Solver<'p> {
         }
     }
 
-    fn assemble_contact(&self, state: &State, layouts: &Layouts, system: &mut System, residual: &mut Residual) {
+    fn assemble_contact(&mut self, state: &State, near: &mut NearPairs, residual: &mut Residual) {
         let problem = self.problem;
-        system.border.column_mut(OUTPUT).fill(0.0);
-        let (values, pattern, bore_positions) = (&mut system.values, &system.pattern, &system.bore_positions);
-        problem.bore.evaluate(self.bore_law(), &problem.outline, state.generator_rad, &state.u, |contact| {
-            let nodes = problem.bore.edges[contact.edge];
-            for (a, &n) in nodes.iter().enumerate() {
+        let (bore_law, flank_law) = (self.bore_law(), self.flank_law());
+        let wheels = self.wheels.as_mut();
+        problem.bore.evaluate_near(bore_law, &problem.outline, state.generator_rad, &state.u, &mut near.bore, |contact| {
+            for (a, &n) in problem.bore.edges[contact.edge].iter().enumerate() {
                 for k in 0..2 {
                     let f = contact.force[2 * a + k];
                     residual.force[2 * n as usize + k] += f;
                     residual.scale = residual.scale.max(f.abs());
                 }
-                let row_x = a * (2 * a + 1);
-                let row_y = row_x + 2 * a + 1;
-                let [xx, yy] = pattern.diagonal(n).map(|p| p as usize);
-                values[xx] += contact.stiffness[row_x + 2 * a];
-                values[xx + 1] += contact.stiffness[row_y + 2 * a];
-                values[yy] += contact.stiffness[row_y + 2 * a + 1];
-                for b in 0..a {
-                    let p = bore_positions[contact.edge][a * (a - 1) / 2 + b].expect("bore nodes share an element");
-                    let (base, row, column) = (p.base as usize, p.row as usize, p.column as usize);
-                    values[base] += contact.stiffness[row_x + 2 * b];
-                    values[base + column] += contact.stiffness[row_x + 2 * b + 1];
-                    values[base + row] += contact.stiffness[row_y + 2 * b];
-                    values[base + row + column] += contact.stiffness[row_y + 2 * b + 1];
-                }
             }
+            wheels.add_bore(contact);
             residual.generator_moment += contact.moment;
             residual.generator_contacts += 1;
             residual.peak[1] = residual.peak[1].max(contact.peak);
         });
         let at = configuration(state);
+        let column = self.border.column_mut(OUTPUT);
+        column.fill(0.0);
         let mut corner = 0.0;
-        for (&pair, layout) in layouts {
-            let Some(contact) = self.flanks.evaluate(pair, at, self.flank_law(), &layout.points) else {
-                continue;
-            };
-            let positions = &system.pairs[&pair];
-            let n = contact.force.len();
-            let column = system.border.column_mut(OUTPUT);
-            for (a, &node) in positions.nodes.iter().enumerate() {
+        near.evaluate(&self.flanks, at, flank_law, |pair, contact| {
+            let cs_node = |n: usize| self.cs_index[n].expect("flank nodes are free") as usize;
+            let nodes = self.flanks.fs_nodes(pair).chain(self.flanks.cs_nodes(pair).map(cs_node));
+            for (a, node) in nodes.enumerate() {
                 for k in 0..2 {
                     let i = 2 * a + k;
-                    residual.force[2 * node as usize + k] += contact.force[i];
+                    residual.force[2 * node + k] += contact.force[i];
                     residual.scale = residual.scale.max(contact.force[i].abs());
-                    column[2 * node as usize + k] += contact.border[i];
-                }
-                let [xx, yy] = system.pattern.diagonal(node).map(|p| p as usize);
-                system.values[xx] += contact.stiffness[2 * a * n + 2 * a];
-                system.values[xx + 1] += contact.stiffness[(2 * a + 1) * n + 2 * a];
-                system.values[yy] += contact.stiffness[(2 * a + 1) * n + 2 * a + 1];
-            }
-            for &(a, b, p) in &positions.blocks {
-                for i in 0..2 {
-                    for j in 0..2 {
-                        let position = p.base as usize + i * p.row as usize + j * p.column as usize;
-                        system.values[position] += contact.stiffness[(2 * a + i) * n + 2 * b + j];
-                    }
+                    column[2 * node + k] += contact.border[i];
                 }
             }
+            wheels.add_flank(pair, contact);
             corner += contact.corner;
             residual.flank_torque += contact.torque;
             residual.torque_scale += contact.torque.abs();
             residual.flank_contacts += 1;
             residual.peak[0] = residual.peak[0].max(contact.peak);
-        }
-        let width = system.border.width;
-        system.border.corner.fill(0.0);
-        system.border.corner[OUTPUT * width + OUTPUT] = corner;
+        });
+        self.border.corner.fill(0.0);
+        self.border.corner[0] = corner;
     }
 
     /// Load and drag on the output, sleeve on the bore, and the anchor.
-    fn assemble_holding(&self, state: &State, torque_n_m: f64, system: &mut System, residual: &mut Residual) {
+    fn assemble_holding(&mut self, state: &State, torque_n_m: f64, residual: &mut Residual) {
         let problem = self.problem;
-        let width = system.border.width;
+        let width = self.border.width;
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let load = problem.per_width(torque_n_m);
         let (drag, drag_stiffness) = problem.drag_torque(state.output_rad - state.drag_anchor_rad);
@@ -732,7 +617,7 @@ impl<'p> Solver<'p> {
         residual.border[OUTPUT] = load + residual.flank_torque + residual.drag_torque;
         residual.torque_scale += load.abs() + problem.drag;
         residual.free_output = residual.flank_contacts == 0 && drag_stiffness == 0.0;
-        let corner = &mut system.border.corner;
+        let corner = &mut self.border.corner;
         corner[OUTPUT * width + OUTPUT] += drag_stiffness;
 
         for (f, w) in residual.force.iter_mut().zip(&problem.rotation_weights) {
@@ -741,9 +626,6 @@ impl<'p> Solver<'p> {
         let rotation = dot(&problem.rotation_weights, &state.u);
         residual.border[SLEEVE] = -(rotation - problem.sleeve_compliance * state.sleeve_moment);
         corner[SLEEVE * width + SLEEVE] = -problem.sleeve_compliance;
-
-        let anchored = self.anchored_unknown();
-        system.values[system.pattern.column_starts[anchored] as usize] += ANCHOR;
         corner[ANCHORED * width + ANCHORED] = 1.0 / ANCHOR;
 
         if width == BORDERS {
@@ -766,41 +648,34 @@ impl<'p> Solver<'p> {
     ///
     /// With `chord` the last tangent serves again.
     fn solve(&mut self, residual: &Residual, chord: bool) -> Option<Step> {
-        let system = self.system.as_mut()?;
-        if !chord || system.eliminated.is_none() {
+        if !chord || self.eliminated.is_none() {
             let clock = Instant::now();
-            system.eliminated = None;
-            let mut definite = system.factor.factorise(&system.pattern, &system.values).is_ok();
+            self.eliminated = None;
             // Far from equilibrium the rim may resist no sliding along the generator; a grounded spring at every node then
             // shortens the step and leaves its direction downhill.
-            for spring in GROUNDED_SPRINGS {
-                if definite {
-                    break;
-                }
-                for &start in &system.pattern.column_starts[..system.pattern.unknowns()] {
-                    system.values[start as usize] += spring;
-                }
-                definite = system.factor.factorise(&system.pattern, &system.values).is_ok();
-            }
+            let definite = std::iter::once(0.0).chain(GROUNDED_SPRINGS).any(|spring| self.wheels.factorise(spring));
             self.effort.factorisation += clock.elapsed();
+            self.effort.factorisations += 1;
             if !definite {
                 return None;
             }
             let clock = Instant::now();
-            system.eliminated = Some(BorderedSystem::new(&mut system.factor, &system.border));
+            self.eliminated = Some(Rc::new(BorderedSystem::new(self.wheels.as_mut(), &self.border)));
+            self.turned = 0;
             self.effort.solution += clock.elapsed();
         }
         let clock = Instant::now();
         let mut free = residual.force.clone();
         let mut border = residual.border;
-        let width = system.border.width;
-        let eliminated = system.eliminated.as_ref()?;
-        let solved = eliminated.solve(&mut system.factor, &mut free, &mut border[..width]);
+        self.turn(&mut free, &mut border, -self.turned);
+        let solved = self.eliminated.as_ref()?.solve(self.wheels.as_mut(), &mut free, &mut border[..self.border.width]);
+        self.turn(&mut free, &mut border, self.turned);
         self.effort.solution += clock.elapsed();
         if !solved {
             return None;
         }
-        let fs = 2 * self.problem.flexspline.nodes.len();
+        let (fs, _) = self.problem.wheels();
+        let u = free[..2 * fs.nodes.len()].to_vec();
         let mut v = vec![0.0; 2 * self.cs_index.len()];
         for (n, index) in self.cs_index.iter().enumerate() {
             if let Some(free_node) = index {
@@ -808,41 +683,62 @@ impl<'p> Solver<'p> {
                 v[2 * n + 1] = free[2 * *free_node as usize + 1];
             }
         }
-        let u = free[..fs].to_vec();
         Some(Step { free, u, v, border })
+    }
+
+    /// Turns forces or displacements by so many pitches.
+    fn turn(&self, free: &mut [f64], border: &mut [f64; BORDERS], pitches: isize) {
+        if pitches != 0 {
+            self.wheels.turn(free, pitches);
+            let (sin, cos) = (pitches as f64 * self.problem.flexspline.pitch()).sin_cos();
+            let [x, y] = [border[LATERAL], border[LATERAL + 1]];
+            (border[LATERAL], border[LATERAL + 1]) = (cos * x - sin * y, sin * x + cos * y);
+        }
+    }
+
+    /// Takes up a tangent that was passed whole pitches ago, or nearly; whether there is one.
+    fn recall(&mut self, generator_rad: f64) -> bool {
+        let pitch = self.problem.flexspline.pitch();
+        let pitches = |tangent: &Tangent| (generator_rad - tangent.generator_rad) / pitch;
+        let off = |tangent: &Tangent| (pitches(tangent) - pitches(tangent).round()).abs();
+        let Some(tangent) = self.tangents.iter().min_by(|a, b| off(a).total_cmp(&off(b))) else {
+            return false;
+        };
+        if off(tangent) > RECALL_WITHIN {
+            return false;
+        }
+        self.turned = pitches(tangent).round() as isize;
+        self.wheels.recall(&tangent.kept, self.turned);
+        self.eliminated = Some(tangent.eliminated.clone());
+        true
+    }
+
+    /// Keeps the tangent just made for the next pitches.
+    fn keep_tangent(&mut self, generator_rad: f64) {
+        if self.made_at > KEEP_BELOW {
+            return;
+        }
+        if let (0, Some(kept), Some(eliminated)) = (self.turned, self.wheels.keep(), &self.eliminated) {
+            if self.tangents.len() == TANGENTS {
+                self.tangents.pop_front();
+            }
+            self.tangents.push_back(Tangent { generator_rad, kept, eliminated: eliminated.clone() });
+        }
     }
 
     /// Turn of the output for a unit torque on it (rad mm / N mm), by the last tangent.
     fn compliance(&mut self, residual: &Residual) -> Option<f64> {
-        if self.system.as_ref()?.eliminated.is_none() {
+        if self.eliminated.is_none() {
             self.solve(residual, false)?;
         }
-        let system = self.system.as_mut()?;
-        let mut free = vec![0.0; residual.force.len()];
         let mut border = [0.0; BORDERS];
         border[OUTPUT] = 1.0;
-        let width = system.border.width;
-        let solved = system.eliminated.as_ref()?.solve(&mut system.factor, &mut free, &mut border[..width]);
+        let solved = self.eliminated.as_ref()?.solve_border(&mut border[..self.border.width]);
         solved.then_some(border[OUTPUT])
     }
 
-    /// Whether the corners of the spaces still face the places they were laid out for.
-    fn layouts_fit(&self, state: &State, layouts: &Layouts) -> bool {
-        let at = configuration(state);
-        layouts.iter().filter(|(pair, _)| self.flanks.smallest_gap(**pair, at) < TOUCH).all(|(pair, layout)| {
-            match (layout.corner, self.flanks.corner(*pair, at)) {
-                (Some(a), Some(b)) => (a - b).abs() < CORNER_DRIFT,
-                (None, None) => true,
-                (Some(r), None) | (None, Some(r)) => {
-                    (r - self.flanks.tooth.start_radius).abs().min((r - self.flanks.tooth.junction_radius).abs())
-                        < CORNER_DRIFT
-                }
-            }
-        })
-    }
-
     /// Carries the history over the end of an increment.
-    fn finish(&self, state: &mut State, from: &State, layouts: &Layouts) {
+    fn finish(&self, state: &mut State, from: &State, near: &NearPairs) {
         let problem = self.problem;
         let reach = problem.drag / problem.drag_stiffness;
         let stretched = state.output_rad - state.drag_anchor_rad;
@@ -854,15 +750,7 @@ impl<'p> Solver<'p> {
             state.travel = turn.signum();
         }
         if problem.flank_law.friction > 0.0 {
-            let at = configuration(state);
-            state.friction = layouts
-                .iter()
-                .map(|(&pair, layout)| {
-                    let history = self.flanks.friction_history(pair, at, problem.flank_law, &layout.points);
-                    ((pair.tooth, pair.side), history)
-                })
-                .filter(|(_, history)| history.iter().any(|(_, t)| *t != 0.0))
-                .collect();
+            state.friction = near.friction(&self.flanks, configuration(state), problem.flank_law);
         }
     }
 
@@ -883,24 +771,75 @@ impl<'p> Solver<'p> {
     }
 }
 
-fn configuration(state: &State) -> Configuration<'_> {
-    Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad }
+/// The border of this drive; the column of the output angle and the corner change with the contact.
+fn fixed_border(problem: &Problem, wheels: &dyn Wheels) -> Border {
+    let width = if problem.lateral_stiffness > 0.0 { BORDERS } else { LATERAL };
+    let mut border = Border::zeros(wheels.unknowns(), width);
+    border.column_mut(SLEEVE)[..problem.rotation_weights.len()].copy_from_slice(&problem.rotation_weights);
+    for (unknown, weight) in wheels.anchor() {
+        border.column_mut(ANCHORED)[unknown] = weight;
+    }
+    if width == BORDERS {
+        for (i, w) in problem.mean_weights.iter().enumerate().step_by(2) {
+            border.column_mut(LATERAL)[i] = *w;
+            border.column_mut(LATERAL + 1)[i + 1] = *w;
+        }
+    }
+    border
 }
 
-/// Product of a packed symmetric 16 x 16 matrix with a vector.
-fn packed_times(packed: &[f64; PACKED], x: &[f64; 16]) -> [f64; 16] {
-    let mut y = [0.0; 16];
-    let mut k = 0;
-    for i in 0..16 {
-        for j in 0..i {
-            y[i] += packed[k] * x[j];
-            y[j] += packed[k] * x[i];
-            k += 1;
+/// States and their weights, and how far (pitches) the nearest of them is.
+struct PhaseWeights {
+    states: Vec<(usize, f64)>,
+    nearest: f64,
+}
+
+/// Interpolates (or goes on from) the few states whose distance in pitches is nearest to a whole number; the latest of those
+/// that coincide.
+fn phase_weights(pitches: &[f64]) -> Option<PhaseWeights> {
+    let off = |k: usize| pitches[k] - pitches[k].round();
+    let mut order: Vec<usize> = (0..pitches.len()).collect();
+    order.sort_by(|a, b| off(*a).abs().total_cmp(&off(*b).abs()).then(b.cmp(a)));
+    let mut chosen: Vec<usize> = Vec::new();
+    for k in order {
+        let apart = chosen.iter().all(|c| (off(*c) - off(k)).abs() > PHASES_APART);
+        if apart && off(k).abs() < PHASE_REACH && chosen.len() < PHASES {
+            chosen.push(k);
         }
-        y[i] += packed[k] * x[i];
-        k += 1;
     }
-    y
+    let nearest = off(*chosen.first()?).abs();
+    let weight = |k: usize| -> f64 {
+        chosen.iter().filter(|c| **c != k).map(|c| -off(*c) / (off(k) - off(*c))).product()
+    };
+    let mut states: Vec<(usize, f64)> = chosen.iter().map(|k| (*k, weight(*k))).collect();
+    // Going on too far from states too close together magnifies what they have not settled.
+    if states.iter().any(|(_, weight)| weight.abs() > LARGEST_WEIGHT) {
+        states = vec![(chosen[0], 1.0)];
+    }
+    Some(PhaseWeights { states, nearest })
+}
+
+/// Whether the motion under a load goes on as it was.
+fn goes_on(last: &State, from: &State, torque_n_m: f64) -> bool {
+    last.torque_n_m == torque_n_m && from.torque_n_m == torque_n_m && last.travel == from.travel
+}
+
+/// Broyden's update of an old tangent by the steps that were taken with it (Kelley, Iterative Methods for Linear and Nonlinear
+/// Equations, 1995, section 7.3): `step` is the old tangent's.
+fn improve(step: &mut Step, taken: &[Step]) {
+    for pair in taken.windows(2) {
+        let part = pair[0].dot(step) / pair[0].dot(&pair[0]);
+        step.add(part, &pair[1]);
+    }
+    if let Some(last) = taken.last() {
+        let part = last.dot(step) / last.dot(last);
+        // Beyond this the secant says more about the contact than about the tangent.
+        if part.abs() < 0.5 {
+            let more = part / (1.0 - part);
+            let own = Step { free: step.free.clone(), u: step.u.clone(), v: step.v.clone(), border: step.border };
+            step.add(more, &own);
+        }
+    }
 }
 
 /// How far the last iteration brought the residual down.
@@ -924,6 +863,21 @@ impl Step {
     fn work(&self, residual: &Residual) -> f64 {
         residual.force.iter().zip(&self.free).map(|(f, d)| f * d).sum::<f64>()
             + residual.border[OUTPUT] * self.border[OUTPUT]
+    }
+
+    /// Scalar product of displacements (mm²), the turn of the output counted at a radius.
+    fn dot(&self, other: &Step) -> f64 {
+        const RADIUS: f64 = 50.0;
+        let nodes = self.free.iter().zip(&other.free).map(|(a, b)| a * b).sum::<f64>();
+        nodes + RADIUS * RADIUS * self.border[OUTPUT] * other.border[OUTPUT]
+    }
+
+    fn add(&mut self, factor: f64, other: &Step) {
+        let add = |x: &mut [f64], y: &[f64]| x.iter_mut().zip(y).for_each(|(x, y)| *x += factor * y);
+        add(&mut self.free, &other.free);
+        add(&mut self.u, &other.u);
+        add(&mut self.v, &other.v);
+        add(&mut self.border, &other.border);
     }
 
     /// Largest displacement, mm.

@@ -1,16 +1,52 @@
 //! The drive as a mechanical problem: meshes, contact, holding, at one temperature. Immutable while it is solved.
 
+use std::borrow::Cow;
+use std::fmt;
+use std::str::FromStr;
+
 use crate::contact::{BoreContact, BoreLaw, FlankContact, FlankLaw};
 use crate::drive::{Drive, FlankDeviations, GeneratorKind, GeneratorOutline, InvoluteFlank, RimVariation, ToothFlank};
 use crate::material::PlaneStrain;
 use crate::mesh::{MeshLevel, WheelMesh};
 
 use super::error::SolveError;
+use super::fast::CondensedDrive;
 use super::state::State;
+
+/// Which solver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Method {
+    /// Every node of both wheels in one sparse matrix.
+    Reference,
+    /// Teeth condensed onto the nodes that touch something, in frames that turn with them.
+    Fast,
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Method::Reference => "reference",
+            Method::Fast => "fast",
+        })
+    }
+}
+
+impl FromStr for Method {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        [Method::Reference, Method::Fast]
+            .into_iter()
+            .find(|method| method.to_string() == text)
+            .ok_or_else(|| format!("solver \"{text}\": allowed are reference, fast"))
+    }
+}
 
 /// Settings of the numerical method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverSettings {
+    /// Which solver.
+    pub method: Method,
     /// Mesh of both wheels.
     pub mesh: MeshLevel,
     /// Contact penalty on the bore, N/mm³; `None` chooses by generator: 1e7 under rollers, whose contact is narrow and hard
@@ -54,6 +90,7 @@ impl SolverSettings {
 impl Default for SolverSettings {
     fn default() -> Self {
         SolverSettings {
+            method: Method::Reference,
             mesh: MeshLevel::Standard,
             bore_penalty: None,
             flank_penalty: 5e7,
@@ -85,6 +122,8 @@ pub struct Problem {
     pub material: PlaneStrain,
     /// Settings of the method.
     pub settings: SolverSettings,
+    /// The wheels condensed, for [`Method::Fast`].
+    pub(super) condensed: Option<CondensedDrive>,
     pub(super) bore: BoreContact,
     pub(super) bore_law: BoreLaw,
     pub(super) flank_law: FlankLaw,
@@ -106,6 +145,7 @@ pub struct Problem {
     pub(super) held: Vec<bool>,
     /// Their radial displacement, mm.
     pub(super) seat_displacement: f64,
+    degrees_of_freedom: usize,
 }
 
 impl Problem {
@@ -127,10 +167,19 @@ impl Problem {
         let space =
             InvoluteFlank::new(&ToothFlank::internal(&drive.circular_spline)?, drive.circular_spline.base_radius_mm());
         let deviations = FlankDeviations::new(&drive);
-        let bore = BoreContact::new(&flexspline, settings.bore_points(kind));
-        let (rotation_weights, mean_weights) = bore_averages(&flexspline, &bore);
         let outer = drive.circular_spline.outer_radius_mm;
-        let held = circular_spline.nodes.iter().map(|p| p[0].hypot(p[1]) > outer - 1e-6).collect();
+        let mut held: Vec<bool> = circular_spline.nodes.iter().map(|p| p[0].hypot(p[1]) > outer - 1e-6).collect();
+        let free = held.iter().filter(|held| !**held).count();
+        let degrees_of_freedom = 2 * (flexspline.nodes.len() + free) + 1;
+        let condensed = (settings.method == Method::Fast)
+            .then(|| CondensedDrive::new(&flexspline, &circular_spline, &material, |n| held[n as usize]));
+        let mut fs = &flexspline;
+        if let Some(condensed) = &condensed {
+            fs = &condensed.flexspline.skin.mesh;
+            held = vec![false; condensed.circular_spline.skin.mesh.nodes.len()];
+        }
+        let bore = BoreContact::new(fs, settings.bore_points(kind));
+        let (rotation_weights, mean_weights) = bore_averages(fs, &bore);
         let thermal = &drive.thermal_state;
         Ok(Problem {
             bore_law: BoreLaw::new(settings.bore_penalty(kind), drive.generator.bearing_stiffness_n_per_mm3),
@@ -144,9 +193,11 @@ impl Problem {
             drag: drive.output.drag_torque_n_m * 1e3 / width,
             drag_stiffness: DRAG_STICK_STIFFNESS,
             seat_displacement: outer * (thermal.housing_scale / thermal.circular_spline_scale - 1.0),
+            degrees_of_freedom,
             rotation_weights,
             mean_weights,
             held,
+            condensed,
             bore,
             tooth,
             space,
@@ -170,6 +221,7 @@ impl Problem {
         sectors: usize,
         rows: usize,
     ) -> Result<Problem, SolveError> {
+        let settings = SolverSettings { method: Method::Reference, ..settings };
         let mut problem = Problem::new(drive, kind, drive.temperature.reference_c, settings)?;
         let bore_radius = drive.flexspline.bore_radius_mm();
         problem.flexspline = WheelMesh::smooth_ring(bore_radius, drive.flexspline.rim_thickness_mm, sectors, rows)?
@@ -181,7 +233,8 @@ impl Problem {
 
     /// Contact between the flanks.
     pub fn flanks(&self) -> FlankContact<'_> {
-        self.flanks_on(&self.flexspline, &self.circular_spline)
+        let (fs, cs) = self.wheels();
+        self.flanks_on(fs, cs)
     }
 
     /// Contact between the flanks as other meshes carry them, of the same sectors and flanks.
@@ -202,17 +255,18 @@ impl Problem {
 
     /// Refuses a state in which wheels touch where no contact is modelled: a tooth of the flexspline in the root of a space.
     pub(super) fn check_range(&self, state: &State) -> Result<(), SolveError> {
+        let (mesh, _) = self.wheels();
         // As built, some root of a space may stand further in, and the tooth and the axis beside their places.
         let further_in = self.deviations.spaces.iter().map(|space| -space.translation[0]).fold(0.0, f64::max);
         let root = self.drive.circular_spline.root_radius_mm - further_in;
         let axis = self.deviations.axis;
-        for tooth in 0..self.flexspline.teeth {
-            for flank in &self.flexspline.flanks {
+        for tooth in 0..mesh.teeth {
+            for flank in &mesh.flanks {
                 let Some(&tip) = flank.nodes.last() else { continue };
-                let n = self.flexspline.node(tooth as isize, tip);
-                let x = self.flexspline.nodes[n];
+                let n = mesh.node(tooth as isize, tip);
+                let x = mesh.nodes[n];
                 let [dx, dy] = self.deviations.teeth[tooth].translation;
-                let (s, c) = self.flexspline.sector_angle(tooth).sin_cos();
+                let (s, c) = mesh.sector_angle(tooth).sin_cos();
                 let beside = [c * dx - s * dy - axis[0], s * dx + c * dy - axis[1]];
                 let radius = (x[0] + state.u[2 * n] + beside[0]).hypot(x[1] + state.u[2 * n + 1] + beside[1]);
                 if radius > root {
@@ -230,21 +284,64 @@ impl Problem {
         Ok(())
     }
 
-    /// Unknowns: flexspline nodes, circular-spline nodes that are not held, two each, and the output angle.
+    /// The meshes on whose nodes the displacements of a [`State`] live: flexspline, circular spline.
+    pub fn wheels(&self) -> (&WheelMesh, &WheelMesh) {
+        match &self.condensed {
+            Some(condensed) => (&condensed.flexspline.skin.mesh, &condensed.circular_spline.skin.mesh),
+            None => (&self.flexspline, &self.circular_spline),
+        }
+    }
+
+    /// Number of each circular-spline node among the free nodes of both wheels, those of the flexspline first.
+    pub(super) fn free_circular_spline_nodes(&self) -> Vec<Option<u32>> {
+        let mut next = self.wheels().0.nodes.len() as u32;
+        let mut number = |held: &bool| {
+            (!held).then(|| {
+                next += 1;
+                next - 1
+            })
+        };
+        self.held.iter().map(&mut number).collect()
+    }
+
+    /// A state of this problem on all nodes of both wheels ([`Problem::flexspline`], [`Problem::circular_spline`]): itself, or,
+    /// from the fast solver, with the nodes that were condensed away.
+    pub fn whole_state<'s>(&self, state: &'s State) -> Cow<'s, State> {
+        match &self.condensed {
+            Some(condensed) => Cow::Owned(condensed.recover(self, state)),
+            None => Cow::Borrowed(state),
+        }
+    }
+
+    /// Displaces the circular-spline nodes that the housing holds, in a field of all its nodes.
+    pub(super) fn seat(&self, v: &mut [f64]) {
+        let outer = self.drive.circular_spline.outer_radius_mm;
+        for (n, x) in self.circular_spline.nodes.iter().enumerate() {
+            let r = x[0].hypot(x[1]);
+            if r > outer - 1e-6 {
+                let stretch = self.seat_displacement / r;
+                v[2 * n] = x[0] * stretch;
+                v[2 * n + 1] = x[1] * stretch;
+            }
+        }
+    }
+
+    /// Unknowns of the whole model: flexspline nodes, circular-spline nodes that are not held, two each, and the output angle.
     pub fn degrees_of_freedom(&self) -> usize {
-        2 * (self.flexspline.nodes.len() + self.held.iter().filter(|h| !**h).count()) + 1
+        self.degrees_of_freedom
     }
 
     /// Where the search for the deformed drive starts: every normal of the rim placed on the exact constant-length
     /// neutral curve of this generator, the circular spline undeformed, `generator_rad` and nominal output angle.
     pub fn starting_shape(&self, generator_rad: f64) -> State {
+        let (fs, cs) = self.wheels();
         let neutral = self.outline.neutral();
         let scale = self.drive.thermal_state.flexspline_scale;
         let neutral_radius = neutral.radius_mm() * scale;
         // The rim follows its generator sideways.
         let [cx, cy] = self.outline.centre();
-        let mut u = Vec::with_capacity(2 * self.flexspline.nodes.len());
-        for x in &self.flexspline.nodes {
+        let mut u = Vec::with_capacity(2 * fs.nodes.len());
+        for x in &fs.nodes {
             let (r, phi) = (x[0].hypot(x[1]), x[1].atan2(x[0]));
             let (p, normal) = neutral.position(phi - generator_rad);
             let (s, c) = generator_rad.sin_cos();
@@ -254,11 +351,9 @@ impl Problem {
             let above = r - neutral_radius;
             u.extend([p[0] + above * cn - x[0], p[1] + above * sn - x[1]]);
         }
-        let mut v = vec![0.0; 2 * self.circular_spline.nodes.len()];
-        for (n, x) in self.circular_spline.nodes.iter().enumerate().filter(|(n, _)| self.held[*n]) {
-            let stretch = self.seat_displacement / x[0].hypot(x[1]);
-            v[2 * n] = x[0] * stretch;
-            v[2 * n + 1] = x[1] * stretch;
+        let mut v = vec![0.0; 2 * cs.nodes.len()];
+        if self.condensed.is_none() {
+            self.seat(&mut v);
         }
         let output_rad = generator_rad / self.drive.ratio();
         State {

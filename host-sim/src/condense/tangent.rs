@@ -1,0 +1,363 @@
+//! The tangent of one cell, reduced to its faces and to the tractions on its flanks; and the way back.
+//!
+//! With the tangent `K + g a^T + a g^T + c a a^T` of a turning cell (see [`super::corotation`]; a reaches the faces only) and
+//! the columns G of the contact on its flanks (see [`Traction`]), flank and bore nodes are eliminated from
+//!
+//! ```text
+//!           flank      bore        faces   tractions  geometric
+//!   flank   K_ff                                                    eliminated once for all congruent cells
+//!   bore    K_bf       K_bb + N                                     N: contact on the bore
+//!   faces   K_if       K_ib + N    K_ii + N
+//!   tract.  G^T        0           0        0
+//!   geom.   g_f^T      g_b^T       g_i^T    0          c
+//! ```
+//!
+//! and the geometric row, which is no equation, is folded onto the faces: with the reduced `g_i`, `g_t`, `c`, the faces get
+//! `g_i a^T + a g_i^T + c a a^T` and their coupling with the tractions `g_t a^T`. This is exact, because a is zero on what was
+//! eliminated.
+
+use super::chain::{Chain, Contribution};
+use super::dense::Kernels;
+use super::model::Cell;
+
+/// Contact of a pair of flanks as this cell sees it: columns of G on its flank nodes, in its frame.
+///
+/// The contact has the stiffness `D = G G^T`. With the tractions `lambda = G^T z` as unknowns `[K G; G^T -I]` stands for
+/// `K + G G^T`, and what one wheel contributes does not depend on the other.
+#[derive(Debug, Clone)]
+pub struct Traction {
+    /// Its block in the chain.
+    pub block: u32,
+    /// First unknown of the cell that it acts on.
+    pub start: usize,
+    /// Unknowns that it acts on.
+    pub length: usize,
+    /// The columns, one after the other.
+    pub columns: Vec<f64>,
+}
+
+impl Traction {
+    /// Number of columns.
+    pub fn rank(&self) -> usize {
+        self.columns.len() / self.length
+    }
+
+    fn forces<'a>(&'a self) -> impl Iterator<Item = (usize, &'a [f64])> + Clone + 'a {
+        self.columns.chunks_exact(self.length).map(|column| (self.start, column))
+    }
+}
+
+/// (sine, cosine) of an angle.
+type Turn = (f64, f64);
+
+/// A reduced tangent.
+#[derive(Debug, Clone, Default)]
+pub struct CellTangent {
+    /// Frame of the cell against the global one, and against the frames of its two faces.
+    frame: Turn,
+    faces: [Turn; 2],
+    /// Blocks of its faces in the chain.
+    blocks: [u32; 2],
+    tractions: Vec<Traction>,
+    /// a on the faces and g on the flanks; empty in a cell that does not turn.
+    turn_rate: Vec<f64>,
+    flank_geometric: Vec<f64>,
+    /// Panel of the bore, where contact has changed it.
+    panel: Vec<f64>,
+    /// `L^-1` of the bore part of each traction and of the geometric row.
+    extra: Vec<f64>,
+}
+
+/// Where a cell stands.
+#[derive(Debug, Clone, Copy)]
+pub struct Placement {
+    /// Angle of its frame against the global one, rad.
+    pub frame: f64,
+    /// Of its frame against those of its two faces, rad.
+    pub faces: [f64; 2],
+    /// Blocks of its faces in the chain.
+    pub blocks: [u32; 2],
+}
+
+/// What a turning frame adds to the tangent: a on the faces; g on all nodes; c.
+#[derive(Debug, Clone, Copy)]
+pub struct Geometric<'a> {
+    /// Derivative of the rotation.
+    pub a: &'a [f64],
+    /// See [`super::corotation`].
+    pub g: &'a [f64],
+    /// See [`super::corotation`].
+    pub c: f64,
+}
+
+/// Work space, and what the way forward leaves for the way back.
+#[derive(Debug, Clone, Default)]
+pub struct Local {
+    force: Vec<f64>,
+    body: Vec<f64>,
+    rest: Vec<f64>,
+    yielded: Vec<f64>,
+}
+
+impl CellTangent {
+    /// Reduces a cell. `contact` adds what touches the bore to the lower triangle of the matrix of bore and faces (of the given
+    /// order) and says whether it did.
+    pub fn reduce(
+        &mut self,
+        kernels: Kernels,
+        cell: &Cell,
+        place: Placement,
+        tractions: Vec<Traction>,
+        geometric: Option<Geometric>,
+        contact: impl FnOnce(&mut [f64], usize) -> bool,
+    ) -> Option<Contribution> {
+        let (f, b, i) = (cell.flank(), cell.bore(), 2 * cell.face());
+        let r = b + i;
+        self.frame = place.frame.sin_cos();
+        self.faces = place.faces.map(f64::sin_cos);
+        self.blocks = place.blocks;
+        self.tractions = tractions;
+
+        // Bore and faces.
+        let mut front = cell.body.clone();
+        self.panel.clear();
+        if contact(&mut front, r) {
+            if !kernels.eliminate(&mut front, r, b, 1.0) {
+                return None;
+            }
+            self.panel.extend_from_slice(&front[..r * b]);
+        } else {
+            front.copy_from_slice(&cell.free_body);
+        }
+        let columns: Vec<(usize, &[f64])> = self.tractions.iter().flat_map(|t| t.forces()).collect();
+        let n = i + columns.len();
+        let mut matrix = vec![0.0; n * n];
+        for col in 0..i {
+            let from = (b + col) * r + b;
+            matrix[col * n + col..col * n + i].copy_from_slice(&front[from + col..from + i]);
+        }
+
+        // Tractions, then the geometric row: flank nodes, bore nodes, one row after the other.
+        let panel = if self.panel.is_empty() { &cell.free_body[..r * b] } else { &self.panel };
+        let geometric_flank = geometric.map_or(&[][..], |x| &x.g[..f]);
+        self.extra.clear();
+        let mut follow = vec![0.0; r];
+        let mut yielded = vec![0.0; f];
+        let mut geometric_tractions = vec![0.0; columns.len()];
+        for (k, &(start, column)) in columns.iter().enumerate() {
+            for (x, t) in follow.iter_mut().zip(cell.flank_coupling.chunks_exact(f)) {
+                *x = -dot(column, &t[start..start + column.len()]);
+            }
+            yielded.fill(0.0);
+            let flexibility = &cell.flank_flexibility[start * f..(start + column.len()) * f];
+            kernels.multiply_add(flexibility, column, 1.0, &mut yielded);
+            for (l, &(other, against)) in columns.iter().enumerate().skip(k) {
+                matrix[i + l + (i + k) * n] = -dot(against, &yielded[other..other + against.len()]);
+            }
+            if geometric.is_some() {
+                geometric_tractions[k] = -dot(geometric_flank, &yielded);
+            }
+            let (bore, faces) = follow.split_at_mut(b);
+            kernels.forward(panel, r, b, 1.0, bore, faces);
+            for (l, earlier) in self.extra.chunks_exact(b.max(1)).enumerate() {
+                matrix[i + k + (i + l) * n] -= dot(earlier, bore);
+            }
+            matrix[i + k + (i + k) * n] -= dot(bore, bore);
+            self.extra.extend_from_slice(bore);
+            for (col, x) in faces.iter().enumerate() {
+                matrix[i + k + col * n] = *x;
+            }
+        }
+        self.turn_rate.clear();
+        self.flank_geometric.clear();
+        if let Some(Geometric { a, g, c }) = geometric {
+            follow.copy_from_slice(&g[f..]);
+            kernels.multiply_transposed_add(&cell.flank_coupling, geometric_flank, -1.0, &mut follow);
+            yielded.fill(0.0);
+            kernels.multiply_add(&cell.flank_flexibility, geometric_flank, 1.0, &mut yielded);
+            let mut c = c - dot(geometric_flank, &yielded);
+            let (bore, faces) = follow.split_at_mut(b);
+            kernels.forward(panel, r, b, 1.0, bore, faces);
+            for (x, earlier) in geometric_tractions.iter_mut().zip(self.extra.chunks_exact(b.max(1))) {
+                *x -= dot(earlier, bore);
+            }
+            c -= dot(bore, bore);
+            self.extra.extend_from_slice(bore);
+            for col in 0..i {
+                let (ga, aa) = (a[col], faces[col] + c * a[col]);
+                for row in col..i {
+                    matrix[row + col * n] += faces[row] * ga + a[row] * aa;
+                }
+                for (row, x) in geometric_tractions.iter().enumerate() {
+                    matrix[i + row + col * n] += x * ga;
+                }
+            }
+            self.turn_rate.extend_from_slice(a);
+            self.flank_geometric.extend_from_slice(geometric_flank);
+        }
+        rotate_faces(&mut matrix, n, i / 2, &self.faces);
+        let mut blocks = self.blocks.to_vec();
+        blocks.extend(self.tractions.iter().map(|t| t.block));
+        Some(Contribution { blocks, matrix })
+    }
+
+    fn panel<'a>(&'a self, cell: &'a Cell) -> &'a [f64] {
+        if self.panel.is_empty() { &cell.free_body } else { &self.panel }
+    }
+
+    /// Brings the forces on flank and bore nodes (`unknowns` of `x`) to faces and tractions (`chain`).
+    pub fn forward(
+        &self,
+        kernels: Kernels,
+        cell: &Cell,
+        unknowns: &[u32],
+        x: &[f64],
+        order: &Chain,
+        chain: &mut [f64],
+        local: &mut Local,
+    ) {
+        let (f, b, face) = (cell.flank(), cell.bore(), cell.face());
+        let Local { force, body, rest, yielded } = local;
+        force.clear();
+        force.extend(unknowns[..f + b].iter().map(|u| x[*u as usize]));
+        rotate_pairs(force, back(self.frame));
+        let (flank, bore) = force.split_at_mut(f);
+        body.clear();
+        body.extend_from_slice(bore);
+        body.resize(b + 2 * face, 0.0);
+        kernels.multiply_transposed_add(&cell.flank_coupling, flank, -1.0, body);
+        yielded.clear();
+        yielded.resize(f, 0.0);
+        kernels.multiply_add(&cell.flank_flexibility, flank, 1.0, yielded);
+        bore.copy_from_slice(&body[..b]);
+        let faces = &mut body[b..];
+        kernels.forward(self.panel(cell), b + 2 * face, b, 1.0, bore, faces);
+        // Rows of tractions and geometry.
+        rest.clear();
+        let columns = self.tractions.iter().flat_map(|t| t.forces());
+        rest.extend(columns.map(|(start, column)| -dot(column, &yielded[start..start + column.len()])));
+        if !self.turn_rate.is_empty() {
+            rest.push(-dot(&self.flank_geometric, yielded));
+        }
+        for (r, earlier) in rest.iter_mut().zip(self.extra.chunks_exact(b.max(1))) {
+            *r -= dot(earlier, bore);
+        }
+        if let (Some(folded), false) = (rest.last(), self.turn_rate.is_empty()) {
+            faces.iter_mut().zip(&self.turn_rate).for_each(|(x, a)| *x += folded * a);
+        }
+        for (side, part) in faces.chunks_exact_mut(face).enumerate() {
+            rotate_pairs(part, self.faces[side]);
+            let to = order.offset(self.blocks[side] as usize);
+            chain[to..to + face].iter_mut().zip(part.iter()).for_each(|(c, x)| *c += x);
+        }
+        let mut rest = rest.as_slice();
+        for traction in &self.tractions {
+            let (own, others) = rest.split_at(traction.rank());
+            let to = order.offset(traction.block as usize);
+            chain[to..to + own.len()].iter_mut().zip(own).for_each(|(c, x)| *c += x);
+            rest = others;
+        }
+    }
+
+    /// Displacements of flank and bore nodes, faces and tractions being solved.
+    pub fn backward(
+        &self,
+        kernels: Kernels,
+        cell: &Cell,
+        unknowns: &[u32],
+        x: &mut [f64],
+        order: &Chain,
+        chain: &[f64],
+        local: &mut Local,
+    ) {
+        let (f, b, face) = (cell.flank(), cell.bore(), cell.face());
+        let Local { force, body, rest, yielded } = local;
+        for (side, part) in body[b..].chunks_exact_mut(face).enumerate() {
+            let from = order.offset(self.blocks[side] as usize);
+            part.copy_from_slice(&chain[from..from + face]);
+            rotate_pairs(part, back(self.faces[side]));
+        }
+        rest.clear();
+        for traction in &self.tractions {
+            let from = order.offset(traction.block as usize);
+            rest.extend_from_slice(&chain[from..from + traction.rank()]);
+        }
+        let turn = dot(&self.turn_rate, &body[b..b + self.turn_rate.len()]);
+        if !self.turn_rate.is_empty() {
+            rest.push(turn);
+        }
+        let (flank, bore) = force.split_at_mut(f);
+        for (value, earlier) in rest.iter().zip(self.extra.chunks_exact(b.max(1))) {
+            bore.iter_mut().zip(earlier).for_each(|(x, e)| *x -= value * e);
+        }
+        let (bore_body, faces) = body.split_at_mut(b);
+        kernels.backward(self.panel(cell), b + 2 * face, b, 1.0, bore, faces);
+        bore_body.copy_from_slice(bore);
+        // Flanks: yielded - C (G lambda + g turn) - T body.
+        flank.copy_from_slice(yielded);
+        yielded.fill(0.0);
+        yielded.iter_mut().zip(&self.flank_geometric).for_each(|(l, g)| *l = turn * g);
+        let columns = self.tractions.iter().flat_map(|t| t.forces());
+        for ((start, column), traction) in columns.zip(rest.iter()) {
+            yielded[start..].iter_mut().zip(column).for_each(|(l, g)| *l += traction * g);
+        }
+        kernels.multiply_add(&cell.flank_flexibility, yielded, -1.0, flank);
+        kernels.multiply_add(&cell.flank_coupling, body, -1.0, flank);
+        rotate_pairs(force, self.frame);
+        for (u, value) in unknowns.iter().zip(force.iter()) {
+            x[*u as usize] = *value;
+        }
+    }
+}
+
+/// Rotates vectors, x and y in turn.
+#[inline]
+pub fn rotate_pairs(x: &mut [f64], (sin, cos): Turn) {
+    for p in x.chunks_exact_mut(2) {
+        (p[0], p[1]) = (cos * p[0] - sin * p[1], sin * p[0] + cos * p[1]);
+    }
+}
+
+/// Dot product in four strands: at these lengths a kernel is not worth its call.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len().min(b.len());
+    let (a4, b4) = (a[..n].chunks_exact(4), b[..n].chunks_exact(4));
+    let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
+    let mut strands = [0.0; 4];
+    for (a, b) in a4.zip(b4) {
+        for i in 0..4 {
+            strands[i] += a[i] * b[i];
+        }
+    }
+    strands.iter().sum::<f64>() + tail
+}
+
+/// The opposite turn.
+#[inline]
+pub fn back((sin, cos): Turn) -> Turn {
+    (-sin, cos)
+}
+
+/// Turns the first two groups of `half` unknowns of a matrix (lower triangle, order n) by an angle each.
+fn rotate_faces(matrix: &mut [f64], n: usize, half: usize, turns: &[Turn; 2]) {
+    // The rotation of columns needs the whole of the faces.
+    for col in 0..2 * half {
+        for row in 0..col {
+            matrix[row + col * n] = matrix[col + row * n];
+        }
+    }
+    for (side, &(sin, cos)) in turns.iter().enumerate() {
+        for k in (side * half..(side + 1) * half).step_by(2) {
+            let (left, right) = matrix.split_at_mut((k + 1) * n);
+            let (a, b) = (&mut left[k * n..], &mut right[..n]);
+            for (x, y) in a.iter_mut().zip(b) {
+                (*x, *y) = (cos * *x - sin * *y, sin * *x + cos * *y);
+            }
+        }
+    }
+    for column in matrix.chunks_exact_mut(n).take(2 * half) {
+        for (side, turn) in turns.iter().enumerate() {
+            rotate_pairs(&mut column[side * half..(side + 1) * half], *turn);
+        }
+    }
+}

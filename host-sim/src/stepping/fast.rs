@@ -1,0 +1,569 @@
+//! The `fast` solver's wheels: condensed cells in turning frames, and a block factorisation around the rings.
+//!
+//! A factorisation reduces every cell to its faces and to the tractions on its flanks ([`CellTangent`]) and then eliminates
+//! faces and tractions around both rings ([`Chain`]).
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+use std::rc::Rc;
+
+use crate::condense::{
+    Block, CellState, CellTangent, Chain, CoRotation, CondensedWheel, Contribution, Geometric, Kernels, Local, Placement, Traction,
+    back, rotate_pairs,
+};
+use crate::contact::{BorePressure, FlankPair, PairContribution};
+use crate::drive::Side;
+use crate::fem::Factor;
+use crate::material::PlaneStrain;
+use crate::mesh::WheelMesh;
+
+use super::newton::ANCHOR;
+use super::problem::Problem;
+use super::state::State;
+use super::wheels::Wheels;
+
+/// Both wheels of a drive, condensed: what all solvers of a problem share.
+#[derive(Debug, Clone)]
+pub struct CondensedDrive {
+    /// The flexspline.
+    pub flexspline: CondensedWheel,
+    /// The circular spline.
+    pub circular_spline: CondensedWheel,
+}
+
+impl CondensedDrive {
+    /// Condenses both wheels; `held` are the circular-spline nodes that the housing holds.
+    pub fn new(
+        flexspline: &WheelMesh,
+        circular_spline: &WheelMesh,
+        material: &PlaneStrain,
+        held: impl Fn(u32) -> bool + Sync,
+    ) -> CondensedDrive {
+        let flexspline = CondensedWheel::new(flexspline, material, 0, |_| false);
+        let first = 2 * flexspline.skin.mesh.nodes.len();
+        CondensedDrive { circular_spline: CondensedWheel::new(circular_spline, material, first, held), flexspline }
+    }
+
+    /// The state on all nodes of the wheels of `problem`, which this was made of.
+    pub(super) fn recover(&self, problem: &Problem, state: &State) -> State {
+        let (fs, whole) = (&self.flexspline, &problem.flexspline);
+        let mut u = fs.spread(whole, &state.u);
+        for j in 0..fs.count() {
+            let (cell, unknowns) = fs.cell(j, true);
+            let (element, further) = fs.element(j);
+            let angle = whole.sector_angle(j);
+            let mut d: Vec<f64> = unknowns.iter().map(|k| state.u[*k as usize]).collect();
+            rotate_pairs(&mut d, (-angle).sin_cos());
+            let mut inner = CellState::default();
+            cell.frame.split(&d, &mut inner);
+            let q = element.recover(&inner.q, 0.0);
+            let (nodes, positions) = element.interior();
+            for ((n, position), q) in nodes.iter().zip(positions).zip(q.chunks_exact(2)) {
+                let mut moved = CoRotation::join(&inner, *position, [q[0], q[1]]);
+                rotate_pairs(&mut moved, angle.sin_cos());
+                place(whole, *n, further, &mut u, moved);
+            }
+        }
+        let (cs, whole) = (&self.circular_spline, &problem.circular_spline);
+        let mut v = cs.spread(whole, &state.v);
+        for t in 0..cs.count() {
+            let (_, unknowns) = cs.cell(t, true);
+            let (element, further) = cs.element(t);
+            let frame = self.cs_frame(t).sin_cos();
+            let mut d: Vec<f64> = unknowns.iter().map(|k| state.v[*k as usize - cs.first_unknown]).collect();
+            rotate_pairs(&mut d, back(frame));
+            let q = element.recover(&d, problem.seat_displacement);
+            for (n, q) in element.interior().0.iter().zip(q.chunks_exact(2)) {
+                let mut moved = [q[0], q[1]];
+                rotate_pairs(&mut moved, frame);
+                place(whole, *n, further, &mut v, moved);
+            }
+        }
+        problem.seat(&mut v);
+        State { u, v, ..state.clone() }
+    }
+
+    fn fs_mesh(&self) -> &WheelMesh {
+        &self.flexspline.skin.mesh
+    }
+
+    fn cs_mesh(&self) -> &WheelMesh {
+        &self.circular_spline.skin.mesh
+    }
+
+    /// Angle of the frame of a circular-spline cell, rad.
+    fn cs_frame(&self, cell: usize) -> f64 {
+        (cell as f64 + 0.5) * self.cs_mesh().pitch()
+    }
+
+    /// The circular-spline cell that carries the flank of a pair.
+    fn cs_cell(&self, pair: FlankPair) -> usize {
+        let teeth = self.cs_mesh().teeth;
+        match pair.side {
+            Side::Plus => pair.space,
+            Side::Minus => (pair.space + teeth - 1) % teeth,
+        }
+    }
+
+    /// Of every face: its block, the first of its unknowns, the angle of its frame.
+    fn faces(&self) -> Vec<(usize, usize, f64)> {
+        let (fs, cs) = (self.fs_mesh(), self.cs_mesh());
+        let first = self.circular_spline.first_unknown;
+        let fs_faces = (0..fs.teeth).map(|j| (j, 2 * j * fs.nodes_per_sector, (j as f64 - 0.5) * fs.pitch()));
+        let cs_faces =
+            (0..cs.teeth).map(|t| (fs.teeth + t, first + 2 * t * cs.nodes_per_sector, t as f64 * cs.pitch()));
+        fs_faces.chain(cs_faces).collect()
+    }
+}
+
+/// Writes the displacement of a node given in another cell, `further` sectors back.
+fn place(mesh: &WheelMesh, node: u32, further: usize, field: &mut [f64], displacement: [f64; 2]) {
+    let (sector, local) = (node as usize / mesh.nodes_per_sector, node % mesh.nodes_per_sector as u32);
+    let n = mesh.node((sector + further) as isize, local);
+    field[2 * n..2 * n + 2].copy_from_slice(&displacement);
+}
+
+/// A factorised tangent.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Factorisation {
+    /// Cells whose flank nodes took part.
+    live: Vec<bool>,
+    /// Cells of the flexspline, then of the circular spline.
+    cells: Vec<CellTangent>,
+    chain: Chain,
+}
+
+/// A factorised tangent that others hold too.
+pub(super) type Kept = Rc<Factorisation>;
+
+pub(super) struct CondensedWheels<'p> {
+    problem: &'p Problem,
+    model: &'p CondensedDrive,
+    kernels: Kernels,
+    /// Cells with a flank that touches or may soon; the flank nodes of the others follow when all is done.
+    live: Vec<bool>,
+    /// The flexspline cells of this state, and their forces before balancing.
+    states: Vec<CellState>,
+    forces: Vec<Vec<f64>>,
+    /// Where the wave and the output stand.
+    generator_rad: f64,
+    output_rad: f64,
+    /// Contact of this state: edges of the bore; pairs of flanks with their nodal tangent.
+    bore: Vec<(usize, [f64; 21])>,
+    flanks: Vec<(FlankPair, Vec<f64>)>,
+    factor: Kept,
+    /// Pitches by which the state is turned against the one that the factor was made for.
+    turned: isize,
+    locals: Vec<Local>,
+}
+
+impl<'p> CondensedWheels<'p> {
+    pub fn new(problem: &'p Problem, model: &'p CondensedDrive) -> Self {
+        let teeth = model.flexspline.count();
+        let cells = teeth + model.circular_spline.count();
+        CondensedWheels {
+            problem,
+            model,
+            kernels: Kernels::default(),
+            live: vec![false; cells],
+            states: vec![CellState::default(); teeth],
+            forces: vec![Vec::new(); teeth],
+            generator_rad: 0.0,
+            output_rad: 0.0,
+            bore: Vec::new(),
+            flanks: Vec::new(),
+            factor: Rc::default(),
+            turned: 0,
+            locals: Vec::new(),
+        }
+    }
+
+    /// The contact of every pair as tractions on the cells of both wheels; and the size and tooth side of each pair's block.
+    fn tractions(&self) -> (Vec<Vec<Traction>>, Vec<(FlankPair, usize)>) {
+        let (fs, cs) = (self.model.fs_mesh(), self.model.cs_mesh());
+        let mut by_cell = vec![Vec::new(); fs.teeth + cs.teeth];
+        let mut ranks = Vec::new();
+        for (pair, stiffness) in &self.flanks {
+            let on_fs = 2 * fs.flanks[pair.side.index()].nodes.len();
+            let (n, columns) = low_rank(stiffness);
+            if columns.is_empty() {
+                continue;
+            }
+            let block = (fs.teeth + cs.teeth + ranks.len()) as u32;
+            let cs_cell = self.model.cs_cell(*pair);
+            let traction = |turn: f64, part: std::ops::Range<usize>| {
+                let length = part.len();
+                let mut columns: Vec<f64> = columns.chunks_exact(n).flat_map(|c| &c[part.clone()]).copied().collect();
+                rotate_pairs(&mut columns, turn.sin_cos());
+                Traction { block, start: pair.side.index() * length, length, columns }
+            };
+            let fs_turn = fs.sector_angle(pair.tooth) + self.states[pair.tooth].turn;
+            by_cell[pair.tooth].push(traction(-fs_turn, 0..on_fs));
+            by_cell[fs.teeth + cs_cell].push(traction(-self.model.cs_frame(cs_cell), on_fs..n));
+            ranks.push((*pair, columns.len() / n));
+        }
+        (by_cell, ranks)
+    }
+
+    /// Reduces a flexspline cell.
+    fn reduce_flexspline_cell(
+        &self,
+        j: usize,
+        tangent: &mut CellTangent,
+        tractions: Vec<Traction>,
+    ) -> Option<Contribution> {
+        let mesh = self.model.fs_mesh();
+        let (cell, _) = self.model.flexspline.cell(j, self.live[j]);
+        let state = &self.states[j];
+        let quarter: Vec<f64> = state.q.chunks_exact(2).flat_map(|q| [-q[1], q[0]]).collect();
+        let mut turned = vec![0.0; quarter.len()];
+        self.kernels.multiply_add(&cell.stiffness, &quarter, 1.0, &mut turned);
+        let (g, c) = cell.frame.geometric(state, &self.forces[j], &turned);
+        let place = Placement {
+            frame: mesh.sector_angle(j) + state.turn,
+            faces: [state.turn + 0.5 * mesh.pitch(), state.turn - 0.5 * mesh.pitch()],
+            blocks: [j as u32, ((j + 1) % mesh.teeth) as u32],
+        };
+        let geometric = Geometric { a: &state.turn_rate, g: &g, c };
+        tangent.reduce(self.kernels, cell, place, tractions, Some(geometric), |matrix, order| {
+            self.add_bore_contact(j, matrix, order)
+        })
+    }
+
+    /// Adds the contact on the bore of a cell to the matrix of its bore and face nodes; whether there is any.
+    fn add_bore_contact(&self, j: usize, matrix: &mut [f64], order: usize) -> bool {
+        let mesh = self.model.fs_mesh();
+        let (cell, _) = self.model.flexspline.cell(j, false);
+        let (b, face) = (cell.bore(), cell.face());
+        let per_cell = mesh.base_edges.len();
+        let (sin, cos) = (mesh.sector_angle(j) + self.states[j].turn).sin_cos();
+        let first = self.bore.partition_point(|(edge, _)| *edge < j * per_cell);
+        let touching = self.bore[first..].iter().take_while(|(edge, _)| *edge < (j + 1) * per_cell);
+        let mut any = false;
+        for (edge, k) in touching {
+            any = true;
+            // Nodes along the bore of the cell: corner of the first face, bore nodes, corner of the second face.
+            let place = |n: usize| match n {
+                0 => b,
+                n if n == 2 * per_cell => b + face,
+                n => 2 * (n - 1),
+            };
+            let along = 2 * (edge - j * per_cell);
+            let entry = |r: usize, c: usize| if r >= c { k[r * (r + 1) / 2 + c] } else { k[c * (c + 1) / 2 + r] };
+            for n in 0..3 {
+                for m in 0..3 {
+                    let (row, column) = (place(along + n), place(along + m));
+                    if row < column {
+                        continue;
+                    }
+                    // R^T K R, R being the frame of the cell.
+                    let block = [0, 1].map(|x| [0, 1].map(|y| entry(2 * n + x, 2 * m + y)));
+                    let rows = [0, 1]
+                        .map(|y| [cos * block[0][y] + sin * block[1][y], cos * block[1][y] - sin * block[0][y]]);
+                    for x in 0..2 {
+                        let values = [cos * rows[0][x] + sin * rows[1][x], cos * rows[1][x] - sin * rows[0][x]];
+                        for y in 0..2 {
+                            if row + x >= column + y {
+                                matrix[row + x + (column + y) * order] += values[y];
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        any
+    }
+
+    fn reduce_circular_spline_cell(
+        &self,
+        t: usize,
+        tangent: &mut CellTangent,
+        tractions: Vec<Traction>,
+    ) -> Option<Contribution> {
+        let (first, mesh) = (self.model.fs_mesh().teeth, self.model.cs_mesh());
+        let place = Placement {
+            frame: self.model.cs_frame(t),
+            faces: [0.5 * mesh.pitch(), -0.5 * mesh.pitch()],
+            blocks: [(first + t) as u32, (first + (t + 1) % mesh.teeth) as u32],
+        };
+        let (cell, _) = self.model.circular_spline.cell(t, self.live[first + t]);
+        tangent.reduce(self.kernels, cell, place, tractions, None, |_, _| false)
+    }
+
+    /// Places the flank nodes that no force acts on.
+    fn fill_flanks(&self, state: &mut State) {
+        let fs = &self.model.flexspline;
+        for j in (0..fs.count()).filter(|j| !self.live[*j]) {
+            let ((bare, others), (cell, all)) = (fs.cell(j, false), fs.cell(j, true));
+            let angle = fs.skin.mesh.sector_angle(j);
+            let mut d: Vec<f64> = others.iter().map(|u| state.u[*u as usize]).collect();
+            rotate_pairs(&mut d, (-angle).sin_cos());
+            let mut inner = CellState::default();
+            bare.frame.split(&d, &mut inner);
+            let q = cell.free_flanks(self.kernels, &inner.q, 0.0);
+            let mut flanks: Vec<f64> = q
+                .chunks_exact(2)
+                .zip(cell.frame.positions())
+                .flat_map(|(q, position)| CoRotation::join(&inner, *position, [q[0], q[1]]))
+                .collect();
+            rotate_pairs(&mut flanks, angle.sin_cos());
+            all.iter().zip(&flanks).for_each(|(u, x)| state.u[*u as usize] = *x);
+        }
+        let cs = &self.model.circular_spline;
+        for t in (0..cs.count()).filter(|t| !self.live[fs.count() + t]) {
+            let ((_, others), (cell, all)) = (cs.cell(t, false), cs.cell(t, true));
+            let frame = self.model.cs_frame(t).sin_cos();
+            let mut d: Vec<f64> = others.iter().map(|u| state.v[*u as usize - cs.first_unknown]).collect();
+            rotate_pairs(&mut d, back(frame));
+            let mut flanks = cell.free_flanks(self.kernels, &d, self.problem.seat_displacement);
+            rotate_pairs(&mut flanks, frame);
+            all.iter().zip(&flanks).for_each(|(u, x)| state.v[*u as usize - cs.first_unknown] = *x);
+        }
+    }
+
+    /// Blocks around the rings, ordered by their angle from the minor axis of the generator, where no flanks touch.
+    fn blocks(&self, ranks: &[(FlankPair, usize)]) -> Vec<Block> {
+        let cut = self.generator_rad + FRAC_PI_2;
+        let from_cut = |angle: f64| (angle - cut).rem_euclid(TAU);
+        let (fs, cs) = (self.model.fs_mesh(), self.model.cs_mesh());
+        let block = |size, angle| Block { size, sign: 1.0, key: from_cut(angle) };
+        let (fs_size, cs_size) = (self.model.flexspline.face(), self.model.circular_spline.face());
+        let fs_blocks = (0..fs.teeth).map(|j| block(fs_size, (j as f64 - 0.5) * fs.pitch()));
+        let cs_blocks = (0..cs.teeth).map(|t| block(cs_size, t as f64 * cs.pitch() + self.output_rad));
+        let mut blocks: Vec<Block> = fs_blocks.chain(cs_blocks).collect();
+        // The first face of each ring closes it.
+        for ring in [0..fs.teeth, fs.teeth..fs.teeth + cs.teeth] {
+            if let Some(first) = ring.min_by(|a, b| blocks[*a].key.total_cmp(&blocks[*b].key)) {
+                blocks[first].key += TAU;
+            }
+        }
+        blocks.extend(ranks.iter().map(|(pair, rank)| {
+            let angle = (pair.tooth as f64 + 0.25 * pair.side.sign()) * fs.pitch();
+            Block { sign: -1.0, ..block(*rank, angle) }
+        }));
+        blocks
+    }
+}
+
+/// Tangent of a pair of flanks of less than this, relative to the largest, is left out of the factor.
+const RANK_TOLERANCE: f64 = 1e-10;
+
+/// Order n and columns of G with `D = G G^T` for a positive semi-definite D (n x n by rows, lower triangle): Cholesky with
+/// diagonal pivoting until nothing is left.
+fn low_rank(stiffness: &[f64]) -> (usize, Vec<f64>) {
+    let n = (stiffness.len() as f64).sqrt().round() as usize;
+    let entry = |i: usize, j: usize| if i >= j { stiffness[i * n + j] } else { stiffness[j * n + i] };
+    let mut diagonal: Vec<f64> = (0..n).map(|i| entry(i, i)).collect();
+    let largest = diagonal.iter().fold(0.0_f64, |m, x| m.max(*x));
+    let mut columns: Vec<f64> = Vec::new();
+    while columns.len() < n * n {
+        let (pivot, &value) = diagonal.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).expect("a pair has nodes");
+        if value.is_nan() || value <= RANK_TOLERANCE * largest {
+            break;
+        }
+        let mut column: Vec<f64> = (0..n).map(|i| entry(i, pivot)).collect();
+        for earlier in columns.chunks_exact(n) {
+            let factor = earlier[pivot];
+            column.iter_mut().zip(earlier).for_each(|(c, e)| *c -= factor * e);
+        }
+        let scale = 1.0 / value.sqrt();
+        for (c, d) in column.iter_mut().zip(&mut diagonal) {
+            *c *= scale;
+            *d -= *c * *c;
+        }
+        diagonal[pivot] = 0.0;
+        columns.extend(column);
+    }
+    (n, columns)
+}
+
+impl Factor for CondensedWheels<'_> {
+    fn solve(&mut self, columns: &mut [f64], count: usize) {
+        let n = columns.len() / count;
+        let CondensedWheels { model, kernels, factor, locals, live, turned, .. } = self;
+        let factor = factor.as_ref();
+        let faces = model.faces();
+        let (fs, cs) = (&model.flexspline, &model.circular_spline);
+        // A cell that is near contact now has forces on its flanks, even if it had not where the factor was made.
+        let (fs_live, cs_live) = live.split_at(fs.count());
+        let now = |ring: &[bool], cell: usize| ring[(cell as isize + *turned).rem_euclid(ring.len() as isize) as usize];
+        let cells: Vec<_> = (0..fs.count())
+            .map(|j| fs.cell(j, factor.live[j] || now(fs_live, j)))
+            .chain((0..cs.count()).map(|t| cs.cell(t, factor.live[fs.count() + t] || now(cs_live, t))))
+            .collect();
+        let size = |block: usize| if block < fs.count() { fs.face() } else { cs.face() };
+        let unknowns = factor.chain.unknowns();
+        let mut chains = vec![0.0; unknowns * count];
+        locals.resize_with(cells.len() * count, Local::default);
+        for (c, ((cell, unknowns_of), tangent)) in cells.iter().zip(&factor.cells).enumerate() {
+            let sides = columns.chunks_exact(n).zip(chains.chunks_exact_mut(unknowns));
+            for ((x, chain), local) in sides.zip(&mut locals[c * count..]) {
+                tangent.forward(*kernels, cell, unknowns_of, x, &factor.chain, chain, local);
+            }
+        }
+        for (x, chain) in columns.chunks_exact(n).zip(chains.chunks_exact_mut(unknowns)) {
+            for &(block, start, angle) in &faces {
+                let turn = (-angle).sin_cos();
+                let to = &mut chain[factor.chain.offset(block)..][..size(block)];
+                for (c, own) in to.chunks_exact_mut(2).zip(x[start..].chunks_exact(2)) {
+                    let mut own = [own[0], own[1]];
+                    rotate_pairs(&mut own, turn);
+                    (c[0], c[1]) = (c[0] + own[0], c[1] + own[1]);
+                }
+            }
+        }
+        factor.chain.solve(&mut chains);
+        for (c, ((cell, unknowns_of), tangent)) in cells.iter().zip(&factor.cells).enumerate() {
+            let sides = columns.chunks_exact_mut(n).zip(chains.chunks_exact(unknowns));
+            for ((x, chain), local) in sides.zip(&mut locals[c * count..]) {
+                tangent.backward(*kernels, cell, unknowns_of, x, &factor.chain, chain, local);
+            }
+        }
+        for (x, chain) in columns.chunks_exact_mut(n).zip(chains.chunks_exact(unknowns)) {
+            for &(block, start, angle) in &faces {
+                let (from, size) = (factor.chain.offset(block), size(block));
+                x[start..start + size].copy_from_slice(&chain[from..from + size]);
+                rotate_pairs(&mut x[start..start + size], angle.sin_cos());
+            }
+        }
+    }
+}
+
+impl Wheels for CondensedWheels<'_> {
+    fn unknowns(&self) -> usize {
+        2 * (self.model.fs_mesh().nodes.len() + self.model.cs_mesh().nodes.len())
+    }
+
+    fn prepare(&mut self, near: &[FlankPair], _widely: &dyn Fn() -> Vec<FlankPair>) -> bool {
+        self.live.fill(false);
+        for &pair in near {
+            let cs_cell = self.model.cs_cell(pair);
+            self.live[pair.tooth] = true;
+            self.live[self.model.flexspline.count() + cs_cell] = true;
+        }
+        false
+    }
+
+    fn complete(&self, state: &mut State) {
+        self.fill_flanks(state);
+    }
+
+    fn assemble(&mut self, state: &State, force: &mut [f64]) {
+        self.bore.clear();
+        self.flanks.clear();
+        self.generator_rad = state.generator_rad;
+        self.output_rad = state.output_rad;
+        let fs = &self.model.flexspline;
+        let mut d = Vec::new();
+        for j in 0..fs.count() {
+            let (cell, unknowns) = fs.cell(j, self.live[j]);
+            let (inner, f) = (&mut self.states[j], &mut self.forces[j]);
+            let angle = fs.skin.mesh.sector_angle(j);
+            d.clear();
+            d.extend(unknowns.iter().map(|u| state.u[*u as usize]));
+            rotate_pairs(&mut d, (-angle).sin_cos());
+            cell.frame.split(&d, inner);
+            f.clear();
+            f.resize(d.len(), 0.0);
+            self.kernels.multiply_add(&cell.stiffness, &inner.q, 1.0, f);
+            d.copy_from_slice(f);
+            cell.frame.balance(inner, &mut d);
+            rotate_pairs(&mut d, (angle + inner.turn).sin_cos());
+            for (u, f) in unknowns.iter().zip(&d) {
+                force[*u as usize] -= f;
+            }
+        }
+        let cs = &self.model.circular_spline;
+        let mut f = Vec::new();
+        for t in 0..cs.count() {
+            let (cell, unknowns) = cs.cell(t, self.live[fs.count() + t]);
+            let frame = self.model.cs_frame(t).sin_cos();
+            d.clear();
+            d.extend(unknowns.iter().map(|u| state.v[*u as usize - cs.first_unknown]));
+            rotate_pairs(&mut d, back(frame));
+            f.clear();
+            f.extend(cell.seat.iter().map(|s| s * self.problem.seat_displacement));
+            self.kernels.multiply_add(&cell.stiffness, &d, 1.0, &mut f);
+            rotate_pairs(&mut f, frame);
+            for (u, f) in unknowns.iter().zip(&f) {
+                force[*u as usize] -= f;
+            }
+        }
+    }
+
+    fn add_bore(&mut self, contact: &BorePressure) {
+        self.bore.push((contact.edge, contact.stiffness));
+    }
+
+    fn add_flank(&mut self, pair: FlankPair, contact: &PairContribution) {
+        self.flanks.push((pair, contact.stiffness.clone()));
+    }
+
+    /// The bore corner of the first face of cell 0, along the bore.
+    fn anchor(&self) -> Vec<(usize, f64)> {
+        let (sin, cos) = (-0.5 * self.model.fs_mesh().pitch()).sin_cos();
+        vec![(0, -sin), (1, cos)]
+    }
+
+    fn factorise(&mut self, spring: f64) -> bool {
+        let (mut tractions, ranks) = self.tractions();
+        let mut factor = Rc::try_unwrap(std::mem::take(&mut self.factor)).unwrap_or_default();
+        factor.cells.resize_with(self.live.len(), CellTangent::default);
+        let fs_cells = self.model.flexspline.count();
+        factor.live.clone_from(&self.live);
+        let mut contributions = Vec::with_capacity(2 * factor.cells.len());
+        let mut definite = true;
+        for (c, tangent) in factor.cells.iter_mut().enumerate() {
+            let tractions = std::mem::take(&mut tractions[c]);
+            let reduced = if c < fs_cells {
+                self.reduce_flexspline_cell(c, tangent, tractions)
+            } else {
+                self.reduce_circular_spline_cell(c - fs_cells, tangent, tractions)
+            };
+            match reduced {
+                Some(contribution) => contributions.push(contribution),
+                None => {
+                    definite = false;
+                    break;
+                }
+            }
+        }
+        if definite {
+            let blocks = self.blocks(&ranks);
+            // Springs, the anchor (tangential is y in the frame of a face), and the unit of the tractions.
+            for (k, block) in blocks.iter().enumerate() {
+                let n = block.size;
+                let diagonal = if block.sign < 0.0 { -1.0 } else { spring };
+                let mut matrix = vec![0.0; n * n];
+                (0..n).for_each(|i| matrix[i * n + i] = diagonal);
+                if k == 0 {
+                    matrix[n + 1] += ANCHOR;
+                }
+                if diagonal != 0.0 || k == 0 {
+                    contributions.push(Contribution { blocks: vec![k as u32], matrix });
+                }
+            }
+            definite = factor.chain.factorise(&blocks, &contributions);
+        }
+        self.factor = Rc::new(factor);
+        self.turned = 0;
+        definite
+    }
+
+    fn keep(&self) -> Option<Kept> {
+        Some(self.factor.clone())
+    }
+
+    fn recall(&mut self, kept: &Kept, pitches: isize) {
+        self.factor = kept.clone();
+        self.turned = pitches;
+    }
+
+    fn turn(&self, x: &mut [f64], pitches: isize) {
+        let (fs, cs) = x.split_at_mut(self.model.circular_spline.first_unknown);
+        for (mesh, part) in [(self.model.fs_mesh(), fs), (self.model.cs_mesh(), cs)] {
+            let sector = 2 * mesh.nodes_per_sector;
+            part.rotate_right(pitches.rem_euclid(mesh.teeth as isize) as usize * sector);
+            rotate_pairs(part, (pitches as f64 * mesh.pitch()).sin_cos());
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! Flank pairs that touch or may soon, and how far the drive has moved since each was looked at.
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
+use crate::contact::{Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, OpenEdges, PairContribution};
+
+use super::state::State;
+
+/// Pairs closer than this (mm) are looked after during an increment.
+const REACH: f64 = 0.015;
+/// How far (mm) flanks are looked for when the output is balanced.
+const CLEARANCE_REACH: f64 = 0.06;
+/// Gap (mm) below which a pair counts as touching when its layout is checked.
+const TOUCH: f64 = 1e-7;
+/// Shift (mm) of a corner on the flank up to which the integration points stay.
+const CORNER_DRIFT: f64 = 1e-4;
+
+/// A pair with its integration points.
+struct NearPair {
+    layout: FlankLayout,
+    /// It stays open until the drive has moved this far.
+    open_until: f64,
+}
+
+/// The pairs of one increment.
+#[derive(Default)]
+pub(super) struct NearPairs {
+    pairs: BTreeMap<FlankPair, NearPair>,
+    /// How far (mm) any two flanks may have moved against one another, all steps added up.
+    moved: f64,
+    /// Edges of the bore.
+    pub bore: OpenEdges,
+    /// Pairs beyond the reach come no closer than this motion allows.
+    searched_until: f64,
+}
+
+impl NearPairs {
+    /// The drive moves: no gap changes by more than `distance_mm`.
+    pub fn advance(&mut self, distance_mm: f64) {
+        self.moved += distance_mm;
+        self.bore.moved += distance_mm;
+    }
+
+    /// Forgets all pairs.
+    pub fn clear(&mut self) {
+        self.pairs.clear();
+        self.searched_until = self.moved;
+    }
+
+    /// Whether pairs that were out of reach may have come near.
+    pub fn must_search(&self) -> bool {
+        self.moved >= self.searched_until
+    }
+
+    /// Looks for pairs that may touch from here on. Friction begins where the pair stood in the state `from`.
+    pub fn search(&mut self, flanks: &FlankContact, at: Configuration, from: &State, friction: bool) {
+        self.searched_until = self.moved + 0.5 * REACH;
+        for pair in flanks.near_pairs(at, REACH) {
+            if let Entry::Vacant(place) = self.pairs.entry(pair) {
+                let mut layout = flanks.layout(pair, at);
+                if friction {
+                    let empty = Vec::new();
+                    let history = from.friction.get(&(pair.tooth, pair.side)).unwrap_or(&empty);
+                    flanks.start_friction(pair, configuration(from), history, &mut layout.points);
+                }
+                place.insert(NearPair { layout, open_until: 0.0 });
+            }
+        }
+    }
+
+    /// The pairs.
+    pub fn pairs(&self) -> impl Iterator<Item = FlankPair> + '_ {
+        self.pairs.keys().copied()
+    }
+
+    /// Forces and tangents of the pairs that touch.
+    pub fn evaluate(
+        &mut self,
+        flanks: &FlankContact,
+        at: Configuration,
+        law: FlankLaw,
+        mut report: impl FnMut(FlankPair, &PairContribution),
+    ) {
+        for (&pair, near) in &mut self.pairs {
+            if self.moved < near.open_until {
+                continue;
+            }
+            let mut gap = f64::INFINITY;
+            match flanks.evaluate_with_gap(pair, at, law, &near.layout.points, &mut gap) {
+                Some(contact) => report(pair, &contact),
+                None => near.open_until = self.moved + gap,
+            }
+        }
+    }
+
+    /// Whether the corners of the spaces still face the places they were laid out for.
+    pub fn layouts_fit(&self, flanks: &FlankContact, at: Configuration) -> bool {
+        let touching = self.pairs.iter().filter(|(pair, near)| {
+            self.moved >= near.open_until && flanks.smallest_gap(**pair, at) < TOUCH
+        });
+        touching.map(|(pair, near)| (near.layout.corner, flanks.corner(*pair, at))).all(|corners| match corners {
+            (Some(a), Some(b)) => (a - b).abs() < CORNER_DRIFT,
+            (None, None) => true,
+            (Some(r), None) | (None, Some(r)) => {
+                (r - flanks.tooth.start_radius).abs().min((r - flanks.tooth.junction_radius).abs()) < CORNER_DRIFT
+            }
+        })
+    }
+
+    /// Tangential tractions at the end of an increment, pair by pair.
+    pub fn friction(
+        &self,
+        flanks: &FlankContact,
+        at: Configuration,
+        law: FlankLaw,
+    ) -> BTreeMap<(usize, crate::drive::Side), crate::contact::FrictionHistory> {
+        self.pairs
+            .iter()
+            .map(|(&pair, near)| {
+                ((pair.tooth, pair.side), flanks.friction_history(pair, at, law, &near.layout.points))
+            })
+            .filter(|(_, history)| history.iter().any(|(_, traction)| *traction != 0.0))
+            .collect()
+    }
+
+    /// Output angle at which `torque` of everything but the flanks (and its slope), and frictionless flanks balance while the
+    /// wheels keep their shape; `None` when no flank is in reach.
+    ///
+    /// Gaps are linear in so small a turn: the points are looked at once, and again where the turn was not so small.
+    pub fn balance(
+        &mut self,
+        flanks: &FlankContact,
+        state: &State,
+        law: FlankLaw,
+        tolerance: f64,
+        others: impl Fn(f64) -> (f64, f64),
+    ) -> Option<f64> {
+        const SMALL: f64 = 2e-3;
+        let radius = flanks.space.base_radius;
+        let start = configuration(state);
+        let mut output_rad = state.output_rad;
+        // The pairs that are looked after anyway mostly suffice.
+        let mut reach = REACH;
+        for _ in 0..20 {
+            let at = Configuration { output_rad, ..start };
+            let mut points = Vec::new();
+            let mut add = |pair, layout: &FlankLayout| {
+                flanks.gaps(pair, at, &layout.points, &mut |gap, rate, weight| points.push((gap, rate, weight)));
+            };
+            if reach == REACH {
+                self.pairs.iter().for_each(|(pair, near)| add(*pair, &near.layout));
+            } else {
+                flanks.near_pairs(at, reach).into_iter().for_each(|pair| add(pair, &flanks.layout(pair, at)));
+            }
+            let torque = |turn: f64| {
+                let (mut torque, mut slope) = others(output_rad + turn);
+                for (gap, rate, weight) in &points {
+                    let depth = -(gap + rate * turn);
+                    if depth > 0.0 {
+                        torque += law.stiffness * weight * depth * rate;
+                        slope -= law.stiffness * weight * rate * rate;
+                    }
+                }
+                (torque, slope)
+            };
+            let turn = balance(torque, tolerance, reach / radius);
+            let small = turn.is_some_and(|turn| (turn * radius).abs() < SMALL);
+            if reach == REACH && !small {
+                reach = CLEARANCE_REACH;
+                continue;
+            }
+            output_rad += turn?;
+            if small {
+                break;
+            }
+            self.clear();
+        }
+        ((output_rad - state.output_rad).abs() < CLEARANCE_REACH / radius).then_some(output_rad)
+    }
+}
+
+/// Zero of a falling function (value, slope) within `reach` of zero: bracketed, then Newton safeguarded by bisection.
+fn balance(torque: impl Fn(f64) -> (f64, f64), tolerance: f64, reach: f64) -> Option<f64> {
+    let (mut behind, mut ahead) = (None::<f64>, None::<f64>);
+    let mut stride = 1e-6_f64;
+    let mut turn = 0.0_f64;
+    for _ in 0..60 {
+        let (value, slope) = torque(turn);
+        if value.abs() <= tolerance {
+            break;
+        }
+        if value > 0.0 {
+            behind = Some(turn);
+        } else {
+            ahead = Some(turn);
+        }
+        let newton = if slope < 0.0 { turn - value / slope } else { f64::NAN };
+        turn = match (behind, ahead) {
+            (Some(low), Some(high)) if newton > low && newton < high => newton,
+            (Some(low), Some(high)) => 0.5 * (low + high),
+            _ => {
+                stride *= 4.0;
+                let stride = stride.copysign(value);
+                if (newton - turn).abs() < stride.abs() { newton } else { turn + stride }
+            }
+        };
+        if turn.abs() > reach {
+            return None;
+        }
+    }
+    Some(turn)
+}
+
+/// Where a state stands.
+pub(super) fn configuration(state: &State) -> Configuration<'_> {
+    Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad }
+}

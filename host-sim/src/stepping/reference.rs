@@ -1,0 +1,253 @@
+//! The `reference` solver's wheels: every node of both meshes in one sparse matrix.
+//!
+//! The flexspline is geometrically non-linear (total Lagrangian); the circular spline, which hardly deforms, is linear in the
+//! frame that turns with it.
+
+use std::collections::BTreeMap;
+
+use crate::contact::{BorePressure, FlankPair, PairContribution};
+use crate::element::{PACKED, add_tangent_and_force, linear_stiffness};
+use crate::fem::{BlockPosition, Cholesky, ElementPositions, Factor, Pattern};
+
+use super::newton::ANCHOR;
+use super::problem::Problem;
+use super::state::State;
+use super::wheels::Wheels;
+
+/// Both wheels, with the sparse tangent for one set of flank pairs.
+pub(super) struct SparseWheels<'p> {
+    problem: &'p Problem,
+    /// Number of each circular-spline node among the free nodes.
+    cs_index: Vec<Option<u32>>,
+    free_nodes: usize,
+    /// Small-strain stiffness of the circular-spline elements of sector 0.
+    cs_template: Vec<[f64; PACKED]>,
+    system: Option<System>,
+}
+
+/// The sparse system for one set of flank pairs.
+struct System {
+    pairs: BTreeMap<FlankPair, PairPositions>,
+    pattern: Pattern,
+    fs_positions: Vec<ElementPositions>,
+    bore_positions: Vec<[Option<BlockPosition>; 3]>,
+    /// Values of the circular spline, which do not change.
+    cs_values: Vec<f64>,
+    factor: Cholesky,
+    values: Vec<f64>,
+}
+
+/// Where a pair's contribution goes.
+struct PairPositions {
+    /// Free node of each local node.
+    nodes: Vec<u32>,
+    /// Blocks of local node pairs (a, b < a) that the pattern holds.
+    blocks: Vec<(usize, usize, BlockPosition)>,
+}
+
+impl<'p> SparseWheels<'p> {
+    pub fn new(problem: &'p Problem, cs_index: &[Option<u32>]) -> Self {
+        let cs_template = problem.circular_spline.gauss[..problem.circular_spline.elements_per_sector]
+            .iter()
+            .map(|points| linear_stiffness(points, &problem.material))
+            .collect();
+        let free_nodes = problem.flexspline.nodes.len() + cs_index.iter().flatten().count();
+        SparseWheels { problem, cs_index: cs_index.to_vec(), free_nodes, cs_template, system: None }
+    }
+
+    fn analyse(&self, pairs: &[FlankPair]) -> System {
+        let problem = self.problem;
+        let flanks = problem.flanks();
+        let cs_nodes: Vec<[Option<u32>; 8]> =
+            problem.circular_spline.elements.iter().map(|element| element.map(|n| self.cs_index[n as usize])).collect();
+        let cs_groups: Vec<Vec<u32>> = cs_nodes.iter().map(|e| e.iter().flatten().copied().collect()).collect();
+        let pair_nodes: Vec<(Vec<u32>, Vec<u32>)> = pairs
+            .iter()
+            .map(|&pair| {
+                let fs = flanks.fs_nodes(pair).map(|n| n as u32).collect();
+                let cs = flanks.cs_nodes(pair).map(|n| self.cs_index[n].expect("flank nodes are free")).collect();
+                (fs, cs)
+            })
+            .collect();
+        let groups =
+            problem.flexspline.elements.iter().map(|e| e.as_slice()).chain(cs_groups.iter().map(Vec::as_slice));
+        let across = pair_nodes.iter().map(|(fs, cs)| (fs.as_slice(), cs.as_slice()));
+        let pattern = Pattern::new(self.free_nodes, groups, across);
+        let factor = Cholesky::new(&pattern);
+
+        let mut cs_values = vec![0.0; pattern.stored()];
+        for (nodes, points) in cs_nodes.iter().zip(&problem.circular_spline.gauss) {
+            pattern.element(nodes).scatter(&linear_stiffness(points, &problem.material), &mut cs_values);
+        }
+        let fs_positions = problem.flexspline.elements.iter().map(|e| pattern.element(&e.map(Some))).collect();
+        let bore_positions = problem
+            .bore
+            .edges
+            .iter()
+            .map(|[a, m, b]| [pattern.block(*m, *a), pattern.block(*b, *a), pattern.block(*b, *m)])
+            .collect();
+        let pairs = pairs
+            .iter()
+            .zip(pair_nodes)
+            .map(|(&pair, (fs, cs))| {
+                let nodes: Vec<u32> = fs.into_iter().chain(cs).collect();
+                let blocks = (0..nodes.len())
+                    .flat_map(|a| (0..a).map(move |b| (a, b)))
+                    .filter_map(|(a, b)| Some((a, b, pattern.block(nodes[a], nodes[b])?)))
+                    .collect();
+                (pair, PairPositions { nodes, blocks })
+            })
+            .collect();
+        let values = vec![0.0; pattern.stored()];
+        System { pairs, pattern, fs_positions, bore_positions, cs_values, factor, values }
+    }
+
+    /// The tangential unknown of a bore node at angle ~0.
+    fn anchored_unknown(&self) -> usize {
+        2 * self.problem.bore.edges[0][1] as usize + 1
+    }
+
+    fn system(&mut self) -> &mut System {
+        self.system.as_mut().expect("room was made for the pairs")
+    }
+}
+
+impl Factor for SparseWheels<'_> {
+    fn solve(&mut self, columns: &mut [f64], count: usize) {
+        self.system().factor.solve(columns, count);
+    }
+}
+
+impl Wheels for SparseWheels<'_> {
+    fn unknowns(&self) -> usize {
+        2 * self.free_nodes
+    }
+
+    fn prepare(&mut self, near: &[FlankPair], widely: &dyn Fn() -> Vec<FlankPair>) -> bool {
+        if self.system.as_ref().is_some_and(|system| near.iter().all(|pair| system.pairs.contains_key(pair))) {
+            return false;
+        }
+        let mut pairs = widely();
+        pairs.extend(near);
+        pairs.sort_unstable();
+        pairs.dedup();
+        self.system = Some(self.analyse(&pairs));
+        true
+    }
+
+    fn complete(&self, _state: &mut State) {}
+
+    fn assemble(&mut self, state: &State, force: &mut [f64]) {
+        let system = self.system.as_mut().expect("room was made for the pairs");
+        let problem = self.problem;
+        system.values.copy_from_slice(&system.cs_values);
+        let fs = &problem.flexspline;
+        for ((element, points), positions) in fs.elements.iter().zip(&fs.gauss).zip(&system.fs_positions) {
+            let mut local = [0.0; 16];
+            for (a, &n) in element.iter().enumerate() {
+                local[2 * a] = state.u[2 * n as usize];
+                local[2 * a + 1] = state.u[2 * n as usize + 1];
+            }
+            let (mut stiffness, mut nodal) = ([0.0; PACKED], [0.0; 16]);
+            add_tangent_and_force(points, &problem.material, &local, &mut stiffness, &mut nodal);
+            positions.scatter(&stiffness, &mut system.values);
+            for (a, &n) in element.iter().enumerate() {
+                force[2 * n as usize] -= nodal[2 * a];
+                force[2 * n as usize + 1] -= nodal[2 * a + 1];
+            }
+        }
+        let cs = &problem.circular_spline;
+        for (e, element) in cs.elements.iter().enumerate() {
+            let (sin, cos) = cs.sector_angle(e / cs.elements_per_sector).sin_cos();
+            let stiffness = &self.cs_template[e % cs.elements_per_sector];
+            let mut local = [0.0; 16];
+            for (a, &n) in element.iter().enumerate() {
+                let (x, y) = (state.v[2 * n as usize], state.v[2 * n as usize + 1]);
+                local[2 * a] = cos * x + sin * y;
+                local[2 * a + 1] = cos * y - sin * x;
+            }
+            let nodal = packed_times(stiffness, &local);
+            for (a, &n) in element.iter().enumerate() {
+                if let Some(free) = self.cs_index[n as usize] {
+                    let k = 2 * free as usize;
+                    force[k] -= cos * nodal[2 * a] - sin * nodal[2 * a + 1];
+                    force[k + 1] -= sin * nodal[2 * a] + cos * nodal[2 * a + 1];
+                }
+            }
+        }
+    }
+
+    fn add_bore(&mut self, contact: &BorePressure) {
+        let nodes = self.problem.bore.edges[contact.edge];
+        let System { pattern, bore_positions, values, .. } = self.system();
+        for (a, &n) in nodes.iter().enumerate() {
+            let row_x = a * (2 * a + 1);
+            let row_y = row_x + 2 * a + 1;
+            let [xx, yy] = pattern.diagonal(n).map(|p| p as usize);
+            values[xx] += contact.stiffness[row_x + 2 * a];
+            values[xx + 1] += contact.stiffness[row_y + 2 * a];
+            values[yy] += contact.stiffness[row_y + 2 * a + 1];
+            for b in 0..a {
+                let p = bore_positions[contact.edge][a * (a - 1) / 2 + b].expect("bore nodes share an element");
+                let (base, row, column) = (p.base as usize, p.row as usize, p.column as usize);
+                values[base] += contact.stiffness[row_x + 2 * b];
+                values[base + column] += contact.stiffness[row_x + 2 * b + 1];
+                values[base + row] += contact.stiffness[row_y + 2 * b];
+                values[base + row + column] += contact.stiffness[row_y + 2 * b + 1];
+            }
+        }
+    }
+
+    fn add_flank(&mut self, pair: FlankPair, contact: &PairContribution) {
+        let System { pattern, pairs, values, .. } = self.system();
+        let positions = &pairs[&pair];
+        let n = contact.force.len();
+        for (a, &node) in positions.nodes.iter().enumerate() {
+            let [xx, yy] = pattern.diagonal(node).map(|p| p as usize);
+            values[xx] += contact.stiffness[2 * a * n + 2 * a];
+            values[xx + 1] += contact.stiffness[(2 * a + 1) * n + 2 * a];
+            values[yy] += contact.stiffness[(2 * a + 1) * n + 2 * a + 1];
+        }
+        for &(a, b, p) in &positions.blocks {
+            for i in 0..2 {
+                for j in 0..2 {
+                    let position = p.base as usize + i * p.row as usize + j * p.column as usize;
+                    values[position] += contact.stiffness[(2 * a + i) * n + 2 * b + j];
+                }
+            }
+        }
+    }
+
+    fn anchor(&self) -> Vec<(usize, f64)> {
+        vec![(self.anchored_unknown(), 1.0)]
+    }
+
+    fn factorise(&mut self, spring: f64) -> bool {
+        let anchored = self.anchored_unknown();
+        let System { pattern, values, factor, .. } = self.system();
+        let mut stiffened = values.clone();
+        stiffened[pattern.column_starts[anchored] as usize] += ANCHOR;
+        if spring > 0.0 {
+            for &start in &pattern.column_starts[..pattern.unknowns()] {
+                stiffened[start as usize] += spring;
+            }
+        }
+        factor.factorise(pattern, &stiffened).is_ok()
+    }
+}
+
+/// Product of a packed symmetric 16 x 16 matrix with a vector.
+fn packed_times(packed: &[f64; PACKED], x: &[f64; 16]) -> [f64; 16] {
+    let mut y = [0.0; 16];
+    let mut k = 0;
+    for i in 0..16 {
+        for j in 0..i {
+            y[i] += packed[k] * x[j];
+            y[j] += packed[k] * x[i];
+            k += 1;
+        }
+        y[i] += packed[k] * x[i];
+        k += 1;
+    }
+    y
+}

@@ -1,0 +1,195 @@
+//! The fast solver is the reference solver, quicker: same drive, same mesh, same path, same answer.
+//!
+//! ```text
+//!   reference:  every node, geometrically non-linear      fast:  +---+---+---+   teeth condensed, linear in frames that turn
+//!               one sparse matrix                                |_^_|_^_|_^_|   faces around the ring, flanks that touch
+//! ```
+//!
+//! HHD-95, every generator: deformed, loaded, turned forward and back through the clearance; with friction and the compliances
+//! of HHD-95-typical; cold; with every imperfection at once, and with one of each kind. Bounds: 0.1″ in the output angle, 0.5 %
+//! in wind-up and in peak stress; they stand for the whole path, not for its end.
+//! Physics wrong if this fails: a cell condensed wrongly, a frame that carries a moment, strain that a turning frame cannot
+//! hold, contact that one solver sees and the other does not.
+
+use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
+use flexspline_sim::mesh::MeshLevel;
+use flexspline_sim::stepping::{Method, Problem, SolverSettings};
+use flexspline_sim::stress::peak_stress;
+use flexspline_tests::motion::{ARCSEC, Run, imperfect, on};
+
+const OUTPUT_ARCSEC: f64 = 0.1;
+const WIND_UP: f64 = 0.005;
+const STRESS: f64 = 0.005;
+
+/// A place on the path: generator angle (rad) and load (N m).
+type Place = (f64, f64);
+
+/// What both solvers say of a place.
+struct Answer {
+    output_rad: f64,
+    error_arcsec: f64,
+    generator_torque_n_m: f64,
+    compliance_rad_per_n_m: f64,
+    peak_mpa: f64,
+    /// All displacements of both wheels, mm.
+    field: Vec<f64>,
+}
+
+/// Forward under load, back through the clearance, at another load.
+fn there_and_back(torque_n_m: f64) -> Vec<Place> {
+    let forward = (1..=4).map(|k| (0.01 * f64::from(k), torque_n_m));
+    let back = (1..=4).map(|k| (0.04 - 0.012 * f64::from(k), torque_n_m));
+    let lighter = (1..=2).map(|k| (-0.008 - 0.01 * f64::from(k), -0.3 * torque_n_m));
+    std::iter::once((0.0, torque_n_m)).chain(forward).chain(back).chain(lighter).collect()
+}
+
+fn answers(
+    drive: &Drive,
+    kind: GeneratorKind,
+    settings: SolverSettings,
+    temperature_c: f64,
+    path: &[Place],
+) -> Vec<Answer> {
+    let problem =
+        Problem::new(drive, kind, temperature_c, settings).unwrap_or_else(|error| panic!("{kind}: {error}"));
+    let mut run = Run::new(&problem);
+    std::iter::once(None)
+        .chain(path.iter().map(Some))
+        .map(|place| {
+            let sample = place.map(|(generator_rad, torque)| run.to(*generator_rad, *torque));
+            let whole = problem.whole_state(&run.state);
+            Answer {
+                output_rad: run.state.output_rad,
+                error_arcsec: run.error_arcsec(),
+                generator_torque_n_m: sample.as_ref().map_or(0.0, |s| s.increment.generator_torque_n_m),
+                compliance_rad_per_n_m: sample.as_ref().map_or(0.0, |s| s.increment.compliance_rad_per_n_m),
+                peak_mpa: peak_stress(&problem, &run.state).von_mises_mpa,
+                field: whole.u.iter().chain(&whole.v).copied().collect(),
+            }
+        })
+        .collect()
+}
+
+fn compare(what: &str, drive: &Drive, kind: GeneratorKind, settings: SolverSettings, temperature_c: f64, path: &[Place]) {
+    let with = |method| answers(drive, kind, SolverSettings { method, ..settings }, temperature_c, path);
+    let (fast, reference) = (with(Method::Fast), with(Method::Reference));
+    let worst = |difference: &dyn Fn(&Answer, &Answer) -> f64| {
+        fast.iter().zip(&reference).map(|(f, r)| difference(f, r)).fold(0.0_f64, f64::max)
+    };
+    let output = worst(&|f, r| (f.output_rad - r.output_rad).abs() * ARCSEC);
+    let stress = worst(&|f, r| (f.peak_mpa / r.peak_mpa - 1.0).abs());
+    let field = worst(&|f, r| f.field.iter().zip(&r.field).map(|(f, r)| (f - r).abs()).fold(0.0, f64::max));
+    let torque = worst(&|f, r| (f.generator_torque_n_m - r.generator_torque_n_m).abs());
+    let compliance = worst(&|f, r| match r.compliance_rad_per_n_m {
+        0.0 => 0.0,
+        soft => (f.compliance_rad_per_n_m / soft - 1.0).abs(),
+    });
+    // The first place is unloaded, the second loaded where the generator stands.
+    let wind_up = |a: &[Answer]| a[1].error_arcsec - a[0].error_arcsec;
+    let winds = wind_up(&fast) / wind_up(&reference) - 1.0;
+    println!(
+        "{kind}, {what}: output {output:.4}\", wind-up {:.2}\" and {:+.4} %, peak stress {:.3} %, displacements {:.1e} mm, \
+         generator torque {torque:.1e} N.m, compliance {:.2} %",
+        wind_up(&reference),
+        100.0 * winds,
+        100.0 * stress,
+        field,
+        100.0 * compliance
+    );
+    assert!(output <= OUTPUT_ARCSEC, "{kind}, {what}: outputs differ by {output} arcsec");
+    assert!(winds.abs() <= WIND_UP, "{kind}, {what}: wind-ups differ by {} %", 100.0 * winds);
+    assert!(stress <= STRESS, "{kind}, {what}: peak stresses differ by {} %", 100.0 * stress);
+    // 0.1" at the output is 24 nm at a flank; a node of the wheels may not be off by much more.
+    assert!(field <= 2e-4, "{kind}, {what}: displacements differ by {field} mm");
+    assert!(compliance <= 0.05, "{kind}, {what}: compliances differ by {} %", 100.0 * compliance);
+}
+
+/// Load at which rollers still hold the rim, N m.
+fn load(kind: GeneratorKind) -> f64 {
+    match kind {
+        GeneratorKind::TwoRoller => 10.0,
+        GeneratorKind::FourRoller => 50.0,
+        GeneratorKind::DoubleDisc | GeneratorKind::Cam => 100.0,
+    }
+}
+
+#[test]
+fn every_generator_on_the_mesh_that_ships() {
+    for kind in GeneratorKind::ALL {
+        let path = &there_and_back(load(kind))[..3];
+        compare("standard mesh", &Drive::hhd_95(), kind, on(MeshLevel::Standard), 20.0, path);
+    }
+}
+
+#[test]
+fn every_generator_there_and_back() {
+    for kind in GeneratorKind::ALL {
+        compare("there and back", &Drive::hhd_95(), kind, on(MeshLevel::Coarse), 20.0, &there_and_back(load(kind)));
+    }
+}
+
+#[test]
+fn friction_and_compliances_in_the_cold() {
+    let mut drive = Drive::hhd_95_typical();
+    drive.flanks.friction_coefficient = 0.1;
+    drive.sleeve.lateral_stiffness_n_per_mm = 500.0;
+    for kind in GeneratorKind::ALL {
+        let settings = SolverSettings { bore_points: Some(16), ..on(MeshLevel::Coarse) };
+        compare("friction, -20 C", &drive, kind, settings, -20.0, &there_and_back(0.5 * load(kind)));
+    }
+}
+
+#[test]
+fn every_imperfection_at_once() {
+    for kind in GeneratorKind::ALL {
+        let path = there_and_back(0.5 * load(kind));
+        compare("imperfect", &imperfect(), kind, on(MeshLevel::Coarse), 20.0, &path[..6]);
+    }
+}
+
+#[test]
+fn one_imperfection_of_each_kind() {
+    type Change = fn(&mut Drive);
+    let harmonic = |order, amplitude_um| vec![Harmonic { order, amplitude_um, phase_deg: 20.0 }];
+    let changes: [(&str, Change); 13] = [
+        ("circular-spline eccentricity", |d| d.as_built.circular_spline_eccentricity_um = 5.0),
+        ("circular-spline ovality", |d| d.as_built.circular_spline_ovality_um = 5.0),
+        ("circular-spline offset", |d| d.as_built.circular_spline_offset_um = 5.0),
+        ("flexspline runout", |d| d.as_built.flexspline_runout_um = 5.0),
+        ("flexspline pitch, tooth by tooth", |d| {
+            d.as_built.flexspline_pitch_error_um = (0..188).map(|k| f64::from(k).sin()).collect();
+        }),
+        ("generator eccentricity", |d| d.as_built.generator_eccentricity_um = 10.0),
+        ("lobe asymmetry", |d| d.as_built.generator_lobe_asymmetry_um = 5.0),
+        ("flexspline wear", |d| d.as_built.flexspline_wear_um = 3.0),
+        ("circular-spline wear", |d| d.as_built.circular_spline_wear_um = 3.0),
+        ("damaged tooth", |d| {
+            d.as_built.damaged_teeth =
+                vec![DamagedTooth { wheel: Wheel::Flexspline, tooth: 3, flank: DamagedFlank::Both, depth_um: 8.0 }];
+        }),
+        ("warmer generator", |d| d.as_built.generator_warmer_k = 5.0),
+        ("warmer circular spline", |d| d.as_built.circular_spline_warmer_k = -5.0),
+        ("nothing", |_| {}),
+    ];
+    let mut drives: Vec<(&str, Drive)> = changes
+        .into_iter()
+        .map(|(what, change)| {
+            let mut drive = Drive::hhd_95();
+            change(&mut drive);
+            (what, drive)
+        })
+        .collect();
+    let mut with = |what, change: &dyn Fn(&mut Drive)| {
+        let mut drive = Drive::hhd_95();
+        change(&mut drive);
+        drives.push((what, drive));
+    };
+    with("rim thickness", &|d| d.as_built.rim_thickness_harmonics = harmonic(4, 20.0));
+    with("cam form", &|d| d.as_built.cam_form_harmonics = harmonic(3, 3.0));
+    with("flexspline pitch harmonic", &|d| d.as_built.flexspline_pitch_harmonics = harmonic(2, 5.0));
+    with("circular-spline pitch harmonic", &|d| d.as_built.circular_spline_pitch_harmonics = harmonic(2, 5.0));
+    for (what, drive) in &drives {
+        let path = [(0.0, 20.0), (0.01, 20.0), (0.02, 20.0)];
+        compare(what, drive, GeneratorKind::Cam, on(MeshLevel::Coarse), 20.0, &path);
+    }
+}
