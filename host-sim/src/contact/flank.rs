@@ -651,6 +651,38 @@ mod tests {
         });
     }
 
+    /// What lets open points and far pairs be left without their foot never says more than the foot does.
+    #[test]
+    fn the_glance_is_a_lower_bound_of_the_gap() {
+        with_flanks(|flanks, fs, cs| {
+            let wave = |n: usize, size: f64| (0..2 * n).map(|i| size * (1.7 * i as f64).sin()).collect::<Vec<f64>>();
+            let (u, v) = (wave(fs.nodes.len(), 5e-3), wave(cs.nodes.len(), 5e-3));
+            let (mut tightest, mut rounded) = (f64::INFINITY, 0);
+            for k in 0..40 {
+                let at = Configuration { u: &u, v: &v, output_rad: 1e-4 * f64::from(k) - 2e-3 };
+                for side in Side::BOTH {
+                    let pair = FlankPair { side, ..PAIR };
+                    let field = flanks.local_field(pair, at);
+                    for point in flanks.layout(pair, at).points {
+                        let x = flanks.seen_from_space(&field, point.position, point.edge, &point.shape);
+                        let (foot, least) = (flanks.foot(pair, &field, x), flanks.least_distance(&field, x));
+                        assert!(least <= foot.distance.max(0.0), "{least} of {}", foot.distance);
+                        tightest = tightest.min(foot.distance - least);
+                        rounded += usize::from(foot.radius < flanks.space.junction_radius);
+                    }
+                    let gap = flanks.smallest_gap(pair, at);
+                    for reach in [0.01, 0.04, 0.1] {
+                        assert!(!flanks.is_farther(pair, &field, reach) || gap >= reach, "{gap} within {reach}");
+                    }
+                }
+            }
+            assert!(
+                tightest < 5e-3 && rounded > 0,
+                "a bound that tells nothing: {tightest}, {rounded} on the rounding"
+            );
+        });
+    }
+
     #[test]
     fn pressed_flanks_push_back_and_open_flanks_do_not() {
         with_flanks(|flanks, fs, cs| {

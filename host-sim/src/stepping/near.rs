@@ -206,7 +206,12 @@ fn balance(torque: impl Fn(f64) -> (f64, f64), tolerance: f64, reach: f64) -> Op
             }
         };
         if turn.abs() > reach {
-            return None;
+            // A stride may pass what lies just within the reach: its end is looked at before giving up.
+            let end = reach.copysign(turn);
+            if behind.is_some_and(|low| low >= end) || ahead.is_some_and(|high| high <= end) {
+                return None;
+            }
+            turn = end;
         }
     }
     Some(turn)
@@ -215,4 +220,26 @@ fn balance(torque: impl Fn(f64) -> (f64, f64), tolerance: f64, reach: f64) -> Op
 /// Where a state stands.
 pub(super) fn configuration(state: &State) -> Configuration<'_> {
     Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A flank that meets a load of 1 after a clearance: wherever it is within the reach, it is found, and beyond it is not.
+    #[test]
+    fn a_clearance_is_crossed_up_to_the_reach() {
+        let reach = 1.344e-3;
+        for clearance in [1e-5, 3e-4, 3.5e-4, 8e-4, 1.3e-3, 1.4e-3] {
+            for sense in [1.0, -1.0] {
+                let torque = |turn: f64| {
+                    let depth = (sense * turn - clearance).max(0.0);
+                    (sense * (1.0 - 1e6 * depth), if depth > 0.0 { -1e6 } else { 0.0 })
+                };
+                let found = balance(torque, 1e-6, reach);
+                assert_eq!(found.is_some(), clearance < reach, "{clearance}: {found:?}");
+                assert!(found.is_none_or(|turn| (sense * turn - clearance - 1e-6).abs() < 1e-11), "{clearance}: {found:?}");
+            }
+        }
+    }
 }
