@@ -7,8 +7,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use std::rc::Rc;
 
 use crate::condense::{
-    Block, CellState, CellTangent, Chain, CoRotation, CondensedWheel, Contribution, Geometric, Kernels, Local, Placement, Traction,
-    back, rotate_pairs,
+    Block, CellAt, CellState, CellTangent, Chain, CoRotation, CondensedWheel, Contribution, Geometric, Kernels, Local,
+    Placement, Traction, back, rotate_pairs,
 };
 use crate::contact::{BorePressure, FlankPair, PairContribution};
 use crate::drive::Side;
@@ -257,8 +257,8 @@ impl<'p> CondensedWheels<'p> {
                     }
                     // R^T K R, R being the frame of the cell.
                     let block = [0, 1].map(|x| [0, 1].map(|y| entry(2 * n + x, 2 * m + y)));
-                    let rows = [0, 1]
-                        .map(|y| [cos * block[0][y] + sin * block[1][y], cos * block[1][y] - sin * block[0][y]]);
+                    let rows =
+                        [0, 1].map(|y| [cos * block[0][y] + sin * block[1][y], cos * block[1][y] - sin * block[0][y]]);
                     for x in 0..2 {
                         let values = [cos * rows[0][x] + sin * rows[1][x], cos * rows[1][x] - sin * rows[0][x]];
                         for y in 0..2 {
@@ -386,18 +386,19 @@ impl Factor for CondensedWheels<'_> {
         // A cell that is near contact now has forces on its flanks, even if it had not where the factor was made.
         let (fs_live, cs_live) = live.split_at(fs.count());
         let now = |ring: &[bool], cell: usize| ring[(cell as isize + *turned).rem_euclid(ring.len() as isize) as usize];
-        let cells: Vec<_> = (0..fs.count())
+        let cells: Vec<CellAt> = (0..fs.count())
             .map(|j| fs.cell(j, factor.live[j] || now(fs_live, j)))
             .chain((0..cs.count()).map(|t| cs.cell(t, factor.live[fs.count() + t] || now(cs_live, t))))
+            .map(|(cell, unknowns)| CellAt { kernels: *kernels, cell, unknowns, order: &factor.chain })
             .collect();
         let size = |block: usize| if block < fs.count() { fs.face() } else { cs.face() };
         let unknowns = factor.chain.unknowns();
         let mut chains = vec![0.0; unknowns * count];
         locals.resize_with(cells.len() * count, Local::default);
-        for (c, ((cell, unknowns_of), tangent)) in cells.iter().zip(&factor.cells).enumerate() {
+        for (c, (at, tangent)) in cells.iter().zip(&factor.cells).enumerate() {
             let sides = columns.chunks_exact(n).zip(chains.chunks_exact_mut(unknowns));
             for ((x, chain), local) in sides.zip(&mut locals[c * count..]) {
-                tangent.forward(*kernels, cell, unknowns_of, x, &factor.chain, chain, local);
+                tangent.forward(*at, x, chain, local);
             }
         }
         for (x, chain) in columns.chunks_exact(n).zip(chains.chunks_exact_mut(unknowns)) {
@@ -412,10 +413,10 @@ impl Factor for CondensedWheels<'_> {
             }
         }
         factor.chain.solve(&mut chains);
-        for (c, ((cell, unknowns_of), tangent)) in cells.iter().zip(&factor.cells).enumerate() {
+        for (c, (at, tangent)) in cells.iter().zip(&factor.cells).enumerate() {
             let sides = columns.chunks_exact_mut(n).zip(chains.chunks_exact(unknowns));
             for ((x, chain), local) in sides.zip(&mut locals[c * count..]) {
-                tangent.backward(*kernels, cell, unknowns_of, x, &factor.chain, chain, local);
+                tangent.backward(*at, x, chain, local);
             }
         }
         for (x, chain) in columns.chunks_exact_mut(n).zip(chains.chunks_exact(unknowns)) {

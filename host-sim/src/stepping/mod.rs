@@ -11,7 +11,7 @@ mod state;
 mod wheels;
 
 pub use error::SolveError;
-pub use newton::{Effort, Increment, Solver};
 pub use fast::CondensedDrive;
+pub use newton::{Effort, Increment, Solver};
 pub use problem::{Method, Problem, SolverSettings};
 pub use state::State;

@@ -13,9 +13,9 @@ use crate::contact::{BoreLaw, Configuration, FlankContact, FlankLaw, FlankPair};
 use crate::fem::{Border, BorderedSystem};
 
 use super::error::SolveError;
-use super::predictor::turn_field;
 use super::fast::{CondensedWheels, Kept};
 use super::near::{NearPairs, configuration};
+use super::predictor::turn_field;
 use super::problem::Problem;
 use super::reference::SparseWheels;
 use super::state::State;
@@ -522,7 +522,8 @@ impl<'p> Solver<'p> {
     fn motion(&self, step: &Step) -> f64 {
         let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let nodes = largest(&step.u) + largest(&step.v);
-        1.25 * std::f64::consts::SQRT_2 * nodes + self.problem.drive.circular_spline.root_radius_mm * step.border[OUTPUT].abs()
+        1.25 * std::f64::consts::SQRT_2 * nodes
+            + self.problem.drive.circular_spline.root_radius_mm * step.border[OUTPUT].abs()
     }
 
     /// Turns the output to where load, drag and flanks balance while the wheels keep their shape.
@@ -594,19 +595,26 @@ impl<'p> Solver<'p> {
         let problem = self.problem;
         let (bore_law, flank_law) = (self.bore_law(), self.flank_law());
         let wheels = self.wheels.as_mut();
-        problem.bore.evaluate_near(bore_law, &problem.outline, state.generator_rad, &state.u, &mut near.bore, |contact| {
-            for (a, &n) in problem.bore.edges[contact.edge].iter().enumerate() {
-                for k in 0..2 {
-                    let f = contact.force[2 * a + k];
-                    residual.force[2 * n as usize + k] += f;
-                    residual.scale = residual.scale.max(f.abs());
+        problem.bore.evaluate_near(
+            bore_law,
+            &problem.outline,
+            state.generator_rad,
+            &state.u,
+            &mut near.bore,
+            |contact| {
+                for (a, &n) in problem.bore.edges[contact.edge].iter().enumerate() {
+                    for k in 0..2 {
+                        let f = contact.force[2 * a + k];
+                        residual.force[2 * n as usize + k] += f;
+                        residual.scale = residual.scale.max(f.abs());
+                    }
                 }
-            }
-            wheels.add_bore(contact);
-            residual.generator_moment += contact.moment;
-            residual.generator_contacts += 1;
-            residual.peak[1] = residual.peak[1].max(contact.peak);
-        });
+                wheels.add_bore(contact);
+                residual.generator_moment += contact.moment;
+                residual.generator_contacts += 1;
+                residual.peak[1] = residual.peak[1].max(contact.peak);
+            },
+        );
         let at = configuration(state);
         let column = self.border.column_mut(OUTPUT);
         column.fill(0.0);
@@ -835,9 +843,8 @@ fn phase_weights(pitches: &[f64]) -> Option<PhaseWeights> {
         }
     }
     let nearest = off(*chosen.first()?).abs();
-    let weight = |k: usize| -> f64 {
-        chosen.iter().filter(|c| **c != k).map(|c| -off(*c) / (off(k) - off(*c))).product()
-    };
+    let weight =
+        |k: usize| -> f64 { chosen.iter().filter(|c| **c != k).map(|c| -off(*c) / (off(k) - off(*c))).product() };
     let mut states: Vec<(usize, f64)> = chosen.iter().map(|k| (*k, weight(*k))).collect();
     // Going on too far from states too close together magnifies what they have not settled.
     if states.iter().any(|(_, weight)| weight.abs() > LARGEST_WEIGHT) {
