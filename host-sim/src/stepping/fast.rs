@@ -6,6 +6,8 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::rc::Rc;
 
+use rayon::prelude::*;
+
 use crate::condense::{
     Block, CellAt, CellState, CellTangent, Chain, CoRotation, CondensedWheel, Contribution, Geometric, Kernels, Local,
     Placement, Traction, back, rotate_pairs,
@@ -47,37 +49,34 @@ impl CondensedDrive {
     pub(super) fn recover(&self, problem: &Problem, state: &State) -> State {
         let (fs, whole) = (&self.flexspline, &problem.flexspline);
         let mut u = fs.spread(whole, &state.u);
-        for j in 0..fs.count() {
+        let flexspline_cell = |j: usize| -> Vec<f64> {
             let (cell, unknowns) = fs.cell(j, true);
-            let (element, further) = fs.element(j);
+            let (element, _) = fs.element(j);
             let angle = whole.sector_angle(j);
             let mut d: Vec<f64> = unknowns.iter().map(|k| state.u[*k as usize]).collect();
             rotate_pairs(&mut d, (-angle).sin_cos());
             let mut inner = CellState::default();
             cell.frame.split(&d, &mut inner);
             let q = element.recover(&inner.q, 0.0);
-            let (nodes, positions) = element.interior();
-            for ((n, position), q) in nodes.iter().zip(positions).zip(q.chunks_exact(2)) {
-                let mut moved = CoRotation::join(&inner, *position, [q[0], q[1]]);
-                rotate_pairs(&mut moved, angle.sin_cos());
-                place(whole, *n, further, &mut u, moved);
-            }
-        }
+            let positions = element.interior().1.iter();
+            let mut moved: Vec<f64> =
+                positions.zip(q.chunks_exact(2)).flat_map(|(p, q)| CoRotation::join(&inner, *p, [q[0], q[1]])).collect();
+            rotate_pairs(&mut moved, angle.sin_cos());
+            moved
+        };
+        place_interiors(fs, whole, flexspline_cell, &mut u);
         let (cs, whole) = (&self.circular_spline, &problem.circular_spline);
         let mut v = cs.spread(whole, &state.v);
-        for t in 0..cs.count() {
+        let circular_spline_cell = |t: usize| -> Vec<f64> {
             let (_, unknowns) = cs.cell(t, true);
-            let (element, further) = cs.element(t);
             let frame = self.cs_frame(t).sin_cos();
             let mut d: Vec<f64> = unknowns.iter().map(|k| state.v[*k as usize - cs.first_unknown]).collect();
             rotate_pairs(&mut d, back(frame));
-            let q = element.recover(&d, problem.seat_displacement);
-            for (n, q) in element.interior().0.iter().zip(q.chunks_exact(2)) {
-                let mut moved = [q[0], q[1]];
-                rotate_pairs(&mut moved, frame);
-                place(whole, *n, further, &mut v, moved);
-            }
-        }
+            let mut moved = cs.element(t).0.recover(&d, problem.seat_displacement);
+            rotate_pairs(&mut moved, frame);
+            moved
+        };
+        place_interiors(cs, whole, circular_spline_cell, &mut v);
         problem.seat(&mut v);
         State { u, v, ..state.clone() }
     }
@@ -115,11 +114,23 @@ impl CondensedDrive {
     }
 }
 
-/// Writes the displacement of a node given in another cell, `further` sectors back.
-fn place(mesh: &WheelMesh, node: u32, further: usize, field: &mut [f64], displacement: [f64; 2]) {
-    let (sector, local) = (node as usize / mesh.nodes_per_sector, node % mesh.nodes_per_sector as u32);
-    let n = mesh.node((sector + further) as isize, local);
-    field[2 * n..2 * n + 2].copy_from_slice(&displacement);
+/// Writes the displacements of the nodes inside the cells of a wheel, cell by cell, into a field of the whole wheel.
+fn place_interiors(
+    wheel: &CondensedWheel,
+    whole: &WheelMesh,
+    displacements: impl Fn(usize) -> Vec<f64> + Send + Sync,
+    field: &mut [f64],
+) {
+    let cells: Vec<Vec<f64>> = (0..wheel.count()).into_par_iter().with_min_len(24).map(displacements).collect();
+    for (j, moved) in cells.iter().enumerate() {
+        let (element, further) = wheel.element(j);
+        for (node, x) in element.interior().0.iter().zip(moved.chunks_exact(2)) {
+            // The node is given in the cell that was condensed, `further` sectors back.
+            let (sector, local) = (*node as usize / whole.nodes_per_sector, node % whole.nodes_per_sector as u32);
+            let n = whole.node((sector + further) as isize, local);
+            field[2 * n..2 * n + 2].copy_from_slice(x);
+        }
+    }
 }
 
 /// A factorised tangent.
