@@ -1,5 +1,6 @@
 //! The same mesh, state and outlines for other programs.
 
+pub mod inp;
 mod outlines;
 mod vtu;
 
