@@ -17,8 +17,8 @@ use crate::program::{Limits, Used, run};
 const ARCSEC: f64 = 180.0 * 3600.0 / PI;
 /// The drag of the output has no place in a deck.
 const WITHOUT_DRAG: &str = "output.drag_torque_n_m=0";
-/// Steps of a deck before the load is on: the generator takes its form, the output is turned against the teeth.
-const STEPS_BEFORE_LOAD: usize = 2;
+/// The step of a deck that ends with the load on. One follows for each rotation increment, then one to the last load.
+const LOAD_STEP: usize = 3;
 /// Times that our solvers go through the path.
 const REPEAT: usize = 3;
 
@@ -39,15 +39,17 @@ pub struct Case {
     pub step_rad: f64,
     /// Parts that CalculiX is made to take each of them in.
     pub parts: usize,
+    /// Contact penalties on bore and flanks, N/mm³, the same in both programs.
+    pub penalties: [f64; 2],
 }
 
 /// What came out of CalculiX.
 pub struct Peer {
     /// Output angle (rad) at the end of the load step, of each rotation step and of the last.
     pub output_rad: Vec<f64>,
-    /// Iterations of each of these steps.
+    /// Iterations to each of these.
     pub iterations: Vec<usize>,
-    /// Processor time of each of these steps, s.
+    /// Processor time of each of these, s.
     pub cpu_s: Vec<f64>,
     /// Of the whole run.
     pub used: Used,
@@ -102,6 +104,8 @@ impl Case {
             ("--torque-n-m", self.torque_n_m),
             ("--last-torque-n-m", self.last_torque_n_m),
             ("--step-rad", self.step_rad),
+            ("--bore-penalty", self.penalties[0]),
+            ("--flank-penalty", self.penalties[1]),
         ];
         let mut command = Command::new(flexspline);
         command.args(["export", "--format", "inp", "--quiet", "--set", WITHOUT_DRAG]);
@@ -138,11 +142,11 @@ impl Case {
         let used = run(&mut command, &folder.join("ccx.log"), Some(&sta), limits)?;
         let read = |path: &Path| std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()));
 
-        let steps = self.increments + 2;
+        let stops = self.increments + 2;
         let mut peer = Peer {
             output_rad: Vec::new(),
-            iterations: vec![0; steps],
-            cpu_s: vec![0.0; steps],
+            iterations: vec![0; stops],
+            cpu_s: vec![0.0; stops],
             used,
             bore: Vec::new(),
             stress: Vec::new(),
@@ -155,15 +159,15 @@ impl Case {
             let (Some(step), Some(iterations)) = (number(0), number(3)) else {
                 return Err(format!("{}: found {line:?}, which is no increment", sta.display()));
             };
-            if let Some(k) = step.checked_sub(STEPS_BEFORE_LOAD + 1).filter(|k| *k < steps) {
+            if let Some(k) = step.checked_sub(LOAD_STEP).filter(|k| *k < stops) {
                 peer.iterations[k] += iterations;
                 peer.cpu_s[k] += cpu_s - before_s;
             }
             before_s = *cpu_s;
         }
         let tables = tables(&read(&dat)?).map_err(|error| format!("{}: {error}", dat.display()))?;
-        for k in 0..steps {
-            let step = STEPS_BEFORE_LOAD + 1 + k;
+        for k in 0..stops {
+            let step = LOAD_STEP + k;
             let rows = |set: &str| {
                 let rows = at_step(&tables, set, step).filter(|rows| !rows.is_empty());
                 rows.ok_or_else(|| format!("{}: no {set} at the end of step {step}", dat.display()))
@@ -178,7 +182,13 @@ impl Case {
     /// Our model of the same drive.
     pub fn problem(&self) -> Result<Problem, String> {
         let drive = Drive::hhd_95().with_sets([WITHOUT_DRAG]).map_err(|error| error.to_string())?;
-        let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
+        let [bore_penalty, flank_penalty] = self.penalties;
+        let settings = SolverSettings {
+            mesh: self.mesh,
+            bore_penalty: Some(bore_penalty),
+            flank_penalty,
+            ..SolverSettings::default()
+        };
         Problem::new(&drive, self.generator, drive.temperature.reference_c, settings).map_err(|error| error.to_string())
     }
 
@@ -249,6 +259,9 @@ impl Case {
         let mut command = Command::new(flexspline);
         command.args(["simulate", "--quiet", "--set", WITHOUT_DRAG, "--solver", solver.name()]);
         command.args(["--generator", self.generator.name(), "--mesh", &self.mesh.to_string()]);
+        for (option, value) in [("--bore-penalty", self.penalties[0]), ("--flank-penalty", self.penalties[1])] {
+            command.args([option, &value.to_string()]);
+        }
         command.arg("--path").arg(&path).arg("--out").arg(folder.join(solver.name()));
         let limits = Limits { cpu_s: 600.0, memory_mb: 8000.0 };
         Ok(run(&mut command, &folder.join(format!("{}.log", solver.name())), None, limits)?.memory_mb)

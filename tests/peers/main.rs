@@ -94,6 +94,7 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
         increments: 2,
         step_rad: 0.01,
         parts: 1,
+        penalties: [1e5, 1e6],
     };
     let mut cases = vec![short];
     if options.long {

@@ -7,14 +7,14 @@
 //! |---|---|
 //! | wheels | our nodes and elements, `CPE8R`: the 8-node quadrilateral with 2 x 2 points that [`crate::element`] is |
 //! | material | `*ELASTIC` under `NLGEOM`: St Venant-Kirchhoff, as ours |
-//! | generator | bodies with the exact outline, moved by three prescribed numbers ([`generator`]) |
+//! | generator | bodies with the exact outline, every node prescribed ([`generator`]) |
 //! | contact | `SURFACE TO SURFACE`, linear penalty of our stiffness, `*FRICTION` if the drive has any |
 //! | flexspline | mean rotation of the bore held, mean displacement on the lateral spring ([`holding`]) |
 //! | circular spline | every node of its outer circle on one rotation, the node `OUTPUT`, which carries the load |
 //!
 //! Steps: `1` the generator takes its form, the circular spline away from the teeth (contact removed); `2` the circular
-//! spline is turned against the teeth by a little more than the rigid clearance; `3` it is let go and the load comes on;
-//! then one step for each rotation increment, and if wanted a last one to another load.
+//! spline is turned against the teeth by a little more than the rigid clearance; `3` it is let go and the load comes on; then
+//! one for each rotation increment, and if wanted a last one to another load.
 //!
 //! What differs from our model:
 //! * Flanks are the faces of the elements, parabolas through three points of the involute (1 nm off it on the standard mesh),
@@ -25,7 +25,7 @@
 //! * Springs of [`STABILISING_TORSION`] on the output and [`STABILISING_LATERAL`] on the bore hold what nothing else holds
 //!   before the parts touch. The first takes 1e-4 rad times itself off the load: 0.1 N mm of 2500.
 //! * The Coulomb drag of the output is left out: [`Deck::new`] refuses a drive that has it rather than drop it silently.
-//! * Between the ends of a rotation step the generator moves along the chord: only states at the ends of steps count.
+//! * Within a step the nodes of the generator move along straight lines: only states at the ends of steps count.
 //!
 //! Abaqus was not at hand: that it reads the deck is a claim from its documented syntax, not from a run.
 
@@ -135,10 +135,9 @@ pub struct Deck {
     pub surfaces: [Vec<Face>; 4],
     /// Node whose first degree of freedom is the output angle (rad), and the second the displacement of the outer circle (mm).
     pub output: usize,
-    /// Node whose first degree of freedom forms the generator (0 to 1).
-    pub form: usize,
-    /// Node whose degrees of freedom are `cos psi - 1` and `sin psi` of the generator angle.
-    pub turn: usize,
+    generator: GeneratorBody,
+    /// Number of the first node of the generator.
+    pub first_generator_node: usize,
     springs: Vec<Spring>,
     seat_mm: f64,
     bearing_turn_rad: f64,
@@ -176,8 +175,8 @@ impl Deck {
             outer: Vec::new(),
             surfaces: Default::default(),
             output: 0,
-            form: 0,
-            turn: 0,
+            generator: GeneratorBody::new(&problem.outline, fs),
+            first_generator_node: 0,
             springs: Vec::new(),
             seat_mm: 0.0,
             bearing_turn_rad: 0.5 * BEARING_TURN * backlash_rad * sign(settings.torque_n_m),
@@ -203,7 +202,7 @@ impl Deck {
             friction: drive.flanks.friction_coefficient,
         };
         deck.add_wheels([fs, cs]);
-        deck.add_generator(&GeneratorBody::new(&problem.outline, drive.flexspline.bore_radius_mm()));
+        deck.add_generator();
         let thermal = &drive.thermal_state;
         deck.hold_circular_spline(
             cs,
@@ -249,27 +248,13 @@ impl Deck {
         }
     }
 
-    fn add_generator(&mut self, body: &GeneratorBody) {
+    fn add_generator(&mut self) {
         let (first_node, first_element) = (self.nodes.len() + 1, self.elements.len() + 1);
-        self.nodes.extend(&body.before);
-        self.elements.extend(body.elements.iter().map(|element| element.map(|n| first_node + n as usize)));
+        self.first_generator_node = first_node;
+        self.nodes.extend(self.generator.before());
+        self.elements.extend(self.generator.elements.iter().map(|element| element.map(|n| first_node + n as usize)));
         self.bodies[2] = first_element..self.elements.len() + 1;
         self.surfaces[3].extend(self.bodies[2].clone().map(|e| (e, 2)));
-        self.form = self.add_helper();
-        self.turn = self.add_helper();
-        for (k, (before, formed)) in body.before.iter().zip(&body.formed).enumerate() {
-            let [x, y] = *formed;
-            for (dof, change, along, across) in [(1, x - before[0], x, -y), (2, y - before[1], y, x)] {
-                self.equations.push(Equation {
-                    terms: vec![
-                        Term { node: first_node + k, dof, coefficient: 1.0 },
-                        Term { node: self.form, dof: 1, coefficient: -change },
-                        Term { node: self.turn, dof: 1, coefficient: -along },
-                        Term { node: self.turn, dof: 2, coefficient: -across },
-                    ],
-                });
-            }
-        }
     }
 
     /// Outer circle: `u = theta J x + seat x / r`.
@@ -360,13 +345,7 @@ impl Deck {
             writeln!(out, "*SPRING, ELSET={name}\n1\n{}", short(*stiffness))?;
             next += 1;
         }
-        let sets = [
-            ("BORE", self.bore.as_slice()),
-            ("OUTER_CIRCLE", &self.outer),
-            ("OUTPUT", &[self.output]),
-            ("GENERATOR_FORM", &[self.form]),
-            ("GENERATOR_TURN", &[self.turn]),
-        ];
+        let sets = [("BORE", self.bore.as_slice()), ("OUTER_CIRCLE", &self.outer), ("OUTPUT", &[self.output])];
         for (name, nodes) in sets {
             writeln!(out, "*NSET, NSET={name}")?;
             list(out, nodes.iter().copied())?;
@@ -429,7 +408,8 @@ impl Deck {
             Step { output: Output::Held(self.bearing_turn_rad), flanks: Flanks::Added, ..loaded },
         ];
         let turned = |k| Step { generator_rad: k as f64 * self.settings.step_rad, ..loaded };
-        steps.extend((0..=self.settings.increments).map(turned));
+        steps.push(loaded);
+        steps.extend((1..=self.settings.increments).map(turned));
         steps.extend(
             self.last_load_per_mm.map(|load| Step { output: Output::Loaded(load), ..turned(self.settings.increments) }),
         );
@@ -448,16 +428,16 @@ impl Deck {
         if let Some(change) = change {
             writeln!(out, "*MODEL CHANGE, TYPE=CONTACT PAIR, {change}\n{fs_flanks}, {cs_flanks}")?;
         }
-        let (s, c) = step.generator_rad.sin_cos();
         writeln!(out, "*BOUNDARY, OP=NEW")?;
-        let prescribed =
-            [(self.form, 1, 1.0), (self.turn, 1, c - 1.0), (self.turn, 2, s), (self.output, 2, self.seat_mm)];
-        let held = match step.output {
-            Output::Held(angle) => Some((self.output, 1, angle)),
-            Output::Loaded(_) => None,
-        };
-        for (node, dof, value) in prescribed.into_iter().chain(held) {
-            writeln!(out, "{node}, {dof}, {dof}, {}", short(value))?;
+        let stand = self.generator.at(step.generator_rad);
+        for (node, position) in (self.first_generator_node..).zip(&stand) {
+            for (i, before) in self.nodes[node - 1].iter().enumerate() {
+                writeln!(out, "{node}, {0}, {0}, {1}", i + 1, short(position[i] - before))?;
+            }
+        }
+        writeln!(out, "{0}, 2, 2, {1}", self.output, short(self.seat_mm))?;
+        if let Output::Held(angle) = step.output {
+            writeln!(out, "{0}, 1, 1, {1}", self.output, short(angle))?;
         }
         // A node of a spring has all its degrees of freedom; the spring holds the first.
         for spring in &self.springs {
@@ -468,7 +448,7 @@ impl Deck {
             writeln!(out, "*CLOAD, OP=NEW\n{}, 1, {}", self.output, short(load))?;
         }
         // Of each step its end: the frequency is beyond its increments.
-        for set in ["OUTPUT", "GENERATOR_TURN", "BORE"] {
+        for set in ["OUTPUT", "BORE"] {
             writeln!(out, "*NODE PRINT, NSET={set}, FREQUENCY=1000\nU")?;
         }
         writeln!(out, "*EL PRINT, ELSET=BORE_ROW, FREQUENCY=1000\nS")?;
@@ -661,48 +641,32 @@ mod tests {
             }
         }
         let reach = deck.surfaces[3].iter().flat_map(|f| face(*f)).map(radius).fold(0.0, f64::max);
-        assert!(reach < fs.bore_radius_mm() && reach > fs.bore_radius_mm() - 1e-3);
+        assert!(reach < fs.bore_radius_mm() && reach > fs.bore_radius_mm() - 1e-3, "{reach}");
     }
 
     #[test]
-    fn a_unit_of_output_turns_the_outer_circle_and_the_generator_follows_its_angle() {
-        let drive = drive();
-        let problem = problem(&drive, GeneratorKind::DoubleDisc);
-        let deck = Deck::new(&problem, SETTINGS).unwrap();
-        let psi = 0.7_f64;
-        let value = |node: usize, dof: u8| match (node, dof) {
-            (n, 1) if n == deck.output => 1e-3,
-            (n, 1) if n == deck.form => 1.0,
-            (n, 1) if n == deck.turn => psi.cos() - 1.0,
-            (n, 2) if n == deck.turn => psi.sin(),
-            _ => 0.0,
-        };
-        let moved = |equation: &Equation| -> f64 {
-            -equation.terms[1..].iter().map(|t| t.coefficient * value(t.node, t.dof)).sum::<f64>()
-        };
-        let mut body = BTreeMap::new();
-        for equation in &deck.equations {
-            let first = equation.terms[0];
-            if deck.outer.contains(&first.node) {
-                let [x, y] = deck.nodes[first.node - 1];
-                let expected = if first.dof == 1 { -1e-3 * y } else { 1e-3 * x };
-                assert!((moved(equation) - expected).abs() < 1e-12);
-            } else if equation.terms.iter().any(|t| t.node == deck.turn) {
-                body.entry(first.node).or_insert([0.0; 2])[usize::from(first.dof) - 1] = moved(equation);
-            }
+    fn a_unit_of_output_turns_the_outer_circle() {
+        let deck = Deck::new(&problem(&drive(), GeneratorKind::Cam), SETTINGS).unwrap();
+        let mut turned = 0;
+        for equation in deck.equations.iter().filter(|equation| deck.outer.contains(&equation.terms[0].node)) {
+            let [first, angle, seat] = equation.terms[..] else { panic!("{equation:?}") };
+            let [x, y] = deck.nodes[first.node - 1];
+            let r = x.hypot(y);
+            let expected = if first.dof == 1 { (-y, x / r) } else { (x, y / r) };
+            assert_eq!(
+                (first.coefficient, angle.node, angle.dof, seat.node, seat.dof),
+                (1.0, deck.output, 1, deck.output, 2)
+            );
+            assert!((angle.coefficient + expected.0).abs() < 1e-12 && (seat.coefficient + expected.1).abs() < 1e-12);
+            turned += 1;
         }
-        let (s, c) = psi.sin_cos();
-        for (element, side) in &deck.surfaces[3] {
-            let node = deck.elements[element - 1][3 + side];
-            let p: Point = std::array::from_fn(|i| deck.nodes[node - 1][i] + body[&node][i]);
-            let off = problem.outline.nearest([c * p[0] + s * p[1], c * p[1] - s * p[0]]).distance;
-            assert!(off.abs() < 1e-10, "{off} mm off the turned outline");
-        }
+        assert_eq!(turned, 2 * deck.outer.len());
     }
 
     #[test]
     fn steps_say_where_everything_stands() {
-        let deck = Deck::new(&problem(&drive(), GeneratorKind::Cam), SETTINGS).unwrap();
+        let problem = problem(&drive(), GeneratorKind::Cam);
+        let deck = Deck::new(&problem, SETTINGS).unwrap();
         let blocks = blocks(&deck);
         let of = |keyword: &str| -> Vec<&Vec<Vec<String>>> {
             blocks.iter().filter(|(k, _)| k.starts_with(keyword)).map(|(_, lines)| lines).collect()
@@ -711,16 +675,25 @@ mod tests {
         let loads: Vec<f64> = of("*CLOAD").iter().map(|lines| number(&lines[0][2])).collect();
         // 50 and -20 N.m on 20 mm, in N mm per mm.
         assert_eq!(loads, [2500.0, 2500.0, 2500.0, -1000.0]);
-        let sines: Vec<f64> = of("*BOUNDARY").iter().map(|lines| number(&lines[2][3])).collect();
-        assert_eq!(
-            sines.iter().map(|s| (s.asin() * 1e4).round()).collect::<Vec<_>>(),
-            [0.0, 0.0, 0.0, 100.0, 200.0, 200.0]
-        );
         let held: Vec<bool> = of("*BOUNDARY")
             .iter()
             .map(|lines| lines.iter().any(|l| number::<usize>(&l[0]) == deck.output && l[1] == "1"))
             .collect();
         assert_eq!(held, [true, true, false, false, false, false]);
+        // Faces of the generator stand on the outline turned by its angle.
+        for (lines, psi) in of("*BOUNDARY").iter().zip([0.0_f64, 0.0, 0.0, 0.01, 0.02, 0.02]) {
+            let mut moved: BTreeMap<usize, Point> = BTreeMap::new();
+            for line in lines.iter().filter(|line| line.len() == 4) {
+                moved.entry(number(&line[0])).or_default()[number::<usize>(&line[1]) - 1] = number(&line[3]);
+            }
+            let (s, c) = psi.sin_cos();
+            for (element, face) in &deck.surfaces[3] {
+                let node = deck.elements[element - 1][3 + face];
+                let p: Point = std::array::from_fn(|i| deck.nodes[node - 1][i] + moved[&node][i]);
+                let off = problem.outline.nearest([c * p[0] + s * p[1], c * p[1] - s * p[0]]).distance;
+                assert!(off.abs() < 1e-9, "{off} mm off the turned outline");
+            }
+        }
     }
 
     #[test]
