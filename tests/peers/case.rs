@@ -192,6 +192,17 @@ impl Case {
         Problem::new(&drive, self.generator, drive.temperature.reference_c, settings).map_err(|error| error.to_string())
     }
 
+    /// How far the output of our model would be from where it is if it had the penalties that it comes with, arc-seconds.
+    pub fn penalty_arcsec(&self, problem: &Problem, peer: &Peer) -> Result<f64, String> {
+        let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
+        let (drive, kind) = (&problem.drive, problem.kind);
+        let own = Problem::new(drive, kind, drive.temperature.reference_c, settings).map_err(|e| e.to_string())?;
+        let stops = self.stops(peer, drive.flexspline.width_mm);
+        let [theirs, ours] = [problem, &own].map(|problem| journey(problem, OurSolver::Reference, &stops, 1));
+        let pairs = theirs?.states.into_iter().zip(ours?.states);
+        Ok(pairs.map(|(a, b)| (a.output_rad - b.output_rad).abs() * ARCSEC).fold(0.0, f64::max))
+    }
+
     /// The stops of our path: the generator as in the deck, the load less what the deck's spring on the output takes.
     fn stops(&self, peer: &Peer, width_mm: f64) -> Vec<Stop> {
         let load = |k: usize| if k > self.increments { self.last_torque_n_m } else { self.torque_n_m };
