@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::export::inp::STABILISING_TORSION;
+use flexspline_sim::export::STABILISING_TORSION;
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::stepping::{Problem, SolverSettings};
 

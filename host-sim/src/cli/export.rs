@@ -1,4 +1,4 @@
-//! `flexspline export`: the deformed mesh or the outlines, for other programs.
+//! `flexspline export`: the deformed mesh, the outlines or the whole problem, for other programs.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -8,8 +8,7 @@ use serde::Serialize;
 
 use super::simulate::{ModelOptions, refused_or_failed, show};
 use super::{Context, Failure};
-use crate::export::inp::{Deck, DeckSettings};
-use crate::export::{outlines, write_vtu};
+use crate::export::{Deck, DeckSettings, outlines, write_vtu};
 use crate::output::{OutputError, write_csv, write_whole};
 use crate::simulate::{Path, PathPoint, simulate};
 use crate::stepping::Problem;
@@ -21,7 +20,7 @@ const POINTS_PER_PIECE: usize = 24;
 /// smaller on the way.
 const LARGEST_STEP_RAD: f64 = 0.1;
 
-/// Export the deformed mesh or the outlines for other programs
+/// Export the deformed mesh, the outlines or a CalculiX and Abaqus deck for other programs
 ///
 /// vtu: both wheels deformed and loaded at one generator angle, with displacement and von Mises stress, for ParaView.
 /// csv: the outlines of tooth, space and generator, undeformed, each in its own frame.

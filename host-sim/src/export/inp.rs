@@ -27,7 +27,9 @@
 //! * The Coulomb drag of the output is left out: [`Deck::new`] refuses a drive that has it rather than drop it silently.
 //! * Within a step the nodes of the generator move along straight lines: only states at the ends of steps count.
 //!
-//! Abaqus was not at hand: that it reads the deck is a claim from its documented syntax, not from a run.
+//! Abaqus was not at hand: that it reads the deck is a claim from its documented syntax, not from a run. The second number
+//! under `*FRICTION` is CalculiX's stick slope; Abaqus takes it for a slip rate, which changes nothing where there is one row.
+//! A degree of freedom 3 that is held has a meaning only for CalculiX, which makes bricks of plane elements.
 
 mod generator;
 mod holding;
