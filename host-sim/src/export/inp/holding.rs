@@ -175,14 +175,14 @@ mod tests {
     fn a_loaded_drive_of_ours_satisfies_the_equations() {
         let drive = Drive::hhd_95();
         let settings = SolverSettings { mesh: MeshLevel::Coarse, ..SolverSettings::default() };
-        let problem = Problem::new(&drive, GeneratorKind::Cam, drive.temperature.reference_c, settings).unwrap();
+        let problem = Problem::new(&drive, GeneratorKind::TwoRoller, drive.temperature.reference_c, settings).unwrap();
         let mut solver = Solver::new(&problem);
         let (state, _) = solver.deform(0.3).unwrap();
-        let (state, _) = solver.increment(&state, 0.3, 50.0).unwrap();
+        let (state, _) = solver.increment(&state, 0.3, 10.0).unwrap();
         let running = running_sums(&problem.flexspline, &state.u);
         let largest = running.iter().map(|sums| sums[0].abs()).fold(0.0, f64::max);
         let last = running[running.len() - 1][0];
-        assert!(largest > 1.0 && last.abs() < 1e-8 * largest, "{last} at the end, up to {largest} on the way");
+        assert!(largest > 1.0 && last.abs() < 1e-11 * largest, "{last} at the end, up to {largest} on the way");
     }
 
     #[test]
