@@ -27,8 +27,8 @@ use program::Limits;
 /// Contact penalties on bore and flanks in both programs, N/mm³. Ours is 5e7 on the flanks; ten times less moves the output by
 /// 0.1″ and spares CalculiX iterations. Printed with each case: what our own penalties would change.
 const PENALTIES: [f64; 2] = [1e6, 5e6];
-/// Largest difference of the output angle, arc-seconds.
-const OUTPUT_ARCSEC: f64 = 0.5;
+/// Largest difference of the output angle, arc-seconds: 0.015 was found on both meshes.
+const OUTPUT_ARCSEC: f64 = 0.1;
 /// Largest relative difference of the wind-up.
 const WIND_UP: f64 = 0.01;
 /// Largest difference of the stress along the bore, relative to the largest stress.

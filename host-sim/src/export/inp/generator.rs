@@ -21,7 +21,7 @@ use crate::mesh::WheelMesh;
 /// Depth of a strip behind its face, mm.
 const DEPTH: f64 = 1.0;
 /// Length of a face of a roller, mm.
-const ROLLER_FACE: f64 = 0.5;
+const ROLLER_FACE: f64 = 0.2;
 /// What lies between the generator before assembly and the bore, mm.
 const CLEARANCE: f64 = 1e-4;
 
