@@ -7,10 +7,10 @@ use std::process::Command;
 use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::export::STABILISING_TORSION;
 use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::stepping::{Problem, SolverSettings};
+use flexspline_sim::stepping::{Method, Problem, SolverSettings};
 
 use crate::dat::{at_step, tables};
-use crate::ours::{Journey, OurSolver, Stop, displacement, journey, stress};
+use crate::ours::{Journey, Stop, displacement, journey, stress};
 use crate::program::{Limits, Used, run};
 
 /// Arc-seconds in a radian.
@@ -62,7 +62,7 @@ pub struct Peer {
 /// One of our solvers beside it.
 pub struct Comparison {
     /// Which.
-    pub solver: OurSolver,
+    pub solver: Method,
     /// Largest difference of the output angle over all steps, arc-seconds.
     pub output_arcsec: f64,
     /// Largest difference of what the output turns in a rotation increment, arc-seconds.
@@ -183,10 +183,11 @@ impl Case {
     }
 
     /// Our model of the same drive.
-    pub fn problem(&self) -> Result<Problem, String> {
+    pub fn problem(&self, method: Method) -> Result<Problem, String> {
         let drive = Drive::hhd_95().with_sets(AS_IN_THE_DECK).map_err(|error| error.to_string())?;
         let [bore_penalty, flank_penalty] = self.penalties;
         let settings = SolverSettings {
+            method,
             mesh: self.mesh,
             bore_penalty: Some(bore_penalty),
             flank_penalty,
@@ -201,7 +202,7 @@ impl Case {
         let (drive, kind) = (&problem.drive, problem.kind);
         let own = Problem::new(drive, kind, drive.temperature.reference_c, settings).map_err(|e| e.to_string())?;
         let stops = self.stops(peer, drive.flexspline.width_mm);
-        let [theirs, ours] = [problem, &own].map(|problem| journey(problem, OurSolver::Reference, &stops, 1));
+        let [theirs, ours] = [problem, &own].map(|problem| journey(problem, &stops, 1));
         let pairs = theirs?.states.into_iter().zip(ours?.states);
         Ok(pairs.map(|(a, b)| (a.output_rad - b.output_rad).abs() * ARCSEC).fold(0.0, f64::max))
     }
@@ -219,12 +220,12 @@ impl Case {
         &self,
         problem: &Problem,
         peer: &Peer,
-        solver: OurSolver,
         flexspline: &Path,
         folder: &Path,
     ) -> Result<Comparison, String> {
+        let solver = problem.settings.method;
         let stops = self.stops(peer, problem.drive.flexspline.width_mm);
-        let Journey { states, cpu } = journey(problem, solver, &stops, REPEAT)?;
+        let Journey { states, cpu } = journey(problem, &stops, REPEAT)?;
         let turned: Vec<f64> = states.iter().map(|state| state.output_rad).collect();
         let largest = |values: &mut dyn Iterator<Item = f64>| values.map(f64::abs).fold(0.0, f64::max);
         let apart = |k: usize| (peer.output_rad[k] - turned[k]) * ARCSEC;
@@ -266,19 +267,19 @@ impl Case {
     }
 
     /// Memory of the command that goes the same way.
-    fn memory(&self, stops: &[Stop], solver: OurSolver, flexspline: &Path, folder: &Path) -> Result<f64, String> {
+    fn memory(&self, stops: &[Stop], solver: Method, flexspline: &Path, folder: &Path) -> Result<f64, String> {
         let path = folder.join("path.csv");
         let rows: String = stops.iter().map(|(angle, torque)| format!("{angle},{torque}\n")).collect();
         std::fs::write(&path, format!("generator_rad,torque_n_m\n{rows}")).map_err(|error| error.to_string())?;
         let mut command = Command::new(flexspline);
-        command.args(["simulate", "--quiet", "--solver", solver.name()]);
+        command.args(["simulate", "--quiet", "--solver", &solver.to_string()]);
         command.args(AS_IN_THE_DECK.iter().flat_map(|set| ["--set", set]));
         command.args(["--generator", self.generator.name(), "--mesh", &self.mesh.to_string()]);
         for (option, value) in [("--bore-penalty", self.penalties[0]), ("--flank-penalty", self.penalties[1])] {
             command.args([option, &value.to_string()]);
         }
-        command.arg("--path").arg(&path).arg("--out").arg(folder.join(solver.name()));
+        command.arg("--path").arg(&path).arg("--out").arg(folder.join(solver.to_string()));
         let limits = Limits { cpu_s: 600.0, memory_mb: 8000.0 };
-        Ok(run(&mut command, &folder.join(format!("{}.log", solver.name())), None, limits)?.memory_mb)
+        Ok(run(&mut command, &folder.join(format!("{solver}.log")), None, limits)?.memory_mb)
     }
 }

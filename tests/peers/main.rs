@@ -21,7 +21,8 @@ use flexspline_sim::drive::GeneratorKind;
 use flexspline_sim::mesh::MeshLevel;
 
 use case::{Case, Comparison, Peer};
-use ours::OurSolver;
+use flexspline_sim::stepping::Method;
+use ours::SOLVERS;
 use program::Limits;
 
 /// Contact penalties on bore and flanks in both programs, N/mm³. Ours is 5e7 on the flanks; ten times less moves the output by
@@ -33,10 +34,15 @@ const OUTPUT_ARCSEC: f64 = 0.1;
 const WIND_UP: f64 = 0.01;
 /// Largest difference of the stress along the bore, relative to the largest stress.
 const STRESS: f64 = 0.03;
-/// How many times less processor time than CalculiX an increment takes: asserted from 60 000 unknowns on.
-const CPU_RATIO: f64 = 60.0;
-/// The same on smaller meshes.
-const CPU_RATIO_SMALL: f64 = 20.0;
+/// How many times less processor time than CalculiX an increment of our solver takes: from 60 000 unknowns on, and below.
+fn cpu_ratio(solver: Method, unknowns: usize) -> f64 {
+    match (solver, unknowns >= LARGE) {
+        (Method::Reference, true) => 60.0,
+        (Method::Reference, false) => 20.0,
+        (Method::Fast, true) => 2000.0,
+        (Method::Fast, false) => 300.0,
+    }
+}
 /// Unknowns from which the larger ratio is asserted.
 const LARGE: usize = 60_000;
 
@@ -137,8 +143,7 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
 /// One case: everything that is printed and claimed about it, and its part of the last line.
 fn beside(case: &Case, options: &Options, flexspline: &Path, claims: &mut Claims) -> Result<(String, Peer), String> {
     let folder = options.out.join(case.name());
-    let problem = case.problem()?;
-    let unknowns = problem.degrees_of_freedom();
+    let unknowns = case.problem(Method::Reference)?.degrees_of_freedom();
     println!("== {} at {} N.m, {unknowns} dof", case.name(), case.torque_n_m);
     let deck = case.export(flexspline, &folder)?;
     let peer = case.calculix(&options.ccx, &deck, Limits { cpu_s: 3600.0, memory_mb: 6000.0 })?;
@@ -151,22 +156,23 @@ fn beside(case: &Case, options: &Options, flexspline: &Path, claims: &mut Claims
     let mut costs = vec![format!("CalculiX {peer_cpu_s:.1} s")];
     let mut memory = vec![format!("CalculiX {:.0} MB", peer.used.memory_mb)];
     let mut agreement = String::new();
-    for solver in OurSolver::ALL {
-        let ours = case.compare(&problem, &peer, solver, flexspline, &folder)?;
+    for solver in SOLVERS {
+        let problem = case.problem(solver)?;
+        let ours = case.compare(&problem, &peer, flexspline, &folder)?;
         let ratio = peer_cpu_s / ours.cpu_s;
         report(&ours, ratio);
-        if solver == OurSolver::Reference {
+        if solver == Method::Reference {
             let moved = case.penalty_arcsec(&problem, &peer)?;
             println!("  our own penalties instead move our output by up to {moved:.3}\"");
         }
-        let needed = if unknowns >= LARGE { CPU_RATIO } else { CPU_RATIO_SMALL };
+        let needed = cpu_ratio(solver, unknowns);
         claims.check(&format!("output within {OUTPUT_ARCSEC}\""), ours.output_arcsec <= OUTPUT_ARCSEC);
         claims.check(&format!("wind-up within {:.0} %", 100.0 * WIND_UP), ours.wind_up() <= WIND_UP);
         claims.check(&format!("stress along the bore within {:.0} %", 100.0 * STRESS), ours.stress() <= STRESS);
         claims.check(&format!("at least {needed} times less processor time"), ratio >= needed);
-        costs.push(format!("{} {:.3} s ({ratio:.0}x)", solver.name(), ours.cpu_s));
-        memory.push(format!("{} {:.0} MB", solver.name(), ours.memory_mb));
-        if solver == OurSolver::Reference {
+        costs.push(format!("{} {:.3} s ({ratio:.0}x)", solver, ours.cpu_s));
+        memory.push(format!("{} {:.0} MB", solver, ours.memory_mb));
+        if solver == Method::Reference {
             agreement = format!(
                 "output angle differs {:.2}\", wind-up {:.2} %, stress {:.2} %",
                 ours.output_arcsec,
@@ -191,9 +197,7 @@ fn report(ours: &Comparison, ratio: f64) {
     let [apart_mpa, rms_mpa, most_mpa] = ours.stress_mpa;
     println!(
         "  {}: {:.3} s per rotation increment ({ratio:.0} times less), {:.0} MB",
-        ours.solver.name(),
-        ours.cpu_s,
-        ours.memory_mb
+        ours.solver, ours.cpu_s, ours.memory_mb
     );
     println!(
         "  output angle: up to {:.3}\" apart, increments up to {:.3}\"",

@@ -4,31 +4,15 @@ use std::time::Duration;
 
 use cpu_time::ProcessTime;
 use flexspline_sim::element::cauchy_stress;
-use flexspline_sim::stepping::{Problem, Solver, State};
+use flexspline_sim::stepping::{Method, Problem, Solver, State};
 
-/// A solver of ours to be put beside CalculiX.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OurSolver {
-    /// Full sparse Newton.
-    Reference,
-}
-
-impl OurSolver {
-    /// Every one of them, the one that the others are measured against first.
-    pub const ALL: [OurSolver; 1] = [OurSolver::Reference];
-
-    /// Its name on the command line of `flexspline simulate`.
-    pub fn name(self) -> &'static str {
-        match self {
-            OurSolver::Reference => "reference",
-        }
-    }
-}
+/// Our solvers, the one that the others are measured against first.
+pub const SOLVERS: [Method; 2] = [Method::Reference, Method::Fast];
 
 /// Where the drive is taken: generator angle (rad) and load (N m).
 pub type Stop = (f64, f64);
 
-/// The states at the stops, and the processor time that each took.
+/// The states at the stops, on all nodes, and the processor time that each took.
 pub struct Journey {
     /// One for each stop.
     pub states: Vec<State>,
@@ -37,20 +21,18 @@ pub struct Journey {
 }
 
 /// Takes the drive through the stops, `repeat` times over from a new start, for the sake of the time.
-pub fn journey(problem: &Problem, solver: OurSolver, stops: &[Stop], repeat: usize) -> Result<Journey, String> {
+pub fn journey(problem: &Problem, stops: &[Stop], repeat: usize) -> Result<Journey, String> {
     let mut states = Vec::new();
     let mut cpu = vec![Vec::new(); stops.len()];
     for _ in 0..repeat {
         states.clear();
-        let mut solver = match solver {
-            OurSolver::Reference => Solver::new(problem),
-        };
+        let mut solver = Solver::new(problem);
         let (mut state, _) = solver.deform(stops[0].0).map_err(|error| error.to_string())?;
         for ((generator_rad, torque_n_m), cpu) in stops.iter().zip(&mut cpu) {
             let clock = ProcessTime::now();
             (state, _) = solver.increment(&state, *generator_rad, *torque_n_m).map_err(|error| error.to_string())?;
             cpu.push(clock.elapsed());
-            states.push(state.clone());
+            states.push(problem.whole_state(&state).into_owned());
         }
     }
     let median = |mut times: Vec<Duration>| {

@@ -59,8 +59,10 @@ impl CondensedDrive {
             cell.frame.split(&d, &mut inner);
             let q = element.recover(&inner.q, 0.0);
             let positions = element.interior().1.iter();
-            let mut moved: Vec<f64> =
-                positions.zip(q.chunks_exact(2)).flat_map(|(p, q)| CoRotation::join(&inner, *p, [q[0], q[1]])).collect();
+            let mut moved: Vec<f64> = positions
+                .zip(q.chunks_exact(2))
+                .flat_map(|(p, q)| CoRotation::join(&inner, *p, [q[0], q[1]]))
+                .collect();
             rotate_pairs(&mut moved, angle.sin_cos());
             moved
         };
