@@ -78,6 +78,11 @@ impl GeneratorBody {
         GeneratorBody { outline: outline.clone(), bore_radius: mesh.base_radius, shape, elements }
     }
 
+    /// Whether the rim touches it in narrow places and may creep along them.
+    pub fn is_rollers(&self) -> bool {
+        matches!(self.shape, Shape::Rollers { .. })
+    }
+
     /// Where the nodes stand before assembly, mm.
     pub fn before(&self) -> Vec<Point> {
         match &self.shape {
