@@ -84,9 +84,9 @@ pub struct Placement {
 pub struct Geometric<'a> {
     /// Derivative of the rotation.
     pub a: &'a [f64],
-    /// See [`super::corotation`].
+    /// See [`super::CoRotation`].
     pub g: &'a [f64],
-    /// See [`super::corotation`].
+    /// See [`super::CoRotation`].
     pub c: f64,
 }
 

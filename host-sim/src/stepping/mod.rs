@@ -4,10 +4,12 @@ mod error;
 mod fast;
 mod near;
 mod newton;
+mod passed;
 mod predictor;
 mod problem;
 mod reference;
 mod state;
+mod step;
 mod wheels;
 
 pub use error::SolveError;
