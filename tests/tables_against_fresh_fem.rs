@@ -84,3 +84,19 @@ fn tables_hold_between_their_nodes_and_across_a_reversal() {
     println!("replay at 30 N.m: largest residual {left:.3}\"");
     assert!(left < 0.5 && summary["mean_residual_arcsec"].as_f64().unwrap().abs() < 1.0, "{summary}");
 }
+
+/// Work is shared out to threads by generator and temperature; what comes out does not know of it.
+#[test]
+fn tables_do_not_depend_on_the_number_of_threads() {
+    let desk = Desk::new();
+    let line = "tables --generator cam --mesh coarse --positions 4 --most-nodes 6 --temperatures-c -20,20,60";
+    for threads in ["1", "2", "3"] {
+        desk.line(&format!("{line} --threads {threads} --out with-{threads}")).done();
+    }
+    for file in ["cam.fxt", "cam.samples.csv"] {
+        let one = fs::read(desk.path("with-1").join(file)).unwrap();
+        for other in ["with-2", "with-3"] {
+            assert_eq!(one, fs::read(desk.path(other).join(file)).unwrap(), "{file}");
+        }
+    }
+}

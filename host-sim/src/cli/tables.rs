@@ -69,13 +69,13 @@ pub(super) struct Tables {
     /// Samples over one tooth pitch
     #[arg(long, value_name = "N", default_value_t = 8, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(4..=32))]
     positions: u8,
-    /// Temperature nodes, degrees C [default: ends and reference of the operating range]
+    /// Temperature nodes, degrees C [default: the ends of the operating range]
     #[arg(
         long,
         value_name = "T,T,...",
         value_delimiter = ',',
         conflicts_with = "from_samples",
-        allow_negative_numbers = true
+        allow_hyphen_values = true
     )]
     temperatures_c: Option<Vec<f64>>,
     /// Mesh: coarse, standard or fine
