@@ -9,7 +9,7 @@ use flexspline::{Direction, GeneratorAngle, Table};
 
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::{Problem, Solver, SolverSettings, State};
-use crate::sweep::{Chain, Computed, KnownNode, Observer, SweepError, SweepPlan, symmetric_nodes};
+use crate::sweep::{Chain, Computed, KnownNode, Observer, SweepError, SweepPlan, check_uniform, symmetric_nodes};
 use crate::tables::trial_table;
 
 /// How nodes are chosen.
@@ -46,6 +46,7 @@ pub fn choose_torque_nodes(
     settings: SolverSettings,
     observe: &Observer,
 ) -> Result<ChosenNodes, SweepError> {
+    check_uniform(drive)?;
     let temperature = plan.temperature_nodes_c[0];
     let temperature_c = f64::from(temperature);
     let problem = Problem::new(drive, kind, temperature_c, settings)?;

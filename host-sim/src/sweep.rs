@@ -136,9 +136,20 @@ pub enum SweepError {
         /// Travel of the generator.
         pitches: usize,
     },
+    /// One tooth pitch in one direction does not say all of the drive.
+    #[error("{field}: a drive with this imperfection does not repeat every tooth pitch, which is all that is sampled")]
+    NotUniform {
+        /// The field of the drive.
+        field: &'static str,
+    },
     /// The observer asked to stop.
     #[error("stopped")]
     Stopped,
+}
+
+/// Refuses a drive of which a sweep would see a part.
+pub(crate) fn check_uniform(drive: &Drive) -> Result<(), SweepError> {
+    drive.as_built.first_not_uniform().map_or(Ok(()), |field| Err(SweepError::NotUniform { field }))
 }
 
 /// Runs the sweep of one generator; torque of either sign is a chain of its own, from light to heavy. Nodes that are `known`
@@ -151,6 +162,7 @@ pub fn sweep(
     settings: SolverSettings,
     observe: &Observer,
 ) -> Result<Sweep, SweepError> {
+    check_uniform(drive)?;
     let half = Half::of(drive);
     // Temperatures are independent of one another; they are put together in their order.
     let parts = plan
@@ -365,6 +377,17 @@ pub(crate) fn mirror(sample: &Sample) -> Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_drive_that_does_not_repeat_is_not_swept() {
+        let mut drive = Drive::hhd_95();
+        drive.as_built.circular_spline_eccentricity_um = 1.0;
+        let kind = GeneratorKind::Cam;
+        let plan = SweepPlan::for_generator(&drive, kind);
+        let swept = sweep(&drive, kind, &plan, &[], SolverSettings::default(), &|_| ControlFlow::Continue(()));
+        let message = swept.unwrap_err().to_string();
+        assert!(message.starts_with("as_built.circular_spline_eccentricity_um: "), "{message}");
+    }
 
     #[test]
     fn torque_nodes_are_symmetric_and_rise_to_the_largest() {
