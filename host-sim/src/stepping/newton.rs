@@ -35,6 +35,8 @@ const LARGEST_STEP: f64 = 0.1;
 const LARGEST_LOAD_STEP: f64 = 100.0;
 /// Factors on the penalties while the way to a new load is found.
 const LOADING_SOFTNESS: [f64; 3] = [1e-3, 3e-2, 1.0];
+/// Stiffness of the bore (N/mm³) below which it is not softened: the softest penalty on the way to a new load.
+const SOFTEST_BORE: f64 = 1e3;
 /// Iterations after which the next part of an increment may be twice as large.
 const EASY: usize = 10;
 
@@ -114,8 +116,10 @@ pub struct Solver<'p> {
     made_at: f64,
     /// Tangents of steady motion, oldest first.
     tangents: VecDeque<Tangent>,
-    /// Factor on the penalties, below 1 only while the drive is first deformed.
+    /// Factor on the penalties, below 1 only while the way to a new shape or load is found.
     softening: f64,
+    /// While the drive is assembled its flanks slip freely.
+    assembling: bool,
     /// The states passed in steady motion.
     passed: Passed,
     /// Time spent so far.
@@ -149,6 +153,7 @@ impl<'p> Solver<'p> {
             made_at: f64::INFINITY,
             tangents: VecDeque::new(),
             softening: 1.0,
+            assembling: false,
             passed: Passed::default(),
             effort: Effort::default(),
         }
@@ -160,9 +165,9 @@ impl<'p> Solver<'p> {
         // All of a conforming generator touches at once; a soft contact first finds which part stays.
         let mut iterations = 0;
         for softening in [1e-3, 1.0] {
-            self.softening = softening;
+            (self.softening, self.assembling) = (softening, true);
             let solved = self.newton(&state, generator_rad, 0.0);
-            self.softening = 1.0;
+            (self.softening, self.assembling) = (1.0, false);
             let (next, mut increment) = solved?;
             iterations += increment.iterations;
             increment.iterations = iterations;
@@ -417,7 +422,9 @@ impl<'p> Solver<'p> {
     }
 
     fn bore_law(&self) -> BoreLaw {
-        BoreLaw { stiffness: self.softening * self.problem.bore_law.stiffness }
+        let stiffness = self.problem.bore_law.stiffness;
+        // A bearing that yields is soft enough as it is.
+        BoreLaw { stiffness: stiffness.min((self.softening * stiffness).max(SOFTEST_BORE)) }
     }
 
     fn flank_law(&self) -> FlankLaw {
@@ -425,7 +432,7 @@ impl<'p> Solver<'p> {
         FlankLaw {
             stiffness: self.softening * law.stiffness,
             stick_stiffness: self.softening * law.stick_stiffness,
-            ..law
+            friction: if self.assembling { 0.0 } else { law.friction },
         }
     }
 
@@ -623,7 +630,7 @@ impl<'p> Solver<'p> {
             state.travel = turn.signum();
         }
         if problem.flank_law.friction > 0.0 {
-            state.friction = near.friction(&self.flanks, configuration(state), problem.flank_law);
+            state.friction = near.friction(&self.flanks, configuration(state), self.flank_law());
         }
     }
 
