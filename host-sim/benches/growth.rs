@@ -32,7 +32,7 @@ const TEETH: [u32; 3] = [100, 188, 300];
 /// Of HHD-95.
 const TORQUE_N_M: f64 = 50.0;
 /// Rounds, and increments in each: after ten the phase within a tooth pitch comes round.
-const ROUNDS: usize = 7;
+const ROUNDS: usize = 5;
 const ROUND: usize = 20;
 
 /// HHD-95 with another number of teeth of the same module: the wheels grow with the tooth count, and with them rim, ring and

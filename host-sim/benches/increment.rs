@@ -51,12 +51,13 @@ fn increments(criterion: &mut Criterion<CpuTime>) {
 /// Benchmarks one case; mean CPU milliseconds of its increments, if the filter of the command let it run.
 fn mean_ms<M: Measurement>(group: &mut BenchmarkGroup<'_, M>, problem: &Problem, torque_n_m: f64) -> Option<f64> {
     let (kind, method) = (problem.kind, problem.settings.method);
+    let settle = if method == Method::Fast { Motion::new } else { Motion::taken_over };
     // Settled when it first runs: a case that is filtered out costs nothing.
     let run: RefCell<Option<(Motion, Duration)>> = RefCell::new(None);
     group.bench_function(format!("{kind} {torque_n_m} N.m/{method}"), |bencher| {
         let mut run = run.borrow_mut();
         let (motion, time) =
-            run.get_or_insert_with(|| (Motion::new(problem, torque_n_m, STEP_RAD, SETTLING), Duration::ZERO));
+            run.get_or_insert_with(|| (settle(problem, torque_n_m, STEP_RAD, SETTLING), Duration::ZERO));
         bencher.iter(|| {
             let clock = ProcessTime::now();
             motion.advance();

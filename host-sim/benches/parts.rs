@@ -47,7 +47,7 @@ fn parts(criterion: &mut Criterion<CpuTime>) {
     let state = Motion::new(&problem, TORQUE_N_M, STEP_RAD, 5).state;
     let whole = problem.whole_state(&state).into_owned();
     let mut group = criterion.benchmark_group("part");
-    group.sample_size(10).warm_up_time(Duration::from_millis(200)).measurement_time(Duration::from_secs(1));
+    group.sample_size(10).warm_up_time(Duration::from_millis(200)).measurement_time(Duration::from_millis(800));
     reference(&mut group, &problem, &whole);
     contact(&mut group, &problem, &state);
     fast(&mut group, &problem, &state);

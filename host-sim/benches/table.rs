@@ -5,8 +5,8 @@
 //! ```
 //!
 //! Criterion's figure is CPU time of all threads for a table of the cam up to 50 N.m, at both ends of the operating
-//! temperatures, with at most five torque nodes on each side and four positions over a tooth pitch, by the fast solver,
-//! standard mesh, set-up of the problems included. The line after it says what the table holds and what it took.
+//! temperatures, on the torque nodes that the choice begins with (it may add none) and four positions over a tooth pitch, by
+//! the fast solver, standard mesh, set-up of the problems included. The line after it says what the table holds.
 
 mod common;
 
