@@ -209,7 +209,7 @@ impl<'m> Tangent<'m> {
         for (wheel, first, turning) in [(fs, 0, true), (cs, fs.count(), false)] {
             let mesh: &WheelMesh = &wheel.skin.mesh;
             for j in 0..wheel.count() {
-                // The cells of the flexspline have their tooth in the middle, those of the circular spline a tooth between two spaces.
+                // A flexspline cell is centred on its tooth, a circular-spline cell between two numbered spaces.
                 let middle = if turning { mesh.sector_angle(j) } else { (j as f64 + 0.5) * mesh.pitch() };
                 let (cell, unknowns) = wheel.cell(j, false);
                 let (turn, geometric) = match turning {
