@@ -174,7 +174,13 @@ fn bad_input_is_refused_with_its_place_and_leaves_nothing() {
         ("simulate --generator cam -q -v", "cannot be used with"),
         ("drive --drive HHD-96", "HHD-95, HHD-95-typical"),
         ("export --generator cam", "--format"),
-        ("export --generator cam --format stl", "vtu, csv"),
+        ("export --generator cam --format stl", "vtu, csv, inp"),
+        ("export --generator cam --format csv --increments 3", "--increments: only a deck has it"),
+        ("export --generator cam --format vtu --last-torque-n-m 3", "--last-torque-n-m: only a deck has it"),
+        ("export --generator cam --format inp --generator-rad 0.1", "--generator-rad: a deck starts at 0"),
+        ("export --generator cam --format inp --step-rad 0", "--step-rad: found 0"),
+        ("export --generator cam --format inp --last-torque-n-m nan", "--last-torque-n-m: found NaN"),
+        ("export --generator cam --format inp --mesh coarse", "output.drag_torque_n_m: found 0.02"),
         ("export --generator cam --format csv --generator-rad 1", "--generator-rad: outlines are undeformed"),
         ("export --generator cam --format vtu --generator-rad inf", "generator angle: found inf"),
     ];
@@ -267,7 +273,15 @@ fn export_writes_what_it_says() {
     let mesh = "export --format vtu --generator cam --mesh coarse --generator-rad 0.3 --torque-n-m -5";
     desk.line(mesh).done();
     assert!(desk.read("out/cam.vtu").trim_end().ends_with("</VTKFile>"));
-    assert_eq!(names(&desk.path("out")), ["cam.vtu", "two-roller-outlines.csv"]);
+    let deck = "export --format inp --generator cam --mesh coarse --torque-n-m 50 --increments 3 --step-rad -0.02";
+    let deck = desk.line(&format!("{deck} --set output.drag_torque_n_m=0 --json")).done().json();
+    assert_eq!(deck["written"][0], "out/cam.inp");
+    let deck = desk.read("out/cam.inp");
+    assert!(deck.starts_with("*HEADING\nHHD-95, cam generator, 50.000 N.m"), "{deck:.80}");
+    // Form, bearing, load, and three rotations.
+    assert_eq!(deck.matches("*STEP").count(), 6);
+    assert!(deck.contains("** step 6: generator at -0.06 rad") && deck.trim_end().ends_with("*END STEP"));
+    assert_eq!(names(&desk.path("out")), ["cam.inp", "cam.vtu", "two-roller-outlines.csv"]);
 }
 
 #[test]

@@ -15,7 +15,7 @@
 
 use flexspline_sim::element::{GaussPoint, add_internal_force, cauchy_stress, gauss_points, linear_stiffness, shape};
 use flexspline_sim::element::{shape_gradient, strain_energy};
-use flexspline_sim::fem::{Cholesky, Pattern};
+use flexspline_sim::fem::{Cholesky, Factor, Pattern};
 use flexspline_sim::material::PlaneStrain;
 
 type Point = [f64; 2];

@@ -10,6 +10,8 @@
 //!
 //! The circular spline is recovered in the frame that turns with it; the invariant does not see the turn.
 
+use rayon::prelude::*;
+
 use crate::element::{cauchy_stress, extrapolate_to_nodes};
 use crate::material::PlaneStrain;
 use crate::mesh::{WheelKind, WheelMesh};
@@ -18,22 +20,30 @@ use crate::stepping::{Problem, State};
 /// Cauchy stress `[s11, s22, s12]` (MPa) at every node of a wheel with nodal displacements `field` (x and y of each node).
 pub fn nodal_stress(mesh: &WheelMesh, material: &PlaneStrain, field: &[f64]) -> Vec<[f64; 3]> {
     assert_eq!(field.len(), 2 * mesh.nodes.len(), "two displacements for each node");
+    let at_nodes: Vec<[[f64; 3]; 8]> = mesh
+        .elements
+        .par_iter()
+        .zip(&mesh.gauss)
+        .with_min_len(256)
+        .map(|(element, points)| {
+            let mut u = [0.0; 16];
+            for (a, &n) in element.iter().enumerate() {
+                u[2 * a] = field[2 * n as usize];
+                u[2 * a + 1] = field[2 * n as usize + 1];
+            }
+            let at_points = cauchy_stress(points, material, &u);
+            let of = [0, 1, 2].map(|component| extrapolate_to_nodes(&at_points.map(|s| s[component])));
+            std::array::from_fn(|a| [of[0][a], of[1][a], of[2][a]])
+        })
+        .collect();
+    // Summed in the order of the elements, whatever thread they were computed on.
     let mut sum = vec![[0.0; 3]; mesh.nodes.len()];
     let mut elements_at = vec![0.0_f64; mesh.nodes.len()];
-    for (element, points) in mesh.elements.iter().zip(&mesh.gauss) {
-        let mut u = [0.0; 16];
-        for (a, &n) in element.iter().enumerate() {
-            u[2 * a] = field[2 * n as usize];
-            u[2 * a + 1] = field[2 * n as usize + 1];
-        }
-        let at_points = cauchy_stress(points, material, &u);
-        for component in 0..3 {
-            let at_nodes = extrapolate_to_nodes(&at_points.map(|s| s[component]));
-            for (&n, value) in element.iter().zip(at_nodes) {
-                sum[n as usize][component] += value;
+    for (element, stresses) in mesh.elements.iter().zip(&at_nodes) {
+        for (&n, stress) in element.iter().zip(stresses) {
+            for (total, s) in sum[n as usize].iter_mut().zip(stress) {
+                *total += s;
             }
-        }
-        for &n in element {
             elements_at[n as usize] += 1.0;
         }
     }

@@ -281,12 +281,7 @@ pub struct Chain<'a> {
 
 impl<'a> Chain<'a> {
     /// A chain at one temperature.
-    pub fn new(
-        drive: &'a Drive,
-        plan: &'a SweepPlan,
-        temperature_c: f64,
-        observe: &'a Observer<'a>,
-    ) -> Self {
+    pub fn new(drive: &'a Drive, plan: &'a SweepPlan, temperature_c: f64, observe: &'a Observer<'a>) -> Self {
         Chain {
             drive,
             plan,

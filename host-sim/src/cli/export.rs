@@ -1,4 +1,4 @@
-//! `flexspline export`: the deformed mesh or the outlines, for other programs.
+//! `flexspline export`: the deformed mesh, the outlines or the whole problem, for other programs.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -8,22 +8,34 @@ use serde::Serialize;
 
 use super::simulate::{ModelOptions, refused_or_failed, show};
 use super::{Context, Failure};
-use crate::export::{outlines, write_vtu};
+use crate::export::{Deck, DeckSettings, outlines, write_vtu};
 use crate::output::{OutputError, write_csv, write_whole};
 use crate::simulate::{Path, PathPoint, simulate};
+use crate::stepping::Problem;
 
 /// Intervals to a piece of a tooth outline, of 0.01 to 0.1 mm in all.
 const POINTS_PER_PIECE: usize = 24;
 
-/// Export the deformed mesh or the outlines for other programs
+/// Largest rotation increment of a deck, rad: the generator moves along the chord, which at half of this makes it 60 µm
+/// smaller on the way.
+const LARGEST_STEP_RAD: f64 = 0.1;
+
+/// Export the deformed mesh, the outlines or a CalculiX and Abaqus deck for other programs
 ///
 /// vtu: both wheels deformed and loaded at one generator angle, with displacement and von Mises stress, for ParaView.
 /// csv: the outlines of tooth, space and generator, undeformed, each in its own frame.
+/// inp: the undeformed mesh with contact, holding and load as a deck for CalculiX and Abaqus, which deforms, loads and turns
+/// the drive; mm, N, MPa, a slice of 1 mm.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   flexspline export --format vtu --generator two-roller --torque-n-m 20
-  flexspline export --format csv --generator double-disc --out drawings")]
+  flexspline export --format csv --generator double-disc --out drawings
+  flexspline export --format inp --generator cam --torque-n-m 50 --set output.drag_torque_n_m=0
+
+The last one is run by: OMP_NUM_THREADS=1 ccx out/cam. It prints to out/cam.dat, at the end of each
+step, the output angle (node set OUTPUT, first component, rad), the displacements of the bore (BORE)
+and the stresses of the elements along it (BORE_ROW).")]
 pub(super) struct Export {
     #[command(flatten)]
     model: ModelOptions,
@@ -33,6 +45,15 @@ pub(super) struct Export {
     /// Generator angle of the mesh, rad [default: 0]
     #[arg(long, value_name = "RAD", allow_negative_numbers = true)]
     generator_rad: Option<f64>,
+    /// Rotation increments, one step of the deck each [default: 10]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=10_000), help_heading = "Deck")]
+    increments: Option<u32>,
+    /// Size of each increment, rad; negative turns the generator backward [default: 0.01]
+    #[arg(long, value_name = "RAD", allow_negative_numbers = true, help_heading = "Deck")]
+    step_rad: Option<f64>,
+    /// Load that a last step brings the output to, N.m: the wind-up between two loads [default: no such step]
+    #[arg(long, value_name = "T", allow_negative_numbers = true, help_heading = "Deck")]
+    last_torque_n_m: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -41,6 +62,8 @@ enum Format {
     Vtu,
     /// Outlines: <G>-outlines.csv
     Csv,
+    /// CalculiX and Abaqus deck: <G>.inp
+    Inp,
 }
 
 /// Result with `--json`.
@@ -52,12 +75,47 @@ struct Exported {
 
 impl Export {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
+        self.check()?;
         let written = match self.format {
             Format::Vtu => self.mesh(context)?,
             Format::Csv => self.outlines(context)?,
+            Format::Inp => self.deck(context)?,
         };
         let text = format!("wrote {}", written.display());
         context.print(&Exported { schema_version: 1, written: vec![written] }, || text)
+    }
+
+    /// Refuses options that the format has no use for, and numbers that are none.
+    fn check(&self) -> Result<(), Failure> {
+        let of_decks = [
+            ("--increments", self.increments.is_some()),
+            ("--step-rad", self.step_rad.is_some()),
+            ("--last-torque-n-m", self.last_torque_n_m.is_some()),
+        ];
+        if self.format != Format::Inp {
+            return match of_decks.into_iter().find(|(_, given)| *given) {
+                Some((option, _)) => {
+                    Err(Failure::BadInput(format!("{option}: only a deck has it; allowed with --format inp")))
+                }
+                None => Ok(()),
+            };
+        }
+        if self.generator_rad.is_some() {
+            return Err(Failure::BadInput(
+                "--generator-rad: a deck starts at 0 and turns by --increments of --step-rad; allowed with --format vtu".into(),
+            ));
+        }
+        if let Some(step_rad) = self.step_rad.filter(|step| !(step.abs() > 0.0 && step.abs() <= LARGEST_STEP_RAD)) {
+            return Err(Failure::BadInput(format!(
+                "--step-rad: found {step_rad}; allowed: up to {LARGEST_STEP_RAD} rad either way, and not 0"
+            )));
+        }
+        if let Some(torque) = self.last_torque_n_m.filter(|torque| !torque.is_finite()) {
+            return Err(Failure::BadInput(format!(
+                "--last-torque-n-m: found {torque}; allowed: a finite number of N.m"
+            )));
+        }
+        Ok(())
     }
 
     fn mesh(&self, context: &Context) -> Result<PathBuf, Failure> {
@@ -87,6 +145,25 @@ impl Export {
             return Err(error.into());
         }
         run.map_err(refused_or_failed)?;
+        Ok(file)
+    }
+
+    fn deck(&self, context: &Context) -> Result<PathBuf, Failure> {
+        let drive = context.drive()?;
+        let settings = self.model.settings(Path::Points(vec![PathPoint::default()]));
+        settings.check(&drive).map_err(|error| Failure::BadInput(error.to_string()))?;
+        let temperature_c = settings.temperature_c.unwrap_or(drive.temperature.reference_c);
+        let problem = Problem::new(&drive, self.model.generator, temperature_c, settings.solver)
+            .map_err(|error| Failure::BadInput(error.to_string()))?;
+        let path = DeckSettings {
+            torque_n_m: settings.torque_n_m,
+            last_torque_n_m: self.last_torque_n_m,
+            increments: self.increments.unwrap_or(10) as usize,
+            step_rad: self.step_rad.unwrap_or(0.01),
+        };
+        let deck = Deck::new(&problem, path).map_err(|error| Failure::BadInput(error.to_string()))?;
+        let file = context.out()?.join(format!("{}.inp", self.model.generator));
+        write_whole(&file, |out| deck.write(out))?;
         Ok(file)
     }
 

@@ -240,8 +240,7 @@ impl Tables {
                     error => Failure::Failed(format!("{kind}: {error}")),
                 };
                 let mut plan = plan.clone();
-                let chosen =
-                    choose_torque_nodes(drive, *kind, &plan, *choice, settings, &observe).map_err(failed)?;
+                let chosen = choose_torque_nodes(drive, *kind, &plan, *choice, settings, &observe).map_err(failed)?;
                 plan.torque_nodes_n_m = chosen.torque_nodes_n_m;
                 let swept = sweep(drive, *kind, &plan, &chosen.known, settings, &observe).map_err(failed)?;
                 if let Ok(mut guard) = progress.lock() {

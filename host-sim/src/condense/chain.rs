@@ -249,11 +249,8 @@ mod tests {
         chain.solve(&mut x);
         let mut residual: Vec<f64> = b.iter().map(|b| -b).collect();
         for c in &contributions {
-            let index: Vec<usize> = c
-                .blocks
-                .iter()
-                .flat_map(|b| (0..sizes[*b as usize]).map(|i| chain.offset(*b as usize) + i))
-                .collect();
+            let index: Vec<usize> =
+                c.blocks.iter().flat_map(|b| (0..sizes[*b as usize]).map(|i| chain.offset(*b as usize) + i)).collect();
             let n = index.len();
             for j in 0..n {
                 for i in j..n {

@@ -20,4 +20,4 @@ pub use dense::Kernels;
 pub use model::{Cell, CondensedWheel};
 pub use skin::Skin;
 pub use superelement::{CellNodes, Superelement};
-pub use tangent::{CellTangent, Geometric, Local, Placement, Traction, back, rotate_pairs};
+pub use tangent::{CellAt, CellTangent, Geometric, Local, Placement, Traction, back, rotate_pairs};

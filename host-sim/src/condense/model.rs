@@ -1,8 +1,8 @@
 //! Both wheels of a drive, condensed.
 
 use faer::Side as Triangle;
-use faer::{Mat, MatRef};
 use faer::linalg::solvers::Solve;
+use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
 use crate::material::PlaneStrain;
@@ -179,5 +179,115 @@ impl CondensedWheel {
             field[2 * node..2 * node + 2].copy_from_slice(u);
         }
         field
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drive::Drive;
+    use crate::element::{PACKED, linear_stiffness};
+    use crate::mesh::MeshLevel;
+
+    const STEEL: (f64, f64) = (206_000.0, 0.3);
+
+    fn steel() -> PlaneStrain {
+        PlaneStrain::new(STEEL.0, STEEL.1)
+    }
+
+    /// Forces of the whole linear wheel under displacements `u`.
+    fn forces(mesh: &WheelMesh, u: &[f64]) -> Vec<f64> {
+        let mut force = vec![0.0; u.len()];
+        for (element, points) in mesh.elements.iter().zip(&mesh.gauss) {
+            let packed: [f64; PACKED] = linear_stiffness(points, &steel());
+            let at = |i: usize| 2 * element[i / 2] as usize + i % 2;
+            for i in 0..16 {
+                for j in 0..16 {
+                    let k = if i >= j { i * (i + 1) / 2 + j } else { j * (j + 1) / 2 + i };
+                    force[at(i)] += packed[k] * u[at(j)];
+                }
+            }
+        }
+        force
+    }
+
+    /// Displacements of kept nodes, small: spread over the wheel by the cells, they leave no force on what was condensed, and
+    /// the forces on what was kept are those of the condensed cells.
+    fn condensation_is_exact(mesh: &WheelMesh, held: impl Fn(u32) -> bool + Sync + Copy, seat_mm: f64) {
+        let wheel = CondensedWheel::new(mesh, &steel(), 0, held);
+        let mut rng = fastrand::Rng::with_seed(11);
+        let kept: Vec<f64> = (0..2 * wheel.skin.mesh.nodes.len()).map(|_| 1e-3 * (rng.f64() - 0.5)).collect();
+        let mut u = wheel.spread(mesh, &kept);
+        let mut expected = vec![0.0; kept.len()];
+        let angle = |j: usize| wheel.skin.cell_nodes(mesh, j, held).angle;
+        for j in 0..wheel.count() {
+            let (cell, unknowns) = wheel.cell(j, true);
+            let (element, further) = wheel.element(j);
+            let mut q: Vec<f64> = unknowns.iter().map(|k| kept[*k as usize]).collect();
+            super::super::tangent::rotate_pairs(&mut q, (-angle(j)).sin_cos());
+            let mut interior = element.recover(&q, seat_mm);
+            super::super::tangent::rotate_pairs(&mut interior, angle(j).sin_cos());
+            for (n, x) in element.interior().0.iter().zip(interior.chunks_exact(2)) {
+                let sector = *n as usize / mesh.nodes_per_sector + further;
+                let node = mesh.node(sector as isize, *n % mesh.nodes_per_sector as u32);
+                u[2 * node..2 * node + 2].copy_from_slice(x);
+            }
+            let mut f: Vec<f64> = cell.seat.iter().map(|s| s * seat_mm).collect();
+            Kernels::default().multiply_add(&cell.stiffness, &q, 1.0, &mut f);
+            super::super::tangent::rotate_pairs(&mut f, angle(j).sin_cos());
+            unknowns.iter().zip(&f).for_each(|(k, f)| expected[*k as usize] += f);
+        }
+        for (n, x) in mesh.nodes.iter().enumerate().filter(|(n, _)| held(*n as u32)) {
+            let r = x[0].hypot(x[1]);
+            u[2 * n] = seat_mm * x[0] / r;
+            u[2 * n + 1] = seat_mm * x[1] / r;
+        }
+        let force = forces(mesh, &u);
+        let scale = force.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+        let expected = wheel.spread(mesh, &expected);
+        let off = (0..mesh.nodes.len())
+            .filter(|n| !held(*n as u32))
+            .flat_map(|n| [2 * n, 2 * n + 1])
+            .map(|k| (force[k] - expected[k]).abs())
+            .fold(0.0, f64::max);
+        println!("{:?}: forces off by {off:.1e} of {scale:.1e} N/mm", mesh.kind);
+        assert!(scale > 1.0 && off < 1e-9 * scale, "{off} of {scale}");
+    }
+
+    #[test]
+    fn both_wheels_are_condensed_exactly() {
+        let drive = Drive::hhd_95();
+        condensation_is_exact(&WheelMesh::flexspline(&drive, MeshLevel::Coarse).unwrap(), |_| false, 0.0);
+        let ring = WheelMesh::circular_spline(&drive, MeshLevel::Coarse).unwrap();
+        let outer = |n: u32| ring.nodes[n as usize][0].hypot(ring.nodes[n as usize][1]) > ring.base_radius - 1e-6;
+        condensation_is_exact(&ring, outer, 2e-3);
+    }
+
+    #[test]
+    fn a_rim_that_varies_is_condensed_tooth_by_tooth() {
+        let mut drive = Drive::hhd_95();
+        drive.as_built.rim_thickness_harmonics =
+            vec![crate::drive::Harmonic { order: 3, amplitude_um: 40.0, phase_deg: 10.0 }];
+        let mesh = WheelMesh::flexspline(&drive, MeshLevel::Coarse).unwrap();
+        assert!(mesh.sector_classes() > 1);
+        condensation_is_exact(&mesh, |_| false, 0.0);
+    }
+
+    #[test]
+    fn flanks_without_force_follow_as_they_do_in_the_whole_cell() {
+        let mesh = WheelMesh::flexspline(&Drive::hhd_95(), MeshLevel::Coarse).unwrap();
+        let wheel = CondensedWheel::new(&mesh, &steel(), 0, |_| false);
+        let ((bare, _), (whole, _)) = (wheel.cell(0, false), wheel.cell(0, true));
+        let kernels = Kernels::default();
+        let body: Vec<f64> = (0..whole.bore() + 2 * whole.face()).map(|k| (k as f64).sin()).collect();
+        let all: Vec<f64> = whole.free_flanks(kernels, &body, 0.0).into_iter().chain(body.iter().copied()).collect();
+        let mut force = vec![0.0; all.len()];
+        kernels.multiply_add(&whole.stiffness, &all, 1.0, &mut force);
+        let mut expected = vec![0.0; whole.flank()];
+        let mut on_body = vec![0.0; body.len()];
+        kernels.multiply_add(&bare.stiffness, &body, 1.0, &mut on_body);
+        expected.extend(on_body);
+        let scale = expected.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+        assert!(force.iter().zip(&expected).all(|(f, e)| (f - e).abs() < 1e-9 * scale));
     }
 }

@@ -95,9 +95,7 @@ impl Skin {
     /// A cell in the whole mesh.
     pub fn cell_nodes(&self, whole: &WheelMesh, cell: usize, held: impl Fn(u32) -> bool) -> CellNodes {
         let per_sector = self.mesh.nodes_per_sector as u32;
-        let original = |n: &u32| {
-            whole.node((n / per_sector) as isize, self.original[(n % per_sector) as usize]) as u32
-        };
+        let original = |n: &u32| whole.node((n / per_sector) as isize, self.original[(n % per_sector) as usize]) as u32;
         let kept = self.cell(cell).iter().map(original).collect();
         let (count, pitch) = (whole.elements_per_sector, whole.pitch());
         let of_sector = |sector: usize| (sector % whole.teeth) * count..(sector % whole.teeth + 1) * count;
@@ -109,8 +107,7 @@ impl Skin {
                 (cell as f64 + 0.5) * pitch,
             ),
         };
-        let mut held_nodes: Vec<u32> =
-            elements.iter().flat_map(|&e| whole.elements[e]).filter(|n| held(*n)).collect();
+        let mut held_nodes: Vec<u32> = elements.iter().flat_map(|&e| whole.elements[e]).filter(|n| held(*n)).collect();
         held_nodes.sort_unstable();
         held_nodes.dedup();
         CellNodes {

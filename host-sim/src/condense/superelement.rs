@@ -82,8 +82,9 @@ impl Superelement {
             let entry = |i: usize, j: usize| packed[if i >= j { i * (i + 1) / 2 + j } else { j * (j + 1) / 2 + i }];
             for (a, &na) in mesh.elements[e].iter().enumerate() {
                 for (b, &nb) in mesh.elements[e].iter().enumerate() {
-                    let columns: [[f64; 2]; 2] =
-                        std::array::from_fn(|j| rotate([entry(2 * a, 2 * b + j), entry(2 * a + 1, 2 * b + j)], to_cell));
+                    let columns: [[f64; 2]; 2] = std::array::from_fn(|j| {
+                        rotate([entry(2 * a, 2 * b + j), entry(2 * a + 1, 2 * b + j)], to_cell)
+                    });
                     for i in 0..2 {
                         let [x, y] = rotate([columns[0][i], columns[1][i]], to_cell);
                         k[(2 * place[na as usize] + i, 2 * place[nb as usize])] += x;

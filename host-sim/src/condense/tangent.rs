@@ -84,10 +84,23 @@ pub struct Placement {
 pub struct Geometric<'a> {
     /// Derivative of the rotation.
     pub a: &'a [f64],
-    /// See [`super::corotation`].
+    /// See [`super::CoRotation`].
     pub g: &'a [f64],
-    /// See [`super::corotation`].
+    /// See [`super::CoRotation`].
     pub c: f64,
+}
+
+/// A cell at its place in a system that is being solved.
+#[derive(Clone, Copy)]
+pub struct CellAt<'a> {
+    /// The kernels.
+    pub kernels: Kernels,
+    /// The cell.
+    pub cell: &'a Cell,
+    /// Its unknowns among those of both wheels.
+    pub unknowns: &'a [u32],
+    /// The factor of faces and tractions.
+    pub order: &'a Chain,
 }
 
 /// Work space, and what the way forward leaves for the way back.
@@ -206,16 +219,8 @@ impl CellTangent {
     }
 
     /// Brings the forces on flank and bore nodes (`unknowns` of `x`) to faces and tractions (`chain`).
-    pub fn forward(
-        &self,
-        kernels: Kernels,
-        cell: &Cell,
-        unknowns: &[u32],
-        x: &[f64],
-        order: &Chain,
-        chain: &mut [f64],
-        local: &mut Local,
-    ) {
+    pub fn forward(&self, at: CellAt, x: &[f64], chain: &mut [f64], local: &mut Local) {
+        let CellAt { kernels, cell, unknowns, order } = at;
         let (f, b, face) = (cell.flank(), cell.bore(), cell.face());
         let Local { force, body, rest, yielded } = local;
         force.clear();
@@ -260,16 +265,8 @@ impl CellTangent {
     }
 
     /// Displacements of flank and bore nodes, faces and tractions being solved.
-    pub fn backward(
-        &self,
-        kernels: Kernels,
-        cell: &Cell,
-        unknowns: &[u32],
-        x: &mut [f64],
-        order: &Chain,
-        chain: &[f64],
-        local: &mut Local,
-    ) {
+    pub fn backward(&self, at: CellAt, x: &mut [f64], chain: &[f64], local: &mut Local) {
+        let CellAt { kernels, cell, unknowns, order } = at;
         let (f, b, face) = (cell.flank(), cell.bore(), cell.face());
         let Local { force, body, rest, yielded } = local;
         for (side, part) in body[b..].chunks_exact_mut(face).enumerate() {

@@ -462,7 +462,13 @@ impl<'a> FlankContact<'a> {
     }
 
     /// Gap of every integration point, how it changes as the output alone turns (mm/rad), and its weight.
-    pub fn gaps(&self, pair: FlankPair, at: Configuration, points: &[FlankPoint], report: &mut impl FnMut(f64, f64, f64)) {
+    pub fn gaps(
+        &self,
+        pair: FlankPair,
+        at: Configuration,
+        points: &[FlankPoint],
+        report: &mut impl FnMut(f64, f64, f64),
+    ) {
         let field = self.local_field(pair, at);
         for point in points {
             let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);

@@ -1,7 +1,9 @@
-//! The same mesh, state and outlines for other programs.
+//! The same mesh, state, outlines and problem for other programs.
 
+mod inp;
 mod outlines;
 mod vtu;
 
+pub use inp::{Deck, DeckError, DeckSettings, Equation, Face, STABILISING_LATERAL, STABILISING_TORSION, Term};
 pub use outlines::{OutlinePoint, outlines};
 pub use vtu::{Frame, write_pvd, write_vtu};

@@ -6,9 +6,11 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::rc::Rc;
 
+use rayon::prelude::*;
+
 use crate::condense::{
-    Block, CellState, CellTangent, Chain, CoRotation, CondensedWheel, Contribution, Geometric, Kernels, Local, Placement, Traction,
-    back, rotate_pairs,
+    Block, CellAt, CellState, CellTangent, Chain, CoRotation, CondensedWheel, Contribution, Geometric, Kernels, Local,
+    Placement, Traction, back, rotate_pairs,
 };
 use crate::contact::{BorePressure, FlankPair, PairContribution};
 use crate::drive::Side;
@@ -47,37 +49,36 @@ impl CondensedDrive {
     pub(super) fn recover(&self, problem: &Problem, state: &State) -> State {
         let (fs, whole) = (&self.flexspline, &problem.flexspline);
         let mut u = fs.spread(whole, &state.u);
-        for j in 0..fs.count() {
+        let flexspline_cell = |j: usize| -> Vec<f64> {
             let (cell, unknowns) = fs.cell(j, true);
-            let (element, further) = fs.element(j);
+            let (element, _) = fs.element(j);
             let angle = whole.sector_angle(j);
             let mut d: Vec<f64> = unknowns.iter().map(|k| state.u[*k as usize]).collect();
             rotate_pairs(&mut d, (-angle).sin_cos());
             let mut inner = CellState::default();
             cell.frame.split(&d, &mut inner);
             let q = element.recover(&inner.q, 0.0);
-            let (nodes, positions) = element.interior();
-            for ((n, position), q) in nodes.iter().zip(positions).zip(q.chunks_exact(2)) {
-                let mut moved = CoRotation::join(&inner, *position, [q[0], q[1]]);
-                rotate_pairs(&mut moved, angle.sin_cos());
-                place(whole, *n, further, &mut u, moved);
-            }
-        }
+            let positions = element.interior().1.iter();
+            let mut moved: Vec<f64> = positions
+                .zip(q.chunks_exact(2))
+                .flat_map(|(p, q)| CoRotation::join(&inner, *p, [q[0], q[1]]))
+                .collect();
+            rotate_pairs(&mut moved, angle.sin_cos());
+            moved
+        };
+        place_interiors(fs, whole, flexspline_cell, &mut u);
         let (cs, whole) = (&self.circular_spline, &problem.circular_spline);
         let mut v = cs.spread(whole, &state.v);
-        for t in 0..cs.count() {
+        let circular_spline_cell = |t: usize| -> Vec<f64> {
             let (_, unknowns) = cs.cell(t, true);
-            let (element, further) = cs.element(t);
             let frame = self.cs_frame(t).sin_cos();
             let mut d: Vec<f64> = unknowns.iter().map(|k| state.v[*k as usize - cs.first_unknown]).collect();
             rotate_pairs(&mut d, back(frame));
-            let q = element.recover(&d, problem.seat_displacement);
-            for (n, q) in element.interior().0.iter().zip(q.chunks_exact(2)) {
-                let mut moved = [q[0], q[1]];
-                rotate_pairs(&mut moved, frame);
-                place(whole, *n, further, &mut v, moved);
-            }
-        }
+            let mut moved = cs.element(t).0.recover(&d, problem.seat_displacement);
+            rotate_pairs(&mut moved, frame);
+            moved
+        };
+        place_interiors(cs, whole, circular_spline_cell, &mut v);
         problem.seat(&mut v);
         State { u, v, ..state.clone() }
     }
@@ -115,11 +116,23 @@ impl CondensedDrive {
     }
 }
 
-/// Writes the displacement of a node given in another cell, `further` sectors back.
-fn place(mesh: &WheelMesh, node: u32, further: usize, field: &mut [f64], displacement: [f64; 2]) {
-    let (sector, local) = (node as usize / mesh.nodes_per_sector, node % mesh.nodes_per_sector as u32);
-    let n = mesh.node((sector + further) as isize, local);
-    field[2 * n..2 * n + 2].copy_from_slice(&displacement);
+/// Writes the displacements of the nodes inside the cells of a wheel, cell by cell, into a field of the whole wheel.
+fn place_interiors(
+    wheel: &CondensedWheel,
+    whole: &WheelMesh,
+    displacements: impl Fn(usize) -> Vec<f64> + Send + Sync,
+    field: &mut [f64],
+) {
+    let cells: Vec<Vec<f64>> = (0..wheel.count()).into_par_iter().with_min_len(24).map(displacements).collect();
+    for (j, moved) in cells.iter().enumerate() {
+        let (element, further) = wheel.element(j);
+        for (node, x) in element.interior().0.iter().zip(moved.chunks_exact(2)) {
+            // The node is given in the cell that was condensed, `further` sectors back.
+            let (sector, local) = (*node as usize / whole.nodes_per_sector, node % whole.nodes_per_sector as u32);
+            let n = whole.node((sector + further) as isize, local);
+            field[2 * n..2 * n + 2].copy_from_slice(x);
+        }
+    }
 }
 
 /// A factorised tangent.
@@ -257,8 +270,8 @@ impl<'p> CondensedWheels<'p> {
                     }
                     // R^T K R, R being the frame of the cell.
                     let block = [0, 1].map(|x| [0, 1].map(|y| entry(2 * n + x, 2 * m + y)));
-                    let rows = [0, 1]
-                        .map(|y| [cos * block[0][y] + sin * block[1][y], cos * block[1][y] - sin * block[0][y]]);
+                    let rows =
+                        [0, 1].map(|y| [cos * block[0][y] + sin * block[1][y], cos * block[1][y] - sin * block[0][y]]);
                     for x in 0..2 {
                         let values = [cos * rows[0][x] + sin * rows[1][x], cos * rows[1][x] - sin * rows[0][x]];
                         for y in 0..2 {
@@ -386,18 +399,19 @@ impl Factor for CondensedWheels<'_> {
         // A cell that is near contact now has forces on its flanks, even if it had not where the factor was made.
         let (fs_live, cs_live) = live.split_at(fs.count());
         let now = |ring: &[bool], cell: usize| ring[(cell as isize + *turned).rem_euclid(ring.len() as isize) as usize];
-        let cells: Vec<_> = (0..fs.count())
+        let cells: Vec<CellAt> = (0..fs.count())
             .map(|j| fs.cell(j, factor.live[j] || now(fs_live, j)))
             .chain((0..cs.count()).map(|t| cs.cell(t, factor.live[fs.count() + t] || now(cs_live, t))))
+            .map(|(cell, unknowns)| CellAt { kernels: *kernels, cell, unknowns, order: &factor.chain })
             .collect();
         let size = |block: usize| if block < fs.count() { fs.face() } else { cs.face() };
         let unknowns = factor.chain.unknowns();
         let mut chains = vec![0.0; unknowns * count];
         locals.resize_with(cells.len() * count, Local::default);
-        for (c, ((cell, unknowns_of), tangent)) in cells.iter().zip(&factor.cells).enumerate() {
+        for (c, (at, tangent)) in cells.iter().zip(&factor.cells).enumerate() {
             let sides = columns.chunks_exact(n).zip(chains.chunks_exact_mut(unknowns));
             for ((x, chain), local) in sides.zip(&mut locals[c * count..]) {
-                tangent.forward(*kernels, cell, unknowns_of, x, &factor.chain, chain, local);
+                tangent.forward(*at, x, chain, local);
             }
         }
         for (x, chain) in columns.chunks_exact(n).zip(chains.chunks_exact_mut(unknowns)) {
@@ -412,10 +426,10 @@ impl Factor for CondensedWheels<'_> {
             }
         }
         factor.chain.solve(&mut chains);
-        for (c, ((cell, unknowns_of), tangent)) in cells.iter().zip(&factor.cells).enumerate() {
+        for (c, (at, tangent)) in cells.iter().zip(&factor.cells).enumerate() {
             let sides = columns.chunks_exact_mut(n).zip(chains.chunks_exact(unknowns));
             for ((x, chain), local) in sides.zip(&mut locals[c * count..]) {
-                tangent.backward(*kernels, cell, unknowns_of, x, &factor.chain, chain, local);
+                tangent.backward(*at, x, chain, local);
             }
         }
         for (x, chain) in columns.chunks_exact_mut(n).zip(chains.chunks_exact(unknowns)) {

@@ -4,14 +4,16 @@ mod error;
 mod fast;
 mod near;
 mod newton;
+mod passed;
 mod predictor;
 mod problem;
 mod reference;
 mod state;
+mod step;
 mod wheels;
 
 pub use error::SolveError;
-pub use newton::{Effort, Increment, Solver};
 pub use fast::CondensedDrive;
+pub use newton::{Effort, Increment, Solver};
 pub use problem::{Method, Problem, SolverSettings};
 pub use state::State;

@@ -96,9 +96,10 @@ impl NearPairs {
 
     /// Whether the corners of the spaces still face the places they were laid out for.
     pub fn layouts_fit(&self, flanks: &FlankContact, at: Configuration) -> bool {
-        let touching = self.pairs.iter().filter(|(pair, near)| {
-            self.moved >= near.open_until && flanks.smallest_gap(**pair, at) < TOUCH
-        });
+        let touching = self
+            .pairs
+            .iter()
+            .filter(|(pair, near)| self.moved >= near.open_until && flanks.smallest_gap(**pair, at) < TOUCH);
         touching.map(|(pair, near)| (near.layout.corner, flanks.corner(*pair, at))).all(|corners| match corners {
             (Some(a), Some(b)) => (a - b).abs() < CORNER_DRIFT,
             (None, None) => true,
@@ -117,9 +118,7 @@ impl NearPairs {
     ) -> BTreeMap<(usize, crate::drive::Side), crate::contact::FrictionHistory> {
         self.pairs
             .iter()
-            .map(|(&pair, near)| {
-                ((pair.tooth, pair.side), flanks.friction_history(pair, at, law, &near.layout.points))
-            })
+            .map(|(&pair, near)| ((pair.tooth, pair.side), flanks.friction_history(pair, at, law, &near.layout.points)))
             .filter(|(_, history)| history.iter().any(|(_, traction)| *traction != 0.0))
             .collect()
     }
@@ -238,7 +237,10 @@ mod tests {
                 };
                 let found = balance(torque, 1e-6, reach);
                 assert_eq!(found.is_some(), clearance < reach, "{clearance}: {found:?}");
-                assert!(found.is_none_or(|turn| (sense * turn - clearance - 1e-6).abs() < 1e-11), "{clearance}: {found:?}");
+                assert!(
+                    found.is_none_or(|turn| (sense * turn - clearance - 1e-6).abs() < 1e-11),
+                    "{clearance}: {found:?}"
+                );
             }
         }
     }

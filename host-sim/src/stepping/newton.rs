@@ -5,7 +5,7 @@
 //!
 //! predict, lay out the contact; repeat { assemble; done? factorise; solve; update } until done.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
@@ -13,12 +13,13 @@ use crate::contact::{BoreLaw, Configuration, FlankContact, FlankLaw, FlankPair};
 use crate::fem::{Border, BorderedSystem};
 
 use super::error::SolveError;
-use super::predictor::turn_field;
 use super::fast::{CondensedWheels, Kept};
 use super::near::{NearPairs, configuration};
+use super::passed::Passed;
 use super::problem::Problem;
 use super::reference::SparseWheels;
 use super::state::State;
+use super::step::{ANCHORED, BORDERS, LATERAL, OUTPUT, Residual, SLEEVE, Step, improve};
 use super::wheels::Wheels;
 
 /// Pairs closer than this (mm) get a place in the sparsity pattern.
@@ -56,16 +57,6 @@ const KEEP_BELOW: f64 = 0.1;
 const MOST_LAYOUTS: usize = 3;
 /// Tangents remembered.
 const TANGENTS: usize = 12;
-
-/// Number of states that the predictor interpolates in phase, how far off they may be and must be apart (pitches), and the
-/// largest weight.
-const PHASES: usize = 3;
-const PHASE_REACH: f64 = 0.06;
-const PHASES_APART: f64 = 1e-3;
-const LARGEST_WEIGHT: f64 = 6.0;
-
-/// States of steady motion that the predictor remembers: a fine sampling of one pitch.
-const REMEMBERED: usize = 48;
 
 /// A converged increment.
 #[derive(Debug, Clone)]
@@ -125,10 +116,8 @@ pub struct Solver<'p> {
     tangents: VecDeque<Tangent>,
     /// Factor on the penalties, below 1 only while the drive is first deformed.
     softening: f64,
-    /// The last states of steady motion, oldest first.
-    passed: VecDeque<State>,
-    /// Generator angle at which the motion became steady.
-    steady_since: f64,
+    /// The states passed in steady motion.
+    passed: Passed,
     /// Time spent so far.
     pub effort: Effort,
 }
@@ -138,56 +127,6 @@ struct Tangent {
     generator_rad: f64,
     kept: Kept,
     eliminated: Rc<BorderedSystem>,
-}
-
-/// Out-of-balance forces at a configuration.
-struct Residual {
-    /// On the free nodes.
-    force: Vec<f64>,
-    /// On output angle, sleeve rotation, anchor, lateral x, lateral y.
-    border: [f64; BORDERS],
-    /// Largest contact force on a node.
-    scale: f64,
-    torque_scale: f64,
-    flank_contacts: usize,
-    generator_contacts: usize,
-    generator_moment: f64,
-    flank_torque: f64,
-    drag_torque: f64,
-    peak: [f64; 2],
-    /// Neither flank nor drag holds the output.
-    free_output: bool,
-}
-
-/// Rows of the border.
-const OUTPUT: usize = 0;
-const SLEEVE: usize = 1;
-const ANCHORED: usize = 2;
-const LATERAL: usize = 3;
-const BORDERS: usize = 5;
-
-impl Residual {
-    fn zero(unknowns: usize) -> Residual {
-        Residual {
-            force: vec![0.0; unknowns],
-            border: [0.0; BORDERS],
-            scale: 1e-3,
-            torque_scale: 1e-3,
-            flank_contacts: 0,
-            generator_contacts: 0,
-            generator_moment: 0.0,
-            flank_torque: 0.0,
-            drag_torque: 0.0,
-            peak: [0.0; 2],
-            free_output: false,
-        }
-    }
-
-    /// Relative to the contact forces; the torque, which everything serves, ten times as strictly.
-    fn relative(&self) -> f64 {
-        let force = self.force.iter().fold(0.0_f64, |m, x| m.max(x.abs())) / self.scale;
-        force.max(10.0 * self.border[OUTPUT].abs() / self.torque_scale)
-    }
 }
 
 impl<'p> Solver<'p> {
@@ -210,8 +149,7 @@ impl<'p> Solver<'p> {
             made_at: f64::INFINITY,
             tangents: VecDeque::new(),
             softening: 1.0,
-            passed: VecDeque::new(),
-            steady_since: 0.0,
+            passed: Passed::default(),
             effort: Effort::default(),
         }
     }
@@ -307,121 +245,18 @@ impl<'p> Solver<'p> {
         unreachable!("the last softening is 1")
     }
 
-    /// State predicted for a generator angle: the wave turned, the output going on as it did before.
-    ///
-    /// A drive in steady motion passes through the same state after every flexspline pitch, one tooth further: states that
-    /// stood nearly there, whole pitches ago, are turned and interpolated. Otherwise the last state, or one that needs a smaller fraction
-    /// of a pitch, is turned. An output that carries no load stays where it is when the generator reverses: it has the clearance to
-    /// cross.
-    fn predict(&self, from: &State, generator_rad: f64, torque_n_m: f64) -> State {
-        let turn = generator_rad - from.generator_rad;
-        if turn == 0.0 {
-            return State { torque_n_m, ..from.clone() };
-        }
-        let problem = self.problem;
-        let idle = problem.per_width(torque_n_m).abs() <= problem.drag;
-        let reversing = turn.signum() * from.travel < 0.0;
-        let nominal = 1.0 / problem.drive.ratio();
-        let pitch = problem.flexspline.pitch();
-        let steady = !reversing
-            && (from.output_rate / nominal - 1.0).abs() < 0.2
-            && self.passed.back().is_some_and(|last| goes_on(last, from, torque_n_m));
-        let (fs, cs) = problem.wheels();
-        if steady {
-            // What was passed in the first pitch may not have settled yet.
-            let settled = |state: &State| (state.generator_rad - self.steady_since).abs() > pitch;
-            let passed: Vec<&State> = self.passed.iter().filter(|state| settled(state)).collect();
-            let pitches = |state: &State| (generator_rad - state.generator_rad) / pitch;
-            let weights = phase_weights(&passed.iter().map(|state| pitches(state)).collect::<Vec<_>>());
-            let own = (pitches(from) - pitches(from).round()).abs();
-            if let Some(weights) = weights.filter(|w| w.nearest < 0.5 * own) {
-                let mut predicted = State {
-                    u: vec![0.0; from.u.len()],
-                    v: vec![0.0; from.v.len()],
-                    output_rad: 0.0,
-                    sleeve_moment: 0.0,
-                    lateral_force: [0.0; 2],
-                    generator_rad,
-                    torque_n_m,
-                    ..from.clone()
-                };
-                for (k, weight) in weights.states {
-                    let state = passed[k];
-                    let turn = generator_rad - state.generator_rad;
-                    let add = |sum: &mut [f64], part: &[f64]| {
-                        sum.iter_mut().zip(part).for_each(|(x, p)| *x += weight * p);
-                    };
-                    add(&mut predicted.u, &turn_field(fs, &state.u, turn));
-                    add(&mut predicted.v, &turn_field(cs, &state.v, turn - turn * nominal));
-                    predicted.output_rad += weight * (state.output_rad + turn * nominal);
-                    predicted.sleeve_moment += weight * state.sleeve_moment;
-                    let (sin, cos) = turn.sin_cos();
-                    let [x, y] = state.lateral_force;
-                    add(&mut predicted.lateral_force, &[cos * x - sin * y, sin * x + cos * y]);
-                }
-                return predicted;
-            }
-        }
-        let off = |state: &State| {
-            let pitches = (generator_rad - state.generator_rad) / pitch;
-            (pitches - pitches.round()).abs()
-        };
-        let nearest = self.passed.iter().filter(|_| steady).min_by(|a, b| off(a).total_cmp(&off(b)));
-        let base = nearest.filter(|state| off(state) < 0.5 * off(from)).unwrap_or(from);
-        let turn = generator_rad - base.generator_rad;
-        let output_turn = match (idle, reversing) {
-            (true, true) => 0.0,
-            (false, true) => turn * nominal,
-            _ if std::ptr::eq(base, from) => from.output_rate * turn,
-            _ => turn * nominal,
-        };
-        let (sin, cos) = turn.sin_cos();
-        let [x, y] = base.lateral_force;
-        State {
-            u: turn_field(fs, &base.u, turn),
-            v: turn_field(cs, &base.v, turn - output_turn),
-            output_rad: base.output_rad + output_turn,
-            sleeve_moment: base.sleeve_moment,
-            lateral_force: [cos * x - sin * y, sin * x + cos * y],
-            generator_rad,
-            torque_n_m,
-            ..from.clone()
-        }
-    }
-
-    /// Remembers a state of steady motion for the predictor.
-    fn remember(&mut self, state: &State) {
-        let nominal = 1.0 / self.problem.drive.ratio();
-        let steady = (state.output_rate / nominal - 1.0).abs() < 0.2;
-        let fits = |old: &State| old.torque_n_m == state.torque_n_m && old.travel == state.travel;
-        if !steady || self.passed.front().is_some_and(|old| !fits(old)) {
-            self.passed.clear();
-            self.tangents.clear();
-        }
-        if steady {
-            self.keep_tangent(state.generator_rad);
-            if self.passed.is_empty() {
-                self.steady_since = state.generator_rad;
-            }
-            if self.passed.len() == REMEMBERED {
-                self.passed.pop_front();
-            }
-            self.passed.push_back(State { friction: BTreeMap::new(), ..state.clone() });
-        }
-    }
-
     fn newton(&mut self, from: &State, generator_rad: f64, torque_n_m: f64) -> Result<(State, Increment), SolveError> {
         let settings = self.problem.settings;
         let failed =
             |history: Vec<f64>, reason| SolveError::NotConverged { generator_rad, torque_n_m, reason, history };
-        let mut state = self.predict(from, generator_rad, torque_n_m);
+        let mut state = self.passed.predict(self.problem, from, generator_rad, torque_n_m);
         let mut near = NearPairs::default();
         self.balance_output(&mut state, from, torque_n_m, &mut near);
         let mut residual = self.assemble(&mut state, from, torque_n_m, &mut near);
         let mut history = Vec::new();
         let mut last_length = 1.0;
         let mut chords: Vec<Step> = Vec::new();
-        let steady = self.softening == 1.0 && self.passed.back().is_some_and(|last| goes_on(last, from, torque_n_m));
+        let steady = self.softening == 1.0 && self.passed.go_on(from, torque_n_m);
         let mut recalled = steady && generator_rad != from.generator_rad && self.recall(generator_rad);
         // A new layout of the contact is a new start, up to a few times.
         let (mut last_iteration, mut layouts) = (settings.max_iterations, 0);
@@ -441,7 +276,10 @@ impl<'p> Solver<'p> {
                     self.wheels.complete(&mut state);
                     self.finish(&mut state, from, &near);
                     if generator_rad != from.generator_rad {
-                        self.remember(&state);
+                        if !self.passed.remember(self.problem, &state) {
+                            self.tangents.clear();
+                        }
+                        self.keep_tangent(state.generator_rad);
                     }
                     return Ok((state, increment));
                 }
@@ -522,7 +360,8 @@ impl<'p> Solver<'p> {
     fn motion(&self, step: &Step) -> f64 {
         let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let nodes = largest(&step.u) + largest(&step.v);
-        1.25 * std::f64::consts::SQRT_2 * nodes + self.problem.drive.circular_spline.root_radius_mm * step.border[OUTPUT].abs()
+        1.25 * std::f64::consts::SQRT_2 * nodes
+            + self.problem.drive.circular_spline.root_radius_mm * step.border[OUTPUT].abs()
     }
 
     /// Turns the output to where load, drag and flanks balance while the wheels keep their shape.
@@ -594,19 +433,26 @@ impl<'p> Solver<'p> {
         let problem = self.problem;
         let (bore_law, flank_law) = (self.bore_law(), self.flank_law());
         let wheels = self.wheels.as_mut();
-        problem.bore.evaluate_near(bore_law, &problem.outline, state.generator_rad, &state.u, &mut near.bore, |contact| {
-            for (a, &n) in problem.bore.edges[contact.edge].iter().enumerate() {
-                for k in 0..2 {
-                    let f = contact.force[2 * a + k];
-                    residual.force[2 * n as usize + k] += f;
-                    residual.scale = residual.scale.max(f.abs());
+        problem.bore.evaluate_near(
+            bore_law,
+            &problem.outline,
+            state.generator_rad,
+            &state.u,
+            &mut near.bore,
+            |contact| {
+                for (a, &n) in problem.bore.edges[contact.edge].iter().enumerate() {
+                    for k in 0..2 {
+                        let f = contact.force[2 * a + k];
+                        residual.force[2 * n as usize + k] += f;
+                        residual.scale = residual.scale.max(f.abs());
+                    }
                 }
-            }
-            wheels.add_bore(contact);
-            residual.generator_moment += contact.moment;
-            residual.generator_contacts += 1;
-            residual.peak[1] = residual.peak[1].max(contact.peak);
-        });
+                wheels.add_bore(contact);
+                residual.generator_moment += contact.moment;
+                residual.generator_contacts += 1;
+                residual.peak[1] = residual.peak[1].max(contact.peak);
+            },
+        );
         let at = configuration(state);
         let column = self.border.column_mut(OUTPUT);
         column.fill(0.0);
@@ -815,111 +661,10 @@ fn fixed_border(problem: &Problem, wheels: &dyn Wheels) -> Border {
     border
 }
 
-/// States and their weights, and how far (pitches) the nearest of them is.
-struct PhaseWeights {
-    states: Vec<(usize, f64)>,
-    nearest: f64,
-}
-
-/// Interpolates (or goes on from) the few states whose distance in pitches is nearest to a whole number; the latest of those
-/// that coincide.
-fn phase_weights(pitches: &[f64]) -> Option<PhaseWeights> {
-    let off = |k: usize| pitches[k] - pitches[k].round();
-    let mut order: Vec<usize> = (0..pitches.len()).collect();
-    order.sort_by(|a, b| off(*a).abs().total_cmp(&off(*b).abs()).then(b.cmp(a)));
-    let mut chosen: Vec<usize> = Vec::new();
-    for k in order {
-        let apart = chosen.iter().all(|c| (off(*c) - off(k)).abs() > PHASES_APART);
-        if apart && off(k).abs() < PHASE_REACH && chosen.len() < PHASES {
-            chosen.push(k);
-        }
-    }
-    let nearest = off(*chosen.first()?).abs();
-    let weight = |k: usize| -> f64 {
-        chosen.iter().filter(|c| **c != k).map(|c| -off(*c) / (off(k) - off(*c))).product()
-    };
-    let mut states: Vec<(usize, f64)> = chosen.iter().map(|k| (*k, weight(*k))).collect();
-    // Going on too far from states too close together magnifies what they have not settled.
-    if states.iter().any(|(_, weight)| weight.abs() > LARGEST_WEIGHT) {
-        states = vec![(chosen[0], 1.0)];
-    }
-    Some(PhaseWeights { states, nearest })
-}
-
-/// Whether the motion under a load goes on as it was.
-fn goes_on(last: &State, from: &State, torque_n_m: f64) -> bool {
-    last.torque_n_m == torque_n_m && from.torque_n_m == torque_n_m && last.travel == from.travel
-}
-
-/// Broyden's update of an old tangent by the steps that were taken with it (Kelley, Iterative Methods for Linear and Nonlinear
-/// Equations, 1995, section 7.3): `step` is the old tangent's.
-fn improve(step: &mut Step, taken: &[Step]) {
-    for pair in taken.windows(2) {
-        let part = pair[0].dot(step) / pair[0].dot(&pair[0]);
-        step.add(part, &pair[1]);
-    }
-    if let Some(last) = taken.last() {
-        let part = last.dot(step) / last.dot(last);
-        // Beyond this the secant says more about the contact than about the tangent.
-        if part.abs() < 0.5 {
-            let more = part / (1.0 - part);
-            let own = Step { free: step.free.clone(), u: step.u.clone(), v: step.v.clone(), border: step.border };
-            step.add(more, &own);
-        }
-    }
-}
-
 /// How far the last iteration brought the residual down.
 fn last_gain(history: &[f64]) -> f64 {
     match history {
         [.., before, after] => after / before,
         _ => 1.0,
-    }
-}
-
-/// A Newton step in all unknowns.
-struct Step {
-    free: Vec<f64>,
-    u: Vec<f64>,
-    v: Vec<f64>,
-    border: [f64; BORDERS],
-}
-
-impl Step {
-    /// Work of the out-of-balance forces along the step.
-    fn work(&self, residual: &Residual) -> f64 {
-        residual.force.iter().zip(&self.free).map(|(f, d)| f * d).sum::<f64>()
-            + residual.border[OUTPUT] * self.border[OUTPUT]
-    }
-
-    /// Scalar product of displacements (mm²), the turn of the output counted at a radius.
-    fn dot(&self, other: &Step) -> f64 {
-        const RADIUS: f64 = 50.0;
-        let nodes = self.free.iter().zip(&other.free).map(|(a, b)| a * b).sum::<f64>();
-        nodes + RADIUS * RADIUS * self.border[OUTPUT] * other.border[OUTPUT]
-    }
-
-    fn add(&mut self, factor: f64, other: &Step) {
-        let add = |x: &mut [f64], y: &[f64]| x.iter_mut().zip(y).for_each(|(x, y)| *x += factor * y);
-        add(&mut self.free, &other.free);
-        add(&mut self.u, &other.u);
-        add(&mut self.v, &other.v);
-        add(&mut self.border, &other.border);
-    }
-
-    /// Largest displacement, mm.
-    fn largest(&self) -> f64 {
-        self.free.iter().fold(1e-30, |m, x| x.abs().max(m))
-    }
-
-    fn applied_to(&self, state: &State, length: f64) -> State {
-        let mut next = state.clone();
-        next.u.iter_mut().zip(&self.u).for_each(|(x, d)| *x += length * d);
-        next.v.iter_mut().zip(&self.v).for_each(|(x, d)| *x += length * d);
-        next.output_rad += length * self.border[OUTPUT];
-        next.sleeve_moment += length * self.border[SLEEVE];
-        next.lateral_force[0] += length * self.border[LATERAL];
-        next.lateral_force[1] += length * self.border[LATERAL + 1];
-        next
     }
 }

@@ -1,0 +1,118 @@
+//! Out-of-balance forces, and the step that takes them away.
+
+use super::state::State;
+
+/// Rows of the border: output angle, mean rotation of the bore, anchor, lateral x and y.
+pub(super) const OUTPUT: usize = 0;
+pub(super) const SLEEVE: usize = 1;
+pub(super) const ANCHORED: usize = 2;
+pub(super) const LATERAL: usize = 3;
+pub(super) const BORDERS: usize = 5;
+
+/// Out-of-balance forces at a configuration.
+pub(super) struct Residual {
+    /// On the free nodes.
+    pub force: Vec<f64>,
+    /// On output angle, sleeve rotation, anchor, lateral x, lateral y.
+    pub border: [f64; BORDERS],
+    /// Largest contact force on a node.
+    pub scale: f64,
+    pub torque_scale: f64,
+    pub flank_contacts: usize,
+    pub generator_contacts: usize,
+    pub generator_moment: f64,
+    pub flank_torque: f64,
+    pub drag_torque: f64,
+    pub peak: [f64; 2],
+    /// Neither flank nor drag holds the output.
+    pub free_output: bool,
+}
+
+impl Residual {
+    pub fn zero(unknowns: usize) -> Residual {
+        Residual {
+            force: vec![0.0; unknowns],
+            border: [0.0; BORDERS],
+            scale: 1e-3,
+            torque_scale: 1e-3,
+            flank_contacts: 0,
+            generator_contacts: 0,
+            generator_moment: 0.0,
+            flank_torque: 0.0,
+            drag_torque: 0.0,
+            peak: [0.0; 2],
+            free_output: false,
+        }
+    }
+
+    /// Relative to the contact forces; the torque, which everything serves, ten times as strictly.
+    pub fn relative(&self) -> f64 {
+        let force = self.force.iter().fold(0.0_f64, |m, x| m.max(x.abs())) / self.scale;
+        force.max(10.0 * self.border[OUTPUT].abs() / self.torque_scale)
+    }
+}
+
+/// A Newton step in all unknowns.
+pub(super) struct Step {
+    pub free: Vec<f64>,
+    pub u: Vec<f64>,
+    pub v: Vec<f64>,
+    pub border: [f64; BORDERS],
+}
+
+impl Step {
+    /// Work of the out-of-balance forces along the step.
+    pub fn work(&self, residual: &Residual) -> f64 {
+        residual.force.iter().zip(&self.free).map(|(f, d)| f * d).sum::<f64>()
+            + residual.border[OUTPUT] * self.border[OUTPUT]
+    }
+
+    /// Scalar product of displacements (mm²), the turn of the output counted at a radius.
+    fn dot(&self, other: &Step) -> f64 {
+        const RADIUS: f64 = 50.0;
+        let nodes = self.free.iter().zip(&other.free).map(|(a, b)| a * b).sum::<f64>();
+        nodes + RADIUS * RADIUS * self.border[OUTPUT] * other.border[OUTPUT]
+    }
+
+    fn add(&mut self, factor: f64, other: &Step) {
+        let add = |x: &mut [f64], y: &[f64]| x.iter_mut().zip(y).for_each(|(x, y)| *x += factor * y);
+        add(&mut self.free, &other.free);
+        add(&mut self.u, &other.u);
+        add(&mut self.v, &other.v);
+        add(&mut self.border, &other.border);
+    }
+
+    /// Largest displacement, mm.
+    pub fn largest(&self) -> f64 {
+        self.free.iter().fold(1e-30, |m, x| x.abs().max(m))
+    }
+
+    pub fn applied_to(&self, state: &State, length: f64) -> State {
+        let mut next = state.clone();
+        next.u.iter_mut().zip(&self.u).for_each(|(x, d)| *x += length * d);
+        next.v.iter_mut().zip(&self.v).for_each(|(x, d)| *x += length * d);
+        next.output_rad += length * self.border[OUTPUT];
+        next.sleeve_moment += length * self.border[SLEEVE];
+        next.lateral_force[0] += length * self.border[LATERAL];
+        next.lateral_force[1] += length * self.border[LATERAL + 1];
+        next
+    }
+}
+
+/// Broyden's update of an old tangent by the steps that were taken with it (Kelley, Iterative Methods for Linear and Nonlinear
+/// Equations, 1995, section 7.3): `step` is the old tangent's.
+pub(super) fn improve(step: &mut Step, taken: &[Step]) {
+    for pair in taken.windows(2) {
+        let part = pair[0].dot(step) / pair[0].dot(&pair[0]);
+        step.add(part, &pair[1]);
+    }
+    if let Some(last) = taken.last() {
+        let part = last.dot(step) / last.dot(last);
+        // Beyond this the secant says more about the contact than about the tangent.
+        if part.abs() < 0.5 {
+            let more = part / (1.0 - part);
+            let own = Step { free: step.free.clone(), u: step.u.clone(), v: step.v.clone(), border: step.border };
+            step.add(more, &own);
+        }
+    }
+}

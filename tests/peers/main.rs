@@ -1,0 +1,208 @@
+//! CalculiX beside flexspline: the same deck, the same path, the same machine.
+//!
+//! For each case the command `flexspline export --format inp` writes a deck, `ccx` runs it on one thread, and each of our
+//! solvers goes the same way on the same mesh: deformed, loaded, turned in increments, and at the end brought to another
+//! load. Compared are the output angle, the wind-up between the two loads, the displacements of the bore, the stress along
+//! it, and what both cost. The short form is the cam on the coarse mesh; `--long` adds the standard mesh and what CalculiX
+//! itself leaves open (each increment in two parts). Rollers are not compared: see the header of `export/inp.rs`.
+//!
+//! Prints what it finds, a line for each claim, and one line of ratios at the end; ends with 1 if a claim fails.
+
+mod case;
+mod dat;
+mod ours;
+mod program;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Parser;
+use flexspline_sim::drive::GeneratorKind;
+use flexspline_sim::mesh::MeshLevel;
+
+use case::{Case, Comparison, Peer};
+use flexspline_sim::stepping::Method;
+use ours::SOLVERS;
+use program::Limits;
+
+/// Contact penalties on bore and flanks in both programs, N/mm³. Ours is 5e7 on the flanks; ten times less moves the output by
+/// 0.1″ and spares CalculiX iterations. Printed with each case: what our own penalties would change.
+const PENALTIES: [f64; 2] = [1e6, 5e6];
+/// Largest difference of the output angle, arc-seconds: 0.015 was found on both meshes.
+const OUTPUT_ARCSEC: f64 = 0.1;
+/// Largest relative difference of the wind-up.
+const WIND_UP: f64 = 0.01;
+/// Largest difference of the stress along the bore, relative to the largest stress.
+const STRESS: f64 = 0.03;
+/// How many times less processor time than CalculiX an increment of our solver takes: from 60 000 unknowns on, and below.
+fn cpu_ratio(solver: Method, unknowns: usize) -> f64 {
+    match (solver, unknowns >= LARGE) {
+        (Method::Reference, true) => 60.0,
+        (Method::Reference, false) => 20.0,
+        (Method::Fast, true) => 2000.0,
+        (Method::Fast, false) => 300.0,
+    }
+}
+/// Unknowns from which the larger ratio is asserted.
+const LARGE: usize = 60_000;
+
+/// Run CalculiX and flexspline on the same deck and compare them
+#[derive(Debug, Parser)]
+struct Options {
+    /// Standard mesh and CalculiX's own scatter too
+    #[arg(long)]
+    long: bool,
+    /// Only this case, by its name
+    #[arg(long)]
+    case: Option<String>,
+    /// Folder for decks and outputs
+    #[arg(long, default_value = "target/peers")]
+    out: PathBuf,
+    /// The program CalculiX
+    #[arg(long, default_value = "ccx")]
+    ccx: PathBuf,
+    /// The command flexspline [default: beside this program]
+    #[arg(long)]
+    flexspline: Option<PathBuf>,
+}
+
+/// Claims, counted.
+#[derive(Default)]
+struct Claims {
+    failed: usize,
+}
+
+impl Claims {
+    fn check(&mut self, what: &str, holds: bool) {
+        println!("  {} {what}", if holds { "ok    " } else { "FAILED" });
+        self.failed += usize::from(!holds);
+    }
+}
+
+fn main() -> ExitCode {
+    let options = Options::parse();
+    let mut claims = Claims::default();
+    match peers(&options, &mut claims) {
+        Ok(line) => println!("peers: {line}"),
+        Err(error) => {
+            println!("peers: FAILED: {error}");
+            return ExitCode::FAILURE;
+        }
+    }
+    if claims.failed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
+    let flexspline = match &options.flexspline {
+        Some(path) => path.clone(),
+        None => std::env::current_exe().map_err(|error| error.to_string())?.with_file_name("flexspline"),
+    };
+    let flexspline = std::path::absolute(flexspline).map_err(|error| error.to_string())?;
+    let short = Case {
+        generator: GeneratorKind::Cam,
+        mesh: MeshLevel::Coarse,
+        torque_n_m: 50.0,
+        last_torque_n_m: 25.0,
+        increments: 2,
+        step_rad: 0.01,
+        parts: 1,
+        penalties: PENALTIES,
+    };
+    let mut cases = vec![short];
+    if options.long || options.case.is_some() {
+        cases.push(Case { mesh: MeshLevel::Standard, ..short });
+        cases.push(Case { parts: 2, ..short });
+    }
+    if let Some(name) = &options.case {
+        let names: Vec<String> = cases.iter().map(Case::name).collect();
+        cases.retain(|case| case.name() == *name);
+        if cases.is_empty() {
+            return Err(format!("--case: found {name:?}, allowed: {}", names.join(", ")));
+        }
+    }
+    let mut lines = Vec::new();
+    let mut whole: Option<Vec<f64>> = None;
+    for case in cases {
+        let (line, peer) = beside(&case, options, &flexspline, claims)?;
+        lines.push(line);
+        if case == short {
+            whole = Some(peer.output_rad);
+        } else if case.parts > 1
+            && let Some(whole) = &whole
+        {
+            let scatter = whole.iter().zip(&peer.output_rad).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let scatter = scatter.to_degrees() * 3600.0;
+            println!("  increments in {} parts move CalculiX's own output by {scatter:.3}\"", case.parts);
+            lines.push(format!("CalculiX's own scatter {scatter:.3}\""));
+        }
+    }
+    Ok(lines.join("; "))
+}
+
+/// One case: everything that is printed and claimed about it, and its part of the last line.
+fn beside(case: &Case, options: &Options, flexspline: &Path, claims: &mut Claims) -> Result<(String, Peer), String> {
+    let folder = options.out.join(case.name());
+    let unknowns = case.problem(Method::Reference)?.degrees_of_freedom();
+    println!("== {} at {} N.m, {unknowns} dof", case.name(), case.torque_n_m);
+    let deck = case.export(flexspline, &folder)?;
+    let peer = case.calculix(&options.ccx, &deck, Limits { cpu_s: 3600.0, memory_mb: 6000.0 })?;
+    let rotation = &peer.cpu_s[1..=case.increments];
+    let peer_cpu_s = rotation.iter().sum::<f64>() / rotation.len() as f64;
+    println!(
+        "  CalculiX: {:.0} s in all, {peer_cpu_s:.1} s per rotation increment, iterations {:?} (load, rotations, load), {:.0} MB",
+        peer.used.cpu_s, peer.iterations, peer.used.memory_mb
+    );
+    let mut costs = vec![format!("CalculiX {peer_cpu_s:.1} s")];
+    let mut memory = vec![format!("CalculiX {:.0} MB", peer.used.memory_mb)];
+    let mut agreement = String::new();
+    for solver in SOLVERS {
+        let problem = case.problem(solver)?;
+        let ours = case.compare(&problem, &peer, flexspline, &folder)?;
+        let ratio = peer_cpu_s / ours.cpu_s;
+        report(&ours, ratio);
+        if solver == Method::Reference {
+            let moved = case.penalty_arcsec(&problem, &peer)?;
+            println!("  our own penalties instead move our output by up to {moved:.3}\"");
+        }
+        let needed = cpu_ratio(solver, unknowns);
+        claims.check(&format!("output within {OUTPUT_ARCSEC}\""), ours.output_arcsec <= OUTPUT_ARCSEC);
+        claims.check(&format!("wind-up within {:.0} %", 100.0 * WIND_UP), ours.wind_up() <= WIND_UP);
+        claims.check(&format!("stress along the bore within {:.0} %", 100.0 * STRESS), ours.stress() <= STRESS);
+        claims.check(&format!("at least {needed} times less processor time"), ratio >= needed);
+        costs.push(format!("{} {:.3} s ({ratio:.0}x)", solver, ours.cpu_s));
+        memory.push(format!("{} {:.0} MB", solver, ours.memory_mb));
+        if solver == Method::Reference {
+            agreement = format!(
+                "output angle differs {:.2}\", wind-up {:.2} %, stress {:.2} %",
+                ours.output_arcsec,
+                100.0 * ours.wind_up(),
+                100.0 * ours.stress()
+            );
+        }
+    }
+    let line = format!(
+        "{} {unknowns} dof, CPU per {} rad increment: {}; {agreement}; memory {}",
+        case.name(),
+        case.step_rad,
+        costs.join(", "),
+        memory.join(", ")
+    );
+    Ok((line, peer))
+}
+
+fn report(ours: &Comparison, ratio: f64) {
+    let [peer_wound, wound] = ours.wind_up_arcsec;
+    let [apart_um, moved_um] = ours.bore_um;
+    let [apart_mpa, rms_mpa, most_mpa] = ours.stress_mpa;
+    println!(
+        "  {}: {:.3} s per rotation increment ({ratio:.0} times less), {:.0} MB",
+        ours.solver, ours.cpu_s, ours.memory_mb
+    );
+    println!(
+        "  output angle: up to {:.3}\" apart, increments up to {:.3}\"",
+        ours.output_arcsec, ours.increment_arcsec
+    );
+    println!("  wind-up between the loads: {peer_wound:.3}\" and {wound:.3}\"");
+    println!("  bore: displacements up to {apart_um:.3} um apart, of {moved_um:.0} um");
+    println!("  von Mises along the bore: up to {apart_mpa:.2} MPa apart (rms {rms_mpa:.3}), of {most_mpa:.0} MPa");
+}

@@ -1,0 +1,59 @@
+//! Our solvers along the path of the deck.
+
+use std::time::Duration;
+
+use cpu_time::ProcessTime;
+use flexspline_sim::element::cauchy_stress;
+use flexspline_sim::stepping::{Method, Problem, Solver, State};
+
+/// Our solvers, the one that the others are measured against first.
+pub const SOLVERS: [Method; 2] = [Method::Reference, Method::Fast];
+
+/// Where the drive is taken: generator angle (rad) and load (N m).
+pub type Stop = (f64, f64);
+
+/// The states at the stops, on all nodes, and the processor time that each took.
+pub struct Journey {
+    /// One for each stop.
+    pub states: Vec<State>,
+    /// Median over the repetitions.
+    pub cpu: Vec<Duration>,
+}
+
+/// Takes the drive through the stops, `repeat` times over from a new start, for the sake of the time.
+pub fn journey(problem: &Problem, stops: &[Stop], repeat: usize) -> Result<Journey, String> {
+    let mut states = Vec::new();
+    let mut cpu = vec![Vec::new(); stops.len()];
+    for _ in 0..repeat {
+        states.clear();
+        let mut solver = Solver::new(problem);
+        let (mut state, _) = solver.deform(stops[0].0).map_err(|error| error.to_string())?;
+        for ((generator_rad, torque_n_m), cpu) in stops.iter().zip(&mut cpu) {
+            let clock = ProcessTime::now();
+            (state, _) = solver.increment(&state, *generator_rad, *torque_n_m).map_err(|error| error.to_string())?;
+            cpu.push(clock.elapsed());
+            states.push(problem.whole_state(&state).into_owned());
+        }
+    }
+    let median = |mut times: Vec<Duration>| {
+        times.sort();
+        times[times.len() / 2]
+    };
+    Ok(Journey { states, cpu: cpu.into_iter().map(median).collect() })
+}
+
+/// Displacement of a node of the flexspline, mm.
+pub fn displacement(state: &State, node: usize) -> [f64; 2] {
+    [state.u[2 * node], state.u[2 * node + 1]]
+}
+
+/// Cauchy stress `[s11, s22, s12]` (MPa) at the integration points of an element of the flexspline, in the order of
+/// CalculiX: along xi first, then along eta.
+pub fn stress(problem: &Problem, state: &State, element: usize) -> [[f64; 3]; 4] {
+    let mut u = [0.0; 16];
+    for (a, &n) in problem.flexspline.elements[element].iter().enumerate() {
+        [u[2 * a], u[2 * a + 1]] = displacement(state, n as usize);
+    }
+    let [a, b, c, d] = cauchy_stress(&problem.flexspline.gauss[element], &problem.material, &u);
+    [a, b, d, c]
+}

@@ -1,0 +1,112 @@
+//! A program run as a child: its processor time, its memory, and a limit on both.
+
+use std::fs::File;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+use procfs::process::Process;
+use wait4::Wait4;
+
+/// How often a running child is looked at.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// What a child used.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Used {
+    /// Processor time in user mode, s.
+    pub cpu_s: f64,
+    /// Largest resident memory, MB.
+    pub memory_mb: f64,
+    /// Processor time (s) when the watched file had each of its lines, from the first.
+    pub cpu_at_line_s: Vec<f64>,
+}
+
+/// Where a child stops being worth waiting for.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Processor time, s.
+    pub cpu_s: f64,
+    /// Resident memory, MB.
+    pub memory_mb: f64,
+}
+
+/// Runs a command to its end, its output in `log`. A file that grows by a line for each thing done (`watched`) dates these.
+pub fn run(command: &mut Command, log: &Path, watched: Option<&Path>, limits: Limits) -> Result<Used, String> {
+    let name = command.get_program().to_string_lossy().into_owned();
+    let failed = |error: &dyn std::fmt::Display| format!("{name}: {error}");
+    let output = File::create(log).map_err(|error| failed(&error))?;
+    let errors = output.try_clone().map_err(|error| failed(&error))?;
+    let mut child =
+        command.stdin(Stdio::null()).stdout(output).stderr(errors).spawn().map_err(|error| failed(&error))?;
+    let process = Process::new(child.id() as i32).map_err(|error| failed(&error))?;
+    let tick_s = 1.0 / procfs::ticks_per_second() as f64;
+    let mut cpu_at_line_s = Vec::new();
+    // A process that has ended and is not yet waited for still says what it used.
+    loop {
+        let stat = process.stat().map_err(|error| failed(&error))?;
+        let cpu_s = stat.utime as f64 * tick_s;
+        if let Some(watched) = watched {
+            let lines = std::fs::read_to_string(watched).map_or(0, |text| text.lines().count());
+            cpu_at_line_s.resize(lines.max(cpu_at_line_s.len()), cpu_s);
+        }
+        if stat.state == 'Z' {
+            break;
+        }
+        let memory_mb = process.status().ok().and_then(|status| status.vmhwm).map_or(0.0, |kb| kb as f64 / 1024.0);
+        let over = if cpu_s > limits.cpu_s {
+            Some(format!("{cpu_s:.0} s of processor time, allowed {:.0}", limits.cpu_s))
+        } else if memory_mb > limits.memory_mb {
+            Some(format!("{memory_mb:.0} MB of memory, allowed {:.0}", limits.memory_mb))
+        } else {
+            None
+        };
+        if let Some(over) = over {
+            child.kill().and_then(|()| child.wait()).map_err(|error| failed(&error))?;
+            return Err(failed(&format!("stopped after {over}; see {}", log.display())));
+        }
+        sleep(LOOK);
+    }
+    let ended = child.wait4().map_err(|error| failed(&error))?;
+    if !ended.status.success() {
+        return Err(failed(&format!("ended with {}; see {}", ended.status, log.display())));
+    }
+    let megabytes = ended.rusage.maxrss as f64 / (1024.0 * 1024.0);
+    Ok(Used { cpu_s: ended.rusage.utime.as_secs_f64(), memory_mb: megabytes, cpu_at_line_s })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Limits = Limits { cpu_s: 20.0, memory_mb: 500.0 };
+
+    #[test]
+    fn a_child_is_measured_and_its_lines_are_dated() {
+        let folder = std::env::temp_dir().join(format!("peers-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let busy = "for k in 1 2; do i=0; while [ $i -lt 200000 ]; do i=$((i+1)); done; echo $k >> lines; done";
+        let used = run(
+            Command::new("sh").args(["-c", busy]).current_dir(&folder),
+            &folder.join("log"),
+            Some(&folder.join("lines")),
+            LIMITS,
+        );
+        let endless = run(
+            Command::new("sh").args(["-c", "while :; do :; done"]).current_dir(&folder),
+            &folder.join("log"),
+            None,
+            Limits { cpu_s: 0.2, ..LIMITS },
+        );
+        let failing =
+            run(Command::new("sh").args(["-c", "exit 3"]).current_dir(&folder), &folder.join("log"), None, LIMITS);
+        std::fs::remove_dir_all(&folder).unwrap();
+        let used = used.unwrap();
+        assert!(used.cpu_s > 0.01 && used.memory_mb > 0.1, "{used:?}");
+        let [first, second] = used.cpu_at_line_s[..] else { panic!("{used:?}") };
+        assert!(0.0 < first && first < second && second <= used.cpu_s + 0.02, "{used:?}");
+        assert!(endless.unwrap_err().contains("processor time"));
+        assert!(failing.unwrap_err().contains("exit status: 3"));
+    }
+}
