@@ -22,8 +22,8 @@ use std::time::Duration;
 use criterion::measurement::Measurement;
 use criterion::{BenchmarkGroup, Criterion, criterion_group, criterion_main};
 use flexspline_sim::condense::{
-    Block, Cell, CellState, CellTangent, Chain, CondensedWheel, Contribution, Geometric, Kernels, Local, Placement,
-    rotate_pairs,
+    Block, Cell, CellAt, CellState, CellTangent, Chain, CondensedWheel, Contribution, Geometric, Kernels, Local,
+    Placement, rotate_pairs,
 };
 use flexspline_sim::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
 use flexspline_sim::drive::GeneratorKind;
@@ -269,13 +269,14 @@ impl<'m> Tangent<'m> {
     /// in between, are left out.)
     fn solve(&mut self, x: &mut [f64]) {
         let mut side = vec![0.0; self.chain.unknowns()];
-        let cells = || self.cells.iter().zip(&self.reduced);
-        for ((placed, tangent), local) in cells().zip(&mut self.local) {
-            tangent.forward(self.kernels, placed.cell, placed.unknowns, x, &self.chain, &mut side, local);
+        let (kernels, order) = (self.kernels, &self.chain);
+        let cells = || self.cells.iter().map(|p| CellAt { kernels, cell: p.cell, unknowns: p.unknowns, order });
+        for ((at, tangent), local) in cells().zip(&self.reduced).zip(&mut self.local) {
+            tangent.forward(at, x, &mut side, local);
         }
-        self.chain.solve(&mut side);
-        for ((placed, tangent), local) in cells().zip(&mut self.local) {
-            tangent.backward(self.kernels, placed.cell, placed.unknowns, x, &self.chain, &side, local);
+        order.solve(&mut side);
+        for ((at, tangent), local) in cells().zip(&self.reduced).zip(&mut self.local) {
+            tangent.backward(at, x, &side, local);
         }
     }
 }
