@@ -186,8 +186,16 @@ struct Placed<'m> {
     cell: &'m Cell,
     unknowns: &'m [u32],
     place: Placement,
-    /// What a turning frame adds, in the flexspline: a, g, c.
-    geometric: Option<(Vec<f64>, Vec<f64>, f64)>,
+    /// In the flexspline.
+    frame: Option<TurningFrame>,
+}
+
+/// How far the frame of a cell has turned, and what that adds to its tangent (see [`Geometric`]).
+struct TurningFrame {
+    turn_rad: f64,
+    a: Vec<f64>,
+    g: Vec<f64>,
+    c: f64,
 }
 
 /// The tangent of both wheels without contact; springs at the faces hold it.
@@ -212,16 +220,14 @@ impl<'m> Tangent<'m> {
                 // A flexspline cell is centred on its tooth, a circular-spline cell between two numbered spaces.
                 let middle = if turning { mesh.sector_angle(j) } else { (j as f64 + 0.5) * mesh.pitch() };
                 let (cell, unknowns) = wheel.cell(j, false);
-                let (turn, geometric) = match turning {
-                    true => turning_frame(kernels, cell, unknowns, middle, state),
-                    false => (0.0, None),
-                };
+                let frame = turning.then(|| TurningFrame::new(kernels, cell, unknowns, middle, state));
+                let turn = frame.as_ref().map_or(0.0, |frame| frame.turn_rad);
                 let place = Placement {
                     frame: middle + turn,
                     faces: [turn + 0.5 * mesh.pitch(), turn - 0.5 * mesh.pitch()],
                     blocks: [(first + j) as u32, (first + (j + 1) % wheel.count()) as u32],
                 };
-                cells.push(Placed { cell, unknowns, place, geometric });
+                cells.push(Placed { cell, unknowns, place, frame });
             }
         }
         // Around both rings, the first face of each last.
@@ -244,7 +250,7 @@ impl<'m> Tangent<'m> {
     fn reduce(&mut self) {
         self.contributions.clear();
         for (placed, tangent) in self.cells.iter().zip(&mut self.reduced) {
-            let geometric = placed.geometric.as_ref().map(|(a, g, c)| Geometric { a, g, c: *c });
+            let geometric = placed.frame.as_ref().map(|f| Geometric { a: &f.a, g: &f.g, c: f.c });
             let reduced = tangent.reduce(self.kernels, placed.cell, placed.place, Vec::new(), geometric, |_, _| false);
             self.contributions.push(reduced.expect("a cell held at its faces is stiff"));
         }
@@ -281,26 +287,21 @@ impl<'m> Tangent<'m> {
     }
 }
 
-/// How far the frame of a flexspline cell has turned, and what that adds to its tangent.
-fn turning_frame(
-    kernels: Kernels,
-    cell: &Cell,
-    unknowns: &[u32],
-    middle_rad: f64,
-    state: &State,
-) -> (f64, Option<(Vec<f64>, Vec<f64>, f64)>) {
-    let mut d: Vec<f64> = unknowns.iter().map(|u| state.u[*u as usize]).collect();
-    rotate_pairs(&mut d, (-middle_rad).sin_cos());
-    let mut inner = CellState::default();
-    cell.frame.split(&d, &mut inner);
-    let quarter: Vec<f64> = inner.q.chunks_exact(2).flat_map(|q| [-q[1], q[0]]).collect();
-    let [force, turned] = [&inner.q, &quarter].map(|q| {
-        let mut product = vec![0.0; q.len()];
-        kernels.multiply_add(&cell.stiffness, q, 1.0, &mut product);
-        product
-    });
-    let (g, c) = cell.frame.geometric(&inner, &force, &turned);
-    (inner.turn, Some((inner.turn_rate, g, c)))
+impl TurningFrame {
+    fn new(kernels: Kernels, cell: &Cell, unknowns: &[u32], middle_rad: f64, state: &State) -> TurningFrame {
+        let mut d: Vec<f64> = unknowns.iter().map(|u| state.u[*u as usize]).collect();
+        rotate_pairs(&mut d, (-middle_rad).sin_cos());
+        let mut inner = CellState::default();
+        cell.frame.split(&d, &mut inner);
+        let quarter: Vec<f64> = inner.q.chunks_exact(2).flat_map(|q| [-q[1], q[0]]).collect();
+        let [force, turned] = [&inner.q, &quarter].map(|q| {
+            let mut product = vec![0.0; q.len()];
+            kernels.multiply_add(&cell.stiffness, q, 1.0, &mut product);
+            product
+        });
+        let (g, c) = cell.frame.geometric(&inner, &force, &turned);
+        TurningFrame { turn_rad: inner.turn, a: inner.turn_rate, g, c }
+    }
 }
 
 criterion_group! { name = part; config = common::criterion(); targets = parts }
