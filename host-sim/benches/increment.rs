@@ -1,136 +1,88 @@
-//! Cost of an increment of 0.01 rad of the whole drive in steady motion, standard mesh, and of its parts.
+//! Cost of an increment of 0.01 rad of the whole drive in steady motion, standard mesh, by both solvers side by side.
 //!
 //! ```text
 //! cargo bench -p flexspline-sim --bench increment
 //! ```
 //!
-//! `increment/…` is the time of a whole increment, Newton iterations and predictor included; the lines after it say how it
-//! is made up: assembly of the elements, contact, factorisation, triangular solves, and the rest. `assembly` and
-//! `contact/…` time one pass over the elements and over the two kinds of contact at the deformed state.
+//! Criterion's figures `increment/<generator> <torque> N.m/<solver>` are CPU time of one increment: predictor, contact, Newton
+//! iterations and all. The line after each gives the mean over all increments of that run (CPU), Newton iterations and
+//! factorisations for each, and how the time is made up by the solver's own clocks (those are wall clocks: on a machine
+//! that does other things they add up to more than the CPU time). The line `reference / fast` is the ratio of the means.
+//! The drive moves on from sample to sample; what was settled before is not timed.
+
+mod common;
 
 use std::cell::RefCell;
-use std::hint::black_box;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use criterion::{Criterion, criterion_group, criterion_main};
-use flexspline_sim::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
-use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::element::{PACKED, add_tangent_and_force};
-use flexspline_sim::stepping::{Effort, Problem, Solver, SolverSettings, State};
+use cpu_time::ProcessTime;
+use criterion::measurement::Measurement;
+use criterion::{BenchmarkGroup, Criterion, SamplingMode, criterion_group, criterion_main};
+use flexspline_sim::drive::GeneratorKind;
+use flexspline_sim::stepping::{Method, Problem};
 
-const STEP_RAD: f64 = 0.01;
-const TORQUE_N_M: f64 = 50.0;
+use common::{CpuTime, Motion, SETTLING, STEP_RAD};
 
-fn problem(kind: GeneratorKind) -> Problem {
-    let drive = Drive::hhd_95();
-    let problem = Problem::new(&drive, kind, drive.temperature.reference_c, SolverSettings::default()).unwrap();
-    assert!(problem.degrees_of_freedom() >= 60_000, "{} degrees of freedom", problem.degrees_of_freedom());
-    problem
-}
+const CASES: [(GeneratorKind, f64); 5] = [
+    (GeneratorKind::Cam, 0.0),
+    (GeneratorKind::Cam, 50.0),
+    (GeneratorKind::TwoRoller, 20.0),
+    (GeneratorKind::FourRoller, 50.0),
+    (GeneratorKind::DoubleDisc, 100.0),
+];
 
-/// Loaded and in steady motion.
-fn settled<'p>(problem: &'p Problem, torque_n_m: f64) -> (Solver<'p>, State) {
-    let mut solver = Solver::new(problem);
-    let (mut state, _) = solver.deform(0.0).unwrap();
-    if torque_n_m != 0.0 {
-        state = solver.increment(&state, 0.0, torque_n_m).unwrap().0;
-    }
-    for _ in 0..5 {
-        state = solver.increment(&state, state.generator_rad + STEP_RAD, torque_n_m).unwrap().0;
-    }
-    (solver, state)
-}
-
-fn whole_increments(criterion: &mut Criterion) {
+fn increments(criterion: &mut Criterion<CpuTime>) {
     let mut group = criterion.benchmark_group("increment");
-    group.sample_size(10).warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(8));
-    for (kind, torque_n_m) in
-        [(GeneratorKind::Cam, 0.0), (GeneratorKind::Cam, TORQUE_N_M), (GeneratorKind::TwoRoller, TORQUE_N_M)]
-    {
-        let problem = problem(kind);
-        let (solver, state) = settled(&problem, torque_n_m);
-        let effort_before = solver.effort;
-        let run = RefCell::new((solver, state, 0_u32, 0_usize, Duration::ZERO));
-        group.bench_function(format!("{kind}/{torque_n_m} N.m/{} dof", problem.degrees_of_freedom()), |bencher| {
-            bencher.iter(|| {
-                let (solver, state, count, iterations, time) = &mut *run.borrow_mut();
-                let clock = Instant::now();
-                let (next, increment) = solver.increment(state, state.generator_rad + STEP_RAD, torque_n_m).unwrap();
-                *time += clock.elapsed();
-                *state = next;
-                *count += 1;
-                *iterations += increment.iterations;
-            });
+    group.sample_size(10).warm_up_time(Duration::from_millis(300)).sampling_mode(SamplingMode::Flat);
+    for (kind, torque_n_m) in CASES {
+        let means = [(Method::Reference, 2.5), (Method::Fast, 1.0)].map(|(method, seconds)| {
+            group.measurement_time(Duration::from_secs_f64(seconds));
+            let problem = common::problem(kind, method);
+            assert!(problem.degrees_of_freedom() >= 60_000, "{} degrees of freedom", problem.degrees_of_freedom());
+            mean_ms(&mut group, &problem, torque_n_m)
         });
-        let (solver, _, count, iterations, time) = run.into_inner();
-        report(kind, effort_before, solver.effort, count, iterations, time);
+        if let [Some(reference), Some(fast)] = means {
+            println!("    {kind} {torque_n_m} N.m: reference / fast = {:.1}\n", reference / fast);
+        }
     }
     group.finish();
 }
 
-fn report(kind: GeneratorKind, before: Effort, after: Effort, count: u32, iterations: usize, time: Duration) {
-    let part = |f: fn(&Effort) -> Duration| (f(&after) - f(&before)).as_secs_f64() * 1e3 / f64::from(count);
-    let parts = [
-        ("assembly", part(|e| e.assembly)),
-        ("contact", part(|e| e.contact)),
-        ("analysis", part(|e| e.analysis)),
-        ("factorisation", part(|e| e.factorisation)),
-        ("solution", part(|e| e.solution)),
-    ];
-    let whole = time.as_secs_f64() * 1e3 / f64::from(count);
-    let rest = whole - parts.iter().map(|(_, ms)| ms).sum::<f64>();
-    print!("    {kind}: {:.1} iterations, {whole:.1} ms:", iterations as f64 / f64::from(count));
-    for (name, ms) in parts {
-        print!(" {name} {ms:.1}");
-    }
-    println!(" rest {rest:.1}");
+/// Benchmarks one case; mean CPU milliseconds of its increments, if the filter of the command let it run.
+fn mean_ms<M: Measurement>(group: &mut BenchmarkGroup<'_, M>, problem: &Problem, torque_n_m: f64) -> Option<f64> {
+    let (kind, method) = (problem.kind, problem.settings.method);
+    let settle = if method == Method::Fast { Motion::new } else { Motion::taken_over };
+    // Settled when it first runs: a case that is filtered out costs nothing.
+    let run: RefCell<Option<(Motion, Duration)>> = RefCell::new(None);
+    group.bench_function(format!("{kind} {torque_n_m} N.m/{method}"), |bencher| {
+        let mut run = run.borrow_mut();
+        let (motion, time) =
+            run.get_or_insert_with(|| (settle(problem, torque_n_m, STEP_RAD, SETTLING), Duration::ZERO));
+        bencher.iter(|| {
+            let clock = ProcessTime::now();
+            motion.advance();
+            *time += clock.elapsed();
+        });
+    });
+    let (motion, time) = run.into_inner()?;
+    let each = |time: Duration| time.as_secs_f64() * 1e3 / motion.increments as f64;
+    let effort = motion.solver.effort;
+    println!(
+        "    {kind} {torque_n_m} N.m, {method}, {} dof: {:.2} ms CPU, {:.1} iterations, {:.2} factorisations (mean of {}); \
+         clocks: assembly {:.2}, contact {:.2}, analysis {:.2}, factorisation {:.2}, solution {:.2} ms",
+        problem.degrees_of_freedom(),
+        each(time),
+        motion.iterations as f64 / motion.increments as f64,
+        effort.factorisations as f64 / motion.increments as f64,
+        motion.increments,
+        each(effort.assembly),
+        each(effort.contact),
+        each(effort.analysis),
+        each(effort.factorisation),
+        each(effort.solution),
+    );
+    Some(each(time))
 }
 
-fn parts(criterion: &mut Criterion) {
-    let problem = problem(GeneratorKind::Cam);
-    let (_, state) = settled(&problem, TORQUE_N_M);
-    let mut group = criterion.benchmark_group("part");
-    group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(2));
-    group.bench_function("assembly/flexspline tangents", |bencher| {
-        bencher.iter(|| {
-            let mut sum = 0.0;
-            for (element, points) in problem.flexspline.elements.iter().zip(&problem.flexspline.gauss) {
-                let local = std::array::from_fn(|i| state.u[2 * element[i / 2] as usize + i % 2]);
-                let (mut stiffness, mut force) = ([0.0; PACKED], [0.0; 16]);
-                add_tangent_and_force(points, &problem.material, &local, &mut stiffness, &mut force);
-                sum += stiffness[0] + force[0];
-            }
-            black_box(sum)
-        });
-    });
-    let bore = BoreContact::new(&problem.flexspline, problem.settings.bore_points(problem.kind));
-    let law = BoreLaw::new(problem.settings.bore_penalty(problem.kind), None);
-    group.bench_function("contact/bore on cam", |bencher| {
-        bencher.iter(|| {
-            let mut moment = 0.0;
-            bore.evaluate(law, &problem.outline, state.generator_rad, &state.u, |edge| moment += edge.moment);
-            black_box(moment)
-        });
-    });
-    let flanks = problem.flanks();
-    let at = Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad };
-    let law = FlankLaw { stiffness: problem.settings.flank_penalty, stick_stiffness: 0.0, friction: 0.0 };
-    group.bench_function("contact/flanks: search, layout, forces", |bencher| {
-        bencher.iter(|| {
-            let torque: f64 = flanks
-                .near_pairs(at, 0.015)
-                .into_iter()
-                .filter_map(|pair| flanks.evaluate(pair, at, law, &flanks.layout(pair, at).points))
-                .map(|contact| contact.torque)
-                .sum();
-            black_box(torque)
-        });
-    });
-    group.bench_function("set-up", |bencher| {
-        bencher.iter(|| self::problem(GeneratorKind::Cam).degrees_of_freedom());
-    });
-    group.finish();
-}
-
-criterion_group!(increment, whole_increments, parts);
+criterion_group! { name = increment; config = common::criterion(); targets = increments }
 criterion_main!(increment);
