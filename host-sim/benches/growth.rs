@@ -13,8 +13,8 @@
 //! of a tooth pitch in each increment (0.01 rad of HHD-95) under a torque in proportion to the tooth count, which
 //! leaves the share of teeth in contact about as it is; in proportion to its square, which loads each tooth of a rigid wheel
 //! alike, more of them come to bear. What the generator supports is not similar whatever is done: w0 is one module, so a rim of
-//! more teeth is bent less and more of it lies on a cam. The four-roller generator, which touches in a few
-//! places, shows the growth of the method alone.
+//! more teeth is bent less and more of it lies on a cam. The four-roller generator touches in a few
+//! places however many teeth there are. The exponent depends on this choice of loads: say which when quoting it.
 
 mod common;
 

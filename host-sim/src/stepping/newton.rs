@@ -83,7 +83,7 @@ pub struct Increment {
     pub peak_pressure_mpa: [f64; 2],
 }
 
-/// CPU time spent in the parts of the solver.
+/// Time spent in the parts of the solver, by the clock.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Effort {
     /// Element tangents, forces and their assembly.
