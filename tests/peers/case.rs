@@ -10,7 +10,7 @@ use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::stepping::{Method, Problem, SolverSettings};
 
 use crate::dat::{at_step, tables};
-use crate::ours::{Journey, Stop, displacement, journey, stress};
+use crate::ours::{Journey, Stop, displacement, journey, run_cpu_s, stress};
 use crate::program::{Limits, Used, run};
 
 /// Arc-seconds in a radian.
@@ -21,6 +21,8 @@ const AS_IN_THE_DECK: [&str; 3] =
     ["output.drag_torque_n_m=0", "flexspline.tip_rounding_mm=0.002", "circular_spline.tip_rounding_mm=0.002"];
 /// The step of a deck that ends with the load on. One follows for each rotation increment, then one to the last load.
 const LOAD_STEP: usize = 3;
+/// Increments of the run in which our solvers are timed: 1 rad, a third of the protocol of the paper.
+const RUN: usize = 100;
 /// Times that our solvers go through the path.
 const REPEAT: usize = 3;
 
@@ -74,8 +76,10 @@ pub struct Comparison {
     /// Difference of the von Mises stress at the integration points of the bore row: the largest, what 99 % keep to, the root
     /// mean square; and the largest stress, MPa.
     pub stress_mpa: [f64; 4],
-    /// Processor time of ours in a rotation increment, s.
+    /// Processor time of ours in a rotation increment of a run, s.
     pub cpu_s: f64,
+    /// The same in the increments that CalculiX went, the first after the load.
+    pub first_cpu_s: f64,
     /// Memory of ours, MB.
     pub memory_mb: f64,
 }
@@ -262,7 +266,8 @@ impl Case {
             wind_up_arcsec: [wound(&peer.output_rad), wound(&turned)],
             bore_um,
             stress_mpa,
-            cpu_s: rotation.iter().map(|cpu| cpu.as_secs_f64()).sum::<f64>() / rotation.len() as f64,
+            cpu_s: run_cpu_s(problem, stops[0], self.step_rad, RUN)?,
+            first_cpu_s: rotation.iter().map(|cpu| cpu.as_secs_f64()).sum::<f64>() / rotation.len() as f64,
             memory_mb: self.memory(&stops, solver, flexspline, folder)?,
         })
     }

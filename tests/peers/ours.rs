@@ -42,6 +42,20 @@ pub fn journey(problem: &Problem, stops: &[Stop], repeat: usize) -> Result<Journ
     Ok(Journey { states, cpu: cpu.into_iter().map(median).collect() })
 }
 
+/// Processor time (s) of an increment in a run: from the stop `start` on, the generator turned `increments` times by `step_rad`
+/// under its load. The first of them know nothing of the motion yet and cost most.
+pub fn run_cpu_s(problem: &Problem, start: Stop, step_rad: f64, increments: usize) -> Result<f64, String> {
+    let mut solver = Solver::new(problem);
+    let (mut state, _) = solver.deform(start.0).map_err(|error| error.to_string())?;
+    (state, _) = solver.increment(&state, start.0, start.1).map_err(|error| error.to_string())?;
+    let clock = ProcessTime::now();
+    for k in 1..=increments {
+        let to = start.0 + step_rad * k as f64;
+        (state, _) = solver.increment(&state, to, start.1).map_err(|error| error.to_string())?;
+    }
+    Ok(clock.elapsed().as_secs_f64() / increments as f64)
+}
+
 /// Displacement of a node of the flexspline, mm.
 pub fn displacement(state: &State, node: usize) -> [f64; 2] {
     [state.u[2 * node], state.u[2 * node + 1]]
