@@ -24,6 +24,13 @@ use crate::material::PlaneStrain;
 /// Length of the packed lower triangle of a 16 x 16 element matrix: entry (i, j <= i) sits at `i (i+1)/2 + j`.
 pub const PACKED: usize = 136;
 
+/// Place of entry (i, j), or of its mirror image, in a packed lower triangle.
+#[inline]
+pub fn packed_index(i: usize, j: usize) -> usize {
+    let (row, column) = if i >= j { (i, j) } else { (j, i) };
+    row * (row + 1) / 2 + column
+}
+
 /// Reference gradients and weight of one integration point.
 #[derive(Debug, Clone, Copy)]
 pub struct GaussPoint {

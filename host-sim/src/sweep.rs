@@ -137,7 +137,12 @@ pub enum SweepError {
         pitches: usize,
     },
     /// One tooth pitch in one direction does not say all of the drive.
-    #[error("{field}: a drive with this imperfection does not repeat every tooth pitch, which is all that is sampled")]
+    #[error(
+        "{field}: tables of a drive with as-built imperfections need samples over whole turns of generator and output, \
+         and this command samples one tooth pitch in one direction; allowed here: an ideal drive, uniform wear \
+         (flexspline_wear_um, circular_spline_wear_um) and temperature differences (generator_warmer_k, \
+         circular_spline_warmer_k)"
+    )]
     NotUniform {
         /// The field of the drive.
         field: &'static str,

@@ -18,7 +18,7 @@ use crate::nodes::{NodeChoice, choose_torque_nodes};
 use crate::output::{write_json, write_whole};
 use crate::samples;
 use crate::stepping::{Method, SolverSettings};
-use crate::sweep::{SweepError, SweepPlan, SweepProgress, sweep};
+use crate::sweep::{SweepError, SweepPlan, SweepProgress, check_uniform, sweep};
 use crate::tables::{
     ARCSEC_PER_RAD, MadeTable, SampleOptions, TableError, TableInfo, c_header, from_samples, from_sweep, rust_source,
 };
@@ -150,14 +150,7 @@ impl Tables {
     }
 
     fn plan(&self, drive: &Drive, kind: GeneratorKind) -> Result<(SweepPlan, NodeChoice), Failure> {
-        if let Some(field) = drive.as_built.first_not_uniform() {
-            return Err(Failure::BadInput(format!(
-                "{field}: tables of a drive with as-built imperfections need samples over whole turns of generator and output, \
-                 and this command samples one tooth pitch in one direction; allowed here: an ideal drive, uniform wear \
-                 (flexspline_wear_um, circular_spline_wear_um) and temperature differences (generator_warmer_k, \
-                 circular_spline_warmer_k)"
-            )));
-        }
+        check_uniform(drive).map_err(|error| Failure::BadInput(error.to_string()))?;
         let mut plan = SweepPlan::for_generator(drive, kind);
         let drag = drive.output.drag_torque_n_m;
         let largest = self.torque_n_m.unwrap_or(crate::sweep::rated_torque_n_m(kind));

@@ -14,7 +14,7 @@
 //!
 //! After Felippa and Haugen, A unified formulation of small-strain corotational finite elements, 2005.
 
-use super::superelement::rotate;
+use crate::mesh::rotate;
 
 /// Kinematics of the frame of a cell.
 #[derive(Debug, Clone)]
@@ -85,16 +85,19 @@ impl CoRotation {
         }
     }
 
-    /// The other way: displacement (in the frame of the cell at rest) of a node at `position` from the middle of the faces,
+    /// The other way: displacements (in the frame of the cell at rest) of nodes at `positions` from the middle of the faces,
     /// displaced by `q` in the turned frame.
-    pub fn join(state: &CellState, position: [f64; 2], q: [f64; 2]) -> [f64; 2] {
+    pub fn join(state: &CellState, positions: &[[f64; 2]], q: &[f64]) -> Vec<f64> {
         let forth @ (sin, _) = state.turn.sin_cos();
         let shortening = -2.0 * (0.5 * state.turn).sin().powi(2);
-        let moved = rotate(q, forth);
-        [
-            state.middle[0] + moved[0] + shortening * position[0] - sin * position[1],
-            state.middle[1] + moved[1] + sin * position[0] + shortening * position[1],
-        ]
+        let place = |([px, py], q): (&[f64; 2], &[f64])| {
+            let moved = rotate([q[0], q[1]], forth);
+            [
+                state.middle[0] + moved[0] + shortening * px - sin * py,
+                state.middle[1] + moved[1] + sin * px + shortening * py,
+            ]
+        };
+        positions.iter().zip(q.chunks_exact(2)).flat_map(place).collect()
     }
 
     /// Positions of the nodes, from the middle of the faces.

@@ -186,7 +186,7 @@ impl CondensedWheel {
 mod tests {
     use super::*;
     use crate::drive::Drive;
-    use crate::element::{PACKED, linear_stiffness};
+    use crate::element::{PACKED, linear_stiffness, packed_index};
     use crate::mesh::MeshLevel;
 
     const STEEL: (f64, f64) = (206_000.0, 0.3);
@@ -203,8 +203,7 @@ mod tests {
             let at = |i: usize| 2 * element[i / 2] as usize + i % 2;
             for i in 0..16 {
                 for j in 0..16 {
-                    let k = if i >= j { i * (i + 1) / 2 + j } else { j * (j + 1) / 2 + i };
-                    force[at(i)] += packed[k] * u[at(j)];
+                    force[at(i)] += packed[packed_index(i, j)] * u[at(j)];
                 }
             }
         }

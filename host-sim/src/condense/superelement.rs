@@ -12,9 +12,9 @@
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side as Triangle};
 
-use crate::element::linear_stiffness;
+use crate::element::{linear_stiffness, packed_index};
 use crate::material::PlaneStrain;
-use crate::mesh::WheelMesh;
+use crate::mesh::{WheelMesh, rotate};
 
 /// The nodes of a cell, by number in the mesh of the wheel.
 #[derive(Debug, Clone, Default)]
@@ -55,12 +55,6 @@ pub struct Superelement {
     seat_recovery: Mat<f64>,
 }
 
-/// Rotates a vector by the angle given as (sine, cosine).
-#[inline]
-pub(super) fn rotate(p: [f64; 2], (sin, cos): (f64, f64)) -> [f64; 2] {
-    [cos * p[0] - sin * p[1], sin * p[0] + cos * p[1]]
-}
-
 impl Superelement {
     /// Condenses a cell.
     pub fn new(mesh: &WheelMesh, material: &PlaneStrain, cell: &CellNodes) -> Superelement {
@@ -79,7 +73,7 @@ impl Superelement {
         for &e in &cell.elements {
             // The tangent at rest is isotropic: rotate it block by block into the frame of the cell.
             let packed = linear_stiffness(&mesh.gauss[e], material);
-            let entry = |i: usize, j: usize| packed[if i >= j { i * (i + 1) / 2 + j } else { j * (j + 1) / 2 + i }];
+            let entry = |i: usize, j: usize| packed[packed_index(i, j)];
             for (a, &na) in mesh.elements[e].iter().enumerate() {
                 for (b, &nb) in mesh.elements[e].iter().enumerate() {
                     let columns: [[f64; 2]; 2] = std::array::from_fn(|j| {

@@ -16,6 +16,8 @@
 //! `g_i a^T + a g_i^T + c a a^T` and their coupling with the tractions `g_t a^T`. This is exact, because a is zero on what was
 //! eliminated.
 
+use crate::mesh::rotate;
+
 use super::chain::{Chain, Contribution};
 use super::dense::Kernels;
 use super::model::Cell;
@@ -309,9 +311,9 @@ impl CellTangent {
 
 /// Rotates vectors, x and y in turn.
 #[inline]
-pub fn rotate_pairs(x: &mut [f64], (sin, cos): Turn) {
+pub fn rotate_pairs(x: &mut [f64], turn: Turn) {
     for p in x.chunks_exact_mut(2) {
-        (p[0], p[1]) = (cos * p[0] - sin * p[1], sin * p[0] + cos * p[1]);
+        [p[0], p[1]] = rotate([p[0], p[1]], turn);
     }
 }
 

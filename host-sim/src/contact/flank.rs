@@ -17,7 +17,7 @@
 //! toothing and housing have theirs.
 
 use crate::element::edge_shape;
-use crate::mesh::{FlankMesh, WheelMesh};
+use crate::mesh::{FlankMesh, WheelMesh, rotate};
 
 use super::quadrature::gauss_legendre;
 use crate::drive::{FlankDeviations, Foot, InvoluteFlank, Placement, Side};
@@ -129,11 +129,6 @@ pub struct Configuration<'s> {
     pub v: &'s [f64],
     /// Output angle, rad.
     pub output_rad: f64,
-}
-
-#[inline]
-fn rotate(p: [f64; 2], (sin, cos): (f64, f64)) -> [f64; 2] {
-    [cos * p[0] - sin * p[1], sin * p[0] + cos * p[1]]
 }
 
 /// Displacements of a pair's flank nodes in local frames (tooth frame and space frame, mirrored for the minus side).

@@ -638,14 +638,7 @@ fn resized(state: &State, old: &ThermalState, problem: &Problem) -> State {
     guess.u.iter_mut().for_each(|x| *x *= fs);
     let cs = new.circular_spline_scale / old.circular_spline_scale;
     guess.v.iter_mut().for_each(|x| *x *= cs);
-    let seated = problem.starting_shape(state.generator_rad).v;
-    let (_, ring) = problem.wheels();
-    for (n, x) in ring.nodes.iter().enumerate() {
-        if x[0].hypot(x[1]) > ring.base_radius - 1e-6 {
-            guess.v[2 * n] = seated[2 * n];
-            guess.v[2 * n + 1] = seated[2 * n + 1];
-        }
-    }
+    problem.seat_state(&mut guess.v);
     guess
 }
 

@@ -4,6 +4,7 @@
 //! faces and tractions around both rings ([`Chain`]).
 
 use std::f64::consts::{FRAC_PI_2, TAU};
+use std::ops::Range;
 use std::rc::Rc;
 
 use rayon::prelude::*;
@@ -14,9 +15,10 @@ use crate::condense::{
 };
 use crate::contact::{BorePressure, FlankPair, PairContribution};
 use crate::drive::Side;
+use crate::element::packed_index;
 use crate::fem::Factor;
 use crate::material::PlaneStrain;
-use crate::mesh::WheelMesh;
+use crate::mesh::{WheelMesh, rotate};
 
 use super::newton::ANCHOR;
 use super::problem::Problem;
@@ -30,6 +32,20 @@ pub struct CondensedDrive {
     pub flexspline: CondensedWheel,
     /// The circular spline.
     pub circular_spline: CondensedWheel,
+    /// Frames at rest of the flexspline cells and of the circular-spline cells.
+    frames: [Vec<Turn>; 2],
+    faces: Vec<Face>,
+}
+
+/// Sine and cosine of an angle.
+type Turn = (f64, f64);
+
+/// A face between two cells: its block, its unknowns, and its frame.
+#[derive(Debug, Clone)]
+struct Face {
+    block: usize,
+    unknowns: Range<usize>,
+    turn: Turn,
 }
 
 impl CondensedDrive {
@@ -42,43 +58,67 @@ impl CondensedDrive {
     ) -> CondensedDrive {
         let flexspline = CondensedWheel::new(flexspline, material, 0, |_| false);
         let first = 2 * flexspline.skin.mesh.nodes.len();
-        CondensedDrive { circular_spline: CondensedWheel::new(circular_spline, material, first, held), flexspline }
+        let circular_spline = CondensedWheel::new(circular_spline, material, first, held);
+        let (fs, cs) = (&flexspline.skin.mesh, &circular_spline.skin.mesh);
+        let face = |block: usize, first: usize, size: usize, angle: f64| Face {
+            block,
+            unknowns: first..first + size,
+            turn: angle.sin_cos(),
+        };
+        let fs_face = |j: usize| face(j, 2 * j * fs.nodes_per_sector, flexspline.face(), (j as f64 - 0.5) * fs.pitch());
+        let cs_face = |t: usize| {
+            let start = first + 2 * t * cs.nodes_per_sector;
+            face(fs.teeth + t, start, circular_spline.face(), t as f64 * cs.pitch())
+        };
+        let faces = (0..fs.teeth).map(fs_face).chain((0..cs.teeth).map(cs_face)).collect();
+        let frames = [
+            (0..fs.teeth).map(|j| fs.sector_angle(j).sin_cos()).collect(),
+            (0..cs.teeth).map(|t| cs_frame(cs, t).sin_cos()).collect(),
+        ];
+        CondensedDrive { flexspline, circular_spline, frames, faces }
+    }
+
+    /// A flexspline cell as it is under the displacements `u` of the skin. `d` is work space.
+    fn flexspline_cell(&self, j: usize, flanks: bool, u: &[f64], d: &mut Vec<f64>, inner: &mut CellState) {
+        let (cell, unknowns) = self.flexspline.cell(j, flanks);
+        d.clear();
+        d.extend(unknowns.iter().map(|k| u[*k as usize]));
+        rotate_pairs(d, back(self.frames[0][j]));
+        cell.frame.split(d, inner);
+    }
+
+    /// Displacements of a circular-spline cell in its frame, into `d`, of the displacements `v` of the skin.
+    fn circular_spline_cell(&self, t: usize, flanks: bool, v: &[f64], d: &mut Vec<f64>) {
+        let cs = &self.circular_spline;
+        let (_, unknowns) = cs.cell(t, flanks);
+        d.clear();
+        d.extend(unknowns.iter().map(|k| v[*k as usize - cs.first_unknown]));
+        rotate_pairs(d, back(self.frames[1][t]));
     }
 
     /// The state on all nodes of the wheels of `problem`, which this was made of.
     pub(super) fn recover(&self, problem: &Problem, state: &State) -> State {
         let (fs, whole) = (&self.flexspline, &problem.flexspline);
         let mut u = fs.spread(whole, &state.u);
-        let flexspline_cell = |j: usize| -> Vec<f64> {
-            let (cell, unknowns) = fs.cell(j, true);
-            let (element, _) = fs.element(j);
-            let angle = whole.sector_angle(j);
-            let mut d: Vec<f64> = unknowns.iter().map(|k| state.u[*k as usize]).collect();
-            rotate_pairs(&mut d, (-angle).sin_cos());
+        let inside_flexspline = |j: usize| -> Vec<f64> {
             let mut inner = CellState::default();
-            cell.frame.split(&d, &mut inner);
-            let q = element.recover(&inner.q, 0.0);
-            let positions = element.interior().1.iter();
-            let mut moved: Vec<f64> = positions
-                .zip(q.chunks_exact(2))
-                .flat_map(|(p, q)| CoRotation::join(&inner, *p, [q[0], q[1]]))
-                .collect();
-            rotate_pairs(&mut moved, angle.sin_cos());
+            self.flexspline_cell(j, true, &state.u, &mut Vec::new(), &mut inner);
+            let (element, _) = fs.element(j);
+            let mut moved = CoRotation::join(&inner, element.interior().1, &element.recover(&inner.q, 0.0));
+            rotate_pairs(&mut moved, self.frames[0][j]);
             moved
         };
-        place_interiors(fs, whole, flexspline_cell, &mut u);
+        place_interiors(fs, whole, inside_flexspline, &mut u);
         let (cs, whole) = (&self.circular_spline, &problem.circular_spline);
         let mut v = cs.spread(whole, &state.v);
-        let circular_spline_cell = |t: usize| -> Vec<f64> {
-            let (_, unknowns) = cs.cell(t, true);
-            let frame = self.cs_frame(t).sin_cos();
-            let mut d: Vec<f64> = unknowns.iter().map(|k| state.v[*k as usize - cs.first_unknown]).collect();
-            rotate_pairs(&mut d, back(frame));
+        let inside_circular_spline = |t: usize| -> Vec<f64> {
+            let mut d = Vec::new();
+            self.circular_spline_cell(t, true, &state.v, &mut d);
             let mut moved = cs.element(t).0.recover(&d, problem.seat_displacement);
-            rotate_pairs(&mut moved, frame);
+            rotate_pairs(&mut moved, self.frames[1][t]);
             moved
         };
-        place_interiors(cs, whole, circular_spline_cell, &mut v);
+        place_interiors(cs, whole, inside_circular_spline, &mut v);
         problem.seat(&mut v);
         State { u, v, ..state.clone() }
     }
@@ -91,11 +131,6 @@ impl CondensedDrive {
         &self.circular_spline.skin.mesh
     }
 
-    /// Angle of the frame of a circular-spline cell, rad.
-    fn cs_frame(&self, cell: usize) -> f64 {
-        (cell as f64 + 0.5) * self.cs_mesh().pitch()
-    }
-
     /// The circular-spline cell that carries the flank of a pair.
     fn cs_cell(&self, pair: FlankPair) -> usize {
         let teeth = self.cs_mesh().teeth;
@@ -104,16 +139,11 @@ impl CondensedDrive {
             Side::Minus => (pair.space + teeth - 1) % teeth,
         }
     }
+}
 
-    /// Of every face: its block, the first of its unknowns, the angle of its frame.
-    fn faces(&self) -> Vec<(usize, usize, f64)> {
-        let (fs, cs) = (self.fs_mesh(), self.cs_mesh());
-        let first = self.circular_spline.first_unknown;
-        let fs_faces = (0..fs.teeth).map(|j| (j, 2 * j * fs.nodes_per_sector, (j as f64 - 0.5) * fs.pitch()));
-        let cs_faces =
-            (0..cs.teeth).map(|t| (fs.teeth + t, first + 2 * t * cs.nodes_per_sector, t as f64 * cs.pitch()));
-        fs_faces.chain(cs_faces).collect()
-    }
+/// Angle of the frame of a circular-spline cell, rad.
+fn cs_frame(mesh: &WheelMesh, cell: usize) -> f64 {
+    (cell as f64 + 0.5) * mesh.pitch()
 }
 
 /// Writes the displacements of the nodes inside the cells of a wheel, cell by cell, into a field of the whole wheel.
@@ -211,7 +241,7 @@ impl<'p> CondensedWheels<'p> {
             };
             let fs_turn = fs.sector_angle(pair.tooth) + self.states[pair.tooth].turn;
             by_cell[pair.tooth].push(traction(-fs_turn, 0..on_fs));
-            by_cell[fs.teeth + cs_cell].push(traction(-self.model.cs_frame(cs_cell), on_fs..n));
+            by_cell[fs.teeth + cs_cell].push(traction(-cs_frame(cs, cs_cell), on_fs..n));
             ranks.push((*pair, columns.len() / n));
         }
         (by_cell, ranks)
@@ -261,7 +291,7 @@ impl<'p> CondensedWheels<'p> {
                 n => 2 * (n - 1),
             };
             let along = 2 * (edge - j * per_cell);
-            let entry = |r: usize, c: usize| if r >= c { k[r * (r + 1) / 2 + c] } else { k[c * (c + 1) / 2 + r] };
+            let entry = |r: usize, c: usize| k[packed_index(r, c)];
             for n in 0..3 {
                 for m in 0..3 {
                     let (row, column) = (place(along + n), place(along + m));
@@ -294,43 +324,12 @@ impl<'p> CondensedWheels<'p> {
     ) -> Option<Contribution> {
         let (first, mesh) = (self.model.fs_mesh().teeth, self.model.cs_mesh());
         let place = Placement {
-            frame: self.model.cs_frame(t),
+            frame: cs_frame(mesh, t),
             faces: [0.5 * mesh.pitch(), -0.5 * mesh.pitch()],
             blocks: [(first + t) as u32, (first + (t + 1) % mesh.teeth) as u32],
         };
         let (cell, _) = self.model.circular_spline.cell(t, self.live[first + t]);
         tangent.reduce(self.kernels, cell, place, tractions, None, |_, _| false)
-    }
-
-    /// Places the flank nodes that no force acts on.
-    fn fill_flanks(&self, state: &mut State) {
-        let fs = &self.model.flexspline;
-        for j in (0..fs.count()).filter(|j| !self.live[*j]) {
-            let ((bare, others), (cell, all)) = (fs.cell(j, false), fs.cell(j, true));
-            let angle = fs.skin.mesh.sector_angle(j);
-            let mut d: Vec<f64> = others.iter().map(|u| state.u[*u as usize]).collect();
-            rotate_pairs(&mut d, (-angle).sin_cos());
-            let mut inner = CellState::default();
-            bare.frame.split(&d, &mut inner);
-            let q = cell.free_flanks(self.kernels, &inner.q, 0.0);
-            let mut flanks: Vec<f64> = q
-                .chunks_exact(2)
-                .zip(cell.frame.positions())
-                .flat_map(|(q, position)| CoRotation::join(&inner, *position, [q[0], q[1]]))
-                .collect();
-            rotate_pairs(&mut flanks, angle.sin_cos());
-            all.iter().zip(&flanks).for_each(|(u, x)| state.u[*u as usize] = *x);
-        }
-        let cs = &self.model.circular_spline;
-        for t in (0..cs.count()).filter(|t| !self.live[fs.count() + t]) {
-            let ((_, others), (cell, all)) = (cs.cell(t, false), cs.cell(t, true));
-            let frame = self.model.cs_frame(t).sin_cos();
-            let mut d: Vec<f64> = others.iter().map(|u| state.v[*u as usize - cs.first_unknown]).collect();
-            rotate_pairs(&mut d, back(frame));
-            let mut flanks = cell.free_flanks(self.kernels, &d, self.problem.seat_displacement);
-            rotate_pairs(&mut flanks, frame);
-            all.iter().zip(&flanks).for_each(|(u, x)| state.v[*u as usize - cs.first_unknown] = *x);
-        }
     }
 
     /// Blocks around the rings, ordered by their angle from the minor axis of the generator, where no flanks touch.
@@ -394,7 +393,6 @@ impl Factor for CondensedWheels<'_> {
         let n = columns.len() / count;
         let CondensedWheels { model, kernels, factor, locals, live, turned, .. } = self;
         let factor = factor.as_ref();
-        let faces = model.faces();
         let (fs, cs) = (&model.flexspline, &model.circular_spline);
         // A cell that is near contact now has forces on its flanks, even if it had not where the factor was made.
         let (fs_live, cs_live) = live.split_at(fs.count());
@@ -404,7 +402,6 @@ impl Factor for CondensedWheels<'_> {
             .chain((0..cs.count()).map(|t| cs.cell(t, factor.live[fs.count() + t] || now(cs_live, t))))
             .map(|(cell, unknowns)| CellAt { kernels: *kernels, cell, unknowns, order: &factor.chain })
             .collect();
-        let size = |block: usize| if block < fs.count() { fs.face() } else { cs.face() };
         let unknowns = factor.chain.unknowns();
         let mut chains = vec![0.0; unknowns * count];
         locals.resize_with(cells.len() * count, Local::default);
@@ -415,12 +412,10 @@ impl Factor for CondensedWheels<'_> {
             }
         }
         for (x, chain) in columns.chunks_exact(n).zip(chains.chunks_exact_mut(unknowns)) {
-            for &(block, start, angle) in &faces {
-                let turn = (-angle).sin_cos();
-                let to = &mut chain[factor.chain.offset(block)..][..size(block)];
-                for (c, own) in to.chunks_exact_mut(2).zip(x[start..].chunks_exact(2)) {
-                    let mut own = [own[0], own[1]];
-                    rotate_pairs(&mut own, turn);
+            for face in &model.faces {
+                let to = &mut chain[factor.chain.offset(face.block)..];
+                for (c, own) in to.chunks_exact_mut(2).zip(x[face.unknowns.clone()].chunks_exact(2)) {
+                    let own = rotate([own[0], own[1]], back(face.turn));
                     (c[0], c[1]) = (c[0] + own[0], c[1] + own[1]);
                 }
             }
@@ -433,10 +428,10 @@ impl Factor for CondensedWheels<'_> {
             }
         }
         for (x, chain) in columns.chunks_exact_mut(n).zip(chains.chunks_exact(unknowns)) {
-            for &(block, start, angle) in &faces {
-                let (from, size) = (factor.chain.offset(block), size(block));
-                x[start..start + size].copy_from_slice(&chain[from..from + size]);
-                rotate_pairs(&mut x[start..start + size], angle.sin_cos());
+            for face in &model.faces {
+                let own = &mut x[face.unknowns.clone()];
+                own.copy_from_slice(&chain[factor.chain.offset(face.block)..][..own.len()]);
+                rotate_pairs(own, face.turn);
             }
         }
     }
@@ -457,8 +452,25 @@ impl Wheels for CondensedWheels<'_> {
         false
     }
 
+    /// Places the flank nodes that no force acts on.
     fn complete(&self, state: &mut State) {
-        self.fill_flanks(state);
+        let (fs, cs) = (&self.model.flexspline, &self.model.circular_spline);
+        let (mut d, mut inner) = (Vec::new(), CellState::default());
+        for j in (0..fs.count()).filter(|j| !self.live[*j]) {
+            self.model.flexspline_cell(j, false, &state.u, &mut d, &mut inner);
+            let (cell, all) = fs.cell(j, true);
+            let q = cell.free_flanks(self.kernels, &inner.q, 0.0);
+            let mut flanks = CoRotation::join(&inner, cell.frame.positions(), &q);
+            rotate_pairs(&mut flanks, self.model.frames[0][j]);
+            all.iter().zip(&flanks).for_each(|(u, x)| state.u[*u as usize] = *x);
+        }
+        for t in (0..cs.count()).filter(|t| !self.live[fs.count() + t]) {
+            self.model.circular_spline_cell(t, false, &state.v, &mut d);
+            let (cell, all) = cs.cell(t, true);
+            let mut flanks = cell.free_flanks(self.kernels, &d, self.problem.seat_displacement);
+            rotate_pairs(&mut flanks, self.model.frames[1][t]);
+            all.iter().zip(&flanks).for_each(|(u, x)| state.v[*u as usize - cs.first_unknown] = *x);
+        }
     }
 
     fn assemble(&mut self, state: &State, force: &mut [f64]) {
@@ -471,17 +483,13 @@ impl Wheels for CondensedWheels<'_> {
         for j in 0..fs.count() {
             let (cell, unknowns) = fs.cell(j, self.live[j]);
             let (inner, f) = (&mut self.states[j], &mut self.forces[j]);
-            let angle = fs.skin.mesh.sector_angle(j);
-            d.clear();
-            d.extend(unknowns.iter().map(|u| state.u[*u as usize]));
-            rotate_pairs(&mut d, (-angle).sin_cos());
-            cell.frame.split(&d, inner);
+            self.model.flexspline_cell(j, self.live[j], &state.u, &mut d, inner);
             f.clear();
             f.resize(d.len(), 0.0);
             self.kernels.multiply_add(&cell.stiffness, &inner.q, 1.0, f);
             d.copy_from_slice(f);
             cell.frame.balance(inner, &mut d);
-            rotate_pairs(&mut d, (angle + inner.turn).sin_cos());
+            rotate_pairs(&mut d, (fs.skin.mesh.sector_angle(j) + inner.turn).sin_cos());
             for (u, f) in unknowns.iter().zip(&d) {
                 force[*u as usize] -= f;
             }
@@ -489,15 +497,13 @@ impl Wheels for CondensedWheels<'_> {
         let cs = &self.model.circular_spline;
         let mut f = Vec::new();
         for t in 0..cs.count() {
-            let (cell, unknowns) = cs.cell(t, self.live[fs.count() + t]);
-            let frame = self.model.cs_frame(t).sin_cos();
-            d.clear();
-            d.extend(unknowns.iter().map(|u| state.v[*u as usize - cs.first_unknown]));
-            rotate_pairs(&mut d, back(frame));
+            let live = self.live[fs.count() + t];
+            let (cell, unknowns) = cs.cell(t, live);
+            self.model.circular_spline_cell(t, live, &state.v, &mut d);
             f.clear();
             f.extend(cell.seat.iter().map(|s| s * self.problem.seat_displacement));
             self.kernels.multiply_add(&cell.stiffness, &d, 1.0, &mut f);
-            rotate_pairs(&mut f, frame);
+            rotate_pairs(&mut f, self.model.frames[1][t]);
             for (u, f) in unknowns.iter().zip(&f) {
                 force[*u as usize] -= f;
             }

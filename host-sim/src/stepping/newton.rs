@@ -301,9 +301,9 @@ impl<'p> Solver<'p> {
                 residual = self.assemble(&mut state, from, torque_n_m, &mut near);
                 continue;
             }
-            // Near the end the last factor still points the right way, and a step with it costs a tenth.
-            recalled &= history.len() == 1 || last_gain(&history) < RECALL_GAIN;
+            // While it makes good progress an old factor serves again: a step with it costs a tenth.
             let gain = last_gain(&history);
+            recalled &= history.len() == 1 || gain < RECALL_GAIN;
             // The tangent of friction leaves out that slip follows pressure: made anew it is no better, improved it is.
             let sluggish = self.problem.flank_law.friction > 0.0
                 && relative < SLUGGISH_BELOW
@@ -322,7 +322,8 @@ impl<'p> Solver<'p> {
             // The force along the step falls from `before` to nothing at the end of a perfect step; far beyond, halve it.
             let before = step.work(&residual);
             let mut length = (LARGEST_STEP / step.largest()).min(1.0).min(8.0 * last_length);
-            near.advance(length * self.motion(&step));
+            let motion = self.motion(&step);
+            near.advance(length * motion);
             let mut mistaken = false;
             for trial in 0.. {
                 // Teeth that come near from here on need their flanks in this state, too: the next candidate starts from it.
@@ -341,11 +342,11 @@ impl<'p> Solver<'p> {
                     break;
                 }
                 length *= 0.5;
-                near.advance(length * self.motion(&step));
+                near.advance(length * motion);
             }
             if mistaken {
                 recalled = false;
-                near.advance(length * self.motion(&step));
+                near.advance(length * motion);
                 residual = self.assemble(&mut state, from, torque_n_m, &mut near);
                 continue;
             }
@@ -378,10 +379,7 @@ impl<'p> Solver<'p> {
             let (drag, slope) = self.problem.drag_torque(output_rad - anchor_rad);
             (load + drag, -slope)
         };
-        if near.must_search() {
-            self.wheels.complete(state);
-            near.search(&self.flanks, configuration(state), from, self.problem.flank_law.friction > 0.0);
-        }
+        self.look_around(state, from, near);
         let law = FlankLaw { friction: 0.0, ..self.flank_law() };
         let tolerance = 1e-3 * (load.abs() + self.problem.drag);
         if let Some(output_rad) = near.balance(&self.flanks, state, law, tolerance, others) {
@@ -391,13 +389,18 @@ impl<'p> Solver<'p> {
         self.effort.contact += clock.elapsed();
     }
 
-    /// Assembles the out-of-balance forces and the tangent.
-    fn assemble(&mut self, state: &mut State, from: &State, torque_n_m: f64, near: &mut NearPairs) -> Residual {
-        let clock = Instant::now();
+    /// Looks for pairs that may have come near.
+    fn look_around(&self, state: &mut State, from: &State, near: &mut NearPairs) {
         if near.must_search() {
             self.wheels.complete(state);
             near.search(&self.flanks, configuration(state), from, self.problem.flank_law.friction > 0.0);
         }
+    }
+
+    /// Assembles the out-of-balance forces and the tangent.
+    fn assemble(&mut self, state: &mut State, from: &State, torque_n_m: f64, near: &mut NearPairs) -> Residual {
+        let clock = Instant::now();
+        self.look_around(state, from, near);
         self.effort.contact += clock.elapsed();
         self.make_room(configuration(state), near);
         let clock = Instant::now();

@@ -313,6 +313,13 @@ impl Problem {
         }
     }
 
+    /// Displaces the circular-spline nodes that the housing holds, where a [`State`] has them.
+    pub(crate) fn seat_state(&self, v: &mut [f64]) {
+        if self.condensed.is_none() {
+            self.seat(v);
+        }
+    }
+
     /// Displaces the circular-spline nodes that the housing holds, in a field of all its nodes.
     pub(super) fn seat(&self, v: &mut [f64]) {
         let outer = self.drive.circular_spline.outer_radius_mm;
@@ -352,9 +359,7 @@ impl Problem {
             u.extend([p[0] + above * cn - x[0], p[1] + above * sn - x[1]]);
         }
         let mut v = vec![0.0; 2 * cs.nodes.len()];
-        if self.condensed.is_none() {
-            self.seat(&mut v);
-        }
+        self.seat_state(&mut v);
         let output_rad = generator_rad / self.drive.ratio();
         State {
             u,
