@@ -106,5 +106,5 @@ pub use image::{
     FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance, TEXT_BYTES,
     TableData, WriteError, image_bytes, write_image,
 };
-pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ITERATIONS, Prediction};
+pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, Prediction};
 pub use table::{Bounds, GeneratorKind, OperatingPoint, Quality, Table, TableId};

@@ -28,7 +28,7 @@ fn write_full_table(path: &Path) {
     };
     let temperatures = [-40.0f32, 20.0, 80.0];
     let drive = Drive::new(188, 190, FixedMember::Flexspline).expect("HHD-95");
-    let curve = |orders: &'static [u16]| Harmonics { orders, nodes: 32 };
+    let curve = |orders: &'static [u16]| Harmonics { orders, nodes: 64 };
     let plan = Plan {
         drive,
         torque_nodes_n_m: &torques,
@@ -36,7 +36,7 @@ fn write_full_table(path: &Path) {
         ripple_nodes: 8,
         generator: curve(&[2, 4]),
         material: curve(&[2, 4]),
-        output: curve(&[1]),
+        output: Harmonics { orders: &[1], nodes: 16 },
         missing_direction: MissingDirection::Refuse,
         negative_half_width_tolerance_rad: 1e-7,
         deviation_limit_rad: 5e-6,
