@@ -134,6 +134,12 @@ impl PlayState {
         self.error
     }
 
+    /// Whether the bounds are ones that an update leaves.
+    #[inline(always)]
+    pub(crate) const fn is_ordered(&self) -> bool {
+        self.lower <= self.upper
+    }
+
     /// Whether there was an update.
     pub(crate) const fn is_started(&self) -> bool {
         self.half >= 0

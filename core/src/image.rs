@@ -30,7 +30,8 @@
 //! | 176 | 4 · 3 | A, B, C: where it starts (2), its nodes (2) |
 //! | 188 | 4 | iterations of the inverse |
 //! | 192 | 4 | hold: targets this close to the output leave the generator where it is, counts |
-//! | 196 | 60 | zero |
+//! | 196 | 4 | words of the body |
+//! | 200 | 56 | zero |
 //! | 256 | 4 · 64 | torque nodes, N·m, padded with the largest number |
 //! | 512 | 4 · 8 | temperature nodes, °C, padded likewise |
 //! | 544 | | A, B, C: `i32` in half counts, stored closed |
@@ -90,13 +91,15 @@ const UNITS_PER_COUNT: f64 = 524_288.0;
 const HALF_WIDTH_ROUNDING_COUNTS: f64 = 3.0;
 const CRC_BYTES: usize = 4;
 const ID_OFFSET: usize = 48;
-const RESERVED: core::ops::Range<usize> = 196..HEADER_BYTES;
+const RESERVED: core::ops::Range<usize> = 200..HEADER_BYTES;
 /// |torque| N·m and |temperature| °C of any node or range: keeps differences of nodes finite.
 pub(crate) const MAX_AXIS_VALUE: f32 = 1e6;
 
+/// Its table for bytes is in flash.
+pub(crate) static CRC: crc::Crc<u32, crc::Table<1>> = crc::Crc::<u32, crc::Table<1>>::new(&crc::CRC_32_ISO_HDLC);
+
 /// CRC-32 (ISO-HDLC), 5.3 instructions a byte on a Cortex-M4.
 pub(crate) fn crc32(bytes: &[u8]) -> u32 {
-    static CRC: crc::Crc<u32, crc::Table<1>> = crc::Crc::<u32, crc::Table<1>>::new(&crc::CRC_32_ISO_HDLC);
     CRC.checksum(bytes)
 }
 
@@ -454,6 +457,7 @@ pub fn write_image(
     layout.plan(nodes.0, nodes.1, nodes.2, curve_nodes).iter().for_each(|word| writer.put(&word.to_le_bytes()));
     // The inverse follows from the bounds, which are found in the finished image.
     writer.put(&[0; 8]);
+    writer.put(&(layout.end as u32).to_le_bytes());
     writer.put(&[0; RESERVED.end - RESERVED.start]);
     for (axis, slots) in [data.torque_nodes_n_m, data.temperature_nodes_c].into_iter().zip(AXIS_SLOTS) {
         writer.put_numbers(axis);
@@ -686,6 +690,7 @@ impl<'a> Table<'a> {
         }
         let (words, _) = image.get(..body_bytes).ok_or(size)?.as_chunks::<4>();
         let plan = layout.plan(torque_nodes, temperature_nodes, ripple_nodes, curve_nodes);
+        derived_is(words, word::BODY, layout.end as u32)?;
         derived_is(words, word::CELL_WIDTH, cell_width(&drive, ripple_nodes).to_bits())?;
         for (at, value) in (word::CELL_WIDTH.saturating_add(1)..).zip(plan) {
             derived_is(words, at, value)?;
@@ -1074,7 +1079,7 @@ mod tests {
                 for node in 0..8 {
                     let phase = table.ripple_axis().node_phase(node);
                     let phases = Phases { generator: 0, material: 0, output: 0, tooth: phase };
-                    let play = table::play_at(&table, &point, phases, &mut 0);
+                    let play = table::play_at(&table, &point, phases, &mut Default::default());
                     let ripple = |values: &[f32]| {
                         let value = |node: usize| {
                             let record = (2 * temperature_node) * 8 + node % 8;
@@ -1239,7 +1244,7 @@ mod tests {
         outside(140, -50.1, Field::TorqueRange);
         outside(148, 80.1, Field::TemperatureRange);
         // What follows from other numbers must do so: unit of the ripple aside, each of these words.
-        for at in [120, 156, 160, 164, 166, 168, 170, 172, 174, 176, 180, 184, 188, 192] {
+        for at in [120, 156, 160, 164, 166, 168, 170, 172, 174, 176, 180, 184, 188, 192, 196] {
             let error = resealed(|image| image[at] ^= 1);
             assert_eq!(error, ImageError::Derived { offset: at / 4 * 4 });
         }

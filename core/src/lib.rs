@@ -95,7 +95,10 @@ mod hysteresis;
 mod image;
 mod model;
 pub mod precompute;
+mod runtime;
+mod store;
 mod table;
+mod upload;
 mod windup;
 
 pub use angle::{GeneratorAngle, OutputAngle};
@@ -107,4 +110,9 @@ pub use image::{
     TableData, WriteError, image_bytes, write_image,
 };
 pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, Prediction};
+pub use runtime::{
+    Flags, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, RateGroup, SAVED_JOINT_BYTES, SettingError,
+};
+pub use store::{ActivateError, Counters, Health, STORE_BYTES, Store};
 pub use table::{Bounds, GeneratorKind, OperatingPoint, Quality, Table, TableId};
+pub use upload::{Upload, UploadError};

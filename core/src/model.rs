@@ -21,7 +21,7 @@
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
 use crate::hysteresis::{Direction, PlayState};
-use crate::table::{self, Bounds, InverseBound, Memory, OperatingPoint, Quality, Table, larger};
+use crate::table::{self, Bounds, Doubt, InverseBound, Memory, OperatingPoint, Quality, Table, larger};
 
 /// Error of the inverse that the number of its iterations aims at, rad at the output: 0.02″, far below what a table misses of
 /// its samples.
@@ -124,26 +124,50 @@ impl<M: Memory> Model<'_, M> {
     /// Follows the generator; what is not sane leaves the correction out.
     #[inline(always)]
     pub fn follow(&self, point: &OperatingPoint, state: &mut PlayState, generator: GeneratorAngle) -> Prediction {
+        self.follow_and_tell(point, state, generator).0
+    }
+
+    /// The same, and what was in doubt.
+    #[inline(always)]
+    pub fn follow_and_tell(
+        &self,
+        point: &OperatingPoint,
+        state: &mut PlayState,
+        generator: GeneratorAngle,
+    ) -> (Prediction, Doubt) {
         let nominal = self.drive.nominal_output(generator);
         let phases = self.drive.phases(generator, nominal);
         let mut doubt = point.doubt;
         let play = table::play_at(self.memory, point, phases, &mut doubt);
-        let sane = point.finite & play.sane & (doubt == 0);
+        let sane = point.finite & play.sane & doubt.none();
         let error = state.update(nominal, if sane { Some((play.centre, play.half)) } else { None });
         let (error, uncertainty) =
             if sane { (error, state.uncertainty_counts().wrapping_add(point.jump)) } else { (0, point.limit()) };
-        Prediction {
+        let prediction = Prediction {
             output: nominal.offset_counts(error as i64),
             nominal,
             transmission_error_rad: error as f32 * RAD_PER_COUNT,
             uncertainty_rad: uncertainty as f32 * RAD_PER_COUNT,
             quality: point.quality(sane, state.is_known()),
-        }
+        };
+        (prediction, doubt)
     }
 
     /// What brings the output to `target`.
     #[inline(always)]
     pub fn aim(&self, point: &OperatingPoint, target: OutputAngle, approach: Approach<'_>) -> Command {
+        let aim = self.solve(point, target, approach);
+        Command {
+            generator: self.drive.nominal_generator(aim.nominal),
+            predicted_error_rad: aim.error as f32 * RAD_PER_COUNT,
+            uncertainty_rad: aim.uncertainty as f32 * RAD_PER_COUNT,
+            quality: aim.quality,
+        }
+    }
+
+    /// The nominal output that brings the output to `target`.
+    #[inline(always)]
+    pub fn solve(&self, point: &OperatingPoint, target: OutputAngle, approach: Approach<'_>) -> Aim {
         let from = departure(point, target, approach);
         let side = from.side;
         let base = point.mean.wrapping_sub(side.wrapping_mul(point.half_width));
@@ -168,21 +192,29 @@ impl<M: Memory> Model<'_, M> {
             centre = error.wrapping_add(side.wrapping_mul(half));
         }
         let nominal = target.offset_counts(-(error as i64));
-        let sane = point.finite & (doubt == 0) & point.allows(centre, half);
+        let sane = point.finite & doubt.none() & point.allows(centre, half);
         let short = from.resting.map_or(0, |state| short_of_contact(state, side, nominal, half));
         let (nominal, error) = match from.resting {
             Some(state) if from.hold => (state.nominal_or_zero(), state.error_counts()),
             _ => (nominal, error.wrapping_add(short)),
         };
-        let (nominal, error, uncertainty) =
-            if sane { (nominal, error, from.uncertainty.wrapping_add(point.jump)) } else { (target, 0, point.limit()) };
-        Command {
-            generator: self.drive.nominal_generator(nominal),
-            predicted_error_rad: error as f32 * RAD_PER_COUNT,
-            uncertainty_rad: uncertainty as f32 * RAD_PER_COUNT,
-            quality: point.quality(sane, from.uncertainty <= 0),
-        }
+        let (nominal, error, uncertainty) = if sane {
+            (nominal, error, from.uncertainty.wrapping_add(point.jump))
+        } else {
+            (target, 0, point.limit())
+        };
+        Aim { nominal, error, uncertainty, quality: point.quality(sane, from.uncertainty <= 0), doubt }
     }
+}
+
+/// Where to go, counts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Aim {
+    pub nominal: OutputAngle,
+    pub error: i32,
+    pub uncertainty: i32,
+    pub quality: Quality,
+    pub doubt: Doubt,
 }
 
 /// Whether and to which side the play must be taken up on the way to `target`.
@@ -282,7 +314,7 @@ impl<'a> Table<'a> {
     ) -> Option<f32> {
         let point = self.at(torque_n_m, temperature_c)?;
         let phases = self.drive.phases(generator, self.drive.nominal_output(generator));
-        let play = table::play_at(self, &point, phases, &mut 0);
+        let play = table::play_at(self, &point, phases, &mut Default::default());
         let error = match direction {
             Direction::Forward => play.centre.wrapping_sub(play.half),
             Direction::Backward => play.centre.wrapping_add(play.half),

@@ -10,11 +10,13 @@ use core::hint::black_box;
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
-use flexspline::{Approach, GeneratorAngle, OutputAngle, PlayState, Table};
+use flexspline::{Drive, FixedMember, GeneratorAngle, Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun, Store, Table};
 use flexspline_firmware::count::{Counter, Range};
 use flexspline_firmware::finish;
 
 static FULL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/full.fxt"));
+static CAM: &[u8] = include_bytes!("/tmp/t1/cam.fxt");
+static TWO: &[u8] = include_bytes!("/tmp/t1/two-roller.fxt");
 
 const INPUTS: u32 = 10_000;
 
@@ -37,35 +39,43 @@ impl Mixed {
 }
 
 #[inline(never)]
-fn forward(t: &Table<'_>, p: &mut PlayState, g: GeneratorAngle, torque: f32, temperature: f32) -> flexspline::Prediction {
-    t.forward(p, g, torque, temperature)
+fn step(joint: &Joint, store: &mut Store, state: &mut JointState, input: &Input) -> flexspline::Output {
+    joint.tick(store, state, input)
 }
 
-#[inline(never)]
-fn inverse(t: &Table<'_>, p: &PlayState, target: OutputAngle, torque: f32, temperature: f32) -> flexspline::Command {
-    t.inverse(target, torque, temperature, Approach::From(p))
-}
+const JOINT: Joint = {
+    let Ok(drive) = Drive::new(188, 190, FixedMember::Flexspline) else { panic!() };
+    let limits = Limits { tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, patience: 5 };
+    let Ok(joint) = Joint::new(drive, limits, Overrun::FadeOut { ticks: 50 }) else { panic!() };
+    joint
+};
 
 #[entry]
 fn main() -> ! {
     let Some(peripherals) = cortex_m::Peripherals::take() else { finish(false) };
     let counter = Counter::new(peripherals.SYST);
-    let Ok(table) = Table::check(FULL) else { finish(false) };
+    for image in [FULL, CAM, TWO] {
+    let Ok(table) = Table::check(image) else { finish(false) };
+    let mut store = Store::new();
+    if store.activate(&table, JOINT.drive()).is_err() { finish(false) }
     let mut mixed = Mixed(1);
-    let mut play = PlayState::unknown();
-    let (mut forwards, mut inverses) = (Range::default(), Range::default());
+    let mut state = JointState::new();
+    let _ = state.request(Mode::Tracking);
+    let mut steps = Range::default();
     let mut generator = GeneratorAngle::ZERO;
+    let mut output = OutputAngle::ZERO;
     for _ in 0..INPUTS {
-        generator = generator.offset_counts(i64::from(mixed.next() as i32) >> 3);
-        let torque = 60.0 * mixed.part();
-        let temperature = 20.0 + 80.0 * mixed.part();
-        let (count, here) = counter.of(|| black_box(forward(&table, &mut play, generator, torque, temperature)));
-        forwards.add(count);
-        let target = here.output.offset_rad(1e-3 * mixed.part());
-        let (count, _) = counter.of(|| black_box(inverse(&table, &play, target, torque, temperature)));
-        inverses.add(count);
+        generator = generator.offset_counts(i64::from(mixed.next() as i32) >> 8);
+        let torque_n_m = 60.0 * mixed.part();
+        let temperature_c = 20.0 + 80.0 * mixed.part();
+        let target = output.offset_rad(1e-3 * mixed.part());
+        let input = Input { generator: Some(generator), target, torque_n_m, temperature_c, missed_ticks: 0 };
+        let (count, out) = counter.of(|| black_box(step(&JOINT, &mut store, &mut state, &input)));
+        output = out.output;
+        steps.add(count);
     }
-    hprintln!("forward {} {}", forwards.min, forwards.max);
-    hprintln!("inverse {} {}", inverses.min, inverses.max);
+    hprintln!("step: {} instructions (min {}, max {})", steps.max, steps.min, steps.max);
+    hprintln!("{:?} {:?}", store.counters(), store.health());
+    }
     finish(true)
 }
