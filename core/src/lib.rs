@@ -111,8 +111,9 @@ pub use image::{
 };
 pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, Prediction};
 pub use runtime::{
-    Flags, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, RateGroup, SAVED_JOINT_BYTES, SettingError,
+    Flags, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, RateGroup, SAVED_JOINT_BYTES,
+    SettingError,
 };
-pub use store::{ActivateError, Counters, Health, STORE_BYTES, Store};
+pub use store::{ActivateError, Counters, Health, Images, STORE_WORDS, Store, mend_page};
 pub use table::{Bounds, GeneratorKind, OperatingPoint, Quality, Table, TableId};
 pub use upload::{Upload, UploadError};

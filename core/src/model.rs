@@ -142,7 +142,7 @@ impl<M: Memory> Model<'_, M> {
         let sane = point.finite & play.sane & doubt.none();
         let error = state.update(nominal, if sane { Some((play.centre, play.half)) } else { None });
         let (error, uncertainty) =
-            if sane { (error, state.uncertainty_counts().wrapping_add(point.jump)) } else { (0, point.limit()) };
+            if sane { (error, state.uncertainty_counts().wrapping_add(point.jump)) } else { (0, point.plan.limit) };
         let prediction = Prediction {
             output: nominal.offset_counts(error as i64),
             nominal,
@@ -184,9 +184,9 @@ impl<M: Memory> Model<'_, M> {
             let ripple = table::ripple_around(self.memory, point, tooth, &mut doubt);
             // Where the solution would be without ripple, in cells from the boundary.
             let here = base.wrapping_add(curves);
-            let place = ripple.place + guess.wrapping_sub(here) as f32 / point.cell_width;
-            let root = ripple.forward.mix(ripple.backward, side as f32).root(place, point.cell_width);
-            error = here.wrapping_sub(((root - place) * point.cell_width) as i32);
+            let place = ripple.place + guess.wrapping_sub(here) as f32 / point.plan.cell_width;
+            let root = ripple.forward.mix(ripple.backward, side as f32).root(place, point.plan.cell_width);
+            error = here.wrapping_sub(((root - place) * point.plan.cell_width) as i32);
             let wide = 0.5 * (ripple.backward.at(root) - ripple.forward.at(root));
             half = point.half_width.wrapping_add(wide as i32);
             centre = error.wrapping_add(side.wrapping_mul(half));
@@ -201,7 +201,7 @@ impl<M: Memory> Model<'_, M> {
         let (nominal, error, uncertainty) = if sane {
             (nominal, error, from.uncertainty.wrapping_add(point.jump))
         } else {
-            (target, 0, point.limit())
+            (target, 0, point.plan.limit)
         };
         Aim { nominal, error, uncertainty, quality: point.quality(sane, from.uncertainty <= 0), doubt }
     }
@@ -233,7 +233,7 @@ fn departure<'s>(point: &OperatingPoint, target: OutputAngle, approach: Approach
     let ahead = target.minus_small_counts(state.output_or_zero());
     let away = ahead.saturating_abs();
     let started = state.is_started();
-    let hold = started & (away <= point.hold());
+    let hold = started & (away <= point.plan.hold);
     let unknown = state.uncertainty_counts();
     // A target inside the interval may lie on the other side of the output: then the whole play is in doubt.
     let guess = if away <= unknown { point.half_width.wrapping_mul(2) } else { 0 };

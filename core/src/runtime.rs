@@ -21,7 +21,7 @@ use crate::drive::Drive;
 use crate::hysteresis::{PlayState, SAVED_STATE_BYTES};
 use crate::image::crc32;
 use crate::model::{Approach, Model};
-use crate::store::Store;
+use crate::store::{Images, Store};
 use crate::table::{self, Doubt, Quality, larger};
 use core::fmt;
 
@@ -163,8 +163,6 @@ pub struct Input {
     pub target: OutputAngle,
     /// Load torque at the output, N·m, positive when it turns the output forward.
     pub torque_n_m: f32,
-    /// Temperature, °C.
-    pub temperature_c: f32,
     /// Ticks that were missed since the last call.
     pub missed_ticks: u16,
 }
@@ -369,7 +367,8 @@ impl Joint {
             return Err(error);
         }
         let most = table::counts(0.05) * FINE as f64;
-        let rate = match checked("rate_rad_s", rate_rad_s, table::counts(rate_rad_s as f64 * tick) * FINE as f64, most) {
+        let rate = match checked("rate_rad_s", rate_rad_s, table::counts(rate_rad_s as f64 * tick) * FINE as f64, most)
+        {
             Ok(rate) => rate,
             Err(error) => return Err(error),
         };
@@ -402,8 +401,8 @@ impl Joint {
     ///
     /// Instructions are counted by `tests/firmware`; the same number in every tick with the same table.
     #[must_use]
-    pub fn tick(&self, store: &mut Store, state: &mut JointState, input: &Input) -> Output {
-        let point = table::locate(store, input.torque_n_m, input.temperature_c);
+    pub fn tick(&self, images: &Images<'_>, store: &mut Store, state: &mut JointState, input: &Input) -> Output {
+        let point = store.locate(input.torque_n_m);
         let (generator, sample_flags, doubted) = self.judge(state, input);
         let torn = (state.play.nominal_or_zero() != state.nominal) | !state.play.is_ordered();
         if torn | doubted {
@@ -417,8 +416,8 @@ impl Joint {
 
         let (goal, late) = self.goal(state, input, input.target.minus_small_counts(aim.nominal), sane);
         let (correction, whole) = self.limit(state, goal);
-        let doubt = Doubt { bits: doubt.bits | aim.doubt.bits };
-        store.scrub(doubt, point.suspects);
+        let doubt = Doubt(doubt.0 | aim.doubt.0);
+        store.tend(images, doubt);
 
         let held_back = goal.wrapping_sub(correction);
         let flags = sample_flags

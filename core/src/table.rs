@@ -133,40 +133,50 @@ pub(crate) const NODE_WORDS: usize = 3;
 
 /// What two copies of a table disagreed in while they were read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Doubt {
-    /// Bits that differed; 0 if there was no doubt.
-    pub bits: u32,
-}
+pub(crate) struct Doubt(pub u32);
 
 impl Doubt {
     /// Whether everything read was beyond doubt.
     #[inline(always)]
     pub const fn none(self) -> bool {
-        self.bits == 0
+        self.0 == 0
     }
 }
 
 /// The words of a table, in one copy or in two that are compared as they are read.
 pub(crate) trait Memory {
+    /// Temperatures between which records are blended as they are read: 1 or 2.
+    const PLANES: usize;
+
     /// `N` words from word `at`. What two copies disagree in is added to `doubt`.
     fn words<const N: usize>(&self, at: usize, doubt: &mut Doubt) -> [u32; N];
+}
 
-    /// One word of the first copy, for a search whose result is checked.
-    fn probe(&self, at: usize) -> u32;
+/// Where the ripple and the curves of a table are, and what else a step needs of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Plan {
+    pub ripple_nodes: u32,
+    pub ripple_unit: u32,
+    /// Nodes and place of A, B, C, 16 bits each.
+    pub curves: [u32; 3],
+    /// Largest error the table may give, counts.
+    pub limit: i32,
+    pub iterations: u32,
+    /// Targets this close to the output leave the generator where it is, counts.
+    pub hold: i32,
+    /// Width of a cell of the ripple's axis at the output, counts; signed like the ratio.
+    pub cell_width: f32,
 }
 
 impl Memory for Table<'_> {
+    const PLANES: usize = 2;
+
     #[inline(always)]
     fn words<const N: usize>(&self, at: usize, _: &mut Doubt) -> [u32; N] {
         self.words
             .get(at..)
             .and_then(|words| words.first_chunk::<N>())
             .map_or([0; N], |words| words.map(u32::from_le_bytes))
-    }
-
-    #[inline(always)]
-    fn probe(&self, at: usize) -> u32 {
-        word_at(self.words, at)
     }
 }
 
@@ -213,28 +223,19 @@ pub(crate) struct InverseBound {
 /// A torque and temperature, located in the table: [`Table::at`]. What forward and inverse of one tick share.
 #[derive(Clone, Copy, Debug)]
 pub struct OperatingPoint {
-    /// Where the first of the four records around it starts, its torque step and its temperature step.
+    /// Where the record below the torque starts, its torque step and its temperature step.
     records: [usize; 3],
-    /// Their shares in 2⁻¹⁴: low torque, high torque, cold; the same, hot.
+    /// Their shares in 2⁻¹⁴: low torque, high torque; the same at the higher temperature.
     shares: [i32; 4],
-    ripple_nodes: u32,
-    ripple_unit: i32,
-    curves: [u32; 3],
-    limit: i32,
+    pub(crate) plan: Plan,
     /// D and H there, counts.
     pub(crate) mean: i32,
     pub(crate) half_width: i32,
     /// Height of the jump the torque lies in, else 0, counts.
     pub(crate) jump: i32,
-    iterations: u32,
-    /// Width of a cell of the ripple's axis at the output, counts; signed like the ratio.
-    pub(crate) cell_width: f32,
-    hold: i32,
-    /// Both inputs are finite.
+    /// All inputs are finite.
     pub(crate) finite: bool,
     in_range: bool,
-    /// Places that were read: header, nodes, and where records are read from, cold and hot.
-    pub(crate) suspects: [usize; 4],
     /// What two copies of the table disagreed in while it was read.
     pub(crate) doubt: Doubt,
 }
@@ -252,19 +253,7 @@ impl OperatingPoint {
     #[inline(always)]
     pub(crate) const fn iterations(&self) -> u32 {
         let most = crate::model::MAX_INVERSE_ITERATIONS as u32;
-        if self.iterations < most { self.iterations } else { most }
-    }
-
-    /// Targets this close to the output leave the generator where it is, counts.
-    #[inline(always)]
-    pub(crate) const fn hold(&self) -> i32 {
-        self.hold
-    }
-
-    /// The largest error that the table may give, counts.
-    #[inline(always)]
-    pub(crate) const fn limit(&self) -> i32 {
-        self.limit
+        if self.plan.iterations < most { self.plan.iterations } else { most }
     }
 
     /// Whether |centre| + |half| is within what an accepted table can give.
@@ -273,7 +262,7 @@ impl OperatingPoint {
         // Negative numbers have room for every magnitude.
         let centre = if centre > 0 { centre.wrapping_neg() } else { centre };
         let half = if half > 0 { half.wrapping_neg() } else { half };
-        centre.saturating_add(half) >= self.limit.wrapping_neg()
+        centre.saturating_add(half) >= self.plan.limit.wrapping_neg()
     }
 
     /// D, rad.
@@ -381,57 +370,95 @@ pub(crate) fn sqrt(x: f32) -> f32 {
 
 /// `value` within a range; its lower end if NaN.
 #[inline(always)]
-fn within(value: f32, [least, most]: [f32; 2]) -> f32 {
+pub(crate) fn within(value: f32, [least, most]: [f32; 2]) -> f32 {
     let above = if value > least { value } else { least };
     if above < most { above } else { most }
 }
 
 #[inline(always)]
-fn finite(value: f32) -> bool {
+pub(crate) fn finite(value: f32) -> bool {
     value.to_bits() & 0x7fff_ffff < 0x7f80_0000
 }
 
 /// The high and the low half of a word.
 #[inline(always)]
-const fn halves(word: u32) -> [usize; 2] {
+pub(crate) const fn halves(word: u32) -> [usize; 2] {
     [(word >> 16) as usize, (word & 0xffff) as usize]
+}
+
+/// D, slope of D and H of a torque node.
+pub(crate) type Node = [f32; NODE_WORDS];
+
+/// The torque among nodes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TorquePlace {
+    /// Place in the interval, 0 to 1, and the interval's width, N·m.
+    pub weight: f32,
+    pub width: f32,
+    /// Whether the interval is a jump.
+    pub jump: bool,
+}
+
+impl OperatingPoint {
+    /// From the nodes around the torque; `warm` is how far from the lower of two temperatures to the other, 0 to 1.
+    #[inline(always)]
+    pub(crate) fn new(
+        place: TorquePlace,
+        [low, high]: [Node; 2],
+        warm: f32,
+        records: [usize; 3],
+        plan: Plan,
+        (finite, in_range): (bool, bool),
+        doubt: Doubt,
+    ) -> Self {
+        let TorquePlace { weight, width, jump } = place;
+        let ([mean_low, slope_low, half_low], [mean_high, slope_high, half_high]) = (low, high);
+        let (rise, widening) = (mean_high - mean_low, half_high - half_low);
+        let bend = windup::bend(weight, width, [rise, slope_low, slope_high]);
+        let bend = if jump { 0.0 } else { bend };
+        // In doubt strictly inside a jump.
+        let height = rise.abs() + widening.abs();
+        let height = if jump & (weight > 0.0) & (weight < 1.0) { height } else { 0.0 };
+        let (t, w) = ((weight * 16_384.0) as i32, (warm * 16_384.0) as i32);
+        let both = t.wrapping_mul(w) >> 14;
+        let rest = 16_384i32.wrapping_sub(t).wrapping_sub(w).wrapping_add(both);
+        Self {
+            records,
+            shares: [rest, t.wrapping_sub(both), w.wrapping_sub(both), both],
+            plan,
+            mean: (mean_low + weight * rise + bend) as i32,
+            half_width: (half_low + weight * widening) as i32,
+            jump: height as i32,
+            finite,
+            in_range,
+            doubt,
+        }
+    }
 }
 
 /// Locates a torque (N·m) and temperature (°C). The same work for all values; those that are not finite give the lower end of
 /// the range and are marked.
-#[inline(always)]
-pub(crate) fn locate<M: Memory>(memory: &M, torque_n_m: f32, temperature_c: f32) -> OperatingPoint {
+pub(crate) fn locate(table: &Table<'_>, torque_n_m: f32, temperature_c: f32) -> OperatingPoint {
     let mut doubt = Doubt::default();
-    let [torque_least, torque_most, least, most] = memory.words(word::TORQUE_RANGE, &mut doubt).map(f32::from_bits);
+    let [torque_least, torque_most, least, most] = table.words(word::TORQUE_RANGE, &mut doubt).map(f32::from_bits);
     let torque = within(torque_n_m, [torque_least, torque_most]);
-    let temperature = within(temperature_c, [least, most]);
-    let [cell_width, last, nodes, records, steps, curve_a, curve_b, curve_c, inverse, hold] =
-        memory.words(word::CELL_WIDTH, &mut doubt);
+    let [last, nodes, records, steps] = table.words(word::CELL_WIDTH.wrapping_add(1), &mut doubt);
     let [last_temperature, last_torque] = halves(last);
     let [node_plane, nodes] = halves(nodes);
     let [record_plane, records] = halves(records);
-    let [ripple_nodes, record_step] = halves(steps);
-    let [ripple_unit, limit] = memory.words(word::RIPPLE_UNIT, &mut doubt);
+    let [_, record_step] = halves(steps);
 
-    let start = |i: usize| f32::from_bits(memory.probe(word::TORQUE_NODES.wrapping_add(i)));
-    let interval = grid::search_64(start, torque).min(last_torque);
-    let [low, high] = memory.words(word::TORQUE_NODES.wrapping_add(interval), &mut doubt).map(f32::from_bits);
-    let start = |i: usize| f32::from_bits(memory.probe(word::TEMPERATURE_NODES.wrapping_add(i)));
-    let plane = grid::search_8(start, temperature).min(last_temperature);
-    let [cold, hot] = memory.words(word::TEMPERATURE_NODES.wrapping_add(plane), &mut doubt).map(f32::from_bits);
-    // A search that was led astray ends in an interval that does not hold the value (but for an axis of one node).
-    let single = (last_torque == 0) & (high == f32::MAX);
-    let astray =
-        (torque < low) & !single | (torque > high) | (temperature < cold) & (node_plane > 0) | (temperature > hot);
-    doubt.bits |= astray as u32;
-
-    let width = high - low;
-    // 0 in the endless width that an axis of one node has.
-    let weight = (torque - low) / width;
+    let number = |i: usize| f32_at(table.words, i);
+    let interval = grid::search_64(|i| number(word::TORQUE_NODES.wrapping_add(i)), torque).min(last_torque);
+    let [low, high] = table.words(word::TORQUE_NODES.wrapping_add(interval), &mut doubt).map(f32::from_bits);
+    let temperature = within(temperature_c, [least, most]);
+    let plane = grid::search_8(|i| number(word::TEMPERATURE_NODES.wrapping_add(i)), temperature).min(last_temperature);
+    let [cold, hot] = table.words(word::TEMPERATURE_NODES.wrapping_add(plane), &mut doubt).map(f32::from_bits);
     let warm = (temperature - cold) / (hot - cold);
+
     let at = nodes.wrapping_add(plane.wrapping_mul(node_plane)).wrapping_add(interval.wrapping_mul(NODE_WORDS));
-    let here: [u32; 2 * NODE_WORDS] = memory.words(at, &mut doubt);
-    let there: [u32; 2 * NODE_WORDS] = memory.words(at.wrapping_add(node_plane), &mut doubt);
+    let here: [u32; 2 * NODE_WORDS] = table.words(at, &mut doubt);
+    let there: [u32; 2 * NODE_WORDS] = table.words(at.wrapping_add(node_plane), &mut doubt);
     let [_, _, flagged, ..] = here;
     let blend = |cold: u32, hot: u32| {
         let (cold, hot) = (f32::from_bits(cold), f32::from_bits(hot));
@@ -439,39 +466,14 @@ pub(crate) fn locate<M: Memory>(memory: &M, torque_n_m: f32, temperature_c: f32)
     };
     let [c0, c1, c2, c3, c4, c5] = here;
     let [h0, h1, h2, h3, h4, h5] = there;
-    let (mean_low, slope_low, half_low) = (blend(c0, h0), blend(c1, h1), blend(c2, h2));
-    let (mean_high, slope_high, half_high) = (blend(c3, h3), blend(c4, h4), blend(c5, h5));
-    let (rise, widening) = (mean_high - mean_low, half_high - half_low);
-    // The last bit of H tells whether the interval above is a jump: straight, and in doubt strictly inside.
-    let jump = flagged & 1 != 0;
-    let bend = windup::bend(weight, width, [rise, slope_low, slope_high]);
-    let bend = if jump { 0.0 } else { bend };
-    let height = rise.abs() + widening.abs();
-    let height = if jump & (weight > 0.0) & (weight < 1.0) { height } else { 0.0 };
-
-    let (t, w) = ((weight * 16_384.0) as i32, (warm * 16_384.0) as i32);
-    let both = t.wrapping_mul(w) >> 14;
+    let around = [[blend(c0, h0), blend(c1, h1), blend(c2, h2)], [blend(c3, h3), blend(c4, h4), blend(c5, h5)]];
+    let width = high - low;
+    // 0 in the endless width that an axis of one node has. The last bit of H tells whether the interval above is a jump.
+    let place = TorquePlace { weight: (torque - low) / width, width, jump: flagged & 1 != 0 };
     let first_record =
         records.wrapping_add(plane.wrapping_mul(record_plane)).wrapping_add(interval.wrapping_mul(record_step));
-    let rest = 16_384i32.wrapping_sub(t).wrapping_sub(w).wrapping_add(both);
-    OperatingPoint {
-        records: [first_record, record_step, record_plane],
-        suspects: [word::TORQUE_RANGE, at, first_record, first_record.wrapping_add(record_plane)],
-        shares: [rest, t.wrapping_sub(both), w.wrapping_sub(both), both],
-        ripple_nodes: ripple_nodes as u32,
-        ripple_unit: ripple_unit as i32,
-        curves: [curve_a, curve_b, curve_c],
-        limit: limit as i32,
-        mean: (mean_low + weight * rise + bend) as i32,
-        half_width: (half_low + weight * widening) as i32,
-        jump: height as i32,
-        iterations: inverse,
-        cell_width: f32::from_bits(cell_width),
-        hold: hold as i32,
-        finite: finite(torque_n_m) & finite(temperature_c),
-        in_range: (torque == torque_n_m) & (temperature == temperature_c),
-        doubt,
-    }
+    let marks = (finite(torque_n_m) & finite(temperature_c), (torque == torque_n_m) & (temperature == temperature_c));
+    OperatingPoint::new(place, around, warm, [first_record, record_step, record_plane], table.plan(), marks, doubt)
 }
 
 /// Ripple coefficients of forward and backward motion from `node` on, at a located point, 2⁻¹⁴ ripple units.
@@ -487,7 +489,7 @@ fn coefficients<M: Memory, const N: usize>(
     let at = first.wrapping_add(node);
     let hot = at.wrapping_add(plane_step);
     let rows = [at, at.wrapping_add(torque_step), hot, hot.wrapping_add(torque_step)];
-    for (row, share) in rows.into_iter().zip(point.shares) {
+    for (row, share) in rows.into_iter().zip(point.shares).take(2 * M::PLANES) {
         let words: [u32; N] = memory.words(row, doubt);
         for ((forward, backward), word) in forward.iter_mut().zip(&mut backward).zip(words) {
             // |Σ| ≤ 2¹⁵·2¹⁴: the shares add up to 2¹⁴.
@@ -502,7 +504,7 @@ fn coefficients<M: Memory, const N: usize>(
 #[inline(always)]
 pub(crate) fn curves_at<M: Memory>(memory: &M, point: &OperatingPoint, phases: Phases, doubt: &mut Doubt) -> i32 {
     let mut sum = 0i32;
-    for (curve, phase) in point.curves.into_iter().zip([phases.generator, phases.material, phases.output]) {
+    for (curve, phase) in point.plan.curves.into_iter().zip([phases.generator, phases.material, phases.output]) {
         let [nodes, at] = halves(curve);
         // The same way for every call with this table: it has the curve or not.
         if nodes > 0 {
@@ -519,11 +521,12 @@ pub(crate) fn curves_at<M: Memory>(memory: &M, point: &OperatingPoint, phases: P
 #[inline(always)]
 pub(crate) fn play_at<M: Memory>(memory: &M, point: &OperatingPoint, phases: Phases, doubt: &mut Doubt) -> Play {
     let (mut centre, mut half) = (point.mean, point.half_width);
-    if point.ripple_nodes > 0 {
-        let cell = Cell::at(point.ripple_nodes, phases.tooth);
+    if point.plan.ripple_nodes > 0 {
+        let cell = Cell::at(point.plan.ripple_nodes, phases.tooth);
         let weights = cell.weights_q15();
         let ripples = coefficients(memory, point, cell.node, doubt);
-        let [forward, backward] = ripples.map(|ripple| mul_high(weighed(ripple, weights), point.ripple_unit));
+        let [forward, backward] =
+            ripples.map(|ripple| mul_high(weighed(ripple, weights), point.plan.ripple_unit as i32));
         centre = centre.wrapping_add(forward.wrapping_add(backward) >> 1);
         half = half.wrapping_add(backward.wrapping_sub(forward) >> 1);
     }
@@ -541,13 +544,13 @@ pub(crate) fn ripple_around<M: Memory>(
     tooth: u32,
     doubt: &mut Doubt,
 ) -> RippleAround {
-    if point.ripple_nodes == 0 {
+    if point.plan.ripple_nodes == 0 {
         return RippleAround::default();
     }
-    let scaled = (tooth as u64).wrapping_mul(point.ripple_nodes as u64);
+    let scaled = (tooth as u64).wrapping_mul(point.plan.ripple_nodes as u64);
     // Node to node: the boundary of their cells is in the middle.
     let [forward, backward] = coefficients(memory, point, (scaled >> 32) as usize, doubt);
-    let counts = point.ripple_unit as f32 * (1.0 / (524_288.0 * 16_384.0));
+    let counts = point.plan.ripple_unit as f32 * (1.0 / (524_288.0 * 16_384.0));
     RippleAround {
         place: (scaled as u32 ^ 0x8000_0000) as i32 as f32 * (1.0 / 4_294_967_296.0),
         forward: Bend::new(forward.map(|ripple| ripple as f32 * counts)),
@@ -578,6 +581,20 @@ impl<'a> Table<'a> {
     #[must_use]
     pub fn temperature_range_c(&self) -> [f32; 2] {
         [0, 1].map(|end: usize| f32_at(self.words, word::TEMPERATURE_RANGE.wrapping_add(end)))
+    }
+
+    pub(crate) fn plan(&self) -> Plan {
+        let at = |place: usize| word_at(self.words, place);
+        let first = word::CELL_WIDTH;
+        Plan {
+            ripple_nodes: at(first.wrapping_add(4)) >> 16,
+            ripple_unit: at(word::RIPPLE_UNIT),
+            curves: [5, 6, 7].map(|place: usize| at(first.wrapping_add(place))),
+            limit: at(word::RIPPLE_UNIT.wrapping_add(1)) as i32,
+            iterations: at(first.wrapping_add(8)),
+            hold: at(first.wrapping_add(9)) as i32,
+            cell_width: f32::from_bits(at(first)),
+        }
     }
 
     /// Torque nodes, N·m.

@@ -10,13 +10,13 @@ use core::hint::black_box;
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
-use flexspline::{Drive, FixedMember, GeneratorAngle, Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun, Store, Table};
+use flexspline::{Drive, FixedMember, GeneratorAngle, Input, Joint, JointState, Limits, Mode, OutputAngle, Images, Overrun, Store};
 use flexspline_firmware::count::{Counter, Range};
 use flexspline_firmware::finish;
 
 static FULL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/full.fxt"));
-static CAM: &[u8] = include_bytes!("/tmp/t1/cam.fxt");
-static TWO: &[u8] = include_bytes!("/tmp/t1/two-roller.fxt");
+static CAM: &[u8] = include_bytes!("/tmp/c4/cam.fxt");
+static TWO: &[u8] = include_bytes!("/tmp/c4/two-roller.fxt");
 
 const INPUTS: u32 = 10_000;
 
@@ -39,8 +39,8 @@ impl Mixed {
 }
 
 #[inline(never)]
-fn step(joint: &Joint, store: &mut Store, state: &mut JointState, input: &Input) -> flexspline::Output {
-    joint.tick(store, state, input)
+fn step(joint: &Joint, images: &Images<'_>, store: &mut Store, state: &mut JointState, input: &Input) -> flexspline::Output {
+    joint.tick(images, store, state, input)
 }
 
 const JOINT: Joint = {
@@ -55,9 +55,9 @@ fn main() -> ! {
     let Some(peripherals) = cortex_m::Peripherals::take() else { finish(false) };
     let counter = Counter::new(peripherals.SYST);
     for image in [FULL, CAM, TWO] {
-    let Ok(table) = Table::check(image) else { finish(false) };
+    let images = Images::new(image, image);
     let mut store = Store::new();
-    if store.activate(&table, JOINT.drive()).is_err() { finish(false) }
+    if store.activate(&images, JOINT.drive(), 21.0).is_err() { finish(false) }
     let mut mixed = Mixed(1);
     let mut state = JointState::new();
     let _ = state.request(Mode::Tracking);
@@ -67,10 +67,10 @@ fn main() -> ! {
     for _ in 0..INPUTS {
         generator = generator.offset_counts(i64::from(mixed.next() as i32) >> 8);
         let torque_n_m = 60.0 * mixed.part();
-        let temperature_c = 20.0 + 80.0 * mixed.part();
+
         let target = output.offset_rad(1e-3 * mixed.part());
-        let input = Input { generator: Some(generator), target, torque_n_m, temperature_c, missed_ticks: 0 };
-        let (count, out) = counter.of(|| black_box(step(&JOINT, &mut store, &mut state, &input)));
+        let input = Input { generator: Some(generator), target, torque_n_m, missed_ticks: 0 };
+        let (count, out) = counter.of(|| black_box(step(&JOINT, &images, &mut store, &mut state, &input)));
         output = out.output;
         steps.add(count);
     }
