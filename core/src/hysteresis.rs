@@ -140,6 +140,13 @@ impl PlayState {
         self.lower <= self.upper
     }
 
+    /// Flips a bit of one bound, as radiation does.
+    #[cfg(test)]
+    pub(crate) fn flip(&mut self, bound: usize, bit: u32) {
+        let bound = if bound == 0 { &mut self.lower } else { &mut self.upper };
+        *bound ^= 1 << bit;
+    }
+
     /// Whether there was an update.
     pub(crate) const fn is_started(&self) -> bool {
         self.half >= 0

@@ -220,7 +220,7 @@ pub struct Output {
     pub correction_rad: f32,
     /// What the limiter held back of the correction, rad.
     pub held_back_rad: f32,
-    /// How far to trust the correction.
+    /// How far to trust estimate and correction.
     pub quality: Quality,
     /// What happened.
     pub flags: Flags,
@@ -422,7 +422,7 @@ impl Joint {
         let held_back = goal.wrapping_sub(correction);
         let flags = sample_flags
             .with(Flags::OVERRUN, late)
-            .with(Flags::HELD_BACK, held_back != 0)
+            .with(Flags::HELD_BACK, (held_back >= FINE) | (held_back <= -FINE))
             .with(Flags::NOT_CORRECTED, !sane)
             .with(Flags::TABLE_DOUBT, !doubt.none())
             .with(Flags::STATE_TORN, torn | !whole);
@@ -434,7 +434,7 @@ impl Joint {
             uncertainty_rad: larger(now.uncertainty_rad, aim.uncertainty as f32 * RAD_PER_COUNT),
             correction_rad: correction as f32 * (RAD_PER_COUNT / FINE as f32),
             held_back_rad: held_back as f32 * (RAD_PER_COUNT / FINE as f32),
-            quality: if sane { aim.quality } else { Quality::Disabled },
+            quality: if now.quality > aim.quality { now.quality } else { aim.quality },
             flags,
         }
     }
@@ -511,5 +511,299 @@ impl Joint {
         let correction = before.wrapping_add(speed as i32);
         state.correction = [correction; 2];
         (correction, one == other)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{self, ARCSEC};
+    use proptest::prelude::*;
+    use std::sync::LazyLock;
+    use std::vec::Vec;
+
+    static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(|| fixture::image(true));
+
+    const LIMITS: Limits =
+        Limits { tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 2.0, generator_rate_rad_s: 700.0, patience: 5 };
+    /// Rate in a tick, and its change from tick to tick, rad.
+    const RATE_RAD: f64 = 5e-5;
+    const ACCELERATION_RAD: f64 = 2e-6;
+
+    /// Less than this is rounding.
+    const COUNT: f32 = 1.5e-9;
+
+    struct Loop {
+        joint: Joint,
+        store: Store,
+        state: JointState,
+        generator: GeneratorAngle,
+        /// Corrections of the last ticks, rad.
+        before: [f64; 2],
+    }
+
+    impl Loop {
+        fn new(overrun: Overrun) -> Self {
+            let mut store = Store::new();
+            store.activate(&Images::new(&IMAGE, &IMAGE), &fixture::drive(), 20.0).unwrap();
+            let mut state = JointState::new();
+            state.request(Mode::Tracking).unwrap();
+            let joint = Joint::new(fixture::drive(), LIMITS, overrun).unwrap();
+            Self { joint, store, state, generator: GeneratorAngle::ZERO, before: [0.0; 2] }
+        }
+
+        fn input(&self, target_rad: f64) -> Input {
+            let target = OutputAngle::from_rad(target_rad).unwrap();
+            Input { generator: Some(self.generator), target, torque_n_m: 5.0, missed_ticks: 0 }
+        }
+
+        /// One tick; no correction may jump.
+        fn tick(&mut self, input: &Input) -> Output {
+            let out = self.joint.tick(&Images::new(&IMAGE, &IMAGE), &mut self.store, &mut self.state, input);
+            let now = out.correction_rad as f64;
+            let [last, before] = self.before;
+            assert!((now - last).abs() <= 1.0001 * RATE_RAD + 2e-9, "rate {}", now - last);
+            let change = (now - last) - (last - before);
+            assert!(change.abs() <= 1.0001 * ACCELERATION_RAD + 2e-9, "acceleration {change}");
+            self.before = [now, last];
+            out
+        }
+
+        /// Follows the command, towards a target that moves by this in a tick.
+        fn run(&mut self, ticks: usize, from_rad: f64, step_rad: f64) -> Output {
+            let mut out = None;
+            for i in 0..ticks {
+                let found = self.tick(&self.input(from_rad + step_rad * i as f64));
+                self.generator = found.command;
+                out = Some(found);
+            }
+            out.unwrap()
+        }
+    }
+
+    #[test]
+    fn the_correction_comes_within_its_limits_and_then_follows() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        let first = run.tick(&run.input(1e-3));
+        assert!(first.flags.contains(Flags::HELD_BACK) && first.held_back_rad.abs() > 1e-5);
+        let last = run.run(400, 1e-3, 1e-5);
+        assert_eq!(last.flags, Flags::default());
+        assert!(last.held_back_rad.abs() < COUNT);
+        assert!(last.correction_rad.abs() > 1e-5);
+        // A reversal wants the whole play at once and gets it within the limits.
+        let reversed = run.run(3, 1e-3 + 400.0 * 1e-5, -1e-5);
+        assert!(reversed.flags.contains(Flags::HELD_BACK));
+        let after = run.run(400, 1e-3 + 397.0 * 1e-5, -1e-5);
+        assert!(after.held_back_rad.abs() < COUNT);
+    }
+
+    #[test]
+    fn modes_change_only_as_they_may_and_never_jump() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        let tracking = run.run(300, 1e-3, 1e-5);
+        run.state.request(Mode::Hold).unwrap();
+        let held = run.run(50, 4e-3, 1e-5);
+        assert!((held.correction_rad - tracking.correction_rad).abs() < COUNT);
+        run.state.request(Mode::Safe).unwrap();
+        for refused in [Mode::Tracking, Mode::Hold] {
+            assert_eq!(run.state.request(refused), Err(ModeError { from: Mode::Safe, to: refused }));
+        }
+        let safe = run.run(300, 4.5e-3, 0.0);
+        assert_eq!((safe.correction_rad, run.state.mode()), (0.0, Mode::Safe));
+        assert_eq!(safe.command, fixture::drive().nominal_generator(run.input(4.5e-3).target));
+        run.state.request(Mode::Off).unwrap();
+        assert_eq!(run.state.request(Mode::Hold), Err(ModeError { from: Mode::Off, to: Mode::Hold }));
+        run.state.request(Mode::Tracking).unwrap();
+        assert!(run.run(300, 4.5e-3, 1e-5).correction_rad != 0.0);
+    }
+
+    #[test]
+    fn lost_samples_leave_the_play_where_it_is() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        run.run(300, 1e-3, 1e-5);
+        let play = *run.state.play();
+        for _ in 0..20 {
+            let out = run.tick(&Input { generator: None, ..run.input(4e-3) });
+            assert!(out.flags.contains(Flags::SAMPLE_LOST));
+        }
+        assert_eq!(run.state.play(), &play);
+        assert!(!run.tick(&run.input(4e-3)).flags.contains(Flags::SAMPLE_LOST));
+    }
+
+    #[test]
+    fn a_glitch_is_not_believed_and_a_new_place_is_with_the_side_unknown() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        let before = run.run(300, 1e-3, 1e-5);
+        let (play, good) = (*run.state.play(), run.generator);
+        run.generator = good.offset_rad(1.0);
+        let out = run.tick(&run.input(4e-3));
+        assert!(out.flags.contains(Flags::GLITCH));
+        assert_eq!(run.state.play(), &play);
+        run.generator = good;
+        assert!(!run.tick(&run.input(4e-3)).flags.contains(Flags::GLITCH));
+        // It stays: believed after five ticks.
+        run.generator = good.offset_rad(1.0);
+        for i in 0..6 {
+            let out = run.tick(&run.input(4e-3));
+            assert_eq!(out.flags.contains(Flags::GLITCH), i < 5, "{i}");
+            assert_eq!(run.state.play().is_known(), i < 5, "{i}");
+        }
+        assert!(before.quality == Quality::InRange);
+        assert_eq!(run.tick(&run.input(4e-3)).quality, Quality::Uncertain);
+    }
+
+    #[test]
+    fn without_torque_the_last_correction_is_kept_and_then_fades() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        let before = run.run(300, 1e-3, 1e-5);
+        for i in 0..6 {
+            let out = run.tick(&Input { torque_n_m: f32::NAN, ..run.input(4e-3) });
+            assert!(out.flags.contains(Flags::NOT_CORRECTED) && out.quality == Quality::Disabled);
+            assert_eq!((out.correction_rad - before.correction_rad).abs() < COUNT, i < 5, "{i}");
+        }
+        let blind = Input { torque_n_m: f32::NAN, ..run.input(4e-3) };
+        for _ in 0..300 {
+            let _ = run.tick(&blind);
+        }
+        assert_eq!(run.tick(&blind).correction_rad, 0.0);
+        // And back, within the limits.
+        assert!(run.run(300, 4e-3, 1e-5).held_back_rad.abs() < COUNT);
+    }
+
+    #[test]
+    fn torque_out_of_range_is_marked_and_corrected_with_the_edge() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        let out = run.tick(&Input { torque_n_m: 51.0, ..run.input(1e-3) });
+        assert_eq!(out.quality, Quality::Extrapolated);
+        let mut edge = Loop::new(Overrun::SkipAndCount);
+        let at = edge.tick(&Input { torque_n_m: 50.0, ..edge.input(1e-3) });
+        assert_eq!(out.transmission_error_rad, at.transmission_error_rad);
+        assert_eq!(at.quality, Quality::Uncertain);
+    }
+
+    #[test]
+    fn overruns_do_what_their_policy_says() {
+        let late = |run: &Loop| Input { missed_ticks: 3, ..run.input(4e-3) };
+        let mut skip = Loop::new(Overrun::SkipAndCount);
+        skip.run(300, 1e-3, 1e-5);
+        let out = skip.tick(&late(&skip));
+        assert!(out.flags.contains(Flags::OVERRUN));
+        assert!(out.held_back_rad.abs() < COUNT);
+        assert_eq!(skip.state.missed_ticks(), 3);
+
+        let mut hold = Loop::new(Overrun::HoldLast);
+        let before = hold.run(300, 1e-3, 1e-5);
+        let elsewhere = Input { target: hold.input(4.2e-3).target, ..late(&hold) };
+        assert!((hold.tick(&elsewhere).correction_rad - before.correction_rad).abs() < COUNT);
+
+        let mut fade = Loop::new(Overrun::FadeOut { ticks: 400 });
+        fade.run(300, 1e-3, 1e-5);
+        let mut corrections = std::vec![fade.tick(&late(&fade)).correction_rad.abs()];
+        for _ in 0..1300 {
+            corrections.push(fade.tick(&fade.input(4e-3)).correction_rad.abs());
+        }
+        assert!(corrections[..400].windows(2).all(|pair| pair[1] <= pair[0] + 2e-9));
+        assert!(corrections[410..790].iter().all(|&c| c == 0.0), "{:?}", &corrections[405..420]);
+        assert!(corrections[1300] > 0.9 * corrections[0]);
+        assert_eq!(fade.state.missed_ticks(), 3);
+    }
+
+    #[test]
+    fn a_reset_in_the_middle_of_a_reversal_goes_on_where_it_was_or_starts_anew() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        run.run(300, 1e-3, 1e-5);
+        run.run(8, 4e-3, -1e-5);
+        let saved = run.state.save();
+        let mut restored = JointState::restore(&saved).unwrap();
+        restored.request(Mode::Tracking).unwrap();
+        run.state = restored;
+        // `tick` asserts the limits across the reset.
+        let on = run.run(3, 3.92e-3, -1e-5);
+        assert!(on.flags.contains(Flags::HELD_BACK) && on.quality == Quality::InRange);
+        for bit in 0..SAVED_JOINT_BYTES * 8 {
+            let mut damaged = saved;
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            assert_eq!(JointState::restore(&damaged), None, "bit {bit}");
+        }
+        // Without what was saved: no correction at first, the side unknown, then known again.
+        let mut state = JointState::new();
+        state.request(Mode::Tracking).unwrap();
+        (run.state, run.before) = (state, [0.0; 2]);
+        let first = run.tick(&run.input(3.9e-3));
+        assert_eq!(first.quality, Quality::Uncertain);
+        assert!(first.uncertainty_rad > 1e-5);
+        assert_eq!(run.run(600, 3.9e-3, -1e-5).uncertainty_rad, 0.0);
+    }
+
+    /// Flips in what changes while running: what can be told is flagged, and the correction stays within its limits.
+    #[test]
+    fn upsets_of_the_state_never_make_the_correction_jump() {
+        let flips: [(fn(&mut JointState, u32), bool); 7] = [
+            (|s, bit| s.nominal = s.nominal.offset_counts(1 << bit), true),
+            (|s, bit| s.correction[0] ^= 1 << bit, true),
+            (|s, bit| s.correction[1] ^= 1 << bit, true),
+            (|s, bit| s.play.flip(0, bit), false),
+            (|s, bit| s.play.flip(1, bit), false),
+            (|s, bit| s.goal ^= 1 << bit, false),
+            (|s, bit| s.aimed ^= 1 << bit, false),
+        ];
+        for (number, (flip, told)) in flips.into_iter().enumerate() {
+            for bit in 0..31 {
+                let mut run = Loop::new(Overrun::SkipAndCount);
+                let before = run.run(300, 1e-3, 1e-5);
+                assert_eq!(before.quality, Quality::InRange);
+                flip(&mut run.state, bit);
+                let out = run.tick(&run.input(4e-3));
+                if !(3..5).contains(&number) {
+                    assert_eq!(out.flags.contains(Flags::STATE_TORN), told, "{number} bit {bit}");
+                } else {
+                    // One bound of a known play moved: no longer known, or taken for unknown.
+                    let said = out.quality == Quality::Uncertain || out.flags.contains(Flags::STATE_TORN);
+                    let same = out.transmission_error_rad as f64 - before.transmission_error_rad as f64;
+                    assert!(said || same.abs() < 0.05 * ARCSEC, "{number} bit {bit}");
+                }
+                run.run(600, 4e-3, 1e-5);
+                let healed = run.run(3, 1e-2, 1e-5);
+                assert_eq!(healed.quality, Quality::InRange, "{number} bit {bit}");
+                assert!(healed.held_back_rad.abs() < COUNT, "{number} bit {bit}");
+            }
+        }
+    }
+
+    #[test]
+    fn rate_groups_run_when_they_are_due() {
+        let group = RateGroup::new(10, 3).unwrap();
+        assert!((0..100).filter(|&tick| group.is_due(tick)).eq((0..10).map(|i| 10 * i + 3)));
+        assert_eq!((RateGroup::new(0, 0), RateGroup::new(5, 5)), (None, None));
+    }
+
+    #[test]
+    fn settings_that_make_no_sense_are_named() {
+        let named = |limits: Limits| Joint::new(fixture::drive(), limits, Overrun::HoldLast).unwrap_err().name;
+        assert_eq!(named(Limits { tick_s: 0.0, ..LIMITS }), "tick_s");
+        assert_eq!(named(Limits { rate_rad_s: f32::NAN, ..LIMITS }), "rate_rad_s");
+        assert_eq!(named(Limits { rate_rad_s: 60.0, ..LIMITS }), "rate_rad_s");
+        assert_eq!(named(Limits { acceleration_rad_s2: -1.0, ..LIMITS }), "acceleration_rad_s2");
+        assert_eq!(named(Limits { generator_rate_rad_s: f32::INFINITY, ..LIMITS }), "generator_rate_rad_s");
+    }
+
+    proptest! {
+        /// Whatever comes in, the correction moves within its limits and stays within the table's.
+        #[test]
+        fn any_input_keeps_the_limits(
+            inputs in prop::collection::vec((any::<bool>(), -2e-3f64..2e-3, -0.1f64..0.1, any::<f32>(), 0u16..3), 1..200),
+            policy in 0u8..3,
+        ) {
+            let policies = [Overrun::SkipAndCount, Overrun::HoldLast, Overrun::FadeOut { ticks: 7 }];
+            let mut run = Loop::new(policies[policy as usize]);
+            for (present, target, moved, torque, missed) in inputs {
+                run.generator = run.generator.offset_rad(moved as f32);
+                let sample = present.then_some(run.generator);
+                let input = Input { generator: sample, torque_n_m: torque, missed_ticks: missed / 2, ..run.input(target) };
+                let out = run.tick(&input);
+                prop_assert!(out.correction_rad.abs() <= 0.03);
+                prop_assert!(out.uncertainty_rad.is_finite() && out.transmission_error_rad.is_finite());
+            }
+        }
     }
 }
