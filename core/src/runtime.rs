@@ -20,7 +20,7 @@ use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
 use crate::hysteresis::{PlayState, SAVED_STATE_BYTES};
 use crate::image::crc32;
-use crate::model::{Approach, Model};
+use crate::model::{Approach, Command, Model, Prediction};
 use crate::store::{Images, Store};
 use crate::table::{self, Doubt, Quality, larger};
 use core::fmt;
@@ -395,6 +395,24 @@ impl Joint {
     #[must_use]
     pub const fn drive(&self) -> &Drive {
         &self.drive
+    }
+
+    /// Output angle for a generator angle, with the play followed in `play`: as [`crate::Table::forward`], from the copies.
+    #[must_use]
+    pub fn forward(
+        &self,
+        store: &Store,
+        play: &mut PlayState,
+        generator: GeneratorAngle,
+        torque_n_m: f32,
+    ) -> Prediction {
+        Model { memory: store, drive: &self.drive }.follow(&store.locate(torque_n_m), play, generator)
+    }
+
+    /// Generator angle that brings the output to `target`: as [`crate::Table::inverse`], from the copies.
+    #[must_use]
+    pub fn inverse(&self, store: &Store, target: OutputAngle, torque_n_m: f32, approach: Approach<'_>) -> Command {
+        Model { memory: store, drive: &self.drive }.aim(&store.locate(torque_n_m), target, approach)
     }
 
     /// One tick.

@@ -17,6 +17,12 @@ fn main() {
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
     println!("cargo:rerun-if-changed=build.rs");
     write_full_table(&out.join("full.fxt"));
+    // The tables of the four generators, made by `flexspline tables`; tests/run does that.
+    let tables =
+        env::var("FLEXSPLINE_TABLES").expect("FLEXSPLINE_TABLES names the folder of the tables; see tests/run");
+    println!("cargo:rustc-env=FLEXSPLINE_TABLES={tables}");
+    println!("cargo:rerun-if-env-changed=FLEXSPLINE_TABLES");
+    println!("cargo:rerun-if-changed={tables}");
 }
 
 /// 25 torques, 3 temperatures, 8 ripple nodes and harmonics of all three angles.
@@ -46,13 +52,21 @@ fn write_full_table(path: &Path) {
         let (sign, load) = (f64::from(direction.sign()), f64::from(torque));
         let flank = load - 1.5 * sign;
         let warm = 1.0 + 1e-3 * (f64::from(temperature) - 20.0);
-        let ripple = (0.5 + 0.02 * load.abs()) * (188.0 * generator_rad).cos() - 0.1 * sign * (188.0 * generator_rad).sin();
+        let ripple =
+            (0.5 + 0.02 * load.abs()) * (188.0 * generator_rad).cos() - 0.1 * sign * (188.0 * generator_rad).sin();
         let (material, output) = (generator_rad * 94.0 / 95.0, generator_rad / 95.0);
-        let slow = 20.0 * (2.0 * generator_rad).cos() + 3.0 * (4.0 * generator_rad).sin() - 12.0 * (2.0 * material).cos()
+        let slow = 20.0 * (2.0 * generator_rad).cos() + 3.0 * (4.0 * generator_rad).sin()
+            - 12.0 * (2.0 * material).cos()
             + 2.0 * (4.0 * material).sin()
             + 8.0 * output.sin();
         let error = warm * (flank / 3.0e4 + flank.signum() * 30.0 * arcsec) + (ripple + slow) * arcsec;
-        Sample { generator_rad, torque_n_m: load, temperature_c: f64::from(temperature), direction, output_rad: output + error }
+        Sample {
+            generator_rad,
+            torque_n_m: load,
+            temperature_c: f64::from(temperature),
+            direction,
+            output_rad: output + error,
+        }
     };
     let mut samples = Vec::new();
     for direction in [Direction::Forward, Direction::Backward] {
@@ -79,7 +93,8 @@ fn write_full_table(path: &Path) {
     let (mut numbers, mut marks) = (vec![0.0; plan.numbers_len()], vec![0; plan.marks_len()]);
     let (mut values, mut image) = (vec![0.0; plan.values_len()], vec![0; plan.image_bytes()]);
     let workspace = Workspace { numbers: &mut numbers, marks: &mut marks, values: &mut values };
-    let fit = make_image(&plan, &provenance, &samples, workspace, &mut image, |_| *b"fullsize").expect("samples of a closed form");
+    let fit = make_image(&plan, &provenance, &samples, workspace, &mut image, |_| *b"fullsize")
+        .expect("samples of a closed form");
     image.truncate(fit.image_bytes);
     fs::write(path, image).expect("OUT_DIR is writable");
 }

@@ -1,9 +1,18 @@
-//! What the programs share: exact instruction counts under QEMU's `-icount`, and how a program ends.
+//! What the programs share: exact instruction counts under QEMU's `-icount`, a trajectory, the tables, and how a program ends.
 #![no_std]
 
 pub mod count;
+pub mod trajectory;
 
 use cortex_m_semihosting::debug;
+
+/// The tables of the four generators that `flexspline tables` made, read in place from flash.
+pub static TABLES: [(&str, &[u8]); 4] = [
+    ("cam", include_bytes!(concat!(env!("FLEXSPLINE_TABLES"), "/cam.fxt"))),
+    ("double-disc", include_bytes!(concat!(env!("FLEXSPLINE_TABLES"), "/double-disc.fxt"))),
+    ("four-roller", include_bytes!(concat!(env!("FLEXSPLINE_TABLES"), "/four-roller.fxt"))),
+    ("two-roller", include_bytes!(concat!(env!("FLEXSPLINE_TABLES"), "/two-roller.fxt"))),
+];
 
 /// Ends the emulation: exit code 0 if all went well, else 1.
 pub fn finish(well: bool) -> ! {

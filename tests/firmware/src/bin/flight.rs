@@ -1,0 +1,43 @@
+//! What flies, and nothing else: tables in flash, a store, a joint, its slow group. Linked with a panic handler that cannot be
+//! linked, so it has no panic path; its size is the size of the core, its call graph bounds the stack.
+//!
+//! With `--features deliberate-panic` it has one, and must not link.
+#![no_std]
+#![no_main]
+
+use core::hint::black_box;
+
+use cortex_m_rt::entry;
+use flexspline::{Images, JointState, Mode, PlayState, RateGroup, Store};
+use flexspline_firmware::trajectory::{JOINT, Trajectory};
+use flexspline_firmware::{TABLES, finish};
+
+const TICKS: u32 = 2000;
+
+#[entry]
+fn main() -> ! {
+    let Some(store) = cortex_m::singleton!(: Store = Store::new()) else { finish(false) };
+    let [.., (_, image)] = TABLES;
+    let images = Images::new(image, image);
+    if store.activate(&images, JOINT.drive(), 21.0).is_err() {
+        finish(false);
+    }
+    let mut state = JointState::restore(&black_box(JointState::new()).save()).unwrap_or_default();
+    let _ = state.request(Mode::Tracking);
+    let mut trajectory = Trajectory::new(1);
+    let slow = RateGroup::new(100, 50);
+    let mut held_back = 0u32;
+    for tick in 0..TICKS {
+        let out = black_box(JOINT.tick(&images, store, &mut state, &trajectory.next()));
+        trajectory.saw(&out);
+        held_back = held_back.wrapping_add((out.held_back_rad != 0.0) as u32);
+        if slow.is_some_and(|group| group.is_due(tick)) {
+            store.set_temperature(&images, 21.0);
+            store.check_images(&images, 16);
+        }
+    }
+    #[cfg(feature = "deliberate-panic")]
+    assert!(held_back < TICKS);
+    let known = state.play() != &PlayState::unknown();
+    finish(known & (held_back > 0) & (store.counters().words_skipped == 0))
+}
