@@ -176,11 +176,11 @@ impl<M: Memory> Model<'_, M> {
         let (mut half, mut centre) = (point.half_width, point.mean);
         // As many times for every call with this table.
         for _ in 0..point.iterations() {
-            let there = self.drive.phases_at_output(target.offset_counts(-(error as i64)));
+            let there = self.drive.phases_at_output(target.offset_counts((error as i64).wrapping_neg()));
             let before = curves;
             curves = table::curves_at(self.memory, point, there, &mut doubt);
             let guess = error.wrapping_add(curves).wrapping_sub(before);
-            let tooth = self.drive.phases_at_output(target.offset_counts(-(guess as i64))).tooth;
+            let tooth = self.drive.phases_at_output(target.offset_counts((guess as i64).wrapping_neg())).tooth;
             let ripple = table::ripple_around(self.memory, point, tooth, &mut doubt);
             // Where the solution would be without ripple, in cells from the boundary.
             let here = base.wrapping_add(curves);
@@ -191,7 +191,7 @@ impl<M: Memory> Model<'_, M> {
             half = point.half_width.wrapping_add(wide as i32);
             centre = error.wrapping_add(side.wrapping_mul(half));
         }
-        let nominal = target.offset_counts(-(error as i64));
+        let nominal = target.offset_counts((error as i64).wrapping_neg());
         let sane = point.finite & doubt.none() & point.allows(centre, half);
         let short = from.resting.map_or(0, |state| short_of_contact(state, side, nominal, half));
         let (nominal, error) = match from.resting {

@@ -24,6 +24,7 @@ use crate::model::{Approach, Command, Model, Prediction};
 use crate::store::{Images, Store};
 use crate::table::{self, Doubt, Quality, larger};
 use core::fmt;
+use core::hint::black_box;
 
 /// What a joint does with its correction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -60,12 +61,12 @@ impl Mode {
     /// and safe is left to off alone.
     #[must_use]
     pub const fn may_become(self, to: Self) -> bool {
-        match (self, to) {
-            (_, Self::Safe) | (_, Self::Off) => true,
-            (Self::Off | Self::Tracking | Self::Hold, Self::Tracking) => true,
-            (Self::Tracking | Self::Hold, Self::Hold) => true,
-            _ => false,
-        }
+        matches!(
+            (self, to),
+            (_, Self::Safe | Self::Off)
+                | (Self::Off | Self::Tracking | Self::Hold, Self::Tracking)
+                | (Self::Tracking | Self::Hold, Self::Hold)
+        )
     }
 }
 
@@ -446,7 +447,7 @@ impl Joint {
             .with(Flags::STATE_TORN, torn | !whole);
         let counts = correction >> 4;
         Output {
-            command: self.drive.nominal_generator(input.target.offset_counts(-(counts as i64))),
+            command: self.drive.nominal_generator(input.target.offset_counts((counts as i64).wrapping_neg())),
             output: now.output,
             transmission_error_rad: now.transmission_error_rad,
             uncertainty_rad: larger(now.uncertainty_rad, aim.uncertainty as f32 * RAD_PER_COUNT),
@@ -466,7 +467,8 @@ impl Joint {
         };
         let moved = sample.minus_small_counts(state.generator);
         let far = ((moved > self.largest_move) | (moved < self.largest_move.wrapping_neg())) & state.started;
-        state.glitches = if far { state.glitches.saturating_add(1) } else { 0 };
+        let more = black_box(state.glitches.saturating_add(1));
+        state.glitches = if far { more } else { 0 };
         let believed = far & (state.glitches > self.patience);
         state.glitches = if believed { 0 } else { state.glitches };
         let glitch = far & !believed;
@@ -481,9 +483,12 @@ impl Joint {
     fn goal(&self, state: &mut JointState, input: &Input, wanted: i32, sane: bool) -> (i32, bool) {
         let late = input.missed_ticks > 0;
         state.missed_ticks = state.missed_ticks.wrapping_add(input.missed_ticks as u32);
-        state.uncorrected = if sane { 0 } else { state.uncorrected.saturating_add(1) };
+        // Arithmetic instead of a choice: the compiler makes branches of choices, and then ticks differ.
+        let blind = black_box(u32::from(!sane));
+        state.uncorrected = state.uncorrected.saturating_add(1).wrapping_mul(blind);
         let kept = state.goal;
-        let wanted = if sane { wanted.wrapping_mul(FINE) } else { kept };
+        let found = wanted.wrapping_mul(FINE);
+        let wanted = found.wrapping_add(kept.wrapping_sub(found).wrapping_mul(blind as i32));
         let wanted = if state.uncorrected > self.patience { 0 } else { wanted };
         let wanted = match state.mode {
             Mode::Tracking => wanted,
@@ -494,10 +499,11 @@ impl Joint {
         let wanted = if hold { kept } else { wanted };
         // Down in `fade` ticks, none for as many; without that policy `fade` is 0.
         let start = self.fade.wrapping_mul(2);
-        state.fading = if late { start } else { state.fading.saturating_sub(1) };
+        let left = black_box(state.fading.saturating_sub(1));
+        state.fading = if late { start } else { left };
         let left = state.fading.saturating_sub(self.fade) as f32 * self.fade_step;
-        let share = if state.fading > 0 { left } else { 1.0 };
-        let goal = if state.fading > 0 { (wanted as f32 * share) as i32 } else { wanted };
+        let faded = black_box((wanted as f32 * left) as i32);
+        let goal = if state.fading > 0 { faded } else { wanted };
         state.goal = wanted;
         (goal, late)
     }
@@ -756,7 +762,8 @@ mod tests {
     /// Flips in what changes while running: what can be told is flagged, and the correction stays within its limits.
     #[test]
     fn upsets_of_the_state_never_make_the_correction_jump() {
-        let flips: [(fn(&mut JointState, u32), bool); 7] = [
+        type Flip = fn(&mut JointState, u32);
+        let flips: [(Flip, bool); 7] = [
             (|s, bit| s.nominal = s.nominal.offset_counts(1 << bit), true),
             (|s, bit| s.correction[0] ^= 1 << bit, true),
             (|s, bit| s.correction[1] ^= 1 << bit, true),

@@ -225,7 +225,7 @@ impl Default for Store {
 }
 
 impl Memory for Store {
-    const PLANES: usize = 1;
+    const ROWS: usize = 2;
 
     #[inline(always)]
     fn words<const N: usize>(&self, at: usize, doubt: &mut Doubt) -> [u32; N] {

@@ -145,8 +145,8 @@ impl Doubt {
 
 /// The words of a table, in one copy or in two that are compared as they are read.
 pub(crate) trait Memory {
-    /// Temperatures between which records are blended as they are read: 1 or 2.
-    const PLANES: usize;
+    /// Records that are blended as they are read: 2, or 4 with two temperatures.
+    const ROWS: usize;
 
     /// `N` words from word `at`. What two copies disagree in is added to `doubt`.
     fn words<const N: usize>(&self, at: usize, doubt: &mut Doubt) -> [u32; N];
@@ -169,7 +169,7 @@ pub(crate) struct Plan {
 }
 
 impl Memory for Table<'_> {
-    const PLANES: usize = 2;
+    const ROWS: usize = 4;
 
     #[inline(always)]
     fn words<const N: usize>(&self, at: usize, _: &mut Doubt) -> [u32; N] {
@@ -489,7 +489,7 @@ fn coefficients<M: Memory, const N: usize>(
     let at = first.wrapping_add(node);
     let hot = at.wrapping_add(plane_step);
     let rows = [at, at.wrapping_add(torque_step), hot, hot.wrapping_add(torque_step)];
-    for (row, share) in rows.into_iter().zip(point.shares).take(2 * M::PLANES) {
+    for (row, share) in rows.into_iter().zip(point.shares).take(M::ROWS) {
         let words: [u32; N] = memory.words(row, doubt);
         for ((forward, backward), word) in forward.iter_mut().zip(&mut backward).zip(words) {
             // |Σ| ≤ 2¹⁵·2¹⁴: the shares add up to 2¹⁴.

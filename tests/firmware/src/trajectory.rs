@@ -19,7 +19,7 @@ pub struct Mixed(pub u32);
 
 impl Mixed {
     /// 32 bits.
-    pub fn next(&mut self) -> u32 {
+    pub fn number(&mut self) -> u32 {
         self.0 = self.0.wrapping_add(0x9e37_79b9);
         let mut x = self.0;
         x = (x ^ (x >> 16)).wrapping_mul(0x85eb_ca6b);
@@ -29,7 +29,7 @@ impl Mixed {
 
     /// Between −1 and 1.
     pub fn part(&mut self) -> f32 {
-        (self.next() >> 8) as f32 * (2.0 / 16_777_216.0) - 1.0
+        (self.number() >> 8) as f32 * (2.0 / 16_777_216.0) - 1.0
     }
 }
 
@@ -55,13 +55,13 @@ impl Trajectory {
     }
 
     /// The next tick's input.
-    pub fn next(&mut self) -> Input {
-        if self.mixed.next() % 64 == 0 {
-            self.speed = (self.mixed.next() as i32) >> 8;
+    pub fn input(&mut self) -> Input {
+        if self.mixed.number().is_multiple_of(64) {
+            self.speed = (self.mixed.number() as i32) >> 8;
             self.torque_n_m = 60.0 * self.mixed.part();
         }
         self.generator = self.generator.offset_counts(i64::from(self.speed));
-        let event = self.mixed.next() % 1024;
+        let event = self.mixed.number() % 1024;
         Input {
             generator: if event == 0 { None } else { Some(self.generator) },
             target: self.output.offset_rad(1e-3 * self.mixed.part()),
@@ -99,10 +99,10 @@ pub fn run(image: &[u8], store: &mut Store, ticks: u32) -> u64 {
     let mut trajectory = Trajectory::new(7);
     let mut sum = 0xcbf2_9ce4_8422_2325;
     for tick in 0..ticks {
-        if tick % 1000 == 0 {
+        if tick.is_multiple_of(1000) {
             store.set_temperature(&images, 20.0 + 60.0 * trajectory.mixed.part());
         }
-        let out = JOINT.tick(&images, store, &mut state, &trajectory.next());
+        let out = JOINT.tick(&images, store, &mut state, &trajectory.input());
         trajectory.saw(&out);
         sum = hash(sum, &out);
     }

@@ -46,7 +46,7 @@ fn measure(counter: &Counter, name: &str, image: &[u8]) -> Option<Range> {
     let (mut ticks, mut forwards, mut inverses) = (Range::default(), Range::default(), Range::default());
     let mut generator = GeneratorAngle::ZERO;
     for _ in 0..INPUTS {
-        let input = trajectory.next();
+        let input = trajectory.input();
         let (count, out) = counter.of(|| black_box(tick(&JOINT, &images, &mut store, &mut state, &input)));
         ticks.add(count);
         trajectory.saw(&out);

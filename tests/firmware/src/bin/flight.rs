@@ -28,7 +28,7 @@ fn main() -> ! {
     let slow = RateGroup::new(100, 50);
     let mut held_back = 0u32;
     for tick in 0..TICKS {
-        let out = black_box(JOINT.tick(&images, store, &mut state, &trajectory.next()));
+        let out = black_box(JOINT.tick(&images, store, &mut state, &trajectory.input()));
         trajectory.saw(&out);
         held_back = held_back.wrapping_add((out.held_back_rad != 0.0) as u32);
         if slow.is_some_and(|group| group.is_due(tick)) {
