@@ -5,7 +5,7 @@
 //! checked: null, alignment, whether the object was initialised, overlap of what is written, lengths and enumerations. A call that
 //! returns anything but [`FlexsplineStatus::Ok`] has changed nothing unless its documentation says so.
 //!
-//! The only `unsafe` of the crate. What it relies on, and what C cannot be kept from breaking: a pointer that is not null and
+//! Not to be called from Rust, and private for that reason. The only `unsafe` of the crate. What it relies on, and what C cannot be kept from breaking: a pointer that is not null and
 //! is aligned points to an object of its type, and images have the length given.
 #![allow(unsafe_code)]
 

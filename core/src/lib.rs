@@ -102,7 +102,7 @@ extern crate std;
 
 mod angle;
 #[cfg(feature = "c-api")]
-pub mod c_api;
+mod c_api;
 mod drive;
 mod error;
 #[cfg(test)]
