@@ -35,7 +35,7 @@ impl Direction {
 }
 
 /// Largest half-width in counts, 0.05 rad: far above any play, far below overflow.
-const MAX_HALF_COUNTS: i32 = 34_178_720;
+pub(crate) const MAX_HALF_COUNTS: i32 = 34_178_720;
 
 /// Where the drive rests inside its play: all that must survive a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -112,7 +112,9 @@ mod hysteresis;
 mod image;
 mod model;
 pub mod precompute;
+mod predictor;
 mod runtime;
+mod slip;
 mod store;
 mod table;
 mod upload;
@@ -127,10 +129,12 @@ pub use image::{
     TableData, WriteError, image_bytes, write_image,
 };
 pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, Prediction};
+pub use predictor::{Ahead, Inertias, Measured, Noise, Predictor, PredictorError, PredictorState};
 pub use runtime::{
     Flags, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, RateGroup, SAVED_JOINT_BYTES,
     SettingError,
 };
+pub use slip::{Slip, SlipBank, SlipElement, SlipState};
 pub use store::{ActivateError, Counters, Health, Images, STORE_WORDS, Store, mend_page};
 pub use table::{Bounds, GeneratorKind, OperatingPoint, Quality, Table, TableId};
 pub use upload::{Upload, UploadError};
