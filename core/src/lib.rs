@@ -129,7 +129,7 @@ pub use image::{
     TableData, WriteError, image_bytes, write_image,
 };
 pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, Prediction};
-pub use predictor::{Ahead, Inertias, Measured, Noise, Predictor, PredictorError, PredictorState};
+pub use predictor::{Ahead, Inertias, Measured, Noise, PREDICTOR_PARTS, Predictor, PredictorError, PredictorState};
 pub use runtime::{
     Flags, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, RateGroup, SAVED_JOINT_BYTES,
     SettingError,

@@ -15,6 +15,8 @@
 //!
 //! Not in here: friction, and the play, which belongs to the table.
 
+#![allow(clippy::arithmetic_side_effects)] // Matrices of floating-point numbers: nothing overflows.
+
 use core::fmt;
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Matrix4x2, Vector2, Vector4};
 
@@ -108,6 +110,9 @@ impl fmt::Display for PredictorError {
 }
 
 impl core::error::Error for PredictorError {}
+
+/// Numbers of a predictor.
+pub const PREDICTOR_PARTS: usize = 29;
 
 /// Squarings of the observer's matrix that the proof takes: 1024 ticks.
 const SQUARINGS: u32 = 10;
@@ -212,6 +217,33 @@ impl Predictor {
             p = (p + p.transpose()) * 0.5;
         }
         let predictor = Self { a: a.cast(), b: b.cast(), gain: gain.cast(), tick_s: tick_s as f32 };
+        predictor.check()
+    }
+
+    /// All numbers of a predictor, for the image of the firmware: the matrices by columns and the tick.
+    #[must_use]
+    pub fn parts(&self) -> [f32; PREDICTOR_PARTS] {
+        let mut parts = [self.tick_s; PREDICTOR_PARTS];
+        let numbers = self.a.iter().chain(self.b.iter()).chain(self.gain.iter());
+        parts.iter_mut().zip(numbers).for_each(|(to, from)| *to = *from);
+        parts
+    }
+
+    /// A predictor of [`Self::parts`], checked.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub fn from_parts(parts: &[f32; PREDICTOR_PARTS]) -> Result<Self, PredictorError> {
+        let mut predictor = Self { a: Matrix4::zeros(), b: Vector4::zeros(), gain: Matrix4x2::zeros(), tick_s: 0.0 };
+        let numbers = predictor.a.iter_mut().chain(predictor.b.iter_mut()).chain(predictor.gain.iter_mut());
+        numbers.chain([&mut predictor.tick_s]).zip(parts).for_each(|(to, from)| *to = *from);
+        let tick_s = predictor.tick_s as f64;
+        if !(tick_s > 0.0 && tick_s < 1e3) {
+            return Err(PredictorError::Setting { name: "tick_s", found: tick_s });
+        }
+        if let Some(bad) = predictor.b.iter().find(|value| !value.is_finite()) {
+            return Err(PredictorError::Setting { name: "b", found: *bad as f64 });
+        }
         predictor.check()
     }
 
@@ -392,6 +424,10 @@ mod tests {
         }
     }
 
+    fn good_parts() -> [f32; PREDICTOR_PARTS] {
+        Predictor::new(INERTIAS, NOISE, TICK_S).unwrap().parts()
+    }
+
     #[test]
     fn what_makes_no_predictor_is_named() {
         let named = |inertias, noise, tick| match Predictor::new(inertias, noise, tick).unwrap_err() {
@@ -401,10 +437,16 @@ mod tests {
         assert_eq!(named(Inertias { load_kg_m2: 0.0, ..INERTIAS }, NOISE, 1e-3), "load_kg_m2");
         assert_eq!(named(INERTIAS, Noise { twist_rad: Some(f64::NAN), ..NOISE }, 1e-3), "twist_rad");
         assert_eq!(named(INERTIAS, NOISE, -1e-3), "tick_s");
+        assert_eq!(Predictor::from_parts(&good_parts()), Ok(Predictor::new(INERTIAS, NOISE, TICK_S).unwrap()));
+        for (place, value) in [(0, f32::NAN), (17, f32::INFINITY), (21, 5.0), (28, 0.0), (28, f32::NAN)] {
+            let mut parts = good_parts();
+            parts[place] = value;
+            assert!(Predictor::from_parts(&parts).is_err(), "{place}");
+        }
         // One that was damaged on its way, or made for another machine.
         let good = Predictor::new(INERTIAS, NOISE, TICK_S).unwrap();
         let wild = Predictor { gain: good.gain * -3.0, ..good };
-        assert!(matches!(wild.check(), Err(PredictorError::Observer { factor }) if !(factor < 1.0)));
+        assert!(matches!(wild.check(), Err(PredictorError::Observer { factor }) if factor.is_nan() || factor > 1.0));
         let undefined = Predictor { a: good.a * f32::NAN, ..good };
         assert!(undefined.check().is_err());
     }

@@ -14,6 +14,9 @@ pub static TABLES: [(&str, &[u8]); 4] = [
     ("two-roller", include_bytes!(concat!(env!("FLEXSPLINE_TABLES"), "/two-roller.fxt"))),
 ];
 
+/// Two inertias, discretised on the host.
+pub static PREDICTOR: [f32; flexspline::PREDICTOR_PARTS] = include!(concat!(env!("OUT_DIR"), "/predictor.rs"));
+
 /// Ends the emulation: exit code 0 if all went well, else 1.
 pub fn finish(well: bool) -> ! {
     loop {

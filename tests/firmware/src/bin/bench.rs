@@ -8,12 +8,12 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use flexspline::{
-    Approach, Command, GeneratorAngle, Images, Input, Joint, JointState, Mode, Output, OutputAngle, PlayState,
-    Prediction, Store,
+    Approach, Command, GeneratorAngle, Images, Input, Joint, JointState, Measured, Mode, Output, OutputAngle,
+    PlayState, Prediction, Predictor, PredictorState, Store,
 };
 use flexspline_firmware::count::{Counter, Range};
-use flexspline_firmware::trajectory::{JOINT, Trajectory};
-use flexspline_firmware::{TABLES, finish};
+use flexspline_firmware::trajectory::{JOINT, Mixed, Trajectory};
+use flexspline_firmware::{PREDICTOR, TABLES, finish};
 
 /// 25 torques, 3 temperatures, and harmonics of all three angles, which no table of FEM has.
 static FULL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/full.fxt"));
@@ -33,6 +33,24 @@ fn forward(joint: &Joint, store: &Store, play: &mut PlayState, generator: Genera
 #[inline(never)]
 fn inverse(joint: &Joint, store: &Store, play: &PlayState, target: OutputAngle, torque: f32) -> Command {
     joint.inverse(store, target, torque, Approach::From(play))
+}
+
+#[inline(never)]
+fn observe(predictor: &Predictor, state: &mut PredictorState, measured: &Measured) {
+    predictor.step(state, measured);
+}
+
+/// Counts of the observer.
+fn measure_observer(counter: &Counter) -> Option<Range> {
+    let predictor = Predictor::from_parts(&PREDICTOR).ok()?;
+    let (mut state, mut mixed, mut range) = (PredictorState::new(), Mixed(3), Range::default());
+    for _ in 0..INPUTS {
+        let measured =
+            Measured { torque_n_m: 50.0 * mixed.part(), speed_rad_s: mixed.part(), twist_rad: 1e-3 * mixed.part() };
+        range.add(counter.of(|| observe(&predictor, &mut state, black_box(&measured))).0);
+    }
+    hprintln!("observer: {} instructions (min {}, max {})", range.max, range.min, range.max);
+    Some(range)
 }
 
 /// Counts with one table; the tick's is given back.
@@ -77,6 +95,10 @@ fn main() -> ! {
     if measure(&counter, "all-curves", FULL).is_none() {
         finish(false);
     }
+    let Some(observer) = measure_observer(&counter) else { finish(false) };
+    // The observer is part of a step.
+    costliest.min += observer.min;
+    costliest.max += observer.max;
     hprintln!("step: {} instructions (min {}, max {})", costliest.max, costliest.min, costliest.max);
     finish(costliest.min == costliest.max)
 }
