@@ -106,10 +106,11 @@ macro_rules! angle {
 
             /// `self − other` in counts, clamped to ±half a turn.
             #[must_use]
-            pub(crate) fn minus_small_counts(self, other: Self) -> i32 {
+            pub(crate) const fn minus_small_counts(self, other: Self) -> i32 {
                 let counts = self.minus_counts(other);
-                // Saturates without a comparison of 64-bit constants.
-                i32::try_from(counts).unwrap_or(if counts < 0 { i32::MIN } else { i32::MAX })
+                let (high, low) = ((counts >> 32) as i32, counts as i32);
+                // All ones or all zeros above the sign of the lower half: it fits. Else the limit on its side.
+                if high == low >> 31 { low } else { (high >> 31) ^ i32::MAX }
             }
 
             /// `self − other` in radians, clamped to ±π; relative error at most 1.2e-7.

@@ -32,6 +32,13 @@ pub struct Drive {
     waves: NonZeroU16,
     fixed: FixedMember,
     ratio: f32,
+    /// |1/ratio| and |ratio|, with the sign of the ratio beside them.
+    to_output: Factor,
+    to_generator: Factor,
+    reversed: bool,
+    /// Turns of the generator, and tooth pitches of the fixed member, in one output turn: 32 whole and 32 fractional bits.
+    generator_rate: i64,
+    tooth_rate: i64,
 }
 
 /// Where the periodic parts of a table are read, each as a fraction of its own period in 2⁻³².
@@ -52,16 +59,38 @@ impl Drive {
     ///
     /// # Errors
     /// [`DriveError`] unless `1 ≤ flexspline_teeth < circular_spline_teeth`.
-    pub fn new(flexspline_teeth: u16, circular_spline_teeth: u16, fixed: FixedMember) -> Result<Self, DriveError> {
+    pub const fn new(
+        flexspline_teeth: u16,
+        circular_spline_teeth: u16,
+        fixed: FixedMember,
+    ) -> Result<Self, DriveError> {
         let bad = DriveError { flexspline_teeth, circular_spline_teeth };
-        let fs = NonZeroU16::new(flexspline_teeth).ok_or(bad)?;
-        let cs = NonZeroU16::new(circular_spline_teeth).ok_or(bad)?;
-        let waves = circular_spline_teeth.checked_sub(flexspline_teeth).and_then(NonZeroU16::new).ok_or(bad)?;
-        let ratio = match fixed {
-            FixedMember::Flexspline => cs.get() as f32 / waves.get() as f32,
-            FixedMember::CircularSpline => -(fs.get() as f32) / waves.get() as f32,
+        let (Some(fs), Some(cs)) = (NonZeroU16::new(flexspline_teeth), NonZeroU16::new(circular_spline_teeth)) else {
+            return Err(bad);
         };
-        Ok(Self { flexspline_teeth: fs, circular_spline_teeth: cs, waves, fixed, ratio })
+        let Some(waves) = NonZeroU16::new(circular_spline_teeth.saturating_sub(flexspline_teeth)) else {
+            return Err(bad);
+        };
+        let (teeth, ripple_order, reversed) = match fixed {
+            FixedMember::Flexspline => (cs, fs.get(), false),
+            FixedMember::CircularSpline => (fs, cs.get(), true),
+        };
+        let (to_output, to_generator) = (Factor::new(waves, teeth), Factor::new(teeth, waves));
+        let rate = to_generator.fixed_point();
+        let generator_rate = if reversed { rate.wrapping_neg() } else { rate };
+        let magnitude = teeth.get() as f32 / waves.get() as f32;
+        Ok(Self {
+            flexspline_teeth: fs,
+            circular_spline_teeth: cs,
+            waves,
+            fixed,
+            ratio: if reversed { -magnitude } else { magnitude },
+            to_output,
+            to_generator,
+            reversed,
+            generator_rate,
+            tooth_rate: generator_rate.wrapping_mul(ripple_order as i64),
+        })
     }
 
     /// Teeth of the flexspline.
@@ -117,26 +146,23 @@ impl Drive {
     }
 
     const fn with_sign(&self, counts: i64) -> i64 {
-        match self.fixed {
-            FixedMember::Flexspline => counts,
-            FixedMember::CircularSpline => counts.wrapping_neg(),
-        }
+        // Without a branch: all ones if reversed, else 0.
+        let mask = (self.reversed as i64).wrapping_neg();
+        (counts ^ mask).wrapping_sub(mask)
     }
 
-    /// The ideal output angle `generator/ratio`, to half a count of the exact quotient at any number of turns.
+    /// The ideal output angle `generator/ratio`, to half a count below a million turns, to 5/4 count at any number.
     ///
-    /// Integer only: six 32-bit divisions, no 64-bit one.
+    /// Integer only, no division: five 32-bit multiplications.
     #[must_use]
-    pub fn nominal_output(&self, generator: GeneratorAngle) -> OutputAngle {
-        let (teeth, waves) = self.turns_and_waves();
-        OutputAngle::from_counts(self.with_sign(scale(generator.counts(), waves, teeth)))
+    pub const fn nominal_output(&self, generator: GeneratorAngle) -> OutputAngle {
+        OutputAngle::from_counts(self.with_sign(self.to_output.of(generator.counts())))
     }
 
-    /// The generator angle `output·ratio` of an ideal drive, to half a count; wraps beyond ±2³¹ generator turns.
+    /// The generator angle `output·ratio` of an ideal drive, with the same error; wraps beyond ±2³¹ generator turns.
     #[must_use]
-    pub fn nominal_generator(&self, output: OutputAngle) -> GeneratorAngle {
-        let (teeth, waves) = self.turns_and_waves();
-        GeneratorAngle::from_counts(self.with_sign(scale(output.counts(), teeth, waves)))
+    pub const fn nominal_generator(&self, output: OutputAngle) -> GeneratorAngle {
+        GeneratorAngle::from_counts(self.with_sign(self.to_generator.of(output.counts())))
     }
 
     /// Where the periodic parts of a table are read at this generator angle; `nominal` is its nominal output.
@@ -148,6 +174,25 @@ impl Drive {
             output: nominal.fraction(),
             tooth: generator.fraction().wrapping_mul(self.ripple_order() as u32),
         }
+    }
+
+    /// The same, from the nominal output alone: two multiplications, each phase within 2⁻³² of a period for every whole output
+    /// turn if the ratio is not a multiple of 2⁻³², else exact.
+    #[must_use]
+    pub(crate) const fn phases_at_output(&self, nominal: OutputAngle) -> Phases {
+        let counts = nominal.counts();
+        let generator = (counts.wrapping_mul(self.generator_rate) >> 32) as u32;
+        Phases {
+            generator,
+            material: generator.wrapping_sub(nominal.fraction()),
+            output: nominal.fraction(),
+            tooth: (counts.wrapping_mul(self.tooth_rate) >> 32) as u32,
+        }
+    }
+
+    /// Tooth pitches of the fixed member in one output turn, signed like the ratio.
+    pub(crate) const fn tooth_periods(&self) -> f32 {
+        self.ratio * self.ripple_order() as f32
     }
 
     /// The generator angle that brings an output with this error to `target`, and the nominal output there:
@@ -162,27 +207,56 @@ impl Drive {
     }
 }
 
-/// `counts·mul/div` to the nearest integer, halves away from zero; wraps like the angles.
-///
-/// Exact: whole turns and the rest are divided apart. Straight-line code, the same work for all values.
-fn scale(counts: i64, mul: NonZeroU16, div: NonZeroU16) -> i64 {
-    let magnitude = counts.unsigned_abs();
-    let turns = (magnitude >> 32) as u32;
-    let divisor = core::num::NonZeroU32::from(div);
-    let whole = turns / divisor;
-    let rest = ((turns % divisor) as u64) << 32 | (magnitude & 0xffff_ffff);
-    // rest < div·2³², so the product is below 2⁶⁴ − 2⁴⁸ and the half divisor cannot overflow it.
-    let product = rest.wrapping_mul(mul.get() as u64).wrapping_add((div.get() >> 1) as u64);
-    let mut quotient = 0u64;
-    let mut remainder = 0u32;
-    for digit in [48, 32, 16, 0] {
-        let part = remainder << 16 | (product >> digit) as u16 as u32;
-        quotient = quotient << 16 | (part / divisor) as u64;
-        remainder = part % divisor;
+/// A ratio of tooth counts: a whole part and 64 fractional bits, the last 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Factor {
+    whole: u32,
+    fraction: u64,
+}
+
+impl Factor {
+    /// `mul/div`, by long division in digits of 16 bits.
+    const fn new(mul: NonZeroU16, div: NonZeroU16) -> Self {
+        let divisor = div.get() as u32;
+        // A zero divisor cannot be; `checked` keeps the panic path out.
+        let (Some(whole), Some(mut remainder)) =
+            ((mul.get() as u32).checked_div(divisor), (mul.get() as u32).checked_rem(divisor))
+        else {
+            return Self { whole: 0, fraction: 0 };
+        };
+        let mut fraction = 0u64;
+        let mut digit = 0;
+        while digit < 4 {
+            let part = remainder << 16;
+            if let (Some(quotient), Some(rest)) = (part.checked_div(divisor), part.checked_rem(divisor)) {
+                fraction = fraction << 16 | quotient as u64;
+                remainder = rest;
+            }
+            digit = u32::wrapping_add(digit, 1);
+        }
+        let up = remainder.wrapping_mul(2) >= divisor;
+        // Rounding up cannot carry into the whole part: the fraction is at most (div - 1)/div, div < 2^16.
+        // An even fraction keeps the largest partial sums of `of` within 64 bits.
+        Self { whole, fraction: fraction.wrapping_add(up as u64) & !1 }
     }
-    let whole_turns = (whole as u64).wrapping_mul(mul.get() as u64) << 32;
-    let scaled = whole_turns.wrapping_add(quotient) as i64;
-    if counts < 0 { scaled.wrapping_neg() } else { scaled }
+
+    /// 32 whole and 32 fractional bits.
+    const fn fixed_point(self) -> i64 {
+        let rounded = (self.fraction >> 32).wrapping_add(self.fraction >> 31 & 1);
+        ((self.whole as u64) << 32).wrapping_add(rounded) as i64
+    }
+
+    /// `counts·factor`, to within 5/4 count (half of one below 2²⁰ turns); wraps like the angles. The same work for all values.
+    const fn of(self, counts: i64) -> i64 {
+        let (high, low) = (counts >> 32, counts as u32 as u64);
+        let (fraction_high, fraction_low) = ((self.fraction >> 32) as i64, self.fraction as u32 as u64);
+        // Partial products of 32 bits each; the lowest but for its carry, rounded at half a count.
+        let lowest = low.wrapping_mul(fraction_low) >> 32;
+        let middle = low.wrapping_mul(fraction_high as u64).wrapping_add(lowest);
+        let other = high.wrapping_mul(fraction_low as i64).wrapping_add(middle as u32 as i64).wrapping_add(1 << 31);
+        let scaled = high.wrapping_mul(fraction_high).wrapping_add((middle >> 32) as i64).wrapping_add(other >> 32);
+        counts.wrapping_mul(self.whole as i64).wrapping_add(scaled)
+    }
 }
 
 #[cfg(test)]
@@ -249,13 +323,35 @@ mod tests {
 
     proptest! {
         #[test]
-        fn scaling_is_exact_division(counts in any::<i64>(), mul in 1u16.., div in 1u16..) {
-            let exact = counts.unsigned_abs() as u128 * mul as u128 + (div / 2) as u128;
-            let exact = (exact / div as u128) as u64 as i64;
-            let exact = if counts < 0 { exact.wrapping_neg() } else { exact };
-            let mul = NonZeroU16::new(mul).unwrap();
-            let div = NonZeroU16::new(div).unwrap();
-            prop_assert_eq!(scale(counts, mul, div), exact);
+        fn scaling_is_division_to_about_a_count(counts in any::<i64>(), mul in 1u16.., div in 1u16..) {
+            let exact = counts as i128 * mul as i128;
+            let (mul, div) = (NonZeroU16::new(mul).unwrap(), NonZeroU16::new(div).unwrap());
+            let found = Factor::new(mul, div).of(counts) as i128;
+            // Both modulo 2^64: the angles wrap.
+            let off = (exact - found * div.get() as i128).rem_euclid((div.get() as i128) << 64);
+            let off = off.min(((div.get() as i128) << 64) - off);
+            prop_assert!(4 * off <= 5 * div.get() as i128 + 4, "{off} of {div}");
+        }
+
+        #[test]
+        fn phases_at_the_output_are_those_of_the_generator(turns in -10_000i32..10_000, fraction in any::<u32>()) {
+            let drives = [
+                (188, 190, FixedMember::Flexspline), (190, 192, FixedMember::CircularSpline),
+                (201, 203, FixedMember::CircularSpline), (200, 203, FixedMember::Flexspline),
+            ];
+            for (fs, cs, fixed) in drives {
+                let drive = Drive::new(fs, cs, fixed).unwrap();
+                let nominal = OutputAngle::new(turns, fraction);
+                let generator = drive.nominal_generator(nominal);
+                let (there, here) = (drive.phases(generator, nominal), drive.phases_at_output(nominal));
+                prop_assert_eq!(there.output, here.output);
+                for (a, b) in [(there.generator, here.generator), (there.tooth, here.tooth), (there.material, here.material)] {
+                    // One count of the generator is `cs` counts of the tooth phase; 10 000 turns of a ratio of thirds.
+                    let off = (a.wrapping_sub(b) as i32).unsigned_abs();
+                    prop_assert!(off < 3_000_000, "{off}");
+                    prop_assert!(fs != 188 || off <= 190, "{off}");
+                }
+            }
         }
 
         #[test]

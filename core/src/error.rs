@@ -47,7 +47,7 @@ pub enum Field {
     Mean,
     /// Mean half-width of the play, rad.
     HalfWidth,
-    /// Slope of the mean error over the torque, rad/(N·m).
+    /// Slope of the mean error over the torque, counts/(N·m).
     MeanSlope,
     /// Ripple of the mean over one tooth pitch, rad.
     MeanRipple,
@@ -204,6 +204,11 @@ pub enum ImageError {
         /// Position in the stored curve.
         index: usize,
     },
+    /// A number that follows from others does not: an offset, a unit, a bound or padding.
+    Derived {
+        /// Offset in the image, bytes.
+        offset: usize,
+    },
     /// A value outside its limits.
     OutOfRange {
         /// Which field.
@@ -235,6 +240,11 @@ pub enum ImageError {
     Slope {
         /// Bound of the slope found; below 1 is allowed.
         found: f32,
+    },
+    /// The inverse does not come close enough in the iterations that a step may take.
+    Inverse {
+        /// Error left, rad at the output; at most [`MAX_INVERSE_ERROR_RAD`](crate::MAX_INVERSE_ERROR_RAD) is allowed.
+        left_rad: f32,
     },
 }
 
@@ -274,6 +284,7 @@ impl fmt::Display for ImageError {
             Self::NotClosed { field, index } => {
                 write!(f, "{field}: does not close, at stored value {index}")
             }
+            Self::Derived { offset } => write!(f, "the word at offset {offset} does not follow from the others"),
             Self::OutOfRange { field, found, least, most } => {
                 write!(f, "{field}: {found}, allowed are {least} to {most}")
             }
@@ -285,6 +296,7 @@ impl fmt::Display for ImageError {
             Self::ErrorBound { found_rad, allowed_rad } => {
                 write!(f, "the table can give an error of {found_rad} rad, its limit is {allowed_rad}")
             }
+            Self::Inverse { left_rad } => write!(f, "the inverse is left with an error of {left_rad} rad"),
             Self::Slope { found } => write!(f, "slope bound |ratio*de/dpsi| = {found}, allowed is below 1"),
         }
     }

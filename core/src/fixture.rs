@@ -107,7 +107,7 @@ pub fn plan(long: bool) -> Plan<'static> {
         ripple_nodes: 16,
         generator: curve(&[2, 4], 64),
         material: curve(&[2, 4], 64),
-        output: curve(&[1], 16),
+        output: curve(&[1], 32),
         missing_direction: MissingDirection::Refuse,
         negative_half_width_tolerance_rad: 0.01 * ARCSEC,
         deviation_limit_rad: 1.0 * ARCSEC,

@@ -35,15 +35,15 @@ impl Direction {
 }
 
 /// Largest half-width in counts, 0.05 rad: far above any play, far below overflow.
-const MAX_HALF_COUNTS: i32 = 34_178_720;
+pub(crate) const MAX_HALF_COUNTS: i32 = 34_178_720;
 
 /// Where the drive rests inside its play: all that must survive a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlayState {
     /// Nominal output at the last update.
     nominal: OutputAngle,
-    /// Estimated output at the last update.
-    output: OutputAngle,
+    /// Estimated output less nominal at the last update, in counts.
+    error: i32,
     /// Bounds of `p − x` in counts.
     lower: i32,
     upper: i32,
@@ -52,8 +52,8 @@ pub struct PlayState {
 }
 
 /// Size of a saved state.
-pub const SAVED_STATE_BYTES: usize = 32;
-const SAVED_BEFORE_CRC: usize = 28;
+pub const SAVED_STATE_BYTES: usize = 28;
+const SAVED_BEFORE_CRC: usize = 24;
 
 impl Default for PlayState {
     fn default() -> Self {
@@ -65,7 +65,7 @@ impl PlayState {
     /// After a reset: anywhere inside the play.
     #[must_use]
     pub const fn unknown() -> Self {
-        Self { nominal: OutputAngle::ZERO, output: OutputAngle::ZERO, lower: i32::MIN, upper: i32::MAX, half: -1 }
+        Self { nominal: OutputAngle::ZERO, error: 0, lower: i32::MIN, upper: i32::MAX, half: -1 }
     }
 
     /// Known to have last moved in `direction` through the full play.
@@ -75,7 +75,7 @@ impl PlayState {
             Direction::Forward => i32::MIN,
             Direction::Backward => i32::MAX,
         };
-        Self { nominal: OutputAngle::ZERO, output: OutputAngle::ZERO, lower: side, upper: side, half: -1 }
+        Self { nominal: OutputAngle::ZERO, error: 0, lower: side, upper: side, half: -1 }
     }
 
     /// The nominal output of the last update; `None` before the first.
@@ -93,57 +93,99 @@ impl PlayState {
     /// Estimate of `p − x` in radians: the middle of the interval, 0 before the first update.
     #[must_use]
     pub fn offset_rad(&self) -> f32 {
-        if self.half < 0 {
-            return 0.0;
-        }
-        (self.lower.saturating_add(self.upper) >> 1) as f32 * RAD_PER_COUNT
+        if self.half < 0 { 0.0 } else { self.offset_counts() as f32 * RAD_PER_COUNT }
+    }
+
+    /// The same in counts, after the first update.
+    pub(crate) const fn offset_counts(&self) -> i32 {
+        self.lower.wrapping_add(self.upper) >> 1
     }
 
     /// Half the width of the interval in radians: the estimate is wrong by no more.
     #[must_use]
     pub fn uncertainty_rad(&self) -> f32 {
+        self.uncertainty_counts() as f32 * RAD_PER_COUNT
+    }
+
+    /// The same in counts.
+    pub(crate) const fn uncertainty_counts(&self) -> i32 {
         let width = self.upper.saturating_sub(self.lower);
-        (width >> 1).saturating_add(width & 1) as f32 * RAD_PER_COUNT
+        (width >> 1).wrapping_add(width & 1)
     }
 
     /// Estimated actual output at the last update; `None` before the first.
     #[must_use]
     pub const fn output(&self) -> Option<OutputAngle> {
-        if self.half < 0 { None } else { Some(self.output) }
+        if self.half < 0 { None } else { Some(self.output_or_zero()) }
     }
 
-    /// Moves the play to `nominal`, with the half-width (clamped to 0..0.05 rad) and centre there; returns the error
-    /// `centre + (p − x)`, rad.
-    pub(crate) fn update(&mut self, nominal: OutputAngle, centre_rad: f32, half_width_rad: f32) -> f32 {
-        let half = crate::angle::counts_from_rad(half_width_rad).clamp(0, MAX_HALF_COUNTS);
+    /// The same; 0 before the first update.
+    pub(crate) const fn output_or_zero(&self) -> OutputAngle {
+        self.nominal.offset_counts(self.error as i64)
+    }
+
+    /// The nominal output of the last update; 0 before the first.
+    pub(crate) const fn nominal_or_zero(&self) -> OutputAngle {
+        self.nominal
+    }
+
+    /// The error at the last update, counts.
+    pub(crate) const fn error_counts(&self) -> i32 {
+        self.error
+    }
+
+    /// Whether the bounds are ones that an update leaves.
+    #[inline(always)]
+    pub(crate) const fn is_ordered(&self) -> bool {
+        self.lower <= self.upper
+    }
+
+    /// Flips a bit of one bound, as radiation does.
+    #[cfg(test)]
+    pub(crate) fn flip(&mut self, bound: usize, bit: u32) {
+        let bound = if bound == 0 { &mut self.lower } else { &mut self.upper };
+        *bound ^= 1 << bit;
+    }
+
+    /// Whether there was an update.
+    pub(crate) const fn is_started(&self) -> bool {
+        self.half >= 0
+    }
+
+    /// Moves the play to `nominal`, with the centre and half-width there in counts; returns the error `centre + (p − x)`.
+    ///
+    /// Without either (they could not be computed) it follows the motion with the half-width and error of the last update; before
+    /// the first with a half-width that is wider than any.
+    pub(crate) const fn update(&mut self, nominal: OutputAngle, play: Option<(i32, i32)>) -> i32 {
+        let last = if self.half < 0 { MAX_HALF_COUNTS } else { self.half };
+        let (centre, half) = match play {
+            Some((centre, half)) => (centre, half),
+            None => (0, last),
+        };
+        let half = if half > MAX_HALF_COUNTS { MAX_HALF_COUNTS } else { half };
+        let half = if half < 0 { 0 } else { half };
         self.update_counts(nominal, half);
-        let error_rad = centre_rad + self.offset_rad();
-        self.output = nominal.offset_rad(error_rad);
-        error_rad
+        let error = centre.wrapping_add(self.offset_counts());
+        self.error = if play.is_some() { error } else { self.error };
+        error
     }
 
-    /// Follows the motion with the half-width and error of the last update, for steps in which they cannot be computed.
-    pub(crate) fn coast(&mut self, nominal: OutputAngle) {
-        if self.half >= 0 {
-            self.output = self.output.offset_counts(nominal.minus_counts(self.nominal));
-            self.update_counts(nominal, self.half);
-        }
-    }
-
-    fn update_counts(&mut self, nominal: OutputAngle, half: i32) {
-        let moved = if self.half < 0 { 0 } else { nominal.minus_small_counts(self.nominal) };
-        // `half` is in 0..=MAX_HALF_COUNTS, so the bounds are ordered and clamp cannot fail.
-        let clamp = |offset: i32| offset.saturating_sub(moved).max(half.wrapping_neg()).min(half);
-        *self = Self { nominal, output: self.output, lower: clamp(self.lower), upper: clamp(self.upper), half };
+    const fn update_counts(&mut self, nominal: OutputAngle, half: i32) {
+        let moved = nominal.minus_small_counts(self.nominal);
+        let moved = if self.half < 0 { 0 } else { moved };
+        self.lower = clamped(self.lower.saturating_sub(moved), half);
+        self.upper = clamped(self.upper.saturating_sub(moved), half);
+        self.nominal = nominal;
+        self.half = half;
     }
 
     /// The state as bytes, with a CRC-32, for storage across a reset.
     #[must_use]
     pub fn save(&self) -> [u8; SAVED_STATE_BYTES] {
         let mut bytes = [0; SAVED_STATE_BYTES];
-        let fields = [self.lower, self.upper, self.half];
-        let angles = [self.nominal.counts(), self.output.counts()];
-        let parts = angles.into_iter().flat_map(i64::to_le_bytes).chain(fields.into_iter().flat_map(i32::to_le_bytes));
+        let fields = [self.error, self.lower, self.upper, self.half];
+        let parts =
+            self.nominal.counts().to_le_bytes().into_iter().chain(fields.into_iter().flat_map(i32::to_le_bytes));
         for (to, from) in bytes.iter_mut().zip(parts) {
             *to = from;
         }
@@ -160,14 +202,14 @@ impl PlayState {
     #[must_use]
     pub fn restore(bytes: &[u8; SAVED_STATE_BYTES]) -> Option<Self> {
         let (counts, rest) = bytes.split_first_chunk::<8>()?;
-        let (output, rest) = rest.split_first_chunk::<8>()?;
+        let (error, rest) = rest.split_first_chunk::<4>()?;
         let (lower, rest) = rest.split_first_chunk::<4>()?;
         let (upper, rest) = rest.split_first_chunk::<4>()?;
         let (half, rest) = rest.split_first_chunk::<4>()?;
         let crc = rest.first_chunk::<4>()?;
         let state = Self {
             nominal: OutputAngle::from_counts(i64::from_le_bytes(*counts)),
-            output: OutputAngle::from_counts(i64::from_le_bytes(*output)),
+            error: i32::from_le_bytes(*error),
             lower: i32::from_le_bytes(*lower),
             upper: i32::from_le_bytes(*upper),
             half: i32::from_le_bytes(*half),
@@ -179,6 +221,13 @@ impl PlayState {
         let fresh = state.half == -1 && (state.lower == i32::MIN || state.lower == i32::MAX);
         (intact && state.lower <= state.upper && (started || fresh)).then_some(state)
     }
+}
+
+/// `offset` within ±`half`, half ≥ 0.
+const fn clamped(offset: i32, half: i32) -> i32 {
+    let least = half.wrapping_neg();
+    let above = if offset < least { least } else { offset };
+    if above > half { half } else { above }
 }
 
 #[cfg(test)]
@@ -235,17 +284,17 @@ mod tests {
     #[test]
     fn uncertainty_is_half_the_interval() {
         let mut state = PlayState::unknown();
-        state.update(OutputAngle::ZERO, 0.0, 1e-4);
+        let _ = state.update(OutputAngle::ZERO, Some((0, 68_357)));
         assert!((state.uncertainty_rad() - 1e-4).abs() < 2e-9);
         assert!(state.offset_rad().abs() < 2e-9);
     }
 
     #[test]
     fn hostile_half_widths_stay_in_bounds() {
-        for half in [f32::NAN, -1.0, f32::INFINITY, f32::NEG_INFINITY, 1e30] {
+        for half in [i32::MIN, -1, 0, i32::MAX] {
             let mut state = PlayState::unknown();
-            state.update(OutputAngle::ZERO, 0.0, half);
-            state.update(OutputAngle::from_counts(i64::MIN), 0.0, half);
+            let _ = state.update(OutputAngle::ZERO, Some((0, half)));
+            let _ = state.update(OutputAngle::from_counts(i64::MIN), Some((0, half)));
             assert!((0..=MAX_HALF_COUNTS).contains(&state.half), "{half}");
             assert!(-state.half <= state.lower && state.lower <= state.upper && state.upper <= state.half);
         }
@@ -262,8 +311,7 @@ mod tests {
                 assert_eq!(PlayState::restore(&damaged), None, "bit {bit}");
             }
         }
-        let disordered =
-            PlayState { lower: 5, upper: -5, half: 10, nominal: OutputAngle::ZERO, output: OutputAngle::ZERO };
+        let disordered = PlayState { lower: 5, upper: -5, half: 10, nominal: OutputAngle::ZERO, error: 0 };
         assert_eq!(PlayState::restore(&disordered.save()), None);
         for (lower, upper) in [(-11, 5), (5, 11)] {
             let outside = PlayState { lower, upper, ..disordered };

@@ -5,7 +5,7 @@
 //! | offset | bytes | what |
 //! |---|---|---|
 //! | 0 | 8 | magic `89 46 58 54 0d 0a 1a 0a` (`\x89FXT`, then what a text transfer would change) |
-//! | 8 | 2 | format version, 2 |
+//! | 8 | 2 | format version, 3 |
 //! | 10 | 2 | byte order mark `0xfeff` |
 //! | 12 | 4 | length of the image in bytes |
 //! | 16 | 32 | drive hash (BLAKE3 of the drive the samples came from) |
@@ -16,42 +16,58 @@
 //! | 106 | 2, 2 | flexspline teeth; circular spline teeth |
 //! | 110 | 1, 1 | torque nodes (1 to 64); temperature nodes (1 to 8) |
 //! | 112 | 1, 1, 1, 1 | ripple nodes (0, or 4 to 32); nodes of A, B, C (0, or 4 to 128) |
-//! | 116 | 4, 4 | scale of the mean ripple R and of the half-width ripple h, rad per unit |
+//! | 116 | 4 | ripple unit, 2⁻¹⁹ count |
+//! | 120 | 4 | error limit, counts |
 //! | 124 | 4 | residual the solver reached |
 //! | 128 | 4, 4 | projection error, worst and rms, rad |
 //! | 136 | 8, 8 | torque range N·m; temperature range °C: least, most |
 //! | 152 | 4 | error limit, rad |
-//! | 156 | 36 | zero |
-//! | 192 | | torque nodes, temperature nodes: `f32` each |
-//! | | | A, B, C: `f32` each, stored closed |
-//! | | | `[temperature][torque]` records: D and H, rad, slope of D, rad/(N·m) (`f32` each), |
-//! | | | then R, h (`i16`) for each ripple node, stored closed |
+//! | 156 | 4 | width of a cell of the ripple at the output, counts, signed like the ratio; 1 without ripple |
+//! | 160 | 2, 2 | last torque interval; last temperature interval |
+//! | 164 | 2, 2 | where nodes start; from one temperature to the next |
+//! | 168 | 2, 2 | where records start; from one temperature to the next |
+//! | 172 | 2, 2 | from one record to the next; ripple nodes |
+//! | 176 | 4 · 3 | A, B, C: where it starts (2), its nodes (2) |
+//! | 188 | 4 | iterations of the inverse |
+//! | 192 | 4 | hold: targets this close to the output leave the generator where it is, counts |
+//! | 196 | 4 | words of the body |
+//! | 200 | 56 | zero |
+//! | 256 | 4 · 64 | torque nodes, N·m, padded with the largest number |
+//! | 512 | 4 · 8 | temperature nodes, °C, padded likewise |
+//! | 544 | | A, B, C: `i32` in half counts, stored closed |
+//! | | | nodes `[temperature][torque node]`: D, its slope over the torque, H (`f32` each; counts, counts/(N·m)); the last bit of |
+//! | | | H is set where the interval above is a jump; a node alone is stored twice |
+//! | | | records `[temperature][torque node]`: for each ripple node, stored closed, the ripple of forward and of backward |
+//! | | | motion (`R − h`, `R + h`, `i16` each, ripple units) |
 //! | | | end of the body |
 //! | | | CRC-32 of each 256-byte page of the body (the last may be shorter) |
 //! | | 4 | CRC-32 of everything before |
 //!
-//! A periodic curve of n nodes is stored closed, as n + 3 values: the last node, all nodes, the first two; the four around
-//! any place are then neighbours. CRC-32 is the one of ISO-HDLC (zlib).
+//! Counts are of 2⁻³² output turn; places and steps are in words of four bytes, steps 0 along an axis of one node. A periodic
+//! curve of n nodes is stored closed, as n + 3 values: the last node, all nodes, the first two; the three around any place
+//! are then neighbours. CRC-32 is the one of ISO-HDLC (zlib).
 //!
-//! The slope of D at a node is that of the curve on its smooth side or sides, one number: an interval that is a jump uses none.
-//! [`write_image`] computes it from D and the torque nodes.
+//! What follows from other numbers (offsets, units, the inverse) is stored so that a step finds all it needs in the image, where
+//! two copies are compared; [`Table::check`] computes it again.
 //!
-//! Size with 3 temperatures, 25 torques, 16 ripple nodes and 64 nodes each for A, B, C:
-//! 192 + 4·(25 + 3 + 3·67) + 75·(12 + 19·4) = 7708, and 31 pages and the end 4·32 = 128: 7836 bytes, below 8 KiB. Without A,
-//! B, C: 7016. With 8 ripple nodes: 5396 and 4580.
+//! Size with 3 temperatures, 25 torques, 8 ripple nodes and 32 nodes each for A, B, C:
+//! 544 + 4·3·35 + 75·(12 + 44) = 5164, and 21 pages and the end 4·22 = 88: 5252 bytes. With 2 temperatures and 60 torques, as
+//! the two-roller generator needs: 7384. Both are below 8 KiB.
 
+use crate::angle::RAD_PER_COUNT;
 use crate::drive::{Drive, FixedMember};
 use crate::error::{Field, ImageError};
 use crate::grid::{self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis};
-use crate::model::MAX_INVERSE_ITERATIONS;
+use crate::model::{HOLD_COUNTS, MAX_INVERSE_ERROR_RAD};
 use crate::table::{
-    Bounds, GeneratorKind, PeriodicCurve, RECORD_HEAD_WORDS, Table, TableId, Words, f32_at, larger, ripple_at,
+    self, Bounds, GeneratorKind, InverseBound, NODE_WORDS, Table, TableId, Words, f32_at, larger, word, word_at,
 };
-use crate::windup::{self, Slopes};
+use crate::windup::Slopes;
+use core::f64::consts::TAU;
 use core::fmt;
 
 /// Format version written and read.
-pub const FORMAT_VERSION: u16 = 2;
+pub const FORMAT_VERSION: u16 = 3;
 /// Bytes of one page, the unit of a scrub and of an upload.
 pub const PAGE_BYTES: usize = 256;
 /// Most temperature nodes.
@@ -66,16 +82,24 @@ pub const TEXT_BYTES: usize = 24;
 
 const MAGIC: [u8; 8] = *b"\x89FXT\r\n\x1a\n";
 const BYTE_ORDER_MARK: u16 = 0xfeff;
-const HEADER_BYTES: usize = 192;
+const HEADER_BYTES: usize = 256;
+/// Slots of the torque axis and of the temperature axis.
+const AXIS_SLOTS: [usize; 2] = [MAX_CLAMPED_NODES, MAX_TEMPERATURE_NODES];
+/// Ripple units in a count: 2¹⁹.
+const UNITS_PER_COUNT: f64 = 524_288.0;
+/// Half-widths may miss zero by this, counts, and the ripple unit: rounding.
+const HALF_WIDTH_ROUNDING_COUNTS: f64 = 3.0;
 const CRC_BYTES: usize = 4;
 const ID_OFFSET: usize = 48;
-const RESERVED: core::ops::Range<usize> = 156..HEADER_BYTES;
+const RESERVED: core::ops::Range<usize> = 200..HEADER_BYTES;
 /// |torque| N·m and |temperature| °C of any node or range: keeps differences of nodes finite.
 pub(crate) const MAX_AXIS_VALUE: f32 = 1e6;
 
+/// Its table for bytes is in flash.
+pub(crate) static CRC: crc::Crc<u32, crc::Table<1>> = crc::Crc::<u32, crc::Table<1>>::new(&crc::CRC_32_ISO_HDLC);
+
 /// CRC-32 (ISO-HDLC), 5.3 instructions a byte on a Cortex-M4.
 pub(crate) fn crc32(bytes: &[u8]) -> u32 {
-    static CRC: crc::Crc<u32, crc::Table<1>> = crc::Crc::<u32, crc::Table<1>>::new(&crc::CRC_32_ISO_HDLC);
     CRC.checksum(bytes)
 }
 
@@ -195,17 +219,53 @@ pub const fn image_bytes(torque: usize, temperature: usize, ripple: usize, curve
 }
 
 const fn body_bytes(torque: usize, temperature: usize, ripple: usize, curves: [usize; 3]) -> usize {
-    let [a, b, c] = curves;
-    let curve_words = stored(a).saturating_add(stored(b)).saturating_add(stored(c));
-    let numbers = torque.saturating_add(temperature).saturating_add(curve_words);
-    let record = stored(ripple).saturating_add(RECORD_HEAD_WORDS);
-    let records = torque.saturating_mul(temperature).saturating_mul(record);
-    numbers.saturating_add(records).saturating_mul(4).saturating_add(HEADER_BYTES)
+    Layout::new(torque, temperature, ripple, curves).end.saturating_mul(4)
 }
 
 /// As [`PeriodicAxis::stored_len`], for any number.
 const fn stored(nodes: usize) -> usize {
     if nodes == 0 { 0 } else { nodes.saturating_add(3) }
+}
+
+/// Where everything lies, in words.
+#[derive(Clone, Copy, Debug)]
+struct Layout {
+    curves: [usize; 3],
+    nodes: usize,
+    node_plane: usize,
+    records: usize,
+    record: usize,
+    end: usize,
+}
+
+impl Layout {
+    const fn new(torque: usize, temperature: usize, ripple: usize, [a, b, c]: [usize; 3]) -> Self {
+        let curve_b = word::CURVES.saturating_add(stored(a));
+        let curve_c = curve_b.saturating_add(stored(b));
+        let nodes = curve_c.saturating_add(stored(c));
+        let node_plane = (if torque > 1 { torque } else { 2 }).saturating_mul(NODE_WORDS);
+        let records = nodes.saturating_add(node_plane.saturating_mul(temperature));
+        let record = stored(ripple);
+        let end = records.saturating_add(record.saturating_mul(torque).saturating_mul(temperature));
+        Self { curves: [word::CURVES, curve_b, curve_c], nodes, node_plane, records, record, end }
+    }
+
+    /// The words from [`word::CELL_WIDTH`] on that follow from the node counts, without cell width and inverse.
+    fn plan(&self, torque: usize, temperature: usize, ripple: usize, curves: [usize; 3]) -> [u32; 7] {
+        let pair = |low: usize, high: usize| low as u32 & 0xffff | (high as u32) << 16;
+        let along = |nodes: usize, step: usize| if nodes > 1 { step } else { 0 };
+        let [a, b, c] = self.curves;
+        let [nodes_a, nodes_b, nodes_c] = curves;
+        [
+            pair(torque.saturating_sub(2), temperature.saturating_sub(2)),
+            pair(self.nodes, along(temperature, self.node_plane)),
+            pair(self.records, along(temperature, self.record.saturating_mul(torque))),
+            pair(along(torque, self.record), ripple),
+            pair(a, nodes_a),
+            pair(b, nodes_b),
+            pair(c, nodes_c),
+        ]
+    }
 }
 
 /// Fills a buffer from the front; what does not fit is only counted.
@@ -234,17 +294,24 @@ impl<'o> Writer<'o> {
     }
 }
 
-/// The one place where ripple is quantised: to nearest, in units of its scale.
-fn quantise(value_rad: f32, scale: f32) -> i16 {
-    let units = if scale > 0.0 { value_rad / scale } else { 0.0 };
-    (units + if units < 0.0 { -0.5 } else { 0.5 }) as i16
+/// The one place where numbers become integers: to nearest.
+fn quantise(value: f64) -> i32 {
+    (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32
 }
 
-fn ripple_scale(field: Field, ripple_rad: &[f32]) -> Result<f32, WriteError> {
-    if let Some(index) = ripple_rad.iter().position(|value| !value.is_finite()) {
-        return Err(ImageError::NotFinite { field, index }.into());
+fn check_finite(field: Field, values: &[f32]) -> Result<(), WriteError> {
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(index) => Err(ImageError::NotFinite { field, index }.into()),
+        None => Ok(()),
     }
-    Ok(ripple_rad.iter().fold(0.0, |most: f32, value| most.max(value.abs())) / i16::MAX as f32)
+}
+
+/// Width of a cell of the ripple at the output, counts.
+fn cell_width(drive: &Drive, ripple_nodes: usize) -> f32 {
+    if ripple_nodes == 0 {
+        return 1.0;
+    }
+    (4_294_967_296.0 / (ripple_nodes as f64 * drive.tooth_periods() as f64)) as f32
 }
 
 fn needs(field: Field, values: &[f32], needed: usize) -> Result<(), WriteError> {
@@ -283,35 +350,49 @@ impl TableData<'_> {
         ])
     }
 
-    fn put_records(&self, out: &mut Writer<'_>, mean_scale: f32, half_scale: f32) {
-        let axis = PeriodicAxis::new(self.ripple_nodes).unwrap_or_default();
-        // max(1): without ripple the iterators are empty, and a chunk size may not be 0.
-        let mut mean_ripples = self.mean_ripple_rad.chunks_exact(self.ripple_nodes.max(1));
-        let mut half_ripples = self.half_width_ripple_rad.chunks_exact(self.ripple_nodes.max(1));
+    /// The unit in which the largest ripple of either direction is 32767, rounded up.
+    fn ripple_unit(&self) -> u32 {
+        let pairs = self.mean_ripple_rad.iter().zip(self.half_width_ripple_rad);
+        let largest = pairs.fold(0.0f64, |most, (r, h)| larger64(most, (*r as f64).abs() + (*h as f64).abs()));
+        let unit = table::counts(largest) / i16::MAX as f64 * UNITS_PER_COUNT;
+        let whole = unit as u32;
+        if unit > whole as f64 { whole.saturating_add(1) } else { whole }
+    }
+
+    fn put_nodes(&self, out: &mut Writer<'_>) {
         let slopes = &Slopes::new(self.torque_nodes_n_m);
-        let torque_nodes = self.torque_nodes_n_m.len().max(1);
-        let mean_slopes = self
-            .mean_rad
-            .chunks_exact(torque_nodes)
-            .flat_map(|means| (0..torque_nodes).map(move |node| slopes.at(node).of(means) as f32));
-        for ((mean, half), mean_slope) in self.mean_rad.iter().zip(self.half_width_rad).zip(mean_slopes) {
-            let mean_ripple = mean_ripples.next().unwrap_or_default();
-            let half_ripple = half_ripples.next().unwrap_or_default();
-            // Rounding may take H + h below zero by half a unit: H is raised by as much. What was
-            // negative by more than that stays so, and is refused.
-            let rounded = half_ripple.iter().fold(0.0, |least: f32, h| least.min(quantise(*h, half_scale) as f32));
-            let least = half + rounded * half_scale;
-            let rounding = 0.51 * half_scale + half.abs() * f32::EPSILON;
-            let raised = if least < 0.0 && least >= -rounding { -rounded * half_scale } else { *half };
-            out.put_numbers(&[*mean, raised, mean_slope]);
-            for position in 0..axis.stored_len() {
-                let node = axis.stored_node(position);
-                let value = |ripple: &[f32]| ripple.get(node).copied().unwrap_or(0.0);
-                out.put(&quantise(value(mean_ripple), mean_scale).to_le_bytes());
-                out.put(&quantise(value(half_ripple), half_scale).to_le_bytes());
+        let nodes = self.torque_nodes_n_m;
+        let jumps = grid::jump_intervals(nodes.len(), |i| nodes.get(i).copied().unwrap_or(0.0));
+        let torques = nodes.len().max(1);
+        for (means, halves) in self.mean_rad.chunks_exact(torques).zip(self.half_width_rad.chunks_exact(torques)) {
+            for (node, (mean, half)) in means.iter().zip(halves).enumerate() {
+                let slope = slopes.at(node).of(means);
+                let half = (table::counts(*half as f64) as f32).to_bits() & !1 | grid::is_jump(jumps, node) as u32;
+                for _ in 0..if nodes.len() == 1 { 2 } else { 1 } {
+                    out.put_numbers(&[*mean as f64, slope].map(|rad| table::counts(rad) as f32));
+                    out.put(&half.to_le_bytes());
+                }
             }
         }
     }
+
+    fn put_records(&self, out: &mut Writer<'_>, unit: u32) {
+        let Some(axis) = PeriodicAxis::new(self.ripple_nodes).filter(|axis| !axis.is_empty()) else { return };
+        let units = |rad: f64| if unit == 0 { 0 } else { quantise(table::counts(rad) * UNITS_PER_COUNT / unit as f64) };
+        let mean_ripples = self.mean_ripple_rad.chunks_exact(axis.len());
+        for (mean, half) in mean_ripples.zip(self.half_width_ripple_rad.chunks_exact(axis.len())) {
+            for position in 0..axis.stored_len() {
+                let value = |ripple: &[f32]| ripple.get(axis.stored_node(position)).copied().unwrap_or(0.0) as f64;
+                let (mean, half) = (value(mean), value(half));
+                out.put(&(units(mean - half) as i16).to_le_bytes());
+                out.put(&(units(mean + half) as i16).to_le_bytes());
+            }
+        }
+    }
+}
+
+fn larger64(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// Writes the image of a table to the front of `out` and returns its length.
@@ -343,8 +424,12 @@ pub fn write_image(
     );
     let found = out.len();
     let image = out.get_mut(..needed).ok_or(WriteError::BufferTooSmall { needed, found })?;
-    let mean_scale = ripple_scale(Field::MeanRipple, data.mean_ripple_rad)?;
-    let half_scale = ripple_scale(Field::HalfWidthRipple, data.half_width_ripple_rad)?;
+    check_finite(Field::MeanRipple, data.mean_ripple_rad)?;
+    check_finite(Field::HalfWidthRipple, data.half_width_ripple_rad)?;
+    let ripple_unit = data.ripple_unit();
+    let nodes = (data.torque_nodes_n_m.len(), data.temperature_nodes_c.len(), data.ripple_nodes);
+    let curve_nodes = curves.map(<[f32]>::len);
+    let layout = Layout::new(nodes.0, nodes.1, nodes.2, curve_nodes);
 
     let mut writer = Writer { rest: image, needed: 0 };
     writer.put(&MAGIC);
@@ -363,24 +448,34 @@ pub fn write_image(
     writer.put(&data.drive.flexspline_teeth().to_le_bytes());
     writer.put(&data.drive.circular_spline_teeth().to_le_bytes());
     writer.put(&counts);
-    writer.put_numbers(&[mean_scale, half_scale, provenance.solver_residual]);
-    writer.put_numbers(&[data.projection_worst_rad, data.projection_rms_rad]);
+    writer.put(&ripple_unit.to_le_bytes());
+    writer.put(&limit_counts(provenance.error_limit_rad).to_le_bytes());
+    writer.put_numbers(&[provenance.solver_residual, data.projection_worst_rad, data.projection_rms_rad]);
     writer.put_numbers(&provenance.torque_range_n_m);
     writer.put_numbers(&provenance.temperature_range_c);
-    writer.put_numbers(&[provenance.error_limit_rad]);
+    writer.put_numbers(&[provenance.error_limit_rad, cell_width(&data.drive, nodes.2)]);
+    layout.plan(nodes.0, nodes.1, nodes.2, curve_nodes).iter().for_each(|word| writer.put(&word.to_le_bytes()));
+    // The inverse follows from the bounds, which are found in the finished image.
+    writer.put(&[0; 8]);
+    writer.put(&(layout.end as u32).to_le_bytes());
     writer.put(&[0; RESERVED.end - RESERVED.start]);
-    writer.put_numbers(data.torque_nodes_n_m);
-    writer.put_numbers(data.temperature_nodes_c);
-    for curve in curves {
+    for (axis, slots) in [data.torque_nodes_n_m, data.temperature_nodes_c].into_iter().zip(AXIS_SLOTS) {
+        writer.put_numbers(axis);
+        (axis.len()..slots).for_each(|_| writer.put_numbers(&[f32::MAX]));
+    }
+    for (field, curve) in [Field::GeneratorCurve, Field::MaterialCurve, Field::OutputCurve].into_iter().zip(curves) {
+        check_finite(field, curve)?;
         let axis = PeriodicAxis::new(curve.len()).unwrap_or_default();
         for position in 0..axis.stored_len() {
-            writer
-                .put_numbers(curve.get(axis.stored_node(position)..).unwrap_or_default().get(..1).unwrap_or_default());
+            let value = curve.get(axis.stored_node(position)).copied().unwrap_or(0.0);
+            writer.put(&quantise(2.0 * table::counts(value as f64)).to_le_bytes());
         }
     }
-    data.put_records(&mut writer, mean_scale, half_scale);
+    data.put_nodes(&mut writer);
+    data.put_records(&mut writer, ripple_unit);
 
     let body_bytes = writer.needed;
+    complete(image, body_bytes)?;
     let id = id(image.get(..body_bytes).unwrap_or_default());
     if let Some(place) = image.get_mut(ID_OFFSET..).and_then(|rest| rest.first_chunk_mut::<8>()) {
         *place = id;
@@ -388,6 +483,25 @@ pub fn write_image(
     seal(image, body_bytes);
     Table::check(image)?;
     Ok(needed)
+}
+
+/// Stores what follows from the bounds of the numbers.
+fn complete(image: &mut [u8], body_bytes: usize) -> Result<(), ImageError> {
+    seal(image, body_bytes);
+    let derived = Table::parse(image)?.derived();
+    for (word, value) in DERIVED_WORDS.into_iter().zip(derived) {
+        let place = image.as_chunks_mut::<4>().0.get_mut(word);
+        place.into_iter().for_each(|bytes| *bytes = value.to_le_bytes());
+    }
+    Ok(())
+}
+
+/// Words that follow from the bounds: iterations, hold.
+const DERIVED_WORDS: [usize; 2] = [word::CELL_WIDTH.saturating_add(8), word::CELL_WIDTH.saturating_add(9)];
+
+/// An error limit in counts, rounded up; the per mille takes up the rounding of single precision.
+fn limit_counts(limit_rad: f32) -> u32 {
+    (table::counts(limit_rad as f64) * 1.001) as u32
 }
 
 /// Computes and stores every checksum of an image whose body is complete.
@@ -401,6 +515,17 @@ fn seal(image: &mut [u8], body_bytes: usize) {
     }
     if let Some((before, last)) = image.split_last_chunk_mut::<CRC_BYTES>() {
         *last = crc32(before).to_le_bytes();
+    }
+}
+
+/// Makes every checksum of an image right that states its body, whatever is in it.
+#[cfg(test)]
+pub(crate) fn reseal(image: &mut [u8]) {
+    let body_bytes = word_at(image.as_chunks::<4>().0, word::BODY) as usize * 4;
+    if body_bytes < image.len() {
+        seal(image, body_bytes);
+        let _ = complete(image, body_bytes);
+        seal(image, body_bytes);
     }
 }
 
@@ -429,10 +554,6 @@ impl<'a> Header<'a> {
         f32::from_le_bytes(self.bytes(offset))
     }
 
-    fn pair(self, offset: usize) -> [f32; 2] {
-        [self.f32(offset), self.f32(offset.saturating_add(4))]
-    }
-
     /// The text at `offset` without its padding.
     fn text(self, offset: usize, field: Field) -> Result<&'a str, ImageError> {
         let bytes = self.0.get(offset..offset.saturating_add(TEXT_BYTES)).unwrap_or_default();
@@ -455,10 +576,16 @@ fn in_range(field: Field, index: usize, found: f32, least: f32, most: f32) -> Re
     if found >= least && found <= most { Ok(found) } else { Err(ImageError::OutOfRange { field, found, least, most }) }
 }
 
-fn check_axis(field: Field, words: Words<'_>) -> Result<(), ImageError> {
+/// The nodes increase and what follows is padding.
+fn check_axis(field: Field, words: Words<'_>, first: usize, nodes: usize, slots: usize) -> Result<(), ImageError> {
     let mut before = f32::NEG_INFINITY;
-    for (index, word) in words.iter().enumerate() {
-        let node = in_range(field, index, f32::from_le_bytes(*word), -MAX_AXIS_VALUE, MAX_AXIS_VALUE)?;
+    for index in 0..slots {
+        let at = first.saturating_add(index);
+        if index >= nodes {
+            derived_is(words, at, f32::MAX.to_bits())?;
+            continue;
+        }
+        let node = in_range(field, index, f32_at(words, at), -MAX_AXIS_VALUE, MAX_AXIS_VALUE)?;
         if node <= before {
             return Err(ImageError::NotIncreasing { field, index });
         }
@@ -467,36 +594,41 @@ fn check_axis(field: Field, words: Words<'_>) -> Result<(), ImageError> {
     Ok(())
 }
 
+/// Whether a word is what it must be.
+fn derived_is(words: Words<'_>, at: usize, value: u32) -> Result<(), ImageError> {
+    if word_at(words, at) == value { Ok(()) } else { Err(ImageError::Derived { offset: at.saturating_mul(4) }) }
+}
+
 /// A range must lie inside the axis; an axis of one node holds wherever its maker says.
-fn check_range(field: Field, [least, most]: [f32; 2], axis: Words<'_>) -> Result<[f32; 2], ImageError> {
+fn check_range(field: Field, words: Words<'_>, at: usize, first: usize, nodes: usize) -> Result<(), ImageError> {
+    let [least, most] = [0, 1].map(|end: usize| f32_at(words, at.saturating_add(end)));
     let (mut from, mut to) = (-MAX_AXIS_VALUE, MAX_AXIS_VALUE);
-    if axis.len() > 1 {
-        (from, to) = (f32_at(axis, 0), f32_at(axis, axis.len().saturating_sub(1)));
+    if nodes > 1 {
+        (from, to) = (f32_at(words, first), f32_at(words, first.saturating_add(nodes).saturating_sub(1)));
     }
     in_range(field, 0, least, from, to)?;
     in_range(field, 1, most, least, to)?;
-    Ok([least, most])
+    Ok(())
 }
 
-/// Largest absolute value.
-fn largest_of(len: usize, value: impl Fn(usize) -> f32) -> f32 {
-    (0..len).fold(0.0, |largest, i| larger(largest, value(i).abs()))
-}
-
-/// Largest absolute slope, per node spacing, of the cubic B-spline with these stored coefficients.
-///
-/// Between two nodes the slope is the quadratic `(1-t)²/2 a + (1/2 + t - t²) b + t²/2 c` of the three steps between the four
-/// coefficients: largest at an end or where its own slope `(b - a) + t (a - 2b + c)` vanishes.
-fn steepest_of(stored: usize, value: impl Fn(usize) -> f32) -> f32 {
-    let step = |i: usize| value(i.saturating_add(1)) - value(i);
-    (0..stored.saturating_sub(3)).fold(0.0, |steepest, i| {
-        let (a, b, c) = (step(i), step(i.saturating_add(1)), step(i.saturating_add(2)));
-        let at = |t: f32| (0.5 * (1.0 - t) * (1.0 - t) * a + (0.5 + t - t * t) * b + 0.5 * t * t * c).abs();
-        let bend = a - 2.0 * b + c;
-        let turn = (a - b) / bend;
-        let inside = if turn > 0.0 && turn < 1.0 { at(turn) } else { 0.0 };
-        larger(steepest, larger(larger(at(0.0), at(1.0)), inside))
-    })
+/// What a closed B-spline has at most: coefficient, slope per node spacing, value. Coefficients bound values too, and are simpler
+/// to blend; values tell how far the curve really goes.
+fn extremes(stored: usize, value: impl Fn(usize) -> f32) -> [f32; 3] {
+    let mut most = [0.0; 3];
+    for i in 0..stored.saturating_sub(2) {
+        let [largest, steepest, reached] = most;
+        let (a, b, c) = (value(i), value(i.saturating_add(1)), value(i.saturating_add(2)));
+        // A parabola from (a + b)/2 to (b + c)/2; its top, if inside, where the slope b − a + t·(a − 2b + c) vanishes.
+        let turn = (a - b) / (a - 2.0 * b + c);
+        let top = 0.5 * (a + b) + 0.5 * turn * (b - a);
+        let top = if turn > 0.0 && turn < 1.0 { top.abs() } else { 0.0 };
+        most = [
+            larger(largest, a.abs()),
+            larger(steepest, (b - a).abs()),
+            larger(reached, larger(top, 0.5 * (a + b).abs())),
+        ];
+    }
+    most
 }
 
 /// Whether the three repeated words of a stored curve equal the nodes they repeat.
@@ -511,29 +643,19 @@ fn check_closed(field: Field, axis: PeriodicAxis, words: Words<'_>) -> Result<()
     Ok(())
 }
 
-/// Adds what a curve of A, B, C can give; `periods` of it in one output turn.
-fn add_curve(bounds: &mut Bounds, field: Field, curve: &PeriodicCurve<'_>, periods: f32) -> Result<(), ImageError> {
-    let len = curve.axis.stored_len();
-    for index in 0..len {
-        in_range(field, index, f32_at(curve.words, index), -MAX_ERROR_RAD, MAX_ERROR_RAD)?;
-    }
-    check_closed(field, curve.axis, curve.words)?;
-    let (largest, steepest) =
-        (largest_of(len, |i| f32_at(curve.words, i)), steepest_of(len, |i| f32_at(curve.words, i)));
-    bounds.error_rad += largest;
-    bounds.periodic_rad += largest;
-    bounds.slope += steepest * curve.axis.len() as f32 * periods.abs() / core::f32::consts::TAU;
-    Ok(())
+/// Counts in radians.
+fn rad(counts: f32) -> f32 {
+    counts * RAD_PER_COUNT
 }
 
 impl<'a> Table<'a> {
     /// Checks an image and gives the table in it. Nothing of an image can be used before.
     ///
     /// Verified: length, magic, version, byte order, CRC-32 of the whole and of every page, texts, tooth counts, node
-    /// counts; every number finite; axes strictly increasing; half-width of the play ≥ 0 everywhere; the largest error the
-    /// table can give within its stated limit and [`MAX_ERROR_RAD`]; `|ratio·de/dψ| < 1` everywhere, so that the inverse
-    /// exists;
-    /// periodic parts closed at the wrap.
+    /// counts; every number finite; axes strictly increasing; half-width of the play ≥ 0 everywhere; torque intervals that
+    /// meet at their nodes; the largest error the table can give within its stated limit and [`MAX_ERROR_RAD`];
+    /// `|ratio·de/dψ| < 1` everywhere, so that the inverse exists, and how it converges; periodic parts closed at the wrap;
+    /// every offset, unit and bound that follows from other numbers.
     ///
     /// Bounds hold for every input, not only at nodes: a B-spline stays within its coefficients, and what the cubic of the
     /// wind-up departs from the straight line between two nodes counts in full.
@@ -543,6 +665,15 @@ impl<'a> Table<'a> {
     /// # Errors
     /// The first check that fails, in the order of [`ImageError`].
     pub fn check(image: &'a [u8]) -> Result<Self, ImageError> {
+        let table = Self::parse(image)?;
+        for (at, value) in DERIVED_WORDS.into_iter().zip(table.derived()) {
+            derived_is(table.words, at, value)?;
+        }
+        Ok(table)
+    }
+
+    /// [`Self::check`] but for the words that follow from the bounds.
+    fn parse(image: &'a [u8]) -> Result<Self, ImageError> {
         let header = check_envelope(image)?;
         let drive = check_identity(header)?;
         let generator_kind =
@@ -563,68 +694,71 @@ impl<'a> Table<'a> {
         if needed != image.len() {
             return Err(size);
         }
-        let body_bytes = body_bytes(torque_nodes, temperature_nodes, ripple_nodes, curve_nodes);
+        let layout = Layout::new(torque_nodes, temperature_nodes, ripple_nodes, curve_nodes);
+        let body_bytes = layout.end.saturating_mul(4);
         if let Some(page) = (0..body_bytes.div_ceil(PAGE_BYTES)).find(|&page| !page_intact(image, body_bytes, page)) {
             return Err(ImageError::PageCrc { page });
         }
-        let body = image.get(HEADER_BYTES..body_bytes).ok_or(size)?;
-        let (mut words, _) = body.as_chunks::<4>();
-        let mut take = |length: usize| {
-            let (here, rest) = words.split_at_checked(length).ok_or(size)?;
-            words = rest;
-            Ok::<Words<'a>, ImageError>(here)
-        };
-        let axis = |nodes: usize| PeriodicAxis::new(nodes).ok_or(size);
-        let torque = take(torque_nodes)?;
-        let temperature = take(temperature_nodes)?;
-        let [a, b, c] = curve_nodes;
-        let generator_curve = PeriodicCurve { axis: axis(a)?, words: take(stored(a))? };
-        let material_curve = PeriodicCurve { axis: axis(b)?, words: take(stored(b))? };
-        let output_curve = PeriodicCurve { axis: axis(c)?, words: take(stored(c))? };
-        let records = words;
-
-        let scale_limit = MAX_ERROR_RAD / i16::MAX as f32;
-        let mut table = Self {
-            image,
-            body_bytes,
-            drive,
-            generator_kind,
-            torque,
-            temperature,
-            generator_curve,
-            material_curve,
-            output_curve,
-            records,
-            ripple: axis(ripple_nodes)?,
-            mean_ripple_scale: in_range(Field::MeanRipple, 0, header.f32(116), 0.0, scale_limit)?,
-            half_ripple_scale: in_range(Field::HalfWidthRipple, 0, header.f32(120), 0.0, scale_limit)?,
-            torque_jumps: grid::jump_intervals(torque.len(), |i| f32_at(torque, i)),
-            torque_range_n_m: header.pair(136),
-            temperature_range_c: header.pair(144),
-            error_limit_rad: in_range(Field::ErrorLimit, 0, header.f32(152), f32::MIN_POSITIVE, MAX_ERROR_RAD)?,
-            bounds: Bounds::default(),
-            inverse_iterations: MAX_INVERSE_ITERATIONS,
-        };
-        check_axis(Field::TorqueNodes, torque)?;
-        check_axis(Field::TemperatureNodes, temperature)?;
-        check_range(Field::TorqueRange, table.torque_range_n_m, torque)?;
-        check_range(Field::TemperatureRange, table.temperature_range_c, temperature)?;
+        let (words, _) = image.get(..body_bytes).ok_or(size)?.as_chunks::<4>();
+        let plan = layout.plan(torque_nodes, temperature_nodes, ripple_nodes, curve_nodes);
+        derived_is(words, word::BODY, layout.end as u32)?;
+        derived_is(words, word::CELL_WIDTH, cell_width(&drive, ripple_nodes).to_bits())?;
+        for (at, value) in (word::CELL_WIDTH.saturating_add(1)..).zip(plan) {
+            derived_is(words, at, value)?;
+        }
+        let limit = in_range(Field::ErrorLimit, 0, header.f32(152), f32::MIN_POSITIVE, MAX_ERROR_RAD)?;
+        derived_is(words, word::RIPPLE_UNIT.saturating_add(1), limit_counts(limit))?;
+        check_axis(Field::TorqueNodes, words, word::TORQUE_NODES, torque_nodes, MAX_CLAMPED_NODES)?;
+        let slots = MAX_TEMPERATURE_NODES;
+        check_axis(Field::TemperatureNodes, words, word::TEMPERATURE_NODES, temperature_nodes, slots)?;
+        check_range(Field::TorqueRange, words, word::TORQUE_RANGE, word::TORQUE_NODES, torque_nodes)?;
+        let (range, nodes) = (word::TEMPERATURE_RANGE, word::TEMPERATURE_NODES);
+        check_range(Field::TemperatureRange, words, range, nodes, temperature_nodes)?;
         in_range(Field::SolverResidual, 0, header.f32(124), 0.0, f32::MAX)?;
         in_range(Field::ProjectionWorst, 0, header.f32(128), 0.0, MAX_ERROR_RAD)?;
         in_range(Field::ProjectionRms, 0, header.f32(132), 0.0, header.f32(128))?;
-        table.bounds = table.check_bounds()?;
-        table.inverse_iterations = table.bounds.inverse_iterations();
+        let mut table = Self {
+            image,
+            words,
+            body_bytes,
+            drive,
+            generator_kind,
+            torque_nodes,
+            temperature_nodes,
+            ripple: PeriodicAxis::new(ripple_nodes).ok_or(size)?,
+            bounds: Bounds::default(),
+            inverse: InverseBound::default(),
+        };
+        table.bounds = table.check_bounds(&layout, curve_nodes)?;
+        let cell_rad = rad(cell_width(&drive, ripple_nodes).abs());
+        table.inverse = table.bounds.inverse(if ripple_nodes == 0 { f32::INFINITY } else { cell_rad });
+        let left_rad = table.inverse.error_rad;
+        if left_rad.is_nan() || left_rad > MAX_INVERSE_ERROR_RAD {
+            return Err(ImageError::Inverse { left_rad });
+        }
         Ok(table)
     }
 
-    fn check_bounds(&self) -> Result<Bounds, ImageError> {
-        let mut bounds = self.check_records()?;
+    /// Values of [`DERIVED_WORDS`].
+    fn derived(&self) -> [u32; 2] {
+        let hold = table::counts(self.inverse.error_rad as f64) as i32;
+        [self.inverse.iterations as u32, hold.saturating_add(HOLD_COUNTS) as u32]
+    }
+
+    fn check_bounds(&self, layout: &Layout, curve_nodes: [usize; 3]) -> Result<Bounds, ImageError> {
+        let mut bounds = Bounds::default();
+        in_range(Field::MeanRipple, 0, word_at(self.words, word::RIPPLE_UNIT) as f32, 0.0, i32::MAX as f32)?;
+        self.check_nodes(layout, &mut bounds)?;
+        self.check_records(layout, &mut bounds)?;
+        bounds.error_rad += bounds.periodic_rad;
         let ratio = self.drive.ratio();
-        add_curve(&mut bounds, Field::GeneratorCurve, &self.generator_curve, ratio)?;
-        add_curve(&mut bounds, Field::MaterialCurve, &self.material_curve, ratio - 1.0)?;
-        add_curve(&mut bounds, Field::OutputCurve, &self.output_curve, 1.0)?;
-        if bounds.error_rad.is_nan() || bounds.error_rad > self.error_limit_rad {
-            return Err(ImageError::ErrorBound { found_rad: bounds.error_rad, allowed_rad: self.error_limit_rad });
+        let curves = [(Field::GeneratorCurve, ratio), (Field::MaterialCurve, ratio - 1.0), (Field::OutputCurve, 1.0)];
+        for (((field, periods), at), nodes) in curves.into_iter().zip(layout.curves).zip(curve_nodes) {
+            self.add_curve(&mut bounds, field, at, nodes, periods)?;
+        }
+        let limit = self.error_limit_rad();
+        if bounds.error_rad.is_nan() || bounds.error_rad > limit {
+            return Err(ImageError::ErrorBound { found_rad: bounds.error_rad, allowed_rad: limit });
         }
         if bounds.slope.is_nan() || bounds.slope >= 1.0 {
             return Err(ImageError::Slope { found: bounds.slope });
@@ -632,50 +766,106 @@ impl<'a> Table<'a> {
         Ok(bounds)
     }
 
-    /// What D, H, R, h can give: linear interpolation between records stays within them, the cubic of D within what it bends.
-    fn check_records(&self) -> Result<Bounds, ImageError> {
-        let mut bounds = Bounds::default();
-        let nodes = self.ripple.len();
-        let periods = self.drive.ripple_order() as f32 * self.drive.ratio().abs();
-        let slope_per_step = nodes as f32 * periods / core::f32::consts::TAU;
-        let stride = stored(nodes).saturating_add(RECORD_HEAD_WORDS);
-        let torque_nodes = self.torque.len().max(1);
-        // Torque, D, slope of D and largest |e| of the record before; none at the first torque.
-        let mut before: Option<[f32; 4]> = None;
-        for (index, record) in self.records.chunks_exact(stride).enumerate() {
-            let node = index.checked_rem(torque_nodes).unwrap_or(0);
-            let mean = in_range(Field::Mean, index, f32_at(record, 0), -MAX_ERROR_RAD, MAX_ERROR_RAD)?;
-            let half = in_range(Field::HalfWidth, index, f32_at(record, 1), 0.0, MAX_ERROR_RAD)?;
-            let slope = finite(Field::MeanSlope, index, f32_at(record, 2))?;
-            let ripple = |node: usize| ripple_at(record, node.saturating_add(RECORD_HEAD_WORDS));
-            let mean_ripple = |node: usize| ripple(node).0 as f32 * self.mean_ripple_scale;
-            let half_ripple = |node: usize| ripple(node).1 as f32 * self.half_ripple_scale;
-            check_closed(Field::MeanRipple, self.ripple, record.get(RECORD_HEAD_WORDS..).unwrap_or_default())?;
-            let len = self.ripple.stored_len();
-            let least = (0..len).fold(half, |least, node| least.min(half + half_ripple(node)));
-            if least < 0.0 {
-                return Err(ImageError::NegativeHalfWidth {
-                    temperature: index.checked_div(torque_nodes).unwrap_or(0),
-                    torque: node,
-                    found_rad: least,
-                });
-            }
-            let (mean_most, half_most) = (largest_of(len, mean_ripple), largest_of(len, half_ripple));
-            // Steady motion follows centre − half-width forward and centre + half-width backward.
-            let forward = steepest_of(len, |i| mean_ripple(i) - half_ripple(i));
-            let backward = steepest_of(len, |i| mean_ripple(i) + half_ripple(i));
-            let (torque, largest) = (f32_at(self.torque, node), mean.abs() + mean_most + half + half_most);
-            bounds.error_rad = bounds.error_rad.max(largest);
-            let below = before.filter(|_| node > 0 && !self.is_torque_jump(node.saturating_sub(1)));
-            if let Some([torque_below, mean_below, slope_below, largest_below]) = below {
-                let bend = windup::most_bend(mean - mean_below, torque - torque_below, slope_below, slope);
-                bounds.error_rad = bounds.error_rad.max(largest.max(largest_below) + bend);
-            }
-            before = Some([torque, mean, slope, largest]);
-            bounds.periodic_rad = bounds.periodic_rad.max(mean_most + half_most);
-            bounds.slope = bounds.slope.max(larger(forward, backward) * slope_per_step);
+    /// Adds what a curve of A, B, C can give; `periods` of it in one output turn.
+    fn add_curve(
+        &self,
+        bounds: &mut Bounds,
+        field: Field,
+        at: usize,
+        nodes: usize,
+        periods: f32,
+    ) -> Result<(), ImageError> {
+        let axis = PeriodicAxis::new(nodes).unwrap_or_default();
+        let value = |i: usize| rad(word_at(self.words, at.saturating_add(i)) as i32 as f32 * 0.5);
+        for index in 0..axis.stored_len() {
+            in_range(field, index, value(index), -MAX_ERROR_RAD, MAX_ERROR_RAD)?;
         }
-        Ok(bounds)
+        check_closed(field, axis, self.words.get(at..).unwrap_or_default())?;
+        let [largest, steepest, _] = extremes(axis.stored_len(), value);
+        let slope = steepest * nodes as f32 * periods.abs() / TAU as f32;
+        bounds.error_rad += largest;
+        bounds.periodic_rad += largest;
+        bounds.slope += slope;
+        bounds.curve_slope += slope;
+        Ok(())
+    }
+
+    /// Where node `index`, over all temperatures, starts.
+    fn node_at(&self, layout: &Layout, index: usize) -> usize {
+        let step = if self.torque_nodes > 1 { NODE_WORDS } else { NODE_WORDS.saturating_mul(2) };
+        layout.nodes.saturating_add(index.saturating_mul(step))
+    }
+
+    /// What D and H can give: linear interpolation between temperatures stays within them, a cubic within its Bernstein
+    /// coefficients.
+    fn check_nodes(&self, layout: &Layout, bounds: &mut Bounds) -> Result<(), ImageError> {
+        let jumps = self.torque_jumps();
+        let most = table::counts(MAX_ERROR_RAD as f64) as f32;
+        // Torque, D, slope of D and H of the node before.
+        let mut before: Option<[f32; 4]> = None;
+        for index in 0..self.torque_nodes.saturating_mul(self.temperature_nodes) {
+            let node = index.checked_rem(self.torque_nodes).unwrap_or(0);
+            let at = self.node_at(layout, index);
+            let number = |i: usize| f32_at(self.words, at.saturating_add(i));
+            let mean = in_range(Field::Mean, index, number(0), -most, most)?;
+            let slope = finite(Field::MeanSlope, index, number(1))?;
+            let half = in_range(Field::HalfWidth, index, number(2), 0.0, most)?;
+            if number(2).to_bits() & 1 != grid::is_jump(jumps, node) as u32 {
+                return Err(ImageError::Derived { offset: at.saturating_add(2).saturating_mul(4) });
+            }
+            if self.torque_nodes == 1 {
+                for word in 0..NODE_WORDS {
+                    derived_is(self.words, at.saturating_add(NODE_WORDS).saturating_add(word), number(word).to_bits())?;
+                }
+                // Nowhere to go with it.
+                in_range(Field::MeanSlope, index, slope, 0.0, 0.0)?;
+            }
+            let torque = f32_at(self.words, word::TORQUE_NODES.saturating_add(node));
+            bounds.error_rad = larger(bounds.error_rad, rad(mean.abs() + half));
+            let below = before.filter(|_| node > 0 && !grid::is_jump(jumps, node.saturating_sub(1)));
+            if let Some([torque_below, mean_below, slope_below, half_below]) = below {
+                let third = (torque - torque_below) / 3.0;
+                let inner = larger((mean_below + slope_below * third).abs(), (mean - slope * third).abs());
+                let inner = if inner.is_finite() { inner } else { f32::INFINITY };
+                bounds.error_rad = larger(bounds.error_rad, rad(inner + larger(half, half_below)));
+            }
+            before = Some([torque, mean, slope, half]);
+        }
+        Ok(())
+    }
+
+    /// What R and h can give, and that they leave no negative half-width.
+    fn check_records(&self, layout: &Layout, bounds: &mut Bounds) -> Result<(), ImageError> {
+        let nodes = self.ripple.len();
+        let unit = (word_at(self.words, word::RIPPLE_UNIT) as f64 / UNITS_PER_COUNT) as f32;
+        let cells_per_rad = nodes as f32 * self.drive.tooth_periods().abs() / TAU as f32;
+        for index in 0..self.torque_nodes.saturating_mul(self.temperature_nodes) {
+            let first = layout.records.saturating_add(index.saturating_mul(layout.record));
+            let record = self.words.get(first..first.saturating_add(layout.record)).unwrap_or_default();
+            check_closed(Field::MeanRipple, self.ripple, record)?;
+            let ripple = |i: usize| {
+                let word = word_at(record, i);
+                [word as i16 as f32 * unit, (word >> 16) as i16 as f32 * unit]
+            };
+            let torque = index.checked_rem(self.torque_nodes).unwrap_or(0);
+            let temperature = index.checked_div(self.torque_nodes).unwrap_or(0);
+            let half = f32_at(self.words, self.node_at(layout, index).saturating_add(2));
+            let least = (0..self.ripple.stored_len()).fold(half, |least, i| {
+                let [forward, backward] = ripple(i);
+                least.min(half + 0.5 * (backward - forward))
+            });
+            if least < -(HALF_WIDTH_ROUNDING_COUNTS as f32 + unit) {
+                return Err(ImageError::NegativeHalfWidth { temperature, torque, found_rad: rad(least) });
+            }
+            // Steady motion follows forward or backward.
+            for way in [|[forward, _]: [f32; 2]| forward, |[_, backward]: [f32; 2]| backward] {
+                let [largest, steepest, reached] = extremes(self.ripple.stored_len(), |i| rad(way(ripple(i))));
+                bounds.periodic_rad = larger(bounds.periodic_rad, largest);
+                bounds.slope = larger(bounds.slope, steepest * cells_per_rad);
+                bounds.ripple_cells = larger(bounds.ripple_cells, reached * cells_per_rad);
+            }
+        }
+        Ok(())
     }
 
     fn header(&self) -> Header<'a> {
@@ -692,6 +882,12 @@ impl<'a> Table<'a> {
     #[must_use]
     pub fn drive_hash(&self) -> [u8; 32] {
         self.header().bytes(16)
+    }
+
+    /// The largest error the image states it may give, rad.
+    #[must_use]
+    pub fn error_limit_rad(&self) -> f32 {
+        self.header().f32(152)
     }
 
     /// Program that made the table.
@@ -811,14 +1007,18 @@ fn check_identity(header: Header<'_>) -> Result<Drive, ImageError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::drive::Phases;
     use crate::error::DriveError;
     use crate::fixture;
     use proptest::prelude::*;
     use std::vec;
     use std::vec::Vec;
 
-    const RECORDS: usize = HEADER_BYTES + 4 * (11 + 3);
-    const RECORD_BYTES: usize = 4 * (RECORD_HEAD_WORDS + 19);
+    /// Where nodes and records of the image of `fixture::image(false)` start, bytes.
+    const NODES: usize = 4 * word::CURVES;
+    const NODE_BYTES: usize = 4 * NODE_WORDS;
+    const RECORDS: usize = NODES + 3 * 11 * NODE_BYTES;
+    const RECORD_BYTES: usize = 4 * 19;
 
     /// A small table with every part; ripple alternates in sign.
     fn data() -> TableData<'static> {
@@ -874,20 +1074,37 @@ mod tests {
         assert!(table.torque_nodes_n_m().eq([-1.0, 1.0]) && table.temperature_nodes_c().eq([0.0, 40.0]));
         assert_eq!(table.error_limit_rad(), 0.02);
         assert_eq!(table.ripple_axis().len(), 8);
-        let words =
-            |curve: &PeriodicCurve<'_>| (0..curve.axis.len()).map(|i| f32_at(curve.words, i + 1)).collect::<Vec<f32>>();
-        assert_eq!(words(&table.generator_curve), data().generator_curve_rad);
-        assert_eq!(words(&table.material_curve), data().material_curve_rad);
-        assert_eq!(words(&table.output_curve), data().output_curve_rad);
-        for record in 0..4 {
-            let base = record * (RECORD_HEAD_WORDS + 11);
-            assert_eq!(f32_at(table.records, base), data().mean_rad[record]);
-            assert_eq!(f32_at(table.records, base + 1), data().half_width_rad[record]);
-            for node in 0..8 {
-                let (mean, half) = ripple_at(table.records, base + RECORD_HEAD_WORDS + 1 + node);
-                let expected = data().mean_ripple_rad[record * 8 + node];
-                assert!((mean as f32 * table.mean_ripple_scale - expected).abs() <= 0.51 * table.mean_ripple_scale);
-                assert!((half as f32 * table.half_ripple_scale - expected).abs() <= 0.51 * table.half_ripple_scale);
+        // At every node and on both sides what was written, to the quantisation.
+        let (unit, count) = (1.7e-6 / 32767.0, 1.5e-9);
+        for (temperature_node, temperature) in [0.0, 40.0].into_iter().enumerate() {
+            for (torque_node, torque) in [-1.0f32, 0.5].into_iter().enumerate() {
+                let point = table.at(torque, temperature).unwrap();
+                let share = (torque + 1.0) / 2.0;
+                let at = |values: &[f32]| {
+                    let first = 2 * temperature_node;
+                    values[first] * (1.0 - share) + values[first + 1] * share
+                };
+                assert!((point.mean_rad() - at(data().mean_rad)).abs() < 2.0 * count, "{torque_node}");
+                let half = point.half_width as f32 * RAD_PER_COUNT;
+                assert!((half - at(data().half_width_rad)).abs() < 2.0 * count);
+                for node in 0..8 {
+                    let phase = table.ripple_axis().node_phase(node);
+                    let phases = Phases { generator: 0, material: 0, output: 0, tooth: phase };
+                    let play = table::play_at(&table, &point, phases, &mut Default::default());
+                    let ripple = |values: &[f32]| {
+                        let value = |node: usize| {
+                            let record = (2 * temperature_node) * 8 + node % 8;
+                            values[record] * (1.0 - share) + values[record + 8] * share
+                        };
+                        0.125 * (value(node + 7) + 6.0 * value(node) + value(node + 1))
+                    };
+                    // A at ψ = 0 and C at δ = 0.
+                    let curves = (-0.0 + 6.0 * 1.0e-5 - 1.0e-5 + 6.0 * 1.0e-4) * 0.125;
+                    let centre = at(data().mean_rad) + ripple(data().mean_ripple_rad) + curves;
+                    assert!((play.centre as f32 * RAD_PER_COUNT - centre).abs() < 4.0 * count + unit);
+                    let half = at(data().half_width_rad) + ripple(data().half_width_ripple_rad);
+                    assert!((play.half as f32 * RAD_PER_COUNT - half).abs() < 4.0 * count + unit);
+                }
             }
         }
     }
@@ -904,8 +1121,8 @@ mod tests {
 
     #[test]
     fn quantisation_rounds_to_nearest() {
-        assert_eq!([0.49, 0.51, -0.49, -0.51, 32767.0].map(|v| quantise(v, 1.0)), [0, 1, 0, -1, 32767]);
-        assert_eq!(quantise(1.0, 0.0), 0);
+        assert_eq!([0.49, 0.51, -0.49, -0.51, 32767.0].map(quantise), [0, 1, 0, -1, 32767]);
+        assert_eq!(quantise(f64::NAN), 0);
     }
 
     #[test]
@@ -924,11 +1141,8 @@ mod tests {
 
     #[test]
     fn the_stated_sizes_hold() {
-        assert_eq!(image_bytes(25, 3, 16, [64; 3]), 7836);
-        assert_eq!(image_bytes(25, 3, 16, [0; 3]), 7016);
-        assert_eq!(image_bytes(25, 3, 8, [64; 3]), 5396);
-        assert_eq!(image_bytes(25, 3, 8, [0; 3]), 4580);
-        assert!(image_bytes(25, 3, 16, [93; 3]) <= 8192);
+        assert_eq!(image_bytes(25, 3, 8, [32; 3]), 5252);
+        assert_eq!(image_bytes(60, 2, 8, [0; 3]), 7384);
         assert_eq!(fixture::image(false).len(), fixture::plan(false).image_bytes());
     }
 
@@ -988,11 +1202,11 @@ mod tests {
         };
         let short = damaged(|image| image.truncate(100));
         assert_eq!(short, ImageError::TooShort { found: 100, needed: image_bytes(1, 1, 0, [0; 3]) });
-        assert_eq!(Table::check(&[]).unwrap_err(), ImageError::TooShort { found: 0, needed: 220 });
+        assert_eq!(Table::check(&[]).unwrap_err(), ImageError::TooShort { found: 0, needed: 584 });
         assert_eq!(damaged(|image| image[0] = 0), ImageError::Magic);
         // What a text-mode transfer does.
         assert_eq!(damaged(|image| _ = image.remove(4)), ImageError::Magic);
-        assert_eq!(damaged(|image| image[8] = 1), ImageError::Version { found: 1, allowed: 2 });
+        assert_eq!(damaged(|image| image[8] = 2), ImageError::Version { found: 2, allowed: 3 });
         assert_eq!(damaged(|image| image.swap(10, 11)), ImageError::ByteOrder { found: 0xfffe });
         let full = image.len();
         assert_eq!(damaged(|image| _ = image.pop()), ImageError::Length { stated: full, found: full - 1 });
@@ -1009,7 +1223,7 @@ mod tests {
 
     #[test]
     fn each_damage_of_the_header_has_its_own_error() {
-        assert_eq!(resealed(|image| image[170] = 1), ImageError::Reserved { offset: 170 });
+        assert_eq!(resealed(|image| image[230] = 1), ImageError::Reserved { offset: 230 });
         assert_eq!(resealed(|image| image[57] = 7), ImageError::Text { field: Field::ToolVersion });
         assert_eq!(resealed(|image| image[102] = b'x'), ImageError::Text { field: Field::MeshLevel });
         assert_eq!(resealed(|image| image[104] = 5), ImageError::GeneratorKind { found: 5 });
@@ -1034,18 +1248,20 @@ mod tests {
             let error = resealed(put(offset, value));
             assert!(matches!(error, ImageError::OutOfRange { field: named, .. } if named == field), "{error}");
         };
-        outside(116, -1.0, Field::MeanRipple);
-        outside(120, 1.0, Field::HalfWidthRipple);
         outside(124, -1.0, Field::SolverResidual);
         outside(128, 0.06, Field::ProjectionWorst);
         outside(132, 0.01, Field::ProjectionRms);
         outside(136, -50.1, Field::TorqueRange);
         outside(140, -50.1, Field::TorqueRange);
         outside(148, 80.1, Field::TemperatureRange);
+        // What follows from other numbers must do so: unit of the ripple aside, each of these words.
+        for at in [120, 156, 160, 164, 166, 168, 170, 172, 174, 176, 180, 184, 188, 192, 196] {
+            let error = resealed(|image| image[at] ^= 1);
+            assert_eq!(error, ImageError::Derived { offset: at / 4 * 4 });
+        }
         outside(152, 0.0, Field::ErrorLimit);
         outside(152, 0.051, Field::ErrorLimit);
         for (offset, field, index) in [
-            (116, Field::MeanRipple, 0),
             (124, Field::SolverResidual, 0),
             (132, Field::ProjectionRms, 0),
             (140, Field::TorqueRange, 1),
@@ -1065,34 +1281,48 @@ mod tests {
         let equal = ImageError::NotIncreasing { field: Field::TorqueNodes, index: 4 };
         assert_eq!(resealed(put(node(4), -1.51)), equal);
         let falling = ImageError::NotIncreasing { field: Field::TemperatureNodes, index: 2 };
-        assert_eq!(resealed(put(node(13), 19.0)), falling);
-        let record = |i: usize| RECORDS + RECORD_BYTES * i;
-        let error = resealed(put(record(5), f32::NEG_INFINITY));
+        assert_eq!(resealed(put(node(66), 19.0)), falling);
+        assert_eq!(resealed(put(node(11), 99.0)), ImageError::Derived { offset: node(11) });
+        let at_node = |i: usize| NODES + NODE_BYTES * i;
+        let error = resealed(put(at_node(5), f32::NEG_INFINITY));
         assert_eq!(error, ImageError::NotFinite { field: Field::Mean, index: 5 });
-        for slope in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-            let error = resealed(put(record(12) + 8, slope));
-            assert_eq!(error, ImageError::NotFinite { field: Field::MeanSlope, index: 12 });
+        for (place, field) in [(4, Field::MeanSlope), (8, Field::HalfWidth)] {
+            for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                let error = resealed(put(at_node(12) + place, value));
+                assert_eq!(error, ImageError::NotFinite { field, index: 12 });
+            }
         }
-        // At the end of the axis, in the middle, and a slope that overflows: 30 N·m on, a quarter of it is too much.
-        for (index, slope) in [(0, 3.0e-3), (9, 3.0e-3), (10, -3.0e-3), (4, f32::MAX), (32, -f32::MAX)] {
-            let error = resealed(put(record(index) + 8, slope));
+        // At the end of the axis, in the middle, and a slope that overflows: 30 N·m on, a third of it is too much.
+        for (index, slope) in [(0, 2.0e6), (9, 2.0e6), (10, -2.0e6), (4, f32::MAX), (32, -f32::MAX)] {
+            let error = resealed(put(at_node(index) + 4, slope));
             assert!(matches!(error, ImageError::ErrorBound { allowed_rad: 0.02, .. }), "{index}: {error}");
         }
-        let error = resealed(put(record(7) + 4, -1.0e-9));
+        let error = resealed(put(at_node(20), 3.0e7));
+        assert!(matches!(error, ImageError::ErrorBound { allowed_rad: 0.02, .. }), "{error}");
+        let error = resealed(put(at_node(7) + 8, -1.0));
         assert!(matches!(error, ImageError::OutOfRange { field: Field::HalfWidth, .. }), "{error}");
+        // The mark of a jump is where the nodes put it.
+        let error = resealed(|image| image[at_node(7) + 8] ^= 1);
+        assert_eq!(error, ImageError::Derived { offset: at_node(7) + 8 });
+        let record = |i: usize| RECORDS + RECORD_BYTES * i;
         // Half-width below its own ripple, at temperature 1 and torque 2.
-        let error = resealed(put(record(13) + 4, 1.0e-8));
+        let error = resealed(put(at_node(13) + 8, 30.0));
         assert!(matches!(error, ImageError::NegativeHalfWidth { temperature: 1, torque: 2, .. }), "{error}");
         // The repeated nodes at either end of a record.
         for (position, index) in [(0, 0), (17, 17), (18, 18)] {
-            let offset = record(3) + 4 * (RECORD_HEAD_WORDS + position);
+            let offset = record(3) + 4 * position;
             let error = resealed(|image| image[offset] ^= 1);
             assert_eq!(error, ImageError::NotClosed { field: Field::MeanRipple, index });
         }
-        let error = resealed(put(record(20), 0.03));
-        assert!(matches!(error, ImageError::ErrorBound { allowed_rad: 0.02, .. }), "{error}");
-        // Ripple a hundred times as large, on a half-width that allows it.
-        let error = resealed(|image| put(116, 1.0e-4 / 32767.0)(image));
+        // Ripple sixty times as large, where the half-width allows it: the same at every node of the last record.
+        let error = resealed(|image| {
+            let unit = u32::from_le_bytes(*image[116..].first_chunk().unwrap());
+            image[116..120].copy_from_slice(&(unit * 60).to_le_bytes());
+            for word in image[RECORDS..RECORDS + 33 * RECORD_BYTES].chunks_exact_mut(4) {
+                // The half-width ripple goes.
+                word.copy_within(0..2, 2);
+            }
+        });
         assert!(matches!(error, ImageError::Slope { found } if found > 1.0 && found < 20.0), "{error}");
     }
 
@@ -1127,7 +1357,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slope_that_no_interval_uses_does_no_harm() {
+    fn short_axes_give_flat_tables() {
         // One node alone, and an end of the axis that a jump cuts off.
         for nodes in [&[0.0][..], &[0.0, 2.0, 20.0, 40.0]] {
             let flat = TableData {
@@ -1142,13 +1372,10 @@ mod tests {
                 output_curve_rad: &[],
                 ..data()
             };
-            let mut image = write(&flat, &Provenance { torque_range_n_m: [0.0; 2], ..provenance() }).unwrap();
-            let body_bytes = Table::check(&image).unwrap().body_bytes;
-            put(HEADER_BYTES + 4 * (nodes.len() + 1) + 8, f32::MAX)(&mut image);
-            seal(&mut image, body_bytes);
+            let image = write(&flat, &Provenance { torque_range_n_m: [0.0; 2], ..provenance() }).unwrap();
             let table = Table::check(&image).unwrap();
             for torque in [-1.0, 0.0, 0.5, 1.9, 2.0, 7.0, 40.0, 50.0] {
-                assert_eq!(table.at(torque, 20.0).unwrap().mean_rad, 1.0e-3, "{torque}");
+                assert!((table.at(torque, 20.0).unwrap().mean_rad() - 1.0e-3).abs() < 2e-9, "{torque}");
             }
         }
     }
@@ -1201,13 +1428,14 @@ mod tests {
             let mut image = fixture::image(false);
             let body_bytes = Table::check(&image).unwrap().body_bytes;
             for (record, mantissa, decade) in slopes {
-                put(RECORDS + RECORD_BYTES * record + 8, mantissa * 1.0e-3 * 10.0f32.powi(-decade))(&mut image);
+                put(NODES + NODE_BYTES * record + 4, mantissa * 1.0e6 * 10.0f32.powi(-decade))(&mut image);
             }
+            let _ = complete(&mut image, body_bytes);
             seal(&mut image, body_bytes);
             if let Ok(table) = Table::check(&image) {
                 for torque in [torque, 0.3 * torque, 0.05 * torque] {
                     let found = table.at(torque, temperature).unwrap();
-                    let reached = found.mean_rad.abs() + found.half_width_rad;
+                    let reached = (found.mean.abs() + found.half_width) as f32 * RAD_PER_COUNT;
                     prop_assert!(reached <= 1.0001 * table.bounds().error_rad, "{} at {}", reached, torque);
                 }
             }
@@ -1224,6 +1452,8 @@ mod tests {
             for (offset, value) in damage {
                 image[offset.min(body_bytes - 1)] = value;
             }
+            seal(&mut image, body_bytes);
+            let _ = complete(&mut image, body_bytes);
             seal(&mut image, body_bytes);
             if let Ok(table) = Table::check(&image) {
                 let generator = crate::GeneratorAngle::from_counts(generator);

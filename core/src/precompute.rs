@@ -73,7 +73,7 @@
 //! let workspace = Workspace { numbers: &mut numbers, marks: &mut marks, values: &mut values };
 //! let hash = |_contents: &[u8]| [0; 8]; // the first 8 bytes of BLAKE3
 //! let fit = make_image(&plan, &provenance, &samples, workspace, &mut image, hash).unwrap();
-//! assert!(fit.worst_rad < 1e-9);
+//! assert!(fit.worst_rad < 4e-9);
 //! assert!(Table::check(&image).is_ok());
 //! ```
 //!
@@ -98,8 +98,8 @@ use core::fmt;
 
 /// Most harmonics of one of ψ, ψ − δ, δ.
 pub const MAX_HARMONICS: usize = 8;
-/// Nodes a curve needs for each period of its highest harmonic: keeps the interpolation error below 1.0e-3 of it.
-pub const NODES_PER_PERIOD: usize = 8;
+/// Nodes a curve needs for each period of its highest harmonic: keeps the interpolation error below 6e-4 of it.
+pub const NODES_PER_PERIOD: usize = 16;
 
 /// Conjugate gradients stop at this residual relative to the right-hand side: 1e-12 of 0.05 rad is far below 0.01″.
 const RELATIVE_RESIDUAL: f64 = 1e-12;
@@ -396,7 +396,7 @@ impl From<ImageError> for ProjectError {
 struct Row {
     error_rad: f64,
     /// Unknowns of the ripple around the sample, and their weights.
-    ripple: [(usize, f64); 16],
+    ripple: [(usize, f64); 12],
     /// Cosine and sine of every harmonic; the first `2·harmonics` count.
     harmonics: [f64; 6 * MAX_HARMONICS],
     bend: Bend,
@@ -610,7 +610,7 @@ impl<'a> Plan<'a> {
         let phases = self.drive.phases(generator, self.drive.nominal_output(generator));
         let mut row = Row {
             error_rad: self.error_rad(sample),
-            ripple: [(0, 0.0); 16],
+            ripple: [(0, 0.0); 12],
             harmonics: [0.0; 6 * MAX_HARMONICS],
             bend: self.bend(sample, slopes),
         };
@@ -619,7 +619,7 @@ impl<'a> Plan<'a> {
                 let cell = axis.locate(phases.tooth);
                 (axis.around(cell), cell.weights())
             }
-            _ => ([0; 4], [1.0, 0.0, 0.0, 0.0]),
+            _ => ([0; 3], [1.0, 0.0, 0.0]),
         };
         let first = direction_number(sample.direction) * self.block();
         let pairs = self.corners(sample).into_iter().flat_map(|(record, weight)| {
@@ -1025,13 +1025,13 @@ fn lay_out<'a>(
 
 /// Coefficients of the spline that passes through `Σ aₖ·cos(k·phase) + bₖ·sin(k·phase)` at every node.
 ///
-/// A spline with coefficients `cos(k·xᵢ)`, node spacing `s`, has `(2 + cos ks)/3·cos(k·xᵢ)` at its nodes.
+/// A spline with coefficients `cos(k·xᵢ)`, node spacing `s`, has `(3 + cos ks)/4·cos(k·xᵢ)` at its nodes.
 fn spread_harmonics(orders: &[u16], amplitudes: &[f64], curve: &mut [f32]) {
     let spacing = TAU / curve.len().max(1) as f64;
     for (node, value) in curve.iter_mut().enumerate() {
         let mut sum = 0.0;
         for (&order, pair) in orders.iter().zip(amplitudes.chunks_exact(2)) {
-            let gain = 3.0 / (2.0 + libm::cos(order as f64 * spacing));
+            let gain = 4.0 / (3.0 + libm::cos(order as f64 * spacing));
             let (sine, cosine) = libm::sincos(order as f64 * spacing * node as f64);
             sum += gain * dot(pair, &[cosine, sine]);
         }
@@ -1155,7 +1155,7 @@ mod tests {
     #[test]
     fn full_turns_separate_both_families_of_harmonics() {
         let (fit, image) = make(&fixture::plan(true), &fixture::samples(true)).unwrap();
-        assert!(fit.worst_rad < 0.005 * ARCSEC, "{} arcsec", fit.worst_rad / ARCSEC);
+        assert!(fit.worst_rad < 0.009 * ARCSEC, "{} arcsec", fit.worst_rad / ARCSEC);
         let worst = worst_elsewhere(&image, true);
         assert!(worst < 0.01, "{worst} arcsec");
     }

@@ -5,7 +5,7 @@
 //!
 //! Slopes come from the node values alone and linearly: [`Slopes`] is what the image writer stores and what the least squares
 //! of [`crate::precompute`] assumes; [`bend`] is what the control step and the least squares evaluate. A limiter against
-//! overshoot would not be linear; what a cubic can reach is bounded when a table is accepted instead ([`most_bend`]).
+//! overshoot would not be linear; what a cubic can reach is bounded when a table is accepted instead.
 
 use crate::grid::{self, MAX_CLAMPED_NODES};
 
@@ -18,14 +18,10 @@ const ROOT_ORIGIN: f64 = 0.25;
 
 /// What a cubic adds to the straight line at `weight` of an interval of `width`, from its rise over the interval, its slope
 /// below and its slope above.
+#[inline(always)]
 pub(crate) fn bend(weight: f32, width: f32, [rise, below, above]: [f32; 3]) -> f32 {
     let rest = 1.0 - weight;
     weight * rest * (rest * (width * below - rise) + weight * (rise - width * above))
-}
-
-/// Most that a cubic departs from the straight line over an interval: a quarter of the larger departure in slope, as rises.
-pub(crate) fn most_bend(rise: f32, width: f32, below: f32, above: f32) -> f32 {
-    0.25 * (width * below - rise).abs().max((rise - width * above).abs())
 }
 
 /// The slope at a node as a sum over neighbouring nodes.
@@ -192,7 +188,7 @@ mod tests {
         for pair in nodes.windows(2) {
             for place in 0..=places {
                 let torque = pair[0] + (pair[1] - pair[0]) * place as f32 / places as f32;
-                let mean = table.at(torque, 20.0).unwrap().mean_rad;
+                let mean = table.at(torque, 20.0).unwrap().mean_rad();
                 found.push((torque as f64, mean as f64, curve(torque as f64)));
             }
         }
@@ -279,17 +275,20 @@ mod tests {
                 let torque = low + (high - low) * share;
                 let share = (torque - low) / (high - low);
                 let straight = means[jump] * (1.0 - share) + means[jump + 1] * share;
-                assert!((at(torque).mean_rad - straight).abs() < 1.0e-9);
-                assert_eq!(at(torque).quality, Quality::Uncertain);
+                assert!((at(torque).mean_rad() - straight).abs() < 2.0e-9);
+                assert_eq!(at(torque).quality(true, true), Quality::Uncertain);
             }
         }
         // At the nodes nothing but the values, on both sides of a jump too.
         for (&node, &mean) in nodes.iter().zip(&means) {
-            assert_eq!(at(node).mean_rad, mean, "{node}");
+            assert!((at(node).mean_rad() - mean).abs() < 2.0e-9, "{node}");
         }
         for (beyond, edge) in [(50.01, 50.0), (1.0e6, 50.0), (-50.01, -50.0), (-1.0e6, -50.0)] {
-            assert_eq!(at(beyond).mean_rad, at(edge).mean_rad);
-            assert_eq!((at(beyond).quality, at(edge).quality), (Quality::Extrapolated, Quality::InRange));
+            assert_eq!(at(beyond).mean_rad(), at(edge).mean_rad());
+            assert_eq!(
+                (at(beyond).quality(true, true), at(edge).quality(true, true)),
+                (Quality::Extrapolated, Quality::InRange)
+            );
         }
     }
 
@@ -304,9 +303,9 @@ mod tests {
         let planes = planes.each_ref().map(|image| Table::check(image).unwrap());
         for i in 0..100 {
             let torque = 1.0 + 0.15 * i as f32;
-            let [cold, hot] = planes.map(|table| table.at(torque, 0.0).unwrap().mean_rad);
-            let found = both.at(torque, 10.0).unwrap().mean_rad;
-            assert!((found - (0.75 * cold + 0.25 * hot)).abs() < 2.0e-10, "{torque}");
+            let [cold, hot] = planes.map(|table| table.at(torque, 0.0).unwrap().mean_rad());
+            let found = both.at(torque, 10.0).unwrap().mean_rad();
+            assert!((found - (0.75 * cold + 0.25 * hot)).abs() < 3.0e-9, "{torque}");
         }
     }
 
@@ -358,7 +357,7 @@ mod tests {
                 nodes.iter().zip(&values).map(|(&node, value)| 1.0e-5 * (offset * node + 10.0 * value)).collect();
             let image = image(&nodes, &means, &[20.0]);
             let table = Table::check(&image).unwrap();
-            let at = |torque: f32| table.at(torque, 20.0).unwrap().mean_rad as f64;
+            let at = |torque: f32| table.at(torque, 20.0).unwrap().mean_rad() as f64;
             let slopes = Slopes::new(&nodes);
             for i in 1..nodes.len() - 1 {
                 if table.is_torque_jump(i - 1) || table.is_torque_jump(i) {
@@ -366,10 +365,11 @@ mod tests {
                 }
                 // A cubic is fixed by four points: its slope at the node, from each side.
                 let side = |other: f32| {
+                    // Counts are 1.5e-9 rad.
                     let third = |k: f32| nodes[i] + (other - nodes[i]) * k / 3.0;
                     let step = (third(1.0) - nodes[i]) as f64;
                     let [a, b, c, d] = [0.0, 1.0, 2.0, 3.0].map(|k| at(third(k)));
-                    ((-11.0 * a + 18.0 * b - 9.0 * c + 2.0 * d) / (6.0 * step), 1.0e-9 / step.abs())
+                    ((-11.0 * a + 18.0 * b - 9.0 * c + 2.0 * d) / (6.0 * step), 4.0e-9 / step.abs())
                 };
                 let ((before, rough_before), (after, rough_after)) = (side(nodes[i - 1]), side(nodes[i + 1]));
                 let rounding = 3.0 * (rough_before + rough_after) + 1.0e-4 * before.abs();
@@ -377,19 +377,6 @@ mod tests {
                 let slope = slopes.at(i).of(&means);
                 prop_assert!((before - slope).abs() <= rounding, "{}: {:e} {:e}", nodes[i], before, slope);
             }
-        }
-
-        #[test]
-        fn the_bend_is_bounded_and_the_bound_is_close(
-            rise in -1.0f32..1.0, below in -1.0f32..1.0, above in -1.0f32..1.0, width in 0.01f32..10.0,
-        ) {
-            let most = most_bend(rise, width, below, above);
-            let mut reached = 0.0f32;
-            for i in 0..=1000 {
-                reached = reached.max(bend(i as f32 / 1000.0, width, [rise, below, above]).abs());
-            }
-            prop_assert!(reached <= most * 1.0001 + 1e-6, "{} {}", reached, most);
-            prop_assert!(most <= 2.7 * reached + 1e-6, "{} {}", reached, most);
         }
     }
 }

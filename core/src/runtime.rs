@@ -1,0 +1,834 @@
+//! The fixed-step runtime of one joint: one call for each tick, with the same work in each.
+//!
+//! In this order: the measured generator angle is judged; torque and temperature are located in the table; the play follows the
+//! generator (forward); the target is turned into a correction (inverse); mode and overrun policy say how much of it is wanted;
+//! a limiter moves the correction there; the scrubber of the table does its slice. What slower rate groups do is called by the
+//! firmware after [`Joint::tick`], in an order that is fixed in its source ([`RateGroup`]).
+//!
+//! | what happens | what the joint does | flag |
+//! |---|---|---|
+//! | no sample | keeps the last generator angle: the play does not move | [`Flags::SAMPLE_LOST`] |
+//! | a sample further from the last one than a tick allows | takes it for a glitch, as no sample; if it stays for `patience` ticks, takes it as true, with the side of the play unknown | [`Flags::GLITCH`] |
+//! | torque or temperature not finite, or the table in doubt | keeps the last correction for `patience` ticks, then fades it out | [`Flags::NOT_CORRECTED`] |
+//! | torque or temperature out of range | corrects with the value at the edge | [`Quality::Extrapolated`] |
+//! | a tick came late | by [`Overrun`] | [`Flags::OVERRUN`] |
+//! | a reversal, or anything else that wants a faster correction | the limiter holds it back; by how much is in [`Output::held_back_rad`] | [`Flags::HELD_BACK`] |
+//! | an upset in the state | an interval of the play that cannot be is taken for unknown; of two corrections that differ the nearer to the goal counts | [`Flags::STATE_TORN`] |
+//! | reset | [`JointState::restore`] goes on where it was, [`JointState::new`] starts with no correction and the side of the play unknown; both within the limits | |
+
+use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
+use crate::drive::Drive;
+use crate::hysteresis::{PlayState, SAVED_STATE_BYTES};
+use crate::image::crc32;
+use crate::model::{Approach, Command, Model, Prediction};
+use crate::store::{Images, Store};
+use crate::table::{self, Doubt, Quality, larger};
+use core::fmt;
+use core::hint::black_box;
+
+/// What a joint does with its correction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Mode {
+    /// No correction: it is taken back within the limits. The start.
+    Off,
+    /// The correction follows the table.
+    Tracking,
+    /// The correction stays as it is.
+    Hold,
+    /// No correction, and none before [`Mode::Off`] was asked for: after a fault.
+    Safe,
+}
+
+/// A transition that is not legal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ModeError {
+    /// The mode now.
+    pub from: Mode,
+    /// The mode asked for.
+    pub to: Mode,
+}
+
+impl fmt::Display for ModeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "no transition from {:?} to {:?}", self.from, self.to)
+    }
+}
+
+impl core::error::Error for ModeError {}
+
+impl Mode {
+    /// Whether `self` may be followed by `to`: everything may stop, tracking starts from off or hold, hold only from tracking,
+    /// and safe is left to off alone.
+    #[must_use]
+    pub const fn may_become(self, to: Self) -> bool {
+        matches!(
+            (self, to),
+            (_, Self::Safe | Self::Off)
+                | (Self::Off | Self::Tracking | Self::Hold, Self::Tracking)
+                | (Self::Tracking | Self::Hold, Self::Hold)
+        )
+    }
+}
+
+/// What a tick that came late does to the correction. Missed ticks are counted with each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Overrun {
+    /// Nothing more: the ticks missed are skipped.
+    SkipAndCount,
+    /// The correction stays as it is in this tick.
+    HoldLast,
+    /// The correction fades to none within so many ticks, stays there as long, and comes back.
+    FadeOut {
+        /// Ticks, at least 1.
+        ticks: u16,
+    },
+}
+
+/// Ticks in which a slower group runs: every `divisor`-th, from `offset` on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RateGroup {
+    divisor: u32,
+    offset: u32,
+}
+
+impl RateGroup {
+    /// A group; `None` unless 1 ≤ `divisor` and `offset` < `divisor`.
+    #[must_use]
+    pub const fn new(divisor: u32, offset: u32) -> Option<Self> {
+        if divisor == 0 || offset >= divisor { None } else { Some(Self { divisor, offset }) }
+    }
+
+    /// Whether it runs in tick number `tick`.
+    #[must_use]
+    pub fn is_due(self, tick: u32) -> bool {
+        tick.checked_rem(self.divisor) == Some(self.offset)
+    }
+}
+
+/// What a joint cannot be set to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SettingError {
+    /// Which setting.
+    pub name: &'static str,
+    /// Value found.
+    pub found: f32,
+}
+
+impl fmt::Display for SettingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {}: must be finite and above zero, and not beyond what one tick can do", self.name, self.found)
+    }
+}
+
+impl core::error::Error for SettingError {}
+
+/// Limits of one joint, in units of its output and of seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Time from tick to tick, s.
+    pub tick_s: f32,
+    /// Fastest correction at the output, rad/s.
+    pub rate_rad_s: f32,
+    /// Largest acceleration of the correction at the output, rad/s².
+    pub acceleration_rad_s2: f32,
+    /// Fastest generator, rad/s: what moves faster from tick to tick is a glitch.
+    pub generator_rate_rad_s: f32,
+    /// Ticks for which a glitch is not believed, and for which the last correction is kept where none can be made.
+    pub patience: u16,
+}
+
+/// Parts of a count that the correction is kept in.
+const FINE: i32 = 16;
+
+/// One joint: all that does not change while it runs. Can be made at compile time and lie in flash.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joint {
+    drive: Drive,
+    overrun: Overrun,
+    /// Fine counts in a tick, and in a tick more each tick.
+    rate: f32,
+    acceleration: f32,
+    largest_move: i32,
+    patience: u32,
+    /// Twice the ticks of a fade, and the part of the correction that one tick of it takes.
+    fade: u32,
+    fade_step: f32,
+}
+
+/// One tick's measurements.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Input {
+    /// Generator angle; `None` if there is no sample.
+    pub generator: Option<GeneratorAngle>,
+    /// Where the output shall be.
+    pub target: OutputAngle,
+    /// Load torque at the output, N·m, positive when it turns the output forward.
+    pub torque_n_m: f32,
+    /// Ticks that were missed since the last call.
+    pub missed_ticks: u16,
+}
+
+/// What happened in a tick; a set of the constants.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Flags(u16);
+
+impl Flags {
+    /// There was no sample.
+    pub const SAMPLE_LOST: Self = Self(1);
+    /// The sample was not believed.
+    pub const GLITCH: Self = Self(2);
+    /// The tick came late.
+    pub const OVERRUN: Self = Self(4);
+    /// The limiter held the correction back.
+    pub const HELD_BACK: Self = Self(8);
+    /// No correction could be made; the last one is kept or fades out.
+    pub const NOT_CORRECTED: Self = Self(16);
+    /// The copies of the table disagree in what was read.
+    pub const TABLE_DOUBT: Self = Self(32);
+    /// The state was not whole.
+    pub const STATE_TORN: Self = Self(64);
+
+    /// Whether all of `other` are set.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// The flags as bits, for telemetry.
+    #[must_use]
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+
+    #[inline(always)]
+    const fn with(self, other: Self, set: bool) -> Self {
+        Self(self.0 | if set { other.0 } else { 0 })
+    }
+}
+
+/// One tick's results.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Output {
+    /// Generator angle to command.
+    pub command: GeneratorAngle,
+    /// Where the output is estimated to be now.
+    pub output: OutputAngle,
+    /// The transmission error now, rad; 0 if disabled.
+    pub transmission_error_rad: f32,
+    /// It lies within ± this, as far as play and jumps go, rad.
+    pub uncertainty_rad: f32,
+    /// The correction in the command: the target less the nominal output of the command, rad.
+    pub correction_rad: f32,
+    /// What the limiter held back of the correction, rad.
+    pub held_back_rad: f32,
+    /// How far to trust estimate and correction.
+    pub quality: Quality,
+    /// What happened.
+    pub flags: Flags,
+}
+
+/// What changes while a joint runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointState {
+    play: PlayState,
+    /// Nominal output of the play, once more.
+    nominal: OutputAngle,
+    generator: GeneratorAngle,
+    /// The correction in fine counts, twice.
+    correction: [i32; 2],
+    /// What is wanted, and what of it was asked of the limiter.
+    goal: i32,
+    aimed: i32,
+    speed: f32,
+    /// Ticks in a row with a glitch, and without a correction.
+    glitches: u32,
+    uncorrected: u32,
+    fading: u32,
+    missed_ticks: u32,
+    mode: Mode,
+    started: bool,
+}
+
+/// Size of a saved joint state.
+pub const SAVED_JOINT_BYTES: usize = SAVED_STATE_BYTES + 12;
+
+impl Default for JointState {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl JointState {
+    /// After a reset: no correction, the side of the play unknown, off.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            play: PlayState::unknown(),
+            nominal: OutputAngle::ZERO,
+            generator: GeneratorAngle::ZERO,
+            correction: [0; 2],
+            goal: 0,
+            aimed: 0,
+            speed: 0.0,
+            glitches: 0,
+            uncorrected: 0,
+            fading: 0,
+            missed_ticks: 0,
+            mode: Mode::Off,
+            started: false,
+        }
+    }
+
+    /// The mode.
+    #[must_use]
+    pub const fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Changes the mode from the next tick on.
+    ///
+    /// # Errors
+    /// [`ModeError`] if [`Mode::may_become`] says no; the mode stays.
+    pub const fn request(&mut self, to: Mode) -> Result<(), ModeError> {
+        if !self.mode.may_become(to) {
+            return Err(ModeError { from: self.mode, to });
+        }
+        self.mode = to;
+        Ok(())
+    }
+
+    /// The play.
+    #[must_use]
+    pub const fn play(&self) -> &PlayState {
+        &self.play
+    }
+
+    /// Ticks missed since the start; wraps.
+    #[must_use]
+    pub const fn missed_ticks(&self) -> u32 {
+        self.missed_ticks
+    }
+
+    /// What must survive a reset: the play and the correction, with checksums.
+    #[must_use]
+    pub fn save(&self) -> [u8; SAVED_JOINT_BYTES] {
+        let mut bytes = [0; SAVED_JOINT_BYTES];
+        let [correction, _] = self.correction;
+        let parts = self.play.save().into_iter().chain(correction.to_le_bytes()).chain(self.speed.to_le_bytes());
+        for (to, from) in bytes.iter_mut().zip(parts) {
+            *to = from;
+        }
+        if let Some((before, sum)) = bytes.split_last_chunk_mut::<4>() {
+            *sum = crc32(before).to_le_bytes();
+        }
+        bytes
+    }
+
+    /// A state from [`Self::save`], in [`Mode::Off`] with the correction still there; `None` if the bytes are damaged.
+    ///
+    /// Restore only if the joint cannot have moved meanwhile, else start from [`Self::new`]. Ask for [`Mode::Tracking`] before
+    /// the first tick to keep the correction.
+    #[must_use]
+    pub fn restore(bytes: &[u8; SAVED_JOINT_BYTES]) -> Option<Self> {
+        let (before, sum) = bytes.split_last_chunk::<4>()?;
+        let (play, rest) = before.split_first_chunk::<SAVED_STATE_BYTES>()?;
+        let (correction, speed) = rest.split_first_chunk::<4>()?;
+        let correction = i32::from_le_bytes(*correction);
+        let speed = f32::from_le_bytes(*speed.first_chunk::<4>()?);
+        let play = PlayState::restore(play)?;
+        let intact = crc32(before) == u32::from_le_bytes(*sum) && speed.is_finite();
+        let state = Self {
+            play,
+            nominal: play.nominal_or_zero(),
+            correction: [correction; 2],
+            goal: correction,
+            aimed: correction,
+            speed,
+            ..Self::new()
+        };
+        intact.then_some(state)
+    }
+}
+
+/// A positive, finite number of counts.
+const fn checked(name: &'static str, found: f32, counts: f64, most: f64) -> Result<f32, SettingError> {
+    if counts > 0.0 && counts <= most { Ok(counts as f32) } else { Err(SettingError { name, found }) }
+}
+
+impl Joint {
+    /// A joint with this drive.
+    ///
+    /// # Errors
+    /// [`SettingError`]: a limit that is not finite and positive, or beyond 0.05 rad (rate) or half a turn (generator) in a tick.
+    pub const fn new(drive: Drive, limits: Limits, overrun: Overrun) -> Result<Self, SettingError> {
+        let Limits { tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, patience } = limits;
+        let tick = tick_s as f64;
+        let tick_ok = checked("tick_s", tick_s, tick, 1.0e3);
+        if let Err(error) = tick_ok {
+            return Err(error);
+        }
+        let most = table::counts(0.05) * FINE as f64;
+        let rate = match checked("rate_rad_s", rate_rad_s, table::counts(rate_rad_s as f64 * tick) * FINE as f64, most)
+        {
+            Ok(rate) => rate,
+            Err(error) => return Err(error),
+        };
+        let per_tick = table::counts(acceleration_rad_s2 as f64 * tick * tick) * FINE as f64;
+        let acceleration = match checked("acceleration_rad_s2", acceleration_rad_s2, per_tick, 1.0e12) {
+            Ok(acceleration) => acceleration,
+            Err(error) => return Err(error),
+        };
+        let per_tick = table::counts(generator_rate_rad_s as f64 * tick);
+        let largest_move = match checked("generator_rate_rad_s", generator_rate_rad_s, per_tick, 2_147_483_000.0) {
+            Ok(counts) => counts as i32,
+            Err(error) => return Err(error),
+        };
+        let ticks = match overrun {
+            Overrun::FadeOut { ticks } => ticks,
+            Overrun::SkipAndCount | Overrun::HoldLast => 0,
+        };
+        let fade_step = if ticks == 0 { 0.0 } else { 1.0 / ticks as f32 };
+        let fade = ticks as u32;
+        Ok(Self { drive, overrun, rate, acceleration, largest_move, patience: patience as u32, fade, fade_step })
+    }
+
+    /// The drive.
+    #[must_use]
+    pub const fn drive(&self) -> &Drive {
+        &self.drive
+    }
+
+    /// Output angle for a generator angle, with the play followed in `play`: as [`crate::Table::forward`], from the copies.
+    #[must_use]
+    pub fn forward(
+        &self,
+        store: &Store,
+        play: &mut PlayState,
+        generator: GeneratorAngle,
+        torque_n_m: f32,
+    ) -> Prediction {
+        Model { memory: store, drive: &self.drive }.follow(&store.locate(torque_n_m), play, generator)
+    }
+
+    /// Generator angle that brings the output to `target`: as [`crate::Table::inverse`], from the copies.
+    #[must_use]
+    pub fn inverse(&self, store: &Store, target: OutputAngle, torque_n_m: f32, approach: Approach<'_>) -> Command {
+        Model { memory: store, drive: &self.drive }.aim(&store.locate(torque_n_m), target, approach)
+    }
+
+    /// One tick.
+    ///
+    /// Instructions are counted by `tests/firmware`; the same number in every tick with the same table.
+    #[must_use]
+    pub fn tick(&self, images: &Images<'_>, store: &mut Store, state: &mut JointState, input: &Input) -> Output {
+        let point = store.locate(input.torque_n_m);
+        let (generator, sample_flags, doubted) = self.judge(state, input);
+        let torn = (state.play.nominal_or_zero() != state.nominal) | !state.play.is_ordered();
+        if torn | doubted {
+            state.play = PlayState::unknown();
+        }
+        let model = Model { memory: &*store, drive: &self.drive };
+        let (now, doubt) = model.follow_and_tell(&point, &mut state.play, generator);
+        state.nominal = state.play.nominal_or_zero();
+        let aim = model.solve(&point, input.target, Approach::From(&state.play));
+        let sane = (aim.quality != Quality::Disabled) & (now.quality != Quality::Disabled);
+
+        let (goal, late) = self.goal(state, input, input.target.minus_small_counts(aim.nominal), sane);
+        let (correction, whole) = self.limit(state, goal);
+        let doubt = Doubt(doubt.0 | aim.doubt.0);
+        store.tend(images, doubt);
+
+        let held_back = goal.wrapping_sub(correction);
+        let flags = sample_flags
+            .with(Flags::OVERRUN, late)
+            .with(Flags::HELD_BACK, (held_back >= FINE) | (held_back <= -FINE))
+            .with(Flags::NOT_CORRECTED, !sane)
+            .with(Flags::TABLE_DOUBT, !doubt.none())
+            .with(Flags::STATE_TORN, torn | !whole);
+        let counts = correction >> 4;
+        Output {
+            command: self.drive.nominal_generator(input.target.offset_counts((counts as i64).wrapping_neg())),
+            output: now.output,
+            transmission_error_rad: now.transmission_error_rad,
+            uncertainty_rad: larger(now.uncertainty_rad, aim.uncertainty as f32 * RAD_PER_COUNT),
+            correction_rad: correction as f32 * (RAD_PER_COUNT / FINE as f32),
+            held_back_rad: held_back as f32 * (RAD_PER_COUNT / FINE as f32),
+            quality: if now.quality > aim.quality { now.quality } else { aim.quality },
+            flags,
+        }
+    }
+
+    /// The generator angle to believe, and whether it tells that the play is not where it was thought.
+    #[inline(always)]
+    fn judge(&self, state: &mut JointState, input: &Input) -> (GeneratorAngle, Flags, bool) {
+        let (lost, sample) = match input.generator {
+            Some(sample) => (false, sample),
+            None => (true, state.generator),
+        };
+        let moved = sample.minus_small_counts(state.generator);
+        let far = ((moved > self.largest_move) | (moved < self.largest_move.wrapping_neg())) & state.started;
+        let more = black_box(state.glitches.saturating_add(1));
+        state.glitches = if far { more } else { 0 };
+        let believed = far & (state.glitches > self.patience);
+        state.glitches = if believed { 0 } else { state.glitches };
+        let glitch = far & !believed;
+        let generator = if glitch { state.generator } else { sample };
+        state.generator = generator;
+        state.started |= !lost;
+        (generator, Flags::default().with(Flags::SAMPLE_LOST, lost).with(Flags::GLITCH, glitch), believed)
+    }
+
+    /// The correction wanted in this tick, fine counts, and whether the tick came late.
+    #[inline(always)]
+    fn goal(&self, state: &mut JointState, input: &Input, wanted: i32, sane: bool) -> (i32, bool) {
+        let late = input.missed_ticks > 0;
+        state.missed_ticks = state.missed_ticks.wrapping_add(input.missed_ticks as u32);
+        // Arithmetic instead of a choice: the compiler makes branches of choices, and then ticks differ.
+        let blind = black_box(u32::from(!sane));
+        state.uncorrected = state.uncorrected.saturating_add(1).wrapping_mul(blind);
+        let kept = state.goal;
+        let found = wanted.wrapping_mul(FINE);
+        let wanted = found.wrapping_add(kept.wrapping_sub(found).wrapping_mul(blind as i32));
+        let wanted = if state.uncorrected > self.patience { 0 } else { wanted };
+        let wanted = match state.mode {
+            Mode::Tracking => wanted,
+            Mode::Hold => kept,
+            Mode::Off | Mode::Safe => 0,
+        };
+        let hold = late & (self.overrun == Overrun::HoldLast);
+        let wanted = if hold { kept } else { wanted };
+        // Down in `fade` ticks, none for as many; without that policy `fade` is 0.
+        let start = self.fade.wrapping_mul(2);
+        let left = black_box(state.fading.saturating_sub(1));
+        state.fading = if late { start } else { left };
+        let left = state.fading.saturating_sub(self.fade) as f32 * self.fade_step;
+        let faded = black_box((wanted as f32 * left) as i32);
+        let goal = if state.fading > 0 { faded } else { wanted };
+        state.goal = wanted;
+        (goal, late)
+    }
+
+    /// Moves the correction towards the goal, and tells whether its two copies were one.
+    ///
+    /// The goal's own speed is followed; what lies between is closed as fast as it can be stopped again: in steps of one tick,
+    /// from a distance `l` with `√(a²/4 + 2al) − a/2`.
+    #[inline(always)]
+    fn limit(&self, state: &mut JointState, goal: i32) -> (i32, bool) {
+        let [one, other] = state.correction;
+        let nearer = goal.abs_diff(one) <= goal.abs_diff(other);
+        let before = if nearer { one } else { other };
+        let pace = goal.wrapping_sub(state.aimed) as f32;
+        state.aimed = goal;
+        let lag = goal.wrapping_sub(before) as f32 - pace;
+        let (most, gain) = (self.rate, self.acceleration);
+        let bounded = |value: f32, limit: f32| {
+            let above = if value > -limit { value } else { -limit };
+            if above < limit { above } else { limit }
+        };
+        let away = lag.abs();
+        let stoppable = table::sqrt(gain * (0.25 * gain + 2.0 * away)) - 0.5 * gain;
+        let stoppable = if stoppable < away { stoppable } else { away };
+        let wanted = bounded(pace + if lag < 0.0 { -stoppable } else { stoppable }, most);
+        let speed = state.speed + bounded(wanted - state.speed, gain);
+        let speed = bounded(speed, most);
+        state.speed = speed;
+        let correction = before.wrapping_add(speed as i32);
+        state.correction = [correction; 2];
+        (correction, one == other)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{self, ARCSEC};
+    use proptest::prelude::*;
+    use std::sync::LazyLock;
+    use std::vec::Vec;
+
+    static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(|| fixture::image(true));
+
+    const LIMITS: Limits =
+        Limits { tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 2.0, generator_rate_rad_s: 700.0, patience: 5 };
+    /// Rate in a tick, and its change from tick to tick, rad.
+    const RATE_RAD: f64 = 5e-5;
+    const ACCELERATION_RAD: f64 = 2e-6;
+
+    /// Less than this is rounding.
+    const COUNT: f32 = 1.5e-9;
+
+    struct Loop {
+        joint: Joint,
+        store: Store,
+        state: JointState,
+        generator: GeneratorAngle,
+        /// Corrections of the last ticks, rad.
+        before: [f64; 2],
+    }
+
+    impl Loop {
+        fn new(overrun: Overrun) -> Self {
+            let mut store = Store::new();
+            store.activate(&Images::new(&IMAGE, &IMAGE), &fixture::drive(), 20.0).unwrap();
+            let mut state = JointState::new();
+            state.request(Mode::Tracking).unwrap();
+            let joint = Joint::new(fixture::drive(), LIMITS, overrun).unwrap();
+            Self { joint, store, state, generator: GeneratorAngle::ZERO, before: [0.0; 2] }
+        }
+
+        fn input(&self, target_rad: f64) -> Input {
+            let target = OutputAngle::from_rad(target_rad).unwrap();
+            Input { generator: Some(self.generator), target, torque_n_m: 5.0, missed_ticks: 0 }
+        }
+
+        /// One tick; no correction may jump.
+        fn tick(&mut self, input: &Input) -> Output {
+            let out = self.joint.tick(&Images::new(&IMAGE, &IMAGE), &mut self.store, &mut self.state, input);
+            let now = out.correction_rad as f64;
+            let [last, before] = self.before;
+            assert!((now - last).abs() <= 1.0001 * RATE_RAD + 2e-9, "rate {}", now - last);
+            let change = (now - last) - (last - before);
+            assert!(change.abs() <= 1.0001 * ACCELERATION_RAD + 2e-9, "acceleration {change}");
+            self.before = [now, last];
+            out
+        }
+
+        /// Follows the command, towards a target that moves by this in a tick.
+        fn run(&mut self, ticks: usize, from_rad: f64, step_rad: f64) -> Output {
+            let mut out = None;
+            for i in 0..ticks {
+                let found = self.tick(&self.input(from_rad + step_rad * i as f64));
+                self.generator = found.command;
+                out = Some(found);
+            }
+            out.unwrap()
+        }
+    }
+
+    #[test]
+    fn the_correction_comes_within_its_limits_and_then_follows() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        let first = run.tick(&run.input(1e-3));
+        assert!(first.flags.contains(Flags::HELD_BACK) && first.held_back_rad.abs() > 1e-5);
+        let last = run.run(400, 1e-3, 1e-5);
+        assert_eq!(last.flags, Flags::default());
+        assert!(last.held_back_rad.abs() < COUNT);
+        assert!(last.correction_rad.abs() > 1e-5);
+        // A reversal wants the whole play at once and gets it within the limits.
+        let reversed = run.run(3, 1e-3 + 400.0 * 1e-5, -1e-5);
+        assert!(reversed.flags.contains(Flags::HELD_BACK));
+        let after = run.run(400, 1e-3 + 397.0 * 1e-5, -1e-5);
+        assert!(after.held_back_rad.abs() < COUNT);
+    }
+
+    #[test]
+    fn modes_change_only_as_they_may_and_never_jump() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        let tracking = run.run(300, 1e-3, 1e-5);
+        run.state.request(Mode::Hold).unwrap();
+        let held = run.run(50, 4e-3, 1e-5);
+        assert!((held.correction_rad - tracking.correction_rad).abs() < COUNT);
+        run.state.request(Mode::Safe).unwrap();
+        for refused in [Mode::Tracking, Mode::Hold] {
+            assert_eq!(run.state.request(refused), Err(ModeError { from: Mode::Safe, to: refused }));
+        }
+        let safe = run.run(300, 4.5e-3, 0.0);
+        assert_eq!((safe.correction_rad, run.state.mode()), (0.0, Mode::Safe));
+        assert_eq!(safe.command, fixture::drive().nominal_generator(run.input(4.5e-3).target));
+        run.state.request(Mode::Off).unwrap();
+        assert_eq!(run.state.request(Mode::Hold), Err(ModeError { from: Mode::Off, to: Mode::Hold }));
+        run.state.request(Mode::Tracking).unwrap();
+        assert!(run.run(300, 4.5e-3, 1e-5).correction_rad != 0.0);
+    }
+
+    #[test]
+    fn lost_samples_leave_the_play_where_it_is() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        run.run(300, 1e-3, 1e-5);
+        let play = *run.state.play();
+        for _ in 0..20 {
+            let out = run.tick(&Input { generator: None, ..run.input(4e-3) });
+            assert!(out.flags.contains(Flags::SAMPLE_LOST));
+        }
+        assert_eq!(run.state.play(), &play);
+        assert!(!run.tick(&run.input(4e-3)).flags.contains(Flags::SAMPLE_LOST));
+    }
+
+    #[test]
+    fn a_glitch_is_not_believed_and_a_new_place_is_with_the_side_unknown() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        let before = run.run(300, 1e-3, 1e-5);
+        let (play, good) = (*run.state.play(), run.generator);
+        run.generator = good.offset_rad(1.0);
+        let out = run.tick(&run.input(4e-3));
+        assert!(out.flags.contains(Flags::GLITCH));
+        assert_eq!(run.state.play(), &play);
+        run.generator = good;
+        assert!(!run.tick(&run.input(4e-3)).flags.contains(Flags::GLITCH));
+        // It stays: believed after five ticks.
+        run.generator = good.offset_rad(1.0);
+        for i in 0..6 {
+            let out = run.tick(&run.input(4e-3));
+            assert_eq!(out.flags.contains(Flags::GLITCH), i < 5, "{i}");
+            assert_eq!(run.state.play().is_known(), i < 5, "{i}");
+        }
+        assert!(before.quality == Quality::InRange);
+        assert_eq!(run.tick(&run.input(4e-3)).quality, Quality::Uncertain);
+    }
+
+    #[test]
+    fn without_torque_the_last_correction_is_kept_and_then_fades() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        let before = run.run(300, 1e-3, 1e-5);
+        for i in 0..6 {
+            let out = run.tick(&Input { torque_n_m: f32::NAN, ..run.input(4e-3) });
+            assert!(out.flags.contains(Flags::NOT_CORRECTED) && out.quality == Quality::Disabled);
+            assert_eq!((out.correction_rad - before.correction_rad).abs() < COUNT, i < 5, "{i}");
+        }
+        let blind = Input { torque_n_m: f32::NAN, ..run.input(4e-3) };
+        for _ in 0..300 {
+            let _ = run.tick(&blind);
+        }
+        assert_eq!(run.tick(&blind).correction_rad, 0.0);
+        // And back, within the limits.
+        assert!(run.run(300, 4e-3, 1e-5).held_back_rad.abs() < COUNT);
+    }
+
+    #[test]
+    fn torque_out_of_range_is_marked_and_corrected_with_the_edge() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        let out = run.tick(&Input { torque_n_m: 51.0, ..run.input(1e-3) });
+        assert_eq!(out.quality, Quality::Extrapolated);
+        let mut edge = Loop::new(Overrun::SkipAndCount);
+        let at = edge.tick(&Input { torque_n_m: 50.0, ..edge.input(1e-3) });
+        assert_eq!(out.transmission_error_rad, at.transmission_error_rad);
+        assert_eq!(at.quality, Quality::Uncertain);
+    }
+
+    #[test]
+    fn overruns_do_what_their_policy_says() {
+        let late = |run: &Loop| Input { missed_ticks: 3, ..run.input(4e-3) };
+        let mut skip = Loop::new(Overrun::SkipAndCount);
+        skip.run(300, 1e-3, 1e-5);
+        let out = skip.tick(&late(&skip));
+        assert!(out.flags.contains(Flags::OVERRUN));
+        assert!(out.held_back_rad.abs() < COUNT);
+        assert_eq!(skip.state.missed_ticks(), 3);
+
+        let mut hold = Loop::new(Overrun::HoldLast);
+        let before = hold.run(300, 1e-3, 1e-5);
+        let elsewhere = Input { target: hold.input(4.2e-3).target, ..late(&hold) };
+        assert!((hold.tick(&elsewhere).correction_rad - before.correction_rad).abs() < COUNT);
+
+        let mut fade = Loop::new(Overrun::FadeOut { ticks: 400 });
+        fade.run(300, 1e-3, 1e-5);
+        let mut corrections = std::vec![fade.tick(&late(&fade)).correction_rad.abs()];
+        for _ in 0..1300 {
+            corrections.push(fade.tick(&fade.input(4e-3)).correction_rad.abs());
+        }
+        assert!(corrections[..400].windows(2).all(|pair| pair[1] <= pair[0] + 2e-9));
+        assert!(corrections[410..790].iter().all(|&c| c == 0.0), "{:?}", &corrections[405..420]);
+        assert!(corrections[1300] > 0.9 * corrections[0]);
+        assert_eq!(fade.state.missed_ticks(), 3);
+    }
+
+    #[test]
+    fn a_reset_in_the_middle_of_a_reversal_goes_on_where_it_was_or_starts_anew() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        run.run(300, 1e-3, 1e-5);
+        run.run(8, 4e-3, -1e-5);
+        let saved = run.state.save();
+        let mut restored = JointState::restore(&saved).unwrap();
+        restored.request(Mode::Tracking).unwrap();
+        run.state = restored;
+        // `tick` asserts the limits across the reset.
+        let on = run.run(3, 3.92e-3, -1e-5);
+        assert!(on.flags.contains(Flags::HELD_BACK) && on.quality == Quality::InRange);
+        for bit in 0..SAVED_JOINT_BYTES * 8 {
+            let mut damaged = saved;
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            assert_eq!(JointState::restore(&damaged), None, "bit {bit}");
+        }
+        // Without what was saved: no correction at first, the side unknown, then known again.
+        let mut state = JointState::new();
+        state.request(Mode::Tracking).unwrap();
+        (run.state, run.before) = (state, [0.0; 2]);
+        let first = run.tick(&run.input(3.9e-3));
+        assert_eq!(first.quality, Quality::Uncertain);
+        assert!(first.uncertainty_rad > 1e-5);
+        assert_eq!(run.run(600, 3.9e-3, -1e-5).uncertainty_rad, 0.0);
+    }
+
+    /// Flips in what changes while running: what can be told is flagged, and the correction stays within its limits.
+    #[test]
+    fn upsets_of_the_state_never_make_the_correction_jump() {
+        type Flip = fn(&mut JointState, u32);
+        let flips: [(Flip, bool); 7] = [
+            (|s, bit| s.nominal = s.nominal.offset_counts(1 << bit), true),
+            (|s, bit| s.correction[0] ^= 1 << bit, true),
+            (|s, bit| s.correction[1] ^= 1 << bit, true),
+            (|s, bit| s.play.flip(0, bit), false),
+            (|s, bit| s.play.flip(1, bit), false),
+            (|s, bit| s.goal ^= 1 << bit, false),
+            (|s, bit| s.aimed ^= 1 << bit, false),
+        ];
+        for (number, (flip, told)) in flips.into_iter().enumerate() {
+            for bit in 0..31 {
+                let mut run = Loop::new(Overrun::SkipAndCount);
+                let before = run.run(300, 1e-3, 1e-5);
+                assert_eq!(before.quality, Quality::InRange);
+                flip(&mut run.state, bit);
+                let out = run.tick(&run.input(4e-3));
+                if !(3..5).contains(&number) {
+                    assert_eq!(out.flags.contains(Flags::STATE_TORN), told, "{number} bit {bit}");
+                } else {
+                    // One bound of a known play moved: no longer known, or taken for unknown.
+                    let said = out.quality == Quality::Uncertain || out.flags.contains(Flags::STATE_TORN);
+                    let same = out.transmission_error_rad as f64 - before.transmission_error_rad as f64;
+                    assert!(said || same.abs() < 0.05 * ARCSEC, "{number} bit {bit}");
+                }
+                run.run(600, 4e-3, 1e-5);
+                let healed = run.run(3, 1e-2, 1e-5);
+                assert_eq!(healed.quality, Quality::InRange, "{number} bit {bit}");
+                assert!(healed.held_back_rad.abs() < COUNT, "{number} bit {bit}");
+            }
+        }
+    }
+
+    #[test]
+    fn rate_groups_run_when_they_are_due() {
+        let group = RateGroup::new(10, 3).unwrap();
+        assert!((0..100).filter(|&tick| group.is_due(tick)).eq((0..10).map(|i| 10 * i + 3)));
+        assert_eq!((RateGroup::new(0, 0), RateGroup::new(5, 5)), (None, None));
+    }
+
+    #[test]
+    fn settings_that_make_no_sense_are_named() {
+        let named = |limits: Limits| Joint::new(fixture::drive(), limits, Overrun::HoldLast).unwrap_err().name;
+        assert_eq!(named(Limits { tick_s: 0.0, ..LIMITS }), "tick_s");
+        assert_eq!(named(Limits { rate_rad_s: f32::NAN, ..LIMITS }), "rate_rad_s");
+        assert_eq!(named(Limits { rate_rad_s: 60.0, ..LIMITS }), "rate_rad_s");
+        assert_eq!(named(Limits { acceleration_rad_s2: -1.0, ..LIMITS }), "acceleration_rad_s2");
+        assert_eq!(named(Limits { generator_rate_rad_s: f32::INFINITY, ..LIMITS }), "generator_rate_rad_s");
+    }
+
+    proptest! {
+        /// Whatever comes in, the correction moves within its limits and stays within the table's.
+        #[test]
+        fn any_input_keeps_the_limits(
+            inputs in prop::collection::vec((any::<bool>(), -2e-3f64..2e-3, -0.1f64..0.1, any::<f32>(), 0u16..3), 1..200),
+            policy in 0u8..3,
+        ) {
+            let policies = [Overrun::SkipAndCount, Overrun::HoldLast, Overrun::FadeOut { ticks: 7 }];
+            let mut run = Loop::new(policies[policy as usize]);
+            for (present, target, moved, torque, missed) in inputs {
+                run.generator = run.generator.offset_rad(moved as f32);
+                let sample = present.then_some(run.generator);
+                let input = Input { generator: sample, torque_n_m: torque, missed_ticks: missed / 2, ..run.input(target) };
+                let out = run.tick(&input);
+                prop_assert!(out.correction_rad.abs() <= 0.03);
+                prop_assert!(out.uncertainty_rad.is_finite() && out.transmission_error_rad.is_finite());
+            }
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! What the programs share: exact instruction counts under QEMU's `-icount`, a trajectory, the tables, and how a program ends.
+#![no_std]
+
+pub mod count;
+pub mod trajectory;
+
+use cortex_m_semihosting::debug;
+
+/// The tables of the four generators that `flexspline tables` made, read in place from flash.
+pub static TABLES: [(&str, &[u8]); 4] = [
+    ("cam", include_bytes!(concat!(env!("FLEXSPLINE_TABLES"), "/cam.fxt"))),
+    ("double-disc", include_bytes!(concat!(env!("FLEXSPLINE_TABLES"), "/double-disc.fxt"))),
+    ("four-roller", include_bytes!(concat!(env!("FLEXSPLINE_TABLES"), "/four-roller.fxt"))),
+    ("two-roller", include_bytes!(concat!(env!("FLEXSPLINE_TABLES"), "/two-roller.fxt"))),
+];
+
+/// Two inertias, discretised on the host.
+pub static PREDICTOR: [f32; flexspline::PREDICTOR_PARTS] = include!(concat!(env!("OUT_DIR"), "/predictor.rs"));
+
+/// Ends the emulation: exit code 0 if all went well, else 1.
+pub fn finish(well: bool) -> ! {
+    loop {
+        debug::exit(if well { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
+    }
+}
+
+/// The panic handler of programs that may print; the flight build has one that cannot be linked.
+#[cfg(not(feature = "flight"))]
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
+    cortex_m_semihosting::hprintln!("{}", info);
+    finish(false)
+}
+
+#[cfg(feature = "flight")]
+use panic_never as _;
