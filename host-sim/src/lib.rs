@@ -9,6 +9,7 @@ pub mod element;
 pub mod export;
 pub mod fem;
 pub mod material;
+pub mod measurement;
 pub mod mesh;
 pub mod nodes;
 pub mod output;
