@@ -4,12 +4,50 @@
 use std::collections::BTreeMap;
 
 use super::linear::{Gram, solve};
-use super::model::{Problem, Scaffold, Term};
+use super::model::{Fit, Problem, Scaffold, Term};
 use super::report::Parameter;
 use super::select::{Selected, blocks};
 
 /// Step of numerical derivatives, standard deviations.
 const STEP: f64 = 0.1;
+
+/// Stretches of the data whose misfits are taken as independent, in each session.
+const STRETCHES: usize = 12;
+
+/// Covariance by the misfit of stretches of the data (a sandwich): holds where the wander is not what it was taken for.
+fn stretched(problem: &Problem<'_>, fit: &Fit, white: &[&[f64]]) -> Vec<f64> {
+    let n = fit.priors.len();
+    let c = &fit.solution.coefficients;
+    let mut meat = vec![0.0; n * n];
+    for session in &problem.whitener.sessions {
+        let len = session.len();
+        for part in 0..STRETCHES {
+            let block = session.start + len * part / STRETCHES..session.start + len * (part + 1) / STRETCHES;
+            let gram = Gram::of(white, block);
+            let score: Vec<f64> = (0..n)
+                .map(|i| problem.worth * (gram.at(i, n) - (0..n).map(|j| gram.at(i, j) * c[j]).sum::<f64>()))
+                .collect();
+            for i in 0..n {
+                for j in 0..n {
+                    meat[i * n + j] += score[i] * score[j];
+                }
+            }
+        }
+    }
+    let bread = &fit.solution.covariance;
+    let times = |a: &[f64], b: &[f64]| -> Vec<f64> {
+        let mut product = vec![0.0; n * n];
+        for i in 0..n {
+            for k in 0..n {
+                for j in 0..n {
+                    product[i * n + j] += a[i * n + k] * b[k * n + j];
+                }
+            }
+        }
+        product
+    };
+    times(&times(bread, &meat), bread)
+}
 
 /// Parameters of each term.
 #[must_use]
@@ -37,6 +75,7 @@ pub fn parameters(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<BTreeMa
             Some(solved.coefficients.iter().zip(&fit.solution.coefficients).map(|(a, b)| a - b).collect())
         })
         .collect();
+    let by_stretches = stretched(problem, &fit, &white);
     let mut place = n - moves.len();
     let mut all = Vec::new();
     for (k, term) in selected.terms.iter().enumerate() {
@@ -72,10 +111,13 @@ pub fn parameters(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<BTreeMa
         }
         let mut named = BTreeMap::new();
         for ((name, value), slope) in at.into_iter().zip(&slopes) {
-            let laplace: f64 = (0..dimension)
-                .flat_map(|i| (0..dimension).map(move |j| (i, j)))
-                .map(|(i, j)| slope[i] * slope[j] * fit.solution.covariance[index[i] * n + index[j]])
-                .sum();
+            let spread = |covariance: &[f64]| -> f64 {
+                (0..dimension)
+                    .flat_map(|i| (0..dimension).map(move |j| (i, j)))
+                    .map(|(i, j)| slope[i] * slope[j] * covariance[index[i] * n + index[j]])
+                    .sum()
+            };
+            let laplace = spread(&fit.solution.covariance).max(spread(&by_stretches));
             let count = shifts.len().max(1) as f64;
             let moved: Vec<f64> =
                 shifts.iter().map(|s| (0..dimension).map(|j| slope[j] * s[index[j]]).sum::<f64>()).collect();

@@ -170,7 +170,8 @@ impl Effect {
                     }
                 }
             }
-            "wear" | "backlash_growth" | "thermal_clearance" => {} // the play carries them
+            // Play and torque carry these.
+            "wear" | "backlash_growth" | "thermal_clearance" | "gravity_torque" => {}
             "stiffness_hardening" => (0..n).for_each(|k| {
                 let u: f64 = torque[k] / top;
                 error[k] -= size * u.signum() * if changed { (u.abs() - 0.3).max(0.0) * 1.4 } else { u.abs().powi(3) };
