@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 
+use flexspline::{FixedMember, GeneratorAngle, PlayState, Table};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -97,6 +98,55 @@ impl Nominal {
             .iter()
             .map(|h| h.amplitude_arcsec * (h.order_per_generator_turn * generator_rad + h.phase_rad).sin())
             .sum()
+    }
+
+    /// What a table says of wind-up and backlash: the part of the error that is odd in the torque, at mid temperature; the backlash is
+    /// what is left of it as the torque goes to zero. Kinematic error is left to the table's own prediction.
+    #[must_use]
+    pub fn of_table(table: &Table<'_>) -> Nominal {
+        let drive = table.drive();
+        let fixed = if drive.fixed() == FixedMember::Flexspline { Fixed::Flexspline } else { Fixed::CircularSpline };
+        let teeth = Teeth {
+            flexspline: u32::from(drive.flexspline_teeth()),
+            circular_spline: u32::from(drive.circular_spline_teeth()),
+            fixed,
+        };
+        let [low, high] = table.temperature_range_c();
+        let temperature = f32::midpoint(low, high).clamp(low, high);
+        let [from, to] = table.torque_range_n_m();
+        let largest = f64::from(from.abs().min(to.abs()));
+        // Mean of the error over a flexspline pitch, after the play has come to rest.
+        let mean = |torque: f64| -> f64 {
+            let mut play = PlayState::unknown();
+            let pitch = std::f64::consts::TAU / f64::from(teeth.flexspline);
+            let (mut sum, steps) = (0.0, 16);
+            for k in 0..4 * steps {
+                let generator = GeneratorAngle::from_rad(f64::from(k) * pitch / f64::from(steps));
+                let said =
+                    table.forward(&mut play, generator.unwrap_or(GeneratorAngle::ZERO), torque as f32, temperature);
+                if k >= 3 * steps {
+                    sum += f64::from(said.transmission_error_rad) / f64::from(steps);
+                }
+            }
+            sum
+        };
+        let odd = |torque: f64| 0.5 * (mean(torque) - mean(-torque));
+        let at: Vec<f64> = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0].iter().map(|share| share * largest).collect();
+        let angles: Vec<f64> = at.iter().map(|torque| odd(*torque)).collect();
+        let slope = |k: usize| ((angles[k + 1] - angles[k]) / (at[k + 1] - at[k])).max(1e-12);
+        let half_backlash_rad = (angles[0] - at[0] * slope(0)).max(0.0);
+        let stiffness =
+            (0..at.len() - 1).map(|k| [if k == 0 { 0.0 } else { at[k] }, 1.0 / slope(k)]).collect();
+        Nominal {
+            ratio: drive.exact_ratio(),
+            teeth: Some(teeth),
+            stiffness,
+            backlash_arcsec: 2.0 * half_backlash_rad * ARCSEC_PER_RAD,
+            friction_torque_n_m: 0.0,
+            temperature_c: f64::from(temperature),
+            harmonics: Vec::new(),
+            spread: USUAL_SPREAD,
+        }
     }
 
     /// Reads `nominal.toml`.
