@@ -100,6 +100,8 @@ const FREE: f64 = 1e4;
 const CLEARLY_BETTER: f64 = 0.995;
 /// Rows are uncertain where the torque is below this multiple of friction.
 const NEAR_FRICTION: f64 = 1.25;
+/// A clearance is crossed within this time, s.
+const CROSSING_S: f64 = 0.08;
 /// If more of the rows than this are uncertain, none is set aside: then they are what the data are about.
 const UNCERTAIN_AT_MOST: f64 = 0.35;
 
@@ -174,7 +176,8 @@ fn uncertain(rows: &Rows, nominal: &Nominal, flank: &[f64]) -> Vec<bool> {
     for session in &rows.sessions {
         for k in session.start + 1..session.end {
             if flank[k] * flank[k - 1] < 0.0 {
-                let around = k.saturating_sub(2).max(session.start)..(k + 3).min(session.end);
+                let settled = (CROSSING_S / rows.period).ceil().clamp(2.0, 50.0) as usize;
+                let around = k.saturating_sub(2).max(session.start)..(k + 1 + settled).min(session.end);
                 uncertain[around].fill(true);
             }
         }

@@ -22,6 +22,8 @@ pub mod report;
 pub mod rivals;
 pub mod rows;
 pub mod select;
+#[cfg(test)]
+mod tests;
 mod uncertainty;
 
 use std::collections::BTreeMap;
@@ -33,11 +35,11 @@ use crate::measurement::Session;
 use crate::nominal::Nominal;
 use base::Base;
 use candidate::{Excitation, Law, library, line, unnamed};
-use model::{Fit, Problem, Scaffold, Term};
+use model::{Fit, Problem, Term};
 use noise::{Noise, Whitener};
 use report::{Cause, Diagnosis, Parameter, Residual, Unexplained, Verdict};
 use rows::Rows;
-use select::{Selected, fit, predicted, select, size_of, standings};
+use select::{Selected, fit, predicted, select, standings};
 
 /// Why data cannot be diagnosed.
 #[derive(Debug, Error, PartialEq, Eq)]
@@ -75,7 +77,9 @@ impl Default for Settings {
 /// Rows needed at least.
 const LEAST_ROWS: usize = 200;
 /// Orders per generator turn up to which lines are looked for.
-const HIGHEST_ORDER: f64 = 40.0;
+const HIGHEST_ORDER: f64 = 150.0;
+/// What is left as a free function counts if it is larger than this against the strongest cause.
+const LEAST_LEFT_OF_STRONGEST: f64 = 0.25;
 /// Named causes that explain less than this share of what is explained at all are not named.
 const LEAST_NAMED_SHARE: f64 = 0.3;
 
@@ -127,12 +131,24 @@ pub fn diagnose(
     progress(2, 5, "causes");
     let selected = select(&problem, &laws, noise.white, Vec::new(), say).ok_or(DiagnosisError::NotFinite)?;
     progress(3, 5, "what is left");
-    // Lines that no law has.
+    // Lines that no law has: looked for in every row, as averages would hide the fast ones.
+    let every = remainder::every_row(&problem, &selected, noise);
     let mut extra: Vec<Law> = Vec::new();
-    let left = remainder::innovations(&problem, &selected);
-    for found in remainder::lines(&problem, &left, HIGHEST_ORDER) {
-        if found.power * worth > remainder::line_limit(&problem) {
-            say(format!("  line of {:.4} per {}: power {:.0}", found.order, found.unit, found.power));
+    let mut fast: Vec<Unexplained> = Vec::new();
+    let limit = remainder::line_limit(rows.len());
+    for found in remainder::lines(&problem, &every, HIGHEST_ORDER) {
+        if found.power * worth <= limit {
+            continue;
+        }
+        say(format!("  line of {:.4} per {}: power {:.0}", found.order, found.unit, found.power));
+        // In innovations of unit variance a line of amplitude a has the power n a^2 / 4.
+        let size = noise.white * (2.0 * found.power / rows.len() as f64).sqrt();
+        if remainder::averaged_away(&problem, &found) {
+            fast.push(Unexplained {
+                looks_like: format!("line of {:.4} per {}", found.order, found.unit),
+                size_arcsec: size,
+            });
+        } else {
             extra.push(line(found.unit, found.order));
         }
     }
@@ -140,27 +156,32 @@ pub fn diagnose(
         selected
     } else {
         // Once more with the line among the laws.
-        let places: Vec<(String, Vec<f64>)> =
-            selected.terms.iter().map(|t| (t.law.cause.clone(), t.places.clone())).collect();
+        let places: Vec<(usize, Vec<f64>)> = selected
+            .terms
+            .iter()
+            .filter_map(|t| Some((laws.iter().position(|law| std::ptr::eq(law, t.law))?, t.places.clone())))
+            .collect();
         drop(selected);
         laws.extend(extra);
-        let start = places
-            .into_iter()
-            .filter_map(|(cause, places)| {
-                let law = laws.iter().find(|law| law.cause == cause && law.shapes.len() == places.len())?;
-                Some(Term::new(&problem, law, places))
-            })
-            .collect();
+        let start = places.into_iter().map(|(k, places)| Term::new(&problem, &laws[k], places)).collect();
         select(&problem, &laws, noise.white, start, say).ok_or(DiagnosisError::NotFinite)?
     };
+    let maps = candidate::maps(&on);
+    let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);
+    left.extend(fast.into_iter().filter(|f| f.size_arcsec > select::least_size(noise.white)));
+    left.extend(remainder::beyond_noise(&problem, &selected, noise));
+    for something in &left {
+        say(format!("  left: {} {:.2}", something.looks_like, something.size_arcsec));
+    }
     progress(4, 5, "rivals");
-    Ok(conclude(&problem, &laws, selected, noise, settings))
+    Ok(conclude(&problem, &laws, selected, left, noise, settings))
 }
 
 fn conclude(
     problem: &Problem<'_>,
     laws: &[Law],
     selected: Selected<'_>,
+    mut left_over: Vec<Unexplained>,
     noise: Noise,
     settings: &Settings,
 ) -> Diagnosis {
@@ -184,6 +205,9 @@ fn conclude(
         named.iter().map(size).sum::<f64>(),
         (0..selected.terms.len()).filter(|k| !named.contains(k)).map(|k| size(&k)).sum::<f64>(),
     );
+    let strongest = named.iter().map(|k| standings[*k].size).fold(0.0, f64::max);
+    left_over.retain(|l| l.size_arcsec > LEAST_LEFT_OF_STRONGEST * strongest);
+    let without_name = without_name + left_over.iter().map(|l| l.size_arcsec.powi(2)).fold(0.0, f64::max);
     let significant_left = without_name > 0.0;
     let verdict = match (named.is_empty(), significant_left) {
         (true, false) => Verdict::None,
@@ -228,10 +252,11 @@ fn conclude(
         }
         causes.sort_by(|a, b| b.size_arcsec.total_cmp(&a.size_arcsec));
     }
-    let unexplained_list = (0..selected.terms.len())
+    let mut unexplained_list: Vec<Unexplained> = (0..selected.terms.len())
         .filter(|k| !named.contains(k) || verdict == Verdict::Unknown)
         .map(|k| Unexplained { looks_like: selected.terms[k].law.cause.clone(), size_arcsec: standings[k].size })
         .collect();
+    unexplained_list.extend(left_over);
     Diagnosis {
         schema_version: 1,
         verdict,
@@ -271,6 +296,3 @@ fn recalibrated(problem: &Problem<'_>, selected: &Selected<'_>) -> BTreeMap<Stri
     }
     named
 }
-
-#[allow(unused_imports)]
-use {size_of as _, Scaffold as _};

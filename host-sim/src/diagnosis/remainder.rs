@@ -2,7 +2,10 @@
 
 use std::f64::consts::PI;
 
-use super::model::{Problem, Term};
+use super::candidate::Law;
+use super::model::{Problem, Scaffold, Term};
+use super::noise::{Noise, Whitener};
+use super::report::Unexplained;
 use super::select::Selected;
 
 /// A line found in what is left.
@@ -16,20 +19,33 @@ pub struct Line {
     pub power: f64,
 }
 
-/// Innovations of the data under a selection.
+/// Innovations of every row, in units of their standard deviation; 0 where the flank is uncertain.
 #[must_use]
-pub fn innovations(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
-    let mut left = problem.data_white.clone();
-    let columns = problem.base_white.iter().chain(selected.terms.iter().flat_map(|t| &t.white));
-    for (column, c) in columns.zip(&selected.fit.solution.coefficients) {
+pub fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<f64> {
+    let on = problem.on;
+    let mut left: Vec<f64> = on.rows.error.iter().zip(&on.base.prediction).map(|(e, p)| e - p).collect();
+    let mut take = |column: &[f64], c: f64| {
         for (l, v) in left.iter_mut().zip(column) {
             *l -= c * v;
         }
+    };
+    for (floating, c) in on.base.floating.iter().zip(selected.fit.base()) {
+        take(&floating.values, *c);
     }
-    left
+    for (k, term) in selected.terms.iter().enumerate() {
+        let columns = (term.law.columns)(on, &term.law.values(&term.places));
+        for (column, c) in columns.iter().zip(selected.fit.of(k)) {
+            take(&column.values, *c);
+        }
+    }
+    let mut white = Whitener::new(on.rows, &on.base.uncertain, 1, noise).whiten_averaged(&left);
+    for (value, uncertain) in white.iter_mut().zip(&on.base.uncertain) {
+        *value = if *uncertain { 0.0 } else { value.clamp(-6.0, 6.0) };
+    }
+    white
 }
 
-/// The strongest line in the innovations, by generator angle and by time.
+/// The strongest line in the innovations of every row, by generator angle and by time.
 ///
 /// Innovations are laid on an even grid of the angle (all sessions, both directions) or of time and transformed; a grid place
 /// that was visited often counts often, as in a periodogram at uneven places.
@@ -37,32 +53,84 @@ pub fn innovations(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
 pub fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> Vec<Line> {
     let rows = problem.on.rows;
     let mut found = Vec::new();
-    let angle = problem.whitener.average(&rows.generator);
-    found.extend(strongest(&angle, innovations, highest_order / (2.0 * PI)).map(|(f, power)| Line {
+    found.extend(strongest(&rows.generator, innovations, highest_order / (2.0 * PI)).map(|(f, power)| Line {
         unit: "generator turn",
         order: f * 2.0 * PI,
         power,
     }));
     if rows.recorded.time {
         // Gaps between sessions would only make the transform long.
-        let mut time = problem.whitener.average(&rows.time);
+        let mut time = rows.time.clone();
         let mut shift = 0.0;
-        for session in &problem.whitener.sessions {
-            let first = time[session.start];
-            let last = time[session.end - 1];
+        for session in &rows.sessions {
+            let (first, last) = (time[session.start], time[session.end - 1]);
             for t in &mut time[session.clone()] {
                 *t += shift - first;
             }
             shift += last - first + 1.0;
         }
-        let step = (shift / time.len().max(1) as f64).max(1e-9);
-        found.extend(strongest(&time, innovations, 0.45 / step).map(|(f, power)| Line {
+        found.extend(strongest(&time, innovations, 0.45 / rows.period).map(|(f, power)| Line {
             unit: "second",
             order: f,
             power,
         }));
     }
     found
+}
+
+/// Whether averaging the rows takes most of a line away.
+#[must_use]
+pub fn averaged_away(problem: &Problem<'_>, line: &Line) -> bool {
+    let rows = problem.on.rows;
+    let angle: Vec<f64> = match line.unit {
+        "second" => rows.time.iter().map(|t| 2.0 * PI * line.order * t).collect(),
+        _ => rows.generator.iter().map(|psi| line.order * psi).collect(),
+    };
+    let wave: Vec<f64> = angle.iter().map(|a| a.cos()).collect();
+    super::rows::rms(&problem.whitener.average(&wave)) < 0.8 * super::rows::rms(&wave)
+}
+
+/// What is left as a free function of what was measured, largest first.
+#[must_use]
+pub fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[Law], white: f64) -> Vec<Unexplained> {
+    use rayon::prelude::*;
+    let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
+    let mut found: Vec<Unexplained> = maps
+        .par_iter()
+        .filter_map(|law| {
+            let term = Term::new(problem, law, Vec::new());
+            let fit = scaffold.fit(&[&term])?;
+            let mut terms = selected.terms.clone();
+            terms.push(term);
+            let standing = super::select::standing(problem, &Selected { terms, fit }, selected.terms.len());
+            let there = standing.evidence > LEAST_EVIDENCE
+                && standing.left_out > LEAST_EVIDENCE
+                && standing.size > super::select::least_size(white);
+            there.then(|| Unexplained { looks_like: law.cause.clone(), size_arcsec: standing.size })
+        })
+        .collect();
+    found.sort_by(|a, b| b.size_arcsec.total_cmp(&a.size_arcsec));
+    found.truncate(1);
+    found
+}
+
+/// Evidence for a free function in what is left.
+const LEAST_EVIDENCE: f64 = 15.0;
+/// A wander beyond this, arcsec and in units of the white noise, is no noise of a sensor.
+const MOST_WANDER_ARCSEC: f64 = 7.0;
+const MOST_WANDER_OF_WHITE: f64 = 2.5;
+
+/// Slow motion that is too large for noise.
+#[must_use]
+pub fn beyond_noise(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<Unexplained> {
+    let left = left(problem, selected);
+    let wander = problem.whitener.followed(&left);
+    let size = problem.certain_rms(&wander);
+    if size > MOST_WANDER_ARCSEC.max(MOST_WANDER_OF_WHITE * noise.white) {
+        vec![Unexplained { looks_like: "slow motion".into(), size_arcsec: size }]
+    } else {
+        Vec::new()
+    }
 }
 
 /// Frequency (per unit of `places`) and power of the strongest line up to `highest`.
@@ -121,34 +189,10 @@ fn transform(re: &mut [f64], im: &mut [f64]) {
     }
 }
 
-/// Power that a line of white noise reaches once in about 10⁵ spectra of these data.
+/// Power that a line of white noise reaches once in about 10⁵ spectra of so many rows.
 #[must_use]
-pub fn line_limit(problem: &Problem<'_>) -> f64 {
-    (problem.data.len() as f64 * 4.0).ln() + 12.0
-}
-
-/// Averages at which the level of what is left changes at once, with the height in arcsec, strongest first.
-#[must_use]
-pub fn steps(problem: &Problem<'_>, left: &[f64], white: f64) -> Vec<(usize, f64)> {
-    let mut found: Vec<(usize, f64)> = Vec::new();
-    let window = 40usize;
-    for session in &problem.whitener.sessions {
-        if session.len() < 4 * window {
-            continue;
-        }
-        let mut best: Option<(usize, f64)> = None;
-        for k in session.start + window..session.end - window {
-            let mean = |r: std::ops::Range<usize>| left[r].iter().sum::<f64>() / window as f64;
-            let height = mean(k..k + window) - mean(k - window..k);
-            if best.is_none_or(|(_, h)| height.abs() > h.abs()) {
-                best = Some((k, height));
-            }
-        }
-        found.extend(best);
-    }
-    found.retain(|(_, height)| height.abs() > 3.0 * white.max(1.0));
-    found.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-    found
+pub fn line_limit(rows: usize) -> f64 {
+    (rows as f64 * 4.0).ln() + 12.0
 }
 
 /// Data less everything explained, averaged, arcsec.

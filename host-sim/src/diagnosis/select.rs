@@ -95,7 +95,7 @@ pub fn standings(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Standing
     (0..selected.terms.len()).map(|k| standing(problem, selected, k)).collect()
 }
 
-fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Standing {
+pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Standing {
     let others: Vec<&Term<'_>> =
         selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
     let Some(without) = Scaffold::new(problem, others.clone()).fit(&[]) else {
@@ -103,6 +103,11 @@ fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Standin
     };
     let with = predicted(problem, &selected.terms.iter().collect::<Vec<_>>(), &selected.fit);
     let lacking = predicted(problem, &others, &without);
+    if selected.terms[k].law.tolerance_of.is_some() {
+        // The base would take its place at once: it is held against the tolerance, not against the fit without it.
+        let size = size_of(problem, &selected.terms[k].contribution(selected.fit.of(k)));
+        return Standing { evidence: selected.fit.solution.evidence - without.solution.evidence, size, left_out: 1.0 };
+    }
     let added: Vec<f64> = with.iter().zip(&lacking).map(|(a, b)| a - b).collect();
     Standing {
         evidence: selected.fit.solution.evidence - without.solution.evidence,
@@ -198,14 +203,19 @@ fn out_of_tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> bool {
     (law.physical)(&[], &[z]) && z.abs() > OUT_OF_TOLERANCE
 }
 
+/// Least size of anything that counts, arcsec, at this white noise.
+#[must_use]
+pub fn least_size(white: f64) -> f64 {
+    LEAST_ARCSEC.max(LEAST_OF_NOISE * white)
+}
+
 struct Limits {
     least: f64,
 }
 
 impl Limits {
-    fn of(problem: &Problem<'_>, white: f64) -> Limits {
-        let _ = problem;
-        Limits { least: LEAST_ARCSEC.max(LEAST_OF_NOISE * white) }
+    fn of(white: f64) -> Limits {
+        Limits { least: least_size(white) }
     }
 
     fn passes(&self, law: &Law, standing: &Standing, strongest: f64, in_tolerance: bool) -> bool {
@@ -228,7 +238,7 @@ pub fn select<'l>(
     start: Vec<Term<'l>>,
     mut log: impl FnMut(String),
 ) -> Option<Selected<'l>> {
-    let limits = Limits::of(problem, white);
+    let limits = Limits::of(white);
     let mut selected = Selected { fit: fit(problem, &start)?, terms: start };
     for round in 0..MOST_CAUSES + MOST_UNNAMED + 1 {
         let Some(next) = forward(problem, laws, &selected, &limits, &mut log) else { break };

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{Column, Excitation, Law, Shape, Tolerance, by_row, main, nuisance};
+use super::{Column, Excitation, Law, Shape, Tolerance, by_row, main};
 use crate::diagnosis::linear::Prior;
 use crate::tables::ARCSEC_PER_RAD;
 
@@ -22,7 +22,7 @@ fn gravity_torque(sign: f64, on: &Excitation<'_>) -> Law {
         let together = by_row(on, |k| wind[k] + play[k]);
         vec![
             Column { values: together, tolerance: Tolerance::Main(Prior { mean: 1.0, std: 0.02 }) },
-            Column { values: play, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 0.1 }) },
+            Column { values: play, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 0.5 }) },
         ]
     })
     .shapes([
@@ -112,7 +112,5 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         laws.push(torsional_resonance(on));
     }
     laws.retain(|law| !law.shapes.is_empty());
-    // The second column of gravity is a deviation of the play alone.
-    let _ = nuisance;
     laws
 }

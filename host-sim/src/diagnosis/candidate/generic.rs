@@ -85,3 +85,67 @@ pub fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
     }
     laws
 }
+
+/// A function of one or two quantities, free but for its smoothness: hats on a grid.
+fn map(name: &str, grids: Vec<(Vec<f64>, usize)>) -> Law {
+    let mut law = Law::new(name, move |on, _| {
+        let n = on.rows.len();
+        let mut columns: Vec<Vec<f64>> = vec![vec![1.0; n]];
+        for (values, nodes) in &grids {
+            let low = super::super::rows::quantile(values.iter().copied(), 0.01);
+            let high = super::super::rows::quantile(values.iter().copied(), 0.99);
+            if high <= low {
+                continue;
+            }
+            let hats: Vec<Vec<f64>> = (0..*nodes)
+                .map(|j| {
+                    let hat = |v: &f64| {
+                        let place = ((v - low) / (high - low)).clamp(0.0, 1.0) * (*nodes - 1) as f64;
+                        (1.0 - (place - j as f64).abs()).max(0.0)
+                    };
+                    values.iter().map(hat).collect()
+                })
+                .collect();
+            columns = columns
+                .iter()
+                .flat_map(|c| {
+                    hats.iter().map(|h| c.iter().zip(h).map(|(a, b)| a * b).collect::<Vec<f64>>()).collect::<Vec<_>>()
+                })
+                .collect();
+        }
+        columns.into_iter().map(|values| main(values, 10.0)).collect()
+    });
+    law.named = false;
+    law
+}
+
+/// What is left as a free function of what was measured: tried only when the causes are in, to see whether anything is left.
+#[must_use]
+pub fn maps(on: &Excitation<'_>) -> Vec<Law> {
+    let rows = on.rows;
+    let turn = |angle: &[f64], of: f64| -> Vec<f64> { angle.iter().map(|a| a.rem_euclid(of)).collect() };
+    let full = std::f64::consts::TAU;
+    let mut maps = vec![
+        map("a function of the generator angle", vec![(turn(&rows.generator, full), 25)]),
+        map("a function of the angle on the circular spline", vec![(turn(&rows.on_circular_spline, full), 25)]),
+        map("a function of the output angle", vec![(turn(&rows.output, full), 13)]),
+    ];
+    if on.load > 0.0 {
+        maps.push(map("a function of torque and direction", vec![(rows.torque.clone(), 11), (rows.direction.clone(), 2)]));
+    }
+    if rows.recorded.temperature {
+        maps.push(map("a function of temperature", vec![(rows.temperature.clone(), 6)]));
+        if on.load > 0.0 {
+            let both = vec![(rows.torque.clone(), 6), (rows.temperature.clone(), 4)];
+            maps.push(map("a function of torque and temperature", both));
+        }
+    }
+    if rows.recorded.time {
+        maps.push(map("a function of speed", vec![(rows.speed.clone(), 12)]));
+        if on.load > 0.0 {
+            let both = vec![(rows.torque.clone(), 6), (rows.time.clone(), 4)];
+            maps.push(map("a function of torque and time", both));
+        }
+    }
+    maps
+}

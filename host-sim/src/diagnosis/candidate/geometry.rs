@@ -215,9 +215,9 @@ fn damaged_tooth(of: Angle) -> Law {
             main(by_row(on, |k| pulse[k] * on.rows.torque[k] / load), 30.0),
             main(pulse.clone(), 20.0),
             main(by_row(on, |k| pulse[k] * (on.rows.torque[k] / load).abs()), 20.0),
-            nuisance(by_row(on, |k| pulse[k] * flank(k) * lobe(k)), 0.6),
-            nuisance(by_row(on, |k| pulse[k] * on.rows.torque[k] / load * lobe(k)), 0.6),
-            nuisance(by_row(on, |k| pulse[k] * lobe(k)), 0.6),
+            nuisance(by_row(on, |k| pulse[k] * flank(k) * lobe(k)), 1.0),
+            nuisance(by_row(on, |k| pulse[k] * on.rows.torque[k] / load * lobe(k)), 1.0),
+            nuisance(by_row(on, |k| pulse[k] * lobe(k)), 1.0),
         ]
     })
     .shapes([Shape::angle("angle_rad", PI, 30), Shape::by_factors("width_rad", 0.03, 0.4, 2)])

@@ -17,7 +17,7 @@ use super::linear::Prior;
 use super::rows::Rows;
 use crate::nominal::Nominal;
 
-pub use generic::{line, unnamed};
+pub use generic::{line, maps, unnamed};
 
 /// What laws are evaluated on.
 pub struct Excitation<'a> {

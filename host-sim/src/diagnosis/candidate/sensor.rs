@@ -36,7 +36,7 @@ fn sensor_latency() -> Law {
 fn ratio_error() -> Law {
     Law::new("ratio_error", |on, _| {
         let ppm = 1e-6 * crate::tables::ARCSEC_PER_RAD;
-        vec![main(by_row(on, |k| on.rows.output[k] * ppm), 1e4)]
+        vec![main(by_row(on, |k| on.rows.output[k] * ppm), 300.0)]
     })
     .parameters(|_, _, c| vec![("relative_error_ppm", c[0])])
 }

@@ -1,6 +1,7 @@
 //! What the temperature does (PHYSICS §5, 18-21).
 
-use super::{Excitation, Law, Shape, by_row, main, nuisance};
+use super::{Column, Excitation, Law, Shape, Tolerance, by_row, main, nuisance};
+use crate::diagnosis::linear::Prior;
 
 /// Temperature above nominal, felt with a lag of `lag_s`, K.
 fn lagged(on: &Excitation<'_>, lag_s: f64) -> Vec<f64> {
@@ -80,6 +81,38 @@ fn lubricant_viscosity() -> Law {
     .physical(|_, c| c[0] > 0.0)
 }
 
+/// The same drag as a load: it winds the drive up and, where it exceeds the torque, moves the play to the other flank.
+fn lubricant_load(on: &Excitation<'_>) -> Law {
+    let scale = on.load;
+    Law::new("lubricant_viscosity", |on, shape| {
+        let (drag_n_m, power, per_k) = (shape[0], shape[1], shape[2]);
+        let rows = on.rows;
+        let fastest = rows.speed.iter().fold(1e-9, |m: f64, w| m.max(w.abs()));
+        let torque: Vec<f64> = (0..rows.len())
+            .map(|k| {
+                let cold = on.nominal.temperature_c - rows.temperature[k];
+                let share = (rows.speed[k] / fastest).abs().powf(power) * (per_k * cold).exp();
+                rows.torque[k] - drag_n_m * share * rows.direction[k] * on.nominal.ratio.signum()
+            })
+            .collect();
+        let flank = on.base.law.flanks(rows, &torque, on.nominal);
+        let play = by_row(on, |k| on.base.half_backlash * (flank[k] - on.base.flank[k]));
+        let together = by_row(on, |k| on.nominal.wind_up_arcsec(torque[k]) - on.base.wind_up[k] + play[k]);
+        vec![
+            Column { values: together, tolerance: Tolerance::Main(Prior { mean: 1.0, std: 0.02 }) },
+            Column { values: play, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 0.5 }) },
+        ]
+    })
+    .shapes([
+        Shape::by_factors("drag_n_m", 0.003 * scale, 1.0 * scale, 5),
+        Shape::evenly("speed_exponent", 0.25, 1.05, 2),
+        Shape::by_factors("per_k", 0.008, 0.12, 3),
+    ])
+    .parameters(|_, shape, c| {
+        vec![("drag_n_m", shape[0] * c[0]), ("speed_exponent", shape[1]), ("relative_drag_per_k", -shape[2])]
+    })
+}
+
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let rows = on.rows;
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -96,6 +129,9 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     }
     if rows.recorded.time && rows.speed.iter().any(|w| *w != 0.0) {
         laws.push(lubricant_viscosity());
+        if on.load > 0.0 && on.nominal.wind_up_arcsec(1.0) > 0.0 {
+            laws.push(lubricant_load(on));
+        }
     }
     laws
 }
