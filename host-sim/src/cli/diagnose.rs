@@ -55,7 +55,7 @@ impl Diagnose {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let map = if self.columns.is_empty() { Ok(ColumnMap::default()) } else { ColumnMap::parse(&self.columns) };
         let map = map.map_err(|error| Failure::BadInput(format!("--columns: {error}")))?;
-        let mut image = Vec::new();
+        let image;
         let (nominal, table) = match (&self.model, &self.tables) {
             (Some(model), _) => {
                 let text = std::fs::read_to_string(model)
@@ -86,8 +86,6 @@ impl Diagnose {
         })
         .map_err(|error| Failure::BadInput(format!("{}: {error}", self.data.display())))?;
         drop(progress);
-        drop(table);
-        image.clear();
         let written = Written {
             diagnosis: &diagnosis,
             data_faults: &recording.faults,

@@ -37,7 +37,7 @@ use base::Base;
 use candidate::{Excitation, Law, library, line, unnamed};
 use model::{Fit, Problem, Term};
 use noise::{Noise, Whitener};
-use report::{Cause, Diagnosis, Parameter, Residual, Unexplained, Verdict};
+use report::{Cause, Compensation, Diagnosis, Parameter, Residual, Unexplained, Verdict};
 use rows::Rows;
 use select::{Selected, fit, predicted, select, standings};
 
@@ -123,13 +123,28 @@ pub fn diagnose(
             eprintln!("{text}");
         }
     };
-    let (noise, worth) = prepare::noise(&on, &laws);
+    let (mut noise, mut worth) = prepare::noise(&on, &laws, &[]);
     say(format!("play {:?}, {noise:?}, worth {worth:.2}, {} rows", base.law, rows.len()));
     let stride = (rows.len() / settings.averages).max(1);
     let whitener = Whitener::new(&rows, &base.uncertain, stride, noise);
-    let problem = Problem::new(&on, whitener, worth);
+    let mut problem = Problem::new(&on, whitener, worth);
     progress(2, 5, "causes");
-    let selected = select(&problem, &laws, noise.white, Vec::new(), say).ok_or(DiagnosisError::NotFinite)?;
+    let mut selected = select(&problem, &laws, noise.white, Vec::new(), say).ok_or(DiagnosisError::NotFinite)?;
+    // What was taken for noise may have been a cause that no column of the first look had.
+    for _ in 0..2 {
+        let explained = remainder::explained(&problem, &selected);
+        let (again, worth_again) = prepare::noise(&on, &laws, &explained);
+        let change = again.floor() / noise.floor();
+        if (0.85..1.18).contains(&change) {
+            break;
+        }
+        (noise, worth) = (again, worth_again);
+        say(format!("once more: {noise:?}, worth {worth:.2}"));
+        problem = Problem::new(&on, Whitener::new(&rows, &base.uncertain, stride, noise), worth);
+        let start: Vec<Term<'_>> =
+            selected.terms.iter().map(|t| Term::new(&problem, t.law, t.places.clone())).collect();
+        selected = select(&problem, &laws, noise.white, start, say).ok_or(DiagnosisError::NotFinite)?;
+    }
     progress(3, 5, "what is left");
     // Lines that no law has: looked for in every row, as averages would hide the fast ones.
     let every = remainder::every_row(&problem, &selected, noise);
@@ -143,6 +158,9 @@ pub fn diagnose(
         say(format!("  line of {:.4} per {}: power {:.0}", found.order, found.unit, found.power));
         // In innovations of unit variance a line of amplitude a has the power n a^2 / 4.
         let size = noise.white * (2.0 * found.power / rows.len() as f64).sqrt();
+        if size < 0.25 * select::least_size(noise.white) {
+            continue;
+        }
         if remainder::averaged_away(&problem, &found) {
             fast.push(Unexplained {
                 looks_like: format!("line of {:.4} per {}", found.order, found.unit),
@@ -239,7 +257,11 @@ fn conclude(
                 .collect();
             let closest = rivals.first().map_or(50.0, |r| r.misfit);
             if !alike.is_empty() && next_experiment.is_none() {
-                next_experiment = experiment::next(&selected.terms[k].law.cause, &alike);
+                let named: Vec<&Law> = alike.iter().filter_map(|a| laws.iter().find(|law| law.cause == *a)).collect();
+                next_experiment =
+                    experiment::next(problem.on, &selected.terms[k], selected.fit.of(k), &named, noise).map(
+                        |(text, apart)| format!("{text}; expected to tell them apart by {apart:.0} standard deviations"),
+                    );
             }
             causes.push(Cause {
                 name: selected.terms[k].law.cause.clone(),
@@ -268,6 +290,7 @@ fn conclude(
             unexplained_fraction: if explainable > 0.0 { (unexplained / explainable).min(1.0) } else { 0.0 },
         },
         held_out: held.total,
+        compensation: compensation(problem, held.total.rms_after_arcsec),
         unexplained: unexplained_list,
         recalibrated: recalibrated(problem, &selected),
         noise_arcsec: [noise.white, noise.wander],
@@ -279,6 +302,19 @@ fn conclude(
 /// Probability of a cause against its closest rival, whose misfit is higher by this; halved by each look-alike.
 fn confidence(misfit: f64, alike: usize) -> f64 {
     if alike > 0 { 1.0 / (1.0 + alike as f64) } else { 1.0 / (1.0 + (-0.5 * misfit.clamp(0.0, 40.0)).exp()) - 0.01 }
+}
+
+fn compensation(problem: &Problem<'_>, rms_extended: f64) -> Compensation {
+    let about_mean = |values: Vec<f64>| {
+        let certain = values.iter().zip(&problem.certain).filter(|(_, c)| **c);
+        let mean = certain.clone().map(|(v, _)| v).sum::<f64>() / certain.count().max(1) as f64;
+        problem.certain_rms(&values.iter().map(|v| v - mean).collect::<Vec<f64>>())
+    };
+    Compensation {
+        rms_uncompensated_arcsec: about_mean(problem.whitener.average(&problem.on.rows.error)),
+        rms_nominal_tables_arcsec: about_mean(problem.data.clone()),
+        rms_extended_tables_arcsec: rms_extended,
+    }
 }
 
 fn recalibrated(problem: &Problem<'_>, selected: &Selected<'_>) -> BTreeMap<String, Parameter> {

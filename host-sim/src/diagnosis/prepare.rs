@@ -55,11 +55,12 @@ pub fn jumps(rows: &Rows, base: &Base) -> Vec<(usize, f64)> {
 
 /// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by its evidence
 /// with the main columns of all laws as free columns. Returns also the worth of the information: below 1 where innovations are
-/// not white.
+/// not white. `explained` is what is explained already, row by row.
 #[must_use]
-pub fn noise(on: &Excitation<'_>, laws: &[Law]) -> (Noise, f64) {
+pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64]) -> (Noise, f64) {
     let rows = on.rows;
-    let left: Vec<f64> = rows.error.iter().zip(&on.base.prediction).map(|(e, p)| e - p).collect();
+    let left: Vec<f64> =
+        (0..rows.len()).map(|k| rows.error[k] - on.base.prediction[k] - explained.get(k).unwrap_or(&0.0)).collect();
     let white = white_level(rows, &left);
     let stride = rows.len().div_ceil(WANDER_AVERAGES);
     let plain = Whitener::new(rows, &on.base.uncertain, stride, Noise { white, wander: 0.0, correlation_s: 1.0 });

@@ -19,14 +19,14 @@ pub struct Line {
     pub power: f64,
 }
 
-/// Innovations of every row, in units of their standard deviation; 0 where the flank is uncertain.
+/// What base and terms explain beside the nominal prediction, row by row, arcsec.
 #[must_use]
-pub fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<f64> {
+pub fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
     let on = problem.on;
-    let mut left: Vec<f64> = on.rows.error.iter().zip(&on.base.prediction).map(|(e, p)| e - p).collect();
+    let mut sum = vec![0.0; on.rows.len()];
     let mut take = |column: &[f64], c: f64| {
-        for (l, v) in left.iter_mut().zip(column) {
-            *l -= c * v;
+        for (l, v) in sum.iter_mut().zip(column) {
+            *l += c * v;
         }
     };
     for (floating, c) in on.base.floating.iter().zip(selected.fit.base()) {
@@ -38,6 +38,16 @@ pub fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -
             take(&column.values, *c);
         }
     }
+    sum
+}
+
+/// Innovations of every row, in units of their standard deviation; 0 where the flank is uncertain.
+#[must_use]
+pub fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<f64> {
+    let on = problem.on;
+    let explained = explained(problem, selected);
+    let left: Vec<f64> =
+        (0..on.rows.len()).map(|k| on.rows.error[k] - on.base.prediction[k] - explained[k]).collect();
     let mut white = Whitener::new(on.rows, &on.base.uncertain, 1, noise).whiten_averaged(&left);
     for (value, uncertain) in white.iter_mut().zip(&on.base.uncertain) {
         *value = if *uncertain { 0.0 } else { value.clamp(-6.0, 6.0) };

@@ -67,6 +67,17 @@ pub struct HeldOut {
     pub rms_after_arcsec: f64,
 }
 
+/// Pointing error that is left when the output is corrected, rms about the mean, arcsec.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Compensation {
+    /// Without correction.
+    pub rms_uncompensated_arcsec: f64,
+    /// Corrected by the nominal model as it stands.
+    pub rms_nominal_tables_arcsec: f64,
+    /// Corrected by the model with the causes, in sessions that took no part in the fit.
+    pub rms_extended_tables_arcsec: f64,
+}
+
 /// Something found that has no name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unexplained {
@@ -89,6 +100,8 @@ pub struct Diagnosis {
     pub residual: Residual,
     /// Over sessions left out.
     pub held_out: HeldOut,
+    /// What a correction by the model would leave.
+    pub compensation: Compensation,
     /// What is there and has no name.
     pub unexplained: Vec<Unexplained>,
     /// Base parameters as the data have them, with their names: relative change.

@@ -212,7 +212,7 @@ impl Effect {
                     let t = on.temperature[k];
                     let thick = if changed {
                         // Vogel, 1 at 20 °C.
-                        (700.0 / (t + 110.0) - 700.0 / 130.0).exp()
+                        (420.0 / (t + 110.0) - 420.0 / 130.0).exp()
                     } else {
                         (-0.035 * (t - 20.0)).exp()
                     };

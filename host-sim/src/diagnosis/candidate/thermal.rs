@@ -56,7 +56,7 @@ fn thermal_stiffness() -> Law {
 /// Drag of the lubricant, against the motion: a power of the speed, and thicker in the cold (Vogel, close to exponential).
 fn lubricant_viscosity() -> Law {
     Law::new("lubricant_viscosity", |on, shape| {
-        let (power, per_k) = (shape[0], shape[1]);
+        let (power, per_k, bend) = (shape[0], shape[1], shape[2]);
         let rows = on.rows;
         let fastest = rows.speed.iter().fold(1e-9, |m: f64, w| m.max(w.abs()));
         let drag = |power: f64, per_k: f64, bend: f64| {
@@ -69,12 +69,12 @@ fn lubricant_viscosity() -> Law {
             drag.into_iter().map(|d| d / size).collect::<Vec<f64>>()
         };
         vec![
-            main(drag(power, per_k, 0.0), 15.0),
-            nuisance(drag(power, per_k, 0.006), 0.3),
-            nuisance(drag(0.5 * power, per_k, 0.0), 0.2),
+            main(drag(power, per_k, bend), 15.0),
+            nuisance(drag(0.5 * power, per_k, bend), 0.15),
+            nuisance(drag(power, 0.5 * per_k, bend), 0.15),
         ]
     })
-    .shapes([Shape::evenly("speed_exponent", 0.25, 1.05, 3), Shape::by_factors("per_k", 0.008, 0.12, 4)])
+    .shapes([Shape::evenly("speed_exponent", 0.25, 1.05, 3), Shape::by_factors("per_k", 0.008, 0.12, 4), Shape::evenly("bend_per_k", -0.002, 0.01, 1)])
     .parameters(|_, shape, c| {
         vec![("rms_arcsec", c[0]), ("speed_exponent", shape[0]), ("relative_drag_per_k", -shape[1])]
     })
