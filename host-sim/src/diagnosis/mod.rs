@@ -78,10 +78,16 @@ impl Default for Settings {
 const LEAST_ROWS: usize = 200;
 /// Orders per generator turn up to which lines are looked for.
 const HIGHEST_ORDER: f64 = 150.0;
+/// Below this a line in time is no different from wander, Hz.
+const SLOWEST_LINE_HZ: f64 = 0.15;
+/// Times that causes are chosen again, at most.
+const MOST_ROUNDS: usize = 3;
 /// What is left as a free function counts if it is larger than this against the strongest cause.
 const LEAST_LEFT_OF_STRONGEST: f64 = 0.25;
 /// Named causes that explain less than this share of what is explained at all are not named.
 const LEAST_NAMED_SHARE: f64 = 0.3;
+/// The same beside a deviation that is described well though it has no name.
+const LEAST_BESIDE_DESCRIBED: f64 = 0.05;
 
 /// Diagnoses sessions against a nominal model, or against a table of the FEM that takes its place in the prediction.
 ///
@@ -123,67 +129,60 @@ pub fn diagnose(
             eprintln!("{text}");
         }
     };
+    let stride = (rows.len() / settings.averages).max(1);
+    let whiten = |noise| Whitener::new(&rows, &base.uncertain, stride, noise);
     let (mut noise, mut worth) = prepare::noise(&on, &laws, &[]);
     say(format!("play {:?}, {noise:?}, worth {worth:.2}, {} rows", base.law, rows.len()));
-    let stride = (rows.len() / settings.averages).max(1);
-    let whitener = Whitener::new(&rows, &base.uncertain, stride, noise);
-    let mut problem = Problem::new(&on, whitener, worth);
     progress(2, 5, "causes");
-    let mut selected = select(&problem, &laws, noise.white, Vec::new(), say).ok_or(DiagnosisError::NotFinite)?;
-    // What was taken for noise may have been a cause that no column of the first look had.
-    for _ in 0..2 {
-        let explained = remainder::explained(&problem, &selected);
-        let (again, worth_again) = prepare::noise(&on, &laws, &explained);
-        let change = again.floor() / noise.floor();
-        if (0.85..1.18).contains(&change) {
+    let mut problem = Problem::new(&on, whiten(noise), worth);
+    let mut fast: Vec<Unexplained> = Vec::new();
+    let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
+    // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
+    for round in 0.. {
+        fast.clear();
+        let terms = start.drain(..).map(|(k, places)| Term::new(&problem, &laws[k], places)).collect();
+        let selected = select(&problem, &laws, noise.white, terms, say).ok_or(DiagnosisError::NotFinite)?;
+        if round == MOST_ROUNDS {
+            start = remembered(&laws, &selected);
             break;
+        }
+        let lines = lines_left(&problem, &selected, noise);
+        let (slow, found): (Vec<_>, Vec<_>) =
+            lines.into_iter().partition(|(line, _)| !remainder::averaged_away(&problem, line));
+        for (line, size) in found {
+            let looks_like = format!("line of {:.4} per {}", line.order, line.unit);
+            if fast.iter().all(|f| f.looks_like != looks_like) {
+                say(format!("  {looks_like}: {size:.2} arcsec, too fast for averages"));
+                fast.push(Unexplained { looks_like, size_arcsec: size });
+            }
+        }
+        let explained = remainder::explained(&problem, &selected);
+        start = remembered(&laws, &selected);
+        drop(selected);
+        let known = laws.len();
+        for (found, size) in slow {
+            let law = line(found.unit, found.order);
+            if laws.iter().all(|l| l.cause != law.cause) {
+                say(format!("  {}: {size:.2} arcsec", law.cause));
+                laws.push(law);
+            }
+        }
+        let new_line = laws.len() > known;
+        let (again, worth_again) = prepare::noise(&on, &laws, if new_line { &[] } else { &explained });
+        let change = again.floor() / noise.floor();
+        if !new_line && (0.85..1.18).contains(&change) {
+            break;
+        }
+        if new_line {
+            start.clear();
         }
         (noise, worth) = (again, worth_again);
         say(format!("once more: {noise:?}, worth {worth:.2}"));
-        problem = Problem::new(&on, Whitener::new(&rows, &base.uncertain, stride, noise), worth);
-        let start: Vec<Term<'_>> =
-            selected.terms.iter().map(|t| Term::new(&problem, t.law, t.places.clone())).collect();
-        selected = select(&problem, &laws, noise.white, start, say).ok_or(DiagnosisError::NotFinite)?;
+        problem = Problem::new(&on, whiten(noise), worth);
     }
+    let terms: Vec<Term<'_>> = start.into_iter().map(|(k, places)| Term::new(&problem, &laws[k], places)).collect();
+    let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
     progress(3, 5, "what is left");
-    // Lines that no law has: looked for in every row, as averages would hide the fast ones.
-    let every = remainder::every_row(&problem, &selected, noise);
-    let mut extra: Vec<Law> = Vec::new();
-    let mut fast: Vec<Unexplained> = Vec::new();
-    let limit = remainder::line_limit(rows.len());
-    for found in remainder::lines(&problem, &every, HIGHEST_ORDER) {
-        if found.power * worth <= limit {
-            continue;
-        }
-        say(format!("  line of {:.4} per {}: power {:.0}", found.order, found.unit, found.power));
-        // In innovations of unit variance a line of amplitude a has the power n a^2 / 4.
-        let size = noise.white * (2.0 * found.power / rows.len() as f64).sqrt();
-        if size < 0.25 * select::least_size(noise.white) {
-            continue;
-        }
-        if remainder::averaged_away(&problem, &found) {
-            fast.push(Unexplained {
-                looks_like: format!("line of {:.4} per {}", found.order, found.unit),
-                size_arcsec: size,
-            });
-        } else {
-            extra.push(line(found.unit, found.order));
-        }
-    }
-    let selected = if extra.is_empty() {
-        selected
-    } else {
-        // Once more with the line among the laws.
-        let places: Vec<(usize, Vec<f64>)> = selected
-            .terms
-            .iter()
-            .filter_map(|t| Some((laws.iter().position(|law| std::ptr::eq(law, t.law))?, t.places.clone())))
-            .collect();
-        drop(selected);
-        laws.extend(extra);
-        let start = places.into_iter().map(|(k, places)| Term::new(&problem, &laws[k], places)).collect();
-        select(&problem, &laws, noise.white, start, say).ok_or(DiagnosisError::NotFinite)?
-    };
     let maps = candidate::maps(&on);
     let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);
     left.extend(fast.into_iter().filter(|f| f.size_arcsec > select::least_size(noise.white)));
@@ -193,6 +192,32 @@ pub fn diagnose(
     }
     progress(4, 5, "rivals");
     Ok(conclude(&problem, &laws, selected, left, noise, settings))
+}
+
+/// Which laws were selected, and where.
+fn remembered(laws: &[Law], selected: &Selected<'_>) -> Vec<(usize, Vec<f64>)> {
+    selected
+        .terms
+        .iter()
+        .filter_map(|t| Some((laws.iter().position(|law| std::ptr::eq(law, t.law))?, t.places.clone())))
+        .collect()
+}
+
+/// Lines in every row, as averages would hide the fast ones, with their size in arcsec.
+fn lines_left(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<(remainder::Line, f64)> {
+    let every = remainder::every_row(problem, selected, noise);
+    let rows = every.len();
+    remainder::lines(problem, &every, HIGHEST_ORDER)
+        .into_iter()
+        .filter(|line| line.power > remainder::line_limit(rows))
+        .filter(|line| line.unit != "second" || line.order > SLOWEST_LINE_HZ)
+        .map(|line| {
+            // In innovations of variance v a line of amplitude a has the power n a² / 4 v.
+            let size = noise.white * rows::rms(&every) * (2.0 * line.power / rows as f64).sqrt();
+            (line, size)
+        })
+        .filter(|(_, size)| *size > 0.25 * select::least_size(noise.white))
+        .collect()
 }
 
 fn conclude(
@@ -225,13 +250,20 @@ fn conclude(
     );
     let strongest = named.iter().map(|k| standings[*k].size).fold(0.0, f64::max);
     left_over.retain(|l| l.size_arcsec > LEAST_LEFT_OF_STRONGEST * strongest);
+    let described = without_name;
     let without_name = without_name + left_over.iter().map(|l| l.size_arcsec.powi(2)).fold(0.0, f64::max);
     let significant_left = without_name > 0.0;
     let verdict = match (named.is_empty(), significant_left) {
         (true, false) => Verdict::None,
         (true, true) => Verdict::Unknown,
         (false, false) => Verdict::Explained,
-        (false, true) if by_name < LEAST_NAMED_SHARE * (by_name + without_name) => Verdict::Unknown,
+        // What is left without even a description may be what the cause was named for.
+        (false, true)
+            if by_name < LEAST_NAMED_SHARE * (by_name + without_name - described)
+                || by_name < LEAST_BESIDE_DESCRIBED * (by_name + described) =>
+        {
+            Verdict::Unknown
+        }
         (false, true) => Verdict::PartlyExplained,
     };
     let held = held_out::evaluate(problem, &all);

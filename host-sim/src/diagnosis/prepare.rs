@@ -98,10 +98,11 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64]) -> (Noise, f6
         Some((solution.evidence - whitener.log_scale(), innovations, whitener))
     };
     let mut hypotheses = vec![Noise { white, wander: 0.0, correlation_s: 1.0 }];
-    let period = rows.period * stride as f64;
-    for wander in [0.1, 0.2, 0.4, 0.8, 1.6, 3.0] {
-        for correlation in [4.0, 16.0, 64.0, 256.0] {
-            hypotheses.push(Noise { white, wander: wander * white, correlation_s: correlation * period });
+    // A wander is slow: what is faster is a line, or a cause.
+    let unit = if rows.recorded.time { 1.0 } else { 100.0 * rows.period };
+    for wander in [0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, 3.0] {
+        for correlation in [2.5, 8.0, 25.0, 80.0] {
+            hypotheses.push(Noise { white, wander: wander * white, correlation_s: correlation * unit });
         }
     }
     use rayon::prelude::*;
