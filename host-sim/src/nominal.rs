@@ -135,8 +135,7 @@ impl Nominal {
         let angles: Vec<f64> = at.iter().map(|torque| odd(*torque)).collect();
         let slope = |k: usize| ((angles[k + 1] - angles[k]) / (at[k + 1] - at[k])).max(1e-12);
         let half_backlash_rad = (angles[0] - at[0] * slope(0)).max(0.0);
-        let stiffness =
-            (0..at.len() - 1).map(|k| [if k == 0 { 0.0 } else { at[k] }, 1.0 / slope(k)]).collect();
+        let stiffness = (0..at.len() - 1).map(|k| [if k == 0 { 0.0 } else { at[k] }, 1.0 / slope(k)]).collect();
         Nominal {
             ratio: drive.exact_ratio(),
             teeth: Some(teeth),
@@ -258,9 +257,10 @@ impl FileForm {
                 ),
             );
         }
-        let optional = |value: &Option<Spanned<f64>>, field: &str, range: [f64; 2], usual: f64, refuse: &mut Refuse<'_>| {
-            value.as_ref().map_or(usual, |value| number(value, field, range[0], range[1], refuse))
-        };
+        let optional =
+            |value: &Option<Spanned<f64>>, field: &str, range: [f64; 2], usual: f64, refuse: &mut Refuse<'_>| {
+                value.as_ref().map_or(usual, |value| number(value, field, range[0], range[1], refuse))
+            };
         let harmonics = form
             .harmonic
             .iter()
@@ -281,7 +281,13 @@ impl FileForm {
             })
             .collect();
         let spread = form.unit_to_unit.as_ref().map_or(USUAL_SPREAD, |s| Spread {
-            stiffness: optional(&s.stiffness, "nominal.unit_to_unit.stiffness", [0.0, 1.0], USUAL_SPREAD.stiffness, refuse),
+            stiffness: optional(
+                &s.stiffness,
+                "nominal.unit_to_unit.stiffness",
+                [0.0, 1.0],
+                USUAL_SPREAD.stiffness,
+                refuse,
+            ),
             backlash: optional(&s.backlash, "nominal.unit_to_unit.backlash", [0.0, 1.0], USUAL_SPREAD.backlash, refuse),
             harmonic: optional(&s.harmonic, "nominal.unit_to_unit.harmonic", [0.0, 1.0], USUAL_SPREAD.harmonic, refuse),
         });
@@ -310,11 +316,16 @@ impl DriveForm {
             (Some(flexspline), Some(circular_spline), None) => {
                 let (f, c) = (*flexspline.get_ref(), *circular_spline.get_ref());
                 if !(20..=2000).contains(&f) {
-                    refuse(Some(flexspline.span()), "drive.flexspline_teeth", format!("found {f}, allowed: 20 to 2000"));
+                    refuse(
+                        Some(flexspline.span()),
+                        "drive.flexspline_teeth",
+                        format!("found {f}, allowed: 20 to 2000"),
+                    );
                     return None;
                 }
                 if c <= f || c > f + 12 {
-                    let allowed = format!("found {c}, allowed: {} to {}, more than the flexspline's {f}", f + 1, f + 12);
+                    let allowed =
+                        format!("found {c}, allowed: {} to {}, more than the flexspline's {f}", f + 1, f + 12);
                     refuse(Some(circular_spline.span()), "drive.circular_spline_teeth", allowed);
                     return None;
                 }
@@ -376,7 +387,11 @@ mod tests {
             ("friction_torque_n_m", "friktion", "n.toml:8: unknown field `friktion`"),
             ("\"flexspline\"", "\"ring\"", "n.toml:4: unknown variant `ring`"),
             ("[10.0, 40000.0]", "[-1.0, 40000.0]", "n.toml:6: nominal.stiffness_n_m_per_rad: found"),
-            ("amplitude_arcsec = 10.0", "amplitude_arcsec = inf", "n.toml:11: nominal.harmonic[0].amplitude_arcsec: found inf"),
+            (
+                "amplitude_arcsec = 10.0",
+                "amplitude_arcsec = inf",
+                "n.toml:11: nominal.harmonic[0].amplitude_arcsec: found inf",
+            ),
             ("circular_spline_teeth = 190\n", "", "n.toml: drive: expected flexspline_teeth and circular_spline_teeth"),
         ] {
             let text = TEXT.replacen(from, to, 1);

@@ -66,10 +66,10 @@ impl Diagnose {
             }
             (None, Some(folder)) => {
                 let path = folder.join(format!("{}.fxt", self.generator));
-                image = std::fs::read(&path)
-                    .map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
-                let table = Table::check(&image)
-                    .map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
+                image =
+                    std::fs::read(&path).map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
+                let table =
+                    Table::check(&image).map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
                 (Nominal::of_table(&table), Some(table))
             }
             (None, None) => return Err(Failure::BadInput("expected --model or --tables".into())),

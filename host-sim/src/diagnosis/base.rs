@@ -115,9 +115,8 @@ impl Base {
         let mut best: Option<(f64, PlayLaw, Vec<f64>)> = None;
         for law in PlayLaw::ALL {
             let flank = law.flanks(rows, &rows.torque, nominal);
-            let left: Vec<f64> = (0..rows.len())
-                .map(|k| rows.error[k] - harmonics[k] - wind_up[k] - half_backlash * flank[k])
-                .collect();
+            let left: Vec<f64> =
+                (0..rows.len()).map(|k| rows.error[k] - harmonics[k] - wind_up[k] - half_backlash * flank[k]).collect();
             let spread = middle_spread(&left, &rows.torque, nominal.friction_torque_n_m);
             if best.as_ref().is_none_or(|(least, _, _)| spread < CLEARLY_BETTER * least) {
                 best = Some((spread, law, flank));

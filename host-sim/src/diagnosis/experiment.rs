@@ -50,10 +50,9 @@ fn menu() -> Vec<Run> {
     vec![
         Run {
             text: "one output turn forward and back at steady torque, once with either sign",
-            sessions: vec![
-                |s| state(95.0 * there_and_back(s), 0.7, 0.0, 0.0),
-                |s| state(95.0 * there_and_back(s), -0.7, 0.0, 0.0),
-            ],
+            sessions: vec![|s| state(95.0 * there_and_back(s), 0.7, 0.0, 0.0), |s| {
+                state(95.0 * there_and_back(s), -0.7, 0.0, 0.0)
+            }],
         },
         Run {
             text: "half an output turn forward and back with torque steps of both signs, drive turned against gravity by 0, 90 and 180 degrees",
@@ -97,7 +96,13 @@ fn menu() -> Vec<Run> {
 
 /// The run of the menu that tells `term` from each of `alike` best, with how far the closest then stands off.
 #[must_use]
-pub fn next(on: &Excitation<'_>, term: &Term<'_>, coefficients: &[f64], alike: &[&Law], noise: Noise) -> Option<(String, f64)> {
+pub fn next(
+    on: &Excitation<'_>,
+    term: &Term<'_>,
+    coefficients: &[f64],
+    alike: &[&Law],
+    noise: Noise,
+) -> Option<(String, f64)> {
     use rayon::prelude::*;
     let runs = menu();
     let apart: Vec<f64> =
@@ -123,9 +128,7 @@ fn least_apart(
             let states: Vec<State> = (0..ROWS).map(|row| at(row as f64 / ROWS as f64)).collect();
             Session {
                 line: (0..ROWS as u64).collect(),
-                time_s: Some(
-                    (0..ROWS).map(|row| SECONDS * (2.0 * k as f64 + row as f64 / ROWS as f64)).collect(),
-                ),
+                time_s: Some((0..ROWS).map(|row| SECONDS * (2.0 * k as f64 + row as f64 / ROWS as f64)).collect()),
                 generator_rad: states.iter().map(|s| TAU * s.turns * on.nominal.ratio.abs() / 95.0).collect(),
                 error_rad: vec![0.0; ROWS],
                 torque_n_m: Some(states.iter().map(|s| s.torque * on.load).collect()),

@@ -159,7 +159,13 @@ pub fn solve(gram: &Gram, priors: &[Prior], worth: f64) -> Option<Solution> {
         }
     }
     let penalty: f64 = z.iter().map(|v| v * v).sum();
-    Some(Solution { coefficients, misfit, residual: misfit - penalty, evidence: -0.5 * misfit - 0.5 * log_det, covariance })
+    Some(Solution {
+        coefficients,
+        misfit,
+        residual: misfit - penalty,
+        evidence: -0.5 * misfit - 0.5 * log_det,
+        covariance,
+    })
 }
 
 #[cfg(test)]

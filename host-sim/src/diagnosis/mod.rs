@@ -281,19 +281,15 @@ fn conclude(
                     );
                 }
             }
-            let alike: Vec<String> = rivals
-                .iter()
-                .filter(|r| r.looks_alike(standings[k].size))
-                .map(|r| r.cause.clone())
-                .take(3)
-                .collect();
+            let alike: Vec<String> =
+                rivals.iter().filter(|r| r.looks_alike(standings[k].size)).map(|r| r.cause.clone()).take(3).collect();
             let closest = rivals.first().map_or(50.0, |r| r.misfit);
             if !alike.is_empty() && next_experiment.is_none() {
                 let named: Vec<&Law> = alike.iter().filter_map(|a| laws.iter().find(|law| law.cause == *a)).collect();
-                next_experiment =
-                    experiment::next(problem.on, &selected.terms[k], selected.fit.of(k), &named, noise).map(
-                        |(text, apart)| format!("{text}; expected to tell them apart by {apart:.0} standard deviations"),
-                    );
+                next_experiment = experiment::next(problem.on, &selected.terms[k], selected.fit.of(k), &named, noise)
+                    .map(|(text, apart)| {
+                        format!("{text}; expected to tell them apart by {apart:.0} standard deviations")
+                    });
             }
             causes.push(Cause {
                 name: selected.terms[k].law.cause.clone(),
@@ -353,7 +349,8 @@ fn recalibrated(problem: &Problem<'_>, selected: &Selected<'_>) -> BTreeMap<Stri
     let n = selected.fit.priors.len();
     let mut named = BTreeMap::new();
     for (k, floating) in problem.on.base.floating.iter().enumerate() {
-        let name = if named.contains_key(&floating.name) { format!("{} {k}", floating.name) } else { floating.name.clone() };
+        let name =
+            if named.contains_key(&floating.name) { format!("{} {k}", floating.name) } else { floating.name.clone() };
         named.insert(
             name,
             Parameter {

@@ -221,12 +221,8 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             .map(Vec::as_slice)
             .chain(further.iter().map(|(column, _)| column.as_slice()))
             .collect();
-        let before: Vec<&[f64]> = problem
-            .base_white
-            .iter()
-            .chain(self.terms.iter().flat_map(|t| &t.white))
-            .map(Vec::as_slice)
-            .collect();
+        let before: Vec<&[f64]> =
+            problem.base_white.iter().chain(self.terms.iter().flat_map(|t| &t.white)).map(Vec::as_slice).collect();
         let size = old + new.len() + 1;
         let mut gram = Gram { size, products: vec![0.0; size * size] };
         let mut put = |i: usize, j: usize, value: f64| {

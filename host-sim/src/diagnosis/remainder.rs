@@ -46,8 +46,7 @@ pub fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
 pub fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<f64> {
     let on = problem.on;
     let explained = explained(problem, selected);
-    let left: Vec<f64> =
-        (0..on.rows.len()).map(|k| on.rows.error[k] - on.base.prediction[k] - explained[k]).collect();
+    let left: Vec<f64> = (0..on.rows.len()).map(|k| on.rows.error[k] - on.base.prediction[k] - explained[k]).collect();
     let mut white = Whitener::new(on.rows, &on.base.uncertain, 1, noise).whiten_averaged(&left);
     for (value, uncertain) in white.iter_mut().zip(&on.base.uncertain) {
         *value = if *uncertain { 0.0 } else { value.clamp(-6.0, 6.0) };
@@ -186,7 +185,8 @@ fn transform(re: &mut [f64], im: &mut [f64]) {
     let mut len = 2;
     while len <= n {
         let turn = -2.0 * PI / len as f64;
-        let twiddles: Vec<(f64, f64)> = (0..len / 2).map(|k| ((turn * k as f64).cos(), (turn * k as f64).sin())).collect();
+        let twiddles: Vec<(f64, f64)> =
+            (0..len / 2).map(|k| ((turn * k as f64).cos(), (turn * k as f64).sin())).collect();
         for start in (0..n).step_by(len) {
             for (k, (c, s)) in twiddles.iter().enumerate() {
                 let (a, b) = (start + k, start + k + len / 2);

@@ -127,7 +127,13 @@ impl Diagnosis {
         };
         let _ = writeln!(text, "verdict: {verdict}");
         for cause in &self.causes {
-            let _ = writeln!(text, "  {} ({:.0} %), {:.1} arcsec rms", cause.name, 100.0 * cause.confidence, cause.size_arcsec);
+            let _ = writeln!(
+                text,
+                "  {} ({:.0} %), {:.1} arcsec rms",
+                cause.name,
+                100.0 * cause.confidence,
+                cause.size_arcsec
+            );
             for (name, p) in &cause.parameters {
                 let _ = writeln!(text, "    {name:<32} {:>12.4} +- {:.4}", p.value, p.std);
             }

@@ -34,15 +34,12 @@ impl Rival {
 /// Rivals of term `k`, closest first.
 #[must_use]
 pub fn rivals(problem: &Problem<'_>, laws: &[Law], selected: &Selected<'_>, k: usize) -> Vec<Rival> {
-    let others: Vec<&Term<'_>> =
-        selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
+    let others: Vec<&Term<'_>> = selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
     let scaffold = Scaffold::new(problem, others.clone());
     let all: Vec<&Term<'_>> = selected.terms.iter().collect();
     let now = predicted(problem, &all, &selected.fit);
-    let open: Vec<&Law> = laws
-        .iter()
-        .filter(|law| law.named && selected.terms.iter().all(|t| t.law.cause != law.cause))
-        .collect();
+    let open: Vec<&Law> =
+        laws.iter().filter(|law| law.named && selected.terms.iter().all(|t| t.law.cause != law.cause)).collect();
     let mut rivals: Vec<Rival> = open
         .into_par_iter()
         .filter_map(|law| {

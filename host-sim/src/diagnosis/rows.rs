@@ -75,12 +75,7 @@ impl Rows {
             rows.generator.extend(&session.generator_rad);
             rows.error.extend(session.error_rad.iter().map(|e| e * ARCSEC_PER_RAD));
             rows.torque.extend(or(&session.torque_n_m, rows.recorded.torque, len, 0.0));
-            rows.temperature.extend(or(
-                &session.temperature_c,
-                rows.recorded.temperature,
-                len,
-                nominal.temperature_c,
-            ));
+            rows.temperature.extend(or(&session.temperature_c, rows.recorded.temperature, len, nominal.temperature_c));
             rows.orientation.extend(or(&session.orientation_rad, rows.recorded.orientation, len, 0.0));
             match &session.time_s {
                 Some(time) if rows.recorded.time => rows.time.extend(time),

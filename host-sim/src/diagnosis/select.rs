@@ -96,8 +96,7 @@ pub fn standings(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Standing
 }
 
 pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Standing {
-    let others: Vec<&Term<'_>> =
-        selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
+    let others: Vec<&Term<'_>> = selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
     let Some(without) = Scaffold::new(problem, others.clone()).fit(&[]) else {
         return Standing { evidence: f64::INFINITY, size: f64::INFINITY, left_out: 1.0 };
     };
@@ -347,9 +346,7 @@ fn backward<'l>(
             let in_tolerance = law.tolerance_of.is_some() && {
                 let others: Vec<&Term<'_>> =
                     selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
-                Scaffold::new(problem, others)
-                    .fit(&[])
-                    .is_none_or(|without| !out_of_tolerance(problem, &without, law))
+                Scaffold::new(problem, others).fit(&[]).is_none_or(|without| !out_of_tolerance(problem, &without, law))
             };
             !physical || !limits.passes(law, &standings[k], strongest, in_tolerance)
         };

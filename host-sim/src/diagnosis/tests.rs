@@ -85,7 +85,9 @@ fn two_effects_at_once_are_both_named() {
 
 #[test]
 fn what_no_cause_explains_is_not_named() {
-    for (k, name) in ["sensor_offset_with_temperature", "line_of_order_10.37", "creep", "torque_cross_talk"].iter().enumerate() {
+    for (k, name) in
+        ["sensor_offset_with_temperature", "line_of_order_10.37", "creep", "torque_cross_talk"].iter().enumerate()
+    {
         let diagnosis = diagnosed(&[effect(name, 15.0, 0.4, 0.4)], 0, 20 + k as u64);
         assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::Unknown, vec![]), "{name}: {}", diagnosis.text());
         assert!(!diagnosis.unexplained.is_empty());

@@ -83,10 +83,8 @@ pub fn parameters(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<BTreeMa
         let value = |c: &[f64], places: &[f64]| (term.law.parameters)(problem.on, &term.law.values(places), c);
         let at = value(coefficients, &term.places);
         let (start, dimension) = (fit.starts[k], coefficients.len() + term.places.len());
-        let index: Vec<usize> = (0..coefficients.len())
-            .map(|j| start + j)
-            .chain((0..term.places.len()).map(|j| place + j))
-            .collect();
+        let index: Vec<usize> =
+            (0..coefficients.len()).map(|j| start + j).chain((0..term.places.len()).map(|j| place + j)).collect();
         place += term.places.len();
         let mut slopes = vec![vec![0.0; dimension]; at.len()];
         for j in 0..dimension {

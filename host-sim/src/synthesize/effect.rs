@@ -162,7 +162,11 @@ impl Effect {
                 for k in 0..n {
                     let x = if fs { psi(k) } else { theta(k) };
                     let away = (x - phase + 0.5 * PI).rem_euclid(PI) - 0.5 * PI;
-                    let pulse = if changed { (1.0 - (away / (1.6 * width)).abs()).max(0.0) } else { (-0.5 * (away / width).powi(2)).exp() };
+                    let pulse = if changed {
+                        (1.0 - (away / (1.6 * width)).abs()).max(0.0)
+                    } else {
+                        (-0.5 * (away / width).powi(2)).exp()
+                    };
                     let load = if changed { torque[k].abs() / top } else { (torque[k].abs() / top).sqrt() };
                     // One flank is damaged.
                     if torque[k] > 0.0 || other > 0.7 {
@@ -233,7 +237,8 @@ impl Effect {
                         for j in 0..40 {
                             let u = driven[k - 1] + (driven[k] - driven[k - 1]) * (f64::from(j) + 0.5) / 40.0;
                             let slope = (driven[k] - driven[k - 1]) / (40.0 * dt);
-                            let a = omega * omega * (u - x) - 2.0 * zeta * omega * (v - if changed { 0.0 } else { slope });
+                            let a =
+                                omega * omega * (u - x) - 2.0 * zeta * omega * (v - if changed { 0.0 } else { slope });
                             v += a * dt;
                             x += v * dt;
                         }

@@ -63,7 +63,13 @@ impl Plan {
         let few = self.richness == Richness::FewTurns;
         let mut temperatures = [-35.0, 55.0, 20.0, -10.0, 38.0, 5.0];
         random.shuffle(&mut temperatures);
-        let speed_scale = if self.richness == Richness::Slow { 0.15 } else if few { 0.1 } else { 1.0 };
+        let speed_scale = if self.richness == Richness::Slow {
+            0.15
+        } else if few {
+            0.1
+        } else {
+            1.0
+        };
         let orientations = random.bool() && self.richness != Richness::Slow;
         for s in 0..self.sessions {
             let from = all.time.len();
@@ -71,10 +77,7 @@ impl Plan {
             let shape = (s + random.usize(0..5)) % 5;
             let amplitude = self.torque_n_m * (0.4 + 0.6 * random.f64());
             let period = 4.0 + 16.0 * random.f64();
-            let (start, drift) = (
-                temperatures[s % 6] + 6.0 * (random.f64() - 0.5),
-                10.0 * (random.f64() - 0.5),
-            );
+            let (start, drift) = (temperatures[s % 6] + 6.0 * (random.f64() - 0.5), 10.0 * (random.f64() - 0.5));
             let orientation = if orientations { std::f64::consts::FRAC_PI_2 * random.usize(0..4) as f64 } else { 0.0 };
             let (mut target, mut speed, mut hold) = (0.0, 0.0, 0.0);
             let (mut step_torque, mut step_until, mut walk) = (0.0, 0.0, 0.0);
@@ -99,13 +102,21 @@ impl Plan {
                     (_, 1) => amplitude * (4.0 * ((phase + 0.25).rem_euclid(1.0) - 0.5).abs() - 1.0),
                     (_, 2) => step_torque,
                     (_, 3) => walk.clamp(-self.torque_n_m, self.torque_n_m),
-                    _ => amplitude * (0.6 + 0.4 * (std::f64::consts::TAU * phase).sin()) * if s % 2 == 0 { 1.0 } else { -1.0 },
+                    _ => {
+                        amplitude
+                            * (0.6 + 0.4 * (std::f64::consts::TAU * phase).sin())
+                            * if s % 2 == 0 { 1.0 } else { -1.0 }
+                    }
                 };
                 all.time.push(clock + t);
                 all.generator.push(psi);
                 all.torque.push(torque);
                 let share = t / (self.rows as f64 * dt);
-                all.temperature.push(if self.richness == Richness::OneTemperature { 20.0 } else { start + drift * share });
+                all.temperature.push(if self.richness == Richness::OneTemperature {
+                    20.0
+                } else {
+                    start + drift * share
+                });
                 all.orientation.push(orientation);
             }
             clock += self.rows as f64 * dt + 300.0 + 3000.0 * random.f64();

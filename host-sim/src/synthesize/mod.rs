@@ -90,7 +90,9 @@ pub fn measure(
                 .harmonics
                 .iter()
                 .zip(&harmonics)
-                .map(|(h, (a, shift))| a * h.amplitude_arcsec * (h.order_per_generator_turn * psi + h.phase_rad + shift).sin())
+                .map(|(h, (a, shift))| {
+                    a * h.amplitude_arcsec * (h.order_per_generator_turn * psi + h.phase_rad + shift).sin()
+                })
                 .sum();
             error[k] = zero + kinematic + side + stiffness * nominal.wind_up_arcsec(torque[k]);
         }

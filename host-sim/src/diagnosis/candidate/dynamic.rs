@@ -25,10 +25,7 @@ fn gravity_torque(sign: f64, on: &Excitation<'_>) -> Law {
             Column { values: play, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 0.5 }) },
         ]
     })
-    .shapes([
-        Shape::by_factors("moment_n_m", 0.01 * scale, 2.0 * scale, 6),
-        Shape::angle("phase_rad", 2.0 * PI, 10),
-    ])
+    .shapes([Shape::by_factors("moment_n_m", 0.01 * scale, 2.0 * scale, 6), Shape::angle("phase_rad", 2.0 * PI, 10)])
     .parameters(|_, shape, c| vec![("moment_n_m", shape[0] * c[0]), ("phase_rad", shape[1])])
 }
 

@@ -131,7 +131,10 @@ pub fn maps(on: &Excitation<'_>) -> Vec<Law> {
         map("a function of the output angle", vec![(turn(&rows.output, full), 13)]),
     ];
     if on.load > 0.0 {
-        maps.push(map("a function of torque and direction", vec![(rows.torque.clone(), 11), (rows.direction.clone(), 2)]));
+        maps.push(map(
+            "a function of torque and direction",
+            vec![(rows.torque.clone(), 11), (rows.direction.clone(), 2)],
+        ));
     }
     if rows.recorded.temperature {
         maps.push(map("a function of temperature", vec![(rows.temperature.clone(), 6)]));

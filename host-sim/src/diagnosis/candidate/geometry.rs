@@ -149,11 +149,8 @@ fn generator_eccentricity(on: &Excitation<'_>) -> Law {
         let (on_flexspline, phase) = polar(c[0], c[1]);
         let on_ring = polar(c[per_wheel], c[per_wheel + 1]).0;
         let strongest = on_flexspline.max(on_ring);
-        let mut named: Vec<Named> = vec![
-            ("amplitude_um", strongest / on.arcsec_per_um),
-            ("amplitude_arcsec", strongest),
-            ("phase_rad", phase),
-        ];
+        let mut named: Vec<Named> =
+            vec![("amplitude_um", strongest / on.arcsec_per_um), ("amplitude_arcsec", strongest), ("phase_rad", phase)];
         if let Some(half) = shape.first() {
             named.push(("half_load_n_m", *half));
         }
@@ -222,7 +219,8 @@ fn damaged_tooth(of: Angle) -> Law {
     })
     .shapes([Shape::angle("angle_rad", PI, 30), Shape::by_factors("width_rad", 0.03, 0.4, 2)])
     .parameters(move |on, shape, c| {
-        let teeth = on.nominal.teeth.map_or((188.0, 190.0), |t| (f64::from(t.flexspline), f64::from(t.circular_spline)));
+        let teeth =
+            on.nominal.teeth.map_or((188.0, 190.0), |t| (f64::from(t.flexspline), f64::from(t.circular_spline)));
         let count = if of == Angle::Flexspline { teeth.0 } else { teeth.1 };
         let depth = c[0].hypot(c[1]).hypot(c[2]).hypot(c[3]);
         vec![

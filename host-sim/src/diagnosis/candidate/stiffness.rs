@@ -48,13 +48,7 @@ fn stiffness_hardening() -> Law {
         vec![main(power(shape[0]), 30.0), nuisance(power(1.0), 0.4), nuisance(power(shape[0] + 1.5), 0.3)]
     })
     .shapes([Shape::evenly("exponent", 1.6, 4.4, 3)])
-    .parameters(|on, shape, c| {
-        vec![
-            ("at_full_load_arcsec", c[0]),
-            ("exponent", shape[0]),
-            ("full_load_n_m", on.load),
-        ]
-    })
+    .parameters(|on, shape, c| vec![("at_full_load_arcsec", c[0]), ("exponent", shape[0]), ("full_load_n_m", on.load)])
     .physical(|_, c| c[0] > 0.0)
 }
 

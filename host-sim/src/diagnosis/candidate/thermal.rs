@@ -63,7 +63,10 @@ fn lubricant_viscosity() -> Law {
             let drag = by_row(on, |k| {
                 let cold = on.nominal.temperature_c - rows.temperature[k];
                 let share = (rows.speed[k] / fastest).abs();
-                -rows.direction[k] * on.nominal.ratio.signum() * share.powf(power) * (per_k * cold * (1.0 + bend * cold)).exp()
+                -rows.direction[k]
+                    * on.nominal.ratio.signum()
+                    * share.powf(power)
+                    * (per_k * cold * (1.0 + bend * cold)).exp()
             });
             let size = super::super::rows::rms(&drag).max(1e-12);
             drag.into_iter().map(|d| d / size).collect::<Vec<f64>>()
@@ -74,7 +77,11 @@ fn lubricant_viscosity() -> Law {
             nuisance(drag(power, 0.5 * per_k, bend), 0.15),
         ]
     })
-    .shapes([Shape::evenly("speed_exponent", 0.25, 1.05, 3), Shape::by_factors("per_k", 0.008, 0.12, 4), Shape::evenly("bend_per_k", -0.002, 0.01, 1)])
+    .shapes([
+        Shape::evenly("speed_exponent", 0.25, 1.05, 3),
+        Shape::by_factors("per_k", 0.008, 0.12, 4),
+        Shape::evenly("bend_per_k", -0.002, 0.01, 1),
+    ])
     .parameters(|_, shape, c| {
         vec![("rms_arcsec", c[0]), ("speed_exponent", shape[0]), ("relative_drag_per_k", -shape[1])]
     })
