@@ -43,54 +43,56 @@ fn steps(share: f64) -> f64 {
     [0.3, -0.3, 1.0, -1.0, 0.1, -0.1, 0.6, -0.6][((share * 16.0) as usize) % 8]
 }
 
+fn run<const N: usize>(text: &'static str, sessions: [fn(f64) -> State; N]) -> Run {
+    Run { text, sessions: sessions.to_vec() }
+}
+
 fn menu() -> Vec<Run> {
     const fn state(turns: f64, torque: f64, warmer: f64, orientation: f64) -> State {
         State { turns, torque, warmer, orientation }
     }
     vec![
-        Run {
-            text: "one output turn forward and back at steady torque, once with either sign",
-            sessions: vec![|s| state(95.0 * there_and_back(s), 0.7, 0.0, 0.0), |s| {
-                state(95.0 * there_and_back(s), -0.7, 0.0, 0.0)
-            }],
-        },
-        Run {
-            text: "half an output turn forward and back with torque steps of both signs, drive turned against gravity by 0, 90 and 180 degrees",
-            sessions: vec![
+        run(
+            "one output turn forward and back at steady torque, once with either sign",
+            [|s| state(95.0 * there_and_back(s), 0.7, 0.0, 0.0), |s| state(95.0 * there_and_back(s), -0.7, 0.0, 0.0)],
+        ),
+        run(
+            "half an output turn forward and back with torque steps of both signs, drive turned against gravity by 0, 90 and 180 degrees",
+            [
                 |s| state(50.0 * there_and_back(s), steps(s), 0.0, 0.0),
                 |s| state(50.0 * there_and_back(s), steps(s), 0.0, FRAC_PI_2),
                 |s| state(50.0 * there_and_back(s), steps(s), 0.0, PI),
             ],
-        },
-        Run {
-            text: "torque triangles of three amplitudes through zero, generator creeping",
-            sessions: vec![|s| {
+        ),
+        run(
+            "torque triangles of three amplitudes through zero, generator creeping",
+            [|s| {
                 let amplitude = [0.15, 0.4, 1.0][((s * 3.0) as usize).min(2)];
                 let triangle = 2.0 / PI * (TAU * 12.0 * s).sin().asin();
                 state(2.0 * s, amplitude * triangle, 0.0, 0.0)
             }],
-        },
-        Run {
-            text: "a cold, a hot and again a cold soak, torque steps of both signs at each, slow and fast in both directions",
-            sessions: vec![
+        ),
+        run(
+            "a cold, a hot and again a cold soak, torque steps of both signs at each, slow and fast in both directions",
+            [
                 |s| state(30.0 * there_and_back(s) * s, steps(s), -35.0, 0.0),
                 |s| state(30.0 * there_and_back(s) * s, steps(s), 35.0, 0.0),
                 |s| state(30.0 * there_and_back(s) * s, steps(s), -35.0, 0.0),
             ],
-        },
-        Run {
-            text: "constant speeds from slow to fast in both directions, torque through zero in between",
-            sessions: vec![|s| {
+        ),
+        run(
+            "constant speeds from slow to fast in both directions, torque through zero in between",
+            [|s| {
                 let run = (s * 8.0).floor();
                 let speed = [0.1, -0.1, 0.3, -0.3, 0.6, -0.6, 1.0, -1.0][(run as usize).min(7)];
                 let before: f64 = [0.0, 0.1, 0.0, 0.3, 0.0, 0.6, 0.0, 1.0][(run as usize).min(7)];
                 state(15.0 * (before + speed * (8.0 * s - run)), 0.7 * (TAU * 10.0 * s).sin(), 0.0, 0.0)
             }],
-        },
-        Run {
-            text: "torque steps of both signs with the generator at rest, recorded as fast as the encoder allows",
-            sessions: vec![|s| state(0.01 * s, steps(s), 0.0, 0.0)],
-        },
+        ),
+        run(
+            "torque steps of both signs with the generator at rest, recorded as fast as the encoder allows",
+            [|s| state(0.01 * s, steps(s), 0.0, 0.0)],
+        ),
     ]
 }
 
