@@ -281,8 +281,12 @@ fn conclude(
                     );
                 }
             }
-            let alike: Vec<String> =
-                rivals.iter().filter(|r| r.looks_alike(standings[k].size)).map(|r| r.cause.clone()).take(3).collect();
+            let alike: Vec<String> = rivals
+                .iter()
+                .filter(|r| r.looks_alike(standings[k].size, selected.terms[k].law.tolerance_of.is_some()))
+                .map(|r| r.cause.clone())
+                .take(3)
+                .collect();
             let closest = rivals.first().map_or(50.0, |r| r.misfit);
             if !alike.is_empty() && next_experiment.is_none() {
                 let named: Vec<&Law> = alike.iter().filter_map(|a| laws.iter().find(|law| law.cause == *a)).collect();

@@ -24,10 +24,12 @@ const SAME_ARCSEC: f64 = 0.5;
 const SAME_SHARE: f64 = 0.12;
 
 impl Rival {
-    /// Whether the data cannot tell it from a cause of this size.
+    /// Whether the data cannot tell it from a cause of this size. With a base parameter `out_of_tolerance` any rival predicts the
+    /// same, as the base takes its place: there the misfit alone decides, which has the tolerance in it.
     #[must_use]
-    pub fn looks_alike(&self, size_arcsec: f64) -> bool {
-        self.misfit < TOLD_APART || self.apart_arcsec < SAME_ARCSEC.max(SAME_SHARE * size_arcsec)
+    pub fn looks_alike(&self, size_arcsec: f64, out_of_tolerance: bool) -> bool {
+        let same = self.apart_arcsec < SAME_ARCSEC.max(SAME_SHARE * size_arcsec);
+        self.misfit < if out_of_tolerance { 5.0 } else { TOLD_APART } || (same && !out_of_tolerance)
     }
 }
 

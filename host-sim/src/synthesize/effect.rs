@@ -63,7 +63,7 @@ impl Effect {
     /// Draws an effect of a visible size.
     #[must_use]
     pub fn draw(name: &str, random: &mut fastrand::Rng) -> Effect {
-        let mut between = |low: f64, high: f64| low * (high / low as f64).powf(random.f64());
+        let mut between = |low: f64, high: f64| low * (high / low).powf(random.f64());
         let size = match name {
             "thermal_clearance" => between(0.5, 2.0),
             "thermal_stiffness" => between(0.002, 0.008),

@@ -87,7 +87,7 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
         ]
     })
     .shapes([
-        Shape::by_factors("frequency_hz", 1.0f64.min(0.3 * fastest), fastest.min(80.0).max(0.5), 14),
+        Shape::by_factors("frequency_hz", 1.0f64.min(0.3 * fastest), fastest.clamp(0.5, 80.0), 14),
         Shape::by_factors("damping_ratio", 0.008, 0.5, 3),
     ])
     .parameters(|_, shape, c| {

@@ -33,7 +33,20 @@ pub fn line(unit: &str, order: f64) -> Law {
         "output turn" => |on, k| on.rows.output[k],
         _ => |on, k| 2.0 * std::f64::consts::PI * on.rows.time[k],
     };
-    wave(format!("line of {order:.4} per {unit}"), angle, order)
+    let name = format!("line of {order:.4} per {unit}");
+    if unit != "second" {
+        return wave(name, angle, order);
+    }
+    // Nothing says that a line in time keeps its phase while nobody records.
+    let mut law = Law::new(&name, move |on, _| {
+        let of = |session: &std::ops::Range<usize>, shift: f64| {
+            let inside = |k: usize| if session.contains(&k) { (order * angle(on, k) - shift).cos() } else { 0.0 };
+            main(by_row(on, inside), 15.0)
+        };
+        on.rows.sessions.iter().flat_map(|s| [of(s, 0.0), of(s, std::f64::consts::FRAC_PI_2)]).collect()
+    });
+    law.named = false;
+    law
 }
 
 /// Everything without a name that is always tried.
