@@ -3,11 +3,12 @@
 use std::f64::consts::PI;
 
 use super::{Column, Excitation, Law, Shape, Tolerance, by_row, main};
+use crate::diagnosis::base::PlayLaw;
 use crate::diagnosis::linear::Prior;
 use crate::tables::ARCSEC_PER_RAD;
 
 /// An unbalanced load, m g l sin of the output angle against gravity: adds to the torque, so it winds the drive up and moves the play.
-fn gravity_torque(sign: f64, on: &Excitation<'_>) -> Law {
+fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
     let scale = if on.load > 0.0 { on.load } else { 20.0 };
     Law::new("gravity_torque", move |on, shape| {
         let (moment, phase) = (shape[0], shape[1]);
@@ -15,7 +16,7 @@ fn gravity_torque(sign: f64, on: &Excitation<'_>) -> Law {
         let torque: Vec<f64> = (0..rows.len())
             .map(|k| rows.torque[k] + moment * (rows.output[k] + sign * rows.orientation[k] - phase).sin())
             .collect();
-        let flank = on.base.law.flanks(rows, &torque, on.nominal);
+        let flank = play.flanks(rows, &torque, on.nominal);
         let half = on.base.half_backlash;
         let wind = by_row(on, |k| on.nominal.wind_up_arcsec(torque[k]) - on.base.wind_up[k]);
         let play = by_row(on, |k| half * (flank[k] - on.base.flank[k]));
@@ -100,9 +101,12 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = Vec::new();
     if on.nominal.wind_up_arcsec(1.0) > 0.0 {
-        laws.push(gravity_torque(1.0, on));
-        if on.rows.recorded.orientation {
-            laws.push(gravity_torque(-1.0, on));
+        // The load that gravity adds moves the torque at which the play turns over: which law it follows there shows only now.
+        for play in [PlayLaw::Held, PlayLaw::Pushed] {
+            laws.push(gravity_torque(1.0, play, on));
+            if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
+                laws.push(gravity_torque(-1.0, play, on));
+            }
         }
     }
     if on.rows.recorded.time {

@@ -246,7 +246,7 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         damaged_tooth(Angle::Flexspline),
         damaged_tooth(Angle::CircularSpline),
     ];
-    if on.rows.recorded.orientation {
+    if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
         laws.push(rectified("gravity_side_load", Angle::Gravity(-1.0), on));
     }
     laws
