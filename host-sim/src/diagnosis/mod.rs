@@ -78,8 +78,6 @@ impl Default for Settings {
 const LEAST_ROWS: usize = 200;
 /// Orders per generator turn up to which lines are looked for.
 const HIGHEST_ORDER: f64 = 150.0;
-/// Below this a line in time is no different from wander, Hz.
-const SLOWEST_LINE_HZ: f64 = 0.15;
 /// Times that causes are chosen again, at most.
 const MOST_ROUNDS: usize = 3;
 /// What is left as a free function counts if it is larger than this against the strongest cause.
@@ -210,7 +208,6 @@ fn lines_left(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> V
     remainder::lines(problem, &every, HIGHEST_ORDER)
         .into_iter()
         .filter(|line| line.power > remainder::line_limit(rows))
-        .filter(|line| line.unit != "second" || line.order > SLOWEST_LINE_HZ)
         .map(|line| {
             // In innovations of variance v a line of amplitude a has the power n a² / 4 v.
             let size = noise.white * rows::rms(&every) * (2.0 * line.power / rows as f64).sqrt();

@@ -8,6 +8,9 @@ use super::noise::{Noise, Whitener};
 use super::report::Unexplained;
 use super::select::Selected;
 
+/// Below this a line in time is no different from wander, Hz.
+const SLOWEST_LINE_HZ: f64 = 0.15;
+
 /// A line found in what is left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
@@ -62,7 +65,7 @@ pub fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -
 pub fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> Vec<Line> {
     let rows = problem.on.rows;
     let mut found = Vec::new();
-    found.extend(strongest(&rows.generator, innovations, highest_order / (2.0 * PI)).map(|(f, power)| Line {
+    found.extend(strongest(&rows.generator, innovations, 0.0, highest_order / (2.0 * PI)).map(|(f, power)| Line {
         unit: "generator turn",
         order: f * 2.0 * PI,
         power,
@@ -78,7 +81,7 @@ pub fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> 
             }
             shift += last - first + 1.0;
         }
-        found.extend(strongest(&time, innovations, 0.45 / rows.period).map(|(f, power)| Line {
+        found.extend(strongest(&time, innovations, SLOWEST_LINE_HZ, 0.45 / rows.period).map(|(f, power)| Line {
             unit: "second",
             order: f,
             power,
@@ -142,8 +145,8 @@ pub fn beyond_noise(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise
     }
 }
 
-/// Frequency (per unit of `places`) and power of the strongest line up to `highest`.
-fn strongest(places: &[f64], values: &[f64], highest: f64) -> Option<(f64, f64)> {
+/// Frequency (per unit of `places`) and power of the strongest line from `lowest` to `highest`.
+fn strongest(places: &[f64], values: &[f64], lowest: f64, highest: f64) -> Option<(f64, f64)> {
     let (low, high) = places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
     let span = high - low;
     if !(span > 0.0 && highest > 0.0) {
@@ -161,7 +164,8 @@ fn strongest(places: &[f64], values: &[f64], highest: f64) -> Option<(f64, f64)>
     transform(&mut re, &mut im);
     let total: f64 = values.iter().map(|v| v * v).sum();
     let upto = ((highest * step * size as f64) as usize).min(size / 2);
-    (1..upto)
+    let from = ((lowest * step * size as f64).ceil() as usize).max(1);
+    (from..upto)
         .map(|k| (k as f64 / (size as f64 * step), (re[k] * re[k] + im[k] * im[k]) / total.max(1e-30)))
         .max_by(|a, b| a.1.total_cmp(&b.1))
 }
@@ -221,7 +225,7 @@ mod tests {
     fn a_line_at_uneven_places_is_found_where_it_is() {
         let places: Vec<f64> = (0..4000).map(|k| 0.05 * f64::from(k) + 0.02 * f64::from(k % 7)).collect();
         let values: Vec<f64> = places.iter().map(|x| (2.0 * PI * 0.731 * x).cos()).collect();
-        let (frequency, power) = strongest(&places, &values, 2.0).unwrap();
+        let (frequency, power) = strongest(&places, &values, 0.0, 2.0).unwrap();
         assert!((frequency - 0.731).abs() < 0.005, "{frequency}");
         assert!(power > 1000.0, "{power}");
     }

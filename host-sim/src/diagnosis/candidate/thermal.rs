@@ -53,6 +53,11 @@ fn thermal_stiffness() -> Law {
     .parameters(|_, _, c| vec![("relative_stiffness_per_k", -0.01 * c[0])])
 }
 
+/// Whether a drag is one of a lubricant: at the edge of the range it is dry friction or lash, which knows neither speed nor cold.
+fn viscous(power: f64, per_k: f64) -> bool {
+    power > 0.27 && per_k > 0.009
+}
+
 /// Drag of the lubricant, against the motion: a power of the speed, and thicker in the cold (Vogel, close to exponential).
 fn lubricant_viscosity() -> Law {
     Law::new("lubricant_viscosity", |on, shape| {
@@ -85,7 +90,7 @@ fn lubricant_viscosity() -> Law {
     .parameters(|_, shape, c| {
         vec![("rms_arcsec", c[0]), ("speed_exponent", shape[0]), ("relative_drag_per_k", -shape[1])]
     })
-    .physical(|_, c| c[0] > 0.0)
+    .physical(|shape, c| c[0] > 0.0 && viscous(shape[0], shape[1]))
 }
 
 /// The same drag as a load: it winds the drive up and, where it exceeds the torque, moves the play to the other flank.
@@ -118,6 +123,7 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
     .parameters(|_, shape, c| {
         vec![("drag_n_m", shape[0] * c[0]), ("speed_exponent", shape[1]), ("relative_drag_per_k", -shape[2])]
     })
+    .physical(|shape, c| c[0] > 0.0 && viscous(shape[1], shape[2]))
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
