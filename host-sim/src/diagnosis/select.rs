@@ -15,10 +15,10 @@ const OUT_OF_TOLERANCE: f64 = 3.3;
 const LEAST_ARCSEC: f64 = 1.5;
 /// Least size in units of the white noise.
 const LEAST_OF_NOISE: f64 = 0.3;
-/// Least size against the strongest cause.
-const LEAST_OF_STRONGEST: f64 = 0.10;
-/// Without a name, a deviation has to be larger than this against the strongest cause: laws differ in detail.
-const LEAST_UNNAMED_OF_STRONGEST: f64 = 0.15;
+/// Least size against what the laws of the other terms may be wrong by.
+const LEAST_OF_MISFIT: f64 = 1.0;
+/// The same for a deviation without a name.
+const LEAST_UNNAMED_OF_MISFIT: f64 = 1.5;
 /// Causes at most.
 const MOST_CAUSES: usize = 3;
 /// Unnamed deviations at most.
@@ -217,13 +217,14 @@ impl Limits {
         Limits { least: least_size(white) }
     }
 
-    fn passes(&self, law: &Law, standing: &Standing, strongest: f64, in_tolerance: bool) -> bool {
-        let share = if law.named { LEAST_OF_STRONGEST } else { LEAST_UNNAMED_OF_STRONGEST };
+    /// `misfit`: what the laws of the other terms may be wrong by, arcsec.
+    fn passes(&self, law: &Law, standing: &Standing, misfit: f64, in_tolerance: bool) -> bool {
+        let share = if law.named { LEAST_OF_MISFIT } else { LEAST_UNNAMED_OF_MISFIT };
         let evidence = if law.tolerance_of.is_some() { 0.5 } else { LEAST_EVIDENCE };
         !in_tolerance
             && standing.evidence > evidence
             && standing.size > self.least
-            && standing.size > share * strongest
+            && standing.size > share * misfit
             && standing.left_out > 0.0
     }
 }
@@ -239,6 +240,7 @@ pub fn select<'l>(
 ) -> Option<Selected<'l>> {
     let limits = Limits::of(white);
     let mut selected = Selected { fit: fit(problem, &start)?, terms: start };
+    let mut seen = std::collections::HashSet::new();
     for round in 0..MOST_CAUSES + MOST_UNNAMED + 1 {
         let Some(next) = forward(problem, laws, &selected, &limits, &mut log) else { break };
         selected = settle(problem, next)?;
@@ -246,6 +248,11 @@ pub fn select<'l>(
         if round > 0 || selected.terms.len() > 1 {
             selected = exchange(problem, laws, selected, &mut log)?;
             selected = backward(problem, selected, &limits, &mut log)?;
+        }
+        let mut causes: Vec<&str> = selected.terms.iter().map(|t| t.law.cause.as_str()).collect();
+        causes.sort_unstable();
+        if !seen.insert(causes.join("+")) {
+            break;
         }
     }
     Some(selected)
@@ -284,7 +291,11 @@ fn forward<'l>(
         gain - if term.law.named { 0.0 } else { UNNAMED_AHEAD.max(0.01 * gain) }
     };
     refined.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
-    let strongest = standings(problem, selected).iter().map(|s| s.size).fold(0.0, f64::max);
+    let misfit = standings(problem, selected)
+        .iter()
+        .zip(&selected.terms)
+        .map(|(s, t)| s.size * t.law.misfit)
+        .fold(0.0, f64::max);
     for (gain, term, fit) in refined {
         if gain < 0.5 {
             break;
@@ -294,7 +305,7 @@ fn forward<'l>(
         terms.push(term);
         let next = Selected { terms, fit };
         let standing = standing(problem, &next, next.terms.len() - 1);
-        let passes = limits.passes(law, &standing, strongest, false);
+        let passes = limits.passes(law, &standing, misfit, false);
         log(format!(
             "  {} {line}: evidence {:.1}, size {:.2}, left out {:.1}",
             if passes { "+" } else { "?" },
@@ -338,7 +349,6 @@ fn backward<'l>(
 ) -> Option<Selected<'l>> {
     while !selected.terms.is_empty() {
         let standings = standings(problem, &selected);
-        let strongest = standings.iter().map(|s| s.size).fold(0.0, f64::max);
         let failing = |k: usize| {
             let law = selected.terms[k].law;
             let c = selected.fit.of(k);
@@ -348,7 +358,11 @@ fn backward<'l>(
                     selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
                 Scaffold::new(problem, others).fit(&[]).is_none_or(|without| !out_of_tolerance(problem, &without, law))
             };
-            !physical || !limits.passes(law, &standings[k], strongest, in_tolerance)
+            let misfit = (0..selected.terms.len())
+                .filter(|j| *j != k)
+                .map(|j| standings[j].size * selected.terms[j].law.misfit)
+                .fold(0.0, f64::max);
+            !physical || !limits.passes(law, &standings[k], misfit, in_tolerance)
         };
         let weakest = (0..selected.terms.len())
             .filter(|k| failing(*k))

@@ -128,7 +128,14 @@ pub struct Law {
     pub physical: Physical,
     /// If set, the law is a base parameter out of tolerance: index of the name in [`Base::floating`].
     pub tolerance_of: Option<&'static str>,
+    /// How wrong the law may be, as a share of its size: what is smaller than that beside it may be its own misfit.
+    pub misfit: f64,
 }
+
+/// Share by which the law of a contact, a friction or a lubricant may be wrong.
+const USUAL_MISFIT: f64 = 0.10;
+/// The same for pure geometry and counting: sensors, ratio, skipped teeth.
+const EXACT_MISFIT: f64 = 0.02;
 
 impl Law {
     fn new(cause: &str, columns: impl Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync + 'static) -> Law {
@@ -140,7 +147,12 @@ impl Law {
             parameters: Box::new(|_, _, _| Vec::new()),
             physical: Box::new(|_, _| true),
             tolerance_of: None,
+            misfit: USUAL_MISFIT,
         }
+    }
+    fn exact(mut self) -> Law {
+        self.misfit = EXACT_MISFIT;
+        self
     }
     fn shapes(mut self, shapes: impl IntoIterator<Item = Shape>) -> Law {
         self.shapes = shapes.into_iter().collect();

@@ -50,5 +50,5 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     if on.rows.recorded.time {
         laws.push(sensor_latency());
     }
-    laws
+    laws.into_iter().map(Law::exact).collect()
 }

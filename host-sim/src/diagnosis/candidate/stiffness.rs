@@ -137,7 +137,8 @@ fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
                 ("offset_arcsec", slipped),
                 ("events", jumps.len() as f64),
             ]
-        }),
+        })
+        .exact(),
     )
 }
 
