@@ -132,13 +132,17 @@ const LEAST_EVIDENCE: f64 = 15.0;
 const MOST_WANDER_ARCSEC: f64 = 7.0;
 const MOST_WANDER_OF_WHITE: f64 = 2.5;
 
-/// Slow motion that is too large for noise.
+/// Innovations that are worth less than this are no noise: something moves in them that the wander cannot follow.
+const LEAST_WORTH: f64 = 0.35;
+
+/// Slow motion that is too large for noise, or too orderly.
 #[must_use]
 pub fn beyond_noise(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<Unexplained> {
     let left = left(problem, selected);
     let wander = problem.whitener.followed(&left);
     let size = problem.certain_rms(&wander);
-    if size > MOST_WANDER_ARCSEC.max(MOST_WANDER_OF_WHITE * noise.white) {
+    let restless = problem.worth < LEAST_WORTH && noise.wander > noise.white;
+    if restless || size > MOST_WANDER_ARCSEC.max(MOST_WANDER_OF_WHITE * noise.white) {
         vec![Unexplained { looks_like: "slow motion".into(), size_arcsec: size }]
     } else {
         Vec::new()

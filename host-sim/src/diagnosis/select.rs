@@ -1,5 +1,5 @@
 //! Which causes: forward by evidence, each held against all others and against deviations without a name; then backward, then
-//! exchange. A cause has to earn its place four times: evidence, size, share of the strongest, sessions it was not fitted to.
+//! exchange. A cause has to earn its place four times: evidence, size, size against the misfit of the other laws, sessions it was not fitted to.
 
 use rayon::prelude::*;
 
