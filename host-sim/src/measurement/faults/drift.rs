@@ -67,9 +67,10 @@ fn slope(sessions: &[Session], gear: &Gear) -> Option<(f64, f64, f64)> {
     }
     let state = State::new(sessions, gear);
     let rows: usize = sessions.iter().map(Session::len).sum();
-    let forward = sessions.iter().enumerate().map(|(s, session)| {
-        (0..session.len()).filter(|row| state.flank(s, *row) > 0.0).count()
-    });
+    let forward = sessions
+        .iter()
+        .enumerate()
+        .map(|(s, session)| (0..session.len()).filter(|row| state.flank(s, *row) > 0.0).count());
     let forward = forward.sum::<usize>() as f64 / rows as f64;
     if !(BOTH_FLANKS..=1.0 - BOTH_FLANKS).contains(&forward) {
         return None;

@@ -26,7 +26,9 @@ const LASTS: f64 = 8.0;
 /// The lasting part and the sudden part agree within this share.
 const AGREES: f64 = 0.4;
 /// No step smaller than this is looked for, rad.
-const LEAST_RAD: f64 = 2.0 * ARCSEC;
+const LEAST_RAD: f64 = 5.0 * ARCSEC;
+/// Nor one that is not seen from one row to the next: so many standard deviations of the white noise.
+const SEEN: f64 = 6.0;
 /// Steps looked for at a time, and rounds of looking.
 const AT_ONCE: usize = 8;
 const ROUNDS: usize = 4;
@@ -37,7 +39,9 @@ const HELD: f64 = 0.1;
 /// Wider than any clearance, rad: such a step needs no load to show that no flank was changed.
 const WIDER_THAN_CLEARANCE_RAD: f64 = 180.0 * ARCSEC;
 /// A change of load by this share of its largest, near the step, may be wind-up.
-const LOAD_STEP: f64 = 0.15;
+const LOAD_STEP: f64 = 0.03;
+/// Its noise alone changes it by no more than so many of its standard deviations.
+const LOAD_NOISE: f64 = 8.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Place {
@@ -108,7 +112,8 @@ type Step = (Place, f64, f64);
 fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<(Place, f64)>)> {
     let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
     let state = State::new(sessions, gear);
-    let mut places = sudden(sessions, gear, noise);
+    let settled = state.settled();
+    let mut places = sudden(sessions, gear, noise, &settled);
     let mut rejected: Vec<Place> = Vec::new();
     let mut steps: Vec<Step> = Vec::new();
     for round in 0..ROUNDS {
@@ -118,7 +123,8 @@ fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<(Place, f64
             let extras: Vec<Extra> = columns.iter().map(|column| column as Extra).collect();
             let fit = state.fit(&extras)?;
             let first = fit.value.len() - places.len();
-            let strength = |k: usize| strength(sessions, gear, noise, places[k], fit.value[first + k], fit.std[first + k]);
+            let strength =
+                |k: usize| strength(sessions, gear, noise, places[k], fit.value[first + k], fit.std[first + k]);
             let weakest = (0..places.len()).min_by(|a, b| strength(*a).total_cmp(&strength(*b)));
             match weakest {
                 Some(k) if strength(k) < 1.0 => {
@@ -133,7 +139,7 @@ fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<(Place, f64
             break;
         }
         let known: Vec<Place> = places.iter().chain(&rejected).copied().collect();
-        let more = standing_out(sessions, gear, noise, &state, &fit, &places, &known);
+        let more = standing_out(sessions, gear, noise, &state, &settled, &fit, &places, &known);
         if more.is_empty() {
             break;
         }
@@ -145,15 +151,18 @@ fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<(Place, f64
     Some((sure, doubtful.into_iter().map(|(place, size, _)| (place, size)).collect()))
 }
 
-/// The change of the error into a row beyond what a dwell could give, 0 if less.
-fn beyond_dwell(session: &Session, row: usize, gear: &Gear) -> f64 {
+/// The change of the error into a row beyond what a dwell could give, 0 if less. An output dwells after the generator turned back.
+fn beyond_dwell(session: &Session, row: usize, settled: &[bool], gear: &Gear) -> f64 {
     let change = session.error_rad[row] - session.error_rad[row - 1];
+    if settled[row] {
+        return change;
+    }
     let motion = FASTER_THAN_DWELL * ((session.generator_rad[row] - session.generator_rad[row - 1]) / gear.ratio).abs();
     change.signum() * (change.abs() - motion).max(0.0)
 }
 
 /// Rows into which the error changes more than anything smooth explains, the largest changes first.
-fn sudden(sessions: &[Session], gear: &Gear, noise: f64) -> Vec<Place> {
+fn sudden(sessions: &[Session], gear: &Gear, noise: f64, settled: &[Vec<bool>]) -> Vec<Place> {
     let changes: Vec<f64> =
         sessions.iter().flat_map(|session| session.error_rad.windows(2).map(|error| error[1] - error[0])).collect();
     let usual = median_and_std(&mut sampled(&changes)).1;
@@ -161,7 +170,7 @@ fn sudden(sessions: &[Session], gear: &Gear, noise: f64) -> Vec<Place> {
     let mut found: Vec<(Place, f64)> = Vec::new();
     for (number, session) in sessions.iter().enumerate() {
         for row in 1..session.len() {
-            let by = beyond_dwell(session, row, gear).abs();
+            let by = beyond_dwell(session, row, &settled[number], gear).abs();
             if by > least {
                 found.push((Place { session: number, row }, by));
             }
@@ -188,11 +197,13 @@ fn largest(mut found: Vec<(Place, f64)>, known: &[Place]) -> Vec<Place> {
 }
 
 /// Rows where means before and after differ more than they do elsewhere, in what state and known steps leave.
+#[allow(clippy::too_many_arguments, reason = "all that is known of the recording")]
 fn standing_out(
     sessions: &[Session],
     gear: &Gear,
     noise: f64,
     state: &State,
+    settled: &[Vec<bool>],
     fit: &Fit,
     places: &[Place],
     known: &[Place],
@@ -223,7 +234,7 @@ fn standing_out(
             let size = differences[row];
             if size.abs() > least {
                 // Of the rows around, the one where it happens.
-                let sharp = beyond_dwell(session, row, gear) * size.signum();
+                let sharp = beyond_dwell(session, row, &settled[number], gear) * size.signum();
                 if sharp > (1.0 - AGREES) * size.abs() - 4.0 * noise {
                     found.push((Place { session: number, row }, size.abs()));
                 }
@@ -240,7 +251,7 @@ fn strength(sessions: &[Session], gear: &Gear, noise: f64, place: Place, size: f
     let motion = ((session.generator_rad[place.row] - session.generator_rad[place.row - 1]) / gear.ratio).abs();
     let agrees = (change - size).abs() < AGREES * size.abs() + 6.0 * noise + 0.5 * motion;
     let loaded = load_changes(session, place.row, largest_torque(sessions)) && !whole_pitches(size, gear);
-    if !agrees || loaded || size.abs() < LEAST_RAD {
+    if !agrees || loaded || size.abs() < LEAST_RAD.max(SEEN * noise) {
         return 0.0;
     }
     // Seen close by, so that a slow change is no step: medians of a few rows.
@@ -248,7 +259,8 @@ fn strength(sessions: &[Session], gear: &Gear, noise: f64, place: Place, size: f
     let mut before = session.error_rad[place.row - beside..place.row].to_vec();
     let mut after = session.error_rad[place.row..place.row + beside].to_vec();
     let local = median_of(&mut after) - median_of(&mut before);
-    let travel = (session.generator_rad[place.row + beside - 1] - session.generator_rad[place.row - beside]).abs() / gear.ratio.abs();
+    let travel = (session.generator_rad[place.row + beside - 1] - session.generator_rad[place.row - beside]).abs()
+        / gear.ratio.abs();
     if (local - size).abs() > AGREES * size.abs() + 4.0 * noise + travel {
         return 0.0;
     }
@@ -263,14 +275,22 @@ fn whole_pitches(size: f64, gear: &Gear) -> bool {
 }
 
 fn largest_torque(sessions: &[Session]) -> f64 {
-    sessions.iter().filter_map(|s| s.torque_n_m.as_ref()).flatten().fold(0.0, |most: f64, torque| most.max(torque.abs()))
+    sessions
+        .iter()
+        .filter_map(|s| s.torque_n_m.as_ref())
+        .flatten()
+        .fold(0.0, |most: f64, torque| most.max(torque.abs()))
 }
 
+/// Whether load changes by more than its noise, or its sign, near a row.
 fn load_changes(session: &Session, row: usize, largest: f64) -> bool {
     session.torque_n_m.as_ref().is_some_and(|torque| {
-        let around = &torque[row.saturating_sub(3)..(row + 3).min(torque.len())];
-        let (least, most) = around.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
-        largest > 0.0 && most - least > LOAD_STEP * largest
+        let beside = 4.min(row).min(torque.len() - row);
+        let range =
+            |values: &[f64]| values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+        let (least, most) = range(&torque[row - beside..row + beside]);
+        let noise = white_noise([&torque[row.saturating_sub(50)..(row + 50).min(torque.len())]]);
+        largest > 0.0 && (most - least > (LOAD_STEP * largest).max(LOAD_NOISE * noise))
     })
 }
 
@@ -301,7 +321,8 @@ fn no_flank_was_changed(sessions: &[Session], state: &State, place: Place, size:
         return time.misfit < 0.95 * angle.misfit;
     }
     let session = &sessions[place.session];
-    let held = session.torque_n_m.as_ref().is_some_and(|torque| torque[place.row].abs() > HELD * largest_torque(sessions));
+    let held =
+        session.torque_n_m.as_ref().is_some_and(|torque| torque[place.row].abs() > HELD * largest_torque(sessions));
     // The same direction before and after, and a load that says which flank.
     held && state.flank(place.session, place.row) == state.flank(place.session, place.row - 1)
 }
