@@ -28,6 +28,13 @@ const AROUND: f64 = 1.6;
 /// …and by this many resolution widths on each side at least.
 const AROUND_WIDTHS: f64 = 20.0;
 
+/// Waves in the record below which a line is not told from wander.
+const FEWEST_WAVES: f64 = 1.5;
+/// Surrogates that noise with a memory is judged by.
+const SURROGATES: u32 = 16;
+/// Lines that are no lines lower the noise left over by up to this factor.
+const TAKEN: f64 = 2.0;
+
 /// What is asked of a spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpectrumSettings {
@@ -189,6 +196,18 @@ pub fn order_spectrum(
         scan = grid.scan(&left);
         noise = background(&orders, &scan, resolution);
     }
+    // Noise with a memory has its own spectrum, steepest where local medians say least: lines must stand above that, too.
+    if !found.is_empty() {
+        let red = grid.remembering(&left);
+        noise.iter_mut().zip(&red).for_each(|(noise, red)| *noise = noise.max(*red));
+        if let Some((_, lines)) = harmonics(angle, value, weight, &found) {
+            let stands = |line: &Line| {
+                let at = orders.partition_point(|order| *order < line.order).min(orders.len() - 1);
+                line.amplitude.powi(2) > noise[at] * times && line.order >= FEWEST_WAVES * resolution
+            };
+            found = lines.iter().filter(|line| stands(line)).map(|line| line.order).collect();
+        }
+    }
     let peaks = peaks(axis, angle, value, weight, ratio, &found, &orders, &noise, waves, resolution);
     let (orders, amplitude_arcsec, level_arcsec) = thinned(&orders, &first, &noise, times, settings.most_points);
     OrderSpectrum { axis, turns, resolution, orders, amplitude_arcsec, level_arcsec, peaks }
@@ -332,6 +351,54 @@ impl<'a> Grid<'a> {
     }
 }
 
+impl Grid<'_> {
+    /// Mean squared amplitude, at each order, of noise as white and with as long a memory (in rows, first-order autoregressive) as what is
+    /// `left`, from surrogates in the places of the rows (Schulz and Mudelsee, Comput. Geosci. 28, 421, 2002, for REDFIT).
+    fn remembering(&self, left: &[f64]) -> Vec<f64> {
+        let n = left.len();
+        let mean = left.iter().sum::<f64>() / n as f64;
+        let covariance = |lag: usize| {
+            left.iter().zip(&left[lag.min(n)..]).map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>()
+                / (n - lag.min(n - 1)) as f64
+        };
+        let whole = covariance(0);
+        // The longest pair of lags at which something is remembered gives memory and size of what remembers.
+        let (mut memory, mut size, mut lag) = (0.0_f64, 0.0, 1);
+        while 4 * lag < n {
+            let (near, far) = (covariance(lag), covariance(2 * lag));
+            if far < 0.1 * whole || far >= near {
+                break;
+            }
+            memory = (far / near).powf(1.0 / lag as f64);
+            size = (near * near / far).min(whole);
+            lag *= 2;
+        }
+        if size <= 0.0 {
+            return vec![0.0; self.places.clone().count()];
+        }
+        // The mean takes with it what is remembered over the whole record.
+        let length = (1.0 + memory) / (1.0 - memory).max(1.0 / n as f64);
+        size *= 1.0 + 2.0 * (length / n as f64).min(1.0);
+        let white = (whole - size).max(0.0).sqrt();
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+        let mut level = vec![0.0; self.places.clone().count()];
+        for _ in 0..SURROGATES {
+            let mut slow = size.sqrt() * normal();
+            let surrogate: Vec<f64> = (0..n)
+                .map(|_| {
+                    slow = memory * slow + (size * (1.0 - memory * memory)).sqrt() * normal();
+                    slow + white * normal()
+                })
+                .collect();
+            let scan = self.scan(&surrogate);
+            level.iter_mut().zip(scan).for_each(|(level, scan)| *level += scan / f64::from(SURROGATES));
+        }
+        // What the lines found took with them belongs to the noise as well.
+        level.iter().map(|level| TAKEN * level).collect()
+    }
+}
+
 /// Mean squared amplitude of the noise at each order, from the median around it: squares of noise are exponentially distributed, with
 /// a median of ln 2 of the mean, and lines, being few, do not move it.
 fn background(orders: &[f64], scan: &[f64], resolution: f64) -> Vec<f64> {
@@ -390,7 +457,7 @@ fn crowded(orders: &[f64], k: usize, resolution: f64) -> bool {
 
 /// The order near `order` that, fitted together with others, explains most.
 fn placed(angle: &[f64], value: &[f64], weight: Option<&[f64]>, others: &[f64], order: f64, resolution: f64) -> f64 {
-    let step = angle.len().div_ceil(6000).max(1);
+    let step = angle.len().div_ceil(2500).max(1);
     let x: Vec<f64> = angle.iter().copied().step_by(step).collect();
     let y: Vec<f64> = value.iter().copied().step_by(step).collect();
     let w: Option<Vec<f64>> = weight.map(|weight| weight.iter().copied().step_by(step).collect());
@@ -407,7 +474,7 @@ fn placed(angle: &[f64], value: &[f64], weight: Option<&[f64]>, others: &[f64], 
     let (mut a, mut b) = (order - 0.5 * resolution, order + 0.5 * resolution);
     let (mut c, mut d) = (b - golden * (b - a), a + golden * (b - a));
     let (mut fc, mut fd) = (explained(c), explained(d));
-    for _ in 0..12 {
+    for _ in 0..9 {
         if fc > fd {
             (b, d, fd) = (d, c, fc);
             c = b - golden * (b - a);
