@@ -18,6 +18,10 @@ const LEAST_RAD: f64 = 3.0 * ARCSEC;
 const STEPS: f64 = 2.0;
 /// And, in torque and temperature, by this share of the range.
 const LEAST_OF_RANGE: f64 = 0.05;
+/// The pulse of a tooth is this wide, rad of the generator; rows that are farther apart may catch it once.
+const TOOTH_RAD: f64 = 0.1;
+/// Load changes at once if it does by so many times its usual pace.
+const LOAD_PACE: f64 = 10.0;
 /// Rows before and after that are looked at.
 const BESIDE: usize = 3;
 /// Rows around, for what is usual there.
@@ -40,6 +44,23 @@ fn out_by(values: &[f64], row: usize) -> f64 {
     };
     let (before, after) = (values[row] - middle(row - BESIDE), values[row] - middle(row + 1));
     if before * after <= 0.0 { 0.0 } else { before.signum() * before.abs().min(after.abs()) }
+}
+
+/// Whether the drive goes on steadily around a row: no reversal and no load that changes at once, which give peaks of their own.
+fn steady(session: &Session, row: usize) -> bool {
+    let near = row.saturating_sub(6).max(1)..(row + 7).min(session.len());
+    let moved = |k: usize| session.generator_rad[k] - session.generator_rad[k - 1];
+    // The row itself may be the one that is out.
+    let mut others = near.clone().filter(|k| *k != row && *k != row + 1);
+    let direction = others.clone().map(moved).sum::<f64>();
+    if others.any(|k| moved(k) * direction < 0.0) {
+        return false;
+    }
+    session.torque_n_m.as_ref().is_none_or(|torque| {
+        let mut paces: Vec<f64> = near.clone().map(|k| (torque[k] - torque[k - 1]).abs()).collect();
+        let largest = paces.iter().copied().fold(0.0, f64::max);
+        largest <= LOAD_PACE * median_of(&mut paces) || largest == 0.0
+    })
 }
 
 /// Rows that are out by more than `least`.
@@ -74,10 +95,26 @@ pub(in crate::measurement) fn check(
     let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
     let resolution = seen(sessions, gear, error_recorded).into_iter().map(|(_, step)| step).fold(0.0, f64::max);
     let least = (OUT * noise).max(LEAST_RAD).max(STEPS * resolution);
-    let found: Vec<Vec<(usize, f64)>> = sessions.iter().map(|session| rows_out(&session.error_rad, least)).collect();
+    let found: Vec<Vec<(usize, f64)>> = sessions
+        .iter()
+        .map(|session| {
+            let mut rows = rows_out(&session.error_rad, least);
+            rows.retain(|(row, _)| steady(session, *row));
+            rows
+        })
+        .collect();
     let count: usize = found.iter().map(Vec::len).sum();
     if count > 0 && count as f64 <= SHARE * rows as f64 {
-        if repeat_with_position(sessions, &found, gear) {
+        let fast = found.iter().zip(sessions.iter()).all(|(rows, session)| {
+            rows.iter().all(|(row, _)| {
+                (session.generator_rad[row + 1] - session.generator_rad[row - 1]).abs() > 2.0 * TOOTH_RAD
+            })
+        });
+        if fast && count < 4 {
+            findings.notes.push(format!(
+                "{count} single rows stand out, in motion so fast that a tooth is passed within a row: drive or data, which is not told"
+            ));
+        } else if repeat_with_position(sessions, &found, gear) {
             findings
                 .notes
                 .push(format!("{count} single rows stand out, always in the same position: the drive, not the data"));

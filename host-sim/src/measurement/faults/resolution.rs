@@ -47,7 +47,9 @@ pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> V
     let (channel, measured) =
         if error_recorded { (Quantity::Error, &session.error_rad) } else { (Quantity::Output, &output) };
     if let Some(step) = lattice(measured)
-        && (noise >= SEEN * step || stands(measured, generator, 1e-3 * step) >= STANDS)
+        && (noise >= SEEN * step
+            || uneven(measured, step) >= UNEVEN
+            || stands(measured, generator, 1e-3 * step) >= STANDS)
     {
         found.push((channel, step));
     }

@@ -16,6 +16,8 @@ const FIT_ROWS: usize = 8000;
 const TURNED_BACK_RAD: f64 = 0.02;
 /// No clearance is wider, rad at the output: 10 arc-minutes.
 const CLEARANCE_RAD: f64 = 600.0 / 206_265.0;
+/// A reversal is noticed some rows late.
+const BEFORE: usize = 5;
 /// Weights fall from so many robust standard deviations on (Huber).
 const HUBER: f64 = 2.5;
 
@@ -76,8 +78,15 @@ impl<'a> State<'a> {
     pub fn settled(&self) -> Vec<Vec<bool>> {
         let of = |(session, flank): (&Session, &Vec<f64>)| {
             let mut turned = session.generator_rad.first().copied().unwrap_or(0.0);
+            let turns_soon = |row: usize| {
+                let soon = (row + BEFORE).min(session.len() - 1);
+                flank[soon] != flank[row]
+            };
             (0..session.len())
                 .map(|row| {
+                    if turns_soon(row) {
+                        return false;
+                    }
                     if row > 0 && flank[row] != flank[row - 1] {
                         turned = session.generator_rad[row];
                     }

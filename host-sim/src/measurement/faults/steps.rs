@@ -36,12 +36,18 @@ const ROUNDS: usize = 4;
 const WHOLE_PITCH: f64 = 0.01;
 /// Load of this share of its largest holds the drive on one flank.
 const HELD: f64 = 0.1;
+/// Wider than any traverse of the clearance, rad: such a step may follow a reversal.
+const LONGEST_TRAVERSE_RAD: f64 = 1200.0 * ARCSEC;
 /// Wider than any clearance, rad: such a step needs no load to show that no flank was changed.
 const WIDER_THAN_CLEARANCE_RAD: f64 = 180.0 * ARCSEC;
 /// A change of load by this share of its largest, near the step, may be wind-up.
 const LOAD_STEP: f64 = 0.03;
 /// Its noise alone changes it by no more than so many of its standard deviations.
 const LOAD_NOISE: f64 = 8.0;
+/// And its usual pace no more than so many times.
+const LOAD_PACE: f64 = 6.0;
+/// A jump stands alone: so many rows before and after it change the error by less than half as much.
+const APART: usize = 12;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Place {
@@ -123,8 +129,9 @@ fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<(Place, f64
             let extras: Vec<Extra> = columns.iter().map(|column| column as Extra).collect();
             let fit = state.fit(&extras)?;
             let first = fit.value.len() - places.len();
-            let strength =
-                |k: usize| strength(sessions, gear, noise, places[k], fit.value[first + k], fit.std[first + k]);
+            let strength = |k: usize| {
+                strength(sessions, gear, noise, &settled, places[k], fit.value[first + k], fit.std[first + k])
+            };
             let weakest = (0..places.len()).min_by(|a, b| strength(*a).total_cmp(&strength(*b)));
             match weakest {
                 Some(k) if strength(k) < 1.0 => {
@@ -245,8 +252,20 @@ fn standing_out(
 }
 
 /// At least 1 for a step that lasts, is sudden, and is the same in both views.
-fn strength(sessions: &[Session], gear: &Gear, noise: f64, place: Place, size: f64, std: f64) -> f64 {
+fn strength(
+    sessions: &[Session],
+    gear: &Gear,
+    noise: f64,
+    settled: &[Vec<bool>],
+    place: Place,
+    size: f64,
+    std: f64,
+) -> f64 {
     let session = &sessions[place.session];
+    let wide = size.abs() > LONGEST_TRAVERSE_RAD;
+    if (!settled[place.session][place.row] && !wide) || others_change_as_much(session, place.row, size) {
+        return 0.0;
+    }
     let change = session.error_rad[place.row] - session.error_rad[place.row - 1];
     let motion = ((session.generator_rad[place.row] - session.generator_rad[place.row - 1]) / gear.ratio).abs();
     let agrees = (change - size).abs() < AGREES * size.abs() + 6.0 * noise + 0.5 * motion;
@@ -282,16 +301,22 @@ fn largest_torque(sessions: &[Session]) -> f64 {
         .fold(0.0, |most: f64, torque| most.max(torque.abs()))
 }
 
-/// Whether load changes by more than its noise, or its sign, near a row.
+/// Whether load changes at once, by more than its noise and its usual pace, near a row.
 fn load_changes(session: &Session, row: usize, largest: f64) -> bool {
     session.torque_n_m.as_ref().is_some_and(|torque| {
-        let beside = 4.min(row).min(torque.len() - row);
-        let range =
-            |values: &[f64]| values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
-        let (least, most) = range(&torque[row - beside..row + beside]);
-        let noise = white_noise([&torque[row.saturating_sub(50)..(row + 50).min(torque.len())]]);
-        largest > 0.0 && (most - least > (LOAD_STEP * largest).max(LOAD_NOISE * noise))
+        let around = &torque[row.saturating_sub(50)..(row + 50).min(torque.len())];
+        let mut paces: Vec<f64> = around.windows(2).map(|t| (t[1] - t[0]).abs()).collect();
+        let usual =
+            (LOAD_STEP * largest).max(LOAD_NOISE * white_noise([around])).max(LOAD_PACE * median_of(&mut paces));
+        let near = &torque[row.saturating_sub(4)..(row + 4).min(torque.len())];
+        largest > 0.0 && near.windows(2).any(|t| (t[1] - t[0]).abs() > usual)
     })
+}
+
+/// Whether the error changes about as much in other rows near by: ringing, a change of speed, a traverse of the clearance.
+fn others_change_as_much(session: &Session, row: usize, size: f64) -> bool {
+    let near = row.saturating_sub(APART).max(1)..(row + APART + 1).min(session.len());
+    near.filter(|k| *k != row).any(|k| (session.error_rad[k] - session.error_rad[k - 1]).abs() > 0.5 * size.abs())
 }
 
 /// Whether a step cannot be a change of flank: the output came back to where it happened and the step did not, or load held the flank,
