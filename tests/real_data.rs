@@ -33,7 +33,7 @@ fn the_csf17_has_its_orders() {
     let turns = (session.generator_rad[430] - session.generator_rad[0]) / TAU;
     assert!((turns - 2.5).abs() < 0.1, "{turns}");
     assert!((rms(error.iter().copied()) - 16.23).abs() < 0.01);
-    // Found by whoever digitised the data, at full resolution: 3.8, 21.3, 1.8, 4.1, which leave 4.56 (5.95 with 2 alone).
+    // Noted when the data were digitised: 3.8, 21.3, 1.8, 4.1, which leave 4.56 (5.95 with 2 alone).
     let (constant, lines) = harmonics(&session.generator_rad, &error, None, &[1.0, 2.0, 3.0, 4.0]).unwrap();
     for (line, due) in lines.iter().zip([3.8, 21.3, 1.8, 4.1]) {
         assert!((line.amplitude - due).abs() < 0.13, "order {}: {}, due {due}", line.order, line.amplitude);
@@ -71,7 +71,7 @@ fn the_csf17_held_out() {
     let raw = rms(error[half..].iter().map(|error| error - mean));
     let (two, four) = (held_out(&[2.0], &error), held_out(&[1.0, 2.0, 3.0, 4.0], &error));
     println!("second half {raw:.2}, 2 a turn leaves {two:.2}, 1 to 4 a turn {four:.2} arcsec rms");
-    // 15.5, 6.19 and 4.39 were found at full resolution; one row more or less in the first half moves them by 0.05.
+    // Noted when the data were digitised: 15.5, 6.19, 4.39. One row more or less in the first half moves them by 0.05.
     assert!(
         (raw - 15.56).abs() < 0.01 && (two - 6.23).abs() < 0.01 && (four - 4.42).abs() < 0.01,
         "{raw} {two} {four}"
