@@ -175,8 +175,11 @@ pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) ->
     faults::frozen::check(&mut sessions, gear, error_recorded, &mut findings).map_err(refuse)?;
     faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
     faults::resolution::check(&sessions, gear, error_recorded, &mut findings);
-    faults::steps::check(&mut sessions, gear, &mut findings);
-    faults::drift::check(&mut sessions, gear, &mut findings);
+    let steps_are_told = faults::steps::check(&mut sessions, gear, &mut findings);
+    // Steps that stay in the data look like drift.
+    if steps_are_told && findings.tooth_steps.is_empty() {
+        faults::drift::check(&mut sessions, gear, &mut findings);
+    }
     let Findings { mut faults, tooth_steps, notes } = findings;
     faults.sort_by_key(|fault| (fault.first_line, fault.name));
     Ok(Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes })

@@ -19,7 +19,11 @@ const STEPS: f64 = 2.0;
 /// And, in torque and temperature, by this share of the range.
 const LEAST_OF_RANGE: f64 = 0.05;
 /// The pulse of a tooth is this wide, rad of the generator; rows that are farther apart may catch it once.
-const TOOTH_RAD: f64 = 0.1;
+const TOOTH_RAD: f64 = 0.05;
+/// Fewer outliers than this are named only if they are large: a kink of the motion gives a small one now and then.
+const FEW: usize = 4;
+/// Large, rad at the output.
+const LARGE_RAD: f64 = 30.0 * ARCSEC;
 /// Load changes at once if it does by so many times its usual pace.
 const LOAD_PACE: f64 = 10.0;
 /// Rows before and after that are looked at.
@@ -110,9 +114,10 @@ pub(in crate::measurement) fn check(
                 (session.generator_rad[row + 1] - session.generator_rad[row - 1]).abs() > 2.0 * TOOTH_RAD
             })
         });
-        if fast && count < 4 {
+        let large = found.iter().flatten().any(|(_, by)| by.abs() > LARGE_RAD);
+        if count < FEW && (fast || !large) {
             findings.notes.push(format!(
-                "{count} single rows stand out, in motion so fast that a tooth is passed within a row: drive or data, which is not told"
+                "{count} single rows stand out: too few, or in too fast a motion, to tell drive from data"
             ));
         } else if repeat_with_position(sessions, &found, gear) {
             findings
@@ -183,7 +188,7 @@ fn report(
 /// Whether rows gather at the same angle of a wheel, more than all rows do.
 fn repeat_with_position(sessions: &[Session], found: &[Vec<(usize, f64)>], gear: &Gear) -> bool {
     let count: usize = found.iter().map(Vec::len).sum();
-    if count < 4 {
+    if count < FEW {
         return false;
     }
     // Generator on the flexspline, once or twice a turn (two lobes); on the circular spline likewise; the output.

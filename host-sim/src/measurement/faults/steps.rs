@@ -66,9 +66,9 @@ fn column(place: Place) -> impl Fn(usize, usize) -> f64 {
     move |session, row| place.reached(session, row)
 }
 
-/// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on.
-pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
-    let Some((steps, doubtful)) = find(sessions, gear) else { return };
+/// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Gives whether all steps found are told apart.
+pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> bool {
+    let Some((steps, doubtful)) = find(sessions, gear) else { return true };
     for (place, size) in &doubtful {
         let line = sessions[place.session].line[place.row];
         findings.notes.push(format!(
@@ -110,6 +110,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             session.error_rad[from..].iter_mut().for_each(|error| *error -= size);
         }
     }
+    doubtful.is_empty()
 }
 
 type Step = (Place, f64, f64);
@@ -153,8 +154,10 @@ fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<(Place, f64
         places.extend(more);
         places.sort_by_key(|place| (place.session, place.row));
     }
-    let (sure, doubtful): (Vec<Step>, Vec<Step>) =
-        steps.into_iter().partition(|(place, size, _)| no_flank_was_changed(sessions, &state, *place, *size));
+    let (sure, doubtful): (Vec<Step>, Vec<Step>) = steps
+        .iter()
+        .copied()
+        .partition(|(place, size, _)| no_flank_was_changed(sessions, &state, &steps, *place, *size));
     Some((sure, doubtful.into_iter().map(|(place, size, _)| (place, size)).collect()))
 }
 
@@ -321,7 +324,7 @@ fn others_change_as_much(session: &Session, row: usize, size: f64) -> bool {
 
 /// Whether a step cannot be a change of flank: the output came back to where it happened and the step did not, or load held the flank,
 /// or no clearance is so wide.
-fn no_flank_was_changed(sessions: &[Session], state: &State, place: Place, size: f64) -> bool {
+fn no_flank_was_changed(sessions: &[Session], state: &State, steps: &[Step], place: Place, size: f64) -> bool {
     if size.abs() > WIDER_THAN_CLEARANCE_RAD {
         return true;
     }
@@ -342,7 +345,15 @@ fn no_flank_was_changed(sessions: &[Session], state: &State, place: Place, size:
     if crossings >= 2 {
         let in_time = |s: usize, r: usize| place.reached(s, r);
         let in_angle = |s: usize, r: usize| f64::from(u8::from(sessions[s].generator_rad[r] >= here));
-        let (Some(time), Some(angle)) = (state.fit(&[&in_time]), state.fit(&[&in_angle])) else { return false };
+        // The other steps are there in either case.
+        let others: Vec<_> =
+            steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
+        let with = |this: Extra| {
+            let mut extras: Vec<Extra> = others.iter().map(|column| column as Extra).collect();
+            extras.push(this);
+            state.fit(&extras)
+        };
+        let (Some(time), Some(angle)) = (with(&in_time), with(&in_angle)) else { return false };
         return time.misfit < 0.95 * angle.misfit;
     }
     let session = &sessions[place.session];
