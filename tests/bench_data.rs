@@ -12,6 +12,7 @@ pub const RATIO: f64 = 95.0;
 
 /// A recording.
 #[derive(Clone, Default)]
+#[allow(dead_code, reason = "each test file uses a part")]
 pub struct Bench {
     pub time_s: Vec<f64>,
     pub generator_rad: Vec<f64>,
@@ -25,6 +26,7 @@ pub fn normal(random: &mut fastrand::Rng) -> f64 {
     (-2.0 * (1.0 - random.f64()).ln()).sqrt() * (TAU * random.f64()).cos()
 }
 
+#[allow(dead_code, reason = "each test file uses a part")]
 impl Bench {
     pub fn rows(&self) -> usize {
         self.time_s.len()

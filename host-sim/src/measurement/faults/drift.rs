@@ -13,7 +13,7 @@ use crate::measurement::robust::median_of;
 
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 /// Drift of less than this over the whole recording is not looked for, rad.
-const LEAST_RAD: f64 = 3.0 * ARCSEC;
+const LEAST_RAD: f64 = 10.0 * ARCSEC;
 /// A trend is so many standard deviations, over stretches as long as the noise remembers.
 const CERTAIN: f64 = 6.0;
 /// Stretches of the recording that a trend is judged by.

@@ -20,10 +20,10 @@ const STEPS: f64 = 2.0;
 const LEAST_OF_RANGE: f64 = 0.05;
 /// The pulse of a tooth is this wide, rad of the generator; rows that are farther apart may catch it once.
 const TOOTH_RAD: f64 = 0.05;
-/// Fewer outliers than this are named only if they are large: a kink of the motion gives a small one now and then.
+/// Fewer outliers than this, or any in fast motion, are named only if they are large: teeth and kinks of the motion give small ones.
 const FEW: usize = 4;
-/// Large, rad at the output.
-const LARGE_RAD: f64 = 30.0 * ARCSEC;
+/// Large, rad at the output: more than a tooth or a usual clearance gives.
+const LARGE_RAD: f64 = 120.0 * ARCSEC;
 /// Load changes at once if it does by so many times its usual pace.
 const LOAD_PACE: f64 = 10.0;
 /// Rows before and after that are looked at.
@@ -115,7 +115,7 @@ pub(in crate::measurement) fn check(
             })
         });
         let large = found.iter().flatten().any(|(_, by)| by.abs() > LARGE_RAD);
-        if count < FEW && (fast || !large) {
+        if (count < FEW || fast) && !large {
             findings.notes.push(format!(
                 "{count} single rows stand out: too few, or in too fast a motion, to tell drive from data"
             ));

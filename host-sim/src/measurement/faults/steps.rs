@@ -69,7 +69,7 @@ fn column(place: Place) -> impl Fn(usize, usize) -> f64 {
 /// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Gives whether all steps found are told apart.
 pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> bool {
     let Some((steps, doubtful)) = find(sessions, gear) else { return true };
-    for (place, size) in &doubtful {
+    for (place, size, _) in &doubtful {
         let line = sessions[place.session].line[place.row];
         findings.notes.push(format!(
             "line {line}: the error steps by {:.1} arcsec; a jump of an encoder or a change of flank, which these data do not tell",
@@ -113,10 +113,11 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     doubtful.is_empty()
 }
 
+/// A step with its size and standard deviation.
 type Step = (Place, f64, f64);
 
-/// Lasting steps with size and standard deviation, and those that may be a change of flank.
-fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<(Place, f64)>)> {
+/// Lasting steps, and those that may be a change of flank.
+fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<Step>)> {
     let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
     let state = State::new(sessions, gear);
     let settled = state.settled();
@@ -158,7 +159,7 @@ fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<(Place, f64
         .iter()
         .copied()
         .partition(|(place, size, _)| no_flank_was_changed(sessions, &state, &steps, *place, *size));
-    Some((sure, doubtful.into_iter().map(|(place, size, _)| (place, size)).collect()))
+    Some((sure, doubtful))
 }
 
 /// The change of the error into a row beyond what a dwell could give, 0 if less. An output dwells after the generator turned back.
@@ -281,9 +282,12 @@ fn strength(
     let mut before = session.error_rad[place.row - beside..place.row].to_vec();
     let mut after = session.error_rad[place.row..place.row + beside].to_vec();
     let local = median_of(&mut after) - median_of(&mut before);
-    let travel = (session.generator_rad[place.row + beside - 1] - session.generator_rad[place.row - beside]).abs()
-        / gear.ratio.abs();
-    if (local - size).abs() > AGREES * size.abs() + 4.0 * noise + travel {
+    let mut paces: Vec<f64> = session.error_rad[place.row - beside..place.row + beside]
+        .windows(2)
+        .map(|error| (error[1] - error[0]).abs())
+        .collect();
+    let moves = beside as f64 * median_of(&mut paces);
+    if (local - size).abs() > AGREES * size.abs() + 4.0 * noise + moves {
         return 0.0;
     }
     size.abs() / (LASTS * std).max(1e-300)
