@@ -23,7 +23,7 @@ fn arcsec(session: &Session) -> Vec<f64> {
 
 fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     let (sum, n) = values.into_iter().fold((0.0, 0.0), |(sum, n), value| (sum + value * value, n + 1.0));
-    (sum / n as f64).sqrt()
+    f64::sqrt(sum / n)
 }
 
 #[test]

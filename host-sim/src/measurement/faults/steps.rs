@@ -25,6 +25,8 @@ const STANDS_OUT: f64 = 8.0;
 const LASTS: f64 = 8.0;
 /// The lasting part and the sudden part agree within this share.
 const AGREES: f64 = 0.4;
+/// A step is taken back by one of the other sign that differs by less than this share.
+const TAKEN_BACK: f64 = 0.2;
 /// No step smaller than this is looked for, rad.
 const LEAST_RAD: f64 = 5.0 * ARCSEC;
 /// Nor one that is not seen from one row to the next: so many standard deviations of the white noise.
@@ -155,6 +157,11 @@ fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<Step>)> {
         places.extend(more);
         places.sort_by_key(|place| (place.session, place.row));
     }
+    // What comes and goes by the same amount does not last: teeth and clearance that fast motion samples once.
+    let taken_back = |(place, size, _): &Step| {
+        steps.iter().any(|(other, back, _)| other != place && (size + back).abs() < TAKEN_BACK * size.abs())
+    };
+    steps = steps.iter().copied().filter(|step| !taken_back(step)).collect();
     let (sure, doubtful): (Vec<Step>, Vec<Step>) = steps
         .iter()
         .copied()
