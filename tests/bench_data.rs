@@ -12,6 +12,7 @@ pub const RATIO: f64 = 95.0;
 
 /// A recording.
 #[derive(Clone, Default)]
+#[allow(dead_code, reason = "each test file uses a part")]
 pub struct Bench {
     pub time_s: Vec<f64>,
     pub generator_rad: Vec<f64>,
@@ -25,6 +26,7 @@ pub fn normal(random: &mut fastrand::Rng) -> f64 {
     (-2.0 * (1.0 - random.f64()).ln()).sqrt() * (TAU * random.f64()).cos()
 }
 
+#[allow(dead_code, reason = "each test file uses a part")]
 impl Bench {
     pub fn rows(&self) -> usize {
         self.time_s.len()
@@ -33,7 +35,9 @@ impl Bench {
     /// As a file; rows go through `change`, which may leave fields empty or drop the row.
     pub fn csv(&self) -> String {
         let mut text = "time_s,generator_rad,output_rad".to_owned();
-        for (there, name) in [(self.torque_n_m.is_some(), ",torque_n_m"), (self.temperature_c.is_some(), ",temperature_c")] {
+        for (there, name) in
+            [(self.torque_n_m.is_some(), ",torque_n_m"), (self.temperature_c.is_some(), ",temperature_c")]
+        {
             text.push_str(if there { name } else { "" });
         }
         text.push('\n');
@@ -62,7 +66,11 @@ impl Bench {
             bench.generator_rad.push(psi);
             bench.output_rad.push(play + (error + noise_arcsec * normal(&mut random)) * ARCSEC);
             bench.torque_n_m.as_mut().unwrap().push(torque + 0.05 * normal(&mut random));
-            bench.temperature_c.as_mut().unwrap().push(20.0 + 10.0 * (TAU * 0.8 * part).sin() + 0.02 * normal(&mut random));
+            bench
+                .temperature_c
+                .as_mut()
+                .unwrap()
+                .push(20.0 + 10.0 * (TAU * 0.8 * part).sin() + 0.02 * normal(&mut random));
         }
         bench
     }
@@ -70,7 +78,7 @@ impl Bench {
     /// A drive with a random choice of real effects, some of them large, and random excitation. Nothing in it is wrong with the data.
     pub fn drawn(rows: usize, seed: u64) -> (Bench, Vec<&'static str>) {
         let mut random = fastrand::Rng::with_seed(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x51);
-        let mut has = |name: &'static str, chance: f64, said: &mut Vec<&'static str>, random: &mut fastrand::Rng| {
+        let has = |name: &'static str, chance: f64, said: &mut Vec<&'static str>, random: &mut fastrand::Rng| {
             let yes = random.f64() < chance;
             if yes {
                 said.push(name);
@@ -81,7 +89,9 @@ impl Bench {
         let within = |random: &mut fastrand::Rng, low: f64, high: f64| low * (high / low).powf(random.f64());
         let lines: Vec<(f64, f64, f64)> = [1.0, 2.0, 4.0, 94.0 / 95.0, 188.0 / 95.0, 376.0 / 95.0, 1.0 / 95.0, 188.0]
             .into_iter()
-            .map(|order| (order, if random.f64() < 0.5 { within(&mut random, 0.3, 40.0) } else { 0.0 }, TAU * random.f64()))
+            .map(|order| {
+                (order, if random.f64() < 0.5 { within(&mut random, 0.3, 40.0) } else { 0.0 }, TAU * random.f64())
+            })
             .collect();
         let noise = within(&mut random, 0.3, 5.0);
         let wander = if has("wander", 0.5, &mut said, &mut random) { within(&mut random, 0.3, 4.0) } else { 0.0 };
@@ -89,15 +99,18 @@ impl Bench {
         let clearance = within(&mut random, 5.0, 200.0);
         let stiffness = within(&mut random, 1e4, 1e5);
         let hardening = if has("hardening", 0.3, &mut said, &mut random) { 3e-5 } else { 0.0 };
-        let hysteresis = if has("hysteresis", 0.4, &mut said, &mut random) { within(&mut random, 3.0, 60.0) } else { 0.0 };
-        let tooth = if has("damaged tooth", 0.3, &mut said, &mut random) { within(&mut random, 10.0, 100.0) } else { 0.0 };
+        let hysteresis =
+            if has("hysteresis", 0.4, &mut said, &mut random) { within(&mut random, 3.0, 60.0) } else { 0.0 };
+        let tooth =
+            if has("damaged tooth", 0.3, &mut said, &mut random) { within(&mut random, 10.0, 100.0) } else { 0.0 };
         let tooth_at = TAU * random.f64();
         let tooth_on_circular_spline = random.bool();
         let resonance = has("resonance", 0.3, &mut said, &mut random);
         let latency_s = if has("latency", 0.3, &mut said, &mut random) { within(&mut random, 1e-4, 1e-2) } else { 0.0 };
         let wear = if has("wear", 0.2, &mut said, &mut random) { within(&mut random, 10.0, 60.0) } else { 0.0 };
         let thermal = if has("thermal clearance", 0.3, &mut said, &mut random) { 1.5 } else { 0.0 };
-        let gravity = if has("gravity torque", 0.25, &mut said, &mut random) { within(&mut random, 2.0, 30.0) } else { 0.0 };
+        let gravity =
+            if has("gravity torque", 0.25, &mut said, &mut random) { within(&mut random, 2.0, 30.0) } else { 0.0 };
         let step = if has("fine encoder", 0.5, &mut said, &mut random) { within(&mut random, 0.05, 1.24) } else { 0.0 };
         let ratio_error = if has("ratio error", 0.15, &mut said, &mut random) { 1.0 + 1.0 / 95.0 } else { 1.0 };
         let load = random.usize(0..5);

@@ -224,9 +224,9 @@ impl ColumnMap {
     pub fn parse(text: &str) -> Result<ColumnMap, MappingError> {
         let mut map = ColumnMap::default();
         for entry in text.split(',').map(str::trim) {
-            let (name, column) = entry
-                .split_once('=')
-                .ok_or_else(|| MappingError(format!("found \"{entry}\", allowed: name=column:unit, separated by commas")))?;
+            let (name, column) = entry.split_once('=').ok_or_else(|| {
+                MappingError(format!("found \"{entry}\", allowed: name=column:unit, separated by commas"))
+            })?;
             let name = name.trim();
             let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name).ok_or_else(|| {
                 let names = Quantity::ALL.map(Quantity::name).join(", ");
@@ -249,7 +249,9 @@ impl ColumnMap {
                 }
             };
             if column.is_empty() {
-                return Err(MappingError(format!("{name}: found no column, allowed: the name of a column of the file")));
+                return Err(MappingError(format!(
+                    "{name}: found no column, allowed: the name of a column of the file"
+                )));
             }
             if let Some((before, ..)) = map.given.iter().find(|(q, other, _)| *q == quantity || other == column) {
                 let what = if *before == quantity {
@@ -270,7 +272,8 @@ impl ColumnMap {
         let mut columns = Vec::new();
         for quantity in Quantity::ALL {
             let given = self.given.iter().find(|(q, ..)| *q == quantity);
-            let (name, unit) = given.map_or_else(|| quantity.default_column(), |(_, name, unit)| (name.as_str(), *unit));
+            let (name, unit) =
+                given.map_or_else(|| quantity.default_column(), |(_, name, unit)| (name.as_str(), *unit));
             let mut places = names.iter().enumerate().filter(|(_, n)| *n == name).map(|(place, _)| place);
             match (places.next(), places.next()) {
                 (Some(_), Some(_)) => return Err(problem(format!("column {name} is there twice"))),
@@ -286,7 +289,8 @@ impl ColumnMap {
         let has = |columns: &[Column], quantity| columns.iter().any(|c| c.quantity == quantity);
         let mapped = |quantity| self.given.iter().any(|(q, ..)| *q == quantity);
         if has(&columns, Quantity::Output) && has(&columns, Quantity::Error) {
-            let spare = if mapped(Quantity::Error) && !mapped(Quantity::Output) { Quantity::Output } else { Quantity::Error };
+            let spare =
+                if mapped(Quantity::Error) && !mapped(Quantity::Output) { Quantity::Output } else { Quantity::Error };
             columns.retain(|c| c.quantity != spare);
         }
         let hint = separator(names);

@@ -25,7 +25,7 @@ pub enum NotANumber {
 
 /// Rows of a CSV file, one at a time.
 pub struct CsvRows<R: Read> {
-    reader: csv::Reader<BufReader<R>>,
+    reader: csv::Reader<Ended<BufReader<R>>>,
     header: Vec<String>,
     header_line: u64,
     record: csv::ByteRecord,
@@ -37,6 +37,28 @@ pub struct Row<'a> {
     record: &'a csv::ByteRecord,
     /// Line, from 1; the last one of a row that a quoted field spreads over several.
     pub line: u64,
+}
+
+/// A source whose last line is ended.
+struct Ended<R> {
+    source: R,
+    last: u8,
+}
+
+impl<R: Read> Read for Ended<R> {
+    fn read(&mut self, to: &mut [u8]) -> std::io::Result<usize> {
+        let n = self.source.read(to)?;
+        if n > 0 {
+            self.last = to[n - 1];
+        } else if self.last != b'\n'
+            && let Some(first) = to.first_mut()
+        {
+            *first = b'\n';
+            self.last = b'\n';
+            return Ok(1);
+        }
+        Ok(n)
+    }
 }
 
 impl<R: Read> CsvRows<R> {
@@ -57,7 +79,7 @@ impl<R: Read> CsvRows<R> {
             .flexible(true)
             .has_headers(false)
             .terminator(csv::Terminator::Any(b'\n'))
-            .from_reader(source);
+            .from_reader(Ended { source, last: b'\n' });
         let mut rows = CsvRows { reader, header: Vec::new(), header_line: 1, record: csv::ByteRecord::new() };
         let mut header = Vec::new();
         let mut header_line = 1;
@@ -109,10 +131,7 @@ impl<R: Read> CsvRows<R> {
     /// The next row that is not blank.
     pub fn next_row(&mut self) -> Result<Option<Row<'_>>, TableProblem> {
         loop {
-            let line = |reader: &csv::Reader<BufReader<R>>| {
-                let ended = u64::from(!reader.is_done());
-                reader.position().line().saturating_sub(ended).max(1)
-            };
+            let line = |reader: &csv::Reader<_>| reader.position().line().saturating_sub(1).max(1);
             match self.reader.read_byte_record(&mut self.record) {
                 Ok(false) => return Ok(None),
                 Ok(true) => {

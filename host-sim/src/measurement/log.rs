@@ -103,7 +103,8 @@ pub(super) struct Found {
 
 /// Reads a file called `file`.
 pub(super) fn read(file: &str, source: impl Read, map: &ColumnMap) -> Result<(Log, Found), MeasuredError> {
-    let refuse = |problem: TableProblem| MeasuredError { file: file.to_owned(), line: Some(problem.line), what: problem.what };
+    let refuse =
+        |problem: TableProblem| MeasuredError { file: file.to_owned(), line: Some(problem.line), what: problem.what };
     let mut rows = CsvRows::new(source).map_err(refuse)?;
     let columns = map.resolve(rows.header(), rows.header_line()).map_err(refuse)?;
     let width = rows.header().len();
@@ -134,7 +135,9 @@ pub(super) fn read(file: &str, source: impl Read, map: &ColumnMap) -> Result<(Lo
     if log.len() < FEWEST_ROWS {
         let what = match log.len() {
             0 => format!("no rows after the header; at least {FEWEST_ROWS} are needed"),
-            n => format!("{n} row{} after the header; at least {FEWEST_ROWS} are needed", if n == 1 { "" } else { "s" }),
+            n => {
+                format!("{n} row{} after the header; at least {FEWEST_ROWS} are needed", if n == 1 { "" } else { "s" })
+            }
         };
         return Err(refuse(TableProblem { line: header_line, what }));
     }
@@ -152,7 +155,10 @@ fn number(row: &Row<'_>, column: &Column) -> Result<f64, String> {
         Ok(_) => return Ok(f64::NAN),
         Err(NotANumber::Text(text)) if missing(&text) => return Ok(f64::NAN),
         Err(NotANumber::Text(text)) => {
-            return Err(format!("{}: found \"{text}\", allowed: a number, or nothing where none was recorded", column.name));
+            return Err(format!(
+                "{}: found \"{text}\", allowed: a number, or nothing where none was recorded",
+                column.name
+            ));
         }
         Err(NotANumber::Absent(fields)) => return Err(format!("{} is missing: {fields} fields", column.name)),
     };

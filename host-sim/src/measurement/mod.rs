@@ -173,10 +173,13 @@ pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) ->
     let error_recorded = log.output_or_error() == Quantity::Error;
     let mut sessions = into_sessions(log, gear.ratio);
     faults::frozen::check(&mut sessions, gear, error_recorded, &mut findings).map_err(refuse)?;
-    faults::outliers::check(&mut sessions, gear, &mut findings);
+    faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
     faults::resolution::check(&sessions, gear, error_recorded, &mut findings);
-    faults::steps::check(&mut sessions, gear, &mut findings);
-    faults::drift::check(&mut sessions, gear, &mut findings);
+    let steps_are_told = faults::steps::check(&mut sessions, gear, &mut findings);
+    // Steps that stay in the data look like drift.
+    if steps_are_told && findings.tooth_steps.is_empty() {
+        faults::drift::check(&mut sessions, gear, &mut findings);
+    }
     let Findings { mut faults, tooth_steps, notes } = findings;
     faults.sort_by_key(|fault| (fault.first_line, fault.name));
     Ok(Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes })
@@ -214,8 +217,7 @@ fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
         orientation_rad: log.take(Quantity::Orientation),
         line: std::mem::take(&mut log.line),
     };
-    let starts: Vec<usize> =
-        (1..log.session.len()).filter(|row| log.session[*row] != log.session[*row - 1]).collect();
+    let starts: Vec<usize> = (1..log.session.len()).filter(|row| log.session[*row] != log.session[*row - 1]).collect();
     // From the last session to the first, so that each is cut off the end.
     let mut sessions: Vec<Session> = starts
         .iter()

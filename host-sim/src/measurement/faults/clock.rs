@@ -30,7 +30,7 @@ pub(in crate::measurement) fn check(log: &mut Log, findings: &mut Findings) {
     if log.get(Quantity::Time).is_none() {
         return;
     }
-    order(log, findings);
+    let strays = order(log, findings);
     standing(log, findings);
     let Some(period) = period(log) else {
         let mut fault = span(log, FaultName::ClockError, 0, log.len() - 1);
@@ -41,7 +41,7 @@ pub(in crate::measurement) fn check(log: &mut Log, findings: &mut Findings) {
         log.take(Quantity::Time);
         return;
     };
-    gaps(log, period, findings);
+    gaps(log, period, &strays, findings);
     jitter(log, period, findings);
     scale(log, period, findings);
 }
@@ -53,10 +53,10 @@ fn period(log: &Log) -> Option<f64> {
     (!steps.is_empty()).then(|| median_of(&mut sampled(&steps)))
 }
 
-/// Time that runs back: a row out of order is left out, a clock that was set back starts a session.
-fn order(log: &mut Log, findings: &mut Findings) {
-    let Some(period) = period(log) else { return };
-    let Some(time) = log.get(Quantity::Time) else { return };
+/// Time that runs back: a row out of order is left out, a clock that was set back starts a session. Gives the lines left out.
+fn order(log: &mut Log, findings: &mut Findings) -> Vec<u64> {
+    let Some(period) = period(log) else { return Vec::new() };
+    let Some(time) = log.get(Quantity::Time) else { return Vec::new() };
     let far = SESSION_GAP_PERIODS * period;
     let rows = time.len();
     let mut drop = vec![false; rows];
@@ -98,13 +98,18 @@ fn order(log: &mut Log, findings: &mut Findings) {
         findings.faults.push(fault);
     }
     log.session = session;
+    let lines = strays.iter().map(|row| log.line[*row]).collect();
     if !strays.is_empty() {
         log.leave_out(&drop);
     }
+    lines
 }
 
 /// Time that stands: rows that are repeated are left out, a coarse clock is spread.
 fn standing(log: &mut Log, findings: &mut Findings) {
+    if period(log).is_none() {
+        return;
+    }
     let Some(time) = log.get(Quantity::Time) else { return };
     let stands: Vec<usize> =
         (1..time.len()).filter(|row| time[*row] == time[*row - 1] && log.continues(*row)).collect();
@@ -121,7 +126,8 @@ fn standing(log: &mut Log, findings: &mut Findings) {
         return;
     }
     fault.treatment = Treatment::Repaired;
-    fault.what = format!("time stands in {} of {} rows: rows of the same time are spread evenly", stands.len(), time.len());
+    fault.what =
+        format!("time stands in {} of {} rows: rows of the same time are spread evenly", stands.len(), time.len());
     findings.faults.push(fault);
     let mut spread = time.to_vec();
     let mut begin = 0;
@@ -150,27 +156,14 @@ fn turned(values: &[f64], row: usize) -> f64 {
     d - TAU * (d / TAU).round()
 }
 
-/// Gaps in time: sessions, rows that were lost, and jumps of the clock while the drive went on.
-fn gaps(log: &mut Log, period: f64, findings: &mut Findings) {
+/// Gaps in time: sessions, and rows that were lost. Near `strays`, lines left out for their time, none is counted as lost.
+fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
     let Some(time) = log.get(Quantity::Time) else { return };
     let rows = time.len();
     let mut steps = sampled(&time.windows(2).map(|t| t[1] - t[0]).filter(|dt| *dt > 0.0).collect::<Vec<_>>());
     let jitter = median_and_std(&mut steps).1;
     let lost_from = (LOST_ROW_PERIODS * period).max(period + 6.0 * jitter);
-    let angles: Vec<&[f64]> =
-        [Quantity::Generator, Quantity::Output].into_iter().filter_map(|channel| log.get(channel)).collect();
-    // The drive went on at its pace across this row as it did in the five rows before and after.
-    let went_on = |row: usize| {
-        row > 5
-            && row + 5 < rows
-            && angles.len() == 2
-            && angles.iter().all(|angle| {
-                let mut around: Vec<f64> = (row - 5..row).chain(row + 1..=row + 5).map(|k| turned(angle, k)).collect();
-                let (pace, scatter) = median_and_std(&mut around);
-                pace != 0.0 && scatter < 0.3 * pace.abs() && (turned(angle, row) - pace).abs() < pace.abs().max(5.0 * scatter)
-            })
-    };
-    let (mut lost, mut long_steps, mut jumps, mut parts) = (Vec::new(), 0, Vec::new(), Vec::new());
+    let (mut lost, mut long_steps, mut parts) = (Vec::new(), 0, Vec::new());
     for row in 1..rows {
         let dt = time[row] - time[row - 1];
         if !log.continues(row) || dt.is_nan() || dt <= lost_from {
@@ -178,13 +171,17 @@ fn gaps(log: &mut Log, period: f64, findings: &mut Findings) {
         }
         long_steps += 1;
         if dt <= SESSION_GAP_PERIODS * period {
-            lost.push((row, (dt / period).round() as u64 - 1));
-        } else if went_on(row) {
-            jumps.push((row, dt - period));
+            // Rows that are in the file, but were left out, are not lost.
+            let there = log.line[row] - log.line[row - 1];
+            lost.push((row, ((dt / period).round() as u64).saturating_sub(there)));
         } else {
             parts.push(row);
         }
     }
+    lost.retain(|(row, rows)| {
+        let near = strays.iter().any(|line| line.abs_diff(log.line[*row]) <= 2);
+        *rows > 0 && !near
+    });
     let total: u64 = lost.iter().map(|(_, rows)| *rows).sum();
     if let (Some(&(first, _)), Some(&(last, _))) = (lost.first(), lost.last()) {
         if long_steps as f64 <= UNEVEN_SHARE * rows as f64 {
@@ -196,17 +193,10 @@ fn gaps(log: &mut Log, period: f64, findings: &mut Findings) {
             );
             findings.faults.push(fault);
         } else {
-            findings.notes.push(format!("rows are not evenly spaced in time: {} steps exceed {lost_from:.6} s", lost.len()));
+            findings
+                .notes
+                .push(format!("rows are not evenly spaced in time: {} steps exceed {lost_from:.6} s", lost.len()));
         }
-    }
-    if let (Some(&(first, by)), Some(&(last, _))) = (jumps.first(), jumps.last()) {
-        let mut fault = span(log, FaultName::ClockError, first, last);
-        (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), jumps.len() as u64, Treatment::Repaired);
-        fault.what = format!(
-            "the clock jumps {} times, first by {by:.4} s, while the drive goes on at its pace: the jumps are taken out",
-            jumps.len()
-        );
-        findings.faults.push(fault);
     }
     if !parts.is_empty() {
         let mut number = 0;
@@ -220,11 +210,6 @@ fn gaps(log: &mut Log, period: f64, findings: &mut Findings) {
             session[row] = number;
         }
         log.session = session;
-    }
-    if let Some(time) = log.get_mut(Quantity::Time) {
-        for (row, by) in jumps {
-            time[row..].iter_mut().for_each(|t| *t -= by);
-        }
     }
 }
 

@@ -13,7 +13,7 @@ use crate::measurement::robust::median_of;
 
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 /// Drift of less than this over the whole recording is not looked for, rad.
-const LEAST_RAD: f64 = 3.0 * ARCSEC;
+const LEAST_RAD: f64 = 10.0 * ARCSEC;
 /// A trend is so many standard deviations, over stretches as long as the noise remembers.
 const CERTAIN: f64 = 6.0;
 /// Stretches of the recording that a trend is judged by.
@@ -29,7 +29,8 @@ const BOTH_FLANKS: f64 = 0.1;
 pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
     let Some((per_s, from_s, std)) = slope(sessions, gear) else { return };
     let Some(last) = sessions.last().and_then(|s| s.time_s.as_ref()?.last().copied()) else { return };
-    let total = per_s * (last - from_s);
+    let first = sessions[0].time_s.as_ref().map_or(from_s, |time| time[0]);
+    let total = per_s * (last - first);
     let mut fault = of_rows(&sessions[0], FaultName::Drift, 0..sessions[0].len());
     if let Some(session) = sessions.last() {
         fault.last_line = session.line[session.len() - 1];
@@ -42,7 +43,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
         "the zero of the error drifts by {:.2} arcsec in all (standard deviation {:.2}), alike on both flanks, and not with temperature or \
          position: a straight line in time is taken out",
         total / ARCSEC,
-        std * (last - from_s) / ARCSEC
+        std * (last - first) / ARCSEC
     );
     findings.faults.push(fault);
     for session in sessions.iter_mut() {
@@ -52,7 +53,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     }
 }
 
-/// Drift, rad/s, the time from which it counts, and its standard deviation.
+/// Drift, rad/s, the time at which it is taken as zero (the middle), and its standard deviation.
 fn slope(sessions: &[Session], gear: &Gear) -> Option<(f64, f64, f64)> {
     if sessions.iter().any(|session| session.time_s.is_none() || session.len() < 2) {
         return None;
@@ -67,9 +68,10 @@ fn slope(sessions: &[Session], gear: &Gear) -> Option<(f64, f64, f64)> {
     }
     let state = State::new(sessions, gear);
     let rows: usize = sessions.iter().map(Session::len).sum();
-    let forward = sessions.iter().enumerate().map(|(s, session)| {
-        (0..session.len()).filter(|row| state.flank(s, *row) > 0.0).count()
-    });
+    let forward = sessions
+        .iter()
+        .enumerate()
+        .map(|(s, session)| (0..session.len()).filter(|row| state.flank(s, *row) > 0.0).count());
     let forward = forward.sum::<usize>() as f64 / rows as f64;
     if !(BOTH_FLANKS..=1.0 - BOTH_FLANKS).contains(&forward) {
         return None;

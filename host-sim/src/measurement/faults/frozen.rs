@@ -31,7 +31,7 @@ fn stretches(values: &[f64], shortest: usize, same: impl Fn(f64, f64) -> bool) -
     let mut found = Vec::new();
     let mut begin = 0;
     for row in 1..=values.len() {
-        if row == values.len() || !same(values[row], values[row - 1]) {
+        if row == values.len() || !same(values[row], values[begin]) {
             if row - begin >= shortest {
                 found.push(begin..row);
             }
@@ -162,6 +162,10 @@ fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, findings: &m
     let mut frozen = Vec::new();
     for (number, values) in sessions.iter().enumerate().filter_map(|(k, session)| Some((k, session.beside(channel)?))) {
         for stretch in stretches(values, longest, |a, b| a == b) {
+            // No load at all is a load, and may be written as exactly nothing.
+            if values[stretch.start] == 0.0 {
+                continue;
+            }
             // Without this stretch the channel stands in so many of its steps.
             let elsewhere = (standing + 1).saturating_sub(stretch.len()) as f64 / (rows - stretch.len()).max(1) as f64;
             let noisy = noise > BLURRED * step && noise > 0.0 && elsewhere < 0.5;

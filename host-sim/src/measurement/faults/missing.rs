@@ -48,7 +48,8 @@ pub(in crate::measurement) fn fill(log: &mut Log, findings: &mut Findings) {
         findings.faults.push(fault);
     }
     // The clock is judged on rows that have a time.
-    let timeless: Vec<bool> = log.get(Quantity::Time).map_or_else(Vec::new, |t| t.iter().map(|t| !t.is_finite()).collect());
+    let timeless: Vec<bool> =
+        log.get(Quantity::Time).map_or_else(Vec::new, |t| t.iter().map(|t| !t.is_finite()).collect());
     if timeless.contains(&true) {
         log.leave_out(&timeless);
     }

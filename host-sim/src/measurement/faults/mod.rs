@@ -1,6 +1,24 @@
-//! What is wrong with data, found before any physics is blamed. One file for each kind.
+//! What is wrong with data, found before any physics is blamed. One file for each kind, its thresholds at its head.
 //!
 //! Two grades: what cannot go on is an error with one message; all else is a [`Fault`] that is named, and repaired or left out.
+//!
+//! | found | done |
+//! |---|---|
+//! | no table, no such column, text for a number, a row too short or too long, under 16 rows, nothing moves, more than half frozen, units that cannot be told | error |
+//! | torque, temperature, orientation or time missing in up to 10 rows in a row | filled by a straight line |
+//! | an angle missing, a longer hole, a last line that breaks off | rows left out |
+//! | a channel beside the angles missing in over half of the rows | channel left out |
+//! | rows missing, by steps of time | named |
+//! | rows out of order or repeated | rows left out |
+//! | clock set back | new session |
+//! | clock too coarse, stamps that jitter while the motion does not | rows spaced evenly |
+//! | a unit, sign or exchange of columns that the ratio, a wrap or a limit gives away | converted |
+//! | output or generator frozen | rows left out |
+//! | torque or temperature frozen | straight line, or channel left out |
+//! | single rows out | rows left out (torque, temperature: mended) |
+//! | index jump | step taken out |
+//! | drift | straight line in time taken out |
+//! | coarse resolution, implausible time | named |
 
 pub(super) mod clock;
 pub(super) mod drift;

@@ -14,6 +14,10 @@ use crate::measurement::robust::median_and_std;
 const FIT_ROWS: usize = 8000;
 /// The generator must turn back by so much, rad, before the flank is taken to have changed: its noise does not.
 const TURNED_BACK_RAD: f64 = 0.02;
+/// No clearance is wider, rad at the output: 10 arc-minutes.
+const CLEARANCE_RAD: f64 = 600.0 / 206_265.0;
+/// A reversal is noticed some rows late.
+const BEFORE: usize = 5;
 /// Weights fall from so many robust standard deviations on (Huber).
 const HUBER: f64 = 2.5;
 
@@ -68,6 +72,29 @@ impl<'a> State<'a> {
     /// Whether the generator last moved forward (+1) or backward (-1).
     pub fn flank(&self, session: usize, row: usize) -> f64 {
         self.flank[session][row]
+    }
+
+    /// Rows, by session, at which the generator has gone on so far since it turned back that clearance is taken up.
+    pub fn settled(&self) -> Vec<Vec<bool>> {
+        let of = |(session, flank): (&Session, &Vec<f64>)| {
+            let mut turned = session.generator_rad.first().copied().unwrap_or(0.0);
+            let turns_soon = |row: usize| {
+                let soon = (row + BEFORE).min(session.len() - 1);
+                flank[soon] != flank[row]
+            };
+            (0..session.len())
+                .map(|row| {
+                    if turns_soon(row) {
+                        return false;
+                    }
+                    if row > 0 && flank[row] != flank[row - 1] {
+                        turned = session.generator_rad[row];
+                    }
+                    (session.generator_rad[row] - turned).abs() > CLEARANCE_RAD * self.ratio.abs()
+                })
+                .collect()
+        };
+        self.sessions.iter().zip(&self.flank).map(of).collect()
     }
 
     /// The columns at a row.

@@ -109,8 +109,13 @@ fn slope(log: &Log) -> Option<(f64, f64, f64)> {
         pieces.extend((from..to).step_by(size).filter_map(|start| extent(start, (start + size).min(to))));
     }
     let (psi, delta) = whole.filter(|(psi, _)| *psi > 0.0)?;
+    // An output that stands still says nothing of the ratio, unless it always does.
+    if pieces.iter().any(|(_, delta)| *delta != 0.0) {
+        pieces.retain(|(_, delta)| *delta != 0.0);
+    }
     let far = pieces.iter().map(|(psi, _)| *psi).fold(0.0, f64::max);
-    let mut slopes: Vec<f64> = pieces.iter().filter(|(psi, _)| *psi > 0.2 * far).map(|(psi, delta)| delta / psi).collect();
+    let mut slopes: Vec<f64> =
+        pieces.iter().filter(|(psi, _)| *psi > 0.2 * far).map(|(psi, delta)| delta / psi).collect();
     let median = median_of(&mut slopes);
     let slope = if (delta / psi - median).abs() <= 0.1 * median.abs() { delta / psi } else { median };
     let travel = output.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), d| (a.min(*d), b.max(*d)));
@@ -133,7 +138,11 @@ fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings
         return Ok(());
     }
     let (generator, output) = (name(columns, Quantity::Generator), name(columns, Quantity::Output));
-    let seen = format!("{output} moves by {slope:.6} of {generator}, where the ratio {} asks for {:.6}", gear.ratio, 1.0 / gear.ratio);
+    let seen = format!(
+        "{output} moves by {slope:.6} of {generator}, where the ratio {} asks for {:.6}",
+        gear.ratio,
+        1.0 / gear.ratio
+    );
     let near = |a: f64| (found / a - 1.0).abs() <= SAME;
     let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
     fault.treatment = Treatment::Repaired;
@@ -176,7 +185,9 @@ fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings
     }
     let units = Unit::ANGLES.map(Unit::name).join(", ");
     Err(if slope == 0.0 || (found.abs() < 0.05 && travel < ENOUGH_MOTION_RAD) {
-        format!("{output} does not follow: {generator} turns by {psi:.3} rad, {output} by {travel:.6} rad; allowed: an output that turns")
+        format!(
+            "{output} does not follow: {generator} turns by {psi:.3} rad, {output} by {travel:.6} rad; allowed: an output that turns"
+        )
     } else {
         format!(
             "{seen}; allowed: within a factor of {} of it. Are columns, units ({units}) and ratio right? They are mapped with --columns \
@@ -188,7 +199,9 @@ fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings
 
 /// Whether recorded errors have the size of errors.
 fn error_size(log: &Log, columns: &[Column]) -> Result<(), String> {
-    let (Some(error), Some(generator)) = (log.get(Quantity::Error), log.get(Quantity::Generator)) else { return Ok(()) };
+    let (Some(error), Some(generator)) = (log.get(Quantity::Error), log.get(Quantity::Generator)) else {
+        return Ok(());
+    };
     // Freed of a straight line in the generator angle, which a wrong ratio gives.
     let pairs: Vec<(f64, f64)> = generator.iter().copied().zip(error.iter().copied()).collect();
     let step = pairs.len().div_ceil(20_000);

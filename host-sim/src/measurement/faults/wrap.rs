@@ -21,7 +21,11 @@ pub(in crate::measurement) fn unwrap(log: &mut Log, columns: &[Column], ratio: f
     for channel in [Quantity::Output, Quantity::Orientation, Quantity::Generator] {
         let Some(column) = columns.iter().find(|column| column.quantity == channel) else { continue };
         let Some(values) = log.get(channel) else { continue };
-        let Some(unit) = wrapped_at(values, column.unit, log) else { continue };
+        let travel = log
+            .get(Quantity::Output)
+            .filter(|_| channel == Quantity::Generator)
+            .map_or(0.0, |output| span_of(output) * ratio.abs());
+        let Some(unit) = wrapped_at(values, column.unit, travel, log) else { continue };
         let scale = unit.factor() / column.unit.factor();
         if unit != column.unit {
             let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
@@ -51,10 +55,15 @@ pub(in crate::measurement) fn unwrap(log: &mut Log, columns: &[Column], ratio: f
     }
 }
 
-/// The unit in which a column stays within one turn and begins anew.
-fn wrapped_at(values: &[f64], unit: Unit, log: &Log) -> Option<Unit> {
+/// From the least to the largest of some values.
+fn span_of(values: &[f64]) -> f64 {
     let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-    let range = most - least;
+    most - least
+}
+
+/// The unit in which a column stays within one turn and begins anew, as it shows by its steps, or by the output, which has travelled so far.
+fn wrapped_at(values: &[f64], unit: Unit, travel_rad: f64, log: &Log) -> Option<Unit> {
+    let range = span_of(values);
     let again = |turn: f64| {
         (1..values.len())
             .filter(|row| log.continues(*row))
@@ -66,13 +75,13 @@ fn wrapped_at(values: &[f64], unit: Unit, log: &Log) -> Option<Unit> {
         let turn = TAU / candidate.factor() * unit.factor();
         range <= turn * (1.0 + 1e-6) && range >= covered * turn
     };
-    if fits(&unit, COVERED) && again(TAU) > 0 {
+    if fits(&unit, COVERED) && (again(TAU) > 0 || travel_rad > 1.5 * TAU) {
         return Some(unit);
     }
     let others = Unit::ANGLES.into_iter().filter(|candidate| *candidate != unit);
-    others.into_iter().find(|candidate| {
-        fits(candidate, 0.98) && again(TAU / candidate.factor() * unit.factor()) >= OFTEN
-    })
+    others
+        .into_iter()
+        .find(|candidate| fits(candidate, 0.98) && again(TAU / candidate.factor() * unit.factor()) >= OFTEN)
 }
 
 /// Makes `values` continuous. `output`, if given, is continuous and turns `ratio` times slower; it counts turns where one row is
