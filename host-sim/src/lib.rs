@@ -16,6 +16,7 @@ pub mod output;
 pub mod progress;
 pub mod reference;
 pub mod replay;
+pub mod report;
 pub mod samples;
 pub mod simulate;
 pub mod stepping;
