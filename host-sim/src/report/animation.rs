@@ -10,7 +10,6 @@
 //! tooth. A page draws sector j of a wheel at generator angle ψ from sample `FRAMES (j − ψ/p)`, interpolated, whatever the
 //! angle: a whole turn, and more, from eight frames. Exact for drives that are alike from tooth to tooth; others are refused.
 
-use std::f64::consts::TAU;
 
 use super::pack::Packed;
 use crate::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
@@ -297,20 +296,34 @@ fn round_up(x: f64) -> f64 {
 }
 
 impl WheelMotion {
+    /// Edges of sector 0 that belong to one element alone: start, middle, end, each as in [`WheelMotion::elements`].
+    pub fn outline(&self) -> Vec<[(usize, usize); 3]> {
+        // An edge between two sectors appears once in sector 0 and once, a sector on, in its neighbour.
+        let key = |a: (usize, usize), b: (usize, usize)| {
+            let least = a.1.min(b.1);
+            let (a, b) = ((a.0, a.1 - least), (b.0, b.1 - least));
+            (a.min(b), a.max(b))
+        };
+        let edges = || self.elements.iter().flat_map(|e| (0..4).map(|k| [e[k], e[4 + k], e[(k + 1) % 4]]));
+        let mut users = std::collections::HashMap::new();
+        for [a, _, b] in edges() {
+            *users.entry(key(a, b)).or_insert(0) += 1;
+        }
+        edges().filter(|[a, _, b]| users[&key(*a, *b)] == 1).collect()
+    }
+
     /// Its arrays for a page, named `<prefix>.nodes` and so on.
     fn pack(&self, prefix: &str, colour_end_mpa: f64) -> Vec<Packed> {
         let name = |part: &str| format!("{prefix}.{part}");
         let nodes = self.nodes.len();
         let elements = self.elements.iter().flatten().map(|(node, sector)| (node + sector * nodes) as f64);
+        let outline: Vec<f64> =
+            self.outline().iter().flatten().map(|(node, sector)| (node + sector * nodes) as f64).collect();
         vec![
             Packed::floats(name("nodes"), &[nodes, 2], self.nodes.iter().flatten().copied()),
             Packed::steps(name("elements"), &[self.elements.len(), 8], 1.0, &elements.collect::<Vec<_>>()),
-            Packed::steps(
-                name("displacement"),
-                &[nodes, 2, self.samples],
-                DISPLACEMENT_STEP_MM,
-                &self.displacement_mm,
-            ),
+            Packed::steps(name("outline"), &[self.outline().len(), 3], 1.0, &outline),
+            Packed::steps(name("displacement"), &[nodes, 2, self.samples], DISPLACEMENT_STEP_MM, &self.displacement_mm),
             Packed::levels(name("stress"), &[nodes, self.samples], colour_end_mpa, &self.von_mises_mpa),
         ]
     }
@@ -347,7 +360,8 @@ mod tests {
     fn eight_frames_describe_every_tooth_at_any_time() {
         let drive = Drive::hhd_95();
         let torque = 10.0;
-        let animation = animate(&drive, GeneratorKind::Cam, torque, coarse(), &mut || ControlFlow::Continue(())).unwrap();
+        let animation =
+            animate(&drive, GeneratorKind::Cam, torque, coarse(), &mut || ControlFlow::Continue(())).unwrap();
         let pitch = TAU / 188.0;
         let far: Vec<_> = (0..=24)
             .map(|k| crate::simulate::PathPoint { generator_rad: pitch * f64::from(k) / 8.0, ..Default::default() })
@@ -434,7 +448,12 @@ mod tests {
             let solver = SolverSettings { mesh: MeshLevel::Standard, ..coarse() };
             let torque = 0.5 * crate::sweep::rated_torque_n_m(kind);
             let a = animate(&Drive::hhd_95(), kind, torque, solver, &mut || ControlFlow::Continue(())).unwrap();
-            println!("{kind}: {:.2} s, peak {:.1}, colour end {}", begun.elapsed().as_secs_f64(), a.peak_mpa, a.colour_end_mpa);
+            println!(
+                "{kind}: {:.2} s, peak {:.1}, colour end {}",
+                begun.elapsed().as_secs_f64(),
+                a.peak_mpa,
+                a.colour_end_mpa
+            );
             let begun = std::time::Instant::now();
             for p in a.pack() {
                 println!("  {:<36} {:?} scale {:e}: {} kB", p.name, p.shape, p.scale, p.text.len() / 1000);
