@@ -102,6 +102,7 @@ export function lineChart(place, id, spec) {
       size,
       grid: { stroke: colour("grid"), width: 1 },
       ticks: { stroke: colour("grid"), width: 1 },
+      values: (u, splits) => splits.map((v) => (v === null ? "" : String(Number(v.toPrecision(4))).replace("-", "−"))),
     });
     const series = description.series.map((s) => {
       const stroke = lineColour(s.colour);
@@ -121,7 +122,7 @@ export function lineChart(place, id, spec) {
       width,
       height: plotHeight(width),
       scales: {
-        x: { time: false },
+        x: { time: false, ...(spec.x.stretched ? { distr: 4, asinh: spec.x.stretched } : {}) },
         y: {
           range: (u, low, high) => {
             const levels = (description.limits ?? []).map((l) => l.y * fy);
@@ -129,7 +130,7 @@ export function lineChart(place, id, spec) {
           },
         },
       },
-      axes: [axis(spec.x, 44), axis(spec.y, 56)],
+      axes: [axis(spec.x, 44), axis(spec.y, 64)],
       series: [{ label: spec.x.label, value: (u, v) => say(u, v, spec.x.quantity, fx) }, ...series],
       legend: { live: true, markers: { width: 3 } },
       cursor: { drag: { x: true, y: true, uni: 20 }, focus: { prox: 24 } },

@@ -74,9 +74,7 @@ export function driveViewer(place, animations) {
   function views() {
     const [width, height] = size;
     const beside = width > height * 1.3;
-    const whole = beside
-      ? { left: 0, top: 0, width: Math.round(width / 2), height }
-      : { left: 0, top: 0, width, height: Math.round(height / 2) };
+    const whole = beside ? { left: 0, top: 0, width: height, height } : { left: 0, top: 0, width, height: width };
     whole.scale = (0.485 * Math.min(whole.width, whole.height)) / drive.reach;
     whole.centre = [0, 0];
     whole.turn = 0;
@@ -85,8 +83,7 @@ export function driveViewer(place, animations) {
       : { left: 0, top: whole.height, width, height: height - whole.height };
     close.scale = close.width / (TEETH_SEEN * drive.pitch * drive.tipRadius);
     close.turn = psi - Math.PI / 2;
-    const [, y] = [0, drive.tipRadius];
-    close.centre = [0, y - (0.12 * close.height) / close.scale];
+    close.centre = [0, drive.tipRadius + (0.05 * close.height) / close.scale];
     return { whole, close };
   }
 
@@ -127,6 +124,8 @@ export function driveViewer(place, animations) {
   function drawOver(whole, close, output) {
     ctx.setTransform(1, 0, 0, 1, 0, 0);
     ctx.clearRect(0, 0, ...size);
+    // On paper a WebGL canvas is blank.
+    if (document.documentElement.classList.contains("printing")) ctx.drawImage(wheels, 0, 0);
     for (const view of [whole, close]) {
       ctx.save();
       ctx.beginPath();
@@ -139,7 +138,10 @@ export function driveViewer(place, animations) {
     }
     ctx.font = FONT.replace("12px", `${12 * ratio}px`);
     ctx.fillStyle = colour("text");
-    const label = (view, text) => ctx.fillText(text, view.left + 8 * ratio, view.top + 18 * ratio);
+    const label = (view, text) => {
+      plate(view.left + 6 * ratio, view.top + 6 * ratio, ctx.measureText(text).width + 12 * ratio, 20 * ratio);
+      ctx.fillText(text, view.left + 12 * ratio, view.top + 20 * ratio);
+    };
     label(whole, "Whole drive");
     label(close, "Teeth at the major axis");
     drawScale(close);
@@ -155,7 +157,10 @@ export function driveViewer(place, animations) {
     ctx.fillStyle = colour("metal");
     ctx.lineWidth = 1.25 * ratio;
     for (const curve of drive.generator) {
-      path(view, curve.map((point) => drive.generatorPoint(point, psi, factor)));
+      path(
+        view,
+        curve.map((point) => drive.generatorPoint(point, psi, factor)),
+      );
       ctx.closePath();
       ctx.fill();
       ctx.stroke();
@@ -184,9 +189,17 @@ export function driveViewer(place, animations) {
     dot(rotated([drive.reach - 2, 0], output), "mark-output");
     const half = (TEETH_SEEN / 2) * drive.pitch * drive.tipRadius;
     const [low, high] = [-0.5, 0.5].map((k) => close.centre[1] + (k * close.height) / close.scale);
-    const corners = [[-half, low], [half, low], [half, high], [-half, high]];
+    const corners = [
+      [-half, low],
+      [half, low],
+      [half, high],
+      [-half, high],
+    ];
     ctx.strokeStyle = colour("text");
-    path(view, corners.map((corner) => rotated(corner, close.turn)));
+    path(
+      view,
+      corners.map((corner) => rotated(corner, close.turn)),
+    );
     ctx.closePath();
     ctx.stroke();
   }
@@ -218,10 +231,20 @@ export function driveViewer(place, animations) {
     }
   }
 
+  /** Ground for text over a picture. */
+  function plate(left, top, width, height) {
+    ctx.save();
+    ctx.globalAlpha = 0.85;
+    ctx.fillStyle = colour("card");
+    ctx.fillRect(left, top, width, height);
+    ctx.restore();
+  }
+
   /** A length for comparison. */
   function drawScale(view) {
     const mm = [5, 2, 1, 0.5, 0.2].find((length) => length * view.scale < 0.3 * view.width) ?? 0.1;
-    const [left, bottom] = [view.left + 10 * ratio, view.top + view.height - 12 * ratio];
+    const [left, bottom] = [view.left + 14 * ratio, view.top + view.height - 14 * ratio];
+    plate(left - 8 * ratio, bottom - 24 * ratio, Math.max(mm * view.scale, 40 * ratio) + 16 * ratio, 34 * ratio);
     ctx.strokeStyle = ctx.fillStyle = colour("text");
     ctx.lineWidth = 2 * ratio;
     ctx.beginPath();
@@ -243,7 +266,9 @@ export function driveViewer(place, animations) {
     find(".readout").textContent =
       `Output at ${output}, error ${written(drive.error(psi), "error", 4)}; load ${written(torque_n_m, "torque", 3)}, ` +
       `${written(temperature_c, "temperature", 3)}. Longest arrow ${largest}.` +
-      (factor > 1.02 ? " Displacements are exaggerated: that wheels overlap is the picture's doing, not the drive's." : "");
+      (factor > 1.02
+        ? " Displacements are exaggerated: that wheels overlap is the picture's doing, not the drive's."
+        : "");
     find(".low").textContent = "0";
     find(".high").textContent = `${colour_end_mpa} MPa`;
     find(".what").textContent = `von Mises stress; largest anywhere ${written(peak_mpa, "stress", 3)}`;
@@ -305,7 +330,7 @@ export function driveViewer(place, animations) {
   function resize() {
     ratio = Math.min(devicePixelRatio, 2);
     const width = stage.clientWidth;
-    const height = Math.round(width > 620 ? width / 2 : width * 1.9);
+    const height = Math.round(width > 620 ? 0.44 * width : 1.75 * width);
     size = [Math.round(width * ratio), Math.round(height * ratio)];
     stage.style.height = `${height}px`;
     for (const canvas of [wheels, over]) [canvas.width, canvas.height] = size;

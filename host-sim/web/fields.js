@@ -4,7 +4,7 @@ import { numbers } from "./pack.js";
 import { factor, onUnits, titled, written } from "./quantities.js";
 import { colour, css, FONT, onTheme, viridis } from "./theme.js";
 
-const MARGIN = { left: 58, right: 78, top: 10, bottom: 42 };
+const MARGIN = { left: 70, right: 78, top: 10, bottom: 42 };
 
 /** Edges of the cells around nodes: half way between them, and as far beyond the ends. */
 function edges(nodes) {
@@ -63,13 +63,14 @@ export function fieldMap(place, id, spec) {
     ctx.fillStyle = colour("text");
     ctx.textAlign = "center";
     for (const t of ticks(ex[0], ex.at(-1), 6)) {
-      ctx.fillText(written(t, spec.x.quantity, 3, false), px(t), MARGIN.top + h + 16);
+      ctx.fillText(String(Number(t.toPrecision(6))), px(t), MARGIN.top + h + 16);
     }
     ctx.fillText(titled(spec.x.label, spec.x.quantity), MARGIN.left + w / 2, MARGIN.top + h + 34);
     ctx.textAlign = "right";
+    const level = (v) => String(Number(v.toPrecision(2))).replace("-", "−");
     const every = Math.ceil(y.length / (h / 18));
     for (let row = 0; row < y.length; row += every) {
-      ctx.fillText(written(y[row], spec.y.quantity, 3, false), MARGIN.left - 6, py(row + 0.5) + 4);
+      ctx.fillText(level(y[row]), MARGIN.left - 6, py(row + 0.5) + 4);
     }
     ctx.save();
     ctx.translate(13, MARGIN.top + h / 2);
@@ -85,7 +86,9 @@ export function fieldMap(place, id, spec) {
     ctx.fillStyle = colour("text");
     ctx.textAlign = "left";
     for (const share of [0, 0.5, 1]) {
-      const text = written(low + share * (high - low), spec.z.quantity, 3, false);
+      const value = low + share * (high - low);
+      // The middle of a symmetric scale is zero but for rounding.
+      const text = written(Math.abs(value) < 1e-6 * (high - low) ? 0 : value, spec.z.quantity, 3, false);
       ctx.fillText(text, bar + 16, MARGIN.top + h * (1 - share) + (share === 1 ? 10 : share === 0 ? 0 : 4));
     }
     readout.textContent = `Colour: ${titled(spec.z.label, spec.z.quantity)}. Point at the map to read it.`;

@@ -186,7 +186,9 @@ async function load(choice, description) {
   ]);
   const [curves, points] = outline.shape;
   const generator = Array.from({ length: curves }, (_, c) =>
-    Array.from({ length: points }, (_, k) => [...outline.values.subarray(2 * (c * points + k), 2 * (c * points + k) + 2)]),
+    Array.from({ length: points }, (_, k) => [
+      ...outline.values.subarray(2 * (c * points + k), 2 * (c * points + k) + 2),
+    ]),
   );
   return new Motion(choice, description, { flexspline, circularSpline, generator, forces });
 }

@@ -74,8 +74,6 @@ async function start() {
     if (choice && choice !== root.dataset.choice) await choose(choice);
     goTo(anchor);
   });
-  addEventListener("beforeprint", () => root.classList.add("printing"), { capture: true });
-  addEventListener("afterprint", () => root.classList.remove("printing"), { capture: true });
 
   // A browser that remembers forms may come back with another unit than the text has.
   setUnits(units.value);

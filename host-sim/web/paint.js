@@ -69,7 +69,10 @@ class WebGLPainter {
   link() {
     const { gl } = this;
     const program = gl.createProgram();
-    for (const [kind, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+    for (const [kind, source] of [
+      [gl.VERTEX_SHADER, VERTEX],
+      [gl.FRAGMENT_SHADER, FRAGMENT],
+    ]) {
       const shader = gl.createShader(kind);
       gl.shaderSource(shader, source);
       gl.compileShader(shader);
@@ -122,7 +125,9 @@ class WebGLPainter {
     const used = [...new Set([...wheel.elements, ...wheel.outline])];
     const number = new Map(used.map((index, k) => [index, k]));
     const places = new Int32Array(used.flatMap((i) => [i % nodeCount, i >= nodeCount ? 1 : 0]));
-    const positions = new Float32Array(used.flatMap((i) => [...wheel.nodes.subarray(2 * (i % nodeCount), 2 * (i % nodeCount) + 2)]));
+    const positions = new Float32Array(
+      used.flatMap((i) => [...wheel.nodes.subarray(2 * (i % nodeCount), 2 * (i % nodeCount) + 2)]),
+    );
     const triangles = (pattern) => {
       const list = [];
       for (let e = 0; e < wheel.elements.length; e += 8)

@@ -7,11 +7,15 @@ export function colour(name) {
 
 export const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', sans-serif";
 
-/** Calls `listener` when the page turns dark or light. */
+/** Calls `listener` when the page turns dark or light, and when it goes to paper, which is light, and comes back. */
 export function onTheme(listener) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", listener);
-  addEventListener("beforeprint", listener);
-  addEventListener("afterprint", listener);
+  for (const name of ["beforeprint", "afterprint"]) {
+    addEventListener(name, () => {
+      document.documentElement.classList.toggle("printing", name === "beforeprint");
+      listener();
+    });
+  }
 }
 
 /** Anchors of the map viridis, dark to light; equal steps look equal, to colour-blind eyes too. */

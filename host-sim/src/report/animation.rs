@@ -10,7 +10,6 @@
 //! tooth. A page draws sector j of a wheel at generator angle ψ from sample `FRAMES (j − ψ/p)`, interpolated, whatever the
 //! angle: a whole turn, and more, from eight frames. Exact for drives that are alike from tooth to tooth; others are refused.
 
-
 use super::pack::Packed;
 use crate::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
 use crate::drive::{Drive, GeneratorKind, Side};

@@ -590,6 +590,12 @@ fn comparison(known: &[Known<'_>], validated: bool) -> Section {
     }
 }
 
+/// The load, stretched about the drag, where the loaded flank changes.
+fn load_axis(known: &[Known<'_>]) -> Axis {
+    let drag = known.first().map_or(0.02, |k| k.drive.output.drag_torque_n_m);
+    Axis::new("Load torque (stretched about zero)", Quantity::Torque).stretched(drag.max(1e-3))
+}
+
 fn charts(known: &[Known<'_>], of: impl Fn(&Known<'_>) -> Option<Lines>) -> Vec<(String, Lines)> {
     known.iter().filter_map(|k| Some((k.id(), of(k)?))).collect()
 }
@@ -687,7 +693,7 @@ fn validation_section(known: &[Known<'_>]) -> Section {
         "miss-torque",
         "Table less fresh FEM, over the load",
         "Loads, temperatures, directions and positions were drawn between the nodes of the table.",
-        Axis::new("Load torque", Quantity::Torque),
+        load_axis(known),
         of("steady", |p| p.torque_n_m),
     ));
     blocks.push(figure(
@@ -725,8 +731,8 @@ fn table_section(known: &[Known<'_>]) -> Section {
             ),
             alt: "Curves of the difference between backward and forward error over the load torque".into(),
             body: FigureBody::Lines {
-                x: Axis::new("Load torque", Quantity::Torque),
-                y: Axis::new("Backward less forward error", Quantity::Error),
+                x: load_axis(known),
+                y: Axis::new("Backward less forward", Quantity::Error),
                 charts: charts(known, |k| Some(k.play())),
             },
         }),
@@ -756,7 +762,7 @@ fn table_section(known: &[Known<'_>]) -> Section {
             ),
             alt: "Points of the deviation of the table from its samples over the load torque".into(),
             body: FigureBody::Lines {
-                x: Axis::new("Load torque", Quantity::Torque),
+                x: load_axis(known),
                 y: Axis::new("Table less sample", Quantity::Error),
                 charts: residuals,
             },

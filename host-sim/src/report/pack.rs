@@ -45,7 +45,9 @@ impl Packed {
     /// Values on a grid of `scale`, or of a coarser one that 16 bits can span. Values must be finite.
     pub fn steps(name: impl Into<String>, shape: &[usize], scale: f64, values: &[f64]) -> Packed {
         let (offset, largest) = middle_and_reach(values);
-        let scale = scale.max(largest / f64::from(i16::MAX));
+        let scale = scale.max(largest / f64::from(i16::MAX - 1));
+        // On the grid, so that whole numbers stay whole.
+        let offset = (offset / scale).round() * scale;
         let mut before = 0_i16;
         let bytes: Vec<[u8; 2]> = values
             .iter()
@@ -100,4 +102,73 @@ impl Packed {
 fn middle_and_reach(values: &[f64]) -> (f64, f64) {
     let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
     if least > most { (0.0, 0.0) } else { (0.5 * (least + most), 0.5 * (most - least)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Read;
+
+    /// The bytes of an array, by another base64 than the one that wrote them.
+    fn inflated(packed: &Packed) -> Vec<u8> {
+        const DIGITS: &str = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+        let text = packed.text.trim_end_matches('=');
+        let bits: Vec<u32> = text.chars().map(|c| DIGITS.find(c).unwrap() as u32).collect();
+        let mut bytes = Vec::new();
+        for group in bits.chunks(4) {
+            let joined = group.iter().fold(0, |all, six| all << 6 | six) << (6 * (4 - group.len()));
+            bytes.extend(joined.to_be_bytes()[1..group.len()].iter());
+        }
+        let mut out = Vec::new();
+        flate2::read::DeflateDecoder::new(bytes.as_slice()).read_to_end(&mut out).unwrap();
+        out
+    }
+
+    fn steps_back(packed: &Packed) -> Vec<f64> {
+        let bytes = inflated(packed);
+        let count = bytes.len() / 2;
+        let mut now = 0_i16;
+        let value = |k: usize| {
+            let z = u16::from_le_bytes([bytes[k], bytes[count + k]]);
+            now = now.wrapping_add(((z >> 1) as i16) ^ -((z & 1) as i16));
+            f64::from(now) * packed.scale + packed.offset
+        };
+        (0..count).map(value).collect()
+    }
+
+    #[test]
+    fn steps_come_back_to_half_a_step_and_whole_numbers_whole() {
+        let mut random = fastrand::Rng::with_seed(7);
+        let values: Vec<f64> = (0..2000).map(|_| 5.0 * (random.f64() - 0.4)).collect();
+        let packed = Packed::steps("x", &[40, 50], 1e-3, &values);
+        assert_eq!(packed.scale, 1e-3);
+        for (found, value) in steps_back(&packed).iter().zip(&values) {
+            assert!((found - value).abs() <= 0.5001e-3, "{found} {value}");
+        }
+        let whole: Vec<f64> = (0..336).map(f64::from).collect();
+        assert_eq!(steps_back(&Packed::steps("whole", &[336], 1.0, &whole)), whole);
+    }
+
+    #[test]
+    fn a_range_too_wide_for_its_step_takes_a_coarser_one() {
+        let values = [-1000.0, 0.0, 1000.0];
+        let packed = Packed::steps("wide", &[3], 1e-4, &values);
+        assert!(packed.scale > 1e-2, "{}", packed.scale);
+        for (found, value) in steps_back(&packed).iter().zip(&values) {
+            assert!((found - value).abs() <= 0.51 * packed.scale, "{found} {value}");
+        }
+    }
+
+    #[test]
+    fn smooth_fields_become_small() {
+        let values: Vec<f64> = (0..10_000).map(|k| 0.3 * (f64::from(k) * 0.01).sin()).collect();
+        let packed = Packed::steps("smooth", &[10_000], 1e-4, &values);
+        assert!(packed.text.len() < 10_000, "{} characters for 80000 bytes", packed.text.len());
+    }
+
+    #[test]
+    #[should_panic(expected = "as many values as its shape has places")]
+    fn a_shape_that_does_not_fit_is_a_mistake() {
+        Packed::floats("x", &[2, 2], [1.0]);
+    }
 }

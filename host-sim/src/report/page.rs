@@ -305,17 +305,24 @@ pub struct Axis {
     pub quantity: Quantity,
     /// Whether it is the generator angle from a pitch's beginning, and linked with the drive.
     pub linked: bool,
+    /// Linear between minus and plus this, logarithmic beyond, for what changes most around zero.
+    pub stretched: Option<f64>,
 }
 
 impl Axis {
     /// An axis of its own.
     pub fn new(label: impl Into<String>, quantity: Quantity) -> Axis {
-        Axis { label: label.into(), quantity, linked: false }
+        Axis { label: label.into(), quantity, linked: false, stretched: None }
     }
 
     /// The generator angle over a pitch, degrees, linked with the drive.
     pub fn linked(label: impl Into<String>) -> Axis {
-        Axis { label: label.into(), quantity: Quantity::Degree, linked: true }
+        Axis { label: label.into(), quantity: Quantity::Degree, linked: true, stretched: None }
+    }
+
+    /// The same axis, linear within `within` of zero and logarithmic beyond.
+    pub fn stretched(self, within: f64) -> Axis {
+        Axis { stretched: Some(within), ..self }
     }
 
     pub(crate) fn title(&self) -> String {
@@ -571,4 +578,110 @@ fn animation_json(a: &Animation) -> Value {
         "peak_mpa": a.peak_mpa,
         "rows": rows,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HOSTILE: &str = r#"</script><script>alert(1)</script>"'&{{1}}<!--"#;
+
+    fn page(status: Status) -> Page {
+        let series = Series { name: HOSTILE.into(), mark: Mark::Line, colour: 0, points: vec![[0.0, 1.0], [1.0, 3.0]] };
+        let lines = Lines { series: vec![series], limits: vec![Limit { name: HOSTILE.into(), y: 2.0 }] };
+        let figure = Figure {
+            id: "figure".into(),
+            title: HOSTILE.into(),
+            caption: HOSTILE.into(),
+            alt: HOSTILE.into(),
+            body: FigureBody::Lines {
+                x: Axis::new(HOSTILE, Quantity::Torque).stretched(0.02),
+                y: Axis::new(HOSTILE, Quantity::Error),
+                charts: vec![("one".into(), lines)],
+            },
+        };
+        Page {
+            title: HOSTILE.into(),
+            command_name: "tables",
+            status,
+            remarks: vec![HOSTILE.into()],
+            choices: vec![Choice { id: "one".into(), name: HOSTILE.into() }],
+            choice_is: "Generator",
+            headlines: vec![Headline {
+                choice: Some("one".into()),
+                answer: Text::new(HOSTILE).error(-12.345, 3),
+                number: Text::default().error(0.5, 2),
+                number_is: HOSTILE.into(),
+            }],
+            sections: vec![Section {
+                id: "section".into(),
+                title: HOSTILE.into(),
+                detail: Detail::Summary,
+                blocks: vec![Block::Figure(figure)],
+            }],
+            animations: Vec::new(),
+            provenance: vec![(HOSTILE.into(), HOSTILE.into())],
+            results: Map::from_iter([(HOSTILE.to_owned(), Value::from(HOSTILE))]),
+        }
+    }
+
+    /// The text between the first `<script … id="flexspline-report">` and the next `</script`, as a browser ends it.
+    fn json_block(html: &str) -> Value {
+        let (_, after) = html.split_once(r#"id="flexspline-report">"#).unwrap();
+        serde_json::from_str(after.split_once("</script").unwrap().0).unwrap()
+    }
+
+    #[test]
+    fn hostile_text_is_text_wherever_it_stands() {
+        let html = page(Status::Good).html().unwrap();
+        // Outside our own script and style nothing of it is markup.
+        assert_eq!(html.matches("<script>alert").count(), 0);
+        assert_eq!(html.matches("<script").count(), 3, "JSON, one packed array, the module");
+        assert_eq!(html.matches("<!--").count(), 0);
+        let json = json_block(&html);
+        assert_eq!(json["title"], HOSTILE);
+        assert_eq!(json["figures"]["figure"]["charts"]["one"]["series"][0]["name"], HOSTILE);
+        assert_eq!(json["results"][HOSTILE], HOSTILE);
+    }
+
+    #[test]
+    fn the_status_is_on_the_page_in_the_json_and_decides_the_command() {
+        for (status, name, failure) in [
+            (Status::Good, "good", false),
+            (Status::Remark, "remark", false),
+            (Status::Extrapolates, "extrapolates", false),
+            (Status::BoundMissed, "bound missed", true),
+            (Status::NotConverged, "not converged", true),
+        ] {
+            let html = page(status).html().unwrap();
+            assert_eq!(json_block(&html)["status"], name);
+            assert!(html.contains(&format!(r#"class="stamp {}">{name}<"#, name.replace(' ', "-"))), "{name}");
+            assert_eq!(status.is_failure(), failure);
+        }
+    }
+
+    #[test]
+    fn errors_carry_their_value_for_the_unit_switch() {
+        let html = page(Status::Good).html().unwrap();
+        assert!(html.contains(r#"<data class="error" value="-12.345" data-digits="3">−12.3″</data>"#));
+    }
+
+    #[test]
+    fn numbers_have_significant_digits() {
+        for (value, digits, text) in
+            [(0.0, 3, "0"), (12.345, 3, "12.3"), (-0.012345, 2, "−0.012"), (1234.5, 2, "1234"), (f64::NAN, 2, "–")]
+        {
+            assert_eq!(significant(value, digits), text);
+        }
+    }
+
+    #[test]
+    fn series_of_different_points_share_their_axis() {
+        let of =
+            |points: &[[f64; 2]]| Series { name: String::new(), mark: Mark::Line, colour: 0, points: points.into() };
+        let lines = Lines { series: vec![of(&[[0.0, 1.0], [2.0, 3.0]]), of(&[[1.0, 5.0]])], limits: Vec::new() };
+        let columns = lines.columns();
+        assert_eq!(columns[0], [0.0, 1.0, 2.0]);
+        assert!(columns[1][1].is_nan() && columns[1][2] == 3.0 && columns[2][1] == 5.0);
+    }
 }
