@@ -89,7 +89,7 @@ export function driveViewer(place, animations) {
 
   /** Sectors of a wheel that the close view may show. */
   function near(wheel, turn) {
-    const half = Math.ceil((TEETH_SEEN * 0.75 * drive.pitch) / wheel.pitch) + 2;
+    const half = Math.ceil((0.5 * TEETH_SEEN * drive.pitch) / wheel.pitch) + 1;
     const middle = Math.round((psi - turn) / wheel.pitch);
     return { first: middle - half, count: 2 * half + 1 };
   }

@@ -133,7 +133,7 @@ impl Tables {
         }
         let report = Report {
             schema_version: 1,
-            status: "made",
+            status: page.as_ref().filter(|page| page.status.is_failure()).map_or("made", |page| page.status.name()),
             tables: made.iter().map(|(table, _)| &table.info).collect(),
             wall_s: clock.elapsed().as_secs_f64(),
         };
