@@ -42,12 +42,6 @@ class Wheel {
     return [d[x + a] + t * (d[x + b] - d[x + a]), d[y + a] + t * (d[y + b] - d[y + a])];
   }
 
-  stressAt(sector, node, count) {
-    const [a, b, t] = this.between(sector, count);
-    const row = node * this.samples;
-    return this.stress[row + a] + t * (this.stress[row + b] - this.stress[row + a]);
-  }
-
   /** Position of a node, given as in `elements`, in the frame of the page. */
   position(sector, index, count, exaggeration, turn) {
     const node = index % this.nodeCount;

@@ -42,7 +42,7 @@ async function start() {
       }
       for (const input of document.querySelectorAll("input[name=choice]")) input.checked = input.value === id;
     }
-    root.dataset.choice = id;
+    root.dataset.chosen = id;
     // Side by side: inflating is what takes time, and it does not take the page's.
     await Promise.all(views.map((view) => view.choose(id)));
     root.dataset.ready = id;
@@ -71,7 +71,7 @@ async function start() {
   detail.addEventListener("change", () => setDetail(detail.value));
   addEventListener("hashchange", async () => {
     const { choice, anchor } = asked();
-    if (choice && choice !== root.dataset.choice) await choose(choice);
+    if (choice && choice !== root.dataset.chosen) await choose(choice);
     goTo(anchor);
   });
 

@@ -242,6 +242,7 @@ class CanvasPainter {
 
   load(motion) {
     this.colourEnd = motion.description.colour_end_mpa;
+    this.corners = new Map();
   }
 
   begin(width, height) {
@@ -250,36 +251,30 @@ class CanvasPainter {
 
   wheel(wheel, view, { first, count, frames, turn, exaggeration, alpha, lines, mesh }) {
     const ctx = this.context;
-    const pitches = frames / wheel.frames;
     const fills = Array.from({ length: BUCKETS }, () => new Path2D());
     const edges = new Path2D();
-    const corners = new Map();
+    const { nodeCount, elements, outline } = wheel;
+    // Places and stresses of a sector and of its neighbour, by index as in `elements`.
+    const [x, y, stress] = [0, 1, 2].map(() => new Float32Array(2 * nodeCount));
+    const level = BUCKETS / (4 * this.colourEnd);
+    if (!this.corners.has(wheel)) {
+      this.corners.set(wheel, Uint16Array.from(new Set(elements.filter((_, k) => k % 8 < 4))));
+    }
     for (let sector = first; sector < first + count; sector++) {
-      corners.clear();
-      const at = (index) => {
-        let found = corners.get(index);
-        if (!found) {
-          const node = index % wheel.nodeCount;
-          const own = sector + (index >= wheel.nodeCount ? 1 : 0);
-          const place = toScreen(view, wheel.position(sector, index, pitches, exaggeration, turn));
-          found = [...place, wheel.stressAt(own, node, pitches)];
-          corners.set(index, found);
-        }
-        return found;
-      };
-      for (let e = 0; e < wheel.elements.length; e += 8) {
-        const quad = [0, 1, 2, 3].map((k) => at(wheel.elements[e + k]));
-        const mean = quad.reduce((sum, q) => sum + q[2], 0) / 4 / this.colourEnd;
-        const path = fills[Math.min(BUCKETS - 1, Math.floor(mean * BUCKETS))];
-        path.moveTo(quad[0][0], quad[0][1]);
-        for (const q of quad.slice(1)) path.lineTo(q[0], q[1]);
-        path.closePath();
+      this.place(wheel, view, sector, frames / wheel.frames, turn, exaggeration, x, y, stress);
+      for (let e = 0; e < elements.length; e += 8) {
+        const [a, b, c, d] = [elements[e], elements[e + 1], elements[e + 2], elements[e + 3]];
+        const sum = stress[a] + stress[b] + stress[c] + stress[d];
+        const path = fills[Math.min(BUCKETS - 1, Math.floor(sum * level))];
+        path.moveTo(x[a], y[a]);
+        path.lineTo(x[b], y[b]);
+        path.lineTo(x[c], y[c]);
+        path.lineTo(x[d], y[d]);
       }
       if (!lines) continue;
-      for (let e = 0; e < wheel.outline.length; e += 3) {
-        const [a, c] = [at(wheel.outline[e]), at(wheel.outline[e + 2])];
-        edges.moveTo(a[0], a[1]);
-        edges.lineTo(c[0], c[1]);
+      for (let e = 0; e < outline.length; e += 3) {
+        edges.moveTo(x[outline[e]], y[outline[e]]);
+        edges.lineTo(x[outline[e + 2]], y[outline[e + 2]]);
       }
     }
     ctx.save();
@@ -290,16 +285,39 @@ class CanvasPainter {
     fills.forEach((path, k) => {
       ctx.fillStyle = ctx.strokeStyle = css(viridis((k + 0.5) / BUCKETS));
       ctx.fill(path);
-      // Without this the seams between elements shine through.
+      // Without this the seams between elements shine through; in the small view nobody sees them.
       ctx.lineWidth = mesh ? 0.2 : 0.6;
-      ctx.stroke(path);
+      if (lines) ctx.stroke(path);
     });
     if (lines) {
-      ctx.strokeStyle = css(lines.map((x) => Math.round(255 * x)));
+      ctx.strokeStyle = css(lines.map((v) => Math.round(255 * v)));
       ctx.lineWidth = 1;
       ctx.stroke(edges);
     }
     ctx.restore();
+  }
+
+  /** Corner nodes of a sector on the screen, and their stress. */
+  place(wheel, view, sector, pitches, turn, exaggeration, x, y, stress) {
+    const { nodes, nodeCount, samples, displacement } = wheel;
+    const [left, top] = [view.left + view.width / 2, view.top + view.height / 2];
+    for (const beside of [0, 1]) {
+      const [a, b, t] = wheel.between(sector + beside, pitches);
+      const angle = (sector + beside) * wheel.pitch + turn - view.turn;
+      const [c, s] = [Math.cos(angle), Math.sin(angle)];
+      for (const index of this.corners.get(wheel)) {
+        if (index >= nodeCount !== (beside === 1)) continue;
+        const node = index - beside * nodeCount;
+        const [row, next] = [2 * node * samples, (2 * node + 1) * samples];
+        const dx = displacement[row + a] + t * (displacement[row + b] - displacement[row + a]);
+        const dy = displacement[next + a] + t * (displacement[next + b] - displacement[next + a]);
+        const [px, py] = [nodes[2 * node] + exaggeration * dx, nodes[2 * node + 1] + exaggeration * dy];
+        x[index] = left + (c * px - s * py - view.centre[0]) * view.scale;
+        y[index] = top - (s * px + c * py - view.centre[1]) * view.scale;
+        const from = wheel.stress[node * samples + a];
+        stress[index] = from + t * (wheel.stress[node * samples + b] - from);
+      }
+    }
   }
 }
 
