@@ -14,23 +14,27 @@ use crate::report::page::Page;
 use crate::report::shown_torque_n_m;
 use crate::stepping::{Method, SolverSettings};
 
-/// The drives in motion, by the fast solver, each at half of what its table spans.
+/// The drives in motion, by the fast solver, each at half of what its table spans. One that cannot be shown is said on the page.
 pub(super) fn animations(
     context: &Context,
     drive: &Drive,
     tables: &[(GeneratorKind, Table<'_>)],
     settings: SolverSettings,
-) -> Vec<Result<Animation, AnimationError>> {
+) -> Result<Vec<Result<Animation, AnimationError>>, Failure> {
     let interrupted = context.watch_interrupt();
     let solver = SolverSettings { method: Method::Fast, ..settings };
-    tables
+    let made = tables
         .par_iter()
         .map(|(kind, table)| {
             animate(drive, *kind, shown_torque_n_m(table), solver, &mut || {
                 if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
         })
-        .collect()
+        .collect();
+    if interrupted() {
+        return Err(Failure::Failed("stopped; report.html was not written".into()));
+    }
+    Ok(made)
 }
 
 /// Writes the page; a failure that it is stamped with is that of the command.

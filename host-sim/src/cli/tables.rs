@@ -148,7 +148,7 @@ impl Tables {
             .map(|(table, _)| Ok((table.kind, Table::check(&table.image).map_err(|e| Failure::Failed(e.to_string()))?)))
             .collect::<Result<Vec<_>, Failure>>()?;
         let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
-        let animations = report::animations(context, drive, &tables, settings);
+        let animations = report::animations(context, drive, &tables, settings)?;
         let inputs = made.iter().filter_map(|(table, _)| match &table.info.source {
             Source::File { name, blake3 } => Some((format!("BLAKE3 of {name}"), blake3.clone())),
             Source::Fem { .. } => None,

@@ -167,7 +167,7 @@ impl Validate {
         }
         inputs.push(("Fresh FEM".into(), format!("{} solver, {} mesh, seed {}", self.solver, self.mesh, self.seed)));
         let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
-        let animations = report::animations(context, drive, &tables, settings);
+        let animations = report::animations(context, drive, &tables, settings)?;
         let subjects = tables.into_iter().zip(&report.tables).zip(animations).map(|(((kind, table), v), animation)| {
             Subject { kind, table, info: None, samples: None, validation: Some(v), animation }
         });

@@ -439,25 +439,17 @@ mod tests {
         }
     }
 
+    /// Four generators on the standard mesh have to fit a page of 1.5 MB; the coarse mesh has half its nodes.
     #[test]
-    #[ignore = "prints sizes"]
-    fn sizes() {
-        for kind in GeneratorKind::ALL {
-            let begun = std::time::Instant::now();
-            let solver = SolverSettings { mesh: MeshLevel::Standard, ..coarse() };
-            let torque = 0.5 * crate::sweep::rated_torque_n_m(kind);
-            let a = animate(&Drive::hhd_95(), kind, torque, solver, &mut || ControlFlow::Continue(())).unwrap();
-            println!(
-                "{kind}: {:.2} s, peak {:.1}, colour end {}",
-                begun.elapsed().as_secs_f64(),
-                a.peak_mpa,
-                a.colour_end_mpa
-            );
-            let begun = std::time::Instant::now();
-            for p in a.pack() {
-                println!("  {:<36} {:?} scale {:e}: {} kB", p.name, p.shape, p.scale, p.text.len() / 1000);
-            }
-            println!("  packed in {:.2} s", begun.elapsed().as_secs_f64());
-        }
+    fn a_drive_in_motion_is_small() {
+        let a = animate(&Drive::hhd_95(), GeneratorKind::TwoRoller, 10.0, coarse(), &mut || ControlFlow::Continue(()))
+            .unwrap();
+        let packed = a.pack();
+        let characters: usize = packed.iter().map(|p| p.text.len()).sum();
+        let numbers = a.flexspline.displacement_mm.len() + a.circular_spline.displacement_mm.len();
+        println!("{} kB for {numbers} displacements and their stresses", characters / 1000);
+        assert!(characters < 120_000, "{characters}");
+        let fine = packed.iter().find(|p| p.name == "two-roller.flexspline.displacement").unwrap();
+        assert_eq!(fine.scale, DISPLACEMENT_STEP_MM);
     }
 }

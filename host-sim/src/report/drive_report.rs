@@ -432,6 +432,16 @@ pub fn drive_report(sources: Sources<'_>) -> Page {
             ));
         }
     }
+    for a in known.iter().filter_map(|k| k.subject.animation.as_ref().ok()) {
+        let residual = a.rows.iter().map(|row| row.residual).fold(0.0, f64::max);
+        provenance.push((
+            format!("In motion, {}", name_of(a.kind)),
+            format!(
+                "fast solver, {FRAMES} frames of one pitch, {} N·m, {} °C, residual at most {residual:.1e}",
+                a.torque_n_m, a.temperature_c
+            ),
+        ));
+    }
     let title = if validated {
         format!("Tables of {} against fresh FEM", drive.name)
     } else {
