@@ -24,6 +24,7 @@ const CONTROLS = `
   <button type="button" class="play" aria-pressed="false">Play</button>
   <label>Speed <select class="speed"></select></label>
   <label class="wide">Generator <input class="scrub" type="range" min="0" max="360" step="0.05" value="0"><output class="angle"></output></label>
+  <label class="wide">Close view at <input class="look" type="range" min="-90" max="90" step="0.5" value="0"><output class="looking"></output></label>
   <label class="wide">Displacements × <input class="exaggeration" type="range" min="0" max="100" step="1" value="0"><output class="times"></output></label>
   <label><input class="forces" type="checkbox" checked> Forces</label>
   <label><input class="mesh" type="checkbox"> Mesh</label>
@@ -35,6 +36,9 @@ const CONTROLS = `
 /** Slider place 0 to 100 to factor 1 to 50, and back. */
 const toFactor = (place) => 50 ** (place / 100);
 const toPlace = (factor) => (100 * Math.log(factor)) / Math.log(50);
+
+/** An angle in degrees, to half of one. */
+const degreesOf = (angle) => `${(Math.round((2 * angle) / DEGREE) / 2).toFixed(1).replace("-", "−")}°`;
 
 /** The viewer in `place`; returns { choose(choice) }. */
 export function driveViewer(place, animations) {
@@ -55,6 +59,8 @@ export function driveViewer(place, animations) {
   let drive = null;
   let psi = 0;
   let factor = 1;
+  // Where the close view looks, from the major axis.
+  let look = 0;
   let playing = false;
   let frames = 0;
   let asked = false;
@@ -82,7 +88,7 @@ export function driveViewer(place, animations) {
       ? { left: whole.width, top: 0, width: width - whole.width, height }
       : { left: 0, top: whole.height, width, height: height - whole.height };
     close.scale = close.width / (TEETH_SEEN * drive.pitch * drive.tipRadius);
-    close.turn = psi - Math.PI / 2;
+    close.turn = psi + look - Math.PI / 2;
     close.centre = [0, drive.tipRadius + (0.05 * close.height) / close.scale];
     return { whole, close };
   }
@@ -90,7 +96,7 @@ export function driveViewer(place, animations) {
   /** Sectors of a wheel that the close view may show. */
   function near(wheel, turn) {
     const half = Math.ceil((0.5 * TEETH_SEEN * drive.pitch) / wheel.pitch) + 1;
-    const middle = Math.round((psi - turn) / wheel.pitch);
+    const middle = Math.round((psi + look - turn) / wheel.pitch);
     return { first: middle - half, count: 2 * half + 1 };
   }
 
@@ -106,7 +112,7 @@ export function driveViewer(place, animations) {
     const { whole, close } = views();
     const count = drive.frames * drive.count(psi);
     const turns = [0, drive.output(psi)];
-    const line = rgb("outline");
+    const line = rgb("edge");
     paint.begin(...size);
     [drive.flexspline, drive.circularSpline].forEach((wheel, k) => {
       // The exaggerated flexspline passes through the circular spline, which then steps back.
@@ -143,7 +149,7 @@ export function driveViewer(place, animations) {
       ctx.fillText(text, view.left + 12 * ratio, view.top + 20 * ratio);
     };
     label(whole, "Whole drive");
-    label(close, "Teeth at the major axis");
+    label(close, look ? `Teeth at ${degreesOf(look)} from the major axis` : "Teeth at the major axis");
     drawScale(close);
   }
 
@@ -259,6 +265,7 @@ export function driveViewer(place, animations) {
     const degrees = modulo(psi / DEGREE, 360);
     scrub.value = degrees;
     find(".angle").textContent = `${degrees.toFixed(2)}°`;
+    find(".looking").textContent = degreesOf(look);
     find(".times").textContent = factor < 9.95 ? factor.toFixed(1) : factor.toFixed(0);
     const { torque_n_m, temperature_c, colour_end_mpa, peak_mpa } = drive.description;
     const output = written(modulo(drive.output(psi) / DEGREE, 360), "degree", 5);
@@ -301,6 +308,25 @@ export function driveViewer(place, animations) {
   play.addEventListener("click", () => setPlaying(!playing));
   scrub.addEventListener("input", () => turnTo(Number(scrub.value) * DEGREE, "scrub"));
   exaggeration.addEventListener("input", () => setFactor(toFactor(Number(exaggeration.value))));
+  find(".look").addEventListener("input", (event) => {
+    look = Number(event.target.value) * DEGREE;
+    write();
+    ask();
+  });
+  // Pointing at the whole drive brings the close view there.
+  stage.addEventListener("click", (event) => {
+    if (!drive) return;
+    const box = stage.getBoundingClientRect();
+    const { whole } = views();
+    const [x, y] = [(event.clientX - box.left) * ratio, (event.clientY - box.top) * ratio];
+    if (x > whole.width || y > whole.height) return;
+    const angle = Math.atan2(whole.height / 2 - y, x - whole.width / 2) - psi;
+    // Both lobes are alike.
+    look = (modulo(angle / DEGREE + 90, 180) - 90) * DEGREE;
+    find(".look").value = look / DEGREE;
+    write();
+    ask();
+  });
   for (const box of [forces, mesh]) box.addEventListener("change", ask);
   stage.addEventListener("keydown", (event) => {
     const step = drive?.pitch ?? 0;

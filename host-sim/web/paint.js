@@ -65,8 +65,7 @@ function isSoftware() {
 
 class WebGLPainter {
   constructor(canvas) {
-    // Smooth edges cost a graphics card nothing, and a processor that stands in for one half its frames.
-    const gl = canvas.getContext("webgl2", { alpha: true, antialias: !isSoftware(), preserveDrawingBuffer: true });
+    const gl = canvas.getContext("webgl2", { alpha: true, antialias: true, preserveDrawingBuffer: true });
     if (!gl) throw new Error("no WebGL2");
     this.gl = gl;
     this.name = "WebGL2";
@@ -232,7 +231,7 @@ class WebGLPainter {
 }
 
 /** Colours that the plain canvas sorts elements into. */
-const BUCKETS = 24;
+const BUCKETS = 40;
 
 class CanvasPainter {
   constructor(canvas) {
@@ -242,14 +241,14 @@ class CanvasPainter {
 
   load(motion) {
     this.colourEnd = motion.description.colour_end_mpa;
-    this.corners = new Map();
+    this.used = new Map();
   }
 
   begin(width, height) {
     this.context.clearRect(0, 0, width, height);
   }
 
-  wheel(wheel, view, { first, count, frames, turn, exaggeration, alpha, lines, mesh }) {
+  wheel(wheel, view, { first, count, frames, turn, exaggeration, fine, alpha, lines, mesh }) {
     const ctx = this.context;
     const fills = Array.from({ length: BUCKETS }, () => new Path2D());
     const edges = new Path2D();
@@ -257,23 +256,36 @@ class CanvasPainter {
     // Places and stresses of a sector and of its neighbour, by index as in `elements`.
     const [x, y, stress] = [0, 1, 2].map(() => new Float32Array(2 * nodeCount));
     const level = BUCKETS / (4 * this.colourEnd);
-    if (!this.corners.has(wheel)) {
-      this.corners.set(wheel, Uint16Array.from(new Set(elements.filter((_, k) => k % 8 < 4))));
-    }
+    const add = (xa, ya, xb, yb, xc, yc, xd, yd, sum) => {
+      const path = fills[Math.min(BUCKETS - 1, Math.floor(sum * level))];
+      path.moveTo(xa, ya);
+      path.lineTo(xb, yb);
+      path.lineTo(xc, yc);
+      path.lineTo(xd, yd);
+    };
     for (let sector = first; sector < first + count; sector++) {
-      this.place(wheel, view, sector, frames / wheel.frames, turn, exaggeration, x, y, stress);
+      this.place(wheel, view, sector, frames / wheel.frames, turn, exaggeration, fine, x, y, stress);
       for (let e = 0; e < elements.length; e += 8) {
-        const [a, b, c, d] = [elements[e], elements[e + 1], elements[e + 2], elements[e + 3]];
-        const sum = stress[a] + stress[b] + stress[c] + stress[d];
-        const path = fills[Math.min(BUCKETS - 1, Math.floor(sum * level))];
-        path.moveTo(x[a], y[a]);
-        path.lineTo(x[b], y[b]);
-        path.lineTo(x[c], y[c]);
-        path.lineTo(x[d], y[d]);
+        const n = elements.subarray(e, e + 8);
+        if (!fine) {
+          const [a, b, c, d] = n;
+          const sum = stress[a] + stress[b] + stress[c] + stress[d];
+          add(x[a], y[a], x[b], y[b], x[c], y[c], x[d], y[d], sum);
+          continue;
+        }
+        // In quarters about the middle, which the shape functions of the element give.
+        const middle = (v) =>
+          0.5 * (v[n[4]] + v[n[5]] + v[n[6]] + v[n[7]]) - 0.25 * (v[n[0]] + v[n[1]] + v[n[2]] + v[n[3]]);
+        const [mx, my, ms] = [middle(x), middle(y), Math.max(0, middle(stress))];
+        for (let k = 0; k < 4; k++) {
+          const [a, b, d] = [n[k], n[4 + k], n[4 + ((k + 3) % 4)]];
+          add(x[a], y[a], x[b], y[b], mx, my, x[d], y[d], stress[a] + stress[b] + ms + stress[d]);
+        }
       }
       if (!lines) continue;
       for (let e = 0; e < outline.length; e += 3) {
         edges.moveTo(x[outline[e]], y[outline[e]]);
+        edges.lineTo(x[outline[e + 1]], y[outline[e + 1]]);
         edges.lineTo(x[outline[e + 2]], y[outline[e + 2]]);
       }
     }
@@ -297,15 +309,24 @@ class CanvasPainter {
     ctx.restore();
   }
 
-  /** Corner nodes of a sector on the screen, and their stress. */
-  place(wheel, view, sector, pitches, turn, exaggeration, x, y, stress) {
+  /** Which nodes are drawn, by index as in `elements`. */
+  nodes(wheel, fine) {
+    const key = fine ? "fine" : "coarse";
+    if (!this.used.has(wheel)) this.used.set(wheel, {});
+    const kept = this.used.get(wheel);
+    kept[key] ??= Uint16Array.from(new Set(wheel.elements.filter((_, k) => fine || k % 8 < 4)));
+    return kept[key];
+  }
+
+  /** Nodes of a sector on the screen, and their stress: all, or the corners of its elements. */
+  place(wheel, view, sector, pitches, turn, exaggeration, fine, x, y, stress) {
     const { nodes, nodeCount, samples, displacement } = wheel;
     const [left, top] = [view.left + view.width / 2, view.top + view.height / 2];
     for (const beside of [0, 1]) {
       const [a, b, t] = wheel.between(sector + beside, pitches);
       const angle = (sector + beside) * wheel.pitch + turn - view.turn;
       const [c, s] = [Math.cos(angle), Math.sin(angle)];
-      for (const index of this.corners.get(wheel)) {
+      for (const index of this.nodes(wheel, fine)) {
         if (index >= nodeCount !== (beside === 1)) continue;
         const node = index - beside * nodeCount;
         const [row, next] = [2 * node * samples, (2 * node + 1) * samples];
@@ -330,15 +351,17 @@ export function toScreen(view, point) {
   ];
 }
 
-/** A painter on this canvas: WebGL2 where there is one. */
+/** A painter on this canvas: WebGL2 where a graphics card draws it. Where the processor does, a plain canvas is faster. */
 export function painter(canvas) {
   try {
-    return new WebGLPainter(canvas);
+    if (!isSoftware()) return new WebGLPainter(canvas);
   } catch {
+    // No WebGL2, or one that cannot do this; its canvas cannot be used for anything else.
     const plain = canvas.cloneNode();
     canvas.replaceWith(plain);
     return new CanvasPainter(plain);
   }
+  return new CanvasPainter(canvas);
 }
 
 /** A colour of the style sheet as three numbers from 0 to 1. */
