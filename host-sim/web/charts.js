@@ -47,6 +47,8 @@ function drawLimits(limits, scaleOf) {
     ctx.strokeStyle = ctx.fillStyle = colour("bad");
     ctx.lineWidth = devicePixelRatio;
     ctx.font = FONT.replace("12px", `${12 * devicePixelRatio}px`);
+    ctx.textAlign = "left";
+    ctx.textBaseline = "bottom";
     ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
     for (const { name, y } of limits) {
       const at = u.valToPos(y * scaleOf(), "y", true);
@@ -55,7 +57,7 @@ function drawLimits(limits, scaleOf) {
       ctx.moveTo(bbox.left, at);
       ctx.lineTo(bbox.left + bbox.width, at);
       ctx.stroke();
-      ctx.fillText(name, bbox.left + 6 * devicePixelRatio, at - 4 * devicePixelRatio);
+      ctx.fillText(name, bbox.left + 6 * devicePixelRatio, at - 2 * devicePixelRatio);
     }
     ctx.restore();
   };
@@ -122,7 +124,10 @@ export function lineChart(place, id, spec) {
       width,
       height: plotHeight(width),
       scales: {
-        x: { time: false, ...(spec.x.stretched ? { distr: 4, asinh: spec.x.stretched } : {}) },
+        x: {
+          time: false,
+          ...(spec.x.stretched ? { distr: 4, asinh: spec.x.stretched, range: (u, low, high) => [low, high] } : {}),
+        },
         y: {
           range: (u, low, high) => {
             const levels = (description.limits ?? []).map((l) => l.y * fy);

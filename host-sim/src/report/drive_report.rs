@@ -55,6 +55,15 @@ pub fn shown_torque_n_m(table: &Table<'_>) -> f64 {
     0.5 * f64::from(table.torque_range_n_m()[1])
 }
 
+/// A torque to four digits: those of single precision are not all meant.
+fn torque_text(torque_n_m: f32) -> String {
+    let torque = f64::from(torque_n_m);
+    let unit = 10_f64.powf(torque.abs().max(1e-9).log10().floor() - 3.0);
+    let digits = (-unit.log10().round()).max(0.0) as usize;
+    let text = format!("{:.digits$}", (torque / unit).round() * unit);
+    if digits == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').to_owned() }
+}
+
 /// What a generator is called in text.
 fn name_of(kind: GeneratorKind) -> &'static str {
     match kind {
@@ -162,7 +171,7 @@ impl<'a> Known<'a> {
         }
         let uncorrected = Text::new(format!("Uncorrected, the {name} drive is off by up to "))
             .error(self.largest_error, 3)
-            .plain(format!(" at {} N·m; ", self.subject.table.torque_range_n_m()[1]));
+            .plain(format!(" at {} N·m; ", torque_text(self.subject.table.torque_range_n_m()[1])));
         if let Some([_, worst]) = self.fresh {
             let torque = shown_torque_n_m(&self.subject.table);
             return Headline {
@@ -205,7 +214,7 @@ impl<'a> Known<'a> {
                     let angle = self.pitch() * k as f64 / POSITIONS as f64;
                     [angle.to_degrees(), self.error(angle, torque, self.temperature, direction) - mean]
                 });
-                let name = format!("{torque} N·m {word}");
+                let name = format!("{} N·m {word}", torque_text(torque));
                 lines.series.push(Series { name, mark, colour, points: points.collect() });
             }
         }
@@ -554,7 +563,7 @@ fn comparison(known: &[Known<'_>], validated: bool) -> Section {
         };
         vec![
             Text::new(name_of(k.subject.kind)),
-            Text::new(format!("{highest}")),
+            Text::new(torque_text(highest)),
             error(k.largest_error, 3),
             error(backlash, 3),
             error(wind_up, 3),
@@ -781,7 +790,7 @@ fn table_section(known: &[Known<'_>]) -> Section {
     for k in known {
         let table = &k.subject.table;
         let [cold, warm] = table.temperature_range_c();
-        let [low, high] = table.torque_range_n_m();
+        let [low, high] = table.torque_range_n_m().map(torque_text);
         let mut rows = vec![
             vec![Text::new("table_id"), Text::new(table.id().to_string())],
             vec![Text::new("Range of the load"), Text::new(format!("{low} to {high} N·m"))],
@@ -873,5 +882,18 @@ fn reading_section() -> Section {
                  Every figure has its numbers as a table and as CSV, in the unit that is selected.",
             ),
         ],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn torques_are_written_as_they_are_meant() {
+        for (torque, text) in [(0.05_f32, "0.05"), (200.0, "200"), (-0.021, "-0.021"), (12.345_67, "12.35"), (0.0, "0")]
+        {
+            assert_eq!(torque_text(torque), text);
+        }
     }
 }
