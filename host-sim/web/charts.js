@@ -67,6 +67,8 @@ function drawLimits(limits, scaleOf) {
 export function lineChart(place, id, spec) {
   const frame = document.createElement("div");
   frame.className = "plot";
+  frame.role = "img";
+  frame.ariaLabel = `${place.dataset.alt}. Its numbers: the button Table.`;
   place.append(frame);
   let chart = null;
   let choice = null;
