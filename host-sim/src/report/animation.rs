@@ -173,7 +173,7 @@ impl WheelMotion {
         let s = self.sample(sector, frame);
         let x = self.nodes[node][0] + self.displacement_mm[2 * node * self.samples + s];
         let y = self.nodes[node][1] + self.displacement_mm[(2 * node + 1) * self.samples + s];
-        let (sin, cos) = (TAU * sector as f64 / self.sectors as f64).sin_cos();
+        let (sin, cos) = (std::f64::consts::TAU * sector as f64 / self.sectors as f64).sin_cos();
         [cos * x - sin * y, sin * x + cos * y]
     }
 }
@@ -361,7 +361,7 @@ mod tests {
         let torque = 10.0;
         let animation =
             animate(&drive, GeneratorKind::Cam, torque, coarse(), &mut || ControlFlow::Continue(())).unwrap();
-        let pitch = TAU / 188.0;
+        let pitch = std::f64::consts::TAU / 188.0;
         let far: Vec<_> = (0..=24)
             .map(|k| crate::simulate::PathPoint { generator_rad: pitch * f64::from(k) / 8.0, ..Default::default() })
             .collect();

@@ -511,6 +511,11 @@ fn judge(known: &[Known<'_>]) -> (Status, Vec<String>) {
     (status, remarks)
 }
 
+/// A value as its JSON file has it: single precision there has the digits it needs, as a [`Value`] all of double precision.
+fn as_written(info: &TableInfo) -> Value {
+    serde_json::to_string(info).and_then(|text| serde_json::from_str(&text)).expect("plain values")
+}
+
 fn result_of(k: &Known<'_>) -> Value {
     let [rms, worst] = k.fresh.map_or([None; 2], |pair| pair.map(Some));
     json!({
@@ -519,7 +524,7 @@ fn result_of(k: &Known<'_>) -> Value {
         "largest_error_arcsec": k.largest_error,
         "fresh_fem_rms_arcsec": rms,
         "fresh_fem_max_arcsec": worst,
-        "table": k.subject.info,
+        "table": k.subject.info.map(as_written),
         "validation": k.subject.validation.map(|v| json!({
             "status": v.status,
             "points": v.points.len(),
