@@ -602,7 +602,7 @@ fn comparison(known: &[Known<'_>], validated: bool) -> Section {
         Text::new(format!(
             "The table_id is what firmware returns for the table it carries: it matches this page with a device in the field. \
              * At {FRAMES} points over a pitch, at half load, forward, at {:.0} °C: few, but none of them made the table. \
-             `flexspline validate` draws many at random loads and temperatures.",
+             The command validate draws many, at random loads and temperatures.",
             known.first().map_or(20.0, |k| k.temperature)
         ))
     };
