@@ -113,12 +113,14 @@ export function driveViewer(place, animations) {
     const count = drive.frames * drive.count(psi);
     const turns = [0, drive.output(psi)];
     const line = rgb("edge");
-    paint.begin(...size);
+    // In play the plain canvas draws the whole drive every other frame: what it then lags is far below a pixel.
+    const resting = playing && paint.name === "canvas" && frames % 2 === 1;
+    paint.begin(...size, resting ? close : null);
     [drive.flexspline, drive.circularSpline].forEach((wheel, k) => {
       // The exaggerated flexspline passes through the circular spline, which then steps back.
       const alpha = k === 1 && factor > 1.02 ? 0.35 : 1;
       const common = { frames: count, turn: turns[k], exaggeration: factor, alpha };
-      paint.wheel(wheel, whole, { ...common, first: 0, count: wheel.sectors, fine: false });
+      if (!resting) paint.wheel(wheel, whole, { ...common, first: 0, count: wheel.sectors, fine: false });
       const seen = near(wheel, turns[k]);
       paint.wheel(wheel, close, { ...common, ...seen, fine: true, lines: line, mesh: mesh.checked && line });
     });

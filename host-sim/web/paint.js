@@ -244,8 +244,10 @@ class CanvasPainter {
     this.used = new Map();
   }
 
-  begin(width, height) {
-    this.context.clearRect(0, 0, width, height);
+  /** Clears all, or one view alone. */
+  begin(width, height, view) {
+    const { left, top } = view ?? { left: 0, top: 0 };
+    this.context.clearRect(left, top, view?.width ?? width, view?.height ?? height);
   }
 
   wheel(wheel, view, { first, count, frames, turn, exaggeration, fine, alpha, lines, mesh }) {
