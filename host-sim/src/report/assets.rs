@@ -106,7 +106,8 @@ mod tests {
         let in_style = ["@import", "url("];
         let in_script = ["fetch(", "xmlhttprequest", "import(", "websocket", "sendbeacon"];
         for (text, own) in [(STYLE.as_str(), &in_style[..]), (SCRIPT.as_str(), &in_script[..])] {
-            let lower = text.to_ascii_lowercase();
+            // The shader's texelFetch reads a texture.
+            let lower = text.to_ascii_lowercase().replace("texelfetch(", "");
             for bad in everywhere.iter().chain(own) {
                 assert!(!lower.contains(bad), "{bad}");
             }
