@@ -476,9 +476,7 @@ fn judge(known: &[Known<'_>]) -> (Status, Vec<String>) {
     let mut status = Status::Good;
     let mut remarks = Vec::new();
     let mut remark = |worse: Status, words: String| {
-        if !status.is_failure() || worse.is_failure() {
-            status = worse;
-        }
+        status = status.max(worse);
         remarks.push(words);
     };
     for k in known {

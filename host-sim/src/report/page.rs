@@ -20,8 +20,8 @@ use super::assets::{self, SCRIPT, STYLE};
 use super::pack::Packed;
 use super::svg;
 
-/// Whether what the page says can be relied on; what is wrong is stamped on it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Whether what the page says can be relied on, best first; what is wrong is stamped on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
     /// Every check passed.
     Good,
