@@ -137,7 +137,11 @@ export function lineChart(place, id, spec) {
           },
         },
       },
-      axes: [axis(spec.x, 44), axis(spec.y, 64)],
+      axes: [
+        axis(spec.x, 44),
+        // As wide as the longest number wants.
+        axis(spec.y, (u, texts) => Math.max(48, 20 + 7 * Math.max(0, ...(texts ?? []).map((t) => t.length)))),
+      ],
       series: [{ label: spec.x.label, value: (u, v) => say(u, v, spec.x.quantity, fx) }, ...series],
       legend: { live: true, markers: { width: 3 } },
       cursor: { drag: { x: true, y: true, uni: 20 }, focus: { prox: 24 } },
