@@ -100,6 +100,7 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod adapt;
 mod angle;
 #[cfg(feature = "c-api")]
 mod c_api;
@@ -120,6 +121,10 @@ mod table;
 mod upload;
 mod windup;
 
+pub use adapt::{
+    AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Coefficient, Learning, Seen, Term, Verdict,
+    saved_adapt_bytes,
+};
 pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};
 pub use error::{DriveError, Field, ImageError};
@@ -131,8 +136,8 @@ pub use image::{
 pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, Prediction};
 pub use predictor::{Ahead, Inertias, Measured, Noise, PREDICTOR_PARTS, Predictor, PredictorError, PredictorState};
 pub use runtime::{
-    Flags, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, RateGroup, SAVED_JOINT_BYTES,
-    SettingError,
+    Adjustment, Flags, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, RateGroup,
+    SAVED_JOINT_BYTES, SettingError,
 };
 pub use slip::{Slip, SlipBank, SlipElement, SlipState};
 pub use store::{ActivateError, Counters, Health, Images, STORE_WORDS, Store, mend_page};

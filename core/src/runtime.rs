@@ -16,7 +16,7 @@
 //! | an upset in the state | an interval of the play that cannot be is taken for unknown; of two corrections that differ the nearer to the goal counts | [`Flags::STATE_TORN`] |
 //! | reset | [`JointState::restore`] goes on where it was, [`JointState::new`] starts with no correction and the side of the play unknown; both within the limits | |
 
-use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
+use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT, counts_from_rad};
 use crate::drive::Drive;
 use crate::hysteresis::{PlayState, SAVED_STATE_BYTES};
 use crate::image::crc32;
@@ -153,6 +153,40 @@ pub struct Joint {
     /// Twice the ticks of a fade, and the part of the correction that one tick of it takes.
     fade: u32,
     fade_step: f32,
+}
+
+/// What is added to the table in one tick: what a friction model, or what was learnt on board, knows beyond it.
+///
+/// Counts of 2⁻³² output turn. Each is taken within ±[`Adjustment::MAX_RAD`]. The half-width never falls below zero anywhere on the
+/// tooth pitch: what would take it there is taken only that far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Adjustment {
+    /// Added to the mean error (actual less nominal).
+    pub mean_counts: i32,
+    /// Added to the half-width of the play.
+    pub half_width_counts: i32,
+}
+
+impl Adjustment {
+    /// Largest magnitude, rad.
+    pub const MAX_RAD: f32 = 0.05;
+    /// The same in counts.
+    pub const MAX_COUNTS: i32 = table::counts(0.05) as i32;
+
+    /// From radians at the output, rounded to a count; saturates at ±[`Self::MAX_RAD`], NaN is taken as none.
+    #[must_use]
+    pub fn from_rad(mean_rad: f32, half_width_rad: f32) -> Self {
+        let counts = |rad: f32| bounded(counts_from_rad(rad));
+        Self { mean_counts: counts(mean_rad), half_width_counts: counts(half_width_rad) }
+    }
+}
+
+/// An adjustment within its magnitude.
+#[inline(always)]
+const fn bounded(counts: i32) -> i32 {
+    let most = Adjustment::MAX_COUNTS;
+    let above = if counts > -most { counts } else { -most };
+    if above < most { above } else { most }
 }
 
 /// One tick's measurements.
