@@ -748,7 +748,7 @@ mod tests {
         fn tick(&mut self, generator: f64, torque: f64, off: Option<f64>) {
             let angle = GeneratorAngle::from_rad(generator).unwrap();
             let nominal = OutputAngle::from_rad(generator / 95.0).unwrap();
-            let centre = (torque / 3e4 * COUNTS) as i32 + self.applied.mean_counts;
+            let centre = ((torque / 3e4 * COUNTS) as i32).saturating_add(self.applied.mean_counts);
             let half = ((HALF_RAD * COUNTS) as i32 + self.applied.half_width_counts).max(0);
             let error = self.play.update(nominal, Some((centre, half)));
             let estimated = nominal.offset_counts(error as i64);
@@ -765,7 +765,7 @@ mod tests {
             };
             self.missed = truth - estimated.to_rad();
             let noise = 2e-6 * self.noise.next();
-            let measured = off.map(|off| OutputAngle::from_rad(truth + noise + off).unwrap());
+            let measured = off.map(|off| OutputAngle::from_rad(truth + noise + off).unwrap_or_default());
             let seen = Seen {
                 generator: Some(angle),
                 torque_n_m: torque as f32,

@@ -104,8 +104,11 @@ mod adapt;
 mod angle;
 #[cfg(feature = "c-api")]
 mod c_api;
+#[cfg(feature = "defmt")]
+mod defmt_impls;
 mod drive;
 mod error;
+mod events;
 #[cfg(test)]
 mod fixture;
 pub mod grid;
@@ -118,6 +121,7 @@ mod runtime;
 mod slip;
 mod store;
 mod table;
+mod telemetry;
 mod upload;
 mod windup;
 
@@ -128,18 +132,26 @@ pub use adapt::{
 pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};
 pub use error::{DriveError, Field, ImageError};
+pub use events::{Event, Events, Watch};
 pub use hysteresis::{Direction, PlayState, SAVED_STATE_BYTES};
 pub use image::{
     FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance, TEXT_BYTES,
     TableData, WriteError, image_bytes, write_image,
 };
 pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, Prediction};
-pub use predictor::{Ahead, Inertias, Measured, Noise, PREDICTOR_PARTS, Predictor, PredictorError, PredictorState};
+pub use predictor::{
+    Ahead, Disturbance, Inertias, Measured, Noise, Now, OutputAhead, PREDICTOR_PARTS, Predictor, PredictorError,
+    PredictorState,
+};
 pub use runtime::{
     Adjustment, Flags, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, RateGroup,
     SAVED_JOINT_BYTES, SettingError,
 };
-pub use slip::{Slip, SlipBank, SlipElement, SlipState};
+pub use slip::{
+    FittedSlip, LoadTorque, NominalOutput, Slip, SlipBank, SlipElement, SlipState, SlipVariable, TorqueSlipElement,
+    saved_slip_bytes,
+};
 pub use store::{ActivateError, Counters, Health, Images, STORE_WORDS, Store, mend_page};
 pub use table::{Bounds, GeneratorKind, OperatingPoint, Quality, Table, TableId};
+pub use telemetry::{Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Writer};
 pub use upload::{Upload, UploadError};

@@ -8,7 +8,9 @@
 use core::hint::black_box;
 
 use cortex_m_rt::entry;
-use flexspline::{Images, JointState, Measured, Mode, PlayState, Predictor, PredictorState, RateGroup, Store};
+use flexspline::{
+    Disturbance, Images, JointState, Measured, Mode, PlayState, Predictor, PredictorState, RateGroup, Store,
+};
 use flexspline_firmware::trajectory::{JOINT, Trajectory};
 use flexspline_firmware::{PREDICTOR, TABLES, finish};
 
@@ -42,7 +44,8 @@ fn main() -> ! {
     }
     #[cfg(feature = "deliberate-panic")]
     assert!(held_back < TICKS);
-    let ahead = predictor.ahead(&inertias, 12.0, 10, [1e-6, 1e-4, 1e-3, 0.1], 1.0);
+    let off = Disturbance { torque_n_m: 1.0, ..Disturbance::default() };
+    let ahead = predictor.ahead(&inertias, 12.0, 10, [1e-6, 1e-4, 1e-3, 0.1], &off);
     let known = ahead.load_rad.is_finite() & (state.play() != &PlayState::unknown());
     finish(known & (held_back > 0) & (store.counters().words_skipped == 0))
 }
