@@ -58,6 +58,83 @@
 //! images be checked ([`Store::check_images`]). Where no loop runs, as on the host, [`Table`] alone answers: [`Table::forward`],
 //! [`Table::inverse`].
 //!
+//! # Beside the table
+//! What the drive does beyond its table goes into the [`Adjustment`] of the next tick, from whatever knows of it.
+//!
+//! An encoder at the output, or a star or beacon now and then, teaches a few coefficients ([`Adapter`]):
+//! ```
+//! use flexspline::*;
+//!
+//! let mean = Coefficient { term: Term::Mean, limit: 2e-4, initial_std: 1e-4 };
+//! let half = Coefficient { term: Term::HalfWidth, limit: 5e-5, initial_std: 2e-5 };
+//! let adapter = Adapter::new(&AdaptSettings {
+//!     coefficients: [mean, half], noise_rad: 2e-6, memory_measurements: 1e4, gate: 5.0, settle_rad: 1e-5, torque_limit_n_m: 0.0,
+//! })?;
+//! let mut learnt = adapter.start();
+//! learnt.set_learning(Learning::On);
+//! // Each tick, after `Joint::tick` gave `output`; `applied` is the adjustment that was in force in it.
+//! let mut after_tick = |output: &Output, play: &PlayState, generator, torque_n_m, applied, measured| {
+//!     let seen = Seen { generator: Some(generator), torque_n_m, applied, play, output, measured };
+//!     adapter.update(&mut learnt, &seen).adjustment
+//! };
+//! # let output = Output { command: GeneratorAngle::ZERO, output: OutputAngle::ZERO, transmission_error_rad: 0.0, uncertainty_rad: 0.0,
+//! #     correction_rad: 0.0, held_back_rad: 0.0, quality: Quality::InRange, flags: Flags::default() };
+//! # let next = after_tick(&output, &PlayState::unknown(), GeneratorAngle::ZERO, 0.0, Adjustment::default(), Some(OutputAngle::ZERO.offset_rad(5e-4)));
+//! # assert!(next.mean_counts > 0);
+//! # Ok::<(), AdaptError>(())
+//! ```
+//! Elastic hysteresis, as springs that slip ([`SlipBank`]), over the nominal output or over the torque:
+//! ```
+//! use flexspline::*;
+//!
+//! let spring = |width_n_m, gain_rad_per_n_m| TorqueSlipElement { width_n_m, gain_rad_per_n_m };
+//! let bank = SlipBank::of_torque([spring(2.0, 4e-6), spring(10.0, 1.5e-6)]).ok_or("widths")?;
+//! let mut springs = SlipState::unknown();
+//! for torque_n_m in [0.0, 30.0, 5.0] {
+//!     let slip = bank.update(&mut springs, torque_n_m);
+//!     let _adjustment = slip.added_to(Adjustment::default());
+//! }
+//! assert!(springs.is_known());
+//! # Ok::<(), &str>(())
+//! ```
+//! Where the output will be some ticks from now, with the table as the output map of two inertias ([`Predictor`]):
+//! ```
+//! use flexspline::*;
+//!
+//! fn in_ten_ticks(joint: &Joint, store: &Store, predictor: &Predictor, state: &PredictorState, now: &Now) -> OutputAhead {
+//!     let off = Disturbance { torque_n_m: 0.5, load_change_n_m: 0.05, ..Disturbance::default() };
+//!     let state_bound = [2e-6, 1e-4, 1e-3, 0.5]; // from `Predictor::state_bound`, once
+//!     let ahead = predictor.ahead(state, 12.0, 10, state_bound, &off);
+//!     predictor.output_ahead(joint, store, state, &ahead, now)
+//! }
+//! let inertias = Inertias { motor_kg_m2: 1.0, load_kg_m2: 3.0, stiffness_n_m_per_rad: 3e4, damping_n_m_s_per_rad: 20.0 };
+//! let noise = Noise { torque_n_m: 0.5, load_change_n_m: 0.2, speed_rad_s: 1e-4, twist_rad: None };
+//! let predictor = Predictor::new(inertias, noise, 1e-3)?;
+//! # let _ = (predictor, in_ten_ticks);
+//! # Ok::<(), PredictorError>(())
+//! ```
+//! Records for the ground, and what changed ([`Recorder`], [`Watch`]):
+//! ```
+//! use flexspline::*;
+//!
+//! let mut recorder = Recorder::new(Ring::<64>::new(), RateGroup::new(100, 0).ok_or("rate group")?);
+//! let mut watch = Watch::new();
+//! let mut after_tick = |tick, state: &JointState, store: &Store, output: &Output| {
+//!     recorder.record(tick, state, store, output);
+//!     let events = watch.see(state, store, output); // with the feature `defmt`: events.log(tick)
+//!     for _event in events.iter() {}
+//! };
+//! # let output = Output { command: GeneratorAngle::ZERO, output: OutputAngle::ZERO, transmission_error_rad: 0.0, uncertainty_rad: 0.0,
+//! #     correction_rad: 0.0, held_back_rad: 0.0, quality: Quality::InRange, flags: Flags::default() };
+//! # after_tick(0, &JointState::new(), &Store::new(), &output);
+//! // When there is time: bytes for the ground.
+//! while let Some(record) = recorder.sink().take() {
+//!     let bytes: [u8; RECORD_BYTES] = record.encode();
+//!     assert_eq!(Record::decode(&bytes), Ok(record));
+//! }
+//! # Ok::<(), &str>(())
+//! ```
+//!
 //! # Promises
 //! * No heap, no panic, no `unsafe`: what flies links with a panic handler that cannot be linked.
 //! * [`Joint::tick`] takes the same number of instructions in every tick with the same table (unless a glitch was believed or
@@ -82,7 +159,7 @@
 //!   output turns forward, −1 where backward) as in the play; with the circular spline fixed the generator turns against it.
 //!
 //! # Not in here
-//! Elastic oscillation and rate-dependent friction: the table is quasi-static.
+//! Rate-dependent friction. The table is quasi-static; elastic oscillation is the [`Predictor`]'s.
 #![no_std]
 #![cfg_attr(not(feature = "c-api"), forbid(unsafe_code))]
 #![cfg_attr(feature = "c-api", deny(unsafe_code))]
