@@ -25,7 +25,7 @@
 //!
 //! /// Every millisecond: what to command so that the output comes to `target`.
 //! fn tick(images: &Images, store: &mut Store, state: &mut JointState, measured: GeneratorAngle, target: OutputAngle) -> GeneratorAngle {
-//!     let input = Input { generator: Some(measured), target, torque_n_m: 12.0, missed_ticks: 0 };
+//!     let input = Input { generator: Some(measured), target, torque_n_m: 12.0, missed_ticks: 0, adjustment: Adjustment::default() };
 //!     JOINT.tick(images, store, state, &input).command
 //! }
 //! # let data = TableData {
@@ -131,8 +131,8 @@ pub use image::{
 pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, Prediction};
 pub use predictor::{Ahead, Inertias, Measured, Noise, PREDICTOR_PARTS, Predictor, PredictorError, PredictorState};
 pub use runtime::{
-    Flags, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, RateGroup, SAVED_JOINT_BYTES,
-    SettingError,
+    Adjustment, Flags, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, RateGroup,
+    SAVED_JOINT_BYTES, SettingError,
 };
 pub use slip::{Slip, SlipBank, SlipElement, SlipState};
 pub use store::{ActivateError, Counters, Health, Images, STORE_WORDS, Store, mend_page};
