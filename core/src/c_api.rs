@@ -10,8 +10,8 @@
 #![allow(unsafe_code)]
 
 use crate::{
-    ActivateError, Drive, FixedMember, Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode,
-    OutputAngle, Overrun, Quality, SAVED_JOINT_BYTES, Store,
+    ActivateError, Adjustment, Drive, FixedMember, Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits,
+    Mode, OutputAngle, Overrun, Quality, SAVED_JOINT_BYTES, Store,
 };
 use core::mem::{align_of, size_of};
 
@@ -415,6 +415,7 @@ pub extern "C" fn flexspline_tick(
             target: OutputAngle::from_counts(input.target_counts),
             torque_n_m: input.torque_n_m,
             missed_ticks: input.missed_ticks,
+            adjustment: Adjustment::default(),
         };
         let found = joint.tick(&images(table)?, store, state, &input);
         let given = FlexsplineOutput {
@@ -527,6 +528,7 @@ mod tests {
             target: OutputAngle::from_counts(11_000_000),
             torque_n_m: 5.0,
             missed_ticks: 0,
+            adjustment: Adjustment::default(),
         };
         let expected = joint.tick(&images, &mut store, &mut state, &input);
         assert_eq!((out.command_counts, out.output_counts), (expected.command.counts(), expected.output.counts()));

@@ -135,7 +135,7 @@ mod tests {
     use super::*;
     use crate::angle::{GeneratorAngle, OutputAngle};
     use crate::fixture;
-    use crate::runtime::{Input, Joint, Limits, Overrun};
+    use crate::runtime::{Adjustment, Input, Joint, Limits, Overrun};
     use crate::store::Images;
     use std::vec::Vec;
 

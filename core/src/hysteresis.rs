@@ -34,8 +34,10 @@ impl Direction {
     }
 }
 
-/// Largest half-width in counts, 0.05 rad: far above any play, far below overflow.
+/// Largest half-width of a table in counts, 0.05 rad.
 pub(crate) const MAX_HALF_COUNTS: i32 = 34_178_720;
+/// Largest half-width of a play in counts, 0.2 rad: far above any table with what may be added to it, far below overflow.
+const MAX_PLAY_COUNTS: i32 = 1 << 27;
 
 /// Where the drive rests inside its play: all that must survive a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -157,12 +159,12 @@ impl PlayState {
     /// Without either (they could not be computed) it follows the motion with the half-width and error of the last update; before
     /// the first with a half-width that is wider than any.
     pub(crate) const fn update(&mut self, nominal: OutputAngle, play: Option<(i32, i32)>) -> i32 {
-        let last = if self.half < 0 { MAX_HALF_COUNTS } else { self.half };
+        let last = if self.half < 0 { MAX_PLAY_COUNTS } else { self.half };
         let (centre, half) = match play {
             Some((centre, half)) => (centre, half),
             None => (0, last),
         };
-        let half = if half > MAX_HALF_COUNTS { MAX_HALF_COUNTS } else { half };
+        let half = if half > MAX_PLAY_COUNTS { MAX_PLAY_COUNTS } else { half };
         let half = if half < 0 { 0 } else { half };
         self.update_counts(nominal, half);
         let error = centre.wrapping_add(self.offset_counts());
@@ -215,7 +217,7 @@ impl PlayState {
             half: i32::from_le_bytes(*half),
         };
         let intact = u32::from_le_bytes(*crc) == crc32(bytes.first_chunk::<SAVED_BEFORE_CRC>()?);
-        let started = (0..=MAX_HALF_COUNTS).contains(&state.half)
+        let started = (0..=MAX_PLAY_COUNTS).contains(&state.half)
             && state.lower >= state.half.wrapping_neg()
             && state.upper <= state.half;
         let fresh = state.half == -1 && (state.lower == i32::MIN || state.lower == i32::MAX);
@@ -295,7 +297,7 @@ mod tests {
             let mut state = PlayState::unknown();
             let _ = state.update(OutputAngle::ZERO, Some((0, half)));
             let _ = state.update(OutputAngle::from_counts(i64::MIN), Some((0, half)));
-            assert!((0..=MAX_HALF_COUNTS).contains(&state.half), "{half}");
+            assert!((0..=MAX_PLAY_COUNTS).contains(&state.half), "{half}");
             assert!(-state.half <= state.lower && state.lower <= state.upper && state.upper <= state.half);
         }
     }

@@ -868,6 +868,21 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
+    /// How far the ripple takes the half-width of the play below H at most, counts, rounded up.
+    pub(crate) fn play_ripple_counts(&self) -> i32 {
+        let layout = Layout::new(self.torque_nodes, self.temperature_nodes, self.ripple.len(), [0; 3]);
+        let [_, first] = table::halves(word_at(self.words, word::CELL_WIDTH.saturating_add(3)));
+        let words = layout.record.saturating_mul(self.torque_nodes).saturating_mul(self.temperature_nodes);
+        let records = self.words.get(first..first.saturating_add(words)).unwrap_or_default();
+        let narrowest = records.iter().map(|&bytes| {
+            let word = u32::from_le_bytes(bytes);
+            (word as i16 as i32).saturating_sub((word as i32 >> 16) as i16 as i32)
+        });
+        let unit = word_at(self.words, word::RIPPLE_UNIT) as f64 / UNITS_PER_COUNT;
+        // Two counts for the rounding of the ripple.
+        (narrowest.fold(0, i32::max) as f64 * 0.5 * unit) as i32 + if self.ripple.is_empty() { 0 } else { 2 }
+    }
+
     fn header(&self) -> Header<'a> {
         Header(self.image.first_chunk().unwrap_or(&[0; HEADER_BYTES]))
     }

@@ -25,7 +25,7 @@
 //!
 //! /// Every millisecond: what to command so that the output comes to `target`.
 //! fn tick(images: &Images, store: &mut Store, state: &mut JointState, measured: GeneratorAngle, target: OutputAngle) -> GeneratorAngle {
-//!     let input = Input { generator: Some(measured), target, torque_n_m: 12.0, missed_ticks: 0 };
+//!     let input = Input { generator: Some(measured), target, torque_n_m: 12.0, missed_ticks: 0, adjustment: Adjustment::default() };
 //!     JOINT.tick(images, store, state, &input).command
 //! }
 //! # let data = TableData {
@@ -72,14 +72,14 @@
 //! })?;
 //! let mut learnt = adapter.start();
 //! learnt.set_learning(Learning::On);
-//! // Each tick, after `Joint::tick` gave `output`; `applied` is the adjustment that was in force in it.
-//! let mut after_tick = |output: &Output, play: &PlayState, generator, torque_n_m, applied, measured| {
-//!     let seen = Seen { generator: Some(generator), torque_n_m, applied, play, output, measured };
-//!     adapter.update(&mut learnt, &seen).adjustment
+//! // Each tick, after `Joint::tick`: the adjustment for the input of the next.
+//! let mut after_tick = |input: &Input, output: &Output, play: &PlayState, measured: Option<OutputAngle>| {
+//!     adapter.update(&mut learnt, &Seen { input, output, play, measured }).adjustment
 //! };
 //! # let output = Output { command: GeneratorAngle::ZERO, output: OutputAngle::ZERO, transmission_error_rad: 0.0, uncertainty_rad: 0.0,
 //! #     correction_rad: 0.0, held_back_rad: 0.0, quality: Quality::InRange, flags: Flags::default() };
-//! # let next = after_tick(&output, &PlayState::unknown(), GeneratorAngle::ZERO, 0.0, Adjustment::default(), Some(OutputAngle::ZERO.offset_rad(5e-4)));
+//! # let input = Input { generator: Some(GeneratorAngle::ZERO), target: OutputAngle::ZERO, torque_n_m: 0.0, missed_ticks: 0, adjustment: Adjustment::default() };
+//! # let next = after_tick(&input, &output, &PlayState::unknown(), Some(OutputAngle::ZERO.offset_rad(5e-4)));
 //! # assert!(next.mean_counts > 0);
 //! # Ok::<(), AdaptError>(())
 //! ```

@@ -158,7 +158,8 @@ pub struct Joint {
 /// What is added to the table in one tick: what a friction model, or what was learnt on board, knows beyond it.
 ///
 /// Counts of 2⁻³² output turn. Each is taken within ±[`Adjustment::MAX_RAD`]. The half-width never falls below zero anywhere on the
-/// tooth pitch: what would take it there is taken only that far.
+/// tooth pitch: what would take it there is taken only that far. The error that a table may give ([`Table::error_limit_rad`]
+/// (crate::Table::error_limit_rad)) is widened by the magnitude of both, to 0.098 rad at most; beyond that nothing is corrected.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Adjustment {
     /// Added to the mean error (actual less nominal).
@@ -200,6 +201,8 @@ pub struct Input {
     pub torque_n_m: f32,
     /// Ticks that were missed since the last call.
     pub missed_ticks: u16,
+    /// Added to the table in this tick; `Adjustment::default()` for none.
+    pub adjustment: Adjustment,
 }
 
 /// What happened in a tick; a set of the constants.
@@ -455,7 +458,8 @@ impl Joint {
     /// Instructions are counted by `tests/firmware`; the same number in every tick with the same table.
     #[must_use]
     pub fn tick(&self, images: &Images<'_>, store: &mut Store, state: &mut JointState, input: &Input) -> Output {
-        let point = store.locate(input.torque_n_m);
+        let Adjustment { mean_counts, half_width_counts } = input.adjustment;
+        let point = store.locate(input.torque_n_m).adjusted(bounded(mean_counts), bounded(half_width_counts));
         let (generator, sample_flags, doubted) = self.judge(state, input);
         let torn = (state.play.nominal_or_zero() != state.nominal) | !state.play.is_ordered();
         if torn | doubted {
@@ -612,7 +616,13 @@ mod tests {
 
         fn input(&self, target_rad: f64) -> Input {
             let target = OutputAngle::from_rad(target_rad).unwrap();
-            Input { generator: Some(self.generator), target, torque_n_m: 5.0, missed_ticks: 0 }
+            Input {
+                generator: Some(self.generator),
+                target,
+                torque_n_m: 5.0,
+                missed_ticks: 0,
+                adjustment: Adjustment::default(),
+            }
         }
 
         /// One tick; no correction may jump.
@@ -830,6 +840,77 @@ mod tests {
     }
 
     #[test]
+    fn an_adjustment_is_added_to_estimate_and_command_alike() {
+        let adjusted = Adjustment::from_rad(3e-5, 1.0e-5);
+        let mut runs = [Adjustment::default(), adjusted].map(|adjustment| {
+            let mut run = Loop::new(Overrun::SkipAndCount);
+            let mut last = None;
+            for i in 0..900 {
+                // Forward, then backward.
+                let place = if i < 450 { i } else { 900 - i };
+                let input = Input { adjustment, ..run.input(1e-3 + 1e-5 * place as f64) };
+                let out = run.tick(&input);
+                if let Some(target) = last.filter(|_| i % 450 > 400) {
+                    // Where the last command was meant to bring the output.
+                    assert!(out.output.minus_rad(target).abs() < 4.0 * COUNT, "{i}");
+                }
+                run.generator = out.command;
+                last = Some(input.target);
+            }
+            run
+        });
+        // Backward to 0.095, forward to 0.195.
+        for (path, expected) in [([0.2, 0.095], 3e-5 + 1e-5), ([0.095, 0.195], 3e-5 - 1e-5)] {
+            let error = |run: &mut Loop, adjustment| {
+                let [_, error] = path.map(|rad| {
+                    let generator = GeneratorAngle::from_rad(rad);
+                    run.tick(&Input { generator, adjustment, ..run.input(1e-3) }).transmission_error_rad
+                });
+                error
+            };
+            let [plain, run] = &mut runs;
+            let gained = error(run, adjusted) - error(plain, Adjustment::default());
+            assert!((gained - expected).abs() < 4.0 * COUNT, "{path:?}: {gained:e}");
+        }
+    }
+
+    #[test]
+    fn adjustments_are_bounded_and_never_turn_the_play_inside_out() {
+        let most = Adjustment::MAX_COUNTS;
+        assert_eq!(
+            Adjustment::from_rad(f32::NAN, f32::NEG_INFINITY),
+            Adjustment { mean_counts: 0, half_width_counts: -most }
+        );
+        assert_eq!(Adjustment::from_rad(1e-6, 0.06), Adjustment { mean_counts: 684, half_width_counts: most });
+        let tick = |adjustment| {
+            let mut run = Loop::new(Overrun::SkipAndCount);
+            run.run(300, 1e-3, 1e-5);
+            let at = run.generator.offset_rad(1e-3);
+            let out = run.tick(&Input { adjustment, generator: Some(at), ..run.input(4e-3) });
+            (out, run)
+        };
+        let closed = |counts| Adjustment { mean_counts: 0, half_width_counts: counts };
+        for (wild, bounded) in [(i32::MIN, -most), (i32::MAX, most)] {
+            assert_eq!(tick(closed(wild)).0, tick(closed(bounded)).0);
+            let mean = |counts| Adjustment { mean_counts: counts, half_width_counts: 0 };
+            let (found, same) = (tick(mean(wild)).0, tick(mean(bounded)).0);
+            assert_eq!(found, same);
+            assert!(found.quality == Quality::InRange && found.transmission_error_rad.abs() > 0.049);
+        }
+        // No play is left but what the ripple needs, 0.1″, and forward and backward differ by no more.
+        let (out, run) = tick(closed(-most));
+        assert_eq!(out.quality, Quality::InRange);
+        let back = Input { generator: Some(run.generator), adjustment: closed(-most), ..run.input(4e-3) };
+        let (mut there, mut run) = (out.transmission_error_rad as f64, run);
+        for input in [back, Input { generator: Some(run.generator.offset_rad(1e-3)), ..back }] {
+            let now = run.tick(&input).transmission_error_rad as f64;
+            assert!((now - there).abs() < 0.6 * ARCSEC, "{}", (now - there) / ARCSEC);
+            there = now;
+        }
+        assert!(run.tick(&back).uncertainty_rad == 0.0);
+    }
+
+    #[test]
     fn rate_groups_run_when_they_are_due() {
         let group = RateGroup::new(10, 3).unwrap();
         assert!((0..100).filter(|&tick| group.is_due(tick)).eq((0..10).map(|i| 10 * i + 3)));
@@ -851,16 +932,22 @@ mod tests {
         #[test]
         fn any_input_keeps_the_limits(
             inputs in prop::collection::vec((any::<bool>(), -2e-3f64..2e-3, -0.1f64..0.1, any::<f32>(), 0u16..3), 1..200),
-            policy in 0u8..3,
+            policy in 0u8..3, adjusted in any::<bool>(), mean_counts in any::<i32>(), half_width_counts in any::<i32>(),
         ) {
             let policies = [Overrun::SkipAndCount, Overrun::HoldLast, Overrun::FadeOut { ticks: 7 }];
             let mut run = Loop::new(policies[policy as usize]);
             for (present, target, moved, torque, missed) in inputs {
                 run.generator = run.generator.offset_rad(moved as f32);
                 let sample = present.then_some(run.generator);
-                let input = Input { generator: sample, torque_n_m: torque, missed_ticks: missed / 2, ..run.input(target) };
+                let (adjustment, most) = if adjusted {
+                    (Adjustment { mean_counts, half_width_counts }, 0.13)
+                } else {
+                    (Adjustment::default(), 0.03)
+                };
+                let missed_ticks = missed / 2;
+                let input = Input { generator: sample, torque_n_m: torque, missed_ticks, adjustment, ..run.input(target) };
                 let out = run.tick(&input);
-                prop_assert!(out.correction_rad.abs() <= 0.03);
+                prop_assert!(out.correction_rad.abs() <= most);
                 prop_assert!(out.uncertainty_rad.is_finite() && out.transmission_error_rad.is_finite());
             }
         }

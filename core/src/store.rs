@@ -154,9 +154,11 @@ impl Source {
     /// Of what a step uses.
     #[inline(always)]
     fn step_sum(&self) -> u32 {
-        let Plan { ripple_nodes, ripple_unit, curves, limit, iterations, hold, cell_width } = self.plan;
+        let Plan { ripple_nodes, ripple_unit, curves, limit, iterations, hold, cell_width, play_ripple } = self.plan;
         let ([a, b, c], [least, most]) = (curves, self.torque_range.map(f32::to_bits));
-        let plan = [ripple_nodes, ripple_unit, a, b, c, limit as u32, iterations, hold as u32, cell_width.to_bits()];
+        let width = cell_width.to_bits();
+        let plan =
+            [ripple_nodes, ripple_unit, a, b, c, limit as u32, iterations, hold as u32, width, play_ripple as u32];
         let own = [least, most, self.last_torque, self.records_from, self.record, self.temperature_in_range as u32];
         sum(plan).wrapping_add(sum(own))
     }
@@ -256,8 +258,16 @@ impl Store {
     /// A store without a table: every step goes without correction.
     #[must_use]
     pub const fn new() -> Self {
-        let plan =
-            Plan { ripple_nodes: 0, ripple_unit: 0, curves: [0; 3], limit: 0, iterations: 0, hold: 0, cell_width: 1.0 };
+        let plan = Plan {
+            ripple_nodes: 0,
+            ripple_unit: 0,
+            curves: [0; 3],
+            limit: 0,
+            iterations: 0,
+            hold: 0,
+            cell_width: 1.0,
+            play_ripple: 0,
+        };
         let source = Source {
             plan,
             torque_range: [0.0; 2],
@@ -545,6 +555,7 @@ impl Source {
         let mut plan = table.plan();
         // The curves follow the torque axis.
         plan.curves = plan.curves.map(|curve| curve.wrapping_sub((word::CURVES - AXIS_WORDS) as u32));
+        plan.play_ripple = table.play_ripple_counts();
         Self {
             plan,
             torque_range: [number(word::TORQUE_RANGE), number(word::TORQUE_RANGE.wrapping_add(1))],
@@ -575,7 +586,8 @@ mod tests {
     use super::*;
     use crate::fixture::{self, ARCSEC};
     use crate::{
-        Flags, GeneratorAngle, Input, Joint, JointState, Limits, Mode, Output, OutputAngle, Overrun, PlayState, Quality,
+        Adjustment, Flags, GeneratorAngle, Input, Joint, JointState, Limits, Mode, Output, OutputAngle, Overrun,
+        PlayState, Quality,
     };
     use std::sync::LazyLock;
     use std::vec::Vec;
@@ -653,7 +665,13 @@ mod tests {
             }
             self.generator = self.generator.offset_rad(self.speed as f32);
             let target = fixture::drive().nominal_output(self.generator).offset_rad(1e-4 * self.mixed.part() as f32);
-            Input { generator: Some(self.generator), target, torque_n_m: self.torque, missed_ticks: 0 }
+            Input {
+                generator: Some(self.generator),
+                target,
+                torque_n_m: self.torque,
+                missed_ticks: 0,
+                adjustment: Adjustment::default(),
+            }
         }
     }
 
@@ -901,7 +919,13 @@ mod tests {
         for i in 0..20_000i32 {
             let place = if (i / 4000) % 2 == 0 { i % 4000 } else { 4000 - i % 4000 };
             let target = OutputAngle::from_rad(1e-3 + place as f64 * 1.0e-5).unwrap();
-            let input = Input { generator: Some(generator), target, torque_n_m: 5.0, missed_ticks: 0 };
+            let input = Input {
+                generator: Some(generator),
+                target,
+                torque_n_m: 5.0,
+                missed_ticks: 0,
+                adjustment: Adjustment::default(),
+            };
             let found = joint().tick(&images, &mut store, &mut state, &input);
             // The generator goes where it is told; a while after a reversal the correction has caught up.
             generator = found.command;

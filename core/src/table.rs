@@ -166,6 +166,8 @@ pub(crate) struct Plan {
     pub hold: i32,
     /// Width of a cell of the ripple's axis at the output, counts; signed like the ratio.
     pub cell_width: f32,
+    /// How far the ripple takes the half-width below H at most, counts; 0 where it is not needed.
+    pub play_ripple: i32,
 }
 
 impl Memory for Table<'_> {
@@ -197,6 +199,9 @@ pub struct Table<'a> {
     pub(crate) bounds: Bounds,
     pub(crate) inverse: InverseBound,
 }
+
+/// Largest error that a table and what is added to it may give, counts: sixteen times the difference of two such fits 32 bits.
+const MAX_LIMIT_COUNTS: i32 = (1 << 26) - 1;
 
 /// What a table can give at most, from its coefficients.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -247,6 +252,19 @@ impl OperatingPoint {
         let inside = if known & (self.jump == 0) { Quality::InRange } else { Quality::Uncertain };
         let quality = if self.in_range { inside } else { Quality::Extrapolated };
         if sane { quality } else { Quality::Disabled }
+    }
+
+    /// The point with this added to D and H, each within ±0.05 rad. H stays where the ripple can take no play below zero, or where
+    /// it is.
+    #[inline(always)]
+    pub(crate) fn adjusted(mut self, mean: i32, half_width: i32) -> Self {
+        let least = if self.half_width < self.plan.play_ripple { self.half_width } else { self.plan.play_ripple };
+        let half = self.half_width.wrapping_add(half_width);
+        self.mean = self.mean.wrapping_add(mean);
+        self.half_width = if half > least { half } else { least };
+        let limit = self.plan.limit.wrapping_add(mean.wrapping_abs()).wrapping_add(half_width.wrapping_abs());
+        self.plan.limit = if limit < MAX_LIMIT_COUNTS { limit } else { MAX_LIMIT_COUNTS };
+        self
     }
 
     /// Iterations of an inverse; whatever the memory that holds the table says, no more than the most allowed.
@@ -594,6 +612,7 @@ impl<'a> Table<'a> {
             iterations: at(first.wrapping_add(8)),
             hold: at(first.wrapping_add(9)) as i32,
             cell_width: f32::from_bits(at(first)),
+            play_ripple: 0,
         }
     }
 

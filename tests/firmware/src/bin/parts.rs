@@ -88,14 +88,8 @@ fn run(counter: &Counter) -> Option<[Range; 5]> {
         let output = JOINT.tick(&images, &mut store, &mut state, &input);
         trajectory.saw(&output);
         let measured = output.output.offset_rad(5e-5 + 2e-6 * mixed.part());
-        let seen = Seen {
-            generator: input.generator,
-            torque_n_m: input.torque_n_m,
-            applied: Adjustment::default(),
-            play: state.play(),
-            output: &output,
-            measured: (tick % 2 == 0).then_some(measured),
-        };
+        let measured = (tick % 2 == 0).then_some(measured);
+        let seen = Seen { input: &input, play: state.play(), output: &output, measured };
         let before = learnt.counters().used;
         let (count, found) = counter.of(|| black_box(update(&adapter, &mut learnt, black_box(&seen))));
         adjustment = found.adjustment;
