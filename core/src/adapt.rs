@@ -346,8 +346,8 @@ impl<const N: usize> Adapter<N> {
     /// One tick: follows the play, learns from the measurement if there is one, and tells what to add in the next tick.
     ///
     /// Call it every tick, in order, also without a measurement. Nothing that comes in can make the adjustment exceed the limits
-    /// or be undefined. No search, no loop that depends on data: a tick without measurement costs less than one with, and neither
-    /// depends on the values (`tests/firmware` counts both).
+    /// or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement that is used takes 1573
+    /// instructions for five coefficients, whatever the values, and one without at most 445 (counted by `tests/firmware`).
     pub fn update(&self, state: &mut AdaptState<N>, seen: &Seen<'_>) -> Adapted {
         let contact = self.follow(state, seen.play);
         let generator = seen.input.generator.unwrap_or(state.generator);
@@ -454,7 +454,8 @@ impl<const N: usize> Adapter<N> {
         let noise = 1.0 + open * open;
         let (seen_as, expected) = (transform(&state.u, &row), state.d);
         let spread = noise + seen_as.iter().zip(expected).map(|(f, d)| d * f * f).sum::<f32>();
-        if !(excess * excess <= self.gate * spread) {
+        let plausible = excess * excess <= self.gate * spread;
+        if !plausible {
             return Verdict::Outlier;
         }
         let wander = row.map(|h| h * self.forget / strength);

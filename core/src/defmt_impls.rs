@@ -14,11 +14,11 @@ use defmt::{Format, Formatter, write};
 
 /// Enums whose variants hold nothing, by name.
 macro_rules! by_name {
-    ($($name:ident { $($variant:ident),* $(,)? })*) => {$(
+    ($($name:ident { $($variant:ident $text:tt),* $(,)? })*) => {$(
         impl Format for $name {
             fn format(&self, f: Formatter<'_>) {
                 match self {
-                    $(Self::$variant => write!(f, stringify!($variant)),)*
+                    $(Self::$variant => write!(f, $text),)*
                 }
             }
         }
@@ -26,16 +26,16 @@ macro_rules! by_name {
 }
 
 by_name! {
-    Quality { InRange, Uncertain, Extrapolated, Disabled }
-    Mode { Off, Tracking, Hold, Safe }
-    Health { Sound, OneImage, Lost, Empty }
-    Direction { Forward, Backward }
-    FixedMember { Flexspline, CircularSpline }
-    GeneratorKind { Other, TwoRoller, FourRoller, DoubleDisc, Cam }
+    Quality { InRange "in range", Uncertain "uncertain", Extrapolated "extrapolated", Disabled "disabled" }
+    Mode { Off "off", Tracking "tracking", Hold "hold", Safe "safe" }
+    Health { Sound "sound", OneImage "one image", Lost "lost", Empty "empty" }
+    Direction { Forward "forward", Backward "backward" }
+    FixedMember { Flexspline "flexspline", CircularSpline "circular spline" }
+    GeneratorKind { Other "other", TwoRoller "two roller", FourRoller "four roller", DoubleDisc "double disc", Cam "cam" }
     Field {
-        ToolVersion, MeshLevel, TorqueNodes, TemperatureNodes, RippleNodes, GeneratorCurve, MaterialCurve, OutputCurve, Mean,
-        HalfWidth, MeanSlope, MeanRipple, HalfWidthRipple, SolverResidual, ProjectionWorst, ProjectionRms, TorqueRange,
-        TemperatureRange, ErrorLimit,
+        ToolVersion "tool version", MeshLevel "mesh level", TorqueNodes "torque nodes", TemperatureNodes "temperature nodes", RippleNodes "ripple nodes", GeneratorCurve "generator curve", MaterialCurve "material curve", OutputCurve "output curve", Mean "mean",
+        HalfWidth "half width", MeanSlope "mean slope", MeanRipple "mean ripple", HalfWidthRipple "half width ripple", SolverResidual "solver residual", ProjectionWorst "projection worst", ProjectionRms "projection rms", TorqueRange "torque range",
+        TemperatureRange "temperature range", ErrorLimit "error limit",
     }
 }
 

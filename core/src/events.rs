@@ -155,8 +155,13 @@ mod tests {
         let joint = Joint::new(fixture::drive(), limits, Overrun::SkipAndCount).unwrap();
         let (mut store, mut state, mut watch) = (Store::new(), JointState::new(), Watch::new());
         let mut tick = |store: &mut Store, state: &mut JointState, torque_n_m, missed_ticks| {
-            let input =
-                Input { generator: Some(GeneratorAngle::ZERO), target: OutputAngle::ZERO, torque_n_m, missed_ticks };
+            let input = Input {
+                generator: Some(GeneratorAngle::ZERO),
+                target: OutputAngle::ZERO,
+                torque_n_m,
+                missed_ticks,
+                adjustment: Adjustment::default(),
+            };
             let output = joint.tick(&images, store, state, &input);
             watch.see(state, store, &output).iter().collect::<Vec<_>>()
         };

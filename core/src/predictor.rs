@@ -333,13 +333,10 @@ impl Predictor {
         if !(stiffness > 0.0 && stiffness < 1e12) {
             return Err(PredictorError::Setting { name: "stiffness_n_m_per_rad", found: stiffness });
         }
-        for (name, mut numbers) in [("b", predictor.b.iter()), ("turn", predictor.turn.iter())] {
-            if let Some(bad) = numbers.find(|value| !value.is_finite()) {
-                return Err(PredictorError::Setting { name, found: *bad as f64 });
-            }
-        }
-        if !predictor.turn_push.is_finite() {
-            return Err(PredictorError::Setting { name: "turn", found: predictor.turn_push as f64 });
+        let pushes = predictor.b.iter().map(|value| ("b", *value));
+        let turns = predictor.turn.iter().chain([&predictor.turn_push]).map(|value| ("turn", *value));
+        if let Some((name, bad)) = pushes.chain(turns).find(|(_, value)| !value.is_finite()) {
+            return Err(PredictorError::Setting { name, found: bad as f64 });
         }
         predictor.check()
     }
@@ -418,19 +415,18 @@ impl Predictor {
         // Rows: load, motor and twist then, as they follow from a state so many ticks before.
         let twist_now = RowVector4::new(1.0, 0.0, 0.0, 0.0);
         let (mut load, mut twist) = (RowVector4::zeros(), twist_now);
-        let (mut pushed, mut turned) = (Vector2::zeros(), 0.0);
-        let mut twist_pushed = 0.0;
+        let (mut load_pushed, mut motor_pushed, mut twist_pushed, mut turned) = (0.0f32, 0.0f32, 0.0f32, 0.0f32);
         // The farthest to both sides, and when.
         let (mut most, mut least) = ((0.0, 0u16), (0.0, 0u16));
         for tick in 1..=ticks {
             // What disturbs in the first of the remaining ticks.
-            let by_torque =
-                Vector2::new(load.dot(&self.b.transpose()) + self.turn_push, twist.dot(&self.b.transpose()));
-            let motor_by_torque = by_torque.x - by_torque.y;
+            let load_by_torque = load.transpose().dot(&self.b) + self.turn_push;
+            let twist_by_torque = twist.transpose().dot(&self.b);
             let (load_by_load, twist_by_load) = (load.w, twist.w);
-            pushed.x += by_torque.x.abs() * torque_off + load_by_load.abs() * load_off;
-            pushed.y += motor_by_torque.abs() * torque_off + (load_by_load - twist_by_load).abs() * load_off;
-            twist_pushed += by_torque.y.abs() * torque_off + twist_by_load.abs() * load_off;
+            load_pushed += load_by_torque.abs() * torque_off + load_by_load.abs() * load_off;
+            motor_pushed +=
+                (load_by_torque - twist_by_torque).abs() * torque_off + (load_by_load - twist_by_load).abs() * load_off;
+            twist_pushed += twist_by_torque.abs() * torque_off + twist_by_load.abs() * load_off;
             load = load * self.a + self.turn;
             twist *= self.a;
             ahead.load_rad += self.turn.transpose().dot(&x) + self.turn_push * torque_n_m;
@@ -443,8 +439,8 @@ impl Predictor {
         }
         let rounding = ROUNDING * ticks as f32 * turned;
         let through = |row: RowVector4<f32>| row.abs().transpose().dot(&off);
-        ahead.bound_rad = through(load) + pushed.x + rounding;
-        ahead.motor_bound_rad = through(load - twist + twist_now) + pushed.y + rounding;
+        ahead.bound_rad = through(load) + load_pushed + rounding;
+        ahead.motor_bound_rad = through(load - twist + twist_now) + motor_pushed + rounding;
         ahead.twist_bound_rad = through(twist) + twist_pushed + ROUNDING * ticks as f32 * (x.x.abs() + start.x.abs());
         (ahead.twist_rad, ahead.twist_now_bound_rad) = (x.x, off.x);
         ahead.turning_rad = if most.1 < least.1 { [most.0, least.0] } else { [least.0, most.0] };
