@@ -165,7 +165,7 @@ mod tests {
             let output = joint.tick(&images, store, state, &input);
             watch.see(state, store, &output).iter().collect::<Vec<_>>()
         };
-        assert_eq!(tick(&mut store, &mut state, 5.0, 0), [Event::Fallback]);
+        assert_eq!(tick(&mut store, &mut state, 5.0, 0), [Event::TableDoubt, Event::Fallback]);
         assert_eq!(tick(&mut store, &mut state, 5.0, 0), []);
         store.activate(&images, &fixture::drive(), 20.0).unwrap();
         state.request(Mode::Tracking).unwrap();

@@ -710,7 +710,7 @@ mod tests {
         }
     }
 
-    /// A thousand drawn runs, with the motor's encoder alone and with one at the output: the output is where it was said to be, within
+    /// Twelve hundred drawn runs, half with the motor's encoder alone, half with one at the output: the output is where it was said to be, within
     /// the bound, and the bound is not empty.
     #[test]
     fn the_output_is_where_it_was_predicted() {
@@ -734,7 +734,7 @@ mod tests {
             let noise = if with_encoder { NOISE } else { Noise { twist_rad: None, ..NOISE } };
             let predictor = Predictor::new(INERTIAS, noise, TICK_S).unwrap();
             let state_bound = predictor.state_bound(&off);
-            for seed in 0..1000 {
+            for seed in 0..600 {
                 let mut mixed = Mixed(seed * 2 + with_encoder as u64);
                 mixed.part();
                 let mut load = -15.0 + 5.0 * mixed.part();
@@ -795,7 +795,7 @@ mod tests {
             }
         }
         std::println!("{cases} cases, {outside} outside, {reversed} reversed, largest shares {shares:?}");
-        assert!(cases > 1900 && reversed > 50, "{cases} {reversed}");
+        assert!(cases > 1150 && reversed > 30, "{cases} {reversed}");
         assert!(1000 * outside <= cases, "{outside} of {cases}");
         // Not empty: some come near it, with random disturbances that hardly ever all pull one way.
         assert!(shares.iter().all(|&share| share > 0.05), "{shares:?}");
