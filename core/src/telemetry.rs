@@ -331,7 +331,7 @@ impl<const N: usize> Queue<N> {
     }
 
     /// A writer for the tick and a reader for the background; neither waits for the other.
-    pub fn split(&mut self) -> (Writer<'_>, Reader<'_>) {
+    pub fn split(&mut self) -> (Writer<'_, N>, Reader<'_, N>) {
         let (producer, consumer) = self.records.split();
         (Writer { producer }, Reader { consumer })
     }
@@ -345,11 +345,11 @@ impl<const N: usize> Sink for Queue<N> {
 }
 
 /// The end of a [`Queue`] that records go into.
-pub struct Writer<'q> {
-    producer: heapless::spsc::Producer<'q, Record>,
+pub struct Writer<'q, const N: usize> {
+    producer: heapless::spsc::Producer<'q, Record, N>,
 }
 
-impl Sink for Writer<'_> {
+impl<const N: usize> Sink for Writer<'_, N> {
     #[inline]
     fn put(&mut self, record: Record) -> bool {
         self.producer.enqueue(record).is_err()
@@ -357,11 +357,11 @@ impl Sink for Writer<'_> {
 }
 
 /// The end of a [`Queue`] that records come out of.
-pub struct Reader<'q> {
-    consumer: heapless::spsc::Consumer<'q, Record>,
+pub struct Reader<'q, const N: usize> {
+    consumer: heapless::spsc::Consumer<'q, Record, N>,
 }
 
-impl Reader<'_> {
+impl<const N: usize> Reader<'_, N> {
     /// Takes the oldest record out.
     pub fn take(&mut self) -> Option<Record> {
         self.consumer.dequeue()
