@@ -79,7 +79,6 @@ fn run(counter: &Counter) -> Option<[Range; 5]> {
     state.request(Mode::Tracking).ok()?;
     let (mut trajectory, mut mixed) = (Trajectory::new(1), Mixed(5));
     let mut ranges = [Range::default(); 5];
-    let mut adjustment = Adjustment::default();
     let mut sum = 0u32;
     for tick in 0..INPUTS {
         let mut input = trajectory.input();
@@ -92,7 +91,7 @@ fn run(counter: &Counter) -> Option<[Range; 5]> {
         let seen = Seen { input: &input, play: state.play(), output: &output, measured };
         let before = learnt.counters().used;
         let (count, found) = counter.of(|| black_box(update(&adapter, &mut learnt, black_box(&seen))));
-        adjustment = found.adjustment;
+        let adjustment = found.adjustment;
         // Used, or nothing to use.
         if learnt.counters().used > before {
             ranges[0].add(count);
