@@ -111,6 +111,9 @@ pub mod grid;
 mod hysteresis;
 mod image;
 mod model;
+#[cfg(feature = "parts")]
+#[doc(hidden)]
+pub mod parts;
 pub mod precompute;
 mod predictor;
 mod runtime;

@@ -3,6 +3,8 @@
 //! Under `-icount shift=10` every instruction takes 1.024 µs of virtual time, and the 25 MHz SysTick of the MPS2 counts
 //! 25.6 ticks for each. (The cycle counter of the DWT reads 0 in QEMU; without `-icount` SysTick follows the wall clock.)
 
+use core::sync::atomic::{Ordering, compiler_fence};
+
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 
@@ -55,9 +57,14 @@ impl Counter {
     #[inline(always)]
     pub fn of<T>(&self, work: impl FnOnce() -> T) -> (u32, T) {
         let _ = &self.timer;
+        // Nothing of what comes before or after may be moved in between.
+        compiler_fence(Ordering::SeqCst);
         let before = SYST::get_current();
+        compiler_fence(Ordering::SeqCst);
         let given = work();
+        compiler_fence(Ordering::SeqCst);
         let after = SYST::get_current();
+        compiler_fence(Ordering::SeqCst);
         let ticks = before.wrapping_sub(after) & RELOAD;
         ((ticks * 10 + TICKS_OF_TEN / 2) / TICKS_OF_TEN - self.own, given)
     }
