@@ -104,15 +104,13 @@ macro_rules! angle {
                 self.counts.wrapping_sub(other.counts)
             }
 
-            /// `self − other` in counts, clamped to ±(2³¹ − 1): half a turn.
+            /// `self − other` in counts, clamped to ±half a turn.
             #[must_use]
-            #[inline(always)]
             pub(crate) const fn minus_small_counts(self, other: Self) -> i32 {
                 let counts = self.minus_counts(other);
                 let (high, low) = ((counts >> 32) as i32, counts as i32);
-                // All ones or all zeros above the sign of the lower half: it fits. Else the limit on its side. (The last bit is
-                // set so that compilers do not make 64-bit comparisons of it: twice the instructions.)
-                if high == low >> 31 { low } else { (high >> 31) ^ i32::MAX | 1 }
+                // All ones or all zeros above the sign of the lower half: it fits. Else the limit on its side.
+                if high == low >> 31 { low } else { (high >> 31) ^ i32::MAX }
             }
 
             /// `self − other` in radians, clamped to ±π; relative error at most 1.2e-7.
@@ -131,6 +129,18 @@ angle! {
 angle! {
     /// Angle δ of the output member relative to the fixed member of the drive.
     OutputAngle
+}
+
+impl OutputAngle {
+    /// `self − other` in counts if that is within half a turn, else a quarter turn with its sign: half the instructions of
+    /// clamping it, for what only asks whether it is far.
+    #[must_use]
+    #[inline(always)]
+    pub(crate) const fn minus_near_counts(self, other: Self) -> i32 {
+        let counts = self.minus_counts(other);
+        let (high, low) = ((counts >> 32) as i32, counts as i32);
+        if high == low >> 31 { low } else { (high >> 31) ^ (i32::MAX >> 1) }
+    }
 }
 
 #[cfg(test)]
@@ -177,6 +187,19 @@ mod tests {
         assert_eq!(OutputAngle::ZERO.offset_rad(f32::INFINITY).counts(), i32::MAX as i64);
         assert_eq!(OutputAngle::new(7, 0).minus_rad(OutputAngle::ZERO), core::f32::consts::PI);
         assert_eq!(OutputAngle::ZERO.minus_rad(OutputAngle::new(7, 0)), -core::f32::consts::PI);
+    }
+
+    #[test]
+    fn what_is_far_is_a_quarter_turn_on_its_side() {
+        let minus = |counts: i64| OutputAngle::from_counts(counts).minus_near_counts(OutputAngle::ZERO);
+        let (most, least) = (i32::MAX as i64, i32::MIN as i64);
+        for near in [0, 5, -5, most, least] {
+            assert_eq!(minus(near), near as i32);
+        }
+        for far in [most + 2, 1 << 40, i64::MAX] {
+            assert_eq!((minus(far), minus(-far)), ((1 << 30) - 1, -(1 << 30)));
+        }
+        assert_eq!(minus(least - 1), -(1 << 30));
     }
 
     proptest! {

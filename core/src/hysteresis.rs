@@ -172,7 +172,7 @@ impl PlayState {
 
     #[inline(always)]
     const fn update_counts(&mut self, nominal: OutputAngle, half: i32) {
-        let moved = nominal.minus_small_counts(self.nominal);
+        let moved = nominal.minus_near_counts(self.nominal);
         let moved = if self.half < 0 { 0 } else { moved };
         self.lower = clamped(self.lower.saturating_sub(moved), half);
         self.upper = clamped(self.upper.saturating_sub(moved), half);

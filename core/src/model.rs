@@ -207,14 +207,49 @@ impl<M: Memory> Model<'_, M> {
     #[inline(never)]
     pub fn solve(&self, point: &OperatingPoint, target: OutputAngle, backward: bool, doubt: &mut Doubt) -> (i32, bool) {
         let plan = self.memory.plan();
-        let side = if backward { -1 } else { 1 };
-        let base = point.mean.wrapping_sub(point.half_width.wrapping_mul(side));
+        // All ones backward.
+        let mask = (backward as i32).wrapping_neg();
+        let half = (point.half_width ^ !mask).wrapping_sub(!mask);
+        let base = point.mean.wrapping_add(half);
+        let error = if plan.is_simple() {
+            self.at_once(point, target, base, backward, doubt)
+        } else {
+            self.step_by_step(point, target, base, backward, doubt)
+        };
+        (error, point.allows_error(plan, error, backward))
+    }
+
+    /// With nothing but a ripple below a cell: one iteration.
+    #[inline(always)]
+    fn at_once(
+        &self,
+        point: &OperatingPoint,
+        target: OutputAngle,
+        base: i32,
+        backward: bool,
+        doubt: &mut Doubt,
+    ) -> i32 {
+        let tooth = self.drive.tooth_at_output(minus(target, base));
+        let moved = table::to_solution(self.memory, point, (tooth, 0), backward, doubt);
+        base.wrapping_sub(self.memory.plan().counts_of(moved))
+    }
+
+    /// With A, B, C, or a ripple beyond a cell, or none.
+    #[inline(never)]
+    fn step_by_step(
+        &self,
+        point: &OperatingPoint,
+        target: OutputAngle,
+        base: i32,
+        backward: bool,
+        doubt: &mut Doubt,
+    ) -> i32 {
+        let plan = self.memory.plan();
         let (mut error, mut curves) = (base, 0);
         // How far the guess is ahead of where the solution would be without ripple, 2⁻²⁴ cells: as far as the last solution was.
         let mut ahead = 0;
         // As many times for every call with this table.
-        let mut left = plan.iterations();
-        while left > 0 {
+        for _ in 0..plan.iterations() {
             let mut guess = error;
             if plan.has_curves() {
                 let before = curves;
@@ -227,11 +262,10 @@ impl<M: Memory> Model<'_, M> {
             if plan.ripple_nodes > 0 {
                 let tooth = self.drive.tooth_at_output(minus(target, guess));
                 ahead = table::to_solution(self.memory, point, (tooth, ahead), backward, doubt);
-                error = here.wrapping_sub((ahead as f32 * (plan.cell_width * (1.0 / table::CELL as f32))) as i32);
+                error = here.wrapping_sub(plan.counts_of(ahead));
             }
-            left = left.wrapping_sub(1);
         }
-        (error, point.allows_error(plan, error, side))
+        error
     }
 
     /// How far the play rests beyond the side it is taken up on at `nominal`, signed like the error: 0 if that side is reached.
@@ -247,7 +281,7 @@ impl<M: Memory> Model<'_, M> {
         let side = if backward { -1 } else { 1 };
         let there = self.drive.phases_at_output(nominal);
         let half = table::play_at(self.memory, point, there, doubt).half;
-        let beyond = state.nominal_or_zero().minus_small_counts(nominal);
+        let beyond = state.nominal_or_zero().minus_near_counts(nominal);
         let beyond = beyond.saturating_add(state.offset_counts()).saturating_add(half.wrapping_mul(side));
         let beyond = beyond.wrapping_mul(side);
         if beyond > 0 { beyond.wrapping_mul(side) } else { 0 }
@@ -269,7 +303,7 @@ pub(crate) fn departure(
     state: &PlayState,
     output: OutputAngle,
 ) -> Departure {
-    let ahead = target.minus_small_counts(output);
+    let ahead = target.minus_near_counts(output);
     let away = ahead.saturating_abs();
     let hold = away <= plan.hold;
     let unknown = state.uncertainty_counts();

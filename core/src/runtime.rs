@@ -145,9 +145,9 @@ pub struct Joint {
     drive: Drive,
     overrun: Overrun,
     /// Fine counts in a tick, and in a tick more each tick.
-    rate: f32,
-    acceleration: f32,
-    /// A quarter of its square.
+    rate: i32,
+    acceleration: i32,
+    /// A quarter of the square of the acceleration.
     quarter_square: f32,
     largest_move: i32,
     patience: u32,
@@ -277,7 +277,7 @@ pub struct JointState {
     /// What is wanted, and what of it was asked of the limiter.
     goal: i32,
     aimed: i32,
-    speed: f32,
+    speed: i32,
     /// Ticks in a row with a glitch, and without a correction.
     glitches: u32,
     uncorrected: u32,
@@ -307,7 +307,7 @@ impl JointState {
             correction: [0; 2],
             goal: 0,
             aimed: 0,
-            speed: 0.0,
+            speed: 0,
             glitches: 0,
             uncorrected: 0,
             fading: 0,
@@ -372,9 +372,9 @@ impl JointState {
         let (play, rest) = before.split_first_chunk::<SAVED_STATE_BYTES>()?;
         let (correction, speed) = rest.split_first_chunk::<4>()?;
         let correction = i32::from_le_bytes(*correction);
-        let speed = f32::from_le_bytes(*speed.first_chunk::<4>()?);
+        let speed = i32::from_le_bytes(*speed.first_chunk::<4>()?);
         let play = PlayState::restore(play)?;
-        let intact = crc32(before) == u32::from_le_bytes(*sum) && speed.is_finite();
+        let intact = crc32(before) == u32::from_le_bytes(*sum);
         let state = Self {
             play,
             nominal: play.nominal_or_zero(),
@@ -386,6 +386,12 @@ impl JointState {
         };
         intact.then_some(state)
     }
+}
+
+#[inline(always)]
+const fn within(value: i32, least: i32, most: i32) -> i32 {
+    let above = if value > least { value } else { least };
+    if above < most { above } else { most }
 }
 
 /// A positive, finite number of counts.
@@ -427,7 +433,13 @@ impl Joint {
         };
         let fade_step = if ticks == 0 { 0.0 } else { 1.0 / ticks as f32 };
         let fade = ticks as u32;
-        let quarter_square = 0.25 * acceleration * acceleration;
+        // A whole number of fine counts, no less than one and no more than asked for otherwise.
+        let most = i32::MAX as f32 / 4.0;
+        let acceleration = if acceleration < most { acceleration } else { most } as i32;
+        let acceleration = if acceleration < 1 { 1 } else { acceleration };
+        let gain = acceleration as f32;
+        let quarter_square = 0.25 * gain * gain;
+        let rate = if rate < 1.0 { 1 } else { rate as i32 };
         Ok(Self {
             drive,
             overrun,
@@ -537,7 +549,8 @@ impl Joint {
         let believed = glitches > self.patience;
         state.glitches = glitches.wrapping_mul(!believed as u32);
         let glitch = far & !believed;
-        let generator = if glitch { state.generator } else { sample };
+        let away = sample.minus_counts(state.generator) & (glitch as i64).wrapping_neg();
+        let generator = sample.offset_counts(away.wrapping_neg());
         state.generator = generator;
         state.started |= !lost;
         (generator, Flags::default().with(Flags::SAMPLE_LOST, lost).with(Flags::GLITCH, glitch), believed)
@@ -576,22 +589,21 @@ impl Joint {
         let [one, other] = state.correction;
         let nearer = goal.abs_diff(one) <= goal.abs_diff(other);
         let before = if nearer { one } else { other };
-        let pace = goal.wrapping_sub(state.aimed) as f32;
+        let pace = goal.wrapping_sub(state.aimed);
+        let lag = state.aimed.wrapping_sub(before);
         state.aimed = goal;
-        let lag = goal.wrapping_sub(before) as f32 - pace;
-        let (most, gain) = (self.rate, self.acceleration);
-        let bounded = |value: f32, limit: f32| {
-            let above = if value > -limit { value } else { -limit };
-            if above < limit { above } else { limit }
-        };
-        let away = lag.abs();
-        let stoppable = table::sqrt(self.quarter_square + (gain + gain) * away) - 0.5 * gain;
-        let stoppable = if stoppable < away { stoppable } else { away };
-        let wanted = bounded(pace + if lag < 0.0 { -stoppable } else { stoppable }, most);
-        let speed = state.speed + bounded(wanted - state.speed, gain);
-        let speed = bounded(speed, most);
+        let away = lag.unsigned_abs();
+        let gain = self.acceleration as f32;
+        let stoppable = table::sqrt(self.quarter_square + (gain + gain) * away as f32) - 0.5 * gain;
+        let stoppable = stoppable as u32;
+        let stoppable = (if stoppable < away { stoppable } else { away }) as i32;
+        let side = lag >> 31;
+        let wanted = pace.saturating_add((stoppable ^ side).wrapping_sub(side));
+        let (slower, faster) =
+            (state.speed.wrapping_sub(self.acceleration), state.speed.wrapping_add(self.acceleration));
+        let speed = within(within(wanted, slower, faster), self.rate.wrapping_neg(), self.rate);
         state.speed = speed;
-        let correction = before.wrapping_add(speed as i32);
+        let correction = before.wrapping_add(speed);
         state.correction = [correction; 2];
         (correction, one == other)
     }

@@ -125,24 +125,26 @@ pub fn mend_page(damaged: &mut [u8], good: &[u8], page: usize) {
 ///
 /// A copy holds the words of an image from the torque axis on, but nodes and records at one temperature only.
 #[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
 struct Source {
     plan: Plan,
     torque_range: [f32; 2],
-    last_torque: u32,
-    /// Words of the copies in use, and of them before the nodes and before the records.
-    used: u32,
-    nodes_from: u32,
-    records_from: u32,
-    /// Words from one record to the next.
-    record: u32,
-    /// How much further in an image nodes and records are at the lower of the two temperatures, and steps to the next.
-    nodes_ahead: u32,
-    node_plane: u32,
-    records_ahead: u32,
-    record_plane: u32,
-    /// The way from the lower temperature node to the next, 0 to 1, and whether the temperature is within the range.
+    /// The way from the lower temperature node to the next, 0 to 1.
     warm: f32,
-    temperature_in_range: bool,
+    /// The last torque interval, and whether the temperature is within the range.
+    last_torque: u16,
+    temperature_in_range: u16,
+    /// Words of the copies in use, and of them before the nodes and before the records.
+    used: u16,
+    nodes_from: u16,
+    records_from: u16,
+    /// Words from one record to the next.
+    record: u16,
+    /// How much further in an image nodes and records are at the lower of the two temperatures, and steps to the next.
+    nodes_ahead: u16,
+    records_ahead: u16,
+    node_plane: u16,
+    record_plane: u16,
 }
 
 impl Source {
@@ -168,17 +170,13 @@ impl Source {
         let own = [
             least,
             most,
-            self.last_torque,
-            self.used,
-            self.nodes_from,
-            self.records_from,
-            self.record,
-            self.nodes_ahead,
-            self.node_plane,
-            self.records_ahead,
-            self.record_plane,
             self.warm.to_bits(),
-            self.temperature_in_range as u32,
+            // Neighbours: read as one word.
+            self.last_torque as u32 | (self.temperature_in_range as u32) << 16,
+            self.used as u32 | (self.nodes_from as u32) << 16,
+            self.records_from as u32 | (self.record as u32) << 16,
+            self.nodes_ahead as u32 | (self.records_ahead as u32) << 16,
+            self.node_plane as u32 | (self.record_plane as u32) << 16,
         ];
         plan.into_iter().chain(own).fold(0x5a5a_5a5a, u32::wrapping_add)
     }
@@ -315,7 +313,7 @@ impl Store {
             records_ahead: 0,
             record_plane: 0,
             warm: 0.0,
-            temperature_in_range: false,
+            temperature_in_range: 0,
         };
         Self {
             first: Copied::EMPTY,
@@ -389,16 +387,16 @@ impl Store {
         let (cold, hot) = (node(plane), node(plane.wrapping_add(1)));
         let [node_plane, nodes] = halves(word_at(first, nodes_at));
         let [record_plane, records] = halves(word_at(first, records_at));
-        let ahead = |start: usize, step: usize, from: u32| {
-            (start.wrapping_add(plane.wrapping_mul(step)) as u32).wrapping_sub(from)
+        let ahead = |start: usize, step: usize, from: u16| {
+            (start.wrapping_add(plane.wrapping_mul(step)) as u16).wrapping_sub(from)
         };
         let source = Source {
             nodes_ahead: ahead(nodes, node_plane, self.source.nodes_from),
-            node_plane: node_plane as u32,
+            node_plane: node_plane as u16,
             records_ahead: ahead(records, record_plane, self.source.records_from),
-            record_plane: record_plane as u32,
+            record_plane: record_plane as u16,
             warm: (temperature - cold) / (hot - cold),
-            temperature_in_range: temperature == temperature_c,
+            temperature_in_range: (temperature == temperature_c) as u16,
             ..self.source
         };
         self.source = source;
@@ -466,7 +464,8 @@ impl Store {
         let around = [below, [a, b, c]];
         let first = (source.records_from as usize).wrapping_add(interval.wrapping_mul(source.record as usize));
         let rows = [first, source.record as usize, 0].map(|words: usize| words.wrapping_mul(2));
-        let marks = (table::finite(torque_n_m) & self.active, (torque == torque_n_m) & source.temperature_in_range);
+        let marks =
+            (table::finite(torque_n_m) & self.active, (torque == torque_n_m) & (source.temperature_in_range != 0));
         let mut point = OperatingPoint::new(place, around, 0.0, rows, marks, doubt);
         point.whole = changed == 0;
         point.adjusted(&source.plan, mean, half_width)
@@ -504,14 +503,14 @@ impl Store {
     fn renew(&mut self, images: &Images<'_>, whole: bool) -> Word {
         let source = &self.source;
         let at = self.next;
-        let (ahead, step, is_number) = (FIRST as u32, 0, false);
-        let is_node = at >= source.nodes_from;
+        let (ahead, step, is_number) = (FIRST as u16, 0, false);
+        let is_node = at >= source.nodes_from as u32;
         let (ahead, step, is_number) =
             if is_node { (source.nodes_ahead, source.node_plane, true) } else { (ahead, step, is_number) };
-        let is_record = at >= source.records_from;
+        let is_record = at >= source.records_from as u32;
         let (ahead, step, is_number) =
             if is_record { (source.records_ahead, source.record_plane, false) } else { (ahead, step, is_number) };
-        let cold = at.wrapping_add(ahead) as usize;
+        let cold = at.wrapping_add(ahead as u32) as usize;
         let hot = cold.wrapping_add(step as usize);
         let [cold_a, cold_b] = images.at(cold);
         let [hot_a, hot_b] = images.at(hot);
@@ -545,7 +544,7 @@ impl Store {
         self.first.set(place, new_a);
         self.second.set(place, new_b);
         let next = at.wrapping_add(1);
-        let ended = next >= source.used;
+        let ended = next >= source.used as u32;
         self.next = if ended { 0 } else { next };
         self.counters.passes = self.counters.passes.wrapping_add(ended as u32);
         let mended = if a == b { Word::Kept } else { Word::Mended };
@@ -601,11 +600,11 @@ impl Source {
         Self {
             plan,
             torque_range: [number(word::TORQUE_RANGE), number(word::TORQUE_RANGE.wrapping_add(1))],
-            last_torque: last_torque as u32,
-            used: records_from.wrapping_add(records) as u32,
-            nodes_from: nodes_from as u32,
-            records_from: records_from as u32,
-            record: record as u32,
+            last_torque: last_torque as u16,
+            used: records_from.wrapping_add(records) as u16,
+            nodes_from: nodes_from as u16,
+            records_from: records_from as u16,
+            record: record as u16,
             ..Self::default()
         }
     }
@@ -921,7 +920,7 @@ mod tests {
             |s| s.last_torque ^= 1,
             |s| s.records_from ^= 8,
             |s| s.record ^= 1,
-            |s| s.temperature_in_range ^= true,
+            |s| s.temperature_in_range ^= 1,
             |s| s.plan.ripple_nodes ^= 4,
         ];
         for (number, change) in changes.into_iter().enumerate() {

@@ -27,7 +27,6 @@
 use crate::angle::RAD_PER_COUNT;
 use crate::drive::{Drive, Phases};
 use crate::grid::{self, Cell, PeriodicAxis};
-use crate::image::ripple_row;
 use crate::windup;
 
 /// How far an answer can be trusted, worst last.
@@ -195,6 +194,24 @@ impl Plan {
         if self.iterations < most { self.iterations } else { most }
     }
 
+    /// Values of one direction in a record: [`crate::image::ripple_row`], of a number that is known to be small.
+    #[inline(always)]
+    const fn row(&self) -> usize {
+        (self.ripple_nodes as usize).wrapping_add(5) & !1
+    }
+
+    /// 2⁻²⁴ cells in counts.
+    #[inline(always)]
+    pub fn counts_of(&self, cells: i32) -> i32 {
+        (cells as f32 * (self.cell_width * (1.0 / CELL as f32))) as i32
+    }
+
+    /// Whether there is a ripple and no A, B, C, and one iteration of the inverse is enough.
+    #[inline(always)]
+    pub const fn is_simple(&self) -> bool {
+        (self.iterations == 1) & (self.ripple_nodes > 0) & !self.has_curves()
+    }
+
     /// Whether there is any of A, B, C.
     #[inline(always)]
     pub const fn has_curves(&self) -> bool {
@@ -324,12 +341,13 @@ impl OperatingPoint {
         centre.saturating_add(half) >= plan.limit.wrapping_neg()
     }
 
-    /// Whether an error on this side, +1 forward, −1 backward, is.
+    /// Whether an error on this side is.
     #[inline(always)]
-    pub(crate) const fn allows_error(&self, plan: &Plan, error: i32, side: i32) -> bool {
+    pub(crate) const fn allows_error(&self, plan: &Plan, error: i32, backward: bool) -> bool {
         let [mean, half_width] = self.added;
-        let own = error.wrapping_sub(mean).wrapping_add(side.wrapping_mul(half_width));
-        own.wrapping_add(plan.limit) as u32 <= plan.limit.wrapping_mul(2) as u32
+        let mask = (backward as i32).wrapping_neg();
+        let added = (half_width ^ !mask).wrapping_sub(!mask).wrapping_add(mean);
+        error.wrapping_sub(added).wrapping_add(plan.limit) as u32 <= plan.limit.wrapping_mul(2) as u32
     }
 
     /// D, rad.
@@ -505,7 +523,7 @@ const fn high(word: u32) -> i32 {
 }
 
 /// A + B + C at these phases, counts.
-#[inline(always)]
+#[inline(never)]
 pub(crate) fn curves_at<M: Memory>(memory: &M, phases: Phases, doubt: &mut Doubt) -> i32 {
     let mut sum = 0i32;
     for (curve, phase) in memory.plan().curves.into_iter().zip([phases.generator, phases.material, phases.output]) {
@@ -527,7 +545,7 @@ fn ripple_at<M: Memory>(memory: &M, point: &OperatingPoint, tooth: u32, doubt: &
     let plan = memory.plan();
     let cell = Cell::at(plan.ripple_nodes, tooth);
     let [before, at, after] = cell.weights_q15().map(|weight| weight as i16 as i32);
-    let backward_row = ripple_row(plan.ripple_nodes as usize);
+    let backward_row = plan.row();
     let (mut forward, mut backward) = (0i32, 0i32);
     for (row, share) in rows(point).take(M::ROWS) {
         let first = row.wrapping_add(cell.node);
@@ -579,7 +597,7 @@ pub(crate) fn to_solution<M: Memory>(
     let plan = memory.plan();
     let cell = Cell::at(plan.ripple_nodes, tooth);
     let node = if cell.node == 0 { plan.ripple_nodes as usize } else { cell.node };
-    let row_of_side = ripple_row(plan.ripple_nodes as usize) & (backward as usize).wrapping_neg();
+    let row_of_side = plan.row() & (backward as usize).wrapping_neg();
     // Two nodes before and two after, which a stored ripple has for all but the first.
     let first = node.wrapping_sub(1).wrapping_add(row_of_side);
     let mut sums = [0i32; 5];
@@ -706,6 +724,7 @@ pub(crate) const fn counts(rad: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::drive::FixedMember;
+    use crate::image::ripple_row;
     use proptest::prelude::*;
     use std::vec::Vec;
 

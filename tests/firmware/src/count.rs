@@ -54,17 +54,17 @@ impl Counter {
     }
 
     /// Instructions that `work` takes and what it gave.
-    #[inline(always)]
+    ///
+    /// Never inlined, so that nothing of what comes before or after is moved in between; what the caller hands over is fetched in
+    /// it and counted.
+    #[inline(never)]
     pub fn of<T>(&self, work: impl FnOnce() -> T) -> (u32, T) {
         let _ = &self.timer;
-        // Nothing of what comes before or after may be moved in between.
-        compiler_fence(Ordering::SeqCst);
         let before = SYST::get_current();
         compiler_fence(Ordering::SeqCst);
         let given = work();
         compiler_fence(Ordering::SeqCst);
         let after = SYST::get_current();
-        compiler_fence(Ordering::SeqCst);
         let ticks = before.wrapping_sub(after) & RELOAD;
         ((ticks * 10 + TICKS_OF_TEN / 2) / TICKS_OF_TEN - self.own, given)
     }
