@@ -639,9 +639,10 @@ fn extremes(stored: usize, value: impl Fn(usize) -> f32) -> [f32; 3] {
 }
 
 /// Half word `index` of a record.
+#[inline(never)]
 fn half_at(record: Words<'_>, index: usize) -> i16 {
     let word = word_at(record, index / 2);
-    (if index % 2 == 0 { word } else { word >> 16 }) as i16
+    (if index.is_multiple_of(2) { word } else { word >> 16 }) as i16
 }
 
 /// Whether the three repeated words of a stored curve equal the nodes they repeat.
@@ -879,8 +880,9 @@ impl<'a> Table<'a> {
                 return Err(ImageError::NegativeHalfWidth { temperature, torque, found_rad: rad(least) });
             }
             // Steady motion follows forward or backward.
-            for way in [|[forward, _]: [f32; 2]| forward, |[_, backward]: [f32; 2]| backward] {
-                let [largest, steepest, reached] = extremes(self.ripple.stored_len(), |i| rad(way(ripple(i))));
+            for first in [0, layout.record] {
+                let way = |i: usize| rad(value(first.saturating_add(i)) as f32 * unit);
+                let [largest, steepest, reached] = extremes(self.ripple.stored_len(), way);
                 bounds.periodic_rad = larger(bounds.periodic_rad, largest);
                 bounds.slope = larger(bounds.slope, steepest * cells_per_rad);
                 bounds.ripple_cells = larger(bounds.ripple_cells, reached * cells_per_rad);
@@ -895,15 +897,18 @@ impl<'a> Table<'a> {
         let [_, first] = table::halves(word_at(self.words, word::CELL_WIDTH.saturating_add(3)));
         let words = layout.record.saturating_mul(self.torque_nodes).saturating_mul(self.temperature_nodes);
         let records = self.words.get(first..first.saturating_add(words)).unwrap_or_default();
-        let narrowest = records.chunks_exact(layout.record.max(1)).flat_map(|record| {
-            let wide = move |i: usize| {
-                (half_at(record, i) as i32).wrapping_sub(half_at(record, i.saturating_add(record.len())) as i32)
-            };
-            (0..record.len()).map(wide)
-        });
-        let unit = word_at(self.words, word::RIPPLE_UNIT) as f64 / UNITS_PER_COUNT;
-        // Two counts for the rounding of the ripple.
-        (narrowest.fold(0, i32::max) as f64 * 0.5 * unit) as i32 + if self.ripple.is_empty() { 0 } else { 2 }
+        let mut narrowest = 0;
+        for record in records.chunks_exact(layout.record.max(1)) {
+            for i in 0..record.len() {
+                let [forward, backward] = [i, i.saturating_add(record.len())].map(|i| half_at(record, i) as i32);
+                let narrower = forward.wrapping_sub(backward);
+                narrowest = if narrower > narrowest { narrower } else { narrowest };
+            }
+        }
+        let narrowest = narrowest.unsigned_abs() as u64;
+        // Half of it in counts of 2¹⁹ units, rounded up, and two for the rounding of the ripple.
+        let counts = narrowest.wrapping_mul(word_at(self.words, word::RIPPLE_UNIT) as u64) >> 20;
+        if self.ripple.is_empty() { 0 } else { (counts as i32).saturating_add(3) }
     }
 
     fn header(&self) -> Header<'a> {

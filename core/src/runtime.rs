@@ -138,6 +138,8 @@ pub struct Limits {
 
 /// Parts of a count that the correction is kept in: the difference of any two corrections fits 32 bits.
 const FINE: i32 = 8;
+/// Less than a count.
+const WITHIN: i32 = FINE - 1;
 
 /// One joint: all that does not change while it runs. Can be made at compile time and lie in flash.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -468,13 +470,13 @@ impl Joint {
         generator: GeneratorAngle,
         torque_n_m: f32,
     ) -> Prediction {
-        self.model(store).follow(&store.locate(torque_n_m, 0, 0), play, generator)
+        self.model(store).follow(&store.locate_here(torque_n_m, 0, 0), play, generator)
     }
 
     /// Generator angle that brings the output to `target`: as [`crate::Table::inverse`], from the copies.
     #[must_use]
     pub fn inverse(&self, store: &Store, target: OutputAngle, torque_n_m: f32, approach: Approach<'_>) -> Command {
-        self.model(store).aim(&store.locate(torque_n_m, 0, 0), target, approach)
+        self.model(store).aim(&store.locate_here(torque_n_m, 0, 0), target, approach)
     }
 
     #[inline(always)]
@@ -516,7 +518,7 @@ impl Joint {
         let held_back = goal.wrapping_sub(correction);
         let flags = sample_flags
             .with(Flags::OVERRUN, late)
-            .with(Flags::HELD_BACK, held_back.wrapping_add(FINE - 1) as u32 > 2 * (FINE as u32 - 1))
+            .with(Flags::HELD_BACK, held_back.wrapping_add(WITHIN) as u32 > (2 * WITHIN) as u32)
             .with(Flags::NOT_CORRECTED, !sane)
             .with(Flags::TABLE_DOUBT, !doubt.none())
             .with(Flags::STATE_TORN, torn | !one);

@@ -359,7 +359,7 @@ impl Store {
         let images = Images { words: [table.words; 2] };
         self.set_temperature(&images, temperature_c);
         for _ in 0..self.source.used {
-            self.renew(&images, true);
+            self.tend(&images, Doubt::default(), true);
         }
         self.counters = counters;
         Ok(table.id())
@@ -447,16 +447,24 @@ impl Store {
     }
 
     /// Locates a torque, with this added to D and H, counts ([`OperatingPoint::adjusted`]). The same work for all values.
+    ///
+    /// A call of its own, as the other parts of a tick: all in one function, more is moved to the stack and back than calls cost.
     #[inline(never)]
     pub(crate) fn locate(&self, torque_n_m: f32, mean: i32, half_width: i32) -> OperatingPoint {
+        self.locate_here(torque_n_m, mean, half_width)
+    }
+
+    /// The same, where nothing else is done.
+    #[inline(always)]
+    pub(crate) fn locate_here(&self, torque_n_m: f32, mean: i32, half_width: i32) -> OperatingPoint {
         let source = &self.source;
         let changed = source.sum() ^ self.sum;
-        let mut doubt = Doubt(changed);
         let torque = table::within(torque_n_m, source.torque_range);
         let start = |i: usize| f32::from_bits(u32::from_le_bytes(self.first.0.get(i).copied().unwrap_or([0; 4])));
         let interval = grid::search_64(start, torque).min(source.last_torque as usize);
-        let [low, high] = self.words(interval, &mut doubt).map(f32::from_bits);
         let at = (source.nodes_from as usize).wrapping_add(interval.wrapping_mul(NODE_WORDS));
+        let mut doubt = Doubt(changed);
+        let [low, high] = self.words(interval, &mut doubt).map(f32::from_bits);
         let [below @ .., a, b, c] = self.words::<6>(at, &mut doubt).map(f32::from_bits);
         let width = high - low;
         let [_, _, half] = below;

@@ -663,7 +663,7 @@ impl<'a> Table<'a> {
         Plan {
             ripple_nodes: at(first.wrapping_add(4)) >> 16,
             ripple_unit: unit,
-            ripple_cells: (unit as f64 * 8_388_608.0 / width as f64) as i32,
+            ripple_cells: (unit as f32 * (8_388_608.0 / width)) as i32,
             curves: [5, 6, 7].map(|place: usize| at(first.wrapping_add(place))),
             limit: at(word::RIPPLE_UNIT.wrapping_add(1)) as i32,
             iterations: at(first.wrapping_add(8)),
