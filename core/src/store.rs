@@ -203,6 +203,10 @@ struct Scrub {
     damaged: [u32; 2],
 }
 
+impl Scrub {
+    const START: Self = Self { second: false, page: 0, word: 0, crc: CRC_START, damaged: [0; 2] };
+}
+
 /// Before the first byte of a CRC-32.
 const CRC_START: u32 = 0xffff_ffff;
 
@@ -321,7 +325,7 @@ impl Store {
             source,
             sum: 0,
             next: 0,
-            scrub: Scrub { second: false, page: 0, word: 0, crc: CRC_START, damaged: [0; 2] },
+            scrub: Scrub::START,
             body: 0,
             counters: Counters { doubtful_ticks: 0, words_mended: 0, words_skipped: 0, pages_damaged: 0, passes: 0 },
             active: false,
@@ -355,7 +359,16 @@ impl Store {
             return Err(ActivateError::TooLarge { needed: source.used as usize });
         }
         let counters = self.counters;
-        *self = Self { source, sum: source.sum(), body, counters, active: true, ..Self::new() };
+        // Field by field: a whole store would be made on the stack first.
+        for copy in [&mut self.first, &mut self.second] {
+            copy.0.fill([0; 4]);
+        }
+        self.source = source;
+        self.sum = source.sum();
+        self.next = 0;
+        self.scrub = Scrub::START;
+        self.body = body;
+        self.active = true;
         let images = Images { words: [table.words; 2] };
         self.set_temperature(&images, temperature_c);
         for _ in 0..self.source.used {
