@@ -161,8 +161,8 @@ pub struct Joint {
 /// What is added to the table in one tick: what a friction model, or what was learnt on board, knows beyond it.
 ///
 /// Counts of 2⁻³² output turn. Each is taken within ±[`Adjustment::MAX_RAD`]. The half-width never falls below zero anywhere on the
-/// tooth pitch: what would take it there is taken only that far. The error that a table may give ([`Table::error_limit_rad`](crate::Table::error_limit_rad)) is
-/// that much larger.
+/// tooth pitch: a reduction is taken only that far. The error that a table may give
+/// ([`Table::error_limit_rad`](crate::Table::error_limit_rad)) is that much larger.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Adjustment {
     /// Added to the mean error (actual less nominal).
