@@ -750,7 +750,7 @@ mod tests {
             let nominal = OutputAngle::from_rad(generator / 95.0).unwrap();
             let centre = ((torque / 3e4 * COUNTS) as i32).saturating_add(self.applied.mean_counts);
             let half = ((HALF_RAD * COUNTS) as i32 + self.applied.half_width_counts).max(0);
-            let error = self.play.update(nominal, Some((centre, half)));
+            let error = self.play.update(nominal, centre, half, true);
             let estimated = nominal.offset_counts(error as i64);
             let truth = self.plant.output(generator, torque);
             let output = Output {
@@ -1131,7 +1131,7 @@ mod tests {
                         uncertainty_rad: torque, correction_rad: 0.0, held_back_rad: 0.0,
                         quality: Quality::InRange, flags: Flags::default(),
                     };
-                    let _ = run.play.update(output.output, None);
+                    let _ = run.play.update(output.output, 0, 0, false);
                     let input = Input {
                         generator: Some(angle), target: output.output, torque_n_m: torque, missed_ticks: 0,
                         adjustment: run.applied,

@@ -190,6 +190,12 @@ impl Drive {
         }
     }
 
+    /// The tooth phase of [`Self::phases_at_output`] alone.
+    #[must_use]
+    pub(crate) const fn tooth_at_output(&self, nominal: OutputAngle) -> u32 {
+        (nominal.counts().wrapping_mul(self.tooth_rate) >> 32) as u32
+    }
+
     /// Tooth pitches of the fixed member in one output turn, signed like the ratio.
     pub(crate) const fn tooth_periods(&self) -> f32 {
         self.ratio * self.ripple_order() as f32

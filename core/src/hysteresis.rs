@@ -156,24 +156,23 @@ impl PlayState {
 
     /// Moves the play to `nominal`, with the centre and half-width there in counts; returns the error `centre + (p − x)`.
     ///
-    /// Without either (they could not be computed) it follows the motion with the half-width and error of the last update; before
-    /// the first with a half-width that is wider than any.
-    pub(crate) const fn update(&mut self, nominal: OutputAngle, play: Option<(i32, i32)>) -> i32 {
+    /// Without either (`sane` is false: they could not be computed) it follows the motion with the half-width and error of the last
+    /// update; before the first with a half-width that is wider than any. Masks instead of choices: the same work for all.
+    #[inline(always)]
+    pub(crate) const fn update(&mut self, nominal: OutputAngle, centre: i32, half: i32, sane: bool) -> i32 {
+        let mask = (sane as i32).wrapping_neg();
         let last = if self.half < 0 { MAX_PLAY_COUNTS } else { self.half };
-        let (centre, half) = match play {
-            Some((centre, half)) => (centre, half),
-            None => (0, last),
-        };
-        let half = if half > MAX_PLAY_COUNTS { MAX_PLAY_COUNTS } else { half };
-        let half = if half < 0 { 0 } else { half };
+        let half = last ^ (last ^ half) & mask;
+        let half = if half as u32 > MAX_PLAY_COUNTS as u32 { MAX_PLAY_COUNTS } else { half };
         self.update_counts(nominal, half);
         let error = centre.wrapping_add(self.offset_counts());
-        self.error = if play.is_some() { error } else { self.error };
+        self.error ^= (self.error ^ error) & mask;
         error
     }
 
+    #[inline(always)]
     const fn update_counts(&mut self, nominal: OutputAngle, half: i32) {
-        let moved = nominal.minus_small_counts(self.nominal);
+        let moved = nominal.minus_near_counts(self.nominal);
         let moved = if self.half < 0 { 0 } else { moved };
         self.lower = clamped(self.lower.saturating_sub(moved), half);
         self.upper = clamped(self.upper.saturating_sub(moved), half);
@@ -286,7 +285,7 @@ mod tests {
     #[test]
     fn uncertainty_is_half_the_interval() {
         let mut state = PlayState::unknown();
-        let _ = state.update(OutputAngle::ZERO, Some((0, 68_357)));
+        let _ = state.update(OutputAngle::ZERO, 0, 68_357, true);
         assert!((state.uncertainty_rad() - 1e-4).abs() < 2e-9);
         assert!(state.offset_rad().abs() < 2e-9);
     }
@@ -295,8 +294,8 @@ mod tests {
     fn hostile_half_widths_stay_in_bounds() {
         for half in [i32::MIN, -1, 0, i32::MAX] {
             let mut state = PlayState::unknown();
-            let _ = state.update(OutputAngle::ZERO, Some((0, half)));
-            let _ = state.update(OutputAngle::from_counts(i64::MIN), Some((0, half)));
+            let _ = state.update(OutputAngle::ZERO, 0, half, true);
+            let _ = state.update(OutputAngle::from_counts(i64::MIN), 0, half, true);
             assert!((0..=MAX_PLAY_COUNTS).contains(&state.half), "{half}");
             assert!(-state.half <= state.lower && state.lower <= state.upper && state.upper <= state.half);
         }

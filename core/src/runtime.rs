@@ -20,11 +20,10 @@ use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT, counts_from_rad};
 use crate::drive::Drive;
 use crate::hysteresis::{PlayState, SAVED_STATE_BYTES};
 use crate::image::crc32;
-use crate::model::{Approach, Command, Model, Prediction};
+use crate::model::{self, Approach, Command, Estimate, Model, Prediction};
 use crate::store::{Images, Store};
-use crate::table::{self, Doubt, Quality, larger};
+use crate::table::{self, Memory, Quality};
 use core::fmt;
-use core::hint::black_box;
 
 /// What a joint does with its correction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -137,8 +136,10 @@ pub struct Limits {
     pub patience: u16,
 }
 
-/// Parts of a count that the correction is kept in.
-const FINE: i32 = 16;
+/// Parts of a count that the correction is kept in: the difference of any two corrections fits 32 bits.
+const FINE: i32 = 8;
+/// Less than a count.
+const WITHIN: i32 = FINE - 1;
 
 /// One joint: all that does not change while it runs. Can be made at compile time and lie in flash.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -146,8 +147,10 @@ pub struct Joint {
     drive: Drive,
     overrun: Overrun,
     /// Fine counts in a tick, and in a tick more each tick.
-    rate: f32,
-    acceleration: f32,
+    rate: i32,
+    acceleration: i32,
+    /// A quarter of the square of the acceleration.
+    quarter_square: f32,
     largest_move: i32,
     patience: u32,
     /// Twice the ticks of a fade, and the part of the correction that one tick of it takes.
@@ -158,8 +161,8 @@ pub struct Joint {
 /// What is added to the table in one tick: what a friction model, or what was learnt on board, knows beyond it.
 ///
 /// Counts of 2⁻³² output turn. Each is taken within ±[`Adjustment::MAX_RAD`]. The half-width never falls below zero anywhere on the
-/// tooth pitch: what would take it there is taken only that far. The error that a table may give ([`Table::error_limit_rad`]
-/// (crate::Table::error_limit_rad)) is widened by the magnitude of both, to 0.098 rad at most; beyond that nothing is corrected.
+/// tooth pitch: a reduction is taken only that far. The error that a table may give
+/// ([`Table::error_limit_rad`](crate::Table::error_limit_rad)) is that much larger.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Adjustment {
     /// Added to the mean error (actual less nominal).
@@ -169,10 +172,10 @@ pub struct Adjustment {
 }
 
 impl Adjustment {
-    /// Largest magnitude, rad.
-    pub const MAX_RAD: f32 = 0.05;
+    /// Largest magnitude, rad: 0.049.
+    pub const MAX_RAD: f32 = Self::MAX_COUNTS as f32 * RAD_PER_COUNT;
     /// The same in counts.
-    pub const MAX_COUNTS: i32 = table::counts(0.05) as i32;
+    pub const MAX_COUNTS: i32 = (1 << 25) - 1;
 
     /// From radians at the output, rounded to a count; saturates at ±[`Self::MAX_RAD`], NaN is taken as none.
     #[must_use]
@@ -185,9 +188,9 @@ impl Adjustment {
 /// An adjustment within its magnitude.
 #[inline(always)]
 const fn bounded(counts: i32) -> i32 {
-    let most = Adjustment::MAX_COUNTS;
-    let above = if counts > -most { counts } else { -most };
-    if above < most { above } else { most }
+    // From −2²⁵ on: one instruction.
+    let above = if counts > !Adjustment::MAX_COUNTS { counts } else { !Adjustment::MAX_COUNTS };
+    if above < Adjustment::MAX_COUNTS { above } else { Adjustment::MAX_COUNTS }
 }
 
 /// One tick's measurements.
@@ -276,7 +279,7 @@ pub struct JointState {
     /// What is wanted, and what of it was asked of the limiter.
     goal: i32,
     aimed: i32,
-    speed: f32,
+    speed: i32,
     /// Ticks in a row with a glitch, and without a correction.
     glitches: u32,
     uncorrected: u32,
@@ -306,7 +309,7 @@ impl JointState {
             correction: [0; 2],
             goal: 0,
             aimed: 0,
-            speed: 0.0,
+            speed: 0,
             glitches: 0,
             uncorrected: 0,
             fading: 0,
@@ -371,9 +374,9 @@ impl JointState {
         let (play, rest) = before.split_first_chunk::<SAVED_STATE_BYTES>()?;
         let (correction, speed) = rest.split_first_chunk::<4>()?;
         let correction = i32::from_le_bytes(*correction);
-        let speed = f32::from_le_bytes(*speed.first_chunk::<4>()?);
+        let speed = i32::from_le_bytes(*speed.first_chunk::<4>()?);
         let play = PlayState::restore(play)?;
-        let intact = crc32(before) == u32::from_le_bytes(*sum) && speed.is_finite();
+        let intact = crc32(before) == u32::from_le_bytes(*sum);
         let state = Self {
             play,
             nominal: play.nominal_or_zero(),
@@ -385,6 +388,12 @@ impl JointState {
         };
         intact.then_some(state)
     }
+}
+
+#[inline(always)]
+const fn within(value: i32, least: i32, most: i32) -> i32 {
+    let above = if value > least { value } else { least };
+    if above < most { above } else { most }
 }
 
 /// A positive, finite number of counts.
@@ -426,7 +435,24 @@ impl Joint {
         };
         let fade_step = if ticks == 0 { 0.0 } else { 1.0 / ticks as f32 };
         let fade = ticks as u32;
-        Ok(Self { drive, overrun, rate, acceleration, largest_move, patience: patience as u32, fade, fade_step })
+        // A whole number of fine counts, no less than one and no more than asked for otherwise.
+        let most = i32::MAX as f32 / 4.0;
+        let acceleration = if acceleration < most { acceleration } else { most } as i32;
+        let acceleration = if acceleration < 1 { 1 } else { acceleration };
+        let gain = acceleration as f32;
+        let quarter_square = 0.25 * gain * gain;
+        let rate = if rate < 1.0 { 1 } else { rate as i32 };
+        Ok(Self {
+            drive,
+            overrun,
+            rate,
+            acceleration,
+            quarter_square,
+            largest_move,
+            patience: patience as u32,
+            fade,
+            fade_step,
+        })
     }
 
     /// The drive.
@@ -444,13 +470,18 @@ impl Joint {
         generator: GeneratorAngle,
         torque_n_m: f32,
     ) -> Prediction {
-        Model { memory: store, drive: &self.drive }.follow(&store.locate(torque_n_m), play, generator)
+        self.model(store).follow(&store.locate_here(torque_n_m, 0, 0), play, generator)
     }
 
     /// Generator angle that brings the output to `target`: as [`crate::Table::inverse`], from the copies.
     #[must_use]
     pub fn inverse(&self, store: &Store, target: OutputAngle, torque_n_m: f32, approach: Approach<'_>) -> Command {
-        Model { memory: store, drive: &self.drive }.aim(&store.locate(torque_n_m), target, approach)
+        self.model(store).aim(&store.locate_here(torque_n_m, 0, 0), target, approach)
+    }
+
+    #[inline(always)]
+    fn model<'s>(&'s self, store: &'s Store) -> Model<'s, Store> {
+        Model { memory: store, drive: &self.drive }
     }
 
     /// One tick.
@@ -459,39 +490,47 @@ impl Joint {
     #[must_use]
     pub fn tick(&self, images: &Images<'_>, store: &mut Store, state: &mut JointState, input: &Input) -> Output {
         let Adjustment { mean_counts, half_width_counts } = input.adjustment;
-        let point = store.locate(input.torque_n_m).adjusted(bounded(mean_counts), bounded(half_width_counts));
+        let point = store.locate(input.torque_n_m, bounded(mean_counts), bounded(half_width_counts));
         let (generator, sample_flags, doubted) = self.judge(state, input);
         let torn = (state.play.nominal_or_zero() != state.nominal) | !state.play.is_ordered();
         if torn | doubted {
             state.play = PlayState::unknown();
         }
-        let model = Model { memory: &*store, drive: &self.drive };
-        let (now, doubt) = model.follow_and_tell(&point, &mut state.play, generator);
-        state.nominal = state.play.nominal_or_zero();
-        let aim = model.solve(&point, input.target, Approach::From(&state.play));
-        let sane = (aim.quality != Quality::Disabled) & (now.quality != Quality::Disabled);
+        let model = self.model(store);
+        let now = model.estimate(&point, &mut state.play, generator);
+        state.nominal = now.nominal;
+        let Estimate { output, error, mut doubt, .. } = now;
+        let from = model::departure(store.plan(), &point, input.target, &state.play, output);
+        let (found, allowed) = model.solve(&point, input.target, from.backward, &mut doubt);
+        let sane = now.sane & allowed & doubt.none();
+        // The correction that leaves the generator where it is.
+        let still = from.ahead.wrapping_add(error);
+        let wanted = if from.hold { still } else { found };
+        let aimed = from.uncertainty.wrapping_add(point.jump);
+        let aimed = if sane { aimed } else { store.plan().limit };
+        let uncertainty = if aimed > now.uncertainty { aimed } else { now.uncertainty };
+        let known = state.play.is_known() & (from.uncertainty <= 0);
 
-        let (goal, late) = self.goal(state, input, input.target.minus_small_counts(aim.nominal), sane);
-        let (correction, whole) = self.limit(state, goal);
-        let doubt = Doubt(doubt.0 | aim.doubt.0);
-        store.tend(images, doubt);
+        let (goal, late) = self.goal(state, input, wanted, sane);
+        let (correction, one) = self.limit(state, goal);
+        store.tend(images, doubt, point.whole);
 
         let held_back = goal.wrapping_sub(correction);
         let flags = sample_flags
             .with(Flags::OVERRUN, late)
-            .with(Flags::HELD_BACK, (held_back >= FINE) | (held_back <= -FINE))
+            .with(Flags::HELD_BACK, held_back.wrapping_add(WITHIN) as u32 > (2 * WITHIN) as u32)
             .with(Flags::NOT_CORRECTED, !sane)
             .with(Flags::TABLE_DOUBT, !doubt.none())
-            .with(Flags::STATE_TORN, torn | !whole);
-        let counts = correction >> 4;
+            .with(Flags::STATE_TORN, torn | !one);
+        let counts = correction >> FINE.trailing_zeros();
         Output {
             command: self.drive.nominal_generator(input.target.offset_counts((counts as i64).wrapping_neg())),
-            output: now.output,
-            transmission_error_rad: now.transmission_error_rad,
-            uncertainty_rad: larger(now.uncertainty_rad, aim.uncertainty as f32 * RAD_PER_COUNT),
+            output,
+            transmission_error_rad: error as f32 * RAD_PER_COUNT,
+            uncertainty_rad: uncertainty as f32 * RAD_PER_COUNT,
             correction_rad: correction as f32 * (RAD_PER_COUNT / FINE as f32),
             held_back_rad: held_back as f32 * (RAD_PER_COUNT / FINE as f32),
-            quality: if now.quality > aim.quality { now.quality } else { aim.quality },
+            quality: point.quality(sane, known),
             flags,
         }
     }
@@ -503,14 +542,17 @@ impl Joint {
             Some(sample) => (false, sample),
             None => (true, state.generator),
         };
-        let moved = sample.minus_small_counts(state.generator);
-        let far = ((moved > self.largest_move) | (moved < self.largest_move.wrapping_neg())) & state.started;
-        let more = black_box(state.glitches.saturating_add(1));
-        state.glitches = if far { more } else { 0 };
-        let believed = far & (state.glitches > self.patience);
-        state.glitches = if believed { 0 } else { state.glitches };
+        // Outside ± the largest move.
+        let most = self.largest_move as i64;
+        let beyond = sample.minus_counts(state.generator).wrapping_add(most) as u64;
+        let far = (beyond > most.wrapping_mul(2) as u64) & state.started;
+        // Arithmetic instead of choices: the compiler makes branches of choices, and then ticks differ.
+        let glitches = state.glitches.wrapping_add(1).wrapping_mul(far as u32);
+        let believed = glitches > self.patience;
+        state.glitches = glitches.wrapping_mul(!believed as u32);
         let glitch = far & !believed;
-        let generator = if glitch { state.generator } else { sample };
+        let away = sample.minus_counts(state.generator) & (glitch as i64).wrapping_neg();
+        let generator = sample.offset_counts(away.wrapping_neg());
         state.generator = generator;
         state.started |= !lost;
         (generator, Flags::default().with(Flags::SAMPLE_LOST, lost).with(Flags::GLITCH, glitch), believed)
@@ -521,26 +563,20 @@ impl Joint {
     fn goal(&self, state: &mut JointState, input: &Input, wanted: i32, sane: bool) -> (i32, bool) {
         let late = input.missed_ticks > 0;
         state.missed_ticks = state.missed_ticks.wrapping_add(input.missed_ticks as u32);
-        // Arithmetic instead of a choice: the compiler makes branches of choices, and then ticks differ.
-        let blind = black_box(u32::from(!sane));
+        let blind = u32::from(!sane);
         state.uncorrected = state.uncorrected.saturating_add(1).wrapping_mul(blind);
         let kept = state.goal;
-        let found = wanted.wrapping_mul(FINE);
-        let wanted = found.wrapping_add(kept.wrapping_sub(found).wrapping_mul(blind as i32));
-        let wanted = if state.uncorrected > self.patience { 0 } else { wanted };
-        let wanted = match state.mode {
-            Mode::Tracking => wanted,
-            Mode::Hold => kept,
-            Mode::Off | Mode::Safe => 0,
-        };
-        let hold = late & (self.overrun == Overrun::HoldLast);
-        let wanted = if hold { kept } else { wanted };
+        let wanted = if sane { wanted.wrapping_mul(FINE) } else { kept };
+        let off = (state.uncorrected > self.patience) | matches!(state.mode, Mode::Off | Mode::Safe);
+        let keep = (state.mode == Mode::Hold) | late & (self.overrun == Overrun::HoldLast);
+        let wanted = if off { 0 } else { wanted };
+        let wanted = if keep { kept } else { wanted };
         // Down in `fade` ticks, none for as many; without that policy `fade` is 0.
         let start = self.fade.wrapping_mul(2);
-        let left = black_box(state.fading.saturating_sub(1));
-        state.fading = if late { start } else { left };
-        let left = state.fading.saturating_sub(self.fade) as f32 * self.fade_step;
-        let faded = black_box((wanted as f32 * left) as i32);
+        let left = state.fading.saturating_sub(1);
+        state.fading = left ^ (left ^ start) & (late as u32).wrapping_neg();
+        let part = state.fading.saturating_sub(self.fade) as f32 * self.fade_step;
+        let faded = (wanted as f32 * part) as i32;
         let goal = if state.fading > 0 { faded } else { wanted };
         state.goal = wanted;
         (goal, late)
@@ -555,22 +591,21 @@ impl Joint {
         let [one, other] = state.correction;
         let nearer = goal.abs_diff(one) <= goal.abs_diff(other);
         let before = if nearer { one } else { other };
-        let pace = goal.wrapping_sub(state.aimed) as f32;
+        let pace = goal.wrapping_sub(state.aimed);
+        let lag = state.aimed.wrapping_sub(before);
         state.aimed = goal;
-        let lag = goal.wrapping_sub(before) as f32 - pace;
-        let (most, gain) = (self.rate, self.acceleration);
-        let bounded = |value: f32, limit: f32| {
-            let above = if value > -limit { value } else { -limit };
-            if above < limit { above } else { limit }
-        };
-        let away = lag.abs();
-        let stoppable = table::sqrt(gain * (0.25 * gain + 2.0 * away)) - 0.5 * gain;
-        let stoppable = if stoppable < away { stoppable } else { away };
-        let wanted = bounded(pace + if lag < 0.0 { -stoppable } else { stoppable }, most);
-        let speed = state.speed + bounded(wanted - state.speed, gain);
-        let speed = bounded(speed, most);
+        let away = lag.unsigned_abs();
+        let gain = self.acceleration as f32;
+        let stoppable = table::sqrt(self.quarter_square + (gain + gain) * away as f32) - 0.5 * gain;
+        let stoppable = stoppable as u32;
+        let stoppable = (if stoppable < away { stoppable } else { away }) as i32;
+        let side = lag >> 31;
+        let wanted = pace.saturating_add((stoppable ^ side).wrapping_sub(side));
+        let (slower, faster) =
+            (state.speed.wrapping_sub(self.acceleration), state.speed.wrapping_add(self.acceleration));
+        let speed = within(within(wanted, slower, faster), self.rate.wrapping_neg(), self.rate);
         state.speed = speed;
-        let correction = before.wrapping_add(speed as i32);
+        let correction = before.wrapping_add(speed);
         state.correction = [correction; 2];
         (correction, one == other)
     }
@@ -876,10 +911,10 @@ mod tests {
 
     #[test]
     fn adjustments_are_bounded_and_never_turn_the_play_inside_out() {
-        let most = Adjustment::MAX_COUNTS;
+        let (least, most) = (-Adjustment::MAX_COUNTS - 1, Adjustment::MAX_COUNTS);
         assert_eq!(
             Adjustment::from_rad(f32::NAN, f32::NEG_INFINITY),
-            Adjustment { mean_counts: 0, half_width_counts: -most }
+            Adjustment { mean_counts: 0, half_width_counts: least }
         );
         assert_eq!(Adjustment::from_rad(1e-6, 0.06), Adjustment { mean_counts: 684, half_width_counts: most });
         let tick = |adjustment| {
@@ -890,17 +925,17 @@ mod tests {
             (out, run)
         };
         let closed = |counts| Adjustment { mean_counts: 0, half_width_counts: counts };
-        for (wild, bounded) in [(i32::MIN, -most), (i32::MAX, most)] {
+        for (wild, bounded) in [(i32::MIN, least), (i32::MAX, most)] {
             assert_eq!(tick(closed(wild)).0, tick(closed(bounded)).0);
             let mean = |counts| Adjustment { mean_counts: counts, half_width_counts: 0 };
             let (found, same) = (tick(mean(wild)).0, tick(mean(bounded)).0);
             assert_eq!(found, same);
-            assert!(found.quality == Quality::InRange && found.transmission_error_rad.abs() > 0.049);
+            assert!(found.quality == Quality::InRange && found.transmission_error_rad.abs() > 0.048);
         }
         // No play is left but what the ripple needs, 0.1″, and forward and backward differ by no more.
-        let (out, run) = tick(closed(-most));
+        let (out, run) = tick(closed(least));
         assert_eq!(out.quality, Quality::InRange);
-        let back = Input { generator: Some(run.generator), adjustment: closed(-most), ..run.input(4e-3) };
+        let back = Input { generator: Some(run.generator), adjustment: closed(least), ..run.input(4e-3) };
         let (mut there, mut run) = (out.transmission_error_rad as f64, run);
         for input in [back, Input { generator: Some(run.generator.offset_rad(1e-3)), ..back }] {
             let now = run.tick(&input).transmission_error_rad as f64;
