@@ -37,6 +37,9 @@ impl Direction {
 /// Largest half-width in counts, 0.05 rad: far above any play, far below overflow.
 pub(crate) const MAX_HALF_COUNTS: i32 = 34_178_720;
 
+/// Largest error that any table can give, with its rounding, counts.
+pub(crate) const MOST_ERROR_COUNTS: u32 = MAX_HALF_COUNTS as u32 + (MAX_HALF_COUNTS as u32 >> 8);
+
 /// Where the drive rests inside its play: all that must survive a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlayState {
@@ -219,7 +222,8 @@ impl PlayState {
             && state.lower >= state.half.wrapping_neg()
             && state.upper <= state.half;
         let fresh = state.half == -1 && (state.lower == i32::MIN || state.lower == i32::MAX);
-        (intact && state.lower <= state.upper && (started || fresh)).then_some(state)
+        let possible = state.lower <= state.upper && state.error.unsigned_abs() <= MOST_ERROR_COUNTS;
+        (intact && possible && (started || fresh)).then_some(state)
     }
 }
 
@@ -313,6 +317,10 @@ mod tests {
         }
         let disordered = PlayState { lower: 5, upper: -5, half: 10, nominal: OutputAngle::ZERO, error: 0 };
         assert_eq!(PlayState::restore(&disordered.save()), None);
+        for error in [i32::MIN, i32::MAX, 35_000_000] {
+            let far = PlayState { lower: -5, error, ..disordered };
+            assert_eq!(PlayState::restore(&PlayState { upper: 5, ..far }.save()), None, "{error}");
+        }
         for (lower, upper) in [(-11, 5), (5, 11)] {
             let outside = PlayState { lower, upper, ..disordered };
             assert_eq!(PlayState::restore(&outside.save()), None);

@@ -89,6 +89,9 @@ const AXIS_SLOTS: [usize; 2] = [MAX_CLAMPED_NODES, MAX_TEMPERATURE_NODES];
 const UNITS_PER_COUNT: f64 = 524_288.0;
 /// Half-widths may miss zero by this, counts, and the ripple unit: rounding.
 const HALF_WIDTH_ROUNDING_COUNTS: f64 = 3.0;
+/// How far B-spline weights of 15 bits can be off, times the largest step between coefficients: one unit for the place in the
+/// cell and one for each of the two weights that are rounded.
+const WEIGHT_ROUNDING: f32 = 3.0 / 32_768.0;
 const CRC_BYTES: usize = 4;
 const ID_OFFSET: usize = 48;
 const RESERVED: core::ops::Range<usize> = 200..HEADER_BYTES;
@@ -519,9 +522,11 @@ fn seal(image: &mut [u8], body_bytes: usize) {
 }
 
 /// Makes every checksum of an image right that states its body, whatever is in it.
-#[cfg(test)]
-pub(crate) fn reseal(image: &mut [u8]) {
-    let body_bytes = word_at(image.as_chunks::<4>().0, word::BODY) as usize * 4;
+#[cfg(any(test, feature = "fuzzing"))]
+#[doc(hidden)]
+pub fn reseal(image: &mut [u8]) {
+    let body_bytes = word_at(image.as_chunks::<4>().0, word::BODY) as usize;
+    let body_bytes = body_bytes.saturating_mul(4);
     if body_bytes < image.len() {
         seal(image, body_bytes);
         let _ = complete(image, body_bytes);
@@ -783,6 +788,8 @@ impl<'a> Table<'a> {
         check_closed(field, axis, self.words.get(at..).unwrap_or_default())?;
         let [largest, steepest, _] = extremes(axis.stored_len(), value);
         let slope = steepest * nodes as f32 * periods.abs() / TAU as f32;
+        // Two readings, which may lie on both sides of a step.
+        bounds.rounding_rad += 2.0 * WEIGHT_ROUNDING * steepest;
         bounds.error_rad += largest;
         bounds.periodic_rad += largest;
         bounds.slope += slope;
@@ -863,6 +870,7 @@ impl<'a> Table<'a> {
                 bounds.periodic_rad = larger(bounds.periodic_rad, largest);
                 bounds.slope = larger(bounds.slope, steepest * cells_per_rad);
                 bounds.ripple_cells = larger(bounds.ripple_cells, reached * cells_per_rad);
+                bounds.rounding_rad = larger(bounds.rounding_rad, WEIGHT_ROUNDING * steepest);
             }
         }
         Ok(())

@@ -33,7 +33,7 @@ pub const MAX_INVERSE_ITERATIONS: u8 = 8;
 pub const MAX_INVERSE_ERROR_RAD: f32 = 1.0e-6;
 
 impl Bounds {
-    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], 1 to 8, and what they leave; `cell_rad` is a cell of the
+    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], 1 to 8, and what they and rounding leave; `cell_rad` is a cell of the
     /// ripple at the output.
     pub(crate) fn inverse(self, cell_rad: f32) -> InverseBound {
         let rate = self.curve_slope / (1.0 - self.slope);
@@ -49,6 +49,9 @@ impl Bounds {
                 break;
             }
         }
+        // Places in a cell are in single precision.
+        let place_rad = if cell_rad.is_finite() { 4.0 * f32::EPSILON * cell_rad } else { 0.0 };
+        bound.error_rad += (self.rounding_rad + place_rad) / (1.0 - self.slope);
         bound
     }
 }

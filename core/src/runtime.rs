@@ -18,7 +18,7 @@
 
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
-use crate::hysteresis::{PlayState, SAVED_STATE_BYTES};
+use crate::hysteresis::{MOST_ERROR_COUNTS, PlayState, SAVED_STATE_BYTES};
 use crate::image::crc32;
 use crate::model::{Approach, Command, Model, Prediction};
 use crate::store::{Images, Store};
@@ -139,6 +139,8 @@ pub struct Limits {
 
 /// Parts of a count that the correction is kept in.
 const FINE: i32 = 16;
+/// No table gives a larger correction, and no joint a faster one, fine counts.
+const MOST_FINE: u32 = MOST_ERROR_COUNTS * FINE as u32;
 
 /// One joint: all that does not change while it runs. Can be made at compile time and lie in flash.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -336,7 +338,8 @@ impl JointState {
         let correction = i32::from_le_bytes(*correction);
         let speed = f32::from_le_bytes(*speed.first_chunk::<4>()?);
         let play = PlayState::restore(play)?;
-        let intact = crc32(before) == u32::from_le_bytes(*sum) && speed.is_finite();
+        let possible = correction.unsigned_abs() <= MOST_FINE && speed.abs() <= MOST_FINE as f32;
+        let intact = crc32(before) == u32::from_le_bytes(*sum) && possible;
         let state = Self {
             play,
             nominal: play.nominal_or_zero(),
@@ -810,6 +813,31 @@ mod tests {
         assert_eq!(named(Limits { rate_rad_s: 60.0, ..LIMITS }), "rate_rad_s");
         assert_eq!(named(Limits { acceleration_rad_s2: -1.0, ..LIMITS }), "acceleration_rad_s2");
         assert_eq!(named(Limits { generator_rate_rad_s: f32::INFINITY, ..LIMITS }), "generator_rate_rad_s");
+    }
+
+    /// With a checksum that fits: what no joint can have saved is refused all the same.
+    #[test]
+    fn impossible_saved_states_are_refused() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        run.run(300, 1e-3, 1e-5);
+        let saved = run.state.save();
+        let changed = |at: usize, value: [u8; 4]| {
+            let mut bytes = saved;
+            bytes[at..at + 4].copy_from_slice(&value);
+            let (before, sum) = bytes.split_last_chunk_mut::<4>().unwrap();
+            *sum = crc32(before).to_le_bytes();
+            JointState::restore(&bytes)
+        };
+        let most = MOST_FINE as i32;
+        for correction in [most + 1, -most - 1, i32::MIN] {
+            assert_eq!(changed(SAVED_STATE_BYTES, correction.to_le_bytes()), None, "{correction}");
+        }
+        for speed in [f32::NAN, f32::INFINITY, -6e8, 1e30] {
+            assert_eq!(changed(SAVED_STATE_BYTES + 4, speed.to_le_bytes()), None, "{speed}");
+        }
+        for correction in [most, -most, 0] {
+            assert!(changed(SAVED_STATE_BYTES, correction.to_le_bytes()).is_some(), "{correction}");
+        }
     }
 
     proptest! {
