@@ -502,9 +502,9 @@ fn complete(image: &mut [u8], body_bytes: usize) -> Result<(), ImageError> {
 /// Words that follow from the bounds: iterations, hold.
 const DERIVED_WORDS: [usize; 2] = [word::CELL_WIDTH.saturating_add(8), word::CELL_WIDTH.saturating_add(9)];
 
-/// An error limit in counts, rounded up; the per mille takes up the rounding of single precision.
+/// An error limit in counts, rounded up; the per mille takes up the rounding of single precision, the counts that of integers.
 fn limit_counts(limit_rad: f32) -> u32 {
-    (table::counts(limit_rad as f64) * 1.001) as u32
+    (table::counts(limit_rad as f64) * 1.001 + 16.0) as u32
 }
 
 /// Computes and stores every checksum of an image whose body is complete.
@@ -1351,6 +1351,31 @@ mod tests {
         let (slope, error) = (bounds.slope as f64, bounds.error_rad as f64);
         assert!(steepest < slope && slope < 1.3 * steepest, "{steepest} {slope}");
         assert!(largest < error && error < 1.1 * largest, "{largest} {error}");
+    }
+
+    #[test]
+    fn a_limit_as_small_as_what_the_table_gives_disables_nothing() {
+        let data = TableData {
+            mean_rad: &[0.0; 4],
+            half_width_rad: &[0.0; 4],
+            mean_ripple_rad: &[2.0e-8; 32],
+            half_width_ripple_rad: &[0.0; 32],
+            generator_curve_rad: &[2.0e-8, -1.0e-8, 1.5e-8, 0.0],
+            output_curve_rad: &[3.0e-8, 0.0, -3.0e-8, 0.0, 0.0],
+            ..data()
+        };
+        let wide = write(&data, &provenance()).unwrap();
+        let reached = Table::check(&wide).unwrap().bounds().error_rad;
+        let tight = write(&data, &Provenance { error_limit_rad: reached, ..provenance() }).unwrap();
+        let table = Table::check(&tight).unwrap();
+        for i in 0..2000 {
+            let target = crate::OutputAngle::from_counts(i * 8_589_934);
+            for direction in [crate::Direction::Forward, crate::Direction::Backward] {
+                let command = table.inverse(target, 0.5, 20.0, crate::Approach::Moving(direction));
+                assert_eq!(command.quality, crate::Quality::InRange, "{i}");
+                assert!(table.steady_error_rad(command.generator, 0.5, 20.0, direction).is_some(), "{i}");
+            }
+        }
     }
 
     #[test]

@@ -124,13 +124,13 @@ pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};
 pub use error::{DriveError, Field, ImageError};
 pub use hysteresis::{Direction, PlayState, SAVED_STATE_BYTES};
+#[cfg(feature = "fuzzing")]
+#[doc(hidden)]
+pub use image::reseal;
 pub use image::{
     FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance, TEXT_BYTES,
     TableData, WriteError, image_bytes, write_image,
 };
-#[cfg(feature = "fuzzing")]
-#[doc(hidden)]
-pub use image::reseal;
 pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, Prediction};
 pub use predictor::{Ahead, Inertias, Measured, Noise, PREDICTOR_PARTS, Predictor, PredictorError, PredictorState};
 pub use runtime::{

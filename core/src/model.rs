@@ -251,12 +251,14 @@ fn departure<'s>(point: &OperatingPoint, target: OutputAngle, approach: Approach
 }
 
 /// How far the play rests beyond the side it is taken up on at `nominal`, signed like the error: 0 if that side is reached, or if
-/// nothing is known.
+/// nothing is known. No further than the other side: a play that is narrower there than where it rests now takes it along.
 #[inline(always)]
 fn short_of_contact(state: &PlayState, side: i32, nominal: OutputAngle, half: i32) -> i32 {
     let beyond = state.nominal_or_zero().minus_small_counts(nominal);
     let beyond = beyond.saturating_add(state.offset_counts()).saturating_add(side.wrapping_mul(half));
     let beyond = side.wrapping_mul(beyond);
+    let play = half.wrapping_mul(2);
+    let beyond = if beyond < play { beyond } else { play };
     side.wrapping_mul(if beyond > 0 { beyond } else { 0 })
 }
 
@@ -582,6 +584,17 @@ mod tests {
                 prop_assert!(off < table.bounds().slope as f64 * width, "{} arcsec off", off / ARCSEC);
             }
         }
+    }
+
+    #[test]
+    fn where_the_play_is_narrower_it_takes_the_output_along() {
+        let mut state = PlayState::after_motion(Direction::Forward);
+        let _ = state.update(OutputAngle::ZERO, Some((0, 1000)));
+        // Resting 1000 behind. On the way back by 300 it would rest at 700 behind, but the play is 100 to either side there.
+        let there = OutputAngle::from_counts(-300);
+        assert_eq!(short_of_contact(&state, -1, there, 1000), -1700);
+        assert_eq!(short_of_contact(&state, -1, there, 100), -200);
+        assert_eq!(short_of_contact(&state, 1, there, 100), 0);
     }
 
     #[test]
