@@ -13,7 +13,7 @@ use crate::{
     ActivateError, Drive, FixedMember, Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode,
     OutputAngle, Overrun, Quality, SAVED_JOINT_BYTES, Store,
 };
-use core::mem::{align_of, size_of};
+use core::mem::{MaybeUninit, align_of, size_of};
 
 #[cfg(all(target_os = "none", not(test)))]
 use panic_never as _;
@@ -42,6 +42,8 @@ pub enum FlexsplineStatus {
     Mode = 8,
     /// The saved bytes are damaged.
     Saved = 9,
+    /// Each image is a table, and they differ.
+    TwoTables = 10,
 }
 
 /// Eight-byte words of a [`FlexsplineStore`].
@@ -57,21 +59,21 @@ pub const FLEXSPLINE_SAVED_BYTES: usize = 40;
 #[repr(C)]
 #[derive(Debug)]
 pub struct FlexsplineStore {
-    opaque: [u64; FLEXSPLINE_STORE_WORDS],
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_STORE_WORDS],
 }
 
 /// The settings of a joint.
 #[repr(C)]
 #[derive(Debug)]
 pub struct FlexsplineJoint {
-    opaque: [u64; FLEXSPLINE_JOINT_WORDS],
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_JOINT_WORDS],
 }
 
 /// What changes while a joint runs.
 #[repr(C)]
 #[derive(Debug)]
 pub struct FlexsplineState {
-    opaque: [u64; FLEXSPLINE_STATE_WORDS],
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_STATE_WORDS],
 }
 
 /// Settings of a joint; angles at the output unless named otherwise.
@@ -205,7 +207,7 @@ fn get<'a, O, T>(object: *const O, mark: u32) -> Result<&'a T, FlexsplineStatus>
     usable(object)?;
     // SAFETY: not null and aligned; all bytes of the mark are a number whatever they are. The value is only used if the mark
     // says that `put` wrote it. The reference does not outlive the call it is made in.
-    let marked = unsafe { &*object.cast::<Marked<core::mem::MaybeUninit<T>>>() };
+    let marked = unsafe { &*object.cast::<Marked<MaybeUninit<T>>>() };
     if marked.mark != mark {
         return Err(FlexsplineStatus::NotInitialised);
     }
@@ -236,9 +238,19 @@ fn bytes<'a>(first: *const u8, length: usize) -> Result<&'a [u8], FlexsplineStat
     Ok(unsafe { core::slice::from_raw_parts(first, length) })
 }
 
-fn images<'a>(images: *const FlexsplineImages) -> Result<Images<'a>, FlexsplineStatus> {
+/// The images, apart from what is written: to be asked for before that is borrowed.
+fn images<'a, const N: usize>(
+    images: *const FlexsplineImages,
+    written: [(usize, usize); N],
+) -> Result<Images<'a>, FlexsplineStatus> {
     let FlexsplineImages { first, first_bytes, second, second_bytes } = copied(images)?;
-    Ok(Images::new(bytes(first, first_bytes)?, bytes(second, second_bytes)?))
+    let found = Images::new(bytes(first, first_bytes)?, bytes(second, second_bytes)?);
+    for object in written {
+        for read in [span(images), (first as usize, first_bytes), (second as usize, second_bytes)] {
+            apart([object, read])?;
+        }
+    }
+    Ok(found)
 }
 
 fn status(result: Result<(), FlexsplineStatus>) -> FlexsplineStatus {
@@ -304,11 +316,13 @@ pub extern "C" fn flexspline_store_activate(
 ) -> FlexsplineStatus {
     let activate = || {
         apart([span(store), span(joint)])?;
+        let images = images(table, [span(store)])?;
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
-        store.activate(&images(table)?, joint.drive(), temperature_c).map(|_| ()).map_err(|error| match error {
+        store.activate(&images, joint.drive(), temperature_c).map(|_| ()).map_err(|error| match error {
             ActivateError::Image(_) => FlexsplineStatus::Image,
-            ActivateError::TooLarge { .. } => FlexsplineStatus::TooLarge,
+            ActivateError::TooLarge { .. } | ActivateError::TooManyPages { .. } => FlexsplineStatus::TooLarge,
+            ActivateError::TwoTables => FlexsplineStatus::TwoTables,
             ActivateError::OtherDrive => FlexsplineStatus::OtherDrive,
         })
     };
@@ -323,8 +337,9 @@ pub extern "C" fn flexspline_store_set_temperature(
     temperature_c: f32,
 ) -> FlexsplineStatus {
     let set = || {
+        let images = images(table, [span(store)])?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
-        if store.set_temperature(&images(table)?, temperature_c) { Ok(()) } else { Err(FlexsplineStatus::Argument) }
+        if store.set_temperature(&images, temperature_c) { Ok(()) } else { Err(FlexsplineStatus::Argument) }
     };
     status(set())
 }
@@ -337,8 +352,9 @@ pub extern "C" fn flexspline_store_check_images(
     words: u16,
 ) -> FlexsplineStatus {
     let check = || {
+        let images = images(table, [span(store)])?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
-        store.check_images(&images(table)?, words as usize);
+        store.check_images(&images, words as usize);
         Ok(())
     };
     status(check())
@@ -405,10 +421,11 @@ pub extern "C" fn flexspline_tick(
     let tick = || {
         apart([span(joint), span(store), span(state), span(output)])?;
         usable(output)?;
+        let images = images(table, [span(store), span(state), span(output)])?;
+        let input = copied(input)?;
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
         let state: &mut JointState = get_mut(state, STATE_MARK)?;
-        let input = copied(input)?;
         let generator = GeneratorAngle::from_counts(input.generator_counts);
         let input = Input {
             generator: if input.has_generator != 0 { Some(generator) } else { None },
@@ -416,7 +433,7 @@ pub extern "C" fn flexspline_tick(
             torque_n_m: input.torque_n_m,
             missed_ticks: input.missed_ticks,
         };
-        let found = joint.tick(&images(table)?, store, state, &input);
+        let found = joint.tick(&images, store, state, &input);
         let given = FlexsplineOutput {
             command_counts: found.command.counts(),
             output_counts: found.output.counts(),
@@ -467,9 +484,9 @@ mod tests {
 
     fn blank() -> Objects {
         Objects {
-            store: Box::new(FlexsplineStore { opaque: [0; FLEXSPLINE_STORE_WORDS] }),
-            joint: FlexsplineJoint { opaque: [0; FLEXSPLINE_JOINT_WORDS] },
-            state: FlexsplineState { opaque: [0; FLEXSPLINE_STATE_WORDS] },
+            store: Box::new(FlexsplineStore { opaque: [MaybeUninit::zeroed(); FLEXSPLINE_STORE_WORDS] }),
+            joint: FlexsplineJoint { opaque: [MaybeUninit::zeroed(); FLEXSPLINE_JOINT_WORDS] },
+            state: FlexsplineState { opaque: [MaybeUninit::zeroed(); FLEXSPLINE_STATE_WORDS] },
         }
     }
 
@@ -592,5 +609,23 @@ mod tests {
         assert_eq!(tick(&mut o, &INPUT, inside), Overlap);
         assert_eq!(tick(&mut o, &INPUT, &mut out), FlexsplineStatus::Ok);
         assert_eq!(out.quality, 3, "no table yet");
+
+        // An image, or what tells of it, inside what is written.
+        let store = &raw mut *o.store;
+        let within = FlexsplineImages { second: store.cast_const().cast(), second_bytes: 100, ..table };
+        assert_eq!(flexspline_store_activate(store, &o.joint, &within, 20.0), Overlap);
+        assert_eq!(flexspline_store_set_temperature(store, &within, 20.0), Overlap);
+        assert_eq!(flexspline_store_check_images(store, &within, 9), Overlap);
+        assert_eq!(flexspline_tick(&o.joint, &within, store, &mut o.state, &INPUT, &mut out), Overlap);
+        let mut room = [table; 400];
+        let inside = room.as_mut_ptr().cast::<FlexsplineStore>();
+        assert_eq!(flexspline_store_init(inside), FlexsplineStatus::Ok);
+        let told = inside.cast::<FlexsplineImages>().wrapping_add(300);
+        // SAFETY: inside the room; the store holds nothing there yet that is read before the call refuses.
+        unsafe { told.write(table) };
+        assert_eq!(flexspline_store_check_images(inside, told, 9), FlexsplineStatus::Ok, "beyond the store");
+        let told = inside.cast::<FlexsplineImages>().wrapping_add(200);
+        unsafe { told.write(table) };
+        assert_eq!(flexspline_store_check_images(inside, told, 9), Overlap);
     }
 }

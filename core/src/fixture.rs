@@ -183,7 +183,10 @@ fn the_images_kept_for_miri_are_the_ones_made() {
         if std::env::var_os("FLEXSPLINE_KEEP_FIXTURES").is_some() {
             std::fs::write(std::format!("{}/src/fixtures/{name}.fxt", env!("CARGO_MANIFEST_DIR")), &made).unwrap();
         } else {
-            assert!(kept(long) == made, "{name}.fxt is not what is made: run this test with FLEXSPLINE_KEEP_FIXTURES=1");
+            assert!(
+                kept(long) == made,
+                "{name}.fxt is not what is made: run this test with FLEXSPLINE_KEEP_FIXTURES=1"
+            );
         }
     }
 }

@@ -138,6 +138,6 @@ pub use runtime::{
     SettingError,
 };
 pub use slip::{Slip, SlipBank, SlipElement, SlipState};
-pub use store::{ActivateError, Counters, Health, Images, STORE_WORDS, Store, mend_page};
+pub use store::{ActivateError, Counters, Health, Images, STORE_PAGES, STORE_WORDS, Store, mend_page};
 pub use table::{Bounds, GeneratorKind, OperatingPoint, Quality, Table, TableId};
 pub use upload::{Upload, UploadError};

@@ -27,6 +27,8 @@ use core::fmt;
 
 /// Largest copy that fits into a [`Store`], words: torque axis 64, curves, and for each torque node 3 and its ripple.
 pub const STORE_WORDS: usize = 1024;
+/// Most pages of an image that a [`Store`] takes, 8 KiB: one bit for each.
+pub const STORE_PAGES: usize = 32;
 /// Words that a read may take from the last place on.
 const SLACK: usize = 8;
 const PAGE_WORDS: usize = PAGE_BYTES / 4;
@@ -71,6 +73,13 @@ pub enum ActivateError {
         /// Words needed; [`STORE_WORDS`] are there.
         needed: usize,
     },
+    /// The image has more pages than the store can tell apart.
+    TooManyPages {
+        /// Pages found; [`STORE_PAGES`] are allowed.
+        found: usize,
+    },
+    /// Each image is a table, and they differ: words of two tables would be mixed.
+    TwoTables,
     /// The table is for other tooth counts or another fixed member.
     OtherDrive,
 }
@@ -80,6 +89,8 @@ impl fmt::Display for ActivateError {
         match *self {
             Self::Image(error) => error.fmt(f),
             Self::TooLarge { needed } => write!(f, "the table needs {needed} words, the store has {STORE_WORDS}"),
+            Self::TooManyPages { found } => write!(f, "the image has {found} pages, a store takes {STORE_PAGES}"),
+            Self::TwoTables => f.write_str("the images are two different tables"),
             Self::OtherDrive => f.write_str("the table is for another drive"),
         }
     }
@@ -290,7 +301,8 @@ impl Store {
 
     /// Checks the images and fills the copies from them, at this temperature; used from the next tick on.
     ///
-    /// At least one image must pass [`Table::check`]; if the other does not, it is damaged and will be named. Takes as long as the
+    /// At least one image must pass [`Table::check`]; if the other does not, it is damaged and will be named; if it is another
+    /// table, neither is taken. Takes as long as the
     /// check and some 80 instructions for each word: between two ticks only if there is time for that.
     ///
     /// # Errors
@@ -303,6 +315,7 @@ impl Store {
     ) -> Result<TableId, ActivateError> {
         let [first, second] = images.words.map(|words| Table::check(words.as_flattened()));
         let table = match (first, second) {
+            (Ok(first), Ok(second)) if first.image != second.image => return Err(ActivateError::TwoTables),
             (Ok(table), _) | (Err(_), Ok(table)) => table,
             (Err(error), Err(_)) => return Err(ActivateError::Image(error)),
         };
@@ -312,6 +325,9 @@ impl Store {
         let source = Source::new(&table);
         if source.used as usize > STORE_WORDS {
             return Err(ActivateError::TooLarge { needed: source.used as usize });
+        }
+        if table.page_count() > STORE_PAGES {
+            return Err(ActivateError::TooManyPages { found: table.page_count() });
         }
         let counters = self.counters;
         *self = Self { source, counters, active: true, ..Self::new() };
@@ -846,6 +862,49 @@ mod tests {
         assert_eq!(store.health(), Health::Empty);
         // One image is enough.
         assert!(store.activate(&Images::new(&damaged, &IMAGE), &drive, 20.0).is_ok());
+        assert_eq!(store.first, active(20.0).first);
+    }
+
+    /// With a bit for each page modulo 32, damage of page 33 of one image would have been looked for in page 1 of the other.
+    #[test]
+    fn an_image_with_more_pages_than_bits_is_not_activated() {
+        let torque: Vec<f32> = (0..40).map(|i| i as f32).collect();
+        let zeros = std::vec![0.0; 40 * 3 * 16];
+        let data = crate::TableData {
+            drive: fixture::drive(),
+            torque_nodes_n_m: &torque,
+            temperature_nodes_c: &[-40.0, 20.0, 80.0],
+            ripple_nodes: 16,
+            mean_rad: &zeros[..120],
+            half_width_rad: &zeros[..120],
+            mean_ripple_rad: &zeros,
+            half_width_ripple_rad: &zeros,
+            generator_curve_rad: &[],
+            material_curve_rad: &[],
+            output_curve_rad: &[],
+            projection_worst_rad: 0.0,
+            projection_rms_rad: 0.0,
+        };
+        let provenance = crate::Provenance { torque_range_n_m: [0.0, 39.0], ..fixture::provenance() };
+        let mut image = std::vec![0; crate::image_bytes(40, 3, 16, [0; 3])];
+        crate::write_image(&data, &provenance, &mut image, fixture::id).unwrap();
+        let pages = Table::check(&image).unwrap().page_count();
+        assert!(pages > STORE_PAGES && 64 + 40 * 22 <= STORE_WORDS, "{pages}");
+        let refused = Store::new().activate(&Images::new(&image, &image), &fixture::drive(), 20.0);
+        assert_eq!(refused, Err(ActivateError::TooManyPages { found: pages }));
+    }
+
+    /// Words that both have would follow the temperature, the others not.
+    #[test]
+    fn two_tables_are_not_activated_as_one() {
+        let mut other = IMAGE.clone();
+        // Another drive description: a table all the same.
+        other[16] ^= 1;
+        crate::image::reseal(&mut other);
+        assert!(Table::check(&other).is_ok());
+        let mut store = active(20.0);
+        let refused = store.activate(&Images::new(&other, &IMAGE), &fixture::drive(), 60.0);
+        assert_eq!(refused, Err(ActivateError::TwoTables));
         assert_eq!(store.first, active(20.0).first);
     }
 

@@ -2,7 +2,7 @@
 
 use crate::Choices;
 use crate::image::COUNT_RAD;
-use crate::tables::{BASES, hostile_axis};
+use crate::tables::{flying, hostile_axis};
 use flexspline::{
     Drive, GeneratorAngle, Images, Input, Joint, JointState, Limits, MAX_ERROR_RAD, Mode, Output, OutputAngle, Overrun,
     Quality, SettingError, Store, Table,
@@ -111,7 +111,7 @@ pub fn any_input(choices: &mut Choices<'_>, generator: &mut GeneratorAngle, torq
 /// One joint, some hundred ticks.
 pub fn run(data: &[u8]) {
     let mut choices = Choices::new(data);
-    let image = &BASES[choices.below(BASES.len())];
+    let image = flying(&mut choices);
     let table = Table::check(image).expect("a base");
     let torques: Vec<f32> = table.torque_nodes_n_m().collect();
     let drive = *table.drive();

@@ -3,7 +3,7 @@
 use crate::Choices;
 use crate::image::COUNT_RAD;
 use crate::runtime::{any_input, any_joint};
-use crate::tables::BASES;
+use crate::tables::flying;
 use flexspline::{
     GeneratorAngle, Images, JointState, Mode, PlayState, SAVED_JOINT_BYTES, SAVED_STATE_BYTES, Store, Table,
 };
@@ -16,7 +16,7 @@ fn seal<const N: usize>(bytes: &mut [u8; N]) {
 /// One saved play and one saved joint.
 pub fn run(data: &[u8]) {
     let mut choices = Choices::new(data);
-    let image = &BASES[choices.below(BASES.len())];
+    let image = flying(&mut choices);
     let table = Table::check(image).expect("a base");
     let drive = *table.drive();
     let torques: Vec<f32> = table.torque_nodes_n_m().collect();

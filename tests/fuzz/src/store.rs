@@ -2,7 +2,7 @@
 
 use crate::Choices;
 use crate::runtime::any_input;
-use crate::tables::BASES;
+use crate::tables::{BASES, flying};
 use flexspline::{
     Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode, Overrun, PAGE_BYTES, Quality, Store, Table,
     mend_page,
@@ -22,7 +22,7 @@ enum Flips {
 /// A store that is hit beside one that is not.
 pub fn run(data: &[u8]) {
     let mut choices = Choices::new(data);
-    let sound = &BASES[choices.below(BASES.len())];
+    let sound = flying(&mut choices);
     let table = Table::check(sound).expect("a base");
     let drive = *table.drive();
     let torques: Vec<f32> = table.torque_nodes_n_m().collect();
