@@ -8,9 +8,15 @@ fn replay(target: &str, run: fn(&[u8])) {
     let mut files: Vec<_> = fs::read_dir(&folder).expect("a corpus").map(|file| file.expect("a file").path()).collect();
     files.sort();
     assert!(files.len() > 2, "no corpus in {}", folder.display());
-    for file in files {
+    // In an interpreter a few have to do.
+    let most = if cfg!(miri) { 3 } else { usize::MAX };
+    for file in files.into_iter().take(most) {
         println!("{}", file.display());
-        run(&fs::read(&file).expect("readable"));
+        let bytes = fs::read(&file).expect("readable");
+        run(if cfg!(miri) { bytes.get(..300).unwrap_or(&bytes) } else { &bytes });
+    }
+    if cfg!(miri) {
+        return;
     }
     // Numbers that look random, the same in every run.
     let mut seed = 0x9e37_79b9_7f4a_7c15u64;
