@@ -47,6 +47,12 @@ pub fn run(data: &[u8]) {
     assert_eq!(state.mode(), Mode::Off);
     let Ok((joint, mut watch)) = any_joint(drive, &mut choices) else { return };
     let kept = i32::from_le_bytes(*bytes[SAVED_STATE_BYTES..].first_chunk().expect("the correction"));
+    let speed = f32::from_le_bytes(*bytes[SAVED_STATE_BYTES + 4..].first_chunk().expect("its speed"));
+    let fine = |parts: f64| parts * f64::from(COUNT_RAD) / 16.0;
+    if !watch.stops_in_time(fine(kept.into()), fine(speed.into())) {
+        // No joint with these limits saves that.
+        return;
+    }
     watch.restart(f64::from(kept) * f64::from(COUNT_RAD) / 16.0);
     let images = Images::new(image, image);
     let mut store = Store::new();
