@@ -104,8 +104,11 @@
 extern crate std;
 
 mod angle;
-#[cfg(feature = "c-api")]
+#[cfg(all(feature = "c-api", not(feature = "fuzzing")))]
 mod c_api;
+#[cfg(all(feature = "c-api", feature = "fuzzing"))]
+#[doc(hidden)]
+pub mod c_api;
 mod drive;
 mod error;
 #[cfg(test)]

@@ -56,24 +56,50 @@ struct Output {
 
 type Object = *mut u64;
 
-unsafe extern "C" {
-    fn flexspline_store_init(store: Object) -> u32;
-    fn flexspline_joint_init(joint: Object, settings: *const Settings) -> u32;
-    fn flexspline_state_init(state: Object) -> u32;
-    fn flexspline_store_activate(store: Object, joint: Object, table: *const Images, temperature_c: f32) -> u32;
-    fn flexspline_store_set_temperature(store: Object, table: *const Images, temperature_c: f32) -> u32;
-    fn flexspline_store_check_images(store: Object, table: *const Images, words: u16) -> u32;
-    fn flexspline_state_request(state: Object, mode: u8) -> u32;
-    fn flexspline_state_save(state: Object, saved: *mut u8) -> u32;
-    fn flexspline_state_restore(state: Object, saved: *const u8) -> u32;
-    fn flexspline_tick(
-        joint: Object,
-        table: *const Images,
-        store: Object,
-        state: Object,
-        input: *const Input,
-        output: *mut Output,
-    ) -> u32;
+// As C calls them: pointers to structures of its own.
+unsafe fn flexspline_store_init(store: Object) -> u32 {
+    flexspline::c_api::flexspline_store_init(store.cast()) as u32
+}
+unsafe fn flexspline_joint_init(joint: Object, settings: *const Settings) -> u32 {
+    flexspline::c_api::flexspline_joint_init(joint.cast(), settings.cast()) as u32
+}
+unsafe fn flexspline_state_init(state: Object) -> u32 {
+    flexspline::c_api::flexspline_state_init(state.cast()) as u32
+}
+unsafe fn flexspline_store_activate(store: Object, joint: Object, table: *const Images, temperature_c: f32) -> u32 {
+    flexspline::c_api::flexspline_store_activate(store.cast(), joint.cast(), table.cast(), temperature_c) as u32
+}
+unsafe fn flexspline_store_set_temperature(store: Object, table: *const Images, temperature_c: f32) -> u32 {
+    flexspline::c_api::flexspline_store_set_temperature(store.cast(), table.cast(), temperature_c) as u32
+}
+unsafe fn flexspline_store_check_images(store: Object, table: *const Images, words: u16) -> u32 {
+    flexspline::c_api::flexspline_store_check_images(store.cast(), table.cast(), words) as u32
+}
+unsafe fn flexspline_state_request(state: Object, mode: u8) -> u32 {
+    flexspline::c_api::flexspline_state_request(state.cast(), mode) as u32
+}
+unsafe fn flexspline_state_save(state: Object, saved: *mut u8) -> u32 {
+    flexspline::c_api::flexspline_state_save(state.cast(), saved.cast()) as u32
+}
+unsafe fn flexspline_state_restore(state: Object, saved: *const u8) -> u32 {
+    flexspline::c_api::flexspline_state_restore(state.cast(), saved.cast()) as u32
+}
+unsafe fn flexspline_tick(
+    joint: Object,
+    table: *const Images,
+    store: Object,
+    state: Object,
+    input: *const Input,
+    output: *mut Output,
+) -> u32 {
+    flexspline::c_api::flexspline_tick(
+        joint.cast(),
+        table.cast(),
+        store.cast(),
+        state.cast(),
+        input.cast(),
+        output.cast(),
+    ) as u32
 }
 
 const OK: u32 = 0;
