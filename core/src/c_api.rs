@@ -628,4 +628,81 @@ mod tests {
         unsafe { told.write(table) };
         assert_eq!(flexspline_store_check_images(inside, told, 9), Overlap);
     }
+
+    #[test]
+    fn settings_make_the_joint_they_name() {
+        let limits = Limits {
+            tick_s: SETTINGS.tick_s,
+            rate_rad_s: SETTINGS.rate_rad_s,
+            acceleration_rad_s2: SETTINGS.acceleration_rad_s2,
+            generator_rate_rad_s: SETTINGS.generator_rate_rad_s,
+            patience: SETTINGS.patience,
+        };
+        let members = [FixedMember::Flexspline, FixedMember::CircularSpline];
+        let policies = [Overrun::SkipAndCount, Overrun::HoldLast, Overrun::FadeOut { ticks: 50 }];
+        for (fixed_member, member) in (0..).zip(members) {
+            for (overrun, policy) in (0..).zip(policies) {
+                let mut o = blank();
+                let settings = FlexsplineSettings { fixed_member, overrun, ..SETTINGS };
+                assert_eq!(flexspline_joint_init(&mut o.joint, &settings), FlexsplineStatus::Ok);
+                let expected = Joint::new(Drive::new(188, 190, member).unwrap(), limits, policy).unwrap();
+                assert_eq!(get::<_, Joint>(&o.joint, JOINT_MARK), Ok(&expected), "{fixed_member} {overrun}");
+            }
+        }
+    }
+
+    #[test]
+    fn each_number_is_the_mode_it_stands_for() {
+        for (number, mode) in (0..).zip([Mode::Off, Mode::Tracking, Mode::Hold, Mode::Safe]) {
+            let mut o = made();
+            assert_eq!(flexspline_state_request(&mut o.state, 1), FlexsplineStatus::Ok);
+            assert_eq!(flexspline_state_request(&mut o.state, number), FlexsplineStatus::Ok);
+            assert_eq!(get::<_, JointState>(&o.state, STATE_MARK).unwrap().mode(), mode);
+        }
+    }
+
+    #[test]
+    fn each_quality_and_a_missing_sample_are_told() {
+        let image = fixture::image(false);
+        let (mut o, table) = (made(), pair(&image));
+        assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
+        let mut tick = |input: FlexsplineInput| {
+            let mut out = FlexsplineOutput::default();
+            let status = flexspline_tick(&o.joint, &table, &mut *o.store, &mut o.state, &input, &mut out);
+            assert_eq!(status, FlexsplineStatus::Ok);
+            out
+        };
+        assert_eq!(tick(INPUT).quality, 1, "the side is not known");
+        // Forward through the play, in ticks that are no glitch.
+        let at = |i: i64| FlexsplineInput { generator_counts: (1 << 30) + i * 20_000_000, ..INPUT };
+        let last = at(20);
+        assert_eq!((1..=20).map(|i| tick(at(i))).last().unwrap().quality, 0);
+        assert_eq!(tick(FlexsplineInput { torque_n_m: 1e3, ..last }).quality, 2);
+        assert_eq!(tick(FlexsplineInput { torque_n_m: f32::NAN, ..last }).quality, 3);
+        assert_eq!(tick(FlexsplineInput { has_generator: 0, ..last }).flags & 1, 1);
+        assert_eq!(tick(last).flags & 1, 0);
+    }
+
+    #[test]
+    fn objects_side_by_side_do_not_overlap() {
+        for (objects, expected) in [
+            ([(100, 10), (110, 5), (50, 50)], Ok(())),
+            ([(100, 10), (109, 5), (50, 50)], Err(FlexsplineStatus::Overlap)),
+            ([(100, 10), (110, 5), (50, 51)], Err(FlexsplineStatus::Overlap)),
+            ([(100, 10), (110, 5), (112, 1)], Err(FlexsplineStatus::Overlap)),
+            ([(100, 10), (usize::MAX, 5), (0, 100)], Ok(())),
+        ] {
+            assert_eq!(apart(objects), expected, "{objects:?}");
+        }
+    }
+
+    #[test]
+    fn what_another_call_made_is_no_object() {
+        let (mut o, image) = (made(), fixture::image(false));
+        let table = pair(&image);
+        let state = (&raw const o.state).cast::<FlexsplineJoint>();
+        assert_eq!(flexspline_store_activate(&mut *o.store, state, &table, 20.0), FlexsplineStatus::NotInitialised);
+        let joint = (&raw mut o.joint).cast::<FlexsplineState>();
+        assert_eq!(flexspline_state_request(joint, 1), FlexsplineStatus::NotInitialised);
+    }
 }
