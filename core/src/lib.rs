@@ -108,6 +108,7 @@ mod angle;
 mod c_api;
 #[cfg(all(feature = "c-api", feature = "fuzzing"))]
 #[doc(hidden)]
+#[allow(clippy::not_unsafe_ptr_arg_deref)] // As C calls them; public for `tests/fuzz` alone.
 pub mod c_api;
 mod drive;
 mod error;
