@@ -118,7 +118,8 @@ impl<'a> Images<'a> {
     }
 }
 
-/// Writes a page of `good` over the same page of `damaged`, and its checksum. Both are whole images of the same table.
+/// Writes a page of `good` over the same page of `damaged`, and its checksum. Both are whole images of the same table. The store is
+/// then to be told: [`Store::mended`].
 pub fn mend_page(damaged: &mut [u8], good: &[u8], page: usize) {
     let body = word_at(good.as_chunks::<4>().0, word::BODY) as usize;
     let sum = body.saturating_add(page).saturating_mul(4);
@@ -399,6 +400,14 @@ impl Store {
             .into_iter()
             .enumerate()
             .find_map(|(image, pages)| (pages != 0).then_some((image, pages.trailing_zeros() as usize)))
+    }
+
+    /// To be told after [`mend_page`]: this page of image 0 or 1 is as good as the other's again. Until the page is checked anew, the
+    /// other would be believed in any case, also when it is hit itself.
+    pub const fn mended(&mut self, image: usize, page: usize) {
+        let [first, second] = self.scrub.damaged;
+        let sound = !1u32.wrapping_shl(page as u32);
+        self.scrub.damaged = if image == 0 { [first & sound, second] } else { [first, second & sound] };
     }
 
     /// Flips bits of one word of one copy, as radiation does: for campaigns. Copies are 0 and 1.
@@ -772,6 +781,7 @@ mod tests {
             if let Some((image, page)) = hit.damaged_page() {
                 let good = images[1 - image].clone();
                 mend_page(&mut images[image], &good, page);
+                hit.mended(image, page);
             }
             if hit.health() == Health::Lost {
                 // What firmware would do: send the table again.
@@ -863,6 +873,27 @@ mod tests {
         // One image is enough.
         assert!(store.activate(&Images::new(&damaged, &IMAGE), &drive, 20.0).is_ok());
         assert_eq!(store.first, active(20.0).first);
+    }
+
+    /// Found by a fuzzer: page 3 of one image is damaged, found, and written again; then the same page of the other is hit.
+    #[test]
+    fn after_a_page_is_mended_the_other_image_is_no_longer_believed_alone() {
+        let mut images = [IMAGE.clone(), IMAGE.clone()];
+        images[0][1000] ^= 4;
+        let mut store = active(20.0);
+        store.check_images(&Images::new(&images[0], &images[1]), 2 * IMAGE.len() / 4 + 128);
+        assert_eq!(store.damaged_page(), Some((0, 3)));
+        let good = images[1].clone();
+        mend_page(&mut images[0], &good, 3);
+        store.mended(0, 3);
+        assert_eq!((store.health(), store.damaged_page()), (Health::Sound, None));
+        let before = store.first;
+        (768..1024).step_by(4).for_each(|at| images[1][at] ^= 0x40);
+        for _ in 0..store.used_words() {
+            store.tend(&Images::new(&images[0], &images[1]), Doubt(0));
+        }
+        assert_eq!(store.first, before);
+        assert!(store.counters().words_skipped > 0);
     }
 
     /// With a bit for each page modulo 32, damage of page 33 of one image would have been looked for in page 1 of the other.

@@ -92,6 +92,7 @@ pub fn run(data: &[u8]) {
         if let Some((image, page)) = hit.damaged_page().filter(|_| choices.below(4) == 0) {
             let good = images[1 - image].clone();
             mend_page(&mut images[image], &good, page);
+            hit.mended(image, page);
             if let (Flips::OtherPages, Some(owner)) = (flips, owner.get_mut(page)) {
                 // A page written again may be hit on either side.
                 let same = |page: usize| {
