@@ -781,7 +781,6 @@ mod tests {
             if let Some((image, page)) = hit.damaged_page() {
                 let good = images[1 - image].clone();
                 mend_page(&mut images[image], &good, page);
-                hit.mended(image, page);
             }
             if hit.health() == Health::Lost {
                 // What firmware would do: send the table again.
