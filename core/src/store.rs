@@ -118,8 +118,8 @@ impl<'a> Images<'a> {
     }
 }
 
-/// Writes a page of `good` over the same page of `damaged`, and its checksum. Both are whole images of the same table. The store is
-/// then to be told: [`Store::mended`].
+/// Writes a page of `good` over the same page of `damaged`, and its checksum. Both are whole images of the same table. If the page
+/// of `good` is intact the store may be told: [`Store::mended`].
 pub fn mend_page(damaged: &mut [u8], good: &[u8], page: usize) {
     let body = word_at(good.as_chunks::<4>().0, word::BODY) as usize;
     let sum = body.saturating_add(page).saturating_mul(4);
@@ -403,7 +403,8 @@ impl Store {
     }
 
     /// To be told after [`mend_page`]: this page of image 0 or 1 is as good as the other's again. Until the page is checked anew, the
-    /// other would be believed in any case, also when it is hit itself.
+    /// other would be believed in any case, also when it is hit itself. Only if the page that was copied is intact
+    /// ([`Table::is_page_intact`]): else it is not known any more that both are damaged.
     pub const fn mended(&mut self, image: usize, page: usize) {
         let [first, second] = self.scrub.damaged;
         let sound = !1u32.wrapping_shl(page as u32);
