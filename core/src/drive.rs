@@ -280,6 +280,9 @@ mod tests {
         assert_eq!(Drive::new(190, 192, FixedMember::CircularSpline).unwrap().ratio(), -95.0);
         assert_eq!(Drive::new(200, 202, FixedMember::Flexspline).unwrap().ratio(), 101.0);
         assert_eq!(Drive::new(201, 203, FixedMember::Flexspline).unwrap().ratio(), 101.5);
+        let thirds =
+            [FixedMember::Flexspline, FixedMember::CircularSpline].map(|fixed| Drive::new(200, 203, fixed).unwrap());
+        assert_eq!(thirds.map(|drive| drive.exact_ratio()), [203.0 / 3.0, -200.0 / 3.0]);
     }
 
     #[test]

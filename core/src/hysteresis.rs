@@ -39,6 +39,10 @@ pub(crate) const MAX_HALF_COUNTS: i32 = 34_178_720;
 /// Largest half-width of a play in counts, 0.2 rad: far above any table with what may be added to it, far below overflow.
 const MAX_PLAY_COUNTS: i32 = 1 << 27;
 
+/// Largest error that any table can give, with its rounding and the largest adjustment of mean and half-width, counts.
+pub(crate) const MOST_ERROR_COUNTS: u32 =
+    MAX_HALF_COUNTS as u32 + (MAX_HALF_COUNTS as u32 >> 8) + 2 * crate::runtime::Adjustment::MAX_COUNTS as u32;
+
 /// Where the drive rests inside its play: all that must survive a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlayState {
@@ -220,7 +224,8 @@ impl PlayState {
             && state.lower >= state.half.wrapping_neg()
             && state.upper <= state.half;
         let fresh = state.half == -1 && (state.lower == i32::MIN || state.lower == i32::MAX);
-        (intact && state.lower <= state.upper && (started || fresh)).then_some(state)
+        let possible = state.lower <= state.upper && state.error.unsigned_abs() <= MOST_ERROR_COUNTS;
+        (intact && possible && (started || fresh)).then_some(state)
     }
 }
 
@@ -314,6 +319,10 @@ mod tests {
         }
         let disordered = PlayState { lower: 5, upper: -5, half: 10, nominal: OutputAngle::ZERO, error: 0 };
         assert_eq!(PlayState::restore(&disordered.save()), None);
+        for error in [i32::MIN, i32::MAX, 105_000_000] {
+            let far = PlayState { lower: -5, error, ..disordered };
+            assert_eq!(PlayState::restore(&PlayState { upper: 5, ..far }.save()), None, "{error}");
+        }
         for (lower, upper) in [(-11, 5), (5, 11)] {
             let outside = PlayState { lower, upper, ..disordered };
             assert_eq!(PlayState::restore(&outside.save()), None);

@@ -91,6 +91,9 @@ const UNITS_PER_COUNT: f64 = 524_288.0;
 const HALF_WIDTH_ROUNDING_COUNTS: f64 = 3.0;
 /// Largest ripple unit for each count of a cell: a ripple of 15.9 cells.
 const MAX_UNITS_PER_CELL: f32 = 255.0;
+/// How far B-spline weights of 15 bits can be off, times the largest step between coefficients: one unit for the place in the
+/// cell and one for each of the two weights that are rounded.
+const WEIGHT_ROUNDING: f32 = 3.0 / 32_768.0;
 const CRC_BYTES: usize = 4;
 const ID_OFFSET: usize = 48;
 const RESERVED: core::ops::Range<usize> = 200..HEADER_BYTES;
@@ -506,9 +509,9 @@ fn complete(image: &mut [u8], body_bytes: usize) -> Result<(), ImageError> {
 /// Words that follow from the bounds: iterations, hold.
 const DERIVED_WORDS: [usize; 2] = [word::CELL_WIDTH.saturating_add(8), word::CELL_WIDTH.saturating_add(9)];
 
-/// An error limit in counts, rounded up; the per mille takes up the rounding of single precision.
+/// An error limit in counts, rounded up; the per mille takes up the rounding of single precision, the counts that of integers.
 fn limit_counts(limit_rad: f32) -> u32 {
-    (table::counts(limit_rad as f64) * 1.001) as u32
+    (table::counts(limit_rad as f64) * 1.001 + 16.0) as u32
 }
 
 /// Computes and stores every checksum of an image whose body is complete.
@@ -526,9 +529,11 @@ fn seal(image: &mut [u8], body_bytes: usize) {
 }
 
 /// Makes every checksum of an image right that states its body, whatever is in it.
-#[cfg(test)]
-pub(crate) fn reseal(image: &mut [u8]) {
-    let body_bytes = word_at(image.as_chunks::<4>().0, word::BODY) as usize * 4;
+#[cfg(any(test, feature = "fuzzing"))]
+#[doc(hidden)]
+pub fn reseal(image: &mut [u8]) {
+    let body_bytes = word_at(image.as_chunks::<4>().0, word::BODY) as usize;
+    let body_bytes = body_bytes.saturating_mul(4);
     if body_bytes < image.len() {
         seal(image, body_bytes);
         let _ = complete(image, body_bytes);
@@ -801,6 +806,8 @@ impl<'a> Table<'a> {
         check_closed(field, axis, self.words.get(at..).unwrap_or_default())?;
         let [largest, steepest, _] = extremes(axis.stored_len(), value);
         let slope = steepest * nodes as f32 * periods.abs() / TAU as f32;
+        // Two readings, which may lie on both sides of a step.
+        bounds.rounding_rad += 2.0 * WEIGHT_ROUNDING * steepest;
         bounds.error_rad += largest;
         bounds.periodic_rad += largest;
         bounds.slope += slope;
@@ -886,6 +893,7 @@ impl<'a> Table<'a> {
                 bounds.periodic_rad = larger(bounds.periodic_rad, largest);
                 bounds.slope = larger(bounds.slope, steepest * cells_per_rad);
                 bounds.ripple_cells = larger(bounds.ripple_cells, reached * cells_per_rad);
+                bounds.rounding_rad = larger(bounds.rounding_rad, WEIGHT_ROUNDING * steepest);
             }
         }
         Ok(())
@@ -992,7 +1000,7 @@ fn page_of(image: &[u8], body_bytes: usize, page: usize) -> Option<&[u8]> {
     image.get(..body_bytes)?.chunks(PAGE_BYTES).nth(page)
 }
 
-fn page_intact(image: &[u8], body_bytes: usize, page: usize) -> bool {
+pub(crate) fn page_intact(image: &[u8], body_bytes: usize, page: usize) -> bool {
     let sums = image.get(body_bytes..).map_or(&[][..], |sums| sums.as_chunks::<CRC_BYTES>().0);
     match (page_of(image, body_bytes, page), sums.get(page)) {
         (Some(bytes), Some(sum)) => crc32(bytes) == u32::from_le_bytes(*sum),
@@ -1386,6 +1394,31 @@ mod tests {
         let (slope, error) = (bounds.slope as f64, bounds.error_rad as f64);
         assert!(steepest < slope && slope < 1.3 * steepest, "{steepest} {slope}");
         assert!(largest < error && error < 1.1 * largest, "{largest} {error}");
+    }
+
+    #[test]
+    fn a_limit_as_small_as_what_the_table_gives_disables_nothing() {
+        let data = TableData {
+            mean_rad: &[0.0; 4],
+            half_width_rad: &[0.0; 4],
+            mean_ripple_rad: &[2.0e-8; 32],
+            half_width_ripple_rad: &[0.0; 32],
+            generator_curve_rad: &[2.0e-8, -1.0e-8, 1.5e-8, 0.0],
+            output_curve_rad: &[3.0e-8, 0.0, -3.0e-8, 0.0, 0.0],
+            ..data()
+        };
+        let wide = write(&data, &provenance()).unwrap();
+        let reached = Table::check(&wide).unwrap().bounds().error_rad;
+        let tight = write(&data, &Provenance { error_limit_rad: reached, ..provenance() }).unwrap();
+        let table = Table::check(&tight).unwrap();
+        for i in 0..2000 {
+            let target = crate::OutputAngle::from_counts(i * 8_589_934);
+            for direction in [crate::Direction::Forward, crate::Direction::Backward] {
+                let command = table.inverse(target, 0.5, 20.0, crate::Approach::Moving(direction));
+                assert_eq!(command.quality, crate::Quality::InRange, "{i}");
+                assert!(table.steady_error_rad(command.generator, 0.5, 20.0, direction).is_some(), "{i}");
+            }
+        }
     }
 
     #[test]

@@ -165,12 +165,15 @@
 #![cfg_attr(feature = "c-api", deny(unsafe_code))]
 #![cfg_attr(
     not(test),
-    warn(
+    deny(
         clippy::indexing_slicing,
         clippy::arithmetic_side_effects,
         clippy::unwrap_used,
         clippy::expect_used,
-        clippy::panic
+        clippy::panic,
+        clippy::unreachable,
+        clippy::todo,
+        clippy::unimplemented
     )
 )]
 
@@ -179,8 +182,12 @@ extern crate std;
 
 mod adapt;
 mod angle;
-#[cfg(feature = "c-api")]
+#[cfg(all(feature = "c-api", not(feature = "fuzzing")))]
 mod c_api;
+#[cfg(all(feature = "c-api", feature = "fuzzing"))]
+#[doc(hidden)]
+#[allow(clippy::not_unsafe_ptr_arg_deref)] // As C calls them; public for `tests/fuzz` alone.
+pub mod c_api;
 #[cfg(feature = "defmt")]
 mod defmt_impls;
 mod drive;
@@ -214,6 +221,9 @@ pub use drive::{Drive, FixedMember, Phases};
 pub use error::{DriveError, Field, ImageError};
 pub use events::{Event, Events, Watch};
 pub use hysteresis::{Direction, PlayState, SAVED_STATE_BYTES};
+#[cfg(feature = "fuzzing")]
+#[doc(hidden)]
+pub use image::reseal;
 pub use image::{
     FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance, TEXT_BYTES,
     TableData, WriteError, image_bytes, write_image,
@@ -231,7 +241,7 @@ pub use slip::{
     FittedSlip, LoadTorque, NominalOutput, Slip, SlipBank, SlipElement, SlipState, SlipVariable, TorqueSlipElement,
     saved_slip_bytes,
 };
-pub use store::{ActivateError, Counters, Health, Images, STORE_WORDS, Store, mend_page};
+pub use store::{ActivateError, Counters, Health, Images, STORE_PAGES, STORE_WORDS, Store, mend_page};
 pub use table::{Bounds, GeneratorKind, OperatingPoint, Quality, Table, TableId};
 pub use telemetry::{Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Writer};
 pub use upload::{Upload, UploadError};

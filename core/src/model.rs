@@ -33,7 +33,7 @@ pub const MAX_INVERSE_ITERATIONS: u8 = 8;
 pub const MAX_INVERSE_ERROR_RAD: f32 = 1.0e-6;
 
 impl Bounds {
-    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], 1 to 8, and what they leave; `cell_rad` is a cell of the
+    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], 1 to 8, and what they and rounding leave; `cell_rad` is a cell of the
     /// ripple at the output.
     pub(crate) fn inverse(self, cell_rad: f32) -> InverseBound {
         let rate = self.curve_slope / (1.0 - self.slope);
@@ -49,6 +49,9 @@ impl Bounds {
                 break;
             }
         }
+        // Places in a cell are in single precision.
+        let place_rad = if cell_rad.is_finite() { 4.0 * f32::EPSILON * cell_rad } else { 0.0 };
+        bound.error_rad += (self.rounding_rad + place_rad) / (1.0 - self.slope);
         bound
     }
 }
@@ -273,7 +276,7 @@ impl<M: Memory> Model<'_, M> {
         error
     }
 
-    /// How far the play rests beyond the side it is taken up on at `nominal`, signed like the error: 0 if that side is reached.
+    /// [`short_of_contact`], with the play that the table has at `nominal`.
     #[inline(always)]
     fn short_of_contact(
         &self,
@@ -283,14 +286,22 @@ impl<M: Memory> Model<'_, M> {
         nominal: OutputAngle,
         doubt: &mut Doubt,
     ) -> i32 {
-        let side = if backward { -1 } else { 1 };
         let there = self.drive.phases_at_output(nominal);
         let half = table::play_at(self.memory, point, there, doubt).half;
-        let beyond = state.nominal_or_zero().minus_near_counts(nominal);
-        let beyond = beyond.saturating_add(state.offset_counts()).saturating_add(half.wrapping_mul(side));
-        let beyond = beyond.wrapping_mul(side);
-        if beyond > 0 { beyond.wrapping_mul(side) } else { 0 }
+        short_of_contact(state, if backward { -1 } else { 1 }, nominal, half)
     }
+}
+
+/// How far the play rests beyond the side it is taken up on at `nominal`, signed like the error: 0 if that side is reached. No
+/// further than the other side: a play that is narrower there than where it rests now takes it along.
+#[inline(always)]
+fn short_of_contact(state: &PlayState, side: i32, nominal: OutputAngle, half: i32) -> i32 {
+    let beyond = state.nominal_or_zero().minus_near_counts(nominal);
+    let beyond = beyond.saturating_add(state.offset_counts()).saturating_add(half.wrapping_mul(side));
+    let beyond = beyond.wrapping_mul(side);
+    let play = half.wrapping_mul(2);
+    let beyond = if beyond < play { beyond } else { play };
+    if beyond > 0 { beyond.wrapping_mul(side) } else { 0 }
 }
 
 /// An angle less counts.
@@ -640,6 +651,17 @@ mod tests {
                 prop_assert!(off < table.bounds().slope as f64 * width, "{} arcsec off", off / ARCSEC);
             }
         }
+    }
+
+    #[test]
+    fn where_the_play_is_narrower_it_takes_the_output_along() {
+        let mut state = PlayState::after_motion(Direction::Forward);
+        let _ = state.update(OutputAngle::ZERO, 0, 1000, true);
+        // Resting 1000 behind. On the way back by 300 it would rest at 700 behind, but the play is 100 to either side there.
+        let there = OutputAngle::from_counts(-300);
+        assert_eq!(short_of_contact(&state, -1, there, 1000), -1700);
+        assert_eq!(short_of_contact(&state, -1, there, 100), -200);
+        assert_eq!(short_of_contact(&state, 1, there, 100), 0);
     }
 
     #[test]

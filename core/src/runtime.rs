@@ -18,7 +18,7 @@
 
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT, counts_from_rad};
 use crate::drive::Drive;
-use crate::hysteresis::{PlayState, SAVED_STATE_BYTES};
+use crate::hysteresis::{MOST_ERROR_COUNTS, PlayState, SAVED_STATE_BYTES};
 use crate::image::crc32;
 use crate::model::{self, Approach, Command, Estimate, Model, Prediction};
 use crate::store::{Images, Store};
@@ -140,6 +140,8 @@ pub struct Limits {
 const FINE: i32 = 8;
 /// Less than a count.
 const WITHIN: i32 = FINE - 1;
+/// No table with its adjustment gives a larger correction, and no joint a faster one, fine counts.
+const MOST_FINE: u32 = MOST_ERROR_COUNTS * FINE as u32;
 
 /// One joint: all that does not change while it runs. Can be made at compile time and lie in flash.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -376,7 +378,8 @@ impl JointState {
         let correction = i32::from_le_bytes(*correction);
         let speed = i32::from_le_bytes(*speed.first_chunk::<4>()?);
         let play = PlayState::restore(play)?;
-        let intact = crc32(before) == u32::from_le_bytes(*sum);
+        let possible = correction.unsigned_abs() <= MOST_FINE && speed.unsigned_abs() <= MOST_FINE;
+        let intact = crc32(before) == u32::from_le_bytes(*sum) && possible;
         let state = Self {
             play,
             nominal: play.nominal_or_zero(),
@@ -396,36 +399,45 @@ const fn within(value: i32, least: i32, most: i32) -> i32 {
     if above < most { above } else { most }
 }
 
-/// A positive, finite number of counts.
-const fn checked(name: &'static str, found: f32, counts: f64, most: f64) -> Result<f32, SettingError> {
-    if counts > 0.0 && counts <= most { Ok(counts as f32) } else { Err(SettingError { name, found }) }
+/// A positive, finite number of counts, at least `least`.
+const fn checked(name: &'static str, found: f32, counts: f64, [least, most]: [f64; 2]) -> Result<f32, SettingError> {
+    if counts > 0.0 && counts >= least && counts <= most {
+        Ok(counts as f32)
+    } else {
+        Err(SettingError { name, found })
+    }
 }
 
 impl Joint {
     /// A joint with this drive.
     ///
     /// # Errors
-    /// [`SettingError`]: a limit that is not finite and positive, or beyond 0.05 rad (rate) or half a turn (generator) in a tick.
+    /// [`SettingError`]: a limit that is not finite and positive, or beyond 0.05 rad (rate) or half a turn (generator) in a tick,
+    /// or a rate below 9e-11 rad in a tick.
     pub const fn new(drive: Drive, limits: Limits, overrun: Overrun) -> Result<Self, SettingError> {
         let Limits { tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, patience } = limits;
         let tick = tick_s as f64;
-        let tick_ok = checked("tick_s", tick_s, tick, 1.0e3);
+        let tick_ok = checked("tick_s", tick_s, tick, [0.0, 1.0e3]);
         if let Err(error) = tick_ok {
             return Err(error);
         }
-        let most = table::counts(0.05) * FINE as f64;
-        let rate = match checked("rate_rad_s", rate_rad_s, table::counts(rate_rad_s as f64 * tick) * FINE as f64, most)
-        {
-            Ok(rate) => rate,
-            Err(error) => return Err(error),
-        };
+        // Slower than one part in a tick would be no correction at all.
+        let bounds = [1.0, table::counts(0.05) * FINE as f64];
+        let rate =
+            match checked("rate_rad_s", rate_rad_s, table::counts(rate_rad_s as f64 * tick) * FINE as f64, bounds) {
+                Ok(rate) => rate,
+                Err(error) => return Err(error),
+            };
         let per_tick = table::counts(acceleration_rad_s2 as f64 * tick * tick) * FINE as f64;
-        let acceleration = match checked("acceleration_rad_s2", acceleration_rad_s2, per_tick, 1.0e12) {
+        let acceleration = match checked("acceleration_rad_s2", acceleration_rad_s2, per_tick, [0.0, 1.0e12]) {
             Ok(acceleration) => acceleration,
             Err(error) => return Err(error),
         };
+        // More than from full speed to full speed back is not needed, and would drown what is left to go in rounding.
+        let acceleration = if acceleration < 2.0 * rate { acceleration } else { 2.0 * rate };
         let per_tick = table::counts(generator_rate_rad_s as f64 * tick);
-        let largest_move = match checked("generator_rate_rad_s", generator_rate_rad_s, per_tick, 2_147_483_000.0) {
+        let largest_move = match checked("generator_rate_rad_s", generator_rate_rad_s, per_tick, [0.0, 2_147_483_000.0])
+        {
             Ok(counts) => counts as i32,
             Err(error) => return Err(error),
         };
@@ -958,8 +970,53 @@ mod tests {
         assert_eq!(named(Limits { tick_s: 0.0, ..LIMITS }), "tick_s");
         assert_eq!(named(Limits { rate_rad_s: f32::NAN, ..LIMITS }), "rate_rad_s");
         assert_eq!(named(Limits { rate_rad_s: 60.0, ..LIMITS }), "rate_rad_s");
+        // Not a part of a count in a tick: the correction would never move.
+        assert_eq!(named(Limits { rate_rad_s: 9.0e-8, ..LIMITS }), "rate_rad_s");
         assert_eq!(named(Limits { acceleration_rad_s2: -1.0, ..LIMITS }), "acceleration_rad_s2");
         assert_eq!(named(Limits { generator_rate_rad_s: f32::INFINITY, ..LIMITS }), "generator_rate_rad_s");
+    }
+
+    /// What is left to go must not drown in the rounding of a large acceleration.
+    #[test]
+    fn an_acceleration_beyond_need_does_not_make_the_correction_jitter() {
+        for step in 0..60 {
+            let acceleration_rad_s2 = 1.0e6 * 1.06f32.powi(step);
+            let mut run = Loop::new(Overrun::SkipAndCount);
+            run.joint =
+                Joint::new(fixture::drive(), Limits { acceleration_rad_s2, ..LIMITS }, Overrun::SkipAndCount).unwrap();
+            let images = Images::new(&IMAGE, &IMAGE);
+            for tick in 0..400 {
+                let input = run.input(1e-3);
+                let out = run.joint.tick(&images, &mut run.store, &mut run.state, &input);
+                run.generator = out.command;
+                assert!(tick < 200 || out.held_back_rad.abs() < COUNT, "{acceleration_rad_s2}, tick {tick}: {out:?}");
+            }
+        }
+    }
+
+    /// With a checksum that fits: what no joint can have saved is refused all the same.
+    #[test]
+    fn impossible_saved_states_are_refused() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        run.run(300, 1e-3, 1e-5);
+        let saved = run.state.save();
+        let changed = |at: usize, value: [u8; 4]| {
+            let mut bytes = saved;
+            bytes[at..at + 4].copy_from_slice(&value);
+            let (before, sum) = bytes.split_last_chunk_mut::<4>().unwrap();
+            *sum = crc32(before).to_le_bytes();
+            JointState::restore(&bytes)
+        };
+        let most = MOST_FINE as i32;
+        for correction in [most + 1, -most - 1, i32::MIN] {
+            assert_eq!(changed(SAVED_STATE_BYTES, correction.to_le_bytes()), None, "{correction}");
+        }
+        for speed in [f32::NAN, f32::INFINITY, -6e8, 1e30] {
+            assert_eq!(changed(SAVED_STATE_BYTES + 4, speed.to_le_bytes()), None, "{speed}");
+        }
+        for correction in [most, -most, 0] {
+            assert!(changed(SAVED_STATE_BYTES, correction.to_le_bytes()).is_some(), "{correction}");
+        }
     }
 
     proptest! {

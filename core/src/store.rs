@@ -18,7 +18,7 @@
 use crate::drive::Drive;
 use crate::error::ImageError;
 use crate::grid;
-use crate::image::{CRC, PAGE_BYTES, ripple_row};
+use crate::image::{CRC, PAGE_BYTES, page_intact, ripple_row};
 use crate::table::{
     self, Doubt, Memory, NODE_WORDS, OperatingPoint, Plan, Table, TableId, TorquePlace, Words, f32_at, halves, word,
     word_at, words_from,
@@ -27,6 +27,8 @@ use core::fmt;
 
 /// Largest copy that fits into a [`Store`], words: 72 for the axes, curves, and for each torque node 3 and its ripple.
 pub const STORE_WORDS: usize = 1024;
+/// Most pages of an image that a [`Store`] takes, 8 KiB: one bit for each.
+pub const STORE_PAGES: usize = 32;
 /// Words that a read may take from the last place on.
 const SLACK: usize = 8;
 const PAGE_WORDS: usize = PAGE_BYTES / 4;
@@ -71,6 +73,13 @@ pub enum ActivateError {
         /// Words needed; [`STORE_WORDS`] are there.
         needed: usize,
     },
+    /// The image has more pages than the store can tell apart.
+    TooManyPages {
+        /// Pages found; [`STORE_PAGES`] are allowed.
+        found: usize,
+    },
+    /// Each image is a table, and they differ: words of two tables would be mixed.
+    TwoTables,
     /// The table is for other tooth counts or another fixed member.
     OtherDrive,
 }
@@ -80,6 +89,8 @@ impl fmt::Display for ActivateError {
         match *self {
             Self::Image(error) => error.fmt(f),
             Self::TooLarge { needed } => write!(f, "the table needs {needed} words, the store has {STORE_WORDS}"),
+            Self::TooManyPages { found } => write!(f, "the image has {found} pages, a store takes {STORE_PAGES}"),
+            Self::TwoTables => f.write_str("the images are two different tables"),
             Self::OtherDrive => f.write_str("the table is for another drive"),
         }
     }
@@ -107,17 +118,23 @@ impl<'a> Images<'a> {
     }
 }
 
-/// Writes a page of `good` over the same page of `damaged`, and its checksum. Both are whole images of the same table.
-pub fn mend_page(damaged: &mut [u8], good: &[u8], page: usize) {
-    let body = word_at(good.as_chunks::<4>().0, word::BODY) as usize;
-    let sum = body.saturating_add(page).saturating_mul(4);
+/// Writes a page of `good` over the same page of `damaged`, and its checksum, and tells whether it did: not if the page of `good` is
+/// damaged too. Both are whole images of the same table. Then tell the store: [`Store::mended`].
+#[must_use]
+pub fn mend_page(damaged: &mut [u8], good: &[u8], page: usize) -> bool {
+    let body_bytes = (word_at(good.as_chunks::<4>().0, word::BODY) as usize).saturating_mul(4);
+    if damaged.len() != good.len() || !page_intact(good, body_bytes, page) {
+        return false;
+    }
+    let sum = body_bytes.saturating_add(page.saturating_mul(4));
     let start = page.saturating_mul(PAGE_BYTES);
-    let end = start.saturating_add(PAGE_BYTES).min(body.saturating_mul(4));
+    let end = start.saturating_add(PAGE_BYTES).min(body_bytes);
     for range in [start..end, sum..sum.saturating_add(4)] {
         if let (Some(to), Some(from)) = (damaged.get_mut(range.clone()), good.get(range)) {
             to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
         }
     }
+    true
 }
 
 /// What a step needs besides the copies, and where the words of the copies come from. What must not change unnoticed: all of it is
@@ -334,7 +351,8 @@ impl Store {
 
     /// Checks the images and fills the copies from them, at this temperature; used from the next tick on.
     ///
-    /// At least one image must pass [`Table::check`]; if the other does not, it is damaged and will be named. Takes as long as the
+    /// At least one image must pass [`Table::check`]; if the other does not, it is damaged and will be named; if it is another
+    /// table, neither is taken. Takes as long as the
     /// check and some 80 instructions for each word: between two ticks only if there is time for that.
     ///
     /// # Errors
@@ -347,6 +365,7 @@ impl Store {
     ) -> Result<TableId, ActivateError> {
         let [first, second] = images.words.map(|words| Table::check(words.as_flattened()));
         let table = match (first, second) {
+            (Ok(first), Ok(second)) if first.image != second.image => return Err(ActivateError::TwoTables),
             (Ok(table), _) | (Err(_), Ok(table)) => table,
             (Err(error), Err(_)) => return Err(ActivateError::Image(error)),
         };
@@ -357,6 +376,9 @@ impl Store {
         let body = word_at(table.words, word::BODY);
         if source.used as usize > STORE_WORDS {
             return Err(ActivateError::TooLarge { needed: source.used as usize });
+        }
+        if table.page_count() > STORE_PAGES {
+            return Err(ActivateError::TooManyPages { found: table.page_count() });
         }
         let counters = self.counters;
         // Field by field: a whole store would be made on the stack first.
@@ -443,6 +465,14 @@ impl Store {
             .into_iter()
             .enumerate()
             .find_map(|(image, pages)| (pages != 0).then_some((image, pages.trailing_zeros() as usize)))
+    }
+
+    /// To be told when [`mend_page`], or what writes flash in its place, has written this page of image 0 or 1 again from an intact
+    /// one. Without it the other image would be believed alone until the page is checked anew, also when it is hit itself.
+    pub const fn mended(&mut self, image: usize, page: usize) {
+        let [first, second] = self.scrub.damaged;
+        let sound = !1u32.wrapping_shl(page as u32);
+        self.scrub.damaged = if image == 0 { [first & sound, second] } else { [first, second & sound] };
     }
 
     /// Flips bits of one word of one copy, as radiation does: for campaigns. Copies are 0 and 1.
@@ -831,7 +861,9 @@ mod tests {
             hit.check_images(&seen, 64);
             if let Some((image, page)) = hit.damaged_page() {
                 let good = images[1 - image].clone();
-                mend_page(&mut images[image], &good, page);
+                if mend_page(&mut images[image], &good, page) {
+                    hit.mended(image, page);
+                }
             }
             if hit.health() == Health::Lost {
                 // What firmware would do: send the table again.
@@ -879,8 +911,15 @@ mod tests {
             store.tend(&images, Doubt(0), true);
         }
         assert!(store.first == before && store.counters().words_skipped == 0);
-        mend_page(&mut damaged, &IMAGE, 3);
+        assert!(mend_page(&mut damaged, &IMAGE, 3));
         assert_eq!(damaged, *IMAGE);
+        // Not from a page that is damaged itself, nor beyond the last, nor for an image of another size.
+        let mut bad = IMAGE.clone();
+        bad[800] ^= 1;
+        for (good, page) in [(&bad[..], 3), (&IMAGE[..], 99), (&IMAGE[4..], 3)] {
+            assert!(!mend_page(&mut damaged, good, page));
+            assert_eq!(damaged, *IMAGE);
+        }
         let images = Images::new(&damaged, &IMAGE);
         store.check_images(&images, 2 * IMAGE.len() / 4 + 128);
         assert_eq!((store.health(), store.damaged_page()), (Health::Sound, None));
@@ -922,6 +961,70 @@ mod tests {
         assert_eq!(store.health(), Health::Empty);
         // One image is enough.
         assert!(store.activate(&Images::new(&damaged, &IMAGE), &drive, 20.0).is_ok());
+        assert_eq!(store.first, active(20.0).first);
+    }
+
+    /// Found by a fuzzer: page 3 of one image is damaged, found, and written again; then the same page of the other is hit.
+    #[test]
+    fn after_a_page_is_mended_the_other_image_is_no_longer_believed_alone() {
+        let mut images = [IMAGE.clone(), IMAGE.clone()];
+        images[0][1000] ^= 4;
+        let mut store = active(20.0);
+        store.check_images(&Images::new(&images[0], &images[1]), 2 * IMAGE.len() / 4 + 128);
+        assert_eq!(store.damaged_page(), Some((0, 3)));
+        let good = images[1].clone();
+        assert!(mend_page(&mut images[0], &good, 3));
+        store.mended(0, 3);
+        assert_eq!((store.health(), store.damaged_page()), (Health::Sound, None));
+        let before = store.first.clone();
+        (768..1024).step_by(4).for_each(|at| images[1][at] ^= 0x40);
+        for _ in 0..store.used_words() {
+            store.tend(&Images::new(&images[0], &images[1]), Doubt(0), true);
+        }
+        assert!(store.first == before);
+        assert!(store.counters().words_skipped > 0);
+    }
+
+    /// With a bit for each page modulo 32, damage of page 33 of one image would have been looked for in page 1 of the other.
+    #[test]
+    fn an_image_with_more_pages_than_bits_is_not_activated() {
+        let torque: Vec<f32> = (0..40).map(|i| i as f32).collect();
+        let zeros = std::vec![0.0; 40 * 3 * 16];
+        let data = crate::TableData {
+            drive: fixture::drive(),
+            torque_nodes_n_m: &torque,
+            temperature_nodes_c: &[-40.0, 20.0, 80.0],
+            ripple_nodes: 16,
+            mean_rad: &zeros[..120],
+            half_width_rad: &zeros[..120],
+            mean_ripple_rad: &zeros,
+            half_width_ripple_rad: &zeros,
+            generator_curve_rad: &[],
+            material_curve_rad: &[],
+            output_curve_rad: &[],
+            projection_worst_rad: 0.0,
+            projection_rms_rad: 0.0,
+        };
+        let provenance = crate::Provenance { torque_range_n_m: [0.0, 39.0], ..fixture::provenance() };
+        let mut image = std::vec![0; crate::image_bytes(40, 3, 16, [0; 3])];
+        crate::write_image(&data, &provenance, &mut image, fixture::id).unwrap();
+        let pages = Table::check(&image).unwrap().page_count();
+        assert!(pages > STORE_PAGES && 64 + 40 * 22 <= STORE_WORDS, "{pages}");
+        let refused = Store::new().activate(&Images::new(&image, &image), &fixture::drive(), 20.0);
+        assert_eq!(refused, Err(ActivateError::TooManyPages { found: pages }));
+    }
+
+    /// Words that both have would follow the temperature, the others not.
+    #[test]
+    fn two_tables_are_not_activated_as_one() {
+        let mut other = IMAGE.clone();
+        // Another drive description: a table all the same.
+        other[16] ^= 1;
+        crate::image::reseal(&mut other);
+        assert!(Table::check(&other).is_ok());
+        let mut store = active(20.0);
+        let refused = store.activate(&Images::new(&other, &IMAGE), &fixture::drive(), 60.0);
+        assert_eq!(refused, Err(ActivateError::TwoTables));
         assert_eq!(store.first, active(20.0).first);
     }
 

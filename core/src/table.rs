@@ -275,6 +275,8 @@ pub struct Bounds {
     pub curve_slope: f32,
     /// Largest ripple, in cells of the ripple's axis: how far off a first guess of the inverse can be.
     pub ripple_cells: f32,
+    /// What the integers of a step round of A, B, C and the ripple, rad: the place in a cell and the weights have 15 bits.
+    pub rounding_rad: f32,
 }
 
 /// What the iterations of the inverse leave.
