@@ -1,73 +1,112 @@
-//! x
-use flexspline_sim::closed_loop::{map::DenseMap, flight::{*, gear::Gear, antenna::*, profile::*}};
-use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::sweep::rated_torque_n_m;
-use flexspline_sim::{samples, tables};
+//! The closed loop by hand.
+//!
+//! ```sh
+//! cargo run --release -p flexspline-sim --example closed_loop -- map tests/firmware/plant [GENERATOR...]    # contact FEM, minutes
+//! cargo run --release -p flexspline-sim --example closed_loop -- fly antenna|brief TABLES [OUT]
+//! cargo run --release -p flexspline-sim --example closed_loop -- inert antenna|brief TABLES [OUT]
+//! cargo run --release -p flexspline-sim --example closed_loop -- rover TABLES
+//! ```
+//! `TABLES` is a folder of `<generator>.fxt`. With `OUT` every tick of the flights is written there as CSV. `fly brief` prints,
+//! line by line, what the program `antenna` prints on the target, and `rover` what `rover` does; `inert` gives the load inertia.
+
+use std::error::Error;
 use std::path::Path;
-fn make(dir: &str, kind: GeneratorKind) {
-    use flexspline_sim::stepping::*;
-    use tables::ARCSEC_PER_RAD;
-    let drive = Drive::hhd_95();
-    let settings = SolverSettings { method: Method::Fast, ..SolverSettings::default() };
-        let t = std::time::Instant::now();
-        let map = match DenseMap::compute(&drive, kind, rated_torque_n_m(kind), settings) { Ok(m)=>m, Err(e)=>{println!("{kind}: {e}"); return} };
-        println!("{kind}: {:?}", t.elapsed());
-        std::fs::write(format!("{dir}/{kind}.csv"), map.to_csv()).unwrap();
-        let gear = Gear::new(map.view(), 23.0);
-        let problem = Problem::new(&drive, kind, 23.0, settings).unwrap();
-        let mut solver = Solver::new(&problem);
-        let (mut state, _) = solver.deform(0.1).unwrap();
-        let mut rng = fastrand::Rng::with_seed(3);
-        let (mut worst, mut sum, mut n)=(0.0f64,0.0,0);
-        let t = std::time::Instant::now();
-        let mut inc=0;
-        for k in 0..40 {
-            let f = rated_torque_n_m(kind)*((k as f64+rng.f64())/40.0).powi(4)+ 1e-3;
-            state = solver.increment(&state, state.generator_rad, f+0.02).unwrap().0;
-            for j in 0..8 {
-                state = solver.increment(&state, state.generator_rad+0.003+0.004*rng.f64(), f+0.02).unwrap().0; inc+=2;
-                if j<1 || state.output_rate<0.5/95.0 {continue}
-                let e = state.output_rad-state.generator_rad/95.0;
-                let d = (gear.elastic_error_rad(state.generator_rad, f, 1.0)-e)*ARCSEC_PER_RAD;
-                if d.abs()>0.2 {println!("F {f:.5} psi {:.4} fem {:.3} diff {d:.3}", state.generator_rad, e*ARCSEC_PER_RAD)}
-                worst=worst.max(d.abs()); sum+=d*d; n+=1;
+
+use flexspline_sim::closed_loop::flight::Plant;
+use flexspline_sim::closed_loop::flight::antenna::COLUMNS;
+use flexspline_sim::closed_loop::flight::gear::Gear;
+use flexspline_sim::closed_loop::flight::profile::{ANTENNA, BRIEF, Profile};
+use flexspline_sim::closed_loop::flight::rover::RoverJoint;
+use flexspline_sim::closed_loop::inertia::{DISH, InertGear};
+use flexspline_sim::closed_loop::map::DenseMap;
+use flexspline_sim::closed_loop::{fly, write_flight};
+use flexspline_sim::drive::{Drive, GeneratorKind};
+use flexspline_sim::output::write_whole;
+use flexspline_sim::stepping::{Method, SolverSettings};
+use flexspline_sim::sweep::rated_torque_n_m;
+
+/// The order of the target's programs.
+const KINDS: [GeneratorKind; 4] =
+    [GeneratorKind::Cam, GeneratorKind::DoubleDisc, GeneratorKind::FourRoller, GeneratorKind::TwoRoller];
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
+        ["map", folder, kinds @ ..] => make_maps(Path::new(folder), kinds),
+        ["rover", tables] => rover(Path::new(tables)),
+        [how @ ("fly" | "inert"), profile, tables, out @ ..] => {
+            let profile = match *profile {
+                "antenna" => ANTENNA,
+                "brief" => BRIEF,
+                other => return Err(format!("profile: found {other}, allowed: antenna, brief").into()),
+            };
+            println!("{COLUMNS}");
+            for kind in KINDS {
+                let plant = format!("tests/firmware/plant/{kind}.csv");
+                let map = DenseMap::parse(kind, &plant, &std::fs::read_to_string(&plant)?)?;
+                let image = std::fs::read(Path::new(tables).join(format!("{kind}.fxt")))?;
+                let out = out.first().map(Path::new);
+                if *how == "fly" {
+                    let gear = Gear::new(map.view(), profile.temperature_c[0]);
+                    run(kind, &image, gear, &profile, out)?;
+                } else {
+                    let gear = InertGear::new(map.view(), profile.temperature_c[0], DISH);
+                    run(kind, &image, gear, &profile, out)?;
+                }
             }
+            Ok(())
         }
-        println!("   worst {worst:.4} rms {:.4} n {n} {:?} inc {inc}", (sum/n as f64).sqrt(), t.elapsed());
+        _ => Err("allowed: map FOLDER [GENERATOR...], fly PROFILE TABLES [OUT], inert PROFILE TABLES [OUT], rover TABLES".into()),
+    }
 }
-fn main() {
-    let drive = Drive::hhd_95();
-    let dir = std::env::args().nth(1).unwrap();
-    if let Some(kind) = std::env::args().nth(2) {
-        for kind in kind.split(',') { make(&dir, kind.parse().unwrap()); }
-        return;
+
+fn make_maps(folder: &Path, kinds: &[&str]) -> Result<(), Box<dyn Error>> {
+    let settings = SolverSettings { method: Method::Fast, ..SolverSettings::default() };
+    for kind in KINDS.iter().filter(|kind| kinds.is_empty() || kinds.contains(&kind.to_string().as_str())) {
+        let map = DenseMap::compute(&Drive::hhd_95(), *kind, rated_torque_n_m(*kind), settings)?;
+        write_whole(&folder.join(format!("{kind}.csv")), |file| file.write_all(map.to_csv().as_bytes()))?;
+        println!("{kind}");
     }
-    for kind in GeneratorKind::ALL {
-        let file = format!("{dir}/{kind}.csv");
-        let Ok(text) = std::fs::read_to_string(&file) else { println!("no {file}"); continue };
-        let map = DenseMap::parse(kind, &file, &text).unwrap();
-        let path = format!("tests/firmware/samples/{kind}.samples.csv");
-        let bytes = std::fs::read(&path).unwrap();
-        let s = samples::read(Path::new(&path)).unwrap();
-        let table = tables::from_samples(&drive, kind, &s, "x", &bytes, Default::default()).unwrap();
-        for (name, profile) in [("full", ANTENNA), ("brief", BRIEF)] {
-        let t = std::time::Instant::now();
-        let largest = rated_torque_n_m(kind);
-        let plants = std::array::from_fn(|_| Gear::new(map.view(), 0.0));
-        let mean = profile.moments(largest).map(|m| m.torque_n_m).sum::<f64>() / f64::from(profile.ticks());
-        let mut antenna = Antenna::new(&table.image, plants, largest, mean, 0.0).unwrap();
-        let mut out = String::from("t,target,rate,torque,unc,sign,mean,torq,core,held,corr\n");
-        use std::fmt::Write;
-        for m in profile.moments(largest) {
-            let p = antenna.tick(&m);
-            let e = p.errors_rad.map(|e| e * tables::ARCSEC_PER_RAD);
-            writeln!(out, "{:.3},{:.7},{:.6},{:.4},{:.3},{:.3},{:.3},{:.3},{:.4},{},{:.3}", m.time_s, m.target_rad, m.rate_rad_s, m.torque_n_m, e[0],e[1],e[2],e[3],e[4], p.held_back as u8, f64::from(antenna.core.out.unwrap().correction_rad)*tables::ARCSEC_PER_RAD).unwrap();
-        }
-        println!("{kind} {name} {:?}", t.elapsed());
-        std::fs::write(format!("{dir}/{kind}-{name}.run.csv"), out).unwrap();
-        for (name, s) in CONTROLLERS.iter().zip(antenna.scores()) {
-            println!("  {name:24} whole {:9.3} {:9.3}  free {:9.3} {:9.3} ({:.3})  steady {:9.3} {:9.3}  free {:9.3} {:9.3}", s.whole.rms_arcsec(), s.whole.max_arcsec(), s.free.rms_arcsec(), s.free.max_arcsec(), 1.0-f64::from(s.free.count())/f64::from(s.whole.count()), s.steady.rms_arcsec(), s.steady.max_arcsec(), s.steady_free.rms_arcsec(), s.steady_free.max_arcsec());
-        }
-        }
+    Ok(())
+}
+
+fn run<P: Plant + Clone>(
+    kind: GeneratorKind,
+    image: &[u8],
+    plant: P,
+    profile: &Profile,
+    out: Option<&Path>,
+) -> Result<(), Box<dyn Error>> {
+    let mut rows = Vec::new();
+    let plants = std::array::from_fn(|_| plant.clone());
+    let antenna = fly(image, plants, profile, rated_torque_n_m(kind), &mut |row| rows.push(row))
+        .ok_or_else(|| format!("{kind}: the table cannot be flown"))?;
+    let mut text = String::new();
+    antenna.write(&kind.to_string(), &mut text)?;
+    print!("{text}");
+    if let Some(folder) = out {
+        std::fs::create_dir_all(folder)?;
+        write_flight(&folder.join(format!("{kind}.flight.csv")), &rows, 1)?;
     }
+    Ok(())
+}
+
+fn rover(tables: &Path) -> Result<(), Box<dyn Error>> {
+    let [first_c, _] = BRIEF.temperature_c;
+    for (number, kind) in KINDS.into_iter().enumerate() {
+        let plant = format!("tests/firmware/plant/{kind}.csv");
+        let map = DenseMap::parse(kind, &plant, &std::fs::read_to_string(&plant)?)?;
+        let image = std::fs::read(tables.join(format!("{kind}.fxt")))?;
+        let (name, largest) = (kind.to_string(), rated_torque_n_m(kind));
+        let gear = Gear::new(map.view(), first_c);
+        let mut joint = RoverJoint::new(number as u32, &name, &image, gear, largest, first_c)
+            .ok_or_else(|| format!("{kind}: the table cannot be flown"))?;
+        for (tick, moment) in BRIEF.moments(largest).enumerate() {
+            joint.tick(tick as u32, &moment);
+        }
+        let mut text = String::new();
+        joint.write(&mut text)?;
+        print!("{text}");
+    }
+    Ok(())
 }

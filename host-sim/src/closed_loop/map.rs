@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use thiserror::Error;
 
-use super::flight::gear::{GearMap, node_share};
+use super::flight::gear::{GearMap, Header, MOST, node_share, parse};
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
 use crate::tables::ARCSEC_PER_RAD;
@@ -22,12 +22,7 @@ const MOST_SETTLING_PITCHES: usize = 10;
 pub struct DenseMap {
     /// Which generator.
     pub kind: GeneratorKind,
-    largest_n_m: f64,
-    drag_n_m: f64,
-    teeth: f64,
-    ratio: f64,
-    phases: usize,
-    nodes: usize,
+    header: Header,
     planes: [Vec<f64>; 2],
 }
 
@@ -70,47 +65,39 @@ impl DenseMap {
         let [cold, warm] = TEMPERATURES_C;
         let at = |temperature_c| plane(drive, kind, largest_n_m, temperature_c, settings);
         let (cold, warm) = rayon::join(|| at(cold), || at(warm));
-        Ok(Self {
-            kind,
+        let header = Header {
             largest_n_m,
             drag_n_m: drive.output.drag_torque_n_m,
             teeth: f64::from(drive.flexspline.teeth),
             ratio: drive.ratio(),
+            temperatures_c: TEMPERATURES_C,
             phases,
             nodes,
-            planes: [cold?, warm?],
-        })
+        };
+        Ok(Self { kind, header, planes: [cold?, warm?] })
     }
 
     /// For the plant.
     pub fn view(&self) -> GearMap<'_> {
         let [cold, warm] = &self.planes;
-        GearMap {
-            largest_n_m: self.largest_n_m,
-            drag_n_m: self.drag_n_m,
-            teeth: self.teeth,
-            ratio: self.ratio,
-            temperatures_c: TEMPERATURES_C,
-            phases: self.phases,
-            nodes: self.nodes,
-            planes: [cold, warm],
-        }
+        self.header.with([cold, warm])
     }
 
     /// As a file: errors in arc-seconds, one line for each temperature and flank torque.
     pub fn to_csv(&self) -> String {
+        let Header { largest_n_m, drag_n_m, teeth, ratio, phases, nodes, .. } = self.header;
         let mut text = String::new();
-        let _ = writeln!(text, "# drag_n_m={} teeth={} ratio={}", self.drag_n_m, self.teeth, self.ratio);
+        let _ = writeln!(text, "# drag_n_m={drag_n_m} teeth={teeth} ratio={ratio}");
         text.push_str("temperature_c,flank_torque_n_m");
-        for phase in 0..self.phases {
+        for phase in 0..phases {
             let _ = write!(text, ",error_arcsec_{phase}");
         }
         text.push('\n');
         for (temperature, plane) in TEMPERATURES_C.iter().zip(&self.planes) {
-            for (node, row) in plane.chunks(self.phases).enumerate() {
-                let _ = write!(text, "{temperature},{}", self.largest_n_m * node_share(node, self.nodes));
+            for (node, row) in plane.chunks(phases).enumerate() {
+                let _ = write!(text, "{temperature},{}", largest_n_m * node_share(node, nodes));
                 for error in row {
-                    let _ = write!(text, ",{:.4}", error * ARCSEC_PER_RAD);
+                    let _ = write!(text, ",{:.3}", error * ARCSEC_PER_RAD);
                 }
                 text.push('\n');
             }
@@ -120,36 +107,14 @@ impl DenseMap {
 
     /// From a file of [`Self::to_csv`].
     pub fn parse(kind: GeneratorKind, file: &str, text: &str) -> Result<Self, MapError> {
-        let refuse = |line: usize, what: &str| MapError::File { file: file.to_owned(), line, what: what.to_owned() };
-        let mut lines = text.lines().enumerate().map(|(k, line)| (k + 1, line));
-        let (_, first) = lines.next().ok_or_else(|| refuse(1, "empty"))?;
-        let numbers: Vec<f64> = first
-            .split_whitespace()
-            .filter_map(|word| word.split_once('='))
-            .filter_map(|(_, number)| number.parse().ok())
-            .collect();
-        let &[drag_n_m, teeth, ratio] = numbers.as_slice() else {
-            return Err(refuse(1, "allowed: # drag_n_m=… teeth=… ratio=…"));
-        };
-        lines.next();
-        let (nodes, phases) = size(kind);
-        let mut planes = [vec![0.0; nodes * phases], vec![0.0; nodes * phases]];
-        let mut largest_n_m = 0.0;
-        for (plane, temperature_c) in planes.iter_mut().zip(TEMPERATURES_C) {
-            for row in plane.chunks_mut(phases) {
-                let (number, line) = lines.next().ok_or_else(|| refuse(0, "rows are missing at the end"))?;
-                let fields: Vec<f64> = line.split(',').filter_map(|field| field.parse().ok()).collect();
-                let [temperature, torque, errors @ ..] = fields.as_slice() else {
-                    return Err(refuse(number, "no numbers"));
-                };
-                if *temperature != temperature_c || errors.len() != phases {
-                    return Err(refuse(number, &format!("allowed: {temperature_c} degrees C and {phases} errors")));
-                }
-                largest_n_m = *torque;
-                row.iter_mut().zip(errors).for_each(|(to, from)| *to = from / ARCSEC_PER_RAD);
-            }
-        }
-        Ok(Self { kind, largest_n_m, drag_n_m, teeth, ratio, phases, nodes, planes })
+        let mut planes = Box::new([[0.0; MOST]; 2]);
+        let header = parse(text, &mut planes).map_err(|line| MapError::File {
+            file: file.to_owned(),
+            line,
+            what: "not a line of a plant; allowed: what DenseMap::to_csv writes".to_owned(),
+        })?;
+        let planes = planes.map(|plane| plane[..header.nodes * header.phases].to_vec());
+        Ok(Self { kind, header, planes })
     }
 }
 

@@ -2,6 +2,10 @@
 #![no_std]
 
 pub mod count;
+/// Everything of the closed loop that flies, as the host has it.
+#[path = "../../../host-sim/src/closed_loop/flight/mod.rs"]
+pub mod flight;
+pub mod plant;
 pub mod trajectory;
 
 use cortex_m_semihosting::debug;

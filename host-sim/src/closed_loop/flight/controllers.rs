@@ -170,10 +170,23 @@ impl<'a> ByTorque<'a> {
     }
 }
 
+/// An output estimated to be nearer to its target than this, or beyond it, is taken for on its way, rad: 0.04″.
+const ON_ITS_WAY_RAD: f32 = 2e-7;
+/// An output further beyond its target than this is asked back, whatever the target's velocity, rad: 20″.
+const TOO_FAR_RAD: f32 = 1e-4;
+
 /// The core: store, joint and its state.
+///
+/// The core goes forward if the target is ahead of where it estimates the output, backward if behind. A servo that tracks is now
+/// ahead, now behind, by less than an arc-second, and each time the whole play would be asked for. So the target that the core is
+/// given is at least [`ON_ITS_WAY_RAD`] ahead of the output in the direction of the commanded velocity, and what was added is
+/// taken off the command again.
 pub struct Compensated<'a> {
     joint: Joint,
     images: Images<'a>,
+    generator: GeneratorAngle,
+    direction: Direction,
+    guarded: bool,
     /// The store of the tables.
     pub store: Store,
     /// The state of the joint.
@@ -201,7 +214,16 @@ impl<'a> Compensated<'a> {
         let images = Images::new(image, image);
         let mut store = Store::new();
         store.activate(&images, &drive, temperature_c).map_err(StartError::Table)?;
-        Ok(Self { joint, images, store, state: JointState::new(), out: None })
+        Ok(Self {
+            joint,
+            images,
+            generator: GeneratorAngle::ZERO,
+            direction: Direction::Forward,
+            guarded: true,
+            store,
+            state: JointState::new(),
+            out: None,
+        })
     }
 
     /// From the next tick on.
@@ -210,23 +232,50 @@ impl<'a> Compensated<'a> {
         let _ = self.state.request(mode);
     }
 
-    /// The slow group: what the thermometer shows, and a slice of the check of the images.
+    /// Gives the core the target as it is, for comparison.
+    #[must_use]
+    pub fn unguarded(mut self) -> Self {
+        self.guarded = false;
+        self
+    }
+
+    /// What the thermometer shows, °C.
     pub fn set_temperature(&mut self, temperature_c: f32) {
         self.store.set_temperature(&self.images, temperature_c);
+    }
+
+    /// A slice of the check of the images.
+    pub fn check_images(&mut self) {
         self.store.check_images(&self.images, 16);
+    }
+
+    /// How far the target is put ahead, counts of the output.
+    fn put_ahead(&mut self, told: &Told) -> i64 {
+        self.direction = direction_of(told.rate_rad_s, self.direction);
+        self.generator = told.generator.unwrap_or(self.generator);
+        let mut play = *self.state.play();
+        let now = self.joint.forward(&self.store, &mut play, self.generator, told.torque_n_m);
+        let sign = self.direction.sign() as f32;
+        let ahead = told.target.minus_rad(now.output) * sign;
+        if !self.guarded || now.quality == Quality::Disabled || !(-TOO_FAR_RAD..ON_ITS_WAY_RAD).contains(&ahead) {
+            return 0;
+        }
+        now.output.offset_rad(sign * ON_ITS_WAY_RAD).minus_counts(told.target)
     }
 
     /// One tick.
     pub fn tick(&mut self, told: &Told) -> GeneratorAngle {
+        let more = self.put_ahead(told);
         let input = Input {
             generator: told.generator,
-            target: told.target,
+            target: told.target.offset_counts(more),
             torque_n_m: told.torque_n_m,
             missed_ticks: told.missed_ticks,
         };
         let out = self.joint.tick(&self.images, &mut self.store, &mut self.state, &input);
         self.out = Some(out);
-        out.command
+        let more = self.joint.drive().nominal_generator(OutputAngle::from_counts(more));
+        out.command.offset_counts(more.counts().wrapping_neg())
     }
 
     /// Whether the limiter held the correction back in the last tick by more than it matters, rad.

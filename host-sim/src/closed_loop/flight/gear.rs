@@ -36,6 +36,71 @@ pub struct GearMap<'a> {
     pub planes: [&'a [f64]; 2],
 }
 
+/// What a file says, without its planes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Header {
+    /// As in [`GearMap`].
+    pub largest_n_m: f64,
+    /// As in [`GearMap`].
+    pub drag_n_m: f64,
+    /// As in [`GearMap`].
+    pub teeth: f64,
+    /// As in [`GearMap`].
+    pub ratio: f64,
+    /// As in [`GearMap`].
+    pub temperatures_c: [f64; 2],
+    /// As in [`GearMap`].
+    pub phases: usize,
+    /// As in [`GearMap`].
+    pub nodes: usize,
+}
+
+impl Header {
+    /// With its planes.
+    pub fn with<'a>(&self, planes: [&'a [f64]; 2]) -> GearMap<'a> {
+        let Self { largest_n_m, drag_n_m, teeth, ratio, temperatures_c, phases, nodes } = *self;
+        GearMap { largest_n_m, drag_n_m, teeth, ratio, temperatures_c, phases, nodes, planes }
+    }
+}
+
+/// Reads a file of a map: a comment with `drag_n_m=`, `teeth=`, `ratio=`, a header, then for each of two temperatures one line
+/// for each flank torque: temperature, flank torque, errors in arc-seconds by phase.
+///
+/// # Errors
+/// The line, from 1, that is not so.
+pub fn parse(text: &str, planes: &mut [[f64; MOST]; 2]) -> Result<Header, usize> {
+    let mut lines = text.lines();
+    let first = lines.next().ok_or(1_usize)?;
+    let named = |name: &str| {
+        let words = first.split_whitespace().filter_map(|word| word.split_once('='));
+        words.filter(|(key, _)| *key == name).find_map(|(_, number)| number.parse::<f64>().ok()).ok_or(1_usize)
+    };
+    let (drag_n_m, teeth, ratio) = (named("drag_n_m")?, named("teeth")?, named("ratio")?);
+    let phases = lines.next().ok_or(2_usize)?.split(',').count().saturating_sub(2);
+    let mut temperatures_c = [f64::NAN; 2];
+    let (mut nodes, mut largest_n_m) = ([0_usize; 2], 0.0);
+    for (k, line) in lines.enumerate() {
+        let refused = k + 3;
+        let mut fields = line.split(',').map(|field| field.parse::<f64>().map_err(|_| refused));
+        let (temperature, torque) = (fields.next().ok_or(refused)??, fields.next().ok_or(refused)??);
+        let warm = usize::from(nodes[0] > 0 && temperature != temperatures_c[0]);
+        temperatures_c[warm] = temperature;
+        for phase in 0..phases {
+            let error = fields.next().ok_or(refused)??;
+            *planes[warm].get_mut(nodes[warm] * phases + phase).ok_or(refused)? = error / super::score::ARCSEC_PER_RAD;
+        }
+        if fields.next().is_some() || torque <= 0.0 {
+            return Err(refused);
+        }
+        nodes[warm] += 1;
+        largest_n_m = torque;
+    }
+    let [cold, warm] = nodes;
+    let known = temperatures_c[0] < temperatures_c[1] && cold == warm && cold >= 4 && (8..=32).contains(&phases);
+    let header = Header { largest_n_m, drag_n_m, teeth, ratio, temperatures_c, phases, nodes: cold };
+    if known { Ok(header) } else { Err(3 + cold + warm) }
+}
+
 /// Flank torque of node `k` of `n`, from 0, as a share of the largest.
 pub fn node_share(k: usize, n: usize) -> f64 {
     let part = (k + 1) as f64 / n as f64;

@@ -11,6 +11,7 @@ pub mod antenna;
 pub mod controllers;
 pub mod gear;
 pub mod profile;
+pub mod rover;
 pub mod score;
 pub mod servo;
 
@@ -45,9 +46,6 @@ impl Plant for gear::Gear<'_> {
     }
 }
 
-/// Ticks between two readings of the thermometer.
-pub const THERMOMETER_TICKS: u32 = 100;
-
 /// Torque sensor and thermometer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensors {
@@ -55,6 +53,9 @@ pub struct Sensors {
     pub torque_step_n_m: f64,
     /// Noise of the torque sensor: evenly between ± this, N·m.
     pub torque_noise_n_m: f64,
+    /// A torque that shows less than this is taken for none, N·m. What noise makes of no load would throw the output from one side
+    /// of the clearance to the other, in the model only.
+    pub torque_dead_zone_n_m: f64,
     /// Resolution of the thermometer, K.
     pub temperature_step_k: f64,
 }
@@ -63,12 +64,18 @@ impl Sensors {
     /// Of the usual kind for a table up to this torque: 14 bits over ± the range, noise of one step, quarters of a degree.
     pub fn for_range(largest_n_m: f64) -> Self {
         let step = 2.0 * largest_n_m / 16_384.0;
-        Self { torque_step_n_m: step, torque_noise_n_m: step, temperature_step_k: 0.25 }
+        Self {
+            torque_step_n_m: step,
+            torque_noise_n_m: step,
+            torque_dead_zone_n_m: 2.5 * step,
+            temperature_step_k: 0.25,
+        }
     }
 
     /// What the torque sensor shows.
     pub fn torque(&self, noise: f64, torque_n_m: f64) -> f32 {
-        stepped(torque_n_m + self.torque_noise_n_m * noise, self.torque_step_n_m) as f32
+        let shown = stepped(torque_n_m + self.torque_noise_n_m * noise, self.torque_step_n_m);
+        if shown.abs() < self.torque_dead_zone_n_m { 0.0 } else { shown as f32 }
     }
 
     /// What the thermometer shows.
@@ -132,9 +139,9 @@ impl<P: Plant> Lane<P> {
         self.servo.encoder()
     }
 
-    /// To the next tick with this command, at whose end the load has this torque.
-    pub fn go(&mut self, command: GeneratorAngle, torque_n_m: f64, ratio: f64) {
-        self.servo.control(command);
+    /// To the next tick with this command; the torque sensor shows the one, at the end of the tick the load has the other.
+    pub fn go(&mut self, command: GeneratorAngle, shown_n_m: f32, torque_n_m: f64, ratio: f64) {
+        self.servo.control(command, -f64::from(shown_n_m) / ratio);
         self.servo.turn(TICK_S, self.plant.carried_n_m(torque_n_m) / ratio);
         self.output_rad = self.plant.go(self.servo.angle_rad(), torque_n_m);
     }

@@ -141,6 +141,15 @@ impl Profile {
         Moments { profile: self, largest_n_m, seconds: self.seconds(), tick: 0, leg: 0, leg_ends: 0.0, at: START }
     }
 
+    /// Mean of the torque over the flight, N·m.
+    pub fn mean_torque_n_m(&self, largest_n_m: f64) -> f64 {
+        let mut sum = 0.0;
+        for moment in self.moments(largest_n_m) {
+            sum += moment.torque_n_m;
+        }
+        sum / f64::from(self.ticks())
+    }
+
     /// Torque on the load as a share of the largest.
     fn load_share(&self, time_s: f64) -> f64 {
         let Load { bias, swing, swing_hz, gust, gust_hz, calm_s: [begins, ends] } = self.load;

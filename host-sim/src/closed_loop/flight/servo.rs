@@ -1,7 +1,7 @@
 //! Motor, its encoder, and the position servo that turns the generator where it is told.
 //!
 //! A position loop with the command's rate fed forward, a speed loop with integral part inside, the torque of the motor
-//! limited; an encoder of so many bits. The drive is felt as the flank torque over the ratio.
+//! limited, the load as the torque sensor shows it fed forward; an encoder of so many bits. The drive is felt as the flank torque over the ratio.
 
 use core::f64::consts::TAU;
 use flexspline::GeneratorAngle;
@@ -87,15 +87,16 @@ impl Servo {
         GeneratorAngle::from_counts(step << (32 - self.settings.encoder_bits))
     }
 
-    /// The torque of the motor for the tick that begins, from the encoder and the command.
-    pub fn control(&mut self, command: GeneratorAngle) {
+    /// The torque of the motor for the tick that begins, from the encoder and the command; `against_n_m` is what the load is
+    /// known to ask of the motor.
+    pub fn control(&mut self, command: GeneratorAngle, against_n_m: f64) {
         let ServoSettings { inertia_kg_m2, largest_torque_n_m, position_hz, speed_hz, integral_hz, .. } = self.settings;
         let measured = self.encoder();
         let speed = angle_rad(measured.minus_counts(self.measured)) / TICK_S;
         let pace = angle_rad(command.minus_counts(self.commanded)) / TICK_S;
         let wanted = pace + TAU * position_hz * angle_rad(command.minus_counts(measured));
         let gain = TAU * speed_hz * inertia_kg_m2;
-        let asked = gain * (wanted - speed) + self.integral_n_m;
+        let asked = gain * (wanted - speed) + self.integral_n_m + against_n_m;
         self.torque_n_m = asked.clamp(-largest_torque_n_m, largest_torque_n_m);
         if self.torque_n_m == asked {
             self.integral_n_m += gain * TAU * integral_hz * TICK_S * (wanted - speed);
