@@ -56,7 +56,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
             Ok(())
         }
-        _ => Err("allowed: map FOLDER [GENERATOR...], fly PROFILE TABLES [OUT], inert PROFILE TABLES [OUT], rover TABLES".into()),
+        _ => Err(
+            "allowed: map FOLDER [GENERATOR...], fly PROFILE TABLES [OUT], inert PROFILE TABLES [OUT], rover TABLES"
+                .into(),
+        ),
     }
 }
 

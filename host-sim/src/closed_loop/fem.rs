@@ -61,13 +61,23 @@ pub struct FemPlant<'p> {
 }
 
 /// The mechanical problem of the FEM in the loop; one temperature throughout.
-pub fn problem(drive: &Drive, kind: GeneratorKind, temperature_c: f64, settings: SolverSettings) -> Result<Problem, SolveError> {
+pub fn problem(
+    drive: &Drive,
+    kind: GeneratorKind,
+    temperature_c: f64,
+    settings: SolverSettings,
+) -> Result<Problem, SolveError> {
     Problem::new(drive, kind, temperature_c, settings)
 }
 
 impl<'p> FemPlant<'p> {
     /// Deformed at generator angle zero, unloaded.
-    pub fn new(problem: &'p Problem, map: GearMap<'p>, temperature_c: f64, windows: Windows) -> Result<Self, SolveError> {
+    pub fn new(
+        problem: &'p Problem,
+        map: GearMap<'p>,
+        temperature_c: f64,
+        windows: Windows,
+    ) -> Result<Self, SolveError> {
         let mut solver = Solver::new(problem);
         let (state, _) = solver.deform(0.0)?;
         Ok(Self {
@@ -91,7 +101,8 @@ impl<'p> FemPlant<'p> {
     fn due(&self, generator_rad: f64, torque_n_m: f64) -> bool {
         let Windows { generator_rad: angle, torque_share, torque_n_m: least } = self.windows;
         let window = (torque_share * self.state.torque_n_m.abs()).max(least);
-        (generator_rad - self.state.generator_rad).abs() >= angle || (torque_n_m - self.state.torque_n_m).abs() >= window
+        (generator_rad - self.state.generator_rad).abs() >= angle
+            || (torque_n_m - self.state.torque_n_m).abs() >= window
     }
 
     /// An increment; the output by the FEM there.

@@ -82,10 +82,7 @@ fn row<P: Plant>(moment: &Moment, pointing: &Pointing, antenna: &Antenna<'_, P>)
         sign_of_velocity_mean_load_arcsec: errors[2],
         torque_and_sign_arcsec: errors[3],
         core_arcsec: errors[CORE],
-        core_correction_arcsec: antenna
-            .core
-            .out
-            .map_or(0.0, |out| f64::from(out.correction_rad) * ARCSEC_PER_RAD),
+        core_correction_arcsec: antenna.core.out.map_or(0.0, |out| f64::from(out.correction_rad) * ARCSEC_PER_RAD),
         held_back: pointing.held_back,
     }
 }

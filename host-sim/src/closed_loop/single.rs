@@ -2,7 +2,7 @@
 
 use flexspline::{Drive, Mode, Output, Overrun};
 
-use super::flight::antenna::{HELD_BACK_RAD, SlowGroups, START_UP_S};
+use super::flight::antenna::{HELD_BACK_RAD, START_UP_S, SlowGroups};
 use super::flight::controllers::{Compensated, StartError, Told};
 use super::flight::profile::Moment;
 use super::flight::score::Scores;
@@ -53,15 +53,24 @@ impl<'a, P: Plant> Single<'a, P> {
         let groups = SlowGroups::staggered(0).unwrap_or_else(|| unreachable!("number 0 is below 20"));
         let lane = Lane::new(plant, Servo::new(SERVO));
         let command = lane.encoder();
-        Ok(Self { lane, core, scores: Scores::default(), drive, groups, sensors, noise: Noise::new(5), tick: 0, command })
+        Ok(Self {
+            lane,
+            core,
+            scores: Scores::default(),
+            drive,
+            groups,
+            sensors,
+            noise: Noise::new(5),
+            tick: 0,
+            command,
+        })
     }
 
     /// One tick. `disturb` may change what the joint is told, and says whether it is called at all; if not, the last command
     /// stands.
     pub fn tick(&mut self, now: &Moment, disturb: impl FnOnce(&mut Told, &mut Compensated<'a>) -> bool) -> Step {
         let error_rad = self.lane.output_rad() - now.target_rad;
-        let sensed = self.lane.plant.carried_n_m(now.torque_n_m);
-        let shown_n_m = self.sensors.torque(self.noise.part(), sensed);
+        let shown_n_m = self.sensors.torque(self.noise.part(), now.torque_n_m);
         let mut told = Told {
             generator: Some(self.lane.encoder()),
             target: ahead(now, 0.0),

@@ -127,7 +127,7 @@ impl<'a, P: Plant> Antenna<'a, P> {
                 generator: Some(lane.encoder()),
                 target,
                 rate_rad_s: now.rate_rad_s,
-                torque_n_m: self.sensors.torque(noise, lane.plant.carried_n_m(now.torque_n_m)),
+                torque_n_m: self.sensors.torque(noise, now.torque_n_m),
                 missed_ticks: 0,
             };
             let command = match k {
@@ -233,5 +233,4 @@ impl Observer {
 }
 
 /// What the columns of [`Antenna::write`] are.
-pub const COLUMNS: &str =
-    "generator   controller           whole rms\"     max\"  steady rms\"    max\"   not held rms\"  max\" steady rms\"    max\"";
+pub const COLUMNS: &str = "generator   controller           whole rms\"     max\"  steady rms\"    max\"   not held rms\"  max\" steady rms\"    max\"";

@@ -16,11 +16,12 @@ use flexspline::{
 
 use super::profile::TICK_S;
 
-/// Limits of every correction, suited to the servo.
+/// Limits of every correction, suited to the servo: a step of 60″ overshoots by 1″ and has settled after 18 ms; with four times the
+/// acceleration it overshoots by 19″, and the output, carried too far, stays there until the target has come by.
 pub const LIMITS: Limits = Limits {
     tick_s: TICK_S as f32,
-    rate_rad_s: 0.1,
-    acceleration_rad_s2: 20.0,
+    rate_rad_s: 0.05,
+    acceleration_rad_s2: 5.0,
     generator_rate_rad_s: 600.0,
     patience: 5,
 };

@@ -24,8 +24,7 @@ pub trait Plant {
     /// The generator and the torque on the load go on by a tick; the output angle then, rad.
     fn go(&mut self, generator_rad: f64, torque_n_m: f64) -> f64;
 
-    /// Torque that the drive carries, N·m, under this torque on the load: what the motor feels over the ratio, and a sensor
-    /// between drive and load.
+    /// Torque that the drive carries, N·m, under this torque on the load: what the motor feels over the ratio.
     fn carried_n_m(&self, torque_n_m: f64) -> f64;
 
     /// The temperature of the drive, °C.
@@ -67,7 +66,7 @@ impl Sensors {
         Self {
             torque_step_n_m: step,
             torque_noise_n_m: step,
-            torque_dead_zone_n_m: 2.5 * step,
+            torque_dead_zone_n_m: 1.5 * step,
             temperature_step_k: 0.25,
         }
     }

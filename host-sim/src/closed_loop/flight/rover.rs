@@ -5,7 +5,7 @@ use core::fmt;
 
 use flexspline::{Mode, Overrun, Table};
 
-use super::antenna::{HELD_BACK_RAD, SlowGroups, START_UP_S};
+use super::antenna::{HELD_BACK_RAD, START_UP_S, SlowGroups};
 use super::controllers::{Compensated, Told, Uncompensated};
 use super::profile::Moment;
 use super::score::Scores;
@@ -31,14 +31,7 @@ pub struct RoverJoint<'a, P> {
 
 impl<'a, P: Plant + Clone> RoverJoint<'a, P> {
     /// Joint `number` at rest; `None` if its table cannot be flown.
-    pub fn new(
-        number: u32,
-        name: &'a str,
-        image: &'a [u8],
-        plant: P,
-        largest_n_m: f64,
-        first_c: f64,
-    ) -> Option<Self> {
+    pub fn new(number: u32, name: &'a str, image: &'a [u8], plant: P, largest_n_m: f64, first_c: f64) -> Option<Self> {
         let drive = *Table::check(image).ok()?.drive();
         let sensors = Sensors::for_range(largest_n_m);
         let mut core = Compensated::new(image, drive, sensors.temperature(first_c), Overrun::SkipAndCount).ok()?;
@@ -64,7 +57,7 @@ impl<'a, P: Plant + Clone> RoverJoint<'a, P> {
     /// One tick.
     pub fn tick(&mut self, tick: u32, now: &Moment) {
         let target = ahead(now, 0.0);
-        let torque_n_m = self.sensors.torque(self.noise.part(), self.lane.plant.carried_n_m(now.torque_n_m));
+        let torque_n_m = self.sensors.torque(self.noise.part(), now.torque_n_m);
         let error_rad = self.lane.output_rad() - now.target_rad;
         let nominal_error_rad = self.nominal_lane.output_rad() - now.target_rad;
         let generator = Some(self.lane.encoder());

@@ -1,7 +1,7 @@
 //! Motor, its encoder, and the position servo that turns the generator where it is told.
 //!
-//! A position loop with the command's rate fed forward, a speed loop with integral part inside, the torque of the motor
-//! limited, the load as the torque sensor shows it fed forward; an encoder of so many bits. The drive is felt as the flank torque over the ratio.
+//! A position loop with the command's rate and acceleration fed forward, a speed loop with integral part inside, the torque of
+//! the motor limited, the load as the torque sensor shows it fed forward; an encoder of so many bits. The drive is felt as the flank torque over the ratio.
 
 use core::f64::consts::TAU;
 use flexspline::GeneratorAngle;
@@ -49,6 +49,7 @@ pub struct Servo {
     /// What was measured and commanded in the tick before.
     measured: GeneratorAngle,
     commanded: GeneratorAngle,
+    pace_rad_s: f64,
 }
 
 impl Servo {
@@ -62,6 +63,7 @@ impl Servo {
             integral_n_m: 0.0,
             measured: GeneratorAngle::ZERO,
             commanded: GeneratorAngle::ZERO,
+            pace_rad_s: 0.0,
         }
     }
 
@@ -96,12 +98,15 @@ impl Servo {
         let pace = angle_rad(command.minus_counts(self.commanded)) / TICK_S;
         let wanted = pace + TAU * position_hz * angle_rad(command.minus_counts(measured));
         let gain = TAU * speed_hz * inertia_kg_m2;
-        let asked = gain * (wanted - speed) + self.integral_n_m + against_n_m;
+        let asked = gain * (wanted - speed)
+            + self.integral_n_m
+            + inertia_kg_m2 * (pace - self.pace_rad_s) / TICK_S
+            + against_n_m;
         self.torque_n_m = asked.clamp(-largest_torque_n_m, largest_torque_n_m);
         if self.torque_n_m == asked {
             self.integral_n_m += gain * TAU * integral_hz * TICK_S * (wanted - speed);
         }
-        (self.measured, self.commanded) = (measured, command);
+        (self.measured, self.commanded, self.pace_rad_s) = (measured, command, pace);
     }
 
     /// The motor moves on for a time while the drive pulls at it with this flank torque over the ratio, N·m.

@@ -18,7 +18,8 @@ fn main() -> ! {
 }
 
 fn drive(rooms: &mut [Room; 4]) -> Option<bool> {
-    let [first_c, _] = BRIEF.temperature_c;
+    let profile = BRIEF;
+    let [first_c, _] = profile.temperature_c;
     let [one, two, three, four] = rooms;
     let maps = [read(0, one)?, read(1, two)?, read(2, three)?, read(3, four)?];
     let joint = |number: usize| {
@@ -27,8 +28,8 @@ fn drive(rooms: &mut [Room; 4]) -> Option<bool> {
         RoverJoint::new(number as u32, name, image, Gear::new(map, first_c), largest_n_m, first_c)
     };
     let mut joints = [joint(0)?, joint(1)?, joint(2)?, joint(3)?];
-    let mut moments = maps.map(|(_, largest_n_m, _)| BRIEF.moments(largest_n_m));
-    for tick in 0..BRIEF.ticks() {
+    let mut moments = maps.map(|(_, largest_n_m, _)| profile.moments(largest_n_m));
+    for tick in 0..profile.ticks() {
         for (joint, moments) in joints.iter_mut().zip(&mut moments) {
             joint.tick(tick, &moments.next()?);
         }
