@@ -17,6 +17,7 @@ use flexspline_sim::closed_loop::flight::antenna::COLUMNS;
 use flexspline_sim::closed_loop::flight::gear::Gear;
 use flexspline_sim::closed_loop::flight::profile::{ANTENNA, BRIEF, Profile};
 use flexspline_sim::closed_loop::flight::rover::RoverJoint;
+use flexspline_sim::closed_loop::flight::servo::{SERVO, SOFT_SERVO, ServoSettings};
 use flexspline_sim::closed_loop::inertia::{DISH, InertGear};
 use flexspline_sim::closed_loop::map::DenseMap;
 use flexspline_sim::closed_loop::{fly, write_flight};
@@ -48,10 +49,10 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let out = out.first().map(Path::new);
                 if *how == "fly" {
                     let gear = Gear::new(map.view(), profile.temperature_c[0]);
-                    run(kind, &image, gear, &profile, out)?;
+                    run(kind, &image, gear, SERVO, &profile, out)?;
                 } else {
                     let gear = InertGear::new(map.view(), profile.temperature_c[0], DISH);
-                    run(kind, &image, gear, &profile, out)?;
+                    run(kind, &image, gear, SOFT_SERVO, &profile, out)?;
                 }
             }
             Ok(())
@@ -77,12 +78,13 @@ fn run<P: Plant + Clone>(
     kind: GeneratorKind,
     image: &[u8],
     plant: P,
+    servo: ServoSettings,
     profile: &Profile,
     out: Option<&Path>,
 ) -> Result<(), Box<dyn Error>> {
     let mut rows = Vec::new();
     let plants = std::array::from_fn(|_| plant.clone());
-    let antenna = fly(image, plants, profile, rated_torque_n_m(kind), &mut |row| rows.push(row))
+    let antenna = fly(image, plants, servo, profile, rated_torque_n_m(kind), &mut |row| rows.push(row))
         .ok_or_else(|| format!("{kind}: the table cannot be flown"))?;
     let mut text = String::new();
     antenna.write(&kind.to_string(), &mut text)?;

@@ -20,6 +20,7 @@ use crate::tables::ARCSEC_PER_RAD;
 use flight::Plant;
 use flight::antenna::{Antenna, CORE, Pointing};
 use flight::profile::{Moment, Profile};
+use flight::servo::ServoSettings;
 
 pub use single::{Single, Step};
 
@@ -56,12 +57,14 @@ pub struct FlightRow {
 pub fn fly<'a, P: Plant>(
     image: &'a [u8],
     plants: [P; 5],
+    servo: ServoSettings,
     profile: &Profile,
     largest_n_m: f64,
     observe: &mut dyn FnMut(FlightRow),
 ) -> Option<Antenna<'a, P>> {
     let [first_c, _] = profile.temperature_c;
-    let mut antenna = Antenna::new(image, plants, largest_n_m, profile.mean_torque_n_m(largest_n_m), first_c)?;
+    let mut antenna =
+        Antenna::new(image, plants, largest_n_m, profile.mean_torque_n_m(largest_n_m), first_c)?.with_servo(servo);
     for moment in profile.moments(largest_n_m) {
         let pointing = antenna.tick(&moment);
         observe(row(&moment, &pointing, &antenna));

@@ -7,7 +7,7 @@ use flexspline::{Drive, Flags, Measured, Mode, Overrun, Predictor, PredictorStat
 use super::controllers::{BySign, ByTorque, Compensated, Told, Uncompensated};
 use super::profile::{Moment, TICK_S};
 use super::score::Scores;
-use super::servo::{SERVO, Servo};
+use super::servo::{SERVO, Servo, ServoSettings};
 use super::{Lane, Noise, Plant, Sensors, ahead};
 
 /// Controllers, in the order of the results.
@@ -106,6 +106,15 @@ impl<'a, P: Plant> Antenna<'a, P> {
             flags: [0; FLAGS.len()],
             digest: 0xcbf2_9ce4_8422_2325,
         })
+    }
+
+    /// Other servos.
+    #[must_use]
+    pub fn with_servo(mut self, settings: ServoSettings) -> Self {
+        for lane in &mut self.lanes {
+            lane.servo = Servo::new(settings);
+        }
+        self
     }
 
     /// The core without what keeps it from turning around: for comparison.
