@@ -15,11 +15,14 @@ use flexspline::{Flags, Mode, Predictor};
 use flexspline_firmware::flight::antenna::{Antenna, COLUMNS, CORE, Observer};
 use flexspline_firmware::flight::gear::Gear;
 use flexspline_firmware::flight::profile::{BRIEF, Moment};
+use flexspline_firmware::flight::score::ARCSEC_PER_RAD;
 use flexspline_firmware::plant::{Console, EMPTY, Room, read};
-use flexspline_firmware::{PREDICTOR, TABLES, finish};
+use flexspline_firmware::{MOTOR_PREDICTOR, TABLES, finish};
 
 /// Ticks of holding after the flight.
 const HELD: u32 = 100;
+/// Most that a correction may move while it is brought to rest, rad: 4″, from 0.01 rad/s at 5 rad/s².
+const MOST_MOVED_RAD: f32 = 2e-5;
 
 #[entry]
 fn main() -> ! {
@@ -41,11 +44,13 @@ fn fly(generator: usize, room: &mut Room) -> Option<bool> {
     let gear = Gear::new(map, first_c);
     let plants = core::array::from_fn(|_| gear.clone());
     let mut antenna = Antenna::new(image, plants, largest_n_m, mean_n_m, first_c)?;
-    let mut observer = Observer::new(Predictor::from_parts(&PREDICTOR).ok()?);
-    let mut last = Moment::default();
+    let mut observer = Observer::new(Predictor::from_parts(&MOTOR_PREDICTOR).ok()?);
+    let (mut last, mut missed_squares) = (Moment::default(), 0.0);
     for moment in BRIEF.moments(largest_n_m) {
         antenna.tick(&moment);
         observer.tick(antenna.lane(CORE), map.ratio);
+        let missed_n_m = f64::from(observer.state.load_torque_n_m()) - moment.torque_n_m;
+        missed_squares += missed_n_m * missed_n_m / f64::from(BRIEF.ticks());
         // Here telemetry takes `antenna.core.out` and the observer's state, once it has a bounded queue to put them into.
         last = moment;
     }
@@ -66,13 +71,15 @@ fn fly(generator: usize, room: &mut Room) -> Option<bool> {
         moved = moved.max((out.correction_rad - held).abs());
         well_flagged(out.flags)?;
     }
+    let observed_n_m = libm::sqrt(missed_squares);
     let _ = writeln!(
         Console,
-        "{name}: {against_none:.1} times better than the nominal ratio, {against_sign:.1} times than by sign of velocity; load by the \
-         observer {:.1} N.m",
-        observer.state.load_torque_n_m()
+        "{name}: {against_none:.1} times better than the nominal ratio, {against_sign:.1} times than by sign of velocity; observer \
+         without a torque sensor {observed_n_m:.2} N.m rms from the load; held within {:.2} arcsec",
+        f64::from(moved) * ARCSEC_PER_RAD
     );
-    Some(against_none >= 10.0 && against_sign >= 3.0 && quiet && moved < 1e-6)
+    let observed = observed_n_m < 0.1 * largest_n_m;
+    Some(against_none >= 10.0 && against_sign >= 3.0 && quiet && observed && moved < MOST_MOVED_RAD)
 }
 
 /// Nothing is wrong with table and state.
