@@ -14,7 +14,7 @@ use flexspline_sim::closed_loop::flight::controllers::{Compensated, LIMITS, Told
 use flexspline_sim::closed_loop::flight::gear::Gear;
 use flexspline_sim::closed_loop::flight::profile::{ANTENNA, BRIEF, Moment, Profile, TICK_S};
 use flexspline_sim::closed_loop::flight::score::{ARCSEC_PER_RAD, Scores};
-use flexspline_sim::closed_loop::flight::servo::{SERVO, SOFT_SERVO, ServoSettings};
+use flexspline_sim::closed_loop::flight::servo::SERVO;
 use flexspline_sim::closed_loop::inertia::{DISH, InertGear};
 use flexspline_sim::closed_loop::map::DenseMap;
 use flexspline_sim::closed_loop::{Single, Step, fly};
@@ -43,19 +43,8 @@ static CAM: LazyLock<(Vec<u8>, DenseMap)> = LazyLock::new(|| (image(GeneratorKin
 
 /// Errors of all controllers over a flight, and the lines that say so.
 fn flown<P: Plant + Clone>(kind: GeneratorKind, image: &[u8], plant: P, profile: &Profile) -> ([Scores; 5], String) {
-    flown_with(SERVO, kind, image, plant, profile)
-}
-
-/// The same with another servo.
-fn flown_with<P: Plant + Clone>(
-    servo: ServoSettings,
-    kind: GeneratorKind,
-    image: &[u8],
-    plant: P,
-    profile: &Profile,
-) -> ([Scores; 5], String) {
     let plants = std::array::from_fn(|_| plant.clone());
-    let antenna = fly(image, plants, servo, profile, rated_torque_n_m(kind), &mut |_| ()).unwrap();
+    let antenna = fly(image, plants, SERVO, profile, rated_torque_n_m(kind), &mut |_| ()).unwrap();
     let mut text = String::new();
     antenna.write(&kind.to_string(), &mut text).unwrap();
     (*antenna.scores(), text)
@@ -82,13 +71,15 @@ fn the_core_points_ten_times_better_than_the_ratio_and_three_times_than_the_sign
     }
 }
 
+/// Twice: the servo is not tuned for this load, and on the stiffest drive (cam) motor and load swing at 158 Hz by some 14″ rms
+/// under every controller, the uncompensated among them.
 #[test]
 fn a_load_with_inertia_leaves_the_gain() {
     println!("{COLUMNS}");
     for kind in GeneratorKind::ALL {
         let (image, map) = (image(kind), map(kind));
         let gear = InertGear::new(map.view(), BRIEF.temperature_c[0], DISH);
-        let (scores, text) = flown_with(SOFT_SERVO, kind, &image, gear, &BRIEF);
+        let (scores, text) = flown(kind, &image, gear, &BRIEF);
         print!("{text}");
         let [none, sign] = factors(&scores);
         println!("{kind}: {none:.1} and {sign:.1} times less");

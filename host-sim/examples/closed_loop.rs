@@ -17,7 +17,7 @@ use flexspline_sim::closed_loop::flight::antenna::COLUMNS;
 use flexspline_sim::closed_loop::flight::gear::Gear;
 use flexspline_sim::closed_loop::flight::profile::{ANTENNA, BRIEF, Profile};
 use flexspline_sim::closed_loop::flight::rover::RoverJoint;
-use flexspline_sim::closed_loop::flight::servo::{SERVO, SOFT_SERVO, ServoSettings};
+use flexspline_sim::closed_loop::flight::servo::{SERVO, ServoSettings};
 use flexspline_sim::closed_loop::inertia::{DISH, InertGear};
 use flexspline_sim::closed_loop::map::DenseMap;
 use flexspline_sim::closed_loop::{fly, write_flight};
@@ -52,7 +52,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                     run(kind, &image, gear, SERVO, &profile, out)?;
                 } else {
                     let gear = InertGear::new(map.view(), profile.temperature_c[0], DISH);
-                    run(kind, &image, gear, SOFT_SERVO, &profile, out)?;
+                    run(kind, &image, gear, SERVO, &profile, out)?;
                 }
             }
             Ok(())

@@ -38,10 +38,6 @@ pub const SERVO: ServoSettings = ServoSettings {
     encoder_bits: 20,
 };
 
-/// The same motor, its loops so slow that they leave a load with inertia alone: with [`SERVO`] the resonance of motor and load on the
-/// stiffest drive (158 Hz) swings by 14″, whatever is commanded.
-pub const SOFT_SERVO: ServoSettings = ServoSettings { position_hz: 10.0, speed_hz: 40.0, integral_hz: 4.0, ..SERVO };
-
 /// A motor with its servo.
 #[derive(Clone, Debug)]
 pub struct Servo {
