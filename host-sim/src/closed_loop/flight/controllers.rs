@@ -180,7 +180,7 @@ const TOO_FAR_RAD: f32 = 1e-4;
 ///
 /// The core goes forward if the target is ahead of where it estimates the output, backward if behind. A servo that tracks is now
 /// ahead, now behind, by less than an arc-second, and each time the whole play would be asked for. So the target that the core is
-/// given is at least [`ON_ITS_WAY_RAD`] ahead of the output in the direction of the commanded velocity, and what was added is
+/// given is at least 0.04″ ahead of the output in the direction of the commanded velocity, and what was added is
 /// taken off the command again.
 pub struct Compensated<'a> {
     joint: Joint,
@@ -256,7 +256,7 @@ impl<'a> Compensated<'a> {
         self.generator = told.generator.unwrap_or(self.generator);
         let mut play = *self.state.play();
         let now = self.joint.forward(&self.store, &mut play, self.generator, told.torque_n_m);
-        let sign = self.direction.sign() as f32;
+        let sign = self.direction.sign();
         let ahead = told.target.minus_rad(now.output) * sign;
         if !self.guarded || now.quality == Quality::Disabled || !(-TOO_FAR_RAD..ON_ITS_WAY_RAD).contains(&ahead) {
             return 0;
