@@ -339,17 +339,17 @@ impl Store {
     ///
     /// # Errors
     /// [`ActivateError`]; the table in use stays, and goes on only if its images stay too.
+    #[inline(never)]
     pub fn activate(
         &mut self,
         images: &Images<'_>,
         drive: &Drive,
         temperature_c: f32,
     ) -> Result<TableId, ActivateError> {
-        let [first, second] = images.words.map(|words| Table::check(words.as_flattened()));
-        let table = match (first, second) {
-            (Ok(table), _) | (Err(_), Ok(table)) => table,
-            (Err(error), Err(_)) => return Err(ActivateError::Image(error)),
-        };
+        let [first, second] = images.words;
+        let table = Table::check(first.as_flattened())
+            .or_else(|error| Table::check(second.as_flattened()).map_err(|_| error))
+            .map_err(ActivateError::Image)?;
         if table.drive() != drive {
             return Err(ActivateError::OtherDrive);
         }
