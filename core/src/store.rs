@@ -339,7 +339,6 @@ impl Store {
     ///
     /// # Errors
     /// [`ActivateError`]; the table in use stays, and goes on only if its images stay too.
-    #[inline(never)]
     pub fn activate(
         &mut self,
         images: &Images<'_>,
