@@ -58,7 +58,7 @@ impl Drive {
     /// A drive from its tooth counts.
     ///
     /// # Errors
-    /// [`DriveError`] unless `1 ≤ flexspline_teeth < circular_spline_teeth`.
+    /// [`DriveError`] unless `1 ≤ flexspline_teeth < circular_spline_teeth ≤ 2·flexspline_teeth`.
     pub const fn new(
         flexspline_teeth: u16,
         circular_spline_teeth: u16,
@@ -71,6 +71,10 @@ impl Drive {
         let Some(waves) = NonZeroU16::new(circular_spline_teeth.saturating_sub(flexspline_teeth)) else {
             return Err(bad);
         };
+        // The generator turns faster than the output, or a count of it would be several of the output.
+        if waves.get() > flexspline_teeth {
+            return Err(bad);
+        }
         let (teeth, ripple_order, reversed) = match fixed {
             FixedMember::Flexspline => (cs, fs.get(), false),
             FixedMember::CircularSpline => (fs, cs.get(), true),

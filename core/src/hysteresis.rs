@@ -44,6 +44,9 @@ const MAX_PLAY_COUNTS: i32 = 1 << 27;
 pub(crate) const MOST_ERROR_COUNTS: u32 =
     MAX_HALF_COUNTS as u32 + (MAX_HALF_COUNTS as u32 >> 8) + 2 * crate::runtime::Adjustment::MAX_COUNTS as u32;
 
+/// The same while nothing was known of the table.
+const MOST_KEPT_COUNTS: u32 = MOST_ERROR_COUNTS + MAX_PLAY_COUNTS as u32;
+
 /// Where the drive rests inside its play: all that must survive a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlayState {
@@ -232,7 +235,7 @@ impl PlayState {
             && state.lower >= state.half.wrapping_neg()
             && state.upper <= state.half;
         let fresh = state.half == -1 && (state.lower == i32::MIN || state.lower == i32::MAX);
-        let possible = state.lower <= state.upper && state.error.unsigned_abs() <= MOST_ERROR_COUNTS;
+        let possible = state.lower <= state.upper && state.error.unsigned_abs() <= MOST_KEPT_COUNTS;
         (intact && possible && (started || fresh)).then_some(state)
     }
 }
@@ -327,7 +330,7 @@ mod tests {
         }
         let disordered = PlayState { lower: 5, upper: -5, half: 10, nominal: OutputAngle::ZERO, error: 0 };
         assert_eq!(PlayState::restore(&disordered.save()), None);
-        for error in [i32::MIN, i32::MAX, 105_000_000] {
+        for error in [i32::MIN, i32::MAX, 240_000_000] {
             let far = PlayState { lower: -5, error, ..disordered };
             assert_eq!(PlayState::restore(&PlayState { upper: 5, ..far }.save()), None, "{error}");
         }
