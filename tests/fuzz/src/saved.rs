@@ -40,7 +40,10 @@ pub fn run(data: &[u8]) {
         assert_eq!(play.save(), bytes[..SAVED_STATE_BYTES], "a state that is read is the one that was saved");
         assert!(play.uncertainty_rad() >= 0.0);
         let error = play.output().map_or(0.0, |output| output.minus_rad(play.nominal().expect("it has an output")));
-        assert!(error.abs() <= 1.005 * flexspline::MAX_ERROR_RAD + 2.0 * flexspline::Adjustment::MAX_RAD + 0.2, "{play:?}");
+        assert!(
+            error.abs() <= 1.005 * flexspline::MAX_ERROR_RAD + 2.0 * flexspline::Adjustment::MAX_RAD + 0.2,
+            "{play:?}"
+        );
     }
     let Some(mut state) = JointState::restore(&bytes) else { return };
     assert_eq!(state.save(), bytes);

@@ -96,7 +96,7 @@ impl Numbers {
             0 => drive(190, 192, FixedMember::CircularSpline),
             1 => drive(1, 2, FixedMember::Flexspline),
             2 => drive(200, 203, FixedMember::CircularSpline),
-            3 => drive(1, 65_535, FixedMember::Flexspline),
+            3 => drive(32_768, 65_535, FixedMember::Flexspline),
             4 => {
                 let fixed = if choices.any() { FixedMember::Flexspline } else { FixedMember::CircularSpline };
                 Drive::new(choices.any(), choices.any(), fixed).ok()?
