@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod cli;
+pub mod closed_loop;
 pub mod condense;
 pub mod contact;
 pub mod drive;
