@@ -18,6 +18,7 @@ pub mod progress;
 pub mod reference;
 pub mod replay;
 pub mod report;
+pub mod residual;
 pub mod samples;
 pub mod simulate;
 pub mod stepping;
