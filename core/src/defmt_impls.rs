@@ -148,6 +148,8 @@ impl Format for ActivateError {
         match *self {
             Self::Image(error) => write!(f, "{}", error),
             Self::TooLarge { needed } => write!(f, "the table needs {=usize} words", needed),
+            Self::TooManyPages { found } => write!(f, "the image has {=usize} pages", found),
+            Self::TwoTables => write!(f, "the images are two different tables"),
             Self::OtherDrive => write!(f, "the table is for another drive"),
         }
     }
