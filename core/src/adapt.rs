@@ -1065,13 +1065,7 @@ mod tests {
         use crate::store::{Images, Store};
         let image = fixture::image(true);
         let images = Images::new(&image, &image);
-        let limits = Limits {
-            tick_s: 1e-3,
-            rate_rad_s: 0.5,
-            acceleration_rad_s2: 100.0,
-            generator_rate_rad_s: 700.0,
-            patience: 5,
-        };
+        let limits = Limits { rate_rad_s: 0.5, acceleration_rad_s2: 100.0, ..fixture::LIMITS };
         let joint = Joint::new(fixture::drive(), limits, Overrun::SkipAndCount).unwrap();
         let mut worst = [0.0f64; 2];
         for (worst, learning) in worst.iter_mut().zip([Learning::Off, Learning::On]) {

@@ -135,7 +135,7 @@ mod tests {
     use super::*;
     use crate::angle::{GeneratorAngle, OutputAngle};
     use crate::fixture;
-    use crate::runtime::{Adjustment, Input, Joint, Limits, Overrun};
+    use crate::runtime::{Adjustment, Input, Joint, Overrun};
     use crate::store::Images;
     use std::vec::Vec;
 
@@ -145,14 +145,7 @@ mod tests {
         let mut damaged = image.clone();
         damaged[700] ^= 4;
         let images = Images::new(&image, &damaged);
-        let limits = Limits {
-            tick_s: 1e-3,
-            rate_rad_s: 0.05,
-            acceleration_rad_s2: 2.0,
-            generator_rate_rad_s: 700.0,
-            patience: 5,
-        };
-        let joint = Joint::new(fixture::drive(), limits, Overrun::SkipAndCount).unwrap();
+        let joint = Joint::new(fixture::drive(), fixture::LIMITS, Overrun::SkipAndCount).unwrap();
         let (mut store, mut state, mut watch) = (Store::new(), JointState::new(), Watch::new());
         let mut tick = |store: &mut Store, state: &mut JointState, torque_n_m, missed_ticks| {
             let input = Input {

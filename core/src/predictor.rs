@@ -531,7 +531,7 @@ impl PredictorState {
 mod tests {
     use super::*;
     use crate::fixture;
-    use crate::runtime::{Limits, Overrun};
+    use crate::runtime::Overrun;
     use crate::store::Images;
     use crate::table::Table;
 
@@ -717,14 +717,7 @@ mod tests {
         let image = fixture::image(true);
         let images = Images::new(&image, &image);
         let missed = Table::check(&image).unwrap().projection_worst_rad() as f64;
-        let limits = Limits {
-            tick_s: 1e-3,
-            rate_rad_s: 0.05,
-            acceleration_rad_s2: 2.0,
-            generator_rate_rad_s: 700.0,
-            patience: 5,
-        };
-        let joint = Joint::new(fixture::drive(), limits, Overrun::SkipAndCount).unwrap();
+        let joint = Joint::new(fixture::drive(), fixture::LIMITS, Overrun::SkipAndCount).unwrap();
         let mut store = Store::new();
         store.activate(&images, &fixture::drive(), 20.0).unwrap();
         let off = Disturbance { torque_n_m: 0.5, load_change_n_m: 0.05, speed_rad_s: 1e-4, twist_rad: 2e-6 };

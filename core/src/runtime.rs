@@ -640,15 +640,13 @@ impl Joint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixture::{self, ARCSEC};
+    use crate::fixture::{self, ARCSEC, LIMITS};
     use proptest::prelude::*;
     use std::sync::LazyLock;
     use std::vec::Vec;
 
     static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(|| fixture::image(true));
 
-    const LIMITS: Limits =
-        Limits { tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 2.0, generator_rate_rad_s: 700.0, patience: 5 };
     /// Rate in a tick, and its change from tick to tick, rad.
     const RATE_RAD: f64 = 5e-5;
     const ACCELERATION_RAD: f64 = 2e-6;

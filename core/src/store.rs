@@ -691,13 +691,7 @@ mod tests {
     static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(|| fixture::image(true));
 
     fn joint() -> Joint {
-        let limits = Limits {
-            tick_s: 1e-3,
-            rate_rad_s: 0.1,
-            acceleration_rad_s2: 20.0,
-            generator_rate_rad_s: 700.0,
-            patience: 5,
-        };
+        let limits = Limits { rate_rad_s: 0.1, acceleration_rad_s2: 20.0, ..fixture::LIMITS };
         Joint::new(fixture::drive(), limits, Overrun::SkipAndCount).unwrap()
     }
 

@@ -9,7 +9,7 @@
 //! alike swing up to some 1500″ with this load.
 
 use super::flight::Plant;
-use super::flight::gear::{Gear, GearMap};
+use super::flight::gear::{Gear, GearMap, Header};
 use super::flight::profile::TICK_S;
 
 /// Steps within a tick.
@@ -50,7 +50,7 @@ impl<'a> InertGear<'a> {
 
     /// Flank torque that goes with an error of the output: the inverse of the map; none inside the clearance.
     fn flank(&self, generator_rad: f64, error_rad: f64) -> f64 {
-        let largest = 1.2 * self.gear.map().largest_n_m;
+        let largest = 1.2 * self.gear.map().header.largest_n_m;
         for sign in [1.0, -1.0] {
             let error =
                 |share: f64| sign * self.gear.elastic_error_rad(generator_rad, sign * share.powi(4) * largest, sign);
@@ -95,7 +95,7 @@ impl<'a> InertGear<'a> {
 impl Plant for InertGear<'_> {
     fn go(&mut self, generator_rad: f64, torque_n_m: f64) -> f64 {
         let LoadSettings { inertia_kg_m2, damping_n_m_s } = self.load;
-        let (ratio, drag) = (self.gear.map().ratio, self.gear.map().drag_n_m);
+        let Header { ratio, drag_n_m: drag, .. } = self.gear.map().header;
         let dt = TICK_S / STEPS as f64;
         let (from, load_from) = (self.generator_rad, self.torque_n_m);
         let generator_rate = (generator_rad - from) / TICK_S;

@@ -80,7 +80,7 @@ impl DenseMap {
     /// For the plant.
     pub fn view(&self) -> GearMap<'_> {
         let [cold, warm] = &self.planes;
-        self.header.with([cold, warm])
+        GearMap { header: self.header, planes: [cold, warm] }
     }
 
     /// As a file: errors in arc-seconds, one line for each temperature and flank torque.

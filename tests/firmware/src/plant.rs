@@ -21,7 +21,7 @@ pub fn read(generator: usize, room: &mut Room) -> Option<(&'static str, f64, Gea
     let header = parse(text, room).ok()?;
     let size = header.nodes * header.phases;
     let [cold, warm] = room;
-    Some((name, largest_n_m, header.with([cold.get(..size)?, warm.get(..size)?])))
+    Some((name, largest_n_m, GearMap { header, planes: [cold.get(..size)?, warm.get(..size)?] }))
 }
 
 /// Prints through semihosting, for what wants a [`core::fmt::Write`].

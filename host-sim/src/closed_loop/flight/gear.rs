@@ -15,9 +15,9 @@ pub const MOST: usize = 128 * 32;
 /// Points of the interpolation over the phase.
 const WIDTH: usize = 6;
 
-/// What contact FEM says of a drive, at two temperatures.
-#[derive(Clone, Copy, Debug)]
-pub struct GearMap<'a> {
+/// Of which drive a map is, and how its numbers lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Header {
     /// Largest flank torque, N·m.
     pub largest_n_m: f64,
     /// Coulomb drag of the output, N·m.
@@ -32,35 +32,15 @@ pub struct GearMap<'a> {
     pub phases: usize,
     /// Flank torques: of `n`, number `k` from 1 carries `(k/n)⁴` of the largest.
     pub nodes: usize,
+}
+
+/// What contact FEM says of a drive, at two temperatures.
+#[derive(Clone, Copy, Debug)]
+pub struct GearMap<'a> {
+    /// Of which drive.
+    pub header: Header,
     /// Error of the output under positive flank torque at each temperature, rad: by flank torque, then phase.
     pub planes: [&'a [f64]; 2],
-}
-
-/// What a file says, without its planes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Header {
-    /// As in [`GearMap`].
-    pub largest_n_m: f64,
-    /// As in [`GearMap`].
-    pub drag_n_m: f64,
-    /// As in [`GearMap`].
-    pub teeth: f64,
-    /// As in [`GearMap`].
-    pub ratio: f64,
-    /// As in [`GearMap`].
-    pub temperatures_c: [f64; 2],
-    /// As in [`GearMap`].
-    pub phases: usize,
-    /// As in [`GearMap`].
-    pub nodes: usize,
-}
-
-impl Header {
-    /// With its planes.
-    pub fn with<'a>(&self, planes: [&'a [f64]; 2]) -> GearMap<'a> {
-        let Self { largest_n_m, drag_n_m, teeth, ratio, temperatures_c, phases, nodes } = *self;
-        GearMap { largest_n_m, drag_n_m, teeth, ratio, temperatures_c, phases, nodes, planes }
-    }
 }
 
 /// Reads a file of a map: a comment with `drag_n_m=`, `teeth=`, `ratio=`, a header, then for each of two temperatures one line
@@ -127,8 +107,8 @@ impl<'a> Gear<'a> {
 
     /// Another temperature, °C. To be called every now and then: it goes over all numbers.
     pub fn set_temperature(&mut self, temperature_c: f64) {
-        let phases = self.map.phases;
-        let [cold, warm] = self.map.temperatures_c;
+        let phases = self.map.header.phases;
+        let [cold, warm] = self.map.header.temperatures_c;
         let share = (temperature_c - cold) / (warm - cold);
         let [first, second] = self.map.planes;
         for (to, (a, b)) in self.plane.iter_mut().skip(phases).zip(first.iter().zip(second)) {
@@ -144,11 +124,11 @@ impl<'a> Gear<'a> {
     /// Error of the output with this flank torque at a generator angle, rad; exactly none on the flanks is the limit from the
     /// side of `sign`.
     pub fn elastic_error_rad(&self, generator_rad: f64, flank_n_m: f64, sign: f64) -> f64 {
-        let (phases, nodes) = (self.map.phases, self.map.nodes);
-        let turns = self.map.teeth * generator_rad * (1.0 / core::f64::consts::TAU);
+        let (phases, nodes) = (self.map.header.phases, self.map.header.nodes);
+        let turns = self.map.header.teeth * generator_rad * (1.0 / core::f64::consts::TAU);
         // A drive is its own mirror image.
         let phase = fraction(sign * turns) * phases as f64 - 0.5;
-        let root = libm::sqrt(libm::sqrt((sign * flank_n_m).max(0.0) / self.map.largest_n_m)) * nodes as f64;
+        let root = libm::sqrt(libm::sqrt((sign * flank_n_m).max(0.0) / self.map.header.largest_n_m)) * nodes as f64;
         let row = (root as usize).clamp(1, nodes - 2);
         let along = root - row as f64;
         let (below, above) = (along + 1.0, along - 1.0);
@@ -176,7 +156,7 @@ impl<'a> Gear<'a> {
 
     /// Ends of the play at a generator angle under a load torque: error of the output moving forward and backward, rad.
     pub fn ends_rad(&self, generator_rad: f64, torque_n_m: f64) -> [f64; 2] {
-        let drag = self.map.drag_n_m;
+        let drag = self.map.header.drag_n_m;
         // At the very edge the output still rests on the flank that it comes from.
         let behind = if torque_n_m - drag > 0.0 { 1.0 } else { -1.0 };
         let ahead = if torque_n_m + drag < 0.0 { -1.0 } else { 1.0 };
@@ -189,11 +169,11 @@ impl<'a> Gear<'a> {
     /// The generator goes to an angle under a load torque; the output angle then, rad.
     pub fn go(&mut self, generator_rad: f64, torque_n_m: f64) -> f64 {
         let [lowest, highest] = self.ends_rad(generator_rad, torque_n_m);
-        let stays = self.error_rad - (generator_rad - self.generator_rad) / self.map.ratio;
+        let stays = self.error_rad - (generator_rad - self.generator_rad) / self.map.header.ratio;
         let below_highest = if stays > highest { highest } else { stays };
         self.error_rad = if below_highest < lowest { lowest } else { below_highest };
         self.generator_rad = generator_rad;
-        generator_rad / self.map.ratio + self.error_rad
+        generator_rad / self.map.header.ratio + self.error_rad
     }
 
     /// Error of the output now: output less generator over ratio, rad.

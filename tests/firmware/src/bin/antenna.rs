@@ -48,7 +48,7 @@ fn fly(generator: usize, room: &mut Room) -> Option<bool> {
     let (mut last, mut missed_squares) = (Moment::default(), 0.0);
     for moment in BRIEF.moments(largest_n_m) {
         antenna.tick(&moment);
-        observer.tick(antenna.lane(CORE), map.ratio);
+        observer.tick(antenna.lane(CORE), map.header.ratio);
         let missed_n_m = f64::from(observer.state.load_torque_n_m()) - moment.torque_n_m;
         missed_squares += missed_n_m * missed_n_m / f64::from(BRIEF.ticks());
         // Here telemetry takes `antenna.core.out` and the observer's state, once it has a bounded queue to put them into.
