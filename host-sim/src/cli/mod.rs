@@ -8,6 +8,7 @@ mod diagnose;
 mod drive;
 mod export;
 mod replay;
+mod report;
 mod simulate;
 mod tables;
 mod validate;

@@ -4,14 +4,13 @@
 //! it with the angle. Drift is named only where the data can tell it from them.
 
 use super::state::{Extra, State};
-use super::{Findings, of_rows};
+use super::{ARCSEC, Findings, of_rows};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::robust::median_of;
 
-const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 /// Drift of less than this over the whole recording is not looked for, rad.
 const LEAST_RAD: f64 = 10.0 * ARCSEC;
 /// A trend is so many standard deviations, over stretches as long as the noise remembers.

@@ -3,14 +3,13 @@
 use std::ops::Range;
 
 use super::lattice::lattice;
-use super::{Findings, of_rows};
+use super::{ARCSEC, Findings, of_rows};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::robust::{quantile_of, sampled, white_noise};
 
-const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 /// Chance of one false alarm in a file, for a channel with noise.
 const CHANCE: f64 = 1e-6;
 /// Noise of at least this share of a step of the lattice moves a channel on at every second row at least.

@@ -38,6 +38,9 @@ use super::Session;
 use super::fault::{Fault, FaultName, ToothStep, Treatment};
 use super::log::Log;
 
+/// An arc-second, rad.
+const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
+
 /// What the checks have found so far.
 #[derive(Debug, Default)]
 pub(super) struct Findings {

@@ -1,14 +1,13 @@
 //! Single rows that neither the rows before nor those after bear out.
 
 use super::resolution::seen;
-use super::{Findings, of_rows};
+use super::{ARCSEC, Findings, of_rows};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::robust::{median_of, quantile_of, sampled, white_noise};
 
-const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 /// A row is out by so many standard deviations of the white noise…
 const OUT: f64 = 10.0;
 /// …and by so many times what all rows around it but one are out by: ripple that rows follow too slowly stands out everywhere.

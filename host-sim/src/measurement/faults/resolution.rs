@@ -1,14 +1,13 @@
 //! A resolution so coarse that no noise blurs it.
 
 use super::lattice::lattice;
-use super::{Findings, of_rows};
+use super::{ARCSEC, Findings, of_rows};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::robust::white_noise;
 
-const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 /// Steps at the output below this are those of good encoders (19 bits a turn), and below what a drive repeats.
 const COARSE_RAD: f64 = 2.5 * ARCSEC;
 /// Noise of more than this share of a step blurs it, so that averages go below the step; a step alone leaves 0.29 of it.

@@ -5,14 +5,13 @@
 //! damaged teeth do not: they come back with the state of the drive.
 
 use super::state::{Extra, Fit, State};
-use super::{Findings, of_rows};
+use super::{ARCSEC, Findings, of_rows};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, ToothStep, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::robust::{median_and_std, median_of, sampled, white_noise};
 
-const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 /// A change in one row that is suspected exceeds the motion of the generator, over the ratio, by this factor…
 const FASTER_THAN_DWELL: f64 = 1.5;
 /// …and the robust spread of all such changes so many times.
