@@ -34,12 +34,15 @@ pub struct Bench<'a> {
     prior: Vec<f64>,
 }
 
+/// Weight of the prior of a base parameter in units of its spread.
+const SPREAD: f64 = 1.0;
+
 /// How an effect stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weight {
     /// Distance from the best fit without it, in standard deviations of the noise.
     pub d: f64,
-    /// What the base parameters do not take up, rms.
+    /// What the base parameters do not take up within two standard deviations of their spread, rms.
     pub rms_arcsec: f64,
 }
 
@@ -116,7 +119,7 @@ impl<'a> Bench<'a> {
         for unit in units {
             let moved = self.errors(&unit, &self.rest, false);
             self.nuisance.push(difference(&moved, &self.rest_arcsec));
-            self.prior.push(1.0);
+            self.prior.push(SPREAD);
         }
     }
 
@@ -191,10 +194,11 @@ impl<'a> Bench<'a> {
         let solution = cholesky.solve(&right);
         let d = (target.norm_squared() - right.dot(&solution)).max(0.0).sqrt();
         let coefficients: Vec<f64> = solution.iter().zip(&scale).map(|(x, s)| x * s).collect();
+        // A unit beyond its spread is a discrepancy, though a recalibration would take it up.
+        let within = coefficients.iter().zip(self.prior.iter().map(Some).chain(std::iter::repeat(None)));
+        let within = within.map(|(x, prior)| if prior == Some(&SPREAD) { x.clamp(-2.0, 2.0) } else { *x });
         let mut left = contribution.to_vec();
-        for (column, coefficient) in
-            self.nuisance.iter().chain(beside.iter().map(|(column, _)| column)).zip(&coefficients)
-        {
+        for (column, coefficient) in self.nuisance.iter().chain(beside.iter().map(|(column, _)| column)).zip(within) {
             for (value, x) in left.iter_mut().zip(column) {
                 *value -= coefficient * x;
             }

@@ -95,7 +95,13 @@ impl Motion {
             _ => 3,
         };
         let sessions = if is(Poor::Short) { 2 + chance.below(2) } else { 5 + chance.below(2) };
-        let rows = if is(Poor::Short) { 3000 + chance.below(4000) } else { 25_000 + chance.below(23_000) };
+        let (fewest, more) = match rate_hz as u32 {
+            _ if is(Poor::Short) => (3000, 4000),
+            100 => (25_000, 15_000),
+            125 => (28_000, 16_000),
+            _ => (36_000, 12_000),
+        };
+        let rows = fewest + chance.below(more);
         let mut motion = Self { step_s: 1.0 / (rate_hz * stride as f64), stride, ..Self::default() };
 
         let mut shapes = vec![Shape::Steps, Shape::Triangle, Shape::Sine, Shape::Wind, Shape::Constant];
@@ -256,7 +262,9 @@ pub fn hermite(motion: &Motion, at: usize, x: f64) -> (f64, f64) {
 /// Speed of the generator through a session: one long slew, then other things, with limited acceleration.
 fn speeds(count: usize, step_s: f64, seconds: f64, sense: f64, poor: &[Poor], chance: &mut Chance) -> Vec<f64> {
     let is = |kind| poor.contains(&kind);
-    let mut plan = vec![(0.47 * seconds, Segment::Turn(sense * chance.uniform(9.0, 19.0)))];
+    // Two such slews in a row pass a whole output turn.
+    let slew_rad_s = f64::max(chance.uniform(6.0, 19.0), TAU * chance.uniform(55.0, 70.0) / (0.47 * seconds).max(8.0));
+    let mut plan = vec![(0.47 * seconds, Segment::Turn(sense * slew_rad_s))];
     let mut rest = vec![
         Segment::Turn(chance.sign() * chance.uniform(0.05, 0.4)),
         Segment::Turn(0.0),

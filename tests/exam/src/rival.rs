@@ -8,11 +8,15 @@ use crate::drive::Drive;
 use crate::effect::{Effect, Family, What};
 
 /// Draws of a rival's numbers that span its signatures for the first, linear, look.
-const DRAWS: usize = 6;
-/// The linear look is not the whole family of a law's signatures; a rival closer than this is refitted in earnest.
-const LOOK_CLOSER: f64 = 3.0 * LEAST_D;
+const DRAWS: usize = 8;
+/// The linear look is not the whole family of a law's signatures: a rival that takes up this share of the distance, or comes
+/// this near, is refitted in earnest.
+const TAKES_UP: f64 = 0.4;
+const NEAR: f64 = 3.0 * LEAST_D;
+/// Draws from which the refit sets out.
+const STARTS: usize = 3;
 /// Gauss-Newton steps of the refit.
-const STEPS: usize = 7;
+const STEPS: usize = 10;
 
 /// Rivals within `LEAST_D` of a contribution, nearest first, with the distance left.
 pub fn look_alikes(
@@ -55,13 +59,26 @@ pub fn distance(
     for at in 0..DRAWS {
         let mut effect = Effect::draw(rival, family, drive, chance);
         let (low, high) = rival.spec(drive).range;
+        // Phases spread evenly: the first number of most shapes.
+        if let Some((_, crate::effect::Range::Phase)) = rival.spec(drive).shape.first() {
+            effect.shape[0] = std::f64::consts::TAU * (at as f64 + 0.5) / DRAWS as f64;
+        }
         effect.size = (low * high).sqrt().copysign(if at % 2 == 0 { 1.0 } else { effect.size });
-        let signature = bench.signature(&effect);
+        let mut signature = bench.signature(&effect);
+        // As far from nothing as the contribution: laws that saturate look different at another size.
+        for _ in 0..2 {
+            let ratio = alone / bench.weigh(&signature).d.max(1e-3);
+            if (0.8..1.25).contains(&ratio) {
+                break;
+            }
+            effect.size = (effect.size.abs() * ratio.clamp(0.05, 20.0)).clamp(0.1 * low, high).copysign(effect.size);
+            signature = bench.signature(&effect);
+        }
         draws.push((effect, signature));
     }
     let span: Vec<_> = draws.iter().map(|(_, signature)| (signature.clone(), 0.0)).collect();
     let linear = bench.weigh_beside(contribution, &span).0.d;
-    if linear > LOOK_CLOSER {
+    if linear > NEAR.max((1.0 - TAKES_UP) * alone) {
         return linear;
     }
     // From the draws that come nearest by their size alone.
@@ -73,7 +90,7 @@ pub fn distance(
         })
         .collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    starts.truncate(2);
+    starts.truncate(STARTS);
     let mut best = alone;
     for (_, start) in starts {
         best = best.min(refit(bench, drive, start, contribution));
@@ -117,7 +134,7 @@ fn refit(bench: &mut Bench, drive: &Drive, start: Effect, contribution: &[f64]) 
             let gained = d - next_d;
             (now, left, d) = (next, next_left, next_d);
             damping *= 0.2;
-            if d < LEAST_D || gained < 1e-2 * d {
+            if d < 0.5 * LEAST_D || gained < 3e-3 * d {
                 break;
             }
         } else {
@@ -135,4 +152,49 @@ fn held(mut effect: Effect, spec: &crate::effect::Spec) -> Effect {
         *value = range.held(*value);
     }
     effect
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drive::{Fixed, Unit};
+    use crate::motion::{Motion, Poor};
+    use crate::noise::Sensors;
+
+    fn found(cause: Cause, family: Family, poor: &[Poor], still: bool) -> Vec<Cause> {
+        let mut chance = Chance::new(3, "rival", 0);
+        let mut drive = Drive::draw(&mut chance);
+        drive.fixed = Fixed::Flexspline;
+        let unit = Unit { family, ..Unit::nominal(&drive) };
+        let mut motion = Motion::draw(&drive, poor, &mut chance);
+        let sensors = Sensors::draw(&drive, &mut chance);
+        for (at, orientation) in motion.orientation_rad.iter_mut().enumerate() {
+            *orientation = if still { 0.0 } else { 1.5 * (at > motion.time_s.len() / 2) as u8 as f64 };
+        }
+        let mut bench = Bench::new(&drive, &unit, &motion, &sensors, &[]);
+        let mut effect = Effect::draw(What::Cause(cause), family, &drive, &mut chance);
+        effect.size = if cause == Cause::GravityTorque { 0.1 * drive.rated_n_m } else { 30.0 };
+        let contribution = bench.signature(&effect);
+        look_alikes(&mut bench, &drive, Some(cause), family, &contribution, &mut chance)
+            .into_iter()
+            .map(|(cause, _)| cause)
+            .collect()
+    }
+
+    #[test]
+    fn a_push_of_gravity_is_a_runout_until_the_housing_is_turned() {
+        for (cause, other) in
+            [(Cause::FlexsplineRunout, Cause::GravitySideLoad), (Cause::GravitySideLoad, Cause::FlexsplineRunout)]
+        {
+            assert!(found(cause, Family::A, &[], true).contains(&other), "{cause:?}");
+            assert!(!found(cause, Family::A, &[], false).contains(&other), "{cause:?}");
+        }
+    }
+
+    #[test]
+    fn an_unbalance_is_an_encoder_off_its_axis_until_the_spring_is_loaded_otherwise() {
+        let like = found(Cause::GravityTorque, Family::A, &[Poor::ConstantTorque], true);
+        assert!(like.contains(&Cause::OutputEncoderEccentricity), "{like:?}");
+        assert!(found(Cause::GravityTorque, Family::A, &[], true).is_empty());
+    }
 }
