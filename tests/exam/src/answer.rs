@@ -29,6 +29,13 @@ pub struct Named {
     pub look_alikes: Vec<String>,
 }
 
+/// One fault of the data.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DataFault {
+    /// Snake case.
+    pub name: String,
+}
+
 /// Root mean square before and after.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
@@ -46,6 +53,9 @@ pub struct Answer {
     /// Strongest first.
     #[serde(default)]
     pub causes: Vec<Named>,
+    /// What is wrong with the data.
+    #[serde(default)]
+    pub data_faults: Vec<DataFault>,
     /// On data that took no part.
     #[serde(default)]
     pub held_out: Option<HeldOut>,

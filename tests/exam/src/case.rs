@@ -7,8 +7,9 @@ use crate::cause::Cause;
 use crate::chance::Chance;
 use crate::drive::{Drive, Unit};
 use crate::effect::{Effect, Family, What};
+use crate::fault::Fault;
 use crate::motion::{Motion, Poor};
-use crate::noise::Sensors;
+use crate::noise::{Sensors, csv};
 use crate::outside::Outside;
 use crate::plant::{self, Readings};
 
@@ -24,6 +25,8 @@ pub enum Kind {
     Compound,
     /// An effect outside the library.
     Outside,
+    /// A fault of the data: drawn only when asked for.
+    Fault,
 }
 
 /// Which cases are drawn.
@@ -99,6 +102,8 @@ pub struct Case {
     pub sensors: Sensors,
     /// What is hidden.
     pub effects: Vec<Effect>,
+    /// What is wrong with the data.
+    pub fault: Option<Fault>,
 }
 
 const BLOCK: u64 = 25;
@@ -128,7 +133,8 @@ impl Case {
                 effects.push(sized(effect, target, &mut bench, &drive, &sensors));
             }
         }
-        Self { seed, index, name, kind: plan.kind, family, poor: plan.poor, drive, unit, motion, sensors, effects }
+        let (kind, poor, fault) = (plan.kind, plan.poor, plan.fault);
+        Self { seed, index, name, kind, family, poor, drive, unit, motion, sensors, effects, fault }
     }
 
     /// Readings without noise.
@@ -139,7 +145,12 @@ impl Case {
     /// `data.csv`.
     pub fn data(&self) -> String {
         let mut chance = Chance::new(self.seed, "noise", self.index);
-        self.sensors.write(&self.motion, &self.readings(), &mut chance)
+        let mut rows = self.sensors.rows(&self.motion, &self.readings(), &mut chance);
+        if let Some(fault) = self.fault {
+            let row_s = self.motion.step_s * self.motion.stride as f64;
+            fault.spoil(&mut rows, row_s, self.sensors.all_arcsec(&self.drive), &mut chance);
+        }
+        csv(&rows, self.motion.orientation_known)
     }
 }
 
@@ -167,6 +178,7 @@ struct Plan {
     kind: Kind,
     hidden: Vec<What>,
     poor: Vec<Poor>,
+    fault: Option<Fault>,
 }
 
 impl Plan {
@@ -194,7 +206,7 @@ impl Plan {
         }
         let mut chance = Chance::new(seed, "plan", index);
         let hidden = match kind {
-            Kind::Null => Vec::new(),
+            Kind::Null | Kind::Fault => Vec::new(),
             Kind::Single => vec![What::Cause(
                 draw.cause.unwrap_or_else(|| Cause::ALL[in_turn(number, Cause::ALL.len(), "singles")]),
             )],
@@ -223,7 +235,8 @@ impl Plan {
                 }
             }
         }
-        Self { kind, hidden, poor }
+        let fault = (kind == Kind::Fault).then(|| Fault::ALL[in_turn(number, Fault::ALL.len(), "faults")]);
+        Self { kind, hidden, poor, fault }
     }
 }
 

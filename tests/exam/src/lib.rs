@@ -13,6 +13,7 @@ pub mod chance;
 pub mod drive;
 pub mod effect;
 pub mod exam;
+pub mod fault;
 pub mod laws;
 pub mod motion;
 pub mod noise;

@@ -53,11 +53,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn truthful(dir: &Path, data: &Path) -> Result<Value, Box<dyn Error>> {
     let case = data.parent().and_then(Path::file_name).ok_or("data without a directory")?;
     let truth: Truth = serde_json::from_str(&fs::read_to_string(dir.join(case).with_extension("json"))?)?;
-    let outside = truth.kind == "outside";
+    let (outside, fault) = (truth.kind == "outside", truth.kind == "fault");
     let counted: Vec<_> = truth.hidden.iter().filter(|hidden| hidden.counts()).collect();
     let causes: Vec<Value> = counted
         .iter()
-        .filter(|_| !outside)
+        .filter(|_| !outside && !fault)
         .map(|hidden| {
             let parameters: serde_json::Map<_, _> = hidden
                 .parameters
@@ -67,13 +67,14 @@ fn truthful(dir: &Path, data: &Path) -> Result<Value, Box<dyn Error>> {
             json!({ "name": hidden.name, "confidence": 1.0, "parameters": parameters, "look_alikes": [] })
         })
         .collect();
-    let verdict = match (counted.is_empty(), outside) {
+    let faults: Vec<Value> = counted.iter().filter(|_| fault).map(|hidden| json!({ "name": hidden.name })).collect();
+    let verdict = match (counted.is_empty() || fault, outside) {
         (true, _) => "none",
         (false, true) => "unknown",
         (false, false) => "explained",
     };
     let before = truth.floor_arcsec.hypot(truth.removable_rms_arcsec);
     let after = if outside { before } else { truth.floor_arcsec };
-    Ok(json!({ "verdict": verdict, "causes": causes,
+    Ok(json!({ "verdict": verdict, "causes": causes, "data_faults": faults,
                "held_out": { "rms_before_arcsec": before, "rms_after_arcsec": after } }))
 }

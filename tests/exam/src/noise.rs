@@ -58,33 +58,51 @@ impl Sensors {
         self.floor_arcsec(drive).hypot(self.wander_arcsec)
     }
 
-    /// `data.csv`: a header and a row for each reading.
-    pub fn write(&self, motion: &Motion, readings: &Readings, chance: &mut Chance) -> String {
-        let mut text = String::with_capacity(readings.error_arcsec.len() * 64 + 100);
-        text.push_str("time_s,generator_rad,output_rad,torque_n_m,temperature_c");
-        text.push_str(if motion.orientation_known { ",orientation_rad\n" } else { "\n" });
+    /// Rows as the sensors give them: time, generator, output, torque, temperature, orientation.
+    pub fn rows(&self, motion: &Motion, readings: &Readings, chance: &mut Chance) -> Vec<[f64; 6]> {
         let mut wander = self.wander_arcsec * chance.normal();
         let row_s = motion.step_s * motion.stride as f64;
         let stepped = |value: f64, step: f64| (value / step).round() * step;
         let mut last_s = motion.time_s[0];
-        for (row, at) in motion.picks(motion.stride).into_iter().enumerate() {
-            let since = (motion.time_s[at] - last_s).max(row_s);
-            last_s = motion.time_s[at];
-            let keeps = (-since / self.wander_s).exp();
-            wander = wander * keeps + self.wander_arcsec * (1.0 - keeps * keeps).sqrt() * chance.normal();
-            let noise = wander + self.white_arcsec * chance.normal();
-            let output = stepped(readings.output_rad[row] + noise / ARCSEC, self.output_step_rad);
-            let generator = stepped(readings.generator_rad[row], self.generator_step_rad);
-            let torque = motion.torque_n_m[at] + self.torque_n_m * chance.normal();
-            let temperature = motion.temperature_c[at] + self.temperature_c * chance.normal();
-            let _ = write!(text, "{:.5},{generator:.7},{output:.10},{torque:.4},{temperature:.2}", motion.time_s[at]);
-            if motion.orientation_known {
-                let _ = write!(text, ",{:.4}", motion.orientation_rad[at]);
-            }
-            text.push('\n');
-        }
-        text
+        let picks = motion.picks(motion.stride).into_iter().enumerate();
+        picks
+            .map(|(row, at)| {
+                let since = (motion.time_s[at] - last_s).max(row_s);
+                last_s = motion.time_s[at];
+                let keeps = (-since / self.wander_s).exp();
+                wander = wander * keeps + self.wander_arcsec * (1.0 - keeps * keeps).sqrt() * chance.normal();
+                let noise = wander + self.white_arcsec * chance.normal();
+                [
+                    motion.time_s[at],
+                    stepped(readings.generator_rad[row], self.generator_step_rad),
+                    stepped(readings.output_rad[row] + noise / ARCSEC, self.output_step_rad),
+                    motion.torque_n_m[at] + self.torque_n_m * chance.normal(),
+                    motion.temperature_c[at] + self.temperature_c * chance.normal(),
+                    motion.orientation_rad[at],
+                ]
+            })
+            .collect()
     }
+}
+
+/// `data.csv`: a header and these rows; what is not finite stays empty.
+pub fn csv(rows: &[[f64; 6]], orientation_known: bool) -> String {
+    let columns = ["time_s", "generator_rad", "output_rad", "torque_n_m", "temperature_c", "orientation_rad"];
+    let told = if orientation_known { 6 } else { 5 };
+    let mut text = String::with_capacity(rows.len() * 64 + 100);
+    text.push_str(&columns[..told].join(","));
+    text.push('\n');
+    for row in rows {
+        for (value, digits) in row[..told].iter().zip([5, 7, 10, 4, 2, 4]) {
+            if value.is_finite() {
+                let _ = write!(text, "{value:.digits$}");
+            }
+            text.push(',');
+        }
+        text.pop();
+        text.push('\n');
+    }
+    text
 }
 
 /// Turns noise of this kind into white noise of variance one (steady Kalman filter of the wander), session by session.

@@ -43,6 +43,12 @@ pub struct Judged {
     pub outside_named: Option<bool>,
     /// An effect outside that counts was called `unknown`.
     pub outside_unknown: Option<bool>,
+    /// A fault of the data was named.
+    pub fault_named: Option<bool>,
+    /// A cause was named for a fault of the data.
+    pub fault_blamed: Option<bool>,
+    /// A fault was named in data that have none.
+    pub fault_invented: Option<bool>,
     /// A wrong name on what cannot be detected.
     pub below_limit_misnamed: Option<bool>,
     /// A cause that is not there was named beside or instead.
@@ -82,6 +88,9 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
         null_not_none: None,
         outside_named: None,
         outside_unknown: None,
+        fault_named: None,
+        fault_blamed: None,
+        fault_invented: None,
         below_limit_misnamed: None,
         false_name: None,
         removed: None,
@@ -92,7 +101,7 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
         seconds,
         failed: answer.is_err(),
     };
-    let nothing = Answer { verdict: "failed".into(), causes: Vec::new(), held_out: None };
+    let nothing = Answer { verdict: "failed".into(), causes: Vec::new(), data_faults: Vec::new(), held_out: None };
     let answer = match answer {
         Ok(answer) => answer,
         Err(error) => {
@@ -116,6 +125,10 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
             if truth.hidden.iter().any(|hidden| hidden.counts()) {
                 judged.outside_unknown = Some(answer.verdict == "unknown");
             }
+        }
+        "fault" => {
+            judged.fault_named = Some(answer.data_faults.iter().any(|fault| is_hidden(&fault.name)));
+            judged.fault_blamed = Some(any_named);
         }
         "single" | "compound" => {
             let counted: Vec<_> = truth.hidden.iter().filter(|hidden| hidden.counts()).collect();
@@ -164,6 +177,9 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
             }
         }
         _ => {}
+    }
+    if truth.kind == "null" {
+        judged.fault_invented = Some(!answer.data_faults.is_empty());
     }
     judged.confidence = answer
         .causes
@@ -232,6 +248,9 @@ impl Scores {
             ("outside_named", rate(&|j| j.outside_named)),
             ("outside_unknown", rate(&|j| j.outside_unknown)),
             ("below_limit_misnamed", rate(&|j| j.below_limit_misnamed)),
+            ("fault_named", rate(&|j| j.fault_named)),
+            ("fault_blamed_on_a_cause", rate(&|j| j.fault_blamed)),
+            ("fault_invented", rate(&|j| j.fault_invented)),
             ("worse_than_recalibrated", rate(&|j| j.worse)),
             ("failed", rate(&|j| Some(j.failed))),
         ];
@@ -309,7 +328,7 @@ impl Scores {
     /// For people.
     pub fn table(&self) -> String {
         let mut text = format!("{} cases                    share  counts    [95 % interval]\n", self.cases);
-        for (name, rate, _) in &self.rates {
+        for (name, rate, _) in self.rates.iter().filter(|(_, rate, _)| rate.of > 0) {
             let _ = writeln!(text, "  {name:<26}{rate}");
         }
         let _ = writeln!(
@@ -353,7 +372,8 @@ impl Judged {
             || self.first == Some(false)
             || self.exact == Some(false)
             || [self.null_named, self.outside_named, self.below_limit_misnamed, self.worse].contains(&Some(true))
-            || self.outside_unknown == Some(false)
+            || [self.outside_unknown, self.fault_named].contains(&Some(false))
+            || [self.fault_blamed, self.fault_invented].contains(&Some(true))
             || self.null_not_none == Some(true)
     }
 }

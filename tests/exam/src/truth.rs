@@ -12,8 +12,8 @@ use crate::drive::{Drive, Unit};
 use crate::effect::{Effect, Family, What};
 use crate::rival;
 
-/// One hidden effect.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// One hidden effect, or a fault of the data.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Hidden {
     /// As the contract names it, or an effect outside.
     pub name: String,
@@ -52,7 +52,7 @@ pub struct Truth {
     pub seed: u64,
     /// Of the case.
     pub index: u64,
-    /// null, single, compound, outside.
+    /// null, single, compound, outside, fault.
     pub kind: String,
     /// A or B.
     pub family: String,
@@ -115,6 +115,9 @@ impl Truth {
                 parameters: parameters(effect, case),
             });
         }
+        if let Some(fault) = case.fault {
+            hidden.push(Hidden { name: fault.name().to_owned(), over_limit: 1.0, ..Hidden::default() });
+        }
         let removable_rms_arcsec = if case.effects.is_empty() {
             0.0
         } else {
@@ -131,6 +134,7 @@ impl Truth {
                 Kind::Single => "single",
                 Kind::Compound => "compound",
                 Kind::Outside => "outside",
+                Kind::Fault => "fault",
             }
             .to_owned(),
             family: format!("{:?}", case.family),

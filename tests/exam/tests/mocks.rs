@@ -73,6 +73,19 @@ fn one_that_knows_the_truth_scores_everything() {
 }
 
 #[test]
+fn faults_of_the_data_are_drawn_and_counted_when_asked_for() {
+    let dir = tempfile::tempdir().unwrap();
+    let open = dir.path().join("open").display().to_string();
+    let knows = ["--manner", "truth", "--truth", &open];
+    let (exam, _) = examine(dir.path(), &knows, &["--kind", "fault", "--reveal", &open]);
+    all(&exam, "fault_named");
+    none(&exam, "fault_blamed_on_a_cause");
+    let (exam, _) = examine(dir.path(), &["--manner", "always"], &["--kind", "fault"]);
+    none(&exam, "fault_named");
+    all(&exam, "fault_blamed_on_a_cause");
+}
+
+#[test]
 fn one_that_never_names_anything_finds_and_misnames_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let (exam, passed) = examine(dir.path(), &["--manner", "none"], &["--at-least", "first_name=0.9"]);
