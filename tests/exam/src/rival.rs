@@ -13,10 +13,12 @@ const DRAWS: usize = 8;
 /// this near, is refitted in earnest.
 const TAKES_UP: f64 = 0.4;
 const NEAR: f64 = 3.0 * LEAST_D;
+/// Phases tried before a refit: errors of a wheel repeat in half a turn where both flanks clash, with a narrow valley.
+const PHASES: usize = 24;
 /// Draws from which the refit sets out.
 const STARTS: usize = 3;
 /// Gauss-Newton steps of the refit.
-const STEPS: usize = 10;
+const STEPS: usize = 16;
 
 /// Rivals within `LEAST_D` of a contribution, nearest first, with the distance left.
 pub fn look_alikes(
@@ -81,7 +83,14 @@ pub fn distance(
     if linear > NEAR.max((1.0 - TAKES_UP) * alone) {
         return linear;
     }
-    // From the draws that come nearest by their size alone.
+    // From the draws that come nearest by their size alone, each turned around the wheel.
+    let turned = matches!(rival.spec(drive).shape.first(), Some((_, crate::effect::Range::Phase)));
+    for turn in 0..if turned { PHASES } else { 0 } {
+        let mut effect = draws[turn % DRAWS].0.clone();
+        effect.shape[0] = std::f64::consts::TAU * turn as f64 / PHASES as f64;
+        let signature = bench.signature(&effect);
+        draws.push((effect, signature));
+    }
     let mut starts: Vec<_> = draws
         .into_iter()
         .map(|(effect, signature)| {
@@ -134,7 +143,7 @@ fn refit(bench: &mut Bench, drive: &Drive, start: Effect, contribution: &[f64]) 
             let gained = d - next_d;
             (now, left, d) = (next, next_left, next_d);
             damping *= 0.2;
-            if d < 0.5 * LEAST_D || gained < 3e-3 * d {
+            if d < 0.5 * LEAST_D || gained < 3e-4 * d {
                 break;
             }
         } else {

@@ -8,7 +8,9 @@ use serde_json::Value;
 /// Runs an examination of a mock; its rates as (right, of) by name.
 fn examine(dir: &Path, mock: &[&str], more: &[&str]) -> (Value, bool) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_flexspline-exam"));
-    command.args(["run", "--cases", "50", "--seed", "21", "--diagnoser", env!("CARGO_BIN_EXE_flexspline-exam-mock")]);
+    // All kinds of cases; enough below the limit of detection only in the longer run.
+    let cases = if mock.contains(&"truth") { "50" } else { "25" };
+    command.args(["run", "--cases", cases, "--seed", "21", "--diagnoser", env!("CARGO_BIN_EXE_flexspline-exam-mock")]);
     for argument in mock {
         command.arg(format!("--diagnoser-arg={argument}"));
     }
@@ -112,7 +114,6 @@ fn one_that_always_names_wear_is_right_on_wear_alone() {
     for name in ["null_named", "null_not_none", "outside_named"] {
         all(&exam, name);
     }
-    none(&exam, "compound_exact");
     for case in exam["cases"].as_array().unwrap().iter().filter(|case| case["kind"] == "single") {
         if let Some(strict) = case["first_strict"].as_bool() {
             assert_eq!(strict, case["hidden"][0][0] == "wear", "{case}");
