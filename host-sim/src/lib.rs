@@ -10,6 +10,7 @@ pub mod drive;
 pub mod element;
 pub mod export;
 pub mod fem;
+pub mod kernels;
 pub mod material;
 pub mod measurement;
 pub mod mesh;

@@ -7,6 +7,7 @@ mod context;
 mod diagnose;
 mod drive;
 mod export;
+mod kernels;
 mod replay;
 mod report;
 mod simulate;
@@ -80,6 +81,7 @@ enum Command {
     Drive(drive::DriveCommand),
     Export(export::Export),
     Tables(tables::Tables),
+    Kernels(kernels::KernelsCommand),
     Validate(validate::Validate),
     Replay(replay::Replay),
     Diagnose(diagnose::Diagnose),
@@ -143,6 +145,7 @@ impl Command {
             Command::Drive(command) => command.run(context),
             Command::Export(command) => command.run(context),
             Command::Tables(command) => command.run(context),
+            Command::Kernels(command) => command.run(context),
             Command::Validate(command) => command.run(context),
             Command::Replay(command) => command.run(context),
             Command::Diagnose(command) => command.run(context),
