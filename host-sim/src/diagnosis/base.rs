@@ -95,29 +95,39 @@ pub struct Base {
 }
 
 /// Standard deviation of what no drawing fixes, arcsec: the zero of the output encoder.
-const FREE: f64 = 1e4;
+pub(super) const FREE: f64 = 1e4;
 /// A play law that leaves this much less (relative) than the first is taken instead.
 const CLEARLY_BETTER: f64 = 0.995;
 /// Rows are uncertain where the torque is below this multiple of friction.
-const NEAR_FRICTION: f64 = 1.25;
+pub(super) const NEAR_FRICTION: f64 = 1.25;
 /// A clearance is crossed within this time, s.
 const CROSSING_S: f64 = 0.08;
 /// If more of the rows than this are uncertain, none is set aside: then they are what the data are about.
-const UNCERTAIN_AT_MOST: f64 = 0.35;
+pub(super) const UNCERTAIN_AT_MOST: f64 = 0.35;
 
 impl Base {
     /// The nominal model over the rows; `table` takes the place of its parts where it is given.
     #[must_use]
     pub fn new(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>) -> Base {
+        Base::of_laws(rows, nominal, table, &PlayLaw::ALL)
+    }
+
+    /// The same with the law of the play known.
+    #[must_use]
+    pub fn with_play(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>, law: PlayLaw) -> Base {
+        Base::of_laws(rows, nominal, table, &[law])
+    }
+
+    fn of_laws(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>, laws: &[PlayLaw]) -> Base {
         let wind_up: Vec<f64> = rows.torque.iter().map(|t| nominal.wind_up_arcsec(*t)).collect();
         let harmonics: Vec<f64> = rows.generator.iter().map(|psi| nominal.harmonics_arcsec(*psi)).collect();
         let half_backlash = 0.5 * nominal.backlash_arcsec;
         let mut best: Option<(f64, PlayLaw, Vec<f64>)> = None;
-        for law in PlayLaw::ALL {
+        for &law in laws {
             let flank = law.flanks(rows, &rows.torque, nominal);
             let left: Vec<f64> =
                 (0..rows.len()).map(|k| rows.error[k] - harmonics[k] - wind_up[k] - half_backlash * flank[k]).collect();
-            let spread = middle_spread(&left, &rows.torque, nominal.friction_torque_n_m);
+            let spread = middle_spread(rows, &left, nominal.friction_torque_n_m);
             if best.as_ref().is_none_or(|(least, _, _)| spread < CLEARLY_BETTER * least) {
                 best = Some((spread, law, flank));
             }
@@ -149,9 +159,10 @@ impl Base {
 }
 
 /// Mean square left where the torque is around friction, after what varies slowly over those rows is taken out.
-fn middle_spread(left: &[f64], torque: &[f64], friction: f64) -> f64 {
-    let inside: Vec<f64> = left.iter().zip(torque).filter(|(_, t)| t.abs() <= friction).map(|(e, _)| *e).collect();
-    let all: f64 = left.iter().sum::<f64>() / left.len().max(1) as f64;
+fn middle_spread(rows: &Rows, left: &[f64], friction: f64) -> f64 {
+    let used = || rows.sessions_used().flatten();
+    let inside: Vec<f64> = used().filter(|k| rows.torque[*k].abs() <= friction).map(|k| left[k]).collect();
+    let all: f64 = used().map(|k| left[k]).sum::<f64>() / rows.count_used().max(1) as f64;
     inside.iter().map(|e| (e - all).powi(2)).sum::<f64>()
 }
 

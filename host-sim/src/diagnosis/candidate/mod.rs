@@ -27,12 +27,53 @@ pub struct Excitation<'a> {
     pub nominal: &'a Nominal,
     /// Nominal prediction and its parts.
     pub base: &'a Base,
+    /// What coefficients are counted in.
+    pub scales: &'a Scales,
+}
+
+/// What the coefficients of laws are counted in: taken from the rows that a model is fitted to, kept where it predicts others.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scales {
     /// Scale of the load, N·m; 0 without torque.
     pub load: f64,
+    /// Mean speed of the generator while it moves, rad/s.
+    pub mean_speed: f64,
+    /// Time of the first row, s.
+    pub begin_s: f64,
+    /// From the first row to the last, s.
+    pub duration_s: f64,
+    /// Travel of the generator from the first row to the last, rad.
+    pub travel: f64,
+    /// Travel under load, rad N·m.
+    pub work: f64,
     /// Arcsec at the output for 1 µm on the pitch circle.
     pub arcsec_per_um: f64,
-    /// Jumps found in the data: row and height, arcsec.
-    pub jumps: &'a [(usize, f64)],
+    /// Jumps found in the data: time (s) and height (arcsec).
+    pub jumps: Vec<(f64, f64)>,
+}
+
+impl Scales {
+    /// Of these rows.
+    #[must_use]
+    pub fn new(rows: &Rows, pitch_radius_mm: f64, jumps: Vec<(f64, f64)>) -> Scales {
+        let (mut moving, mut turned) = (0usize, 0.0);
+        for speed in rows.speed.iter().filter(|speed| **speed != 0.0) {
+            moving += 1;
+            turned += speed.abs();
+        }
+        let work = (1..rows.len()).map(|k| (rows.travel[k] - rows.travel[k - 1]) * rows.torque[k].abs()).sum();
+        let begin_s = rows.time.first().copied().unwrap_or(0.0);
+        Scales {
+            load: rows.load_scale(),
+            mean_speed: turned / moving.max(1) as f64,
+            begin_s,
+            duration_s: rows.time.last().copied().unwrap_or(0.0) - begin_s,
+            travel: rows.travel.last().copied().unwrap_or(0.0),
+            work,
+            arcsec_per_um: crate::tables::ARCSEC_PER_RAD * 1e-3 / pitch_radius_mm,
+            jumps,
+        }
+    }
 }
 
 /// A shape parameter.
@@ -68,6 +109,17 @@ impl Shape {
     pub fn value(&self, place: f64) -> f64 {
         let place = if self.cyclic { place.rem_euclid(1.0) } else { place.clamp(0.0, 1.0) };
         if self.log { self.low * (self.high / self.low).powf(place) } else { self.low + (self.high - self.low) * place }
+    }
+
+    /// The place of a value.
+    #[must_use]
+    pub fn place(&self, value: f64) -> f64 {
+        if self.log {
+            ((value.max(1e-300) / self.low).ln() / (self.high / self.low).ln()).clamp(0.0, 1.0)
+        } else {
+            let place = (value - self.low) / (self.high - self.low);
+            if self.cyclic { place.rem_euclid(1.0) } else { place.clamp(0.0, 1.0) }
+        }
     }
 
     /// Places tried first.
@@ -108,9 +160,20 @@ fn nuisance(values: Vec<f64>, share: f64) -> Column {
 /// A parameter for the report: name with unit, value.
 pub type Named = (&'static str, f64);
 
+type Load = Box<dyn Fn(&Excitation<'_>, &[f64]) -> Vec<f64> + Send + Sync>;
 type Columns = Box<dyn Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync>;
 type Parameters = Box<dyn Fn(&Excitation<'_>, &[f64], &[f64]) -> Vec<Named> + Send + Sync>;
 type Physical = Box<dyn Fn(&[f64], &[f64]) -> bool + Send + Sync>;
+
+/// A linear law close to a law that is none: its coefficients say where to begin with the shape parameters.
+pub struct Lead {
+    /// Columns at the values of the shape parameters tried first; what the lead finds is not looked at.
+    pub columns: Columns,
+    /// Values of the shape parameters from those tried and the coefficients found.
+    pub shape: Box<dyn Fn(&[f64], &[f64]) -> Vec<f64> + Send + Sync>,
+    /// Only where the load leaves no doubt about the flank.
+    pub loaded_only: bool,
+}
 
 /// One law of one cause.
 pub struct Law {
@@ -130,6 +193,12 @@ pub struct Law {
     pub tolerance_of: Option<&'static str>,
     /// How wrong the law may be, as a share of its size: what is smaller than that beside it may be its own misfit.
     pub misfit: f64,
+    /// Where to begin.
+    pub lead: Option<Lead>,
+    /// The law is a free profile: what it may hold has to be taken out before the noise is measured, the finest detail too.
+    pub free_form: bool,
+    /// Load (N·m, row by row) that the cause adds beside the torque that was recorded.
+    pub load: Option<Load>,
 }
 
 /// Share by which the law of a contact, a friction or a lubricant may be wrong.
@@ -148,6 +217,9 @@ impl Law {
             physical: Box::new(|_, _| true),
             tolerance_of: None,
             misfit: USUAL_MISFIT,
+            lead: None,
+            free_form: false,
+            load: None,
         }
     }
     fn exact(mut self) -> Law {
@@ -174,6 +246,12 @@ impl Law {
     #[must_use]
     pub fn values(&self, places: &[f64]) -> Vec<f64> {
         self.shapes.iter().zip(places).map(|(shape, place)| shape.value(*place)).collect()
+    }
+
+    /// Places of values of the shape parameters.
+    #[must_use]
+    pub fn places(&self, values: &[f64]) -> Vec<f64> {
+        self.shapes.iter().zip(values).map(|(shape, value)| shape.place(*value)).collect()
     }
 
     /// All combinations of places tried first.
