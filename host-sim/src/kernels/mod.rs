@@ -224,30 +224,47 @@ impl Kernels {
         self.under(torque_n_m, |l| at(l, place_rad), |l| -at(l, -place_rad))
     }
 
+    /// Where a load lies between those of the eccentricity: for [`EccentricField::at`].
+    #[must_use]
+    pub fn place_of_load(&self, torque_n_m: f64) -> PlaceOfLoad {
+        let (low, high, part) = Self::between(self.eccentric.torques_n_m.iter().copied(), torque_n_m.abs());
+        PlaceOfLoad { low, high, part }
+    }
+
+    /// Error of a circular spline whose axis stands `size_um` beside the generator's, in every direction and under every load. Between
+    /// sizes linear, from nothing at nothing; beyond the largest along the last slope.
+    #[must_use]
+    pub fn eccentric_field(&self, size_um: f64) -> EccentricField {
+        let e = &self.eccentric;
+        let above = e.sizes_um.iter().position(|s| *s >= size_um).unwrap_or(e.sizes_um.len() - 1);
+        let (low, high) = (if above == 0 { 0.0 } else { e.sizes_um[above - 1] }, e.sizes_um[above]);
+        let part = (size_um - low) / (high - low);
+        let at = |load: usize, direction: usize| {
+            let of = |size: usize| e.deviation_arcsec[size][load][direction];
+            let value_low = if above == 0 { 0.0 } else { of(above - 1) };
+            value_low + (of(above) - value_low) * part
+        };
+        let n = e.directions;
+        let by_load = (0..e.torques_n_m.len())
+            .map(|load| {
+                // Cubic in between (Catmull-Rom): the curve has a crest of a few tens of degrees.
+                (0..n * FINER)
+                    .map(|j| {
+                        let (k, x) = (j / FINER, (j % FINER) as f64 / FINER as f64);
+                        let [a, b, c, d] = [n - 1, 0, 1, 2].map(|i| at(load, (k + i) % n));
+                        b + 0.5 * x * (c - a + x * (2.0 * a - 5.0 * b + 4.0 * c - d + x * (3.0 * (b - c) + d - a)))
+                    })
+                    .collect()
+            })
+            .collect();
+        EccentricField { by_load, per_rad: (n * FINER * self.repeats) as f64 / TAU }
+    }
+
     /// Error (arcsec) of a circular spline whose axis stands `size_um` beside the generator's, in the direction `direction_rad` from
     /// the major axis.
     #[must_use]
     pub fn eccentricity(&self, size_um: f64, direction_rad: f64, torque_n_m: f64) -> f64 {
-        let (sign, direction) = if torque_n_m < 0.0 { (-1.0, -direction_rad) } else { (1.0, direction_rad) };
-        let e = &self.eccentric;
-        let (l0, l1, part) = Self::between(e.torques_n_m.iter().copied(), torque_n_m.abs());
-        let along = (direction / TAU * (e.directions * self.repeats) as f64).rem_euclid(e.directions as f64);
-        // Samples 0 to n − 1 of a period, cubic in between (Catmull-Rom): the curve has a crest of a few tens of degrees.
-        let around = |of: &[f64]| -> f64 {
-            let n = of.len();
-            let (k, x) = (along as usize % n, along.fract());
-            let [a, b, c, d] = [n - 1, 0, 1, 2].map(|j| of[(k + j) % n]);
-            b + 0.5 * x * (c - a + x * (2.0 * a - 5.0 * b + 4.0 * c - d + x * (3.0 * (b - c) + d - a)))
-        };
-        let at_size = |size: usize| {
-            let of = &e.deviation_arcsec[size];
-            (1.0 - part) * around(&of[l0]) + part * around(&of[l1])
-        };
-        // Between sizes linear, from nothing at nothing; beyond the largest along the last slope.
-        let above = e.sizes_um.iter().position(|s| *s >= size_um).unwrap_or(e.sizes_um.len() - 1);
-        let (low, value_low) = if above == 0 { (0.0, 0.0) } else { (e.sizes_um[above - 1], at_size(above - 1)) };
-        let (high, value_high) = (e.sizes_um[above], at_size(above));
-        sign * (value_low + (value_high - value_low) * (size_um - low) / (high - low))
+        self.eccentric_field(size_um).at(direction_rad, torque_n_m < 0.0, self.place_of_load(torque_n_m))
     }
 
     /// Reads `<G>.kernels.json`.
@@ -299,6 +316,40 @@ impl Kernels {
                 s.len() == e.torques_n_m.len() && s.iter().all(|d| d.len() == e.directions && e.directions > 3)
             });
         if shape { Ok(()) } else { Err("eccentric.deviation_arcsec: allowed: [size][load][direction]".to_owned()) }
+    }
+}
+
+/// Finer steps of direction in an [`EccentricField`] than in the file.
+const FINER: usize = 8;
+
+/// Where a load lies between those of a file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlaceOfLoad {
+    low: usize,
+    high: usize,
+    part: f64,
+}
+
+/// Error of an eccentricity of one size by direction and load.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EccentricField {
+    by_load: Vec<Vec<f64>>,
+    per_rad: f64,
+}
+
+impl EccentricField {
+    /// Error (arcsec) with the axis displaced in a direction from the major axis, rad, under a load of either sign.
+    #[must_use]
+    pub fn at(&self, direction_rad: f64, negative_load: bool, load: PlaceOfLoad) -> f64 {
+        let (sign, direction) = if negative_load { (-1.0, -direction_rad) } else { (1.0, direction_rad) };
+        let n = self.by_load[load.low].len();
+        let along = (direction * self.per_rad).rem_euclid(n as f64);
+        let (k, x) = (along as usize % n, along.fract());
+        let of = |load: usize| {
+            let field = &self.by_load[load];
+            (1.0 - x) * field[k] + x * field[(k + 1) % n]
+        };
+        sign * ((1.0 - load.part) * of(load.low) + load.part * of(load.high))
     }
 }
 
