@@ -22,7 +22,7 @@ use flexspline_sim::kernels::{KernelPlan, Kernels, make};
 use flexspline_sim::measurement::Session;
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::nominal::Nominal;
-use flexspline_sim::stepping::{Problem, Solver, SolverSettings};
+use flexspline_sim::stepping::{Method, Problem, Solver, SolverSettings};
 use flexspline_tests::command::Desk;
 use rayon::prelude::*;
 
@@ -33,7 +33,7 @@ const PLACES: usize = 12;
 const LOADS: [f64; 3] = [4.0, 15.0, 50.0];
 
 fn coarse() -> SolverSettings {
-    SolverSettings { mesh: MeshLevel::Coarse, ..SolverSettings::default() }
+    SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
 }
 
 /// Table and kernels of the ideal drive.

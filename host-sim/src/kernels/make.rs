@@ -333,10 +333,11 @@ mod tests {
     use super::*;
     use crate::drive::{DamagedFlank, DamagedTooth, Harmonic, Wheel};
     use crate::mesh::MeshLevel;
+    use crate::stepping::Method;
     use std::sync::OnceLock;
 
     fn coarse() -> SolverSettings {
-        SolverSettings { mesh: MeshLevel::Coarse, ..SolverSettings::default() }
+        SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
     }
 
     /// Kernels of the cam under a few loads.
