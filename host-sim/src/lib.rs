@@ -22,4 +22,5 @@ pub mod stepping;
 pub mod stress;
 pub mod sweep;
 pub mod tables;
+pub mod turns;
 pub mod validate;
