@@ -24,6 +24,7 @@ fn tables_hold_between_their_nodes_and_across_a_reversal() {
     let expected: Vec<String> = ["cam", "double-disc"]
         .iter()
         .flat_map(|g| ["fxt", "h", "json", "rs", "samples.csv"].map(|e| format!("{g}.{e}")))
+        .chain(["report.html".to_owned()])
         .collect();
     assert_eq!(names(&desk.path("made")), expected);
 

@@ -41,6 +41,8 @@ typedef enum FlexsplineStatus {
   FLEXSPLINE_STATUS_MODE = 8,
   // The saved bytes are damaged.
   FLEXSPLINE_STATUS_SAVED = 9,
+  // Each image is a table, and they differ.
+  FLEXSPLINE_STATUS_TWO_TABLES = 10,
 } FlexsplineStatus;
 
 // The copies of a table.

@@ -10,10 +10,10 @@
 #![allow(unsafe_code)]
 
 use crate::{
-    ActivateError, Drive, FixedMember, Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode,
-    OutputAngle, Overrun, Quality, SAVED_JOINT_BYTES, Store,
+    ActivateError, Adjustment, Drive, FixedMember, Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits,
+    Mode, OutputAngle, Overrun, Quality, SAVED_JOINT_BYTES, Store,
 };
-use core::mem::{align_of, size_of};
+use core::mem::{MaybeUninit, align_of, size_of};
 
 #[cfg(all(target_os = "none", not(test)))]
 use panic_never as _;
@@ -42,6 +42,8 @@ pub enum FlexsplineStatus {
     Mode = 8,
     /// The saved bytes are damaged.
     Saved = 9,
+    /// Each image is a table, and they differ.
+    TwoTables = 10,
 }
 
 /// Eight-byte words of a [`FlexsplineStore`].
@@ -57,21 +59,21 @@ pub const FLEXSPLINE_SAVED_BYTES: usize = 40;
 #[repr(C)]
 #[derive(Debug)]
 pub struct FlexsplineStore {
-    opaque: [u64; FLEXSPLINE_STORE_WORDS],
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_STORE_WORDS],
 }
 
 /// The settings of a joint.
 #[repr(C)]
 #[derive(Debug)]
 pub struct FlexsplineJoint {
-    opaque: [u64; FLEXSPLINE_JOINT_WORDS],
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_JOINT_WORDS],
 }
 
 /// What changes while a joint runs.
 #[repr(C)]
 #[derive(Debug)]
 pub struct FlexsplineState {
-    opaque: [u64; FLEXSPLINE_STATE_WORDS],
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_STATE_WORDS],
 }
 
 /// Settings of a joint; angles at the output unless named otherwise.
@@ -205,7 +207,7 @@ fn get<'a, O, T>(object: *const O, mark: u32) -> Result<&'a T, FlexsplineStatus>
     usable(object)?;
     // SAFETY: not null and aligned; all bytes of the mark are a number whatever they are. The value is only used if the mark
     // says that `put` wrote it. The reference does not outlive the call it is made in.
-    let marked = unsafe { &*object.cast::<Marked<core::mem::MaybeUninit<T>>>() };
+    let marked = unsafe { &*object.cast::<Marked<MaybeUninit<T>>>() };
     if marked.mark != mark {
         return Err(FlexsplineStatus::NotInitialised);
     }
@@ -236,9 +238,19 @@ fn bytes<'a>(first: *const u8, length: usize) -> Result<&'a [u8], FlexsplineStat
     Ok(unsafe { core::slice::from_raw_parts(first, length) })
 }
 
-fn images<'a>(images: *const FlexsplineImages) -> Result<Images<'a>, FlexsplineStatus> {
+/// The images, apart from what is written: to be asked for before that is borrowed.
+fn images<'a, const N: usize>(
+    images: *const FlexsplineImages,
+    written: [(usize, usize); N],
+) -> Result<Images<'a>, FlexsplineStatus> {
     let FlexsplineImages { first, first_bytes, second, second_bytes } = copied(images)?;
-    Ok(Images::new(bytes(first, first_bytes)?, bytes(second, second_bytes)?))
+    let found = Images::new(bytes(first, first_bytes)?, bytes(second, second_bytes)?);
+    for object in written {
+        for read in [span(images), (first as usize, first_bytes), (second as usize, second_bytes)] {
+            apart([object, read])?;
+        }
+    }
+    Ok(found)
 }
 
 fn status(result: Result<(), FlexsplineStatus>) -> FlexsplineStatus {
@@ -304,11 +316,13 @@ pub extern "C" fn flexspline_store_activate(
 ) -> FlexsplineStatus {
     let activate = || {
         apart([span(store), span(joint)])?;
+        let images = images(table, [span(store)])?;
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
-        store.activate(&images(table)?, joint.drive(), temperature_c).map(|_| ()).map_err(|error| match error {
+        store.activate(&images, joint.drive(), temperature_c).map(|_| ()).map_err(|error| match error {
             ActivateError::Image(_) => FlexsplineStatus::Image,
-            ActivateError::TooLarge { .. } => FlexsplineStatus::TooLarge,
+            ActivateError::TooLarge { .. } | ActivateError::TooManyPages { .. } => FlexsplineStatus::TooLarge,
+            ActivateError::TwoTables => FlexsplineStatus::TwoTables,
             ActivateError::OtherDrive => FlexsplineStatus::OtherDrive,
         })
     };
@@ -323,8 +337,9 @@ pub extern "C" fn flexspline_store_set_temperature(
     temperature_c: f32,
 ) -> FlexsplineStatus {
     let set = || {
+        let images = images(table, [span(store)])?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
-        if store.set_temperature(&images(table)?, temperature_c) { Ok(()) } else { Err(FlexsplineStatus::Argument) }
+        if store.set_temperature(&images, temperature_c) { Ok(()) } else { Err(FlexsplineStatus::Argument) }
     };
     status(set())
 }
@@ -337,8 +352,9 @@ pub extern "C" fn flexspline_store_check_images(
     words: u16,
 ) -> FlexsplineStatus {
     let check = || {
+        let images = images(table, [span(store)])?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
-        store.check_images(&images(table)?, words as usize);
+        store.check_images(&images, words as usize);
         Ok(())
     };
     status(check())
@@ -405,18 +421,20 @@ pub extern "C" fn flexspline_tick(
     let tick = || {
         apart([span(joint), span(store), span(state), span(output)])?;
         usable(output)?;
+        let images = images(table, [span(store), span(state), span(output)])?;
+        let input = copied(input)?;
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
         let state: &mut JointState = get_mut(state, STATE_MARK)?;
-        let input = copied(input)?;
         let generator = GeneratorAngle::from_counts(input.generator_counts);
         let input = Input {
             generator: if input.has_generator != 0 { Some(generator) } else { None },
             target: OutputAngle::from_counts(input.target_counts),
             torque_n_m: input.torque_n_m,
             missed_ticks: input.missed_ticks,
+            adjustment: Adjustment::default(),
         };
-        let found = joint.tick(&images(table)?, store, state, &input);
+        let found = joint.tick(&images, store, state, &input);
         let given = FlexsplineOutput {
             command_counts: found.command.counts(),
             output_counts: found.output.counts(),
@@ -467,9 +485,9 @@ mod tests {
 
     fn blank() -> Objects {
         Objects {
-            store: Box::new(FlexsplineStore { opaque: [0; FLEXSPLINE_STORE_WORDS] }),
-            joint: FlexsplineJoint { opaque: [0; FLEXSPLINE_JOINT_WORDS] },
-            state: FlexsplineState { opaque: [0; FLEXSPLINE_STATE_WORDS] },
+            store: Box::new(FlexsplineStore { opaque: [MaybeUninit::zeroed(); FLEXSPLINE_STORE_WORDS] }),
+            joint: FlexsplineJoint { opaque: [MaybeUninit::zeroed(); FLEXSPLINE_JOINT_WORDS] },
+            state: FlexsplineState { opaque: [MaybeUninit::zeroed(); FLEXSPLINE_STATE_WORDS] },
         }
     }
 
@@ -527,6 +545,7 @@ mod tests {
             target: OutputAngle::from_counts(11_000_000),
             torque_n_m: 5.0,
             missed_ticks: 0,
+            adjustment: Adjustment::default(),
         };
         let expected = joint.tick(&images, &mut store, &mut state, &input);
         assert_eq!((out.command_counts, out.output_counts), (expected.command.counts(), expected.output.counts()));
@@ -592,5 +611,100 @@ mod tests {
         assert_eq!(tick(&mut o, &INPUT, inside), Overlap);
         assert_eq!(tick(&mut o, &INPUT, &mut out), FlexsplineStatus::Ok);
         assert_eq!(out.quality, 3, "no table yet");
+
+        // An image, or what tells of it, inside what is written.
+        let store = &raw mut *o.store;
+        let within = FlexsplineImages { second: store.cast_const().cast(), second_bytes: 100, ..table };
+        assert_eq!(flexspline_store_activate(store, &o.joint, &within, 20.0), Overlap);
+        assert_eq!(flexspline_store_set_temperature(store, &within, 20.0), Overlap);
+        assert_eq!(flexspline_store_check_images(store, &within, 9), Overlap);
+        assert_eq!(flexspline_tick(&o.joint, &within, store, &mut o.state, &INPUT, &mut out), Overlap);
+        let mut room = [table; 400];
+        let inside = room.as_mut_ptr().cast::<FlexsplineStore>();
+        assert_eq!(flexspline_store_init(inside), FlexsplineStatus::Ok);
+        let told = inside.cast::<FlexsplineImages>().wrapping_add(300);
+        // SAFETY: inside the room; the store holds nothing there yet that is read before the call refuses.
+        unsafe { told.write(table) };
+        assert_eq!(flexspline_store_check_images(inside, told, 9), FlexsplineStatus::Ok, "beyond the store");
+        let told = inside.cast::<FlexsplineImages>().wrapping_add(200);
+        unsafe { told.write(table) };
+        assert_eq!(flexspline_store_check_images(inside, told, 9), Overlap);
+    }
+
+    #[test]
+    fn settings_make_the_joint_they_name() {
+        let limits = Limits {
+            tick_s: SETTINGS.tick_s,
+            rate_rad_s: SETTINGS.rate_rad_s,
+            acceleration_rad_s2: SETTINGS.acceleration_rad_s2,
+            generator_rate_rad_s: SETTINGS.generator_rate_rad_s,
+            patience: SETTINGS.patience,
+        };
+        let members = [FixedMember::Flexspline, FixedMember::CircularSpline];
+        let policies = [Overrun::SkipAndCount, Overrun::HoldLast, Overrun::FadeOut { ticks: 50 }];
+        for (fixed_member, member) in (0..).zip(members) {
+            for (overrun, policy) in (0..).zip(policies) {
+                let mut o = blank();
+                let settings = FlexsplineSettings { fixed_member, overrun, ..SETTINGS };
+                assert_eq!(flexspline_joint_init(&mut o.joint, &settings), FlexsplineStatus::Ok);
+                let expected = Joint::new(Drive::new(188, 190, member).unwrap(), limits, policy).unwrap();
+                assert_eq!(get::<_, Joint>(&o.joint, JOINT_MARK), Ok(&expected), "{fixed_member} {overrun}");
+            }
+        }
+    }
+
+    #[test]
+    fn each_number_is_the_mode_it_stands_for() {
+        for (number, mode) in (0..).zip([Mode::Off, Mode::Tracking, Mode::Hold, Mode::Safe]) {
+            let mut o = made();
+            assert_eq!(flexspline_state_request(&mut o.state, 1), FlexsplineStatus::Ok);
+            assert_eq!(flexspline_state_request(&mut o.state, number), FlexsplineStatus::Ok);
+            assert_eq!(get::<_, JointState>(&o.state, STATE_MARK).unwrap().mode(), mode);
+        }
+    }
+
+    #[test]
+    fn each_quality_and_a_missing_sample_are_told() {
+        let image = fixture::image(false);
+        let (mut o, table) = (made(), pair(&image));
+        assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
+        let mut tick = |input: FlexsplineInput| {
+            let mut out = FlexsplineOutput::default();
+            let status = flexspline_tick(&o.joint, &table, &mut *o.store, &mut o.state, &input, &mut out);
+            assert_eq!(status, FlexsplineStatus::Ok);
+            out
+        };
+        assert_eq!(tick(INPUT).quality, 1, "the side is not known");
+        // Forward through the play, in ticks that are no glitch.
+        let at = |i: i64| FlexsplineInput { generator_counts: (1 << 30) + i * 20_000_000, ..INPUT };
+        let last = at(20);
+        assert_eq!((1..=20).map(|i| tick(at(i))).last().unwrap().quality, 0);
+        assert_eq!(tick(FlexsplineInput { torque_n_m: 1e3, ..last }).quality, 2);
+        assert_eq!(tick(FlexsplineInput { torque_n_m: f32::NAN, ..last }).quality, 3);
+        assert_eq!(tick(FlexsplineInput { has_generator: 0, ..last }).flags & 1, 1);
+        assert_eq!(tick(last).flags & 1, 0);
+    }
+
+    #[test]
+    fn objects_side_by_side_do_not_overlap() {
+        for (objects, expected) in [
+            ([(100, 10), (110, 5), (50, 50)], Ok(())),
+            ([(100, 10), (109, 5), (50, 50)], Err(FlexsplineStatus::Overlap)),
+            ([(100, 10), (110, 5), (50, 51)], Err(FlexsplineStatus::Overlap)),
+            ([(100, 10), (110, 5), (112, 1)], Err(FlexsplineStatus::Overlap)),
+            ([(100, 10), (usize::MAX, 5), (0, 100)], Ok(())),
+        ] {
+            assert_eq!(apart(objects), expected, "{objects:?}");
+        }
+    }
+
+    #[test]
+    fn what_another_call_made_is_no_object() {
+        let (mut o, image) = (made(), fixture::image(false));
+        let table = pair(&image);
+        let state = (&raw const o.state).cast::<FlexsplineJoint>();
+        assert_eq!(flexspline_store_activate(&mut *o.store, state, &table, 20.0), FlexsplineStatus::NotInitialised);
+        let joint = (&raw mut o.joint).cast::<FlexsplineState>();
+        assert_eq!(flexspline_state_request(joint, 1), FlexsplineStatus::NotInitialised);
     }
 }

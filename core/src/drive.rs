@@ -58,7 +58,7 @@ impl Drive {
     /// A drive from its tooth counts.
     ///
     /// # Errors
-    /// [`DriveError`] unless `1 ≤ flexspline_teeth < circular_spline_teeth`.
+    /// [`DriveError`] unless `1 ≤ flexspline_teeth < circular_spline_teeth ≤ 2·flexspline_teeth`.
     pub const fn new(
         flexspline_teeth: u16,
         circular_spline_teeth: u16,
@@ -71,6 +71,10 @@ impl Drive {
         let Some(waves) = NonZeroU16::new(circular_spline_teeth.saturating_sub(flexspline_teeth)) else {
             return Err(bad);
         };
+        // The generator turns faster than the output, or a count of it would be several of the output.
+        if waves.get() > flexspline_teeth {
+            return Err(bad);
+        }
         let (teeth, ripple_order, reversed) = match fixed {
             FixedMember::Flexspline => (cs, fs.get(), false),
             FixedMember::CircularSpline => (fs, cs.get(), true),
@@ -190,6 +194,12 @@ impl Drive {
         }
     }
 
+    /// The tooth phase of [`Self::phases_at_output`] alone.
+    #[must_use]
+    pub(crate) const fn tooth_at_output(&self, nominal: OutputAngle) -> u32 {
+        (nominal.counts().wrapping_mul(self.tooth_rate) >> 32) as u32
+    }
+
     /// Tooth pitches of the fixed member in one output turn, signed like the ratio.
     pub(crate) const fn tooth_periods(&self) -> f32 {
         self.ratio * self.ripple_order() as f32
@@ -274,6 +284,9 @@ mod tests {
         assert_eq!(Drive::new(190, 192, FixedMember::CircularSpline).unwrap().ratio(), -95.0);
         assert_eq!(Drive::new(200, 202, FixedMember::Flexspline).unwrap().ratio(), 101.0);
         assert_eq!(Drive::new(201, 203, FixedMember::Flexspline).unwrap().ratio(), 101.5);
+        let thirds =
+            [FixedMember::Flexspline, FixedMember::CircularSpline].map(|fixed| Drive::new(200, 203, fixed).unwrap());
+        assert_eq!(thirds.map(|drive| drive.exact_ratio()), [203.0 / 3.0, -200.0 / 3.0]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// Tooth counts that make no drive: `1 ≤ flexspline_teeth < circular_spline_teeth` is required.
+/// Tooth counts that make no drive: `1 ≤ flexspline_teeth < circular_spline_teeth ≤ 2·flexspline_teeth` is required.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriveError {
     /// Flexspline teeth found.
@@ -15,8 +15,8 @@ impl fmt::Display for DriveError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} flexspline teeth and {} circular spline teeth: the flexspline needs at least one, and fewer than the \
-             circular spline",
+            "{} flexspline teeth and {} circular spline teeth: the flexspline needs at least one, fewer than the \
+             circular spline and at least half as many",
             self.flexspline_teeth, self.circular_spline_teeth
         )
     }

@@ -6,11 +6,16 @@ use crate::drive::{Drive, FixedMember};
 use crate::hysteresis::Direction;
 use crate::image::Provenance;
 use crate::precompute::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
+use crate::runtime::Limits;
 use crate::table::GeneratorKind;
 use core::f64::consts::TAU;
 use std::vec::Vec;
 
 pub const ARCSEC: f64 = TAU / 360.0 / 3600.0;
+
+/// Limits of a joint at a thousand ticks a second.
+pub const LIMITS: Limits =
+    Limits { tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 2.0, generator_rate_rad_s: 700.0, patience: 5 };
 pub const PITCH: f64 = TAU / 188.0;
 
 /// Jumps at ±the drag torque of 1.5 N·m.
@@ -156,12 +161,37 @@ impl Buffers {
     }
 }
 
-/// The image of the drive above.
+/// The image of the drive above. Under Miri, where the least squares take too long, the one that is kept.
 pub fn image(long: bool) -> Vec<u8> {
+    if cfg!(miri) { kept(long).to_vec() } else { make(long) }
+}
+
+fn make(long: bool) -> Vec<u8> {
     let plan = plan(long);
     let mut out = std::vec![0; plan.image_bytes()];
     let mut buffers = Buffers::new(&plan);
     let samples = samples(long);
     make_image(&plan, &provenance(), &samples, buffers.workspace(), &mut out, id).unwrap();
     out
+}
+
+/// Written by the test below, with FLEXSPLINE_KEEP_FIXTURES set.
+fn kept(long: bool) -> &'static [u8] {
+    if long { include_bytes!("fixtures/long.fxt") } else { include_bytes!("fixtures/short.fxt") }
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "makes the images")]
+fn the_images_kept_for_miri_are_the_ones_made() {
+    for (long, name) in [(false, "short"), (true, "long")] {
+        let made = make(long);
+        if std::env::var_os("FLEXSPLINE_KEEP_FIXTURES").is_some() {
+            std::fs::write(std::format!("{}/src/fixtures/{name}.fxt", env!("CARGO_MANIFEST_DIR")), &made).unwrap();
+        } else {
+            assert!(
+                kept(long) == made,
+                "{name}.fxt is not what is made: run this test with FLEXSPLINE_KEEP_FIXTURES=1"
+            );
+        }
+    }
 }

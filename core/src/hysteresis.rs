@@ -1,11 +1,12 @@
 //! The play (backlash) operator, as an interval while its position is not known.
 //!
-//! In nominal output angle `x`, with half-width `h ≥ 0`, the play follows `p ← clamp(p, x − h, x + h)`. The output is at
-//! `x + centre + (p − x)`. After steady motion forward `p = x − h`: the output lags the motion by the half-width, so
-//! `e₊ = centre − h` and `e₋ = centre + h`.
+//! With the nominal output `x`, and centre `c` and half-width `h ≥ 0` of the play there and under the load, the output follows
+//! `p ← clamp(p, x + c − h, x + c + h)`: it stands, held by the drag, until a flank takes it along, whether the flank comes by
+//! motion or by a load that goes. Its error is `e = p − x`; after steady motion forward the output lags, `e₊ = c − h`, backward
+//! `e₋ = c + h`.
 //!
 //! After a reset nobody knows on which side of its play the drive rests. The state therefore is a lower and an upper
-//! bound of `p − x`, both moved by the same operator. Each move and each reversal can only bring them closer; after one
+//! bound of the offset `e − c`, both moved by the same operator. Each move and each reversal can only bring them closer; after one
 //! move through the full play they are equal, and from then on they stay equal.
 //!
 //! Everything is in integer counts of 2⁻³² output turn: the result depends on the turning points only, not on how
@@ -34,8 +35,17 @@ impl Direction {
     }
 }
 
-/// Largest half-width in counts, 0.05 rad: far above any play, far below overflow.
+/// Largest half-width of a table in counts, 0.05 rad.
 pub(crate) const MAX_HALF_COUNTS: i32 = 34_178_720;
+/// Largest half-width of a play in counts, 0.2 rad: far above any table with what may be added to it, far below overflow.
+const MAX_PLAY_COUNTS: i32 = 1 << 27;
+
+/// Largest error that any table can give, with its rounding and the largest adjustment of mean and half-width, counts.
+pub(crate) const MOST_ERROR_COUNTS: u32 =
+    MAX_HALF_COUNTS as u32 + (MAX_HALF_COUNTS as u32 >> 8) + 2 * crate::runtime::Adjustment::MAX_COUNTS as u32;
+
+/// The same while nothing was known of the table.
+const MOST_KEPT_COUNTS: u32 = MOST_ERROR_COUNTS + MAX_PLAY_COUNTS as u32;
 
 /// Where the drive rests inside its play: all that must survive a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +54,7 @@ pub struct PlayState {
     nominal: OutputAngle,
     /// Estimated output less nominal at the last update, in counts.
     error: i32,
-    /// Bounds of `p − x` in counts.
+    /// Bounds of `e − c` in counts.
     lower: i32,
     upper: i32,
     /// Half-width at the last update, in counts; −1 before the first.
@@ -90,7 +100,7 @@ impl PlayState {
         self.lower == self.upper
     }
 
-    /// Estimate of `p − x` in radians: the middle of the interval, 0 before the first update.
+    /// Estimate of the offset from the centre, `e − c`, in radians: the middle of the interval, 0 before the first update.
     #[must_use]
     pub fn offset_rad(&self) -> f32 {
         if self.half < 0 { 0.0 } else { self.offset_counts() as f32 * RAD_PER_COUNT }
@@ -140,10 +150,14 @@ impl PlayState {
         self.lower <= self.upper
     }
 
-    /// Flips a bit of one bound, as radiation does.
+    /// Flips a bit of a bound (0, 1) or of the error (2), as radiation does.
     #[cfg(test)]
     pub(crate) fn flip(&mut self, bound: usize, bit: u32) {
-        let bound = if bound == 0 { &mut self.lower } else { &mut self.upper };
+        let bound = match bound {
+            0 => &mut self.lower,
+            1 => &mut self.upper,
+            _ => &mut self.error,
+        };
         *bound ^= 1 << bit;
     }
 
@@ -152,31 +166,33 @@ impl PlayState {
         self.half >= 0
     }
 
-    /// Moves the play to `nominal`, with the centre and half-width there in counts; returns the error `centre + (p − x)`.
+    /// Moves the play to `nominal`, with the centre and half-width there in counts; returns the error `p − x`.
     ///
-    /// Without either (they could not be computed) it follows the motion with the half-width and error of the last update; before
-    /// the first with a half-width that is wider than any.
-    pub(crate) const fn update(&mut self, nominal: OutputAngle, play: Option<(i32, i32)>) -> i32 {
-        let last = if self.half < 0 { MAX_HALF_COUNTS } else { self.half };
-        let (centre, half) = match play {
-            Some((centre, half)) => (centre, half),
-            None => (0, last),
-        };
-        let half = if half > MAX_HALF_COUNTS { MAX_HALF_COUNTS } else { half };
-        let half = if half < 0 { 0 } else { half };
-        self.update_counts(nominal, half);
-        let error = centre.wrapping_add(self.offset_counts());
-        self.error = if play.is_some() { error } else { self.error };
-        error
-    }
-
-    const fn update_counts(&mut self, nominal: OutputAngle, half: i32) {
-        let moved = nominal.minus_small_counts(self.nominal);
-        let moved = if self.half < 0 { 0 } else { moved };
+    /// Without either (`sane` is false: they could not be computed) it follows the motion with the centre and half-width of the last
+    /// update; before the first with a half-width that is wider than any. Masks instead of choices: the same work for all.
+    #[inline(always)]
+    pub(crate) const fn update(&mut self, nominal: OutputAngle, centre: i32, half: i32, sane: bool) -> i32 {
+        let mask = (sane as i32).wrapping_neg();
+        let started = !(self.half >> 31);
+        let last = if self.half < 0 { MAX_PLAY_COUNTS } else { self.half };
+        let half = last ^ (last ^ half) & mask;
+        let half = if half as u32 > MAX_PLAY_COUNTS as u32 { MAX_PLAY_COUNTS } else { half };
+        let last = self.error.wrapping_sub(self.offset_counts()) & started;
+        let centre = last ^ (last ^ centre) & mask;
+        // How far the middle of the play went, while the output stayed.
+        let moved = nominal.minus_near_counts(self.nominal).saturating_add(centre.wrapping_sub(last)) & started;
         self.lower = clamped(self.lower.saturating_sub(moved), half);
         self.upper = clamped(self.upper.saturating_sub(moved), half);
         self.nominal = nominal;
         self.half = half;
+        self.error = centre.wrapping_add(self.offset_counts());
+        self.error
+    }
+
+    /// What is known of the centre changed, not where the drive rests in its play: the output is now estimated so much further.
+    #[inline(always)]
+    pub(crate) const fn shift(&mut self, counts: i32) {
+        self.error = self.error.wrapping_add(counts & !(self.half >> 31));
     }
 
     /// The state as bytes, with a CRC-32, for storage across a reset.
@@ -215,11 +231,12 @@ impl PlayState {
             half: i32::from_le_bytes(*half),
         };
         let intact = u32::from_le_bytes(*crc) == crc32(bytes.first_chunk::<SAVED_BEFORE_CRC>()?);
-        let started = (0..=MAX_HALF_COUNTS).contains(&state.half)
+        let started = (0..=MAX_PLAY_COUNTS).contains(&state.half)
             && state.lower >= state.half.wrapping_neg()
             && state.upper <= state.half;
         let fresh = state.half == -1 && (state.lower == i32::MIN || state.lower == i32::MAX);
-        (intact && state.lower <= state.upper && (started || fresh)).then_some(state)
+        let possible = state.lower <= state.upper && state.error.unsigned_abs() <= MOST_KEPT_COUNTS;
+        (intact && possible && (started || fresh)).then_some(state)
     }
 }
 
@@ -242,14 +259,14 @@ mod tests {
         let mut x = from;
         for &step in path {
             x += step as i64;
-            state.update_counts(OutputAngle::from_counts(x), HALF);
+            let _ = state.update(OutputAngle::from_counts(x), 0, HALF, true);
         }
         x
     }
 
     fn known() -> PlayState {
         let mut state = PlayState::after_motion(Direction::Forward);
-        state.update_counts(OutputAngle::ZERO, HALF);
+        let _ = state.update(OutputAngle::ZERO, 0, HALF, true);
         state
     }
 
@@ -284,7 +301,7 @@ mod tests {
     #[test]
     fn uncertainty_is_half_the_interval() {
         let mut state = PlayState::unknown();
-        let _ = state.update(OutputAngle::ZERO, Some((0, 68_357)));
+        let _ = state.update(OutputAngle::ZERO, 0, 68_357, true);
         assert!((state.uncertainty_rad() - 1e-4).abs() < 2e-9);
         assert!(state.offset_rad().abs() < 2e-9);
     }
@@ -293,9 +310,9 @@ mod tests {
     fn hostile_half_widths_stay_in_bounds() {
         for half in [i32::MIN, -1, 0, i32::MAX] {
             let mut state = PlayState::unknown();
-            let _ = state.update(OutputAngle::ZERO, Some((0, half)));
-            let _ = state.update(OutputAngle::from_counts(i64::MIN), Some((0, half)));
-            assert!((0..=MAX_HALF_COUNTS).contains(&state.half), "{half}");
+            let _ = state.update(OutputAngle::ZERO, 0, half, true);
+            let _ = state.update(OutputAngle::from_counts(i64::MIN), 0, half, true);
+            assert!((0..=MAX_PLAY_COUNTS).contains(&state.half), "{half}");
             assert!(-state.half <= state.lower && state.lower <= state.upper && state.upper <= state.half);
         }
     }
@@ -313,6 +330,10 @@ mod tests {
         }
         let disordered = PlayState { lower: 5, upper: -5, half: 10, nominal: OutputAngle::ZERO, error: 0 };
         assert_eq!(PlayState::restore(&disordered.save()), None);
+        for error in [i32::MIN, i32::MAX, 240_000_000] {
+            let far = PlayState { lower: -5, error, ..disordered };
+            assert_eq!(PlayState::restore(&PlayState { upper: 5, ..far }.save()), None, "{error}");
+        }
         for (lower, upper) in [(-11, 5), (5, 11)] {
             let outside = PlayState { lower, upper, ..disordered };
             assert_eq!(PlayState::restore(&outside.save()), None);

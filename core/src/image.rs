@@ -37,22 +37,22 @@
 //! | 544 | | A, B, C: `i32` in half counts, stored closed |
 //! | | | nodes `[temperature][torque node]`: D, its slope over the torque, H (`f32` each; counts, counts/(N·m)); the last bit of |
 //! | | | H is set where the interval above is a jump; a node alone is stored twice |
-//! | | | records `[temperature][torque node]`: for each ripple node, stored closed, the ripple of forward and of backward |
-//! | | | motion (`R − h`, `R + h`, `i16` each, ripple units) |
+//! | | | records `[temperature][torque node]`: the ripple of forward motion, `R − h`, at each node, then that of backward |
+//! | | | motion, `R + h`, each stored closed as an even number of `i16`, ripple units |
 //! | | | end of the body |
 //! | | | CRC-32 of each 256-byte page of the body (the last may be shorter) |
 //! | | 4 | CRC-32 of everything before |
 //!
 //! Counts are of 2⁻³² output turn; places and steps are in words of four bytes, steps 0 along an axis of one node. A periodic
 //! curve of n nodes is stored closed, as n + 3 values: the last node, all nodes, the first two; the three around any place
-//! are then neighbours. CRC-32 is the one of ISO-HDLC (zlib).
+//! are then neighbours. A ripple goes on for one or two nodes more, n + 4 or n + 5 values: so are the five. CRC-32 is the one of ISO-HDLC (zlib).
 //!
 //! What follows from other numbers (offsets, units, the inverse) is stored so that a step finds all it needs in the image, where
 //! two copies are compared; [`Table::check`] computes it again.
 //!
 //! Size with 3 temperatures, 25 torques, 8 ripple nodes and 32 nodes each for A, B, C:
-//! 544 + 4·3·35 + 75·(12 + 44) = 5164, and 21 pages and the end 4·22 = 88: 5252 bytes. With 2 temperatures and 60 torques, as
-//! the two-roller generator needs: 7384. Both are below 8 KiB.
+//! 544 + 4·3·35 + 75·(12 + 48) = 5464, and 22 pages and the end 4·23 = 92: 5556 bytes. With 2 temperatures and 60 torques, as
+//! the two-roller generator needs: 7872. Both are below 8 KiB.
 
 use crate::angle::RAD_PER_COUNT;
 use crate::drive::{Drive, FixedMember};
@@ -89,6 +89,11 @@ const AXIS_SLOTS: [usize; 2] = [MAX_CLAMPED_NODES, MAX_TEMPERATURE_NODES];
 const UNITS_PER_COUNT: f64 = 524_288.0;
 /// Half-widths may miss zero by this, counts, and the ripple unit: rounding.
 const HALF_WIDTH_ROUNDING_COUNTS: f64 = 3.0;
+/// Largest ripple unit for each count of a cell: a ripple of 15.9 cells.
+const MAX_UNITS_PER_CELL: f32 = 255.0;
+/// How far B-spline weights of 15 bits can be off, times the largest step between coefficients: one unit for the place in the
+/// cell and one for each of the two weights that are rounded.
+const WEIGHT_ROUNDING: f32 = 3.0 / 32_768.0;
 const CRC_BYTES: usize = 4;
 const ID_OFFSET: usize = 48;
 const RESERVED: core::ops::Range<usize> = 200..HEADER_BYTES;
@@ -227,6 +232,11 @@ const fn stored(nodes: usize) -> usize {
     if nodes == 0 { 0 } else { nodes.saturating_add(3) }
 }
 
+/// Values of the ripple of one direction in a record; also the words of a record.
+pub(crate) const fn ripple_row(nodes: usize) -> usize {
+    if nodes == 0 { 0 } else { nodes.saturating_add(5) & !1 }
+}
+
 /// Where everything lies, in words.
 #[derive(Clone, Copy, Debug)]
 struct Layout {
@@ -245,7 +255,7 @@ impl Layout {
         let nodes = curve_c.saturating_add(stored(c));
         let node_plane = (if torque > 1 { torque } else { 2 }).saturating_mul(NODE_WORDS);
         let records = nodes.saturating_add(node_plane.saturating_mul(temperature));
-        let record = stored(ripple);
+        let record = ripple_row(ripple);
         let end = records.saturating_add(record.saturating_mul(torque).saturating_mul(temperature));
         Self { curves: [word::CURVES, curve_b, curve_c], nodes, node_plane, records, record, end }
     }
@@ -381,11 +391,11 @@ impl TableData<'_> {
         let units = |rad: f64| if unit == 0 { 0 } else { quantise(table::counts(rad) * UNITS_PER_COUNT / unit as f64) };
         let mean_ripples = self.mean_ripple_rad.chunks_exact(axis.len());
         for (mean, half) in mean_ripples.zip(self.half_width_ripple_rad.chunks_exact(axis.len())) {
-            for position in 0..axis.stored_len() {
-                let value = |ripple: &[f32]| ripple.get(axis.stored_node(position)).copied().unwrap_or(0.0) as f64;
-                let (mean, half) = (value(mean), value(half));
-                out.put(&(units(mean - half) as i16).to_le_bytes());
-                out.put(&(units(mean + half) as i16).to_le_bytes());
+            for side in [-1.0, 1.0] {
+                for position in 0..ripple_row(axis.len()) {
+                    let value = |ripple: &[f32]| ripple.get(axis.stored_node(position)).copied().unwrap_or(0.0) as f64;
+                    out.put(&(units(value(mean) + side * value(half)) as i16).to_le_bytes());
+                }
             }
         }
     }
@@ -499,9 +509,9 @@ fn complete(image: &mut [u8], body_bytes: usize) -> Result<(), ImageError> {
 /// Words that follow from the bounds: iterations, hold.
 const DERIVED_WORDS: [usize; 2] = [word::CELL_WIDTH.saturating_add(8), word::CELL_WIDTH.saturating_add(9)];
 
-/// An error limit in counts, rounded up; the per mille takes up the rounding of single precision.
+/// An error limit in counts, rounded up; the per mille takes up the rounding of single precision, the counts that of integers.
 fn limit_counts(limit_rad: f32) -> u32 {
-    (table::counts(limit_rad as f64) * 1.001) as u32
+    (table::counts(limit_rad as f64) * 1.001 + 16.0) as u32
 }
 
 /// Computes and stores every checksum of an image whose body is complete.
@@ -519,9 +529,11 @@ fn seal(image: &mut [u8], body_bytes: usize) {
 }
 
 /// Makes every checksum of an image right that states its body, whatever is in it.
-#[cfg(test)]
-pub(crate) fn reseal(image: &mut [u8]) {
-    let body_bytes = word_at(image.as_chunks::<4>().0, word::BODY) as usize * 4;
+#[cfg(any(test, feature = "fuzzing"))]
+#[doc(hidden)]
+pub fn reseal(image: &mut [u8]) {
+    let body_bytes = word_at(image.as_chunks::<4>().0, word::BODY) as usize;
+    let body_bytes = body_bytes.saturating_mul(4);
     if body_bytes < image.len() {
         seal(image, body_bytes);
         let _ = complete(image, body_bytes);
@@ -631,6 +643,13 @@ fn extremes(stored: usize, value: impl Fn(usize) -> f32) -> [f32; 3] {
     most
 }
 
+/// Half word `index` of a record.
+#[inline(never)]
+fn half_at(record: Words<'_>, index: usize) -> i16 {
+    let word = word_at(record, index / 2);
+    (if index.is_multiple_of(2) { word } else { word >> 16 }) as i16
+}
+
 /// Whether the three repeated words of a stored curve equal the nodes they repeat.
 fn check_closed(field: Field, axis: PeriodicAxis, words: Words<'_>) -> Result<(), ImageError> {
     let word = |position: usize| words.get(position);
@@ -728,6 +747,7 @@ impl<'a> Table<'a> {
             ripple: PeriodicAxis::new(ripple_nodes).ok_or(size)?,
             bounds: Bounds::default(),
             inverse: InverseBound::default(),
+            plan: Table::plan_in(words),
         };
         table.bounds = table.check_bounds(&layout, curve_nodes)?;
         let cell_rad = rad(cell_width(&drive, ripple_nodes).abs());
@@ -747,7 +767,10 @@ impl<'a> Table<'a> {
 
     fn check_bounds(&self, layout: &Layout, curve_nodes: [usize; 3]) -> Result<Bounds, ImageError> {
         let mut bounds = Bounds::default();
-        in_range(Field::MeanRipple, 0, word_at(self.words, word::RIPPLE_UNIT) as f32, 0.0, i32::MAX as f32)?;
+        // So that the ripple in cells, and in counts, fits the integers of a step.
+        let most = cell_width(&self.drive, self.ripple.len()).abs() * MAX_UNITS_PER_CELL;
+        let most = if self.ripple.is_empty() || most > i32::MAX as f32 { i32::MAX as f32 } else { most };
+        in_range(Field::MeanRipple, 0, word_at(self.words, word::RIPPLE_UNIT) as f32, 0.0, most)?;
         self.check_nodes(layout, &mut bounds)?;
         self.check_records(layout, &mut bounds)?;
         bounds.error_rad += bounds.periodic_rad;
@@ -783,6 +806,8 @@ impl<'a> Table<'a> {
         check_closed(field, axis, self.words.get(at..).unwrap_or_default())?;
         let [largest, steepest, _] = extremes(axis.stored_len(), value);
         let slope = steepest * nodes as f32 * periods.abs() / TAU as f32;
+        // Two readings, which may lie on both sides of a step.
+        bounds.rounding_rad += 2.0 * WEIGHT_ROUNDING * steepest;
         bounds.error_rad += largest;
         bounds.periodic_rad += largest;
         bounds.slope += slope;
@@ -842,11 +867,15 @@ impl<'a> Table<'a> {
         for index in 0..self.torque_nodes.saturating_mul(self.temperature_nodes) {
             let first = layout.records.saturating_add(index.saturating_mul(layout.record));
             let record = self.words.get(first..first.saturating_add(layout.record)).unwrap_or_default();
-            check_closed(Field::MeanRipple, self.ripple, record)?;
-            let ripple = |i: usize| {
-                let word = word_at(record, i);
-                [word as i16 as f32 * unit, (word >> 16) as i16 as f32 * unit]
-            };
+            let value = |i: usize| half_at(record, i);
+            for index in 0..layout.record.saturating_mul(2) {
+                let node = self.ripple.stored_node(index.checked_rem(layout.record).unwrap_or(0)).saturating_add(1);
+                let first = if index < layout.record { 0 } else { layout.record };
+                if value(index) != value(first.saturating_add(node)) {
+                    return Err(ImageError::NotClosed { field: Field::MeanRipple, index });
+                }
+            }
+            let ripple = |i: usize| [i, i.saturating_add(layout.record)].map(|i| value(i) as f32 * unit);
             let torque = index.checked_rem(self.torque_nodes).unwrap_or(0);
             let temperature = index.checked_div(self.torque_nodes).unwrap_or(0);
             let half = f32_at(self.words, self.node_at(layout, index).saturating_add(2));
@@ -858,14 +887,36 @@ impl<'a> Table<'a> {
                 return Err(ImageError::NegativeHalfWidth { temperature, torque, found_rad: rad(least) });
             }
             // Steady motion follows forward or backward.
-            for way in [|[forward, _]: [f32; 2]| forward, |[_, backward]: [f32; 2]| backward] {
-                let [largest, steepest, reached] = extremes(self.ripple.stored_len(), |i| rad(way(ripple(i))));
+            for first in [0, layout.record] {
+                let way = |i: usize| rad(value(first.saturating_add(i)) as f32 * unit);
+                let [largest, steepest, reached] = extremes(self.ripple.stored_len(), way);
                 bounds.periodic_rad = larger(bounds.periodic_rad, largest);
                 bounds.slope = larger(bounds.slope, steepest * cells_per_rad);
                 bounds.ripple_cells = larger(bounds.ripple_cells, reached * cells_per_rad);
+                bounds.rounding_rad = larger(bounds.rounding_rad, WEIGHT_ROUNDING * steepest);
             }
         }
         Ok(())
+    }
+
+    /// How far the ripple takes the half-width of the play below H at most, counts, rounded up.
+    pub(crate) fn play_ripple_counts(&self) -> i32 {
+        let layout = Layout::new(self.torque_nodes, self.temperature_nodes, self.ripple.len(), [0; 3]);
+        let [_, first] = table::halves(word_at(self.words, word::CELL_WIDTH.saturating_add(3)));
+        let words = layout.record.saturating_mul(self.torque_nodes).saturating_mul(self.temperature_nodes);
+        let records = self.words.get(first..first.saturating_add(words)).unwrap_or_default();
+        let mut narrowest = 0;
+        for record in records.chunks_exact(layout.record.max(1)) {
+            for i in 0..record.len() {
+                let [forward, backward] = [i, i.saturating_add(record.len())].map(|i| half_at(record, i) as i32);
+                let narrower = forward.wrapping_sub(backward);
+                narrowest = if narrower > narrowest { narrower } else { narrowest };
+            }
+        }
+        let narrowest = narrowest.unsigned_abs() as u64;
+        // Half of it in counts of 2¹⁹ units, rounded up, and two for the rounding of the ripple.
+        let counts = narrowest.wrapping_mul(word_at(self.words, word::RIPPLE_UNIT) as u64) >> 20;
+        if self.ripple.is_empty() { 0 } else { (counts as i32).saturating_add(3) }
     }
 
     fn header(&self) -> Header<'a> {
@@ -949,7 +1000,7 @@ fn page_of(image: &[u8], body_bytes: usize, page: usize) -> Option<&[u8]> {
     image.get(..body_bytes)?.chunks(PAGE_BYTES).nth(page)
 }
 
-fn page_intact(image: &[u8], body_bytes: usize, page: usize) -> bool {
+pub(crate) fn page_intact(image: &[u8], body_bytes: usize, page: usize) -> bool {
     let sums = image.get(body_bytes..).map_or(&[][..], |sums| sums.as_chunks::<CRC_BYTES>().0);
     match (page_of(image, body_bytes, page), sums.get(page)) {
         (Some(bytes), Some(sum)) => crc32(bytes) == u32::from_le_bytes(*sum),
@@ -1018,7 +1069,7 @@ mod tests {
     const NODES: usize = 4 * word::CURVES;
     const NODE_BYTES: usize = 4 * NODE_WORDS;
     const RECORDS: usize = NODES + 3 * 11 * NODE_BYTES;
-    const RECORD_BYTES: usize = 4 * 19;
+    const RECORD_BYTES: usize = 4 * 20;
 
     /// A small table with every part; ripple alternates in sign.
     fn data() -> TableData<'static> {
@@ -1141,8 +1192,8 @@ mod tests {
 
     #[test]
     fn the_stated_sizes_hold() {
-        assert_eq!(image_bytes(25, 3, 8, [32; 3]), 5252);
-        assert_eq!(image_bytes(60, 2, 8, [0; 3]), 7384);
+        assert_eq!(image_bytes(25, 3, 8, [32; 3]), 5556);
+        assert_eq!(image_bytes(60, 2, 8, [0; 3]), 7872);
         assert_eq!(fixture::image(false).len(), fixture::plan(false).image_bytes());
     }
 
@@ -1309,8 +1360,8 @@ mod tests {
         let error = resealed(put(at_node(13) + 8, 30.0));
         assert!(matches!(error, ImageError::NegativeHalfWidth { temperature: 1, torque: 2, .. }), "{error}");
         // The repeated nodes at either end of a record.
-        for (position, index) in [(0, 0), (17, 17), (18, 18)] {
-            let offset = record(3) + 4 * position;
+        for index in [0, 17, 18, 19, 20, 39] {
+            let offset = record(3) + 2 * index;
             let error = resealed(|image| image[offset] ^= 1);
             assert_eq!(error, ImageError::NotClosed { field: Field::MeanRipple, index });
         }
@@ -1318,9 +1369,9 @@ mod tests {
         let error = resealed(|image| {
             let unit = u32::from_le_bytes(*image[116..].first_chunk().unwrap());
             image[116..120].copy_from_slice(&(unit * 60).to_le_bytes());
-            for word in image[RECORDS..RECORDS + 33 * RECORD_BYTES].chunks_exact_mut(4) {
+            for record in image[RECORDS..RECORDS + 33 * RECORD_BYTES].chunks_exact_mut(RECORD_BYTES) {
                 // The half-width ripple goes.
-                word.copy_within(0..2, 2);
+                record.copy_within(0..RECORD_BYTES / 2, RECORD_BYTES / 2);
             }
         });
         assert!(matches!(error, ImageError::Slope { found } if found > 1.0 && found < 20.0), "{error}");
@@ -1343,6 +1394,31 @@ mod tests {
         let (slope, error) = (bounds.slope as f64, bounds.error_rad as f64);
         assert!(steepest < slope && slope < 1.3 * steepest, "{steepest} {slope}");
         assert!(largest < error && error < 1.1 * largest, "{largest} {error}");
+    }
+
+    #[test]
+    fn a_limit_as_small_as_what_the_table_gives_disables_nothing() {
+        let data = TableData {
+            mean_rad: &[0.0; 4],
+            half_width_rad: &[0.0; 4],
+            mean_ripple_rad: &[2.0e-8; 32],
+            half_width_ripple_rad: &[0.0; 32],
+            generator_curve_rad: &[2.0e-8, -1.0e-8, 1.5e-8, 0.0],
+            output_curve_rad: &[3.0e-8, 0.0, -3.0e-8, 0.0, 0.0],
+            ..data()
+        };
+        let wide = write(&data, &provenance()).unwrap();
+        let reached = Table::check(&wide).unwrap().bounds().error_rad;
+        let tight = write(&data, &Provenance { error_limit_rad: reached, ..provenance() }).unwrap();
+        let table = Table::check(&tight).unwrap();
+        for i in 0..2000 {
+            let target = crate::OutputAngle::from_counts(i * 8_589_934);
+            for direction in [crate::Direction::Forward, crate::Direction::Backward] {
+                let command = table.inverse(target, 0.5, 20.0, crate::Approach::Moving(direction));
+                assert_eq!(command.quality, crate::Quality::InRange, "{i}");
+                assert!(table.steady_error_rad(command.generator, 0.5, 20.0, direction).is_some(), "{i}");
+            }
+        }
     }
 
     #[test]

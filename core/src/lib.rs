@@ -25,7 +25,7 @@
 //!
 //! /// Every millisecond: what to command so that the output comes to `target`.
 //! fn tick(images: &Images, store: &mut Store, state: &mut JointState, measured: GeneratorAngle, target: OutputAngle) -> GeneratorAngle {
-//!     let input = Input { generator: Some(measured), target, torque_n_m: 12.0, missed_ticks: 0 };
+//!     let input = Input { generator: Some(measured), target, torque_n_m: 12.0, missed_ticks: 0, adjustment: Adjustment::default() };
 //!     JOINT.tick(images, store, state, &input).command
 //! }
 //! # let data = TableData {
@@ -58,11 +58,88 @@
 //! images be checked ([`Store::check_images`]). Where no loop runs, as on the host, [`Table`] alone answers: [`Table::forward`],
 //! [`Table::inverse`].
 //!
+//! # Beside the table
+//! What the drive does beyond its table goes into the [`Adjustment`] of the next tick, from whatever knows of it.
+//!
+//! An encoder at the output, or a star or beacon now and then, teaches a few coefficients ([`Adapter`]):
+//! ```
+//! use flexspline::*;
+//!
+//! let mean = Coefficient { term: Term::Mean, limit: 2e-4, initial_std: 1e-4 };
+//! let half = Coefficient { term: Term::HalfWidth, limit: 5e-5, initial_std: 2e-5 };
+//! let adapter = Adapter::new(&AdaptSettings {
+//!     coefficients: [mean, half], noise_rad: 2e-6, memory_measurements: 1e4, gate: 5.0, settle_rad: 1e-5, torque_limit_n_m: 0.0,
+//! })?;
+//! let mut learnt = adapter.start();
+//! learnt.set_learning(Learning::On);
+//! // Each tick, after `Joint::tick`: the adjustment for the input of the next.
+//! let mut after_tick = |input: &Input, output: &Output, play: &PlayState, measured: Option<OutputAngle>| {
+//!     adapter.update(&mut learnt, &Seen { input, output, play, measured }).adjustment
+//! };
+//! # let output = Output { command: GeneratorAngle::ZERO, output: OutputAngle::ZERO, transmission_error_rad: 0.0, uncertainty_rad: 0.0,
+//! #     correction_rad: 0.0, held_back_rad: 0.0, quality: Quality::InRange, flags: Flags::default() };
+//! # let input = Input { generator: Some(GeneratorAngle::ZERO), target: OutputAngle::ZERO, torque_n_m: 0.0, missed_ticks: 0, adjustment: Adjustment::default() };
+//! # let next = after_tick(&input, &output, &PlayState::unknown(), Some(OutputAngle::ZERO.offset_rad(5e-4)));
+//! # assert!(next.mean_counts > 0);
+//! # Ok::<(), AdaptError>(())
+//! ```
+//! Elastic hysteresis, as springs that slip ([`SlipBank`]), over the nominal output or over the torque:
+//! ```
+//! use flexspline::*;
+//!
+//! let spring = |width_n_m, gain_rad_per_n_m| TorqueSlipElement { width_n_m, gain_rad_per_n_m };
+//! let bank = SlipBank::of_torque([spring(2.0, 4e-6), spring(10.0, 1.5e-6)]).ok_or("widths")?;
+//! let mut springs = SlipState::unknown();
+//! for torque_n_m in [0.0, 30.0, 5.0] {
+//!     let slip = bank.update(&mut springs, torque_n_m);
+//!     let _adjustment = slip.added_to(Adjustment::default());
+//! }
+//! assert!(springs.is_known());
+//! # Ok::<(), &str>(())
+//! ```
+//! Where the output will be some ticks from now, with the table as the output map of two inertias ([`Predictor`]):
+//! ```
+//! use flexspline::*;
+//!
+//! fn in_ten_ticks(joint: &Joint, store: &Store, predictor: &Predictor, state: &PredictorState, now: &Now) -> OutputAhead {
+//!     let off = Disturbance { torque_n_m: 0.5, load_change_n_m: 0.05, ..Disturbance::default() };
+//!     let state_bound = [2e-6, 1e-4, 1e-3, 0.5]; // from `Predictor::state_bound`, once
+//!     let ahead = predictor.ahead(state, 12.0, 10, state_bound, &off);
+//!     predictor.output_ahead(joint, store, state, &ahead, now)
+//! }
+//! let inertias = Inertias { motor_kg_m2: 1.0, load_kg_m2: 3.0, stiffness_n_m_per_rad: 3e4, damping_n_m_s_per_rad: 20.0 };
+//! let noise = Noise { torque_n_m: 0.5, load_change_n_m: 0.2, speed_rad_s: 1e-4, twist_rad: None };
+//! let predictor = Predictor::new(inertias, noise, 1e-3)?;
+//! # let _ = (predictor, in_ten_ticks);
+//! # Ok::<(), PredictorError>(())
+//! ```
+//! Records for the ground, and what changed ([`Recorder`], [`Watch`]):
+//! ```
+//! use flexspline::*;
+//!
+//! let mut recorder = Recorder::new(Ring::<64>::new(), RateGroup::new(100, 0).ok_or("rate group")?);
+//! let mut watch = Watch::new();
+//! let mut after_tick = |tick, state: &JointState, store: &Store, output: &Output| {
+//!     recorder.record(tick, state, store, output);
+//!     let events = watch.see(state, store, output); // with the feature `defmt`: events.log(tick)
+//!     for _event in events.iter() {}
+//! };
+//! # let output = Output { command: GeneratorAngle::ZERO, output: OutputAngle::ZERO, transmission_error_rad: 0.0, uncertainty_rad: 0.0,
+//! #     correction_rad: 0.0, held_back_rad: 0.0, quality: Quality::InRange, flags: Flags::default() };
+//! # after_tick(0, &JointState::new(), &Store::new(), &output);
+//! // When there is time: bytes for the ground.
+//! while let Some(record) = recorder.sink().take() {
+//!     let bytes: [u8; RECORD_BYTES] = record.encode();
+//!     assert_eq!(Record::decode(&bytes), Ok(record));
+//! }
+//! # Ok::<(), &str>(())
+//! ```
+//!
 //! # Promises
 //! * No heap, no panic, no `unsafe`: what flies links with a panic handler that cannot be linked.
-//! * [`Joint::tick`] takes the same number of instructions in every tick with the same table (unless a glitch was believed or
-//!   the state was hit by an upset): 1544 on a Cortex-M4F with the tables of cam, double disc and four rollers, 1775 with that of
-//!   two rollers, of them 570 for forward and 769 or 1005 for inverse if called alone. No loop depends on data, no libm is called.
+//! * [`Joint::tick`] takes the same number of instructions in every tick with the same table (unless a glitch was believed, the
+//!   state or a word of the table was hit by an upset, or the images differ): 1320 on a Cortex-M4F with the tables of all four
+//!   generators; forward alone 555, inverse alone 787. No loop depends on data, no libm is called.
 //! * The two copies of what a tick reads are compared as they are read. A tick that read something doubtful says so and does not
 //!   use it ([`store`](Store)).
 //! * A damaged or hostile image gives an [`ImageError`], never a wrong correction. What a table can give at most is bounded
@@ -82,59 +159,89 @@
 //!   output turns forward, −1 where backward) as in the play; with the circular spline fixed the generator turns against it.
 //!
 //! # Not in here
-//! Elastic oscillation and rate-dependent friction: the table is quasi-static.
+//! Rate-dependent friction. The table is quasi-static; elastic oscillation is the [`Predictor`]'s.
 #![no_std]
 #![cfg_attr(not(feature = "c-api"), forbid(unsafe_code))]
 #![cfg_attr(feature = "c-api", deny(unsafe_code))]
 #![cfg_attr(
     not(test),
-    warn(
+    deny(
         clippy::indexing_slicing,
         clippy::arithmetic_side_effects,
         clippy::unwrap_used,
         clippy::expect_used,
-        clippy::panic
+        clippy::panic,
+        clippy::unreachable,
+        clippy::todo,
+        clippy::unimplemented
     )
 )]
 
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod adapt;
 mod angle;
-#[cfg(feature = "c-api")]
+#[cfg(all(feature = "c-api", not(feature = "fuzzing")))]
 mod c_api;
+#[cfg(all(feature = "c-api", feature = "fuzzing"))]
+#[doc(hidden)]
+#[allow(clippy::not_unsafe_ptr_arg_deref)] // As C calls them; public for `tests/fuzz` alone.
+pub mod c_api;
+#[cfg(feature = "defmt")]
+mod defmt_impls;
 mod drive;
 mod error;
+mod events;
 #[cfg(test)]
 mod fixture;
 pub mod grid;
 mod hysteresis;
 mod image;
 mod model;
+#[cfg(feature = "parts")]
+#[doc(hidden)]
+pub mod parts;
 pub mod precompute;
 mod predictor;
 mod runtime;
 mod slip;
 mod store;
 mod table;
+mod telemetry;
 mod upload;
 mod windup;
 
+pub use adapt::{
+    AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Coefficient, Learning, Seen, Term, Verdict,
+    saved_adapt_bytes,
+};
 pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};
 pub use error::{DriveError, Field, ImageError};
+pub use events::{Event, Events, Watch};
 pub use hysteresis::{Direction, PlayState, SAVED_STATE_BYTES};
+#[cfg(feature = "fuzzing")]
+#[doc(hidden)]
+pub use image::reseal;
 pub use image::{
     FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance, TEXT_BYTES,
     TableData, WriteError, image_bytes, write_image,
 };
 pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, Prediction};
-pub use predictor::{Ahead, Inertias, Measured, Noise, PREDICTOR_PARTS, Predictor, PredictorError, PredictorState};
-pub use runtime::{
-    Flags, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, RateGroup, SAVED_JOINT_BYTES,
-    SettingError,
+pub use predictor::{
+    Ahead, Disturbance, Inertias, Measured, Noise, Now, OutputAhead, PREDICTOR_PARTS, Predictor, PredictorError,
+    PredictorState,
 };
-pub use slip::{Slip, SlipBank, SlipElement, SlipState};
-pub use store::{ActivateError, Counters, Health, Images, STORE_WORDS, Store, mend_page};
+pub use runtime::{
+    Adjustment, Flags, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, RateGroup,
+    SAVED_JOINT_BYTES, SettingError,
+};
+pub use slip::{
+    FittedSlip, LoadTorque, NominalOutput, Slip, SlipBank, SlipElement, SlipState, SlipVariable, TorqueSlipElement,
+    saved_slip_bytes,
+};
+pub use store::{ActivateError, Counters, Health, Images, STORE_PAGES, STORE_WORDS, Store, mend_page};
 pub use table::{Bounds, GeneratorKind, OperatingPoint, Quality, Table, TableId};
+pub use telemetry::{Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Writer};
 pub use upload::{Upload, UploadError};

@@ -9,19 +9,19 @@
 //!
 //! # The inverse
 //! On a known side of the play it solves `x + e(x) = target` for the nominal output `x`. At `xₖ = target − eₖ`, from
-//! `e₀ = D ∓ H`, it takes A, B, C as they are there and the ripple as what it is: two parabolas, each side of the boundary
-//! between cells that is nearest to `xₖ`. `x + ripple` grows steadily (its slope bound `L` is below 1), so the sign at the
-//! boundary tells on which side the solution lies, and the root of a parabola is the solution, exactly.
+//! `e₀ = D ∓ H`, it takes A, B, C as they are there and the ripple as what it is: a parabola in each of three cells, that of the
+//! node next to `xₖ` and its two neighbours. `x + ripple` grows steadily (its slope bound `L` is below 1), so the signs at the
+//! boundaries tell in which cell the solution lies, and the root of its parabola is the solution, exactly.
 //!
 //! What is left comes from A, B, C, with the slope bound `Lc`: `|eₖ₊₁ − e| ≤ Lc/(1 − L)·|eₖ − e|`. A ripple so large that the
-//! solution can lie beyond both cells takes further iterations; each brings it half a cell nearer at least. How many are
+//! solution can lie beyond the three cells takes further iterations; each brings it a cell nearer at least. How many are
 //! needed is found from the coefficients, stands in the image and is found again when the table is accepted: one, without
-//! A, B, C and with a ripple below half a cell.
+//! A, B, C and with a ripple below a cell.
 
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
 use crate::hysteresis::{Direction, PlayState};
-use crate::table::{self, Bounds, Doubt, InverseBound, Memory, OperatingPoint, Quality, Table, larger};
+use crate::table::{self, Bounds, Doubt, InverseBound, Memory, OperatingPoint, Plan, Quality, Table, larger};
 
 /// Error of the inverse that the number of its iterations aims at, rad at the output: 0.02″, far below what a table misses of
 /// its samples.
@@ -33,7 +33,7 @@ pub const MAX_INVERSE_ITERATIONS: u8 = 8;
 pub const MAX_INVERSE_ERROR_RAD: f32 = 1.0e-6;
 
 impl Bounds {
-    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], 1 to 8, and what they leave; `cell_rad` is a cell of the
+    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], 1 to 8, and what they and rounding leave; `cell_rad` is a cell of the
     /// ripple at the output.
     pub(crate) fn inverse(self, cell_rad: f32) -> InverseBound {
         let rate = self.curve_slope / (1.0 - self.slope);
@@ -41,7 +41,7 @@ impl Bounds {
         // How far the solution for A, B, C held fixed can be.
         let mut away_rad = self.ripple_cells * cell_rad + self.periodic_rad * rate;
         while bound.iterations < MAX_INVERSE_ITERATIONS {
-            let short_rad = larger(away_rad - 0.5 * cell_rad, 0.0);
+            let short_rad = larger(away_rad - cell_rad, 0.0);
             bound.error_rad = bound.error_rad * rate + short_rad;
             away_rad = bound.error_rad * (1.0 + rate);
             bound.iterations = bound.iterations.saturating_add(1);
@@ -49,6 +49,9 @@ impl Bounds {
                 break;
             }
         }
+        // Places in a cell are in single precision.
+        let place_rad = if cell_rad.is_finite() { 4.0 * f32::EPSILON * cell_rad } else { 0.0 };
+        bound.error_rad += (self.rounding_rad + place_rad) / (1.0 - self.slope);
         bound
     }
 }
@@ -75,7 +78,7 @@ pub struct Command {
     /// Generator angle to go to.
     pub generator: GeneratorAngle,
     /// The transmission error expected there, rad; 0 when disabled. The output is expected at the nominal output of
-    /// `generator` plus this: the target, but for the case told at [`Approach::From`].
+    /// `generator` plus this: the target.
     pub predicted_error_rad: f32,
     /// As in [`Prediction`].
     pub uncertainty_rad: f32,
@@ -93,10 +96,6 @@ pub enum Approach<'s> {
     /// [`Table::inverse_error_bound_rad`] plus 8 counts (1.2e-8 rad) of where the output is holds the generator still, so
     /// that rounding cannot make it cross the play to and fro.
     ///
-    /// While the play is crossed the output still moves with the centre of the table. A reversal smaller than that movement
-    /// (at most [`Bounds::slope`] times the width of the play) has its target inside the play, where
-    /// no side is in contact; it is then missed by what [`Command::predicted_error_rad`] says.
-    ///
     /// A state that was never updated gives the middle of the play, with its half-width as uncertainty.
     From(&'s PlayState),
 }
@@ -104,14 +103,16 @@ pub enum Approach<'s> {
 /// Targets this close to the output leave the generator where it is: the rounding of forward and inverse, counts.
 pub(crate) const HOLD_COUNTS: i32 = 8;
 
-/// What a motion ends in: which side of the play, what is not known of it, and where the play rests before.
+/// What a motion ends in: which side of the play, what is not known of it, and how far the target is.
 #[derive(Clone, Copy)]
-struct Departure<'s> {
-    /// +1 forward, −1 backward, 0 the middle of the play.
-    side: i32,
-    uncertainty: i32,
-    hold: bool,
-    resting: Option<&'s PlayState>,
+pub(crate) struct Departure {
+    /// Backward motion.
+    pub backward: bool,
+    pub uncertainty: i32,
+    /// The target is where the output is.
+    pub hold: bool,
+    /// Target less output, counts.
+    pub ahead: i32,
 }
 
 /// Reads a table for a drive: one copy, or two that are compared.
@@ -120,141 +121,179 @@ pub(crate) struct Model<'m, M> {
     pub drive: &'m Drive,
 }
 
+/// What the output does now, counts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Estimate {
+    pub nominal: OutputAngle,
+    pub output: OutputAngle,
+    pub error: i32,
+    pub uncertainty: i32,
+    pub sane: bool,
+    pub doubt: Doubt,
+}
+
 impl<M: Memory> Model<'_, M> {
     /// Follows the generator; what is not sane leaves the correction out.
     #[inline(always)]
     pub fn follow(&self, point: &OperatingPoint, state: &mut PlayState, generator: GeneratorAngle) -> Prediction {
-        self.follow_and_tell(point, state, generator).0
+        let now = self.estimate_here(point, state, generator);
+        Prediction {
+            output: now.output,
+            nominal: now.nominal,
+            transmission_error_rad: now.error as f32 * RAD_PER_COUNT,
+            uncertainty_rad: now.uncertainty as f32 * RAD_PER_COUNT,
+            quality: point.quality(now.sane, state.is_known()),
+        }
     }
 
-    /// The same, and what was in doubt.
+    /// The same in counts, as a call of its own.
+    #[inline(never)]
+    pub fn estimate(&self, point: &OperatingPoint, state: &mut PlayState, generator: GeneratorAngle) -> Estimate {
+        self.estimate_here(point, state, generator)
+    }
+
     #[inline(always)]
-    pub fn follow_and_tell(
-        &self,
-        point: &OperatingPoint,
-        state: &mut PlayState,
-        generator: GeneratorAngle,
-    ) -> (Prediction, Doubt) {
+    fn estimate_here(&self, point: &OperatingPoint, state: &mut PlayState, generator: GeneratorAngle) -> Estimate {
         let nominal = self.drive.nominal_output(generator);
         let phases = self.drive.phases(generator, nominal);
         let mut doubt = point.doubt;
         let play = table::play_at(self.memory, point, phases, &mut doubt);
         let sane = point.finite & play.sane & doubt.none();
-        let error = state.update(nominal, if sane { Some((play.centre, play.half)) } else { None });
-        let (error, uncertainty) =
-            if sane { (error, state.uncertainty_counts().wrapping_add(point.jump)) } else { (0, point.plan.limit) };
-        let prediction = Prediction {
-            output: nominal.offset_counts(error as i64),
-            nominal,
-            transmission_error_rad: error as f32 * RAD_PER_COUNT,
-            uncertainty_rad: uncertainty as f32 * RAD_PER_COUNT,
-            quality: point.quality(sane, state.is_known()),
-        };
-        (prediction, doubt)
+        let mask = (sane as i32).wrapping_neg();
+        let error = state.update(nominal, play.centre, play.half, sane) & mask;
+        let limit = self.memory.plan().limit;
+        let uncertainty = limit ^ (limit ^ state.uncertainty_counts().wrapping_add(point.jump)) & mask;
+        Estimate { nominal, output: nominal.offset_counts(error as i64), error, uncertainty, sane, doubt }
     }
 
     /// What brings the output to `target`.
     #[inline(always)]
     pub fn aim(&self, point: &OperatingPoint, target: OutputAngle, approach: Approach<'_>) -> Command {
-        let aim = self.solve(point, target, approach);
-        Command {
-            generator: self.drive.nominal_generator(aim.nominal),
-            predicted_error_rad: aim.error as f32 * RAD_PER_COUNT,
-            uncertainty_rad: aim.uncertainty as f32 * RAD_PER_COUNT,
-            quality: aim.quality,
-        }
-    }
-
-    /// The nominal output that brings the output to `target`.
-    #[inline(always)]
-    pub fn solve(&self, point: &OperatingPoint, target: OutputAngle, approach: Approach<'_>) -> Aim {
-        let from = departure(point, target, approach);
-        let side = from.side;
-        let base = point.mean.wrapping_sub(side.wrapping_mul(point.half_width));
-        let (mut error, mut curves) = (base, 0);
         let mut doubt = point.doubt;
-        let (mut half, mut centre) = (point.half_width, point.mean);
-        // As many times for every call with this table.
-        for _ in 0..point.iterations() {
-            let there = self.drive.phases_at_output(target.offset_counts((error as i64).wrapping_neg()));
-            let before = curves;
-            curves = table::curves_at(self.memory, point, there, &mut doubt);
-            let guess = error.wrapping_add(curves).wrapping_sub(before);
-            let tooth = self.drive.phases_at_output(target.offset_counts((guess as i64).wrapping_neg())).tooth;
-            let ripple = table::ripple_around(self.memory, point, tooth, &mut doubt);
-            // Where the solution would be without ripple, in cells from the boundary.
-            let here = base.wrapping_add(curves);
-            let place = ripple.place + guess.wrapping_sub(here) as f32 / point.plan.cell_width;
-            let root = ripple.forward.mix(ripple.backward, side as f32).root(place, point.plan.cell_width);
-            error = here.wrapping_sub(((root - place) * point.plan.cell_width) as i32);
-            let wide = 0.5 * (ripple.backward.at(root) - ripple.forward.at(root));
-            half = point.half_width.wrapping_add(wide as i32);
-            centre = error.wrapping_add(side.wrapping_mul(half));
-        }
-        let nominal = target.offset_counts((error as i64).wrapping_neg());
-        let sane = point.finite & doubt.none() & point.allows(centre, half);
-        let short = from.resting.map_or(0, |state| short_of_contact(state, side, nominal, half));
-        let (nominal, error) = match from.resting {
-            Some(state) if from.hold => (state.nominal_or_zero(), state.error_counts()),
-            _ => (nominal, error.wrapping_add(short)),
+        let (nominal, error, uncertainty, sane) = match approach {
+            Approach::Moving(direction) => {
+                let (error, sane) = self.solve(point, target, direction == Direction::Backward, &mut doubt);
+                (minus(target, error), error, 0, sane)
+            }
+            Approach::From(state) if state.is_started() => {
+                let from = departure(self.memory.plan(), point, target, state, state.output_or_zero());
+                let (error, sane) = self.solve(point, target, from.backward, &mut doubt);
+                let nominal = minus(target, error);
+                let held = (state.nominal_or_zero(), state.error_counts());
+                let (nominal, error) = if from.hold { held } else { (nominal, error) };
+                (nominal, error, from.uncertainty, sane)
+            }
+            Approach::From(_) => {
+                let (forward, sane) = self.solve(point, target, false, &mut doubt);
+                let (backward, sane_too) = self.solve(point, target, true, &mut doubt);
+                let middle = forward.wrapping_add(backward) >> 1;
+                (minus(target, middle), middle, point.half_width, sane & sane_too)
+            }
         };
+        let sane = sane & point.finite & doubt.none();
+        let quality = point.quality(sane, uncertainty <= 0);
         let (nominal, error, uncertainty) = if sane {
-            (nominal, error, from.uncertainty.wrapping_add(point.jump))
+            (nominal, error, uncertainty.wrapping_add(point.jump))
         } else {
-            (target, 0, point.plan.limit)
+            (target, 0, self.memory.plan().limit)
         };
-        Aim { nominal, error, uncertainty, quality: point.quality(sane, from.uncertainty <= 0), doubt }
+        Command {
+            generator: self.drive.nominal_generator(nominal),
+            predicted_error_rad: error as f32 * RAD_PER_COUNT,
+            uncertainty_rad: uncertainty as f32 * RAD_PER_COUNT,
+            quality,
+        }
+    }
+
+    /// The error on one side of the play where that brings the output to `target`, counts, and whether it is one that the table
+    /// can give.
+    #[inline(never)]
+    pub fn solve(&self, point: &OperatingPoint, target: OutputAngle, backward: bool, doubt: &mut Doubt) -> (i32, bool) {
+        let plan = self.memory.plan();
+        // All ones backward.
+        let mask = (backward as i32).wrapping_neg();
+        let half = (point.half_width ^ !mask).wrapping_sub(!mask);
+        let base = point.mean.wrapping_add(half);
+        let error = if plan.is_simple() {
+            self.at_once(point, target, base, backward, doubt)
+        } else {
+            self.step_by_step(point, target, base, backward, doubt)
+        };
+        (error, point.allows_error(plan, error, backward))
+    }
+
+    /// With nothing but a ripple below a cell: one iteration.
+    #[inline(always)]
+    fn at_once(
+        &self,
+        point: &OperatingPoint,
+        target: OutputAngle,
+        base: i32,
+        backward: bool,
+        doubt: &mut Doubt,
+    ) -> i32 {
+        let tooth = self.drive.tooth_at_output(minus(target, base));
+        let moved = table::to_solution(self.memory, point, (tooth, 0), backward, doubt);
+        base.wrapping_sub(self.memory.plan().counts_of(moved))
+    }
+
+    /// With A, B, C, or a ripple beyond a cell, or none.
+    #[inline(never)]
+    fn step_by_step(
+        &self,
+        point: &OperatingPoint,
+        target: OutputAngle,
+        base: i32,
+        backward: bool,
+        doubt: &mut Doubt,
+    ) -> i32 {
+        let plan = self.memory.plan();
+        let (mut error, mut curves) = (base, 0);
+        // How far the guess is ahead of where the solution would be without ripple, 2⁻²⁴ cells: as far as the last solution was.
+        let mut ahead = 0;
+        // As many times for every call with this table.
+        for _ in 0..plan.iterations() {
+            let mut guess = error;
+            if plan.has_curves() {
+                let before = curves;
+                curves = table::curves_at(self.memory, self.drive.phases_at_output(minus(target, error)), doubt);
+                guess = guess.wrapping_add(curves).wrapping_sub(before);
+            }
+            // Where the solution would be without ripple.
+            let here = base.wrapping_add(curves);
+            error = here;
+            if plan.ripple_nodes > 0 {
+                let tooth = self.drive.tooth_at_output(minus(target, guess));
+                ahead = table::to_solution(self.memory, point, (tooth, ahead), backward, doubt);
+                error = here.wrapping_sub(plan.counts_of(ahead));
+            }
+        }
+        error
     }
 }
 
-/// Where to go, counts.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Aim {
-    pub nominal: OutputAngle,
-    pub error: i32,
-    pub uncertainty: i32,
-    pub quality: Quality,
-    pub doubt: Doubt,
+/// An angle less counts.
+#[inline(always)]
+const fn minus(angle: OutputAngle, counts: i32) -> OutputAngle {
+    angle.offset_counts((counts as i64).wrapping_neg())
 }
 
-/// Whether and to which side the play must be taken up on the way to `target`.
+/// Whether and to which side the play must be taken up on the way from where the output is to `target`.
 #[inline(always)]
-fn departure<'s>(point: &OperatingPoint, target: OutputAngle, approach: Approach<'s>) -> Departure<'s> {
-    let state = match approach {
-        Approach::Moving(direction) => {
-            let side = match direction {
-                Direction::Forward => 1,
-                Direction::Backward => -1,
-            };
-            return Departure { side, uncertainty: 0, hold: false, resting: None };
-        }
-        Approach::From(state) => state,
-    };
-    let ahead = target.minus_small_counts(state.output_or_zero());
+pub(crate) fn departure(
+    plan: &Plan,
+    point: &OperatingPoint,
+    target: OutputAngle,
+    state: &PlayState,
+    output: OutputAngle,
+) -> Departure {
+    let ahead = target.minus_near_counts(output);
     let away = ahead.saturating_abs();
-    let started = state.is_started();
-    let hold = started & (away <= point.plan.hold);
+    let hold = away <= plan.hold;
     let unknown = state.uncertainty_counts();
     // A target inside the interval may lie on the other side of the output: then the whole play is in doubt.
     let guess = if away <= unknown { point.half_width.wrapping_mul(2) } else { 0 };
-    let moving = if hold { unknown } else { guess };
-    let side = if ahead > 0 { 1 } else { -1 };
-    Departure {
-        side: if started { side } else { 0 },
-        uncertainty: if started { moving } else { point.half_width },
-        hold,
-        resting: Some(state),
-    }
-}
-
-/// How far the play rests beyond the side it is taken up on at `nominal`, signed like the error: 0 if that side is reached, or if
-/// nothing is known.
-#[inline(always)]
-fn short_of_contact(state: &PlayState, side: i32, nominal: OutputAngle, half: i32) -> i32 {
-    let beyond = state.nominal_or_zero().minus_small_counts(nominal);
-    let beyond = beyond.saturating_add(state.offset_counts()).saturating_add(side.wrapping_mul(half));
-    let beyond = side.wrapping_mul(beyond);
-    side.wrapping_mul(if beyond > 0 { beyond } else { 0 })
+    Departure { backward: ahead <= 0, uncertainty: if hold { unknown } else { guess }, hold, ahead }
 }
 
 impl<'a> Table<'a> {
@@ -299,8 +338,9 @@ impl<'a> Table<'a> {
         temperature_c: f32,
     ) -> (Prediction, Command) {
         let point = table::locate(self, torque_n_m, temperature_c);
-        let prediction = self.model().follow(&point, state, measured);
-        (prediction, self.model().aim(&point, target, Approach::From(state)))
+        let model = self.model();
+        let prediction = model.follow(&point, state, measured);
+        (prediction, model.aim(&point, target, Approach::From(state)))
     }
 
     /// Transmission error in steady motion in `direction`, rad; `None` if an input is not finite.
@@ -413,7 +453,7 @@ mod tests {
         assert!((step as f64 - 60.0 * ARCSEC).abs() < 0.2 * ARCSEC, "{}", step as f64 / ARCSEC);
         for side in [below, above] {
             let off = (side.transmission_error_rad - inside.transmission_error_rad).abs();
-            assert!(off <= inside.uncertainty_rad);
+            assert!(off <= 1.01 * inside.uncertainty_rad, "{off} {}", inside.uncertainty_rad);
         }
         assert!(inside.uncertainty_rad < 1.1 * step);
         let command = table.inverse(OutputAngle::ZERO, 1.5, 20.0, Approach::Moving(Direction::Forward));
@@ -582,21 +622,32 @@ mod tests {
     }
 
     #[test]
-    fn a_reversal_within_the_play_says_by_how_much_it_misses() {
+    fn a_reversal_within_what_the_centre_moves_is_met() {
         let table = table();
         let mut state = PlayState::after_motion(Direction::Forward);
         let _ = table.forward(&mut state, GeneratorAngle::ZERO, -25.221724, 20.0);
-        let mut off = [0.0; 2];
-        for (target, off) in [0.001_749_479_8, 0.001_747_644_2].into_iter().zip(&mut off) {
+        for target in [0.001_749_479_8, 0.001_747_644_2] {
             let target = OutputAngle::from_rad(target).unwrap();
             let command = table.inverse(target, -25.221724, 20.0, Approach::From(&state));
             let there = table.forward(&mut state, command.generator, -25.221724, 20.0);
-            let unforeseen = there.transmission_error_rad - command.predicted_error_rad;
-            assert!((unforeseen.abs() as f64) < 0.01 * ARCSEC, "{unforeseen}");
-            *off = there.output.minus_rad(target).abs() as f64 / ARCSEC;
+            let off = there.output.minus_rad(target).abs() as f64;
+            assert!(off < 0.01 * ARCSEC, "{} arcsec", off / ARCSEC);
         }
-        // The first is reached in contact; on the way to the second the centre itself moves the output past it.
-        assert!(off[0] < 0.01 && off[1] > 0.05, "{off:?} arcsec");
+    }
+
+    /// The load goes while the generator stands: the output springs back and stays on the flank it was on.
+    #[test]
+    fn a_load_that_goes_leaves_the_output_on_its_flank() {
+        let table = table();
+        for (torque, direction) in [(50.0, Direction::Backward), (-50.0, Direction::Forward)] {
+            let mut state = PlayState::after_motion(Direction::Forward);
+            let _ = table.forward(&mut state, angle(1.0), torque, 20.0);
+            let rest = table.forward(&mut state, angle(1.0), 0.0, 20.0);
+            // Pushed forward it leads, as after motion backward without load.
+            let expected = table.steady_error_rad(angle(1.0), 0.0, 20.0, direction).unwrap();
+            let off = f64::from(rest.transmission_error_rad - expected);
+            assert!(off.abs() < 0.01 * ARCSEC, "{torque} N.m: {} arcsec", off / ARCSEC);
+        }
     }
 
     #[test]

@@ -16,15 +16,14 @@
 //! | an upset in the state | an interval of the play that cannot be is taken for unknown; of two corrections that differ the nearer to the goal counts | [`Flags::STATE_TORN`] |
 //! | reset | [`JointState::restore`] goes on where it was, [`JointState::new`] starts with no correction and the side of the play unknown; both within the limits | |
 
-use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
+use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT, counts_from_rad};
 use crate::drive::Drive;
-use crate::hysteresis::{PlayState, SAVED_STATE_BYTES};
+use crate::hysteresis::{MOST_ERROR_COUNTS, PlayState, SAVED_STATE_BYTES};
 use crate::image::crc32;
-use crate::model::{Approach, Command, Model, Prediction};
+use crate::model::{self, Approach, Command, Estimate, Model, Prediction};
 use crate::store::{Images, Store};
-use crate::table::{self, Doubt, Quality, larger};
+use crate::table::{self, Memory, Quality};
 use core::fmt;
-use core::hint::black_box;
 
 /// What a joint does with its correction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -137,8 +136,12 @@ pub struct Limits {
     pub patience: u16,
 }
 
-/// Parts of a count that the correction is kept in.
-const FINE: i32 = 16;
+/// Parts of a count that the correction is kept in: the difference of any two corrections fits 32 bits.
+const FINE: i32 = 8;
+/// Less than a count.
+const WITHIN: i32 = FINE - 1;
+/// No table with its adjustment gives a larger correction, and no joint a faster one, fine counts.
+const MOST_FINE: u32 = MOST_ERROR_COUNTS * FINE as u32;
 
 /// One joint: all that does not change while it runs. Can be made at compile time and lie in flash.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -146,13 +149,50 @@ pub struct Joint {
     drive: Drive,
     overrun: Overrun,
     /// Fine counts in a tick, and in a tick more each tick.
-    rate: f32,
-    acceleration: f32,
+    rate: i32,
+    acceleration: i32,
+    /// A quarter of the square of the acceleration.
+    quarter_square: f32,
     largest_move: i32,
     patience: u32,
     /// Twice the ticks of a fade, and the part of the correction that one tick of it takes.
     fade: u32,
     fade_step: f32,
+}
+
+/// What is added to the table in one tick: what a friction model, or what was learnt on board, knows beyond it.
+///
+/// Counts of 2⁻³² output turn. Each is taken within ±[`Adjustment::MAX_RAD`]. The half-width never falls below zero anywhere on the
+/// tooth pitch: a reduction is taken only that far. The error that a table may give
+/// ([`Table::error_limit_rad`](crate::Table::error_limit_rad)) is that much larger.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Adjustment {
+    /// Added to the mean error (actual less nominal).
+    pub mean_counts: i32,
+    /// Added to the half-width of the play.
+    pub half_width_counts: i32,
+}
+
+impl Adjustment {
+    /// Largest magnitude, rad: 0.049.
+    pub const MAX_RAD: f32 = Self::MAX_COUNTS as f32 * RAD_PER_COUNT;
+    /// The same in counts.
+    pub const MAX_COUNTS: i32 = (1 << 25) - 1;
+
+    /// From radians at the output, rounded to a count; saturates at ±[`Self::MAX_RAD`], NaN is taken as none.
+    #[must_use]
+    pub fn from_rad(mean_rad: f32, half_width_rad: f32) -> Self {
+        let counts = |rad: f32| bounded(counts_from_rad(rad));
+        Self { mean_counts: counts(mean_rad), half_width_counts: counts(half_width_rad) }
+    }
+}
+
+/// An adjustment within its magnitude.
+#[inline(always)]
+const fn bounded(counts: i32) -> i32 {
+    // From −2²⁵ on: one instruction.
+    let above = if counts > !Adjustment::MAX_COUNTS { counts } else { !Adjustment::MAX_COUNTS };
+    if above < Adjustment::MAX_COUNTS { above } else { Adjustment::MAX_COUNTS }
 }
 
 /// One tick's measurements.
@@ -166,6 +206,8 @@ pub struct Input {
     pub torque_n_m: f32,
     /// Ticks that were missed since the last call.
     pub missed_ticks: u16,
+    /// Added to the table in this tick; `Adjustment::default()` for none.
+    pub adjustment: Adjustment,
 }
 
 /// What happened in a tick; a set of the constants.
@@ -231,15 +273,17 @@ pub struct Output {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointState {
     play: PlayState,
-    /// Nominal output of the play, once more.
-    nominal: OutputAngle,
+    /// Mean of the last adjustment, counts.
+    adjusted: i32,
+    /// Output of the play and the last adjustment, added up: once more.
+    output: OutputAngle,
     generator: GeneratorAngle,
     /// The correction in fine counts, twice.
     correction: [i32; 2],
     /// What is wanted, and what of it was asked of the limiter.
     goal: i32,
     aimed: i32,
-    speed: f32,
+    speed: i32,
     /// Ticks in a row with a glitch, and without a correction.
     glitches: u32,
     uncorrected: u32,
@@ -264,12 +308,13 @@ impl JointState {
     pub const fn new() -> Self {
         Self {
             play: PlayState::unknown(),
-            nominal: OutputAngle::ZERO,
+            adjusted: 0,
+            output: OutputAngle::ZERO,
             generator: GeneratorAngle::ZERO,
             correction: [0; 2],
             goal: 0,
             aimed: 0,
-            speed: 0.0,
+            speed: 0,
             glitches: 0,
             uncorrected: 0,
             fading: 0,
@@ -295,6 +340,12 @@ impl JointState {
         }
         self.mode = to;
         Ok(())
+    }
+
+    /// What [`Self::output`] must be.
+    #[inline(always)]
+    const fn told_twice(&self) -> OutputAngle {
+        self.play.output_or_zero().offset_counts(self.adjusted as i64)
     }
 
     /// The play.
@@ -334,12 +385,13 @@ impl JointState {
         let (play, rest) = before.split_first_chunk::<SAVED_STATE_BYTES>()?;
         let (correction, speed) = rest.split_first_chunk::<4>()?;
         let correction = i32::from_le_bytes(*correction);
-        let speed = f32::from_le_bytes(*speed.first_chunk::<4>()?);
+        let speed = i32::from_le_bytes(*speed.first_chunk::<4>()?);
         let play = PlayState::restore(play)?;
-        let intact = crc32(before) == u32::from_le_bytes(*sum) && speed.is_finite();
+        let possible = correction.unsigned_abs() <= MOST_FINE && speed.unsigned_abs() <= MOST_FINE;
+        let intact = crc32(before) == u32::from_le_bytes(*sum) && possible;
         let state = Self {
             play,
-            nominal: play.nominal_or_zero(),
+            output: play.output_or_zero(),
             correction: [correction; 2],
             goal: correction,
             aimed: correction,
@@ -350,36 +402,51 @@ impl JointState {
     }
 }
 
-/// A positive, finite number of counts.
-const fn checked(name: &'static str, found: f32, counts: f64, most: f64) -> Result<f32, SettingError> {
-    if counts > 0.0 && counts <= most { Ok(counts as f32) } else { Err(SettingError { name, found }) }
+#[inline(always)]
+const fn within(value: i32, least: i32, most: i32) -> i32 {
+    let above = if value > least { value } else { least };
+    if above < most { above } else { most }
+}
+
+/// A positive, finite number of counts, at least `least`.
+const fn checked(name: &'static str, found: f32, counts: f64, [least, most]: [f64; 2]) -> Result<f32, SettingError> {
+    if counts > 0.0 && counts >= least && counts <= most {
+        Ok(counts as f32)
+    } else {
+        Err(SettingError { name, found })
+    }
 }
 
 impl Joint {
     /// A joint with this drive.
     ///
     /// # Errors
-    /// [`SettingError`]: a limit that is not finite and positive, or beyond 0.05 rad (rate) or half a turn (generator) in a tick.
+    /// [`SettingError`]: a limit that is not finite and positive, or beyond 0.05 rad (rate) or half a turn (generator) in a tick,
+    /// or a rate below 9e-11 rad in a tick.
     pub const fn new(drive: Drive, limits: Limits, overrun: Overrun) -> Result<Self, SettingError> {
         let Limits { tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, patience } = limits;
         let tick = tick_s as f64;
-        let tick_ok = checked("tick_s", tick_s, tick, 1.0e3);
+        let tick_ok = checked("tick_s", tick_s, tick, [0.0, 1.0e3]);
         if let Err(error) = tick_ok {
             return Err(error);
         }
-        let most = table::counts(0.05) * FINE as f64;
-        let rate = match checked("rate_rad_s", rate_rad_s, table::counts(rate_rad_s as f64 * tick) * FINE as f64, most)
-        {
-            Ok(rate) => rate,
-            Err(error) => return Err(error),
-        };
+        // Slower than one part in a tick would be no correction at all.
+        let bounds = [1.0, table::counts(0.05) * FINE as f64];
+        let rate =
+            match checked("rate_rad_s", rate_rad_s, table::counts(rate_rad_s as f64 * tick) * FINE as f64, bounds) {
+                Ok(rate) => rate,
+                Err(error) => return Err(error),
+            };
         let per_tick = table::counts(acceleration_rad_s2 as f64 * tick * tick) * FINE as f64;
-        let acceleration = match checked("acceleration_rad_s2", acceleration_rad_s2, per_tick, 1.0e12) {
+        let acceleration = match checked("acceleration_rad_s2", acceleration_rad_s2, per_tick, [0.0, 1.0e12]) {
             Ok(acceleration) => acceleration,
             Err(error) => return Err(error),
         };
+        // More than from full speed to full speed back is not needed, and would drown what is left to go in rounding.
+        let acceleration = if acceleration < 2.0 * rate { acceleration } else { 2.0 * rate };
         let per_tick = table::counts(generator_rate_rad_s as f64 * tick);
-        let largest_move = match checked("generator_rate_rad_s", generator_rate_rad_s, per_tick, 2_147_483_000.0) {
+        let largest_move = match checked("generator_rate_rad_s", generator_rate_rad_s, per_tick, [0.0, 2_147_483_000.0])
+        {
             Ok(counts) => counts as i32,
             Err(error) => return Err(error),
         };
@@ -389,7 +456,24 @@ impl Joint {
         };
         let fade_step = if ticks == 0 { 0.0 } else { 1.0 / ticks as f32 };
         let fade = ticks as u32;
-        Ok(Self { drive, overrun, rate, acceleration, largest_move, patience: patience as u32, fade, fade_step })
+        // A whole number of fine counts, no less than one and no more than asked for otherwise.
+        let most = i32::MAX as f32 / 4.0;
+        let acceleration = if acceleration < most { acceleration } else { most } as i32;
+        let acceleration = if acceleration < 1 { 1 } else { acceleration };
+        let gain = acceleration as f32;
+        let quarter_square = 0.25 * gain * gain;
+        let rate = if rate < 1.0 { 1 } else { rate as i32 };
+        Ok(Self {
+            drive,
+            overrun,
+            rate,
+            acceleration,
+            quarter_square,
+            largest_move,
+            patience: patience as u32,
+            fade,
+            fade_step,
+        })
     }
 
     /// The drive.
@@ -407,13 +491,18 @@ impl Joint {
         generator: GeneratorAngle,
         torque_n_m: f32,
     ) -> Prediction {
-        Model { memory: store, drive: &self.drive }.follow(&store.locate(torque_n_m), play, generator)
+        self.model(store).follow(&store.locate_here(torque_n_m, 0, 0), play, generator)
     }
 
     /// Generator angle that brings the output to `target`: as [`crate::Table::inverse`], from the copies.
     #[must_use]
     pub fn inverse(&self, store: &Store, target: OutputAngle, torque_n_m: f32, approach: Approach<'_>) -> Command {
-        Model { memory: store, drive: &self.drive }.aim(&store.locate(torque_n_m), target, approach)
+        self.model(store).aim(&store.locate_here(torque_n_m, 0, 0), target, approach)
+    }
+
+    #[inline(always)]
+    fn model<'s>(&'s self, store: &'s Store) -> Model<'s, Store> {
+        Model { memory: store, drive: &self.drive }
     }
 
     /// One tick.
@@ -421,39 +510,53 @@ impl Joint {
     /// Instructions are counted by `tests/firmware`; the same number in every tick with the same table.
     #[must_use]
     pub fn tick(&self, images: &Images<'_>, store: &mut Store, state: &mut JointState, input: &Input) -> Output {
-        let point = store.locate(input.torque_n_m);
+        let Adjustment { mean_counts, half_width_counts } = input.adjustment;
+        let mean_counts = bounded(mean_counts);
+        let point = store.locate(input.torque_n_m, mean_counts, bounded(half_width_counts));
+        let torn = (state.told_twice() != state.output) | !state.play.is_ordered();
+        // An adjustment is learnt, not moved; the one before a reset is in what was saved.
+        let learnt = mean_counts.wrapping_sub(state.adjusted);
+        state.play.shift(if state.started { learnt } else { 0 });
+        state.adjusted = mean_counts;
         let (generator, sample_flags, doubted) = self.judge(state, input);
-        let torn = (state.play.nominal_or_zero() != state.nominal) | !state.play.is_ordered();
         if torn | doubted {
             state.play = PlayState::unknown();
         }
-        let model = Model { memory: &*store, drive: &self.drive };
-        let (now, doubt) = model.follow_and_tell(&point, &mut state.play, generator);
-        state.nominal = state.play.nominal_or_zero();
-        let aim = model.solve(&point, input.target, Approach::From(&state.play));
-        let sane = (aim.quality != Quality::Disabled) & (now.quality != Quality::Disabled);
+        let model = self.model(store);
+        let now = model.estimate(&point, &mut state.play, generator);
+        state.output = state.told_twice();
+        let Estimate { output, error, mut doubt, .. } = now;
+        let from = model::departure(store.plan(), &point, input.target, &state.play, output);
+        let (found, allowed) = model.solve(&point, input.target, from.backward, &mut doubt);
+        let sane = now.sane & allowed & doubt.none();
+        // The correction that leaves the generator where it is.
+        let still = from.ahead.wrapping_add(error);
+        let wanted = if from.hold { still } else { found };
+        let aimed = from.uncertainty.wrapping_add(point.jump);
+        let aimed = if sane { aimed } else { store.plan().limit };
+        let uncertainty = if aimed > now.uncertainty { aimed } else { now.uncertainty };
+        let known = state.play.is_known() & (from.uncertainty <= 0);
 
-        let (goal, late) = self.goal(state, input, input.target.minus_small_counts(aim.nominal), sane);
-        let (correction, whole) = self.limit(state, goal);
-        let doubt = Doubt(doubt.0 | aim.doubt.0);
-        store.tend(images, doubt);
+        let (goal, late) = self.goal(state, input, wanted, sane);
+        let (correction, one) = self.limit(state, goal);
+        store.tend(images, doubt, point.whole);
 
         let held_back = goal.wrapping_sub(correction);
         let flags = sample_flags
             .with(Flags::OVERRUN, late)
-            .with(Flags::HELD_BACK, (held_back >= FINE) | (held_back <= -FINE))
+            .with(Flags::HELD_BACK, held_back.wrapping_add(WITHIN) as u32 > (2 * WITHIN) as u32)
             .with(Flags::NOT_CORRECTED, !sane)
             .with(Flags::TABLE_DOUBT, !doubt.none())
-            .with(Flags::STATE_TORN, torn | !whole);
-        let counts = correction >> 4;
+            .with(Flags::STATE_TORN, torn | !one);
+        let counts = correction >> FINE.trailing_zeros();
         Output {
             command: self.drive.nominal_generator(input.target.offset_counts((counts as i64).wrapping_neg())),
-            output: now.output,
-            transmission_error_rad: now.transmission_error_rad,
-            uncertainty_rad: larger(now.uncertainty_rad, aim.uncertainty as f32 * RAD_PER_COUNT),
+            output,
+            transmission_error_rad: error as f32 * RAD_PER_COUNT,
+            uncertainty_rad: uncertainty as f32 * RAD_PER_COUNT,
             correction_rad: correction as f32 * (RAD_PER_COUNT / FINE as f32),
             held_back_rad: held_back as f32 * (RAD_PER_COUNT / FINE as f32),
-            quality: if now.quality > aim.quality { now.quality } else { aim.quality },
+            quality: point.quality(sane, known),
             flags,
         }
     }
@@ -465,14 +568,17 @@ impl Joint {
             Some(sample) => (false, sample),
             None => (true, state.generator),
         };
-        let moved = sample.minus_small_counts(state.generator);
-        let far = ((moved > self.largest_move) | (moved < self.largest_move.wrapping_neg())) & state.started;
-        let more = black_box(state.glitches.saturating_add(1));
-        state.glitches = if far { more } else { 0 };
-        let believed = far & (state.glitches > self.patience);
-        state.glitches = if believed { 0 } else { state.glitches };
+        // Outside ± the largest move.
+        let most = self.largest_move as i64;
+        let beyond = sample.minus_counts(state.generator).wrapping_add(most) as u64;
+        let far = (beyond > most.wrapping_mul(2) as u64) & state.started;
+        // Arithmetic instead of choices: the compiler makes branches of choices, and then ticks differ.
+        let glitches = state.glitches.wrapping_add(1).wrapping_mul(far as u32);
+        let believed = glitches > self.patience;
+        state.glitches = glitches.wrapping_mul(!believed as u32);
         let glitch = far & !believed;
-        let generator = if glitch { state.generator } else { sample };
+        let away = sample.minus_counts(state.generator) & (glitch as i64).wrapping_neg();
+        let generator = sample.offset_counts(away.wrapping_neg());
         state.generator = generator;
         state.started |= !lost;
         (generator, Flags::default().with(Flags::SAMPLE_LOST, lost).with(Flags::GLITCH, glitch), believed)
@@ -483,26 +589,20 @@ impl Joint {
     fn goal(&self, state: &mut JointState, input: &Input, wanted: i32, sane: bool) -> (i32, bool) {
         let late = input.missed_ticks > 0;
         state.missed_ticks = state.missed_ticks.wrapping_add(input.missed_ticks as u32);
-        // Arithmetic instead of a choice: the compiler makes branches of choices, and then ticks differ.
-        let blind = black_box(u32::from(!sane));
+        let blind = u32::from(!sane);
         state.uncorrected = state.uncorrected.saturating_add(1).wrapping_mul(blind);
         let kept = state.goal;
-        let found = wanted.wrapping_mul(FINE);
-        let wanted = found.wrapping_add(kept.wrapping_sub(found).wrapping_mul(blind as i32));
-        let wanted = if state.uncorrected > self.patience { 0 } else { wanted };
-        let wanted = match state.mode {
-            Mode::Tracking => wanted,
-            Mode::Hold => kept,
-            Mode::Off | Mode::Safe => 0,
-        };
-        let hold = late & (self.overrun == Overrun::HoldLast);
-        let wanted = if hold { kept } else { wanted };
+        let wanted = if sane { wanted.wrapping_mul(FINE) } else { kept };
+        let off = (state.uncorrected > self.patience) | matches!(state.mode, Mode::Off | Mode::Safe);
+        let keep = (state.mode == Mode::Hold) | late & (self.overrun == Overrun::HoldLast);
+        let wanted = if off { 0 } else { wanted };
+        let wanted = if keep { kept } else { wanted };
         // Down in `fade` ticks, none for as many; without that policy `fade` is 0.
         let start = self.fade.wrapping_mul(2);
-        let left = black_box(state.fading.saturating_sub(1));
-        state.fading = if late { start } else { left };
-        let left = state.fading.saturating_sub(self.fade) as f32 * self.fade_step;
-        let faded = black_box((wanted as f32 * left) as i32);
+        let left = state.fading.saturating_sub(1);
+        state.fading = left ^ (left ^ start) & (late as u32).wrapping_neg();
+        let part = state.fading.saturating_sub(self.fade) as f32 * self.fade_step;
+        let faded = (wanted as f32 * part) as i32;
         let goal = if state.fading > 0 { faded } else { wanted };
         state.goal = wanted;
         (goal, late)
@@ -517,22 +617,21 @@ impl Joint {
         let [one, other] = state.correction;
         let nearer = goal.abs_diff(one) <= goal.abs_diff(other);
         let before = if nearer { one } else { other };
-        let pace = goal.wrapping_sub(state.aimed) as f32;
+        let pace = goal.wrapping_sub(state.aimed);
+        let lag = state.aimed.wrapping_sub(before);
         state.aimed = goal;
-        let lag = goal.wrapping_sub(before) as f32 - pace;
-        let (most, gain) = (self.rate, self.acceleration);
-        let bounded = |value: f32, limit: f32| {
-            let above = if value > -limit { value } else { -limit };
-            if above < limit { above } else { limit }
-        };
-        let away = lag.abs();
-        let stoppable = table::sqrt(gain * (0.25 * gain + 2.0 * away)) - 0.5 * gain;
-        let stoppable = if stoppable < away { stoppable } else { away };
-        let wanted = bounded(pace + if lag < 0.0 { -stoppable } else { stoppable }, most);
-        let speed = state.speed + bounded(wanted - state.speed, gain);
-        let speed = bounded(speed, most);
+        let away = lag.unsigned_abs();
+        let gain = self.acceleration as f32;
+        let stoppable = table::sqrt(self.quarter_square + (gain + gain) * away as f32) - 0.5 * gain;
+        let stoppable = stoppable as u32;
+        let stoppable = (if stoppable < away { stoppable } else { away }) as i32;
+        let side = lag >> 31;
+        let wanted = pace.saturating_add((stoppable ^ side).wrapping_sub(side));
+        let (slower, faster) =
+            (state.speed.wrapping_sub(self.acceleration), state.speed.wrapping_add(self.acceleration));
+        let speed = within(within(wanted, slower, faster), self.rate.wrapping_neg(), self.rate);
         state.speed = speed;
-        let correction = before.wrapping_add(speed as i32);
+        let correction = before.wrapping_add(speed);
         state.correction = [correction; 2];
         (correction, one == other)
     }
@@ -541,15 +640,13 @@ impl Joint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixture::{self, ARCSEC};
+    use crate::fixture::{self, ARCSEC, LIMITS};
     use proptest::prelude::*;
     use std::sync::LazyLock;
     use std::vec::Vec;
 
     static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(|| fixture::image(true));
 
-    const LIMITS: Limits =
-        Limits { tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 2.0, generator_rate_rad_s: 700.0, patience: 5 };
     /// Rate in a tick, and its change from tick to tick, rad.
     const RATE_RAD: f64 = 5e-5;
     const ACCELERATION_RAD: f64 = 2e-6;
@@ -578,7 +675,13 @@ mod tests {
 
         fn input(&self, target_rad: f64) -> Input {
             let target = OutputAngle::from_rad(target_rad).unwrap();
-            Input { generator: Some(self.generator), target, torque_n_m: 5.0, missed_ticks: 0 }
+            Input {
+                generator: Some(self.generator),
+                target,
+                torque_n_m: 5.0,
+                missed_ticks: 0,
+                adjustment: Adjustment::default(),
+            }
         }
 
         /// One tick; no correction may jump.
@@ -763,10 +866,12 @@ mod tests {
     #[test]
     fn upsets_of_the_state_never_make_the_correction_jump() {
         type Flip = fn(&mut JointState, u32);
-        let flips: [(Flip, bool); 7] = [
-            (|s, bit| s.nominal = s.nominal.offset_counts(1 << bit), true),
+        let flips: [(Flip, bool); 9] = [
+            (|s, bit| s.output = s.output.offset_counts(1 << bit), true),
             (|s, bit| s.correction[0] ^= 1 << bit, true),
             (|s, bit| s.correction[1] ^= 1 << bit, true),
+            (|s, bit| s.play.flip(2, bit), true),
+            (|s, bit| s.adjusted ^= 1 << bit, true),
             (|s, bit| s.play.flip(0, bit), false),
             (|s, bit| s.play.flip(1, bit), false),
             (|s, bit| s.goal ^= 1 << bit, false),
@@ -779,7 +884,7 @@ mod tests {
                 assert_eq!(before.quality, Quality::InRange);
                 flip(&mut run.state, bit);
                 let out = run.tick(&run.input(4e-3));
-                if !(3..5).contains(&number) {
+                if !(5..7).contains(&number) {
                     assert_eq!(out.flags.contains(Flags::STATE_TORN), told, "{number} bit {bit}");
                 } else {
                     // One bound of a known play moved: no longer known, or taken for unknown.
@@ -796,6 +901,77 @@ mod tests {
     }
 
     #[test]
+    fn an_adjustment_is_added_to_estimate_and_command_alike() {
+        let adjusted = Adjustment::from_rad(3e-5, 1.0e-5);
+        let mut runs = [Adjustment::default(), adjusted].map(|adjustment| {
+            let mut run = Loop::new(Overrun::SkipAndCount);
+            let mut last = None;
+            for i in 0..900 {
+                // Forward, then backward.
+                let place = if i < 450 { i } else { 900 - i };
+                let input = Input { adjustment, ..run.input(1e-3 + 1e-5 * place as f64) };
+                let out = run.tick(&input);
+                if let Some(target) = last.filter(|_| i % 450 > 400) {
+                    // Where the last command was meant to bring the output.
+                    assert!(out.output.minus_rad(target).abs() < 4.0 * COUNT, "{i}");
+                }
+                run.generator = out.command;
+                last = Some(input.target);
+            }
+            run
+        });
+        // Backward to 0.095, forward to 0.195.
+        for (path, expected) in [([0.2, 0.095], 3e-5 + 1e-5), ([0.095, 0.195], 3e-5 - 1e-5)] {
+            let error = |run: &mut Loop, adjustment| {
+                let [_, error] = path.map(|rad| {
+                    let generator = GeneratorAngle::from_rad(rad);
+                    run.tick(&Input { generator, adjustment, ..run.input(1e-3) }).transmission_error_rad
+                });
+                error
+            };
+            let [plain, run] = &mut runs;
+            let gained = error(run, adjusted) - error(plain, Adjustment::default());
+            assert!((gained - expected).abs() < 4.0 * COUNT, "{path:?}: {gained:e}");
+        }
+    }
+
+    #[test]
+    fn adjustments_are_bounded_and_never_turn_the_play_inside_out() {
+        let (least, most) = (-Adjustment::MAX_COUNTS - 1, Adjustment::MAX_COUNTS);
+        assert_eq!(
+            Adjustment::from_rad(f32::NAN, f32::NEG_INFINITY),
+            Adjustment { mean_counts: 0, half_width_counts: least }
+        );
+        assert_eq!(Adjustment::from_rad(1e-6, 0.06), Adjustment { mean_counts: 684, half_width_counts: most });
+        let tick = |adjustment| {
+            let mut run = Loop::new(Overrun::SkipAndCount);
+            run.run(300, 1e-3, 1e-5);
+            let at = run.generator.offset_rad(1e-3);
+            let out = run.tick(&Input { adjustment, generator: Some(at), ..run.input(4e-3) });
+            (out, run)
+        };
+        let closed = |counts| Adjustment { mean_counts: 0, half_width_counts: counts };
+        for (wild, bounded) in [(i32::MIN, least), (i32::MAX, most)] {
+            assert_eq!(tick(closed(wild)).0, tick(closed(bounded)).0);
+            let mean = |counts| Adjustment { mean_counts: counts, half_width_counts: 0 };
+            let (found, same) = (tick(mean(wild)).0, tick(mean(bounded)).0);
+            assert_eq!(found, same);
+            assert!(found.quality == Quality::InRange && found.transmission_error_rad.abs() > 0.048);
+        }
+        // No play is left but what the ripple needs, 0.1″, and forward and backward differ by no more.
+        let (out, run) = tick(closed(least));
+        assert_eq!(out.quality, Quality::InRange);
+        let back = Input { generator: Some(run.generator), adjustment: closed(least), ..run.input(4e-3) };
+        let (mut there, mut run) = (out.transmission_error_rad as f64, run);
+        for input in [back, Input { generator: Some(run.generator.offset_rad(1e-3)), ..back }] {
+            let now = run.tick(&input).transmission_error_rad as f64;
+            assert!((now - there).abs() < 0.6 * ARCSEC, "{}", (now - there) / ARCSEC);
+            there = now;
+        }
+        assert!(run.tick(&back).uncertainty_rad == 0.0);
+    }
+
+    #[test]
     fn rate_groups_run_when_they_are_due() {
         let group = RateGroup::new(10, 3).unwrap();
         assert!((0..100).filter(|&tick| group.is_due(tick)).eq((0..10).map(|i| 10 * i + 3)));
@@ -808,8 +984,53 @@ mod tests {
         assert_eq!(named(Limits { tick_s: 0.0, ..LIMITS }), "tick_s");
         assert_eq!(named(Limits { rate_rad_s: f32::NAN, ..LIMITS }), "rate_rad_s");
         assert_eq!(named(Limits { rate_rad_s: 60.0, ..LIMITS }), "rate_rad_s");
+        // Not a part of a count in a tick: the correction would never move.
+        assert_eq!(named(Limits { rate_rad_s: 9.0e-8, ..LIMITS }), "rate_rad_s");
         assert_eq!(named(Limits { acceleration_rad_s2: -1.0, ..LIMITS }), "acceleration_rad_s2");
         assert_eq!(named(Limits { generator_rate_rad_s: f32::INFINITY, ..LIMITS }), "generator_rate_rad_s");
+    }
+
+    /// What is left to go must not drown in the rounding of a large acceleration.
+    #[test]
+    fn an_acceleration_beyond_need_does_not_make_the_correction_jitter() {
+        for step in 0..60 {
+            let acceleration_rad_s2 = 1.0e6 * 1.06f32.powi(step);
+            let mut run = Loop::new(Overrun::SkipAndCount);
+            run.joint =
+                Joint::new(fixture::drive(), Limits { acceleration_rad_s2, ..LIMITS }, Overrun::SkipAndCount).unwrap();
+            let images = Images::new(&IMAGE, &IMAGE);
+            for tick in 0..400 {
+                let input = run.input(1e-3);
+                let out = run.joint.tick(&images, &mut run.store, &mut run.state, &input);
+                run.generator = out.command;
+                assert!(tick < 200 || out.held_back_rad.abs() < COUNT, "{acceleration_rad_s2}, tick {tick}: {out:?}");
+            }
+        }
+    }
+
+    /// With a checksum that fits: what no joint can have saved is refused all the same.
+    #[test]
+    fn impossible_saved_states_are_refused() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        run.run(300, 1e-3, 1e-5);
+        let saved = run.state.save();
+        let changed = |at: usize, value: [u8; 4]| {
+            let mut bytes = saved;
+            bytes[at..at + 4].copy_from_slice(&value);
+            let (before, sum) = bytes.split_last_chunk_mut::<4>().unwrap();
+            *sum = crc32(before).to_le_bytes();
+            JointState::restore(&bytes)
+        };
+        let most = MOST_FINE as i32;
+        for correction in [most + 1, -most - 1, i32::MIN] {
+            assert_eq!(changed(SAVED_STATE_BYTES, correction.to_le_bytes()), None, "{correction}");
+        }
+        for speed in [f32::NAN, f32::INFINITY, -6e8, 1e30] {
+            assert_eq!(changed(SAVED_STATE_BYTES + 4, speed.to_le_bytes()), None, "{speed}");
+        }
+        for correction in [most, -most, 0] {
+            assert!(changed(SAVED_STATE_BYTES, correction.to_le_bytes()).is_some(), "{correction}");
+        }
     }
 
     proptest! {
@@ -817,16 +1038,22 @@ mod tests {
         #[test]
         fn any_input_keeps_the_limits(
             inputs in prop::collection::vec((any::<bool>(), -2e-3f64..2e-3, -0.1f64..0.1, any::<f32>(), 0u16..3), 1..200),
-            policy in 0u8..3,
+            policy in 0u8..3, adjusted in any::<bool>(), mean_counts in any::<i32>(), half_width_counts in any::<i32>(),
         ) {
             let policies = [Overrun::SkipAndCount, Overrun::HoldLast, Overrun::FadeOut { ticks: 7 }];
             let mut run = Loop::new(policies[policy as usize]);
             for (present, target, moved, torque, missed) in inputs {
                 run.generator = run.generator.offset_rad(moved as f32);
                 let sample = present.then_some(run.generator);
-                let input = Input { generator: sample, torque_n_m: torque, missed_ticks: missed / 2, ..run.input(target) };
+                let (adjustment, most) = if adjusted {
+                    (Adjustment { mean_counts, half_width_counts }, 0.13)
+                } else {
+                    (Adjustment::default(), 0.03)
+                };
+                let missed_ticks = missed / 2;
+                let input = Input { generator: sample, torque_n_m: torque, missed_ticks, adjustment, ..run.input(target) };
                 let out = run.tick(&input);
-                prop_assert!(out.correction_rad.abs() <= 0.03);
+                prop_assert!(out.correction_rad.abs() <= most);
                 prop_assert!(out.uncertainty_rad.is_finite() && out.transmission_error_rad.is_finite());
             }
         }

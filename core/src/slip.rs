@@ -4,17 +4,23 @@
 //! zᵢ ← clamp(zᵢ + Δx, −wᵢ, wᵢ),      e = Σ gᵢ·zᵢ
 //! ```
 //!
-//! with `x` the nominal output. Springs that stick give the slope after a reversal, springs that slip the dwell; the sum gives the
-//! branches of a loop, whose memory are the turning points. Deflections are integer counts: the result depends on the turning
-//! points only, not on how many steps a motion is cut into.
+//! with `x` the nominal output ([`NominalOutput`]: the friction of the generator's path) or the load torque ([`LoadTorque`]: wind-up
+//! that does not come back the way it went). Springs that stick give the slope after a reversal, springs that slip the dwell; the
+//! sum gives the branches of a loop, whose memory are the turning points. Deflections are integer counts: the result depends on the
+//! turning points only, not on how many steps a motion is cut into.
+//!
+//! In the loop: one update each tick, and [`Slip::added_to`] the [`Adjustment`] of the next.
 //!
 //! After a reset no deflection is known. Each is an interval, moved at both ends by the same operator: motion brings the ends
 //! together, and one stroke of `2wᵢ` makes them one.
 
-use crate::angle::{OutputAngle, RAD_PER_COUNT};
+use crate::angle::{COUNTS_PER_RAD, OutputAngle, RAD_PER_COUNT, counts_from_rad};
 use crate::hysteresis::MAX_HALF_COUNTS;
+use crate::image::crc32;
+use crate::runtime::Adjustment;
+use core::marker::PhantomData;
 
-/// One spring that slips.
+/// One spring that slips with the nominal output.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SlipElement {
     /// Deflection at which it slips, rad of the nominal output, 0 to 0.05.
@@ -23,20 +29,61 @@ pub struct SlipElement {
     pub gain: f32,
 }
 
+/// One spring that slips with the load torque.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TorqueSlipElement {
+    /// Torque from its middle at which it slips, N·m, 0 to 10 000.
+    pub width_n_m: f32,
+    /// Error per torque, rad/(N·m); its error when slipping is `gain·width_n_m`, signed.
+    pub gain_rad_per_n_m: f32,
+}
+
+/// The variable is the nominal output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NominalOutput;
+
+/// The variable is the load torque.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LoadTorque;
+
+/// What the deflections of a bank are counted in.
+pub trait SlipVariable {
+    /// Which, in the sum of the settings.
+    const KIND: u32;
+}
+
+impl SlipVariable for NominalOutput {
+    const KIND: u32 = 1;
+}
+
+impl SlipVariable for LoadTorque {
+    const KIND: u32 = 2;
+}
+
+/// Counts of a torque in 1 N·m.
+const PER_N_M: f32 = 65_536.0;
+/// Largest width and torque, N·m: the way from end to end is below half of what counts hold.
+const MAX_N_M: f32 = 10_000.0;
+
 /// A bank of springs: the settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SlipBank<const N: usize> {
+pub struct SlipBank<const N: usize, V = NominalOutput> {
     widths: [i32; N],
+    /// Rad per count.
     gains: [f32; N],
+    /// Of the settings: a saved state of others is not taken.
+    sum: u32,
+    variable: PhantomData<V>,
 }
 
 /// Deflections of a bank: all that must survive a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SlipState<const N: usize> {
-    nominal: OutputAngle,
+pub struct SlipState<const N: usize, V = NominalOutput> {
+    at: i64,
     started: bool,
     lower: [i32; N],
     upper: [i32; N],
+    variable: PhantomData<V>,
 }
 
 /// What a bank adds.
@@ -48,65 +95,274 @@ pub struct Slip {
     pub uncertainty_rad: f32,
 }
 
-impl<const N: usize> SlipBank<N> {
-    /// A bank; `None` if a width is not within 0 to 0.05 rad or a gain not finite.
+/// A bank that was found from samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FittedSlip<const N: usize, V = NominalOutput> {
+    /// The bank.
+    pub bank: SlipBank<N, V>,
+    /// What the samples have beside it everywhere, rad.
+    pub offset_rad: f64,
+    /// What is left of the samples, rad: root of the mean square.
+    pub rms_rad: f64,
+    /// Samples used: those at which every deflection was known.
+    pub used: usize,
+}
+
+impl Slip {
+    /// The error in counts, within ±[`Adjustment::MAX_COUNTS`]: to be added to the mean of an [`Adjustment`].
     #[must_use]
-    pub fn new(elements: [SlipElement; N]) -> Option<Self> {
-        let sound = |e: &SlipElement| e.width_rad >= 0.0 && e.width_rad <= 0.05 && e.gain.is_finite();
-        if !elements.iter().all(sound) {
-            return None;
-        }
-        let width = |e: SlipElement| crate::angle::counts_from_rad(e.width_rad).min(MAX_HALF_COUNTS);
-        Some(Self { widths: elements.map(width), gains: elements.map(|e| e.gain) })
+    pub fn mean_counts(&self) -> i32 {
+        Adjustment::from_rad(self.error_rad, 0.0).mean_counts
     }
 
-    /// Follows the motion to `nominal`. The same work for all values.
-    pub fn update(&self, state: &mut SlipState<N>, nominal: OutputAngle) -> Slip {
-        let moved = if state.started { nominal.minus_small_counts(state.nominal) } else { 0 };
-        (state.nominal, state.started) = (nominal, true);
-        let mut slip = Slip { error_rad: 0.0, uncertainty_rad: 0.0 };
-        let ends = state.lower.iter_mut().zip(state.upper.iter_mut());
-        for ((lower, upper), (&width, &gain)) in ends.zip(self.widths.iter().zip(&self.gains)) {
-            let clamped = |z: i32| z.saturating_add(moved).max(width.wrapping_neg()).min(width);
-            (*lower, *upper) = (clamped(*lower), clamped(*upper));
-            let (middle, open) = (lower.wrapping_add(*upper) >> 1, upper.wrapping_sub(*lower));
-            slip.error_rad += gain * (middle as f32 * RAD_PER_COUNT);
-            slip.uncertainty_rad += gain.abs() * (0.5 * open as f32 * RAD_PER_COUNT);
-        }
-        slip
+    /// An adjustment with this added.
+    #[must_use]
+    pub fn added_to(&self, adjustment: Adjustment) -> Adjustment {
+        let most = Adjustment::MAX_COUNTS;
+        let sum = adjustment.mean_counts.saturating_add(self.mean_counts());
+        Adjustment { mean_counts: sum.max(most.wrapping_neg()).min(most), ..adjustment }
     }
 }
 
-impl<const N: usize> Default for SlipState<N> {
+impl<const N: usize> SlipBank<N, NominalOutput> {
+    /// A bank on the nominal output; `None` if a width is not within 0 to 0.05 rad or a gain not finite.
+    #[must_use]
+    pub fn new(elements: [SlipElement; N]) -> Option<Self> {
+        let sound = |e: &SlipElement| e.width_rad >= 0.0 && e.width_rad <= 0.05 && e.gain.is_finite();
+        let width = |e: SlipElement| counts_from_rad(e.width_rad).min(MAX_HALF_COUNTS);
+        elements.iter().all(sound).then(|| Self::of(elements.map(width), elements.map(|e| e.gain * RAD_PER_COUNT)))
+    }
+
+    /// Follows the motion to `nominal`, once each tick. The same work for all values.
+    pub fn update(&self, state: &mut SlipState<N>, nominal: OutputAngle) -> Slip {
+        self.follow(state, nominal.counts())
+    }
+
+    /// Gains at given widths from samples of error, rad, at nominal outputs along a path, in its order: a curve of first loading
+    /// from [`SlipState::relaxed`], or loops from [`SlipState::unknown`], of which that part is used where every deflection is known.
+    ///
+    /// Non-negative least squares with a free offset. For the host. `None` if a width is not allowed or no sample is of use.
+    pub fn fit(
+        widths_rad: [f32; N],
+        start: SlipState<N>,
+        samples: impl IntoIterator<Item = (OutputAngle, f64)>,
+    ) -> Option<FittedSlip<N>> {
+        let unit = Self::new(widths_rad.map(|width_rad| SlipElement { width_rad, gain: 0.0 }))?;
+        unit.fitted(start, samples.into_iter().map(|(at, error)| (at.counts(), error)))
+    }
+}
+
+impl<const N: usize> SlipBank<N, LoadTorque> {
+    /// A bank on the load torque; `None` if a width is not within 0 to 10 000 N·m or a gain not finite.
+    #[must_use]
+    pub fn of_torque(elements: [TorqueSlipElement; N]) -> Option<Self> {
+        let sound =
+            |e: &TorqueSlipElement| e.width_n_m >= 0.0 && e.width_n_m <= MAX_N_M && e.gain_rad_per_n_m.is_finite();
+        let width = |e: TorqueSlipElement| (e.width_n_m * PER_N_M) as i32;
+        let gain = |e: TorqueSlipElement| e.gain_rad_per_n_m / PER_N_M;
+        elements.iter().all(sound).then(|| Self::of(elements.map(width), elements.map(gain)))
+    }
+
+    /// Follows the load torque, N·m, once each tick: beyond ±10 000 N·m it is taken there, and one that is not finite moves
+    /// nothing. The same work for all values.
+    pub fn update(&self, state: &mut SlipState<N, LoadTorque>, torque_n_m: f32) -> Slip {
+        let counts = torque_counts(torque_n_m).unwrap_or(state.at);
+        if torque_n_m.is_finite() { self.follow(state, counts) } else { self.told(state) }
+    }
+
+    /// As [`SlipBank::fit`], at torques in N·m; samples at a torque that is not finite are left out.
+    pub fn fit_torque(
+        widths_n_m: [f32; N],
+        start: SlipState<N, LoadTorque>,
+        samples: impl IntoIterator<Item = (f32, f64)>,
+    ) -> Option<FittedSlip<N, LoadTorque>> {
+        let unit = Self::of_torque(widths_n_m.map(|width_n_m| TorqueSlipElement { width_n_m, gain_rad_per_n_m: 0.0 }))?;
+        unit.fitted(start, samples.into_iter().filter_map(|(torque, error)| Some((torque_counts(torque)?, error))))
+    }
+}
+
+fn torque_counts(torque_n_m: f32) -> Option<i64> {
+    torque_n_m.is_finite().then(|| crate::table::within(torque_n_m, [-MAX_N_M, MAX_N_M]) * PER_N_M).map(|c| c as i64)
+}
+
+/// Bytes of the saved state of `elements` springs.
+#[must_use]
+pub const fn saved_slip_bytes(elements: usize) -> usize {
+    elements.saturating_mul(8).saturating_add(16)
+}
+
+impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
+    fn of(widths: [i32; N], gains: [f32; N]) -> Self {
+        let words = widths.into_iter().map(i32::to_le_bytes).chain(gains.map(f32::to_le_bytes));
+        let sum = words.fold(V::KIND, |sum, word| sum.rotate_left(7) ^ crc32(&word));
+        Self { widths, gains, sum, variable: PhantomData }
+    }
+
+    fn follow(&self, state: &mut SlipState<N, V>, at: i64) -> Slip {
+        let moved = OutputAngle::from_counts(at).minus_small_counts(OutputAngle::from_counts(state.at));
+        let moved = if state.started { moved } else { 0 };
+        (state.at, state.started) = (at, true);
+        let ends = state.lower.iter_mut().zip(state.upper.iter_mut());
+        for ((lower, upper), &width) in ends.zip(&self.widths) {
+            let clamped = |z: i32| z.saturating_add(moved).max(width.wrapping_neg()).min(width);
+            (*lower, *upper) = (clamped(*lower), clamped(*upper));
+        }
+        self.told(state)
+    }
+
+    fn told(&self, state: &SlipState<N, V>) -> Slip {
+        let mut slip = Slip { error_rad: 0.0, uncertainty_rad: 0.0 };
+        for ((lower, upper), (gain, &width)) in
+            state.lower.iter().zip(&state.upper).zip(self.gains.iter().zip(&self.widths))
+        {
+            let within = |z: i32| z.max(width.wrapping_neg()).min(width);
+            let (lower, upper) = (within(*lower), within(*upper));
+            let (middle, open) = (lower.wrapping_add(upper) >> 1, upper.wrapping_sub(lower));
+            slip.error_rad += gain * middle as f32;
+            slip.uncertainty_rad += gain.abs() * (0.5 * open as f32);
+        }
+        slip
+    }
+
+    /// Writes the state with a CRC-32, for storage across a reset: the first [`saved_slip_bytes`]`(N)` bytes. `None` if there are
+    /// fewer, or before the first update.
+    ///
+    /// Little endian: variable (`i64`), lower ends, upper ends (`i32`), sum of the settings, CRC-32.
+    pub fn save(&self, state: &SlipState<N, V>, bytes: &mut [u8]) -> Option<usize> {
+        let bytes = bytes.get_mut(..saved_slip_bytes(N)).filter(|_| state.started)?;
+        let (contents, crc) = bytes.split_last_chunk_mut::<4>()?;
+        let at = [state.at as i32, (state.at >> 32) as i32];
+        let words = at.iter().chain(&state.lower).chain(&state.upper).copied().chain([self.sum as i32]);
+        for (to, from) in contents.as_chunks_mut::<4>().0.iter_mut().zip(words) {
+            *to = from.to_le_bytes();
+        }
+        *crc = crc32(contents).to_le_bytes();
+        Some(saved_slip_bytes(N))
+    }
+
+    /// A state from [`Self::save`]; `None` if the bytes are damaged or were saved with other springs. Only if the joint cannot have
+    /// moved (for a bank on the torque: the load cannot have changed) meanwhile, else [`SlipState::unknown`].
+    #[must_use]
+    pub fn restore(&self, bytes: &[u8]) -> Option<SlipState<N, V>> {
+        let bytes = bytes.get(..saved_slip_bytes(N))?;
+        let (contents, crc) = bytes.split_last_chunk::<4>()?;
+        let mut words = contents.as_chunks::<4>().0.iter().map(|word| i32::from_le_bytes(*word));
+        let (low, high) = (words.next()?, words.next()?);
+        let mut state = SlipState::unknown();
+        state.at = (high as i64) << 32 | low as u32 as i64;
+        state.started = true;
+        for to in state.lower.iter_mut().chain(&mut state.upper) {
+            *to = words.next()?;
+        }
+        let intact = words.next()? == self.sum as i32 && u32::from_le_bytes(*crc) == crc32(contents);
+        let mut ends = state.lower.iter().zip(&state.upper).zip(&self.widths);
+        let possible =
+            ends.all(|((&lower, &upper), &width)| lower >= width.wrapping_neg() && lower <= upper && upper <= width);
+        (intact && possible).then_some(state)
+    }
+
+    /// Gains of these widths by non-negative least squares, one coordinate after another.
+    #[allow(clippy::arithmetic_side_effects)] // Floating-point numbers.
+    fn fitted(self, mut state: SlipState<N, V>, samples: impl Iterator<Item = (i64, f64)>) -> Option<FittedSlip<N, V>> {
+        let (mut gram, mut toward, mut sums) = ([[0.0; N]; N], [0.0; N], [0.0; N]);
+        let (mut errors, mut squares, mut used) = (0.0, 0.0, 0usize);
+        for (at, error) in samples {
+            self.follow(&mut state, at);
+            if !state.is_known() || !error.is_finite() {
+                continue;
+            }
+            // In parts of the width: all alike.
+            let mut parts = state.lower.map(f64::from);
+            parts.iter_mut().zip(self.widths).for_each(|(z, width)| *z /= f64::from(width.max(1)));
+            for ((row, toward), (sum, z)) in gram.iter_mut().zip(&mut toward).zip(sums.iter_mut().zip(parts)) {
+                row.iter_mut().zip(parts).for_each(|(cell, other)| *cell += z * other);
+                *toward += z * error;
+                *sum += z;
+            }
+            (errors, squares, used) = (errors + error, squares + error * error, used.saturating_add(1));
+        }
+        if used == 0 {
+            return None;
+        }
+        // About the means: the offset is free.
+        let number = used as f64;
+        for ((row, toward), sum) in gram.iter_mut().zip(&mut toward).zip(sums) {
+            row.iter_mut().zip(sums).for_each(|(cell, other)| *cell -= sum * other / number);
+            *toward -= sum * errors / number;
+        }
+        let mut gains = [0.0f64; N];
+        for _ in 0..FIT_SWEEPS {
+            for (i, (row, toward)) in gram.iter().zip(toward).enumerate() {
+                let own = row.get(i).copied().unwrap_or(0.0);
+                let rest = toward - row.iter().zip(gains).map(|(cell, gain)| cell * gain).sum::<f64>();
+                if let Some(gain) = gains.get_mut(i).filter(|_| own > 1e-9 * number) {
+                    *gain = (*gain + rest / own).max(0.0);
+                }
+            }
+        }
+        let of_parts = |values: [f64; N]| values.iter().zip(gains).map(|(value, gain)| value * gain).sum::<f64>();
+        let offset_rad = (errors - of_parts(sums)) / number;
+        let mut left = squares - errors * errors / number - 2.0 * of_parts(toward);
+        for (row, gain) in gram.iter().zip(gains) {
+            left += gain * of_parts(*row);
+        }
+        let mut per_count = self.widths.map(|width| 1.0 / f64::from(width.max(1)));
+        per_count.iter_mut().zip(gains).for_each(|(per_count, gain)| *per_count *= gain);
+        let bank = Self::of(self.widths, per_count.map(|gain| gain as f32));
+        Some(FittedSlip { bank, offset_rad, rms_rad: libm::sqrt((left / number).max(0.0)), used })
+    }
+}
+
+/// Sweeps over all gains in a fit.
+const FIT_SWEEPS: u32 = 20_000;
+
+impl<const N: usize> SlipBank<N, NominalOutput> {
+    /// The springs.
+    #[must_use]
+    pub fn elements(&self) -> [SlipElement; N] {
+        let mut elements = [SlipElement::default(); N];
+        for (to, (width, gain)) in elements.iter_mut().zip(self.widths.iter().zip(self.gains)) {
+            *to = SlipElement { width_rad: *width as f32 * RAD_PER_COUNT, gain: gain * COUNTS_PER_RAD };
+        }
+        elements
+    }
+}
+
+impl<const N: usize> SlipBank<N, LoadTorque> {
+    /// The springs.
+    #[must_use]
+    pub fn elements(&self) -> [TorqueSlipElement; N] {
+        let mut elements = [TorqueSlipElement::default(); N];
+        for (to, (width, gain)) in elements.iter_mut().zip(self.widths.iter().zip(self.gains)) {
+            *to = TorqueSlipElement { width_n_m: *width as f32 / PER_N_M, gain_rad_per_n_m: gain * PER_N_M };
+        }
+        elements
+    }
+}
+
+impl<const N: usize, V> Default for SlipState<N, V> {
     fn default() -> Self {
         Self::unknown()
     }
 }
 
-impl<const N: usize> SlipState<N> {
+impl<const N: usize, V> SlipState<N, V> {
     /// After a reset: any deflection.
     #[must_use]
     pub const fn unknown() -> Self {
-        Self { nominal: OutputAngle::ZERO, started: false, lower: [i32::MIN; N], upper: [i32::MAX; N] }
+        Self { at: 0, started: false, lower: [i32::MIN; N], upper: [i32::MAX; N], variable: PhantomData }
+    }
+
+    /// No deflection, as before the first motion, or after strokes that died away.
+    #[must_use]
+    pub const fn relaxed() -> Self {
+        Self { at: 0, started: false, lower: [0; N], upper: [0; N], variable: PhantomData }
     }
 
     /// Whether every deflection is known.
     #[must_use]
     pub fn is_known(&self) -> bool {
         self.lower == self.upper
-    }
-
-    /// Deflections as lower and upper ends in counts, to be stored across a reset with a checksum of the caller's.
-    #[must_use]
-    pub const fn ends(&self) -> ([i32; N], [i32; N], OutputAngle) {
-        (self.lower, self.upper, self.nominal)
-    }
-
-    /// From [`Self::ends`]; `None` if an upper end is below its lower. Only if the joint cannot have moved meanwhile.
-    #[must_use]
-    pub fn from_ends(lower: [i32; N], upper: [i32; N], nominal: OutputAngle) -> Option<Self> {
-        let ordered = lower.iter().zip(&upper).all(|(lower, upper)| lower <= upper);
-        ordered.then_some(Self { nominal, started: true, lower, upper })
     }
 }
 
@@ -158,9 +414,100 @@ mod tests {
         for bad in [(f32::NAN, 0.1), (-1e-6, 0.1), (0.06, 0.1), (1e-3, f32::INFINITY)] {
             assert_eq!(SlipBank::new([SlipElement { width_rad: bad.0, gain: bad.1 }]), None);
         }
-        let (lower, upper, nominal) = known().ends();
-        assert_eq!(SlipState::from_ends(lower, upper, nominal), Some(known()));
-        assert_eq!(SlipState::from_ends([1, 0, 0], [0, 0, 0], nominal), None);
+        for bad in [(f32::NAN, 0.1), (-1e-6, 0.1), (1.1e4, 0.1), (1e-3, f32::INFINITY)] {
+            let element = TorqueSlipElement { width_n_m: bad.0, gain_rad_per_n_m: bad.1 };
+            assert_eq!(SlipBank::of_torque([element]), None);
+        }
+    }
+
+    #[test]
+    fn states_come_back_from_bytes_or_not_at_all() {
+        let mut state = SlipState::unknown();
+        let mut saved = [0; saved_slip_bytes(3)];
+        assert_eq!(bank().save(&state, &mut saved), None);
+        run(&mut state, i64::MIN / 3, &[WIDTH / 2, -7, 19]);
+        assert_eq!(bank().save(&state, &mut saved), Some(40));
+        assert_eq!(bank().save(&state, &mut saved[..39]), None);
+        assert_eq!(bank().restore(&saved), Some(state));
+        for bit in 0..saved.len() * 8 {
+            let mut damaged = saved;
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            assert_eq!(bank().restore(&damaged), None, "bit {bit}");
+        }
+        let mut other = bank();
+        other.gains[1] *= 2.0;
+        assert_eq!(SlipBank::<3>::of(other.widths, other.gains).restore(&saved), None);
+        for (lower, upper) in [(1, 0), (-WIDTH, 0), (0, WIDTH)] {
+            let impossible = SlipState { lower: [lower, 0, 0], upper: [upper, 0, 0], ..state };
+            bank().save(&impossible, &mut saved).unwrap();
+            assert_eq!(bank().restore(&saved), None);
+        }
+    }
+
+    fn torque_bank() -> SlipBank<2, LoadTorque> {
+        let element = |width_n_m, gain_rad_per_n_m| TorqueSlipElement { width_n_m, gain_rad_per_n_m };
+        SlipBank::of_torque([element(2.0, 4e-6), element(10.0, 1.5e-6)]).unwrap()
+    }
+
+    /// The loop of wind-up over torque, in closed form: as wide as twice what slips, and nothing that is no number moves it.
+    #[test]
+    fn torque_has_its_loop() {
+        let mut state = SlipState::unknown();
+        let at = |state: &mut SlipState<2, LoadTorque>, torque| torque_bank().update(state, torque).error_rad as f64;
+        let slipping = 2.0 * 4e-6 + 10.0 * 1.5e-6;
+        assert!(at(&mut state, -40.0).abs() < 1e-12 && !state.is_known());
+        assert!((at(&mut state, 40.0) - slipping).abs() < 1e-11 && state.is_known());
+        assert!((at(&mut state, 35.0) - (-2.0 * 4e-6 + 5.0 * 1.5e-6)).abs() < 1e-11);
+        assert!((at(&mut state, 0.0) + slipping).abs() < 1e-11);
+        for wild in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let before = state;
+            assert!((at(&mut state, wild) + slipping).abs() < 1e-11);
+            assert_eq!(state, before);
+        }
+        assert!((at(&mut state, f32::MAX) - slipping).abs() < 1e-11);
+        assert!((at(&mut state, -f32::MAX) + slipping).abs() < 1e-11);
+        let adjustment = Adjustment { mean_counts: 100, half_width_counts: 7 };
+        let slip = torque_bank().update(&mut state, f32::MAX);
+        let added = slip.added_to(adjustment);
+        assert_eq!(added, Adjustment { mean_counts: 100 + slip.mean_counts(), half_width_counts: 7 });
+        assert!((slip.mean_counts() as f64 - slipping * COUNTS_PER_RAD as f64).abs() < 1.0);
+        let full = Adjustment { mean_counts: i32::MAX, half_width_counts: 0 };
+        assert_eq!(slip.added_to(full).mean_counts, Adjustment::MAX_COUNTS);
+    }
+
+    /// From the curve of first loading, and from loops whose start is not known.
+    #[test]
+    fn gains_are_found_from_samples() {
+        let truth = torque_bank();
+        let widths = [1.0, 2.0, 5.0, 10.0];
+        let expected = [0.0, 4e-6, 0.0, 1.5e-6];
+        let loops = (0..4000).map(|i| 30.0 * (i as f32 * 0.01).sin() * (1.0 - i as f32 / 8000.0));
+        let loading = (0..400).map(|i| i as f32 * 0.05);
+        let mut state = SlipState::relaxed();
+        let curve: Vec<_> = loading.map(|t| (t, 3e-5 + truth.update(&mut state, t).error_rad as f64)).collect();
+        let mut state = SlipState::relaxed();
+        let looped: Vec<_> = loops
+            .map(|t| (t, 3e-5 + truth.update(&mut state, t).error_rad as f64 + 1e-7 * (1e3 * t as f64).sin()))
+            .collect();
+        for (start, samples, limit) in [(SlipState::relaxed(), curve, 1e-9), (SlipState::unknown(), looped, 5e-8)] {
+            let found = SlipBank::fit_torque(widths, start, samples.iter().copied().chain([(f32::NAN, 0.0)])).unwrap();
+            for (element, expected) in found.bank.elements().into_iter().zip(expected) {
+                assert!((element.gain_rad_per_n_m as f64 - expected).abs() < limit, "{found:?}");
+            }
+            assert!((found.offset_rad - 3e-5).abs() < 20.0 * limit && found.rms_rad < 1e-7, "{found:?}");
+            assert!(found.used > 300 && found.used <= samples.len());
+        }
+        // One that never slips in the samples is not told from a slope; none at all tell nothing.
+        assert_eq!(SlipBank::fit_torque([1.0], SlipState::unknown(), [(0.0, 1e-5), (0.5, 1e-5)]), None);
+        assert_eq!(SlipBank::fit([f32::NAN], SlipState::relaxed(), []), None);
+        let mut state = SlipState::relaxed();
+        let path: Vec<_> =
+            (0..3000).map(|i| OutputAngle::from_counts((6e5 * (i as f64 * 0.01).sin()) as i64)).collect();
+        let samples = path.iter().map(|&at| (at, bank().update(&mut state, at).error_rad as f64));
+        let found = SlipBank::fit(bank().elements().map(|e| e.width_rad), SlipState::unknown(), samples).unwrap();
+        for (found, exact) in found.bank.elements().iter().zip(bank().elements()) {
+            assert!((found.gain - exact.gain).abs() < 1e-4 * exact.gain);
+        }
     }
 
     proptest! {
@@ -225,6 +572,32 @@ mod tests {
             prop_assert!(work >= -1e-3, "{}", work);
         }
 
+        /// Madelung: a loop inside the last stroke comes back to its turning point, with all that came before, however deep loops are
+        /// nested in it; beyond the turning point the motion goes on as if the loop had not been.
+        #[test]
+        fn inner_loops_close_at_their_turning_point(
+            before in prop::collection::vec(-2 * WIDTH..2 * WIDTH, 0..5), stroke in 10..3 * WIDTH,
+            nested in prop::collection::vec(1i32..100, 1..6), beyond in 0..2 * WIDTH, sign in prop::bool::ANY,
+        ) {
+            let turned = |step: i32| if sign { step } else { -step };
+            let mut state = known();
+            let (x, _) = run(&mut state, 0, &before);
+            let (x, at) = run(&mut state, x, &[turned(stroke)]);
+            let turning = state;
+            // Ever smaller strokes to and fro, and back out again through each of their turning points.
+            let mut amplitudes = std::vec![stroke];
+            for share in &nested {
+                amplitudes.push((*amplitudes.last().unwrap() as i64 * *share as i64 / 100) as i32);
+            }
+            let path: Vec<i32> = amplitudes[1..].iter().enumerate().map(|(i, a)| if i % 2 == 0 { -a } else { *a }).map(turned).collect();
+            let back: Vec<i32> = path.iter().rev().map(|step| -step).collect();
+            let (x, _) = run(&mut state, x, &path);
+            let (x, again) = run(&mut state, x, &back);
+            prop_assert_eq!((state, again), (turning, at));
+            let mut straight = turning;
+            prop_assert_eq!(run(&mut state, x, &[turned(beyond)]), run(&mut straight, x, &[turned(beyond)]));
+        }
+
         #[test]
         fn the_interval_holds_every_possible_truth(
             start in prop::array::uniform3(-1.0f64..=1.0), path in prop::collection::vec(-WIDTH..WIDTH, 1..20),
@@ -233,7 +606,7 @@ mod tests {
             let (_, first) = run(&mut interval, 0, &[]);
             let mut deflections = bank().widths;
             deflections.iter_mut().zip(start).for_each(|(z, share)| *z = (*z as f64 * share) as i32);
-            let mut truth = SlipState::from_ends(deflections, deflections, OutputAngle::ZERO).unwrap();
+            let mut truth = SlipState { started: true, lower: deflections, upper: deflections, ..SlipState::unknown() };
             let (mut x, mut open) = (0, first.uncertainty_rad);
             for step in path {
                 let (_, real) = run(&mut truth, x, &[step]);

@@ -148,8 +148,21 @@ pub(crate) trait Memory {
     /// Records that are blended as they are read: 2, or 4 with two temperatures.
     const ROWS: usize;
 
+    /// Where things are.
+    fn plan(&self) -> &Plan;
+
     /// `N` words from word `at`. What two copies disagree in is added to `doubt`.
     fn words<const N: usize>(&self, at: usize, doubt: &mut Doubt) -> [u32; N];
+
+    /// The same from half word `at`: the first of `2·N` halves is the low one of the first word.
+    fn halves<const N: usize>(&self, at: usize, doubt: &mut Doubt) -> [u32; N];
+}
+
+/// `N` words from this byte on.
+#[inline(always)]
+pub(crate) fn words_from<const N: usize>(bytes: &[u8], at: usize) -> [u32; N] {
+    let found = bytes.get(at..).and_then(|bytes| bytes.as_chunks::<4>().0.first_chunk::<N>());
+    found.map_or([0; N], |words| words.map(u32::from_le_bytes))
 }
 
 /// Where the ripple and the curves of a table are, and what else a step needs of it.
@@ -157,6 +170,9 @@ pub(crate) trait Memory {
 pub(crate) struct Plan {
     pub ripple_nodes: u32,
     pub ripple_unit: u32,
+    /// A sum of ripple units and weights, in 2⁻¹⁴, times this is 2⁻²⁴ cells of the ripple at the output, times 2³²; signed like
+    /// the ratio.
+    pub ripple_cells: i32,
     /// Nodes and place of A, B, C, 16 bits each.
     pub curves: [u32; 3],
     /// Largest error the table may give, counts.
@@ -166,10 +182,51 @@ pub(crate) struct Plan {
     pub hold: i32,
     /// Width of a cell of the ripple's axis at the output, counts; signed like the ratio.
     pub cell_width: f32,
+    /// How far the ripple takes the half-width below H at most, counts; 0 where it is not needed.
+    pub play_ripple: i32,
+}
+
+impl Plan {
+    /// Iterations of an inverse; whatever the memory that holds the table says, no more than the most allowed.
+    #[inline(always)]
+    pub const fn iterations(&self) -> u32 {
+        let most = crate::model::MAX_INVERSE_ITERATIONS as u32;
+        if self.iterations < most { self.iterations } else { most }
+    }
+
+    /// Values of one direction in a record: [`crate::image::ripple_row`], of a number that is known to be small.
+    #[inline(always)]
+    const fn row(&self) -> usize {
+        (self.ripple_nodes as usize).wrapping_add(5) & !1
+    }
+
+    /// 2⁻²⁴ cells in counts.
+    #[inline(always)]
+    pub fn counts_of(&self, cells: i32) -> i32 {
+        (cells as f32 * (self.cell_width * (1.0 / CELL as f32))) as i32
+    }
+
+    /// Whether there is a ripple and no A, B, C, and one iteration of the inverse is enough.
+    #[inline(always)]
+    pub const fn is_simple(&self) -> bool {
+        (self.iterations == 1) & (self.ripple_nodes > 0) & !self.has_curves()
+    }
+
+    /// Whether there is any of A, B, C.
+    #[inline(always)]
+    pub const fn has_curves(&self) -> bool {
+        let [a, b, c] = self.curves;
+        (a | b | c) >> 16 != 0
+    }
 }
 
 impl Memory for Table<'_> {
     const ROWS: usize = 4;
+
+    #[inline(always)]
+    fn plan(&self) -> &Plan {
+        &self.plan
+    }
 
     #[inline(always)]
     fn words<const N: usize>(&self, at: usize, _: &mut Doubt) -> [u32; N] {
@@ -177,6 +234,12 @@ impl Memory for Table<'_> {
             .get(at..)
             .and_then(|words| words.first_chunk::<N>())
             .map_or([0; N], |words| words.map(u32::from_le_bytes))
+    }
+
+    #[inline(always)]
+    fn halves<const N: usize>(&self, at: usize, _: &mut Doubt) -> [u32; N] {
+        // Of the image: what is read beyond the last record are its checksums.
+        words_from(self.image, at.wrapping_mul(2))
     }
 }
 
@@ -194,6 +257,7 @@ pub struct Table<'a> {
     pub(crate) torque_nodes: usize,
     pub(crate) temperature_nodes: usize,
     pub(crate) ripple: PeriodicAxis,
+    pub(crate) plan: Plan,
     pub(crate) bounds: Bounds,
     pub(crate) inverse: InverseBound,
 }
@@ -211,6 +275,8 @@ pub struct Bounds {
     pub curve_slope: f32,
     /// Largest ripple, in cells of the ripple's axis: how far off a first guess of the inverse can be.
     pub ripple_cells: f32,
+    /// What the integers of a step round of A, B, C and the ripple, rad: the place in a cell and the weights have 15 bits.
+    pub rounding_rad: f32,
 }
 
 /// What the iterations of the inverse leave.
@@ -223,18 +289,21 @@ pub(crate) struct InverseBound {
 /// A torque and temperature, located in the table: [`Table::at`]. What forward and inverse of one tick share.
 #[derive(Clone, Copy, Debug)]
 pub struct OperatingPoint {
-    /// Where the record below the torque starts, its torque step and its temperature step.
-    records: [usize; 3],
-    /// Their shares in 2⁻¹⁴: low torque, high torque; the same at the higher temperature.
+    /// Half words: where the record below the torque starts, its torque step and its temperature step.
+    rows: [usize; 3],
+    /// Their shares in 2⁻³⁰, to 2⁻¹⁴: low torque, high torque; the same at the higher temperature.
     shares: [i32; 4],
-    pub(crate) plan: Plan,
     /// D and H there, counts.
     pub(crate) mean: i32,
     pub(crate) half_width: i32,
+    /// What of them was added to the table's.
+    added: [i32; 2],
     /// Height of the jump the torque lies in, else 0, counts.
     pub(crate) jump: i32,
     /// All inputs are finite.
     pub(crate) finite: bool,
+    /// What the store knows of its table is what it was told.
+    pub(crate) whole: bool,
     in_range: bool,
     /// What two copies of the table disagreed in while it was read.
     pub(crate) doubt: Doubt,
@@ -249,20 +318,38 @@ impl OperatingPoint {
         if sane { quality } else { Quality::Disabled }
     }
 
-    /// Iterations of an inverse; whatever the memory that holds the table says, no more than the most allowed.
+    /// The point with this added to D and H, each within ±2²⁵ counts. H stays where the ripple can take no play below zero, or
+    /// where it is.
     #[inline(always)]
-    pub(crate) const fn iterations(&self) -> u32 {
-        let most = crate::model::MAX_INVERSE_ITERATIONS as u32;
-        if self.plan.iterations < most { self.plan.iterations } else { most }
+    pub(crate) fn adjusted(mut self, plan: &Plan, mean: i32, half_width: i32) -> Self {
+        let before = self.half_width;
+        let least = if before < plan.play_ripple { before } else { plan.play_ripple };
+        let half = before.wrapping_add(half_width);
+        let half = if half > least { half } else { least };
+        self.mean = self.mean.wrapping_add(mean);
+        self.half_width = half;
+        self.added = [mean, half.wrapping_sub(before)];
+        self
     }
 
-    /// Whether |centre| + |half| is within what an accepted table can give.
+    /// Whether |centre| + |half| is within what an accepted table can give, and what was added to it.
     #[inline(always)]
-    pub(crate) const fn allows(&self, centre: i32, half: i32) -> bool {
+    pub(crate) const fn allows(&self, plan: &Plan, centre: i32, half: i32) -> bool {
+        let [mean, half_width] = self.added;
+        let (centre, half) = (centre.wrapping_sub(mean), half.wrapping_sub(half_width));
         // Negative numbers have room for every magnitude.
         let centre = if centre > 0 { centre.wrapping_neg() } else { centre };
         let half = if half > 0 { half.wrapping_neg() } else { half };
-        centre.saturating_add(half) >= self.plan.limit.wrapping_neg()
+        centre.saturating_add(half) >= plan.limit.wrapping_neg()
+    }
+
+    /// Whether an error on this side is.
+    #[inline(always)]
+    pub(crate) const fn allows_error(&self, plan: &Plan, error: i32, backward: bool) -> bool {
+        let [mean, half_width] = self.added;
+        let mask = (backward as i32).wrapping_neg();
+        let added = (half_width ^ !mask).wrapping_sub(!mask).wrapping_add(mean);
+        error.wrapping_sub(added).wrapping_add(plan.limit) as u32 <= plan.limit.wrapping_mul(2) as u32
     }
 
     /// D, rad.
@@ -281,68 +368,6 @@ pub(crate) struct Play {
     pub sane: bool,
 }
 
-/// The ripple around a phase, as a function of the distance `t` from the boundary between two cells nearest to it, −1 to 1 in
-/// cells: `value + t·slope + t²·bend`, counts; `bend` differs from one side to the other.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct RippleAround {
-    /// The phase itself, as a distance from the boundary.
-    pub place: f32,
-    pub forward: Bend,
-    pub backward: Bend,
-}
-
-/// Two parabolas that meet at 0 with the same slope.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Bend {
-    pub value: f32,
-    pub slope: f32,
-    /// Before and after 0.
-    pub bend: [f32; 2],
-}
-
-impl Bend {
-    /// Of four B-spline coefficients.
-    #[inline(always)]
-    fn new([before, a, b, after]: [f32; 4]) -> Self {
-        let slope = b - a;
-        Self { value: 0.5 * (a + b), slope, bend: [0.5 * (slope - (a - before)), 0.5 * ((after - b) - slope)] }
-    }
-
-    /// Half the sum of both weighed with `1 + side` and `1 − side`.
-    #[inline(always)]
-    pub fn mix(self, other: Self, side: f32) -> Self {
-        let mix = |a: f32, b: f32| 0.5 * ((a + b) + side * (a - b));
-        let ([before, after], [other_before, other_after]) = (self.bend, other.bend);
-        Self {
-            value: mix(self.value, other.value),
-            slope: mix(self.slope, other.slope),
-            bend: [mix(before, other_before), mix(after, other_after)],
-        }
-    }
-
-    #[inline(always)]
-    pub fn at(self, t: f32) -> f32 {
-        let [before, after] = self.bend;
-        let bend = if t < 0.0 { before } else { after };
-        self.value + t * (self.slope + t * bend)
-    }
-
-    /// Where `width·(t − place) + self = 0`, within ±1: how far a target is from the boundary. |slope| < |width|.
-    #[inline(always)]
-    pub fn root(self, place: f32, width: f32) -> f32 {
-        let (constant, linear) = (self.value - width * place, self.slope + width);
-        // The sign of the root is that of −constant/width.
-        let [before, after] = self.bend;
-        let behind = (constant > 0.0) == (width > 0.0);
-        let bend = if behind { before } else { after };
-        let discriminant = linear * linear - 4.0 * bend * constant;
-        let discriminant = if discriminant > 0.0 { discriminant } else { 0.0 };
-        let root = sqrt(discriminant);
-        let root = if width > 0.0 { root } else { -root };
-        within(-2.0 * constant / (linear + root), [-1.0, 1.0])
-    }
-}
-
 /// `a·b/2³²`, rounded down.
 #[inline(always)]
 const fn mul_high(a: i32, b: i32) -> i32 {
@@ -355,12 +380,14 @@ const fn weighed([a, b, c]: [i32; 3], [first, second, third]: [i32; 3]) -> i32 {
     mul_high(a, first << 16).wrapping_add(mul_high(b, second << 16)).wrapping_add(mul_high(c, third << 16))
 }
 
-/// Square root of a number that is not negative, to 3e-7 of it: an estimate of 1/√x from the exponent and three steps of Newton.
+/// Square root of a number, 0 of one below 0, to 3e-7 of it: an estimate of 1/√x from the exponent and three steps of Newton.
 ///
 /// The same on every machine, and a tenth of the instructions that `libm` takes without a processor's own root.
 #[inline(always)]
 pub(crate) fn sqrt(x: f32) -> f32 {
-    let mut inverse = f32::from_bits(0x5f37_59df_u32.wrapping_sub(x.to_bits() >> 1));
+    let bits = x.to_bits() & !((x.to_bits() as i32 >> 31) as u32);
+    let x = f32::from_bits(bits);
+    let mut inverse = f32::from_bits(0x5f37_59df_u32.wrapping_sub(bits >> 1));
     let half = 0.5 * x;
     for _ in 0..3 {
         inverse *= 1.5 - half * inverse * inverse;
@@ -406,8 +433,7 @@ impl OperatingPoint {
         place: TorquePlace,
         [low, high]: [Node; 2],
         warm: f32,
-        records: [usize; 3],
-        plan: Plan,
+        rows: [usize; 3],
         (finite, in_range): (bool, bool),
         doubt: Doubt,
     ) -> Self {
@@ -416,20 +442,23 @@ impl OperatingPoint {
         let (rise, widening) = (mean_high - mean_low, half_high - half_low);
         let bend = windup::bend(weight, width, [rise, slope_low, slope_high]);
         let bend = if jump { 0.0 } else { bend };
-        // In doubt strictly inside a jump.
-        let height = rise.abs() + widening.abs();
-        let height = if jump & (weight > 0.0) & (weight < 1.0) { height } else { 0.0 };
         let (t, w) = ((weight * 16_384.0) as i32, (warm * 16_384.0) as i32);
+        // A search that was led astray ends in an interval that does not hold the torque.
+        let doubt = Doubt(doubt.0 | (t as u32 > 16_384) as u32);
+        // In doubt strictly inside a jump.
+        let inside = (t.wrapping_sub(1) as u32) < 16_383;
+        let height = (rise.abs() + widening.abs()) as i32 & ((jump & inside) as i32).wrapping_neg();
         let both = t.wrapping_mul(w) >> 14;
         let rest = 16_384i32.wrapping_sub(t).wrapping_sub(w).wrapping_add(both);
         Self {
-            records,
-            shares: [rest, t.wrapping_sub(both), w.wrapping_sub(both), both],
-            plan,
+            rows,
+            shares: [rest, t.wrapping_sub(both), w.wrapping_sub(both), both].map(|share| share << 16),
             mean: (mean_low + weight * rise + bend) as i32,
             half_width: (half_low + weight * widening) as i32,
-            jump: height as i32,
+            added: [0; 2],
+            jump: height,
             finite,
+            whole: true,
             in_range,
             doubt,
         }
@@ -473,38 +502,33 @@ pub(crate) fn locate(table: &Table<'_>, torque_n_m: f32, temperature_c: f32) -> 
     let first_record =
         records.wrapping_add(plane.wrapping_mul(record_plane)).wrapping_add(interval.wrapping_mul(record_step));
     let marks = (finite(torque_n_m) & finite(temperature_c), (torque == torque_n_m) & (temperature == temperature_c));
-    OperatingPoint::new(place, around, warm, [first_record, record_step, record_plane], table.plan(), marks, doubt)
+    let rows = [first_record, record_step, record_plane].map(|words: usize| words.wrapping_mul(2));
+    OperatingPoint::new(place, around, warm, rows, marks, doubt)
 }
 
-/// Ripple coefficients of forward and backward motion from `node` on, at a located point, 2⁻¹⁴ ripple units.
+/// Where the records around a torque start, half words, and their shares in 2⁻³⁰.
 #[inline(always)]
-fn coefficients<M: Memory, const N: usize>(
-    memory: &M,
-    point: &OperatingPoint,
-    node: usize,
-    doubt: &mut Doubt,
-) -> [[i32; N]; 2] {
-    let (mut forward, mut backward) = ([0i32; N], [0i32; N]);
-    let [first, torque_step, plane_step] = point.records;
-    let at = first.wrapping_add(node);
-    let hot = at.wrapping_add(plane_step);
-    let rows = [at, at.wrapping_add(torque_step), hot, hot.wrapping_add(torque_step)];
-    for (row, share) in rows.into_iter().zip(point.shares).take(M::ROWS) {
-        let words: [u32; N] = memory.words(row, doubt);
-        for ((forward, backward), word) in forward.iter_mut().zip(&mut backward).zip(words) {
-            // |Σ| ≤ 2¹⁵·2¹⁴: the shares add up to 2¹⁴.
-            *forward = forward.wrapping_add((word as i16 as i32).wrapping_mul(share as i16 as i32));
-            *backward = backward.wrapping_add(((word as i32 >> 16) as i16 as i32).wrapping_mul(share as i16 as i32));
-        }
-    }
-    [forward, backward]
+fn rows(point: &OperatingPoint) -> impl Iterator<Item = (usize, i32)> {
+    let [first, torque_step, plane_step] = point.rows;
+    let hot = first.wrapping_add(plane_step);
+    [first, first.wrapping_add(torque_step), hot, hot.wrapping_add(torque_step)].into_iter().zip(point.shares)
+}
+
+#[inline(always)]
+const fn low(word: u32) -> i32 {
+    word as i16 as i32
+}
+
+#[inline(always)]
+const fn high(word: u32) -> i32 {
+    word as i32 >> 16
 }
 
 /// A + B + C at these phases, counts.
-#[inline(always)]
-pub(crate) fn curves_at<M: Memory>(memory: &M, point: &OperatingPoint, phases: Phases, doubt: &mut Doubt) -> i32 {
+#[inline(never)]
+pub(crate) fn curves_at<M: Memory>(memory: &M, phases: Phases, doubt: &mut Doubt) -> i32 {
     let mut sum = 0i32;
-    for (curve, phase) in point.plan.curves.into_iter().zip([phases.generator, phases.material, phases.output]) {
+    for (curve, phase) in memory.plan().curves.into_iter().zip([phases.generator, phases.material, phases.output]) {
         let [nodes, at] = halves(curve);
         // The same way for every call with this table: it has the curve or not.
         if nodes > 0 {
@@ -517,45 +541,95 @@ pub(crate) fn curves_at<M: Memory>(memory: &M, point: &OperatingPoint, phases: P
     sum
 }
 
+/// The ripple of forward and of backward motion at this phase of the tooth pitch, counts.
+#[inline(always)]
+fn ripple_at<M: Memory>(memory: &M, point: &OperatingPoint, tooth: u32, doubt: &mut Doubt) -> (i32, i32) {
+    let plan = memory.plan();
+    let cell = Cell::at(plan.ripple_nodes, tooth);
+    let [before, at, after] = cell.weights_q15().map(|weight| weight as i16 as i32);
+    let backward_row = plan.row();
+    let (mut forward, mut backward) = (0i32, 0i32);
+    for (row, share) in rows(point).take(M::ROWS) {
+        let first = row.wrapping_add(cell.node);
+        for (sum, place) in [(&mut forward, first), (&mut backward, first.wrapping_add(backward_row))] {
+            let [a, b] = memory.halves(place, doubt);
+            // |Σ| ≤ 2¹⁵·2¹⁵: the weights add up to 2¹⁵; 2¹³ of it to a unit.
+            let own = low(a).wrapping_mul(before).wrapping_add(high(a).wrapping_mul(at));
+            let own = own.wrapping_add(low(b).wrapping_mul(after));
+            *sum = sum.wrapping_add(mul_high(own, share));
+        }
+    }
+    (mul_high(forward, plan.ripple_unit as i32), mul_high(backward, plan.ripple_unit as i32))
+}
+
 /// Centre and half-width of the play at a located point and these phases. The same work for all phases.
 #[inline(always)]
 pub(crate) fn play_at<M: Memory>(memory: &M, point: &OperatingPoint, phases: Phases, doubt: &mut Doubt) -> Play {
+    let plan = memory.plan();
     let (mut centre, mut half) = (point.mean, point.half_width);
-    if point.plan.ripple_nodes > 0 {
-        let cell = Cell::at(point.plan.ripple_nodes, phases.tooth);
-        let weights = cell.weights_q15();
-        let ripples = coefficients(memory, point, cell.node, doubt);
-        let [forward, backward] =
-            ripples.map(|ripple| mul_high(weighed(ripple, weights), point.plan.ripple_unit as i32));
+    if plan.ripple_nodes > 0 {
+        let (forward, backward) = ripple_at(memory, point, phases.tooth, doubt);
         centre = centre.wrapping_add(forward.wrapping_add(backward) >> 1);
         half = half.wrapping_add(backward.wrapping_sub(forward) >> 1);
     }
-    centre = centre.wrapping_add(curves_at(memory, point, phases, doubt));
+    if plan.has_curves() {
+        centre = centre.wrapping_add(curves_at(memory, phases, doubt));
+    }
     // Not negative but for rounding: the image check bounds it.
     let half = if half < 0 { 0 } else { half };
-    Play { centre, half, sane: point.allows(centre, half) }
+    Play { centre, half, sane: point.allows(plan, centre, half) }
 }
 
-/// The ripple around a phase of the tooth pitch. The same work for all phases.
+/// 2⁻²⁴ cells in one.
+pub(crate) const CELL: i32 = 1 << 24;
+
+/// How far from a place the solution of `x + ripple(x) = place` is, 2⁻²⁴ cells. The same work for all places.
+///
+/// `tooth` is the phase at a guess that is `ahead` of the place, 2⁻²⁴ cells. Within a cell of the guess the answer is exact: in the
+/// cell around the node next to the guess, or that before or after it, whichever has the solution between its ends, it is the root
+/// of a parabola. `x + ripple` grows steadily, so what is further away is at least the end of these that is given.
 #[inline(always)]
-pub(crate) fn ripple_around<M: Memory>(
+pub(crate) fn to_solution<M: Memory>(
     memory: &M,
     point: &OperatingPoint,
-    tooth: u32,
+    (tooth, ahead): (u32, i32),
+    backward: bool,
     doubt: &mut Doubt,
-) -> RippleAround {
-    if point.plan.ripple_nodes == 0 {
-        return RippleAround::default();
+) -> i32 {
+    let plan = memory.plan();
+    let cell = Cell::at(plan.ripple_nodes, tooth);
+    let node = if cell.node == 0 { plan.ripple_nodes as usize } else { cell.node };
+    let row_of_side = plan.row() & (backward as usize).wrapping_neg();
+    // Two nodes before and two after, which a stored ripple has for all but the first.
+    let first = node.wrapping_sub(1).wrapping_add(row_of_side);
+    let mut sums = [0i32; 5];
+    for (row, share) in rows(point).take(M::ROWS) {
+        let [a, b, c] = memory.halves(row.wrapping_add(first), doubt);
+        for (sum, ripple) in sums.iter_mut().zip([low(a), high(a), low(b), high(b), low(c)]) {
+            *sum = sum.wrapping_add(ripple.wrapping_mul(share >> 16));
+        }
     }
-    let scaled = (tooth as u64).wrapping_mul(point.plan.ripple_nodes as u64);
-    // Node to node: the boundary of their cells is in the middle.
-    let [forward, backward] = coefficients(memory, point, (scaled >> 32) as usize, doubt);
-    let counts = point.plan.ripple_unit as f32 * (1.0 / (524_288.0 * 16_384.0));
-    RippleAround {
-        place: (scaled as u32 ^ 0x8000_0000) as i32 as f32 * (1.0 / 4_294_967_296.0),
-        forward: Bend::new(forward.map(|ripple| ripple as f32 * counts)),
-        backward: Bend::new(backward.map(|ripple| ripple as f32 * counts)),
-    }
+    let cells = sums.map(|sum| mul_high(sum, plan.ripple_cells));
+    let [_, b, c, d, _] = cells;
+    // All from here on in 2⁻²⁴ cells from the node: the place, and what is missing at either end of the cell.
+    let place = ((cell.fraction ^ 0x8000_0000) as i32 >> 8).wrapping_sub(ahead);
+    let missing = |a: i32, b: i32| (a.wrapping_add(b) >> 1).wrapping_sub(place);
+    // 0 the cell before, 1 that of the node, 2 the one after. An index, not choices: the compiler makes branches of choices.
+    let which = (missing(b, c) <= CELL / 2) as usize;
+    let which = which.wrapping_add((missing(c, d) <= -CELL / 2) as usize);
+    let [a, b, c] = cells.get(which..).and_then(|cells| cells.first_chunk::<3>()).copied().unwrap_or([0; 3]);
+    let start = (which as i32).wrapping_mul(CELL).wrapping_sub(CELL / 2 * 3);
+    let start = start.wrapping_sub(place);
+    // missing + t·linear + t²·bend/2 = 0 from the start of the cell on.
+    let linear = CELL.wrapping_add(b.wrapping_sub(a)) as f32;
+    let bend = a.wrapping_sub(b).wrapping_add(c.wrapping_sub(b)) as f32;
+    let missing = (a.wrapping_add(b) >> 1).wrapping_add(start) as f32;
+    let twice = missing + missing;
+    let root = twice / (linear + sqrt(linear * linear - bend * twice));
+    let along = (root * -(CELL as f32)) as i32;
+    let along = if along > 0 { along } else { 0 };
+    let along = if along < CELL { along } else { CELL };
+    start.wrapping_add(along)
 }
 
 impl<'a> Table<'a> {
@@ -583,17 +657,21 @@ impl<'a> Table<'a> {
         [0, 1].map(|end: usize| f32_at(self.words, word::TEMPERATURE_RANGE.wrapping_add(end)))
     }
 
-    pub(crate) fn plan(&self) -> Plan {
-        let at = |place: usize| word_at(self.words, place);
+    /// From the words of an image.
+    pub(crate) fn plan_in(words: Words<'a>) -> Plan {
+        let at = |place: usize| word_at(words, place);
         let first = word::CELL_WIDTH;
+        let (unit, width) = (at(word::RIPPLE_UNIT), f32_at(words, first));
         Plan {
             ripple_nodes: at(first.wrapping_add(4)) >> 16,
-            ripple_unit: at(word::RIPPLE_UNIT),
+            ripple_unit: unit,
+            ripple_cells: (unit as f32 * (8_388_608.0 / width)) as i32,
             curves: [5, 6, 7].map(|place: usize| at(first.wrapping_add(place))),
             limit: at(word::RIPPLE_UNIT.wrapping_add(1)) as i32,
             iterations: at(first.wrapping_add(8)),
             hold: at(first.wrapping_add(9)) as i32,
-            cell_width: f32::from_bits(at(first)),
+            cell_width: width,
+            play_ripple: 0,
         }
     }
 
@@ -642,4 +720,107 @@ impl<'a> Table<'a> {
 /// Radians in counts.
 pub(crate) const fn counts(rad: f64) -> f64 {
     rad * (4_294_967_296.0 / core::f64::consts::TAU)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drive::FixedMember;
+    use crate::image::ripple_row;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    /// A record of one ripple for both torques.
+    struct Record {
+        halves: Vec<i16>,
+        plan: Plan,
+    }
+
+    impl Memory for Record {
+        const ROWS: usize = 2;
+
+        fn plan(&self) -> &Plan {
+            &self.plan
+        }
+
+        fn words<const N: usize>(&self, _: usize, _: &mut Doubt) -> [u32; N] {
+            [0; N]
+        }
+
+        fn halves<const N: usize>(&self, at: usize, _: &mut Doubt) -> [u32; N] {
+            let half = |i: usize| self.halves.get(at + i).map_or(0, |half| *half as u16 as u32);
+            core::array::from_fn(|i| half(2 * i) | half(2 * i + 1) << 16)
+        }
+    }
+
+    /// The ripple in cells at a place in cells.
+    fn ripple(cells: &[f64], place: f64) -> f64 {
+        let node = (place + 0.5).floor();
+        let (t, n) = (place + 0.5 - node, cells.len() as f64);
+        let at = |i: f64| cells[i.rem_euclid(n) as usize];
+        let (a, b, c) = (at(node - 1.0), at(node), at(node + 1.0));
+        0.5 * a * (1.0 - t) * (1.0 - t) + b * (0.5 + t * (1.0 - t)) + 0.5 * c * t * t
+    }
+
+    proptest! {
+        /// Within a cell of the guess the root is exact; what is further away is approached by a cell at least.
+        #[test]
+        fn a_solution_is_found_in_the_cells_around_a_guess(
+            steps in prop::collection::vec(-0.95f64..0.95, 4..=32), size in 0.01f64..1.0,
+            place in 0.0f64..1.0, off in -3.0f64..3.0, reversed: bool, weight in 0.0f32..1.0,
+        ) {
+            // Coefficients whose steps are below a cell, so that place + ripple grows.
+            let n = steps.len();
+            let mean = steps.iter().sum::<f64>() / n as f64;
+            let mut cells: Vec<f64> = Vec::new();
+            let mut sum = 0.0;
+            for step in &steps {
+                sum += (step - mean) * size / (1.0 + mean.abs());
+                cells.push(sum);
+            }
+            let largest = cells.iter().fold(1e-3, |most: f64, c| most.max(c.abs()));
+            prop_assume!(largest < 15.0);
+            let fixed = if reversed { FixedMember::CircularSpline } else { FixedMember::Flexspline };
+            let width = Drive::new(188, 190, fixed).unwrap().tooth_periods().recip() / n as f32 * 4_294_967_296.0;
+            // Units that the largest coefficient has 32767 of, signed like the ratio.
+            let unit = (largest * width.abs() as f64 * 524_288.0 / 32_766.0) as u32;
+            let row = ripple_row(n);
+            let half = |position: usize| {
+                let cell = cells[(position + n - 1) % n] * width.signum() as f64;
+                (cell * width.abs() as f64 * 524_288.0 / unit as f64).round() as i16
+            };
+            let mut halves = std::vec![0x7abc; row];
+            halves.extend((0..row).map(half));
+            let plan = Plan {
+                ripple_nodes: n as u32,
+                ripple_cells: (unit as f64 * 8_388_608.0 / width as f64) as i32,
+                cell_width: width,
+                ..Plan::default()
+            };
+            let record = Record { halves, plan };
+            let place_of = TorquePlace { weight, width: 1.0, jump: false };
+            let point = OperatingPoint::new(place_of, [[0.0; 3]; 2], 0.0, [0; 3], (true, true), Doubt(0));
+
+            // Where x + ripple(x) = place: by bisection.
+            let place = place * n as f64;
+            let (mut low, mut high) = (place - 2.0 * largest - 1.0, place + 2.0 * largest + 1.0);
+            for _ in 0..60 {
+                let x = 0.5 * (low + high);
+                if x + ripple(&cells, x) > place { high = x } else { low = x }
+            }
+            let guess = low + off;
+            let phase = ((guess / n as f64).rem_euclid(1.0) * 4_294_967_296.0) as u32;
+            let ahead = ((guess - place) * CELL as f64) as i32;
+            let found = to_solution(&record, &point, (phase, ahead), true, &mut Doubt(0)) as f64 / CELL as f64 + place;
+            if off.abs() < 0.999 {
+                // Rounding of coefficients, seen through the slope of x + ripple.
+                let step = |i: usize| (cells[(i + 1) % n] - cells[i]).abs();
+                let slope = 1.0 - (0..n).fold(0.0, |most: f64, i| most.max(step(i)));
+                let allowed = (largest / 16_000.0 + 2e-6) / slope + 1e-6;
+                prop_assert!((found - low).abs() < allowed, "{} {} of {}, {}", found, low, place, allowed);
+            } else {
+                prop_assert!((found - low).abs() < off.abs() - 0.95 && (found - low) * off >= -1e-2, "{} {}", found - low, off);
+            }
+        }
+    }
 }

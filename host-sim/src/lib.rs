@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod cli;
+pub mod closed_loop;
 pub mod condense;
 pub mod contact;
 pub mod drive;
@@ -16,6 +17,8 @@ pub mod output;
 pub mod progress;
 pub mod reference;
 pub mod replay;
+pub mod report;
+pub mod residual;
 pub mod samples;
 pub mod simulate;
 pub mod stepping;

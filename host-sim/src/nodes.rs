@@ -32,6 +32,12 @@ pub struct ChosenNodes {
     pub known: Vec<KnownNode>,
     /// Whether the table meets the tolerance at the middle of every interval; if not, the nodes ran out.
     pub resolved: bool,
+    /// Increments solved.
+    pub increments: usize,
+    /// Newton iterations.
+    pub iterations: usize,
+    /// Largest residual, relative to the contact forces.
+    pub worst_residual: f64,
 }
 
 /// Nodes on each side that the choice starts with.
@@ -95,6 +101,9 @@ pub fn choose_torque_nodes(
         torque_nodes_n_m: positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).collect(),
         known,
         resolved: open.is_empty(),
+        increments: chain.increments,
+        iterations: chain.iterations,
+        worst_residual: chain.worst_residual,
     })
 }
 

@@ -7,6 +7,7 @@ use flexspline::{GeneratorAngle, PlayState, Quality, Table};
 use serde::Serialize;
 use thiserror::Error;
 
+use crate::measurement::{CsvRows, NotANumber, TableProblem};
 use crate::tables::ARCSEC_PER_RAD;
 
 /// A measured row.
@@ -82,46 +83,31 @@ pub struct MeasurementError {
 
 /// Reads measured rows; `temperature_c` stands where the file has no such column.
 pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result<Vec<MeasuredRow>, MeasurementError> {
-    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-    let mut reader =
-        csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).flexible(true).from_reader(bytes);
-    let refuse = |line: u64, what: String| MeasurementError { file: file.to_owned(), line, what };
-    let line_of = |position: Option<&csv::Position>| position.map_or(1, csv::Position::line);
-    let unreadable = |e: &csv::Error| refuse(line_of(e.position()), "not readable as UTF-8 text with commas".into());
-    let header = reader.headers().map_err(|e| unreadable(&e))?.clone();
-    let header_line = line_of(header.position());
-    let column = |name: &str| -> Result<Option<usize>, MeasurementError> {
-        let mut found = header.iter().enumerate().filter(|(_, c)| *c == name).map(|(i, _)| i);
-        let first = found.next();
-        match found.next() {
-            Some(_) => Err(refuse(header_line, format!("column {name} is there twice"))),
-            None => Ok(first),
-        }
-    };
-    let generator =
-        column("generator_rad")?.ok_or_else(|| refuse(header_line, "column generator_rad is missing".into()))?;
-    let (output, error) = match (column("output_rad")?, column("error_arcsec")?) {
-        (None, None) => {
-            return Err(refuse(
-                header_line,
-                "neither column output_rad nor error_arcsec is there; one is needed".into(),
-            ));
-        }
-        both => both,
-    };
+    let refuse = |TableProblem { line, what }| MeasurementError { file: file.to_owned(), line, what };
+    let mut rows = CsvRows::new(bytes).map_err(refuse)?;
+    let column = |name: &str| rows.find(name).map_err(refuse);
+    let generator = rows.need("generator_rad").map_err(refuse)?;
+    let output = column("output_rad")?;
+    let error = column("error_arcsec")?;
+    if output.or(error).is_none() {
+        let what = "neither column output_rad nor error_arcsec is there; one is needed".to_owned();
+        return Err(refuse(rows.header_problem(what)));
+    }
     let (torque, temperature) = (column("torque_n_m")?, column("temperature_c")?);
-    let mut rows = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|e| unreadable(&e))?;
-        let line = line_of(record.position());
+    let header = rows.header().to_vec();
+    let mut measured = Vec::new();
+    while let Some(row) = rows.next_row().map_err(refuse)? {
         let number = |place: usize| -> Result<f64, MeasurementError> {
             let name = &header[place];
-            let text =
-                record.get(place).ok_or_else(|| refuse(line, format!("{name} is missing: {} fields", record.len())))?;
-            match text.parse::<f64>() {
-                Ok(value) if value.is_finite() && value.abs() < 1e9 => Ok(value),
-                _ => Err(refuse(line, format!("{name}: found \"{text}\", allowed: a finite number below 1e9"))),
-            }
+            let what = match row.number(place) {
+                Ok(value) if value.is_finite() && value.abs() < 1e9 => return Ok(value),
+                Err(NotANumber::Absent(fields)) => format!("{name} is missing: {fields} fields"),
+                _ => {
+                    let text = row.text(place).unwrap_or_default();
+                    format!("{name}: found \"{text}\", allowed: a finite number below 1e9")
+                }
+            };
+            Err(refuse(TableProblem { line: row.line, what }))
         };
         let generator_rad = number(generator)?;
         let error_arcsec = match (output, error) {
@@ -129,17 +115,17 @@ pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result
             (None, Some(error)) => number(error)?,
             (None, None) => 0.0,
         };
-        rows.push(MeasuredRow {
+        measured.push(MeasuredRow {
             generator_rad,
             error_arcsec,
             torque_n_m: torque.map_or(Ok(0.0), number)?,
             temperature_c: temperature.map_or(Ok(temperature_c), number)?,
         });
     }
-    if rows.is_empty() {
-        return Err(refuse(header_line, "no rows after the header".into()));
+    if measured.is_empty() {
+        return Err(refuse(rows.header_problem("no rows after the header".to_owned())));
     }
-    Ok(rows)
+    Ok(measured)
 }
 
 /// Runs the core over the rows, from a state it does not know.

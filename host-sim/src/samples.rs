@@ -9,6 +9,8 @@ use flexspline::Direction;
 use flexspline::precompute::Sample;
 use thiserror::Error;
 
+use crate::measurement::{CsvRows, NotANumber, Row, TableProblem};
+
 /// The columns, in the order in which they are written.
 pub const COLUMNS: [&str; 5] = ["generator_rad", "torque_n_m", "temperature_c", "direction", "output_rad"];
 
@@ -68,58 +70,47 @@ pub fn read(path: &Path) -> Result<Vec<Sample>, SampleError> {
 
 /// Reads samples from the bytes of a file called `file`.
 pub fn parse(file: &str, text: &[u8]) -> Result<Vec<Sample>, SampleError> {
-    let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
-    let mut reader =
-        csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).flexible(true).from_reader(text);
-    let line_of = |position: Option<&csv::Position>| position.map_or(1, csv::Position::line);
-    let not_text = |error: &csv::Error| SampleError::Row {
-        file: file.to_owned(),
-        line: line_of(error.position()),
-        what: "not readable as UTF-8 text with commas".to_owned(),
-    };
-    let header = reader.headers().map_err(|e| not_text(&e))?.clone();
-    let header_line = line_of(header.position());
-    let header_error = |what: String| SampleError::Header { file: file.to_owned(), line: header_line, what };
+    let row = |TableProblem { line, what }| SampleError::Row { file: file.to_owned(), line, what };
+    let header = |TableProblem { line, what }| SampleError::Header { file: file.to_owned(), line, what };
+    let mut rows = CsvRows::new(text).map_err(row)?;
     let mut places = [0; 5];
     for (place, name) in places.iter_mut().zip(COLUMNS) {
-        let mut found = header.iter().enumerate().filter(|(_, column)| *column == name).map(|(i, _)| i);
-        *place = found.next().ok_or_else(|| header_error(format!("column {name} is missing")))?;
-        if found.next().is_some() {
-            return Err(header_error(format!("column {name} is there twice")));
-        }
+        *place = rows.need(name).map_err(header)?;
     }
     let mut samples = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|e| not_text(&e))?;
-        let line = line_of(record.position());
-        let row = |what: String| SampleError::Row { file: file.to_owned(), line, what };
-        let mut numbers = [0.0_f64; 5];
-        for ((number, place), name) in numbers.iter_mut().zip(places).zip(COLUMNS) {
-            let text = record
-                .get(place)
-                .ok_or_else(|| row(format!("{} fields, but {name} is field {}", record.len(), place + 1)))?;
-            *number = text.parse().map_err(|_| row(format!("{name} is \"{text}\", not a number")))?;
-            if !number.is_finite() {
-                return Err(row(format!("{name} is {number}; a finite number is needed")));
-            }
-        }
-        let [generator_rad, torque_n_m, temperature_c, direction, output_rad] = numbers;
-        let direction = match direction {
-            1.0 => Direction::Forward,
-            -1.0 => Direction::Backward,
-            other => return Err(row(format!("direction is {other}; allowed are 1 and -1"))),
-        };
-        for ((name, limit, unit), value) in LIMITS.iter().zip([generator_rad, torque_n_m, temperature_c, output_rad]) {
-            if value.abs() > *limit {
-                return Err(row(format!("{name} is {value} {unit}; at most {limit:e} {unit} is plausible")));
-            }
-        }
-        samples.push(Sample { generator_rad, torque_n_m, temperature_c, direction, output_rad });
+    while let Some(found) = rows.next_row().map_err(row)? {
+        samples.push(sample(&found, places).map_err(|what| row(TableProblem { line: found.line, what }))?);
     }
     if samples.is_empty() {
         return Err(SampleError::Empty { file: file.to_owned() });
     }
     Ok(samples)
+}
+
+/// The sample in a row; the error says field, value and what is allowed.
+fn sample(row: &Row<'_>, places: [usize; 5]) -> Result<Sample, String> {
+    let mut numbers = [0.0_f64; 5];
+    for ((number, place), name) in numbers.iter_mut().zip(places).zip(COLUMNS) {
+        *number = row.number(place).map_err(|wrong| match wrong {
+            NotANumber::Absent(fields) => format!("{fields} fields, but {name} is field {}", place + 1),
+            NotANumber::Text(text) => format!("{name} is \"{text}\", not a number"),
+        })?;
+        if !number.is_finite() {
+            return Err(format!("{name} is {number}; a finite number is needed"));
+        }
+    }
+    let [generator_rad, torque_n_m, temperature_c, direction, output_rad] = numbers;
+    let direction = match direction {
+        1.0 => Direction::Forward,
+        -1.0 => Direction::Backward,
+        other => return Err(format!("direction is {other}; allowed are 1 and -1")),
+    };
+    for ((name, limit, unit), value) in LIMITS.iter().zip([generator_rad, torque_n_m, temperature_c, output_rad]) {
+        if value.abs() > *limit {
+            return Err(format!("{name} is {value} {unit}; at most {limit:e} {unit} is plausible"));
+        }
+    }
+    Ok(Sample { generator_rad, torque_n_m, temperature_c, direction, output_rad })
 }
 
 /// The samples as CSV text; reading it back gives the same numbers.

@@ -290,9 +290,9 @@ pub struct Chain<'a> {
     temperature_c: f64,
     observe: &'a Observer<'a>,
     points: Vec<Computed>,
-    increments: usize,
-    iterations: usize,
-    worst_residual: f64,
+    pub(crate) increments: usize,
+    pub(crate) iterations: usize,
+    pub(crate) worst_residual: f64,
 }
 
 impl<'a> Chain<'a> {

@@ -7,6 +7,7 @@ mod context;
 mod drive;
 mod export;
 mod replay;
+mod report;
 mod simulate;
 mod tables;
 mod validate;

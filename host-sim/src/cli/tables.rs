@@ -7,20 +7,25 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use clap::Args;
+use flexspline::Table;
+use flexspline::precompute::Sample;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Failure;
 use super::context::Context;
+use super::{Failure, report};
 use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
 use crate::nodes::{NodeChoice, choose_torque_nodes};
 use crate::output::{write_json, write_whole};
+use crate::report::page::Page;
+use crate::report::{Sources, Subject, drive_report};
 use crate::samples;
 use crate::stepping::{Method, SolverSettings};
 use crate::sweep::{SweepError, SweepPlan, SweepProgress, sweep};
 use crate::tables::{
-    ARCSEC_PER_RAD, MadeTable, SampleOptions, TableError, TableInfo, c_header, from_samples, from_sweep, rust_source,
+    ARCSEC_PER_RAD, MadeTable, SampleOptions, Source, TableError, TableInfo, c_header, from_samples, from_sweep,
+    rust_source,
 };
 use crate::turns::{deviation_increments, sweep_turns};
 
@@ -29,7 +34,7 @@ use crate::turns::{deviation_increments, sweep_turns};
 /// For each generator the drive is swept by contact FEM over one tooth pitch at every torque and temperature node (a drive with
 /// imperfections at places spread over the turns of generator and output), and the samples are projected onto the table by the code that also runs on board. Written are <G>.fxt (the image that firmware
 /// reads in place), <G>.json (what made it and how good it is), <G>.rs and <G>.h (the same bytes as source), and
-/// <G>.samples.csv.
+/// <G>.samples.csv; and report.html, a page with the drive in motion that any browser opens.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -80,7 +85,13 @@ pub(super) struct Tables {
     /// Solver: fast or reference
     #[arg(long, value_name = "SOLVER", default_value = "fast", conflicts_with = "from_samples", value_parser = str::parse::<Method>)]
     solver: Method,
+    /// Do not write report.html, which takes a FEM run over one more tooth pitch for each generator
+    #[arg(long)]
+    no_report: bool,
 }
+
+/// A table, with the samples of its sweep if it was swept.
+type Made = (MadeTable, Option<Vec<Sample>>);
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -101,24 +112,59 @@ impl Tables {
             None => self.sweep(context, &drive, &generators)?,
         };
         let out = context.out()?;
-        for (table, samples_csv) in &mut made {
+        for (table, samples) in &mut made {
             table.info.command.clone_from(&context.command);
             let path = |ending: &str| out.join(format!("{}.{ending}", table.kind));
             write_whole(&path("fxt"), |file| file.write_all(&table.image))?;
             write_json(&path("json"), &table.info)?;
             write_whole(&path("rs"), |file| file.write_all(rust_source(table).as_bytes()))?;
             write_whole(&path("h"), |file| file.write_all(c_header(table).as_bytes()))?;
-            if let Some(samples_csv) = samples_csv {
-                write_whole(&path("samples.csv"), |file| file.write_all(samples_csv.as_bytes()))?;
+            if let Some(samples) = samples {
+                write_whole(&path("samples.csv"), |file| file.write_all(samples::to_csv(samples).as_bytes()))?;
             }
+        }
+        let page = if self.no_report { None } else { Some(self.page(context, &drive, &made)?) };
+        if let Some(page) = &page {
+            report::write(page, out)?;
         }
         let report = Report {
             schema_version: 1,
-            status: "made",
+            status: page.as_ref().filter(|page| page.status.is_failure()).map_or("made", |page| page.status.name()),
             tables: made.iter().map(|(table, _)| &table.info).collect(),
             wall_s: clock.elapsed().as_secs_f64(),
         };
-        context.print(&report, || text(&report, out))
+        context.print(&report, || text(&report, out, page.is_some()))?;
+        page.map_or(Ok(()), |page| report::stamped(&page, out))
+    }
+
+    /// The report.
+    fn page(&self, context: &Context, drive: &Drive, made: &[Made]) -> Result<Page, Failure> {
+        let tables = made
+            .iter()
+            .map(|(table, _)| Ok((table.kind, Table::check(&table.image).map_err(|e| Failure::Failed(e.to_string()))?)))
+            .collect::<Result<Vec<_>, Failure>>()?;
+        let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
+        let animations = report::animations(context, drive, &tables, settings)?;
+        let inputs = made.iter().filter_map(|(table, _)| match &table.info.source {
+            Source::File { name, blake3 } => Some((format!("BLAKE3 of {name}"), blake3.clone())),
+            Source::Fem { .. } => None,
+        });
+        let subjects =
+            tables.into_iter().zip(made).zip(animations).map(|(((kind, table), (made, samples)), animation)| Subject {
+                kind,
+                table,
+                info: Some(&made.info),
+                samples: samples.as_deref(),
+                validation: None,
+                animation,
+            });
+        Ok(drive_report(Sources {
+            drive,
+            command_name: "tables",
+            command: &context.command,
+            inputs: inputs.collect(),
+            subjects: subjects.collect(),
+        }))
     }
 
     fn project(&self, drive: &Drive, generators: &[GeneratorKind], file: &PathBuf) -> Result<MadeTable, Failure> {
@@ -183,12 +229,7 @@ impl Tables {
         Ok((plan, choice))
     }
 
-    fn sweep(
-        &self,
-        context: &Context,
-        drive: &Drive,
-        generators: &[GeneratorKind],
-    ) -> Result<Vec<(MadeTable, Option<String>)>, Failure> {
+    fn sweep(&self, context: &Context, drive: &Drive, generators: &[GeneratorKind]) -> Result<Vec<Made>, Failure> {
         let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
         let repeats = drive.as_built.first_not_uniform().is_none();
         let plans =
@@ -234,12 +275,15 @@ impl Tables {
                 let mut plan = plan.clone();
                 let chosen = choose_torque_nodes(drive, *kind, &plan, *choice, settings, &observe).map_err(failed)?;
                 plan.torque_nodes_n_m = chosen.torque_nodes_n_m;
-                let swept = if repeats {
+                let mut swept = if repeats {
                     sweep(drive, *kind, &plan, &chosen.known, settings, &observe)
                 } else {
                     sweep_turns(drive, *kind, &plan, &chosen.known, settings, &observe)
                 }
                 .map_err(failed)?;
+                swept.increments += chosen.increments;
+                swept.iterations += chosen.iterations;
+                swept.worst_residual = swept.worst_residual.max(chosen.worst_residual);
                 if let Ok(mut guard) = progress.lock() {
                     guard.2[k] = mine.load(Ordering::Relaxed);
                 }
@@ -248,7 +292,7 @@ impl Tables {
                     .map_err(|error: TableError| Failure::Failed(format!("{kind}: {error}")))?;
                 let mut table = table;
                 table.info.torque_nodes_resolved = Some(chosen.resolved);
-                Ok((table, Some(samples::to_csv(&swept.samples))))
+                Ok((table, Some(swept.samples)))
             })
             .collect()
     }
@@ -265,7 +309,7 @@ pub(super) fn generators(name: &str) -> Result<Vec<GeneratorKind>, Failure> {
     })
 }
 
-fn text(report: &Report<'_>, out: &std::path::Path) -> String {
+fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
     let mut text = String::from(
         "generator    table_id          bytes  torque N.m   backlash\"  wind-up\" at the ends   slope  worst deviation\"\n",
     );
@@ -292,9 +336,10 @@ fn text(report: &Report<'_>, out: &std::path::Path) -> String {
         ));
     }
     text.push_str(&format!(
-        "wrote {} table{} to {} in {:.0} s",
+        "wrote {} table{}{} to {} in {:.0} s",
         report.tables.len(),
         if report.tables.len() == 1 { "" } else { "s" },
+        if with_page { " and report.html" } else { "" },
         out.display(),
         report.wall_s
     ));

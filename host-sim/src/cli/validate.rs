@@ -10,10 +10,12 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::context::Context;
-use super::{Failure, tables::generators};
-use crate::drive::GeneratorKind;
+use super::{Failure, report, tables::generators};
+use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
 use crate::output::write_json;
+use crate::report::page::Page;
+use crate::report::{Sources, Subject, drive_report};
 use crate::stepping::{Method, SolverSettings};
 use crate::validate::{
     MAX_BOUND_ARCSEC, RMS_BOUND_ARCSEC, ValidateError, Validation, ValidationSettings, check_drive, generator_of,
@@ -55,6 +57,9 @@ pub(super) struct Validate {
     /// Solver of the fresh FEM: reference or fast
     #[arg(long, value_name = "SOLVER", default_value = "reference", value_parser = str::parse::<Method>)]
     solver: Method,
+    /// Do not write report.html, which takes a FEM run over one more tooth pitch for each generator
+    #[arg(long)]
+    no_report: bool,
 }
 
 /// `validation.json`.
@@ -130,6 +135,9 @@ impl Validate {
         };
         drop(progress);
         write_json(&out.join("validation.json"), &report)?;
+        if !self.no_report {
+            report::write(&self.page(context, &drive, &images, &report)?, out)?;
+        }
         context.print(&report, || text(&report, out))?;
         if passed {
             Ok(())
@@ -139,6 +147,37 @@ impl Validate {
                  validation.json"
             )))
         }
+    }
+
+    /// The report.
+    fn page(
+        &self,
+        context: &Context,
+        drive: &Drive,
+        images: &[(PathBuf, Vec<u8>)],
+        report: &Report,
+    ) -> Result<Page, Failure> {
+        let failed = |error: &dyn std::fmt::Display| Failure::Failed(error.to_string());
+        let mut tables = Vec::new();
+        let mut inputs = Vec::new();
+        for (path, image) in images {
+            let table = Table::check(image).map_err(|error| failed(&error))?;
+            tables.push((check_drive(drive, &table).map_err(|error| failed(&error))?, table));
+            inputs.push((format!("BLAKE3 of {}", path.display()), blake3::hash(image).to_hex().to_string()));
+        }
+        inputs.push(("Fresh FEM".into(), format!("{} solver, {} mesh, seed {}", self.solver, self.mesh, self.seed)));
+        let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
+        let animations = report::animations(context, drive, &tables, settings)?;
+        let subjects = tables.into_iter().zip(&report.tables).zip(animations).map(|(((kind, table), v), animation)| {
+            Subject { kind, table, info: None, samples: None, validation: Some(v), animation }
+        });
+        Ok(drive_report(Sources {
+            drive,
+            command_name: "validate",
+            command: &context.command,
+            inputs,
+            subjects: subjects.collect(),
+        }))
     }
 
     /// The images in the folder.

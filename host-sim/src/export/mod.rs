@@ -6,4 +6,5 @@ mod vtu;
 
 pub use inp::{Deck, DeckError, DeckSettings, Equation, Face, STABILISING_LATERAL, STABILISING_TORSION, Term};
 pub use outlines::{OutlinePoint, outlines};
+pub(crate) use vtu::base64;
 pub use vtu::{Frame, write_pvd, write_vtu};

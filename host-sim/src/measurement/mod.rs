@@ -2,6 +2,33 @@
 //!
 //! Angles are radians, torque N·m, temperature °C, time s; `error` is output less generator over ratio, rad at the output. All
 //! columns of a session have the same length; what was not recorded is `None`.
+//!
+//! [`read`] takes a CSV file to sessions: columns and units by a [`ColumnMap`], wrapped angles made continuous, gaps in time
+//! as the borders of sessions, and the faults of the data found, named and dealt with ([`Fault`]) before anything is asked of the
+//! drive.
+
+mod columns;
+mod csv_rows;
+mod fault;
+mod faults;
+mod gear;
+mod log;
+mod robust;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+pub use columns::{ColumnMap, MappingError, Quantity, Unit};
+pub use csv_rows::{CsvRows, NotANumber, Row, TableProblem};
+pub use fault::{Fault, FaultName, ToothStep, Treatment};
+pub use faults::clock::SESSION_GAP_PERIODS;
+pub use gear::Gear;
+pub use log::{FEWEST_ROWS, MeasuredError};
+pub use robust::{MAD_TO_STD, median_and_std, median_of, quantile_of, sampled, white_noise};
+
+use faults::Findings;
+use log::Log;
 
 /// Rows without a gap, in order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,4 +61,181 @@ impl Session {
     pub fn is_empty(&self) -> bool {
         self.generator_rad.is_empty()
     }
+
+    /// Output angle, rad.
+    #[must_use]
+    pub fn output_rad(&self, ratio: f64) -> Vec<f64> {
+        self.generator_rad.iter().zip(&self.error_rad).map(|(generator, error)| generator / ratio + error).collect()
+    }
+
+    /// Torque, temperature or orientation, where recorded.
+    fn beside(&self, channel: Quantity) -> Option<&[f64]> {
+        match channel {
+            Quantity::Torque => self.torque_n_m.as_deref(),
+            Quantity::Temperature => self.temperature_c.as_deref(),
+            Quantity::Orientation => self.orientation_rad.as_deref(),
+            _ => None,
+        }
+    }
+
+    fn beside_mut(&mut self, channel: Quantity) -> Option<&mut Vec<f64>> {
+        match channel {
+            Quantity::Torque => self.torque_n_m.as_mut(),
+            Quantity::Temperature => self.temperature_c.as_mut(),
+            Quantity::Orientation => self.orientation_rad.as_mut(),
+            _ => None,
+        }
+    }
+
+    fn forget(&mut self, channel: Quantity) {
+        match channel {
+            Quantity::Torque => self.torque_n_m = None,
+            Quantity::Temperature => self.temperature_c = None,
+            Quantity::Orientation => self.orientation_rad = None,
+            _ => {}
+        }
+    }
+
+    /// Leaves out the rows for which `drop` is true.
+    fn leave_out(&mut self, drop: &[bool]) {
+        let others = [&mut self.time_s, &mut self.torque_n_m, &mut self.temperature_c, &mut self.orientation_rad];
+        let columns = [&mut self.generator_rad, &mut self.error_rad];
+        for values in columns.into_iter().chain(others.into_iter().flatten()) {
+            let mut row = 0;
+            values.retain(|_| {
+                row += 1;
+                !drop[row - 1]
+            });
+        }
+        let mut row = 0;
+        self.line.retain(|_| {
+            row += 1;
+            !drop[row - 1]
+        });
+    }
+}
+
+/// A file of measured data, ready for use.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// Which file.
+    pub file: String,
+    /// Rows of the file, those left out among them.
+    pub rows: usize,
+    /// Sessions, none of them empty.
+    pub sessions: Vec<Session>,
+    /// What is wrong with the data.
+    pub faults: Vec<Fault>,
+    /// Where the drive ratcheted; these steps are in the sessions still.
+    pub tooth_steps: Vec<ToothStep>,
+    /// What was noticed and is no fault, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Reads a file of measured data of a drive with this `gear`.
+pub fn read(path: &Path, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
+    let file = path.display().to_string();
+    match File::open(path) {
+        Ok(source) => parse(&file, source, columns, gear),
+        Err(error) => Err(MeasuredError { file, line: None, what: error.to_string() }),
+    }
+}
+
+/// Reads measured data from `source`, a file called `file`.
+pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
+    let refuse = |what: String| MeasuredError { file: file.to_owned(), line: None, what };
+    if gear.ratio == 0.0 || !gear.ratio.is_finite() {
+        return Err(refuse(format!("ratio: found {}, allowed: a finite number other than zero", gear.ratio)));
+    }
+    let (mut log, found) = log::read(file, source, columns)?;
+    let rows = log.len();
+    let mut findings = Findings::default();
+    if let Some(line) = found.broken_off {
+        findings.faults.push(Fault {
+            name: FaultName::MissingSamples,
+            channel: None,
+            time_s: None,
+            until_s: None,
+            first_line: line,
+            last_line: line,
+            rows: 1,
+            size_arcsec: None,
+            treatment: Treatment::Masked,
+            what: "the last line breaks off: it is left out".to_owned(),
+        });
+    }
+    faults::missing::fill(&mut log, &mut findings);
+    faults::clock::check(&mut log, &mut findings);
+    faults::missing::leave_out(&mut log, &mut findings);
+    enough(&log).map_err(refuse)?;
+    faults::wrap::unwrap(&mut log, &found.columns, gear.ratio, &mut findings);
+    faults::units::check(&mut log, &found.columns, gear, &mut findings).map_err(refuse)?;
+    let error_recorded = log.output_or_error() == Quantity::Error;
+    let mut sessions = into_sessions(log, gear.ratio);
+    faults::frozen::check(&mut sessions, gear, error_recorded, &mut findings).map_err(refuse)?;
+    faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
+    faults::resolution::check(&sessions, gear, error_recorded, &mut findings);
+    let steps_are_told = faults::steps::check(&mut sessions, gear, &mut findings);
+    // Steps that stay in the data look like drift.
+    if steps_are_told && findings.tooth_steps.is_empty() {
+        faults::drift::check(&mut sessions, gear, &mut findings);
+    }
+    let Findings { mut faults, tooth_steps, notes } = findings;
+    faults.sort_by_key(|fault| (fault.first_line, fault.name));
+    Ok(Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes })
+}
+
+/// Whether enough rows are left, and anything moves in them.
+fn enough(log: &Log) -> Result<(), String> {
+    if log.len() < FEWEST_ROWS {
+        return Err(format!("{} rows have all that is needed; at least {FEWEST_ROWS} must", log.len()));
+    }
+    let constant = |channel| log.get(channel).is_some_and(|values| values.iter().all(|value| *value == values[0]));
+    let follower = log.output_or_error();
+    if constant(Quantity::Generator) && constant(follower) {
+        return Err(format!("generator and {follower} keep one value throughout; at least one of them must change"));
+    }
+    Ok(())
+}
+
+/// The sessions of a log.
+fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
+    let generator = log.take(Quantity::Generator).unwrap_or_default();
+    let error = match log.take(Quantity::Output) {
+        Some(mut output) => {
+            output.iter_mut().zip(&generator).for_each(|(output, generator)| *output -= generator / ratio);
+            output
+        }
+        None => log.take(Quantity::Error).unwrap_or_default(),
+    };
+    let mut whole = Session {
+        generator_rad: generator,
+        error_rad: error,
+        time_s: log.take(Quantity::Time),
+        torque_n_m: log.take(Quantity::Torque),
+        temperature_c: log.take(Quantity::Temperature),
+        orientation_rad: log.take(Quantity::Orientation),
+        line: std::mem::take(&mut log.line),
+    };
+    let starts: Vec<usize> = (1..log.session.len()).filter(|row| log.session[*row] != log.session[*row - 1]).collect();
+    // From the last session to the first, so that each is cut off the end.
+    let mut sessions: Vec<Session> = starts
+        .iter()
+        .rev()
+        .map(|start| {
+            let cut = |values: &mut Option<Vec<f64>>| values.as_mut().map(|values| values.split_off(*start));
+            Session {
+                line: whole.line.split_off(*start),
+                generator_rad: whole.generator_rad.split_off(*start),
+                error_rad: whole.error_rad.split_off(*start),
+                time_s: cut(&mut whole.time_s),
+                torque_n_m: cut(&mut whole.torque_n_m),
+                temperature_c: cut(&mut whole.temperature_c),
+                orientation_rad: cut(&mut whole.orientation_rad),
+            }
+        })
+        .collect();
+    sessions.push(whole);
+    sessions.reverse();
+    sessions
 }

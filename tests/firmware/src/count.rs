@@ -3,6 +3,8 @@
 //! Under `-icount shift=10` every instruction takes 1.024 µs of virtual time, and the 25 MHz SysTick of the MPS2 counts
 //! 25.6 ticks for each. (The cycle counter of the DWT reads 0 in QEMU; without `-icount` SysTick follows the wall clock.)
 
+use core::sync::atomic::{Ordering, compiler_fence};
+
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 
@@ -52,11 +54,16 @@ impl Counter {
     }
 
     /// Instructions that `work` takes and what it gave.
-    #[inline(always)]
+    ///
+    /// Never inlined, so that nothing of what comes before or after is moved in between; what the caller hands over is fetched in
+    /// it and counted.
+    #[inline(never)]
     pub fn of<T>(&self, work: impl FnOnce() -> T) -> (u32, T) {
         let _ = &self.timer;
         let before = SYST::get_current();
+        compiler_fence(Ordering::SeqCst);
         let given = work();
+        compiler_fence(Ordering::SeqCst);
         let after = SYST::get_current();
         let ticks = before.wrapping_sub(after) & RELOAD;
         ((ticks * 10 + TICKS_OF_TEN / 2) / TICKS_OF_TEN - self.own, given)

@@ -2,6 +2,10 @@
 #![no_std]
 
 pub mod count;
+/// Everything of the closed loop that flies, as the host has it.
+#[path = "../../../host-sim/src/closed_loop/flight/mod.rs"]
+pub mod flight;
+pub mod plant;
 pub mod trajectory;
 
 use cortex_m_semihosting::debug;
@@ -16,6 +20,10 @@ pub static TABLES: [(&str, &[u8]); 4] = [
 
 /// Two inertias, discretised on the host.
 pub static PREDICTOR: [f32; flexspline::PREDICTOR_PARTS] = include!(concat!(env!("OUT_DIR"), "/predictor.rs"));
+
+/// The same for a joint without an encoder at its output.
+pub static MOTOR_PREDICTOR: [f32; flexspline::PREDICTOR_PARTS] =
+    include!(concat!(env!("OUT_DIR"), "/motor_predictor.rs"));
 
 /// Ends the emulation: exit code 0 if all went well, else 1.
 pub fn finish(well: bool) -> ! {

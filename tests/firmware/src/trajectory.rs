@@ -1,8 +1,8 @@
 //! A mixed trajectory, the same on every machine: what the target does is compared with what the host does, bit by bit.
 
 use flexspline::{
-    Drive, FixedMember, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode, Output, OutputAngle, Overrun,
-    Store,
+    Adjustment, Drive, FixedMember, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode, Output,
+    OutputAngle, Overrun, Store,
 };
 
 /// The joint of all programs: HHD-95, a thousand ticks a second.
@@ -67,6 +67,7 @@ impl Trajectory {
             target: self.output.offset_rad(1e-3 * self.mixed.part()),
             torque_n_m: if event == 1 { f32::NAN } else { self.torque_n_m },
             missed_ticks: (event == 2) as u16,
+            adjustment: Adjustment::default(),
         }
     }
 

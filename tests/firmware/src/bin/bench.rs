@@ -8,8 +8,8 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use flexspline::{
-    Approach, Command, GeneratorAngle, Images, Input, Joint, JointState, Measured, Mode, Output, OutputAngle,
-    PlayState, Prediction, Predictor, PredictorState, Store,
+    Approach, Command, GeneratorAngle, Images, Input, Joint, JointState, Measured, Mode, OperatingPoint, Output,
+    OutputAngle, PlayState, Prediction, Predictor, PredictorState, Store, parts,
 };
 use flexspline_firmware::count::{Counter, Range};
 use flexspline_firmware::trajectory::{JOINT, Mixed, Trajectory};
@@ -36,6 +36,37 @@ fn inverse(joint: &Joint, store: &Store, play: &PlayState, target: OutputAngle, 
 }
 
 #[inline(never)]
+fn locate(store: &Store, torque: f32) -> OperatingPoint {
+    parts::locate(store, torque)
+}
+
+#[inline(never)]
+fn slice(store: &mut Store, images: &Images<'_>) {
+    parts::slice(store, images);
+}
+
+#[inline(never)]
+fn output(
+    joint: &Joint,
+    store: &Store,
+    point: &OperatingPoint,
+    play: &mut PlayState,
+    generator: GeneratorAngle,
+) -> i32 {
+    parts::forward(joint, store, point, play, generator)
+}
+
+#[inline(never)]
+fn move_play(play: &mut PlayState, nominal: OutputAngle) -> i32 {
+    parts::play(play, nominal)
+}
+
+#[inline(never)]
+fn solve(joint: &Joint, store: &Store, point: &OperatingPoint, target: OutputAngle, backward: bool) -> i32 {
+    parts::inverse(joint, store, point, target, backward)
+}
+
+#[inline(never)]
 fn observe(predictor: &Predictor, state: &mut PredictorState, measured: &Measured) {
     predictor.step(state, measured);
 }
@@ -53,32 +84,49 @@ fn measure_observer(counter: &Counter) -> Option<Range> {
     Some(range)
 }
 
+/// Ranges of one table, by name.
+type Ranges = [(&'static str, Range); 8];
+
 /// Counts with one table; the tick's is given back.
+///
+/// `tick`, and `forward` and `inverse` as they are called alone, from locating the torque to angles. Then the parts of a tick, each
+/// called alone: `locate` the torque, `output` (nominal, ripple and play) and, of that, the `play`, `solve` for the command, the
+/// `slice` that makes a word of the copies anew. The `rest` is what is left of the tick: judging the sample, goal, limiter, flags.
 fn measure(counter: &Counter, name: &str, image: &[u8]) -> Option<Range> {
     let images = Images::new(image, image);
     let mut store = Store::new();
     store.activate(&images, JOINT.drive(), 21.0).ok()?;
-    let (mut state, mut play) = (JointState::new(), PlayState::unknown());
+    let (mut state, mut play, mut other) = (JointState::new(), PlayState::unknown(), PlayState::unknown());
     state.request(Mode::Tracking).ok()?;
     let mut trajectory = Trajectory::new(1);
-    let (mut ticks, mut forwards, mut inverses) = (Range::default(), Range::default(), Range::default());
+    let names = ["forward", "inverse", "locate", "output", "play", "solve", "slice", "tick"];
+    let mut ranges: Ranges = names.map(|name| (name, Range::default()));
     let mut generator = GeneratorAngle::ZERO;
     for _ in 0..INPUTS {
         let input = trajectory.input();
-        let (count, out) = counter.of(|| black_box(tick(&JOINT, &images, &mut store, &mut state, &input)));
-        ticks.add(count);
+        let (tick_count, out) = counter.of(|| black_box(tick(&JOINT, &images, &mut store, &mut state, &input)));
         trajectory.saw(&out);
         generator = input.generator.unwrap_or(generator);
-        let torque = input.torque_n_m;
-        let (count, _) = counter.of(|| black_box(forward(&JOINT, &store, &mut play, generator, torque)));
-        forwards.add(count);
-        let (count, _) = counter.of(|| black_box(inverse(&JOINT, &store, &play, input.target, torque)));
-        inverses.add(count);
+        let (torque, target) = (input.torque_n_m, input.target);
+        let (forwards, _) = counter.of(|| black_box(forward(&JOINT, &store, &mut play, generator, torque)));
+        let (inverses, _) = counter.of(|| black_box(inverse(&JOINT, &store, &play, target, torque)));
+        let (locates, point) = counter.of(|| black_box(locate(&store, torque)));
+        let (outputs, _) = counter.of(|| black_box(output(&JOINT, &store, &point, &mut other, generator)));
+        let (plays, _) = counter.of(|| black_box(move_play(&mut other, out.output)));
+        let backward = target.counts() & 1 != 0;
+        let (solves, _) = counter.of(|| black_box(solve(&JOINT, &store, &point, target, backward)));
+        let (slices, ()) = counter.of(|| slice(&mut store, &images));
+        let counts = [forwards, inverses, locates, outputs, plays, solves, slices, tick_count];
+        ranges.iter_mut().zip(counts).for_each(|((_, range), count)| range.add(count));
     }
-    for (part, range) in [("forward", forwards), ("inverse", inverses), ("tick", ticks)] {
+    for (part, range) in ranges {
         hprintln!("{} {}: {} instructions (min {}, max {})", name, part, range.max, range.min, range.max);
     }
-    Some(ticks)
+    let [.., (_, locate), (_, output), _, (_, solve), (_, slice), (_, tick)] = ranges;
+    let rest = |end: fn(&Range) -> u32| end(&tick) - [locate, output, solve, slice].iter().map(end).sum::<u32>();
+    let (min, max) = (rest(|range| range.min), rest(|range| range.max));
+    hprintln!("{} rest: {} instructions (min {}, max {}), by difference", name, max, min, max);
+    Some(tick)
 }
 
 #[entry]

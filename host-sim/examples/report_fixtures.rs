@@ -1,0 +1,130 @@
+//! What the browser tests read beside real reports: packed arrays with what they hold, and a page whose every text is hostile.
+//!
+//! `cargo run --release -p flexspline-sim --example report_fixtures -- DIR`
+
+use std::path::PathBuf;
+
+use flexspline_sim::report::pack::Packed;
+use flexspline_sim::report::page::{
+    Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity, Section,
+    Series, Status, Table, Text,
+};
+use serde_json::{Map, Value, json};
+
+const HOSTILE: &str = r#"</script></title></noscript>"><img src=x onerror="window.hacked=1"><script>window.hacked=1</script>&amp;'{{7*7}}<!--"#;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = PathBuf::from(std::env::args().nth(1).ok_or("usage: report_fixtures DIR")?);
+    std::fs::create_dir_all(&folder)?;
+    std::fs::write(folder.join("pack.json"), serde_json::to_string(&packs())?)?;
+    std::fs::write(folder.join("hostile.html"), hostile().html()?)?;
+    Ok(())
+}
+
+/// Arrays of every kind: smooth, noisy, constant, at the ends of their range, empty, not finite.
+fn packs() -> Vec<Value> {
+    let mut random = fastrand::Rng::with_seed(1);
+    let smooth: Vec<f64> = (0..5000).map(|k| 0.4 * (f64::from(k) * 0.01).sin()).collect();
+    let noisy: Vec<f64> = (0..3000).map(|_| 1e3 * (random.f64() - 0.5)).collect();
+    let whole: Vec<f64> = (0..337).map(f64::from).collect();
+    let mut out = Vec::new();
+    let mut put = |packed: Packed, values: &[f64], tolerance: f64| {
+        let values: Vec<Value> =
+            values.iter().map(|v| if v.is_finite() { json!(v) } else { json!(v.to_string()) }).collect();
+        out.push(json!({
+            "name": packed.name, "kind": packed.kind, "scale": packed.scale, "offset": packed.offset,
+            "text": packed.text, "values": values, "tolerance": tolerance,
+        }));
+    };
+    for (name, values, scale) in
+        [("smooth", &smooth, 1e-4), ("noisy", &noisy, 1e-4), ("whole", &whole, 1.0), ("constant", &vec![7.25; 9], 0.25)]
+    {
+        let packed = Packed::steps(name, &[values.len()], scale, values);
+        let tolerance = if name == "whole" { 0.0 } else { 0.51 * packed.scale };
+        put(packed, values, tolerance);
+    }
+    let ends = [f64::NAN, f64::INFINITY, -0.0, 1e-30, -3.5e20, 0.1];
+    put(Packed::floats("floats", &[6], ends), &ends, 1e-7);
+    put(Packed::floats("empty", &[0], []), &[], 0.0);
+    let levels: Vec<f64> = (0..4000).map(|k| 100.0 + 100.0 * (f64::from(k) * 0.37).sin()).collect();
+    put(Packed::levels("levels", &[4000], 200.0, &levels), &levels, 0.4);
+    out
+}
+
+fn hostile() -> Page {
+    let id = "cam".to_owned();
+    let series = |mark, colour| Series {
+        name: HOSTILE.into(),
+        mark,
+        colour,
+        points: (0..20).map(|k| [f64::from(k), f64::from(k * k)]).collect(),
+    };
+    let axis = |quantity| Axis::new(HOSTILE, quantity);
+    let figure = |id: &str, body| {
+        Block::Figure(Figure {
+            id: id.into(),
+            title: HOSTILE.into(),
+            caption: HOSTILE.into(),
+            alt: HOSTILE.into(),
+            body,
+        })
+    };
+    let lines = Lines {
+        series: vec![series(Mark::Line, 0), series(Mark::Points, 1)],
+        limits: vec![Limit { name: HOSTILE.into(), y: 100.0 }],
+    };
+    let field = Field { x: vec![0.0, 1.0, 2.0], y: vec![0.0, 1.0], z: vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0] };
+    let table = Table {
+        caption: HOSTILE.into(),
+        header: vec![HOSTILE.into(), "value".into()],
+        rows: vec![vec![HOSTILE.into(), Text::default().error(12.5, 3)]],
+    };
+    let mut results = Map::new();
+    results.insert(HOSTILE.into(), HOSTILE.into());
+    Page {
+        title: HOSTILE.into(),
+        command_name: "tables",
+        status: Status::BoundMissed,
+        remarks: vec![HOSTILE.into()],
+        choices: vec![
+            Choice { id: id.clone(), name: HOSTILE.into() },
+            Choice { id: "other".into(), name: "other".into() },
+        ],
+        choice_is: "Generator",
+        headlines: vec![Headline {
+            choice: None,
+            answer: HOSTILE.into(),
+            number: Text::default().error(61.0, 3),
+            number_is: HOSTILE.into(),
+        }],
+        sections: vec![Section {
+            id: "section".into(),
+            title: HOSTILE.into(),
+            detail: Detail::Summary,
+            blocks: vec![
+                Block::Paragraph { choice: None, text: Text::new(HOSTILE).strong(HOSTILE) },
+                Block::Table { choice: None, table },
+                figure(
+                    "lines",
+                    FigureBody::Lines {
+                        x: axis(Quantity::Degree),
+                        y: axis(Quantity::Error),
+                        charts: vec![(id.clone(), lines)],
+                    },
+                ),
+                figure(
+                    "field",
+                    FigureBody::Field {
+                        x: axis(Quantity::Degree),
+                        y: axis(Quantity::Torque),
+                        z: axis(Quantity::Error),
+                        fields: vec![(id, field)],
+                    },
+                ),
+            ],
+        }],
+        animations: Vec::new(),
+        provenance: vec![(HOSTILE.into(), HOSTILE.into())],
+        results,
+    }
+}

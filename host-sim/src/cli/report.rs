@@ -1,0 +1,59 @@
+//! `report.html`, for the commands that write one.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use flexspline::Table;
+use rayon::prelude::*;
+
+use super::{Context, Failure};
+use crate::drive::{Drive, GeneratorKind};
+use crate::output::write_whole;
+use crate::report::animation::{Animation, AnimationError, animate};
+use crate::report::page::Page;
+use crate::report::shown_torque_n_m;
+use crate::stepping::{Method, SolverSettings};
+
+/// The drives in motion, by the fast solver, each at half of what its table spans. One that cannot be shown is said on the page.
+pub(super) fn animations(
+    context: &Context,
+    drive: &Drive,
+    tables: &[(GeneratorKind, Table<'_>)],
+    settings: SolverSettings,
+) -> Result<Vec<Result<Animation, AnimationError>>, Failure> {
+    let interrupted = context.watch_interrupt();
+    let solver = SolverSettings { method: Method::Fast, ..settings };
+    let made = tables
+        .par_iter()
+        .map(|(kind, table)| {
+            animate(drive, *kind, shown_torque_n_m(table), solver, &mut || {
+                if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })
+        })
+        .collect();
+    if interrupted() {
+        return Err(Failure::Failed("stopped; report.html was not written".into()));
+    }
+    Ok(made)
+}
+
+/// Writes the page; a failure that it is stamped with is that of the command.
+pub(super) fn write(page: &Page, out: &Path) -> Result<(), Failure> {
+    let path = out.join("report.html");
+    let html = page.html().map_err(|error| Failure::Failed(format!("{}: {error}", path.display())))?;
+    write_whole(&path, |file| file.write_all(html.as_bytes()))?;
+    Ok(())
+}
+
+/// The failure that a page is stamped with.
+pub(super) fn stamped(page: &Page, out: &Path) -> Result<(), Failure> {
+    if !page.status.is_failure() {
+        return Ok(());
+    }
+    Err(Failure::Failed(format!(
+        "{}: {}; see {}",
+        page.status.name(),
+        page.remarks.join(" "),
+        out.join("report.html").display()
+    )))
+}

@@ -1,0 +1,101 @@
+//! One joint with the core alone, and whatever goes wrong with it.
+
+use flexspline::{Drive, Mode, Output, Overrun};
+
+use super::flight::antenna::{HELD_BACK_RAD, START_UP_S, SlowGroups};
+use super::flight::controllers::{Compensated, StartError, Told};
+use super::flight::profile::Moment;
+use super::flight::score::Scores;
+use super::flight::servo::{SERVO, Servo};
+use super::flight::{Lane, Noise, Plant, Sensors, ahead};
+
+/// One tick of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Step {
+    /// Output less target at the beginning of the tick, rad.
+    pub error_rad: f64,
+    /// What the joint said; `None` if it was not called in this tick.
+    pub out: Option<Output>,
+}
+
+/// A joint in flight.
+pub struct Single<'a, P> {
+    /// Motor and drive.
+    pub lane: Lane<P>,
+    /// The core.
+    pub core: Compensated<'a>,
+    /// Errors so far.
+    pub scores: Scores,
+    drive: Drive,
+    groups: SlowGroups,
+    sensors: Sensors,
+    noise: Noise,
+    tick: u32,
+    command: flexspline::GeneratorAngle,
+}
+
+impl<'a, P: Plant> Single<'a, P> {
+    /// At rest, tracking.
+    ///
+    /// # Errors
+    /// [`StartError`].
+    pub fn new(
+        image: &'a [u8],
+        drive: Drive,
+        plant: P,
+        largest_n_m: f64,
+        first_c: f64,
+        overrun: Overrun,
+    ) -> Result<Self, StartError> {
+        let sensors = Sensors::for_range(largest_n_m);
+        let mut core = Compensated::new(image, drive, sensors.temperature(first_c), overrun)?;
+        core.request(Mode::Tracking);
+        let groups = SlowGroups::staggered(0).unwrap_or_else(|| unreachable!("number 0 is below 20"));
+        let lane = Lane::new(plant, Servo::new(SERVO));
+        let command = lane.encoder();
+        Ok(Self {
+            lane,
+            core,
+            scores: Scores::default(),
+            drive,
+            groups,
+            sensors,
+            noise: Noise::new(5),
+            tick: 0,
+            command,
+        })
+    }
+
+    /// One tick. `disturb` may change what the joint is told, and says whether it is called at all; if not, the last command
+    /// stands.
+    pub fn tick(&mut self, now: &Moment, disturb: impl FnOnce(&mut Told, &mut Compensated<'a>) -> bool) -> Step {
+        let error_rad = self.lane.output_rad() - now.target_rad;
+        let shown_n_m = self.sensors.torque(self.noise.part(), now.torque_n_m);
+        let mut told = Told {
+            generator: Some(self.lane.encoder()),
+            target: ahead(now, 0.0),
+            rate_rad_s: now.rate_rad_s,
+            torque_n_m: shown_n_m,
+            missed_ticks: 0,
+        };
+        let called = disturb(&mut told, &mut self.core);
+        if called {
+            self.command = self.core.tick(&told);
+        }
+        self.lane.go(self.command, shown_n_m, now.torque_n_m, self.drive.exact_ratio());
+        if called && self.groups.thermometer.is_due(self.tick) {
+            self.core.set_temperature(self.sensors.temperature(now.temperature_c));
+        }
+        if self.groups.thermometer.is_due(self.tick) {
+            self.lane.plant.set_temperature(now.temperature_c);
+        }
+        if called && self.groups.images.is_due(self.tick) {
+            self.core.check_images();
+        }
+        if now.time_s >= START_UP_S {
+            self.scores.add(error_rad, now.steady, self.core.held_back(HELD_BACK_RAD));
+        }
+        self.tick += 1;
+        Step { error_rad, out: if called { self.core.out } else { None } }
+    }
+}

@@ -1,0 +1,278 @@
+//! Time that does not run as it should, and the gaps that part sessions.
+
+use std::f64::consts::TAU;
+
+use super::{Findings, span};
+use crate::measurement::columns::Quantity;
+use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::log::Log;
+use crate::measurement::robust::{median_and_std, median_of, sampled};
+
+/// A gap longer than so many sample periods starts a new session (CONTRACT).
+pub const SESSION_GAP_PERIODS: f64 = 10.0;
+/// A step of time above so many periods, jitter aside, has a row missing in it: half way between one lost row and none.
+const LOST_ROW_PERIODS: f64 = 1.5;
+/// Where more steps than this are that long, rows are not evenly spaced by intent, and none is missing.
+const UNEVEN_SHARE: f64 = 0.05;
+/// Where more steps than this are zero, the clock is coarse; where fewer, rows are repeated.
+const COARSE_SHARE: f64 = 0.1;
+/// A clock jitters if its steps scatter by more than this share of a period…
+const JITTER_SHARE: f64 = 0.1;
+/// …and by so many times more than the motion from row to row.
+const JITTER_OVER_MOTION: f64 = 5.0;
+/// Sample periods that exist, s.
+const PERIODS_S: [f64; 2] = [1e-7, 3600.0];
+/// Generator speeds that exist, up to 20 000 turns a minute, rad/s.
+const FASTEST_RAD_S: f64 = 2100.0;
+
+/// Finds faults of the clock, repairs or leaves out what they touch, and parts the rows into sessions.
+pub(in crate::measurement) fn check(log: &mut Log, findings: &mut Findings) {
+    if log.get(Quantity::Time).is_none() {
+        return;
+    }
+    let strays = order(log, findings);
+    standing(log, findings);
+    let Some(period) = period(log) else {
+        let mut fault = span(log, FaultName::ClockError, 0, log.len() - 1);
+        (fault.channel, fault.treatment) = (Some(Quantity::Time), Treatment::Masked);
+        (fault.time_s, fault.until_s) = (None, None);
+        fault.what = "time stands still: it is not used".to_owned();
+        findings.faults.push(fault);
+        log.take(Quantity::Time);
+        return;
+    };
+    gaps(log, period, &strays, findings);
+    jitter(log, period, findings);
+    scale(log, period, findings);
+}
+
+/// Median of the positive steps of time, s.
+fn period(log: &Log) -> Option<f64> {
+    let time = log.get(Quantity::Time)?;
+    let steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).filter(|dt| *dt > 0.0).collect();
+    (!steps.is_empty()).then(|| median_of(&mut sampled(&steps)))
+}
+
+/// Time that runs back: a row out of order is left out, a clock that was set back starts a session. Gives the lines left out.
+fn order(log: &mut Log, findings: &mut Findings) -> Vec<u64> {
+    let Some(period) = period(log) else { return Vec::new() };
+    let Some(time) = log.get(Quantity::Time) else { return Vec::new() };
+    let far = SESSION_GAP_PERIODS * period;
+    let rows = time.len();
+    let mut drop = vec![false; rows];
+    let mut session = vec![0_u32; rows];
+    let (mut latest, mut number) = (f64::NEG_INFINITY, 0);
+    let (mut strays, mut resets) = (Vec::new(), Vec::new());
+    for row in 0..rows {
+        let t = time[row];
+        if !t.is_finite() {
+            session[row] = number;
+            continue;
+        }
+        // A stamp that is far from both its neighbours, which are close to each other, is wrong by itself.
+        let next = time.get(row + 1).copied().unwrap_or(f64::NAN);
+        let alone = next >= latest && next - latest <= far && !(latest..=next).contains(&t) && latest.is_finite();
+        if alone || (t < latest && latest - t <= far) {
+            drop[row] = true;
+            strays.push(row);
+        } else {
+            if t < latest {
+                number += 1;
+                resets.push((row, latest - t));
+            }
+            latest = t;
+        }
+        session[row] = number;
+    }
+    if let (Some(&first), Some(&last)) = (strays.first(), strays.last()) {
+        let mut fault = span(log, FaultName::ClockError, first, last);
+        (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), strays.len() as u64, Treatment::Masked);
+        fault.what = format!("time runs back or is far off in {} rows: they are left out", strays.len());
+        findings.faults.push(fault);
+    }
+    if let (Some(&(first, back)), Some(&(last, _))) = (resets.first(), resets.last()) {
+        let mut fault = span(log, FaultName::ClockError, first, last);
+        (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), resets.len() as u64, Treatment::Kept);
+        fault.what =
+            format!("time is set back {} times, first by {back:.4} s: a new session is begun there", resets.len());
+        findings.faults.push(fault);
+    }
+    log.session = session;
+    let lines = strays.iter().map(|row| log.line[*row]).collect();
+    if !strays.is_empty() {
+        log.leave_out(&drop);
+    }
+    lines
+}
+
+/// Time that stands: rows that are repeated are left out, a coarse clock is spread.
+fn standing(log: &mut Log, findings: &mut Findings) {
+    if period(log).is_none() {
+        return;
+    }
+    let Some(time) = log.get(Quantity::Time) else { return };
+    let stands: Vec<usize> =
+        (1..time.len()).filter(|row| time[*row] == time[*row - 1] && log.continues(*row)).collect();
+    let (Some(&first), Some(&last)) = (stands.first(), stands.last()) else { return };
+    let mut fault = span(log, FaultName::ClockError, first, last);
+    (fault.channel, fault.rows) = (Some(Quantity::Time), stands.len() as u64);
+    if stands.len() as f64 <= COARSE_SHARE * time.len() as f64 {
+        let mut drop = vec![false; time.len()];
+        stands.iter().for_each(|row| drop[*row] = true);
+        fault.treatment = Treatment::Masked;
+        fault.what = format!("{} rows repeat the time of the row before: they are left out", stands.len());
+        findings.faults.push(fault);
+        log.leave_out(&drop);
+        return;
+    }
+    fault.treatment = Treatment::Repaired;
+    fault.what =
+        format!("time stands in {} of {} rows: rows of the same time are spread evenly", stands.len(), time.len());
+    findings.faults.push(fault);
+    let mut spread = time.to_vec();
+    let mut begin = 0;
+    while begin < spread.len() {
+        let mut end = begin + 1;
+        while end < spread.len() && spread[end] == spread[begin] && log.continues(end) {
+            end += 1;
+        }
+        let next = spread.get(end).copied().filter(|next| *next > spread[begin] && log.continues(end));
+        // At the end of a session: as fast as on the whole.
+        let step = next.map_or_else(
+            || (time[time.len() - 1] - time[0]).abs() / time.len() as f64,
+            |next| (next - spread[begin]) / (end - begin) as f64,
+        );
+        for row in begin + 1..end {
+            spread[row] = spread[begin] + step * (row - begin) as f64;
+        }
+        begin = end;
+    }
+    log.put(Quantity::Time, spread);
+}
+
+/// Change of an angle over one row, the shorter way round.
+fn turned(values: &[f64], row: usize) -> f64 {
+    let d = values[row] - values[row - 1];
+    d - TAU * (d / TAU).round()
+}
+
+/// Gaps in time: sessions, and rows that were lost. Near `strays`, lines left out for their time, none is counted as lost.
+fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
+    let Some(time) = log.get(Quantity::Time) else { return };
+    let rows = time.len();
+    let mut steps = sampled(&time.windows(2).map(|t| t[1] - t[0]).filter(|dt| *dt > 0.0).collect::<Vec<_>>());
+    let jitter = median_and_std(&mut steps).1;
+    let lost_from = (LOST_ROW_PERIODS * period).max(period + 6.0 * jitter);
+    let (mut lost, mut long_steps, mut parts) = (Vec::new(), 0, Vec::new());
+    for row in 1..rows {
+        let dt = time[row] - time[row - 1];
+        if !log.continues(row) || dt.is_nan() || dt <= lost_from {
+            continue;
+        }
+        long_steps += 1;
+        if dt <= SESSION_GAP_PERIODS * period {
+            // Rows that are in the file, but were left out, are not lost.
+            let there = log.line[row] - log.line[row - 1];
+            lost.push((row, ((dt / period).round() as u64).saturating_sub(there)));
+        } else {
+            parts.push(row);
+        }
+    }
+    lost.retain(|(row, rows)| {
+        let near = strays.iter().any(|line| line.abs_diff(log.line[*row]) <= 2);
+        *rows > 0 && !near
+    });
+    let total: u64 = lost.iter().map(|(_, rows)| *rows).sum();
+    if let (Some(&(first, _)), Some(&(last, _))) = (lost.first(), lost.last()) {
+        if long_steps as f64 <= UNEVEN_SHARE * rows as f64 {
+            let mut fault = span(log, FaultName::MissingSamples, first, last);
+            (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), total, Treatment::Kept);
+            fault.what = format!(
+                "{total} rows are missing in {} places: time goes on by more than {LOST_ROW_PERIODS} of the usual {period:.6} s",
+                lost.len()
+            );
+            findings.faults.push(fault);
+        } else {
+            findings
+                .notes
+                .push(format!("rows are not evenly spaced in time: {} steps exceed {lost_from:.6} s", lost.len()));
+        }
+    }
+    if !parts.is_empty() {
+        let mut number = 0;
+        let mut session = vec![0; rows];
+        let mut next = parts.iter().peekable();
+        for row in 0..rows {
+            let parted = next.next_if(|part| **part == row).is_some();
+            if row > 0 && (parted || !log.continues(row)) {
+                number += 1;
+            }
+            session[row] = number;
+        }
+        log.session = session;
+    }
+}
+
+/// Stamps that scatter while the motion from row to row does not.
+fn jitter(log: &mut Log, period: f64, findings: &mut Findings) {
+    let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else { return };
+    let (mut of_time, mut of_motion) = (Vec::new(), Vec::new());
+    for row in 2..time.len() {
+        if !log.continues(row) || !log.continues(row - 1) {
+            continue;
+        }
+        let (a, b) = (turned(generator, row - 1), turned(generator, row));
+        let pace = 0.5 * (a.abs() + b.abs());
+        if pace > 0.0 && pace < 1.0 {
+            of_motion.push((b - a).abs() / pace);
+            of_time.push((time[row] - 2.0 * time[row - 1] + time[row - 2]).abs() / period);
+        }
+    }
+    if of_time.len() < 100 {
+        return;
+    }
+    let (time_scatter, motion_scatter) = (median_of(&mut sampled(&of_time)), median_of(&mut sampled(&of_motion)));
+    if time_scatter <= JITTER_SHARE || time_scatter <= JITTER_OVER_MOTION * motion_scatter {
+        return;
+    }
+    let mut fault = span(log, FaultName::ClockError, 0, log.len() - 1);
+    (fault.channel, fault.treatment) = (Some(Quantity::Time), Treatment::Repaired);
+    fault.what = format!(
+        "stamps scatter by {:.0} % of a period while the motion from row to row scatters by {:.1} %: rows are spaced evenly",
+        100.0 * time_scatter,
+        100.0 * motion_scatter
+    );
+    findings.faults.push(fault);
+    let ends: Vec<usize> = (1..=log.len()).filter(|row| *row == log.len() || !log.continues(*row)).collect();
+    let Some(time) = log.get_mut(Quantity::Time) else { return };
+    let mut begin = 0;
+    for end in ends {
+        let (from, to, last) = (time[begin], time[end - 1], (end - 1 - begin).max(1) as f64);
+        for row in begin..end {
+            time[row] = from + (to - from) * (row - begin) as f64 / last;
+        }
+        begin = end;
+    }
+}
+
+/// A period or a speed that does not exist: a unit of time taken for another.
+fn scale(log: &Log, period: f64, findings: &mut Findings) {
+    let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else { return };
+    let mut speeds: Vec<f64> = (1..time.len())
+        .filter(|row| log.continues(*row) && time[*row] > time[*row - 1])
+        .map(|row| (turned(generator, row) / (time[row] - time[row - 1])).abs())
+        .filter(|speed| *speed > 0.0)
+        .collect();
+    let speed = median_of(&mut speeds);
+    let what = if !(PERIODS_S[0]..=PERIODS_S[1]).contains(&period) {
+        format!("a sample period of {period:e} s is not plausible")
+    } else if speed > FASTEST_RAD_S {
+        format!("a generator speed of {speed:.0} rad/s is not plausible")
+    } else {
+        return;
+    };
+    let mut fault = span(log, FaultName::ClockError, 0, log.len() - 1);
+    (fault.channel, fault.treatment) = (Some(Quantity::Time), Treatment::Kept);
+    fault.what = format!("{what}: is the unit of time right?");
+    findings.faults.push(fault);
+}

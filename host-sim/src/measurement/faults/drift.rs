@@ -1,0 +1,148 @@
+//! A zero that moves with time, the same in every state of the drive.
+//!
+//! Wear, heat and a falling stiffness move the error too, but not on both flanks alike; a wrong ratio and an eccentric encoder move
+//! it with the angle. Drift is named only where the data can tell it from them.
+
+use super::state::{Extra, State};
+use super::{ARCSEC, Findings, of_rows};
+use crate::measurement::Session;
+use crate::measurement::columns::Quantity;
+use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::gear::Gear;
+use crate::measurement::robust::median_of;
+
+/// Drift of less than this over the whole recording is not looked for, rad.
+const LEAST_RAD: f64 = 10.0 * ARCSEC;
+/// A trend is so many standard deviations, over stretches as long as the noise remembers.
+const CERTAIN: f64 = 6.0;
+/// Stretches of the recording that a trend is judged by.
+const STRETCHES: usize = 24;
+/// What is the same on both flanks: the part that differs is below this share.
+const ALIKE: f64 = 0.35;
+/// A trend whose standard deviation grows by more than this when position, load and temperature are considered may be one of them.
+const CONFUSED: f64 = 4.0;
+/// Share of rows that each flank must have.
+const BOTH_FLANKS: f64 = 0.1;
+
+/// Finds a linear drift over the whole recording, names it and takes it out.
+pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
+    let Some((per_s, from_s, std)) = slope(sessions, gear) else { return };
+    let Some(last) = sessions.last().and_then(|s| s.time_s.as_ref()?.last().copied()) else { return };
+    let first = sessions[0].time_s.as_ref().map_or(from_s, |time| time[0]);
+    let total = per_s * (last - first);
+    let mut fault = of_rows(&sessions[0], FaultName::Drift, 0..sessions[0].len());
+    if let Some(session) = sessions.last() {
+        fault.last_line = session.line[session.len() - 1];
+    }
+    fault.until_s = Some(last);
+    fault.rows = sessions.iter().map(|session| session.len() as u64).sum();
+    (fault.channel, fault.treatment) = (Some(Quantity::Error), Treatment::Repaired);
+    fault.size_arcsec = Some(total / ARCSEC);
+    fault.what = format!(
+        "the zero of the error drifts by {:.2} arcsec in all (standard deviation {:.2}), alike on both flanks, and not with temperature or \
+         position: a straight line in time is taken out",
+        total / ARCSEC,
+        std * (last - first) / ARCSEC
+    );
+    findings.faults.push(fault);
+    for session in sessions.iter_mut() {
+        if let Some(time) = &session.time_s {
+            session.error_rad.iter_mut().zip(time).for_each(|(error, t)| *error -= per_s * (t - from_s));
+        }
+    }
+}
+
+/// Drift, rad/s, the time at which it is taken as zero (the middle), and its standard deviation.
+fn slope(sessions: &[Session], gear: &Gear) -> Option<(f64, f64, f64)> {
+    if sessions.iter().any(|session| session.time_s.is_none() || session.len() < 2) {
+        return None;
+    }
+    let time = |s: usize, r: usize| sessions[s].time_s.as_ref().map_or(0.0, |time| time[r]);
+    let begin = time(0, 0);
+    let end = sessions.len().checked_sub(1).map(|s| time(s, sessions[s].len() - 1))?;
+    // A clock that was set back gives no common time.
+    let ordered = (1..sessions.len()).all(|s| time(s, 0) >= time(s - 1, sessions[s - 1].len() - 1));
+    if end <= begin || !ordered {
+        return None;
+    }
+    let state = State::new(sessions, gear);
+    let rows: usize = sessions.iter().map(Session::len).sum();
+    let forward = sessions
+        .iter()
+        .enumerate()
+        .map(|(s, session)| (0..session.len()).filter(|row| state.flank(s, *row) > 0.0).count());
+    let forward = forward.sum::<usize>() as f64 / rows as f64;
+    if !(BOTH_FLANKS..=1.0 - BOTH_FLANKS).contains(&forward) {
+        return None;
+    }
+    let tau = |s: usize, r: usize| 2.0 * (time(s, r) - begin) / (end - begin) - 1.0;
+    let by_flank = |s: usize, r: usize| tau(s, r) * state.flank(s, r);
+    let by_load = |s: usize, r: usize| {
+        let torque = sessions[s].torque_n_m.as_ref().map_or(0.0, |torque| torque[r]);
+        tau(s, r) * if torque == 0.0 { 0.0 } else { torque.signum() }
+    };
+    let by_load_size = |s: usize, r: usize| sessions[s].torque_n_m.as_ref().map_or(0.0, |torque| torque[r] * tau(s, r));
+    let all: [Extra; 4] = [&tau, &by_flank, &by_load, &by_load_size];
+    let fit = state.fit(&all)?;
+    let place = fit.value.len() - 4;
+    let value = |k: usize| fit.value[place + k];
+    let (drift, formal) = (value(0), fit.std[place]);
+    // The part that goes with the flank, at the largest torque for the last.
+    let torque = sessions.iter().filter_map(|s| s.torque_n_m.as_ref()).flatten().fold(0.0, |m: f64, t| m.max(t.abs()));
+    let unlike = value(1).abs().max(value(2).abs()).max(value(3).abs() * torque);
+    if drift.abs() * 2.0 < LEAST_RAD || unlike > ALIKE * drift.abs() {
+        return None;
+    }
+    // Sessions that all have load of one sign lie on one flank, whatever their direction.
+    let loaded = sessions.iter().filter_map(|s| s.torque_n_m.as_ref()).flatten();
+    let (mut plus, mut minus) = (0, 0);
+    for torque in loaded {
+        plus += usize::from(*torque > 0.0);
+        minus += usize::from(*torque < 0.0);
+    }
+    if plus + minus > 0 && (plus.min(minus) as f64) < BOTH_FLANKS * (plus + minus) as f64 {
+        return None;
+    }
+    // Time over the recording, alone, has the size 1/√3.
+    if formal > CONFUSED * 3.0_f64.sqrt() * fit.unit_std {
+        return None;
+    }
+    // Once more by stretches: the trend of their medians, which noise of a long memory does not make so certain.
+    let mut stretches: Vec<Vec<f64>> = vec![Vec::new(); STRETCHES];
+    for s in 0..sessions.len() {
+        let left = state.left(&fit, s, &all);
+        for (row, left) in left.iter().enumerate() {
+            let tau = tau(s, row);
+            let place = ((tau + 1.0) / 2.0 * STRETCHES as f64) as usize;
+            stretches[place.min(STRETCHES - 1)].push(left + drift * tau);
+        }
+    }
+    let points: Vec<(f64, f64)> = stretches
+        .iter_mut()
+        .enumerate()
+        .filter(|(_, left)| left.len() >= 8)
+        .map(|(k, left)| ((k as f64 + 0.5) / STRETCHES as f64 * 2.0 - 1.0, median_of(left)))
+        .collect();
+    let (trend, std) = line(&points)?;
+    let certain = (drift / formal).abs() > CERTAIN && (trend / std).abs() > CERTAIN && trend * drift > 0.0;
+    let steady = (trend - drift).abs() < 0.5 * drift.abs();
+    let per_s = 2.0 / (end - begin);
+    (certain && steady).then_some((drift * per_s, 0.5 * (begin + end), std.max(formal) * per_s))
+}
+
+/// Slope of a straight line and its standard deviation, neighbours being correlated as their residuals are.
+fn line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
+    let n = points.len() as f64;
+    if points.len() < 8 {
+        return None;
+    }
+    let (mx, my) = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
+    let (xx, xy) = points.iter().fold((0.0, 0.0), |s, p| (s.0 + (p.0 - mx).powi(2), s.1 + (p.0 - mx) * (p.1 - my)));
+    let slope = xy / xx;
+    let left: Vec<f64> = points.iter().map(|p| p.1 - my - slope * (p.0 - mx)).collect();
+    let own: f64 = left.iter().map(|l| l * l).sum();
+    let next: f64 = left.windows(2).map(|l| l[0] * l[1]).sum();
+    let correlation = if own > 0.0 { (next / own).clamp(0.0, 0.9) } else { 0.0 };
+    let std = (own / (n - 2.0) / xx * (1.0 + correlation) / (1.0 - correlation)).sqrt();
+    Some((slope, std.max(1e-12)))
+}

@@ -1,0 +1,198 @@
+//! Channels that repeat a value while they should change.
+
+use std::ops::Range;
+
+use super::lattice::lattice;
+use super::{ARCSEC, Findings, of_rows};
+use crate::measurement::Session;
+use crate::measurement::columns::Quantity;
+use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::gear::Gear;
+use crate::measurement::robust::{quantile_of, sampled, white_noise};
+
+/// Chance of one false alarm in a file, for a channel with noise.
+const CHANCE: f64 = 1e-6;
+/// Noise of at least this share of a step of the lattice moves a channel on at every second row at least.
+const BLURRED: f64 = 0.6;
+/// Shortest stretch that counts, rows.
+const SHORTEST: usize = 20;
+/// White noise below this is none at the output, rad: what a solver leaves.
+const NO_NOISE_RAD: f64 = 0.02 * ARCSEC;
+/// An output that dwells for longer than this, and catches up in one row, has been frozen; clearance is given back on the way.
+const DWELL_RAD: f64 = 600.0 * ARCSEC;
+/// No clearance is as wide as this.
+const LONG_DWELL_RAD: f64 = 1200.0 * ARCSEC;
+/// A channel without noise that is frozen catches up by so many of its usual largest steps.
+const CATCHES_UP: f64 = 10.0;
+
+/// Stretches of rows with one value, at least `shortest` rows long.
+fn stretches(values: &[f64], shortest: usize, same: impl Fn(f64, f64) -> bool) -> Vec<Range<usize>> {
+    let mut found = Vec::new();
+    let mut begin = 0;
+    for row in 1..=values.len() {
+        if row == values.len() || !same(values[row], values[begin]) {
+            if row - begin >= shortest {
+                found.push(begin..row);
+            }
+            begin = row;
+        }
+    }
+    found
+}
+
+/// Length of a stretch that chance does not give in so many rows, of a channel that changes at every second row at least.
+fn beyond_chance(rows: usize) -> usize {
+    let length = (CHANCE / rows.max(1) as f64).ln() / 0.5_f64.ln();
+    SHORTEST.max(length.ceil() as usize)
+}
+
+/// Finds frozen stretches and leaves their rows out; a channel that is frozen throughout is an error.
+pub(in crate::measurement) fn check(
+    sessions: &mut Vec<Session>,
+    gear: &Gear,
+    error_recorded: bool,
+    findings: &mut Findings,
+) -> Result<(), String> {
+    let rows: usize = sessions.iter().map(Session::len).sum();
+    let outputs: Vec<Vec<f64>> = sessions.iter().map(|session| session.output_rad(gear.ratio)).collect();
+    let (noise, step) = noise_and_step(&outputs.iter().map(Vec::as_slice).collect::<Vec<_>>());
+    let noisy = noise > BLURRED * step && noise > NO_NOISE_RAD;
+    let mut drop: Vec<Vec<bool>> = sessions.iter().map(|session| vec![false; session.len()]).collect();
+    for (number, (session, output)) in sessions.iter().zip(&outputs).enumerate() {
+        let generator = &session.generator_rad;
+        // Digits of an error that was written down leave something of the angle.
+        let digits = if error_recorded { 1e-3 * ARCSEC } else { 0.0 };
+        let same = |a: f64, b: f64| (a - b).abs() <= digits + 1e-13 * (a.abs() + b.abs());
+        let mut frozen: Vec<(Quantity, Range<usize>, f64)> = Vec::new();
+        let follower = if error_recorded { Quantity::Error } else { Quantity::Output };
+        for stretch in stretches(output, 3, same) {
+            let missed = missed(generator, &stretch) / gear.ratio.abs();
+            let catches_up = output.get(stretch.end).is_some_and(|next| {
+                let due = (generator[stretch.end] - generator[stretch.start]) / gear.ratio;
+                let made = next - output[stretch.start];
+                made * due.signum() > 0.5 * due.abs() && due.abs() > 0.5 * missed
+            });
+            let by_dwell = missed > LONG_DWELL_RAD || (missed > DWELL_RAD && catches_up);
+            if by_dwell || (noisy && stretch.len() >= beyond_chance(rows)) {
+                frozen.push((follower, stretch, missed));
+            }
+        }
+        if error_recorded {
+            let (noise, step) = noise_and_step(&[&session.error_rad]);
+            let noisy = noise > BLURRED * step && noise > NO_NOISE_RAD;
+            for stretch in stretches(&session.error_rad, beyond_chance(rows), |a, b| a == b) {
+                if noisy || stretch.len() == session.len() {
+                    frozen.push((Quantity::Error, stretch, 0.0));
+                }
+            }
+        }
+        for stretch in stretches(generator, 3, |a, b| a == b) {
+            let moved = missed_by(output, &stretch);
+            let catches_up = generator.get(stretch.end).is_some_and(|next| {
+                let due = (output[stretch.end] - output[stretch.start]) * gear.ratio;
+                (next - generator[stretch.start]) * due.signum() > 0.5 * due.abs()
+            });
+            if !error_recorded && (moved > LONG_DWELL_RAD || (moved > DWELL_RAD && catches_up)) {
+                frozen.push((Quantity::Generator, stretch, moved));
+            }
+        }
+        for (channel, stretch, missed) in frozen {
+            let mut fault = of_rows(session, FaultName::FrozenChannel, stretch.clone());
+            (fault.channel, fault.treatment) = (Some(channel), Treatment::Masked);
+            fault.size_arcsec = Some(missed / ARCSEC);
+            fault.what = format!(
+                "the {channel} keeps one value over {} rows, in which it should have moved by {:.1} arcsec at the output: they are left out",
+                stretch.len(),
+                missed / ARCSEC
+            );
+            findings.faults.push(fault);
+            drop[number][stretch].iter_mut().for_each(|row| *row = true);
+        }
+    }
+    let left: usize = drop.iter().flatten().filter(|dropped| !**dropped).count();
+    if 2 * left < rows {
+        let fault = findings.faults.iter().find(|fault| fault.name == FaultName::FrozenChannel);
+        let channel = fault.and_then(|fault| fault.channel).map_or("output", Quantity::name);
+        return Err(format!(
+            "the {channel} keeps one value over {} of {rows} rows; allowed: at most half of them",
+            rows - left
+        ));
+    }
+    beside(sessions, Quantity::Torque, rows, findings);
+    beside(sessions, Quantity::Temperature, rows, findings);
+    for (session, drop) in sessions.iter_mut().zip(&drop) {
+        if drop.contains(&true) {
+            session.leave_out(drop);
+        }
+    }
+    sessions.retain(|session| !session.is_empty());
+    Ok(())
+}
+
+/// White noise and resolution of a channel; no lattice is a step of zero.
+fn noise_and_step(series: &[&[f64]]) -> (f64, f64) {
+    let longest = series.iter().max_by_key(|values| values.len()).copied().unwrap_or(&[]);
+    (white_noise(series.iter().copied()), lattice(longest).unwrap_or(0.0))
+}
+
+/// The farthest an angle goes from its first value in a stretch.
+fn missed_by(values: &[f64], stretch: &Range<usize>) -> f64 {
+    values[stretch.clone()].iter().map(|value| (value - values[stretch.start]).abs()).fold(0.0, f64::max)
+}
+
+fn missed(generator: &[f64], stretch: &Range<usize>) -> f64 {
+    missed_by(generator, stretch)
+}
+
+/// Torque or temperature: frozen stretches are filled by a straight line, the whole channel is left out if half of it is frozen.
+///
+/// A constant load, a load in steps and a soak at one temperature are not faults: only a channel with noise that lost it, or a
+/// channel that always changes, stands, and catches up at once, is frozen.
+fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, findings: &mut Findings) {
+    let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(channel)).collect();
+    if series.is_empty() {
+        return;
+    }
+    let (noise, step) = noise_and_step(&series);
+    let steps: Vec<f64> = series.iter().flat_map(|v| v.windows(2).map(|v| (v[1] - v[0]).abs())).collect();
+    let standing = steps.iter().filter(|step| **step == 0.0).count();
+    let usual = quantile_of(&mut sampled(&steps), 0.99);
+    let longest = beyond_chance(rows);
+    let mut frozen = Vec::new();
+    for (number, values) in sessions.iter().enumerate().filter_map(|(k, session)| Some((k, session.beside(channel)?))) {
+        for stretch in stretches(values, longest, |a, b| a == b) {
+            // No load at all is a load, and may be written as exactly nothing.
+            if values[stretch.start] == 0.0 {
+                continue;
+            }
+            // Without this stretch the channel stands in so many of its steps.
+            let elsewhere = (standing + 1).saturating_sub(stretch.len()) as f64 / (rows - stretch.len()).max(1) as f64;
+            let noisy = noise > BLURRED * step && noise > 0.0 && elsewhere < 0.5;
+            let back = values.get(stretch.end).map_or(0.0, |next| (next - values[stretch.start]).abs());
+            let smooth = elsewhere < 0.02 && back > CATCHES_UP * usual && usual > 0.0;
+            if noisy || smooth {
+                frozen.push((number, stretch));
+            }
+        }
+    }
+    let count: usize = frozen.iter().map(|(_, stretch)| stretch.len()).sum();
+    let useless = 2 * count > rows;
+    for (number, stretch) in frozen {
+        let mut fault = of_rows(&sessions[number], FaultName::FrozenChannel, stretch.clone());
+        fault.channel = Some(channel);
+        fault.treatment = if useless { Treatment::Masked } else { Treatment::Repaired };
+        let done = if useless { "the channel is not used" } else { "a straight line is put in its place" };
+        fault.what = format!("the {channel} keeps one value over {} rows: {done}", stretch.len());
+        findings.faults.push(fault);
+        if let Some(values) = sessions[number].beside_mut(channel) {
+            let from = values[stretch.start];
+            let to = values.get(stretch.end).copied().unwrap_or(from);
+            for row in stretch.clone() {
+                values[row] = from + (to - from) * (row - stretch.start) as f64 / stretch.len() as f64;
+            }
+        }
+    }
+    if useless {
+        sessions.iter_mut().for_each(|session| session.forget(channel));
+    }
+}

@@ -1,0 +1,84 @@
+//! What is wrong with data, found before any physics is blamed. One file for each kind, its thresholds at its head.
+//!
+//! Two grades: what cannot go on is an error with one message; all else is a [`Fault`] that is named, and repaired or left out.
+//!
+//! | found | done |
+//! |---|---|
+//! | no table, no such column, text for a number, a row too short or too long, under 16 rows, nothing moves, more than half frozen, units that cannot be told | error |
+//! | torque, temperature, orientation or time missing in up to 10 rows in a row | filled by a straight line |
+//! | an angle missing, a longer hole, a last line that breaks off | rows left out |
+//! | a channel beside the angles missing in over half of the rows | channel left out |
+//! | rows missing, by steps of time | named |
+//! | rows out of order or repeated | rows left out |
+//! | clock set back | new session |
+//! | clock too coarse, stamps that jitter while the motion does not | rows spaced evenly |
+//! | a unit, sign or exchange of columns that the ratio, a wrap or a limit gives away | converted |
+//! | output or generator frozen | rows left out |
+//! | torque or temperature frozen | straight line, or channel left out |
+//! | single rows out | rows left out (torque, temperature: mended) |
+//! | index jump | step taken out |
+//! | drift | straight line in time taken out |
+//! | coarse resolution, implausible time | named |
+
+pub(super) mod clock;
+pub(super) mod drift;
+pub(super) mod frozen;
+pub(super) mod lattice;
+pub(super) mod missing;
+pub(super) mod outliers;
+pub(super) mod resolution;
+mod state;
+pub(super) mod steps;
+pub(super) mod units;
+pub(super) mod wrap;
+
+use std::ops::Range;
+
+use super::Session;
+use super::fault::{Fault, FaultName, ToothStep, Treatment};
+use super::log::Log;
+
+/// An arc-second, rad.
+const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
+
+/// What the checks have found so far.
+#[derive(Debug, Default)]
+pub(super) struct Findings {
+    pub faults: Vec<Fault>,
+    pub tooth_steps: Vec<ToothStep>,
+    pub notes: Vec<String>,
+}
+
+/// A fault from row `first` to row `last` of a log, to be completed.
+fn span(log: &Log, name: FaultName, first: usize, last: usize) -> Fault {
+    Fault {
+        name,
+        channel: None,
+        time_s: log.time_at(first),
+        until_s: log.time_at(last),
+        first_line: log.line[first],
+        last_line: log.line[last],
+        rows: (last - first + 1) as u64,
+        size_arcsec: None,
+        treatment: Treatment::Kept,
+        what: String::new(),
+    }
+}
+
+/// A fault in some rows (at least one) of a session, to be completed.
+fn of_rows(session: &Session, name: FaultName, rows: Range<usize>) -> Fault {
+    let last = rows.end - 1;
+    let time = |row: usize| session.time_s.as_ref().map(|time| time[row]);
+    Fault {
+        name,
+        channel: None,
+        time_s: time(rows.start),
+        until_s: time(last),
+        first_line: session.line[rows.start],
+        last_line: session.line[last],
+        rows: rows.len() as u64,
+        size_arcsec: None,
+        treatment: Treatment::Kept,
+        what: String::new(),
+    }
+}

@@ -1,0 +1,81 @@
+//! A resolution so coarse that no noise blurs it.
+
+use super::lattice::lattice;
+use super::{ARCSEC, Findings, of_rows};
+use crate::measurement::Session;
+use crate::measurement::columns::Quantity;
+use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::gear::Gear;
+use crate::measurement::robust::white_noise;
+
+/// Steps at the output below this are those of good encoders (19 bits a turn), and below what a drive repeats.
+const COARSE_RAD: f64 = 2.5 * ARCSEC;
+/// Noise of more than this share of a step blurs it, so that averages go below the step; a step alone leaves 0.29 of it.
+const BLURRED: f64 = 0.7;
+
+/// A step is real if the output leaves this share of it as noise…
+const SEEN: f64 = 0.15;
+/// …or the channel stands in this share of the rows while the other one moves…
+const STANDS: f64 = 0.3;
+/// …or, in even motion, its changes from row to row are uneven by a step in this share. A generator that is commanded from one round number
+/// to the next lies on a lattice too, and is exact.
+const UNEVEN: f64 = 0.1;
+
+/// Resolutions that show in the data, in rad at the output.
+pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> Vec<(Quantity, f64)> {
+    let Some(session) = sessions.iter().max_by_key(|session| session.len()) else { return Vec::new() };
+    let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
+    let (generator, output) = (&session.generator_rad, session.output_rad(gear.ratio));
+    let share = |rows: &mut dyn Iterator<Item = (bool, bool)>| {
+        let (mut of, mut are) = (0_usize, 0_usize);
+        for (counts, is) in rows {
+            of += usize::from(counts);
+            are += usize::from(counts && is);
+        }
+        are as f64 / of.max(1) as f64
+    };
+    // Round-off of an output that is the sum of two columns is no motion.
+    let stands = |values: &[f64], others: &[f64], least: f64| {
+        let moved = |v: &[f64], row: usize| (v[row] - v[row - 1]).abs() > least;
+        share(&mut (1..values.len()).map(|row| (moved(others, row), !moved(values, row))))
+    };
+    let uneven = |values: &[f64], step: f64| {
+        share(&mut values.windows(3).map(|v| (true, (v[2] - 2.0 * v[1] + v[0]).abs() > 0.5 * step)))
+    };
+    let mut found = Vec::new();
+    let (channel, measured) =
+        if error_recorded { (Quantity::Error, &session.error_rad) } else { (Quantity::Output, &output) };
+    if let Some(step) = lattice(measured)
+        && (noise >= SEEN * step
+            || uneven(measured, step) >= UNEVEN
+            || stands(measured, generator, 1e-3 * step) >= STANDS)
+    {
+        found.push((channel, step));
+    }
+    if let Some(step) = lattice(generator)
+        && (uneven(generator, step) >= UNEVEN || stands(generator, &output, 1e-3 * step) >= STANDS)
+    {
+        found.push((Quantity::Generator, step / gear.ratio.abs()));
+    }
+    found
+}
+
+/// Names a resolution of output or generator that is coarse at the output; nothing can be done about it.
+pub(in crate::measurement) fn check(sessions: &[Session], gear: &Gear, error_recorded: bool, findings: &mut Findings) {
+    let Some(session) = sessions.iter().max_by_key(|session| session.len()) else { return };
+    let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
+    for (channel, step) in seen(sessions, gear, error_recorded) {
+        if step < COARSE_RAD || noise > BLURRED * step {
+            continue;
+        }
+        let mut fault = of_rows(session, FaultName::Quantisation, 0..session.len());
+        (fault.channel, fault.treatment) = (Some(channel), Treatment::Kept);
+        fault.size_arcsec = Some(step / ARCSEC);
+        fault.what = format!(
+            "the {channel} has a resolution of {:.2} arcsec at the output, and too little noise to blur it ({:.2} arcsec)",
+            step / ARCSEC,
+            noise / ARCSEC
+        );
+        findings.faults.push(fault);
+    }
+}

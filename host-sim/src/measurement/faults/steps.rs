@@ -1,0 +1,374 @@
+//! Steps of the error that last: an encoder that lost its index, or a drive that has ratcheted.
+//!
+//! A step is made within one row, faster than an output at rest could give it (a dwell in the clearance changes the error by no more
+//! than the generator moves), and it stays, through reversals and at any load. Clearance that is thrown over, wind-up and
+//! damaged teeth do not: they come back with the state of the drive.
+
+use super::state::{Extra, Fit, State};
+use super::{ARCSEC, Findings, of_rows};
+use crate::measurement::Session;
+use crate::measurement::columns::Quantity;
+use crate::measurement::fault::{FaultName, ToothStep, Treatment};
+use crate::measurement::gear::Gear;
+use crate::measurement::robust::{median_and_std, median_of, sampled, white_noise};
+
+/// A change in one row that is suspected exceeds the motion of the generator, over the ratio, by this factor…
+const FASTER_THAN_DWELL: f64 = 1.5;
+/// …and the robust spread of all such changes so many times.
+const SUDDEN: f64 = 10.0;
+/// Means over so many rows before and after are compared…
+const WINDOW: usize = 16;
+/// …and suspected from so many robust standard deviations of all such comparisons on.
+const STANDS_OUT: f64 = 8.0;
+/// The lasting part of a step is so many standard deviations.
+const LASTS: f64 = 8.0;
+/// The lasting part and the sudden part agree within this share.
+const AGREES: f64 = 0.4;
+/// A step is taken back by one of the other sign that differs by less than this share.
+const TAKEN_BACK: f64 = 0.2;
+/// No step smaller than this is looked for, rad.
+const LEAST_RAD: f64 = 5.0 * ARCSEC;
+/// Nor one that is not seen from one row to the next: so many standard deviations of the white noise.
+const SEEN: f64 = 6.0;
+/// Steps looked for at a time, and rounds of looking.
+const AT_ONCE: usize = 8;
+const ROUNDS: usize = 4;
+/// A step is that many whole tooth pitches if it differs by less than this share of one.
+const WHOLE_PITCH: f64 = 0.01;
+/// Load of this share of its largest holds the drive on one flank.
+const HELD: f64 = 0.1;
+/// Wider than any traverse of the clearance, rad: such a step may follow a reversal.
+const LONGEST_TRAVERSE_RAD: f64 = 1200.0 * ARCSEC;
+/// Wider than any clearance, rad: such a step needs no load to show that no flank was changed.
+const WIDER_THAN_CLEARANCE_RAD: f64 = 180.0 * ARCSEC;
+/// A change of load by this share of its largest, near the step, may be wind-up.
+const LOAD_STEP: f64 = 0.03;
+/// Its noise alone changes it by no more than so many of its standard deviations.
+const LOAD_NOISE: f64 = 8.0;
+/// And its usual pace no more than so many times.
+const LOAD_PACE: f64 = 6.0;
+/// A jump stands alone: so many rows before and after it change the error by less than half as much.
+const APART: usize = 12;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Place {
+    session: usize,
+    row: usize,
+}
+
+impl Place {
+    fn reached(self, session: usize, row: usize) -> f64 {
+        f64::from(u8::from((session, row) >= (self.session, self.row)))
+    }
+}
+
+/// A column that steps from 0 to 1.
+fn column(place: Place) -> impl Fn(usize, usize) -> f64 {
+    move |session, row| place.reached(session, row)
+}
+
+/// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Gives whether all steps found are told apart.
+pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> bool {
+    let Some((steps, doubtful)) = find(sessions, gear) else { return true };
+    for (place, size, _) in &doubtful {
+        let line = sessions[place.session].line[place.row];
+        findings.notes.push(format!(
+            "line {line}: the error steps by {:.1} arcsec; a jump of an encoder or a change of flank, which these data do not tell",
+            size / ARCSEC
+        ));
+    }
+    for (place, size, std) in steps {
+        let session = &sessions[place.session];
+        let fault = of_rows(session, FaultName::EncoderIndexJump, place.row..place.row + 1);
+        if let Some(pitch) = gear.tooth_pitch_rad {
+            let pitches = (size / pitch).round();
+            if pitches != 0.0 && (size - pitches * pitch).abs() < (5.0 * std).max(WHOLE_PITCH * pitch) {
+                findings.tooth_steps.push(ToothStep {
+                    session: place.session,
+                    row: place.row,
+                    line: fault.first_line,
+                    time_s: fault.time_s,
+                    size_arcsec: size / ARCSEC,
+                    pitches: pitches as i32,
+                });
+                continue;
+            }
+        }
+        let mut fault = fault;
+        fault.channel = Some(Quantity::Error);
+        fault.size_arcsec = Some(size / ARCSEC);
+        fault.treatment = Treatment::Repaired;
+        fault.what = format!(
+            "the error steps by {:.1} arcsec (standard deviation {:.1}) within one row and stays there: an encoder has lost its index; the \
+             step is taken out",
+            size / ARCSEC,
+            std / ARCSEC
+        );
+        fault.until_s = None;
+        findings.faults.push(fault);
+        for (number, session) in sessions.iter_mut().enumerate().skip(place.session) {
+            let from = if number == place.session { place.row } else { 0 };
+            session.error_rad[from..].iter_mut().for_each(|error| *error -= size);
+        }
+    }
+    doubtful.is_empty()
+}
+
+/// A step with its size and standard deviation.
+type Step = (Place, f64, f64);
+
+/// Lasting steps, and those that may be a change of flank.
+fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<Step>)> {
+    let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
+    let state = State::new(sessions, gear);
+    let settled = state.settled();
+    let mut places = sudden(sessions, gear, noise, &settled);
+    let mut rejected: Vec<Place> = Vec::new();
+    let mut steps: Vec<Step> = Vec::new();
+    for round in 0..ROUNDS {
+        // Drop one by one what does not last, the weakest first.
+        let fit = loop {
+            let columns: Vec<_> = places.iter().copied().map(column).collect();
+            let extras: Vec<Extra> = columns.iter().map(|column| column as Extra).collect();
+            let fit = state.fit(&extras)?;
+            let first = fit.value.len() - places.len();
+            let strength = |k: usize| {
+                strength(sessions, gear, noise, &settled, places[k], fit.value[first + k], fit.std[first + k])
+            };
+            let weakest = (0..places.len()).min_by(|a, b| strength(*a).total_cmp(&strength(*b)));
+            match weakest {
+                Some(k) if strength(k) < 1.0 => {
+                    rejected.push(places.remove(k));
+                }
+                _ => break fit,
+            }
+        };
+        let first = fit.value.len() - places.len();
+        steps = places.iter().enumerate().map(|(k, p)| (*p, fit.value[first + k], fit.std[first + k])).collect();
+        if round + 1 == ROUNDS {
+            break;
+        }
+        let known: Vec<Place> = places.iter().chain(&rejected).copied().collect();
+        let more = standing_out(sessions, gear, noise, &state, &settled, &fit, &places, &known);
+        if more.is_empty() {
+            break;
+        }
+        places.extend(more);
+        places.sort_by_key(|place| (place.session, place.row));
+    }
+    // What comes and goes by the same amount does not last: teeth and clearance that fast motion samples once.
+    let taken_back = |(place, size, _): &Step| {
+        steps.iter().any(|(other, back, _)| other != place && (size + back).abs() < TAKEN_BACK * size.abs())
+    };
+    steps = steps.iter().copied().filter(|step| !taken_back(step)).collect();
+    let (sure, doubtful): (Vec<Step>, Vec<Step>) = steps
+        .iter()
+        .copied()
+        .partition(|(place, size, _)| no_flank_was_changed(sessions, &state, &steps, *place, *size));
+    Some((sure, doubtful))
+}
+
+/// The change of the error into a row beyond what a dwell could give, 0 if less. An output dwells after the generator turned back.
+fn beyond_dwell(session: &Session, row: usize, settled: &[bool], gear: &Gear) -> f64 {
+    let change = session.error_rad[row] - session.error_rad[row - 1];
+    if settled[row] {
+        return change;
+    }
+    let motion = FASTER_THAN_DWELL * ((session.generator_rad[row] - session.generator_rad[row - 1]) / gear.ratio).abs();
+    change.signum() * (change.abs() - motion).max(0.0)
+}
+
+/// Rows into which the error changes more than anything smooth explains, the largest changes first.
+fn sudden(sessions: &[Session], gear: &Gear, noise: f64, settled: &[Vec<bool>]) -> Vec<Place> {
+    let changes: Vec<f64> =
+        sessions.iter().flat_map(|session| session.error_rad.windows(2).map(|error| error[1] - error[0])).collect();
+    let usual = median_and_std(&mut sampled(&changes)).1;
+    let least = (SUDDEN * usual.max(noise)).max(LEAST_RAD);
+    let mut found: Vec<(Place, f64)> = Vec::new();
+    for (number, session) in sessions.iter().enumerate() {
+        for row in 1..session.len() {
+            let by = beyond_dwell(session, row, &settled[number], gear).abs();
+            if by > least {
+                found.push((Place { session: number, row }, by));
+            }
+        }
+    }
+    largest(found, &[])
+}
+
+/// The places of the largest values, apart from each other and from those known.
+fn largest(mut found: Vec<(Place, f64)>, known: &[Place]) -> Vec<Place> {
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut places: Vec<Place> = Vec::new();
+    for (place, _) in found {
+        let near = |other: &Place| other.session == place.session && other.row.abs_diff(place.row) < WINDOW / 2;
+        if !places.iter().chain(known).any(near) {
+            places.push(place);
+            if places.len() == AT_ONCE {
+                break;
+            }
+        }
+    }
+    places.sort_by_key(|place| (place.session, place.row));
+    places
+}
+
+/// Rows where means before and after differ more than they do elsewhere, in what state and known steps leave.
+#[allow(clippy::too_many_arguments, reason = "all that is known of the recording")]
+fn standing_out(
+    sessions: &[Session],
+    gear: &Gear,
+    noise: f64,
+    state: &State,
+    settled: &[Vec<bool>],
+    fit: &Fit,
+    places: &[Place],
+    known: &[Place],
+) -> Vec<Place> {
+    let columns: Vec<_> = places.iter().copied().map(column).collect();
+    let extras: Vec<Extra> = columns.iter().map(|column| column as Extra).collect();
+    let differences: Vec<Vec<f64>> = (0..sessions.len())
+        .map(|number| {
+            let left = state.left(fit, number, &extras);
+            let mut sums = vec![0.0; left.len() + 1];
+            for row in 0..left.len() {
+                sums[row + 1] = sums[row] + left[row];
+            }
+            let mean = |from: usize, to: usize| (sums[to] - sums[from]) / (to - from) as f64;
+            (0..left.len())
+                .map(|row| {
+                    let inside = row >= WINDOW && row + WINDOW <= left.len();
+                    if inside { mean(row, row + WINDOW) - mean(row - WINDOW, row) } else { 0.0 }
+                })
+                .collect()
+        })
+        .collect();
+    let usual = median_and_std(&mut differences.iter().flat_map(|d| sampled(d)).collect::<Vec<_>>()).1;
+    let least = (STANDS_OUT * usual).max(LEAST_RAD);
+    let mut found = Vec::new();
+    for (number, (session, differences)) in sessions.iter().zip(&differences).enumerate() {
+        for row in 1..session.len() {
+            let size = differences[row];
+            if size.abs() > least {
+                // Of the rows around, the one where it happens.
+                let sharp = beyond_dwell(session, row, &settled[number], gear) * size.signum();
+                if sharp > (1.0 - AGREES) * size.abs() - 4.0 * noise {
+                    found.push((Place { session: number, row }, size.abs()));
+                }
+            }
+        }
+    }
+    largest(found, known)
+}
+
+/// At least 1 for a step that lasts, is sudden, and is the same in both views.
+fn strength(
+    sessions: &[Session],
+    gear: &Gear,
+    noise: f64,
+    settled: &[Vec<bool>],
+    place: Place,
+    size: f64,
+    std: f64,
+) -> f64 {
+    let session = &sessions[place.session];
+    let wide = size.abs() > LONGEST_TRAVERSE_RAD;
+    if (!settled[place.session][place.row] && !wide) || others_change_as_much(session, place.row, size) {
+        return 0.0;
+    }
+    let change = session.error_rad[place.row] - session.error_rad[place.row - 1];
+    let motion = ((session.generator_rad[place.row] - session.generator_rad[place.row - 1]) / gear.ratio).abs();
+    let agrees = (change - size).abs() < AGREES * size.abs() + 6.0 * noise + 0.5 * motion;
+    let loaded = load_changes(session, place.row, largest_torque(sessions)) && !whole_pitches(size, gear);
+    if !agrees || loaded || size.abs() < LEAST_RAD.max(SEEN * noise) {
+        return 0.0;
+    }
+    // Seen close by, so that a slow change is no step: medians of a few rows.
+    let beside = 6.min(place.row).min(session.len() - place.row);
+    let mut before = session.error_rad[place.row - beside..place.row].to_vec();
+    let mut after = session.error_rad[place.row..place.row + beside].to_vec();
+    let local = median_of(&mut after) - median_of(&mut before);
+    let mut paces: Vec<f64> = session.error_rad[place.row - beside..place.row + beside]
+        .windows(2)
+        .map(|error| (error[1] - error[0]).abs())
+        .collect();
+    let moves = beside as f64 * median_of(&mut paces);
+    if (local - size).abs() > AGREES * size.abs() + 4.0 * noise + moves {
+        return 0.0;
+    }
+    size.abs() / (LASTS * std).max(1e-300)
+}
+
+fn whole_pitches(size: f64, gear: &Gear) -> bool {
+    gear.tooth_pitch_rad.is_some_and(|pitch| {
+        let pitches = (size / pitch).round();
+        pitches != 0.0 && (size - pitches * pitch).abs() < WHOLE_PITCH * pitch
+    })
+}
+
+fn largest_torque(sessions: &[Session]) -> f64 {
+    sessions
+        .iter()
+        .filter_map(|s| s.torque_n_m.as_ref())
+        .flatten()
+        .fold(0.0, |most: f64, torque| most.max(torque.abs()))
+}
+
+/// Whether load changes at once, by more than its noise and its usual pace, near a row.
+fn load_changes(session: &Session, row: usize, largest: f64) -> bool {
+    session.torque_n_m.as_ref().is_some_and(|torque| {
+        let around = &torque[row.saturating_sub(50)..(row + 50).min(torque.len())];
+        let mut paces: Vec<f64> = around.windows(2).map(|t| (t[1] - t[0]).abs()).collect();
+        let usual =
+            (LOAD_STEP * largest).max(LOAD_NOISE * white_noise([around])).max(LOAD_PACE * median_of(&mut paces));
+        let near = &torque[row.saturating_sub(4)..(row + 4).min(torque.len())];
+        largest > 0.0 && near.windows(2).any(|t| (t[1] - t[0]).abs() > usual)
+    })
+}
+
+/// Whether the error changes about as much in other rows near by: ringing, a change of speed, a traverse of the clearance.
+fn others_change_as_much(session: &Session, row: usize, size: f64) -> bool {
+    let near = row.saturating_sub(APART).max(1)..(row + APART + 1).min(session.len());
+    near.filter(|k| *k != row).any(|k| (session.error_rad[k] - session.error_rad[k - 1]).abs() > 0.5 * size.abs())
+}
+
+/// Whether a step cannot be a change of flank: the output came back to where it happened and the step did not, or load held the flank,
+/// or no clearance is so wide.
+fn no_flank_was_changed(sessions: &[Session], state: &State, steps: &[Step], place: Place, size: f64) -> bool {
+    if size.abs() > WIDER_THAN_CLEARANCE_RAD {
+        return true;
+    }
+    let here = sessions[place.session].generator_rad[place.row];
+    let mut crossings = 0;
+    for session in sessions {
+        let mut side = 0.0;
+        for psi in &session.generator_rad {
+            let away = psi - here;
+            if away.abs() > 0.5 {
+                if side * away < 0.0 {
+                    crossings += 1;
+                }
+                side = away.signum();
+            }
+        }
+    }
+    if crossings >= 2 {
+        let in_time = |s: usize, r: usize| place.reached(s, r);
+        let in_angle = |s: usize, r: usize| f64::from(u8::from(sessions[s].generator_rad[r] >= here));
+        // The other steps are there in either case.
+        let others: Vec<_> =
+            steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
+        let with = |this: Extra| {
+            let mut extras: Vec<Extra> = others.iter().map(|column| column as Extra).collect();
+            extras.push(this);
+            state.fit(&extras)
+        };
+        let (Some(time), Some(angle)) = (with(&in_time), with(&in_angle)) else { return false };
+        return time.misfit < 0.95 * angle.misfit;
+    }
+    let session = &sessions[place.session];
+    let held =
+        session.torque_n_m.as_ref().is_some_and(|torque| torque[place.row].abs() > HELD * largest_torque(sessions));
+    // The same direction before and after, and a load that says which flank.
+    held && state.flank(place.session, place.row) == state.flank(place.session, place.row - 1)
+}

@@ -1,0 +1,228 @@
+//! Units, signs and columns taken for others.
+
+use super::{Findings, span};
+use crate::measurement::columns::{Column, Quantity, Unit};
+use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::gear::Gear;
+use crate::measurement::log::Log;
+use crate::measurement::robust::{median_of, quantile_of, sampled};
+
+/// The output must have turned by so much, by the generator or by itself, before the ratio is judged: twenty times two
+/// arc-minutes of clearance, so that clearance moves the ratio by less than 5 %.
+const ENOUGH_MOTION_RAD: f64 = 20.0 * 120.0 / 206_265.0;
+/// A ratio this near to one that a mistake gives is that mistake; degrees for arc-minutes (60) and radians for degrees (57.3) are
+/// 4.6 % apart.
+const SAME: f64 = 0.02;
+/// A ratio within these factors of the right one is left to the diagnosis, as an error of the ratio.
+const RATIO_ERROR: [f64; 2] = [0.5, 2.0];
+/// Errors that spread by more (robust, 10°) or less (a thousandth of an arc-second) are not errors of a drive in the unit given.
+const SPREADS_RAD: [f64; 2] = [0.174_5, 1e-3 / 206_265.0];
+/// Temperatures at which a drive exists, °C; kelvins taken for them lie beyond.
+const TEMPERATURES_C: [f64; 2] = [-180.0, 180.0];
+
+/// Finds and repairs units; an error says what cannot be told.
+pub(in crate::measurement) fn check(
+    log: &mut Log,
+    columns: &[Column],
+    gear: &Gear,
+    findings: &mut Findings,
+) -> Result<(), String> {
+    torque(log, gear, findings)?;
+    temperature(log, findings);
+    if log.output_or_error() == Quantity::Output {
+        ratio(log, columns, gear, findings)
+    } else {
+        error_size(log, columns)
+    }
+}
+
+fn name(columns: &[Column], quantity: Quantity) -> &str {
+    columns.iter().find(|column| column.quantity == quantity).map_or(quantity.name(), |column| &column.name)
+}
+
+fn unit(columns: &[Column], quantity: Quantity) -> Unit {
+    columns.iter().find(|column| column.quantity == quantity).map_or(quantity.default_column().1, |column| column.unit)
+}
+
+fn torque(log: &mut Log, gear: &Gear, findings: &mut Findings) -> Result<(), String> {
+    let limit = gear.largest_torque_n_m;
+    let Some(values) = log.get_mut(Quantity::Torque) else { return Ok(()) };
+    let mut sizes: Vec<f64> = sampled(values).into_iter().filter(|t| t.is_finite()).map(f64::abs).collect();
+    let size = quantile_of(&mut sizes, 0.95);
+    if size <= limit {
+        return Ok(());
+    }
+    if size * 1e-3 > limit {
+        return Err(format!("torque: found {size:e} N.m in a twentieth of the rows, allowed: at most {limit:e} N.m"));
+    }
+    values.iter_mut().for_each(|t| *t *= 1e-3);
+    let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
+    (fault.channel, fault.treatment) = (Some(Quantity::Torque), Treatment::Repaired);
+    fault.what = format!("torque of {size:.0} N.m, where {limit:.0} N.m is the most: it is read in mN.m");
+    findings.faults.push(fault);
+    Ok(())
+}
+
+fn temperature(log: &mut Log, findings: &mut Findings) {
+    let Some(values) = log.get_mut(Quantity::Temperature) else { return };
+    let mut some: Vec<f64> = sampled(values).into_iter().filter(|t| t.is_finite()).collect();
+    let median = median_of(&mut some);
+    if (TEMPERATURES_C[0]..=TEMPERATURES_C[1]).contains(&median) {
+        return;
+    }
+    let kelvin = (TEMPERATURES_C[0] + 273.15..=TEMPERATURES_C[1] + 273.15).contains(&median);
+    if kelvin {
+        values.iter_mut().for_each(|t| *t -= 273.15);
+    } else {
+        log.take(Quantity::Temperature);
+    }
+    let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
+    fault.channel = Some(Quantity::Temperature);
+    fault.treatment = if kelvin { Treatment::Repaired } else { Treatment::Masked };
+    let done = if kelvin { "it is read in kelvin" } else { "it is not used" };
+    fault.what = format!("a temperature of {median:.1} degrees C is not plausible: {done}");
+    findings.faults.push(fault);
+}
+
+/// Turns of the output for each of the generator, and how far the output went.
+///
+/// The farthest two rows of each session give the ratio that clearance moves least; the median over pieces of the sessions stands in
+/// where a jump has moved one of the two.
+fn slope(log: &Log) -> Option<(f64, f64, f64)> {
+    let (generator, output) = (log.get(Quantity::Generator)?, log.get(Quantity::Output)?);
+    let bounds: Vec<usize> = (0..=log.len()).filter(|row| *row == log.len() || !log.continues(*row)).collect();
+    let mut whole: Option<(f64, f64)> = None;
+    let mut pieces: Vec<(f64, f64)> = Vec::new();
+    let extent = |from: usize, to: usize| {
+        let by = |a: &usize, b: &usize| generator[*a].total_cmp(&generator[*b]);
+        let (low, high) = ((from..to).min_by(by)?, (from..to).max_by(by)?);
+        Some((generator[high] - generator[low], output[high] - output[low]))
+    };
+    for bound in bounds.windows(2) {
+        let (from, to) = (bound[0], bound[1]);
+        if let Some(found) = extent(from, to)
+            && whole.is_none_or(|(psi, _)| found.0 > psi)
+        {
+            whole = Some(found);
+        }
+        let size = ((to - from) / 32).max(2);
+        pieces.extend((from..to).step_by(size).filter_map(|start| extent(start, (start + size).min(to))));
+    }
+    let (psi, delta) = whole.filter(|(psi, _)| *psi > 0.0)?;
+    // An output that stands still says nothing of the ratio, unless it always does.
+    if pieces.iter().any(|(_, delta)| *delta != 0.0) {
+        pieces.retain(|(_, delta)| *delta != 0.0);
+    }
+    let far = pieces.iter().map(|(psi, _)| *psi).fold(0.0, f64::max);
+    let mut slopes: Vec<f64> =
+        pieces.iter().filter(|(psi, _)| *psi > 0.2 * far).map(|(psi, delta)| delta / psi).collect();
+    let median = median_of(&mut slopes);
+    let slope = if (delta / psi - median).abs() <= 0.1 * median.abs() { delta / psi } else { median };
+    let travel = output.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), d| (a.min(*d), b.max(*d)));
+    Some((slope, psi, travel.1 - travel.0))
+}
+
+fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings) -> Result<(), String> {
+    let Some((slope, psi, travel)) = slope(log) else {
+        findings.notes.push("the generator stands still: nothing that turns with it can be seen".to_owned());
+        return Ok(());
+    };
+    // One for a drive with the ratio given.
+    let found = slope * gear.ratio;
+    if (RATIO_ERROR[0]..=RATIO_ERROR[1]).contains(&found) {
+        return Ok(());
+    }
+    let expected = (psi / gear.ratio).abs();
+    if expected < ENOUGH_MOTION_RAD && travel < ENOUGH_MOTION_RAD {
+        findings.notes.push("too little motion to judge units by the ratio".to_owned());
+        return Ok(());
+    }
+    let (generator, output) = (name(columns, Quantity::Generator), name(columns, Quantity::Output));
+    let seen = format!(
+        "{output} moves by {slope:.6} of {generator}, where the ratio {} asks for {:.6}",
+        gear.ratio,
+        1.0 / gear.ratio
+    );
+    let near = |a: f64| (found / a - 1.0).abs() <= SAME;
+    let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
+    fault.treatment = Treatment::Repaired;
+    if (found / gear.ratio.powi(2) - 1.0).abs() <= 2.5 * SAME {
+        fault.what = format!("{seen}: the two columns are exchanged, and were put right");
+        findings.faults.push(fault);
+        let (a, b) = (log.take(Quantity::Generator), log.take(Quantity::Output));
+        if let (Some(a), Some(b)) = (a, b) {
+            log.put(Quantity::Generator, b);
+            log.put(Quantity::Output, a);
+        }
+        return Ok(());
+    }
+    if (found + 1.0).abs() <= 0.1 {
+        fault.channel = Some(Quantity::Output);
+        fault.what = format!("{seen}: the output counts the other way, and was turned round");
+        findings.faults.push(fault);
+        if let Some(output) = log.get_mut(Quantity::Output) {
+            output.iter_mut().for_each(|angle| *angle = -*angle);
+        }
+        return Ok(());
+    }
+    // One column in a unit other than the one given.
+    for channel in [Quantity::Generator, Quantity::Output] {
+        let given = unit(columns, channel);
+        for candidate in Unit::ANGLES.into_iter().filter(|candidate| *candidate != given) {
+            let scale = candidate.factor() / given.factor();
+            let gives = if channel == Quantity::Generator { scale } else { scale.recip() };
+            if near(gives) {
+                fault.channel = Some(channel);
+                let column = name(columns, channel);
+                fault.what = format!("{seen}: {column} is in {candidate}, not in {given}, and was converted");
+                findings.faults.push(fault);
+                if let Some(values) = log.get_mut(channel) {
+                    values.iter_mut().for_each(|angle| *angle *= scale);
+                }
+                return Ok(());
+            }
+        }
+    }
+    let units = Unit::ANGLES.map(Unit::name).join(", ");
+    Err(if slope == 0.0 || (found.abs() < 0.05 && travel < ENOUGH_MOTION_RAD) {
+        format!(
+            "{output} does not follow: {generator} turns by {psi:.3} rad, {output} by {travel:.6} rad; allowed: an output that turns"
+        )
+    } else {
+        format!(
+            "{seen}; allowed: within a factor of {} of it. Are columns, units ({units}) and ratio right? They are mapped with --columns \
+             generator=NAME:UNIT,output=NAME:UNIT",
+            RATIO_ERROR[1]
+        )
+    })
+}
+
+/// Whether recorded errors have the size of errors.
+fn error_size(log: &Log, columns: &[Column]) -> Result<(), String> {
+    let (Some(error), Some(generator)) = (log.get(Quantity::Error), log.get(Quantity::Generator)) else {
+        return Ok(());
+    };
+    // Freed of a straight line in the generator angle, which a wrong ratio gives.
+    let pairs: Vec<(f64, f64)> = generator.iter().copied().zip(error.iter().copied()).collect();
+    let step = pairs.len().div_ceil(20_000);
+    let some: Vec<(f64, f64)> = pairs.into_iter().step_by(step).collect();
+    let n = some.len() as f64;
+    let mean = some.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
+    let (xx, xy) = some.iter().fold((0.0, 0.0), |s, p| {
+        let (x, y) = (p.0 - mean.0, p.1 - mean.1);
+        (s.0 + x * x, s.1 + x * y)
+    });
+    let slope = if xx > 0.0 { xy / xx } else { 0.0 };
+    let mut left: Vec<f64> = some.iter().map(|p| (p.1 - mean.1 - slope * (p.0 - mean.0)).abs()).collect();
+    let spread = quantile_of(&mut left, 0.75);
+    let (column, given) = (name(columns, Quantity::Error), unit(columns, Quantity::Error));
+    let units = Unit::ANGLES.map(Unit::name).join(", ");
+    if spread > SPREADS_RAD[0] || (spread > 0.0 && spread < SPREADS_RAD[1]) {
+        let found = spread / given.factor();
+        return Err(format!(
+            "{column}: found errors of {found:e} {given}, allowed: between a thousandth of an arc-second and ten degrees. Is its unit \
+             ({units}) right? It is mapped with --columns error=NAME:UNIT"
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,110 @@
+//! Angles that begin anew after a turn, made continuous.
+
+use std::f64::consts::TAU;
+
+use super::{Findings, span};
+use crate::measurement::columns::{Column, Quantity, Unit};
+use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::log::Log;
+use crate::measurement::robust::quantile_of;
+
+/// A column that stays within one turn, and begins anew, covers at least this share of the turn.
+const COVERED: f64 = 0.75;
+/// Times it must begin anew before a unit other than the one given is believed.
+const OFTEN: usize = 3;
+/// Steps up to this share of a turn are told from a wrap without help.
+const UNAMBIGUOUS: f64 = 0.4;
+
+/// Finds wrapped angles (also in a unit other than the one given, which is a fault) and unwraps them.
+pub(in crate::measurement) fn unwrap(log: &mut Log, columns: &[Column], ratio: f64, findings: &mut Findings) {
+    // The output first: it is slow, and shows how far a fast generator has turned.
+    for channel in [Quantity::Output, Quantity::Orientation, Quantity::Generator] {
+        let Some(column) = columns.iter().find(|column| column.quantity == channel) else { continue };
+        let Some(values) = log.get(channel) else { continue };
+        let travel = log
+            .get(Quantity::Output)
+            .filter(|_| channel == Quantity::Generator)
+            .map_or(0.0, |output| span_of(output) * ratio.abs());
+        let Some(unit) = wrapped_at(values, column.unit, travel, log) else { continue };
+        let scale = unit.factor() / column.unit.factor();
+        if unit != column.unit {
+            let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
+            (fault.channel, fault.treatment) = (Some(channel), Treatment::Repaired);
+            fault.what = format!(
+                "{} begins anew after {:.6} {}, one turn in {unit}: it is read in {unit}",
+                column.name,
+                TAU / unit.factor(),
+                column.unit
+            );
+            findings.faults.push(fault);
+        }
+        let Some(mut values) = log.take(channel) else { continue };
+        values.iter_mut().for_each(|value| *value *= scale);
+        let helped = channel == Quantity::Generator && log.get(Quantity::Output).is_some();
+        let output = if helped { log.get(Quantity::Output) } else { None };
+        let ambiguous = along(&mut values, log, ratio, output);
+        findings.notes.push(format!("{} is within one turn: it was made continuous", column.name));
+        if ambiguous {
+            findings.notes.push(format!(
+                "{} moves by more than {UNAMBIGUOUS} turns from row to row: {}",
+                column.name,
+                if helped { "turns are counted by the output angle" } else { "the count of its turns is not certain" }
+            ));
+        }
+        log.put(channel, values);
+    }
+}
+
+/// From the least to the largest of some values.
+fn span_of(values: &[f64]) -> f64 {
+    let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    most - least
+}
+
+/// The unit in which a column stays within one turn and begins anew, as it shows by its steps, or by the output, which has travelled so far.
+fn wrapped_at(values: &[f64], unit: Unit, travel_rad: f64, log: &Log) -> Option<Unit> {
+    let range = span_of(values);
+    let again = |turn: f64| {
+        (1..values.len())
+            .filter(|row| log.continues(*row))
+            .filter(|row| (values[*row] - values[*row - 1]).abs() > 0.6 * turn)
+            .take(OFTEN)
+            .count()
+    };
+    let fits = |candidate: &Unit, covered: f64| {
+        let turn = TAU / candidate.factor() * unit.factor();
+        range <= turn * (1.0 + 1e-6) && range >= covered * turn
+    };
+    if fits(&unit, COVERED) && (again(TAU) > 0 || travel_rad > 1.5 * TAU) {
+        return Some(unit);
+    }
+    let others = Unit::ANGLES.into_iter().filter(|candidate| *candidate != unit);
+    others
+        .into_iter()
+        .find(|candidate| fits(candidate, 0.98) && again(TAU / candidate.factor() * unit.factor()) >= OFTEN)
+}
+
+/// Makes `values` continuous. `output`, if given, is continuous and turns `ratio` times slower; it counts turns where one row is
+/// too far from the next, where a session begins, and at the very first row. Returns whether rows are too far apart.
+fn along(values: &mut [f64], log: &Log, ratio: f64, output: Option<&[f64]>) -> bool {
+    let nearest = |d: f64| d - TAU * (d / TAU).round();
+    let mut steps: Vec<f64> = match output {
+        Some(output) => output.windows(2).map(|o| ((o[1] - o[0]) * ratio).abs()).collect(),
+        None => values.windows(2).map(|v| nearest(v[1] - v[0]).abs()).collect(),
+    };
+    let fast = quantile_of(&mut steps, 0.99) > UNAMBIGUOUS * TAU;
+    if let Some(output) = output {
+        values[0] += TAU * ((output[0] * ratio - values[0]) / TAU).round();
+    }
+    for row in 1..values.len() {
+        let step = match output {
+            Some(output) if fast || !log.continues(row) => {
+                let expected = (output[row] - output[row - 1]) * ratio;
+                expected + nearest(values[row] - values[row - 1] - expected)
+            }
+            _ => nearest(values[row] - values[row - 1]),
+        };
+        values[row] = values[row - 1] + step;
+    }
+    fast
+}

@@ -1,0 +1,30 @@
+//! What the reader has to know of a drive.
+
+/// Ratio, tooth pitch and largest torque of a drive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gear {
+    /// Turns of the generator for one of the output, negative if the output turns against it.
+    pub ratio: f64,
+    /// Pitch of the teeth by which the output skips when the drive ratchets, rad at the output: 2π over the teeth of the wheel that turns.
+    /// `None` for a gear without known teeth.
+    pub tooth_pitch_rad: Option<f64>,
+    /// Torques beyond this, N·m, are in another unit.
+    pub largest_torque_n_m: f64,
+}
+
+impl Gear {
+    /// Torque beyond which a unit is wrong where no drive says more, N·m: drives of common sizes do not take it even for a moment.
+    pub const LARGEST_TORQUE_N_M: f64 = 10_000.0;
+
+    /// A gear of which the ratio is known.
+    pub fn of_ratio(ratio: f64) -> Gear {
+        Gear { ratio, tooth_pitch_rad: None, largest_torque_n_m: Gear::LARGEST_TORQUE_N_M }
+    }
+
+    /// A strain wave gear by its teeth; the flexspline is fixed, or the circular spline.
+    pub fn of_teeth(flexspline: u32, circular_spline: u32, flexspline_fixed: bool) -> Gear {
+        let (f, c) = (f64::from(flexspline), f64::from(circular_spline));
+        let (ratio, turning) = if flexspline_fixed { (c / (c - f), c) } else { (-f / (c - f), f) };
+        Gear { tooth_pitch_rad: Some(std::f64::consts::TAU / turning), ..Gear::of_ratio(ratio) }
+    }
+}

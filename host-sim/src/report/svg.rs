@@ -1,0 +1,138 @@
+//! Pictures for readers whose program runs no script: plain SVG, in arc-seconds.
+
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+
+use super::animation::{Animation, FRAMES, WheelMotion};
+use super::page::{Axis, Lines, Mark, significant};
+
+const WIDTH: f64 = 640.0;
+const HEIGHT: f64 = 300.0;
+const LEFT: f64 = 70.0;
+const BOTTOM: f64 = 45.0;
+const TOP: f64 = 12.0;
+const RIGHT: f64 = 12.0;
+/// Points of a line at most; a sketch has no use for more.
+const MOST_POINTS: usize = 60;
+const COLOURS: [&str; 6] = ["#0063a6", "#b3470c", "#00725a", "#8a3f8f", "#6b5b00", "#555555"];
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+fn span(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (a, b) =
+        values.filter(|v| v.is_finite()).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    if a < b {
+        (a, b)
+    } else if a == b {
+        (a - 1.0, b + 1.0)
+    } else {
+        (0.0, 1.0)
+    }
+}
+
+/// A chart.
+pub(super) fn lines(x: &Axis, y: &Axis, chart: &Lines) -> String {
+    let points = || chart.series.iter().flat_map(|s| s.points.iter());
+    let (x0, x1) = span(points().map(|p| p[0]));
+    let (y0, y1) = span(points().map(|p| p[1]).chain(chart.limits.iter().map(|l| l.y)));
+    let px = |v: f64| LEFT + (v - x0) / (x1 - x0) * (WIDTH - LEFT - RIGHT);
+    let py = |v: f64| HEIGHT - BOTTOM - (v - y0) / (y1 - y0) * (HEIGHT - BOTTOM - TOP);
+    let mut svg = format!(
+        r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" role="img" font-size="12" fill="currentColor">"##
+    );
+    for k in 0..=4 {
+        let share = f64::from(k) / 4.0;
+        let (vx, vy) = (x0 + share * (x1 - x0), y0 + share * (y1 - y0));
+        let _ = write!(
+            svg,
+            r##"<path d="M{LEFT} {1:.1}H{2}" stroke="#8884"/><text x="{3}" y="{1:.1}" text-anchor="end" dy="4">{4}</text><text x="{0:.1}" y="{5}" text-anchor="middle">{6}</text>"##,
+            px(vx),
+            py(vy),
+            WIDTH - RIGHT,
+            LEFT - 6.0,
+            significant(vy, 3),
+            HEIGHT - BOTTOM + 16.0,
+            significant(vx, 3),
+        );
+    }
+    for limit in &chart.limits {
+        let _ = write!(
+            svg,
+            r##"<path d="M{LEFT} {:.1}H{}" stroke="#c00000" stroke-dasharray="2 3"><title>{}</title></path>"##,
+            py(limit.y),
+            WIDTH - RIGHT,
+            escape(&limit.name)
+        );
+    }
+    for series in &chart.series {
+        let colour = COLOURS[series.colour % COLOURS.len()];
+        if series.mark == Mark::Points {
+            for [vx, vy] in series.points.iter().filter(|p| p[1].is_finite()) {
+                let _ = write!(svg, r##"<circle cx="{:.1}" cy="{:.1}" r="2.5" fill="{colour}"/>"##, px(*vx), py(*vy));
+            }
+            continue;
+        }
+        let step = series.points.len().div_ceil(MOST_POINTS).max(1);
+        let mut d = String::new();
+        for [vx, vy] in series.points.iter().step_by(step).chain(series.points.last()).filter(|p| p[1].is_finite()) {
+            let _ = write!(d, "{}{:.1} {:.1}", if d.is_empty() { "M" } else { "L" }, px(*vx), py(*vy));
+        }
+        let dash = if series.mark == Mark::Dashed { r#" stroke-dasharray="6 4""# } else { "" };
+        let _ = write!(
+            svg,
+            r##"<path d="{d}" fill="none" stroke="{colour}" stroke-width="1.5"{dash}><title>{}</title></path>"##,
+            escape(&series.name)
+        );
+    }
+    let _ = write!(
+        svg,
+        r##"<text x="{}" y="{}" text-anchor="middle">{}</text><text transform="translate(12 {}) rotate(-90)" text-anchor="middle">{}</text></svg>"##,
+        0.5 * (LEFT + WIDTH - RIGHT),
+        HEIGHT - 8.0,
+        escape(&x.title()),
+        0.5 * (TOP + HEIGHT - BOTTOM),
+        escape(&y.title()),
+    );
+    svg
+}
+
+/// Outlines of both wheels and the generator at generator angle 0.
+pub(super) fn drive(animation: &Animation) -> String {
+    let reach = animation.circular_spline.nodes.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max) + 1.0;
+    let mut svg = format!(
+        r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="{0:.1} {0:.1} {1:.1} {1:.1}" width="480" role="img" fill="none" stroke="currentColor" stroke-width="0.12">"##,
+        -reach,
+        2.0 * reach
+    );
+    for wheel in [&animation.flexspline, &animation.circular_spline] {
+        let _ = write!(svg, r##"<path d="{}"/>"##, outline(wheel));
+    }
+    for curve in &animation.generator {
+        let points: String = curve.iter().step_by(2).map(|[x, y]| format!("{x:.2},{:.2} ", -y)).collect();
+        let _ = write!(svg, r##"<polygon points="{}"/>"##, points.trim_end());
+    }
+    svg.push_str("</svg>");
+    svg
+}
+
+/// The edges of a wheel that belong to one element: its outline, corner to corner.
+fn outline(wheel: &WheelMotion) -> String {
+    let mut d = String::new();
+    for edge in wheel.outline() {
+        for sector in 0..wheel.sectors {
+            let at = |(node, offset): (usize, usize)| {
+                let sector = sector + offset;
+                let s = (FRAMES * sector) % wheel.samples;
+                let x = wheel.nodes[node][0] + wheel.displacement_mm[2 * node * wheel.samples + s];
+                let y = wheel.nodes[node][1] + wheel.displacement_mm[(2 * node + 1) * wheel.samples + s];
+                let (sin, cos) = (TAU * sector as f64 / wheel.sectors as f64).sin_cos();
+                (cos * x - sin * y, -(sin * x + cos * y))
+            };
+            let ((x0, y0), (x1, y1)) = (at(edge[0]), at(edge[2]));
+            let _ = write!(d, "M{x0:.2} {y0:.2}L{x1:.2} {y1:.2}");
+        }
+    }
+    d
+}

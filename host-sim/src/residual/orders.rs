@@ -1,0 +1,190 @@
+//! Sines of given orders by least squares, and the orders that a strain wave gear has by its teeth.
+
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side};
+use serde::Serialize;
+
+/// What an order is tied to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Wheel {
+    /// Flexspline or generator: whole numbers in a generator turn.
+    FlexsplineOrGenerator,
+    /// Circular spline: whole numbers in a turn of ψ−δ.
+    CircularSpline,
+    /// Output and its encoder: whole numbers in an output turn.
+    Output,
+}
+
+/// An order that a part of the drive makes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct NamedOrder {
+    /// Which part.
+    pub wheel: Wheel,
+    /// Waves in a turn of that part's angle.
+    pub harmonic: u32,
+    /// Waves in a generator turn.
+    pub per_generator_turn: f64,
+}
+
+/// Highest harmonic that is named.
+const NAMED: u32 = 8;
+
+/// Orders that parts of a drive with this ratio make: harmonics 1 to 8 of each.
+pub fn named_orders(ratio: f64) -> Vec<NamedOrder> {
+    let wheels = [
+        (Wheel::FlexsplineOrGenerator, 1.0),
+        (Wheel::CircularSpline, 1.0 - 1.0 / ratio),
+        (Wheel::Output, 1.0 / ratio.abs()),
+    ];
+    let of = |(wheel, turns): (Wheel, f64)| {
+        (1..=NAMED).map(move |harmonic| NamedOrder { wheel, harmonic, per_generator_turn: f64::from(harmonic) * turns })
+    };
+    wheels.into_iter().flat_map(of).collect()
+}
+
+/// A sine `amplitude * sin(order * angle + phase)`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Line {
+    /// Waves in a turn of the angle.
+    pub order: f64,
+    /// Amplitude, in the unit of the data.
+    pub amplitude: f64,
+    /// Phase, rad, −π to π.
+    pub phase_rad: f64,
+    /// Standard deviation of the amplitude if the noise is white.
+    pub amplitude_std: f64,
+}
+
+/// A constant and sines of these orders that fit `y` over `angle` (rad) best, all together; weights are those of the squares.
+/// `None` if the data cannot tell the orders apart, or are too few.
+pub fn harmonics(angle: &[f64], y: &[f64], weight: Option<&[f64]>, orders: &[f64]) -> Option<(f64, Vec<Line>)> {
+    let width = 1 + 2 * orders.len();
+    let n = angle.len().min(y.len());
+    let fit = Normal::of(&angle[..n], y, weight, orders)?;
+    let Normal { inverse, right, yy, .. } = &fit;
+    let value: Vec<f64> = (0..width).map(|a| (0..width).map(|b| inverse[(a, b)] * right[b]).sum()).collect();
+    let said: f64 = value.iter().zip(right).map(|(value, right)| value * right).sum();
+    // Variance of the noise in a row of weight one.
+    let variance = (yy - said).max(0.0) / (n - width) as f64;
+    let unit = fit.amplitude_stds();
+    let lines = orders
+        .iter()
+        .enumerate()
+        .map(|(place, order)| {
+            let (s, c) = (value[1 + 2 * place], value[2 + 2 * place]);
+            let amplitude_std = unit[place] * variance.sqrt();
+            Line { order: *order, amplitude: s.hypot(c), phase_rad: c.atan2(s), amplitude_std }
+        })
+        .collect();
+    Some((value[0], lines))
+}
+
+/// Standard deviation of each amplitude for white noise of one, over that of a sine that stands alone in evenly spread rows: how
+/// much the orders and the places of the rows confuse each other. `None` as for [`harmonics`].
+pub(super) fn confusion(angle: &[f64], weight: Option<&[f64]>, orders: &[f64]) -> Option<Vec<f64>> {
+    let fit = Normal::of(angle, &[], weight, orders)?;
+    Some(fit.amplitude_stds().into_iter().map(|std| std * (angle.len() as f64 / 2.0).sqrt()).collect())
+}
+
+/// Normal equations of a constant and sines.
+struct Normal {
+    inverse: Mat<f64>,
+    right: Vec<f64>,
+    yy: f64,
+}
+
+impl Normal {
+    /// No values stand for zeros.
+    fn of(angle: &[f64], y: &[f64], weight: Option<&[f64]>, orders: &[f64]) -> Option<Normal> {
+        let (width, n) = (1 + 2 * orders.len(), angle.len());
+        if n <= width {
+            return None;
+        }
+        let mut normal = vec![0.0; width * width];
+        let mut right = vec![0.0; width];
+        let mut row = vec![1.0; width];
+        let (mut yy, mut total) = (0.0, 0.0);
+        for k in 0..n {
+            let w = weight.map_or(1.0, |weight| weight[k]);
+            let y = y.get(k).copied().unwrap_or(0.0);
+            for (place, order) in orders.iter().enumerate() {
+                (row[1 + 2 * place], row[2 + 2 * place]) = (order * angle[k]).sin_cos();
+            }
+            for a in 0..width {
+                let wa = w * row[a];
+                right[a] += wa * y;
+                for b in 0..=a {
+                    normal[a * width + b] += wa * row[b];
+                }
+            }
+            yy += w * y * y;
+            total += w;
+        }
+        let matrix = Mat::from_fn(width, width, |a, b| normal[a.max(b) * width + a.min(b)]);
+        let inverse = matrix.llt(Side::Lower).ok()?.solve(Mat::<f64>::identity(width, width));
+        // A variance grown a million times by the other columns is no answer.
+        let sound = |a: usize| inverse[(a, a)].is_finite() && inverse[(a, a)] * total < 1e6;
+        (0..width).all(sound).then_some(Normal { inverse, right, yy })
+    }
+
+    /// Standard deviation of each amplitude for a noise of one in a row of weight one.
+    fn amplitude_stds(&self) -> Vec<f64> {
+        let waves = (self.right.len() - 1) / 2;
+        (0..waves)
+            .map(|k| (0.5 * (self.inverse[(1 + 2 * k, 1 + 2 * k)] + self.inverse[(2 + 2 * k, 2 + 2 * k)])).sqrt())
+            .collect()
+    }
+}
+
+impl Line {
+    /// Its value at an angle, rad.
+    pub fn at(&self, angle: f64) -> f64 {
+        self.amplitude * (self.order * angle + self.phase_rad).sin()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sines_are_recovered_with_phase_and_offset() {
+        let angle: Vec<f64> = (0..400).map(|k| f64::from(k) * 0.11).collect();
+        let y: Vec<f64> =
+            angle.iter().map(|x| 3.0 + 5.0 * (2.0 * x + 0.7).sin() + 1.5 * (3.3 * x - 2.0).sin()).collect();
+        let (constant, lines) = harmonics(&angle, &y, None, &[2.0, 3.3]).unwrap();
+        assert!((constant - 3.0).abs() < 1e-9);
+        assert!((lines[0].amplitude - 5.0).abs() < 1e-9 && (lines[0].phase_rad - 0.7).abs() < 1e-9);
+        assert!((lines[1].amplitude - 1.5).abs() < 1e-9 && (lines[1].phase_rad + 2.0).abs() < 1e-9);
+        assert!((lines[0].at(0.3) - 5.0 * 1.3_f64.sin()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn orders_that_the_data_cannot_tell_apart_are_refused() {
+        let angle: Vec<f64> = (0..400).map(|k| f64::from(k) * 1e-4).collect();
+        assert_eq!(harmonics(&angle, &angle, None, &[2.0, 2.0 * 94.0 / 95.0]), None);
+        assert_eq!(harmonics(&angle[..3], &angle[..3], None, &[2.0]), None);
+    }
+
+    #[test]
+    fn the_standard_deviation_is_that_of_repeated_trials() {
+        let angle: Vec<f64> = (0..300).map(|k| f64::from(k) * 0.13).collect();
+        let mut random = fastrand::Rng::with_seed(9);
+        let (mut sum, mut said) = (0.0, 0.0);
+        for _ in 0..300 {
+            let noise = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+            let y: Vec<f64> = angle
+                .iter()
+                .map(|x| 10.0 * (2.0 * x).sin())
+                .zip(std::iter::repeat_with(noise))
+                .map(|(y, n)| y + n)
+                .collect();
+            let (_, lines) = harmonics(&angle, &y, None, &[2.0]).unwrap();
+            sum += (lines[0].amplitude - 10.0).powi(2);
+            said += lines[0].amplitude_std / 300.0;
+        }
+        let std = (sum / 300.0).sqrt();
+        assert!((said / std - 1.0).abs() < 0.12, "said {said}, seen {std}");
+    }
+}

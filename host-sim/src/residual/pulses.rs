@@ -1,0 +1,148 @@
+//! Pulses that stay in one position of a wheel: a damaged tooth, or a piece of debris in a space.
+
+use std::f64::consts::{PI, TAU};
+
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side};
+use serde::Serialize;
+
+use super::rows::{Axis, Rows};
+use crate::measurement::median_and_std;
+
+/// Bins of a turn: 2 degrees.
+const BINS: usize = 180;
+/// Waves in a turn that are no pulse.
+const WAVES: usize = 4;
+/// Widths of a pulse that are tried (standard deviation of a bell), rad: the arc of engaged teeth is 10 to 30 degrees.
+const WIDTHS_RAD: [f64; 3] = [0.06, 0.12, 0.2];
+/// Standard deviations that a pulse stands out by: of 180 places, 3 widths and 2 periods one does so by chance once in 10^6.
+const STANDS_OUT: f64 = 6.5;
+/// Turns of the axis below which another wheel's lines do not average out.
+const FEWEST_TURNS: f64 = 6.0;
+
+/// A pulse at one position.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Pulse {
+    /// The angle it stays at: ψ for the flexspline, ψ−δ for the circular spline.
+    pub axis: Axis,
+    /// Pulses in a turn: two where both lobes pass the place alike.
+    pub per_turn: u32,
+    /// Its first place in a turn, rad.
+    pub position_rad: f64,
+    /// Standard deviation of its bell, rad.
+    pub width_rad: f64,
+    /// Its height, arcsec, and the standard deviation of that.
+    pub height_arcsec: f64,
+    /// Standard deviation of the height, arcsec.
+    pub height_std_arcsec: f64,
+}
+
+pub(super) fn find(rows: &Rows) -> Vec<Pulse> {
+    let mut found: Vec<Pulse> =
+        [Axis::Generator, Axis::GeneratorLessOutput].into_iter().filter_map(|axis| on(rows, axis)).collect();
+    // Both wheels turn almost alike: a pulse of one is a shadow on the other. The sharper one is meant.
+    let score = |pulse: &Pulse| (pulse.height_arcsec / pulse.height_std_arcsec).abs();
+    if found.len() == 2 {
+        let weaker = usize::from(score(&found[0]) > score(&found[1]));
+        found.remove(weaker);
+    }
+    found
+}
+
+fn on(rows: &Rows, axis: Axis) -> Option<Pulse> {
+    let angle = rows.angle(axis);
+    let (low, high) = angle.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    if high - low < FEWEST_TURNS * TAU {
+        return None;
+    }
+    let centred = rows.centred_by_direction();
+    // First and second half of the rows by themselves: a pulse is in both.
+    let half = angle.len() / 2;
+    let whole = folded(&angle, &centred);
+    let (first, second) = (folded(&angle[..half], &centred[..half]), folded(&angle[half..], &centred[half..]));
+    let best = best(&whole)?;
+    let again = |bins: &[(f64, f64)]| fit(bins, best.1, best.2, best.3).map(|(height, _)| height);
+    let (height, std) = best.0;
+    let agree = [again(&first), again(&second)].into_iter().all(|part| part.is_none_or(|part| part / height > 0.4));
+    agree.then(|| Pulse {
+        axis,
+        per_turn: best.3,
+        position_rad: best.1.rem_euclid(TAU / f64::from(best.3)),
+        width_rad: best.2,
+        height_arcsec: height,
+        height_std_arcsec: std,
+    })
+}
+
+/// Median and number of rows in each bin of a turn.
+fn folded(angle: &[f64], value: &[f64]) -> Vec<(f64, f64)> {
+    let mut bins: Vec<Vec<f64>> = vec![Vec::new(); BINS];
+    for (angle, value) in angle.iter().zip(value) {
+        bins[((angle.rem_euclid(TAU) / TAU * BINS as f64) as usize).min(BINS - 1)].push(*value);
+    }
+    bins.iter_mut().map(|values| (median_and_std(values).0, values.len() as f64)).collect()
+}
+
+type Found = ((f64, f64), f64, f64, u32);
+
+fn best(bins: &[(f64, f64)]) -> Option<Found> {
+    let mut best: Option<Found> = None;
+    for per_turn in [1, 2] {
+        for width in WIDTHS_RAD {
+            for place in 0..BINS / per_turn as usize {
+                let at = (place as f64 + 0.5) / BINS as f64 * TAU;
+                let Some((height, std)) = fit(bins, at, width, per_turn) else { continue };
+                let score = |(height, std): (f64, f64)| (height / std).abs();
+                if score((height, std)) > STANDS_OUT && best.is_none_or(|best| score((height, std)) > score(best.0)) {
+                    best = Some(((height, std), at, width, per_turn));
+                }
+            }
+        }
+    }
+    best
+}
+
+/// Height of a bell and its standard deviation, waves of low order fitted with it.
+fn fit(bins: &[(f64, f64)], at: f64, width: f64, per_turn: u32) -> Option<(f64, f64)> {
+    const COLUMNS: usize = 2 + 2 * WAVES;
+    let period = TAU / f64::from(per_turn);
+    let mut normal = [[0.0; COLUMNS]; COLUMNS];
+    let mut right = [0.0; COLUMNS];
+    let mut yy = 0.0;
+    let mut used = 0.0;
+    let most = bins.iter().map(|bin| bin.1).fold(0.0, f64::max);
+    for (place, (median, count)) in bins.iter().enumerate() {
+        if *count < 1.0 {
+            continue;
+        }
+        let angle = (place as f64 + 0.5) / BINS as f64 * TAU;
+        let off = angle - at;
+        let off = off - period * (off / period).round();
+        let mut row = [1.0; COLUMNS];
+        for wave in 0..WAVES {
+            (row[1 + 2 * wave], row[2 + 2 * wave]) = ((wave + 1) as f64 * angle).sin_cos();
+        }
+        row[COLUMNS - 1] = (-0.5 * (off / width).powi(2)).exp();
+        // Beyond some rows in a bin, it is no longer their noise that matters.
+        let weight = (count / most).sqrt();
+        for a in 0..COLUMNS {
+            right[a] += weight * row[a] * median;
+            for b in 0..COLUMNS {
+                normal[a][b] += weight * row[a] * row[b];
+            }
+        }
+        yy += weight * median * median;
+        used += 1.0;
+    }
+    if used < 0.9 * BINS as f64 {
+        return None;
+    }
+    let matrix = Mat::from_fn(COLUMNS, COLUMNS, |a, b| normal[a][b]);
+    let inverse = matrix.llt(Side::Lower).ok()?.solve(Mat::<f64>::identity(COLUMNS, COLUMNS));
+    let value: Vec<f64> = (0..COLUMNS).map(|a| (0..COLUMNS).map(|b| inverse[(a, b)] * right[b]).sum()).collect();
+    let said: f64 = value.iter().zip(&right).map(|(value, right)| value * right).sum();
+    // Neighbouring bins share what is left over; a bell covers several of them.
+    let shared = (2.0 * width / (TAU / BINS as f64)).max(1.0) * PI.sqrt() / 2.0;
+    let variance = (yy - said).max(0.0) / (used - COLUMNS as f64) * shared.min(3.0);
+    Some((value[COLUMNS - 1], (variance * inverse[(COLUMNS - 1, COLUMNS - 1)]).sqrt().max(1e-12)))
+}

@@ -1,0 +1,92 @@
+// The page at work: what is chosen is shown; units, detail, links, print.
+import { lineChart } from "./charts.js";
+import { driveViewer } from "./drive.js";
+import { fieldMap } from "./fields.js";
+import { canInflate } from "./pack.js";
+import { setUnits } from "./quantities.js";
+
+const report = JSON.parse(document.getElementById("flexspline-report").textContent);
+const root = document.documentElement;
+
+function complain(text) {
+  const problem = document.getElementById("problem");
+  problem.textContent = text;
+  problem.hidden = false;
+}
+
+/** What the address asks for: #choice, #figure or #choice/figure. */
+function asked() {
+  const parts = decodeURIComponent(location.hash.slice(1)).split("/");
+  const known = report.choices.map((c) => c.id);
+  return { choice: parts.find((p) => known.includes(p)), anchor: parts.find((p) => p && !known.includes(p)) };
+}
+
+async function start() {
+  root.classList.add("scripted");
+  const views = [];
+  for (const place of document.querySelectorAll(".drawing")) {
+    const id = place.dataset.figure;
+    const spec = report.figures[id];
+    if (spec.kind === "drive") views.push(driveViewer(place, report.animations));
+    if (spec.kind === "lines") views.push(lineChart(place, id, spec));
+    if (spec.kind === "field") views.push(fieldMap(place, id, spec));
+  }
+
+  async function choose(id) {
+    const { name } = report.choices.find((c) => c.id === id);
+    for (const element of document.querySelectorAll("[data-choice]")) element.hidden = element.dataset.choice !== id;
+    if (report.choices.length > 1) {
+      for (const element of document.querySelectorAll(".of-choice")) element.textContent = `, ${name}`;
+      for (const link of document.querySelectorAll(".tools a")) {
+        link.hash = `${id}/${link.closest("figure").id}`;
+      }
+      for (const input of document.querySelectorAll("input[name=choice]")) input.checked = input.value === id;
+    }
+    root.dataset.chosen = id;
+    // Side by side: inflating is what takes time, and it does not take the page's.
+    await Promise.all(views.map((view) => view.choose(id)));
+    root.dataset.ready = id;
+  }
+
+  function setDetail(level) {
+    const levels = ["summary", "engineering", "full"];
+    for (const section of document.querySelectorAll("section[data-detail]")) {
+      section.querySelector("details").open = levels.indexOf(section.dataset.detail) <= levels.indexOf(level);
+    }
+  }
+
+  function goTo(anchor) {
+    const target = anchor && document.getElementById(anchor);
+    if (!target) return;
+    target.closest("details")?.setAttribute("open", "");
+    target.scrollIntoView();
+  }
+
+  for (const input of document.querySelectorAll("input[name=choice]")) {
+    input.addEventListener("change", () => choose(input.value));
+  }
+  const units = document.getElementById("units");
+  units.addEventListener("change", () => setUnits(units.value));
+  const detail = document.getElementById("detail");
+  detail.addEventListener("change", () => setDetail(detail.value));
+  addEventListener("hashchange", async () => {
+    const { choice, anchor } = asked();
+    if (choice && choice !== root.dataset.chosen) await choose(choice);
+    goTo(anchor);
+  });
+
+  // A browser that remembers forms may come back with another unit than the text has.
+  setUnits(units.value);
+  const { choice, anchor } = asked();
+  await choose(choice ?? report.choices[0].id);
+  goTo(anchor);
+}
+
+if (canInflate()) {
+  start().catch((error) => complain(`The figures could not be drawn: ${error.message}`));
+} else {
+  complain(
+    "This browser cannot inflate the numbers of this page (DecompressionStream with deflate-raw): " +
+      "Chrome 103, Firefox 113, Safari 16.4 and later can. Text and tables are complete.",
+  );
+}

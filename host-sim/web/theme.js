@@ -1,0 +1,34 @@
+// Colours for canvases, taken from the style sheet so that there is one place for them.
+
+/** A colour of the style sheet by the name of its variable. */
+export function colour(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+}
+
+export const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', sans-serif";
+
+/** Calls `listener` when the page turns dark or light, and when it goes to paper, which is light, and comes back. */
+export function onTheme(listener) {
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", listener);
+  for (const name of ["beforeprint", "afterprint"]) {
+    addEventListener(name, () => {
+      document.documentElement.classList.toggle("printing", name === "beforeprint");
+      listener();
+    });
+  }
+}
+
+/** Anchors of the map viridis, dark to light; equal steps look equal, to colour-blind eyes too. */
+const VIRIDIS = ["440154", "472d7b", "3b528b", "2c728e", "21918c", "28ae80", "5ec962", "addc30", "fde725"];
+const ANCHORS = VIRIDIS.map((hex) => [0, 2, 4].map((k) => parseInt(hex.slice(k, k + 2), 16)));
+
+/** Colour of the map at 0 to 1, as three bytes. */
+export function viridis(x) {
+  const place = Math.min(Math.max(x, 0), 1) * (ANCHORS.length - 1);
+  const k = Math.min(Math.floor(place), ANCHORS.length - 2);
+  return ANCHORS[k].map((from, c) => Math.round(from + (ANCHORS[k + 1][c] - from) * (place - k)));
+}
+
+export function css([r, g, b]) {
+  return `rgb(${r} ${g} ${b})`;
+}

@@ -1,0 +1,108 @@
+//! The store: bits of copies and images flip while ticks run.
+
+use crate::Choices;
+use crate::runtime::any_input;
+use crate::tables::{BASES, flying};
+use flexspline::{
+    Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode, Overrun, PAGE_BYTES, Quality, Store, Table,
+    mend_page,
+};
+
+/// What flips.
+#[derive(Clone, Copy, PartialEq)]
+enum Flips {
+    /// Bits of one copy and of one image.
+    OneSide,
+    /// Bits of both images, never in the same page, and of one copy.
+    OtherPages,
+    /// Anything; and temperatures and tables change.
+    Anything,
+}
+
+/// A store that is hit beside one that is not.
+pub fn run(data: &[u8]) {
+    let mut choices = Choices::new(data);
+    let sound = flying(&mut choices);
+    let table = Table::check(sound).expect("a base");
+    let drive = *table.drive();
+    let torques: Vec<f32> = table.torque_nodes_n_m().collect();
+    let limit_rad = 1.002 * table.error_limit_rad();
+    let limits =
+        Limits { tick_s: 1e-3, rate_rad_s: 5.0, acceleration_rad_s2: 5e3, generator_rate_rad_s: 600.0, patience: 3 };
+    let joint = Joint::new(drive, limits, Overrun::SkipAndCount).expect("limits of a joint");
+    let flips = [Flips::OneSide, Flips::OtherPages, Flips::Anything][choices.below(3)];
+    let (side, copy) = (choices.below(2), choices.below(2));
+    let mut images = [sound.clone(), sound.clone()];
+    let mut hit = Store::new();
+    hit.activate(&Images::new(sound, sound), &drive, 20.0).expect("a base");
+    let mut twin = hit.clone();
+    let mut state = JointState::new();
+    state.request(Mode::Tracking).expect("from off");
+    let mut generator = GeneratorAngle::ZERO;
+    let pages = sound.len().div_ceil(PAGE_BYTES);
+    let mut owner = vec![None; pages];
+    for _ in 0..400 {
+        if choices.is_empty() {
+            break;
+        }
+        for _ in 0..choices.below(3) {
+            let at = choices.below(images[0].len().min(images[1].len()).min(65_535));
+            let (image, into) = match flips {
+                Flips::OneSide => (side, copy),
+                Flips::OtherPages => (*owner[at / PAGE_BYTES].get_or_insert(choices.below(2)), copy),
+                Flips::Anything => (choices.below(2), choices.below(2)),
+            };
+            match choices.below(4) {
+                0 => images[image][at] ^= 1 << choices.below(8),
+                1 => images[image][at] = choices.any(),
+                2 => hit.upset(into, choices.below(hit.used_words().max(1)), 1 << choices.below(32)),
+                _ => hit.upset(into, choices.below(hit.used_words().max(1)), choices.any()),
+            }
+        }
+        let seen = Images::new(&images[0], &images[1]);
+        if flips == Flips::Anything {
+            match choices.below(12) {
+                0 => drop(hit.set_temperature(&seen, choices.wild())),
+                1 => drop(hit.activate(&seen, &drive, choices.wild())),
+                2 => {
+                    let other = &BASES[choices.below(BASES.len())];
+                    let other_drive = *Table::check(other).expect("a base").drive();
+                    if hit.activate(&Images::new(other, other), &drive, 20.0).is_ok() {
+                        assert_eq!(other_drive, drive);
+                        images = [other.clone(), other.clone()];
+                    }
+                }
+                _ => {}
+            }
+        }
+        let seen = Images::new(&images[0], &images[1]);
+        let input = any_input(&mut choices, &mut generator, &torques, &drive);
+        let mut copied = state;
+        let found = joint.tick(&seen, &mut hit, &mut copied, &input);
+        assert!(found.correction_rad.abs() <= limit_rad, "{found:?}");
+        assert!(found.transmission_error_rad.abs() <= limit_rad, "{found:?}");
+        let expected = joint.tick(&Images::new(sound, sound), &mut twin, &mut state, &Input { ..input });
+        if flips == Flips::Anything {
+            state = copied;
+        } else {
+            let unused = found.flags.contains(Flags::NOT_CORRECTED) && found.quality == Quality::Disabled;
+            assert!(unused || found == expected, "{found:?} instead of {expected:?}");
+        }
+        hit.check_images(&seen, choices.below(600));
+        if let Some((image, page)) = hit.damaged_page().filter(|_| choices.below(4) == 0) {
+            let good = images[1 - image].clone();
+            if mend_page(&mut images[image], &good, page) {
+                hit.mended(image, page);
+            }
+            if let (Flips::OtherPages, Some(owner)) = (flips, owner.get_mut(page)) {
+                // A page written again may be hit on either side.
+                let same = |page: usize| {
+                    images.iter().all(|image| image.chunks(PAGE_BYTES).nth(page) == sound.chunks(PAGE_BYTES).nth(page))
+                };
+                if same(page) {
+                    *owner = None;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,733 @@
+//! Measured data, damaged in every way that is known: each file ends in a clear error or in a fault with its name, and what is physics
+//! is not taken for a fault.
+
+#[path = "bench_data.rs"]
+mod bench_data;
+
+use bench_data::{ARCSEC, Bench, RATIO, normal};
+use flexspline_sim::measurement::{ColumnMap, FaultName, Gear, MeasuredError, Recording, Treatment, parse};
+
+fn gear() -> Gear {
+    Gear::of_teeth(188, 190, true)
+}
+
+fn read(text: &[u8]) -> Result<Recording, MeasuredError> {
+    parse("m.csv", text, &ColumnMap::default(), &gear())
+}
+
+fn names(recording: &Recording) -> Vec<FaultName> {
+    let mut names: Vec<FaultName> = recording.faults.iter().map(|fault| fault.name).collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+#[test]
+fn clean_data_has_no_fault() {
+    let bench = Bench::plain(6000, 1.0, 3);
+    let read = read(bench.csv().as_bytes()).unwrap();
+    assert_eq!(read.faults, []);
+    assert_eq!(read.sessions.len(), 1);
+    let session = &read.sessions[0];
+    assert_eq!(session.len(), 6000);
+    assert_eq!((session.line[0], session.line[5999]), (2, 6001));
+    for row in [0, 777, 5999] {
+        let error = bench.output_rad[row] - bench.generator_rad[row] / RATIO;
+        assert!((session.error_rad[row] - error).abs() < 1e-9);
+        assert!((session.output_rad(RATIO)[row] - bench.output_rad[row]).abs() < 1e-10);
+    }
+}
+
+/// False alarms over many drives with backlash, hysteresis, resonance, damaged teeth, wear, heat, latency, gravity and the rest.
+#[test]
+fn physics_is_not_taken_for_a_fault_of_the_data() {
+    let seeds = std::env::var("FLEXSPLINE_SEEDS").ok().and_then(|n| n.parse().ok()).unwrap_or(300);
+    let mut alarms = Vec::new();
+    for seed in 0..seeds {
+        let (bench, said) = Bench::drawn(5000, seed);
+        let read = read(bench.csv().as_bytes()).unwrap_or_else(|error| panic!("seed {seed} {said:?}: {error}"));
+        if !read.faults.is_empty() || !read.tooth_steps.is_empty() {
+            let what: Vec<_> = read.faults.iter().map(|fault| &fault.what).collect();
+            alarms.push(format!("seed {seed} {said:?}: {what:?} {:?}", read.tooth_steps));
+        }
+    }
+    println!("{} false alarms in {seeds}", alarms.len());
+    assert!(alarms.len() as f64 <= 0.01 * seeds as f64, "{} in {seeds}:\n{}", alarms.len(), alarms.join("\n"));
+}
+
+/// What a damaged file must end in.
+enum Ends {
+    /// An error that says all this.
+    Error(&'static [&'static str]),
+    /// These faults and no others, in order of their names.
+    Faults(&'static [FaultName]),
+}
+
+use Ends::{Error, Faults};
+use FaultName::{
+    ClockError, Drift, EncoderIndexJump, FrozenChannel, MissingSamples, Outliers, Quantisation, UnitMismatch,
+};
+
+/// The plain drive with some rows of its file changed: number of the row from 0, its fields.
+fn edited(change: impl Fn(usize, &mut Vec<String>)) -> String {
+    let text = Bench::plain(4000, 1.0, 5).csv();
+    let mut lines = text.lines();
+    let mut edited = format!("{}\n", lines.next().unwrap());
+    for (row, line) in lines.enumerate() {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        change(row, &mut fields);
+        if !fields.is_empty() {
+            edited.push_str(&fields.join(","));
+            edited.push('\n');
+        }
+    }
+    edited
+}
+
+/// The plain drive with its columns changed.
+fn changed(change: impl Fn(&mut Bench)) -> String {
+    let mut bench = Bench::plain(4000, 1.0, 5);
+    change(&mut bench);
+    bench.csv()
+}
+
+fn scaled(values: &mut [f64], by: f64) {
+    values.iter_mut().for_each(|value| *value *= by);
+}
+
+#[test]
+fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
+    const TIME: usize = 0;
+    const GENERATOR: usize = 1;
+    const OUTPUT: usize = 2;
+    const TORQUE: usize = 3;
+    const TEMPERATURE: usize = 4;
+    let good = Bench::plain(4000, 1.0, 5).csv();
+    let header = "time_s,generator_rad,output_rad,torque_n_m,temperature_c\n";
+    let rows = |n: usize| good.lines().take(n + 1).collect::<Vec<_>>().join("\n") + "\n";
+    let deg = 180.0 / std::f64::consts::PI;
+    let cases: Vec<(&str, Vec<u8>, Ends)> = vec![
+        // Files that are no table.
+        ("empty", Vec::new(), Error(&["m.csv:1: ", "no header"])),
+        ("blank lines", b"\n\n  \n".to_vec(), Error(&["no header"])),
+        ("header only", header.into(), Error(&["m.csv:1: ", "no rows", "at least 16"])),
+        ("one row", rows(1).into(), Error(&["1 row after", "at least 16"])),
+        ("two rows", rows(2).into(), Error(&["2 rows after", "at least 16"])),
+        (
+            "no header",
+            good.lines().skip(1).take(50).collect::<Vec<_>>().join("\n").into(),
+            Error(&["first line has numbers"]),
+        ),
+        ("binary", (0..=255_u8).cycle().take(4000).collect(), Error(&["binary"])),
+        ("gzip", b"\x1F\x8B\x08\x00abc".to_vec(), Error(&["gzip"])),
+        ("a workbook", b"PK\x03\x04\x14".to_vec(), Error(&["workbook"])),
+        (
+            "UTF-16",
+            good.encode_utf16().fold(vec![0xFF, 0xFE], |mut b, c| {
+                b.extend(c.to_le_bytes());
+                b
+            }),
+            Error(&["UTF-16"]),
+        ),
+        ("header not UTF-8", b"generator_rad,output_rad,\xB0C\n1,2,3\n".to_vec(), Error(&["m.csv:1: ", "UTF-8"])),
+        (
+            "prose",
+            b"Measured on Tuesday.\nAll went well.\n".to_vec(),
+            Error(&["column generator_rad is missing", "separated by spaces"]),
+        ),
+        // Columns.
+        ("semicolons", good.replace(',', ";").into(), Error(&["semicolons", "allowed: commas"])),
+        ("decimal commas", good.replace(',', ";").replace('.', ",").into(), Error(&["semicolons"])),
+        (
+            "decimal commas between commas",
+            good.replace('.', ",").into(),
+            Error(&["m.csv:2: ", "fields, but the header has 5", "with a point"]),
+        ),
+        ("tabs", good.replace(',', "\t").into(), Error(&["tabs"])),
+        (
+            "no generator",
+            good.replacen("generator_rad", "motor", 1).into(),
+            Error(&["column generator_rad is missing", "found: time_s, motor", "--columns"]),
+        ),
+        (
+            "no output",
+            good.replacen("output_rad", "load", 1).into(),
+            Error(&["neither column output_rad nor error_arcsec", "--columns"]),
+        ),
+        (
+            "generator twice",
+            good.replacen("torque_n_m", "generator_rad", 1).into(),
+            Error(&["m.csv:1: column generator_rad is there twice"]),
+        ),
+        (
+            "a text",
+            edited(|k, f| {
+                if k == 7 {
+                    f[OUTPUT] = "ERR".into()
+                }
+            })
+            .into(),
+            Error(&["m.csv:9: output_rad: found \"ERR\"", "allowed: a number"]),
+        ),
+        (
+            "a line of units",
+            good.replacen('\n', "\ns,rad,rad,Nm,degC\n", 1).into(),
+            Error(&["m.csv:2: time_s: found \"s\""]),
+        ),
+        (
+            "a huge number",
+            edited(|k, f| {
+                if k == 7 {
+                    f[GENERATOR] = "1e300".into()
+                }
+            })
+            .into(),
+            Error(&["m.csv:9: generator_rad: found \"1e300\"", "at most 1e9"]),
+        ),
+        (
+            "a short row",
+            edited(|k, f| {
+                if k == 7 {
+                    f.truncate(2)
+                }
+            })
+            .into(),
+            Error(&["m.csv:9: 2 fields, but output_rad is field 3"]),
+        ),
+        (
+            "a long row",
+            edited(|k, f| {
+                if k == 7 {
+                    f.push("5.5".into())
+                }
+            })
+            .into(),
+            Error(&["m.csv:9: 6 fields, but the header has 5"]),
+        ),
+        (
+            "two rows in one",
+            edited(|k, f| {
+                if k == 7 {
+                    f.extend(f.clone())
+                }
+            })
+            .into(),
+            Error(&["m.csv:9: 10 fields"]),
+        ),
+        // Nothing to see.
+        (
+            "constant",
+            changed(|b| {
+                b.generator_rad.fill(1.0);
+                b.output_rad.fill(0.01);
+            })
+            .into(),
+            Error(&["generator and output keep one value"]),
+        ),
+        ("output stands", changed(|b| b.output_rad.fill(0.01)).into(), Error(&["output_rad does not follow"])),
+        (
+            "output frozen in most rows",
+            changed(|b| {
+                let value = b.output_rad[1000];
+                b.output_rad[1000..3900].fill(value);
+            })
+            .into(),
+            Error(&["the output keeps one value over 29", "at most half"]),
+        ),
+        ("nothing but NaN", edited(|_, f| f[OUTPUT] = "NaN".into()).into(), Error(&["0 rows have all that is needed"])),
+        (
+            "another ratio",
+            changed(|b| scaled(&mut b.output_rad, 7.7)).into(),
+            Error(&["within a factor of 2", "ratio"]),
+        ),
+        (
+            "torque of a ship",
+            changed(|b| scaled(b.torque_n_m.as_mut().unwrap(), 1e6)).into(),
+            Error(&["torque: found", "at most 1e4"]),
+        ),
+        // Harmless.
+        (
+            "byte order mark, CRLF, comments, quotes",
+            format!("\u{feff}# bench 7\n{}", good.replacen("\n", "\n# start\n", 1))
+                .replace('\n', "\r\n")
+                .replacen("output_rad", "\"output_rad\"", 1)
+                .into(),
+            Faults(&[]),
+        ),
+        ("commas at the end of rows", edited(|_, f| f.push(String::new())).into(), Faults(&[])),
+        (
+            "a column of notes in Latin-1",
+            {
+                let mut bytes = Vec::new();
+                for (k, line) in good.lines().enumerate() {
+                    bytes.extend(line.bytes());
+                    bytes.extend(if k == 0 { &b",note\n"[..] } else { b",\xB0C \n" });
+                }
+                bytes
+            },
+            Faults(&[]),
+        ),
+        (
+            "no time, no torque",
+            edited(|_, f| f.truncate(3)).replace("time_s", "t").replacen(",torque_n_m,temperature_c", "", 1).into(),
+            Faults(&[]),
+        ),
+        (
+            "constant temperature and torque",
+            changed(|b| {
+                b.torque_n_m.as_mut().unwrap().fill(0.0);
+                b.temperature_c.as_mut().unwrap().fill(20.0);
+            })
+            .into(),
+            Faults(&[]),
+        ),
+        (
+            "wrapped angles",
+            changed(|b| {
+                b.generator_rad.iter_mut().for_each(|a| *a = a.rem_euclid(std::f64::consts::TAU));
+                b.output_rad.iter_mut().for_each(|a| *a = a.rem_euclid(std::f64::consts::TAU));
+            })
+            .into(),
+            Faults(&[]),
+        ),
+        ("a break of a minute", changed(|b| b.time_s[2000..].iter_mut().for_each(|t| *t += 60.0)).into(), Faults(&[])),
+        // Missing.
+        (
+            "NaN",
+            edited(|k, f| {
+                if k % 400 == 7 {
+                    f[OUTPUT] = "NaN".into()
+                }
+            })
+            .into(),
+            Faults(&[MissingSamples]),
+        ),
+        (
+            "inf",
+            edited(|k, f| {
+                if k % 400 == 7 {
+                    f[OUTPUT] = "-inf".into()
+                }
+            })
+            .into(),
+            Faults(&[MissingSamples]),
+        ),
+        (
+            "empty fields",
+            edited(|k, f| {
+                if k % 400 == 7 {
+                    f[TORQUE] = String::new()
+                }
+            })
+            .into(),
+            Faults(&[MissingSamples]),
+        ),
+        (
+            "n/a",
+            edited(|k, f| {
+                if k % 400 == 7 {
+                    f[TEMPERATURE] = "n/a".into()
+                }
+            })
+            .into(),
+            Faults(&[MissingSamples]),
+        ),
+        (
+            "torque missing in most rows",
+            edited(|k, f| {
+                if k % 3 > 0 {
+                    f[TORQUE] = String::new()
+                }
+            })
+            .into(),
+            Faults(&[MissingSamples]),
+        ),
+        (
+            "time missing here and there",
+            edited(|k, f| {
+                if k % 400 == 7 {
+                    f[TIME] = String::new()
+                }
+            })
+            .into(),
+            Faults(&[MissingSamples]),
+        ),
+        (
+            "rows lost",
+            edited(|k, f| {
+                if k % 400 < 4 {
+                    f.clear()
+                }
+            })
+            .into(),
+            Faults(&[MissingSamples]),
+        ),
+        ("last line broken off", good[..good.len() - 30].to_owned().into(), Faults(&[MissingSamples])),
+        // Clock.
+        (
+            "rows repeated",
+            {
+                let mut text = String::new();
+                for (k, line) in good.lines().enumerate() {
+                    (0..if k % 300 == 50 { 2 } else { 1 }).for_each(|_| text.push_str(&format!("{line}\n")));
+                }
+                text.into()
+            },
+            Faults(&[ClockError]),
+        ),
+        (
+            "rows out of order",
+            {
+                let mut lines: Vec<&str> = good.lines().collect();
+                lines.swap(500, 501);
+                lines.swap(1500, 1501);
+                (lines.join("\n") + "\n").into()
+            },
+            Faults(&[ClockError]),
+        ),
+        (
+            "clock set back",
+            changed(|b| b.time_s[2000..].iter_mut().for_each(|t| *t -= 15.0)).into(),
+            Faults(&[ClockError]),
+        ),
+        ("one stamp from another day", changed(|b| b.time_s[2000] += 86_400.0).into(), Faults(&[ClockError])),
+        (
+            "a clock that jumps ahead is a break",
+            changed(|b| b.time_s[2200..].iter_mut().for_each(|t| *t += 5.0)).into(),
+            Faults(&[]),
+        ),
+        (
+            "clock of a fifth of a second",
+            changed(|b| b.time_s.iter_mut().for_each(|t| *t = (*t * 5.0).floor() / 5.0)).into(),
+            Faults(&[ClockError]),
+        ),
+        (
+            "stamps that jitter",
+            {
+                let mut random = fastrand::Rng::with_seed(3);
+                let mut bench = Bench::plain(4000, 1.0, 5);
+                bench.time_s.iter_mut().for_each(|t| *t += 0.004 * (random.f64() - 0.5));
+                bench.csv().into()
+            },
+            Faults(&[ClockError]),
+        ),
+        ("time stands", changed(|b| b.time_s.fill(7.0)).into(), Faults(&[ClockError])),
+        ("time in nanoseconds", changed(|b| scaled(&mut b.time_s, 1e9)).into(), Faults(&[ClockError])),
+        // Units.
+        ("generator in degrees", changed(|b| scaled(&mut b.generator_rad, deg)).into(), Faults(&[UnitMismatch])),
+        ("generator in turns", changed(|b| scaled(&mut b.generator_rad, deg / 360.0)).into(), Faults(&[UnitMismatch])),
+        (
+            "generator wrapped at 360",
+            changed(|b| b.generator_rad.iter_mut().for_each(|a| *a = (*a * deg).rem_euclid(360.0))).into(),
+            Faults(&[UnitMismatch]),
+        ),
+        ("output in degrees", changed(|b| scaled(&mut b.output_rad, deg)).into(), Faults(&[UnitMismatch])),
+        ("output in arc-seconds", changed(|b| scaled(&mut b.output_rad, 1.0 / ARCSEC)).into(), Faults(&[UnitMismatch])),
+        (
+            "columns exchanged",
+            good.replacen("generator_rad,output_rad", "output_rad,generator_rad", 1).into(),
+            Faults(&[UnitMismatch]),
+        ),
+        ("output counts backwards", changed(|b| scaled(&mut b.output_rad, -1.0)).into(), Faults(&[UnitMismatch])),
+        ("torque in mN.m", changed(|b| scaled(b.torque_n_m.as_mut().unwrap(), 1e3)).into(), Faults(&[UnitMismatch])),
+        (
+            "temperature in kelvin",
+            changed(|b| b.temperature_c.as_mut().unwrap().iter_mut().for_each(|t| *t += 273.15)).into(),
+            Faults(&[UnitMismatch]),
+        ),
+        // Encoders.
+        (
+            "an index lost",
+            changed(|b| b.output_rad[1700..].iter_mut().for_each(|a| *a += 53.0 * ARCSEC)).into(),
+            Faults(&[EncoderIndexJump]),
+        ),
+        (
+            "an index lost twice",
+            changed(|b| {
+                b.output_rad[900..].iter_mut().for_each(|a| *a -= 31.0 * ARCSEC);
+                b.output_rad[2600..].iter_mut().for_each(|a| *a += 400.0 * ARCSEC);
+            })
+            .into(),
+            Faults(&[EncoderIndexJump]),
+        ),
+        (
+            "counts of the generator lost",
+            changed(|b| b.generator_rad[1700..].iter_mut().for_each(|a| *a += 0.03)).into(),
+            Faults(&[EncoderIndexJump]),
+        ),
+        (
+            "output frozen",
+            changed(|b| {
+                let value = b.output_rad[1500];
+                b.output_rad[1500..1620].fill(value);
+            })
+            .into(),
+            Faults(&[FrozenChannel]),
+        ),
+        (
+            "generator frozen",
+            changed(|b| {
+                let value = b.generator_rad[600];
+                b.generator_rad[600..720].fill(value);
+            })
+            .into(),
+            Faults(&[FrozenChannel]),
+        ),
+        (
+            "torque frozen",
+            changed(|b| {
+                let torque = b.torque_n_m.as_mut().unwrap();
+                let value = torque[1500];
+                torque[1500..1800].fill(value);
+            })
+            .into(),
+            Faults(&[FrozenChannel]),
+        ),
+        (
+            "temperature frozen",
+            changed(|b| {
+                let temperature = b.temperature_c.as_mut().unwrap();
+                let value = temperature[1500];
+                temperature[1500..1800].fill(value);
+            })
+            .into(),
+            Faults(&[FrozenChannel]),
+        ),
+        (
+            "spikes of the output",
+            changed(|b| (100..3900).step_by(331).for_each(|k| b.output_rad[k] += 60.0 * ARCSEC)).into(),
+            Faults(&[Outliers]),
+        ),
+        (
+            "spikes of the torque",
+            changed(|b| (100..3900).step_by(331).for_each(|k| b.torque_n_m.as_mut().unwrap()[k] += 25.0)).into(),
+            Faults(&[Outliers]),
+        ),
+        (
+            "a coarse output encoder",
+            changed(|b| b.output_rad.iter_mut().for_each(|a| *a = (*a / (12.0 * ARCSEC)).round() * 12.0 * ARCSEC))
+                .into(),
+            Faults(&[Quantisation]),
+        ),
+        (
+            "a coarse generator encoder",
+            changed(|b| b.generator_rad.iter_mut().for_each(|a| *a = (*a / 0.005).round() * 0.005)).into(),
+            Faults(&[Quantisation]),
+        ),
+        (
+            "a zero that drifts",
+            changed(|b| (0..b.rows()).for_each(|k| b.output_rad[k] += 0.008 * k as f64 * ARCSEC)).into(),
+            Faults(&[Drift]),
+        ),
+        // Two at once.
+        (
+            "NaN, an index lost, kelvin",
+            {
+                let mut bench = Bench::plain(4000, 1.0, 5);
+                bench.output_rad[1700..].iter_mut().for_each(|a| *a += 53.0 * ARCSEC);
+                bench.temperature_c.as_mut().unwrap().iter_mut().for_each(|t| *t += 273.15);
+                bench.output_rad[77] = f64::NAN;
+                bench.csv().into()
+            },
+            Faults(&[EncoderIndexJump, MissingSamples, UnitMismatch]),
+        ),
+    ];
+    let mut wrong = Vec::new();
+    for (name, bytes, ends) in &cases {
+        let read = read(bytes);
+        match (ends, &read) {
+            (Error(said), Err(error)) => {
+                let text = error.to_string();
+                if !text.starts_with("m.csv") || !said.iter().all(|said| text.contains(said)) || text.contains('\n') {
+                    wrong.push(format!("{name}: said {text:?}, wanted {said:?}"));
+                }
+            }
+            (Faults(due), Ok(recording)) => {
+                if names(recording) != *due {
+                    let found: Vec<_> = recording.faults.iter().map(|fault| (fault.name, &fault.what)).collect();
+                    wrong.push(format!("{name}: found {found:?}, wanted {due:?}, notes {:?}", recording.notes));
+                }
+            }
+            (Error(said), Ok(recording)) => {
+                wrong.push(format!("{name}: accepted, {:?}, wanted {said:?}", recording.faults))
+            }
+            (Faults(due), Err(error)) => wrong.push(format!("{name}: {error}, wanted {due:?}")),
+        }
+    }
+    println!("{} damaged files", cases.len());
+    assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
+}
+
+#[test]
+fn what_is_repaired_is_as_it_was_and_its_place_is_said() {
+    let clean = read(Bench::plain(4000, 1.0, 5).csv().as_bytes()).unwrap();
+    let clean = &clean.sessions[0];
+    // An index jump: where, how large, and gone.
+    let jump = read(changed(|b| b.output_rad[1700..].iter_mut().for_each(|a| *a += 53.0 * ARCSEC)).as_bytes()).unwrap();
+    let fault = &jump.faults[0];
+    assert_eq!((fault.first_line, fault.treatment), (1702, Treatment::Repaired));
+    assert!(
+        (fault.time_s.unwrap() - 17.0).abs() < 1e-9 && (fault.size_arcsec.unwrap() - 53.0).abs() < 3.0,
+        "{fault:?}"
+    );
+    let left = |row: usize| (jump.sessions[0].error_rad[row] - clean.error_rad[row]) / ARCSEC;
+    assert!(left(100).abs() < 1e-6 && left(3000).abs() < 3.0, "{} {}", left(100), left(3000));
+    let json = serde_json::to_value(fault).unwrap();
+    assert_eq!((json["name"].as_str(), json["time_s"].as_f64()), (Some("encoder_index_jump"), Some(17.0)));
+    // Units: the same data as with the right ones.
+    for (name, text) in [
+        ("degrees", changed(|b| scaled(&mut b.generator_rad, 180.0 / std::f64::consts::PI))),
+        ("kelvin", changed(|b| b.temperature_c.as_mut().unwrap().iter_mut().for_each(|t| *t += 273.15))),
+        (
+            "exchanged",
+            Bench::plain(4000, 1.0, 5).csv().replacen("generator_rad,output_rad", "output_rad,generator_rad", 1),
+        ),
+        ("wrapped", changed(|b| b.generator_rad.iter_mut().for_each(|a| *a = a.rem_euclid(std::f64::consts::TAU)))),
+    ] {
+        let session = &read(text.as_bytes()).unwrap().sessions[0];
+        for row in [0, 1234, 3999] {
+            // Digits of the file: 1e-9 rad of a generator angle in degrees.
+            assert!((session.generator_rad[row] - clean.generator_rad[row]).abs() < 1e-6, "{name}");
+            assert!((session.error_rad[row] - clean.error_rad[row]).abs() < 0.01 * ARCSEC, "{name}");
+            let warm = |session: &flexspline_sim::measurement::Session| session.temperature_c.as_ref().unwrap()[row];
+            assert!((warm(session) - warm(clean)).abs() < 1e-4, "{name}");
+        }
+    }
+    // A drift: its size, and gone.
+    let text = changed(|b| (0..b.rows()).for_each(|k| b.output_rad[k] += 0.008 * k as f64 * ARCSEC));
+    let fault = &read(text.as_bytes()).unwrap().faults[0];
+    assert!((fault.size_arcsec.unwrap() - 32.0).abs() < 4.0, "{fault:?}");
+    // Frozen rows are left out, by their lines.
+    let frozen = read(
+        changed(|b| {
+            let value = b.output_rad[1500];
+            b.output_rad[1500..1620].fill(value);
+        })
+        .as_bytes(),
+    )
+    .unwrap();
+    assert_eq!((frozen.faults[0].first_line, frozen.faults[0].rows, frozen.sessions[0].len()), (1502, 120, 3880));
+    assert_eq!(frozen.sessions[0].line[1500], 1622);
+}
+
+#[test]
+fn a_drive_that_ratchets_is_the_drive_and_not_an_encoder() {
+    let pitch = std::f64::consts::TAU / 190.0;
+    let text = changed(|b| b.output_rad[1700..].iter_mut().for_each(|a| *a -= 2.0 * pitch));
+    let read = read(text.as_bytes()).unwrap();
+    assert_eq!(names(&read), []);
+    assert_eq!(read.tooth_steps.len(), 1, "{:?}", read.notes);
+    let step = &read.tooth_steps[0];
+    assert_eq!((step.pitches, step.row, step.line), (-2, 1700, 1702));
+    let left = read.sessions[0].error_rad[1800] - read.sessions[0].error_rad[1600];
+    assert!((left + 2.0 * pitch).abs() < 100.0 * ARCSEC, "the step is still there");
+}
+
+#[test]
+fn a_generator_that_turns_half_way_round_between_rows_is_counted_by_the_output() {
+    let bench = Bench::plain(4000, 1.0, 5);
+    let mut fast = bench.clone();
+    // Every 70th row: 3.5 rad forward, 3.06 back.
+    for values in [&mut fast.time_s, &mut fast.generator_rad, &mut fast.output_rad] {
+        *values = values.iter().copied().step_by(70).collect();
+    }
+    (fast.torque_n_m, fast.temperature_c) = (None, None);
+    let due = fast.generator_rad.clone();
+    fast.generator_rad.iter_mut().for_each(|a| *a = a.rem_euclid(std::f64::consts::TAU));
+    let read = read(fast.csv().as_bytes()).unwrap();
+    assert!(read.notes.iter().any(|note| note.contains("counted by the output")), "{:?}", read.notes);
+    for (found, due) in read.sessions[0].generator_rad.iter().zip(&due) {
+        assert!((found - due).abs() < 1e-6, "{found} {due}");
+    }
+}
+
+#[test]
+fn sessions_of_one_row_and_of_many_are_kept_apart() {
+    let text = changed(|b| {
+        b.time_s[1000..].iter_mut().for_each(|t| *t += 60.0);
+        b.time_s[1001..].iter_mut().for_each(|t| *t += 60.0);
+        // Ten periods are no gap, eleven are.
+        b.time_s[2000..].iter_mut().for_each(|t| *t += 0.089);
+        b.time_s[3000..].iter_mut().for_each(|t| *t += 0.095);
+        b.generator_rad[3000..].iter_mut().for_each(|t| *t += 0.5);
+        b.output_rad[3000..].iter_mut().for_each(|t| *t += 0.5 / RATIO);
+    });
+    let read = read(text.as_bytes()).unwrap();
+    let lengths: Vec<usize> = read.sessions.iter().map(|session| session.len()).collect();
+    assert_eq!(lengths, [1000, 1, 1999, 1000]);
+    assert_eq!(read.sessions[2].line[0], 1003);
+}
+
+#[test]
+fn columns_are_mapped_and_wrong_mappings_say_so() {
+    let map = ColumnMap::parse("generator=turns:turn,error=e:arcmin,time=t:ms,temperature=T:K").unwrap();
+    let mut text = "T,e,turns,t\n".to_owned();
+    let mut random = fastrand::Rng::with_seed(1);
+    for k in 0..500 {
+        text.push_str(&format!(
+            "{},{},{},{}\n",
+            293.15,
+            0.5 * (0.1 * f64::from(k)).sin() + 0.01 * normal(&mut random),
+            f64::from(k) * 0.01,
+            k * 5
+        ));
+    }
+    let read = parse("m.csv", text.as_bytes(), &map, &gear()).unwrap();
+    let session = &read.sessions[0];
+    assert_eq!(read.faults, []);
+    assert!((session.generator_rad[100] - std::f64::consts::TAU).abs() < 1e-12);
+    assert!((session.time_s.as_ref().unwrap()[100] - 0.5).abs() < 1e-12);
+    assert!((session.temperature_c.as_ref().unwrap()[0] - 20.0).abs() < 1e-9);
+    assert!(session.error_rad.iter().all(|e| e.abs() < 35.0 * ARCSEC));
+    let missing = ColumnMap::parse("generator=psi:deg,error=e").unwrap();
+    let error = parse("m.csv", text.as_bytes(), &missing, &gear()).unwrap_err().to_string();
+    assert!(error.contains("column psi is missing, which --columns gives for generator"), "{error}");
+    let wrong = ColumnMap::parse("generator=turns:turn,error=e:turn").unwrap();
+    let error = parse("m.csv", text.as_bytes(), &wrong, &gear()).unwrap_err().to_string();
+    assert!(error.contains("e: found errors of") && error.contains("ten degrees"), "{error}");
+    let error = parse("m.csv", text.as_bytes(), &map, &Gear::of_ratio(0.0)).unwrap_err().to_string();
+    assert!(error.contains("ratio: found 0"), "{error}");
+}
+
+/// Ten million rows, written as they are read: `cargo test --release -p flexspline-tests --test measured_data -- --ignored --nocapture`.
+#[test]
+#[ignore = "takes a minute and a gigabyte and a half"]
+fn ten_million_rows() {
+    struct Endless {
+        row: u64,
+        rows: u64,
+        text: Vec<u8>,
+        at: usize,
+        random: fastrand::Rng,
+    }
+    impl std::io::Read for Endless {
+        fn read(&mut self, to: &mut [u8]) -> std::io::Result<usize> {
+            if self.at == self.text.len() && self.row < self.rows {
+                use std::io::Write;
+                self.text.clear();
+                self.at = 0;
+                for _ in 0..1000.min(self.rows - self.row) {
+                    let k = self.row as f64;
+                    let psi = 0.01 * k;
+                    let output = psi / RATIO + (10.0 * (2.0 * psi).sin() + normal(&mut self.random)) * ARCSEC;
+                    writeln!(self.text, "{:.4},{psi:.4},{output:.9},{:.2},20.0", k * 0.001, 10.0 * (psi * 0.01).sin())?;
+                    self.row += 1;
+                }
+            }
+            let n = to.len().min(self.text.len() - self.at);
+            to[..n].copy_from_slice(&self.text[self.at..self.at + n]);
+            self.at += n;
+            Ok(n)
+        }
+    }
+    let header = b"time_s,generator_rad,output_rad,torque_n_m,temperature_c\n".to_vec();
+    let source = Endless { row: 0, rows: 10_000_000, text: header, at: 0, random: fastrand::Rng::with_seed(1) };
+    let start = std::time::Instant::now();
+    let read = parse("m.csv", source, &ColumnMap::default(), &gear()).unwrap();
+    let seconds = start.elapsed().as_secs_f64();
+    assert_eq!(read.rows, 10_000_000);
+    assert_eq!(read.faults, []);
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let peak = status.lines().find(|line| line.starts_with("VmHWM")).unwrap_or("").to_owned();
+    println!("{seconds:.1} s with writing the text, {peak}");
+}

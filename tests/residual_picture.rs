@@ -1,0 +1,249 @@
+//! The picture of a residual: signals that are known come back with amplitude, phase and position, and noise shows nothing.
+
+#[path = "bench_data.rs"]
+mod bench_data;
+
+use std::f64::consts::TAU;
+use std::time::Instant;
+
+use bench_data::{ARCSEC, Bench, RATIO, normal};
+use flexspline_sim::measurement::{Gear, Session};
+use flexspline_sim::residual::{Axis, OrderSpectrum, Picture, SpectrumSettings, Wheel, harmonics, order_spectrum};
+
+const CIRCULAR_SPLINE: f64 = 94.0 / 95.0;
+
+/// A session of one direction over some turns, not evenly spaced.
+fn angles(rows: usize, turns: f64, random: &mut fastrand::Rng) -> Vec<f64> {
+    (0..rows).map(|k| (k as f64 + 0.8 * (random.f64() - 0.5)) / rows as f64 * turns * TAU).collect()
+}
+
+fn spectrum(angle: &[f64], value: &[f64]) -> OrderSpectrum {
+    order_spectrum(Axis::Generator, angle, value, None, RATIO, &SpectrumSettings::default())
+}
+
+#[test]
+fn amplitude_phase_and_order_come_back_within_their_uncertainty() {
+    let (mut amplitude, mut phase, mut order, mut count) = (0.0, 0.0, 0.0, 0.0);
+    for seed in 0..60 {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let angle = angles(4000, 23.0, &mut random);
+        let due = [(2.0, 6.0, 0.4), (4.0, 1.5, -2.0), (1.0, 0.7, 2.9), (7.3, 2.5, 1.0)];
+        let value: Vec<f64> = angle
+            .iter()
+            .map(|x| due.iter().map(|(o, a, p)| a * (o * x + p).sin()).sum::<f64>() + 2.0 * normal(&mut random))
+            .collect();
+        let found = spectrum(&angle, &value);
+        assert_eq!(found.peaks.len(), 4, "seed {seed}: {:?}", found.peaks);
+        for (o, a, p) in due {
+            let peak = found.peaks.iter().min_by(|x, y| (x.order - o).abs().total_cmp(&(y.order - o).abs())).unwrap();
+            assert!((peak.order - o).abs() < found.resolution, "seed {seed}: {peak:?}");
+            amplitude += ((peak.amplitude_arcsec - a) / peak.amplitude_std_arcsec).powi(2);
+            order += ((peak.order - o) / peak.order_std).powi(2);
+            // The phase at the middle of the record, where it does not depend on the order.
+            let middle = 23.0 * TAU / 2.0;
+            let off = (peak.order * middle + peak.phase_rad - o * middle - p).rem_euclid(TAU);
+            phase += (off.min(TAU - off) / peak.phase_std_rad).powi(2);
+            count += 1.0;
+        }
+    }
+    let [amplitude, phase, order] = [amplitude, phase, order].map(|sum: f64| (sum / count).sqrt());
+    println!("errors over their standard deviations: amplitude {amplitude:.2}, phase {phase:.2}, order {order:.2}");
+    for ratio in [amplitude, phase, order] {
+        assert!((0.75..1.3).contains(&ratio), "amplitude {amplitude}, phase {phase}, order {order}");
+    }
+}
+
+#[test]
+fn flexspline_and_circular_spline_are_told_apart_beyond_half_an_output_turn() {
+    let lines = |turns: f64, seed: u64| {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let angle = angles(8000, turns, &mut random);
+        let value: Vec<f64> = angle
+            .iter()
+            .map(|x| 10.0 * (2.0 * x + 0.3).sin() + 6.0 * (2.0 * CIRCULAR_SPLINE * x + 1.2).sin() + normal(&mut random))
+            .collect();
+        spectrum(&angle, &value)
+    };
+    for seed in 0..10 {
+        for turns in [70.0, 95.0, 190.0] {
+            let found = lines(turns, seed);
+            for (order, amplitude, wheel) in
+                [(2.0, 10.0, Wheel::FlexsplineOrGenerator), (2.0 * CIRCULAR_SPLINE, 6.0, Wheel::CircularSpline)]
+            {
+                let peak = found.peaks.iter().find(|peak| (peak.order - order).abs() < 0.3 / turns);
+                let peak =
+                    peak.unwrap_or_else(|| panic!("{turns} turns, seed {seed}, order {order}: {:#?}", found.peaks));
+                assert!(
+                    (peak.amplitude_arcsec - amplitude).abs() < 5.0 * peak.amplitude_std_arcsec,
+                    "{turns}: {peak:?}"
+                );
+                assert!(
+                    !peak.is_unresolved() && peak.named[0].wheel == wheel && peak.named[0].harmonic == 2,
+                    "{peak:?}"
+                );
+            }
+        }
+        for turns in [10.0, 30.0, 44.0] {
+            let found = lines(turns, seed);
+            let strongest = &found.peaks[0];
+            assert!((strongest.order - 2.0).abs() < 1.0 / turns, "{turns}: {strongest:?}");
+            assert!(strongest.is_unresolved(), "{turns}: {strongest:?}");
+        }
+    }
+}
+
+#[test]
+fn noise_shows_no_line_white_or_wandering() {
+    let seeds = 600;
+    let mut alarms = Vec::new();
+    for seed in 0..seeds {
+        let mut random = fastrand::Rng::with_seed(seed);
+        // At most 200 of the 3000 rows: what remembers a third of its record is not told from a slow wave by anybody.
+        let memory = [0.0_f64, 0.9, 0.97, 0.99][seed as usize % 4];
+        let turns = [2.5, 12.0, 60.0, 150.0][(seed / 4) as usize % 4];
+        let back = seed % 3 == 0;
+        let mut angle = angles(3000, turns, &mut random);
+        if back {
+            angle.iter_mut().for_each(|x| *x = (*x - turns * TAU * 0.4).abs());
+        }
+        let mut wander = 0.0;
+        let value: Vec<f64> = angle
+            .iter()
+            .map(|_| {
+                wander = memory * wander + (1.0 - memory * memory).sqrt() * normal(&mut random);
+                2.0 * wander + normal(&mut random)
+            })
+            .collect();
+        let found = spectrum(&angle, &value);
+        if !found.peaks.is_empty() {
+            alarms.push(format!("seed {seed}, memory {memory}, {turns} turns, {back}: {:?}", found.peaks));
+        }
+    }
+    println!("{} of {seeds} noises show a line", alarms.len());
+    assert!(alarms.len() as f64 <= 0.01 * seeds as f64, "{} of {seeds}\n{}", alarms.len(), alarms.join("\n"));
+}
+
+fn session(angle: Vec<f64>) -> Session {
+    let rows = angle.len();
+    Session {
+        line: (2..rows as u64 + 2).collect(),
+        time_s: Some((0..rows).map(|k| k as f64 * 0.01).collect()),
+        error_rad: vec![0.0; rows],
+        generator_rad: angle,
+        ..Session::default()
+    }
+}
+
+#[test]
+fn a_damaged_tooth_is_a_pulse_in_its_place_and_a_clean_drive_has_none() {
+    let mut clean = 0;
+    for seed in 0..60 {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let angle = angles(12_000, 60.0, &mut random);
+        let at = TAU * random.f64();
+        let circular = seed % 2 == 0;
+        let mut make = |height: f64| -> Vec<f64> {
+            angle
+                .iter()
+                .map(|psi| {
+                    let place = if circular { psi * CIRCULAR_SPLINE } else { *psi };
+                    let off = (place - at) - TAU * ((place - at) / TAU).round();
+                    let pulse = height * (-0.5 * (off / 0.12).powi(2)).exp();
+                    (pulse
+                        + 8.0 * (2.0 * psi).sin()
+                        + 5.0 * (2.0 * psi * CIRCULAR_SPLINE).sin()
+                        + 2.0 * normal(&mut random))
+                        * ARCSEC
+                })
+                .collect()
+        };
+        let (damaged, sound) = (make(12.0), make(0.0));
+        let sessions = [session(angle.clone())];
+        let picture = Picture::of(&sessions, &[damaged], &Gear::of_ratio(RATIO)).unwrap();
+        assert_eq!(picture.pulses.len(), 1, "seed {seed}");
+        let pulse = picture.pulses[0];
+        let off = (pulse.position_rad - at + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
+        let axis = if circular { Axis::GeneratorLessOutput } else { Axis::Generator };
+        assert!(pulse.axis == axis && pulse.per_turn == 1, "seed {seed}: {pulse:?}");
+        assert!(off.abs() < 0.06 && (pulse.height_arcsec - 12.0).abs() < 2.5, "seed {seed}, at {at}: {pulse:?}");
+        clean += Picture::of(&sessions, &[sound], &Gear::of_ratio(RATIO)).unwrap().pulses.len();
+    }
+    assert!(clean <= 1, "{clean} pulses in 60 clean drives");
+}
+
+#[test]
+fn the_whole_picture_of_a_long_recording_takes_about_a_second() {
+    let bench = Bench::plain(40_000, 1.0, 1);
+    let sessions: Vec<Session> = (0..4)
+        .map(|k| {
+            let rows = k * 10_000..(k + 1) * 10_000;
+            let error: Vec<f64> = rows.clone().map(|r| bench.output_rad[r] - bench.generator_rad[r] / RATIO).collect();
+            Session {
+                line: rows.clone().map(|r| r as u64 + 2).collect(),
+                time_s: Some(bench.time_s[rows.clone()].to_vec()),
+                generator_rad: bench.generator_rad[rows.clone()].to_vec(),
+                error_rad: error,
+                torque_n_m: Some(bench.torque_n_m.as_ref().unwrap()[rows.clone()].to_vec()),
+                temperature_c: Some(bench.temperature_c.as_ref().unwrap()[rows].to_vec()),
+                orientation_rad: None,
+            }
+        })
+        .collect();
+    let residual: Vec<Vec<f64>> = sessions.iter().map(|session| session.error_rad.clone()).collect();
+    let start = Instant::now();
+    let picture = Picture::of(&sessions, &residual, &Gear::of_teeth(188, 190, true)).unwrap();
+    let seconds = start.elapsed().as_secs_f64();
+    println!("40 000 rows: {seconds:.2} s");
+    assert!(seconds < if cfg!(debug_assertions) { 8.0 } else { 4.0 }, "{seconds} s");
+    let by: Vec<&str> = picture.groups.iter().map(|grouping| grouping.by).collect();
+    assert_eq!(by, ["direction", "session", "torque_n_m", "temperature_c", "generator_speed_rad_s"]);
+    // Clearance of 30 arcsec: behind going forward, ahead going back.
+    let [forward, backward] = [0, 1].map(|k| picture.groups[0].groups[k].statistics.median_arcsec);
+    assert!((backward - forward - 30.0).abs() < 3.0, "{forward} {backward}");
+    // Load of 30 N.m winds up by 14 arcsec.
+    let torque = &picture.groups[2].groups;
+    let wound = torque[4].statistics.median_arcsec - torque[0].statistics.median_arcsec;
+    assert!((20.0..32.0).contains(&wound), "{wound}");
+    assert!((picture.noise.white_arcsec - 1.0).abs() < 0.15, "{:?}", picture.noise);
+    assert_eq!(picture.maps.len(), 6);
+    assert!(picture.maps.iter().all(|map| map.bins.iter().all(|bin| bin.count > 0)));
+    let json = serde_json::to_value(&picture).unwrap();
+    assert!(json["spectra"][0]["peaks"][0]["amplitude_arcsec"].is_number());
+    assert!(!json.to_string().contains("null,null"));
+}
+
+#[test]
+fn the_memory_of_the_noise_is_found_under_the_lines() {
+    let mut random = fastrand::Rng::with_seed(11);
+    let angle = angles(40_000, 80.0, &mut random);
+    let mut wander = 0.0;
+    let residual: Vec<f64> = angle
+        .iter()
+        .map(|x| {
+            wander = 0.99 * wander + 0.141 * 3.0 * normal(&mut random);
+            (20.0 * (2.0 * x).sin() + wander + normal(&mut random)) * ARCSEC
+        })
+        .collect();
+    let noise = Picture::of(&[session(angle)], &[residual], &Gear::of_ratio(RATIO)).unwrap().noise;
+    println!("{noise:?}");
+    assert!((noise.white_arcsec - 1.0).abs() < 0.1 && (noise.correlated_arcsec - 3.0).abs() < 0.6, "{noise:?}");
+    // 9/10 of the variance has a memory of 199 rows, 1/10 none.
+    assert!((120.0..280.0).contains(&noise.decorrelation_rows), "{noise:?}");
+    assert!((noise.independent_rows * noise.decorrelation_rows - 40_000.0).abs() < 1.0);
+}
+
+#[test]
+fn little_data_gives_an_empty_picture_and_no_nonsense() {
+    for rows in [0, 1, 2, 17] {
+        let sessions = [session((0..rows).map(|k| k as f64 * 0.1).collect())];
+        let picture = Picture::of(&sessions, &[vec![1e-5; rows]], &Gear::of_ratio(RATIO)).unwrap();
+        assert_eq!(picture.rows, rows);
+        assert!(picture.spectra.iter().all(|spectrum| spectrum.peaks.is_empty()));
+        assert!(picture.noise.white_arcsec == 0.0 && picture.noise.independent_rows.is_finite());
+    }
+    let still = [session(vec![1.0; 100])];
+    assert!(Picture::of(&still, &[vec![0.0; 100]], &Gear::of_ratio(RATIO)).unwrap().pulses.is_empty());
+    let error = Picture::of(&still, &[vec![0.0; 99]], &Gear::of_ratio(RATIO)).unwrap_err();
+    assert_eq!(error.to_string(), "session 0: 99 values of the residual for 100 rows");
+    assert_eq!(harmonics(&[], &[], None, &[2.0]), None);
+}
