@@ -4,6 +4,7 @@
 //! checked, the function is called, and its result is written and shown. Data goes to stdout, talk to stderr.
 
 mod context;
+mod diagnose;
 mod drive;
 mod export;
 mod replay;
@@ -81,6 +82,7 @@ enum Command {
     Tables(tables::Tables),
     Validate(validate::Validate),
     Replay(replay::Replay),
+    Diagnose(diagnose::Diagnose),
 }
 
 /// Options of every command.
@@ -143,6 +145,7 @@ impl Command {
             Command::Tables(command) => command.run(context),
             Command::Validate(command) => command.run(context),
             Command::Replay(command) => command.run(context),
+            Command::Diagnose(command) => command.run(context),
         }
     }
 }

@@ -1,0 +1,189 @@
+//! The nominal prediction over the rows, and what of it may float without being a discrepancy.
+//!
+//! # Play
+//! The flank that carries follows the load: `p = +1` where the torque turns the output forward onto one flank, `−1` on the other,
+//! and the error holds `p · backlash / 2`. Inside `|torque| < friction` drives differ, so several laws are tried and the one
+//! that leaves least is taken:
+//! held (p stays where it was), pushed (friction holds the output until the generator has used up the clearance and pushes it:
+//! a play operator in the nominal output), by sign alone, and smooth.
+
+use flexspline::{GeneratorAngle, PlayState, Table};
+
+use super::rows::Rows;
+use crate::nominal::Nominal;
+use crate::tables::ARCSEC_PER_RAD;
+
+/// How the flank changes where the torque is below friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PlayLaw {
+    /// It stays as it was until the torque exceeds friction.
+    Held,
+    /// Friction holds the output until the generator pushes it.
+    Pushed,
+    /// It follows the sign of the torque.
+    Sign,
+    /// `tanh(torque / friction)`.
+    Smooth,
+}
+
+impl PlayLaw {
+    /// All laws.
+    pub const ALL: [PlayLaw; 4] = [PlayLaw::Held, PlayLaw::Pushed, PlayLaw::Sign, PlayLaw::Smooth];
+
+    /// Which flank carries in each row, −1 to 1, under a torque.
+    #[must_use]
+    pub fn flanks(self, rows: &Rows, torque: &[f64], nominal: &Nominal) -> Vec<f64> {
+        let friction = nominal.friction_torque_n_m;
+        let half_rad = (0.5 * nominal.backlash_arcsec / ARCSEC_PER_RAD).max(1e-12);
+        let mut flanks = vec![0.0; rows.len()];
+        for session in &rows.sessions {
+            let first = session.start;
+            // Before the first load: where the friction of a moving output puts it.
+            let mut p = if torque[first].abs() > friction {
+                torque[first].signum()
+            } else {
+                -rows.direction[first] * nominal.ratio.signum()
+            };
+            for k in session.clone() {
+                let load = torque[k];
+                p = match self {
+                    PlayLaw::Smooth => (load / friction.max(1e-9)).tanh(),
+                    _ if load.abs() > friction => load.signum(),
+                    PlayLaw::Held => p,
+                    PlayLaw::Sign if load != 0.0 => load.signum(),
+                    PlayLaw::Sign => p,
+                    PlayLaw::Pushed => {
+                        let turned = if k > first { rows.output[k] - rows.output[k - 1] } else { 0.0 };
+                        (p - turned / half_rad).clamp(-1.0, 1.0)
+                    }
+                };
+                flanks[k] = p;
+            }
+        }
+        flanks
+    }
+}
+
+/// A column that belongs to the nominal model and may float: coefficient 0 is nominal.
+#[derive(Clone, Debug)]
+pub struct Floating {
+    /// What it is.
+    pub name: String,
+    /// Column, arcsec per unit of the coefficient.
+    pub values: Vec<f64>,
+    /// Standard deviation between units; large for the zero of the encoder.
+    pub spread: f64,
+}
+
+/// Nominal prediction and tolerances.
+#[derive(Clone, Debug)]
+pub struct Base {
+    /// Prediction of the nominal model, arcsec.
+    pub prediction: Vec<f64>,
+    /// Which flank carries, −1 to 1.
+    pub flank: Vec<f64>,
+    /// Nominal wind-up, arcsec.
+    pub wind_up: Vec<f64>,
+    /// Half the nominal backlash, arcsec.
+    pub half_backlash: f64,
+    /// Law of the play.
+    pub law: PlayLaw,
+    /// What may float.
+    pub floating: Vec<Floating>,
+    /// Rows where the flank is not known well: crossing the clearance, or torque around friction.
+    pub uncertain: Vec<bool>,
+}
+
+/// Standard deviation of what no drawing fixes, arcsec: the zero of the output encoder.
+const FREE: f64 = 1e4;
+/// A play law that leaves this much less (relative) than the first is taken instead.
+const CLEARLY_BETTER: f64 = 0.995;
+/// Rows are uncertain where the torque is below this multiple of friction.
+const NEAR_FRICTION: f64 = 1.25;
+/// A clearance is crossed within this time, s.
+const CROSSING_S: f64 = 0.08;
+/// If more of the rows than this are uncertain, none is set aside: then they are what the data are about.
+const UNCERTAIN_AT_MOST: f64 = 0.35;
+
+impl Base {
+    /// The nominal model over the rows; `table` takes the place of its parts where it is given.
+    #[must_use]
+    pub fn new(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>) -> Base {
+        let wind_up: Vec<f64> = rows.torque.iter().map(|t| nominal.wind_up_arcsec(*t)).collect();
+        let harmonics: Vec<f64> = rows.generator.iter().map(|psi| nominal.harmonics_arcsec(*psi)).collect();
+        let half_backlash = 0.5 * nominal.backlash_arcsec;
+        let mut best: Option<(f64, PlayLaw, Vec<f64>)> = None;
+        for law in PlayLaw::ALL {
+            let flank = law.flanks(rows, &rows.torque, nominal);
+            let left: Vec<f64> =
+                (0..rows.len()).map(|k| rows.error[k] - harmonics[k] - wind_up[k] - half_backlash * flank[k]).collect();
+            let spread = middle_spread(&left, &rows.torque, nominal.friction_torque_n_m);
+            if best.as_ref().is_none_or(|(least, _, _)| spread < CLEARLY_BETTER * least) {
+                best = Some((spread, law, flank));
+            }
+        }
+        let (law, flank) = best.map_or((PlayLaw::Held, Vec::new()), |(_, law, flank)| (law, flank));
+        let prediction: Vec<f64> = match table {
+            Some(table) => predicted_by_table(rows, table),
+            None => (0..rows.len()).map(|k| harmonics[k] + wind_up[k] + half_backlash * flank[k]).collect(),
+        };
+        let mut floating = vec![Floating { name: "zero".into(), values: vec![1.0; rows.len()], spread: FREE }];
+        let mut add = |name: &str, values: Vec<f64>, spread: f64| {
+            if spread > 0.0 && values.iter().any(|v| *v != 0.0) {
+                floating.push(Floating { name: name.into(), values, spread });
+            }
+        };
+        add("stiffness", wind_up.clone(), nominal.spread.stiffness);
+        add("backlash", flank.iter().map(|p| half_backlash * p).collect(), nominal.spread.backlash);
+        for harmonic in &nominal.harmonics {
+            let wave = |shift: f64| -> Vec<f64> {
+                let at = |psi: &f64| harmonic.order_per_generator_turn * psi + harmonic.phase_rad + shift;
+                rows.generator.iter().map(|psi| harmonic.amplitude_arcsec * at(psi).sin()).collect()
+            };
+            add("harmonic", wave(0.0), nominal.spread.harmonic);
+            add("harmonic", wave(std::f64::consts::FRAC_PI_2), nominal.spread.harmonic);
+        }
+        let uncertain = uncertain(rows, nominal, &flank);
+        Base { prediction, flank, wind_up, half_backlash, law, floating, uncertain }
+    }
+}
+
+/// Mean square left where the torque is around friction, after what varies slowly over those rows is taken out.
+fn middle_spread(left: &[f64], torque: &[f64], friction: f64) -> f64 {
+    let inside: Vec<f64> = left.iter().zip(torque).filter(|(_, t)| t.abs() <= friction).map(|(e, _)| *e).collect();
+    let all: f64 = left.iter().sum::<f64>() / left.len().max(1) as f64;
+    inside.iter().map(|e| (e - all).powi(2)).sum::<f64>()
+}
+
+fn predicted_by_table(rows: &Rows, table: &Table<'_>) -> Vec<f64> {
+    let mut predicted = vec![0.0; rows.len()];
+    for session in &rows.sessions {
+        let mut play = PlayState::unknown();
+        for k in session.clone() {
+            let generator = GeneratorAngle::from_rad(rows.generator[k]).unwrap_or(GeneratorAngle::ZERO);
+            let said = table.forward(&mut play, generator, rows.torque[k] as f32, rows.temperature[k] as f32);
+            predicted[k] = f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD;
+        }
+    }
+    predicted
+}
+
+fn uncertain(rows: &Rows, nominal: &Nominal, flank: &[f64]) -> Vec<bool> {
+    let near = NEAR_FRICTION * nominal.friction_torque_n_m;
+    let mut uncertain: Vec<bool> =
+        (0..rows.len()).map(|k| rows.torque[k].abs() <= near || flank[k].abs() < 0.999).collect();
+    for session in &rows.sessions {
+        for k in session.start + 1..session.end {
+            if flank[k] * flank[k - 1] < 0.0 {
+                let settled = (CROSSING_S / rows.period).ceil().clamp(2.0, 50.0) as usize;
+                let around = k.saturating_sub(2).max(session.start)..(k + 1 + settled).min(session.end);
+                uncertain[around].fill(true);
+            }
+        }
+    }
+    let share = uncertain.iter().filter(|u| **u).count() as f64 / rows.len().max(1) as f64;
+    if share > UNCERTAIN_AT_MOST {
+        uncertain.fill(false);
+    }
+    uncertain
+}

@@ -1,0 +1,117 @@
+//! What moves the load: gravity that the torque column does not hold, and the load's inertia on the drive's spring (PHYSICS §5, 25, 28).
+
+use std::f64::consts::PI;
+
+use super::{Column, Excitation, Law, Shape, Tolerance, by_row, main};
+use crate::diagnosis::base::PlayLaw;
+use crate::diagnosis::linear::Prior;
+use crate::tables::ARCSEC_PER_RAD;
+
+/// An unbalanced load, m g l sin of the output angle against gravity: adds to the torque, so it winds the drive up and moves the play.
+fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
+    let scale = if on.load > 0.0 { on.load } else { 20.0 };
+    Law::new("gravity_torque", move |on, shape| {
+        let (moment, phase) = (shape[0], shape[1]);
+        let rows = on.rows;
+        let torque: Vec<f64> = (0..rows.len())
+            .map(|k| rows.torque[k] + moment * (rows.output[k] + sign * rows.orientation[k] - phase).sin())
+            .collect();
+        let flank = play.flanks(rows, &torque, on.nominal);
+        let half = on.base.half_backlash;
+        let wind = by_row(on, |k| on.nominal.wind_up_arcsec(torque[k]) - on.base.wind_up[k]);
+        let play = by_row(on, |k| half * (flank[k] - on.base.flank[k]));
+        let together = by_row(on, |k| wind[k] + play[k]);
+        vec![
+            Column { values: together, tolerance: Tolerance::Main(Prior { mean: 1.0, std: 0.02 }) },
+            Column { values: play, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 0.5 }) },
+        ]
+    })
+    .shapes([Shape::by_factors("moment_n_m", 0.01 * scale, 2.0 * scale, 6), Shape::angle("phase_rad", 2.0 * PI, 10)])
+    .parameters(|_, shape, c| vec![("moment_n_m", shape[0] * c[0]), ("phase_rad", shape[1])])
+}
+
+/// Response of a mass on a spring to `driven`, less what it is driven to.
+fn ringing(on: &Excitation<'_>, driven: &[f64], frequency_hz: f64, damping: f64) -> Vec<f64> {
+    let rows = on.rows;
+    let omega = 2.0 * PI * frequency_hz;
+    let mut less = vec![0.0; driven.len()];
+    for session in &rows.sessions {
+        let first = session.start;
+        let (mut x, mut v) = (driven[first], 0.0);
+        let (mut dt_known, mut step) = (f64::NAN, [0.0; 4]);
+        for k in first + 1..session.end {
+            let dt = rows.time[k] - rows.time[k - 1];
+            if (dt - dt_known).abs() > 1e-9 * dt.abs() || dt_known.is_nan() {
+                (dt_known, step) = (dt, transition(omega, damping, dt));
+            }
+            // Straight from one row to the next: exact for the mass under a ramp.
+            let slope = if dt > 0.0 { (driven[k] - driven[k - 1]) / dt } else { 0.0 };
+            let lag = 2.0 * damping / omega;
+            let (off, rate) = (x - driven[k - 1] + lag * slope, v - slope);
+            x = driven[k] - lag * slope + step[0] * off + step[1] * rate;
+            v = slope + step[2] * off + step[3] * rate;
+            less[k] = x - driven[k];
+        }
+    }
+    less
+}
+
+/// Free motion of a damped oscillator over `dt`: position and velocity after from before.
+fn transition(omega: f64, damping: f64, dt: f64) -> [f64; 4] {
+    let zeta = damping.min(0.999);
+    let (decay, turned) = (omega * zeta, omega * (1.0 - zeta * zeta).sqrt());
+    let (fade, c, s) = ((-decay * dt).exp(), (turned * dt).cos(), (turned * dt).sin());
+    [
+        fade * (c + decay / turned * s),
+        fade * s / turned,
+        -fade * omega * omega / turned * s,
+        fade * (c - decay / turned * s),
+    ]
+}
+
+/// The load's inertia on the torsion of the drive: rings after steps of the torque and where the kinematic error meets its frequency.
+fn torsional_resonance(on: &Excitation<'_>) -> Law {
+    let fastest = 0.45 / on.rows.period;
+    Law::new("torsional_resonance", |on, shape| {
+        let (frequency, damping) = (shape[0], shape[1]);
+        let base = on.base;
+        let kinematic = by_row(on, |k| base.prediction[k] - base.wind_up[k]);
+        let turning: Vec<f64> = on.rows.output.iter().map(|out| out * ARCSEC_PER_RAD).collect();
+        let lag = 2.0 * damping / (2.0 * PI * frequency);
+        let moved = ringing(on, &turning, frequency, damping);
+        // A steady speed is no lag of a mass whose damper is inside the drive.
+        let moved = by_row(on, |k| moved[k] + lag * on.rows.speed[k] / on.nominal.ratio * ARCSEC_PER_RAD);
+        vec![
+            main(ringing(on, &base.wind_up, frequency, damping), 1.0),
+            main(ringing(on, &kinematic, frequency, damping), 1.0),
+            main(moved, 0.5),
+        ]
+    })
+    .shapes([
+        Shape::by_factors("frequency_hz", 1.0f64.min(0.3 * fastest), fastest.clamp(0.5, 80.0), 14),
+        Shape::by_factors("damping_ratio", 0.008, 0.5, 3),
+    ])
+    .parameters(|_, shape, c| {
+        let gain = [c[0], c[1]].into_iter().fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
+        vec![("frequency_hz", shape[0]), ("damping_ratio", shape[1]), ("gain", gain)]
+    })
+    .physical(|_, c| c[0] > 0.0 || c[1] > 0.0 || c[2] > 0.0)
+}
+
+pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
+    let mut laws = Vec::new();
+    if on.nominal.wind_up_arcsec(1.0) > 0.0 {
+        // The load that gravity adds moves the torque at which the play turns over: which law it follows there shows only now.
+        for play in [PlayLaw::Held, PlayLaw::Pushed] {
+            laws.push(gravity_torque(1.0, play, on));
+            if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
+                laws.push(gravity_torque(-1.0, play, on));
+            }
+        }
+    }
+    if on.rows.recorded.time {
+        laws.push(torsional_resonance(on));
+    }
+    laws.retain(|law| !law.shapes.is_empty());
+    laws
+}

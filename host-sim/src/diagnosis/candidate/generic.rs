@@ -1,0 +1,167 @@
+//! Deviations without a cause in the library. They compete with the causes: where one of them tells the data better, no cause is
+//! named for it.
+
+use super::{Excitation, Law, by_row, main};
+
+fn law(name: &str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send + Sync + 'static) -> Law {
+    let mut law = Law::new(name, move |on, _| {
+        let column = by_row(on, |k| values(on, k));
+        let size = super::super::rows::rms(&column).max(1e-12);
+        vec![main(column.into_iter().map(|v| v / size).collect(), 20.0)]
+    });
+    law.named = false;
+    law
+}
+
+fn wave(name: String, angle: fn(&Excitation<'_>, usize) -> f64, order: f64) -> Law {
+    let mut law = Law::new(&name, move |on, _| {
+        vec![
+            main(by_row(on, |k| (order * angle(on, k)).cos()), 15.0),
+            main(by_row(on, |k| (order * angle(on, k)).sin()), 15.0),
+        ]
+    });
+    law.named = false;
+    law
+}
+
+/// A line at any order of an angle or of time: `unit` is what it is counted against.
+#[must_use]
+pub fn line(unit: &str, order: f64) -> Law {
+    let angle: fn(&Excitation<'_>, usize) -> f64 = match unit {
+        "generator turn" => |on, k| on.rows.generator[k],
+        "turn on the circular spline" => |on, k| on.rows.on_circular_spline[k],
+        "output turn" => |on, k| on.rows.output[k],
+        _ => |on, k| 2.0 * std::f64::consts::PI * on.rows.time[k],
+    };
+    let name = format!("line of {order:.4} per {unit}");
+    if unit != "second" {
+        return wave(name, angle, order);
+    }
+    // Nothing says that a line in time keeps its phase while nobody records.
+    let mut law = Law::new(&name, move |on, _| {
+        let of = |session: &std::ops::Range<usize>, shift: f64| {
+            let inside = |k: usize| if session.contains(&k) { (order * angle(on, k) - shift).cos() } else { 0.0 };
+            main(by_row(on, inside), 15.0)
+        };
+        on.rows.sessions.iter().flat_map(|s| [of(s, 0.0), of(s, std::f64::consts::FRAC_PI_2)]).collect()
+    });
+    law.named = false;
+    law
+}
+
+/// Everything without a name that is always tried.
+#[must_use]
+pub fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
+    let rows = on.rows;
+    let mut laws = Vec::new();
+    if rows.recorded.temperature {
+        laws.push(law("offset with temperature", |on, k| on.rows.temperature[k] - on.nominal.temperature_c));
+        laws.push(law("offset with temperature squared", |on, k| {
+            (on.rows.temperature[k] - on.nominal.temperature_c).powi(2)
+        }));
+    }
+    if rows.recorded.time {
+        laws.push(law("offset with time", |on, k| on.rows.time[k] - on.rows.time[0]));
+        let since = |rows: &super::super::rows::Rows| {
+            let mut since = vec![0.0; rows.len()];
+            for session in &rows.sessions {
+                for k in session.clone() {
+                    since[k] = rows.time[k] - rows.time[session.start];
+                }
+            }
+            since
+        };
+        let since = since(rows);
+        let again = since.clone();
+        laws.push(law("creep since the session began (logarithm)", move |_, k| (1.0 + since[k]).ln()));
+        laws.push(law("settling since the session began (exponential, 20 s)", move |_, k| (-again[k] / 20.0).exp()));
+        laws.push(law("offset with the magnitude of speed", |on, k| on.rows.speed[k].abs()));
+        laws.push(law("offset with speed squared", |on, k| on.rows.speed[k].powi(2)));
+        laws.push(law("offset with speed squared, by direction", |on, k| {
+            on.rows.speed[k].powi(2) * on.rows.direction[k]
+        }));
+    }
+    laws.push(law("offset by direction", |on, k| on.rows.direction[k]));
+    if on.load > 0.0 {
+        laws.push(law("offset with the magnitude of torque", |on, k| on.rows.torque[k].abs()));
+        laws.push(law("offset with torque squared", |on, k| on.rows.torque[k].powi(2)));
+        laws.push(law("torque by direction", |on, k| on.rows.torque[k].abs() * on.rows.direction[k]));
+        if rows.recorded.time {
+            laws.push(law("wind-up with time", |on, k| on.base.wind_up[k] * (on.rows.time[k] - on.rows.time[0])));
+        }
+    }
+    for order in [3.0, 5.0, 7.0, 8.0, 10.0, 12.0] {
+        laws.push(line("generator turn", order));
+    }
+    for order in [2.0, 3.0] {
+        laws.push(line("output turn", order));
+    }
+    laws
+}
+
+/// A function of one or two quantities, free but for its smoothness: hats on a grid.
+fn map(name: &str, grids: Vec<(Vec<f64>, usize)>) -> Law {
+    let mut law = Law::new(name, move |on, _| {
+        let n = on.rows.len();
+        let mut columns: Vec<Vec<f64>> = vec![vec![1.0; n]];
+        for (values, nodes) in &grids {
+            let low = super::super::rows::quantile(values.iter().copied(), 0.01);
+            let high = super::super::rows::quantile(values.iter().copied(), 0.99);
+            if high <= low {
+                continue;
+            }
+            let hats: Vec<Vec<f64>> = (0..*nodes)
+                .map(|j| {
+                    let hat = |v: &f64| {
+                        let place = ((v - low) / (high - low)).clamp(0.0, 1.0) * (*nodes - 1) as f64;
+                        (1.0 - (place - j as f64).abs()).max(0.0)
+                    };
+                    values.iter().map(hat).collect()
+                })
+                .collect();
+            columns = columns
+                .iter()
+                .flat_map(|c| {
+                    hats.iter().map(|h| c.iter().zip(h).map(|(a, b)| a * b).collect::<Vec<f64>>()).collect::<Vec<_>>()
+                })
+                .collect();
+        }
+        columns.into_iter().map(|values| main(values, 10.0)).collect()
+    });
+    law.named = false;
+    law
+}
+
+/// What is left as a free function of what was measured: tried only when the causes are in, to see whether anything is left.
+#[must_use]
+pub fn maps(on: &Excitation<'_>) -> Vec<Law> {
+    let rows = on.rows;
+    let turn = |angle: &[f64], of: f64| -> Vec<f64> { angle.iter().map(|a| a.rem_euclid(of)).collect() };
+    let full = std::f64::consts::TAU;
+    let mut maps = vec![
+        map("a function of the generator angle", vec![(turn(&rows.generator, full), 25)]),
+        map("a function of the angle on the circular spline", vec![(turn(&rows.on_circular_spline, full), 25)]),
+        map("a function of the output angle", vec![(turn(&rows.output, full), 13)]),
+    ];
+    if on.load > 0.0 {
+        maps.push(map(
+            "a function of torque and direction",
+            vec![(rows.torque.clone(), 11), (rows.direction.clone(), 2)],
+        ));
+    }
+    if rows.recorded.temperature {
+        maps.push(map("a function of temperature", vec![(rows.temperature.clone(), 6)]));
+        if on.load > 0.0 {
+            let both = vec![(rows.torque.clone(), 6), (rows.temperature.clone(), 4)];
+            maps.push(map("a function of torque and temperature", both));
+        }
+    }
+    if rows.recorded.time {
+        maps.push(map("a function of speed", vec![(rows.speed.clone(), 12)]));
+        if on.load > 0.0 {
+            let both = vec![(rows.torque.clone(), 6), (rows.time.clone(), 4)];
+            maps.push(map("a function of torque and time", both));
+        }
+    }
+    maps
+}

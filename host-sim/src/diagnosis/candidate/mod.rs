@@ -1,0 +1,217 @@
+//! Candidate causes: each a law of physics with named parameters, re-simulated on the data's own excitation.
+//!
+//! A [`Law`] turns shape parameters (what enters non-linearly: a slip torque, a time constant, a place) into columns whose
+//! coefficients enter linearly. Laws in the field differ from those here in detail, so each carries *nuisance* columns: the
+//! directions in which its law is likely to be wrong, with coefficients of the order of a share of the main ones. A deviation
+//! of that kind then breeds no second cause. Sources: PHYSICS §1.3, §5.
+
+mod dynamic;
+mod generic;
+mod geometry;
+mod sensor;
+mod stiffness;
+mod thermal;
+
+use super::base::Base;
+use super::linear::Prior;
+use super::rows::Rows;
+use crate::nominal::Nominal;
+
+pub use generic::{line, maps, unnamed};
+
+/// What laws are evaluated on.
+pub struct Excitation<'a> {
+    /// The rows.
+    pub rows: &'a Rows,
+    /// Nominal model.
+    pub nominal: &'a Nominal,
+    /// Nominal prediction and its parts.
+    pub base: &'a Base,
+    /// Scale of the load, N·m; 0 without torque.
+    pub load: f64,
+    /// Arcsec at the output for 1 µm on the pitch circle.
+    pub arcsec_per_um: f64,
+    /// Jumps found in the data: row and height, arcsec.
+    pub jumps: &'a [(usize, f64)],
+}
+
+/// A shape parameter.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    /// Name with unit.
+    pub name: &'static str,
+    /// Least plausible value.
+    pub low: f64,
+    /// Largest plausible value.
+    pub high: f64,
+    /// Values tried first, spread over the range: evenly, or by factors if `log`.
+    pub tried: usize,
+    /// By factors.
+    pub log: bool,
+    /// The range closes on itself: an angle.
+    pub cyclic: bool,
+}
+
+impl Shape {
+    fn by_factors(name: &'static str, low: f64, high: f64, tried: usize) -> Shape {
+        Shape { name, low, high, tried, log: true, cyclic: false }
+    }
+    fn evenly(name: &'static str, low: f64, high: f64, tried: usize) -> Shape {
+        Shape { name, low, high, tried, log: false, cyclic: false }
+    }
+    fn angle(name: &'static str, period: f64, tried: usize) -> Shape {
+        Shape { name, low: 0.0, high: period, tried, log: false, cyclic: true }
+    }
+
+    /// The value at a place between 0 and 1.
+    #[must_use]
+    pub fn value(&self, place: f64) -> f64 {
+        let place = if self.cyclic { place.rem_euclid(1.0) } else { place.clamp(0.0, 1.0) };
+        if self.log { self.low * (self.high / self.low).powf(place) } else { self.low + (self.high - self.low) * place }
+    }
+
+    /// Places tried first.
+    fn places(&self) -> Vec<f64> {
+        let count = self.tried.max(1) as f64;
+        (0..self.tried.max(1)).map(|k| (k as f64 + if self.cyclic { 0.0 } else { 0.5 }) / count).collect()
+    }
+}
+
+/// What the coefficient of a column may be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tolerance {
+    /// A parameter of the law.
+    Main(Prior),
+    /// A deviation of the law: its size is of the order of this share of the main coefficients.
+    Nuisance(f64),
+}
+
+/// A column of a law.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// Arcsec per unit of the coefficient, row by row.
+    pub values: Vec<f64>,
+    /// What the coefficient may be.
+    pub tolerance: Tolerance,
+}
+
+/// A main column with a coefficient around zero.
+fn main(values: Vec<f64>, std: f64) -> Column {
+    Column { values, tolerance: Tolerance::Main(Prior { mean: 0.0, std }) }
+}
+
+/// A nuisance column.
+fn nuisance(values: Vec<f64>, share: f64) -> Column {
+    Column { values, tolerance: Tolerance::Nuisance(share) }
+}
+
+/// A parameter for the report: name with unit, value.
+pub type Named = (&'static str, f64);
+
+type Columns = Box<dyn Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync>;
+type Parameters = Box<dyn Fn(&Excitation<'_>, &[f64], &[f64]) -> Vec<Named> + Send + Sync>;
+type Physical = Box<dyn Fn(&[f64], &[f64]) -> bool + Send + Sync>;
+
+/// One law of one cause.
+pub struct Law {
+    /// Cause in snake case, or what an unnamed deviation looks like.
+    pub cause: String,
+    /// False for a deviation that has no cause in the library.
+    pub named: bool,
+    /// Shape parameters.
+    pub shapes: Vec<Shape>,
+    /// Columns at given shape parameters.
+    pub columns: Columns,
+    /// Parameters for the report from shape parameters and coefficients.
+    pub parameters: Parameters,
+    /// Whether shape parameters and coefficients make sense, signs above all.
+    pub physical: Physical,
+    /// If set, the law is a base parameter out of tolerance: index of the name in [`Base::floating`].
+    pub tolerance_of: Option<&'static str>,
+    /// How wrong the law may be, as a share of its size: what is smaller than that beside it may be its own misfit.
+    pub misfit: f64,
+}
+
+/// Share by which the law of a contact, a friction or a lubricant may be wrong.
+const USUAL_MISFIT: f64 = 0.10;
+/// The same for pure geometry and counting: sensors, ratio, skipped teeth.
+const EXACT_MISFIT: f64 = 0.02;
+
+impl Law {
+    fn new(cause: &str, columns: impl Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync + 'static) -> Law {
+        Law {
+            cause: cause.to_owned(),
+            named: true,
+            shapes: Vec::new(),
+            columns: Box::new(columns),
+            parameters: Box::new(|_, _, _| Vec::new()),
+            physical: Box::new(|_, _| true),
+            tolerance_of: None,
+            misfit: USUAL_MISFIT,
+        }
+    }
+    fn exact(mut self) -> Law {
+        self.misfit = EXACT_MISFIT;
+        self
+    }
+    fn shapes(mut self, shapes: impl IntoIterator<Item = Shape>) -> Law {
+        self.shapes = shapes.into_iter().collect();
+        self
+    }
+    fn parameters(
+        mut self,
+        parameters: impl Fn(&Excitation<'_>, &[f64], &[f64]) -> Vec<Named> + Send + Sync + 'static,
+    ) -> Law {
+        self.parameters = Box::new(parameters);
+        self
+    }
+    fn physical(mut self, physical: impl Fn(&[f64], &[f64]) -> bool + Send + Sync + 'static) -> Law {
+        self.physical = Box::new(physical);
+        self
+    }
+
+    /// Values of the shape parameters at places between 0 and 1.
+    #[must_use]
+    pub fn values(&self, places: &[f64]) -> Vec<f64> {
+        self.shapes.iter().zip(places).map(|(shape, place)| shape.value(*place)).collect()
+    }
+
+    /// All combinations of places tried first.
+    #[must_use]
+    pub fn tried(&self) -> Vec<Vec<f64>> {
+        let mut tried = vec![Vec::new()];
+        for shape in &self.shapes {
+            tried = tried
+                .iter()
+                .flat_map(|so_far: &Vec<f64>| {
+                    shape.places().into_iter().map(|place| so_far.iter().copied().chain([place]).collect())
+                })
+                .collect();
+        }
+        tried
+    }
+}
+
+/// Every law of every cause that the data can speak about.
+#[must_use]
+pub fn library(on: &Excitation<'_>) -> Vec<Law> {
+    let mut laws = Vec::new();
+    if on.nominal.teeth.is_some() {
+        laws.extend(geometry::laws(on));
+    }
+    laws.extend(stiffness::laws(on));
+    laws.extend(thermal::laws(on));
+    laws.extend(dynamic::laws(on));
+    laws.extend(sensor::laws(on));
+    laws
+}
+
+/// A column made row by row.
+fn by_row(on: &Excitation<'_>, value: impl Fn(usize) -> f64) -> Vec<f64> {
+    (0..on.rows.len()).map(value).collect()
+}
+
+/// Amplitude and phase of `c cos(x) + s sin(x) = amplitude cos(x − phase)`.
+fn polar(c: f64, s: f64) -> (f64, f64) {
+    (c.hypot(s), s.atan2(c))
+}

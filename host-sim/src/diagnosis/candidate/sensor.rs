@@ -1,0 +1,54 @@
+//! What the sensors do (PHYSICS §5, 7-12): geometry of the encoders, time between their readings, a wrong ratio. None knows of load.
+
+use super::{Excitation, Law, by_row, main, nuisance, polar};
+
+fn encoder(cause: &'static str, phase: fn(&Excitation<'_>, usize) -> f64, per_ratio: bool) -> Law {
+    Law::new(cause, move |on, _| {
+        let wave = |order: f64, shift: f64| by_row(on, |k| (order * phase(on, k) - shift).cos());
+        let quarter = std::f64::consts::FRAC_PI_2;
+        vec![
+            main(wave(1.0, 0.0), 30.0),
+            main(wave(1.0, quarter), 30.0),
+            nuisance(wave(2.0, 0.0), 0.15),
+            nuisance(wave(2.0, quarter), 0.15),
+        ]
+    })
+    .parameters(move |on, _, c| {
+        let (amplitude, phase) = polar(c[0], c[1]);
+        let mut named = vec![("amplitude_arcsec", amplitude), ("phase_rad", phase)];
+        if per_ratio {
+            named.push(("amplitude_at_generator_arcsec", amplitude * on.nominal.ratio.abs()));
+        }
+        named
+    })
+}
+
+/// The output is read later than the generator.
+fn sensor_latency() -> Law {
+    Law::new("sensor_latency", |on, _| {
+        let per_ms = 1e-3 * crate::tables::ARCSEC_PER_RAD / on.nominal.ratio;
+        vec![main(by_row(on, |k| -on.rows.speed[k] * per_ms), 5.0)]
+    })
+    .parameters(|_, _, c| vec![("latency_ms", c[0])])
+}
+
+/// The error grows with the angle: the ratio is not what the nominal model says.
+fn ratio_error() -> Law {
+    Law::new("ratio_error", |on, _| {
+        let ppm = 1e-6 * crate::tables::ARCSEC_PER_RAD;
+        vec![main(by_row(on, |k| on.rows.output[k] * ppm), 300.0)]
+    })
+    .parameters(|_, _, c| vec![("relative_error_ppm", c[0])])
+}
+
+pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
+    let mut laws = vec![
+        encoder("output_encoder_eccentricity", |on, k| on.rows.output[k], false),
+        encoder("generator_encoder_eccentricity", |on, k| on.rows.generator[k], true),
+        ratio_error(),
+    ];
+    if on.rows.recorded.time {
+        laws.push(sensor_latency());
+    }
+    laws.into_iter().map(Law::exact).collect()
+}

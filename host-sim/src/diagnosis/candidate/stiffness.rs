@@ -1,0 +1,160 @@
+//! What the torque does beyond the nominal wind-up and play (PHYSICS §5, 14-17, 22, 24).
+
+use super::{Excitation, Law, Shape, by_row, main, nuisance};
+
+/// Torque in units of the load scale.
+fn load_share(on: &Excitation<'_>, k: usize) -> f64 {
+    on.rows.torque[k] / on.load.max(1e-9)
+}
+
+/// The spring part of a slip element (stop operator): follows the torque up to ±`slip`, in units of `slip`.
+pub(super) fn stop_operator(on: &Excitation<'_>, slip: f64) -> Vec<f64> {
+    let torque = &on.rows.torque;
+    let mut held = vec![0.0; torque.len()];
+    for session in &on.rows.sessions {
+        let mut z = 0.0;
+        for k in session.clone() {
+            let step = torque[k] - if k > session.start { torque[k - 1] } else { 0.0 };
+            z = f64::clamp(z + step, -slip, slip);
+            held[k] = z / slip;
+        }
+    }
+    held
+}
+
+/// Springs that slip one after the other (Maxwell slip, Prandtl-Ishlinskii): the output lags the torque by what they hold.
+fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
+    let load = on.load;
+    Law::new("torsional_hysteresis", |on, shape| {
+        let slip = shape[0];
+        let negative = |values: Vec<f64>| values.into_iter().map(|z| -z).collect::<Vec<f64>>();
+        vec![
+            main(negative(stop_operator(on, slip)), 30.0),
+            nuisance(negative(stop_operator(on, 0.35 * slip)), 0.35),
+            nuisance(negative(stop_operator(on, 2.5 * slip)), 0.5),
+            nuisance(by_row(on, |k| load_share(on, k)), 0.7),
+            nuisance(by_row(on, |k| load_share(on, k).powi(3)), 0.15),
+        ]
+    })
+    .shapes([Shape::by_factors("slip_torque_n_m", 0.03 * load, 1.0 * load, 6)])
+    .parameters(|_, shape, c| vec![("half_width_arcsec", c[0]), ("slip_torque_n_m", shape[0])])
+    .physical(|_, c| c[0] > 0.0)
+}
+
+/// Stiffer the higher the load: the wind-up lags behind the nominal line by a power of the torque.
+fn stiffness_hardening() -> Law {
+    Law::new("stiffness_hardening", |on, shape| {
+        let power = |n: f64| by_row(on, |k| -load_share(on, k).signum() * load_share(on, k).abs().powf(n));
+        vec![main(power(shape[0]), 30.0), nuisance(power(1.0), 0.4), nuisance(power(shape[0] + 1.5), 0.3)]
+    })
+    .shapes([Shape::evenly("exponent", 1.6, 4.4, 3)])
+    .parameters(|on, shape, c| vec![("at_full_load_arcsec", c[0]), ("exponent", shape[0]), ("full_load_n_m", on.load)])
+    .physical(|_, c| c[0] > 0.0)
+}
+
+fn stiffness_error() -> Law {
+    let mut law = Law::new("stiffness_error", |on, _| vec![main(on.base.wind_up.clone(), 0.5)])
+        .parameters(|_, _, c| vec![("relative_stiffness", 1.0 / (1.0 + c[0]) - 1.0), ("relative_wind_up", c[0])]);
+    law.tolerance_of = Some("stiffness");
+    law
+}
+
+fn backlash_growth() -> Law {
+    let mut law = Law::new("backlash_growth", |on, _| {
+        let half = on.base.half_backlash.max(1.0);
+        vec![main(by_row(on, |k| half * on.base.flank[k]), 1.0)]
+    })
+    .parameters(|on, _, c| vec![("growth_arcsec", 2.0 * c[0] * on.base.half_backlash.max(1.0))])
+    .physical(|_, c| c[0] > 0.0);
+    law.tolerance_of = Some("backlash");
+    law
+}
+
+/// Progress of wear from 0 at the first row to 1 at the last.
+#[derive(Clone, Copy)]
+enum Progress {
+    Time,
+    Travel,
+    Work,
+}
+
+/// A clearance that widens during the data, with time, travel, or travel under load (Archard).
+fn wear(by: Progress) -> Law {
+    Law::new("wear", move |on, shape| {
+        let rows = on.rows;
+        let n = rows.len();
+        let mut done = vec![0.0; n];
+        for k in 1..n {
+            let step = match by {
+                Progress::Time => rows.time[k] - rows.time[k - 1],
+                Progress::Travel => rows.travel[k] - rows.travel[k - 1],
+                Progress::Work => (rows.travel[k] - rows.travel[k - 1]) * rows.torque[k].abs(),
+            };
+            done[k] = done[k - 1] + step.max(0.0);
+        }
+        let all = done[n - 1].max(1e-12);
+        let widened = |k: usize| (done[k] / all).powf(shape[0]);
+        vec![
+            main(by_row(on, |k| on.base.flank[k] * widened(k)), 30.0),
+            nuisance(by_row(on, |k| on.base.flank[k] * widened(k).powi(2)), 0.25),
+            nuisance(by_row(on, |k| on.base.flank[k]), 0.25),
+        ]
+    })
+    .shapes([Shape::by_factors("exponent", 0.5, 2.0, 1)])
+    .parameters(|_, shape, c| vec![("growth_arcsec", 2.0 * c[0]), ("exponent", shape[0])])
+    .physical(|_, c| c[0] > 0.0)
+}
+
+/// Teeth that skipped: the output is off by whole teeth from then on.
+fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
+    let teeth = on.nominal.teeth?;
+    let pitch = 1_296_000.0 / f64::from(teeth.circular_spline);
+    let other = 1_296_000.0 / f64::from(teeth.flexspline);
+    let whole = |height: f64| {
+        [pitch, other].iter().any(|pitch| {
+            let count = (height / pitch).round();
+            count != 0.0 && (height - count * pitch).abs() < 0.004 * pitch * count.abs() + 60.0
+        })
+    };
+    if on.jumps.is_empty() || !on.jumps.iter().all(|(_, height)| whole(*height)) {
+        return None;
+    }
+    let jumps = on.jumps.to_vec();
+    let total: f64 = jumps.iter().map(|(_, height)| height).sum();
+    let columns = jumps.clone();
+    Some(
+        Law::new("ratcheting", move |on, _| {
+            columns
+                .iter()
+                .map(|(at, height)| main(by_row(on, |k| if k >= *at { height / pitch } else { 0.0 }), 2.0 * pitch))
+                .collect()
+        })
+        .parameters(move |on, _, c| {
+            let slipped: f64 = jumps.iter().zip(c).map(|((_, height), c)| c * height / pitch).sum();
+            vec![
+                ("teeth", (total / pitch).round()),
+                ("first_time_s", on.rows.time[jumps[0].0]),
+                ("offset_arcsec", slipped),
+                ("events", jumps.len() as f64),
+            ]
+        })
+        .exact(),
+    )
+}
+
+pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
+    let mut laws = Vec::new();
+    if on.load > 0.0 {
+        laws.extend([torsional_hysteresis(on), stiffness_hardening(), stiffness_error()]);
+    }
+    laws.push(backlash_growth());
+    laws.push(wear(Progress::Travel));
+    if on.rows.recorded.time {
+        laws.push(wear(Progress::Time));
+    }
+    if on.load > 0.0 {
+        laws.push(wear(Progress::Work));
+    }
+    laws.extend(ratcheting(on));
+    laws
+}

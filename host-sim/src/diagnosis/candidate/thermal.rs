@@ -1,0 +1,150 @@
+//! What the temperature does (PHYSICS §5, 18-21).
+
+use super::{Column, Excitation, Law, Shape, Tolerance, by_row, main, nuisance};
+use crate::diagnosis::linear::Prior;
+
+/// Temperature above nominal, felt with a lag of `lag_s`, K.
+fn lagged(on: &Excitation<'_>, lag_s: f64) -> Vec<f64> {
+    let rows = on.rows;
+    let mut felt = vec![0.0; rows.len()];
+    for session in &rows.sessions {
+        let mut state = rows.temperature[session.start];
+        for k in session.clone() {
+            if k > session.start {
+                let dt = (rows.time[k] - rows.time[k - 1]).max(0.0);
+                state += (rows.temperature[k] - state) * (1.0 - (-dt / lag_s).exp());
+            }
+            felt[k] = state - on.nominal.temperature_c;
+        }
+    }
+    felt
+}
+
+/// Warm parts close the clearance, cold ones open it (or the reverse): −2″/K of generator and flexspline against the circular spline.
+fn thermal_clearance(on: &Excitation<'_>) -> Law {
+    Law::new("thermal_clearance", |on, shape| {
+        let warmer = lagged(on, shape.first().copied().unwrap_or(1e-3));
+        let flank = |k: usize| on.base.flank[k];
+        vec![
+            main(by_row(on, |k| flank(k) * warmer[k]), 1.0),
+            nuisance(by_row(on, |k| flank(k) * warmer[k] * warmer[k].abs() / 30.0), 0.3),
+            nuisance(by_row(on, |k| flank(k) * warmer[k] * warmer[k] / 30.0), 0.3),
+        ]
+    })
+    .shapes(on.rows.recorded.time.then(|| Shape::by_factors("lag_s", 0.5, 600.0, 3)))
+    .parameters(|_, shape, c| {
+        let mut named = vec![("backlash_per_k_arcsec", 2.0 * c[0])];
+        if let Some(lag) = shape.first() {
+            named.push(("lag_s", *lag));
+        }
+        named
+    })
+}
+
+/// Wind-up that grows or falls with temperature.
+fn thermal_stiffness() -> Law {
+    Law::new("thermal_stiffness", |on, _| {
+        let warmer = |k: usize| on.rows.temperature[k] - on.nominal.temperature_c;
+        vec![
+            main(by_row(on, |k| on.base.wind_up[k] * warmer(k) / 100.0), 0.5),
+            nuisance(by_row(on, |k| on.base.wind_up[k] * warmer(k).powi(2) / 3000.0), 0.4),
+        ]
+    })
+    .parameters(|_, _, c| vec![("relative_stiffness_per_k", -0.01 * c[0])])
+}
+
+/// Whether a drag is one of a lubricant: at the edge of the range it is dry friction or lash, which knows neither speed nor cold.
+fn viscous(power: f64, per_k: f64) -> bool {
+    power > 0.27 && per_k > 0.009
+}
+
+/// Drag of the lubricant, against the motion: a power of the speed, and thicker in the cold (Vogel, close to exponential).
+fn lubricant_viscosity() -> Law {
+    Law::new("lubricant_viscosity", |on, shape| {
+        let (power, per_k, bend) = (shape[0], shape[1], shape[2]);
+        let rows = on.rows;
+        let fastest = rows.speed.iter().fold(1e-9, |m: f64, w| m.max(w.abs()));
+        let drag = |power: f64, per_k: f64, bend: f64| {
+            let drag = by_row(on, |k| {
+                let cold = on.nominal.temperature_c - rows.temperature[k];
+                let share = (rows.speed[k] / fastest).abs();
+                -rows.direction[k]
+                    * on.nominal.ratio.signum()
+                    * share.powf(power)
+                    * (per_k * cold * (1.0 + bend * cold)).exp()
+            });
+            let size = super::super::rows::rms(&drag).max(1e-12);
+            drag.into_iter().map(|d| d / size).collect::<Vec<f64>>()
+        };
+        vec![
+            main(drag(power, per_k, bend), 15.0),
+            nuisance(drag(0.5 * power, per_k, bend), 0.15),
+            nuisance(drag(power, 0.5 * per_k, bend), 0.15),
+        ]
+    })
+    .shapes([
+        Shape::evenly("speed_exponent", 0.25, 1.05, 3),
+        Shape::by_factors("per_k", 0.008, 0.12, 4),
+        Shape::evenly("bend_per_k", -0.002, 0.01, 1),
+    ])
+    .parameters(|_, shape, c| {
+        vec![("rms_arcsec", c[0]), ("speed_exponent", shape[0]), ("relative_drag_per_k", -shape[1])]
+    })
+    .physical(|shape, c| c[0] > 0.0 && viscous(shape[0], shape[1]))
+}
+
+/// The same drag as a load: it winds the drive up and, where it exceeds the torque, moves the play to the other flank.
+fn lubricant_load(on: &Excitation<'_>) -> Law {
+    let scale = on.load;
+    Law::new("lubricant_viscosity", |on, shape| {
+        let (drag_n_m, power, per_k) = (shape[0], shape[1], shape[2]);
+        let rows = on.rows;
+        let fastest = rows.speed.iter().fold(1e-9, |m: f64, w| m.max(w.abs()));
+        let torque: Vec<f64> = (0..rows.len())
+            .map(|k| {
+                let cold = on.nominal.temperature_c - rows.temperature[k];
+                let share = (rows.speed[k] / fastest).abs().powf(power) * (per_k * cold).exp();
+                rows.torque[k] - drag_n_m * share * rows.direction[k] * on.nominal.ratio.signum()
+            })
+            .collect();
+        let flank = on.base.law.flanks(rows, &torque, on.nominal);
+        let play = by_row(on, |k| on.base.half_backlash * (flank[k] - on.base.flank[k]));
+        let together = by_row(on, |k| on.nominal.wind_up_arcsec(torque[k]) - on.base.wind_up[k] + play[k]);
+        vec![
+            Column { values: together, tolerance: Tolerance::Main(Prior { mean: 1.0, std: 0.02 }) },
+            Column { values: play, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 0.5 }) },
+        ]
+    })
+    .shapes([
+        Shape::by_factors("drag_n_m", 0.003 * scale, 1.0 * scale, 5),
+        Shape::evenly("speed_exponent", 0.25, 1.05, 2),
+        Shape::by_factors("per_k", 0.008, 0.12, 3),
+    ])
+    .parameters(|_, shape, c| {
+        vec![("drag_n_m", shape[0] * c[0]), ("speed_exponent", shape[1]), ("relative_drag_per_k", -shape[2])]
+    })
+    .physical(|shape, c| c[0] > 0.0 && viscous(shape[1], shape[2]))
+}
+
+pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
+    let rows = on.rows;
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for t in &rows.temperature {
+        (low, high) = (low.min(*t), high.max(*t));
+    }
+    let mut laws = Vec::new();
+    // At one temperature nothing thermal can be told from a changed constant.
+    if rows.recorded.temperature && (high - low > 2.0 || (low - on.nominal.temperature_c).abs() > 5.0) {
+        laws.push(thermal_clearance(on));
+        if on.load > 0.0 {
+            laws.push(thermal_stiffness());
+        }
+    }
+    if rows.recorded.time && rows.speed.iter().any(|w| *w != 0.0) {
+        laws.push(lubricant_viscosity());
+        if on.load > 0.0 && on.nominal.wind_up_arcsec(1.0) > 0.0 {
+            laws.push(lubricant_load(on));
+        }
+    }
+    laws
+}

@@ -1,0 +1,172 @@
+//! What to record next, to tell look-alikes apart.
+//!
+//! Each run of a short menu is imagined: the cause named, as it was fitted, is simulated on it without noise, and every look-alike is
+//! fitted to that. The run is chosen whose closest look-alike stands off the furthest, in standard deviations (Hunter & Reiner 1965;
+//! T-optimality, Atkinson & Fedorov 1975).
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use super::base::Base;
+use super::candidate::{Excitation, Law};
+use super::model::{Problem, Scaffold, Term};
+use super::noise::{Noise, Whitener};
+use super::rows::Rows;
+use crate::measurement::Session;
+
+/// One run: text, and session by session how it is driven at `share` (0 to 1) of its time.
+struct Run {
+    text: &'static str,
+    sessions: Vec<fn(f64) -> State>,
+}
+
+/// Generator turns, torque in units of the load scale, K above nominal, orientation.
+struct State {
+    turns: f64,
+    torque: f64,
+    warmer: f64,
+    orientation: f64,
+}
+
+/// Rows per imagined session, and its length in seconds.
+const ROWS: usize = 1500;
+const SECONDS: f64 = 120.0;
+/// Runs that tell less apart than this, in standard deviations, are not worth recording.
+const WORTH_IT: f64 = 5.0;
+
+/// A generator that goes forward and comes back: share of the way.
+fn there_and_back(share: f64) -> f64 {
+    1.0 - (2.0 * share - 1.0).abs()
+}
+
+/// Torque steps of both signs and three sizes.
+fn steps(share: f64) -> f64 {
+    [0.3, -0.3, 1.0, -1.0, 0.1, -0.1, 0.6, -0.6][((share * 16.0) as usize) % 8]
+}
+
+fn run<const N: usize>(text: &'static str, sessions: [fn(f64) -> State; N]) -> Run {
+    Run { text, sessions: sessions.to_vec() }
+}
+
+fn menu() -> Vec<Run> {
+    const fn state(turns: f64, torque: f64, warmer: f64, orientation: f64) -> State {
+        State { turns, torque, warmer, orientation }
+    }
+    vec![
+        run(
+            "one output turn forward and back at steady torque, once with either sign",
+            [|s| state(95.0 * there_and_back(s), 0.7, 0.0, 0.0), |s| state(95.0 * there_and_back(s), -0.7, 0.0, 0.0)],
+        ),
+        run(
+            "half an output turn forward and back with torque steps of both signs, drive turned against gravity by 0, 90 and 180 degrees",
+            [
+                |s| state(50.0 * there_and_back(s), steps(s), 0.0, 0.0),
+                |s| state(50.0 * there_and_back(s), steps(s), 0.0, FRAC_PI_2),
+                |s| state(50.0 * there_and_back(s), steps(s), 0.0, PI),
+            ],
+        ),
+        run(
+            "torque triangles of three amplitudes through zero, generator creeping",
+            [|s| {
+                let amplitude = [0.15, 0.4, 1.0][((s * 3.0) as usize).min(2)];
+                let triangle = 2.0 / PI * (TAU * 12.0 * s).sin().asin();
+                state(2.0 * s, amplitude * triangle, 0.0, 0.0)
+            }],
+        ),
+        run(
+            "a cold, a hot and again a cold soak, torque steps of both signs at each, slow and fast in both directions",
+            [
+                |s| state(30.0 * there_and_back(s) * s, steps(s), -35.0, 0.0),
+                |s| state(30.0 * there_and_back(s) * s, steps(s), 35.0, 0.0),
+                |s| state(30.0 * there_and_back(s) * s, steps(s), -35.0, 0.0),
+            ],
+        ),
+        run(
+            "constant speeds from slow to fast in both directions, torque through zero in between",
+            [|s| {
+                let run = (s * 8.0).floor();
+                let speed = [0.1, -0.1, 0.3, -0.3, 0.6, -0.6, 1.0, -1.0][(run as usize).min(7)];
+                let before: f64 = [0.0, 0.1, 0.0, 0.3, 0.0, 0.6, 0.0, 1.0][(run as usize).min(7)];
+                state(15.0 * (before + speed * (8.0 * s - run)), 0.7 * (TAU * 10.0 * s).sin(), 0.0, 0.0)
+            }],
+        ),
+        run(
+            "torque steps of both signs with the generator at rest, recorded as fast as the encoder allows",
+            [|s| state(0.01 * s, steps(s), 0.0, 0.0)],
+        ),
+    ]
+}
+
+/// The run of the menu that tells `term` from each of `alike` best, with how far the closest then stands off.
+#[must_use]
+pub fn next(
+    on: &Excitation<'_>,
+    term: &Term<'_>,
+    coefficients: &[f64],
+    alike: &[&Law],
+    noise: Noise,
+) -> Option<(String, f64)> {
+    use rayon::prelude::*;
+    let runs = menu();
+    let apart: Vec<f64> =
+        runs.par_iter().map(|run| least_apart(on, run, term, coefficients, alike, noise).unwrap_or(0.0)).collect();
+    let best = (0..runs.len()).max_by(|a, b| apart[*a].total_cmp(&apart[*b]))?;
+    (apart[best] > WORTH_IT).then(|| (runs[best].text.to_owned(), apart[best]))
+}
+
+/// Standard deviations by which the closest of `alike` misses what `term` would do on a run.
+fn least_apart(
+    on: &Excitation<'_>,
+    run: &Run,
+    term: &Term<'_>,
+    coefficients: &[f64],
+    alike: &[&Law],
+    noise: Noise,
+) -> Option<f64> {
+    let sessions: Vec<Session> = run
+        .sessions
+        .iter()
+        .enumerate()
+        .map(|(k, at)| {
+            let states: Vec<State> = (0..ROWS).map(|row| at(row as f64 / ROWS as f64)).collect();
+            Session {
+                line: (0..ROWS as u64).collect(),
+                time_s: Some((0..ROWS).map(|row| SECONDS * (2.0 * k as f64 + row as f64 / ROWS as f64)).collect()),
+                generator_rad: states.iter().map(|s| TAU * s.turns * on.nominal.ratio.abs() / 95.0).collect(),
+                error_rad: vec![0.0; ROWS],
+                torque_n_m: Some(states.iter().map(|s| s.torque * on.load).collect()),
+                temperature_c: Some(states.iter().map(|s| on.nominal.temperature_c + s.warmer).collect()),
+                orientation_rad: Some(states.iter().map(|s| s.orientation).collect()),
+            }
+        })
+        .collect();
+    let mut rows = Rows::new(&sessions, on.nominal);
+    let base = Base::new(&rows, on.nominal, None);
+    let mut truth = base.prediction.clone();
+    {
+        let imagined = Excitation { rows: &rows, base: &base, jumps: &[], ..*on };
+        for (column, c) in (term.law.columns)(&imagined, &term.law.values(&term.places)).iter().zip(coefficients) {
+            for (t, v) in truth.iter_mut().zip(&column.values) {
+                *t += c * v;
+            }
+        }
+    }
+    rows.error = truth;
+    let imagined = Excitation { rows: &rows, base: &base, jumps: &[], ..*on };
+    let problem = Problem::new(&imagined, Whitener::new(&rows, &base.uncertain, 1, noise), 1.0);
+    let scaffold = Scaffold::new(&problem, Vec::new());
+    let own = scaffold.fit(&[&Term::new(&problem, term.law, term.places.clone())])?.solution.misfit;
+    let mut least = f64::INFINITY;
+    for law in alike {
+        let best = law
+            .tried()
+            .into_iter()
+            .filter_map(|places| {
+                let trial = Term::new(&problem, law, places.clone()).main_only();
+                Some((scaffold.fit(&[&trial])?.solution.misfit, places))
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (_, fit) = scaffold.refine(Term::new(&problem, law, best.1))?;
+        least = least.min((fit.solution.misfit - own).max(0.0).sqrt());
+    }
+    Some(least)
+}

@@ -1,0 +1,58 @@
+//! Gain on sessions that took no part: each session predicted by a fit to the others, without any offset of its own.
+
+use super::linear::{Gram, solve};
+use super::model::{Problem, Scaffold, Term};
+use super::report::HeldOut;
+use super::select::blocks;
+
+/// Errors of prediction in blocks left out.
+pub struct Evaluated {
+    /// All causes together.
+    pub total: HeldOut,
+    /// Share of the squared error before that each term removes.
+    pub gains: Vec<f64>,
+}
+
+/// Leaves out one session after another.
+#[must_use]
+pub fn evaluate(problem: &Problem<'_>, terms: &[&Term<'_>]) -> Evaluated {
+    let square = |terms: &[&Term<'_>], linearised: bool| left_out(problem, terms, linearised).unwrap_or(f64::NAN);
+    let before = square(&[], false);
+    let after = if terms.is_empty() { before } else { square(terms, true) };
+    let gains = (0..terms.len())
+        .map(|k| {
+            let others: Vec<&Term<'_>> = terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| *t).collect();
+            (square(&others, false) - after) / before.max(1e-12)
+        })
+        .collect();
+    let rms = |square: f64| if square.is_finite() { square.sqrt() } else { 0.0 };
+    Evaluated { total: HeldOut { rms_before_arcsec: rms(before), rms_after_arcsec: rms(after) }, gains }
+}
+
+/// Mean squared error of prediction, arcsec², over averages without uncertain rows. With `linearised` the shape parameters are
+/// found anew without the session as well, to first order.
+fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], linearised: bool) -> Option<f64> {
+    let scaffold = Scaffold::new(problem, terms.to_vec());
+    let (fit, moves) = if linearised { scaffold.linearised()? } else { (scaffold.fit(&[])?, Vec::new()) };
+    let white: Vec<&[f64]> = problem
+        .base_white
+        .iter()
+        .chain(terms.iter().flat_map(|t| &t.white))
+        .chain(&moves)
+        .chain([&problem.data_white])
+        .map(Vec::as_slice)
+        .collect();
+    let columns: Vec<&Vec<f64>> = problem.base.iter().chain(terms.iter().flat_map(|t| &t.averaged)).collect();
+    let (mut sum, mut count) = (0.0, 0usize);
+    for block in blocks(problem) {
+        let mut outside = fit.gram.clone();
+        outside.add(&Gram::of(&white, block.clone()), -1.0);
+        let c = solve(&outside, &fit.priors, problem.worth)?.coefficients;
+        for g in block.filter(|g| problem.certain[*g]) {
+            let predicted: f64 = columns.iter().zip(&c).map(|(column, c)| c * column[g]).sum();
+            sum += (problem.data[g] - predicted).powi(2);
+            count += 1;
+        }
+    }
+    Some(sum / count.max(1) as f64)
+}

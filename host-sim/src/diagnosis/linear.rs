@@ -1,0 +1,193 @@
+//! Linear least squares with Gaussian priors: solution, penalised misfit, evidence, covariance.
+//!
+//! With whitened data y, columns X, prior mean m and precision P: `A = XᵀX + P`, `b = Xᵀy + P m`, `J = |y|² + mᵀP m − bᵀA⁻¹b`, and
+//! `ln evidence = −J/2 − ln|A|/2 + ln|P|/2` but for what all models share.
+
+/// Symmetric products of columns, the data last.
+#[derive(Clone, Debug, Default)]
+pub struct Gram {
+    /// Columns and the data.
+    pub size: usize,
+    /// Row by row.
+    pub products: Vec<f64>,
+}
+
+impl Gram {
+    /// Products of `columns`, whose last is the data, over a range of rows.
+    #[must_use]
+    pub fn of(columns: &[&[f64]], range: std::ops::Range<usize>) -> Gram {
+        let size = columns.len();
+        let mut products = vec![0.0; size * size];
+        for i in 0..size {
+            for j in 0..=i {
+                let product = dot(&columns[i][range.clone()], &columns[j][range.clone()]);
+                products[i * size + j] = product;
+                products[j * size + i] = product;
+            }
+        }
+        Gram { size, products }
+    }
+
+    /// Product of two columns.
+    #[must_use]
+    pub fn at(&self, i: usize, j: usize) -> f64 {
+        self.products[i * self.size + j]
+    }
+
+    /// Adds another one, times a factor.
+    pub fn add(&mut self, other: &Gram, factor: f64) {
+        for (a, b) in self.products.iter_mut().zip(&other.products) {
+            *a += factor * b;
+        }
+    }
+
+    /// Only some of the columns; the data is kept.
+    #[must_use]
+    pub fn select(&self, keep: &[usize]) -> Gram {
+        let index: Vec<usize> = keep.iter().copied().chain([self.size - 1]).collect();
+        let products = index.iter().flat_map(|i| index.iter().map(|j| self.at(*i, *j))).collect();
+        Gram { size: index.len(), products }
+    }
+}
+
+/// Sum of products.
+#[must_use]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a8.zip(b8) {
+        for k in 0..8 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    rest + sums.iter().sum::<f64>()
+}
+
+/// Prior of a coefficient.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub std: f64,
+}
+
+/// A solved problem.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Coefficients.
+    pub coefficients: Vec<f64>,
+    /// Penalised misfit J.
+    pub misfit: f64,
+    /// Squared residual without the penalty.
+    pub residual: f64,
+    /// Logarithm of the evidence.
+    pub evidence: f64,
+    /// Covariance of the coefficients, row by row.
+    pub covariance: Vec<f64>,
+}
+
+/// Solves with priors. `worth` scales all information in the data: below 1 where the noise is not as white as it was taken for.
+///
+/// `None` if the products are not finite.
+#[must_use]
+pub fn solve(gram: &Gram, priors: &[Prior], worth: f64) -> Option<Solution> {
+    let n = priors.len();
+    debug_assert_eq!(gram.size, n + 1);
+    // In units of the prior: diagonal at least 1, well scaled whatever the columns are.
+    let s: Vec<f64> = priors.iter().map(|p| p.std.max(1e-12)).collect();
+    let shift: Vec<f64> = priors.iter().map(|p| p.mean).collect();
+    let mut a = vec![0.0; n * n];
+    let mut b = vec![0.0; n];
+    let mut power = gram.at(n, n);
+    for i in 0..n {
+        let across: f64 = (0..n).map(|j| gram.at(i, j) * shift[j]).sum();
+        power += shift[i] * (across - 2.0 * gram.at(i, n));
+        b[i] = worth * s[i] * (gram.at(i, n) - across);
+        for j in 0..n {
+            a[i * n + j] = worth * s[i] * s[j] * gram.at(i, j);
+        }
+        a[i * n + i] += 1.0;
+    }
+    let mut l = a;
+    let mut log_det = 0.0;
+    for j in 0..n {
+        for k in 0..j {
+            let factor = l[j * n + k];
+            for i in j..n {
+                l[i * n + j] -= l[i * n + k] * factor;
+            }
+        }
+        let pivot = l[j * n + j];
+        if pivot <= 0.0 || !pivot.is_finite() {
+            return None;
+        }
+        let root = pivot.sqrt();
+        log_det += 2.0 * root.ln();
+        for i in j..n {
+            l[i * n + j] /= root;
+        }
+    }
+    let forward = |x: &mut [f64]| {
+        for i in 0..n {
+            let sum: f64 = (0..i).map(|k| l[i * n + k] * x[k]).sum();
+            x[i] = (x[i] - sum) / l[i * n + i];
+        }
+    };
+    let backward = |x: &mut [f64]| {
+        for i in (0..n).rev() {
+            let sum: f64 = (i + 1..n).map(|k| l[k * n + i] * x[k]).sum();
+            x[i] = (x[i] - sum) / l[i * n + i];
+        }
+    };
+    let mut z = b;
+    forward(&mut z);
+    let explained: f64 = z.iter().map(|v| v * v).sum();
+    backward(&mut z);
+    let coefficients: Vec<f64> = (0..n).map(|i| shift[i] + s[i] * z[i]).collect();
+    let misfit = worth * power - explained;
+    let mut covariance = vec![0.0; n * n];
+    let mut unit = vec![0.0; n];
+    for j in 0..n {
+        unit.fill(0.0);
+        unit[j] = 1.0;
+        forward(&mut unit);
+        backward(&mut unit);
+        for i in 0..n {
+            covariance[i * n + j] = unit[i] * s[i] * s[j];
+        }
+    }
+    let penalty: f64 = z.iter().map(|v| v * v).sum();
+    Some(Solution {
+        coefficients,
+        misfit,
+        residual: misfit - penalty,
+        evidence: -0.5 * misfit - 0.5 * log_det,
+        covariance,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_coefficient_is_the_weighted_mean_of_prior_and_data() {
+        let (x, y) = ([1.0, 1.0, 2.0], [2.0, 1.0, 5.0]);
+        let gram = Gram::of(&[&x, &y], 0..3);
+        let prior = Prior { mean: 0.5, std: 0.7 };
+        let solution = solve(&gram, &[prior], 1.0).unwrap();
+        let precision = 6.0 + 1.0 / 0.49;
+        let value = (13.0 + 0.5 / 0.49) / precision;
+        assert!((solution.coefficients[0] - value).abs() < 1e-12);
+        assert!((solution.covariance[0] - 1.0 / precision).abs() < 1e-12);
+        let misfit = |c: f64| -> f64 {
+            x.iter().zip(&y).map(|(x, y)| (y - c * x).powi(2)).sum::<f64>() + ((c - 0.5) / 0.7).powi(2)
+        };
+        assert!((solution.misfit - misfit(value)).abs() < 1e-12);
+        // The evidence is the density of y under y ~ N(x m, 1 + x xᵀ s²): by Sylvester |1 + 6 s²|.
+        let evidence = -0.5 * misfit(value) - 0.5 * (1.0f64 + 6.0 * 0.49).ln();
+        assert!((solution.evidence - evidence).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,165 @@
+//! Noise of the measurement: white, plus a slow wander (an Ornstein-Uhlenbeck process), and columns made white under it.
+//!
+//! Neighbouring rows of a wandering measurement do not count as two. A Kalman filter of the wander turns the data, and every column
+//! alike, into innovations of unit variance; least squares on those is generalised least squares on the rows, and forty
+//! thousand correlated rows weigh what they are worth (n_eff).
+
+use super::rows::{Rows, quantile};
+
+/// White noise and wander.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// White, one standard deviation of a row, arcsec.
+    pub white: f64,
+    /// Wander, one standard deviation, arcsec.
+    pub wander: f64,
+    /// Correlation time of the wander, s.
+    pub correlation_s: f64,
+}
+
+impl Noise {
+    /// Both together, one standard deviation, arcsec.
+    #[must_use]
+    pub fn floor(&self) -> f64 {
+        self.white.hypot(self.wander)
+    }
+}
+
+/// Neighbouring rows averaged to one, and the averages made white.
+#[derive(Clone, Debug)]
+pub struct Whitener {
+    /// Averages: rows of each, none across sessions.
+    groups: Vec<std::ops::Range<usize>>,
+    /// Averages of each session.
+    pub sessions: Vec<std::ops::Range<usize>>,
+    /// Filter gain at each average.
+    gain: Vec<f64>,
+    /// Standard deviation of the innovation.
+    scale: Vec<f64>,
+    /// Decay of the wander to the next average.
+    decay: Vec<f64>,
+}
+
+/// Weight of a row whose flank is uncertain: its noise is this many times white.
+const UNCERTAIN_NOISE: f64 = 1e3;
+
+impl Whitener {
+    /// Averages of `stride` rows under `noise`; rows marked uncertain count next to nothing.
+    #[must_use]
+    pub fn new(rows: &Rows, uncertain: &[bool], stride: usize, noise: Noise) -> Whitener {
+        let stride = stride.max(1);
+        let (mut groups, mut sessions) = (Vec::new(), Vec::new());
+        for session in &rows.sessions {
+            let from = groups.len();
+            let mut k = session.start;
+            while k < session.end {
+                let end = (k + stride).min(session.end);
+                groups.push(k..end);
+                k = end;
+            }
+            sessions.push(from..groups.len());
+        }
+        let count = groups.len();
+        let (mut gain, mut scale, mut decay) = (vec![0.0; count], vec![1.0; count], vec![0.0; count]);
+        let power = noise.wander * noise.wander;
+        for session in &sessions {
+            let mut variance = power;
+            for g in session.clone() {
+                let rows_in = &groups[g];
+                let doubtful = uncertain[rows_in.clone()].iter().any(|u| *u);
+                let white = noise.white.max(1e-9) * if doubtful { UNCERTAIN_NOISE } else { 1.0 };
+                let white = white * white / rows_in.len() as f64;
+                let innovation = variance + white;
+                gain[g] = variance / innovation;
+                scale[g] = innovation.sqrt();
+                let after = variance * (1.0 - gain[g]);
+                if g + 1 < session.end {
+                    let dt = rows.time[groups[g + 1].start] - rows.time[rows_in.start];
+                    let keep = (-dt / noise.correlation_s).exp();
+                    decay[g] = keep;
+                    variance = keep * keep * after + power * (1.0 - keep * keep);
+                }
+            }
+        }
+        Whitener { groups, sessions, gain, scale, decay }
+    }
+
+    /// Averages.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.groups.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.groups.is_empty()
+    }
+
+    /// Averages of a column.
+    #[must_use]
+    pub fn average(&self, column: &[f64]) -> Vec<f64> {
+        self.groups.iter().map(|g| column[g.clone()].iter().sum::<f64>() / g.len() as f64).collect()
+    }
+
+    /// Averages that no uncertain row is part of.
+    #[must_use]
+    pub fn certain(&self, uncertain: &[bool]) -> Vec<bool> {
+        self.groups.iter().map(|g| !uncertain[g.clone()].iter().any(|u| *u)).collect()
+    }
+
+    /// Innovations of averaged values, in units of their standard deviation.
+    #[must_use]
+    pub fn whiten_averaged(&self, averaged: &[f64]) -> Vec<f64> {
+        let mut white = vec![0.0; averaged.len()];
+        for session in &self.sessions {
+            let mut expected = 0.0;
+            for g in session.clone() {
+                let innovation = averaged[g] - expected;
+                white[g] = innovation / self.scale[g];
+                expected = self.decay[g] * (expected + self.gain[g] * innovation);
+            }
+        }
+        white
+    }
+
+    /// Innovations of a column of rows.
+    #[must_use]
+    pub fn whiten(&self, column: &[f64]) -> Vec<f64> {
+        self.whiten_averaged(&self.average(column))
+    }
+
+    /// What the filter follows in averaged values: its estimate of the wander.
+    #[must_use]
+    pub fn followed(&self, averaged: &[f64]) -> Vec<f64> {
+        let mut wander = vec![0.0; averaged.len()];
+        for session in &self.sessions {
+            let mut expected = 0.0;
+            for g in session.clone() {
+                let now = expected + self.gain[g] * (averaged[g] - expected);
+                wander[g] = now;
+                expected = self.decay[g] * now;
+            }
+        }
+        wander
+    }
+
+    /// Sum of the logarithms of the innovations' standard deviations.
+    #[must_use]
+    pub fn log_scale(&self) -> f64 {
+        self.scale.iter().map(|s| s.ln()).sum()
+    }
+}
+
+/// White noise of rows, arcsec: from second differences, which no slow process and no smooth model reaches.
+#[must_use]
+pub fn white_level(rows: &Rows, left: &[f64]) -> f64 {
+    let mut differences = Vec::with_capacity(left.len());
+    for session in &rows.sessions {
+        for k in session.start + 2..session.end {
+            differences.push((left[k] - 2.0 * left[k - 1] + left[k - 2]).abs());
+        }
+    }
+    // Median of |N(0, 6)| is 0.6745 sqrt 6.
+    (quantile(differences.into_iter(), 0.5) / (0.6745 * 6f64.sqrt())).max(1e-3)
+}

@@ -1,0 +1,138 @@
+//! What has to be known before causes are compared: how noisy the data are, and where they jump.
+
+use super::base::Base;
+use super::candidate::{Excitation, Law, Tolerance};
+use super::linear::{Gram, Prior, solve};
+use super::noise::{Noise, Whitener, white_level};
+use super::rows::{Rows, quantile, rms};
+
+/// Averages used to find the wander, about.
+const WANDER_AVERAGES: usize = 2500;
+/// Rows before and after a jump whose medians are compared.
+const BESIDE: usize = 12;
+/// Least height of what is taken for a jump before anything else is known, arcsec.
+const LEAST_JUMP: f64 = 1000.0;
+
+/// Rows at which the error leaves for another level at once, and by how much (arcsec).
+#[must_use]
+pub fn jumps(rows: &Rows, base: &Base) -> Vec<(usize, f64)> {
+    let left: Vec<f64> = rows.error.iter().zip(&base.prediction).map(|(e, p)| e - p).collect();
+    let mut found: Vec<(usize, f64)> = Vec::new();
+    let mut between = |at: usize, before: &[f64], after: &[f64]| {
+        let height = quantile(after.iter().copied(), 0.5) - quantile(before.iter().copied(), 0.5);
+        if height.abs() > LEAST_JUMP && (left[at] - left[at - 1]).abs() > 0.5 * LEAST_JUMP {
+            found.push((at, height));
+        }
+    };
+    let mut last: Option<usize> = None;
+    for session in &rows.sessions {
+        if let Some(end) = last {
+            let (a, b) = (end.saturating_sub(BESIDE), (session.start + BESIDE).min(session.end));
+            between(session.start, &left[a..end], &left[session.start..b]);
+        }
+        for k in session.start + 1..session.end {
+            if (left[k] - left[k - 1]).abs() > 0.5 * LEAST_JUMP {
+                let (a, b) = (k.saturating_sub(BESIDE).max(session.start), (k + BESIDE).min(session.end));
+                between(k, &left[a..k], &left[k..b]);
+            }
+        }
+        last = Some(session.end);
+    }
+    // One jump may pass over several rows.
+    let mut merged: Vec<(usize, f64)> = Vec::new();
+    for (at, height) in found {
+        match merged.last_mut() {
+            Some((before, h)) if at - *before < BESIDE => {
+                if height.abs() > h.abs() {
+                    (*before, *h) = (at, height);
+                }
+            }
+            _ => merged.push((at, height)),
+        }
+    }
+    merged
+}
+
+/// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by its evidence
+/// with the main columns of all laws as free columns. Returns also the worth of the information: below 1 where innovations are
+/// not white. `explained` is what is explained already, row by row.
+#[must_use]
+pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64]) -> (Noise, f64) {
+    let rows = on.rows;
+    let left: Vec<f64> =
+        (0..rows.len()).map(|k| rows.error[k] - on.base.prediction[k] - explained.get(k).unwrap_or(&0.0)).collect();
+    let white = white_level(rows, &left);
+    let stride = rows.len().div_ceil(WANDER_AVERAGES);
+    let plain = Whitener::new(rows, &on.base.uncertain, stride, Noise { white, wander: 0.0, correlation_s: 1.0 });
+    let mut columns: Vec<(Vec<f64>, Prior)> = Vec::new();
+    for floating in &on.base.floating {
+        columns.push((plain.average(&floating.values), Prior { mean: 0.0, std: floating.spread }));
+    }
+    for law in laws {
+        let tried = law.tried();
+        for places in [tried.first(), tried.get(tried.len() / 2)].into_iter().flatten().take(tried.len().min(2)) {
+            for column in (law.columns)(on, &law.values(places)) {
+                if let Tolerance::Main(_) = column.tolerance {
+                    let averaged = plain.average(&column.values);
+                    let std = 20.0 / rms(&averaged).max(1e-9);
+                    columns.push((averaged, Prior { mean: 0.0, std }));
+                }
+            }
+        }
+    }
+    let data = plain.average(&left);
+    let judge = |noise: Noise| {
+        let whitener = Whitener::new(rows, &on.base.uncertain, stride, noise);
+        let all: Vec<Vec<f64>> =
+            columns.iter().map(|(c, _)| c).chain([&data]).map(|c| whitener.whiten_averaged(c)).collect();
+        let views: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();
+        let gram = Gram::of(&views, 0..data.len());
+        let priors: Vec<Prior> = columns.iter().map(|(_, prior)| *prior).collect();
+        let solution = solve(&gram, &priors, 1.0)?;
+        let mut innovations = all[columns.len()].clone();
+        for (column, c) in all.iter().zip(&solution.coefficients) {
+            for (i, v) in innovations.iter_mut().zip(column) {
+                *i -= c * v;
+            }
+        }
+        Some((solution.evidence - whitener.log_scale(), innovations, whitener))
+    };
+    let mut hypotheses = vec![Noise { white, wander: 0.0, correlation_s: 1.0 }];
+    // A wander is slow: what is faster is a line, or a cause.
+    let unit = if rows.recorded.time { 1.0 } else { 100.0 * rows.period };
+    for wander in [0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, 3.0] {
+        for correlation in [2.5, 8.0, 25.0, 80.0] {
+            hypotheses.push(Noise { white, wander: wander * white, correlation_s: correlation * unit });
+        }
+    }
+    use rayon::prelude::*;
+    let judged: Vec<_> = hypotheses.par_iter().map(|n| judge(*n)).collect();
+    let best = (0..judged.len())
+        .filter(|k| judged[*k].is_some())
+        .max_by(|a, b| {
+            let of = |k: usize| judged[k].as_ref().map_or(f64::NEG_INFINITY, |(e, _, _)| *e);
+            of(*a).total_cmp(&of(*b))
+        })
+        .unwrap_or(0);
+    let worth = judged[best].as_ref().map_or(1.0, |(_, innovations, whitener)| worth_of(innovations, whitener));
+    (hypotheses[best], worth)
+}
+
+/// Worth of innovations that should be white with unit variance: the inverse of the variance of their sums over blocks.
+fn worth_of(innovations: &[f64], whitener: &Whitener) -> f64 {
+    let mut worst: f64 = 1.0;
+    for length in [1usize, 5, 20] {
+        let mut sums = Vec::new();
+        for session in &whitener.sessions {
+            for block in innovations[session.clone()].chunks_exact(length) {
+                sums.push(block.iter().sum::<f64>() / (length as f64).sqrt());
+            }
+        }
+        if sums.len() >= 30 {
+            // Robust: half the blocks lie within 0.6745 standard deviations.
+            let spread = quantile(sums.iter().map(|s| s.abs()), 0.5) / 0.6745;
+            worst = worst.max(spread * spread);
+        }
+    }
+    (1.0 / worst).clamp(0.05, 1.0)
+}

@@ -1,0 +1,236 @@
+//! What is left when the causes are in: lines, steps and slow motion that noise does not make.
+
+use std::f64::consts::PI;
+
+use super::candidate::Law;
+use super::model::{Problem, Scaffold, Term};
+use super::noise::{Noise, Whitener};
+use super::report::Unexplained;
+use super::select::Selected;
+
+/// Below this a line in time is no different from wander, Hz.
+const SLOWEST_LINE_HZ: f64 = 0.15;
+
+/// A line found in what is left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// What it is counted against: `generator turn` or `second`.
+    pub unit: &'static str,
+    /// Periods per unit.
+    pub order: f64,
+    /// Power in units of what white noise has on average.
+    pub power: f64,
+}
+
+/// What base and terms explain beside the nominal prediction, row by row, arcsec.
+#[must_use]
+pub fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
+    let on = problem.on;
+    let mut sum = vec![0.0; on.rows.len()];
+    let mut take = |column: &[f64], c: f64| {
+        for (l, v) in sum.iter_mut().zip(column) {
+            *l += c * v;
+        }
+    };
+    for (floating, c) in on.base.floating.iter().zip(selected.fit.base()) {
+        take(&floating.values, *c);
+    }
+    for (k, term) in selected.terms.iter().enumerate() {
+        let columns = (term.law.columns)(on, &term.law.values(&term.places));
+        for (column, c) in columns.iter().zip(selected.fit.of(k)) {
+            take(&column.values, *c);
+        }
+    }
+    sum
+}
+
+/// Innovations of every row, in units of their standard deviation; 0 where the flank is uncertain.
+#[must_use]
+pub fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<f64> {
+    let on = problem.on;
+    let explained = explained(problem, selected);
+    let left: Vec<f64> = (0..on.rows.len()).map(|k| on.rows.error[k] - on.base.prediction[k] - explained[k]).collect();
+    let mut white = Whitener::new(on.rows, &on.base.uncertain, 1, noise).whiten_averaged(&left);
+    for (value, uncertain) in white.iter_mut().zip(&on.base.uncertain) {
+        *value = if *uncertain { 0.0 } else { value.clamp(-6.0, 6.0) };
+    }
+    white
+}
+
+/// The strongest line in the innovations of every row, by generator angle and by time.
+///
+/// Innovations are laid on an even grid of the angle (all sessions, both directions) or of time and transformed; a grid place
+/// that was visited often counts often, as in a periodogram at uneven places.
+#[must_use]
+pub fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> Vec<Line> {
+    let rows = problem.on.rows;
+    let mut found = Vec::new();
+    found.extend(strongest(&rows.generator, innovations, 0.0, highest_order / (2.0 * PI)).map(|(f, power)| Line {
+        unit: "generator turn",
+        order: f * 2.0 * PI,
+        power,
+    }));
+    if rows.recorded.time {
+        // Gaps between sessions would only make the transform long.
+        let mut time = rows.time.clone();
+        let mut shift = 0.0;
+        for session in &rows.sessions {
+            let (first, last) = (time[session.start], time[session.end - 1]);
+            for t in &mut time[session.clone()] {
+                *t += shift - first;
+            }
+            shift += last - first + 1.0;
+        }
+        found.extend(strongest(&time, innovations, SLOWEST_LINE_HZ, 0.45 / rows.period).map(|(f, power)| Line {
+            unit: "second",
+            order: f,
+            power,
+        }));
+    }
+    found
+}
+
+/// Whether averaging the rows takes most of a line away.
+#[must_use]
+pub fn averaged_away(problem: &Problem<'_>, line: &Line) -> bool {
+    let rows = problem.on.rows;
+    let angle: Vec<f64> = match line.unit {
+        "second" => rows.time.iter().map(|t| 2.0 * PI * line.order * t).collect(),
+        _ => rows.generator.iter().map(|psi| line.order * psi).collect(),
+    };
+    let wave: Vec<f64> = angle.iter().map(|a| a.cos()).collect();
+    super::rows::rms(&problem.whitener.average(&wave)) < 0.8 * super::rows::rms(&wave)
+}
+
+/// What is left as a free function of what was measured, largest first.
+#[must_use]
+pub fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[Law], white: f64) -> Vec<Unexplained> {
+    use rayon::prelude::*;
+    let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
+    let mut found: Vec<Unexplained> = maps
+        .par_iter()
+        .filter_map(|law| {
+            let term = Term::new(problem, law, Vec::new());
+            let fit = scaffold.fit(&[&term])?;
+            let mut terms = selected.terms.clone();
+            terms.push(term);
+            let standing = super::select::standing(problem, &Selected { terms, fit }, selected.terms.len());
+            let there = standing.evidence > LEAST_EVIDENCE
+                && standing.left_out > LEAST_EVIDENCE
+                && standing.size > super::select::least_size(white);
+            there.then(|| Unexplained { looks_like: law.cause.clone(), size_arcsec: standing.size })
+        })
+        .collect();
+    found.sort_by(|a, b| b.size_arcsec.total_cmp(&a.size_arcsec));
+    found.truncate(1);
+    found
+}
+
+/// Evidence for a free function in what is left.
+const LEAST_EVIDENCE: f64 = 15.0;
+/// A wander beyond this, arcsec and in units of the white noise, is no noise of a sensor.
+const MOST_WANDER_ARCSEC: f64 = 7.0;
+const MOST_WANDER_OF_WHITE: f64 = 2.5;
+
+/// Innovations that are worth less than this are no noise: something moves in them that the wander cannot follow.
+const LEAST_WORTH: f64 = 0.35;
+
+/// Slow motion that is too large for noise, or too orderly.
+#[must_use]
+pub fn beyond_noise(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<Unexplained> {
+    let left = left(problem, selected);
+    let wander = problem.whitener.followed(&left);
+    let size = problem.certain_rms(&wander);
+    let restless = problem.worth < LEAST_WORTH && noise.wander > noise.white;
+    if restless || size > MOST_WANDER_ARCSEC.max(MOST_WANDER_OF_WHITE * noise.white) {
+        vec![Unexplained { looks_like: "slow motion".into(), size_arcsec: size }]
+    } else {
+        Vec::new()
+    }
+}
+
+/// Frequency (per unit of `places`) and power of the strongest line from `lowest` to `highest`.
+fn strongest(places: &[f64], values: &[f64], lowest: f64, highest: f64) -> Option<(f64, f64)> {
+    let (low, high) = places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let span = high - low;
+    if !(span > 0.0 && highest > 0.0) {
+        return None;
+    }
+    let wanted = (span * highest * 4.0).clamp(64.0, 262_144.0);
+    let size = (wanted as usize).next_power_of_two().min(1 << 18);
+    let step = span / (size as f64 * 0.5);
+    let mut re = vec![0.0; size];
+    let mut im = vec![0.0; size];
+    for (x, v) in places.iter().zip(values) {
+        let at = ((x - low) / step) as usize;
+        re[at.min(size - 1)] += v;
+    }
+    transform(&mut re, &mut im);
+    let total: f64 = values.iter().map(|v| v * v).sum();
+    let upto = ((highest * step * size as f64) as usize).min(size / 2);
+    let from = ((lowest * step * size as f64).ceil() as usize).max(1);
+    (from..upto)
+        .map(|k| (k as f64 / (size as f64 * step), (re[k] * re[k] + im[k] * im[k]) / total.max(1e-30)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Fourier transform in place, size a power of two (Cooley & Tukey 1965).
+fn transform(re: &mut [f64], im: &mut [f64]) {
+    let n = re.len();
+    let mut j = 0;
+    for i in 1..n {
+        let mut bit = n >> 1;
+        while j & bit != 0 {
+            j ^= bit;
+            bit >>= 1;
+        }
+        j |= bit;
+        if i < j {
+            re.swap(i, j);
+            im.swap(i, j);
+        }
+    }
+    let mut len = 2;
+    while len <= n {
+        let turn = -2.0 * PI / len as f64;
+        let twiddles: Vec<(f64, f64)> =
+            (0..len / 2).map(|k| ((turn * k as f64).cos(), (turn * k as f64).sin())).collect();
+        for start in (0..n).step_by(len) {
+            for (k, (c, s)) in twiddles.iter().enumerate() {
+                let (a, b) = (start + k, start + k + len / 2);
+                let (x, y) = (re[b] * c - im[b] * s, re[b] * s + im[b] * c);
+                (re[b], im[b]) = (re[a] - x, im[a] - y);
+                (re[a], im[a]) = (re[a] + x, im[a] + y);
+            }
+        }
+        len *= 2;
+    }
+}
+
+/// Power that a line of white noise reaches once in about 10⁵ spectra of so many rows.
+#[must_use]
+pub fn line_limit(rows: usize) -> f64 {
+    (rows as f64 * 4.0).ln() + 12.0
+}
+
+/// Data less everything explained, averaged, arcsec.
+#[must_use]
+pub fn left(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
+    let terms: Vec<&Term<'_>> = selected.terms.iter().collect();
+    let predicted = super::select::predicted(problem, &terms, &selected.fit);
+    problem.data.iter().zip(&predicted).map(|(d, p)| d - p).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_at_uneven_places_is_found_where_it_is() {
+        let places: Vec<f64> = (0..4000).map(|k| 0.05 * f64::from(k) + 0.02 * f64::from(k % 7)).collect();
+        let values: Vec<f64> = places.iter().map(|x| (2.0 * PI * 0.731 * x).cos()).collect();
+        let (frequency, power) = strongest(&places, &values, 0.0, 2.0).unwrap();
+        assert!((frequency - 0.731).abs() < 0.005, "{frequency}");
+        assert!(power > 1000.0, "{power}");
+    }
+}

@@ -1,0 +1,163 @@
+//! `diagnosis.json` and its text.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+/// What was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Nothing beyond noise and unit-to-unit spread.
+    None,
+    /// Causes found, nothing significant left.
+    Explained,
+    /// Causes found, and a significant remainder.
+    PartlyExplained,
+    /// A real discrepancy that no cause in the library explains.
+    Unknown,
+}
+
+/// A parameter with its uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Value.
+    pub value: f64,
+    /// One standard deviation.
+    pub std: f64,
+}
+
+/// A cause.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cause {
+    /// Name, snake case.
+    pub name: String,
+    /// Probability that it is this one and not the best rival, given that it is one of the library.
+    pub confidence: f64,
+    /// Parameters; the unit is the end of the name.
+    pub parameters: BTreeMap<&'static str, Parameter>,
+    /// Share of the squared error left by the recalibrated nominal model that this cause removes in sessions it was not fitted to.
+    pub held_out_gain: f64,
+    /// Root mean square of what it explains, arcsec.
+    pub size_arcsec: f64,
+    /// Causes that these data cannot tell from it, at most three.
+    pub look_alikes: Vec<String>,
+}
+
+/// Residual over all data used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Residual {
+    /// Of the recalibrated nominal model.
+    pub rms_before_arcsec: f64,
+    /// With the causes.
+    pub rms_after_arcsec: f64,
+    /// White noise and wander.
+    pub noise_floor_arcsec: f64,
+    /// Share of the explainable squared error that is left.
+    pub unexplained_fraction: f64,
+}
+
+/// Residual over sessions that took no part in the fit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct HeldOut {
+    /// Of the nominal model, recalibrated on the other sessions.
+    pub rms_before_arcsec: f64,
+    /// With the causes, fitted to the other sessions.
+    pub rms_after_arcsec: f64,
+}
+
+/// Pointing error that is left when the output is corrected, rms about the mean, arcsec.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Compensation {
+    /// Without correction.
+    pub rms_uncompensated_arcsec: f64,
+    /// Corrected by the nominal model as it stands.
+    pub rms_nominal_tables_arcsec: f64,
+    /// Corrected by the model with the causes, in sessions that took no part in the fit.
+    pub rms_extended_tables_arcsec: f64,
+}
+
+/// Something found that has no name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Unexplained {
+    /// What it looks like.
+    pub looks_like: String,
+    /// Root mean square, arcsec.
+    pub size_arcsec: f64,
+}
+
+/// The result of a diagnosis.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// Version of this object.
+    pub schema_version: u32,
+    /// Verdict.
+    pub verdict: Verdict,
+    /// Causes, strongest first.
+    pub causes: Vec<Cause>,
+    /// Over all data.
+    pub residual: Residual,
+    /// Over sessions left out.
+    pub held_out: HeldOut,
+    /// What a correction by the model would leave.
+    pub compensation: Compensation,
+    /// What is there and has no name.
+    pub unexplained: Vec<Unexplained>,
+    /// Base parameters as the data have them, with their names: relative change.
+    pub recalibrated: BTreeMap<String, Parameter>,
+    /// White noise of a row and wander, arcsec.
+    pub noise_arcsec: [f64; 2],
+    /// Correlation time of the wander, s.
+    pub wander_correlation_s: f64,
+    /// What to record to tell look-alikes apart.
+    pub next_experiment: Option<String>,
+}
+
+impl Diagnosis {
+    /// A few lines for a terminal.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        let verdict = match self.verdict {
+            Verdict::None => "nothing beyond noise and unit-to-unit spread",
+            Verdict::Explained => "explained",
+            Verdict::PartlyExplained => "partly explained",
+            Verdict::Unknown => "a discrepancy that no known cause explains",
+        };
+        let _ = writeln!(text, "verdict: {verdict}");
+        for cause in &self.causes {
+            let _ = writeln!(
+                text,
+                "  {} ({:.0} %), {:.1} arcsec rms",
+                cause.name,
+                100.0 * cause.confidence,
+                cause.size_arcsec
+            );
+            for (name, p) in &cause.parameters {
+                let _ = writeln!(text, "    {name:<32} {:>12.4} +- {:.4}", p.value, p.std);
+            }
+            if !cause.look_alikes.is_empty() {
+                let _ = writeln!(text, "    cannot be told from: {}", cause.look_alikes.join(", "));
+            }
+        }
+        for left in &self.unexplained {
+            let _ = writeln!(text, "  without a cause: {}, {:.1} arcsec rms", left.looks_like, left.size_arcsec);
+        }
+        let (r, h) = (&self.residual, &self.held_out);
+        let _ = writeln!(
+            text,
+            "residual, rms: {:.2} arcsec recalibrated, {:.2} with the causes, {:.2} is noise",
+            r.rms_before_arcsec, r.rms_after_arcsec, r.noise_floor_arcsec
+        );
+        let _ = writeln!(
+            text,
+            "in sessions left out: {:.2} arcsec recalibrated, {:.2} with the causes",
+            h.rms_before_arcsec, h.rms_after_arcsec
+        );
+        if let Some(next) = &self.next_experiment {
+            let _ = writeln!(text, "next: {next}");
+        }
+        text
+    }
+}

@@ -1,0 +1,80 @@
+//! Every rival refitted in the place of each cause named: what the data cannot tell apart is said.
+
+use rayon::prelude::*;
+
+use super::candidate::Law;
+use super::model::{Problem, Scaffold, Term};
+use super::select::{Selected, predicted, size_of};
+
+/// A rival in the place of a cause.
+#[derive(Clone, Debug)]
+pub struct Rival {
+    /// Its name.
+    pub cause: String,
+    /// Rise of the misfit, in units in which 25 is five standard deviations.
+    pub misfit: f64,
+    /// Difference of the predictions, rms arcsec.
+    pub apart_arcsec: f64,
+}
+
+/// Rise of the misfit up to which two causes are not told apart: five standard deviations.
+const TOLD_APART: f64 = 25.0;
+/// Predictions closer than this (arcsec rms, or this share of the cause's size) are not told apart by any law known this well.
+const SAME_ARCSEC: f64 = 0.5;
+const SAME_SHARE: f64 = 0.12;
+
+impl Rival {
+    /// Whether the data cannot tell it from a cause of this size. With a base parameter `out_of_tolerance` any rival predicts the
+    /// same, as the base takes its place: there the misfit alone decides, which has the tolerance in it.
+    #[must_use]
+    pub fn looks_alike(&self, size_arcsec: f64, out_of_tolerance: bool) -> bool {
+        let same = self.apart_arcsec < SAME_ARCSEC.max(SAME_SHARE * size_arcsec);
+        self.misfit < if out_of_tolerance { 5.0 } else { TOLD_APART } || (same && !out_of_tolerance)
+    }
+}
+
+/// Rivals of term `k`, closest first.
+#[must_use]
+pub fn rivals(problem: &Problem<'_>, laws: &[Law], selected: &Selected<'_>, k: usize) -> Vec<Rival> {
+    let others: Vec<&Term<'_>> = selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
+    let scaffold = Scaffold::new(problem, others.clone());
+    let all: Vec<&Term<'_>> = selected.terms.iter().collect();
+    let now = predicted(problem, &all, &selected.fit);
+    let open: Vec<&Law> =
+        laws.iter().filter(|law| law.named && selected.terms.iter().all(|t| t.law.cause != law.cause)).collect();
+    let mut rivals: Vec<Rival> = open
+        .into_par_iter()
+        .filter_map(|law| {
+            let best = law
+                .tried()
+                .into_iter()
+                .filter_map(|places| {
+                    let term = Term::new(problem, law, places.clone()).main_only();
+                    Some((scaffold.fit(&[&term])?.solution.misfit, places))
+                })
+                .min_by(|a, b| a.0.total_cmp(&b.0))?;
+            // Far away already: no refinement brings it back.
+            if best.0 > 3.0 * selected.fit.solution.misfit + 3000.0 {
+                return None;
+            }
+            let (term, fit) = scaffold.refine(Term::new(problem, law, best.1))?;
+            let c = fit.of(fit.starts.len() - 1);
+            if !(law.physical)(&law.values(&term.places), c) {
+                return None;
+            }
+            let mut terms = others.clone();
+            terms.push(&term);
+            let then = predicted(problem, &terms, &fit);
+            let apart: Vec<f64> = now.iter().zip(&then).map(|(a, b)| a - b).collect();
+            Some(Rival {
+                cause: law.cause.clone(),
+                misfit: fit.solution.misfit - selected.fit.solution.misfit,
+                apart_arcsec: size_of(problem, &apart),
+            })
+        })
+        .collect();
+    rivals.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
+    let mut seen = std::collections::HashSet::new();
+    rivals.retain(|r| seen.insert(r.cause.clone()));
+    rivals
+}

@@ -1,0 +1,156 @@
+//! The rows of all sessions in one place, with what follows from them: speed, direction, travel, and angles on each wheel.
+
+use std::ops::Range;
+
+use crate::measurement::Session;
+use crate::nominal::{Fixed, Nominal};
+use crate::tables::ARCSEC_PER_RAD;
+
+/// Which columns were recorded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Recorded {
+    /// Time.
+    pub time: bool,
+    /// Torque.
+    pub torque: bool,
+    /// Temperature.
+    pub temperature: bool,
+    /// Orientation.
+    pub orientation: bool,
+}
+
+/// Rows of all sessions one after another; all vectors have the same length.
+#[derive(Clone, Debug, Default)]
+pub struct Rows {
+    /// Where each session stands.
+    pub sessions: Vec<Range<usize>>,
+    /// What was recorded.
+    pub recorded: Recorded,
+    /// Time, s; row numbers where it was not recorded.
+    pub time: Vec<f64>,
+    /// Generator angle, rad.
+    pub generator: Vec<f64>,
+    /// Output error, arcsec.
+    pub error: Vec<f64>,
+    /// Load torque, N·m; 0 where it was not recorded.
+    pub torque: Vec<f64>,
+    /// Temperature, °C; nominal where it was not recorded.
+    pub temperature: Vec<f64>,
+    /// Orientation, rad; 0 where it was not recorded.
+    pub orientation: Vec<f64>,
+    /// Generator speed, rad/s (rad per row without time).
+    pub speed: Vec<f64>,
+    /// Direction of the generator, ±1, held while it stands.
+    pub direction: Vec<f64>,
+    /// Generator travel since the first row, rad, sessions joined.
+    pub travel: Vec<f64>,
+    /// Nominal output angle, rad.
+    pub output: Vec<f64>,
+    /// Angle of the wave on the flexspline's material, rad.
+    pub on_flexspline: Vec<f64>,
+    /// Angle of the wave on the circular spline's material, rad.
+    pub on_circular_spline: Vec<f64>,
+    /// Median sample period, s.
+    pub period: f64,
+}
+
+impl Rows {
+    /// Joins sessions.
+    #[must_use]
+    pub fn new(sessions: &[Session], nominal: &Nominal) -> Rows {
+        let mut rows = Rows::default();
+        let all = |has: fn(&Session) -> bool| sessions.iter().all(has) && !sessions.is_empty();
+        rows.recorded = Recorded {
+            time: all(|s| s.time_s.is_some()),
+            torque: all(|s| s.torque_n_m.is_some()),
+            temperature: all(|s| s.temperature_c.is_some()),
+            orientation: all(|s| s.orientation_rad.is_some()),
+        };
+        let or = |column: &Option<Vec<f64>>, recorded: bool, len: usize, usual: f64| match column {
+            Some(values) if recorded => values.clone(),
+            _ => vec![usual; len],
+        };
+        for session in sessions.iter().filter(|session| session.len() > 3) {
+            let (from, len) = (rows.generator.len(), session.len());
+            rows.generator.extend(&session.generator_rad);
+            rows.error.extend(session.error_rad.iter().map(|e| e * ARCSEC_PER_RAD));
+            rows.torque.extend(or(&session.torque_n_m, rows.recorded.torque, len, 0.0));
+            rows.temperature.extend(or(&session.temperature_c, rows.recorded.temperature, len, nominal.temperature_c));
+            rows.orientation.extend(or(&session.orientation_rad, rows.recorded.orientation, len, 0.0));
+            match &session.time_s {
+                Some(time) if rows.recorded.time => rows.time.extend(time),
+                _ => rows.time.extend((from..from + len).map(|k| k as f64)),
+            }
+            rows.sessions.push(from..from + len);
+        }
+        rows.derive(nominal);
+        rows
+    }
+
+    fn derive(&mut self, nominal: &Nominal) {
+        let n = self.len();
+        let mut periods: Vec<f64> = Vec::with_capacity(n);
+        (self.speed, self.direction, self.travel) = (vec![0.0; n], vec![1.0; n], vec![0.0; n]);
+        let mut travel = 0.0;
+        for session in self.sessions.clone() {
+            let mut direction = 0.0;
+            for k in session.clone() {
+                let (a, b) = (k.max(session.start + 1) - 1, (k + 1).min(session.end - 1));
+                let dt = self.time[b] - self.time[a];
+                let turned = self.generator[b] - self.generator[a];
+                self.speed[k] = if dt > 0.0 { turned / dt } else { 0.0 };
+                if turned != 0.0 {
+                    direction = turned.signum();
+                }
+                self.direction[k] = direction;
+                if k > session.start {
+                    travel += (self.generator[k] - self.generator[k - 1]).abs();
+                    periods.push(self.time[k] - self.time[k - 1]);
+                }
+                self.travel[k] = travel;
+            }
+        }
+        periods.sort_by(f64::total_cmp);
+        self.period = periods.get(periods.len() / 2).copied().filter(|p| *p > 0.0).unwrap_or(1.0);
+        self.output = self.generator.iter().map(|psi| psi / nominal.ratio).collect();
+        let turning = nominal.teeth.map(|teeth| teeth.fixed);
+        let against = |moves: bool| -> Vec<f64> {
+            self.generator.iter().zip(&self.output).map(|(psi, out)| psi - if moves { *out } else { 0.0 }).collect()
+        };
+        self.on_flexspline = against(turning == Some(Fixed::CircularSpline));
+        self.on_circular_spline = against(turning != Some(Fixed::CircularSpline));
+    }
+
+    /// Rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.generator.len()
+    }
+
+    /// Whether there are no rows.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.generator.is_empty()
+    }
+
+    /// A high percentile of the torque's magnitude, N·m: the scale of the load.
+    #[must_use]
+    pub fn load_scale(&self) -> f64 {
+        quantile(self.torque.iter().map(|t| t.abs()), 0.98)
+    }
+}
+
+/// Quantile of a set of numbers; 0 of none.
+pub(crate) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
+    let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    if values.is_empty() {
+        return 0.0;
+    }
+    let at = ((values.len() - 1) as f64 * share).round() as usize;
+    *values.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+/// Root mean square.
+pub(crate) fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}

@@ -1,0 +1,417 @@
+//! Which causes: forward by evidence, each held against all others and against deviations without a name; then backward, then
+//! exchange. A cause has to earn its place four times: evidence, size, size against the misfit of the other laws, sessions it was not fitted to.
+
+use rayon::prelude::*;
+
+use super::candidate::Law;
+use super::linear::{Gram, solve};
+use super::model::{Fit, Problem, Scaffold, Term};
+
+/// Evidence (natural logarithm of the ratio) below which nothing is named: "very strong" by Kass & Raftery (1995).
+const LEAST_EVIDENCE: f64 = 6.0;
+/// A base parameter is out of tolerance beyond this many standard deviations between units.
+const OUT_OF_TOLERANCE: f64 = 3.3;
+/// Least size of a contribution, arcsec.
+const LEAST_ARCSEC: f64 = 1.5;
+/// Least size in units of the white noise.
+const LEAST_OF_NOISE: f64 = 0.3;
+/// Least size against what the laws of the other terms may be wrong by.
+const LEAST_OF_MISFIT: f64 = 1.0;
+/// The same for a deviation without a name.
+const LEAST_UNNAMED_OF_MISFIT: f64 = 1.5;
+/// Causes at most.
+const MOST_CAUSES: usize = 3;
+/// Unnamed deviations at most.
+const MOST_UNNAMED: usize = 3;
+/// Laws that are refined in each round.
+const REFINED: usize = 7;
+/// Evidence by which something unnamed has to be ahead of the best cause to be taken before it.
+const UNNAMED_AHEAD: f64 = 5.0;
+
+/// A selection and its fit.
+pub struct Selected<'l> {
+    /// Terms.
+    pub terms: Vec<Term<'l>>,
+    /// Their fit.
+    pub fit: Fit,
+}
+
+/// How a term stands in a selection.
+#[derive(Clone, Debug)]
+pub struct Standing {
+    /// Gain of evidence over the selection without it.
+    pub evidence: f64,
+    /// Root mean square of what it adds, arcsec; for what is there at times only, the larger of that and 0.4 of its 97 % quantile.
+    pub size: f64,
+    /// Relative change of the prediction error of sessions left out (negative: better without it).
+    pub left_out: f64,
+}
+
+/// Fits a set of terms.
+#[must_use]
+pub fn fit(problem: &Problem<'_>, terms: &[Term<'_>]) -> Option<Fit> {
+    Scaffold::new(problem, terms.iter().collect()).fit(&[])
+}
+
+/// The strongest of each law at its best place tried, beside some terms; not refined. Best evidence first.
+fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law]) -> Vec<(f64, Term<'l>)> {
+    let scaffold = Scaffold::new(problem, terms.iter().collect());
+    let Some(before) = scaffold.fit(&[]) else { return Vec::new() };
+    let trials: Vec<(usize, Vec<f64>)> =
+        laws.iter().enumerate().flat_map(|(k, law)| law.tried().into_iter().map(move |places| (k, places))).collect();
+    let tried: Vec<(usize, f64, Vec<f64>)> = trials
+        .into_par_iter()
+        .filter_map(|(k, places)| {
+            let term = Term::new(problem, laws[k], places.clone()).main_only();
+            let fit = scaffold.fit(&[&term])?;
+            Some((k, fit.solution.evidence, places))
+        })
+        .collect();
+    let mut best: Vec<Option<(f64, Vec<f64>)>> = vec![None; laws.len()];
+    for (k, evidence, places) in tried {
+        if best[k].as_ref().is_none_or(|(least, _)| evidence > *least) {
+            best[k] = Some((evidence, places));
+        }
+    }
+    let mut found: Vec<(f64, Term<'l>)> = best
+        .into_par_iter()
+        .enumerate()
+        .filter_map(|(k, best)| {
+            let term = Term::new(problem, laws[k], best?.1);
+            let fit = scaffold.fit(&[&term])?;
+            let c = fit.of(fit.starts.len() - 1);
+            let gain = fit.solution.evidence - before.solution.evidence;
+            let physical = (laws[k].physical)(&laws[k].values(&term.places), c);
+            (physical && gain.is_finite()).then_some((gain, term))
+        })
+        .collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found
+}
+
+/// What each term adds that the others cannot, and what it is worth on sessions left out.
+#[must_use]
+pub fn standings(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Standing> {
+    (0..selected.terms.len()).map(|k| standing(problem, selected, k)).collect()
+}
+
+pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Standing {
+    let others: Vec<&Term<'_>> = selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
+    let Some(without) = Scaffold::new(problem, others.clone()).fit(&[]) else {
+        return Standing { evidence: f64::INFINITY, size: f64::INFINITY, left_out: 1.0 };
+    };
+    let with = predicted(problem, &selected.terms.iter().collect::<Vec<_>>(), &selected.fit);
+    let lacking = predicted(problem, &others, &without);
+    if selected.terms[k].law.tolerance_of.is_some() {
+        // The base would take its place at once: it is held against the tolerance, not against the fit without it.
+        let size = size_of(problem, &selected.terms[k].contribution(selected.fit.of(k)));
+        return Standing { evidence: selected.fit.solution.evidence - without.solution.evidence, size, left_out: 1.0 };
+    }
+    let added: Vec<f64> = with.iter().zip(&lacking).map(|(a, b)| a - b).collect();
+    Standing {
+        evidence: selected.fit.solution.evidence - without.solution.evidence,
+        size: size_of(problem, &added),
+        left_out: left_out_gain(problem, &selected.terms.iter().collect::<Vec<_>>(), &others),
+    }
+}
+
+/// Size of an addition to the prediction.
+#[must_use]
+pub fn size_of(problem: &Problem<'_>, added: &[f64]) -> f64 {
+    let used: Vec<f64> = added.iter().zip(&problem.certain).filter(|(_, c)| **c).map(|(v, _)| v.abs()).collect();
+    let high = super::rows::quantile(used.iter().copied(), 0.97);
+    super::rows::rms(&used).max(0.4 * high)
+}
+
+/// Prediction beside the nominal one, averaged.
+#[must_use]
+pub fn predicted(problem: &Problem<'_>, terms: &[&Term<'_>], fit: &Fit) -> Vec<f64> {
+    let mut sum = vec![0.0; problem.data.len()];
+    let columns = problem.base.iter().chain(terms.iter().flat_map(|t| &t.averaged));
+    for (column, c) in columns.zip(&fit.solution.coefficients) {
+        for (s, v) in sum.iter_mut().zip(column) {
+            *s += c * v;
+        }
+    }
+    sum
+}
+
+/// Blocks that are left out one at a time: sessions, or quarters of the data where there are fewer than three.
+#[must_use]
+pub fn blocks(problem: &Problem<'_>) -> Vec<std::ops::Range<usize>> {
+    let sessions = &problem.whitener.sessions;
+    if sessions.len() >= 3 {
+        return sessions.clone();
+    }
+    sessions
+        .iter()
+        .flat_map(|s| {
+            let parts = 4;
+            let len = s.len();
+            (0..parts).map(move |p| s.start + len * p / parts..s.start + len * (p + 1) / parts)
+        })
+        .filter(|b| !b.is_empty())
+        .collect()
+}
+
+/// Relative gain of squared innovations in blocks left out, by having all `terms` instead of `fewer`.
+fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]) -> f64 {
+    let misfit = |terms: &[&Term<'_>]| -> Option<f64> {
+        let columns: Vec<&[f64]> = problem
+            .base_white
+            .iter()
+            .chain(terms.iter().flat_map(|t| &t.white))
+            .chain([&problem.data_white])
+            .map(Vec::as_slice)
+            .collect();
+        let fit = Scaffold::new(problem, terms.to_vec()).fit(&[])?;
+        let mut all = 0.0;
+        for block in blocks(problem) {
+            let inside = Gram::of(&columns, block);
+            let mut outside = fit.gram.clone();
+            outside.add(&inside, -1.0);
+            let solution = solve(&outside, &fit.priors, problem.worth)?;
+            let n = fit.priors.len();
+            let c = &solution.coefficients;
+            let mut left = inside.at(n, n);
+            for i in 0..n {
+                left -= 2.0 * c[i] * inside.at(i, n);
+                for j in 0..n {
+                    left += c[i] * c[j] * inside.at(i, j);
+                }
+            }
+            all += left;
+        }
+        Some(all)
+    };
+    match (misfit(terms), misfit(fewer)) {
+        (Some(with), Some(without)) => (without - with) * problem.worth,
+        _ => 0.0,
+    }
+}
+
+/// Whether a base parameter has left its tolerance far enough for `law` to be named.
+fn out_of_tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> bool {
+    let Some(name) = law.tolerance_of else { return false };
+    let floating = &problem.on.base.floating;
+    let Some(at) = floating.iter().position(|f| f.name == name) else {
+        // Not floating at all: any change is one.
+        return true;
+    };
+    let z = fit.solution.coefficients[at] / floating[at].spread;
+    (law.physical)(&[], &[z]) && z.abs() > OUT_OF_TOLERANCE
+}
+
+/// Least size of anything that counts, arcsec, at this white noise.
+#[must_use]
+pub fn least_size(white: f64) -> f64 {
+    LEAST_ARCSEC.max(LEAST_OF_NOISE * white)
+}
+
+struct Limits {
+    least: f64,
+}
+
+impl Limits {
+    fn of(white: f64) -> Limits {
+        Limits { least: least_size(white) }
+    }
+
+    /// `misfit`: what the laws of the other terms may be wrong by, arcsec.
+    fn passes(&self, law: &Law, standing: &Standing, misfit: f64, in_tolerance: bool) -> bool {
+        let share = if law.named { LEAST_OF_MISFIT } else { LEAST_UNNAMED_OF_MISFIT };
+        let evidence = if law.tolerance_of.is_some() { 0.5 } else { LEAST_EVIDENCE };
+        !in_tolerance
+            && standing.evidence > evidence
+            && standing.size > self.least
+            && standing.size > share * misfit
+            && standing.left_out > 0.0
+    }
+}
+
+/// Chooses causes among `laws`.
+#[must_use]
+pub fn select<'l>(
+    problem: &Problem<'_>,
+    laws: &'l [Law],
+    white: f64,
+    start: Vec<Term<'l>>,
+    mut log: impl FnMut(String),
+) -> Option<Selected<'l>> {
+    let limits = Limits::of(white);
+    let mut selected = Selected { fit: fit(problem, &start)?, terms: start };
+    let mut seen = std::collections::HashSet::new();
+    for round in 0..MOST_CAUSES + MOST_UNNAMED + 1 {
+        let Some(next) = forward(problem, laws, &selected, &limits, &mut log) else { break };
+        selected = settle(problem, next)?;
+        selected = backward(problem, selected, &limits, &mut log)?;
+        if round > 0 || selected.terms.len() > 1 {
+            selected = exchange(problem, laws, selected, &mut log)?;
+            selected = backward(problem, selected, &limits, &mut log)?;
+        }
+        let mut causes: Vec<&str> = selected.terms.iter().map(|t| t.law.cause.as_str()).collect();
+        causes.sort_unstable();
+        if !seen.insert(causes.join("+")) {
+            break;
+        }
+    }
+    Some(selected)
+}
+
+fn forward<'l>(
+    problem: &Problem<'_>,
+    laws: &'l [Law],
+    selected: &Selected<'l>,
+    limits: &Limits,
+    log: &mut impl FnMut(String),
+) -> Option<Selected<'l>> {
+    let named = selected.terms.iter().filter(|t| t.law.named).count();
+    let unnamed = selected.terms.len() - named;
+    let open: Vec<&Law> = laws
+        .iter()
+        .filter(|law| selected.terms.iter().all(|t| t.law.cause != law.cause))
+        .filter(|law| if law.named { named < MOST_CAUSES } else { unnamed < MOST_UNNAMED })
+        .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &selected.fit, law))
+        .collect();
+    let mut found = scan(problem, &selected.terms, &open);
+    found.truncate(REFINED + 2);
+    let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
+    let before = selected.fit.solution.evidence;
+    let mut refined: Vec<(f64, Term<'l>, Fit)> = found
+        .into_par_iter()
+        .filter_map(|(_, term)| {
+            let (term, fit) = scaffold.refine(term)?;
+            let gain = fit.solution.evidence - before;
+            let c = fit.of(fit.starts.len() - 1);
+            (term.law.physical)(&term.law.values(&term.places), c).then_some((gain, term, fit))
+        })
+        .collect();
+    // Something with a name goes before something without unless that is clearly better.
+    let ahead = |(gain, term, _): &(f64, Term<'l>, Fit)| {
+        gain - if term.law.named { 0.0 } else { UNNAMED_AHEAD.max(0.01 * gain) }
+    };
+    refined.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
+    let misfit = standings(problem, selected)
+        .iter()
+        .zip(&selected.terms)
+        .map(|(s, t)| s.size * t.law.misfit)
+        .fold(0.0, f64::max);
+    for (gain, term, fit) in refined {
+        if gain < 0.5 {
+            break;
+        }
+        let mut terms = selected.terms.clone();
+        let (law, line) = (term.law, format!("{} {:?}", term.law.cause, term.law.values(&term.places)));
+        terms.push(term);
+        let next = Selected { terms, fit };
+        let standing = standing(problem, &next, next.terms.len() - 1);
+        let passes = limits.passes(law, &standing, misfit, false);
+        log(format!(
+            "  {} {line}: evidence {:.1}, size {:.2}, left out {:.1}",
+            if passes { "+" } else { "?" },
+            standing.evidence,
+            standing.size,
+            standing.left_out
+        ));
+        if passes {
+            return Some(next);
+        }
+    }
+    None
+}
+
+/// Refines each term beside the others.
+fn settle<'l>(problem: &Problem<'_>, mut selected: Selected<'l>) -> Option<Selected<'l>> {
+    if selected.terms.len() < 2 {
+        return Some(selected);
+    }
+    for k in 0..selected.terms.len() {
+        if selected.terms[k].places.is_empty() {
+            continue;
+        }
+        let term = selected.terms[k].clone();
+        let others: Vec<&Term<'_>> =
+            selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
+        if let Some((term, _)) = Scaffold::new(problem, others).refine(term) {
+            selected.terms[k] = term;
+        }
+    }
+    selected.fit = fit(problem, &selected.terms)?;
+    Some(selected)
+}
+
+/// Drops what no longer earns its place, weakest first.
+fn backward<'l>(
+    problem: &Problem<'_>,
+    mut selected: Selected<'l>,
+    limits: &Limits,
+    log: &mut impl FnMut(String),
+) -> Option<Selected<'l>> {
+    while !selected.terms.is_empty() {
+        let standings = standings(problem, &selected);
+        let failing = |k: usize| {
+            let law = selected.terms[k].law;
+            let c = selected.fit.of(k);
+            let physical = (law.physical)(&law.values(&selected.terms[k].places), c);
+            let in_tolerance = law.tolerance_of.is_some() && {
+                let others: Vec<&Term<'_>> =
+                    selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
+                Scaffold::new(problem, others).fit(&[]).is_none_or(|without| !out_of_tolerance(problem, &without, law))
+            };
+            let misfit = (0..selected.terms.len())
+                .filter(|j| *j != k)
+                .map(|j| standings[j].size * selected.terms[j].law.misfit)
+                .fold(0.0, f64::max);
+            !physical || !limits.passes(law, &standings[k], misfit, in_tolerance)
+        };
+        let weakest = (0..selected.terms.len())
+            .filter(|k| failing(*k))
+            .min_by(|a, b| standings[*a].evidence.total_cmp(&standings[*b].evidence));
+        let Some(k) = weakest else { break };
+        log(format!("  - {}: {:?}", selected.terms[k].law.cause, standings[k]));
+        selected.terms.remove(k);
+        selected.fit = fit(problem, &selected.terms)?;
+    }
+    Some(selected)
+}
+
+/// Replaces a term by another law where that tells the data better.
+fn exchange<'l>(
+    problem: &Problem<'_>,
+    laws: &'l [Law],
+    mut selected: Selected<'l>,
+    log: &mut impl FnMut(String),
+) -> Option<Selected<'l>> {
+    for k in 0..selected.terms.len() {
+        let others: Vec<Term<'l>> =
+            selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t.clone()).collect();
+        let without = fit(problem, &others)?;
+        let open: Vec<&Law> = laws
+            .iter()
+            .filter(|law| selected.terms.iter().all(|t| t.law.cause != law.cause))
+            .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &without, law))
+            .collect();
+        let mut rivals = scan(problem, &others, &open);
+        rivals.truncate(4);
+        let scaffold = Scaffold::new(problem, others.iter().collect());
+        let best = rivals
+            .into_par_iter()
+            .filter_map(|(_, term)| {
+                let (term, fit) = scaffold.refine(term)?;
+                let c = fit.of(fit.starts.len() - 1);
+                (term.law.physical)(&term.law.values(&term.places), c).then_some((term, fit))
+            })
+            .max_by(|a, b| a.1.solution.evidence.total_cmp(&b.1.solution.evidence));
+        if let Some((term, fit)) = best {
+            let needed = if term.law.named { 3.0 } else { UNNAMED_AHEAD };
+            if fit.solution.evidence > selected.fit.solution.evidence + needed {
+                log(format!("  ~ {} gives way to {}", selected.terms[k].law.cause, term.law.cause));
+                let mut terms = others;
+                terms.push(term);
+                selected = settle(problem, Selected { fit, terms })?;
+                return Some(selected);
+            }
+        }
+    }
+    Some(selected)
+}

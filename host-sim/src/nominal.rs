@@ -1,0 +1,402 @@
+//! A drive known only from its catalogue: `nominal.toml`.
+//!
+//! Nominal output = generator / ratio + harmonics + play (backlash, loaded by torque) + wind-up (torque). Angles are radians,
+//! errors arc-seconds at the output, torque N·m, positive where it turns the output forward.
+
+use std::ops::Range;
+
+use flexspline::{FixedMember, GeneratorAngle, PlayState, Table};
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::drive::{DriveError, Problem};
+use crate::tables::ARCSEC_PER_RAD;
+
+/// Which wheel does not turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fixed {
+    /// The flexspline; the circular spline is the output.
+    Flexspline,
+    /// The circular spline; the flexspline is the output.
+    CircularSpline,
+}
+
+/// Tooth counts of a strain wave drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Teeth {
+    /// Of the flexspline.
+    pub flexspline: u32,
+    /// Of the circular spline.
+    pub circular_spline: u32,
+    /// Which of them is fixed.
+    pub fixed: Fixed,
+}
+
+/// One harmonic of the nominal output error, `amplitude sin(order generator + phase)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Harmonic {
+    /// Periods per generator turn; need not be whole.
+    pub order_per_generator_turn: f64,
+    /// Amplitude, arcsec.
+    pub amplitude_arcsec: f64,
+    /// Phase, rad.
+    pub phase_rad: f64,
+}
+
+/// Relative spread (one standard deviation) between units that is no discrepancy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// Of the torsional stiffness.
+    pub stiffness: f64,
+    /// Of the backlash.
+    pub backlash: f64,
+    /// Of each harmonic, in phase and in quadrature.
+    pub harmonic: f64,
+}
+
+/// The nominal model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Nominal {
+    /// Generator turns per output turn, signed.
+    pub ratio: f64,
+    /// Teeth; `None` for a gear of another kind, known by its ratio.
+    pub teeth: Option<Teeth>,
+    /// Torsional stiffness (N·m/rad) from each torque (N·m) on; the first torque is 0.
+    pub stiffness: Vec<[f64; 2]>,
+    /// Backlash, arcsec: the whole width of the play.
+    pub backlash_arcsec: f64,
+    /// Friction of the output inside the clearance, N·m.
+    pub friction_torque_n_m: f64,
+    /// Temperature that the numbers hold at, °C.
+    pub temperature_c: f64,
+    /// Kinematic error.
+    pub harmonics: Vec<Harmonic>,
+    /// Spread between units.
+    pub spread: Spread,
+}
+
+impl Nominal {
+    /// Wind-up under a torque, arcsec, of the sign of the torque.
+    #[must_use]
+    pub fn wind_up_arcsec(&self, torque_n_m: f64) -> f64 {
+        let load = torque_n_m.abs();
+        let mut angle_rad = 0.0;
+        for (k, &[from, stiffness]) in self.stiffness.iter().enumerate() {
+            let to = self.stiffness.get(k + 1).map_or(f64::INFINITY, |next| next[0]);
+            if load > from {
+                angle_rad += (load.min(to) - from) / stiffness;
+            }
+        }
+        angle_rad.copysign(torque_n_m) * ARCSEC_PER_RAD
+    }
+
+    /// Kinematic error at a generator angle, arcsec.
+    #[must_use]
+    pub fn harmonics_arcsec(&self, generator_rad: f64) -> f64 {
+        self.harmonics
+            .iter()
+            .map(|h| h.amplitude_arcsec * (h.order_per_generator_turn * generator_rad + h.phase_rad).sin())
+            .sum()
+    }
+
+    /// What a table says of wind-up and backlash: the part of the error that is odd in the torque, at mid temperature; the backlash is
+    /// what is left of it as the torque goes to zero. Kinematic error is left to the table's own prediction.
+    #[must_use]
+    pub fn of_table(table: &Table<'_>) -> Nominal {
+        let drive = table.drive();
+        let fixed = if drive.fixed() == FixedMember::Flexspline { Fixed::Flexspline } else { Fixed::CircularSpline };
+        let teeth = Teeth {
+            flexspline: u32::from(drive.flexspline_teeth()),
+            circular_spline: u32::from(drive.circular_spline_teeth()),
+            fixed,
+        };
+        let [low, high] = table.temperature_range_c();
+        let temperature = f32::midpoint(low, high).clamp(low, high);
+        let [from, to] = table.torque_range_n_m();
+        let largest = f64::from(from.abs().min(to.abs()));
+        // Mean of the error over a flexspline pitch, after the play has come to rest.
+        let mean = |torque: f64| -> f64 {
+            let mut play = PlayState::unknown();
+            let pitch = std::f64::consts::TAU / f64::from(teeth.flexspline);
+            let (mut sum, steps) = (0.0, 16);
+            for k in 0..4 * steps {
+                let generator = GeneratorAngle::from_rad(f64::from(k) * pitch / f64::from(steps));
+                let said =
+                    table.forward(&mut play, generator.unwrap_or(GeneratorAngle::ZERO), torque as f32, temperature);
+                if k >= 3 * steps {
+                    sum += f64::from(said.transmission_error_rad) / f64::from(steps);
+                }
+            }
+            sum
+        };
+        let odd = |torque: f64| 0.5 * (mean(torque) - mean(-torque));
+        let at: Vec<f64> = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0].iter().map(|share| share * largest).collect();
+        let angles: Vec<f64> = at.iter().map(|torque| odd(*torque)).collect();
+        let slope = |k: usize| ((angles[k + 1] - angles[k]) / (at[k + 1] - at[k])).max(1e-12);
+        let half_backlash_rad = (angles[0] - at[0] * slope(0)).max(0.0);
+        let stiffness = (0..at.len() - 1).map(|k| [if k == 0 { 0.0 } else { at[k] }, 1.0 / slope(k)]).collect();
+        Nominal {
+            ratio: drive.exact_ratio(),
+            teeth: Some(teeth),
+            stiffness,
+            backlash_arcsec: 2.0 * half_backlash_rad * ARCSEC_PER_RAD,
+            friction_torque_n_m: 0.0,
+            temperature_c: f64::from(temperature),
+            harmonics: Vec::new(),
+            spread: USUAL_SPREAD,
+        }
+    }
+
+    /// Reads `nominal.toml`.
+    ///
+    /// # Errors
+    /// Every problem found, each with file, line, field, value found and what is allowed.
+    pub fn from_toml(file_name: &str, text: &str) -> Result<Nominal, DriveError> {
+        let line = |span: Range<usize>| 1 + text.get(..span.start).unwrap_or("").matches('\n').count();
+        let file: FileForm = toml::from_str(text).map_err(|error| {
+            let place = error.span().map_or(file_name.to_owned(), |span| format!("{file_name}:{}", line(span)));
+            let found = error.span().and_then(|span| text.get(span)).filter(|t| t.len() < 60 && !t.contains('\n'));
+            let found = found.map(|t| format!(", found {t}")).unwrap_or_default();
+            DriveError {
+                problems: vec![Problem { place, field: String::new(), what: format!("{}{found}", error.message()) }],
+            }
+        })?;
+        let mut problems = Vec::new();
+        let nominal = file.check(&mut |span, field: &str, what| {
+            let place = span.map_or(file_name.to_owned(), |span| format!("{file_name}:{}", line(span)));
+            problems.push(Problem { place, field: field.to_owned(), what });
+        });
+        match nominal {
+            Some(nominal) if problems.is_empty() => Ok(nominal),
+            _ => Err(DriveError { problems }),
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileForm {
+    drive: DriveForm,
+    nominal: NominalForm,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DriveForm {
+    flexspline_teeth: Option<Spanned<u32>>,
+    circular_spline_teeth: Option<Spanned<u32>>,
+    fixed: Option<Fixed>,
+    ratio: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct NominalForm {
+    stiffness_n_m_per_rad: Spanned<StiffnessForm>,
+    backlash_arcsec: Spanned<f64>,
+    friction_torque_n_m: Option<Spanned<f64>>,
+    temperature_c: Option<Spanned<f64>>,
+    #[serde(default)]
+    harmonic: Vec<HarmonicForm>,
+    unit_to_unit: Option<SpreadForm>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "expected a stiffness in N.m/rad or a list [[0.0, K1], [T1, K2], ...]")]
+enum StiffnessForm {
+    One(f64),
+    Steps(Vec<[f64; 2]>),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HarmonicForm {
+    order_per_generator_turn: Spanned<f64>,
+    amplitude_arcsec: Spanned<f64>,
+    phase_rad: Spanned<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SpreadForm {
+    stiffness: Option<Spanned<f64>>,
+    backlash: Option<Spanned<f64>>,
+    harmonic: Option<Spanned<f64>>,
+}
+
+/// Spread assumed where the file gives none: stiffness, backlash, harmonics of drives of one type.
+const USUAL_SPREAD: Spread = Spread { stiffness: 0.03, backlash: 0.05, harmonic: 0.20 };
+
+type Refuse<'a> = dyn FnMut(Option<Range<usize>>, &str, String) + 'a;
+
+fn number(value: &Spanned<f64>, field: &str, low: f64, high: f64, refuse: &mut Refuse<'_>) -> f64 {
+    let found = *value.get_ref();
+    if !(found >= low && found <= high) {
+        refuse(Some(value.span()), field, format!("found {found}, allowed: {low} to {high}"));
+    }
+    found
+}
+
+impl FileForm {
+    fn check(self, refuse: &mut Refuse<'_>) -> Option<Nominal> {
+        let (ratio, teeth) = self.drive.check(refuse)?;
+        let form = self.nominal;
+        let stiffness = match form.stiffness_n_m_per_rad.get_ref() {
+            StiffnessForm::One(stiffness) => vec![[0.0, *stiffness]],
+            StiffnessForm::Steps(steps) => steps.clone(),
+        };
+        let rising = stiffness.windows(2).all(|pair| pair[0][0] < pair[1][0]);
+        let sound = stiffness.iter().all(|&[torque, k]| torque.is_finite() && (1e-3..=1e12).contains(&k));
+        if stiffness.first().is_none_or(|first| first[0] != 0.0) || !rising || !sound {
+            refuse(
+                Some(form.stiffness_n_m_per_rad.span()),
+                "nominal.stiffness_n_m_per_rad",
+                format!(
+                    "found {stiffness:?} as [torque, stiffness], allowed: torques from 0 upward, stiffness 0.001 to 1e12"
+                ),
+            );
+        }
+        let optional =
+            |value: &Option<Spanned<f64>>, field: &str, range: [f64; 2], usual: f64, refuse: &mut Refuse<'_>| {
+                value.as_ref().map_or(usual, |value| number(value, field, range[0], range[1], refuse))
+            };
+        let harmonics = form
+            .harmonic
+            .iter()
+            .enumerate()
+            .map(|(k, h)| {
+                let field = |name: &str| format!("nominal.harmonic[{k}].{name}");
+                Harmonic {
+                    order_per_generator_turn: number(
+                        &h.order_per_generator_turn,
+                        &field("order_per_generator_turn"),
+                        1e-6,
+                        1e5,
+                        refuse,
+                    ),
+                    amplitude_arcsec: number(&h.amplitude_arcsec, &field("amplitude_arcsec"), -1e5, 1e5, refuse),
+                    phase_rad: number(&h.phase_rad, &field("phase_rad"), -100.0, 100.0, refuse),
+                }
+            })
+            .collect();
+        let spread = form.unit_to_unit.as_ref().map_or(USUAL_SPREAD, |s| Spread {
+            stiffness: optional(
+                &s.stiffness,
+                "nominal.unit_to_unit.stiffness",
+                [0.0, 1.0],
+                USUAL_SPREAD.stiffness,
+                refuse,
+            ),
+            backlash: optional(&s.backlash, "nominal.unit_to_unit.backlash", [0.0, 1.0], USUAL_SPREAD.backlash, refuse),
+            harmonic: optional(&s.harmonic, "nominal.unit_to_unit.harmonic", [0.0, 1.0], USUAL_SPREAD.harmonic, refuse),
+        });
+        Some(Nominal {
+            ratio,
+            teeth,
+            stiffness,
+            backlash_arcsec: number(&form.backlash_arcsec, "nominal.backlash_arcsec", 0.0, 1e5, refuse),
+            friction_torque_n_m: optional(
+                &form.friction_torque_n_m,
+                "nominal.friction_torque_n_m",
+                [0.0, 1e6],
+                0.0,
+                refuse,
+            ),
+            temperature_c: optional(&form.temperature_c, "nominal.temperature_c", [-273.0, 500.0], 20.0, refuse),
+            harmonics,
+            spread,
+        })
+    }
+}
+
+impl DriveForm {
+    fn check(&self, refuse: &mut Refuse<'_>) -> Option<(f64, Option<Teeth>)> {
+        match (&self.flexspline_teeth, &self.circular_spline_teeth, &self.ratio) {
+            (Some(flexspline), Some(circular_spline), None) => {
+                let (f, c) = (*flexspline.get_ref(), *circular_spline.get_ref());
+                if !(20..=2000).contains(&f) {
+                    refuse(
+                        Some(flexspline.span()),
+                        "drive.flexspline_teeth",
+                        format!("found {f}, allowed: 20 to 2000"),
+                    );
+                    return None;
+                }
+                if c <= f || c > f + 12 {
+                    let allowed =
+                        format!("found {c}, allowed: {} to {}, more than the flexspline's {f}", f + 1, f + 12);
+                    refuse(Some(circular_spline.span()), "drive.circular_spline_teeth", allowed);
+                    return None;
+                }
+                let fixed = self.fixed.unwrap_or(Fixed::Flexspline);
+                let waves = f64::from(c - f);
+                let ratio = match fixed {
+                    Fixed::Flexspline => f64::from(c) / waves,
+                    Fixed::CircularSpline => -f64::from(f) / waves,
+                };
+                Some((ratio, Some(Teeth { flexspline: f, circular_spline: c, fixed })))
+            }
+            (None, None, Some(ratio)) => {
+                let found = *ratio.get_ref();
+                if !(found.abs() >= 1.0 && found.abs() <= 1e6) {
+                    let what = format!("found {found}, allowed: 1 to 1e6 or -1e6 to -1");
+                    refuse(Some(ratio.span()), "drive.ratio", what);
+                    return None;
+                }
+                Some((found, None))
+            }
+            _ => {
+                let what = "expected flexspline_teeth and circular_spline_teeth, or ratio alone";
+                refuse(None, "drive", what.to_owned());
+                None
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\nfixed = \"flexspline\"\n[nominal]\n\
+        stiffness_n_m_per_rad = [[0.0, 20000.0], [10.0, 40000.0]]\nbacklash_arcsec = 60.0\nfriction_torque_n_m = 1.5\n\
+        [[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 10.0\nphase_rad = 0.4\n";
+
+    #[test]
+    fn a_file_is_read() {
+        let nominal = Nominal::from_toml("n.toml", TEXT).unwrap();
+        assert_eq!((nominal.ratio, nominal.temperature_c, nominal.spread), (95.0, 20.0, USUAL_SPREAD));
+        assert_eq!(nominal.harmonics.len(), 1);
+        let wind_up_rad = nominal.wind_up_arcsec(-30.0) / ARCSEC_PER_RAD;
+        assert!((wind_up_rad + 10.0 / 20000.0 + 20.0 / 40000.0).abs() < 1e-15);
+        let other = TEXT.replace("fixed = \"flexspline\"", "fixed = \"circular_spline\"");
+        assert_eq!(Nominal::from_toml("n.toml", &other).unwrap().ratio, -94.0);
+        let by_ratio = "[drive]\nratio = -6.0\n[nominal]\nstiffness_n_m_per_rad = 3e4\nbacklash_arcsec = 60\n";
+        let nominal = Nominal::from_toml("n.toml", by_ratio).unwrap();
+        assert_eq!((nominal.ratio, nominal.teeth, nominal.friction_torque_n_m), (-6.0, None, 0.0));
+    }
+
+    #[test]
+    fn a_wrong_file_is_refused_by_line_field_and_value() {
+        for (from, to, message) in [
+            ("= 190", "= 187", "n.toml:3: drive.circular_spline_teeth: found 187, allowed: 189 to 200"),
+            ("= 60.0", "= -1.0", "n.toml:7: nominal.backlash_arcsec: found -1, allowed: 0 to 100000"),
+            ("= 60.0", "= nan", "n.toml:7: nominal.backlash_arcsec: found NaN"),
+            ("= 60.0", "= \"wide\"", "n.toml:7: "),
+            ("friction_torque_n_m", "friktion", "n.toml:8: unknown field `friktion`"),
+            ("\"flexspline\"", "\"ring\"", "n.toml:4: unknown variant `ring`"),
+            ("[10.0, 40000.0]", "[-1.0, 40000.0]", "n.toml:6: nominal.stiffness_n_m_per_rad: found"),
+            (
+                "amplitude_arcsec = 10.0",
+                "amplitude_arcsec = inf",
+                "n.toml:11: nominal.harmonic[0].amplitude_arcsec: found inf",
+            ),
+            ("circular_spline_teeth = 190\n", "", "n.toml: drive: expected flexspline_teeth and circular_spline_teeth"),
+        ] {
+            let text = TEXT.replacen(from, to, 1);
+            let error = Nominal::from_toml("n.toml", &text).unwrap_err().to_string();
+            assert!(error.starts_with(message), "{to}: {error}");
+        }
+    }
+}

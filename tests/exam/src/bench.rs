@@ -1,0 +1,241 @@
+//! The oracle: what could be known at best from these data. It has the plant, the size of the noise and the spread of
+//! units, and asks how far an effect stands out once every base parameter has been allowed to float.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::drive::{
+    BACKLASH_SPREAD, Drive, FRICTION_SPREAD, HARMONIC_SPREAD, PHASE_SPREAD_RAD, STIFFNESS_SPREAD, Unit,
+};
+use crate::effect::Effect;
+use crate::motion::Motion;
+use crate::noise::{Sensors, Whitening};
+use crate::plant;
+
+/// Rows of the thinned run on which the oracle works.
+const ROWS: usize = 9000;
+
+/// A run on which effects are weighed.
+pub struct Bench<'a> {
+    drive: &'a Drive,
+    unit: &'a Unit,
+    /// All rows.
+    rows: Motion,
+    /// Every `thin`th.
+    thinned: Motion,
+    thin: usize,
+    whitening: Whitening,
+    /// Effects that are there besides.
+    rest: Vec<Effect>,
+    rest_arcsec: Vec<f64>,
+    rest_fast_arcsec: Option<Vec<f64>>,
+    nuisance: Vec<Vec<f64>>,
+    whitened: DMatrix<f64>,
+    /// Weight of the prior of each nuisance column.
+    prior: Vec<f64>,
+}
+
+/// Weight of the prior of a base parameter in units of its spread.
+const SPREAD: f64 = 1.0;
+
+/// How an effect stands out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Weight {
+    /// Distance from the best fit without it, in standard deviations of the noise.
+    pub d: f64,
+    /// What the base parameters do not take up within two standard deviations of their spread, rms.
+    pub rms_arcsec: f64,
+}
+
+/// Contribution that counts as there: DIAGNOSIS §3.
+pub fn least_rms_arcsec(white_arcsec: f64) -> f64 {
+    f64::max(1.5, 0.3 * white_arcsec)
+}
+
+/// Distance in standard deviations beyond which an effect counts as there, and two effects as apart.
+pub const LEAST_D: f64 = 5.0;
+
+impl Weight {
+    /// Over the limit of detection: above one counts as detectable.
+    pub fn over_limit(&self, white_arcsec: f64) -> f64 {
+        (self.rms_arcsec / least_rms_arcsec(white_arcsec)).min(self.d / LEAST_D)
+    }
+}
+
+impl<'a> Bench<'a> {
+    /// A bench for this run with these effects present besides the one to be weighed.
+    pub fn new(drive: &'a Drive, unit: &'a Unit, motion: &Motion, sensors: &Sensors, rest: &[Effect]) -> Self {
+        let rows = motion.at_rows();
+        let thin = rows.time_s.len().div_ceil(ROWS);
+        let thinned = rows.every(thin);
+        // A thinned row stands for its neighbours: the white noise of their mean.
+        let white = sensors.floor_arcsec(drive) / (thin as f64).sqrt();
+        let whitening = Whitening::new(&thinned, white, sensors.wander_arcsec, sensors.wander_s);
+        let mut bench = Self {
+            drive,
+            unit,
+            rows,
+            thinned,
+            thin,
+            whitening,
+            rest: rest.to_vec(),
+            rest_arcsec: Vec::new(),
+            rest_fast_arcsec: None,
+            nuisance: Vec::new(),
+            whitened: DMatrix::zeros(0, 0),
+            prior: Vec::new(),
+        };
+        bench.rest_arcsec = bench.errors(unit, rest, false);
+        bench.float_base();
+        bench.float_rest();
+        bench.whitened = columns(&bench.nuisance.iter().map(|c| bench.whitening.apply(c)).collect::<Vec<_>>());
+        bench
+    }
+
+    fn errors(&self, unit: &Unit, effects: &[Effect], fast: bool) -> Vec<f64> {
+        if fast || effects.iter().any(|effect| effect.what.is_fast()) {
+            let errors = plant::run(self.drive, unit, &self.rows, effects).error_arcsec;
+            self.rows.picks(self.thin).into_iter().map(|at| errors[at]).collect()
+        } else {
+            plant::run(self.drive, unit, &self.thinned, effects).error_arcsec
+        }
+    }
+
+    /// Base parameters, each by one standard deviation of its spread.
+    fn float_base(&mut self) {
+        self.nuisance.push(vec![1.0; self.rest_arcsec.len()]);
+        self.prior.push(1e-9);
+        let mut units = vec![
+            Unit { stiffness: self.unit.stiffness + STIFFNESS_SPREAD, ..self.unit.clone() },
+            Unit { backlash: self.unit.backlash + BACKLASH_SPREAD, ..self.unit.clone() },
+            Unit { friction: self.unit.friction + FRICTION_SPREAD, ..self.unit.clone() },
+        ];
+        for at in 0..self.unit.harmonics.len() {
+            let mut louder = self.unit.clone();
+            louder.harmonics[at].0 += HARMONIC_SPREAD;
+            let mut shifted = self.unit.clone();
+            shifted.harmonics[at].1 += PHASE_SPREAD_RAD;
+            units.extend([louder, shifted]);
+        }
+        for unit in units {
+            let moved = self.errors(&unit, &self.rest, false);
+            self.nuisance.push(difference(&moved, &self.rest_arcsec));
+            self.prior.push(SPREAD);
+        }
+    }
+
+    /// Numbers of the effects that are there besides: free.
+    fn float_rest(&mut self) {
+        for at in 0..self.rest.len() {
+            for moved in tangents(&self.rest[at], self.drive) {
+                let mut effects = self.rest.clone();
+                effects[at] = moved;
+                let moved = self.errors(self.unit, &effects, false);
+                let column = difference(&moved, &self.rest_arcsec);
+                if column.iter().any(|x| x.abs() > 1e-9) {
+                    self.nuisance.push(column);
+                    self.prior.push(1e-6);
+                }
+            }
+        }
+    }
+
+    /// What an effect adds to the error at the thinned rows.
+    pub fn signature(&mut self, effect: &Effect) -> Vec<f64> {
+        self.signature_of(std::slice::from_ref(effect))
+    }
+
+    /// What several effects add together.
+    pub fn signature_of(&mut self, effects: &[Effect]) -> Vec<f64> {
+        let mut all = self.rest.clone();
+        all.extend_from_slice(effects);
+        let any_fast = |effects: &[Effect]| effects.iter().any(|effect| effect.what.is_fast());
+        let fast = any_fast(effects) && !any_fast(&self.rest);
+        if fast && self.rest_fast_arcsec.is_none() {
+            self.rest_fast_arcsec = Some(self.errors(self.unit, &self.rest, true));
+        }
+        let with = self.errors(self.unit, &all, false);
+        difference(
+            &with,
+            if fast { self.rest_fast_arcsec.as_ref().unwrap_or(&self.rest_arcsec) } else { &self.rest_arcsec },
+        )
+    }
+
+    /// Weighs a contribution against the base parameters.
+    pub fn weigh(&self, contribution: &[f64]) -> Weight {
+        self.weigh_beside(contribution, &[]).0
+    }
+
+    /// The same with further columns that may take it up freely; also their coefficients. `damping` holds each against
+    /// its scale.
+    pub fn weigh_beside(&self, contribution: &[f64], beside: &[(Vec<f64>, f64)]) -> (Weight, Vec<f64>) {
+        let target = DVector::from_vec(self.whitening.apply(contribution));
+        let own = self.whitened.ncols();
+        let mut all = self.whitened.clone().resize_horizontally(own + beside.len(), 0.0);
+        for (at, (column, _)) in beside.iter().enumerate() {
+            all.column_mut(own + at).copy_from_slice(&self.whitening.apply(column));
+        }
+        let mut gram = all.tr_mul(&all);
+        let right = all.tr_mul(&target);
+        for at in 0..own {
+            gram[(at, at)] += self.prior[at];
+        }
+        for (at, (_, damping)) in beside.iter().enumerate() {
+            let diagonal = &mut gram[(own + at, own + at)];
+            *diagonal += damping.max(1e-9 * *diagonal + 1e-12);
+        }
+        let scale: Vec<f64> = (0..gram.nrows()).map(|at| gram[(at, at)].sqrt().recip()).collect();
+        let scaled = DMatrix::from_fn(gram.nrows(), gram.nrows(), |i, j| {
+            gram[(i, j)] * scale[i] * scale[j] + if i == j { 1e-10 } else { 0.0 }
+        });
+        let right = DVector::from_fn(right.len(), |at, _| right[at] * scale[at]);
+        let Some(cholesky) = scaled.cholesky() else {
+            return (Weight { d: target.norm(), rms_arcsec: rms(contribution) }, vec![0.0; beside.len()]);
+        };
+        let solution = cholesky.solve(&right);
+        let d = (target.norm_squared() - right.dot(&solution)).max(0.0).sqrt();
+        let coefficients: Vec<f64> = solution.iter().zip(&scale).map(|(x, s)| x * s).collect();
+        // A unit beyond its spread is a discrepancy, though a recalibration would take it up.
+        let within = coefficients.iter().zip(self.prior.iter().map(Some).chain(std::iter::repeat(None)));
+        let within = within.map(|(x, prior)| if prior == Some(&SPREAD) { x.clamp(-2.0, 2.0) } else { *x });
+        let mut left = contribution.to_vec();
+        for (column, coefficient) in self.nuisance.iter().chain(beside.iter().map(|(column, _)| column)).zip(within) {
+            for (value, x) in left.iter_mut().zip(column) {
+                *value -= coefficient * x;
+            }
+        }
+        (Weight { d, rms_arcsec: rms(&left) }, coefficients[own..].to_vec())
+    }
+}
+
+/// Effects that differ from this one by a small step of one number.
+pub fn tangents(effect: &Effect, drive: &Drive) -> Vec<Effect> {
+    let spec = effect.what.spec(drive);
+    let mut moved = vec![effect.sized(effect.size * 1.05)];
+    for (at, (_, range)) in spec.shape.iter().enumerate() {
+        let step = range.step(effect.shape[at]);
+        if step != 0.0 {
+            let mut other = effect.clone();
+            other.shape[at] = range.held(effect.shape[at] + step);
+            if other.shape[at] == effect.shape[at] {
+                other.shape[at] = range.held(effect.shape[at] - step);
+            }
+            moved.push(other);
+        }
+    }
+    moved
+}
+
+/// Element by element.
+pub fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+/// Root of the mean square.
+pub fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+fn columns(list: &[Vec<f64>]) -> DMatrix<f64> {
+    let rows = list.first().map_or(0, Vec::len);
+    DMatrix::from_iterator(rows, list.len(), list.iter().flatten().copied())
+}

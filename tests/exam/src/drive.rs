@@ -1,0 +1,266 @@
+//! The drive as its catalogue describes it, and the one on the bench: another unit of the same kind.
+
+use serde::Serialize;
+use std::fmt::Write;
+
+use crate::ARCSEC;
+use crate::chance::Chance;
+use crate::effect::Family;
+
+/// The wheel that the housing holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fixed {
+    /// The circular spline turns with the output.
+    Flexspline,
+    /// The flexspline turns with the output, against the generator.
+    CircularSpline,
+}
+
+/// A line of the kinematic error over the generator angle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Harmonic {
+    /// Per generator turn.
+    pub order: f64,
+    /// At the output.
+    pub amplitude_arcsec: f64,
+    /// Of the sine.
+    pub phase_rad: f64,
+}
+
+/// What the diagnosis is told: the catalogue.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Drive {
+    /// Teeth of the flexspline.
+    pub flexspline_teeth: u32,
+    /// Teeth of the circular spline.
+    pub circular_spline_teeth: u32,
+    /// The wheel that stands still.
+    pub fixed: Fixed,
+    /// Torque from which each stiffness holds, N m, and the stiffness, N m/rad; the first torque is zero.
+    pub stiffness: Vec<(f64, f64)>,
+    /// Full width of the clearance.
+    pub backlash_arcsec: f64,
+    /// Load below which the output stays where it is inside the clearance, N m.
+    pub friction_torque_n_m: f64,
+    /// Lines of the kinematic error.
+    pub harmonics: Vec<Harmonic>,
+    /// Largest torque of the runs, N m. Not told.
+    pub rated_n_m: f64,
+}
+
+/// Relative spread of units, one standard deviation.
+pub const STIFFNESS_SPREAD: f64 = 0.03;
+/// Relative spread of the clearance.
+pub const BACKLASH_SPREAD: f64 = 0.05;
+/// Relative spread of the amplitude of each line.
+pub const HARMONIC_SPREAD: f64 = 0.20;
+/// Spread of the phase of each line, rad: half of what its amplitude spreads.
+pub const PHASE_SPREAD_RAD: f64 = 0.05;
+/// Relative spread of the friction in the clearance. Not told: it moves single rows at a reversal.
+pub const FRICTION_SPREAD: f64 = 0.02;
+
+impl Drive {
+    /// A drive out of the catalogue: half of them the 188/190 of the project, a third with the circular spline held.
+    pub fn draw(chance: &mut Chance) -> Self {
+        let (flexspline_teeth, circular_spline_teeth) =
+            if chance.one_in(0.5) { (188, 190) } else { *chance.of(&[(200, 202), (160, 162), (198, 200), (120, 122)]) };
+        let fixed = if chance.one_in(0.33) { Fixed::CircularSpline } else { Fixed::Flexspline };
+        let stiffness_n_m_per_rad = chance.log_uniform(1.5e4, 1.0e5).round();
+        let wind_up_arcsec = chance.uniform(80.0, 250.0);
+        let rated_n_m = stiffness_n_m_per_rad * wind_up_arcsec / ARCSEC;
+        let stiffness = if chance.one_in(0.25) {
+            let (t1, t2) = (0.15 * rated_n_m, 0.55 * rated_n_m);
+            let k = stiffness_n_m_per_rad;
+            vec![
+                (0.0, (0.75 * k).round()),
+                ((10.0 * t1).round() / 10.0, k),
+                ((10.0 * t2).round() / 10.0, (1.15 * k).round()),
+            ]
+        } else {
+            vec![(0.0, stiffness_n_m_per_rad)]
+        };
+        let mut drive = Self {
+            flexspline_teeth,
+            circular_spline_teeth,
+            fixed,
+            stiffness,
+            backlash_arcsec: chance.uniform(20.0, 90.0).round(),
+            friction_torque_n_m: (1000.0 * rated_n_m * chance.uniform(0.02, 0.06)).round() / 1000.0,
+            harmonics: Vec::new(),
+            rated_n_m,
+        };
+        let moving = 2.0 * drive.teeth_of(other(fixed)).recip() * drive.teeth_of(fixed);
+        let mut lines = vec![(2.0, 5.0, 18.0), (moving, 3.0, 10.0), (4.0, 1.0, 4.0), (1.0, 0.5, 2.0)];
+        lines.truncate(2 + chance.below(3));
+        for (order, low, high) in lines {
+            drive.harmonics.push(Harmonic {
+                order,
+                amplitude_arcsec: (100.0 * chance.log_uniform(low, high)).round() / 100.0,
+                phase_rad: (1e4 * chance.phase()).round() / 1e4,
+            });
+        }
+        drive
+    }
+
+    fn teeth_of(&self, wheel: Fixed) -> f64 {
+        f64::from(match wheel {
+            Fixed::Flexspline => self.flexspline_teeth,
+            Fixed::CircularSpline => self.circular_spline_teeth,
+        })
+    }
+
+    /// Teeth of the wheel that stands still: the mesh repeats so many times per generator turn.
+    pub fn mesh_order(&self) -> f64 {
+        self.teeth_of(self.fixed)
+    }
+
+    /// Teeth of the wheel at the output.
+    pub fn output_teeth(&self) -> f64 {
+        self.teeth_of(other(self.fixed))
+    }
+
+    /// Generator turns per output turn, with the sense (Willis, generator as the carrier).
+    pub fn ratio(&self) -> f64 {
+        let (f, c) = (f64::from(self.flexspline_teeth), f64::from(self.circular_spline_teeth));
+        match self.fixed {
+            Fixed::Flexspline => c / (c - f),
+            Fixed::CircularSpline => -f / (c - f),
+        }
+    }
+
+    /// Stiffness of small loads, N m/rad.
+    pub fn first_stiffness(&self) -> f64 {
+        self.stiffness[0].1
+    }
+
+    /// Wind-up at a load of the same sign, arcsec.
+    pub fn wind_up_arcsec(&self, load_n_m: f64) -> f64 {
+        let load = load_n_m.abs();
+        let mut sum = 0.0;
+        for (at, &(from, k)) in self.stiffness.iter().enumerate() {
+            let to = self.stiffness.get(at + 1).map_or(f64::INFINITY, |next| next.0);
+            sum += (load.min(to) - from).max(0.0) / k;
+        }
+        sum.copysign(load_n_m) * ARCSEC
+    }
+
+    /// `nominal.toml`.
+    pub fn nominal_toml(&self) -> String {
+        let fixed = match self.fixed {
+            Fixed::Flexspline => "flexspline",
+            Fixed::CircularSpline => "circular_spline",
+        };
+        let stiffness = match self.stiffness.as_slice() {
+            [(_, k)] => format!("{k:.1}"),
+            parts => {
+                format!("[{}]", parts.iter().map(|(t, k)| format!("[{t:.1}, {k:.1}]")).collect::<Vec<_>>().join(", "))
+            }
+        };
+        let mut text = format!(
+            "[drive]\nflexspline_teeth = {}\ncircular_spline_teeth = {}\nfixed = \"{fixed}\"\n\n[nominal]\n\
+             stiffness_n_m_per_rad = {stiffness}\nbacklash_arcsec = {:.1}\nfriction_torque_n_m = {:.3}\ntemperature_c = 20.0\n",
+            self.flexspline_teeth, self.circular_spline_teeth, self.backlash_arcsec, self.friction_torque_n_m
+        );
+        for line in &self.harmonics {
+            let _ = write!(
+                text,
+                "\n[[nominal.harmonic]]\norder_per_generator_turn = {:?}\namplitude_arcsec = {:?}\nphase_rad = {:?}\n",
+                line.order, line.amplitude_arcsec, line.phase_rad
+            );
+        }
+        let _ = write!(
+            text,
+            "\n[nominal.unit_to_unit]\nstiffness = {STIFFNESS_SPREAD}\nbacklash = {BACKLASH_SPREAD}\nharmonic = {HARMONIC_SPREAD}\n"
+        );
+        text
+    }
+}
+
+fn other(wheel: Fixed) -> Fixed {
+    match wheel {
+        Fixed::Flexspline => Fixed::CircularSpline,
+        Fixed::CircularSpline => Fixed::Flexspline,
+    }
+}
+
+/// The drive on the bench, relative to its catalogue.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Unit {
+    /// Stiffness over nominal.
+    pub stiffness: f64,
+    /// Clearance over nominal.
+    pub backlash: f64,
+    /// Friction in the clearance over nominal.
+    pub friction: f64,
+    /// Amplitude over nominal and shift of phase (rad) of each line.
+    pub harmonics: Vec<(f64, f64)>,
+    /// Zero of the output encoder.
+    pub offset_arcsec: f64,
+    /// Stiffness of the teeth over that of the whole drive: what the two zones share by.
+    pub tooth_stiffness: f64,
+    /// How zones share.
+    pub family: Family,
+}
+
+impl Unit {
+    /// A unit exactly as the catalogue says.
+    pub fn nominal(drive: &Drive) -> Self {
+        Self {
+            stiffness: 1.0,
+            backlash: 1.0,
+            friction: 1.0,
+            harmonics: vec![(1.0, 0.0); drive.harmonics.len()],
+            offset_arcsec: 0.0,
+            tooth_stiffness: 8.0,
+            family: Family::A,
+        }
+    }
+
+    /// A unit within the spread.
+    pub fn draw(drive: &Drive, family: Family, chance: &mut Chance) -> Self {
+        let mut spread = |relative: f64| relative * chance.normal().clamp(-2.5, 2.5);
+        Self {
+            stiffness: 1.0 + spread(STIFFNESS_SPREAD),
+            backlash: 1.0 + spread(BACKLASH_SPREAD),
+            friction: 1.0 + spread(FRICTION_SPREAD),
+            harmonics: drive
+                .harmonics
+                .iter()
+                .map(|_| (1.0 + spread(HARMONIC_SPREAD), spread(PHASE_SPREAD_RAD)))
+                .collect(),
+            offset_arcsec: if chance.one_in(0.5) { 0.0 } else { chance.uniform(-60.0, 60.0) },
+            tooth_stiffness: chance.uniform(6.0, 12.0),
+            family,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ratios_and_piecewise_wind_up() {
+        let mut drive = Drive::draw(&mut Chance::new(1, "drive", 0));
+        (drive.flexspline_teeth, drive.circular_spline_teeth) = (188, 190);
+        drive.fixed = Fixed::Flexspline;
+        assert_eq!(drive.ratio(), 95.0);
+        drive.fixed = Fixed::CircularSpline;
+        assert_eq!(drive.ratio(), -94.0);
+        drive.stiffness = vec![(0.0, 1e4), (10.0, 2e4)];
+        assert!((drive.wind_up_arcsec(-30.0) / ARCSEC + 10.0 / 1e4 + 20.0 / 2e4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_nominal_file_is_toml_that_says_the_same() {
+        for index in 0..20 {
+            let drive = Drive::draw(&mut Chance::new(3, "drive", index));
+            let read: toml::Table = drive.nominal_toml().parse().unwrap();
+            let nominal = read["nominal"].as_table().unwrap();
+            assert_eq!(nominal["backlash_arcsec"].as_float(), Some(drive.backlash_arcsec));
+            assert_eq!(nominal["harmonic"].as_array().unwrap().len(), drive.harmonics.len());
+            assert_eq!(nominal["harmonic"][0]["order_per_generator_turn"].as_float(), Some(drive.harmonics[0].order));
+        }
+    }
+}

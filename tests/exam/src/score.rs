@@ -1,0 +1,379 @@
+//! Scores: what each answer is worth beside the truth, and all of them together.
+
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use crate::answer::Answer;
+use crate::rate::Rate;
+use crate::truth::Truth;
+
+/// One case, judged. `None`: not asked of this case.
+#[derive(Debug, Clone, Serialize)]
+pub struct Judged {
+    /// Directory of the data.
+    pub name: String,
+    /// Of the case.
+    pub index: u64,
+    /// Sort.
+    pub kind: String,
+    /// Laws.
+    pub family: String,
+    /// What the excitation lacks.
+    pub poor: Vec<String>,
+    /// What is hidden, with the times over the limit.
+    pub hidden: Vec<(String, f64)>,
+    /// What was named.
+    pub named: Vec<String>,
+    /// Verdict, or what went wrong.
+    pub verdict: String,
+    /// First name is a hidden cause that counts, or its look-alike by the oracle.
+    pub first: Option<bool>,
+    /// First name is exactly a hidden cause.
+    pub first_strict: Option<bool>,
+    /// As `first`, or a hidden cause stands among the look-alikes that the answer itself lists.
+    pub first_or_listed: Option<bool>,
+    /// The names are the hidden causes that count, no more and no fewer.
+    pub exact: Option<bool>,
+    /// Something was named on a null.
+    pub null_named: Option<bool>,
+    /// A null was called anything but `none`.
+    pub null_not_none: Option<bool>,
+    /// Something was named on an effect outside.
+    pub outside_named: Option<bool>,
+    /// An effect outside that counts was called `unknown`.
+    pub outside_unknown: Option<bool>,
+    /// A fault of the data was named.
+    pub fault_named: Option<bool>,
+    /// A cause was named for a fault of the data.
+    pub fault_blamed: Option<bool>,
+    /// A fault was named in data that have none.
+    pub fault_invented: Option<bool>,
+    /// A wrong name on what cannot be detected.
+    pub below_limit_misnamed: Option<bool>,
+    /// A cause that is not there was named beside or instead.
+    pub false_name: Option<bool>,
+    /// Share of the held-out variance above the noise that was removed.
+    pub removed: Option<f64>,
+    /// The extended model is worse than the recalibrated nominal one on held-out data.
+    pub worse: Option<bool>,
+    /// (confidence, right) of each name.
+    pub confidence: Vec<(f64, bool)>,
+    /// (cause, parameter, value, standard deviation, truth) of each comparable parameter.
+    pub intervals: Vec<(String, String, f64, f64, f64)>,
+    /// Names that were asked: (hidden, found).
+    pub found: Vec<(String, bool)>,
+    /// Run time, s.
+    pub seconds: f64,
+    /// No readable answer.
+    pub failed: bool,
+}
+
+/// Judges one answer.
+pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Judged {
+    let mut judged = Judged {
+        name: truth.name.clone(),
+        index: truth.index,
+        kind: truth.kind.clone(),
+        family: truth.family.clone(),
+        poor: truth.poor.clone(),
+        hidden: truth.hidden.iter().map(|hidden| (hidden.name.clone(), hidden.over_limit)).collect(),
+        named: Vec::new(),
+        verdict: String::new(),
+        first: None,
+        first_strict: None,
+        first_or_listed: None,
+        exact: None,
+        null_named: None,
+        null_not_none: None,
+        outside_named: None,
+        outside_unknown: None,
+        fault_named: None,
+        fault_blamed: None,
+        fault_invented: None,
+        below_limit_misnamed: None,
+        false_name: None,
+        removed: None,
+        worse: None,
+        confidence: Vec::new(),
+        intervals: Vec::new(),
+        found: Vec::new(),
+        seconds,
+        failed: answer.is_err(),
+    };
+    let nothing = Answer { verdict: "failed".into(), causes: Vec::new(), data_faults: Vec::new(), held_out: None };
+    let answer = match answer {
+        Ok(answer) => answer,
+        Err(error) => {
+            judged.verdict = error.clone();
+            &nothing
+        }
+    };
+    if judged.verdict.is_empty() {
+        judged.verdict.clone_from(&answer.verdict);
+    }
+    judged.named = answer.causes.iter().map(|cause| cause.name.clone()).collect();
+    let is_hidden = |name: &str| truth.hidden.iter().any(|hidden| hidden.is_called(name));
+    let any_named = !answer.causes.is_empty();
+    match truth.kind.as_str() {
+        "null" => {
+            judged.null_named = Some(any_named);
+            judged.null_not_none = Some(answer.verdict != "none");
+        }
+        "outside" if !truth.outside_looks_named() => {
+            judged.outside_named = Some(any_named);
+            if truth.hidden.iter().any(|hidden| hidden.counts()) {
+                judged.outside_unknown = Some(answer.verdict == "unknown");
+            }
+        }
+        "fault" => {
+            judged.fault_named = Some(answer.data_faults.iter().any(|fault| is_hidden(&fault.name)));
+            judged.fault_blamed = Some(any_named);
+        }
+        "single" | "compound" => {
+            let counted: Vec<_> = truth.hidden.iter().filter(|hidden| hidden.counts()).collect();
+            let false_name = judged.named.iter().any(|name| !is_hidden(name));
+            if counted.is_empty() {
+                judged.below_limit_misnamed = Some(false_name);
+            } else {
+                judged.false_name = Some(false_name);
+                let first = answer.causes.first();
+                let right = first.is_some_and(|first| is_hidden(&first.name));
+                judged.first = Some(right);
+                judged.first_strict =
+                    Some(first.is_some_and(|first| truth.hidden.iter().any(|hidden| hidden.name == first.name)));
+                judged.first_or_listed = Some(
+                    right
+                        || first.is_some_and(|first| {
+                            let listed = first.look_alikes.iter().take(3);
+                            listed.into_iter().any(|name| truth.hidden.iter().any(|hidden| hidden.name == *name))
+                        }),
+                );
+                let found: Vec<bool> =
+                    counted.iter().map(|hidden| judged.named.iter().any(|name| hidden.is_called(name))).collect();
+                // Two hidden causes may not both be found by one name.
+                let enough = judged.named.len() >= counted.len() && judged.named.len() <= truth.hidden.len();
+                judged.exact = Some(!false_name && enough && found.iter().all(|found| *found));
+                judged.found = counted.iter().map(|hidden| hidden.name.clone()).zip(found).collect();
+            }
+            for named in &answer.causes {
+                let Some(hidden) = truth.hidden.iter().find(|hidden| hidden.name == named.name && hidden.counts())
+                else {
+                    continue;
+                };
+                for (parameter, value) in &hidden.parameters {
+                    if let Some(estimate) = named.parameters.get(parameter)
+                        && let Some(std) = estimate.std
+                        && std > 0.0
+                    {
+                        let mut value = *value;
+                        if parameter.starts_with("phase") {
+                            value = estimate.value + crate::teeth::wrapped(value - estimate.value);
+                        }
+                        let interval = (named.name.clone(), parameter.clone(), estimate.value, std, value);
+                        judged.intervals.push(interval);
+                    }
+                }
+            }
+        }
+        _ => {}
+    }
+    if truth.kind == "null" {
+        judged.fault_invented = Some(!answer.data_faults.is_empty());
+    }
+    judged.confidence = answer
+        .causes
+        .iter()
+        .map(|cause| (cause.confidence, is_hidden(&cause.name) && truth.kind != "outside"))
+        .collect();
+    if let Some(held_out) = answer.held_out {
+        let (before, after) = (held_out.rms_before_arcsec.powi(2), held_out.rms_after_arcsec.powi(2));
+        judged.worse = Some(held_out.rms_after_arcsec > 1.002 * held_out.rms_before_arcsec);
+        let floor = truth.floor_arcsec.powi(2);
+        let named_kind = truth.kind == "single" || truth.kind == "compound";
+        if named_kind && judged.first.is_some() && before - floor > 0.1 * truth.removable_rms_arcsec.powi(2) {
+            judged.removed = Some(((before - after) / (before - floor)).min(1.0));
+        }
+    } else if judged.first.is_some() {
+        judged.removed = Some(0.0);
+    }
+    judged
+}
+
+/// All cases together.
+#[derive(Debug, Clone, Serialize)]
+pub struct Scores {
+    /// Name, share and interval of each rate.
+    pub rates: Vec<(&'static str, Rate, (f64, f64))>,
+    /// Mean share of the removable held-out variance that was removed, and its standard error.
+    pub removed_mean: (f64, f64),
+    /// Median of the same.
+    pub removed_median: f64,
+    /// Mean square of confidence less right.
+    pub brier: f64,
+    /// By stated confidence: lower bound, names, share right.
+    pub reliability: Vec<(f64, usize, f64)>,
+    /// Found against times over the limit of detection: bounds, rate.
+    pub by_size: Vec<(f64, f64, Rate)>,
+    /// By hidden cause (singles that count): what came first, how often.
+    pub confusion: BTreeMap<String, BTreeMap<String, usize>>,
+    /// Coverage of 95 % intervals by cause and parameter.
+    pub coverage: BTreeMap<String, Rate>,
+    /// Run time, s: median and largest.
+    pub seconds: (f64, f64),
+    /// Cases.
+    pub cases: usize,
+}
+
+impl Scores {
+    /// Gathers.
+    pub fn of(all: &[Judged]) -> Self {
+        let rate = |ask: &dyn Fn(&Judged) -> Option<bool>| Rate::over(all.iter().map(ask));
+        let when = |condition: bool, value: Option<bool>| if condition { value } else { None };
+        let single = |j: &Judged| j.kind == "single";
+        let mut rates: Vec<(&'static str, Rate)> = vec![
+            ("first_name", rate(&|j| when(single(j), j.first))),
+            ("first_name_rich", rate(&|j| when(single(j) && j.poor.is_empty(), j.first))),
+            ("first_name_poor", rate(&|j| when(!j.poor.is_empty(), j.first))),
+            ("first_name_family_a", rate(&|j| when(single(j) && j.family == "A", j.first))),
+            ("first_name_family_b", rate(&|j| when(single(j) && j.family == "B", j.first))),
+            ("first_name_strict", rate(&|j| when(single(j), j.first_strict))),
+            ("first_name_or_listed", rate(&|j| when(single(j), j.first_or_listed))),
+            ("exact", rate(&|j| when(single(j), j.exact))),
+            ("compound_first", rate(&|j| when(j.kind == "compound", j.first))),
+            ("compound_exact", rate(&|j| when(j.kind == "compound", j.exact))),
+            ("false_name", rate(&|j| j.false_name)),
+            ("null_named", rate(&|j| j.null_named)),
+            ("null_not_none", rate(&|j| j.null_not_none)),
+            ("outside_named", rate(&|j| j.outside_named)),
+            ("outside_unknown", rate(&|j| j.outside_unknown)),
+            ("below_limit_misnamed", rate(&|j| j.below_limit_misnamed)),
+            ("fault_named", rate(&|j| j.fault_named)),
+            ("fault_blamed_on_a_cause", rate(&|j| j.fault_blamed)),
+            ("fault_invented", rate(&|j| j.fault_invented)),
+            ("worse_than_recalibrated", rate(&|j| j.worse)),
+            ("failed", rate(&|j| Some(j.failed))),
+        ];
+        let compound = all.iter().filter(|j| j.kind == "compound");
+        rates.push(("compound_recall", Rate::over(compound.flat_map(|j| j.found.iter().map(|(_, yes)| Some(*yes))))));
+        let intervals = all.iter().flat_map(|j| &j.intervals);
+        let covered = |(_, _, value, std, truth): &(String, String, f64, f64, f64)| (value - truth).abs() <= 1.96 * std;
+        rates.push(("coverage_95", Rate::over(intervals.clone().map(|i| Some(covered(i))))));
+        let mut coverage: BTreeMap<String, Rate> = BTreeMap::new();
+        for interval in intervals {
+            let entry = coverage.entry(format!("{} {}", interval.0, interval.1)).or_default();
+            entry.of += 1;
+            entry.right += usize::from(covered(interval));
+        }
+
+        let mut removed: Vec<f64> = all.iter().filter_map(|j| j.removed).collect();
+        removed.sort_by(f64::total_cmp);
+        let count = removed.len().max(1) as f64;
+        let mean = removed.iter().sum::<f64>() / count;
+        let spread = (removed.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count / count).sqrt();
+
+        let names: Vec<(f64, bool)> = all.iter().flat_map(|j| j.confidence.iter().copied()).collect();
+        let brier = names.iter().map(|(p, right)| (p - f64::from(u8::from(*right))).powi(2)).sum::<f64>()
+            / names.len().max(1) as f64;
+        let bounds = [0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.01];
+        let reliability = bounds
+            .windows(2)
+            .map(|b| {
+                let within: Vec<_> = names.iter().filter(|(p, _)| (b[0]..b[1]).contains(p)).collect();
+                let right = within.iter().filter(|(_, right)| *right).count();
+                (b[0], within.len(), right as f64 / within.len().max(1) as f64)
+            })
+            .collect();
+
+        let sizes = [0.0, 0.3, 0.6, 1.0, 1.5, 2.5, 5.0, 10.0, 1e9];
+        let singles: Vec<_> = all.iter().filter(|j| single(j)).collect();
+        let by_size = sizes
+            .windows(2)
+            .map(|b| {
+                let within = singles.iter().filter(|j| (b[0]..b[1]).contains(&j.hidden[0].1));
+                // Below the limit there is no look-alike to excuse a name.
+                let found = within.map(|j| Some(j.first.unwrap_or_else(|| j.named.first() == Some(&j.hidden[0].0))));
+                (b[0], b[1], Rate::over(found))
+            })
+            .collect();
+
+        let mut confusion: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
+        for judged in singles.iter().filter(|j| j.first.is_some()) {
+            let said = judged.named.first().cloned().unwrap_or_else(|| format!("({})", judged.verdict));
+            let said = if judged.first == Some(true) && said != judged.hidden[0].0 { format!("{said}*") } else { said };
+            *confusion.entry(judged.hidden[0].0.clone()).or_default().entry(said).or_default() += 1;
+        }
+        let mut seconds: Vec<f64> = all.iter().map(|j| j.seconds).collect();
+        seconds.sort_by(f64::total_cmp);
+        let middle = |sorted: &[f64]| sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+        Self {
+            rates: rates.into_iter().map(|(name, rate)| (name, rate, rate.interval())).collect(),
+            removed_mean: (mean, spread),
+            removed_median: middle(&removed),
+            brier,
+            reliability,
+            by_size,
+            confusion,
+            coverage,
+            seconds: (middle(&seconds), seconds.last().copied().unwrap_or(0.0)),
+            cases: all.len(),
+        }
+    }
+
+    /// One rate.
+    pub fn rate(&self, name: &str) -> Option<Rate> {
+        self.rates.iter().find(|(found, ..)| *found == name).map(|(_, rate, _)| *rate)
+    }
+
+    /// For people.
+    pub fn table(&self) -> String {
+        let mut text = format!("{} cases                    share  counts    [95 % interval]\n", self.cases);
+        for (name, rate, _) in self.rates.iter().filter(|(_, rate, _)| rate.of > 0) {
+            let _ = writeln!(text, "  {name:<26}{rate}");
+        }
+        let _ = writeln!(
+            text,
+            "  removable variance removed, held out: mean {:.3} ± {:.3}, median {:.3}",
+            self.removed_mean.0, self.removed_mean.1, self.removed_median
+        );
+        let _ = writeln!(
+            text,
+            "  Brier {:.4}; run time median {:.1} s, largest {:.1} s",
+            self.brier, self.seconds.0, self.seconds.1
+        );
+        text.push_str("\nstated confidence from: names, share right\n");
+        for (from, count, right) in self.reliability.iter().filter(|(_, count, _)| *count > 0) {
+            let _ = writeln!(text, "  {from:.2}: {count}, {right:.2}");
+        }
+        text.push_str("\nsingles by size (times the limit of detection): first name right\n");
+        for (from, to, rate) in self.by_size.iter().filter(|(_, _, rate)| rate.of > 0) {
+            let to = if *to > 1e6 { "".to_owned() } else { format!("{to}") };
+            let _ = writeln!(text, "  {from:>4} .. {to:<4} {rate}");
+        }
+        text.push_str("\nhidden single that counts: first names (* = look-alike by the oracle)\n");
+        for (hidden, said) in &self.confusion {
+            let said: Vec<_> = said.iter().map(|(name, count)| format!("{name} {count}")).collect();
+            let _ = writeln!(text, "  {hidden:<31} {}", said.join(", "));
+        }
+        if !self.coverage.is_empty() {
+            text.push_str("\n95 % intervals that hold the truth\n");
+            for (name, rate) in &self.coverage {
+                let _ = writeln!(text, "  {name:<48} {rate}");
+            }
+        }
+        text
+    }
+}
+
+impl Judged {
+    /// Whether someone should look at it.
+    pub fn went_wrong(&self) -> bool {
+        self.failed
+            || self.first == Some(false)
+            || self.exact == Some(false)
+            || [self.null_named, self.outside_named, self.below_limit_misnamed, self.worse].contains(&Some(true))
+            || [self.outside_unknown, self.fault_named].contains(&Some(false))
+            || [self.fault_blamed, self.fault_invented].contains(&Some(true))
+            || self.null_not_none == Some(true)
+    }
+}

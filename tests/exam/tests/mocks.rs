@@ -1,0 +1,163 @@
+//! The examiner examined: answers whose scores are known beforehand.
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+/// Runs an examination of a mock; its rates as (right, of) by name.
+fn examine(dir: &Path, mock: &[&str], more: &[&str]) -> (Value, bool) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_flexspline-exam"));
+    // All kinds of cases; enough below the limit of detection only in the longer run.
+    let cases = if mock.contains(&"truth") { "50" } else { "25" };
+    command.args(["run", "--cases", cases, "--seed", "21", "--diagnoser", env!("CARGO_BIN_EXE_flexspline-exam-mock")]);
+    for argument in mock {
+        command.arg(format!("--diagnoser-arg={argument}"));
+    }
+    let output = command.args(more).arg("--out").arg(dir).output().unwrap();
+    let text = std::fs::read_to_string(dir.join("exam.json")).unwrap();
+    (serde_json::from_str(&text).unwrap(), output.status.success())
+}
+
+fn share(exam: &Value, name: &str) -> (u64, u64) {
+    let rates = exam["scores"]["rates"].as_array().unwrap();
+    let rate = &rates.iter().find(|rate| rate[0] == name).unwrap()[1];
+    (rate["right"].as_u64().unwrap(), rate["of"].as_u64().unwrap())
+}
+
+fn all(exam: &Value, name: &str) {
+    let (right, of) = share(exam, name);
+    assert!(of > 0 && right == of, "{name}: {right}/{of}");
+}
+
+fn none(exam: &Value, name: &str) {
+    let (right, of) = share(exam, name);
+    assert!(of > 0 && right == 0, "{name}: {right}/{of}");
+}
+
+#[test]
+fn one_that_knows_the_truth_scores_everything() {
+    let dir = tempfile::tempdir().unwrap();
+    let open = dir.path().join("open").display().to_string();
+    let (exam, passed) = examine(
+        dir.path(),
+        &["--manner", "truth", "--truth", &open],
+        &[
+            "--reveal",
+            &open,
+            "--at-least",
+            "first_name=0.97",
+            "--at-most",
+            "null_named=0.01",
+            "--removed",
+            "0.97",
+            "--strict",
+        ],
+    );
+    assert!(passed);
+    for name in [
+        "first_name",
+        "first_name_strict",
+        "exact",
+        "compound_first",
+        "compound_exact",
+        "compound_recall",
+        "coverage_95",
+    ] {
+        all(&exam, name);
+    }
+    all(&exam, "outside_unknown");
+    for name in ["false_name", "null_named", "null_not_none", "outside_named", "below_limit_misnamed", "failed"] {
+        none(&exam, name);
+    }
+    assert!((exam["scores"]["removed_mean"][0].as_f64().unwrap() - 1.0).abs() < 1e-6);
+    assert_eq!(exam["scores"]["brier"], 0.0);
+}
+
+#[test]
+fn faults_of_the_data_are_drawn_and_counted_when_asked_for() {
+    let dir = tempfile::tempdir().unwrap();
+    let open = dir.path().join("open").display().to_string();
+    let knows = ["--manner", "truth", "--truth", &open];
+    let (exam, _) = examine(dir.path(), &knows, &["--kind", "fault", "--reveal", &open]);
+    all(&exam, "fault_named");
+    none(&exam, "fault_blamed_on_a_cause");
+    let (exam, _) = examine(dir.path(), &["--manner", "always"], &["--kind", "fault"]);
+    none(&exam, "fault_named");
+    all(&exam, "fault_blamed_on_a_cause");
+}
+
+#[test]
+fn one_that_never_names_anything_finds_and_misnames_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let (exam, passed) = examine(dir.path(), &["--manner", "none"], &["--at-least", "first_name=0.9"]);
+    assert!(!passed, "a bound far off is missed");
+    for name in [
+        "first_name",
+        "exact",
+        "compound_exact",
+        "null_named",
+        "null_not_none",
+        "outside_named",
+        "outside_unknown",
+        "false_name",
+    ] {
+        none(&exam, name);
+    }
+}
+
+#[test]
+fn one_that_always_names_wear_is_right_on_wear_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let (exam, passed) = examine(dir.path(), &["--manner", "always"], &["--at-most", "null_named=0.5"]);
+    assert!(!passed);
+    for name in ["null_named", "null_not_none", "outside_named"] {
+        all(&exam, name);
+    }
+    for case in exam["cases"].as_array().unwrap().iter().filter(|case| case["kind"] == "single") {
+        if let Some(strict) = case["first_strict"].as_bool() {
+            assert_eq!(strict, case["hidden"][0][0] == "wear", "{case}");
+        }
+    }
+    let (dir, case) = (tempfile::tempdir().unwrap(), ["--kind", "single", "--cause", "wear", "--clear", "--rich"]);
+    let (exam, _) = examine(dir.path(), &["--manner", "always"], &case);
+    all(&exam, "first_name");
+}
+
+#[test]
+fn one_that_crashes_fails_every_case() {
+    let dir = tempfile::tempdir().unwrap();
+    let (exam, _) = examine(dir.path(), &["--manner", "truth", "--truth", "/nowhere"], &[]);
+    all(&exam, "failed");
+    none(&exam, "first_name");
+}
+
+#[test]
+fn the_truth_is_where_the_commitment_says_and_one_case_can_be_written_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let (exam, _) = examine(dir.path(), &["--manner", "none"], &["--keep"]);
+    let mut files: Vec<_> =
+        std::fs::read_dir(dir.path().join("truth")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    let mut hasher = blake3::Hasher::new();
+    for file in &files {
+        hasher.update(&std::fs::read(file).unwrap());
+    }
+    assert_eq!(exam["commitment"], hasher.finalize().to_hex().to_string());
+
+    let missed = exam["cases"].as_array().unwrap().iter().find(|case| case["first"] == false).unwrap();
+    let (name, index) = (missed["name"].as_str().unwrap(), missed["index"].to_string());
+    let one = dir.path().join("one");
+    let status = Command::new(env!("CARGO_BIN_EXE_flexspline-exam"))
+        .args(["case", "--seed", "21", "--index", &index, "--out"])
+        .arg(&one)
+        .output()
+        .unwrap()
+        .status;
+    assert!(status.success());
+    let read = |path: std::path::PathBuf| std::fs::read(path).unwrap();
+    let kept = dir.path().join("cases").join(name);
+    assert!(read(one.join("data.csv")) == read(kept.join("data.csv")));
+    assert!(read(one.join("nominal.toml")) == read(kept.join("nominal.toml")));
+    assert!(read(one.join("truth.json")) == read(dir.path().join("truth").join(format!("{name}.json"))));
+}
