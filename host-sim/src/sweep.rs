@@ -117,6 +117,9 @@ pub struct Sweep {
     pub worst_residual: f64,
     /// Unknowns of the model.
     pub degrees_of_freedom: usize,
+    /// Places over the turns of generator and output at which every torque of a sign was sampled; 0 for a drive that repeats from
+    /// tooth to tooth.
+    pub places: usize,
 }
 
 /// Why a sweep ended early.
@@ -194,6 +197,7 @@ pub fn sweep(
                 iterations: chain.iterations,
                 worst_residual: chain.worst_residual,
                 degrees_of_freedom: problem.degrees_of_freedom(),
+                places: 0,
             })
         })
         .collect::<Result<Vec<Sweep>, SweepError>>()?;

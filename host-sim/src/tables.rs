@@ -20,9 +20,9 @@ pub const ARCSEC_PER_RAD: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
 /// Full turns that separate 2 per generator turn from 2 per turn of the generator against the output, less a margin.
 const TURNS_FOR_HARMONICS: f64 = 47.5;
 /// Orders fitted where the samples cover enough turns: per generator turn, per turn against the output, per output turn.
-const GENERATOR_ORDERS: [u16; 4] = [1, 2, 3, 4];
-const MATERIAL_ORDERS: [u16; 4] = [1, 2, 3, 4];
-const OUTPUT_ORDERS: [u16; 2] = [1, 2];
+pub(crate) const GENERATOR_ORDERS: [u16; 4] = [1, 2, 3, 4];
+pub(crate) const MATERIAL_ORDERS: [u16; 4] = [1, 2, 3, 4];
+pub(crate) const OUTPUT_ORDERS: [u16; 2] = [1, 2];
 /// Torques of a sample file closer than this share of the largest are one node.
 const SAME_TORQUE: f64 = 1e-6;
 /// Deviation (rad) that FEM samples may have from the table; they are exact but for rounding.

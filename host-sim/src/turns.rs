@@ -7,35 +7,39 @@
 //!
 //! * the drive without the imperfections, over one tooth pitch at every node, as [`crate::sweep`] does it;
 //! * the *deviation*, the output with the imperfections less the output without, both frictionless, at a few loads of either
-//!   sign, from many places. At each place the drive is deformed and then goes from load to load, at a few tooth
-//!   phases. The places cover the turn of the generator and the turn of the output as evenly as so few points can (the additive
-//!   recurrence of the plastic number), so that harmonics of ψ, δ and ψ − δ do not pass for one another.
+//!   sign, from many places. The places cover the turn of the generator and the turn of the output as evenly as so few points
+//!   can (the additive recurrence of the plastic number), so that harmonics of ψ, δ and ψ − δ do not pass for one another.
 //!
-//! The samples are those of the first sweep, each at every place whose tooth phase is its own, with the deviation there added
-//! (between loads linear in the root of the load).
+//! The places lie whole flexspline pitches apart. There the drive without imperfections is in one state, and the drive with them
+//! nearly so: under each load it goes from place to place in one increment each, the state of the last place turned as the guess
+//! of the next.
 //!
-//! The table has one curve for each of the angles, the same at every load. What of the deviation changes with the load (an
-//! eccentricity is felt less where more teeth share it), or depends on two angles at once, stays as a difference that the table
-//! states; what the putting together misses is seen by `validate`.
+//! The samples are those of the first sweep, each at every place, with the deviation there added: between loads linear in the
+//! cube root of the load, within the pitch along the harmonics that the table will hold.
+//!
+//! The table has one curve for each of the angles, the same at every load. What of the deviation changes with the load or the
+//! flank that bears (an eccentricity is felt less where more teeth share it, and from another side by the other flank), or depends
+//! on two angles at once, stays as a difference that the table states; what the putting together misses is seen by `validate`.
 
-use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
-use flexspline::Direction;
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side};
 use flexspline::precompute::Sample;
 use rayon::prelude::*;
 
 use crate::drive::{Drive, GeneratorKind};
-use crate::stepping::{Problem, Solver, SolverSettings, State};
+use crate::stepping::{Increment, Problem, SolveError, Solver, SolverSettings, State};
 use crate::sweep::{KnownNode, Observer, Sweep, SweepError, SweepPlan, SweepProgress, sweep};
+use crate::tables::{GENERATOR_ORDERS, MATERIAL_ORDERS, OUTPUT_ORDERS};
 
 /// Places of generator and output for each sign of the load.
-const PLACES: usize = 24;
-/// Samples of a load at a place.
-const SAMPLES: usize = 3;
+const PLACES: usize = 48;
 /// Loads of each sign.
-const LEVELS: usize = 4;
+const LEVELS: usize = 6;
+/// The lightest of them, N m.
+const LIGHTEST_N_M: f64 = 0.1;
 /// Drag under which the deviation is looked at, N m: that of the ideal drive.
 const SMOOTH_DRAG_N_M: f64 = 0.02;
 /// The plastic number: `p³ = p + 1`.
@@ -43,21 +47,12 @@ const PLASTIC: f64 = 1.324_717_957_244_746;
 
 /// Increments that the deviation takes, about.
 pub fn deviation_increments() -> usize {
-    2 * PLACES * LEVELS * SAMPLES
+    2 * LEVELS * (PLACES + 4)
 }
 
-/// Output with imperfections less output without.
-#[derive(Debug, Clone, Copy)]
-struct Deviation {
-    generator_rad: f64,
-    /// Tooth phase, in positions of a pitch.
-    phase: usize,
-    /// One for each load, light to heavy, rad.
-    rad: [f64; LEVELS],
-}
-
-/// Runs the sweep of one generator at the torque and temperature nodes of the plan. Nodes that are `known` (of the drive without
-/// the imperfections) are not computed again.
+/// Runs the sweep of one generator at the torque and temperature nodes of the plan, for any drive: one that repeats from tooth to
+/// tooth is swept over one pitch ([`sweep`]), any other over whole turns of generator and output. Nodes that are `known` (of the
+/// drive without the imperfections) are not computed again.
 pub fn sweep_turns(
     drive: &Drive,
     kind: GeneratorKind,
@@ -68,198 +63,237 @@ pub fn sweep_turns(
 ) -> Result<Sweep, SweepError> {
     let repeating = Drive { as_built: drive.as_built.uniform_part(), ..drive.clone() };
     let mut whole = sweep(&repeating, kind, plan, known, settings, observe)?;
+    if drive.as_built.first_not_uniform().is_none() {
+        return Ok(whole);
+    }
 
-    let levels = levels(plan, drive.output.drag_torque_n_m);
     let temperature_c = drive.temperature.reference_c;
-    let smooth = |drive: &Drive| {
+    let problem = |drive: &Drive| {
         let mut smooth = drive.clone();
         smooth.flanks.friction_coefficient = 0.0;
         smooth.output.drag_torque_n_m = SMOOTH_DRAG_N_M;
-        smooth
+        Problem::new(&smooth, kind, temperature_c, settings)
     };
-    let without = {
-        let nodes = levels.iter().rev().map(|t| -t).chain(levels).collect();
-        let plan = SweepPlan {
-            torque_nodes_n_m: nodes,
-            temperature_nodes_c: vec![temperature_c as f32],
-            settling_pitches: 0.0,
-            ..plan.clone()
-        };
-        sweep(&smooth(&repeating), kind, &plan, &[], settings, observe)?
-    };
-    let lattice = Lattice::new(drive, plan.positions);
-    let reference: HashMap<(u64, usize), f64> = without
-        .samples
-        .iter()
-        .filter(|s| s.direction == Direction::Forward)
-        .map(|s| {
-            ((s.torque_n_m.to_bits(), lattice.phase(s.generator_rad)), s.output_rad - s.generator_rad / drive.ratio())
-        })
-        .collect();
-
-    let problem = Problem::new(&smooth(drive), kind, temperature_c, settings)?;
-    let runs: Vec<(usize, f64)> = (0..PLACES).flat_map(|place| [(place, 1.0), (place, -1.0)]).collect();
+    let (with, without) = (problem(drive)?, problem(&repeating)?);
+    let largest = plan.torque_nodes_n_m.iter().fold(0.0_f32, |m, t| m.max(t.abs()));
+    let levels = levels(f64::from(largest) + drive.output.drag_torque_n_m);
+    let runs: Vec<(usize, f64)> = (0..LEVELS).rev().flat_map(|level| [(level, 1.0), (level, -1.0)]).collect();
     let done = runs
         .par_iter()
-        .map(|&(place, sign)| {
-            let mut run =
-                Run { drive, lattice, temperature_c, observe, increments: 0, iterations: 0, worst_residual: 0.0 };
-            let start = lattice.place(drive, 2 * place + usize::from(sign < 0.0));
-            let found = run.deviations(&problem, start, levels.map(|t| sign * f64::from(t)), &reference)?;
-            Ok((sign, found, run.increments, run.iterations, run.worst_residual))
+        .map(|&(level, sign)| {
+            let torque_n_m = sign * levels[level];
+            let mut count = Count { observe, increments: 0, iterations: 0, worst_residual: 0.0 };
+            let all_alike = count.errors(&without, &[0.0], torque_n_m)?[0];
+            let places = places(drive, sign);
+            let deviation: Vec<f64> =
+                count.errors(&with, &places, torque_n_m)?.into_iter().map(|error| error - all_alike).collect();
+            let run = Run { level, sign, deviation };
+            Ok((run, count.increments, count.iterations, count.worst_residual))
         })
         .collect::<Result<Vec<_>, SweepError>>()?;
-
-    let (mut pushed, mut pulled) = (Vec::new(), Vec::new());
-    whole.increments += without.increments;
-    whole.iterations += without.iterations;
-    for (sign, mut found, increments, iterations, worst_residual) in done {
-        if sign > 0.0 { &mut pushed } else { &mut pulled }.append(&mut found);
+    for (_, increments, iterations, worst_residual) in &done {
         whole.increments += increments;
         whole.iterations += iterations;
-        whole.worst_residual = whole.worst_residual.max(worst_residual);
+        whole.worst_residual = whole.worst_residual.max(*worst_residual);
     }
-    for (n, l) in [("+", &pushed), ("-", &pulled)] { for d in l.iter() { eprintln!("DEV {n} {} {} {:?}", d.generator_rad, d.phase, d.rad.map(|r| r*206265.0)); } }
-    whole.samples = put_together(drive, &whole.samples, &levels, lattice, [&pushed, &pulled]);
+    let deviations = Deviations::new(drive, levels, done.into_iter().map(|(run, ..)| run).collect());
+    whole.samples = whole.samples.iter().flat_map(|sample| deviations.spread(drive, sample)).collect();
+    whole.places = PLACES;
     Ok(whole)
 }
 
-/// Loads at which the deviation is looked at, light to heavy, evenly in their roots: torque nodes above the drag.
-fn levels(plan: &SweepPlan, drag_n_m: f64) -> [f32; LEVELS] {
-    let nodes: Vec<f32> = plan.torque_nodes_n_m.iter().copied().filter(|t| f64::from(*t) > drag_n_m).collect();
-    let (first, last) = (nodes[0].sqrt(), nodes[nodes.len() - 1].sqrt());
-    let mut levels = [0.0; LEVELS];
-    for (k, level) in levels.iter_mut().enumerate() {
-        *level = (first + (last - first) * k as f32 / (LEVELS - 1) as f32).powi(2);
-    }
-    levels
+/// The transmission error (rad) under a load at generator angles that lie whole flexspline pitches apart, in ascending order:
+/// forward motion without friction on the flanks, at a drag of the output of 0.02 N·m. Over one turn of the output (95 of the
+/// generator) its range is what catalogues call transmission accuracy.
+pub fn errors_over_turns(
+    drive: &Drive,
+    kind: GeneratorKind,
+    torque_n_m: f64,
+    generator_rad: &[f64],
+    settings: SolverSettings,
+    observe: &Observer,
+) -> Result<Vec<f64>, SweepError> {
+    let mut smooth = drive.clone();
+    smooth.flanks.friction_coefficient = 0.0;
+    smooth.output.drag_torque_n_m = SMOOTH_DRAG_N_M;
+    let problem = Problem::new(&smooth, kind, drive.temperature.reference_c, settings)?;
+    Count { observe, increments: 0, iterations: 0, worst_residual: 0.0 }.errors(&problem, generator_rad, torque_n_m)
 }
 
-/// The generator angles of a sweep: whole parts of a tooth pitch.
-#[derive(Debug, Clone, Copy)]
-struct Lattice {
-    positions: usize,
-    /// Parts in a step: three, or the next that comes by every part in turn.
-    stride: usize,
-    part_rad: f64,
+/// Loads at which the deviation is looked at, light to heavy, evenly in their cube roots, N m.
+fn levels(largest_n_m: f64) -> [f64; LEVELS] {
+    let (first, last) = (LIGHTEST_N_M.cbrt(), largest_n_m.cbrt());
+    std::array::from_fn(|k| (first + (last - first) * k as f64 / (LEVELS - 1) as f64).powi(3))
 }
 
-impl Lattice {
-    fn new(drive: &Drive, positions: usize) -> Lattice {
-        let common = |mut a: usize, mut b: usize| {
-            while b > 0 {
-                (a, b) = (b, a % b);
-            }
-            a
-        };
-        let stride = [3, 5, 7].into_iter().find(|n| common(*n, positions) == 1).unwrap_or(1);
-        Lattice { positions, stride, part_rad: TAU / f64::from(drive.flexspline.teeth) / positions as f64 }
-    }
-
-    fn phase(self, generator_rad: f64) -> usize {
-        (generator_rad / self.part_rad).round().rem_euclid(self.positions as f64) as usize
-    }
-
-    /// Generator angle of place `k`: evenly spread over one turn of the output and one turn of the generator.
-    fn place(self, drive: &Drive, k: usize) -> f64 {
-        let number = (k + 1) as f64;
-        let (output, generator) = ((number / PLASTIC).fract(), (number / (PLASTIC * PLASTIC)).fract());
-        let turns = (output * drive.ratio().abs()).floor();
-        ((turns + generator) * TAU / self.part_rad).round() * self.part_rad
-    }
+/// Generator angles of the places, ascending: evenly spread over one turn of the output and one turn of the generator, whole
+/// flexspline pitches apart; others for either sign of the load.
+fn places(drive: &Drive, sign: f64) -> Vec<f64> {
+    let pitch = TAU / f64::from(drive.flexspline.teeth);
+    let mut places: Vec<f64> = (0..PLACES)
+        .map(|k| {
+            let number = (2 * k + 1 + usize::from(sign < 0.0)) as f64;
+            let (output, generator) = ((number / PLASTIC).fract(), (number / (PLASTIC * PLASTIC)).fract());
+            let turns = (output * drive.ratio().abs()).floor();
+            ((turns + generator) * TAU / pitch).round() * pitch
+        })
+        .collect();
+    places.sort_by(f64::total_cmp);
+    places
 }
 
-/// One place, from load to load.
-struct Run<'a> {
-    drive: &'a Drive,
-    lattice: Lattice,
-    temperature_c: f64,
+/// Goes from place to place and counts.
+struct Count<'a> {
     observe: &'a Observer<'a>,
     increments: usize,
     iterations: usize,
     worst_residual: f64,
 }
 
-impl Run<'_> {
-    fn advance(
+impl Count<'_> {
+    fn counted(
         &mut self,
-        solver: &mut Solver<'_>,
-        state: &State,
-        turn: f64,
-        torque_n_m: f64,
+        problem: &Problem,
+        solved: Result<(State, Increment), SolveError>,
     ) -> Result<State, SweepError> {
-        let (next, increment) = solver.increment(state, state.generator_rad + turn, torque_n_m)?;
+        let (state, increment) = solved?;
         self.increments += 1;
         self.iterations += increment.iterations;
         self.worst_residual = self.worst_residual.max(increment.residual);
+        let temperature_c = problem.drive.temperature.reference_c;
         let progress =
-            SweepProgress { iterations: increment.iterations, torque_n_m, temperature_c: self.temperature_c };
+            SweepProgress { iterations: increment.iterations, torque_n_m: state.torque_n_m, temperature_c };
         match (self.observe)(progress) {
-            ControlFlow::Continue(()) => Ok(next),
+            ControlFlow::Continue(()) => Ok(state),
             ControlFlow::Break(()) => Err(SweepError::Stopped),
         }
     }
 
-    /// The deviation at a few tooth phases from `start` on, under one load after the other. Every second load is gone through
-    /// backward: without friction the state is an elastic one that does not know where it came from.
-    fn deviations(
+    /// The transmission error at places in ascending order, under one load.
+    fn errors(&mut self, problem: &Problem, places: &[f64], torque_n_m: f64) -> Result<Vec<f64>, SweepError> {
+        let ratio = problem.drive.ratio();
+        let mut solver = Solver::new(problem);
+        let Some(first) = places.first() else { return Ok(Vec::new()) };
+        let mut state = self.loaded_before(problem, &mut solver, *first, torque_n_m)?;
+        let mut errors = Vec::with_capacity(places.len());
+        for &place in places {
+            // The output goes on at its mean rate, whatever it did between the last two places.
+            state.output_rate = 1.0 / ratio;
+            let solved = match solver.increment(&state, place, torque_n_m) {
+                // Too different from the last place: deformed and loaded afresh.
+                Err(SolveError::NotConverged { .. }) => {
+                    let before = self.loaded_before(problem, &mut solver, place, torque_n_m)?;
+                    solver.increment(&before, place, torque_n_m)
+                }
+                other => other,
+            };
+            state = self.counted(problem, solved)?;
+            errors.push(state.output_rad - place / ratio);
+        }
+        Ok(errors)
+    }
+
+    /// The drive loaded one pitch before a place, so that it arrives there moving forward.
+    fn loaded_before(
         &mut self,
         problem: &Problem,
-        start: f64,
-        torques: [f64; LEVELS],
-        reference: &HashMap<(u64, usize), f64>,
-    ) -> Result<Vec<Deviation>, SweepError> {
-        let mut solver = Solver::new(problem);
-        let step = self.lattice.stride as f64 * self.lattice.part_rad;
-        let mut found: Vec<Deviation> = (0..SAMPLES)
-            .map(|k| start + k as f64 * step)
-            .map(|psi| Deviation { generator_rad: psi, phase: self.lattice.phase(psi), rad: [0.0; LEVELS] })
-            .collect();
-        let mut state = solver.deform(start)?.0;
-        for (level, &torque_n_m) in torques.iter().enumerate() {
-            state = self.advance(&mut solver, &state, 0.0, torque_n_m)?;
-            for deviation in &mut found {
-                let turn = deviation.generator_rad - state.generator_rad;
-                if turn != 0.0 {
-                    state = self.advance(&mut solver, &state, turn, torque_n_m)?;
-                }
-                let error = state.output_rad - state.generator_rad / self.drive.ratio();
-                let key = (torque_n_m.to_bits(), deviation.phase);
-                deviation.rad[level] = error - reference.get(&key).expect("the sweep without has every phase");
-            }
-            found.reverse();
-        }
-        Ok(found)
+        solver: &mut Solver<'_>,
+        place: f64,
+        torque_n_m: f64,
+    ) -> Result<State, SweepError> {
+        let before = place - TAU / f64::from(problem.drive.flexspline.teeth);
+        let deformed = solver.deform(before)?.0;
+        let solved = solver.increment(&deformed, before, torque_n_m);
+        self.counted(problem, solved)
     }
 }
 
-/// Samples of the drive without imperfections, each at the places of its tooth phase, with the deviation there.
-fn put_together(
-    drive: &Drive,
-    samples: &[Sample],
-    levels: &[f32; LEVELS],
-    lattice: Lattice,
-    deviations: [&[Deviation]; 2],
-) -> Vec<Sample> {
-    let drag_n_m = drive.output.drag_torque_n_m;
-    let mut all = Vec::new();
-    for sample in samples {
-        let flank_n_m = sample.torque_n_m - f64::from(sample.direction.sign()) * drag_n_m;
-        let there = deviations[usize::from(flank_n_m < 0.0)];
+/// Output with imperfections less output without, at every place of a sign under one load, rad.
+struct Run {
+    level: usize,
+    sign: f64,
+    deviation: Vec<f64>,
+}
+
+/// The deviation at places and loads.
+struct Deviations {
+    /// Loads, N m, light to heavy.
+    levels: [f64; LEVELS],
+    /// Of loads that turn the output forward, then of those that turn it back: places and, at each, the deviation under each
+    /// load.
+    signs: [(Vec<f64>, Vec<[f64; LEVELS]>); 2],
+    /// Amplitudes of the harmonics that all loads have in common, of the cosine and the sine in turn.
+    amplitudes: Vec<f64>,
+}
+
+impl Deviations {
+    fn new(drive: &Drive, levels: [f64; LEVELS], runs: Vec<Run>) -> Deviations {
+        let mut signs = [1.0, -1.0].map(|sign| (places(drive, sign), vec![[0.0; LEVELS]; PLACES]));
+        for run in runs {
+            let deviations = &mut signs[usize::from(run.sign < 0.0)].1;
+            deviations.iter_mut().zip(run.deviation).for_each(|(at, rad)| at[run.level] = rad);
+        }
+        let amplitudes = common_harmonics(drive, &signs);
+        Deviations { levels, signs, amplitudes }
+    }
+
+    /// A sample of the drive without imperfections, at every place, with the deviation there.
+    fn spread<'a>(&'a self, drive: &'a Drive, sample: &'a Sample) -> impl Iterator<Item = Sample> + 'a {
+        let flank_n_m = sample.torque_n_m - f64::from(sample.direction.sign()) * drive.output.drag_torque_n_m;
+        let (places, deviations) = &self.signs[usize::from(flank_n_m < 0.0)];
+        let pitch = TAU / f64::from(drive.flexspline.teeth);
         let error = sample.output_rad - sample.generator_rad / drive.ratio();
-        for place in there.iter().filter(|place| place.phase == lattice.phase(sample.generator_rad)) {
-            let generator_rad = place.generator_rad;
-            let output_rad = generator_rad / drive.ratio() + error + between(levels, &place.rad, flank_n_m.abs());
-            all.push(Sample { generator_rad, output_rad, ..*sample });
-        }
+        let within = sample.generator_rad.rem_euclid(pitch);
+        places.iter().zip(deviations).map(move |(place, at)| {
+            let generator_rad = place + within;
+            let along = self.common(drive, generator_rad) - self.common(drive, *place);
+            let deviation = between(&self.levels, at, flank_n_m.abs()) + along;
+            Sample { generator_rad, output_rad: generator_rad / drive.ratio() + error + deviation, ..*sample }
+        })
     }
-    all
+
+    fn common(&self, drive: &Drive, generator_rad: f64) -> f64 {
+        harmonics(drive, generator_rad).iter().zip(&self.amplitudes).map(|(a, b)| a * b).sum()
+    }
 }
 
-/// Value at a load, linear in its root; beyond the levels that of the nearest.
-fn between(levels: &[f32; LEVELS], values: &[f64; LEVELS], load_n_m: f64) -> f64 {
-    let [first, .., last] = levels.map(|t| f64::from(t).sqrt());
-    let along = ((load_n_m.sqrt() - first) / (last - first)).clamp(0.0, 1.0) * (LEVELS - 1) as f64;
+/// Cosine and sine of every order that a table holds.
+fn harmonics(drive: &Drive, generator_rad: f64) -> Vec<f64> {
+    let output = generator_rad / drive.ratio();
+    let of = |orders: &'static [u16], angle: f64| {
+        orders.iter().flat_map(move |order| {
+            let (sin, cos) = (f64::from(*order) * angle).sin_cos();
+            [cos, sin]
+        })
+    };
+    of(&GENERATOR_ORDERS, generator_rad)
+        .chain(of(&MATERIAL_ORDERS, generator_rad - output))
+        .chain(of(&OUTPUT_ORDERS, output))
+        .collect()
+}
+
+/// The harmonics that all loads of both signs have in common, by least squares; each sign and load has a mean of its own.
+fn common_harmonics(drive: &Drive, signs: &[(Vec<f64>, Vec<[f64; LEVELS]>); 2]) -> Vec<f64> {
+    // The means are taken out of columns and data alike. The columns of a sign are the same under every load.
+    let mut normal: Option<(Mat<f64>, Mat<f64>)> = None;
+    for (places, deviations) in signs {
+        let rows: Vec<Vec<f64>> = places.iter().map(|place| harmonics(drive, *place)).collect();
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / places.len() as f64;
+        let columns = Mat::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j] - mean(&mut rows.iter().map(|r| r[j])));
+        let data = Mat::from_fn(rows.len(), 1, |i, _| mean(&mut deviations[i].iter().copied()));
+        let part = (columns.transpose() * &columns, columns.transpose() * &data);
+        normal = Some(normal.map_or(part.clone(), |(matrix, right)| (matrix + &part.0, right + &part.1)));
+    }
+    let Some((matrix, right)) = normal else { return Vec::new() };
+    let factor = matrix.llt(Side::Lower).expect("the places tell the harmonics apart");
+    let solution = factor.solve(&right);
+    (0..solution.nrows()).map(|k| solution[(k, 0)]).collect()
+}
+
+/// Value at a load, linear in its cube root; beyond the levels that of the nearest.
+fn between(levels: &[f64; LEVELS], values: &[f64; LEVELS], load_n_m: f64) -> f64 {
+    let (first, last) = (levels[0].cbrt(), levels[LEVELS - 1].cbrt());
+    let along = ((load_n_m.cbrt() - first) / (last - first)).clamp(0.0, 1.0) * (LEVELS - 1) as f64;
     let below = (along as usize).min(LEVELS - 2);
     values[below] + (along - below as f64) * (values[below + 1] - values[below])
 }
@@ -267,48 +301,74 @@ fn between(levels: &[f32; LEVELS], values: &[f64; LEVELS], load_n_m: f64) -> f64
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::drive::Harmonic;
+    use flexspline::Direction;
 
     #[test]
     fn places_tell_the_three_angles_apart() {
         let drive = Drive::hhd_95();
-        let lattice = Lattice::new(&drive, 8);
-        let places: Vec<f64> = (0..2 * PLACES).map(|k| lattice.place(&drive, k)).collect();
-        assert!(places.iter().all(|p| (0.0..=TAU * 95.0).contains(p)));
-        // Orders of ψ, ψ − δ and δ up to those of a table are nearly orthogonal over the places of either sign.
-        let orders = |psi: f64| {
-            let delta = psi / 95.0;
-            let generator = (1..=4).map(move |n| f64::from(n) * psi);
-            let material = (1..=4).map(move |n| f64::from(n) * (psi - delta));
-            generator.chain(material).chain((1..=2).map(move |n| f64::from(n) * delta)).collect::<Vec<f64>>()
-        };
-        for of_sign in [0, 1] {
-            for (a, b) in (0..10).flat_map(|a| (0..a).map(move |b| (a, b))) {
-                let mean = |sign: f64| {
-                    let phases = places.iter().skip(of_sign).step_by(2).map(|p| orders(*p)[a] + sign * orders(*p)[b]);
-                    let (c, s) = phases.fold((0.0, 0.0), |(c, s), phase| (c + phase.cos(), s + phase.sin()));
-                    f64::hypot(c, s) / PLACES as f64
-                };
-                assert!(mean(1.0) < 0.4 && mean(-1.0) < 0.4, "orders {a}, {b}: {} {}", mean(1.0), mean(-1.0));
+        for sign in [1.0, -1.0] {
+            let places = places(&drive, sign);
+            assert!(places.iter().all(|p| (0.0..=TAU * 95.0).contains(p)));
+            // Cosines and sines of the orders of ψ, ψ − δ and δ are nearly orthogonal over the places of either sign.
+            let rows: Vec<Vec<f64>> = places.iter().map(|place| harmonics(&drive, *place)).collect();
+            for (a, b) in (0..20).flat_map(|a| (0..a).map(move |b| (a, b))) {
+                let mean = rows.iter().map(|row| row[a] * row[b]).sum::<f64>() / rows.len() as f64;
+                assert!(mean.abs() < 0.2, "columns {a}, {b}: {mean}");
             }
         }
     }
 
     #[test]
-    fn steps_come_by_every_phase() {
-        for positions in 4..=32 {
-            let lattice = Lattice::new(&Drive::hhd_95(), positions);
-            let step = lattice.stride as f64 * lattice.part_rad;
-            let mut phases: Vec<usize> = (0..positions).map(|k| lattice.phase(k as f64 * step - 7.0 * step)).collect();
-            phases.sort_unstable();
-            assert_eq!(phases, (0..positions).collect::<Vec<usize>>());
+    fn harmonics_common_to_all_loads_are_found_whatever_the_means() {
+        let drive = Drive::hhd_95();
+        let amplitudes: Vec<f64> = (0..20).map(|k| (f64::from(k) + 1.0) * 1e-6).collect();
+        let runs = (0..LEVELS).flat_map(|level| [(level, 1.0), (level, -1.0)]).map(|(level, sign)| {
+            let deviation = |place: &f64| {
+                let sum: f64 = harmonics(&drive, *place).iter().zip(&amplitudes).map(|(a, b)| a * b).sum();
+                sum + 1e-4 * sign * level as f64
+            };
+            Run { level, sign, deviation: places(&drive, sign).iter().map(deviation).collect() }
+        });
+        let found = Deviations::new(&drive, levels(200.0), runs.collect());
+        for (found, expected) in found.amplitudes.iter().zip(&amplitudes) {
+            assert!((found - expected).abs() < 1e-15, "{found} {expected}");
         }
     }
 
     #[test]
-    fn between_loads_the_deviation_goes_with_the_root() {
-        let (levels, values) = ([1.0, 4.0, 9.0, 16.0], [10.0, 20.0, 0.0, 4.0]);
-        for (load, expected) in [(0.1, 10.0), (1.0, 10.0), (2.25, 15.0), (6.25, 10.0), (16.0, 4.0), (50.0, 4.0)] {
+    fn between_loads_the_deviation_goes_with_the_cube_root() {
+        let levels: [f64; LEVELS] = std::array::from_fn(|k| (k as f64 + 1.0).powi(3));
+        let values: [f64; LEVELS] = std::array::from_fn(|k| (k * k) as f64);
+        for (load, expected) in [(0.1, 0.0), (1.0, 0.0), (3.375, 0.5), (27.0, 4.0), (42.875, 6.5), (1e3, 25.0)] {
             assert!((between(&levels, &values, load) - expected).abs() < 1e-12, "{load}");
+        }
+    }
+
+    /// A pitch error of the flexspline teeth that bear displaces the output by itself, whatever the load: at every place the
+    /// sample is the one without, displaced by the harmonic there.
+    #[test]
+    fn a_sample_is_spread_with_the_deviation_of_each_place() {
+        let mut drive = Drive::hhd_95();
+        drive.as_built.flexspline_pitch_harmonics = vec![Harmonic { order: 2, amplitude_um: 5.0, phase_deg: 0.0 }];
+        let deviation = |psi: f64| 1e-4 * (2.0 * psi - 0.3).cos();
+        let runs = (0..LEVELS).flat_map(|level| [(level, 1.0), (level, -1.0)]).map(|(level, sign)| Run {
+            level,
+            sign,
+            deviation: places(&drive, sign).into_iter().map(deviation).collect(),
+        });
+        let deviations = Deviations::new(&drive, levels(50.0), runs.collect());
+        let (generator_rad, torque_n_m) = (0.3 * TAU / 188.0, -7.0);
+        let output_rad = generator_rad / 95.0 + 3e-4;
+        let sample =
+            Sample { generator_rad, torque_n_m, temperature_c: 20.0, direction: Direction::Backward, output_rad };
+        let spread: Vec<Sample> = deviations.spread(&drive, &sample).collect();
+        assert_eq!(spread.len(), PLACES);
+        for (at, place) in spread.iter().zip(places(&drive, -1.0)) {
+            assert!((at.generator_rad - place - generator_rad).abs() < 1e-12);
+            let error = at.output_rad - at.generator_rad / 95.0;
+            assert!((error - 3e-4 - deviation(at.generator_rad)).abs() < 1e-12, "{error}");
+            assert_eq!((at.torque_n_m, at.direction), (torque_n_m, Direction::Backward));
         }
     }
 }

@@ -22,7 +22,7 @@ use crate::report::page::Page;
 use crate::report::{Sources, Subject, drive_report};
 use crate::samples;
 use crate::stepping::{Method, SolverSettings};
-use crate::sweep::{SweepError, SweepPlan, SweepProgress, sweep};
+use crate::sweep::{SweepError, SweepPlan, SweepProgress};
 use crate::tables::{
     ARCSEC_PER_RAD, MadeTable, SampleOptions, Source, TableError, TableInfo, c_header, from_samples, from_sweep,
     rust_source,
@@ -275,12 +275,8 @@ impl Tables {
                 let mut plan = plan.clone();
                 let chosen = choose_torque_nodes(drive, *kind, &plan, *choice, settings, &observe).map_err(failed)?;
                 plan.torque_nodes_n_m = chosen.torque_nodes_n_m;
-                let mut swept = if repeats {
-                    sweep(drive, *kind, &plan, &chosen.known, settings, &observe)
-                } else {
-                    sweep_turns(drive, *kind, &plan, &chosen.known, settings, &observe)
-                }
-                .map_err(failed)?;
+                let mut swept =
+                    sweep_turns(drive, *kind, &plan, &chosen.known, settings, &observe).map_err(failed)?;
                 swept.increments += chosen.increments;
                 swept.iterations += chosen.iterations;
                 swept.worst_residual = swept.worst_residual.max(chosen.worst_residual);

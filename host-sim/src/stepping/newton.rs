@@ -497,6 +497,8 @@ impl<'p> Solver<'p> {
         let load = problem.per_width(torque_n_m);
         let (drag, drag_stiffness) = problem.drag_torque(state.output_rad - state.drag_anchor_rad);
         residual.drag_torque = drag;
+        // The drag that sticks is so stiff that the last digit of the output angle is felt after a few radians.
+        residual.torque_round_off = drag_stiffness * f64::EPSILON * state.output_rad.abs();
         residual.border[OUTPUT] = load + residual.flank_torque + residual.drag_torque;
         residual.torque_scale += load.abs() + problem.drag;
         residual.free_output = residual.flank_contacts == 0 && drag_stiffness == 0.0;
