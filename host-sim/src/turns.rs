@@ -11,8 +11,7 @@
 //!   can (the additive recurrence of the plastic number), so that harmonics of ψ, δ and ψ − δ do not pass for one another.
 //!
 //! The places lie whole flexspline pitches apart. There the drive without imperfections is in one state, and the drive with them
-//! nearly so: under each load it goes from place to place in one increment each, the state of the last place turned as the guess
-//! of the next.
+//! nearly so: under each load it jumps from place to place ([`Solver::jump`]).
 //!
 //! The samples are those of the first sweep, each at every place, with the deviation there added: between loads linear in the
 //! cube root of the load, within the pitch along the harmonics that the table will hold.
@@ -35,9 +34,9 @@ use crate::sweep::{KnownNode, Observer, Sweep, SweepError, SweepPlan, SweepProgr
 use crate::tables::{GENERATOR_ORDERS, MATERIAL_ORDERS, OUTPUT_ORDERS};
 
 /// Places of generator and output for each sign of the load.
-const PLACES: usize = 48;
+const PLACES: usize = 24;
 /// Loads of each sign.
-const LEVELS: usize = 6;
+const LEVELS: usize = 5;
 /// The lightest of them, N m.
 const LIGHTEST_N_M: f64 = 0.1;
 /// Drag under which the deviation is looked at, N m: that of the ideal drive.
@@ -177,9 +176,7 @@ impl Count<'_> {
         let mut state = self.loaded_before(problem, &mut solver, *first, torque_n_m)?;
         let mut errors = Vec::with_capacity(places.len());
         for &place in places {
-            // The output goes on at its mean rate, whatever it did between the last two places.
-            state.output_rate = 1.0 / ratio;
-            let solved = match solver.increment(&state, place, torque_n_m) {
+            let solved = match solver.jump(&state, place) {
                 // Too different from the last place: deformed and loaded afresh.
                 Err(SolveError::NotConverged { .. }) => {
                     let before = self.loaded_before(problem, &mut solver, place, torque_n_m)?;

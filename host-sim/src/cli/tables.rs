@@ -32,9 +32,10 @@ use crate::turns::{deviation_increments, sweep_turns};
 /// Make compensation tables: from FEM sweeps of the drive, or from samples of another program or a bench
 ///
 /// For each generator the drive is swept by contact FEM over one tooth pitch at every torque and temperature node (a drive with
-/// imperfections at places spread over the turns of generator and output), and the samples are projected onto the table by the code that also runs on board. Written are <G>.fxt (the image that firmware
-/// reads in place), <G>.json (what made it and how good it is), <G>.rs and <G>.h (the same bytes as source), and
-/// <G>.samples.csv; and report.html, a page with the drive in motion that any browser opens.
+/// imperfections also at places spread over the turns of generator and output), and the samples are projected onto the table by
+/// the code that also runs on board. Written are <G>.fxt (the image that firmware reads in place), <G>.json (what made it and how
+/// good it is), <G>.rs and <G>.h (the same bytes as source), and <G>.samples.csv; and report.html, a page with the drive in
+/// motion that any browser opens.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -330,6 +331,9 @@ fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
             "{}: the torque nodes ran out before the table met the FEM everywhere; see --most-nodes, --torque-n-m\n",
             info.generator
         ));
+    }
+    for (info, turns) in report.tables.iter().filter_map(|info| Some((info, info.turns.as_ref()?))) {
+        text.push_str(&format!("{}: {}\n", info.generator, turns.remark));
     }
     text.push_str(&format!(
         "wrote {} table{}{} to {} in {:.0} s",
