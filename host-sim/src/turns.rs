@@ -34,7 +34,7 @@ use crate::sweep::{KnownNode, Observer, Sweep, SweepError, SweepPlan, SweepProgr
 use crate::tables::{GENERATOR_ORDERS, MATERIAL_ORDERS, OUTPUT_ORDERS};
 
 /// Places of generator and output for each sign of the load.
-const PLACES: usize = 24;
+const PLACES: usize = 32;
 /// Loads of each sign.
 const LEVELS: usize = 5;
 /// The lightest of them, N m.

@@ -23,6 +23,10 @@ pub const RMS_BOUND_ARCSEC: f64 = 0.5;
 /// Largest difference, arcsec.
 pub const MAX_BOUND_ARCSEC: f64 = 2.0;
 
+/// How much more than a table states of itself at the places it was made of it may miss at a dozen others: the root mean square of
+/// twelve differences scatters by a fifth.
+const ELSEWHERE: f64 = 1.5;
+
 /// How to validate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ValidationSettings {
@@ -347,8 +351,8 @@ impl Fresh<'_> {
         let bare: Vec<f64> = self.points.iter().map(|p| p.fem_arcsec).collect();
         let mut bounds = [RMS_BOUND_ARCSEC, MAX_BOUND_ARCSEC];
         if self.drive.as_built.first_not_uniform().is_some() {
-            bounds[0] += f64::from(self.table.projection_rms_rad()) * ARCSEC_PER_RAD;
-            bounds[1] += f64::from(self.table.projection_worst_rad()) * ARCSEC_PER_RAD;
+            bounds[0] += ELSEWHERE * f64::from(self.table.projection_rms_rad()) * ARCSEC_PER_RAD;
+            bounds[1] += ELSEWHERE * f64::from(self.table.projection_worst_rad()) * ARCSEC_PER_RAD;
         }
         let passed = rms(&all) <= bounds[0] && largest(&all) <= bounds[1];
         Validation {

@@ -18,6 +18,7 @@ use super::near::{NearPairs, configuration};
 use super::passed::Passed;
 use super::problem::Problem;
 use super::reference::SparseWheels;
+use super::slip::{Field, Slipping};
 use super::state::State;
 use super::step::{ANCHORED, BORDERS, LATERAL, OUTPUT, Residual, SLEEVE, Step, improve};
 use super::wheels::Wheels;
@@ -48,11 +49,6 @@ const ROUND_OFF: f64 = 1e-6;
 
 /// Gain of an iteration after which the last factor serves again.
 const CHORD_GAIN: f64 = 0.2;
-/// Under friction: relative residual and gain from which the last factor is kept and improved, so many times.
-const SLUGGISH_BELOW: f64 = 0.3;
-const SLUGGISH_GAIN: f64 = 0.3;
-const MOST_CHORDS: usize = 12;
-
 /// Fraction of a pitch off which a tangent of an earlier pitch still serves, and the gain that each iteration must then make.
 const RECALL_WITHIN: f64 = 0.06;
 const RECALL_GAIN: f64 = 0.3;
@@ -119,6 +115,8 @@ pub struct Solver<'p> {
     made_at: f64,
     /// Tangents of steady motion, oldest first.
     tangents: VecDeque<Tangent>,
+    /// What the tangent leaves out.
+    slipping: Slipping,
     /// Factor on the penalties, below 1 only while the way to a new shape or load is found.
     softening: f64,
     /// While the drive is assembled its flanks slip freely.
@@ -155,6 +153,7 @@ impl<'p> Solver<'p> {
             turned: 0,
             made_at: f64::INFINITY,
             tangents: VecDeque::new(),
+            slipping: Slipping::default(),
             softening: 1.0,
             assembling: false,
             passed: Passed::default(),
@@ -329,12 +328,7 @@ impl<'p> Solver<'p> {
             // While it makes good progress an old factor serves again: a step with it costs a tenth.
             let gain = last_gain(&history);
             recalled &= history.len() == 1 || gain < RECALL_GAIN;
-            // The tangent of friction leaves out that slip follows pressure: made anew it is no better, improved it is.
-            let sluggish = self.problem.flank_law.friction > 0.0
-                && relative < SLUGGISH_BELOW
-                && (SLUGGISH_GAIN..1.0).contains(&gain)
-                && chords.len() < MOST_CHORDS;
-            let chord = recalled || gain < CHORD_GAIN || sluggish;
+            let chord = recalled || gain < CHORD_GAIN;
             let Some(mut step) = self.solve(&residual, chord) else {
                 return Err(failed(history, "the stiffness matrix is not positive definite"));
             };
@@ -488,14 +482,18 @@ impl<'p> Solver<'p> {
                 residual.peak[1] = residual.peak[1].max(contact.peak);
             },
         );
+        self.slipping.clear();
+        let slipping = &mut self.slipping;
         let at = configuration(state);
         let column = self.border.column_mut(OUTPUT);
         column.fill(0.0);
         let mut corner = 0.0;
         near.evaluate(&self.flanks, at, flank_law, |pair, contact| {
             let cs_node = |n: usize| self.cs_index[n].expect("flank nodes are free") as usize;
-            let nodes = self.flanks.fs_nodes(pair).chain(self.flanks.cs_nodes(pair).map(cs_node));
-            for (a, node) in nodes.enumerate() {
+            let nodes: Vec<usize> =
+                self.flanks.fs_nodes(pair).chain(self.flanks.cs_nodes(pair).map(cs_node)).collect();
+            contact.slipping.iter().for_each(|point| slipping.add(point, |i| 2 * nodes[i / 2] + i % 2));
+            for (a, node) in nodes.into_iter().enumerate() {
                 for k in 0..2 {
                     let i = 2 * a + k;
                     residual.force[2 * node + k] += contact.force[i];
@@ -575,15 +573,12 @@ impl<'p> Solver<'p> {
             self.effort.solution += clock.elapsed();
         }
         let clock = Instant::now();
-        let mut free = residual.force.clone();
-        let mut border = residual.border;
-        self.turn(&mut free, &mut border, -self.turned);
-        let solved = self.eliminated.as_ref()?.solve(self.wheels.as_mut(), &mut free, &mut border[..self.border.width]);
-        self.turn(&mut free, &mut border, self.turned);
+        let slipping = std::mem::take(&mut self.slipping);
+        let forces = Field { free: residual.force.clone(), border: residual.border };
+        let solved = slipping.solve(forces, |field| self.solve_symmetric(field));
+        self.slipping = slipping;
         self.effort.solution += clock.elapsed();
-        if !solved {
-            return None;
-        }
+        let Field { free, border } = solved?;
         let (fs, _) = self.problem.wheels();
         let u = free[..2 * fs.nodes.len()].to_vec();
         let mut v = vec![0.0; 2 * self.cs_index.len()];
@@ -594,6 +589,15 @@ impl<'p> Solver<'p> {
             }
         }
         Some(Step { free, u, v, border })
+    }
+
+    /// Solves with the last factor, in place.
+    fn solve_symmetric(&mut self, field: &mut Field) -> Option<()> {
+        let Field { free, border } = field;
+        self.turn(free, border, -self.turned);
+        let solved = self.eliminated.as_ref()?.solve(self.wheels.as_mut(), free, &mut border[..self.border.width]);
+        self.turn(free, border, self.turned);
+        solved.then_some(())
     }
 
     /// Turns forces or displacements by so many pitches.
