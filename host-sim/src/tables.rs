@@ -33,6 +33,9 @@ const AS_BUILT_DEVIATION_RAD: f64 = 6e-4;
 /// Negative half-width (rad) taken for the noise of the contact discretisation: 0.1″.
 const HALF_WIDTH_NOISE_RAD: f64 = 5e-7;
 
+/// Places of a turn of the output over which a curve's mean is taken: no multiple of an order.
+const PLACES_OF_A_MEAN: u32 = 101;
+
 /// A finished table.
 #[derive(Debug, Clone)]
 pub struct MadeTable {
@@ -112,7 +115,8 @@ pub struct TurnsInfo {
 pub struct TurnsAtTorque {
     /// Torque node, N m.
     pub torque_n_m: f32,
-    /// Range of the drive's error over the places, the ripple within a pitch left out, arcsec: at most its transmission accuracy.
+    /// Range of the drive's error over the places, the ripple within a pitch left out, arcsec. So few places see most, not all, of
+    /// its transmission accuracy.
     pub drive_peak_to_peak_arcsec: f64,
     /// What the table leaves of it, arcsec: root mean square.
     pub left_rms_arcsec: f64,
@@ -367,14 +371,18 @@ fn make(
     let fit = make_image(plan, &provenance, samples, workspace, &mut image, id).map_err(TableError::Project)?;
     image.truncate(fit.image_bytes);
     let table = Table::check(&image).map_err(|e| TableError::Project(e.into()))?;
+    // Curves over whole turns are averaged; the ripple of a pitch is too small to matter.
+    let curves = [plan.generator, plan.material, plan.output].iter().any(|curve| !curve.orders.is_empty());
+    let places = if curves { PLACES_OF_A_MEAN } else { 1 };
+    let turn = std::f64::consts::TAU * plan.drive.exact_ratio() / f64::from(places);
     let at = |torque: f32| {
         let temperature = plan.temperature_nodes_c[plan.temperature_nodes_c.len() / 2];
         let error = |direction| {
-            f64::from(
-                table
-                    .steady_error_rad(flexspline::GeneratorAngle::ZERO, torque, temperature, direction)
-                    .unwrap_or(f32::NAN),
-            ) * ARCSEC_PER_RAD
+            let there = |k: u32| {
+                let angle = flexspline::GeneratorAngle::from_rad(f64::from(k) * turn)?;
+                table.steady_error_rad(angle, torque, temperature, direction).map(f64::from)
+            };
+            (0..places).map(|k| there(k).unwrap_or(f64::NAN)).sum::<f64>() / f64::from(places) * ARCSEC_PER_RAD
         };
         [error(flexspline::Direction::Forward), error(flexspline::Direction::Backward)]
     };
@@ -439,7 +447,7 @@ fn turns_info(drive: &Drive, plan: &SweepPlan, sweep: &Sweep, table: &Table<'_>)
         .collect();
     let largest = |of: fn(&TurnsAtTorque) -> f64| by_torque.iter().map(of).fold(0.0, f64::max);
     let remark = format!(
-        "over whole turns the drive's error ranges over {:.1}\" at most; the table has one curve for each angle, the same under every \
+        "at these places over whole turns the drive's error ranges over up to {:.1}\"; the table has one curve for each angle, the same under every \
          load, and leaves {:.1}\" rms and {:.1}\" at most where the curves change with load and flank",
         largest(|t| t.drive_peak_to_peak_arcsec),
         largest(|t| t.left_rms_arcsec),
