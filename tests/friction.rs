@@ -94,13 +94,13 @@ fn lifting_the_rated_load_converges() {
     let problem = problem(&drive, GeneratorKind::Cam, on(MeshLevel::Coarse));
     let mut run = Run::loaded(&problem, -200.0);
     let pitch = run.pitch();
-    run.turn(pitch, 8);
+    let settling = run.turn(pitch, 8);
     let steady = run.turn(pitch, 8);
-    let most = steady.iter().map(|s| s.increment.iterations).max().unwrap();
     println!(
-        "cam, friction 0.08, -200 N.m: e {:.3}\", {:.1} iterations, at most {most}",
+        "cam, friction 0.08, -200 N.m: e {:.3}\", {:.1} iterations settling, {:.1} settled",
         mean_error(&steady),
+        mean_iterations(&settling),
         mean_iterations(&steady)
     );
-    assert!(mean_iterations(&steady) < 20.0 && most < 40);
+    assert!(mean_iterations(&settling) < 20.0 && mean_iterations(&steady) < 6.0);
 }
