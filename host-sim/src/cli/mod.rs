@@ -90,7 +90,7 @@ enum Command {
 /// Options of every command.
 #[derive(Debug, Args)]
 struct Common {
-    /// Drive file, or the name of a built-in drive: HHD-95 (ideal) or HHD-95-typical (friction, compliances)
+    /// Drive file, or the name of a built-in drive: HHD-95 (ideal) or HHD-95-typical (friction, compliances, tolerances)
     #[arg(long, global = true, value_name = "FILE|NAME", default_value = "HHD-95", help_heading = "Common options")]
     drive: String,
     /// Override one field of the drive, for instance flanks.friction_coefficient=0.08; may be repeated

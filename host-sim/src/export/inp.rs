@@ -157,6 +157,7 @@ pub struct Deck {
     last_load_per_mm: Option<f64>,
     settings: DeckSettings,
     heading: String,
+    as_built: bool,
     modulus: f64,
     poissons_ratio: f64,
     bore_stiffness: f64,
@@ -195,6 +196,7 @@ impl Deck {
             load_per_mm: problem.per_width(settings.torque_n_m),
             last_load_per_mm: settings.last_torque_n_m.map(|torque| problem.per_width(torque)),
             settings,
+            as_built: drive.as_built.first_not_uniform().is_some(),
             heading: format!(
                 "{}, {} generator, {:.3} N.m, flexspline {} and circular spline {} elements",
                 drive.name,
@@ -329,6 +331,12 @@ impl Deck {
     /// Writes the deck.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "*HEADING\n{}", self.heading)?;
+        if self.as_built {
+            writeln!(
+                out,
+                "** flanks and generator as drawn: imperfections of the drive as built are not in this deck"
+            )?;
+        }
         writeln!(out, "** mm, N, MPa; a slice of 1 mm: forces and moments are per mm of face width")?;
         self.write_mesh(out)?;
         self.write_properties(out)?;
