@@ -41,8 +41,21 @@ fn fading(on: &Excitation<'_>, half_load: f64, k: usize) -> f64 {
 }
 
 fn waves(on: &Excitation<'_>, of: Angle, order: f64, weight: impl Fn(usize) -> f64) -> [Vec<f64>; 2] {
-    let at = |k: usize| order * angle(on, of, k);
-    [by_row(on, |k| weight(k) * at(k).cos()), by_row(on, |k| weight(k) * at(k).sin())]
+    let kept = kept(on, of, order);
+    [by_row(on, |k| weight(k) * kept[0][k]), by_row(on, |k| weight(k) * kept[1][k])]
+}
+
+/// Cosine and sine of a multiple of an angle, made once.
+fn kept(on: &Excitation<'_>, of: Angle, order: f64) -> std::sync::Arc<[Vec<f64>; 2]> {
+    let which = match of {
+        Angle::Flexspline => 0,
+        Angle::CircularSpline => 1,
+        Angle::Gravity(sign) => 2 + i8::from(sign > 0.0),
+    };
+    on.base.waves.of(which, order, || {
+        let (sin, cos) = (0..on.rows.len()).map(|k| (order * angle(on, of, k)).sin_cos()).unzip();
+        [cos, sin]
+    })
 }
 
 /// Half-load of the fading: from a thirtieth of the load scale to three times it.
@@ -59,6 +72,12 @@ const FLANK_AHEAD: f64 = 0.36;
 const MEAN_OF_SECOND: f64 = 1.15;
 const FOURTH_OF_SECOND: f64 = 0.15;
 
+/// Cosine of a kept angle less `shift` plus `by`.
+fn ahead(kept: &[Vec<f64>; 2], k: usize, shift: f64, by: f64) -> f64 {
+    let (sin, cos) = (by - shift).sin_cos();
+    kept[0][k] * cos - kept[1][k] * sin
+}
+
 /// An eccentricity, rectified by the clearance: `-|sin|` of the angle to the eccentricity on the flank that turns the output forward,
 /// `+|sin|` on the other, each ahead by the pressure angle in its own sense.
 fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
@@ -67,9 +86,11 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
     let mut law = Law::new(cause, move |on, shape| {
         let half = fade_of(shape);
         let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
+        let (second, fourth) = (kept(on, of, 2.0), kept(on, of, 4.0));
         let pattern = by_row(on, |k| {
-            let ahead = angle(on, of, k) - shape[0] + FLANK_AHEAD * flank(k);
-            let wave = (2.0 * ahead).cos() + FOURTH_OF_SECOND * (4.0 * ahead).cos() - MEAN_OF_SECOND;
+            let wave = ahead(&second, k, 2.0 * shape[0], 2.0 * FLANK_AHEAD * flank(k))
+                + FOURTH_OF_SECOND * ahead(&fourth, k, 4.0 * shape[0], 4.0 * FLANK_AHEAD * flank(k))
+                - MEAN_OF_SECOND;
             fade(k) * flank(k) * wave
         });
         let mut columns: Vec<Column> = vec![main(pattern, USUAL_ARCSEC)];
@@ -106,8 +127,9 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
             let mut columns: Vec<Column> = Vec::new();
             // Second order along cos 2 eps and sin 2 eps.
             for shift in [0.0, FRAC_PI_2] {
-                let along = |k: usize| 2.0 * (angle(on, of, k) + FLANK_AHEAD * flank(k)) - shift;
-                columns.push(main(by_row(on, |k| fade(k) * flank(k) * along(k).cos()), USUAL_ARCSEC));
+                let second = kept(on, of, 2.0);
+                let along = |k: usize| ahead(&second, k, shift, 2.0 * FLANK_AHEAD * flank(k));
+                columns.push(main(by_row(on, |k| fade(k) * flank(k) * along(k)), USUAL_ARCSEC));
             }
             columns.push(main(by_row(on, |k| fade(k) * flank(k)), USUAL_ARCSEC));
             columns

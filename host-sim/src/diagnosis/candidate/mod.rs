@@ -193,6 +193,8 @@ pub struct Law {
     pub tolerance_of: Option<&'static str>,
     /// How wrong the law may be, as a share of its size: what is smaller than that beside it may be its own misfit.
     pub misfit: f64,
+    /// Relative uncertainty of its parameters beside that of the data: what the law itself is not sure of.
+    pub doubt: f64,
     /// Where to begin.
     pub lead: Option<Lead>,
     /// The law is a free profile: what it may hold has to be taken out before the noise is measured, the finest detail too.
@@ -205,6 +207,9 @@ pub struct Law {
 const USUAL_MISFIT: f64 = 0.10;
 /// The same for pure geometry and counting: sensors, ratio, skipped teeth.
 const EXACT_MISFIT: f64 = 0.02;
+/// Relative uncertainty of parameters of such laws, and of exact ones.
+const USUAL_DOUBT: f64 = 0.03;
+const EXACT_DOUBT: f64 = 0.002;
 
 impl Law {
     fn new(cause: &str, columns: impl Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync + 'static) -> Law {
@@ -217,6 +222,7 @@ impl Law {
             physical: Box::new(|_, _| true),
             tolerance_of: None,
             misfit: USUAL_MISFIT,
+            doubt: USUAL_DOUBT,
             lead: None,
             free_form: false,
             load: None,
@@ -224,6 +230,7 @@ impl Law {
     }
     fn exact(mut self) -> Law {
         self.misfit = EXACT_MISFIT;
+        self.doubt = EXACT_DOUBT;
         self
     }
     fn shapes(mut self, shapes: impl IntoIterator<Item = Shape>) -> Law {
