@@ -84,7 +84,7 @@ const LEAST_ROWS: usize = 200;
 /// Orders per generator turn up to which lines are looked for.
 const HIGHEST_ORDER: f64 = 150.0;
 /// Times that causes are chosen again, at most.
-const MOST_ROUNDS: usize = 3;
+const MOST_ROUNDS: usize = 2;
 /// What is left as a free function counts if it is larger than this against the strongest cause.
 const LEAST_LEFT_OF_STRONGEST: f64 = 0.25;
 /// Named causes that explain less than this share of what is explained at all are not named.

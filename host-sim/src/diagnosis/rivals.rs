@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::candidate::Law;
 use super::model::{Problem, Scaffold, Term};
-use super::select::{Selected, predicted, size_of};
+use super::select::{Selected, predicted, size_of, sound};
 
 /// A rival in the place of a cause.
 #[derive(Clone, Debug)]
@@ -59,7 +59,7 @@ pub fn rivals(problem: &Problem<'_>, laws: &[Law], selected: &Selected<'_>, k: u
             }
             let (term, fit) = scaffold.refine(Term::new(problem, law, best.1))?;
             let c = fit.of(fit.starts.len() - 1);
-            if !(law.physical)(&law.values(&term.places), c) {
+            if !sound(&term, c) {
                 return None;
             }
             let mut terms = others.clone();
