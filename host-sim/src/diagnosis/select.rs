@@ -118,7 +118,8 @@ fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law]) -> Vec<
             let fit = scaffold.fit(&[&term])?;
             let c = fit.of(fit.starts.len() - 1);
             let gain = fit.solution.evidence - before.solution.evidence;
-            let physical = sound(&term, c);
+            // Where a lead points is only near.
+            let physical = laws[k].lead.is_some() || sound(&term, c);
             (physical && gain.is_finite()).then_some((gain, term))
         })
         .collect();
