@@ -58,10 +58,10 @@ fn kept(on: &Excitation<'_>, of: Angle, order: f64) -> std::sync::Arc<[Vec<f64>;
     })
 }
 
-/// Half-load of the fading: from a thirtieth of the load scale to three times it.
+/// Half-load of the fading: from a thirtieth of the load scale to where nothing fades.
 fn half_load(on: &Excitation<'_>) -> Shape {
     let load = on.scales.load.max(1e-3);
-    Shape::by_factors("half_load_n_m", load / 30.0, load * 3.0, 3)
+    Shape::by_factors("half_load_n_m", load / 30.0, load * 30.0, 3)
 }
 
 /// Order-2 amplitude of a rectified sine on one flank over its amplitude: 4 / 3 pi.
@@ -373,7 +373,7 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         law.misfit = SHAPE_MISFIT;
         law.kin = Kin::Shape;
         // The clearance that the deeper lobe takes is more than its waves.
-        law.most_nuisance = if law.cause == "generator_eccentricity" { 6.0 } else { 0.9 };
+        law.most_nuisance = if law.cause == "generator_eccentricity" { 6.0 } else { 1.0 };
     }
     laws
 }
