@@ -143,7 +143,8 @@ pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize)
     let gain = selected.fit.solution.evidence + selected.terms[k].occam - without.solution.evidence;
     if selected.terms[k].law.tolerance_of.is_some() {
         // The base would take its place at once: it is held against the tolerance, not against the fit without it.
-        let size = size_of(problem, &selected.terms[k].contribution(selected.fit.of(k)));
+        // At one load throughout, the zero of the encoder takes all of it.
+        let size = size_of(problem, &about_mean(problem, selected.terms[k].contribution(selected.fit.of(k))));
         return Standing { evidence: gain, size, alone: size, left_out: 1.0 };
     }
     let added: Vec<f64> = with.iter().zip(&lacking).map(|(a, b)| a - b).collect();
