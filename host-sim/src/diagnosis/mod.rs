@@ -67,13 +67,15 @@ pub struct Settings {
     pub pitch_radius_mm: f64,
     /// Averages of rows that fits are made on, about.
     pub averages: usize,
+    /// Chooses causes anew without each third of the sessions, to measure the gain there; costs about as much again.
+    pub leave_out: bool,
     /// Says on stderr what is tried.
     pub verbose: bool,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false }
+        Settings { pitch_radius_mm: 48.7, averages: 12_000, leave_out: true, verbose: false }
     }
 }
 
@@ -82,7 +84,7 @@ const LEAST_ROWS: usize = 200;
 /// Orders per generator turn up to which lines are looked for.
 const HIGHEST_ORDER: f64 = 150.0;
 /// Times that causes are chosen again, at most.
-const MOST_ROUNDS: usize = 3;
+const MOST_ROUNDS: usize = 2;
 /// What is left as a free function counts if it is larger than this against the strongest cause.
 const LEAST_LEFT_OF_STRONGEST: f64 = 0.25;
 /// Named causes that explain less than this share of what is explained at all are not named.
@@ -138,8 +140,13 @@ pub fn diagnose_extended(
             eprintln!("  left: {} {:.2}", something.looks_like, something.size_arcsec);
         }
     }
-    let diagnosis = conclude(&problem, &laws, selected, left, noise, settings);
+    let mut diagnosis = conclude(&problem, &laws, selected, left, noise, settings);
     progress(3, 4, "gain on sessions left out");
+    let nested = || held_out::nested(&problem, table, settings, !diagnosis.causes.is_empty());
+    if let Some(total) = settings.leave_out.then(nested).flatten() {
+        diagnosis.held_out = total;
+        diagnosis.compensation.rms_extended_tables_arcsec = total.rms_after_arcsec;
+    }
     let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
     drop(problem);
     Ok((diagnosis, found.extended(laws, &base, &scales)))
@@ -233,6 +240,22 @@ impl<'a> Search<'a> {
         }
         Ok(Search { laws, problem, noise, start, fast })
     }
+
+    /// The nominal model alone.
+    fn empty(on: &'a Excitation<'a>, settings: &Settings) -> Search<'a> {
+        let laws = library(on);
+        let uncertain = prepare::uncertain(on, &[]);
+        let (noise, worth) = prepare::noise(on, &laws, &[], &uncertain);
+        let stride = (on.rows.count_used() / settings.averages).max(1);
+        let problem = Problem::new(on, &uncertain, Whitener::new(on.rows, &uncertain, stride, noise), worth);
+        Search { laws, problem, noise, start: Vec::new(), fast: Vec::new() }
+    }
+
+    /// The model with what was chosen.
+    fn extended(self) -> Option<Extended> {
+        let found = Found::of(&self.problem, &self.laws, &self.start)?;
+        Some(found.extended(self.laws, self.problem.on.base, self.problem.on.scales))
+    }
 }
 
 /// Which laws were selected, and where.
@@ -307,8 +330,15 @@ fn conclude(
         (false, true) => Verdict::PartlyExplained,
     };
     let held = held_out::evaluate(problem, &all);
+    // What does not predict sessions it was not fitted to is no explanation.
+    let verdict = if !named.is_empty() && held.total.rms_after_arcsec > held.total.rms_before_arcsec {
+        Verdict::Unknown
+    } else {
+        verdict
+    };
     let mut causes = Vec::new();
     let mut next_experiment = None;
+    let mut told_better = Vec::new();
     if verdict != Verdict::Unknown {
         let parameters = uncertainty::parameters(problem, &selected);
         for k in named.iter().copied() {
@@ -320,6 +350,12 @@ fn conclude(
                         selected.terms[k].law.cause, rival.cause, rival.misfit, rival.apart_arcsec
                     );
                 }
+            }
+            let size = standings[k].size;
+            if rivals.iter().any(|r| r.tells_better(size)) {
+                // A rival that no other test lets through tells it better: neither is known.
+                told_better.push(k);
+                continue;
             }
             let alike: Vec<String> = rivals
                 .iter()
@@ -346,8 +382,13 @@ fn conclude(
         }
         causes.sort_by(|a, b| b.size_arcsec.total_cmp(&a.size_arcsec));
     }
+    let verdict = match verdict {
+        Verdict::Explained | Verdict::PartlyExplained if causes.is_empty() => Verdict::Unknown,
+        Verdict::Explained if !told_better.is_empty() => Verdict::PartlyExplained,
+        other => other,
+    };
     let mut unexplained_list: Vec<Unexplained> = (0..selected.terms.len())
-        .filter(|k| !named.contains(k) || verdict == Verdict::Unknown)
+        .filter(|k| !named.contains(k) || told_better.contains(k) || verdict == Verdict::Unknown)
         .map(|k| Unexplained { looks_like: selected.terms[k].law.cause.clone(), size_arcsec: standings[k].size })
         .collect();
     unexplained_list.extend(left_over);
