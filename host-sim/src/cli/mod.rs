@@ -10,6 +10,7 @@ mod export;
 mod replay;
 mod report;
 mod simulate;
+mod synthesize;
 mod tables;
 mod validate;
 
@@ -82,6 +83,7 @@ enum Command {
     Tables(tables::Tables),
     Validate(validate::Validate),
     Replay(replay::Replay),
+    Synthesize(synthesize::Synthesize),
     Diagnose(diagnose::Diagnose),
 }
 
@@ -145,6 +147,7 @@ impl Command {
             Command::Tables(command) => command.run(context),
             Command::Validate(command) => command.run(context),
             Command::Replay(command) => command.run(context),
+            Command::Synthesize(command) => command.run(context),
             Command::Diagnose(command) => command.run(context),
         }
     }

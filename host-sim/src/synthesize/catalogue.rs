@@ -76,13 +76,7 @@ pub struct Definition {
     twins: Vec<(&'static str, &'static str, Factor)>,
 }
 
-const fn number(
-    name: &'static str,
-    meaning: &'static str,
-    low: f64,
-    high: f64,
-    usual: Usual,
-) -> Parameter {
+const fn number(name: &'static str, meaning: &'static str, low: f64, high: f64, usual: Usual) -> Parameter {
     Parameter { name, meaning, range: [low, high], usual, words: &[] }
 }
 
@@ -140,7 +134,11 @@ pub fn effects() -> Vec<Definition> {
         cause(
             "circular_spline_ovality",
             "circular spline pressed to an oval that keeps its length",
-            &[microns("of the radius", 8.0), ARCSECONDS, phase("angle of a crest of the error, on the circular spline")],
+            &[
+                microns("of the radius", 8.0),
+                ARCSECONDS,
+                phase("angle of a crest of the error, on the circular spline"),
+            ],
             &[("amplitude_um", "amplitude_arcsec", Oval)],
         ),
         cause(
@@ -173,10 +171,7 @@ pub fn effects() -> Vec<Definition> {
             &[
                 number("depth_um", "depth that lacks, along the normal", 0.0, 500.0, Value(10.0)),
                 number("amplitude_arcsec", "the same at the output, under the largest load", 0.0, 3000.0, Follows),
-                Parameter {
-                    words: WHEELS,
-                    ..number("wheel", "0 flexspline, 1 circular spline", 0.0, 1.0, Value(0.0))
-                },
+                Parameter { words: WHEELS, ..number("wheel", "0 flexspline, 1 circular spline", 0.0, 1.0, Value(0.0)) },
                 number("tooth", "which one, from 0", 0.0, 2000.0, Value(40.0)),
                 number("angle_rad", "the same as an angle on the wheel", -TAU, TAU, Follows),
                 number("width_rad", "half the arc over which it is felt", 0.02, 0.6, Value(0.15)),
@@ -199,8 +194,15 @@ pub fn effects() -> Vec<Definition> {
             "stiffness_hardening",
             "stiffer the higher the load",
             &[
-                number("hardening_arcsec", "by which the wind-up falls short at the largest torque", 0.0, 1000.0, Value(20.0)),
-                number("exponent", "of the torque", 1.2, 8.0, Value(3.0)),
+                number(
+                    "hardening_arcsec",
+                    "by which the wind-up falls short at the full load",
+                    0.0,
+                    1000.0,
+                    Value(20.0),
+                ),
+                number("hardening_exponent", "of the torque", 1.2, 8.0, Value(3.0)),
+                number("full_load_n_m", "the torque at which it is stated", 1e-3, 1e6, OfLoad(1.0)),
             ],
             &[],
         ),
@@ -214,7 +216,13 @@ pub fn effects() -> Vec<Definition> {
             "torsional_hysteresis",
             "springs that slip: the output lags the torque",
             &[
-                number("half_width_arcsec", "half the opening of the large loop at zero torque", 0.0, 1000.0, Value(15.0)),
+                number(
+                    "half_width_arcsec",
+                    "half the opening of the large loop at zero torque",
+                    0.0,
+                    1000.0,
+                    Value(15.0),
+                ),
                 number("slip_torque_n_m", "at which the middle spring slips", 1e-3, 1e6, OfLoad(0.2)),
             ],
             &[],
@@ -240,17 +248,14 @@ pub fn effects() -> Vec<Definition> {
             &[
                 number("drag_n_m", "at the mean speed and the nominal temperature", 0.0, 1e5, OfLoad(0.1)),
                 number("speed_exponent", "of the speed", 0.2, 1.2, Value(2.0 / 3.0)),
-                number("relative_per_k", "thicker by this for each kelvin colder", 0.0, 0.15, Value(0.035)),
+                number("relative_drag_per_k", "of the drag", -0.15, 0.0, Value(-0.035)),
             ],
             &[],
         ),
         cause(
             "gravity_torque",
             "an unbalanced load that the torque column does not hold",
-            &[
-                number("torque_n_m", "m g l", 0.0, 1e5, OfLoad(0.2)),
-                phase("of sin(output + orientation + phase)"),
-            ],
+            &[number("torque_n_m", "m g l", 0.0, 1e5, OfLoad(0.2)), phase("of sin(output + orientation + phase)")],
             &[],
         ),
         cause(
@@ -271,10 +276,7 @@ pub fn effects() -> Vec<Definition> {
         cause(
             "output_encoder_eccentricity",
             "disc of the output encoder off its axis",
-            &[
-                number("amplitude_arcsec", "at the output", 0.0, 10_000.0, Value(20.0)),
-                phase("of sin(output + phase)"),
-            ],
+            &[number("amplitude_arcsec", "at the output", 0.0, 10_000.0, Value(20.0)), phase("of sin(output + phase)")],
             &[],
         ),
         cause(
@@ -302,10 +304,7 @@ pub fn effects() -> Vec<Definition> {
         cause(
             "ratcheting",
             "teeth that skip",
-            &[
-                number("jump_arcsec", "of the output, whole teeth", -1e5, 1e5, ToothPitch),
-                TIME,
-            ],
+            &[number("jump_arcsec", "of the output, whole teeth", -1e5, 1e5, ToothPitch), TIME],
             &[],
         ),
         fault(
@@ -327,11 +326,7 @@ pub fn effects() -> Vec<Definition> {
             "rows without an output angle",
             &[number("share", "of the rows", 0.0, 0.5, Value(0.02))],
         ),
-        fault(
-            "clock_error",
-            "time runs back",
-            &[number("step_s", "by which", 1e-4, 1e4, Value(0.5)), TIME],
-        ),
+        fault("clock_error", "time runs back", &[number("step_s", "by which", 1e-4, 1e4, Value(0.5)), TIME]),
         fault(
             "outliers",
             "single rows far off",
@@ -341,11 +336,7 @@ pub fn effects() -> Vec<Definition> {
             ],
         ),
         fault("unit_mismatch", "the output angle is in degrees and says radians", &[]),
-        fault(
-            "quantisation",
-            "a coarse output encoder",
-            &[number("step_arcsec", "its step", 0.0, 1e5, Value(30.0))],
-        ),
+        fault("quantisation", "a coarse output encoder", &[number("step_arcsec", "its step", 0.0, 1e5, Value(30.0))]),
         fault(
             "drift",
             "a zero that moves with time",
@@ -461,7 +452,8 @@ impl Chosen {
     pub(super) fn completed(&self, setting: &Setting<'_>, random: &mut fastrand::Rng) -> Result<Chosen, String> {
         let mut complete = self.clone();
         let definition = &self.definition;
-        let place = |name: &str| definition.parameters.iter().position(|p| p.name == name).expect("twins are parameters");
+        let place =
+            |name: &str| definition.parameters.iter().position(|p| p.name == name).expect("twins are parameters");
         for (k, parameter) in definition.parameters.iter().enumerate() {
             let drawn = random.f64();
             if complete.values[k].is_some() {
@@ -517,10 +509,8 @@ impl Chosen {
             direction_rad: phase(),
             half_load_n_m: v("half_load_n_m"),
         };
-        let pitch = |angle| Law::Pitch {
-            angle,
-            lines: vec![(v("harmonic"), v("amplitude_arcsec"), -v("harmonic") * phase())],
-        };
+        let pitch =
+            |angle| Law::Pitch { angle, lines: vec![(v("harmonic"), v("amplitude_arcsec"), -v("harmonic") * phase())] };
         Some(match self.definition.name {
             "circular_spline_eccentricity" => displaced(Angle::CircularSpline),
             "flexspline_runout" => displaced(Angle::Flexspline),
@@ -528,11 +518,9 @@ impl Chosen {
             "circular_spline_ovality" => Law::Oval { amplitude: v("amplitude_arcsec"), phase_rad: -2.0 * phase() },
             "flexspline_pitch_error" => pitch(Angle::Flexspline),
             "circular_spline_pitch_error" => pitch(Angle::CircularSpline),
-            "generator_eccentricity" => Law::Lobes {
-                amplitude: v("amplitude_arcsec"),
-                phase_rad: -phase(),
-                half_load_n_m: v("half_load_n_m"),
-            },
+            "generator_eccentricity" => {
+                Law::Lobes { amplitude: v("amplitude_arcsec"), phase_rad: -phase(), half_load_n_m: v("half_load_n_m") }
+            }
             "cam_form_error" => Law::CamForm { amplitude: v("amplitude_arcsec"), phase_rad: phase() },
             "damaged_tooth" => Law::Damage {
                 angle: if v("wheel") == 0.0 { Angle::Flexspline } else { Angle::CircularSpline },
@@ -545,8 +533,8 @@ impl Chosen {
             "wear" => Law::Wear { growth: v("growth_arcsec") },
             "stiffness_hardening" => Law::Hardening {
                 at_full_load: v("hardening_arcsec"),
-                exponent: v("exponent"),
-                full_load_n_m: setting.load_n_m,
+                exponent: v("hardening_exponent"),
+                full_load_n_m: v("full_load_n_m"),
             },
             "stiffness_error" => Law::Softer { relative: 1.0 / v("stiffness_ratio") - 1.0 },
             "torsional_hysteresis" => Law::Slip {
@@ -560,7 +548,7 @@ impl Chosen {
                 drag_n_m: v("drag_n_m"),
                 speed_rad_s: setting.mean_speed_rad_s(),
                 speed_exponent: v("speed_exponent"),
-                per_k: v("relative_per_k"),
+                per_k: -v("relative_drag_per_k"),
             },
             "gravity_torque" => Law::Unbalance { torque_n_m: v("torque_n_m"), phase_rad: phase() },
             "torsional_resonance" => {

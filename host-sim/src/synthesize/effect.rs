@@ -84,8 +84,12 @@ impl Effect {
         let (size, phase, other) = (self.size, self.phase, self.other);
         let top = largest(torque);
         let half_load_n_m = top * (0.1 + 0.5 * other);
-        let displaced =
-            |angle| Law::Displaced { angle, amplitude: size / SECOND_OF_RECTIFIED, direction_rad: phase, half_load_n_m };
+        let displaced = |angle| Law::Displaced {
+            angle,
+            amplitude: size / SECOND_OF_RECTIFIED,
+            direction_rad: phase,
+            half_load_n_m,
+        };
         match self.name.as_str() {
             "circular_spline_eccentricity" => displaced(Angle::CircularSpline),
             "flexspline_runout" => displaced(Angle::Flexspline),

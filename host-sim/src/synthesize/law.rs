@@ -255,7 +255,8 @@ impl Law {
                 }
             }
             // Clearance and torque carry these.
-            Law::Wider { .. } | Law::Wear { .. } | Law::Breathing { .. } | Law::Drag { .. } | Law::Unbalance { .. } => {}
+            Law::Wider { .. } | Law::Wear { .. } | Law::Breathing { .. } | Law::Drag { .. } | Law::Unbalance { .. } => {
+            }
             Law::Hardening { at_full_load, exponent, full_load_n_m } => (0..n).for_each(|k| {
                 let u: f64 = torque[k] / full_load_n_m;
                 let less = if changed { (u.abs() - 0.3).max(0.0) * 1.4 } else { u.abs().powf(*exponent) };

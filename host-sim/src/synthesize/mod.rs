@@ -4,7 +4,7 @@
 //! changed law, for tests), at a finer step where it has a state, under sensors with white noise and a wander of another kind than
 //! the one the diagnosis assumes.
 //!
-//! * [`catalogue`](effects): the effects by name, their parameters with units, ranges and defaults; [`parse`] reads
+//! * [`effects`]: the effects by name, their parameters with units, ranges and defaults; [`parse`] reads
 //!   `NAME:param=value,...`.
 //! * [`Plant`]: nominal drive (a table made by FEM, or a catalogue's model) and the [`Unit`] measured.
 //! * [`Excitation`]: how it is driven, made up by a [`Plan`] or taken from measured sessions.
@@ -133,6 +133,27 @@ pub struct Synthesized {
     pub unit: Unit,
     /// The effects with the value of every parameter, in the order given.
     pub effects: Vec<Chosen>,
+}
+
+/// What `chosen` effects add to the error of a nominal drive under an excitation, without sensors, row by row, arcsec. Parameters
+/// that are not given take their default; nothing is drawn.
+///
+/// # Errors
+/// As [`synthesize`].
+pub fn added_arcsec(plant: &Plant<'_>, sizes: Sizes, chosen: &[Chosen], on: &Excitation) -> Result<Vec<f64>, String> {
+    let setting = Setting { nominal: plant.nominal, sizes, on, load_n_m: law::largest(&on.torque) };
+    let mut same = fastrand::Rng::with_seed(0);
+    let effects = chosen.iter().map(|effect| effect.completed(&setting, &mut same)).collect::<Result<Vec<_>, _>>()?;
+    let mut laws: Vec<Law> = effects.iter().filter_map(|effect| effect.law(&setting)).collect();
+    laws.sort_by_key(Law::stage);
+    let unit = Unit::nominal(plant.nominal);
+    let error = |laws: &[Law]| {
+        let torque = plant.flank_torque(on, laws);
+        let mut error = plant.error(on, &torque, laws, &unit, false);
+        plant.add_laws(on, &torque, laws, false, &mut error);
+        error
+    };
+    Ok(error(&laws).iter().zip(error(&[])).map(|(with, without)| with - without).collect())
 }
 
 /// Measures a drive with `chosen` effects; `encoder_bits` is the resolution of the output encoder, bits to a turn.

@@ -73,14 +73,7 @@ impl Plant<'_> {
     }
 
     /// Error without sensors and before `laws` have added to it, arcsec.
-    pub(super) fn error(
-        &self,
-        on: &Excitation,
-        torque: &[f64],
-        laws: &[Law],
-        unit: &Unit,
-        changed: bool,
-    ) -> Vec<f64> {
+    pub(super) fn error(&self, on: &Excitation, torque: &[f64], laws: &[Law], unit: &Unit, changed: bool) -> Vec<f64> {
         let n = on.time.len();
         let nominal_half = 0.5 * self.nominal.backlash_arcsec;
         let mut half = vec![nominal_half * unit.clearance; n];
