@@ -14,8 +14,8 @@ use crate::diagnosis::report::{Compensation, Diagnosis};
 use crate::diagnosis::{Extended, Settings, diagnose_extended};
 use crate::drive::{Drive, GeneratorKind};
 use crate::extension::{
-    Agreement, Evaluation, ExtendedTables, FoundGeometry, Model, TableSubject, causes_to_toml, check_by_fem, evaluate,
-    found_geometry,
+    Agreement, CauseEntry, Evaluation, ExtendedTables, FoundGeometry, Model, Remake, TableSubject, causes_to_toml,
+    check_by_fem, evaluate, found_geometry, no_place_in_a_table,
 };
 use crate::measurement::{ColumnMap, Fault, Recording, Session, read};
 use crate::mesh::MeshLevel;
@@ -53,9 +53,9 @@ pub(super) struct Diagnose {
     /// Make the extended tables by FEM from drive-extended.toml; without it they are sampled from the extended model
     #[arg(long, requires = "tables")]
     remake_tables: bool,
-    /// Mesh of FEM runs: coarse, standard or fine
-    #[arg(long, value_name = "LEVEL", default_value = "coarse", value_parser = str::parse::<MeshLevel>)]
-    mesh: MeshLevel,
+    /// Mesh of FEM runs: coarse, standard or fine [default: that of the table]
+    #[arg(long, value_name = "LEVEL", requires = "tables", value_parser = str::parse::<MeshLevel>)]
+    mesh: Option<MeshLevel>,
     /// Names and units of columns, for instance generator=wave_gen_turns:turn,error=error_arcsec:arcsec
     #[arg(long, value_name = "MAP", default_value = "")]
     columns: String,
@@ -83,6 +83,8 @@ struct Extension {
     /// Identity of the extended table.
     #[serde(skip_serializing_if = "Option::is_none")]
     table_id: Option<String>,
+    /// Whether the extended tables are of the FEM of the extended drive; else they are sampled from the extended model.
+    tables_by_fem: bool,
     /// Fields of the drive that hold causes.
     drive_fields: Vec<String>,
     /// What the FEM of that drive says.
@@ -138,7 +140,18 @@ impl Diagnose {
         let tables = tables_of(&subject, &table_subject, &recording.sessions);
         let mut extension = Extension::default();
         let causes: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.name.as_str()).collect();
-        match evaluate(&recording.sessions, &causes, &tables, &settings) {
+        let remake = |fitted: &Extended| -> Result<Option<Vec<u8>>, String> {
+            let entries: Vec<CauseEntry> = fitted.causes().iter().map(CauseEntry::of_fitted).collect();
+            let of = (&subject.nominal, subject.table.as_ref());
+            let found = found_geometry(&subject.drive, fitted, &entries, of, tables.orientation_rad)
+                .map_err(|error| error.to_string())?;
+            match self.remade(context, &found, self.mesh(&subject)) {
+                Ok(made) => Ok(made.map(|made| made.image)),
+                Err(Failure::BadInput(what) | Failure::Failed(what)) => Err(what),
+            }
+        };
+        let remake: Option<&Remake<'_>> = if self.remake_tables { Some(&remake) } else { None };
+        match evaluate(&recording.sessions, &causes, &tables, &settings, remake) {
             Ok(evaluation) => {
                 diagnosis.compensation = Compensation {
                     rms_uncompensated_arcsec: evaluation.rms_uncompensated_arcsec,
@@ -164,6 +177,12 @@ impl Diagnose {
         };
         write_json(&out.join("diagnosis.json"), &written)?;
         context.print(&written, || text(&recording, &diagnosis, &extension, out))
+    }
+
+    /// The mesh of FEM runs.
+    fn mesh(&self, subject: &Subject<'_>) -> MeshLevel {
+        let of_table = || subject.table.as_ref().and_then(|table| table.mesh_level().parse().ok());
+        self.mesh.or_else(of_table).unwrap_or(MeshLevel::Coarse)
     }
 
     /// The bytes of the table that was asked for.
@@ -239,7 +258,8 @@ impl Diagnose {
                 extension.drive_fields = found.mapped.iter().flat_map(|mapped| mapped.fields.clone()).collect();
                 extension.named_causes = found.rest.iter().map(|cause| cause.name.clone()).collect();
                 if self.remake_tables && extension.tables_not_written.is_none() {
-                    made = self.remade(context, &found, extension)?;
+                    made = self.remade(context, &found, self.mesh(subject))?;
+                    extension.tables_by_fem = made.is_some();
                 }
                 header(context) + &found.drive.to_toml() + &causes_to_toml(&found.rest)
             }
@@ -278,38 +298,50 @@ impl Diagnose {
         extension: &mut Extension,
     ) -> Result<FoundGeometry, Failure> {
         let of = (&subject.nominal, subject.table.as_ref());
-        let found = found_geometry(&subject.drive, extended, &diagnosis.causes, of, tables.orientation_rad)
+        let causes: Vec<CauseEntry> = diagnosis.causes.iter().map(CauseEntry::of).collect();
+        let found = found_geometry(&subject.drive, extended, &causes, of, tables.orientation_rad)
             .map_err(|error| Failure::Failed(format!("the causes make no drive: {error}")))?;
         if !found.mapped.iter().any(|mapped| mapped.by_angle) {
             return Ok(found);
         }
         let mut progress = context.progress("FEM of the extended drive");
         progress.set(0, 1, "a few places on either flank");
-        let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
+        let settings = SolverSettings { mesh: self.mesh(subject), ..SolverSettings::default() };
         let agreement =
             check_by_fem((&subject.drive, &found), self.generator, settings, extended, of, tables.orientation_rad)
                 .map_err(|error| Failure::Failed(format!("the FEM of the extended drive: {error}")))?;
         extension.fem_agreement = Some(agreement);
-        Ok(found)
+        if agreement.difference_rms_arcsec < WORST_AGREEMENT * agreement.found_rms_arcsec {
+            return Ok(found);
+        }
+        // The FEM of such a drive does something else: the causes are kept by name, not as a shape that is not theirs.
+        let (shapes, others): (Vec<CauseEntry>, Vec<CauseEntry>) = causes
+            .into_iter()
+            .partition(|cause| found.mapped.iter().any(|mapped| mapped.by_angle && mapped.cause == cause.name));
+        let mut without = found_geometry(&subject.drive, extended, &others, of, tables.orientation_rad)
+            .map_err(|error| Failure::Failed(format!("the causes make no drive: {error}")))?;
+        without.rest.splice(0..0, shapes);
+        Ok(without)
     }
 
-    /// Tables of the extended drive by FEM; the sampled ones where one tooth pitch does not say all of it.
+    /// The table of the extended drive by FEM, where one tooth pitch says all of it.
     fn remade(
         &self,
         context: &Context,
         found: &FoundGeometry,
-        extension: &mut Extension,
+        mesh: MeshLevel,
     ) -> Result<Option<MadeTable>, Failure> {
-        match fresh_table(context, &found.drive, self.generator, self.mesh) {
-            Ok(made) => Ok(Some(made)),
-            Err(Failure::BadInput(why)) => {
-                extension.drive_fields.push(format!("tables sampled from the extended model, not by FEM: {why}"));
-                Ok(None)
-            }
-            Err(failure) => Err(failure),
+        // What is in no field of the drive would be missing in a table by FEM.
+        let in_tables = found.rest.iter().any(|cause| no_place_in_a_table(&cause.name).is_none());
+        if in_tables || found.drive.as_built.first_not_uniform().is_some() {
+            return Ok(None);
         }
+        fresh_table(context, &found.drive, self.generator, mesh).map(Some)
     }
 }
+
+/// What the FEM of an extended drive may differ by from the causes found, as a share of them, for these to be taken for shapes of it.
+const WORST_AGREEMENT: f64 = 0.5;
 
 /// The first lines of a file that was written here.
 fn header(context: &Context) -> String {

@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::Failure;
 use super::context::{Context, put};
 use crate::drive::{Drive, GeneratorKind};
-use crate::extension;
+use crate::extension::{self, CauseEntry};
 use crate::measurement::{ColumnMap, Gear, read};
 use crate::mesh::MeshLevel;
 use crate::nominal::{Fixed, Nominal};
@@ -71,7 +71,7 @@ pub(super) struct Synthesize {
     #[arg(long, value_name = "N", default_value_t = 22, value_parser = clap::value_parser!(u32).range(10..=40), help_heading = "Sensors")]
     encoder_bits: u32,
     /// Sessions
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=100), help_heading = "Excitation")]
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=100), help_heading = "Excitation")]
     sessions: u16,
     /// Rows of each session
     #[arg(long, value_name = "N", default_value_t = 3000, value_parser = clap::value_parser!(u32).range(50..=1_000_000), help_heading = "Excitation")]
@@ -173,15 +173,17 @@ impl Synthesize {
         let seed = self.seed.unwrap_or_else(|| fastrand::u64(..1 << 32));
         let mut random = fastrand::Rng::with_seed(seed);
         let drive = context.drive()?;
-        let (image, nominal, extended, source) = self.nominal(context, &drive)?;
+        let mut known = Vec::new();
+        if let Some((file, text)) = context.drive_file() {
+            known = extension::causes_in(file, &text).map_err(|error| Failure::BadInput(error.to_string()))?;
+        }
+        let (image, nominal, causes, source) = self.nominal(context, &drive)?;
+        known.extend(causes);
         let table = image
             .as_deref()
             .map(|image| Table::check(image).map_err(|error| Failure::Failed(error.to_string())))
             .transpose()?;
-        let mut chosen = chosen;
-        if let Some(model) = extended {
-            chosen = model.effects().into_iter().chain(chosen).collect();
-        }
+        let chosen: Vec<Chosen> = known.iter().filter_map(CauseEntry::effect).chain(chosen).collect();
         let mut on = self.excitation(&nominal, &mut random)?;
         if self.like.is_none() {
             on.within_temperatures(temperatures);
@@ -275,13 +277,13 @@ impl Synthesize {
         Ok(Excitation::of_sessions(&recording.sessions, self.rate_hz, nominal.temperature_c))
     }
 
-    /// The nominal drive: the image of a table if there is one, its model, and what a model was extended by.
+    /// The nominal drive: the image of a table if there is one, its model, and the causes that a model holds.
     #[allow(clippy::type_complexity)]
     fn nominal(
         &self,
         context: &Context,
         drive: &Drive,
-    ) -> Result<(Option<Vec<u8>>, Nominal, Option<extension::Model>, NominalSource), Failure> {
+    ) -> Result<(Option<Vec<u8>>, Nominal, Vec<CauseEntry>, NominalSource), Failure> {
         if let Some(file) = &self.model {
             let model = extension::Model::read(file).map_err(|error| Failure::BadInput(error.to_string()))?;
             let source = NominalSource {
@@ -291,7 +293,7 @@ impl Synthesize {
                 generator: None,
                 drive: drive.name.clone(),
             };
-            return Ok((None, model.nominal.clone(), Some(model), source));
+            return Ok((None, model.nominal, model.causes, source));
         }
         let (image, file) = match &self.tables {
             Some(folder) => {
@@ -312,7 +314,7 @@ impl Synthesize {
             generator: Some(self.generator.to_string()),
             drive: drive.name.clone(),
         };
-        Ok((Some(image), nominal, None, source))
+        Ok((Some(image), nominal, Vec::new(), source))
     }
 }
 

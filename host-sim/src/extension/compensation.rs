@@ -133,7 +133,13 @@ pub enum EvaluationError {
     /// The model makes no table.
     #[error(transparent)]
     Table(#[from] TableError),
+    /// No table was made otherwise.
+    #[error("{0}")]
+    Remake(String),
 }
+
+/// Makes the image of a table of an extended model by other means than sampling it, if it can.
+pub type Remake<'a> = dyn Fn(&Extended) -> Result<Option<Vec<u8>>, String> + 'a;
 
 /// Fits the causes to the sessions to learn from, makes tables of what was found, and runs the core over the others.
 ///
@@ -144,6 +150,7 @@ pub fn evaluate(
     causes: &[&str],
     tables: &ExtendedTables<'_>,
     settings: &Settings,
+    remake: Option<&Remake<'_>>,
 ) -> Result<Evaluation, EvaluationError> {
     let (sessions, used) = split(sessions);
     let nominal = tables.nominal;
@@ -164,7 +171,13 @@ pub fn evaluate(
             }
         }
     }
-    let extended_image = if applied.is_empty() { None } else { Some(tables.extended(&fitted)?.image) };
+    let mut extended_image = None;
+    if !applied.is_empty() {
+        extended_image = remake.map_or(Ok(None), |remake| remake(&fitted)).map_err(EvaluationError::Remake)?;
+        if extended_image.is_none() {
+            extended_image = Some(tables.extended(&fitted)?.image);
+        }
+    }
     let check = |image: &Option<Vec<u8>>| -> Result<Option<Vec<Vec<f64>>>, TableError> {
         let Some(image) = image else { return Ok(None) };
         let table = Table::check(image).map_err(|error| TableError::Project(error.into()))?;

@@ -19,7 +19,6 @@ use flexspline::Table;
 
 use super::model::CauseEntry;
 use crate::diagnosis::Extended;
-use crate::diagnosis::report::Cause;
 use crate::drive::{DamagedFlank, DamagedTooth, Drive, DriveError, GeneratorKind, Harmonic, Wheel};
 use crate::measurement::Session;
 use crate::nominal::Nominal;
@@ -156,7 +155,7 @@ fn degrees(phase: f64) -> f64 {
 pub fn found_geometry(
     drive: &Drive,
     extended: &Extended,
-    causes: &[Cause],
+    causes: &[CauseEntry],
     (nominal, table): (&Nominal, Option<&Table<'_>>),
     orientation_rad: Option<f64>,
 ) -> Result<FoundGeometry, DriveError> {
@@ -168,7 +167,7 @@ pub fn found_geometry(
     let mut found = drive.clone();
     let (mut mapped, mut rest) = (Vec::new(), Vec::new());
     for cause in causes {
-        let value = |name: &str| cause.parameters.get(name).map(|p| p.value);
+        let value = |name: &str| cause.parameters.get(name).copied();
         let mut fields: Vec<String> = Vec::new();
         let mut by_angle = true;
         let built = &mut found.as_built;
@@ -345,10 +344,7 @@ pub fn found_geometry(
         .into_iter()
         .fold(0.0, f64::max);
         if fields.is_empty() || largest > LARGEST_UM {
-            rest.push(CauseEntry {
-                name: cause.name.clone(),
-                parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
-            });
+            rest.push(cause.clone());
         } else {
             mapped.push(Mapped { cause: cause.name.clone(), fields, by_angle });
         }
@@ -461,12 +457,12 @@ mod tests {
     fn the_fem_agrees_with_the_closed_forms_in_sign_place_and_size() {
         type Change = fn(&mut Drive);
         type Read = fn([Wave; 2]) -> Wave;
+        const PARTS: usize = 5;
         fn whole([plus, minus]: [Wave; 2]) -> Wave {
             plus.plus(minus).times(0.5)
         }
         let settings = SolverSettings { mesh: MeshLevel::Coarse, ..SolverSettings::default() };
         let ideal = Problem::new(&Drive::hhd_95(), GeneratorKind::Cam, 20.0, settings).unwrap();
-        // Half a turn of the wave on the part, whole flexspline pitches apart.
         let cases: [(&str, Change, Read, bool, f64, f64, f64); 6] = [
             (
                 "circular-spline eccentricity",
@@ -545,15 +541,12 @@ mod tests {
             let mut drive = Drive::hhd_95();
             change(&mut drive);
             let problem = Problem::new(&drive, GeneratorKind::Cam, 20.0, settings).unwrap();
-            // 95 pitches are half a turn on the circular spline, 94 on the flexspline.
-            let (parts, apart) = if on_circular_spline { (19, 5) } else { (47, 2) };
+            // Half a turn of the wave on the part, in as few places as tell the second order from the fourth and sixth.
             let share = if on_circular_spline { 94.0 / 95.0 } else { 1.0 };
-            let pitch = TAU / 188.0;
-            let psi = |k: usize| (k * apart) as f64 * pitch;
+            let psi = |k: usize| k as f64 * PI / PARTS as f64 / share;
             let found = [1.0, -1.0].map(|flank| {
-                let reference = stands(&ideal, 0.0, flank * PROBE_N_M).unwrap();
-                let error: Vec<f64> =
-                    (0..parts).map(|k| stands(&problem, psi(k), flank * PROBE_N_M).unwrap() - reference).collect();
+                let at = |problem: &Problem, k: usize| stands(problem, psi(k), flank * PROBE_N_M).unwrap();
+                let error: Vec<f64> = (0..PARTS).map(|k| at(&problem, k) - at(&ideal, k)).collect();
                 Wave::of(&error, |k| share * psi(k), 2.0)
             });
             let wave = read(found);

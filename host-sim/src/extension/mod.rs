@@ -13,7 +13,9 @@ mod model;
 mod remake;
 mod sampled;
 
-pub use compensation::{Compensated, Evaluation, EvaluationError, LEAST_SHARE_IMPROVED, NotApplied, evaluate, left_by_core, split};
+pub use compensation::{
+    Compensated, Evaluation, EvaluationError, LEAST_SHARE_IMPROVED, NotApplied, Remake, evaluate, left_by_core, split,
+};
 pub use geometry::{Agreement, FoundGeometry, Mapped, check_by_fem, found_geometry};
 pub use model::{CauseEntry, Model, causes_in, causes_to_toml};
 pub use remake::{RemakeError, make_table, usual_increments};

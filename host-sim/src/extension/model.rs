@@ -17,7 +17,8 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::diagnosis::report::{Diagnosis, Parameter};
+use crate::diagnosis::FittedCause;
+use crate::diagnosis::report::{Cause, Diagnosis, Parameter};
 use crate::drive::{DriveError, Problem};
 use crate::measurement::Session;
 use crate::nominal::{Fixed, Nominal};
@@ -97,21 +98,14 @@ impl Model {
                 harmonic.phase_rad += across.atan2(along);
             }
         }
-        let causes = diagnosis
-            .causes
-            .iter()
-            .map(|cause| CauseEntry {
-                name: cause.name.clone(),
-                parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
-            })
-            .collect();
+        let causes = diagnosis.causes.iter().map(CauseEntry::of).collect();
         Model { nominal, causes }
     }
 
     /// The causes as effects that can be simulated.
     #[must_use]
     pub fn effects(&self) -> Vec<Chosen> {
-        self.causes.iter().filter_map(|cause| cause.effect().ok()).collect()
+        self.causes.iter().filter_map(CauseEntry::effect).collect()
     }
 
     /// What the causes add to the error of each session, arcsec.
@@ -196,7 +190,7 @@ pub fn causes_in(file_name: &str, text: &str) -> Result<Vec<CauseEntry>, DriveEr
             let what = format!("found \"{}\", allowed: {}", cause.name, known.join(", "));
             return Err(refuse(file_name.to_owned(), format!("{field}.name"), what));
         }
-        if let Err(what) = cause.effect() {
+        if let Err(what) = cause.checked_effect() {
             return Err(refuse(file_name.to_owned(), field, what));
         }
     }
@@ -230,8 +224,31 @@ fn numbered(parameters: &BTreeMap<String, Parameter>, name: &str) -> Vec<f64> {
 }
 
 impl CauseEntry {
-    /// The effect that simulates it.
-    pub(crate) fn effect(&self) -> Result<Chosen, String> {
+    /// A cause of a diagnosis.
+    #[must_use]
+    pub fn of(cause: &Cause) -> CauseEntry {
+        CauseEntry {
+            name: cause.name.clone(),
+            parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
+        }
+    }
+
+    /// A cause as it was fitted.
+    #[must_use]
+    pub fn of_fitted(cause: &FittedCause) -> CauseEntry {
+        CauseEntry {
+            name: cause.name().to_owned(),
+            parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
+        }
+    }
+
+    /// The effect that simulates it, if there is one.
+    #[must_use]
+    pub fn effect(&self) -> Option<Chosen> {
+        self.checked_effect().ok()
+    }
+
+    fn checked_effect(&self) -> Result<Chosen, String> {
         let mut text = String::new();
         let twice: &[&str] = &["amplitude_um", "depth_um", "tooth", "generator_amplitude_arcsec"];
         let has = |name: &str| self.parameters.contains_key(name);

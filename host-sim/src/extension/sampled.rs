@@ -10,7 +10,6 @@ use crate::diagnosis::Extended;
 use crate::drive::GeneratorKind;
 use crate::measurement::Session;
 use crate::nominal::{Fixed, Nominal};
-use crate::sweep::symmetric_nodes;
 use crate::tables::{ARCSEC_PER_RAD, MadeTable, Source, TableError, from_plan};
 
 /// Positions over a whole turn of the output. A prime, so that neither the teeth nor the turns of the generator fold onto one
@@ -23,8 +22,11 @@ const RIPPLE_NODES: usize = 8;
 /// Orders fitted: of the generator and of the generator against the output, and of the output.
 const ORDERS: [u16; 5] = [1, 2, 3, 4, 6];
 const OUTPUT_ORDERS: [u16; 2] = [1, 2];
-/// Nodes of the torque axis on each side where no table gives them.
-const TORQUE_STEPS: usize = 9;
+/// Nodes of the torque axis on each side where no table gives them, how they crowd towards the friction, and half the width of the
+/// jump there, of the friction.
+const TORQUE_STEPS: u32 = 9;
+const CROWDING: f64 = 1.6;
+const JUMP_HALF_WIDTH: f64 = 0.002;
 /// Friction that a model without any is given, of the largest torque: the play needs a torque at which it changes flanks.
 const LEAST_FRICTION: f64 = 1e-3;
 /// Half-width (rad) below zero that is taken for what the projection leaves.
@@ -45,6 +47,18 @@ pub fn no_place_in_a_table(cause: &str) -> Option<&'static str> {
         "wear" => Some("it grows with use, and a table stays"),
         _ => None,
     }
+}
+
+/// Nodes symmetric about zero: a pair at either side of the friction, where the flank changes, and further ones up to the largest
+/// torque.
+fn torque_nodes(friction: f64, largest: f64) -> Vec<f32> {
+    let half = JUMP_HALF_WIDTH * friction;
+    let further = (1..=TORQUE_STEPS).map(|k| {
+        let share = (f64::from(k) / f64::from(TORQUE_STEPS)).powf(CROWDING);
+        friction + half + (largest - friction - half) * share
+    });
+    let positive: Vec<f64> = [friction - half, friction + half].into_iter().chain(further).collect();
+    positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).map(|t| t as f32).collect()
 }
 
 /// What a table is made for.
@@ -105,7 +119,7 @@ impl ExtendedTables<'_> {
         }
         let largest = self.torque_n_m.max(1e-3);
         let friction = self.nominal.friction_torque_n_m.max(LEAST_FRICTION * largest);
-        let torques = symmetric_nodes(friction, largest.max(3.0 * friction), TORQUE_STEPS);
+        let torques = torque_nodes(friction, largest.max(3.0 * friction));
         let [low, high] = self.temperatures_c;
         let temperatures = if high - low > ONE_TEMPERATURE_K {
             vec![low as f32, f64::midpoint(low, high) as f32, high as f32]
@@ -218,6 +232,33 @@ impl ExtendedTables<'_> {
             torque_n_m: Some(vec![torque; rows]),
             temperature_c: Some(vec![temperature; rows]),
             orientation_rad: Some(vec![self.orientation_rad.unwrap_or(0.0); rows]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_rise_and_the_jump_is_known_for_one() {
+        for (friction, largest) in [(1.5, 40.0), (0.04, 40.0), (10.0, 30.0), (1e-3, 1.0)] {
+            let nodes = torque_nodes(friction, largest);
+            assert!(nodes.windows(2).all(|pair| pair[0] < pair[1]), "{nodes:?}");
+            assert!((f64::from(nodes[nodes.len() - 1]) / largest - 1.0).abs() < 1e-6);
+            let width = |k: usize| nodes[k + 1] - nodes[k];
+            let jump = nodes.len() / 2;
+            assert!(width(jump + 1) > 8.0 * width(jump) && width(jump - 1) > 8.0 * width(jump), "{nodes:?}");
+        }
+    }
+
+    #[test]
+    fn what_follows_speed_time_or_the_past_has_no_place_in_a_table() {
+        for cause in ["sensor_latency", "torsional_resonance", "torsional_hysteresis", "ratcheting", "ratio_error"] {
+            assert!(no_place_in_a_table(cause).is_some(), "{cause}");
+        }
+        for cause in ["circular_spline_eccentricity", "backlash_growth", "output_encoder_eccentricity"] {
+            assert!(no_place_in_a_table(cause).is_none(), "{cause}");
         }
     }
 }

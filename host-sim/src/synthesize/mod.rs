@@ -45,6 +45,10 @@ pub struct Sensors {
 /// Resolution of the output encoder where [`measure`] makes data, arcsec.
 const STEP_ARCSEC: f64 = 0.3;
 
+/// White noise of the torque sensor, of the largest torque, and of the thermometer, K.
+const TORQUE_NOISE: f64 = 5e-4;
+const TEMPERATURE_NOISE_K: f64 = 0.02;
+
 /// A catalogue drive to hide effects in.
 #[must_use]
 pub fn catalogue_drive() -> Nominal {
@@ -156,7 +160,8 @@ pub fn added_arcsec(plant: &Plant<'_>, sizes: Sizes, chosen: &[Chosen], on: &Exc
     Ok(error(&laws).iter().zip(error(&[])).map(|(with, without)| with - without).collect())
 }
 
-/// Measures a drive with `chosen` effects; `encoder_bits` is the resolution of the output encoder, bits to a turn.
+/// Measures a drive with `chosen` effects: the output encoder as `sensors` say, and a torque sensor and a thermometer with a little
+/// noise. `encoder_bits` is the resolution of the output encoder, bits to a turn.
 ///
 /// # Errors
 /// A parameter that does not fit the excitation, such as a time outside it.
@@ -183,5 +188,12 @@ pub fn synthesize(
         let nominal = generator / plant.nominal.ratio * ARCSEC_PER_RAD;
         *error = ((nominal + *error) / step).round() * step - nominal;
     }
-    Ok(Synthesized { sessions: into_sessions(on, &error), unit, effects })
+    let mut sessions = into_sessions(on, &error);
+    // No sensor repeats a value to the last digit, even while what it measures stands.
+    for session in &mut sessions {
+        let load = TORQUE_NOISE * setting.load_n_m;
+        session.torque_n_m.iter_mut().flatten().for_each(|t| *t += load * gauss(random));
+        session.temperature_c.iter_mut().flatten().for_each(|t| *t += TEMPERATURE_NOISE_K * gauss(random));
+    }
+    Ok(Synthesized { sessions, unit, effects })
 }
