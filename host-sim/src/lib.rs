@@ -29,4 +29,5 @@ pub mod stress;
 pub mod sweep;
 pub mod synthesize;
 pub mod tables;
+pub mod turns;
 pub mod validate;

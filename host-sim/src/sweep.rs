@@ -117,6 +117,9 @@ pub struct Sweep {
     pub worst_residual: f64,
     /// Unknowns of the model.
     pub degrees_of_freedom: usize,
+    /// Places over the turns of generator and output at which every torque of a sign was sampled; 0 for a drive that repeats from
+    /// tooth to tooth.
+    pub places: usize,
 }
 
 /// Why a sweep ended early.
@@ -138,8 +141,7 @@ pub enum SweepError {
     },
     /// One tooth pitch in one direction does not say all of the drive.
     #[error(
-        "{field}: tables of a drive with as-built imperfections need samples over whole turns of generator and output, \
-         and this command samples one tooth pitch in one direction; allowed here: an ideal drive, uniform wear \
+        "{field}: one tooth pitch in one direction does not say all of this drive; allowed: an ideal drive, uniform wear \
          (flexspline_wear_um, circular_spline_wear_um) and temperature differences (generator_warmer_k, \
          circular_spline_warmer_k)"
     )]
@@ -153,7 +155,7 @@ pub enum SweepError {
 }
 
 /// Refuses a drive of which a sweep would see a part.
-pub(crate) fn check_uniform(drive: &Drive) -> Result<(), SweepError> {
+fn check_uniform(drive: &Drive) -> Result<(), SweepError> {
     drive.as_built.first_not_uniform().map_or(Ok(()), |field| Err(SweepError::NotUniform { field }))
 }
 
@@ -195,6 +197,7 @@ pub fn sweep(
                 iterations: chain.iterations,
                 worst_residual: chain.worst_residual,
                 degrees_of_freedom: problem.degrees_of_freedom(),
+                places: 0,
             })
         })
         .collect::<Result<Vec<Sweep>, SweepError>>()?;

@@ -20,13 +20,16 @@ pub const ARCSEC_PER_RAD: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
 /// Full turns that separate 2 per generator turn from 2 per turn of the generator against the output, less a margin.
 const TURNS_FOR_HARMONICS: f64 = 47.5;
 /// Orders fitted where the samples cover enough turns: per generator turn, per turn against the output, per output turn.
-const GENERATOR_ORDERS: [u16; 4] = [1, 2, 3, 4];
-const MATERIAL_ORDERS: [u16; 4] = [1, 2, 3, 4];
-const OUTPUT_ORDERS: [u16; 2] = [1, 2];
+pub(crate) const GENERATOR_ORDERS: [u16; 4] = [1, 2, 3, 4];
+pub(crate) const MATERIAL_ORDERS: [u16; 4] = [1, 2, 3, 4];
+pub(crate) const OUTPUT_ORDERS: [u16; 2] = [1, 2];
 /// Torques of a sample file closer than this share of the largest are one node.
 const SAME_TORQUE: f64 = 1e-6;
 /// Deviation (rad) that FEM samples may have from the table; they are exact but for rounding.
 const FEM_DEVIATION_RAD: f64 = 1e-6;
+/// The same for a drive with imperfections, whose error changes with the load in ways that a table has no room for: 120″. What it
+/// is stands in the table; only what is no drive at all is refused.
+const AS_BUILT_DEVIATION_RAD: f64 = 6e-4;
 /// Negative half-width (rad) taken for the noise of the contact discretisation: 0.1″.
 const HALF_WIDTH_NOISE_RAD: f64 = 5e-7;
 
@@ -86,8 +89,35 @@ pub struct TableInfo {
     pub backlash_arcsec: f64,
     /// Error in the middle of the play at the ends of the torque axis, arcsec.
     pub wind_up_arcsec: [f64; 2],
+    /// What is left over whole turns of a drive that does not repeat from tooth to tooth; null for one that does.
+    pub turns: Option<TurnsInfo>,
     /// Command line, once known.
     pub command: String,
+}
+
+/// A drive that does not repeat from tooth to tooth, and what its table has no room for: one curve for each of the angles, the
+/// same under every load, for either flank.
+#[derive(Debug, Clone, Serialize)]
+pub struct TurnsInfo {
+    /// Places over the turns of generator and output, for each sign of the load.
+    pub places: usize,
+    /// Torque by torque, in the order of the nodes.
+    pub by_torque: Vec<TurnsAtTorque>,
+    /// The same in words.
+    pub remark: String,
+}
+
+/// Whole turns under one torque: forward and backward motion, all temperatures.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct TurnsAtTorque {
+    /// Torque node, N m.
+    pub torque_n_m: f32,
+    /// Range of the drive's error over the places, the ripple within a pitch left out, arcsec: at most its transmission accuracy.
+    pub drive_peak_to_peak_arcsec: f64,
+    /// What the table leaves of it, arcsec: root mean square.
+    pub left_rms_arcsec: f64,
+    /// Largest difference between table and samples, arcsec.
+    pub left_worst_arcsec: f64,
 }
 
 /// Where samples come from.
@@ -168,22 +198,33 @@ pub fn from_sweep(
     wall_s: f64,
 ) -> Result<MadeTable, TableError> {
     let mesh = solver.mesh.to_string();
+    let repeats = drive.as_built.first_not_uniform().is_none();
     let source = Source::Fem {
         solver: solver.method.to_string(),
         mesh: mesh.to_owned(),
         degrees_of_freedom: sweep.degrees_of_freedom,
         positions: plan.positions,
-        sampled:
+        sampled: if repeats {
             "forward motion over one flexspline pitch at every torque and temperature node; backward motion is its \
-                  mirror image"
-                .to_owned(),
+             mirror image"
+        } else {
+            "the drive without imperfections in forward motion over one flexspline pitch at every torque and temperature node, \
+             backward motion its mirror image; what the imperfections add without friction, at five loads of either sign and \
+             places spread over the turns of generator and output, at reference temperature"
+        }
+        .to_owned(),
         increments: sweep.increments,
         iterations: sweep.iterations,
         worst_residual: sweep.worst_residual,
         wall_s,
     };
     let core_plan = fem_plan(drive, plan)?;
-    make((&drive.name, drive.hash()), sweep.kind, &core_plan, &sweep.samples, source, &mesh, sweep.worst_residual)
+    let mut made = make((&drive.name, drive.hash()), sweep.kind, &core_plan, &sweep.samples, source, &mesh, sweep.worst_residual)?;
+    if sweep.places > 0 {
+        let table = Table::check(&made.image).map_err(|e| TableError::Project(e.into()))?;
+        made.info.turns = Some(turns_info(drive, plan, sweep, &table));
+    }
+    Ok(made)
 }
 
 /// A table of forward samples at positive torque `nodes` alone, for choosing nodes: the other quadrants are filled by mirror
@@ -226,18 +267,26 @@ pub(crate) fn trial_table(
 
 /// What a table of FEM samples is projected with.
 fn fem_plan<'a>(drive: &Drive, plan: &'a SweepPlan) -> Result<Plan<'a>, TableError> {
+    let repeats = drive.as_built.first_not_uniform().is_none();
+    let harmonics = |orders| if repeats { Harmonics::default() } else { harmonics_of(orders) };
     Ok(Plan {
         drive: core_drive(drive)?,
         torque_nodes_n_m: &plan.torque_nodes_n_m,
         temperature_nodes_c: &plan.temperature_nodes_c,
         ripple_nodes: plan.positions.min(MAX_RIPPLE_NODES),
-        generator: Harmonics::default(),
-        material: Harmonics::default(),
-        output: Harmonics::default(),
+        generator: harmonics(&GENERATOR_ORDERS),
+        material: harmonics(&MATERIAL_ORDERS),
+        output: harmonics(&OUTPUT_ORDERS),
         missing_direction: MissingDirection::Refuse,
-        negative_half_width_tolerance_rad: HALF_WIDTH_NOISE_RAD,
-        deviation_limit_rad: FEM_DEVIATION_RAD,
+        negative_half_width_tolerance_rad: if repeats { HALF_WIDTH_NOISE_RAD } else { AS_BUILT_DEVIATION_RAD },
+        deviation_limit_rad: if repeats { FEM_DEVIATION_RAD } else { AS_BUILT_DEVIATION_RAD },
     })
+}
+
+/// Orders, on as many nodes as the highest needs.
+fn harmonics_of(orders: &'static [u16]) -> Harmonics<'static> {
+    let highest = usize::from(orders.iter().copied().max().unwrap_or(1));
+    Harmonics { orders, nodes: flexspline::precompute::NODES_PER_PERIOD * highest }
 }
 
 /// The table of samples from elsewhere: every torque and temperature that occurs is a node, the ripple has as many nodes as
@@ -264,14 +313,7 @@ pub fn from_samples(
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), s| (a.min(s.generator_rad), b.max(s.generator_rad)));
     let long = (most - least) / std::f64::consts::TAU >= TURNS_FOR_HARMONICS;
-    let harmonics = |orders: &'static [u16]| {
-        if long {
-            let highest = usize::from(orders.iter().copied().max().unwrap_or(1));
-            Harmonics { orders, nodes: flexspline::precompute::NODES_PER_PERIOD * highest }
-        } else {
-            Harmonics::default()
-        }
-    };
+    let harmonics = |orders| if long { harmonics_of(orders) } else { Harmonics::default() };
     let plan = Plan {
         drive: core_drive(drive)?,
         torque_nodes_n_m: &torques,
@@ -372,9 +414,50 @@ fn make(
         inverse_error_arcsec: f64::from(table.inverse_error_bound_rad()) * ARCSEC_PER_RAD,
         backlash_arcsec: backlash,
         wind_up_arcsec: [first, last].map(|t| 0.5 * at(t).iter().sum::<f64>()),
+        turns: None,
         command: String::new(),
     };
     Ok(MadeTable { kind, info, image })
+}
+
+/// The finished table, read by the core, against the samples over whole turns.
+fn turns_info(drive: &Drive, plan: &SweepPlan, sweep: &Sweep, table: &Table<'_>) -> TurnsInfo {
+    let error = |s: &Sample| (s.output_rad - s.generator_rad / drive.ratio()) * ARCSEC_PER_RAD;
+    let left = |s: &Sample| {
+        let said = flexspline::GeneratorAngle::from_rad(s.generator_rad)
+            .and_then(|g| table.steady_error_rad(g, s.torque_n_m as f32, s.temperature_c as f32, s.direction));
+        said.map_or(f64::NAN, |rad| f64::from(rad) * ARCSEC_PER_RAD) - error(s)
+    };
+    let by_torque: Vec<TurnsAtTorque> = plan
+        .torque_nodes_n_m
+        .iter()
+        .map(|&torque_n_m| {
+            let here: Vec<&Sample> = sweep.samples.iter().filter(|s| s.torque_n_m as f32 == torque_n_m).collect();
+            // The places of one sample of the sweep follow one another.
+            let range = |places: &[&Sample]| {
+                let (least, most) = places
+                    .iter()
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), s| (a.min(error(s)), b.max(error(s))));
+                most - least
+            };
+            let left: Vec<f64> = here.iter().map(|s| left(s)).collect();
+            TurnsAtTorque {
+                torque_n_m,
+                drive_peak_to_peak_arcsec: here.chunks(sweep.places).map(range).fold(0.0, f64::max),
+                left_rms_arcsec: (left.iter().map(|e| e * e).sum::<f64>() / left.len().max(1) as f64).sqrt(),
+                left_worst_arcsec: left.iter().fold(0.0, |worst, e| e.abs().max(worst)),
+            }
+        })
+        .collect();
+    let largest = |of: fn(&TurnsAtTorque) -> f64| by_torque.iter().map(of).fold(0.0, f64::max);
+    let remark = format!(
+        "over whole turns the drive's error ranges over {:.1}\" at most; the table has one curve for each angle, the same under every \
+         load, and leaves {:.1}\" rms and {:.1}\" at most where the curves change with load and flank",
+        largest(|t| t.drive_peak_to_peak_arcsec),
+        largest(|t| t.left_rms_arcsec),
+        largest(|t| t.left_worst_arcsec)
+    );
+    TurnsInfo { places: sweep.places, by_torque, remark }
 }
 
 /// The drive as the core knows it.

@@ -2,7 +2,12 @@
 //!
 //! Torques, temperatures, directions and positions are drawn between the nodes; each torque is settled and then followed over
 //! a few positions. A run at zero torque is also reversed, so that the play operator is seen crossing the backlash.
+//!
+//! A drive that does not repeat from tooth to tooth is deformed anew for each torque, anywhere in the turns of generator and
+//! output. Its table says how far it is from its own samples, for it has no room for all that such a drive does: the bounds are
+//! wider by that much.
 
+use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
 use flexspline::{Direction, GeneratorAngle, PlayState, Quality, Table};
@@ -17,6 +22,10 @@ use crate::tables::{ARCSEC_PER_RAD, core_kind};
 pub const RMS_BOUND_ARCSEC: f64 = 0.5;
 /// Largest difference, arcsec.
 pub const MAX_BOUND_ARCSEC: f64 = 2.0;
+
+/// How much more than a table states of itself at the places it was made of it may miss at a dozen others: the root mean square of
+/// twelve differences scatters by a fifth.
+const ELSEWHERE: f64 = 1.5;
 
 /// How to validate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,6 +82,11 @@ pub struct Validation {
     pub table_id: String,
     /// "passed" or "bound missed".
     pub status: &'static str,
+    /// What it may miss fresh FEM by, arcsec: root mean square. Of a drive that does not repeat from tooth to tooth
+    /// [`RMS_BOUND_ARCSEC`] and what the table states itself.
+    pub rms_bound_arcsec: f64,
+    /// Largest, arcsec; likewise.
+    pub max_bound_arcsec: f64,
     /// Root mean square difference at all points, arcsec.
     pub rms_arcsec: f64,
     /// Largest difference, arcsec.
@@ -150,6 +164,8 @@ pub fn validate(
     observe: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<Validation, ValidateError> {
     let kind = check_drive(drive, table)?;
+    let repeats = drive.as_built.first_not_uniform().is_none();
+    let whole_turns = TAU * drive.ratio().abs();
     let mut random = fastrand::Rng::with_seed(settings.seed);
     let draws = draw(&mut random, drive, table, settings);
     let total = settings.torques * (settings.positions + 3) + settings.temperatures + REVERSAL_STEPS + 6;
@@ -157,7 +173,7 @@ pub fn validate(
     for (k, (temperature_c, torques)) in draws.iter().enumerate() {
         let problem = Problem::new(drive, kind, *temperature_c, settings.solver)?;
         let mut solver = Solver::new(&problem);
-        let (unloaded, _) = solver.deform(random.f64())?;
+        let (unloaded, _) = solver.deform(random.f64() * if repeats { 1.0 } else { whole_turns })?;
         if k == 0 {
             fresh.reversal(&mut solver, unloaded.clone(), *temperature_c)?;
         }
@@ -167,6 +183,9 @@ pub fn validate(
             let mut chain: Vec<f64> = torques.iter().copied().filter(|t| t * sign > 0.0).collect();
             chain.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
             for torque_n_m in chain {
+                if !repeats {
+                    state = solver.deform(whole_turns * random.f64())?.0;
+                }
                 state =
                     fresh.steady(&mut solver, state, torque_n_m, *temperature_c, settings.positions, &mut random)?;
             }
@@ -232,7 +251,7 @@ impl Fresh<'_> {
     }
 
     fn pitch(&self) -> f64 {
-        std::f64::consts::TAU / f64::from(self.drive.flexspline.teeth)
+        TAU / f64::from(self.drive.flexspline.teeth)
     }
 
     /// Moves until the output follows.
@@ -330,11 +349,18 @@ impl Fresh<'_> {
         let all: Vec<f64> = self.points.iter().map(Point::difference).collect();
         let reversal: Vec<f64> = self.points.iter().filter(|p| p.kind == "reversal").map(Point::difference).collect();
         let bare: Vec<f64> = self.points.iter().map(|p| p.fem_arcsec).collect();
-        let passed = rms(&all) <= RMS_BOUND_ARCSEC && largest(&all) <= MAX_BOUND_ARCSEC;
+        let mut bounds = [RMS_BOUND_ARCSEC, MAX_BOUND_ARCSEC];
+        if self.drive.as_built.first_not_uniform().is_some() {
+            bounds[0] += ELSEWHERE * f64::from(self.table.projection_rms_rad()) * ARCSEC_PER_RAD;
+            bounds[1] += ELSEWHERE * f64::from(self.table.projection_worst_rad()) * ARCSEC_PER_RAD;
+        }
+        let passed = rms(&all) <= bounds[0] && largest(&all) <= bounds[1];
         Validation {
             generator: kind.to_string(),
             table_id: self.table.id().to_string(),
             status: if passed { "passed" } else { "bound missed" },
+            rms_bound_arcsec: bounds[0],
+            max_bound_arcsec: bounds[1],
             rms_arcsec: rms(&all),
             max_arcsec: largest(&all),
             reversal_rms_arcsec: rms(&reversal),

@@ -324,7 +324,7 @@ impl Diagnose {
         Ok(without)
     }
 
-    /// The table of the extended drive by FEM, where one tooth pitch says all of it.
+    /// The table of the extended drive by FEM, if the drive holds all that a table can.
     fn remade(
         &self,
         context: &Context,
@@ -333,7 +333,7 @@ impl Diagnose {
     ) -> Result<Option<MadeTable>, Failure> {
         // What is in no field of the drive would be missing in a table by FEM.
         let in_tables = found.rest.iter().any(|cause| no_place_in_a_table(&cause.name).is_none());
-        if in_tables || found.drive.as_built.first_not_uniform().is_some() {
+        if in_tables {
             return Ok(None);
         }
         fresh_table(context, &found.drive, self.generator, mesh).map(Some)

@@ -22,18 +22,20 @@ use crate::report::page::Page;
 use crate::report::{Sources, Subject, drive_report};
 use crate::samples;
 use crate::stepping::{Method, SolverSettings};
-use crate::sweep::{SweepError, SweepPlan, SweepProgress, check_uniform, sweep};
+use crate::sweep::{SweepError, SweepPlan, SweepProgress};
 use crate::tables::{
     ARCSEC_PER_RAD, MadeTable, SampleOptions, Source, TableError, TableInfo, c_header, from_samples, from_sweep,
     rust_source,
 };
+use crate::turns::{deviation_increments, sweep_turns};
 
 /// Make compensation tables: from FEM sweeps of the drive, or from samples of another program or a bench
 ///
-/// For each generator the drive is swept by contact FEM over one tooth pitch at every torque and temperature node, and the
-/// samples are projected onto the table by the code that also runs on board. Written are <G>.fxt (the image that firmware
-/// reads in place), <G>.json (what made it and how good it is), <G>.rs and <G>.h (the same bytes as source), and
-/// <G>.samples.csv; and report.html, a page with the drive in motion that any browser opens.
+/// For each generator the drive is swept by contact FEM over one tooth pitch at every torque and temperature node (a drive with
+/// imperfections also at places spread over the turns of generator and output), and the samples are projected onto the table by
+/// the code that also runs on board. Written are <G>.fxt (the image that firmware reads in place), <G>.json (what made it and how
+/// good it is), <G>.rs and <G>.h (the same bytes as source), and <G>.samples.csv; and report.html, a page with the drive in
+/// motion that any browser opens.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -60,17 +62,12 @@ pub(super) struct Tables {
     #[arg(long, value_name = "T", conflicts_with = "from_samples", allow_negative_numbers = true)]
     torque_n_m: Option<f64>,
     /// Torque nodes on each side of zero, at most, beside the pair at the drag torque
-    #[arg(long, value_name = "N", default_value_t = 28, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(5..=30))]
-    most_nodes: u8,
-    /// Add a torque node where the table misses the FEM by more than this, arcsec
-    #[arg(
-        long,
-        value_name = "ARCSEC",
-        default_value_t = 0.6,
-        conflicts_with = "from_samples",
-        allow_negative_numbers = true
-    )]
-    node_tolerance_arcsec: f64,
+    /// [default: 28; with imperfections 12]
+    #[arg(long, value_name = "N", conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(5..=30))]
+    most_nodes: Option<u8>,
+    /// Add a torque node where the table misses the FEM by more than this, arcsec [default: 0.6; with imperfections 2]
+    #[arg(long, value_name = "ARCSEC", conflicts_with = "from_samples", allow_negative_numbers = true)]
+    node_tolerance_arcsec: Option<f64>,
     /// Samples over one tooth pitch
     #[arg(long, value_name = "N", default_value_t = 8, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(4..=32))]
     positions: u8,
@@ -196,7 +193,6 @@ impl Tables {
     }
 
     fn plan(&self, drive: &Drive, kind: GeneratorKind) -> Result<(SweepPlan, NodeChoice), Failure> {
-        check_uniform(drive).map_err(|error| Failure::BadInput(error.to_string()))?;
         let mut plan = SweepPlan::for_generator(drive, kind);
         let drag = drive.output.drag_torque_n_m;
         let largest = self.torque_n_m.unwrap_or(crate::sweep::rated_torque_n_m(kind));
@@ -206,13 +202,15 @@ impl Tables {
                 20.0 * drag
             )));
         }
-        let tolerance = self.node_tolerance_arcsec;
+        // Imperfections are sampled at every node, and leave more than nodes do.
+        let repeats = drive.as_built.first_not_uniform().is_none();
+        let tolerance = self.node_tolerance_arcsec.unwrap_or(if repeats { 0.6 } else { 2.0 });
         if !(0.01..=60.0).contains(&tolerance) {
             return Err(Failure::BadInput(format!("--node-tolerance-arcsec: found {tolerance}; allowed: 0.01 to 60")));
         }
         let choice = NodeChoice {
             largest_n_m: largest,
-            most: usize::from(self.most_nodes),
+            most: usize::from(self.most_nodes.unwrap_or(if repeats { 28 } else { 12 })),
             tolerance_rad: tolerance / ARCSEC_PER_RAD,
         };
         plan.positions = usize::from(self.positions);
@@ -234,12 +232,14 @@ impl Tables {
 
     fn sweep(&self, context: &Context, drive: &Drive, generators: &[GeneratorKind]) -> Result<Vec<Made>, Failure> {
         let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
+        let repeats = drive.as_built.first_not_uniform().is_none();
         let plans =
             generators.iter().map(|kind| Ok((*kind, self.plan(drive, *kind)?))).collect::<Result<Vec<_>, Failure>>()?;
         // How many nodes there will be is known only once they are chosen; until then the most is assumed.
         let expected = |plan: &SweepPlan, choice: &NodeChoice| {
             let a_node = plan.positions + 2;
-            choice.most * (plan.temperature_nodes_c.len() + 1) * a_node
+            let turns = if repeats { 0 } else { deviation_increments() };
+            choice.most * (plan.temperature_nodes_c.len() + 1) * a_node + turns
         };
         let totals = plans.iter().map(|(_, (plan, choice))| expected(plan, choice)).collect::<Vec<usize>>();
         let progress = Mutex::new((context.progress("tables"), 0_usize, totals));
@@ -276,7 +276,8 @@ impl Tables {
                 let mut plan = plan.clone();
                 let chosen = choose_torque_nodes(drive, *kind, &plan, *choice, settings, &observe).map_err(failed)?;
                 plan.torque_nodes_n_m = chosen.torque_nodes_n_m;
-                let mut swept = sweep(drive, *kind, &plan, &chosen.known, settings, &observe).map_err(failed)?;
+                let mut swept =
+                    sweep_turns(drive, *kind, &plan, &chosen.known, settings, &observe).map_err(failed)?;
                 swept.increments += chosen.increments;
                 swept.iterations += chosen.iterations;
                 swept.worst_residual = swept.worst_residual.max(chosen.worst_residual);
@@ -330,6 +331,9 @@ fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
             "{}: the torque nodes ran out before the table met the FEM everywhere; see --most-nodes, --torque-n-m\n",
             info.generator
         ));
+    }
+    for (info, turns) in report.tables.iter().filter_map(|info| Some((info, info.turns.as_ref()?))) {
+        text.push_str(&format!("{}: {}\n", info.generator, turns.remark));
     }
     text.push_str(&format!(
         "wrote {} table{}{} to {} in {:.0} s",

@@ -26,7 +26,8 @@ use crate::validate::{
 ///
 /// Torques, temperatures, directions and positions are drawn between the nodes of each table; the drive is settled there and
 /// the table read by the code that firmware links. One run is reversed through the backlash. Ends with exit code 1 if a
-/// table misses the FEM by more than 0.5 arcsec rms or 2 arcsec at any point.
+/// table misses the FEM by more than 0.5 arcsec rms or 2 arcsec at any point; the table of a drive with imperfections is
+/// looked at over whole turns, and may miss it by as much more as it states of itself.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -142,9 +143,14 @@ impl Validate {
         if passed {
             Ok(())
         } else {
+            let missed = report.tables.iter().find(|table| table.status != "passed");
+            let [rms, max] = missed
+                .map_or([RMS_BOUND_ARCSEC, MAX_BOUND_ARCSEC], |table| [table.rms_bound_arcsec, table.max_bound_arcsec]);
+            let rounded = |x: f64| (x * 1e3).round() / 1e3;
             Err(Failure::Failed(format!(
-                "a table misses fresh FEM by more than {RMS_BOUND_ARCSEC} arcsec rms or {MAX_BOUND_ARCSEC} arcsec; see \
-                 validation.json"
+                "a table misses fresh FEM by more than {} arcsec rms or {} arcsec; see validation.json",
+                rounded(rms),
+                rounded(max)
             )))
         }
     }

@@ -118,6 +118,25 @@ pub struct PairContribution {
     pub resultant: [f64; 2],
     /// Force-weighted point of attack, in the turning frame.
     pub attack: [f64; 2],
+    /// The points that slip: what the tangent leaves out.
+    pub slipping: Vec<SlipPoint>,
+}
+
+/// A point that slips: a change of its gap changes the force along the flank, by `stiffness` times the change along `slip`.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SlipPoint {
+    /// Unknowns of its nodes.
+    pub index: [usize; 12],
+    /// How the gap changes with them.
+    pub gap: [f64; 12],
+    /// How it changes with the output angle (mm/rad).
+    pub gap_by_output: f64,
+    /// How the tooth slips along the flank with the unknowns.
+    pub slip: [f64; 12],
+    /// How it slips with the output angle (mm/rad).
+    pub slip_by_output: f64,
+    /// Change of the force that resists the slip, of one sign or the other, over that of the gap (N/mm per mm).
+    pub stiffness: f64,
 }
 
 /// Displacements and output angle at which contact is evaluated.
@@ -524,6 +543,7 @@ impl<'a> FlankContact<'a> {
                 peak: 0.0,
                 resultant: [0.0; 2],
                 attack: [0.0; 2],
+                slipping: Vec::new(),
             });
             let pressure = -law.stiffness * foot.distance;
             out.peak = out.peak.max(pressure);
@@ -576,6 +596,16 @@ impl<'a> FlankContact<'a> {
                 for j in 0..=i {
                     row[index[j]] += kn * g[i] * g[j] + kt * s[i] * s[j];
                 }
+            }
+            if stick == 0.0 && friction != 0.0 {
+                out.slipping.push(SlipPoint {
+                    index,
+                    gap: g,
+                    gap_by_output: g_output,
+                    slip: s,
+                    slip_by_output: s_output,
+                    stiffness: -friction / pressure * kn,
+                });
             }
             out.torque += normal_load * g_output - tangential_load * s_output;
             out.corner += kn * g_output * g_output + kt * s_output * s_output;

@@ -201,6 +201,17 @@ impl AsBuilt {
         .find_map(|(acts, field)| acts.then_some(field))
     }
 
+    /// What is left without the fields that [`AsBuilt::first_not_uniform`] looks for.
+    pub fn uniform_part(&self) -> AsBuilt {
+        AsBuilt {
+            flexspline_wear_um: self.flexspline_wear_um,
+            circular_spline_wear_um: self.circular_spline_wear_um,
+            generator_warmer_k: self.generator_warmer_k,
+            circular_spline_warmer_k: self.circular_spline_warmer_k,
+            ..AsBuilt::default()
+        }
+    }
+
     /// What does not fit the rest of the drive.
     pub(super) fn fit(&self, drive: &Drive, problems: &mut Vec<Problem>) {
         let (zf, zc) = (drive.flexspline.teeth, drive.circular_spline.teeth);

@@ -11,7 +11,7 @@
 //! The causes are re-simulated by the laws of [`crate::synthesize`], under the names that `diagnosis.json` gives their parameters.
 
 use std::collections::BTreeMap;
-use std::f64::consts::{FRAC_PI_4, TAU};
+use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -260,10 +260,6 @@ impl CauseEntry {
                 continue;
             }
             let value = match (self.name.as_str(), parameter.name) {
-                // The phase found is that of the part that both flanks have alike, an eighth of a turn before the displacement.
-                ("circular_spline_eccentricity" | "flexspline_runout" | "gravity_side_load", "phase_rad") => {
-                    (value + FRAC_PI_4).rem_euclid(TAU)
-                }
                 // It is found as sin(output + orientation - phase).
                 ("gravity_torque", "phase_rad") => (-value).rem_euclid(TAU),
                 (_, "phase_rad") => value.rem_euclid(TAU),

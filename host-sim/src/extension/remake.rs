@@ -7,8 +7,9 @@ use thiserror::Error;
 use crate::drive::{Drive, GeneratorKind};
 use crate::nodes::{NodeChoice, choose_torque_nodes};
 use crate::stepping::SolverSettings;
-use crate::sweep::{Observer, SweepError, SweepPlan, rated_torque_n_m, sweep};
+use crate::sweep::{Observer, SweepError, SweepPlan, rated_torque_n_m};
 use crate::tables::{ARCSEC_PER_RAD, MadeTable, TableError, from_sweep};
+use crate::turns::{deviation_increments, sweep_turns};
 
 /// Why no table was made.
 #[derive(Debug, Error)]
@@ -21,20 +22,22 @@ pub enum RemakeError {
     Table(#[from] TableError),
 }
 
-/// Torque nodes on each side at most, and the miss at which one is added, arcsec: those of `tables`.
-const MOST_NODES: usize = 28;
-const NODE_TOLERANCE_ARCSEC: f64 = 0.6;
+/// Torque nodes on each side at most, and the miss at which one is added, arcsec: those of `tables`, for a drive that repeats from tooth
+/// to tooth and for one that does not.
+const MOST_NODES: [usize; 2] = [28, 12];
+const NODE_TOLERANCE_ARCSEC: [f64; 2] = [0.6, 2.0];
 
 /// Increments that [`make_table`] usually takes, for a progress bar.
 #[must_use]
 pub fn usual_increments(drive: &Drive) -> usize {
-    if drive.flanks.friction_coefficient > 0.0 { 800 } else { 170 }
+    let turns = if drive.as_built.first_not_uniform().is_some() { deviation_increments() } else { 0 };
+    turns + if drive.flanks.friction_coefficient > 0.0 { 800 } else { 170 }
 }
 
 /// Sweeps the drive and projects the samples.
 ///
 /// # Errors
-/// No convergence, a drive that does not repeat from tooth to tooth, or stopped by the observer.
+/// No convergence, or stopped by the observer.
 pub fn make_table(
     drive: &Drive,
     kind: GeneratorKind,
@@ -43,14 +46,15 @@ pub fn make_table(
 ) -> Result<MadeTable, RemakeError> {
     let clock = Instant::now();
     let mut plan = SweepPlan::for_generator(drive, kind);
+    let turns = usize::from(drive.as_built.first_not_uniform().is_some());
     let choice = NodeChoice {
         largest_n_m: rated_torque_n_m(kind),
-        most: MOST_NODES,
-        tolerance_rad: NODE_TOLERANCE_ARCSEC / ARCSEC_PER_RAD,
+        most: MOST_NODES[turns],
+        tolerance_rad: NODE_TOLERANCE_ARCSEC[turns] / ARCSEC_PER_RAD,
     };
     let chosen = choose_torque_nodes(drive, kind, &plan, choice, settings, observe)?;
     plan.torque_nodes_n_m = chosen.torque_nodes_n_m;
-    let mut swept = sweep(drive, kind, &plan, &chosen.known, settings, observe)?;
+    let mut swept = sweep_turns(drive, kind, &plan, &chosen.known, settings, observe)?;
     swept.increments += chosen.increments;
     swept.iterations += chosen.iterations;
     swept.worst_residual = swept.worst_residual.max(chosen.worst_residual);

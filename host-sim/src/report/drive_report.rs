@@ -13,7 +13,7 @@ use super::page::{
 };
 use crate::drive::{Drive, GeneratorKind};
 use crate::tables::{ARCSEC_PER_RAD, Source, TableInfo};
-use crate::validate::{MAX_BOUND_ARCSEC, Point, RMS_BOUND_ARCSEC, Validation};
+use crate::validate::{MAX_BOUND_ARCSEC, Point, Validation};
 
 /// Positions over a pitch at which tables are read for curves and means.
 const POSITIONS: usize = 48;
@@ -383,7 +383,7 @@ fn misses(v: &Validation, kind: &str, over: fn(&Point) -> f64) -> Lines {
         }
         Series { name: name.into(), mark: Mark::Points, colour, points }
     });
-    let limits = [MAX_BOUND_ARCSEC, -MAX_BOUND_ARCSEC].map(|y| Limit { name: "bound of any point".into(), y });
+    let limits = [v.max_bound_arcsec, -v.max_bound_arcsec].map(|y| Limit { name: "bound of any point".into(), y });
     Lines { series: series.collect(), limits: limits.into() }
 }
 
@@ -485,6 +485,9 @@ fn judge(known: &[Known<'_>]) -> (Status, Vec<String>) {
             let words = "the torque nodes ran out before the table met the FEM everywhere; see --most-nodes";
             remark(Status::Remark, format!("{name}: {words}."));
         }
+        if let Some(turns) = k.subject.info.and_then(|info| info.turns.as_ref()) {
+            remark(Status::Remark, format!("{name}: {}.", turns.remark.replace('"', "″")));
+        }
         match &k.subject.animation {
             Err(error @ AnimationError::NotPeriodic { .. }) => {
                 remark(Status::Remark, format!("{name}: not shown in motion: {error}."));
@@ -502,8 +505,8 @@ fn judge(known: &[Known<'_>]) -> (Status, Vec<String>) {
         }
         if let Some(v) = k.subject.validation.filter(|v| v.status != "passed") {
             let words = format!(
-                "{:.2}″ rms and {:.2}″ at most; the bounds are {RMS_BOUND_ARCSEC}″ and {MAX_BOUND_ARCSEC}″",
-                v.rms_arcsec, v.max_arcsec
+                "{:.2}″ rms and {:.2}″ at most; the bounds are {:.2}″ and {:.2}″",
+                v.rms_arcsec, v.max_arcsec, v.rms_bound_arcsec, v.max_bound_arcsec
             );
             remark(Status::BoundMissed, format!("{name}: {words}."));
         }
@@ -699,11 +702,11 @@ fn validation_section(known: &[Known<'_>]) -> Section {
                 Text::new(format!("{} points, {} increments of FEM. Root mean square ", v.points.len(), v.increments))
                     .error(v.rms_arcsec, 2)
                     .plain(" (bound ")
-                    .error(RMS_BOUND_ARCSEC, 2)
+                    .error(v.rms_bound_arcsec, 2)
                     .plain("), largest ")
                     .error(v.max_arcsec, 2)
                     .plain(" (bound ")
-                    .error(MAX_BOUND_ARCSEC, 2)
+                    .error(v.max_bound_arcsec, 2)
                     .plain("); in the reversal ")
                     .error(v.reversal_rms_arcsec, 2)
                     .plain(" rms, ")

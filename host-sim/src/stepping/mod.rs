@@ -8,6 +8,7 @@ mod passed;
 mod predictor;
 mod problem;
 mod reference;
+mod slip;
 mod state;
 mod step;
 mod wheels;

@@ -18,6 +18,7 @@ use super::near::{NearPairs, configuration};
 use super::passed::Passed;
 use super::problem::Problem;
 use super::reference::SparseWheels;
+use super::slip::{Field, Slipping};
 use super::state::State;
 use super::step::{ANCHORED, BORDERS, LATERAL, OUTPUT, Residual, SLEEVE, Step, improve};
 use super::wheels::Wheels;
@@ -35,6 +36,9 @@ const LARGEST_STEP: f64 = 0.1;
 const LARGEST_LOAD_STEP: f64 = 100.0;
 /// Factors on the penalties while the way to a new load is found.
 const LOADING_SOFTNESS: [f64; 3] = [1e-3, 3e-2, 1.0];
+/// The same on the way to a far place: of 1, 0.1, 0.03, 0.01 and (0.001, 0.03) before 1 this takes the fewest iterations where most
+/// are needed (20 to 30; cam, 5 µm of eccentricity and pitch errors, 4 and 100 N·m).
+const JUMPING_SOFTNESS: [f64; 2] = [1e-2, 1.0];
 /// Stiffness of the bore (N/mm³) below which it is not softened: the softest penalty on the way to a new load.
 const SOFTEST_BORE: f64 = 1e3;
 /// Iterations after which the next part of an increment may be twice as large.
@@ -45,11 +49,6 @@ const ROUND_OFF: f64 = 1e-6;
 
 /// Gain of an iteration after which the last factor serves again.
 const CHORD_GAIN: f64 = 0.2;
-/// Under friction: relative residual and gain from which the last factor is kept and improved, so many times.
-const SLUGGISH_BELOW: f64 = 0.3;
-const SLUGGISH_GAIN: f64 = 0.3;
-const MOST_CHORDS: usize = 12;
-
 /// Fraction of a pitch off which a tangent of an earlier pitch still serves, and the gain that each iteration must then make.
 const RECALL_WITHIN: f64 = 0.06;
 const RECALL_GAIN: f64 = 0.3;
@@ -116,6 +115,8 @@ pub struct Solver<'p> {
     made_at: f64,
     /// Tangents of steady motion, oldest first.
     tangents: VecDeque<Tangent>,
+    /// What the tangent leaves out.
+    slipping: Slipping,
     /// Factor on the penalties, below 1 only while the way to a new shape or load is found.
     softening: f64,
     /// While the drive is assembled its flanks slip freely.
@@ -152,6 +153,7 @@ impl<'p> Solver<'p> {
             turned: 0,
             made_at: f64::INFINITY,
             tangents: VecDeque::new(),
+            slipping: Slipping::default(),
             softening: 1.0,
             assembling: false,
             passed: Passed::default(),
@@ -222,6 +224,17 @@ impl<'p> Solver<'p> {
         }
     }
 
+    /// Turns the generator on, by whole flexspline pitches and under the same load, to a place where an imperfect drive stands
+    /// differently: the state is turned with it, and a soft contact finds the way first. For flanks without friction: what they
+    /// remember is not carried along.
+    pub fn jump(&mut self, from: &State, generator_rad: f64) -> Result<(State, Increment), SolveError> {
+        // The output goes on at its mean rate, whatever it did last.
+        let from = &State { output_rate: 1.0 / self.problem.drive.ratio(), ..from.clone() };
+        let solved = self.from_soft(from, generator_rad, from.torque_n_m, &JUMPING_SOFTNESS)?;
+        self.problem.check_range(&solved.0)?;
+        Ok(solved)
+    }
+
     /// One part of an increment. A load that changes has no predictor: a soft contact finds the way first.
     fn solve_part(
         &mut self,
@@ -232,9 +245,20 @@ impl<'p> Solver<'p> {
         if torque_n_m == from.torque_n_m {
             return self.newton(from, generator_rad, torque_n_m);
         }
+        self.from_soft(from, generator_rad, torque_n_m, &LOADING_SOFTNESS)
+    }
+
+    /// Newton with contact that is soft at first: factors on the penalties in turn, the last of them 1.
+    fn from_soft(
+        &mut self,
+        from: &State,
+        generator_rad: f64,
+        torque_n_m: f64,
+        softness: &[f64],
+    ) -> Result<(State, Increment), SolveError> {
         let mut guess = from.clone();
         let mut iterations = 0;
-        for softening in LOADING_SOFTNESS {
+        for &softening in softness {
             self.softening = softening;
             let solved = self.newton(&guess, generator_rad, torque_n_m);
             self.softening = 1.0;
@@ -304,12 +328,7 @@ impl<'p> Solver<'p> {
             // While it makes good progress an old factor serves again: a step with it costs a tenth.
             let gain = last_gain(&history);
             recalled &= history.len() == 1 || gain < RECALL_GAIN;
-            // The tangent of friction leaves out that slip follows pressure: made anew it is no better, improved it is.
-            let sluggish = self.problem.flank_law.friction > 0.0
-                && relative < SLUGGISH_BELOW
-                && (SLUGGISH_GAIN..1.0).contains(&gain)
-                && chords.len() < MOST_CHORDS;
-            let chord = recalled || gain < CHORD_GAIN || sluggish;
+            let chord = recalled || gain < CHORD_GAIN;
             let Some(mut step) = self.solve(&residual, chord) else {
                 return Err(failed(history, "the stiffness matrix is not positive definite"));
             };
@@ -463,14 +482,18 @@ impl<'p> Solver<'p> {
                 residual.peak[1] = residual.peak[1].max(contact.peak);
             },
         );
+        self.slipping.clear();
+        let slipping = &mut self.slipping;
         let at = configuration(state);
         let column = self.border.column_mut(OUTPUT);
         column.fill(0.0);
         let mut corner = 0.0;
         near.evaluate(&self.flanks, at, flank_law, |pair, contact| {
             let cs_node = |n: usize| self.cs_index[n].expect("flank nodes are free") as usize;
-            let nodes = self.flanks.fs_nodes(pair).chain(self.flanks.cs_nodes(pair).map(cs_node));
-            for (a, node) in nodes.enumerate() {
+            let nodes: Vec<usize> =
+                self.flanks.fs_nodes(pair).chain(self.flanks.cs_nodes(pair).map(cs_node)).collect();
+            contact.slipping.iter().for_each(|point| slipping.add(point, |i| 2 * nodes[i / 2] + i % 2));
+            for (a, node) in nodes.into_iter().enumerate() {
                 for k in 0..2 {
                     let i = 2 * a + k;
                     residual.force[2 * node + k] += contact.force[i];
@@ -497,6 +520,8 @@ impl<'p> Solver<'p> {
         let load = problem.per_width(torque_n_m);
         let (drag, drag_stiffness) = problem.drag_torque(state.output_rad - state.drag_anchor_rad);
         residual.drag_torque = drag;
+        // The drag that sticks is so stiff that the last digit of the output angle is felt after a few radians.
+        residual.torque_round_off = drag_stiffness * f64::EPSILON * state.output_rad.abs();
         residual.border[OUTPUT] = load + residual.flank_torque + residual.drag_torque;
         residual.torque_scale += load.abs() + problem.drag;
         residual.free_output = residual.flank_contacts == 0 && drag_stiffness == 0.0;
@@ -548,15 +573,12 @@ impl<'p> Solver<'p> {
             self.effort.solution += clock.elapsed();
         }
         let clock = Instant::now();
-        let mut free = residual.force.clone();
-        let mut border = residual.border;
-        self.turn(&mut free, &mut border, -self.turned);
-        let solved = self.eliminated.as_ref()?.solve(self.wheels.as_mut(), &mut free, &mut border[..self.border.width]);
-        self.turn(&mut free, &mut border, self.turned);
+        let slipping = std::mem::take(&mut self.slipping);
+        let forces = Field { free: residual.force.clone(), border: residual.border };
+        let solved = slipping.solve(forces, |field| self.solve_symmetric(field));
+        self.slipping = slipping;
         self.effort.solution += clock.elapsed();
-        if !solved {
-            return None;
-        }
+        let Field { free, border } = solved?;
         let (fs, _) = self.problem.wheels();
         let u = free[..2 * fs.nodes.len()].to_vec();
         let mut v = vec![0.0; 2 * self.cs_index.len()];
@@ -567,6 +589,15 @@ impl<'p> Solver<'p> {
             }
         }
         Some(Step { free, u, v, border })
+    }
+
+    /// Solves with the last factor, in place.
+    fn solve_symmetric(&mut self, field: &mut Field) -> Option<()> {
+        let Field { free, border } = field;
+        self.turn(free, border, -self.turned);
+        let solved = self.eliminated.as_ref()?.solve(self.wheels.as_mut(), free, &mut border[..self.border.width]);
+        self.turn(free, border, self.turned);
+        solved.then_some(())
     }
 
     /// Turns forces or displacements by so many pitches.

@@ -23,6 +23,8 @@ pub(super) struct Residual {
     pub generator_moment: f64,
     pub flank_torque: f64,
     pub drag_torque: f64,
+    /// What rounding of the output angle leaves of the torque at worst.
+    pub torque_round_off: f64,
     pub peak: [f64; 2],
     /// Neither flank nor drag holds the output.
     pub free_output: bool,
@@ -40,6 +42,7 @@ impl Residual {
             generator_moment: 0.0,
             flank_torque: 0.0,
             drag_torque: 0.0,
+            torque_round_off: 0.0,
             peak: [0.0; 2],
             free_output: false,
         }
@@ -48,7 +51,8 @@ impl Residual {
     /// Relative to the contact forces; the torque, which everything serves, ten times as strictly.
     pub fn relative(&self) -> f64 {
         let force = self.force.iter().fold(0.0_f64, |m, x| m.max(x.abs())) / self.scale;
-        force.max(10.0 * self.border[OUTPUT].abs() / self.torque_scale)
+        let torque = (self.border[OUTPUT].abs() - self.torque_round_off).max(0.0);
+        force.max(10.0 * torque / self.torque_scale)
     }
 }
 
