@@ -219,7 +219,8 @@ pub fn from_sweep(
         wall_s,
     };
     let core_plan = fem_plan(drive, plan)?;
-    let mut made = make((&drive.name, drive.hash()), sweep.kind, &core_plan, &sweep.samples, source, &mesh, sweep.worst_residual)?;
+    let mut made =
+        make((&drive.name, drive.hash()), sweep.kind, &core_plan, &sweep.samples, source, &mesh, sweep.worst_residual)?;
     if sweep.places > 0 {
         let table = Table::check(&made.image).map_err(|e| TableError::Project(e.into()))?;
         made.info.turns = Some(turns_info(drive, plan, sweep, &table));

@@ -160,8 +160,7 @@ impl Count<'_> {
         self.iterations += increment.iterations;
         self.worst_residual = self.worst_residual.max(increment.residual);
         let temperature_c = problem.drive.temperature.reference_c;
-        let progress =
-            SweepProgress { iterations: increment.iterations, torque_n_m: state.torque_n_m, temperature_c };
+        let progress = SweepProgress { iterations: increment.iterations, torque_n_m: state.torque_n_m, temperature_c };
         match (self.observe)(progress) {
             ControlFlow::Continue(()) => Ok(state),
             ControlFlow::Break(()) => Err(SweepError::Stopped),

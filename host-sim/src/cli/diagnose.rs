@@ -325,12 +325,7 @@ impl Diagnose {
     }
 
     /// The table of the extended drive by FEM, if the drive holds all that a table can.
-    fn remade(
-        &self,
-        context: &Context,
-        found: &FoundGeometry,
-        mesh: MeshLevel,
-    ) -> Result<Option<MadeTable>, Failure> {
+    fn remade(&self, context: &Context, found: &FoundGeometry, mesh: MeshLevel) -> Result<Option<MadeTable>, Failure> {
         // What is in no field of the drive would be missing in a table by FEM.
         let in_tables = found.rest.iter().any(|cause| no_place_in_a_table(&cause.name).is_none());
         if in_tables {

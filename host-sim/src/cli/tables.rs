@@ -276,8 +276,7 @@ impl Tables {
                 let mut plan = plan.clone();
                 let chosen = choose_torque_nodes(drive, *kind, &plan, *choice, settings, &observe).map_err(failed)?;
                 plan.torque_nodes_n_m = chosen.torque_nodes_n_m;
-                let mut swept =
-                    sweep_turns(drive, *kind, &plan, &chosen.known, settings, &observe).map_err(failed)?;
+                let mut swept = sweep_turns(drive, *kind, &plan, &chosen.known, settings, &observe).map_err(failed)?;
                 swept.increments += chosen.increments;
                 swept.iterations += chosen.iterations;
                 swept.worst_residual = swept.worst_residual.max(chosen.worst_residual);

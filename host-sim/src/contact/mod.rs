@@ -13,6 +13,7 @@ mod quadrature;
 
 pub use bore::{BoreContact, BoreLaw, BorePressure, OpenEdges};
 pub use flank::{
-    Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPoint, FrictionHistory, PairContribution, SlipPoint,
+    Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPoint, FrictionHistory, PairContribution,
+    SlipPoint,
 };
 pub use quadrature::gauss_legendre;

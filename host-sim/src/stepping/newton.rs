@@ -490,8 +490,7 @@ impl<'p> Solver<'p> {
         let mut corner = 0.0;
         near.evaluate(&self.flanks, at, flank_law, |pair, contact| {
             let cs_node = |n: usize| self.cs_index[n].expect("flank nodes are free") as usize;
-            let nodes: Vec<usize> =
-                self.flanks.fs_nodes(pair).chain(self.flanks.cs_nodes(pair).map(cs_node)).collect();
+            let nodes: Vec<usize> = self.flanks.fs_nodes(pair).chain(self.flanks.cs_nodes(pair).map(cs_node)).collect();
             contact.slipping.iter().for_each(|point| slipping.add(point, |i| 2 * nodes[i / 2] + i % 2));
             for (a, node) in nodes.into_iter().enumerate() {
                 for k in 0..2 {

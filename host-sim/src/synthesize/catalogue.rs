@@ -92,6 +92,8 @@ const ARCSECONDS: Parameter = number("amplitude_arcsec", "the same at the output
 const HALF_LOAD: Parameter =
     number("half_load_n_m", "load at which more teeth have halved it", 0.01, 1e6, Usual::OfLoad(0.35));
 const TIME: Parameter = number("time_s", "when", -1e9, 1e12, Usual::Instant(0.3, 0.7));
+/// Flank angle by which the radius of an oval opens its spaces, rad: where teeth of HHD-95 bear.
+const OVAL_FLANK_RAD: f64 = 0.4;
 const WHEELS: &[&str] = &["flexspline", "circular_spline"];
 const CHANNELS: &[&str] = &["generator", "output", "torque", "temperature"];
 
@@ -134,11 +136,7 @@ pub fn effects() -> Vec<Definition> {
         cause(
             "circular_spline_ovality",
             "circular spline pressed to an oval that keeps its length",
-            &[
-                microns("of the radius", 8.0),
-                ARCSECONDS,
-                phase("angle of a crest of the error, on the circular spline"),
-            ],
+            &[microns("of the radius", 8.0), ARCSECONDS, phase("angle of a crest of what both flanks have alike")],
             &[("amplitude_um", "amplitude_arcsec", Oval)],
         ),
         cause(
@@ -515,7 +513,11 @@ impl Chosen {
             "circular_spline_eccentricity" => displaced(Angle::CircularSpline),
             "flexspline_runout" => displaced(Angle::Flexspline),
             "gravity_side_load" => displaced(Angle::Gravity),
-            "circular_spline_ovality" => Law::Oval { amplitude: v("amplitude_arcsec"), phase_rad: -2.0 * phase() },
+            "circular_spline_ovality" => Law::Oval {
+                amplitude: v("amplitude_arcsec"),
+                phase_rad: -2.0 * phase(),
+                radial: 2.0 * OVAL_FLANK_RAD.tan(),
+            },
             "flexspline_pitch_error" => pitch(Angle::Flexspline),
             "circular_spline_pitch_error" => pitch(Angle::CircularSpline),
             "generator_eccentricity" => {
@@ -622,7 +624,7 @@ impl Setting<'_> {
             Factor::AlongNormal => along(self.sizes.base_radius_mm),
             Factor::AlongPitch => along(self.sizes.pitch_radius_mm),
             // Half of it moves the teeth along the ring, and its radius opens them by the tangent of the flank angle.
-            Factor::Oval => 0.5f64.hypot(24f64.to_radians().tan()) * along(self.sizes.pitch_radius_mm),
+            Factor::Oval => 0.5f64.hypot(OVAL_FLANK_RAD.tan()) * along(self.sizes.pitch_radius_mm),
             Factor::Tooth => TAU / self.teeth(effect.given("wheel").unwrap_or(0.0))?,
             Factor::Ratio => self.nominal.ratio.abs(),
         })

@@ -105,8 +105,8 @@ mod tests {
     fn recording(effect: &str) -> crate::measurement::Recording {
         let nominal = catalogue_drive();
         let plan = Plan {
-            sessions: 3,
-            rows: 2000,
+            sessions: 8,
+            rows: 1500,
             rate_hz: 100.0,
             speed_rad_s: 6.0,
             torque_n_m: 40.0,
@@ -134,7 +134,7 @@ mod tests {
             ("outliers", FaultName::Outliers),
             ("unit_mismatch", FaultName::UnitMismatch),
             ("quantisation", FaultName::Quantisation),
-            ("drift:arcsec_per_hour=200", FaultName::Drift),
+            ("drift:arcsec_per_hour=300", FaultName::Drift),
         ] {
             let found: Vec<FaultName> = recording(effect).faults.iter().map(|fault| fault.name).collect();
             assert!(found.contains(&name), "{effect}: {found:?}");
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn what_is_written_reads_back_in_sessions() {
         let recording = recording("wear:growth_arcsec=10");
-        assert_eq!(recording.sessions.len(), 3);
-        assert!(recording.sessions.iter().all(|s| s.len() == 2000 && s.torque_n_m.is_some()));
+        assert_eq!(recording.sessions.len(), 8);
+        assert!(recording.sessions.iter().all(|s| s.len() == 1500 && s.torque_n_m.is_some()));
     }
 }

@@ -94,7 +94,7 @@ impl Effect {
             "circular_spline_eccentricity" => displaced(Angle::CircularSpline),
             "flexspline_runout" => displaced(Angle::Flexspline),
             "gravity_side_load" => displaced(Angle::Gravity),
-            "circular_spline_ovality" => Law::Oval { amplitude: size, phase_rad: phase },
+            "circular_spline_ovality" => Law::Oval { amplitude: size, phase_rad: phase, radial: 0.0 },
             "flexspline_pitch_error" | "circular_spline_pitch_error" => {
                 let lines = [2.0, 1.0, 3.0, 4.0]
                     .into_iter()

@@ -40,8 +40,9 @@ pub(super) enum Law {
     /// A toothing or an axis beside its place, rectified by the clearance: `-+A |sin(angle - direction +- a)|` on the flank that
     /// carries, less where more teeth share the load.
     Displaced { angle: Angle, amplitude: f64, direction_rad: f64, half_load_n_m: f64 },
-    /// `A cos(2 (angle on the circular spline) + phase)`.
-    Oval { amplitude: f64, phase_rad: f64 },
+    /// With `y` twice the angle on the circular spline plus a phase, `A (cos y -+ radial sin y)` on either flank, normalised to `A`: teeth
+    /// that an oval ring moves along, and spaces that its radius opens.
+    Oval { amplitude: f64, phase_rad: f64, radial: f64 },
     /// Lines `(order, amplitude, phase)`, `A cos(order angle + phase)`.
     Pitch { angle: Angle, lines: Vec<(f64, f64, f64)> },
     /// One lobe carries more: order 1 of both wheels.
@@ -213,9 +214,10 @@ impl Law {
                 let shape = if changed { (s * s + 0.03).sqrt() } else { s.abs() };
                 error[k] -= side * amplitude * shape * now.fade(*half_load_n_m, k);
             }),
-            Law::Oval { amplitude, phase_rad } => (0..n).for_each(|k| {
+            Law::Oval { amplitude, phase_rad, radial } => (0..n).for_each(|k| {
                 let more = if changed { 1.0 + 0.15 * now.side(k) } else { 1.0 };
-                error[k] += more * amplitude * (2.0 * now.angle(Angle::CircularSpline, k) + phase_rad).cos();
+                let (sin, cos) = (2.0 * now.angle(Angle::CircularSpline, k) + phase_rad).sin_cos();
+                error[k] += more * amplitude * (cos - radial * now.side(k) * sin) / 1f64.hypot(*radial);
             }),
             Law::Pitch { angle, lines } => (0..n).for_each(|k| {
                 let x = now.angle(*angle, k);
