@@ -12,9 +12,9 @@ use crate::measurement::Session;
 use crate::nominal::{Fixed, Nominal};
 use crate::tables::{ARCSEC_PER_RAD, MadeTable, Source, TableError, from_plan};
 
-/// Positions over a whole turn of the output. A prime, so that neither the teeth nor the turns of the generator fold onto one
-/// another.
-const POSITIONS: usize = 1009;
+/// Positions over a whole turn of the output. A prime, on which no order of the teeth (17860 times 1 to 4), of the generator (95), of the
+/// generator against the output (94) or of the output folds onto another.
+const POSITIONS: usize = 509;
 /// Positions that a session runs through before those that are sampled: the play comes to rest.
 const BEFORE: usize = 40;
 /// Positions of the tooth pitch in a table.
@@ -122,7 +122,7 @@ impl ExtendedTables<'_> {
         let torques = torque_nodes(friction, largest.max(3.0 * friction));
         let [low, high] = self.temperatures_c;
         let temperatures = if high - low > ONE_TEMPERATURE_K {
-            vec![low as f32, f64::midpoint(low, high) as f32, high as f32]
+            vec![low as f32, high as f32]
         } else {
             vec![f64::midpoint(low, high) as f32]
         };
@@ -250,6 +250,19 @@ mod tests {
             let jump = nodes.len() / 2;
             assert!(width(jump + 1) > 8.0 * width(jump) && width(jump - 1) > 8.0 * width(jump), "{nodes:?}");
         }
+    }
+
+    #[test]
+    fn no_order_folds_onto_another() {
+        let folded = |per_output_turn: i64| {
+            let rest = per_output_turn.rem_euclid(POSITIONS as i64);
+            rest.min(POSITIONS as i64 - rest)
+        };
+        let orders = ORDERS.iter().flat_map(|k| [95 * i64::from(*k), 94 * i64::from(*k)]);
+        let mut all: Vec<i64> =
+            orders.chain([1, 2]).chain((1..=4).map(|k| 17860 * k)).map(folded).chain([0]).collect();
+        all.sort_unstable();
+        assert!(all.windows(2).all(|pair| pair[0] < pair[1]), "{all:?}");
     }
 
     #[test]

@@ -83,7 +83,7 @@ pub fn measure(
         .collect();
     let torque = plant.flank_torque(&on, &unbalanced);
     let laws: Vec<Law> = effects.iter().map(|effect| effect.law(&plant, &torque, changed, random)).collect();
-    let mut error = plant.error(&on, &torque, &laws, &unit, changed);
+    let mut error = plant.error(&on, &torque, &laws, &unit, (changed, changed));
     plant.add_laws(&on, &torque, &laws, changed, &mut error);
     add_noise(&on, sensors, &mut error, random);
     error.iter_mut().for_each(|e| *e = (*e / STEP_ARCSEC).round() * STEP_ARCSEC);
@@ -153,7 +153,7 @@ pub fn added_arcsec(plant: &Plant<'_>, sizes: Sizes, chosen: &[Chosen], on: &Exc
     let unit = Unit::nominal(plant.nominal);
     let error = |laws: &[Law]| {
         let torque = plant.flank_torque(on, laws);
-        let mut error = plant.error(on, &torque, laws, &unit, false);
+        let mut error = plant.error(on, &torque, laws, &unit, (false, true));
         plant.add_laws(on, &torque, laws, false, &mut error);
         error
     };
@@ -179,7 +179,7 @@ pub fn synthesize(
     let mut laws: Vec<Law> = effects.iter().filter_map(|effect| effect.law(&setting)).collect();
     laws.sort_by_key(Law::stage);
     let torque = plant.flank_torque(on, &laws);
-    let mut error = plant.error(on, &torque, &laws, &unit, false);
+    let mut error = plant.error(on, &torque, &laws, &unit, (false, true));
     plant.add_laws(on, &torque, &laws, false, &mut error);
     add_noise(on, sensors, &mut error, random);
     // The encoder counts the output angle, not the error.

@@ -72,7 +72,8 @@ impl Plant<'_> {
         torque
     }
 
-    /// Error without sensors and before `laws` have added to it, arcsec.
+    /// Error without sensors and before `laws` have added to it, arcsec. Below the friction of a model the output stands until the
+    /// generator has used up the clearance and pushes it; or, if not `pushed`, its error stands.
     pub(super) fn error(&self, on: &Excitation, torque: &[f64], laws: &[Law], unit: &Unit, changed: bool) -> Vec<f64> {
         let n = on.time.len();
         let nominal_half = 0.5 * self.nominal.backlash_arcsec;
@@ -93,7 +94,7 @@ impl Plant<'_> {
                 last = x;
                 if torque[k].abs() > friction {
                     side = half[k] * torque[k].signum();
-                } else if changed {
+                } else if pushed {
                     side = f64::clamp(side - moved, -half[k], half[k]);
                 } else {
                     side = f64::clamp(side, -half[k], half[k]);
