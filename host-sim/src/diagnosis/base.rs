@@ -123,6 +123,8 @@ pub struct Base {
 pub(super) const FREE: f64 = 1e4;
 /// A play law that leaves this much less (relative) than the first is taken instead.
 const CLEARLY_BETTER: f64 = 0.995;
+/// The same for a law that leaves the flank in doubt far beyond friction.
+const FAR_BETTER: f64 = 0.8;
 /// Rows are uncertain where the torque is below this multiple of friction.
 pub(super) const NEAR_FRICTION: f64 = 1.25;
 /// A clearance is crossed within this time, s.
@@ -153,7 +155,9 @@ impl Base {
             let left: Vec<f64> =
                 (0..rows.len()).map(|k| rows.error[k] - harmonics[k] - wind_up[k] - half_backlash * flank[k]).collect();
             let spread = middle_spread(rows, &left, nominal.friction_torque_n_m);
-            if best.as_ref().is_none_or(|(least, _, _)| spread < CLEARLY_BETTER * least) {
+            // A cause not yet known may look like a clearance that is not crossed at once.
+            let needed = if law == PlayLaw::Smooth { FAR_BETTER } else { CLEARLY_BETTER };
+            if best.as_ref().is_none_or(|(least, _, _)| spread < needed * least) {
                 best = Some((spread, law, flank));
             }
         }

@@ -7,7 +7,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::{Column, Excitation, Law, Lead, Named, Shape, by_row, main, nuisance, polar};
+use super::{Column, Excitation, Kin, Law, Lead, Named, Shape, by_row, main, nuisance, polar};
 
 /// Share by which a law of shape may be wrong: signatures depend on generator and load (PHYSICS §3.4).
 const SHAPE_MISFIT: f64 = 0.2;
@@ -169,22 +169,43 @@ fn pitch(cause: &'static str, of: Angle) -> Law {
         }
         columns.push(nuisance(by_row(on, flank), 0.3));
         columns.push(nuisance(by_row(on, |k| flank(k) * light(k)), 0.3));
+        columns.extend(waves(on, of, 2.0, |k| flank(k) * light(k)).map(|v| nuisance(v, 0.2)));
         if on.scales.load > 0.0 {
             columns.extend(waves(on, of, 2.0, |k| on.rows.torque[k].abs() / on.scales.load).map(|v| nuisance(v, 0.1)));
         }
         columns
     })
-    .parameters(|on, _, c| {
-        let (amplitude, phase) = polar(c[0], c[1]);
-        vec![
-            ("amplitude_um", amplitude / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", amplitude),
-            ("harmonic", 2.0),
-            ("phase_rad", 0.5 * phase),
-        ]
-    });
+    .parameters(pitch_parameters);
     law.free_form = true;
     law
+}
+
+/// The same of a wheel whose error is one smooth wave, as of a cutter or a clamping that is off: order 2 with a little of 1 and 4.
+fn smooth_pitch(cause: &'static str, of: Angle) -> Law {
+    Law::new(cause, move |on, _| {
+        let flank = |k: usize| on.base.flank[k];
+        let light = |k: usize| if on.scales.load > 0.0 { fading(on, 0.3 * on.scales.load, k) } else { 1.0 };
+        let mut columns: Vec<Column> = Vec::new();
+        columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC)));
+        columns.extend(waves(on, of, 4.0, |_| 1.0).map(|v| nuisance(v, 0.25)));
+        columns.extend(waves(on, of, 1.0, light).map(|v| nuisance(v, 0.2)));
+        // The clearance makes even orders of the first one, of other phase on each flank (PHYSICS §1.3).
+        columns.extend(waves(on, of, 2.0, |k| flank(k) * light(k)).map(|v| nuisance(v, 0.25)));
+        columns.extend(waves(on, of, 2.0, light).map(|v| nuisance(v, 0.1)));
+        columns.push(nuisance(by_row(on, |k| flank(k) * light(k)), 0.3));
+        columns
+    })
+    .parameters(pitch_parameters)
+}
+
+fn pitch_parameters(on: &Excitation<'_>, _: &[f64], c: &[f64]) -> Vec<Named> {
+    let (amplitude, phase) = polar(c[0], c[1]);
+    vec![
+        ("amplitude_um", amplitude / on.scales.arcsec_per_um),
+        ("amplitude_arcsec", amplitude),
+        ("harmonic", 2.0),
+        ("phase_rad", 0.5 * phase),
+    ]
 }
 
 /// Ring pressed to an oval: order 2 alone. Radius `d cos 2x` with the tangential part `-d/2 sin 2x` of a ring that keeps its length: a flank
@@ -338,6 +359,8 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         ovality(),
         pitch("flexspline_pitch_error", Angle::Flexspline),
         pitch("circular_spline_pitch_error", Angle::CircularSpline),
+        smooth_pitch("flexspline_pitch_error", Angle::Flexspline),
+        smooth_pitch("circular_spline_pitch_error", Angle::CircularSpline),
         generator_eccentricity(on),
         cam_form_error(),
         damaged_tooth(Angle::Flexspline),
@@ -348,6 +371,9 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     }
     for law in &mut laws {
         law.misfit = SHAPE_MISFIT;
+        law.kin = Kin::Shape;
+        // The clearance that the deeper lobe takes is more than its waves.
+        law.most_nuisance = if law.cause == "generator_eccentricity" { 6.0 } else { 0.9 };
     }
     laws
 }
