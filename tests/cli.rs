@@ -73,6 +73,7 @@ fn a_run_writes_the_columns_and_fields_that_others_rely_on() {
     }
     assert_eq!(summary["schema_version"], 1);
     assert_eq!(summary["generator"], "cam");
+    assert_eq!(summary["solver"], "fast", "the solver that ran");
     assert_eq!(summary["torque_n_m"], Value::Null, "the load changes along this path");
     assert!(summary["degrees_of_freedom"].as_u64().unwrap() > 30_000);
     let worst = rows.iter().map(|row| row[7]).fold(0.0, f64::max);

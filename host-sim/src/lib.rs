@@ -11,6 +11,7 @@ pub mod element;
 pub mod export;
 pub mod extension;
 pub mod fem;
+pub mod kernels;
 pub mod material;
 pub mod measurement;
 pub mod mesh;

@@ -4,12 +4,14 @@
 //! errors arc-seconds at the output, torque N·m, positive where it turns the output forward.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use flexspline::{FixedMember, GeneratorAngle, PlayState, Table};
 use serde::Deserialize;
 use toml::Spanned;
 
 use crate::drive::{DriveError, Problem};
+use crate::kernels::Kernels;
 use crate::tables::ARCSEC_PER_RAD;
 
 /// Which wheel does not turn.
@@ -74,6 +76,8 @@ pub struct Nominal {
     pub harmonics: Vec<Harmonic>,
     /// Spread between units.
     pub spread: Spread,
+    /// What deviations of its geometry do, where the contact FEM has computed it.
+    pub kernels: Option<Arc<Kernels>>,
 }
 
 impl Nominal {
@@ -145,6 +149,7 @@ impl Nominal {
             temperature_c: f64::from(temperature),
             harmonics: Vec::new(),
             spread: USUAL_SPREAD,
+            kernels: None,
         }
     }
 
@@ -309,6 +314,7 @@ impl FileForm {
             temperature_c: optional(&form.temperature_c, "nominal.temperature_c", [-273.0, 500.0], 20.0, refuse),
             harmonics,
             spread,
+            kernels: None,
         })
     }
 }

@@ -7,6 +7,7 @@ mod context;
 mod diagnose;
 mod drive;
 mod export;
+mod kernels;
 mod replay;
 mod report;
 mod simulate;
@@ -81,6 +82,7 @@ enum Command {
     Drive(drive::DriveCommand),
     Export(export::Export),
     Tables(tables::Tables),
+    Kernels(kernels::KernelsCommand),
     Validate(validate::Validate),
     Replay(replay::Replay),
     Synthesize(synthesize::Synthesize),
@@ -145,6 +147,7 @@ impl Command {
             Command::Drive(command) => command.run(context),
             Command::Export(command) => command.run(context),
             Command::Tables(command) => command.run(context),
+            Command::Kernels(command) => command.run(context),
             Command::Validate(command) => command.run(context),
             Command::Replay(command) => command.run(context),
             Command::Synthesize(command) => command.run(context),

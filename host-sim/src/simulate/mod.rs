@@ -584,7 +584,7 @@ impl<'a> Run<'a> {
             generator: settings.generator.to_string(),
             path: settings.path.to_string(),
             mesh: settings.solver.mesh.to_string(),
-            solver: "reference",
+            solver: settings.solver.method.to_string(),
             flank_penalty_n_per_mm3: settings.solver.flank_penalty,
             bore_penalty_n_per_mm3: settings.solver.bore_penalty(settings.generator),
             degrees_of_freedom: self.degrees_of_freedom,

@@ -44,7 +44,7 @@ pub struct Summary {
     /// Mesh level.
     pub mesh: String,
     /// Solver.
-    pub solver: &'static str,
+    pub solver: String,
     /// Contact penalty on the flanks, N/mm³.
     pub flank_penalty_n_per_mm3: f64,
     /// Contact penalty on the bore, N/mm³.

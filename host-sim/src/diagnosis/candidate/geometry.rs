@@ -16,18 +16,18 @@ const SHAPE_MISFIT: f64 = 0.2;
 const USUAL_ARCSEC: f64 = 20.0;
 
 /// Cosine of the pressure angle of a working flank, 20 to 25 degrees (PHYSICS §3.1).
-const COS_PRESSURE_ANGLE: f64 = 0.93;
+pub(super) const COS_PRESSURE_ANGLE: f64 = 0.93;
 
 /// Which angle an error is locked to.
 #[derive(Clone, Copy, PartialEq)]
-enum Angle {
+pub(super) enum Angle {
     Flexspline,
     CircularSpline,
     /// Gravity as the wave sees it, orientation counted with this sign.
     Gravity(f64),
 }
 
-fn angle(on: &Excitation<'_>, of: Angle, k: usize) -> f64 {
+pub(super) fn angle(on: &Excitation<'_>, of: Angle, k: usize) -> f64 {
     match of {
         Angle::Flexspline => on.rows.on_flexspline[k],
         Angle::CircularSpline => on.rows.on_circular_spline[k],

@@ -8,6 +8,7 @@
 mod dynamic;
 mod generic;
 mod geometry;
+mod kernel;
 mod sensor;
 mod stiffness;
 mod thermal;
@@ -320,6 +321,11 @@ pub fn library(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = Vec::new();
     if on.nominal.teeth.is_some() {
         laws.extend(geometry::laws(on));
+        if let Some(kernels) = &on.nominal.kernels {
+            let known = kernel::laws(on, kernels);
+            laws.retain(|law| known.iter().all(|k| k.cause != law.cause));
+            laws.extend(known);
+        }
     }
     laws.extend(stiffness::laws(on));
     laws.extend(thermal::laws(on));

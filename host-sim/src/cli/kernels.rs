@@ -1,0 +1,110 @@
+//! `flexspline kernels`: what a deviation of any tooth, of the generator or of an axis does to the output.
+
+use std::ops::ControlFlow;
+use std::sync::Mutex;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::context::Context;
+use super::{Failure, tables::generators};
+use crate::drive::Wheel;
+use crate::kernels::{KernelError, KernelPlan, make};
+use crate::mesh::MeshLevel;
+use crate::output::write_json;
+use crate::stepping::{Method, SolverSettings};
+
+/// Compute influence kernels: what a deviation of a tooth, of the generator or of an axis does to the output
+///
+/// From contact FEM of the drive without deviations, for each generator: the response to a micrometre on any flexspline tooth, any
+/// circular-spline space, any place of the generator, under loads up to the rated one (from the change of the contact forces with
+/// the load), and to a circular spline that stands beside the axis (from FEM of such drives). Written is <G>.kernels.json, which
+/// `diagnose --tables` takes for the signatures of geometric causes where it stands beside the table.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  flexspline kernels --generator cam
+  flexspline kernels --drive my-drive.toml --mesh coarse --out tables")]
+pub(super) struct KernelsCommand {
+    /// Generator, or all
+    #[arg(short, long, value_name = "G", default_value = "all")]
+    generator: String,
+    /// Mesh: coarse, standard or fine
+    #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = str::parse::<MeshLevel>)]
+    mesh: MeshLevel,
+    /// Solver: reference or fast
+    #[arg(long, value_name = "SOLVER", default_value = "fast", value_parser = str::parse::<Method>)]
+    solver: Method,
+}
+
+/// What the command says of one generator.
+#[derive(Serialize)]
+struct Told {
+    generator: String,
+    file: String,
+    /// Response to a second harmonic of the pitch of either wheel at the lightest and the heaviest load, arcsec per µm.
+    second_harmonic_arcsec_per_um: [[f64; 2]; 2],
+    /// p-p response to an eccentricity of the first size at the lightest and the heaviest load, arcsec.
+    eccentricity_pp_arcsec: [f64; 2],
+    eccentricity_um: f64,
+    torque_n_m: [f64; 2],
+}
+
+impl KernelsCommand {
+    pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
+        let drive = context.drive()?;
+        let kinds = generators(&self.generator)?;
+        let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
+        let out = context.out()?;
+        let progress = Mutex::new(context.progress("kernels"));
+        let interrupted = context.watch_interrupt();
+        let mut told = Vec::new();
+        for kind in kinds {
+            let plan = KernelPlan::for_generator(kind);
+            let steps = plan.steps();
+            let kernels = make(&drive, kind, &plan, settings, &|done| {
+                if let Ok(mut bar) = progress.lock() {
+                    bar.set(done, steps, &kind.to_string());
+                }
+                if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })
+            .map_err(|error| match error {
+                KernelError::NotIdeal { .. } => Failure::BadInput(error.to_string()),
+                KernelError::Stopped => Failure::Failed("stopped; nothing was written".into()),
+                KernelError::Solve(_) => Failure::Failed(format!("{kind}: {error}")),
+            })?;
+            let path = out.join(format!("{kind}.kernels.json"));
+            write_json(&path, &kernels)?;
+            let ends = [plan.torques_n_m[0], plan.torques_n_m[plan.torques_n_m.len() - 1]];
+            let size = |g: [f64; 2]| g[0].hypot(g[1]);
+            let swing = |torque: f64| {
+                let around =
+                    (0..180).map(|d| kernels.eccentricity(plan.sizes_um[0], f64::from(d).to_radians(), torque));
+                let (low, high) = around.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), e| (l.min(e), h.max(e)));
+                high - low
+            };
+            told.push(Told {
+                generator: kind.to_string(),
+                file: path.display().to_string(),
+                second_harmonic_arcsec_per_um: [Wheel::Flexspline, Wheel::CircularSpline]
+                    .map(|wheel| ends.map(|torque| size(kernels.pitch_error(wheel, 2, torque)))),
+                eccentricity_pp_arcsec: ends.map(swing),
+                eccentricity_um: plan.sizes_um[0],
+                torque_n_m: ends,
+            });
+        }
+        drop(progress);
+        context.print(&told, || told.iter().map(text).collect::<Vec<_>>().join("\n"))
+    }
+}
+
+fn text(told: &Told) -> String {
+    let [light, heavy] = told.torque_n_m;
+    let [fs, cs] = told.second_harmonic_arcsec_per_um;
+    let [at_light, at_heavy] = told.eccentricity_pp_arcsec;
+    format!(
+        "{}: arcsec of error at {light} and {heavy} N.m\n  1 um second harmonic of the flexspline's pitch: {:.2}, {:.2}; of the circular \
+         spline's: {:.2}, {:.2}\n  circular spline {} um beside the axis: {at_light:.1}, {at_heavy:.1} p-p\nwrote {}",
+        told.generator, fs[0], fs[1], cs[0], cs[1], told.eccentricity_um, told.file
+    )
+}
