@@ -9,6 +9,7 @@ pub mod diagnosis;
 pub mod drive;
 pub mod element;
 pub mod export;
+pub mod extension;
 pub mod fem;
 pub mod kernels;
 pub mod material;

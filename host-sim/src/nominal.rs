@@ -184,6 +184,9 @@ impl Nominal {
 struct FileForm {
     drive: DriveForm,
     nominal: NominalForm,
+    /// Causes beside the nominal model, which [`crate::extension::Model`] reads.
+    #[serde(default, rename = "extension")]
+    _extension: serde::de::IgnoredAny,
 }
 
 #[derive(Deserialize)]

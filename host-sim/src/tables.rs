@@ -223,7 +223,8 @@ pub fn from_sweep(
         wall_s,
     };
     let core_plan = fem_plan(drive, plan)?;
-    let mut made = make(drive, sweep.kind, &core_plan, &sweep.samples, source, &mesh, sweep.worst_residual)?;
+    let mut made =
+        make((&drive.name, drive.hash()), sweep.kind, &core_plan, &sweep.samples, source, &mesh, sweep.worst_residual)?;
     if sweep.places > 0 {
         let table = Table::check(&made.image).map_err(|e| TableError::Project(e.into()))?;
         made.info.turns = Some(turns_info(drive, plan, sweep, &table));
@@ -266,7 +267,7 @@ pub(crate) fn trial_table(
         ..fem_plan(drive, plan)?
     };
     let source = Source::File { name: String::new(), blake3: String::new() };
-    make(drive, kind, &core_plan, &samples, source, "trial", 0.0).map(|table| table.image)
+    make((&drive.name, drive.hash()), kind, &core_plan, &samples, source, "trial", 0.0).map(|table| table.image)
 }
 
 /// What a table of FEM samples is projected with.
@@ -333,11 +334,23 @@ pub fn from_samples(
         deviation_limit_rad: options.deviation_limit_rad,
     };
     let source = Source::File { name: name.to_owned(), blake3: blake3::hash(bytes).to_hex().to_string() };
-    make(drive, kind, &plan, &snapped, source, "samples", 0.0)
+    make((&drive.name, drive.hash()), kind, &plan, &snapped, source, "samples", 0.0)
+}
+
+/// The table of samples laid out by a plan, of a drive that is known by its name and hash alone.
+pub(crate) fn from_plan(
+    name: &str,
+    hash: [u8; 32],
+    kind: GeneratorKind,
+    plan: &Plan<'_>,
+    samples: &[Sample],
+    source: Source,
+) -> Result<MadeTable, TableError> {
+    make((name, hash), kind, plan, samples, source, "samples", 0.0)
 }
 
 fn make(
-    drive: &Drive,
+    (name, hash): (&str, [u8; 32]),
     kind: GeneratorKind,
     plan: &Plan<'_>,
     samples: &[Sample],
@@ -355,7 +368,7 @@ fn make(
         samples.iter().map(|s| (s.output_rad - s.generator_rad / plan.drive.exact_ratio()).abs()).fold(0.0, f64::max);
     let provenance = Provenance {
         generator_kind: core_kind(kind),
-        drive_hash: drive.hash(),
+        drive_hash: hash,
         tool_version: concat!("flexspline ", env!("CARGO_PKG_VERSION")),
         mesh_level: mesh,
         solver_residual: residual as f32,
@@ -393,8 +406,8 @@ fn make(
         status: "made",
         table_id: table.id().to_string(),
         generator: kind.to_string(),
-        drive: drive.name.clone(),
-        drive_blake3: blake3::Hash::from(drive.hash()).to_hex().to_string(),
+        drive: name.to_owned(),
+        drive_blake3: blake3::Hash::from(hash).to_hex().to_string(),
         tool: provenance.tool_version.to_owned(),
         source,
         image_bytes: fit.image_bytes,

@@ -69,6 +69,15 @@ impl Context {
             .map_err(|error| Failure::BadInput(error.to_string()))
     }
 
+    /// Name and text of the file of `--drive`; nothing for a built-in drive.
+    pub(super) fn drive_file(&self) -> Option<(&str, String)> {
+        let name = self.common.drive.as_str();
+        if Drive::built_in(name).is_some() {
+            return None;
+        }
+        std::fs::read_to_string(name).ok().map(|text| (name, text))
+    }
+
     /// The output folder, which can be written to.
     pub(super) fn out(&self) -> Result<&Path, Failure> {
         let out = self.common.out.as_path();

@@ -11,6 +11,7 @@ mod kernels;
 mod replay;
 mod report;
 mod simulate;
+mod synthesize;
 mod tables;
 mod validate;
 
@@ -84,6 +85,7 @@ enum Command {
     Kernels(kernels::KernelsCommand),
     Validate(validate::Validate),
     Replay(replay::Replay),
+    Synthesize(synthesize::Synthesize),
     Diagnose(diagnose::Diagnose),
 }
 
@@ -148,6 +150,7 @@ impl Command {
             Command::Kernels(command) => command.run(context),
             Command::Validate(command) => command.run(context),
             Command::Replay(command) => command.run(context),
+            Command::Synthesize(command) => command.run(context),
             Command::Diagnose(command) => command.run(context),
         }
     }

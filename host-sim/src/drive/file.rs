@@ -322,7 +322,8 @@ impl<'a> Reader<'a> {
         };
         for (key, value) in table {
             let section = key.get_ref().as_ref();
-            if section == "base" || section == "name" {
+            // What a diagnosis found that no field holds stands in [extension], which `crate::extension` reads.
+            if ["base", "name", "extension"].contains(&section) {
                 continue;
             }
             if !sections().any(|known| known == section) {

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::measurement::Session;
+
 /// How much the data can tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Richness {
@@ -52,6 +54,57 @@ pub struct Excitation {
     /// Orientation, rad.
     pub orientation: Vec<f64>,
 }
+
+impl Excitation {
+    /// Generator speed in each row, rad/s.
+    pub(super) fn speeds(&self) -> Vec<f64> {
+        let mut speeds = vec![0.0; self.time.len()];
+        for session in &self.sessions {
+            for k in session.clone() {
+                let (a, b) = (k.max(session.start + 1) - 1, (k + 1).min(session.end - 1));
+                let dt = self.time[b] - self.time[a];
+                speeds[k] = if dt > 0.0 { (self.generator[b] - self.generator[a]) / dt } else { 0.0 };
+            }
+        }
+        speeds
+    }
+
+    /// That of measured sessions. What was not recorded is taken as rows `1 / rate_hz` apart, no load, the nominal temperature and
+    /// no turn against gravity.
+    #[must_use]
+    pub fn of_sessions(sessions: &[Session], rate_hz: f64, temperature_c: f64) -> Excitation {
+        let mut all = Excitation::default();
+        for session in sessions.iter().filter(|session| session.len() > 1) {
+            let (from, n) = (all.time.len(), session.len());
+            let or = |column: &Option<Vec<f64>>, usual: f64| column.clone().unwrap_or_else(|| vec![usual; n]);
+            match &session.time_s {
+                Some(time) => all.time.extend(time),
+                None => {
+                    // A session begins a while after the one before.
+                    let begin = all.time.last().map_or(0.0, |last| last + 100.0 / rate_hz);
+                    all.time.extend((0..n).map(|k| begin + k as f64 / rate_hz));
+                }
+            }
+            all.generator.extend(&session.generator_rad);
+            all.torque.extend(or(&session.torque_n_m, 0.0));
+            all.temperature.extend(or(&session.temperature_c, temperature_c));
+            all.orientation.extend(or(&session.orientation_rad, 0.0));
+            all.sessions.push(from..from + n);
+        }
+        all
+    }
+
+    /// Stretches the temperatures of a made-up run onto a range, °C.
+    pub fn within_temperatures(&mut self, [low, high]: [f64; 2]) {
+        let [from, to] = MADE_UP_C;
+        for t in &mut self.temperature {
+            *t = (low + (*t - from) / (to - from) * (high - low)).clamp(low, high);
+        }
+    }
+}
+
+/// Temperatures of a made-up run, °C.
+const MADE_UP_C: [f64; 2] = [-43.0, 63.0];
 
 impl Plan {
     /// Makes up a run.

@@ -1,18 +1,35 @@
 //! Made-up measurements of a drive with known effects: for tests of the diagnosis and for the command `synthesize`.
 //!
 //! The plant here shares no law with the candidates of the diagnosis: each effect comes in two forms of its own (the second with a
-//! changed law), at a finer step where it has a state, under sensors with white noise and a wander of another kind than the one
-//! the diagnosis assumes.
+//! changed law, for tests), at a finer step where it has a state, under sensors with white noise and a wander of another kind than
+//! the one the diagnosis assumes.
+//!
+//! * [`effects`]: the effects by name, their parameters with units, ranges and defaults; [`parse`] reads
+//!   `NAME:param=value,...`.
+//! * [`Plant`]: nominal drive (a table made by FEM, or a catalogue's model) and the [`Unit`] measured.
+//! * [`Excitation`]: how it is driven, made up by a [`Plan`] or taken from measured sessions.
+//! * [`synthesize`]: all of it to sessions, and what is true of them.
 
+mod catalogue;
+mod data_fault;
 mod effect;
 mod excitation;
+mod law;
+mod plant;
 
+pub use catalogue::{Chosen, Definition, Parameter, Usual, effects, parse};
+pub use data_fault::to_csv;
 pub use effect::{CAUSES, Effect, STRANGE};
 pub use excitation::{Excitation, Plan, Richness};
+pub use plant::{Plant, Unit};
+
+use catalogue::Setting;
+use law::Law;
 
 use crate::measurement::Session;
 use crate::nominal::Nominal;
 use crate::tables::ARCSEC_PER_RAD;
+use plant::gauss;
 
 /// How noisy the sensors are.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +41,13 @@ pub struct Sensors {
     /// Time scale of the wander, s.
     pub wander_s: f64,
 }
+
+/// Resolution of the output encoder where [`measure`] makes data, arcsec.
+const STEP_ARCSEC: f64 = 0.3;
+
+/// White noise of the torque sensor, of the largest torque, and of the thermometer, K.
+const TORQUE_NOISE: f64 = 5e-4;
+const TEMPERATURE_NOISE_K: f64 = 0.02;
 
 /// A catalogue drive to hide effects in.
 #[must_use]
@@ -48,80 +72,128 @@ pub fn measure(
     law: u8,
     random: &mut fastrand::Rng,
 ) -> Vec<Session> {
-    let excitation = plan.excite(random);
-    let gauss = |random: &mut fastrand::Rng| {
-        let (u, v) = (random.f64().max(1e-12), random.f64());
-        (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
-    };
-    let limited = |random: &mut fastrand::Rng| gauss(random).clamp(-2.5, 2.5);
-    let spread = nominal.spread;
-    let stiffness = 1.0 + spread.stiffness * limited(random);
-    let backlash = 1.0 + spread.backlash * limited(random);
-    let harmonics: Vec<(f64, f64)> = nominal
-        .harmonics
+    let changed = law == 1;
+    let plant = Plant { nominal, table: None };
+    let on = plan.excite(random);
+    let unit = Unit::draw(nominal, random);
+    let unbalanced: Vec<Law> = effects
         .iter()
-        .map(|_| (1.0 + spread.harmonic * limited(random), spread.harmonic * 0.5 * limited(random)))
+        .filter(|effect| effect.name == "gravity_torque")
+        .map(|effect| effect.law(&plant, &on.torque, changed, random))
         .collect();
-    let zero = 200.0 * (random.f64() - 0.5);
-    let n = excitation.time.len();
-    let mut error = vec![0.0; n];
-    // Torque on the flanks, with what the torque column does not hold.
-    let mut torque = excitation.torque.clone();
-    for effect in effects {
-        effect.add_torque(nominal, &excitation, &mut torque);
-    }
-    let half = effect::half_backlash(nominal, &excitation, effects, backlash, law);
-    for session in &excitation.sessions {
-        let mut side = 0.0;
-        let mut last = 0.0;
-        for k in session.clone() {
-            let psi = excitation.generator[k];
-            let x = psi / nominal.ratio * ARCSEC_PER_RAD;
-            let moved = if k > session.start { x - last } else { 0.0 };
-            last = x;
-            if torque[k].abs() > nominal.friction_torque_n_m {
-                side = half[k] * torque[k].signum();
-            } else if law == 0 {
-                side = f64::clamp(side, -half[k], half[k]);
-            } else {
-                side = f64::clamp(side - moved, -half[k], half[k]);
-            }
-            let kinematic: f64 = nominal
-                .harmonics
-                .iter()
-                .zip(&harmonics)
-                .map(|(h, (a, shift))| {
-                    a * h.amplitude_arcsec * (h.order_per_generator_turn * psi + h.phase_rad + shift).sin()
-                })
-                .sum();
-            error[k] = zero + kinematic + side + stiffness * nominal.wind_up_arcsec(torque[k]);
-        }
-    }
-    for effect in effects {
-        effect.add_error(nominal, &excitation, &torque, law, &mut error, random);
-    }
-    for session in &excitation.sessions {
-        // Wander: slow sines of random phase and a second-order random walk.
+    let torque = plant.flank_torque(&on, &unbalanced);
+    let laws: Vec<Law> = effects.iter().map(|effect| effect.law(&plant, &torque, changed, random)).collect();
+    let mut error = plant.error(&on, &torque, &laws, &unit, (changed, changed));
+    plant.add_laws(&on, &torque, &laws, changed, &mut error);
+    add_noise(&on, sensors, &mut error, random);
+    error.iter_mut().for_each(|e| *e = (*e / STEP_ARCSEC).round() * STEP_ARCSEC);
+    into_sessions(&on, &error)
+}
+
+/// Adds white noise and wander: slow sines of random phase.
+fn add_noise(on: &Excitation, sensors: &Sensors, error: &mut [f64], random: &mut fastrand::Rng) {
+    for session in &on.sessions {
         let waves: Vec<(f64, f64)> = (0..4)
             .map(|_| (std::f64::consts::TAU / (sensors.wander_s * (1.0 + 5.0 * random.f64())), 6.3 * random.f64()))
             .collect();
         for k in session.clone() {
-            let slow: f64 = waves.iter().map(|(w, p)| (w * excitation.time[k] + p).sin()).sum::<f64>() / 2f64.sqrt();
+            let slow: f64 = waves.iter().map(|(w, p)| (w * on.time[k] + p).sin()).sum::<f64>() / 2f64.sqrt();
             error[k] += sensors.white_arcsec * gauss(random) + sensors.wander_arcsec * slow;
-            error[k] = (error[k] / 0.3).round() * 0.3;
         }
     }
-    excitation
-        .sessions
+}
+
+/// Sessions of an excitation with the error, arcsec.
+fn into_sessions(on: &Excitation, error: &[f64]) -> Vec<Session> {
+    on.sessions
         .iter()
         .map(|s| Session {
             line: s.clone().map(|k| k as u64 + 2).collect(),
-            time_s: Some(excitation.time[s.clone()].to_vec()),
-            generator_rad: excitation.generator[s.clone()].to_vec(),
+            time_s: Some(on.time[s.clone()].to_vec()),
+            generator_rad: on.generator[s.clone()].to_vec(),
             error_rad: error[s.clone()].iter().map(|e| e / ARCSEC_PER_RAD).collect(),
-            torque_n_m: Some(excitation.torque[s.clone()].to_vec()),
-            temperature_c: Some(excitation.temperature[s.clone()].to_vec()),
-            orientation_rad: Some(excitation.orientation[s.clone()].to_vec()),
+            torque_n_m: Some(on.torque[s.clone()].to_vec()),
+            temperature_c: Some(on.temperature[s.clone()].to_vec()),
+            orientation_rad: Some(on.orientation[s.clone()].to_vec()),
         })
         .collect()
+}
+
+/// Size of the drive, where amplitudes are given in micrometres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sizes {
+    /// Radius of the pitch circle, mm: an arc on it turns the output.
+    pub pitch_radius_mm: f64,
+    /// Radius of the base circle, mm: a displacement along the normal of a flank turns the output.
+    pub base_radius_mm: f64,
+}
+
+/// A made-up measurement.
+#[derive(Clone, Debug)]
+pub struct Synthesized {
+    /// Rows, as the sensors read them, data faults not yet in them.
+    pub sessions: Vec<Session>,
+    /// The unit that was measured.
+    pub unit: Unit,
+    /// The effects with the value of every parameter, in the order given.
+    pub effects: Vec<Chosen>,
+}
+
+/// What `chosen` effects add to the error of a nominal drive under an excitation, without sensors, row by row, arcsec. Parameters
+/// that are not given take their default; nothing is drawn.
+///
+/// # Errors
+/// As [`synthesize`].
+pub fn added_arcsec(plant: &Plant<'_>, sizes: Sizes, chosen: &[Chosen], on: &Excitation) -> Result<Vec<f64>, String> {
+    let setting = Setting { nominal: plant.nominal, sizes, on, load_n_m: law::largest(&on.torque) };
+    let mut same = fastrand::Rng::with_seed(0);
+    let effects = chosen.iter().map(|effect| effect.completed(&setting, &mut same)).collect::<Result<Vec<_>, _>>()?;
+    let mut laws: Vec<Law> = effects.iter().filter_map(|effect| effect.law(&setting)).collect();
+    laws.sort_by_key(Law::stage);
+    let unit = Unit::nominal(plant.nominal);
+    let error = |laws: &[Law]| {
+        let torque = plant.flank_torque(on, laws);
+        let mut error = plant.error(on, &torque, laws, &unit, (false, true));
+        plant.add_laws(on, &torque, laws, false, &mut error);
+        error
+    };
+    Ok(error(&laws).iter().zip(error(&[])).map(|(with, without)| with - without).collect())
+}
+
+/// Measures a drive with `chosen` effects: the output encoder as `sensors` say, and a torque sensor and a thermometer with a little
+/// noise. `encoder_bits` is the resolution of the output encoder, bits to a turn.
+///
+/// # Errors
+/// A parameter that does not fit the excitation, such as a time outside it.
+pub fn synthesize(
+    plant: &Plant<'_>,
+    sizes: Sizes,
+    chosen: &[Chosen],
+    on: &Excitation,
+    (sensors, encoder_bits): (&Sensors, u32),
+    unit: Unit,
+    random: &mut fastrand::Rng,
+) -> Result<Synthesized, String> {
+    let setting = Setting { nominal: plant.nominal, sizes, on, load_n_m: law::largest(&on.torque) };
+    let effects = chosen.iter().map(|effect| effect.completed(&setting, random)).collect::<Result<Vec<_>, _>>()?;
+    let mut laws: Vec<Law> = effects.iter().filter_map(|effect| effect.law(&setting)).collect();
+    laws.sort_by_key(Law::stage);
+    let torque = plant.flank_torque(on, &laws);
+    let mut error = plant.error(on, &torque, &laws, &unit, (false, true));
+    plant.add_laws(on, &torque, &laws, false, &mut error);
+    add_noise(on, sensors, &mut error, random);
+    // The encoder counts the output angle, not the error.
+    let step = 1_296_000.0 / 2f64.powi(encoder_bits as i32);
+    for (error, generator) in error.iter_mut().zip(&on.generator) {
+        let nominal = generator / plant.nominal.ratio * ARCSEC_PER_RAD;
+        *error = ((nominal + *error) / step).round() * step - nominal;
+    }
+    let mut sessions = into_sessions(on, &error);
+    // No sensor repeats a value to the last digit, even while what it measures stands.
+    for session in &mut sessions {
+        let load = TORQUE_NOISE * setting.load_n_m;
+        session.torque_n_m.iter_mut().flatten().for_each(|t| *t += load * gauss(random));
+        session.temperature_c.iter_mut().flatten().for_each(|t| *t += TEMPERATURE_NOISE_K * gauss(random));
+    }
+    Ok(Synthesized { sessions, unit, effects })
 }

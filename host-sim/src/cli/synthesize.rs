@@ -1,0 +1,406 @@
+//! `flexspline synthesize`: measured-looking data of a drive with known effects.
+
+use std::fmt::Write as _;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+use clap::Args;
+use flexspline::Table;
+use serde::Serialize;
+
+use super::Failure;
+use super::context::{Context, put};
+use crate::drive::{Drive, GeneratorKind};
+use crate::extension::{self, CauseEntry};
+use crate::measurement::{ColumnMap, Gear, read};
+use crate::mesh::MeshLevel;
+use crate::nominal::{Fixed, Nominal};
+use crate::output::{write_json, write_whole};
+use crate::stepping::SolverSettings;
+use crate::sweep::{SweepError, SweepProgress};
+use crate::synthesize::{
+    Chosen, Excitation, Plan, Plant, Richness, Sensors, Sizes, Unit, Usual, effects, parse, synthesize, to_csv,
+};
+use crate::tables::MadeTable;
+
+/// Make data that look measured: the drive of the simulation, with effects, noise and sensors of your choice
+///
+/// Writes data.csv, which `flexspline diagnose` reads, and truth.json, which says what is in it. The drive is a table made by FEM
+/// (--tables; without one it is made on the coarse mesh first) or a catalogue's model (--model), and a unit drawn from the spread
+/// between units. --list shows every effect with its parameters.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  flexspline synthesize --list
+  flexspline synthesize --effect circular_spline_eccentricity:amplitude_um=8,phase_rad=0.7
+  flexspline synthesize --effect sensor_latency:delay_s=0.001 --effect wear --tables out --generator cam --seed 7
+  flexspline synthesize --effect gravity_torque --model nominal.toml --like measured.csv --out made-up
+  flexspline synthesize --effect encoder_index_jump:size_arcsec=53 --noise-arcsec 1 --sessions 4 --rows 5000
+
+Without --effect the data are those of a drive within its spread, in which nothing is to be found.")]
+pub(super) struct Synthesize {
+    /// An effect, with parameters if wanted; may be repeated
+    #[arg(long = "effect", value_name = "NAME[:param=value,...]", allow_hyphen_values = true)]
+    effects: Vec<String>,
+    /// List the effects with their parameters, units, ranges and defaults
+    #[arg(long)]
+    list: bool,
+    /// Folder of tables made by `flexspline tables`
+    #[arg(long, value_name = "DIR", conflicts_with = "model")]
+    tables: Option<PathBuf>,
+    /// Generator of the drive
+    #[arg(long, value_name = "G", default_value = "cam", value_parser = str::parse::<GeneratorKind>)]
+    generator: GeneratorKind,
+    /// Nominal model from the catalogue, or one that `flexspline diagnose` has extended
+    #[arg(long, value_name = "nominal.toml")]
+    model: Option<PathBuf>,
+    /// The drawing itself, not a unit drawn from the spread between units
+    #[arg(long)]
+    no_spread: bool,
+    /// White noise of the output angle, arcsec
+    #[arg(long, value_name = "ARCSEC", default_value_t = 2.0, allow_negative_numbers = true, help_heading = "Sensors")]
+    noise_arcsec: f64,
+    /// Slow wander of the output angle, arcsec rms
+    #[arg(long, value_name = "ARCSEC", default_value_t = 0.8, allow_negative_numbers = true, help_heading = "Sensors")]
+    wander_arcsec: f64,
+    /// Time scale of the wander, s
+    #[arg(long, value_name = "S", default_value_t = 12.0, allow_negative_numbers = true, help_heading = "Sensors")]
+    wander_s: f64,
+    /// Resolution of the output encoder, bits to a turn
+    #[arg(long, value_name = "N", default_value_t = 22, value_parser = clap::value_parser!(u32).range(10..=40), help_heading = "Sensors")]
+    encoder_bits: u32,
+    /// Sessions
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=100), help_heading = "Excitation")]
+    sessions: u16,
+    /// Rows of each session
+    #[arg(long, value_name = "N", default_value_t = 3000, value_parser = clap::value_parser!(u32).range(50..=1_000_000), help_heading = "Excitation")]
+    rows: u32,
+    /// Rows per second
+    #[arg(
+        long,
+        value_name = "HZ",
+        default_value_t = 100.0,
+        allow_negative_numbers = true,
+        help_heading = "Excitation"
+    )]
+    rate_hz: f64,
+    /// Largest speed of the generator, rad/s
+    #[arg(
+        long,
+        value_name = "RAD/S",
+        default_value_t = 6.0,
+        allow_negative_numbers = true,
+        help_heading = "Excitation"
+    )]
+    speed: f64,
+    /// Largest torque, N.m
+    #[arg(
+        long,
+        value_name = "N.M",
+        default_value_t = 40.0,
+        allow_negative_numbers = true,
+        help_heading = "Excitation"
+    )]
+    torque: f64,
+    /// Temperatures, degrees C
+    #[arg(
+        long,
+        value_name = "LOW,HIGH",
+        default_value = "-20,50",
+        allow_hyphen_values = true,
+        help_heading = "Excitation"
+    )]
+    temperature_c: String,
+    /// Take motion, load, temperature and time from this file instead
+    #[arg(long, value_name = "DATA.csv", help_heading = "Excitation")]
+    like: Option<PathBuf>,
+    /// Names and units of the columns of that file, as for `flexspline diagnose`
+    #[arg(long, value_name = "MAP", default_value = "", requires = "like", help_heading = "Excitation")]
+    columns: String,
+    /// Seed of everything drawn [default: drawn, and said]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+/// What the prediction of the drive comes from.
+#[derive(Debug, Serialize)]
+struct NominalSource {
+    kind: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    table_id: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    generator: Option<String>,
+    drive: String,
+}
+
+/// The unit, as `truth.json` has it.
+#[derive(Debug, Serialize)]
+struct UnitTruth {
+    wind_up_over_nominal: f64,
+    clearance_over_nominal: f64,
+    zero_arcsec: f64,
+}
+
+/// `truth.json`.
+#[derive(Debug, Serialize)]
+struct Truth {
+    schema_version: u32,
+    command: String,
+    seed: u64,
+    effects: Vec<Chosen>,
+    data_faults: Vec<Chosen>,
+    nominal: NominalSource,
+    unit: UnitTruth,
+    noise_arcsec: f64,
+    wander_arcsec: f64,
+    encoder_bits: u32,
+    sessions: usize,
+    rows: usize,
+}
+
+impl Synthesize {
+    pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
+        if self.list {
+            put(&list());
+            return Ok(());
+        }
+        let chosen = self.effects.iter().map(|text| parse(text)).collect::<Result<Vec<_>, _>>();
+        let chosen = chosen.map_err(|what| Failure::BadInput(format!("--effect: {what}")))?;
+        let (sensors, temperatures) = self.check()?;
+        let seed = self.seed.unwrap_or_else(|| fastrand::u64(..1 << 32));
+        let mut random = fastrand::Rng::with_seed(seed);
+        let drive = context.drive()?;
+        let mut known = Vec::new();
+        if let Some((file, text)) = context.drive_file() {
+            known = extension::causes_in(file, &text).map_err(|error| Failure::BadInput(error.to_string()))?;
+        }
+        let (image, nominal, causes, source) = self.nominal(context, &drive)?;
+        known.extend(causes);
+        let table = image
+            .as_deref()
+            .map(|image| Table::check(image).map_err(|error| Failure::Failed(error.to_string())))
+            .transpose()?;
+        let chosen: Vec<Chosen> = known.iter().filter_map(CauseEntry::effect).chain(chosen).collect();
+        let mut on = self.excitation(&nominal, &mut random)?;
+        if self.like.is_none() {
+            on.within_temperatures(temperatures);
+        }
+        let unit = if self.no_spread { Unit::nominal(&nominal) } else { Unit::draw(&nominal, &mut random) };
+        let sizes = Sizes {
+            pitch_radius_mm: drive.circular_spline.pitch_radius_mm(),
+            base_radius_mm: drive.circular_spline.base_radius_mm(),
+        };
+        let plant = Plant { nominal: &nominal, table: table.as_ref() };
+        let made = synthesize(&plant, sizes, &chosen, &on, (&sensors, self.encoder_bits), unit, &mut random)
+            .map_err(|what| Failure::BadInput(format!("--effect: {what}")))?;
+        let csv = to_csv(&made.sessions, nominal.ratio, &made.effects, &mut random);
+        let (data_faults, effects) = made.effects.into_iter().partition(|effect| effect.definition.fault);
+        let truth = Truth {
+            schema_version: 1,
+            command: context.command.clone(),
+            seed,
+            effects,
+            data_faults,
+            nominal: source,
+            unit: UnitTruth {
+                wind_up_over_nominal: made.unit.wind_up,
+                clearance_over_nominal: made.unit.clearance,
+                zero_arcsec: made.unit.zero_arcsec,
+            },
+            noise_arcsec: self.noise_arcsec,
+            wander_arcsec: self.wander_arcsec,
+            encoder_bits: self.encoder_bits,
+            sessions: made.sessions.len(),
+            rows: made.sessions.iter().map(crate::measurement::Session::len).sum(),
+        };
+        let out = context.out()?;
+        write_whole(&out.join("data.csv"), |file| file.write_all(csv.as_bytes()))?;
+        write_json(&out.join("truth.json"), &truth)?;
+        context.print(&truth, || text(&truth, out))
+    }
+
+    /// Sensors and temperatures, in range.
+    fn check(&self) -> Result<(Sensors, [f64; 2]), Failure> {
+        let within = |option: &str, found: f64, low: f64, high: f64| {
+            if found >= low && found <= high {
+                Ok(found)
+            } else {
+                Err(Failure::BadInput(format!("{option}: found {found}; allowed: {low} to {high}")))
+            }
+        };
+        within("--rate-hz", self.rate_hz, 0.1, 1e5)?;
+        within("--speed", self.speed, 1e-3, 1e3)?;
+        within("--torque", self.torque, 1e-3, 1e5)?;
+        let range: Vec<f64> = self.temperature_c.split(',').filter_map(|t| t.trim().parse().ok()).collect();
+        let temperatures = match range[..] {
+            [one] if self.temperature_c.split(',').count() == 1 => [one, one],
+            [low, high] if low <= high => [low, high],
+            _ => {
+                return Err(Failure::BadInput(format!(
+                    "--temperature-c: found \"{}\"; allowed: LOW,HIGH in degrees C, for instance -20,50, or one temperature",
+                    self.temperature_c
+                )));
+            }
+        };
+        for t in temperatures {
+            within("--temperature-c", t, -200.0, 300.0)?;
+        }
+        Ok((
+            Sensors {
+                white_arcsec: within("--noise-arcsec", self.noise_arcsec, 0.0, 1e5)?,
+                wander_arcsec: within("--wander-arcsec", self.wander_arcsec, 0.0, 1e5)?,
+                wander_s: within("--wander-s", self.wander_s, 1e-2, 1e6)?,
+            },
+            temperatures,
+        ))
+    }
+
+    fn excitation(&self, nominal: &Nominal, random: &mut fastrand::Rng) -> Result<Excitation, Failure> {
+        let Some(path) = &self.like else {
+            let plan = Plan {
+                sessions: usize::from(self.sessions),
+                rows: self.rows as usize,
+                rate_hz: self.rate_hz,
+                speed_rad_s: self.speed,
+                torque_n_m: self.torque,
+                richness: Richness::Rich,
+            };
+            return Ok(plan.excite(random));
+        };
+        let map = if self.columns.is_empty() { Ok(ColumnMap::default()) } else { ColumnMap::parse(&self.columns) };
+        let map = map.map_err(|error| Failure::BadInput(format!("--columns: {error}")))?;
+        let gear = gear(nominal);
+        let recording = read(path, &map, &gear).map_err(|error| Failure::BadInput(error.to_string()))?;
+        Ok(Excitation::of_sessions(&recording.sessions, self.rate_hz, nominal.temperature_c))
+    }
+
+    /// The nominal drive: the image of a table if there is one, its model, and the causes that a model holds.
+    #[allow(clippy::type_complexity)]
+    fn nominal(
+        &self,
+        context: &Context,
+        drive: &Drive,
+    ) -> Result<(Option<Vec<u8>>, Nominal, Vec<CauseEntry>, NominalSource), Failure> {
+        if let Some(file) = &self.model {
+            let model = extension::Model::read(file).map_err(|error| Failure::BadInput(error.to_string()))?;
+            let source = NominalSource {
+                kind: "model",
+                file: Some(file.display().to_string()),
+                table_id: None,
+                generator: None,
+                drive: drive.name.clone(),
+            };
+            return Ok((None, model.nominal, model.causes, source));
+        }
+        let (image, file) = match &self.tables {
+            Some(folder) => {
+                let path = folder.join(format!("{}.fxt", self.generator));
+                let image =
+                    std::fs::read(&path).map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
+                Table::check(&image).map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
+                (image, Some(path.display().to_string()))
+            }
+            None => (fresh_table(context, drive, self.generator, MeshLevel::Coarse)?.image, None),
+        };
+        let table = Table::check(&image).map_err(|error| Failure::Failed(error.to_string()))?;
+        let nominal = Nominal::of_table(&table);
+        let source = NominalSource {
+            kind: "table",
+            file,
+            table_id: Some(table.id().to_string()),
+            generator: Some(self.generator.to_string()),
+            drive: drive.name.clone(),
+        };
+        Ok((Some(image), nominal, Vec::new(), source))
+    }
+}
+
+/// The gear of a nominal model, for the reader of data.
+pub(super) fn gear(nominal: &Nominal) -> Gear {
+    match nominal.teeth {
+        Some(teeth) => Gear::of_teeth(teeth.flexspline, teeth.circular_spline, teeth.fixed == Fixed::Flexspline),
+        None => Gear::of_ratio(nominal.ratio),
+    }
+}
+
+/// A table made by FEM now.
+pub(super) fn fresh_table(
+    context: &Context,
+    drive: &Drive,
+    kind: GeneratorKind,
+    mesh: MeshLevel,
+) -> Result<MadeTable, Failure> {
+    let settings = SolverSettings { mesh, ..SolverSettings::default() };
+    let progress = Mutex::new((context.progress("tables"), 0_usize));
+    let interrupted = context.watch_interrupt();
+    let observe = |now: SweepProgress| {
+        if let Ok(mut guard) = progress.lock() {
+            let (bar, done) = &mut *guard;
+            *done += 1;
+            let note = format!("{kind} {:+.3} N.m {:+.0} °C", now.torque_n_m, now.temperature_c);
+            bar.set(*done, extension::usual_increments(drive).max(*done), &note);
+        }
+        if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    extension::make_table(drive, kind, settings, &observe).map_err(|error| match error {
+        extension::RemakeError::Sweep(SweepError::Stopped) => Failure::Failed("stopped; nothing was written".into()),
+        extension::RemakeError::Sweep(error @ SweepError::NotUniform { .. }) => Failure::BadInput(error.to_string()),
+        error => Failure::Failed(format!("{kind}: {error}")),
+    })
+}
+
+fn text(truth: &Truth, out: &std::path::Path) -> String {
+    let mut text = format!("{} rows in {} sessions, seed {}\n", truth.rows, truth.sessions, truth.seed);
+    if let Some(id) = &truth.nominal.table_id {
+        let _ = writeln!(text, "drive {}, table {id}", truth.nominal.drive);
+    }
+    for effect in truth.effects.iter().chain(&truth.data_faults) {
+        let _ = writeln!(text, "  {}", effect.definition.name);
+        for (parameter, value) in effect.definition.parameters.iter().zip(&effect.values) {
+            let _ = writeln!(text, "    {:<32} {:>14.6}", parameter.name, value.unwrap_or(f64::NAN));
+        }
+    }
+    if truth.effects.is_empty() && truth.data_faults.is_empty() {
+        text.push_str("  no effect: a drive within its spread\n");
+    }
+    let _ = write!(text, "wrote {} and {}", out.join("data.csv").display(), out.join("truth.json").display());
+    text
+}
+
+/// Every effect.
+fn list() -> String {
+    let mut text = String::from("Causes:\n");
+    let all = effects();
+    let faults_from = all.iter().position(|effect| effect.fault);
+    for (k, effect) in all.iter().enumerate() {
+        if Some(k) == faults_from {
+            text.push_str("\nFaults of the data:\n");
+        }
+        let _ = writeln!(text, "  {}: {}", effect.name, effect.meaning);
+        for parameter in &effect.parameters {
+            let usual = match parameter.usual {
+                Usual::Value(value) => match parameter.words.get(value as usize) {
+                    Some(word) => format!("default {word}"),
+                    None => format!("default {value:.6}").trim_end_matches('0').trim_end_matches('.').to_owned(),
+                },
+                Usual::OfLoad(share) => format!("default {share} of the largest torque"),
+                Usual::Drawn(low, high) => format!("default drawn from {low:.4} to {high:.4}"),
+                Usual::Instant(..) => "default drawn within the data".to_owned(),
+                Usual::ToothPitch => "default one tooth pitch".to_owned(),
+                Usual::Follows => "instead of the one above".to_owned(),
+            };
+            let _ = writeln!(
+                text,
+                "    {:<28} {}; {}, allowed {}",
+                parameter.name,
+                parameter.meaning,
+                usual,
+                parameter.allowed()
+            );
+        }
+    }
+    text
+}

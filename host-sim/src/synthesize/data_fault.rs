@@ -1,0 +1,151 @@
+//! Faults of the data: what goes wrong between the sensors and the file.
+
+use std::fmt::Write as _;
+
+use super::catalogue::Chosen;
+use crate::measurement::Session;
+use crate::tables::ARCSEC_PER_RAD;
+
+/// Columns of a row.
+const HEADER: &str = "time_s,generator_rad,output_rad,torque_n_m,temperature_c,orientation_rad\n";
+/// Places of them.
+const TIME: usize = 0;
+const OUTPUT: usize = 2;
+
+/// The rows as CSV text, with the faults among `effects` in them. `ratio` makes output angles of errors.
+#[must_use]
+pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Chosen], random: &mut fastrand::Rng) -> String {
+    let mut rows: Vec<[f64; 6]> = Vec::new();
+    for session in sessions {
+        let output = session.output_rad(ratio);
+        let at = |column: &Option<Vec<f64>>, k: usize| column.as_ref().map_or(0.0, |values| values[k]);
+        rows.extend((0..session.len()).map(|k| {
+            [
+                at(&session.time_s, k),
+                session.generator_rad[k],
+                output[k],
+                at(&session.torque_n_m, k),
+                at(&session.temperature_c, k),
+                at(&session.orientation_rad, k),
+            ]
+        }));
+    }
+    for effect in effects.iter().filter(|effect| effect.definition.fault) {
+        spoil(&mut rows, effect, random);
+    }
+    let mut text = String::with_capacity(80 * rows.len());
+    text.push_str(HEADER);
+    for row in rows {
+        for (k, value) in row.iter().enumerate() {
+            let comma = if k > 0 { "," } else { "" };
+            // Digits that the sensor does not have would only fill the disc: 1e-9 rad is 0.0002".
+            let _ = match k {
+                _ if !value.is_finite() => write!(text, "{comma}"),
+                TIME => write!(text, "{comma}{value:.6}"),
+                1 | OUTPUT => write!(text, "{comma}{value:.9}"),
+                _ => write!(text, "{comma}{value:.4}"),
+            };
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn spoil(rows: &mut [[f64; 6]], effect: &Chosen, random: &mut fastrand::Rng) {
+    let v = |name: &str| effect.value(name);
+    let first = rows.first().map_or(0.0, |row| row[TIME]);
+    match effect.definition.name {
+        "encoder_index_jump" => {
+            let (time, size) = (v("time_s"), v("size_arcsec") / ARCSEC_PER_RAD);
+            rows.iter_mut().filter(|row| row[TIME] >= time).for_each(|row| row[OUTPUT] += size);
+        }
+        "frozen_channel" => {
+            let (from, until) = (v("time_s"), v("time_s") + v("duration_s"));
+            let channel = 1 + v("channel") as usize;
+            let mut held = None;
+            for row in rows.iter_mut().filter(|row| (from..until).contains(&row[TIME])) {
+                row[channel] = *held.get_or_insert(row[channel]);
+            }
+        }
+        "missing_samples" => {
+            let share = v("share");
+            rows.iter_mut().filter(|_| random.f64() < share).for_each(|row| row[OUTPUT] = f64::NAN);
+        }
+        "clock_error" => {
+            let (time, step) = (v("time_s"), v("step_s"));
+            rows.iter_mut().filter(|row| row[TIME] >= time).for_each(|row| row[TIME] -= step);
+        }
+        "outliers" => {
+            let (share, size) = (v("share"), v("size_arcsec") / ARCSEC_PER_RAD);
+            for row in rows.iter_mut() {
+                if random.f64() < share {
+                    row[OUTPUT] += size * (0.5 + 0.5 * random.f64()) * if random.bool() { 1.0 } else { -1.0 };
+                }
+            }
+        }
+        "unit_mismatch" => rows.iter_mut().for_each(|row| row[OUTPUT] = row[OUTPUT].to_degrees()),
+        "quantisation" => {
+            let step = (v("step_arcsec") / ARCSEC_PER_RAD).max(1e-12);
+            rows.iter_mut().for_each(|row| row[OUTPUT] = (row[OUTPUT] / step).round() * step);
+        }
+        "drift" => {
+            let rate = v("arcsec_per_hour") / 3600.0 / ARCSEC_PER_RAD;
+            rows.iter_mut().for_each(|row| row[OUTPUT] += rate * (row[TIME] - first));
+        }
+        other => unreachable!("{other} is no fault of the data"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Excitation, Plan, Plant, Richness, Sensors, Sizes, Unit, catalogue_drive, parse, synthesize};
+    use super::*;
+    use crate::measurement::{ColumnMap, FaultName, Gear, parse as read};
+
+    fn recording(effect: &str) -> crate::measurement::Recording {
+        let nominal = catalogue_drive();
+        let plan = Plan {
+            sessions: 8,
+            rows: 1500,
+            rate_hz: 100.0,
+            speed_rad_s: 6.0,
+            torque_n_m: 40.0,
+            richness: Richness::Rich,
+        };
+        let mut random = fastrand::Rng::with_seed(5);
+        let on: Excitation = plan.excite(&mut random);
+        let unit = Unit::draw(&nominal, &mut random);
+        let sensors = Sensors { white_arcsec: 2.0, wander_arcsec: 0.5, wander_s: 12.0 };
+        let plant = Plant { nominal: &nominal, table: None };
+        let sizes = Sizes { pitch_radius_mm: 48.7, base_radius_mm: 44.6 };
+        let chosen = [parse(effect).unwrap()];
+        let made = synthesize(&plant, sizes, &chosen, &on, (&sensors, 22), unit, &mut random).unwrap();
+        let text = to_csv(&made.sessions, nominal.ratio, &made.effects, &mut random);
+        read("data.csv", text.as_bytes(), &ColumnMap::default(), &Gear::of_teeth(188, 190, true)).unwrap()
+    }
+
+    #[test]
+    fn each_fault_is_found_by_its_name_in_what_is_read_back() {
+        for (effect, name) in [
+            ("encoder_index_jump:size_arcsec=200", FaultName::EncoderIndexJump),
+            ("frozen_channel:channel=output,duration_s=3", FaultName::FrozenChannel),
+            ("missing_samples", FaultName::MissingSamples),
+            ("clock_error", FaultName::ClockError),
+            ("outliers", FaultName::Outliers),
+            ("unit_mismatch", FaultName::UnitMismatch),
+            ("quantisation", FaultName::Quantisation),
+            ("drift:arcsec_per_hour=300", FaultName::Drift),
+        ] {
+            let found: Vec<FaultName> = recording(effect).faults.iter().map(|fault| fault.name).collect();
+            assert!(found.contains(&name), "{effect}: {found:?}");
+        }
+        assert_eq!(recording("wear").faults, []);
+    }
+
+    #[test]
+    fn what_is_written_reads_back_in_sessions() {
+        let recording = recording("wear:growth_arcsec=10");
+        assert_eq!(recording.sessions.len(), 8);
+        assert!(recording.sessions.iter().all(|s| s.len() == 1500 && s.torque_n_m.is_some()));
+    }
+}

@@ -1,0 +1,379 @@
+//! What an effect does to the error, the load and the clearance: one law each, in the form of this plant and in a changed one.
+
+use std::f64::consts::{PI, TAU};
+
+use super::excitation::Excitation;
+use super::plant::Plant;
+use crate::nominal::Nominal;
+use crate::tables::ARCSEC_PER_RAD;
+
+/// Share of `e / (r cos a)` that the second order of the rectified sine has: `4 / 3 pi`.
+pub(super) const SECOND_OF_RECTIFIED: f64 = 0.424;
+/// Pressure angle where flanks meet, rad: the phase of a rectified sine on the flank that carries.
+const FLANK_ANGLE_RAD: f64 = 0.36;
+/// Steps to a row where a state is followed.
+const STEPS: u32 = 40;
+
+/// Which angle an error is locked to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Angle {
+    /// The wave on the flexspline.
+    Flexspline,
+    /// The wave on the circular spline.
+    CircularSpline,
+    /// The wave against gravity.
+    Gravity,
+}
+
+/// A channel of the data, or both.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Encoder {
+    /// At the output.
+    Output,
+    /// At the generator; amplitudes are at the output.
+    Generator,
+}
+
+/// A law with its numbers. Amplitudes are arcsec at the output unless their name says otherwise.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Law {
+    /// A toothing or an axis beside its place, rectified by the clearance: `-+A |sin(angle - direction +- a)|` on the flank that
+    /// carries, less where more teeth share the load.
+    Displaced { angle: Angle, amplitude: f64, direction_rad: f64, half_load_n_m: f64 },
+    /// With `y` twice the angle on the circular spline plus a phase, `A (cos y -+ radial sin y)` on either flank, normalised to `A`: teeth
+    /// that an oval ring moves along, and spaces that its radius opens.
+    Oval { amplitude: f64, phase_rad: f64, radial: f64 },
+    /// Lines `(order, amplitude, phase)`, `A cos(order angle + phase)`.
+    Pitch { angle: Angle, lines: Vec<(f64, f64, f64)> },
+    /// One lobe carries more: order 1 of both wheels.
+    Lobes { amplitude: f64, phase_rad: f64, half_load_n_m: f64 },
+    /// Tooth mesh, and even orders of the generator.
+    CamForm { amplitude: f64, phase_rad: f64 },
+    /// A pulse where a lobe meets the tooth.
+    Damage { angle: Angle, amplitude: f64, place_rad: f64, half_width_rad: f64, both_flanks: bool },
+    /// The clearance is wider by this, whole width.
+    Wider { growth: f64 },
+    /// The clearance widens with travel, by this in all.
+    Wear { growth: f64 },
+    /// Whole width per kelvin, followed with a lag.
+    Breathing { per_k: f64, lag_s: f64 },
+    /// The wind-up falls short by this at the full load, as the power of it.
+    Hardening { at_full_load: f64, exponent: f64, full_load_n_m: f64 },
+    /// Wind-up more than nominal, relative.
+    Softer { relative: f64 },
+    /// The same per kelvin.
+    SofterWarm { relative_per_k: f64 },
+    /// Springs that slip one after the other.
+    Slip { half_width: f64, slip_n_m: f64 },
+    /// Drag that is seen as a lag.
+    DragLag { largest: f64 },
+    /// Drag as a load: at `speed_rad_s` of the generator and the nominal temperature.
+    Drag { drag_n_m: f64, speed_rad_s: f64, speed_exponent: f64, per_k: f64 },
+    /// `m g l sin(output + orientation + phase)`.
+    Unbalance { torque_n_m: f64, phase_rad: f64 },
+    /// The load's inertia on the drive's spring.
+    Resonance { frequency_hz: f64, damping_ratio: f64 },
+    /// `A sin(angle + phase)` in a reading.
+    Disc { encoder: Encoder, amplitude: f64, phase_rad: f64 },
+    /// The output's reading is older by this.
+    Latency { delay_s: f64 },
+    /// Error in proportion to the output angle.
+    Ratio { relative: f64 },
+    /// From a row on the output is elsewhere.
+    Jump { row: usize, by: f64 },
+    /// No cause of the library: named by [`super::STRANGE`].
+    Strange { name: String, size: f64, phase: f64, other: f64 },
+}
+
+/// When a law acts: loads wind the drive up, the load's inertia follows all that the drive does, sensors read what comes of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Stage {
+    Mesh,
+    Inertia,
+    Reading,
+}
+
+/// What the laws act on.
+pub(super) struct Now<'a> {
+    pub plant: &'a Plant<'a>,
+    pub on: &'a Excitation,
+    /// Torque on the flanks, N·m.
+    pub torque: &'a [f64],
+    /// Changed form of the laws.
+    pub changed: bool,
+}
+
+impl Now<'_> {
+    fn nominal(&self) -> &Nominal {
+        self.plant.nominal
+    }
+
+    /// The largest torque, N·m.
+    fn top(&self) -> f64 {
+        largest(self.torque)
+    }
+
+    fn output(&self, k: usize) -> f64 {
+        self.on.generator[k] / self.nominal().ratio
+    }
+
+    fn angle(&self, of: Angle, k: usize) -> f64 {
+        match of {
+            Angle::Flexspline => self.on.generator[k],
+            Angle::CircularSpline => self.on.generator[k] - self.output(k),
+            Angle::Gravity => self.on.generator[k] + self.on.orientation[k],
+        }
+    }
+
+    /// The flank that carries.
+    fn side(&self, k: usize) -> f64 {
+        if self.torque[k] >= 0.0 { 1.0 } else { -1.0 }
+    }
+
+    fn fade(&self, half_load_n_m: f64, k: usize) -> f64 {
+        let x = self.torque[k].abs() / half_load_n_m;
+        if self.changed { (-0.7 * x).exp() * 0.8 + 0.2 } else { 1.0 / (1.0 + x) }
+    }
+}
+
+/// Largest size, never zero.
+pub(super) fn largest(torque: &[f64]) -> f64 {
+    torque.iter().fold(1e-9, |m: f64, t| m.max(t.abs()))
+}
+
+impl Law {
+    /// When it acts.
+    pub fn stage(&self) -> Stage {
+        match self {
+            Law::Resonance { .. } => Stage::Inertia,
+            Law::Disc { .. } | Law::Latency { .. } | Law::Ratio { .. } => Stage::Reading,
+            _ => Stage::Mesh,
+        }
+    }
+
+    /// Torque that the torque column does not hold.
+    pub fn add_torque(&self, nominal: &Nominal, on: &Excitation, torque: &mut [f64]) {
+        match *self {
+            Law::Unbalance { torque_n_m, phase_rad } => {
+                for k in 0..torque.len() {
+                    torque[k] += torque_n_m * (on.generator[k] / nominal.ratio + on.orientation[k] + phase_rad).sin();
+                }
+            }
+            Law::Drag { drag_n_m, speed_rad_s, speed_exponent, per_k } => {
+                for (k, speed) in on.speeds().into_iter().enumerate() {
+                    let thick = (per_k * (nominal.temperature_c - on.temperature[k])).exp();
+                    let grade = (speed / speed_rad_s).abs().powf(speed_exponent) * speed.signum() * thick;
+                    torque[k] -= drag_n_m * grade * nominal.ratio.signum();
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Adds to half the clearance, arcsec, row by row.
+    pub fn add_half_clearance(&self, nominal: &Nominal, on: &Excitation, changed: bool, half: &mut [f64]) {
+        let n = half.len();
+        match *self {
+            Law::Wider { growth } => half.iter_mut().for_each(|h| *h += 0.5 * growth),
+            Law::Wear { growth } => {
+                let mut travel = vec![0.0; n];
+                for session in &on.sessions {
+                    for k in session.clone() {
+                        let step = if k > session.start { (on.generator[k] - on.generator[k - 1]).abs() } else { 0.0 };
+                        let load = if changed { 0.3 + on.torque[k].abs() / 50.0 } else { 1.0 };
+                        travel[k] = if k > 0 { travel[k - 1] } else { 0.0 } + step * load;
+                    }
+                }
+                let all = travel[n - 1].max(1e-9);
+                for k in 0..n {
+                    half[k] += 0.5 * growth * travel[k] / all;
+                }
+            }
+            Law::Breathing { per_k, lag_s } => {
+                for session in &on.sessions {
+                    let mut felt = on.temperature[session.start];
+                    for k in session.clone() {
+                        let dt = if k > session.start { on.time[k] - on.time[k - 1] } else { 0.0 };
+                        felt += (on.temperature[k] - felt) * if lag_s > 0.0 { (dt / lag_s).min(1.0) } else { 1.0 };
+                        half[k] += 0.5 * per_k * (felt - nominal.temperature_c);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Adds what it does to the error, arcsec.
+    pub fn add_error(&self, now: &Now<'_>, error: &mut [f64]) {
+        let n = error.len();
+        let (on, torque, changed) = (now.on, now.torque, now.changed);
+        match self {
+            Law::Displaced { angle, amplitude, direction_rad, half_load_n_m } => (0..n).for_each(|k| {
+                let side = now.side(k);
+                let s = (now.angle(*angle, k) - direction_rad + FLANK_ANGLE_RAD * side).sin();
+                let shape = if changed { (s * s + 0.03).sqrt() } else { s.abs() };
+                error[k] -= side * amplitude * shape * now.fade(*half_load_n_m, k);
+            }),
+            Law::Oval { amplitude, phase_rad, radial } => (0..n).for_each(|k| {
+                let more = if changed { 1.0 + 0.15 * now.side(k) } else { 1.0 };
+                let (sin, cos) = (2.0 * now.angle(Angle::CircularSpline, k) + phase_rad).sin_cos();
+                error[k] += more * amplitude * (cos - radial * now.side(k) * sin) / 1f64.hypot(*radial);
+            }),
+            Law::Pitch { angle, lines } => (0..n).for_each(|k| {
+                let x = now.angle(*angle, k);
+                error[k] += lines.iter().map(|(o, a, p)| a * (o * x + p).cos()).sum::<f64>();
+            }),
+            Law::Lobes { amplitude, phase_rad, half_load_n_m } => (0..n).for_each(|k| {
+                let (psi, theta) = (now.angle(Angle::Flexspline, k), now.angle(Angle::CircularSpline, k));
+                let share = if changed { 0.3 } else { 0.7 };
+                let one = (psi + phase_rad).cos() + share * (theta + 2.0 * phase_rad).cos();
+                error[k] += amplitude * now.fade(*half_load_n_m, k) * one;
+            }),
+            Law::CamForm { amplitude, phase_rad } => {
+                let teeth = now.nominal().teeth.map_or(188.0, |teeth| f64::from(teeth.flexspline));
+                let top = now.top();
+                (0..n).for_each(|k| {
+                    let psi = on.generator[k];
+                    let mesh = (teeth * psi + phase_rad + 0.4 * now.side(k)).cos();
+                    let lobes = (4.0 * psi + 2.0 * phase_rad).cos() + 0.5 * (6.0 * psi + 3.0 * phase_rad).cos();
+                    let share = if changed { 0.4 } else { 0.8 };
+                    let load = 1.0 + 0.2 * torque[k].abs() / top;
+                    error[k] += amplitude * ((1.0 - share) * mesh + share * lobes) * load;
+                });
+            }
+            Law::Damage { angle, amplitude, place_rad, half_width_rad, both_flanks } => {
+                let top = now.top();
+                for k in 0..n {
+                    let away = (now.angle(*angle, k) - place_rad + 0.5 * PI).rem_euclid(PI) - 0.5 * PI;
+                    let pulse = if changed {
+                        (1.0 - (away / (1.6 * half_width_rad)).abs()).max(0.0)
+                    } else {
+                        (-0.5 * (away / half_width_rad).powi(2)).exp()
+                    };
+                    let load = if changed { torque[k].abs() / top } else { (torque[k].abs() / top).sqrt() };
+                    if torque[k] > 0.0 || *both_flanks {
+                        error[k] -= now.side(k) * amplitude * pulse * load;
+                    }
+                }
+            }
+            // Clearance and torque carry these.
+            Law::Wider { .. } | Law::Wear { .. } | Law::Breathing { .. } | Law::Drag { .. } | Law::Unbalance { .. } => {
+            }
+            Law::Hardening { at_full_load, exponent, full_load_n_m } => (0..n).for_each(|k| {
+                let u: f64 = torque[k] / full_load_n_m;
+                let less = if changed { (u.abs() - 0.3).max(0.0) * 1.4 } else { u.abs().powf(*exponent) };
+                error[k] -= at_full_load * u.signum() * less;
+            }),
+            Law::Softer { relative } => {
+                (0..n).for_each(|k| error[k] += relative * now.nominal().wind_up_arcsec(torque[k]));
+            }
+            Law::SofterWarm { relative_per_k } => (0..n).for_each(|k| {
+                let dt = on.temperature[k] - now.nominal().temperature_c;
+                let factor = if changed { (1.3 * relative_per_k * dt).exp() - 1.0 } else { relative_per_k * dt };
+                error[k] += factor * now.nominal().wind_up_arcsec(torque[k]);
+            }),
+            Law::Slip { half_width, slip_n_m } => slip(now, *half_width, *slip_n_m, error),
+            Law::DragLag { largest } => {
+                let speeds = on.speeds();
+                let fastest = speeds.iter().fold(1e-9, |m: f64, w| m.max(w.abs()));
+                for k in 0..n {
+                    let t = on.temperature[k];
+                    let thick = if changed {
+                        // Vogel, 1 at 20 °C.
+                        (420.0 / (t + 110.0) - 420.0 / 130.0).exp()
+                    } else {
+                        (-0.035 * (t - 20.0)).exp()
+                    };
+                    let power = if changed { 0.9 } else { 2.0 / 3.0 };
+                    let w = speeds[k];
+                    error[k] -= largest * (w / fastest).abs().powf(power) * w.signum() * thick.powf(power.max(0.7));
+                }
+            }
+            Law::Resonance { frequency_hz, damping_ratio } => resonance(now, *frequency_hz, *damping_ratio, error),
+            Law::Disc { encoder, amplitude, phase_rad } => (0..n).for_each(|k| {
+                let x = phase_rad + if *encoder == Encoder::Output { now.output(k) } else { on.generator[k] };
+                error[k] += amplitude * (x.sin() + if changed { 0.1 * (2.0 * x + 1.0).sin() } else { 0.0 });
+            }),
+            Law::Latency { delay_s } => {
+                let per_speed = delay_s / now.nominal().ratio * ARCSEC_PER_RAD;
+                error.iter_mut().zip(on.speeds()).for_each(|(e, speed)| *e -= per_speed * speed);
+            }
+            Law::Ratio { relative } => (0..n).for_each(|k| error[k] += relative * now.output(k) * ARCSEC_PER_RAD),
+            Law::Jump { row, by } => error.iter_mut().skip(*row).for_each(|e| *e += by),
+            Law::Strange { name, size, phase, other } => strange(name, now, [*size, *phase, *other], error),
+        }
+    }
+}
+
+/// Torsional hysteresis.
+fn slip(now: &Now<'_>, half_width: f64, slip_n_m: f64, error: &mut [f64]) {
+    let torque = now.torque;
+    for session in &now.on.sessions {
+        let mut z = 0.0;
+        let mut springs = [0.0; 4];
+        for k in session.clone() {
+            let step = if k > session.start { torque[k] - torque[k - 1] } else { torque[k] };
+            if now.changed {
+                // Bouc-Wen at a fiftieth of the step.
+                for _ in 0..50 {
+                    let d = step / 50.0 / slip_n_m;
+                    z += d - 0.5 * d.abs() * z - 0.5 * d * f64::abs(z);
+                }
+                error[k] -= half_width * z;
+            } else {
+                for (j, z) in springs.iter_mut().enumerate() {
+                    let slip = slip_n_m * (0.4 + 0.5 * j as f64);
+                    *z = f64::clamp(*z + step, -slip, slip);
+                    error[k] -= half_width * *z / slip / 4.0;
+                }
+            }
+        }
+    }
+}
+
+/// Load on the drive's spring.
+fn resonance(now: &Now<'_>, frequency_hz: f64, damping_ratio: f64, error: &mut [f64]) {
+    let time = &now.on.time;
+    let (omega, zeta) = (TAU * frequency_hz, damping_ratio);
+    let driven: Vec<f64> = error.to_vec();
+    for session in &now.on.sessions {
+        let first = session.start;
+        let (mut x, mut v) = (driven[first], 0.0);
+        for k in first + 1..session.end {
+            let dt = (time[k] - time[k - 1]) / f64::from(STEPS);
+            for j in 0..STEPS {
+                let u = driven[k - 1] + (driven[k] - driven[k - 1]) * (f64::from(j) + 0.5) / f64::from(STEPS);
+                let slope = (driven[k] - driven[k - 1]) / (f64::from(STEPS) * dt);
+                let damper = v - if now.changed { 0.0 } else { slope };
+                let a = omega * omega * (u - x) - 2.0 * zeta * omega * damper;
+                v += a * dt;
+                x += v * dt;
+            }
+            error[k] = x;
+        }
+    }
+}
+
+fn strange(name: &str, now: &Now<'_>, [size, phase, other]: [f64; 3], error: &mut [f64]) {
+    let (on, n) = (now.on, error.len());
+    let since = |k: usize| {
+        let session = on.sessions.iter().find(|s| s.contains(&k)).expect("every row has a session");
+        on.time[k] - on.time[session.start]
+    };
+    let wave = |order: f64, k: usize| size * (order * on.generator[k] + phase).sin();
+    let speeds = on.speeds();
+    let top = now.top();
+    for k in 0..n {
+        error[k] += match name {
+            "sensor_offset_with_temperature" => size / 25.0 * (on.temperature[k] - 20.0),
+            "line_of_order_7" => wave(7.0, k),
+            "line_of_order_10.37" => wave(10.37, k),
+            "line_in_time" => size * (TAU * (0.3 + 3.0 * other) * on.time[k]).sin(),
+            "creep" => size * (1.0 + since(k)).ln() / 2.0,
+            "oldham_lash" => size * speeds[k].signum(),
+            "torque_cross_talk" => size * (now.torque[k] / top).powi(2),
+            "settling" => 2.0 * size * (-since(k) / (8.0 + 20.0 * other)).exp(),
+            other => unreachable!("no effect {other}"),
+        };
+    }
+}
