@@ -6,13 +6,15 @@ use clap::Args;
 use flexspline::Table;
 use serde::Serialize;
 
-use super::Failure;
 use super::context::Context;
+use super::{Failure, report};
 use crate::diagnosis::report::Diagnosis;
 use crate::diagnosis::{Settings, diagnose};
 use crate::measurement::{ColumnMap, Fault, Gear, Recording, read};
 use crate::nominal::{Fixed, Nominal};
 use crate::output::write_json;
+use crate::report::diagnosis_report::{self, Level};
+use crate::report::page::Page;
 
 /// Find what the simulation gets wrong in measured data, name the cause, measure what the extension gains
 ///
@@ -39,6 +41,9 @@ pub(super) struct Diagnose {
     /// Names and units of columns, for instance generator=wave_gen_turns:turn,error=error_arcsec:arcsec
     #[arg(long, value_name = "MAP", default_value = "")]
     columns: String,
+    /// Do not write report.html
+    #[arg(long)]
+    no_report: bool,
 }
 
 /// `diagnosis.json`: the diagnosis and the faults of the data.
@@ -94,7 +99,36 @@ impl Diagnose {
         };
         let out = context.out()?;
         write_json(&out.join("diagnosis.json"), &written)?;
+        if !self.no_report {
+            report::write(&self.page(context, &recording, &nominal, table.as_ref(), &diagnosis), out)?;
+        }
         context.print(&written, || text(&recording, &diagnosis, out))
+    }
+
+    /// The report.
+    fn page(
+        &self,
+        context: &Context,
+        recording: &Recording,
+        nominal: &Nominal,
+        table: Option<&Table<'_>>,
+        diagnosis: &Diagnosis,
+    ) -> Page {
+        let blake3 = |path: &Path| {
+            let hash = std::fs::read(path).map(|bytes| blake3::hash(&bytes).to_string()).unwrap_or_default();
+            (format!("BLAKE3 of {}", path.display()), hash)
+        };
+        let mut inputs = vec![blake3(&self.data)];
+        inputs.extend(self.model.as_deref().map(blake3));
+        inputs.extend(table.map(|table| ("table_id".to_owned(), table.id().to_string())));
+        diagnosis_report::page(diagnosis_report::Sources {
+            recording,
+            nominal,
+            diagnosis,
+            levels: vec![Level::nominal(&recording.sessions, nominal, table)],
+            command: &context.command,
+            inputs,
+        })
     }
 }
 
