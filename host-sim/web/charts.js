@@ -5,6 +5,8 @@ import { factor, onUnits, titled, unit, written } from "./quantities.js";
 import { colour, FONT, onTheme } from "./theme.js";
 
 const LINE_COLOURS = 6;
+/** Between the ticks of an axis of whole numbers. */
+const WHOLE_STEPS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
 /** Rows that the table view shows; the CSV has all. */
 const TABLE_ROWS = 200;
 
@@ -73,6 +75,7 @@ function drawUprights(uprights) {
     ctx.fillStyle = colour("text");
     ctx.lineWidth = devicePixelRatio;
     ctx.font = FONT.replace("12px", `${size}px`);
+    ctx.textAlign = "left";
     ctx.textBaseline = "top";
     ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
     const ends = [];
@@ -176,12 +179,12 @@ export function lineChart(place, id, spec) {
         },
       },
       axes: [
-        axis(spec.x, 44),
+        { ...axis(spec.x, 44), ...(spec.x.quantity === "whole" ? { incrs: WHOLE_STEPS } : {}) },
         // As wide as the longest number wants.
         axis(spec.y, (u, texts) => Math.max(48, 20 + 7 * Math.max(0, ...(texts ?? []).map((t) => t.length)))),
       ],
       series: [{ label: spec.x.label, value: (u, v) => say(u, v, spec.x.quantity, fx) }, ...series],
-      legend: { live: true, markers: { width: 3 } },
+      legend: { live: true, markers: { width: 3, stroke: (u, k) => series[k - 1]?.stroke } },
       cursor: { drag: { x: true, y: true, uni: 20 }, focus: { prox: 24 } },
       hooks: {
         draw: [

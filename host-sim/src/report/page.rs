@@ -228,6 +228,18 @@ pub struct Table {
     pub rows: Vec<Vec<Text>>,
 }
 
+impl Table {
+    /// Whether a column holds words and no numbers: those stand to the left.
+    fn is_words(&self, column: &usize) -> bool {
+        let cells = || self.rows.iter().filter_map(|row| row.get(*column)).filter_map(|text| text.0.first());
+        let words = |span: &Span| match span {
+            Span::Plain(words) | Span::Strong(words) => words.chars().next().is_some_and(char::is_alphabetic),
+            Span::Error { .. } => false,
+        };
+        cells().count() > 0 && cells().all(words)
+    }
+}
+
 /// A numbered figure.
 #[derive(Debug, Clone)]
 pub struct Figure {
@@ -294,6 +306,8 @@ pub enum Quantity {
     Speed,
     /// A number without a unit.
     Count,
+    /// A whole number without a unit.
+    Whole,
 }
 
 impl Quantity {
@@ -309,7 +323,7 @@ impl Quantity {
             Quantity::Second => "s",
             Quantity::Turn => "turns",
             Quantity::Speed => "rad/s",
-            Quantity::Count => "",
+            Quantity::Count | Quantity::Whole => "",
         }
     }
 }

@@ -30,6 +30,8 @@ use thin::Clock;
 
 /// Rows of which a picture is made, at most: beyond, every so many are left out evenly.
 const MOST_ROWS: usize = 400_000;
+/// Bins of a turn.
+const TURN_BINS: usize = 72;
 
 /// What is left of the measured error by one model.
 #[derive(Debug, Clone)]
@@ -157,7 +159,8 @@ impl Known<'_> {
     fn page(&self) -> Page {
         let Sources { recording, nominal, diagnosis, command, inputs, .. } = &self.sources;
         let (status, also) = self.status();
-        let mut sections = self.picture_sections();
+        let mut sections = vec![self.in_short()];
+        sections.extend(self.picture_sections());
         sections.push(self.before_and_after());
         sections.extend(self.causes());
         sections.push(self.gain());
@@ -231,76 +234,104 @@ impl Known<'_> {
         }
     }
 
+    /// What departs from the nominal model beyond noise, arcsec rms: lines that averages hide are not in the residual.
+    fn departure_arcsec(&self) -> f64 {
+        let (left, unexplained) = (self.sources.diagnosis.residual, &self.sources.diagnosis.unexplained);
+        let found = unexplained.iter().map(|u| u.size_arcsec.powi(2)).sum::<f64>().sqrt();
+        (left.rms_before_arcsec.powi(2) - left.noise_floor_arcsec.powi(2)).max(0.0).sqrt().max(found)
+    }
+
     fn headline(&self) -> Headline {
         let diagnosis = self.sources.diagnosis;
-        let (held, left) = (diagnosis.held_out, diagnosis.residual);
-        let mut answer = Text::default();
         let causes = &diagnosis.causes;
-        let list = |mut text: Text| {
+        let listed = |mut text: Text| {
             for (k, cause) in causes.iter().enumerate() {
-                let between = if k == 0 {
-                    ""
-                } else if k + 1 == causes.len() {
-                    " and "
-                } else {
-                    ", "
+                let between = match k {
+                    0 => "",
+                    k if k + 1 == causes.len() => " and ",
+                    _ => ", ",
                 };
                 text = words::named(text.plain(between), cause);
             }
-            text
+            text.plain(".")
         };
-        let said = match causes.len() {
-            1 => "One cause explains",
-            2 => "Two causes explain",
-            _ => "Several causes explain",
-        };
-        let share = words::percent(self.explained_share());
-        let gain = |text: Text| {
-            text.plain(format!(" In {} the error falls from ", self.left_out()))
-                .error(held.rms_before_arcsec, 3)
-                .plain(" to ")
-                .error(held.rms_after_arcsec, 3)
-                .plain(" rms.")
-        };
-        let number = Text::default().strong(share);
-        let number_is = format!("of the squared error in {} is explained", self.left_out());
-        let excess = (left.rms_before_arcsec.powi(2) - left.noise_floor_arcsec.powi(2)).max(0.0).sqrt();
+        let share = Text::default().strong(words::percent(self.explained_share()));
+        let share_is = format!("of the squared error in {} is explained", self.left_out());
         let (answer, number, number_is) = match diagnosis.verdict {
-            Verdict::Explained => {
-                answer = list(answer.plain(format!("{said} what the nominal model gets wrong: "))).plain(".");
-                (gain(answer), number, number_is)
-            }
-            Verdict::PartlyExplained => {
-                answer = list(answer.plain(format!("{said} a part of what the nominal model gets wrong: "))).plain("; ");
-                answer = match diagnosis.unexplained.first() {
-                    Some(something) => answer
-                        .error(something.size_arcsec, 2)
-                        .plain(format!(" rms have no known cause and look like {}.", something.looks_like)),
-                    None => answer.plain("a significant remainder has no known cause."),
-                };
-                (gain(answer), number, number_is)
-            }
+            Verdict::Explained => (listed(Text::new("Explained by ")), share, share_is),
+            Verdict::PartlyExplained => (listed(Text::new("Partly explained by ")), share, share_is),
             Verdict::Unknown => (
-                answer
-                    .plain("The drive departs from the nominal model by ")
-                    .error(excess, 2)
-                    .plain(" rms beyond noise, and no cause in the library explains it: none is named."),
-                Text::default().error(excess, 2),
+                Text::new(
+                    "Unknown: the drive departs from the nominal model, and no cause in the library explains how.",
+                ),
+                Text::default().error(self.departure_arcsec(), 2),
                 "rms beyond noise, of unknown cause".to_owned(),
             ),
             Verdict::None => (
-                answer
-                    .plain("The drive does what the nominal model says: nothing beyond noise and the spread between units. \
-                            Recalibrated to this unit, the model leaves ")
-                    .error(left.rms_before_arcsec, 3)
-                    .plain(" rms, of which noise is ")
-                    .error(left.noise_floor_arcsec, 3)
-                    .plain("."),
-                Text::default().error(left.rms_before_arcsec, 3),
-                "rms error of the recalibrated nominal model".to_owned(),
+                Text::new(
+                    "Nothing found: the drive does what the nominal model says, within noise and the spread between units.",
+                ),
+                Text::default().error(diagnosis.residual.rms_before_arcsec, 3),
+                "rms error of the nominal model, recalibrated to this unit".to_owned(),
             ),
         };
         Headline { choice: None, answer, number, number_is }
+    }
+
+    /// What the headline leaves out and a reader has to know.
+    fn in_short(&self) -> Section {
+        let diagnosis = self.sources.diagnosis;
+        let (held, left) = (diagnosis.held_out, diagnosis.residual);
+        let mut blocks = Vec::new();
+        if !diagnosis.causes.is_empty() {
+            blocks.push(paragraph(
+                Text::new(format!("In {} the error of the prediction falls from ", self.left_out()))
+                    .error(held.rms_before_arcsec, 3)
+                    .plain(" to ")
+                    .error(held.rms_after_arcsec, 3)
+                    .plain(" rms, where the nominal model, recalibrated to this unit, is compared with the same with the causes in it. \
+                            Noise and wander of the measurement are ")
+                    .error(left.noise_floor_arcsec, 3)
+                    .plain("."),
+            ));
+        } else {
+            blocks.push(paragraph(
+                Text::new("The nominal model, recalibrated to this unit, leaves ")
+                    .error(left.rms_before_arcsec, 3)
+                    .plain(" rms. Noise and wander of the measurement are ")
+                    .error(left.noise_floor_arcsec, 3)
+                    .plain("."),
+            ));
+        }
+        for cause in diagnosis.causes.iter().filter(|cause| !cause.look_alikes.is_empty()) {
+            let alike: Vec<String> = cause.look_alikes.iter().map(|name| words::cause(name)).collect();
+            blocks.push(paragraph(
+                Text::new("These data do not tell ")
+                    .strong(words::cause(&cause.name))
+                    .plain(format!(" from {}.", words::listed(&alike))),
+            ));
+        }
+        if let Some(something) = diagnosis.unexplained.first() {
+            let more = diagnosis.unexplained.len() - 1;
+            let text = Text::new(if diagnosis.causes.is_empty() {
+                "What departs looks like "
+            } else {
+                "Without a known cause: "
+            })
+            .strong(something.looks_like.replace('_', " "))
+            .plain(", ")
+            .error(something.size_arcsec, 2)
+            .plain(if more > 0 {
+                format!(" rms, and {} more below.", words::counted(more))
+            } else {
+                " rms.".into()
+            });
+            blocks.push(paragraph(text));
+        }
+        if let Some(next) = &diagnosis.next_experiment {
+            blocks.push(paragraph(Text::new("To record next: ").plain(format!("{next}."))));
+        }
+        Section { id: "short".into(), title: "In short".into(), detail: Detail::Summary, blocks }
     }
 
     /// Faults of the data, a sentence each, and what there is beside the causes.
@@ -343,12 +374,20 @@ impl Known<'_> {
                 .enumerate()
                 .map(|(k, shown)| {
                     let colour = [5, 0, 1][k.min(2)];
-                    thin::medians(&turn, &shown.level.residual_arcsec, &every, shown.level.name, Mark::Line, colour)
+                    thin::medians(
+                        &turn,
+                        &shown.level.residual_arcsec,
+                        &every,
+                        TURN_BINS,
+                        shown.level.name,
+                        Mark::Line,
+                        colour,
+                    )
                 })
                 .collect(),
             ..Lines::default()
         };
-        let y = || Axis::new("Error less the model", Quantity::Error);
+        let y = || Axis::new("Error less model", Quantity::Error);
         let figure = |id: &str, title: &str, caption: &str, x: Axis, lines: Lines| {
             Block::Figure(Figure {
                 id: id.into(),
@@ -503,27 +542,49 @@ impl Known<'_> {
             ],
         );
         let mut blocks = vec![all, noise, pointing];
-        let recalibrated = &self.sources.diagnosis.recalibrated;
-        if !recalibrated.is_empty() {
-            let rows = recalibrated
-                .iter()
-                .map(|(name, p)| {
-                    let value = if name == "zero" {
-                        Text::default().error(p.value, 3).plain(" ± ").error(p.std, 2)
-                    } else {
-                        let text = format!("{:+.1} ± {:.1} %", 100.0 * p.value, 100.0 * p.std);
-                        Text::new(text.replace('-', "−"))
-                    };
-                    vec![Text::new(words::begun(&name.replace('_', " "))), value]
-                })
-                .collect();
+        let rows = self.recalibrated_rows();
+        if !rows.is_empty() {
             blocks.push(table("The nominal model as this unit has it", &["Parameter", "Against nominal"], rows));
             blocks.push(paragraph(
-                "Within the spread between units; the wind-up and the clearance change by these shares, harmonics by them in phase \
-                 and in quadrature. The zero is that of the encoder.",
+                "Within the spread between units: wind-up and clearance by these shares of nominal, each harmonic by a share of its \
+                 amplitude in phase with it and a quarter of a wave before it. The zero is that of the encoder.",
             ));
         }
         Section { id: "gain".into(), title: "What it gains".into(), detail: Detail::Summary, blocks }
+    }
+
+    /// What floats in the nominal model, with its order where it is a harmonic.
+    fn recalibrated_rows(&self) -> Vec<Vec<Text>> {
+        let recalibrated = &self.sources.diagnosis.recalibrated;
+        // Harmonics are numbered by their place, two for each of the model.
+        let mut waves: Vec<(usize, &String)> = recalibrated
+            .keys()
+            .filter(|name| name.starts_with("harmonic"))
+            .map(|name| (name.trim_start_matches(|c: char| !c.is_ascii_digit()).parse().unwrap_or(0), name))
+            .collect();
+        waves.sort_unstable();
+        let known = waves.len() == 2 * self.sources.nominal.harmonics.len();
+        let wave = |name: &String| {
+            let place = waves.iter().position(|(_, other)| *other == name).filter(|_| known)?;
+            let order = self.sources.nominal.harmonics[place / 2].order_per_generator_turn;
+            let phase = if place % 2 == 0 { "in phase" } else { "a quarter before" };
+            Some((place, format!("Harmonic of order {}, {phase}", significant(order, 4))))
+        };
+        let mut rows: Vec<(usize, Vec<Text>)> = recalibrated
+            .iter()
+            .map(|(name, p)| {
+                let value = if name == "zero" {
+                    Text::default().error(p.value, 3).plain(" ± ").error(p.std, 2)
+                } else {
+                    Text::new(format!("{:+.1} ± {:.1} %", 100.0 * p.value, 100.0 * p.std).replace('-', "−"))
+                };
+                let plain = if name == "stiffness" { "wind-up".to_owned() } else { name.replace('_', " ") };
+                let (place, name) = wave(name).map_or((0, words::begun(&plain)), |(place, text)| (1 + place, text));
+                (place, vec![Text::new(name), value])
+            })
+            .collect();
+        rows.sort_by_key(|(place, _)| *place);
+        rows.into_iter().map(|(_, row)| row).collect()
     }
 
     fn next(&self) -> Section {

@@ -15,6 +15,10 @@ use crate::residual::{Axis as Angle, Direction, Wheel};
 const SPECTRUM_POINTS: usize = 700;
 /// Cells of the map, across and up.
 const MAP: [usize; 2] = [72, 36];
+/// Medians over a quantity.
+const MEDIANS: usize = 24;
+/// A quantity that changes by less than this share of itself is no axis.
+const CHANGES: f64 = 0.03;
 /// Rows that a cell needs before its median is shown.
 const FEWEST_IN_CELL: usize = 2;
 const DIRECTIONS: [(f64, &str); 2] = [(1.0, "forward"), (-1.0, "backward")];
@@ -47,7 +51,7 @@ impl Known<'_> {
         of: impl Fn(&Shown) -> Option<Lines>,
     ) -> Option<Block> {
         let charts = self.charts(of);
-        let y = Axis::new("Error less the model", Quantity::Error);
+        let y = Axis::new("Error less model", Quantity::Error);
         (!charts.is_empty()).then(|| self.figure(id, title, caption, FigureBody::Lines { x, y, charts }))
     }
 
@@ -68,8 +72,15 @@ impl Known<'_> {
             }
         }
         for (colour, (direction, name)) in DIRECTIONS.into_iter().enumerate() {
-            let median =
-                medians(quantity, values, &self.rows_in(direction), &format!("{name}, median"), Mark::Line, 2 + colour);
+            let median = medians(
+                quantity,
+                values,
+                &self.rows_in(direction),
+                MEDIANS,
+                &format!("{name}, median"),
+                Mark::Line,
+                2 + colour,
+            );
             if median.points.len() > 1 {
                 lines.series.push(median);
             }
@@ -104,7 +115,7 @@ impl Known<'_> {
                 FigureBody::Field {
                     x: Axis::new("Generator angle ψ in its turn", Quantity::Degree),
                     y: Axis::new("Output angle δ in its turn", Quantity::Degree),
-                    z: Axis::new("Error less the model", Quantity::Error),
+                    z: Axis::new("Error less model", Quantity::Error),
                     fields: maps,
                 },
             ));
@@ -141,7 +152,7 @@ impl Known<'_> {
                 "over-session",
                 "By session",
                 "Median of each session, and the bounds between which nine rows of ten lie.",
-                Axis::new("Session", Quantity::Count),
+                Axis::new("Session", Quantity::Whole),
                 |shown| {
                     let each: Vec<[f64; 3]> =
                         rows.sessions.iter().map(|s| middle(shown.level.residual_arcsec[s.clone()].to_vec())).collect();
@@ -207,26 +218,16 @@ impl Known<'_> {
             blocks.extend(self.lines(
                 &format!("angle-{id}"),
                 &format!("Over one turn of {symbol}: {wheel}"),
-                "Medians of bins of three degrees, by direction; dashed, a standard deviation on either side of them both.",
+                "Medians of bins of three degrees, by direction. A sound drive has what its nominal model has, and these are flat.",
                 Axis::new(format!("{symbol} in its turn"), Quantity::Degree),
                 |shown| {
                     let mut lines = Lines::default();
                     for map in shown.picture.as_ref()?.maps.iter().filter(|map| map.axis == angle) {
                         let forward = map.direction == Direction::Forward;
                         let (name, colour) = if forward { ("forward", 0) } else { ("backward", 1) };
-                        let series = |name: String, mark, shift: f64| Series {
-                            name,
-                            mark,
-                            colour,
-                            points: map
-                                .bins
-                                .iter()
-                                .map(|bin| [bin.angle_rad.to_degrees(), bin.median_arcsec + shift * bin.spread_arcsec])
-                                .collect(),
-                        };
-                        lines.series.push(series(name.into(), Mark::Line, 0.0));
-                        lines.series.push(series(format!("{name}, above"), Mark::Dashed, 1.0));
-                        lines.series.push(series(format!("{name}, below"), Mark::Dashed, -1.0));
+                        let points =
+                            map.bins.iter().map(|bin| [bin.angle_rad.to_degrees(), bin.median_arcsec]).collect();
+                        lines.series.push(Series { name: name.into(), mark: Mark::Line, colour, points });
                     }
                     (!lines.series.is_empty()).then_some(lines)
                 },
@@ -401,7 +402,7 @@ const ANGLES: [(Angle, &str); 3] =
 
 fn varies(values: &[f64]) -> bool {
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-    high > low
+    high - low > CHANGES * high.abs().max(low.abs())
 }
 
 /// Statistics of the groups of a level.
@@ -417,6 +418,14 @@ fn group_table(shown: &Shown) -> Option<Block> {
     let rows: Vec<Vec<Text>> = picture
         .groups
         .iter()
+        .filter(|grouping| match grouping.by {
+            "session" => grouping.groups.len() > 1,
+            // A speed that is the same throughout is parted by its noise.
+            _ => match (grouping.groups.first().and_then(|g| g.range), grouping.groups.last().and_then(|g| g.range)) {
+                (Some([low, _]), Some([_, high])) => varies(&[low, high]),
+                _ => true,
+            },
+        })
         .flat_map(|grouping| grouping.groups.iter().map(|group| (by(grouping.by), group)))
         .take(MOST)
         .map(|((before, after), group)| {

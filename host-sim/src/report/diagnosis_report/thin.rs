@@ -8,8 +8,6 @@ use crate::report::page::{Mark, Series, Upright};
 const STRETCHES: usize = 500;
 /// Rows that are shown as dots.
 const DOTS: usize = 1600;
-/// Bins of a quantity over which medians are drawn, at most.
-const BINS: usize = 24;
 /// Rows that a bin must have.
 const FEWEST_IN_BIN: usize = 12;
 /// Breaks between sessions, as a share of all the time that was recorded.
@@ -111,15 +109,23 @@ pub(super) fn dots(over: &[f64], values: &[f64], rows: &[usize], name: &str, col
     Series { name: name.to_owned(), mark: Mark::Dots, colour, points: sorted(points) }
 }
 
-/// Medians over bins of equal width of a quantity, where there are rows enough.
-pub(super) fn medians(over: &[f64], values: &[f64], rows: &[usize], name: &str, mark: Mark, colour: usize) -> Series {
+/// Medians over so many bins of equal width of a quantity, where there are rows enough.
+pub(super) fn medians(
+    over: &[f64],
+    values: &[f64],
+    rows: &[usize],
+    count: usize,
+    name: &str,
+    mark: Mark,
+    colour: usize,
+) -> Series {
     let finite = || rows.iter().map(|k| over[*k]).filter(|x| x.is_finite());
     let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
-    let mut bins: Vec<(Vec<f64>, f64)> = vec![(Vec::new(), 0.0); BINS];
+    let mut bins: Vec<(Vec<f64>, f64)> = vec![(Vec::new(), 0.0); count];
     if high > low {
         for k in rows {
-            let place = ((over[*k] - low) / (high - low) * BINS as f64) as usize;
-            let bin = &mut bins[place.min(BINS - 1)];
+            let place = ((over[*k] - low) / (high - low) * count as f64) as usize;
+            let bin = &mut bins[place.min(count - 1)];
             bin.0.push(values[*k]);
             bin.1 += over[*k];
         }
@@ -199,11 +205,11 @@ mod tests {
         assert_eq!(some_rows(3), [0, 1, 2]);
         let over: Vec<f64> = all.iter().map(|k| (*k % 100) as f64).collect();
         let values: Vec<f64> = over.iter().map(|x| 3.0 * x).collect();
-        let series = medians(&over, &values, &all, "x", Mark::Line, 0);
-        assert_eq!(series.points.len(), BINS);
+        let series = medians(&over, &values, &all, 24, "x", Mark::Line, 0);
+        assert_eq!(series.points.len(), 24);
         assert!(series.points.iter().all(|[x, y]| (y - 3.0 * x).abs() < 3.0), "{:?}", series.points);
         assert_eq!(
-            medians(&[1.0; 50], &[1.0; 50], &(0..50).collect::<Vec<_>>(), "x", Mark::Line, 0).points,
+            medians(&[1.0; 50], &[1.0; 50], &(0..50).collect::<Vec<_>>(), 9, "x", Mark::Line, 0).points,
             [] as [[f64; 2]; 0]
         );
     }

@@ -151,6 +151,9 @@ pub(super) fn parameter(name: &str, p: Parameter) -> String {
         .iter()
         .find_map(|(ending, unit)| name.strip_suffix(ending).map(|words| (words, *unit)))
         .unwrap_or((name, ""));
+    if p.std == 0.0 && p.value.fract() == 0.0 {
+        return format!("{} {}{}{unit}", words.replace('_', " "), p.value, if unit.is_empty() { "" } else { " " });
+    }
     let (places, gap) = (decimals(p), if unit.is_empty() || unit.starts_with(['″', '/', '°']) { "" } else { " " });
     let number = |v: f64| format!("{v:.places$}").replace('-', "−");
     format!("{} {} ± {}{gap}{unit}", words.replace('_', " "), number(p.value), number(p.std))
@@ -161,18 +164,11 @@ pub(super) fn parameters(cause: &Cause) -> String {
     cause.parameters.iter().map(|(name, p)| parameter(name, *p)).collect::<Vec<_>>().join("; ")
 }
 
-/// A cause with what a reader has to know of it at once: `eccentricity of the circular spline (97 %, 12.3″)`.
+/// A cause with what a reader has to know of it at once: `eccentricity of the circular spline (97 %, 12″ rms)`.
 pub(super) fn named(text: Text, cause: &Cause) -> Text {
-    let text = text
-        .plain(format!("{} (", self::cause(&cause.name)))
-        .plain(format!("confidence {}, ", percent(cause.confidence)))
+    text.plain(format!("{} ({}, ", self::cause(&cause.name), percent(cause.confidence)))
         .error(cause.size_arcsec, 2)
-        .plain(" rms");
-    if cause.look_alikes.is_empty() {
-        return text.plain(")");
-    }
-    let alike: Vec<String> = cause.look_alikes.iter().map(|name| self::cause(name)).collect();
-    text.plain(format!("; these data do not tell it from {})", listed(&alike)))
+        .plain(" rms)")
 }
 
 /// A fault in words.
@@ -222,7 +218,7 @@ mod tests {
             ("growth_arcsec", -12.0, 3.0, "growth −12.0 ± 3.0″"),
             ("clearance_arcsec_per_k", 1.234_56, 0.012, "clearance 1.235 ± 0.012″/K"),
             ("delay_s", 0.002, 0.000_05, "delay 0.002000 ± 0.000050 s"),
-            ("harmonic", 2.0, 0.0, "harmonic 2.000 ± 0.000"),
+            ("harmonic", 2.0, 0.0, "harmonic 2"),
             ("torque_n_m", 8.1, 0.2, "torque 8.10 ± 0.20 N·m"),
         ] {
             assert_eq!(parameter(name, Parameter { value, std }), text);
