@@ -109,15 +109,25 @@ impl Base {
     /// The nominal model over the rows; `table` takes the place of its parts where it is given.
     #[must_use]
     pub fn new(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>) -> Base {
+        Base::of_laws(rows, nominal, table, &PlayLaw::ALL)
+    }
+
+    /// The same with the law of the play known.
+    #[must_use]
+    pub fn with_play(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>, law: PlayLaw) -> Base {
+        Base::of_laws(rows, nominal, table, &[law])
+    }
+
+    fn of_laws(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>, laws: &[PlayLaw]) -> Base {
         let wind_up: Vec<f64> = rows.torque.iter().map(|t| nominal.wind_up_arcsec(*t)).collect();
         let harmonics: Vec<f64> = rows.generator.iter().map(|psi| nominal.harmonics_arcsec(*psi)).collect();
         let half_backlash = 0.5 * nominal.backlash_arcsec;
         let mut best: Option<(f64, PlayLaw, Vec<f64>)> = None;
-        for law in PlayLaw::ALL {
+        for &law in laws {
             let flank = law.flanks(rows, &rows.torque, nominal);
             let left: Vec<f64> =
                 (0..rows.len()).map(|k| rows.error[k] - harmonics[k] - wind_up[k] - half_backlash * flank[k]).collect();
-            let spread = middle_spread(&left, &rows.torque, nominal.friction_torque_n_m);
+            let spread = middle_spread(rows, &left, nominal.friction_torque_n_m);
             if best.as_ref().is_none_or(|(least, _, _)| spread < CLEARLY_BETTER * least) {
                 best = Some((spread, law, flank));
             }
@@ -149,9 +159,10 @@ impl Base {
 }
 
 /// Mean square left where the torque is around friction, after what varies slowly over those rows is taken out.
-fn middle_spread(left: &[f64], torque: &[f64], friction: f64) -> f64 {
-    let inside: Vec<f64> = left.iter().zip(torque).filter(|(_, t)| t.abs() <= friction).map(|(e, _)| *e).collect();
-    let all: f64 = left.iter().sum::<f64>() / left.len().max(1) as f64;
+fn middle_spread(rows: &Rows, left: &[f64], friction: f64) -> f64 {
+    let used = || rows.sessions_used().flatten();
+    let inside: Vec<f64> = used().filter(|k| rows.torque[*k].abs() <= friction).map(|k| left[k]).collect();
+    let all: f64 = used().map(|k| left[k]).sum::<f64>() / rows.count_used().max(1) as f64;
     inside.iter().map(|e| (e - all).powi(2)).sum::<f64>()
 }
 

@@ -133,7 +133,7 @@ fn least_apart(
                 time_s: Some((0..ROWS).map(|row| SECONDS * (2.0 * k as f64 + row as f64 / ROWS as f64)).collect()),
                 generator_rad: states.iter().map(|s| TAU * s.turns * on.nominal.ratio.abs() / 95.0).collect(),
                 error_rad: vec![0.0; ROWS],
-                torque_n_m: Some(states.iter().map(|s| s.torque * on.load).collect()),
+                torque_n_m: Some(states.iter().map(|s| s.torque * on.scales.load).collect()),
                 temperature_c: Some(states.iter().map(|s| on.nominal.temperature_c + s.warmer).collect()),
                 orientation_rad: Some(states.iter().map(|s| s.orientation).collect()),
             }
@@ -143,7 +143,7 @@ fn least_apart(
     let base = Base::new(&rows, on.nominal, None);
     let mut truth = base.prediction.clone();
     {
-        let imagined = Excitation { rows: &rows, base: &base, jumps: &[], ..*on };
+        let imagined = Excitation { rows: &rows, base: &base, ..*on };
         for (column, c) in (term.law.columns)(&imagined, &term.law.values(&term.places)).iter().zip(coefficients) {
             for (t, v) in truth.iter_mut().zip(&column.values) {
                 *t += c * v;
@@ -151,7 +151,7 @@ fn least_apart(
         }
     }
     rows.error = truth;
-    let imagined = Excitation { rows: &rows, base: &base, jumps: &[], ..*on };
+    let imagined = Excitation { rows: &rows, base: &base, ..*on };
     let problem = Problem::new(&imagined, Whitener::new(&rows, &base.uncertain, 1, noise), 1.0);
     let scaffold = Scaffold::new(&problem, Vec::new());
     let own = scaffold.fit(&[&Term::new(&problem, term.law, term.places.clone())])?.solution.misfit;

@@ -12,6 +12,7 @@
 pub mod base;
 pub mod candidate;
 mod experiment;
+mod extended;
 mod held_out;
 pub mod linear;
 pub mod model;
@@ -34,7 +35,9 @@ use thiserror::Error;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
 use base::Base;
-use candidate::{Excitation, Law, library, line, unnamed};
+use candidate::{Excitation, Law, Scales, library, line, unnamed};
+use extended::Found;
+pub use extended::{Extended, FittedCause, Series};
 use model::{Fit, Problem, Term};
 use noise::{Noise, Whitener};
 use report::{Cause, Compensation, Diagnosis, Parameter, Residual, Unexplained, Verdict};
@@ -98,98 +101,133 @@ pub fn diagnose(
     nominal: &Nominal,
     table: Option<&Table<'_>>,
     settings: &Settings,
-    mut progress: impl FnMut(usize, usize, &str),
+    progress: impl FnMut(usize, usize, &str),
 ) -> Result<Diagnosis, DiagnosisError> {
+    diagnose_extended(sessions, nominal, table, settings, progress).map(|(diagnosis, _)| diagnosis)
+}
+
+/// The same, with the model that was found, to predict other rows with.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn diagnose_extended(
+    sessions: &[Session],
+    nominal: &Nominal,
+    table: Option<&Table<'_>>,
+    settings: &Settings,
+    mut progress: impl FnMut(usize, usize, &str),
+) -> Result<(Diagnosis, Extended), DiagnosisError> {
     let rows = Rows::new(sessions, nominal);
-    if rows.len() < LEAST_ROWS {
-        return Err(DiagnosisError::TooFewRows { found: rows.len(), needed: LEAST_ROWS });
+    check(&rows)?;
+    progress(0, 4, "nominal model");
+    let base = Base::new(&rows, nominal, table);
+    let scales = Scales::new(&rows, settings.pitch_radius_mm, prepare::jumps(&rows, &base));
+    let on = Excitation { rows: &rows, nominal, base: &base, scales: &scales };
+    progress(1, 4, "causes");
+    let search = Search::new(&on, settings)?;
+    progress(2, 4, "rivals");
+    let Search { laws, problem, noise, start, fast } = search;
+    let terms: Vec<Term<'_>> = start.iter().map(|(k, p)| Term::new(&problem, &laws[*k], p.clone())).collect();
+    let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
+    let maps = candidate::maps(&on);
+    let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);
+    left.extend(fast.into_iter().filter(|f| f.size_arcsec > select::least_size(noise.white)));
+    left.extend(remainder::beyond_noise(&problem, &selected, noise));
+    if settings.verbose {
+        for something in &left {
+            eprintln!("  left: {} {:.2}", something.looks_like, something.size_arcsec);
+        }
+    }
+    let diagnosis = conclude(&problem, &laws, selected, left, noise, settings);
+    progress(3, 4, "gain on sessions left out");
+    let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
+    drop(problem);
+    Ok((diagnosis, found.extended(laws, &base, &scales)))
+}
+
+/// Whether rows can be diagnosed at all.
+fn check(rows: &Rows) -> Result<(), DiagnosisError> {
+    if rows.count_used() < LEAST_ROWS {
+        return Err(DiagnosisError::TooFewRows { found: rows.count_used(), needed: LEAST_ROWS });
     }
     let finite = |column: &[f64]| column.iter().all(|v| v.is_finite());
     if ![&rows.generator, &rows.error, &rows.torque, &rows.temperature, &rows.time].into_iter().all(|c| finite(c)) {
         return Err(DiagnosisError::NotFinite);
     }
-    progress(0, 5, "nominal model");
-    let base = Base::new(&rows, nominal, table);
-    let jumps = prepare::jumps(&rows, &base);
-    let on = Excitation {
-        rows: &rows,
-        nominal,
-        base: &base,
-        load: rows.load_scale(),
-        arcsec_per_um: crate::tables::ARCSEC_PER_RAD * 1e-3 / settings.pitch_radius_mm,
-        jumps: &jumps,
-    };
-    let mut laws = library(&on);
-    laws.extend(unnamed(&on));
-    progress(1, 5, "noise");
-    let say = |text: String| {
-        if settings.verbose {
-            eprintln!("{text}");
-        }
-    };
-    let stride = (rows.len() / settings.averages).max(1);
-    let whiten = |noise| Whitener::new(&rows, &base.uncertain, stride, noise);
-    let (mut noise, mut worth) = prepare::noise(&on, &laws, &[]);
-    say(format!("play {:?}, {noise:?}, worth {worth:.2}, {} rows", base.law, rows.len()));
-    progress(2, 5, "causes");
-    let mut problem = Problem::new(&on, whiten(noise), worth);
-    let mut fast: Vec<Unexplained> = Vec::new();
-    let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
-    // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
-    for round in 0.. {
-        fast.clear();
-        let terms = start.drain(..).map(|(k, places)| Term::new(&problem, &laws[k], places)).collect();
-        let selected = select(&problem, &laws, noise.white, terms, say).ok_or(DiagnosisError::NotFinite)?;
-        if round == MOST_ROUNDS {
+    Ok(())
+}
+
+/// Laws chosen, the noise they leave, and what they were chosen on.
+struct Search<'a> {
+    laws: Vec<Law>,
+    problem: Problem<'a>,
+    noise: Noise,
+    /// Index and places of each law chosen.
+    start: Vec<(usize, Vec<f64>)>,
+    /// Lines too fast for averages.
+    fast: Vec<Unexplained>,
+}
+
+impl<'a> Search<'a> {
+    fn new(on: &'a Excitation<'a>, settings: &Settings) -> Result<Search<'a>, DiagnosisError> {
+        let mut laws = library(on);
+        laws.extend(unnamed(on));
+        let say = |text: String| {
+            if settings.verbose {
+                eprintln!("{text}");
+            }
+        };
+        let stride = (on.rows.count_used() / settings.averages).max(1);
+        let whiten = |noise| Whitener::new(on.rows, &on.base.uncertain, stride, noise);
+        let (mut noise, mut worth) = prepare::noise(on, &laws, &[]);
+        say(format!("play {:?}, {noise:?}, worth {worth:.2}, {} rows", on.base.law, on.rows.count_used()));
+        let mut problem = Problem::new(on, whiten(noise), worth);
+        let mut fast: Vec<Unexplained> = Vec::new();
+        let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
+        // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
+        for round in 0.. {
+            fast.clear();
+            let terms = start.drain(..).map(|(k, places)| Term::new(&problem, &laws[k], places)).collect();
+            let selected = select(&problem, &laws, noise.white, terms, say).ok_or(DiagnosisError::NotFinite)?;
             start = remembered(&laws, &selected);
-            break;
-        }
-        let lines = lines_left(&problem, &selected, noise);
-        let (slow, found): (Vec<_>, Vec<_>) =
-            lines.into_iter().partition(|(line, _)| !remainder::averaged_away(&problem, line));
-        for (line, size) in found {
-            let looks_like = format!("line of {:.4} per {}", line.order, line.unit);
-            if fast.iter().all(|f| f.looks_like != looks_like) {
-                say(format!("  {looks_like}: {size:.2} arcsec, too fast for averages"));
-                fast.push(Unexplained { looks_like, size_arcsec: size });
+            if round == MOST_ROUNDS {
+                break;
             }
-        }
-        let explained = remainder::explained(&problem, &selected);
-        start = remembered(&laws, &selected);
-        drop(selected);
-        let known = laws.len();
-        for (found, size) in slow {
-            let law = line(found.unit, found.order);
-            if laws.iter().all(|l| l.cause != law.cause) {
-                say(format!("  {}: {size:.2} arcsec", law.cause));
-                laws.push(law);
+            let lines = lines_left(&problem, &selected, noise);
+            let (slow, found): (Vec<_>, Vec<_>) =
+                lines.into_iter().partition(|(line, _)| !remainder::averaged_away(&problem, line));
+            for (line, size) in found {
+                let looks_like = format!("line of {:.4} per {}", line.order, line.unit);
+                if fast.iter().all(|f| f.looks_like != looks_like) {
+                    say(format!("  {looks_like}: {size:.2} arcsec, too fast for averages"));
+                    fast.push(Unexplained { looks_like, size_arcsec: size });
+                }
             }
+            let explained = remainder::explained(&problem, &selected);
+            drop(selected);
+            let known = laws.len();
+            for (found, size) in slow {
+                let law = line(found.unit, found.order);
+                if laws.iter().all(|l| l.cause != law.cause) {
+                    say(format!("  {}: {size:.2} arcsec", law.cause));
+                    laws.push(law);
+                }
+            }
+            let new_line = laws.len() > known;
+            let (again, worth_again) = prepare::noise(on, &laws, if new_line { &[] } else { &explained });
+            let change = again.floor() / noise.floor();
+            if !new_line && (0.85..1.18).contains(&change) {
+                break;
+            }
+            if new_line {
+                start.clear();
+            }
+            (noise, worth) = (again, worth_again);
+            say(format!("once more: {noise:?}, worth {worth:.2}"));
+            problem = Problem::new(on, whiten(noise), worth);
         }
-        let new_line = laws.len() > known;
-        let (again, worth_again) = prepare::noise(&on, &laws, if new_line { &[] } else { &explained });
-        let change = again.floor() / noise.floor();
-        if !new_line && (0.85..1.18).contains(&change) {
-            break;
-        }
-        if new_line {
-            start.clear();
-        }
-        (noise, worth) = (again, worth_again);
-        say(format!("once more: {noise:?}, worth {worth:.2}"));
-        problem = Problem::new(&on, whiten(noise), worth);
+        Ok(Search { laws, problem, noise, start, fast })
     }
-    let terms: Vec<Term<'_>> = start.into_iter().map(|(k, places)| Term::new(&problem, &laws[k], places)).collect();
-    let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
-    progress(3, 5, "what is left");
-    let maps = candidate::maps(&on);
-    let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);
-    left.extend(fast.into_iter().filter(|f| f.size_arcsec > select::least_size(noise.white)));
-    left.extend(remainder::beyond_noise(&problem, &selected, noise));
-    for something in &left {
-        say(format!("  left: {} {:.2}", something.looks_like, something.size_arcsec));
-    }
-    progress(4, 5, "rivals");
-    Ok(conclude(&problem, &laws, selected, left, noise, settings))
 }
 
 /// Which laws were selected, and where.
@@ -233,7 +271,7 @@ fn conclude(
     };
     let before = none.as_ref().map_or(Vec::new(), |fit| left(&[], fit));
     let after = left(&all, &selected.fit);
-    let stride_floor = noise.white / (problem.on.rows.len() as f64 / problem.data.len() as f64).sqrt();
+    let stride_floor = noise.white / (problem.on.rows.count_used() as f64 / problem.data.len() as f64).sqrt();
     let floor = stride_floor.hypot(noise.wander);
     let (rms_before, rms_after) = (problem.certain_rms(&before), problem.certain_rms(&after));
     let explainable = (rms_before * rms_before - floor * floor).max(0.0);

@@ -49,7 +49,7 @@ impl Whitener {
     pub fn new(rows: &Rows, uncertain: &[bool], stride: usize, noise: Noise) -> Whitener {
         let stride = stride.max(1);
         let (mut groups, mut sessions) = (Vec::new(), Vec::new());
-        for session in &rows.sessions {
+        for session in rows.sessions_used() {
             let from = groups.len();
             let mut k = session.start;
             while k < session.end {
@@ -108,6 +108,16 @@ impl Whitener {
         self.groups.iter().map(|g| !uncertain[g.clone()].iter().any(|u| *u)).collect()
     }
 
+    /// Values of averages back in the rows they are made of; 0 in rows of none.
+    #[must_use]
+    pub fn in_rows(&self, averaged: &[f64], rows: usize) -> Vec<f64> {
+        let mut values = vec![0.0; rows];
+        for (group, value) in self.groups.iter().zip(averaged) {
+            values[group.clone()].fill(*value);
+        }
+        values
+    }
+
     /// Innovations of averaged values, in units of their standard deviation.
     #[must_use]
     pub fn whiten_averaged(&self, averaged: &[f64]) -> Vec<f64> {
@@ -155,7 +165,7 @@ impl Whitener {
 #[must_use]
 pub fn white_level(rows: &Rows, left: &[f64]) -> f64 {
     let mut differences = Vec::with_capacity(left.len());
-    for session in &rows.sessions {
+    for session in rows.sessions_used() {
         for k in session.start + 2..session.end {
             differences.push((left[k] - 2.0 * left[k - 1] + left[k - 2]).abs());
         }

@@ -13,9 +13,9 @@ const BESIDE: usize = 12;
 /// Least height of what is taken for a jump before anything else is known, arcsec.
 const LEAST_JUMP: f64 = 1000.0;
 
-/// Rows at which the error leaves for another level at once, and by how much (arcsec).
+/// Times at which the error leaves for another level at once, and by how much (arcsec).
 #[must_use]
-pub fn jumps(rows: &Rows, base: &Base) -> Vec<(usize, f64)> {
+pub fn jumps(rows: &Rows, base: &Base) -> Vec<(f64, f64)> {
     let left: Vec<f64> = rows.error.iter().zip(&base.prediction).map(|(e, p)| e - p).collect();
     let mut found: Vec<(usize, f64)> = Vec::new();
     let mut between = |at: usize, before: &[f64], after: &[f64]| {
@@ -25,7 +25,7 @@ pub fn jumps(rows: &Rows, base: &Base) -> Vec<(usize, f64)> {
         }
     };
     let mut last: Option<usize> = None;
-    for session in &rows.sessions {
+    for session in rows.sessions_used() {
         if let Some(end) = last {
             let (a, b) = (end.saturating_sub(BESIDE), (session.start + BESIDE).min(session.end));
             between(session.start, &left[a..end], &left[session.start..b]);
@@ -50,7 +50,7 @@ pub fn jumps(rows: &Rows, base: &Base) -> Vec<(usize, f64)> {
             _ => merged.push((at, height)),
         }
     }
-    merged
+    merged.into_iter().map(|(at, height)| (rows.time[at], height)).collect()
 }
 
 /// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by its evidence
@@ -62,7 +62,7 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64]) -> (Noise, f6
     let left: Vec<f64> =
         (0..rows.len()).map(|k| rows.error[k] - on.base.prediction[k] - explained.get(k).unwrap_or(&0.0)).collect();
     let white = white_level(rows, &left);
-    let stride = rows.len().div_ceil(WANDER_AVERAGES);
+    let stride = rows.count_used().div_ceil(WANDER_AVERAGES).max(1);
     let plain = Whitener::new(rows, &on.base.uncertain, stride, Noise { white, wander: 0.0, correlation_s: 1.0 });
     let mut columns: Vec<(Vec<f64>, Prior)> = Vec::new();
     for floating in &on.base.floating {

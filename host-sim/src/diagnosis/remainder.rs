@@ -50,7 +50,8 @@ pub fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -
     let on = problem.on;
     let explained = explained(problem, selected);
     let left: Vec<f64> = (0..on.rows.len()).map(|k| on.rows.error[k] - on.base.prediction[k] - explained[k]).collect();
-    let mut white = Whitener::new(on.rows, &on.base.uncertain, 1, noise).whiten_averaged(&left);
+    let whitener = Whitener::new(on.rows, &on.base.uncertain, 1, noise);
+    let mut white = whitener.in_rows(&whitener.whiten(&left), on.rows.len());
     for (value, uncertain) in white.iter_mut().zip(&on.base.uncertain) {
         *value = if *uncertain { 0.0 } else { value.clamp(-6.0, 6.0) };
     }

@@ -22,8 +22,10 @@ pub struct Recorded {
 /// Rows of all sessions one after another; all vectors have the same length.
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
-    /// Where each session stands.
+    /// Where each session stands; a session without rows is empty.
     pub sessions: Vec<Range<usize>>,
+    /// Which sessions are learnt from. The others have a history (time, travel, temperature) all the same.
+    pub used: Vec<bool>,
     /// What was recorded.
     pub recorded: Recorded,
     /// Time, s; row numbers where it was not recorded.
@@ -55,7 +57,7 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Joins sessions.
+    /// Joins sessions; all are learnt from, but for those of three rows or fewer.
     #[must_use]
     pub fn new(sessions: &[Session], nominal: &Nominal) -> Rows {
         let mut rows = Rows::default();
@@ -70,7 +72,7 @@ impl Rows {
             Some(values) if recorded => values.clone(),
             _ => vec![usual; len],
         };
-        for session in sessions.iter().filter(|session| session.len() > 3) {
+        for session in sessions {
             let (from, len) = (rows.generator.len(), session.len());
             rows.generator.extend(&session.generator_rad);
             rows.error.extend(session.error_rad.iter().map(|e| e * ARCSEC_PER_RAD));
@@ -82,9 +84,30 @@ impl Rows {
                 _ => rows.time.extend((from..from + len).map(|k| k as f64)),
             }
             rows.sessions.push(from..from + len);
+            rows.used.push(len > 3);
         }
         rows.derive(nominal);
         rows
+    }
+
+    /// Learns from these sessions alone, as far as they have rows enough.
+    #[must_use]
+    pub fn learning_from(mut self, used: &[bool]) -> Rows {
+        for (k, session) in self.used.iter_mut().enumerate() {
+            *session &= used.get(k).copied().unwrap_or(false);
+        }
+        self
+    }
+
+    /// Sessions that are learnt from.
+    pub fn sessions_used(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        self.sessions.iter().zip(&self.used).filter(|(_, used)| **used).map(|(session, _)| session.clone())
+    }
+
+    /// Rows that are learnt from.
+    #[must_use]
+    pub fn count_used(&self) -> usize {
+        self.sessions_used().map(|session| session.len()).sum()
     }
 
     fn derive(&mut self, nominal: &Nominal) {

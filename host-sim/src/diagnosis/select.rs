@@ -258,6 +258,38 @@ pub fn select<'l>(
     Some(selected)
 }
 
+/// The given causes, each by the law of it that tells the data best beside the others.
+#[must_use]
+pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[&str]) -> Vec<Term<'l>> {
+    let mut terms: Vec<Term<'l>> = Vec::new();
+    loop {
+        let open: Vec<&Law> = laws
+            .iter()
+            .filter(|law| causes.contains(&law.cause.as_str()) && terms.iter().all(|t| t.law.cause != law.cause))
+            .collect();
+        let found = scan(problem, &terms, &open);
+        if found.is_empty() {
+            break;
+        }
+        let scaffold = Scaffold::new(problem, terms.iter().collect());
+        let best = found
+            .into_par_iter()
+            .filter_map(|(_, term)| {
+                let (term, fit) = scaffold.refine(term)?;
+                Some((fit.solution.evidence, term))
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, term)) = best else { break };
+        terms.push(term);
+        for _ in 0..2 {
+            let Some(fit) = fit(problem, &terms) else { return terms };
+            let Some(settled) = settle(problem, Selected { fit, terms: terms.clone() }) else { break };
+            terms = settled.terms;
+        }
+    }
+    terms
+}
+
 fn forward<'l>(
     problem: &Problem<'_>,
     laws: &'l [Law],

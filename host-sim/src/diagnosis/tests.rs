@@ -1,7 +1,7 @@
 //! The whole diagnosis on made-up data; the plant is that of `synthesize`, which shares no law with the candidates.
 
 use super::report::{Diagnosis, Verdict};
-use super::{DiagnosisError, Settings, diagnose};
+use super::{DiagnosisError, Extended, Settings, diagnose};
 use crate::measurement::Session;
 use crate::synthesize::{Effect, Plan, Richness, Sensors, catalogue_drive, measure};
 
@@ -54,11 +54,11 @@ fn an_eccentric_circular_spline_is_told_from_a_runout_of_the_flexspline_and_meas
 #[test]
 fn sizes_come_with_intervals_that_hold_the_truth() {
     for (name, size, parameter, truth) in [
-        ("sensor_latency", 2.0, "latency_ms", 2.0),
-        ("gravity_torque", 8.0, "moment_n_m", 8.0),
+        ("sensor_latency", 2.0, "delay_s", 2e-3),
+        ("gravity_torque", 8.0, "torque_n_m", 8.0),
         ("output_encoder_eccentricity", 20.0, "amplitude_arcsec", 20.0),
         ("torsional_resonance", 9.0, "frequency_hz", 9.0),
-        ("stiffness_error", 0.3, "relative_wind_up", 0.3),
+        ("stiffness_error", 0.3, "stiffness_ratio", 1.0 / 1.3),
     ] {
         let diagnosis = diagnosed(&[effect(name, size, 1.0, 0.3)], 0, 11);
         assert_eq!(names(&diagnosis), [name], "{}", diagnosis.text());
@@ -116,4 +116,38 @@ fn data_that_say_nothing_are_refused() {
     sessions[2].error_rad[77] = f64::NAN;
     let refused = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap_err();
     assert_eq!(refused, DiagnosisError::NotFinite);
+}
+
+#[test]
+fn a_model_fitted_to_some_sessions_predicts_the_others() {
+    let effects = [effect("torsional_hysteresis", 18.0, 0.0, 0.4), effect("sensor_latency", 2.0, 0.0, 0.0)];
+    let sessions = data(&effects, Richness::Rich, 0, 31);
+    let nominal = catalogue_drive();
+    let used = [true, false, true, false, true];
+    let causes = ["torsional_hysteresis", "sensor_latency"];
+    let settings = Settings::default();
+    let extended = Extended::fit_to(&sessions, &used, &nominal, None, &causes, &settings).unwrap();
+    assert_eq!(extended.causes().len(), 2);
+    let series = extended.predict(&sessions, &nominal, None);
+    let square = |values: Vec<f64>, uncertain: &[bool]| -> f64 {
+        values.iter().zip(uncertain).filter(|(_, u)| !**u).map(|(v, _)| v * v).sum()
+    };
+    for (one, session) in series.iter().zip(&sessions).skip(1).step_by(2) {
+        assert_eq!(one.extended_arcsec.len(), session.len());
+        let before = square(one.less_recalibrated(), &one.flank_uncertain);
+        let after = square(one.less_extended(), &one.flank_uncertain);
+        assert!(after < 0.2 * before, "{after} of {before}");
+    }
+    // On its own, a session is predicted as it was among the others: neither cause remembers sessions before.
+    let alone = &extended.predict(&sessions[1..2], &nominal, None)[0];
+    for (a, b) in alone.extended_arcsec.iter().zip(&series[1].extended_arcsec) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
+    // What the other sessions hold plays no part.
+    let mut changed = sessions.clone();
+    for k in [1, 3] {
+        changed[k].error_rad.iter_mut().for_each(|e| *e *= -3.0);
+    }
+    let again = Extended::fit_to(&changed, &used, &nominal, None, &causes, &settings).unwrap();
+    assert_eq!(again.predict(&sessions, &nominal, None), series);
 }

@@ -9,7 +9,7 @@ use crate::tables::ARCSEC_PER_RAD;
 
 /// An unbalanced load, m g l sin of the output angle against gravity: adds to the torque, so it winds the drive up and moves the play.
 fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
-    let scale = if on.load > 0.0 { on.load } else { 20.0 };
+    let scale = if on.scales.load > 0.0 { on.scales.load } else { 20.0 };
     Law::new("gravity_torque", move |on, shape| {
         let (moment, phase) = (shape[0], shape[1]);
         let rows = on.rows;
@@ -26,8 +26,8 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
             Column { values: play, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 0.5 }) },
         ]
     })
-    .shapes([Shape::by_factors("moment_n_m", 0.01 * scale, 2.0 * scale, 6), Shape::angle("phase_rad", 2.0 * PI, 10)])
-    .parameters(|_, shape, c| vec![("moment_n_m", shape[0] * c[0]), ("phase_rad", shape[1])])
+    .shapes([Shape::by_factors("torque_n_m", 0.01 * scale, 2.0 * scale, 6), Shape::angle("phase_rad", 2.0 * PI, 10)])
+    .parameters(|_, shape, c| vec![("torque_n_m", shape[0] * c[0]), ("phase_rad", shape[1])])
 }
 
 /// Response of a mass on a spring to `driven`, less what it is driven to.

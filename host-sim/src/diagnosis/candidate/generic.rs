@@ -82,7 +82,7 @@ pub fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
         }));
     }
     laws.push(law("offset by direction", |on, k| on.rows.direction[k]));
-    if on.load > 0.0 {
+    if on.scales.load > 0.0 {
         laws.push(law("offset with the magnitude of torque", |on, k| on.rows.torque[k].abs()));
         laws.push(law("offset with torque squared", |on, k| on.rows.torque[k].powi(2)));
         laws.push(law("torque by direction", |on, k| on.rows.torque[k].abs() * on.rows.direction[k]));
@@ -143,7 +143,7 @@ pub fn maps(on: &Excitation<'_>) -> Vec<Law> {
         map("a function of the angle on the circular spline", vec![(turn(&rows.on_circular_spline, full), 25)]),
         map("a function of the output angle", vec![(turn(&rows.output, full), 13)]),
     ];
-    if on.load > 0.0 {
+    if on.scales.load > 0.0 {
         maps.push(map(
             "a function of torque and direction",
             vec![(rows.torque.clone(), 11), (rows.direction.clone(), 2)],
@@ -151,14 +151,14 @@ pub fn maps(on: &Excitation<'_>) -> Vec<Law> {
     }
     if rows.recorded.temperature {
         maps.push(map("a function of temperature", vec![(rows.temperature.clone(), 6)]));
-        if on.load > 0.0 {
+        if on.scales.load > 0.0 {
             let both = vec![(rows.torque.clone(), 6), (rows.temperature.clone(), 4)];
             maps.push(map("a function of torque and temperature", both));
         }
     }
     if rows.recorded.time {
         maps.push(map("a function of speed", vec![(rows.speed.clone(), 12)]));
-        if on.load > 0.0 {
+        if on.scales.load > 0.0 {
             let both = vec![(rows.torque.clone(), 6), (rows.time.clone(), 4)];
             maps.push(map("a function of torque and time", both));
         }

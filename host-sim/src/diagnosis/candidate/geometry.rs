@@ -12,6 +12,9 @@ use super::{Column, Excitation, Law, Named, Shape, by_row, main, nuisance, polar
 /// Largest plausible amplitude, arcsec, one standard deviation.
 const USUAL_ARCSEC: f64 = 20.0;
 
+/// Cosine of the pressure angle of a working flank, 20 to 25 degrees (PHYSICS §3.1).
+const COS_PRESSURE_ANGLE: f64 = 0.93;
+
 /// Which angle an error is locked to.
 #[derive(Clone, Copy, PartialEq)]
 enum Angle {
@@ -41,13 +44,13 @@ fn waves(on: &Excitation<'_>, of: Angle, order: f64, weight: impl Fn(usize) -> f
 
 /// Half-load of the fading: from a thirtieth of the load scale to three times it.
 fn half_load(on: &Excitation<'_>) -> Shape {
-    let load = on.load.max(1e-3);
+    let load = on.scales.load.max(1e-3);
     Shape::by_factors("half_load_n_m", load / 30.0, load * 3.0, 3)
 }
 
 /// An eccentricity, rectified by the clearance.
 fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
-    let loaded = on.load > 0.0;
+    let loaded = on.scales.load > 0.0;
     Law::new(cause, move |on, shape| {
         let half = shape.first().copied().unwrap_or(f64::INFINITY);
         let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
@@ -66,13 +69,13 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
     })
     .shapes(loaded.then(|| half_load(on)))
     .parameters(move |on, shape, c| {
-        // On each flank the second order has 0.424 of e / (r cos alpha), cos alpha = 0.93.
+        // On each flank the second order has 4 / 3 pi = 0.424 of e / (r cos alpha).
         let plus = polar(c[0] + c[2], c[1] + c[3]);
         let minus = polar(c[0] - c[2], c[1] - c[3]);
         let second = 0.5 * (plus.0 + minus.0);
         let mut named: Vec<Named> = vec![
-            ("amplitude_um", second / 0.424 * 0.93 / on.arcsec_per_um),
-            ("second_order_arcsec", second),
+            ("amplitude_um", second / 0.424 * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um),
+            ("amplitude_arcsec", second / 0.424),
             ("phase_rad", 0.5 * polar(c[0], c[1]).1),
         ];
         if let Some(half) = shape.first() {
@@ -91,8 +94,8 @@ fn pitch(cause: &'static str, of: Angle) -> Law {
             columns.extend(waves(on, of, order, |_| 1.0).map(|v| main(v, usual)));
         }
         columns.extend(waves(on, of, 2.0, |k| on.base.flank[k]).map(|v| nuisance(v, 0.15)));
-        if on.load > 0.0 {
-            columns.extend(waves(on, of, 2.0, |k| on.rows.torque[k].abs() / on.load).map(|v| nuisance(v, 0.1)));
+        if on.scales.load > 0.0 {
+            columns.extend(waves(on, of, 2.0, |k| on.rows.torque[k].abs() / on.scales.load).map(|v| nuisance(v, 0.1)));
         }
         columns
     })
@@ -100,7 +103,7 @@ fn pitch(cause: &'static str, of: Angle) -> Law {
         let amplitude = |pair: usize| polar(c[2 * pair], c[2 * pair + 1]);
         let largest = (0..ORDERS.len()).max_by(|a, b| amplitude(*a).0.total_cmp(&amplitude(*b).0)).unwrap_or(0);
         vec![
-            ("amplitude_um", amplitude(largest).0 / on.arcsec_per_um),
+            ("amplitude_um", amplitude(largest).0 / on.scales.arcsec_per_um),
             ("amplitude_arcsec", amplitude(largest).0),
             ("harmonic", ORDERS[largest].0),
             ("phase_rad", amplitude(largest).1 / ORDERS[largest].0),
@@ -108,27 +111,31 @@ fn pitch(cause: &'static str, of: Angle) -> Law {
     })
 }
 
-/// Ring pressed to an oval: order 2 alone; 10 µm of radius are 28.4″ with the tangential part of a ring that keeps its length.
+/// Ring pressed to an oval: order 2 alone; 10 µm of radius are 0.67 of 10 µm on the pitch circle with the tangential part of a ring that keeps its length.
 fn ovality() -> Law {
     let of = Angle::CircularSpline;
     Law::new("circular_spline_ovality", move |on, _| {
         let mut columns: Vec<Column> = Vec::new();
         columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC)));
         columns.extend(waves(on, of, 2.0, |k| on.base.flank[k]).map(|v| nuisance(v, 0.4)));
-        if on.load > 0.0 {
-            columns.extend(waves(on, of, 2.0, |k| on.rows.torque[k].abs() / on.load).map(|v| nuisance(v, 0.15)));
+        if on.scales.load > 0.0 {
+            columns.extend(waves(on, of, 2.0, |k| on.rows.torque[k].abs() / on.scales.load).map(|v| nuisance(v, 0.15)));
         }
         columns
     })
-    .parameters(|_, _, c| {
+    .parameters(|on, _, c| {
         let (amplitude, phase) = polar(c[0], c[1]);
-        vec![("amplitude_um", amplitude / 2.84), ("amplitude_arcsec", amplitude), ("phase_rad", 0.5 * phase)]
+        vec![
+            ("amplitude_um", amplitude / (0.67 * on.scales.arcsec_per_um)),
+            ("amplitude_arcsec", amplitude),
+            ("phase_rad", 0.5 * phase),
+        ]
     })
 }
 
 /// One lobe carries more than the other, so that odd harmonics of both wheels come through: order 1 of each, fading with load.
 fn generator_eccentricity(on: &Excitation<'_>) -> Law {
-    let loaded = on.load > 0.0;
+    let loaded = on.scales.load > 0.0;
     Law::new("generator_eccentricity", |on, shape| {
         let half = shape.first().copied().unwrap_or(f64::INFINITY);
         let fade = |k: usize| fading(on, half, k);
@@ -149,8 +156,11 @@ fn generator_eccentricity(on: &Excitation<'_>) -> Law {
         let (on_flexspline, phase) = polar(c[0], c[1]);
         let on_ring = polar(c[per_wheel], c[per_wheel + 1]).0;
         let strongest = on_flexspline.max(on_ring);
-        let mut named: Vec<Named> =
-            vec![("amplitude_um", strongest / on.arcsec_per_um), ("amplitude_arcsec", strongest), ("phase_rad", phase)];
+        let mut named: Vec<Named> = vec![
+            ("amplitude_um", strongest / on.scales.arcsec_per_um),
+            ("amplitude_arcsec", strongest),
+            ("phase_rad", phase),
+        ];
         if let Some(half) = shape.first() {
             named.push(("half_load_n_m", *half));
         }
@@ -175,9 +185,11 @@ fn cam_form_error() -> Law {
         columns.extend(waves(on, of, 8.0, |_| 1.0).map(|v| nuisance(v, 0.4)));
         columns.extend(waves(on, of, 2.0 * teeth, flank).map(|v| nuisance(v, 0.4)));
         columns.push(nuisance(by_row(on, flank), 1.0));
-        if on.load > 0.0 {
+        if on.scales.load > 0.0 {
             for order in [4.0, 6.0, teeth] {
-                columns.extend(waves(on, of, order, |k| on.rows.torque[k].abs() / on.load).map(|v| nuisance(v, 0.4)));
+                columns.extend(
+                    waves(on, of, order, |k| on.rows.torque[k].abs() / on.scales.load).map(|v| nuisance(v, 0.4)),
+                );
             }
         }
         columns
@@ -186,7 +198,7 @@ fn cam_form_error() -> Law {
         let mesh = polar(c[0], c[1]).0.hypot(polar(c[2], c[3]).0);
         let (fourth, sixth) = (polar(c[4], c[5]).0, polar(c[6], c[7]).0);
         vec![
-            ("amplitude_um", mesh.max(fourth).max(sixth) / on.arcsec_per_um),
+            ("amplitude_um", mesh.max(fourth).max(sixth) / on.scales.arcsec_per_um),
             ("mesh_ripple_arcsec", mesh),
             ("fourth_order_arcsec", fourth),
             ("sixth_order_arcsec", sixth),
@@ -206,7 +218,7 @@ fn damaged_tooth(of: Angle) -> Law {
         // The two lobes meet the tooth half a turn apart and may share the load unequally.
         let lobe = |k: usize| (angle(on, of, k) - place).cos().signum();
         let flank = |k: usize| on.base.flank[k];
-        let load = if on.load > 0.0 { on.load } else { 1.0 };
+        let load = if on.scales.load > 0.0 { on.scales.load } else { 1.0 };
         vec![
             main(by_row(on, |k| pulse[k] * flank(k)), 30.0),
             main(by_row(on, |k| pulse[k] * on.rows.torque[k] / load), 30.0),
@@ -224,11 +236,12 @@ fn damaged_tooth(of: Angle) -> Law {
         let count = if of == Angle::Flexspline { teeth.0 } else { teeth.1 };
         let depth = c[0].hypot(c[1]).hypot(c[2]).hypot(c[3]);
         vec![
+            ("depth_um", depth / on.scales.arcsec_per_um),
             ("amplitude_arcsec", depth),
             ("angle_rad", shape[0]),
             ("width_rad", shape[1]),
             ("tooth", (shape[0] / (2.0 * PI) * count).round()),
-            ("on_circular_spline", f64::from(u8::from(of == Angle::CircularSpline))),
+            ("wheel", f64::from(u8::from(of == Angle::CircularSpline))),
         ]
     })
 }

@@ -27,12 +27,53 @@ pub struct Excitation<'a> {
     pub nominal: &'a Nominal,
     /// Nominal prediction and its parts.
     pub base: &'a Base,
+    /// What coefficients are counted in.
+    pub scales: &'a Scales,
+}
+
+/// What the coefficients of laws are counted in: taken from the rows that a model is fitted to, kept where it predicts others.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scales {
     /// Scale of the load, N·m; 0 without torque.
     pub load: f64,
+    /// Mean speed of the generator while it moves, rad/s.
+    pub mean_speed: f64,
+    /// Time of the first row, s.
+    pub begin_s: f64,
+    /// From the first row to the last, s.
+    pub duration_s: f64,
+    /// Travel of the generator from the first row to the last, rad.
+    pub travel: f64,
+    /// Travel under load, rad N·m.
+    pub work: f64,
     /// Arcsec at the output for 1 µm on the pitch circle.
     pub arcsec_per_um: f64,
-    /// Jumps found in the data: row and height, arcsec.
-    pub jumps: &'a [(usize, f64)],
+    /// Jumps found in the data: time (s) and height (arcsec).
+    pub jumps: Vec<(f64, f64)>,
+}
+
+impl Scales {
+    /// Of these rows.
+    #[must_use]
+    pub fn new(rows: &Rows, pitch_radius_mm: f64, jumps: Vec<(f64, f64)>) -> Scales {
+        let (mut moving, mut turned) = (0usize, 0.0);
+        for speed in rows.speed.iter().filter(|speed| **speed != 0.0) {
+            moving += 1;
+            turned += speed.abs();
+        }
+        let work = (1..rows.len()).map(|k| (rows.travel[k] - rows.travel[k - 1]) * rows.torque[k].abs()).sum();
+        let begin_s = rows.time.first().copied().unwrap_or(0.0);
+        Scales {
+            load: rows.load_scale(),
+            mean_speed: turned / moving.max(1) as f64,
+            begin_s,
+            duration_s: rows.time.last().copied().unwrap_or(0.0) - begin_s,
+            travel: rows.travel.last().copied().unwrap_or(0.0),
+            work,
+            arcsec_per_um: crate::tables::ARCSEC_PER_RAD * 1e-3 / pitch_radius_mm,
+            jumps,
+        }
+    }
 }
 
 /// A shape parameter.

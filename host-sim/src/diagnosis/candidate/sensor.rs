@@ -14,10 +14,11 @@ fn encoder(cause: &'static str, phase: fn(&Excitation<'_>, usize) -> f64, per_ra
         ]
     })
     .parameters(move |on, _, c| {
-        let (amplitude, phase) = polar(c[0], c[1]);
+        // c cos(x) + s sin(x) = A sin(x + phase).
+        let (amplitude, phase) = polar(c[1], c[0]);
         let mut named = vec![("amplitude_arcsec", amplitude), ("phase_rad", phase)];
         if per_ratio {
-            named.push(("amplitude_at_generator_arcsec", amplitude * on.nominal.ratio.abs()));
+            named.push(("generator_amplitude_arcsec", amplitude * on.nominal.ratio.abs()));
         }
         named
     })
@@ -26,19 +27,16 @@ fn encoder(cause: &'static str, phase: fn(&Excitation<'_>, usize) -> f64, per_ra
 /// The output is read later than the generator.
 fn sensor_latency() -> Law {
     Law::new("sensor_latency", |on, _| {
-        let per_ms = 1e-3 * crate::tables::ARCSEC_PER_RAD / on.nominal.ratio;
-        vec![main(by_row(on, |k| -on.rows.speed[k] * per_ms), 5.0)]
+        let per_s = crate::tables::ARCSEC_PER_RAD / on.nominal.ratio;
+        vec![main(by_row(on, |k| -on.rows.speed[k] * per_s), 5e-3)]
     })
-    .parameters(|_, _, c| vec![("latency_ms", c[0])])
+    .parameters(|_, _, c| vec![("delay_s", c[0])])
 }
 
 /// The error grows with the angle: the ratio is not what the nominal model says.
 fn ratio_error() -> Law {
-    Law::new("ratio_error", |on, _| {
-        let ppm = 1e-6 * crate::tables::ARCSEC_PER_RAD;
-        vec![main(by_row(on, |k| on.rows.output[k] * ppm), 300.0)]
-    })
-    .parameters(|_, _, c| vec![("relative_error_ppm", c[0])])
+    Law::new("ratio_error", |on, _| vec![main(by_row(on, |k| on.rows.output[k] * crate::tables::ARCSEC_PER_RAD), 3e-4)])
+        .parameters(|_, _, c| vec![("ratio_relative_error", c[0])])
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {

@@ -4,7 +4,7 @@ use super::{Excitation, Law, Shape, by_row, main, nuisance};
 
 /// Torque in units of the load scale.
 fn load_share(on: &Excitation<'_>, k: usize) -> f64 {
-    on.rows.torque[k] / on.load.max(1e-9)
+    on.rows.torque[k] / on.scales.load.max(1e-9)
 }
 
 /// The spring part of a slip element (stop operator): follows the torque up to ±`slip`, in units of `slip`.
@@ -24,7 +24,7 @@ pub(super) fn stop_operator(on: &Excitation<'_>, slip: f64) -> Vec<f64> {
 
 /// Springs that slip one after the other (Maxwell slip, Prandtl-Ishlinskii): the output lags the torque by what they hold.
 fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
-    let load = on.load;
+    let load = on.scales.load;
     Law::new("torsional_hysteresis", |on, shape| {
         let slip = shape[0];
         let negative = |values: Vec<f64>| values.into_iter().map(|z| -z).collect::<Vec<f64>>();
@@ -37,7 +37,13 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
         ]
     })
     .shapes([Shape::by_factors("slip_torque_n_m", 0.03 * load, 1.0 * load, 6)])
-    .parameters(|_, shape, c| vec![("half_width_arcsec", c[0]), ("slip_torque_n_m", shape[0])])
+    .parameters(|on, shape, c| {
+        // On the way back from the full load an element holds this share of what it can when the torque passes zero.
+        let full = on.scales.load;
+        let held = |slip: f64| ((full - slip) / slip).clamp(0.0, 1.0);
+        let half_width: f64 = [1.0, 0.35, 2.5].iter().zip(c).map(|(factor, c)| c * held(factor * shape[0])).sum();
+        vec![("half_width_arcsec", half_width), ("slip_torque_n_m", shape[0])]
+    })
     .physical(|_, c| c[0] > 0.0)
 }
 
@@ -48,13 +54,15 @@ fn stiffness_hardening() -> Law {
         vec![main(power(shape[0]), 30.0), nuisance(power(1.0), 0.4), nuisance(power(shape[0] + 1.5), 0.3)]
     })
     .shapes([Shape::evenly("exponent", 1.6, 4.4, 3)])
-    .parameters(|on, shape, c| vec![("at_full_load_arcsec", c[0]), ("exponent", shape[0]), ("full_load_n_m", on.load)])
+    .parameters(|on, shape, c| {
+        vec![("hardening_arcsec", c[0]), ("hardening_exponent", shape[0]), ("full_load_n_m", on.scales.load)]
+    })
     .physical(|_, c| c[0] > 0.0)
 }
 
 fn stiffness_error() -> Law {
     let mut law = Law::new("stiffness_error", |on, _| vec![main(on.base.wind_up.clone(), 0.5)])
-        .parameters(|_, _, c| vec![("relative_stiffness", 1.0 / (1.0 + c[0]) - 1.0), ("relative_wind_up", c[0])]);
+        .parameters(|_, _, c| vec![("stiffness_ratio", 1.0 / (1.0 + c[0]))]);
     law.tolerance_of = Some("stiffness");
     law
 }
@@ -84,15 +92,27 @@ fn wear(by: Progress) -> Law {
         let rows = on.rows;
         let n = rows.len();
         let mut done = vec![0.0; n];
-        for k in 1..n {
+        for k in 0..n {
+            if let Progress::Time = by {
+                done[k] = (rows.time[k] - on.scales.begin_s).max(0.0);
+                continue;
+            }
+            if k == 0 {
+                continue;
+            }
             let step = match by {
-                Progress::Time => rows.time[k] - rows.time[k - 1],
+                Progress::Time => 0.0,
                 Progress::Travel => rows.travel[k] - rows.travel[k - 1],
                 Progress::Work => (rows.travel[k] - rows.travel[k - 1]) * rows.torque[k].abs(),
             };
             done[k] = done[k - 1] + step.max(0.0);
         }
-        let all = done[n - 1].max(1e-12);
+        let all = match by {
+            Progress::Time => on.scales.duration_s,
+            Progress::Travel => on.scales.travel,
+            Progress::Work => on.scales.work,
+        }
+        .max(1e-12);
         let widened = |k: usize| (done[k] / all).powf(shape[0]);
         vec![
             main(by_row(on, |k| on.base.flank[k] * widened(k)), 30.0),
@@ -116,27 +136,23 @@ fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
             count != 0.0 && (height - count * pitch).abs() < 0.004 * pitch * count.abs() + 60.0
         })
     };
-    if on.jumps.is_empty() || !on.jumps.iter().all(|(_, height)| whole(*height)) {
+    if on.scales.jumps.is_empty() || !on.scales.jumps.iter().all(|(_, height)| whole(*height)) {
         return None;
     }
-    let jumps = on.jumps.to_vec();
-    let total: f64 = jumps.iter().map(|(_, height)| height).sum();
+    let jumps = on.scales.jumps.to_vec();
     let columns = jumps.clone();
     Some(
         Law::new("ratcheting", move |on, _| {
             columns
                 .iter()
-                .map(|(at, height)| main(by_row(on, |k| if k >= *at { height / pitch } else { 0.0 }), 2.0 * pitch))
+                .map(|(at, height)| {
+                    main(by_row(on, |k| if on.rows.time[k] >= *at { height / pitch } else { 0.0 }), 2.0 * pitch)
+                })
                 .collect()
         })
-        .parameters(move |on, _, c| {
+        .parameters(move |_, _, c| {
             let slipped: f64 = jumps.iter().zip(c).map(|((_, height), c)| c * height / pitch).sum();
-            vec![
-                ("teeth", (total / pitch).round()),
-                ("first_time_s", on.rows.time[jumps[0].0]),
-                ("offset_arcsec", slipped),
-                ("events", jumps.len() as f64),
-            ]
+            vec![("jump_arcsec", slipped), ("time_s", jumps[0].0), ("events", jumps.len() as f64)]
         })
         .exact(),
     )
@@ -144,7 +160,7 @@ fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = Vec::new();
-    if on.load > 0.0 {
+    if on.scales.load > 0.0 {
         laws.extend([torsional_hysteresis(on), stiffness_hardening(), stiffness_error()]);
     }
     laws.push(backlash_growth());
@@ -152,7 +168,7 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     if on.rows.recorded.time {
         laws.push(wear(Progress::Time));
     }
-    if on.load > 0.0 {
+    if on.scales.load > 0.0 {
         laws.push(wear(Progress::Work));
     }
     laws.extend(ratcheting(on));

@@ -33,7 +33,7 @@ fn thermal_clearance(on: &Excitation<'_>) -> Law {
     })
     .shapes(on.rows.recorded.time.then(|| Shape::by_factors("lag_s", 0.5, 600.0, 3)))
     .parameters(|_, shape, c| {
-        let mut named = vec![("backlash_per_k_arcsec", 2.0 * c[0])];
+        let mut named = vec![("clearance_arcsec_per_k", 2.0 * c[0])];
         if let Some(lag) = shape.first() {
             named.push(("lag_s", *lag));
         }
@@ -50,7 +50,7 @@ fn thermal_stiffness() -> Law {
             nuisance(by_row(on, |k| on.base.wind_up[k] * warmer(k).powi(2) / 3000.0), 0.4),
         ]
     })
-    .parameters(|_, _, c| vec![("relative_stiffness_per_k", -0.01 * c[0])])
+    .parameters(|_, _, c| vec![("stiffness_relative_per_k", -0.01 * c[0])])
 }
 
 /// Whether a drag is one of a lubricant: at the edge of the range it is dry friction or lash, which knows neither speed nor cold.
@@ -58,26 +58,38 @@ fn viscous(power: f64, per_k: f64) -> bool {
     power > 0.27 && per_k > 0.009
 }
 
+/// Speed at which a drag is stated, rad/s.
+fn usual_speed(on: &Excitation<'_>) -> f64 {
+    on.scales.mean_speed.max(1e-9)
+}
+
+/// Slope of the nominal wind-up at no load, arcsec/N·m; 1 for a drive that does not give.
+fn wind_up_arcsec_per_n_m(on: &Excitation<'_>) -> f64 {
+    let slope = on.nominal.wind_up_arcsec(1e-3) / 1e-3;
+    if slope > 0.0 { slope } else { 1.0 }
+}
+
 /// Drag of the lubricant, against the motion: a power of the speed, and thicker in the cold (Vogel, close to exponential).
 fn lubricant_viscosity() -> Law {
     Law::new("lubricant_viscosity", |on, shape| {
         let (power, per_k, bend) = (shape[0], shape[1], shape[2]);
         let rows = on.rows;
-        let fastest = rows.speed.iter().fold(1e-9, |m: f64, w| m.max(w.abs()));
+        let usual = usual_speed(on);
+        // Arcsec for 1 N·m of drag at the mean speed and the nominal temperature.
         let drag = |power: f64, per_k: f64, bend: f64| {
-            let drag = by_row(on, |k| {
+            by_row(on, |k| {
                 let cold = on.nominal.temperature_c - rows.temperature[k];
-                let share = (rows.speed[k] / fastest).abs();
+                let share = (rows.speed[k] / usual).abs();
                 -rows.direction[k]
                     * on.nominal.ratio.signum()
                     * share.powf(power)
                     * (per_k * cold * (1.0 + bend * cold)).exp()
-            });
-            let size = super::super::rows::rms(&drag).max(1e-12);
-            drag.into_iter().map(|d| d / size).collect::<Vec<f64>>()
+                    * wind_up_arcsec_per_n_m(on)
+            })
         };
+        let size = super::super::rows::rms(&drag(power, per_k, bend)).max(1e-12);
         vec![
-            main(drag(power, per_k, bend), 15.0),
+            main(drag(power, per_k, bend), 15.0 / size),
             nuisance(drag(0.5 * power, per_k, bend), 0.15),
             nuisance(drag(power, 0.5 * per_k, bend), 0.15),
         ]
@@ -88,22 +100,22 @@ fn lubricant_viscosity() -> Law {
         Shape::evenly("bend_per_k", -0.002, 0.01, 1),
     ])
     .parameters(|_, shape, c| {
-        vec![("rms_arcsec", c[0]), ("speed_exponent", shape[0]), ("relative_drag_per_k", -shape[1])]
+        vec![("drag_n_m", c[0]), ("speed_exponent", shape[0]), ("relative_drag_per_k", -shape[1])]
     })
     .physical(|shape, c| c[0] > 0.0 && viscous(shape[0], shape[1]))
 }
 
 /// The same drag as a load: it winds the drive up and, where it exceeds the torque, moves the play to the other flank.
 fn lubricant_load(on: &Excitation<'_>) -> Law {
-    let scale = on.load;
+    let scale = on.scales.load;
     Law::new("lubricant_viscosity", |on, shape| {
         let (drag_n_m, power, per_k) = (shape[0], shape[1], shape[2]);
         let rows = on.rows;
-        let fastest = rows.speed.iter().fold(1e-9, |m: f64, w| m.max(w.abs()));
+        let usual = usual_speed(on);
         let torque: Vec<f64> = (0..rows.len())
             .map(|k| {
                 let cold = on.nominal.temperature_c - rows.temperature[k];
-                let share = (rows.speed[k] / fastest).abs().powf(power) * (per_k * cold).exp();
+                let share = (rows.speed[k] / usual).abs().powf(power) * (per_k * cold).exp();
                 rows.torque[k] - drag_n_m * share * rows.direction[k] * on.nominal.ratio.signum()
             })
             .collect();
@@ -136,13 +148,13 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     // At one temperature nothing thermal can be told from a changed constant.
     if rows.recorded.temperature && (high - low > 2.0 || (low - on.nominal.temperature_c).abs() > 5.0) {
         laws.push(thermal_clearance(on));
-        if on.load > 0.0 {
+        if on.scales.load > 0.0 {
             laws.push(thermal_stiffness());
         }
     }
     if rows.recorded.time && rows.speed.iter().any(|w| *w != 0.0) {
         laws.push(lubricant_viscosity());
-        if on.load > 0.0 && on.nominal.wind_up_arcsec(1.0) > 0.0 {
+        if on.scales.load > 0.0 && on.nominal.wind_up_arcsec(1.0) > 0.0 {
             laws.push(lubricant_load(on));
         }
     }

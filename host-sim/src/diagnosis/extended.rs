@@ -1,0 +1,226 @@
+//! The extended model: the nominal drive recalibrated, plus the causes with the values found, to be evaluated on any rows.
+//!
+//! [`Extended::fit_to`] learns from some of the sessions alone, so that what it says of the others was not seen by it.
+
+use std::collections::BTreeMap;
+
+use flexspline::Table;
+
+use super::base::{Base, PlayLaw};
+use super::candidate::{Excitation, Law, Scales, library};
+use super::model::{Problem, Scaffold, Term};
+use super::noise::Whitener;
+use super::report::Parameter;
+use super::rows::Rows;
+use super::select::{Selected, fit};
+use super::{DiagnosisError, Settings, prepare, uncertainty};
+use crate::measurement::Session;
+use crate::nominal::Nominal;
+
+/// A cause as it was found.
+pub struct FittedCause {
+    law: Law,
+    places: Vec<f64>,
+    coefficients: Vec<f64>,
+    /// Parameters with their uncertainty, as in [`super::report::Cause`].
+    pub parameters: BTreeMap<&'static str, Parameter>,
+}
+
+impl FittedCause {
+    /// Name, snake case.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.law.cause
+    }
+}
+
+/// The nominal model recalibrated, and with causes.
+pub struct Extended {
+    play: PlayLaw,
+    scales: Scales,
+    recalibrated: Vec<f64>,
+    base: Vec<f64>,
+    causes: Vec<FittedCause>,
+}
+
+/// Predictions for the rows of one session, arcsec at the output, with what was measured.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Series {
+    /// Measured error.
+    pub measured_arcsec: Vec<f64>,
+    /// Nominal model as it stands.
+    pub nominal_arcsec: Vec<f64>,
+    /// Nominal model with its parameters recalibrated within the unit-to-unit spread.
+    pub recalibrated_arcsec: Vec<f64>,
+    /// Nominal model recalibrated beside the causes, plus the causes.
+    pub extended_arcsec: Vec<f64>,
+    /// What each cause adds, in the order of [`Extended::causes`].
+    pub cause_arcsec: Vec<Vec<f64>>,
+    /// Rows whose flank is not known well: the clearance is being crossed, or the torque is around friction.
+    pub flank_uncertain: Vec<bool>,
+}
+
+impl Series {
+    /// Measured less nominal, arcsec.
+    #[must_use]
+    pub fn less_nominal(&self) -> Vec<f64> {
+        less(&self.measured_arcsec, &self.nominal_arcsec)
+    }
+
+    /// Measured less recalibrated, arcsec.
+    #[must_use]
+    pub fn less_recalibrated(&self) -> Vec<f64> {
+        less(&self.measured_arcsec, &self.recalibrated_arcsec)
+    }
+
+    /// Measured less extended, arcsec.
+    #[must_use]
+    pub fn less_extended(&self) -> Vec<f64> {
+        less(&self.measured_arcsec, &self.extended_arcsec)
+    }
+}
+
+fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+impl Extended {
+    /// Fits the nominal model and the named causes to sessions. A name that these data cannot speak about (a load without
+    /// torque, a law of teeth without teeth) is left out.
+    ///
+    /// # Errors
+    /// As [`super::diagnose`].
+    pub fn fit(
+        sessions: &[Session],
+        nominal: &Nominal,
+        table: Option<&Table<'_>>,
+        causes: &[&str],
+        settings: &Settings,
+    ) -> Result<Extended, DiagnosisError> {
+        Extended::fit_to(sessions, &vec![true; sessions.len()], nominal, table, causes, settings)
+    }
+
+    /// Fits to the sessions that are `used`; of the others only the history counts (time, travel under load).
+    ///
+    /// # Errors
+    /// As [`super::diagnose`].
+    pub fn fit_to(
+        sessions: &[Session],
+        used: &[bool],
+        nominal: &Nominal,
+        table: Option<&Table<'_>>,
+        causes: &[&str],
+        settings: &Settings,
+    ) -> Result<Extended, DiagnosisError> {
+        let rows = Rows::new(sessions, nominal).learning_from(used);
+        super::check(&rows)?;
+        let base = Base::new(&rows, nominal, table);
+        let scales = Scales::new(&rows, settings.pitch_radius_mm, prepare::jumps(&rows, &base));
+        let on = Excitation { rows: &rows, nominal, base: &base, scales: &scales };
+        let laws = library(&on);
+        let (noise, worth) = prepare::noise(&on, &laws, &[]);
+        let stride = (rows.count_used() / settings.averages).max(1);
+        let problem = Problem::new(&on, Whitener::new(&rows, &base.uncertain, stride, noise), worth);
+        let start: Vec<(usize, Vec<f64>)> = super::select::fixed(&problem, &laws, causes)
+            .iter()
+            .filter_map(|t| Some((laws.iter().position(|law| std::ptr::eq(law, t.law))?, t.places.clone())))
+            .collect();
+        let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
+        Ok(found.extended(laws, &base, &scales))
+    }
+
+    /// Causes of the model.
+    #[must_use]
+    pub fn causes(&self) -> &[FittedCause] {
+        &self.causes
+    }
+
+    /// What was found as a prediction on the rows of `sessions`, which need not be those of the fit: one series for each.
+    #[must_use]
+    pub fn predict(&self, sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> Vec<Series> {
+        let rows = Rows::new(sessions, nominal);
+        if rows.is_empty() {
+            return vec![Series::default(); sessions.len()];
+        }
+        let base = Base::with_play(&rows, nominal, table, self.play);
+        let on = Excitation { rows: &rows, nominal, base: &base, scales: &self.scales };
+        let (recalibrated, extended, parts) = self.rows(&on);
+        rows.sessions
+            .iter()
+            .map(|s| Series {
+                measured_arcsec: rows.error[s.clone()].to_vec(),
+                nominal_arcsec: base.prediction[s.clone()].to_vec(),
+                recalibrated_arcsec: recalibrated[s.clone()].to_vec(),
+                extended_arcsec: extended[s.clone()].to_vec(),
+                cause_arcsec: parts.iter().map(|part| part[s.clone()].to_vec()).collect(),
+                flank_uncertain: base.uncertain[s.clone()].to_vec(),
+            })
+            .collect()
+    }
+
+    /// Recalibrated, extended, and each cause, row by row.
+    pub(super) fn rows(&self, on: &Excitation<'_>) -> (Vec<f64>, Vec<f64>, Vec<Vec<f64>>) {
+        let add = |sum: &mut [f64], column: &[f64], c: f64| {
+            for (s, v) in sum.iter_mut().zip(column) {
+                *s += c * v;
+            }
+        };
+        let (mut recalibrated, mut extended) = (on.base.prediction.clone(), on.base.prediction.clone());
+        for (k, floating) in on.base.floating.iter().enumerate() {
+            add(&mut recalibrated, &floating.values, self.recalibrated.get(k).copied().unwrap_or(0.0));
+            add(&mut extended, &floating.values, self.base.get(k).copied().unwrap_or(0.0));
+        }
+        let mut parts = Vec::new();
+        for cause in &self.causes {
+            let mut part = vec![0.0; on.rows.len()];
+            let columns = (cause.law.columns)(on, &cause.law.values(&cause.places));
+            for (column, c) in columns.iter().zip(&cause.coefficients) {
+                add(&mut part, &column.values, *c);
+            }
+            add(&mut extended, &part, 1.0);
+            parts.push(part);
+        }
+        (recalibrated, extended, parts)
+    }
+}
+
+/// What a fit leaves behind when its columns are gone.
+pub(super) struct Found {
+    recalibrated: Vec<f64>,
+    base: Vec<f64>,
+    terms: Vec<(usize, Vec<f64>, Vec<f64>, BTreeMap<&'static str, Parameter>)>,
+}
+
+impl Found {
+    /// Fits the laws at `start` (index and places), and the nominal model alone.
+    pub(super) fn of(problem: &Problem<'_>, laws: &[Law], start: &[(usize, Vec<f64>)]) -> Option<Found> {
+        let terms: Vec<Term<'_>> = start.iter().map(|(k, p)| Term::new(problem, &laws[*k], p.clone())).collect();
+        let alone = Scaffold::new(problem, Vec::new()).fit(&[])?;
+        let selected = Selected { fit: fit(problem, &terms)?, terms };
+        let parameters = uncertainty::parameters(problem, &selected);
+        Some(Found {
+            recalibrated: alone.solution.coefficients,
+            base: selected.fit.base().to_vec(),
+            terms: start
+                .iter()
+                .enumerate()
+                .zip(parameters)
+                .map(|((k, (law, places)), named)| (*law, places.clone(), selected.fit.of(k).to_vec(), named))
+                .collect(),
+        })
+    }
+
+    /// Keeps the laws that were fitted.
+    pub(super) fn extended(self, laws: Vec<Law>, base: &Base, scales: &Scales) -> Extended {
+        let mut laws: Vec<Option<Law>> = laws.into_iter().map(Some).collect();
+        let causes = self
+            .terms
+            .into_iter()
+            .filter_map(|(k, places, coefficients, parameters)| {
+                Some(FittedCause { law: laws[k].take()?, places, coefficients, parameters })
+            })
+            .filter(|cause| cause.law.named)
+            .collect();
+        Extended { play: base.law, scales: scales.clone(), recalibrated: self.recalibrated, base: self.base, causes }
+    }
+}
