@@ -112,7 +112,7 @@ export function lineChart(place, id, spec) {
   let chart = null;
   let choice = null;
   let shown = 0;
-  const key = () => (EVERY in spec.charts ? EVERY : choice);
+  const key = () => (Object.hasOwn(spec.charts, EVERY) ? EVERY : choice);
 
   async function draw() {
     const mine = ++shown;

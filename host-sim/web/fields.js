@@ -135,8 +135,10 @@ export function fieldMap(place, id, spec) {
       const part = async (name) => Array.from((await numbers(`${next}/${id}/${name}`)).values);
       const [x, y, z] = await Promise.all(["x", "y", "z"].map(part));
       if (choice !== next) return;
-      const there = z.filter((v) => !Number.isNaN(v));
-      field = { x, y, z, low: Math.min(...there), high: Math.max(...there) };
+      // A few cells that stand out do not take the colours of all others.
+      const there = z.filter((v) => !Number.isNaN(v)).sort((a, b) => a - b);
+      const beside = Math.floor(0.004 * there.length);
+      field = { x, y, z, low: there[beside], high: there[there.length - 1 - beside] };
       if (field.high - field.low < 1e-12) field.high = field.low + 1;
       draw();
       place.refreshTable?.();

@@ -38,7 +38,7 @@ async function start() {
     if (report.choices.length > 1) {
       for (const element of document.querySelectorAll(".of-choice")) {
         const { charts } = report.figures[element.closest("figure").id];
-        element.textContent = charts && EVERY in charts ? "" : `, ${name}`;
+        element.textContent = Object.hasOwn(charts ?? {}, EVERY) ? "" : `, ${name}`;
       }
       for (const link of document.querySelectorAll(".tools a")) {
         link.hash = `${id}/${link.closest("figure").id}`;

@@ -11,7 +11,6 @@ mod words;
 
 use std::borrow::Cow;
 
-use flexspline::Table;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
@@ -19,9 +18,9 @@ use super::page::{
     Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Mark, Page, Quantity, Section,
     Status, Table as PageTable, Text, significant,
 };
-use crate::diagnosis::base::Base;
 use crate::diagnosis::report::{Diagnosis, Verdict};
 use crate::diagnosis::rows::Rows;
+use crate::diagnosis::{Extended, Series};
 use crate::measurement::{Gear, Recording, Session};
 use crate::nominal::Nominal;
 use crate::residual::Picture;
@@ -44,24 +43,38 @@ pub struct Level {
     pub residual_arcsec: Vec<f64>,
 }
 
-impl Level {
-    /// Of the nominal model, or of a table that takes the place of its prediction.
-    pub fn nominal(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> Level {
-        let rows = Rows::new(sessions, nominal);
-        let base = Base::new(&rows, nominal, table);
-        let residual_arcsec = rows.error.iter().zip(&base.prediction).map(|(error, said)| error - said).collect();
-        Level { id: "nominal", name: "nominal", residual_arcsec }
-    }
+/// What one cause adds.
+#[derive(Debug, Clone)]
+pub struct Part {
+    /// Its name, snake case.
+    pub cause: String,
+    /// What it adds to the prediction, arcsec, a value for each row of all sessions.
+    pub adds_arcsec: Vec<f64>,
+}
 
-    /// Of the nominal model with its parameters as the data have them.
-    pub fn recalibrated(residual_arcsec: Vec<f64>) -> Level {
-        Level { id: "recalibrated", name: "recalibrated", residual_arcsec }
+/// What each model leaves of the rows, and what each cause adds, from what the model that was found says of all sessions.
+pub fn levels_and_parts(series: &[Series], extended: &Extended, diagnosis: &Diagnosis) -> (Vec<Level>, Vec<Part>) {
+    let joined = |of: &dyn Fn(&Series) -> Vec<f64>| series.iter().flat_map(of).collect::<Vec<f64>>();
+    let level = |id, name, residual_arcsec| Level { id, name, residual_arcsec };
+    let mut levels = vec![
+        level("nominal", "nominal", joined(&Series::less_nominal)),
+        level("recalibrated", "recalibrated", joined(&Series::less_recalibrated)),
+    ];
+    // What was tried and not named is in no model that a reader is shown.
+    if diagnosis.causes.is_empty() {
+        return (levels, Vec::new());
     }
-
-    /// Of the recalibrated model with the causes that were found.
-    pub fn extended(residual_arcsec: Vec<f64>) -> Level {
-        Level { id: "extended", name: "with the causes", residual_arcsec }
-    }
+    levels.push(level("extended", "with the causes", joined(&Series::less_extended)));
+    let parts = extended
+        .causes()
+        .iter()
+        .enumerate()
+        .map(|(k, cause)| Part {
+            cause: cause.name().to_owned(),
+            adds_arcsec: joined(&|s| s.cause_arcsec.get(k).cloned().unwrap_or_default()),
+        })
+        .collect();
+    (levels, parts)
 }
 
 /// What the page is made from.
@@ -74,6 +87,8 @@ pub struct Sources<'a> {
     pub diagnosis: &'a Diagnosis,
     /// What each model leaves; the nominal model first.
     pub levels: Vec<Level>,
+    /// What each cause adds.
+    pub parts: Vec<Part>,
     /// The command line.
     pub command: &'a str,
     /// What else made it: name and value.
@@ -104,13 +119,13 @@ pub fn page(mut sources: Sources<'_>) -> Page {
     }
     let mut levels = std::mem::take(&mut sources.levels);
     levels.retain(|level| level.residual_arcsec.len() == rows.len());
+    sources.parts.retain(|part| part.adds_arcsec.len() == rows.len());
     let every = rows.len().div_ceil(MOST_ROWS);
     if every > 1 {
         sessions = sessions.iter().map(|session| thinned(session, every)).collect();
-        for level in &mut levels {
-            let values = std::mem::take(&mut level.residual_arcsec);
-            level.residual_arcsec =
-                rows.sessions.iter().flat_map(|s| values[s.clone()].iter().step_by(every).copied()).collect();
+        let columns = levels.iter_mut().map(|level| &mut level.residual_arcsec);
+        for column in columns.chain(sources.parts.iter_mut().map(|part| &mut part.adds_arcsec)) {
+            *column = rows.sessions.iter().flat_map(|s| column[s.clone()].iter().step_by(every).copied()).collect();
         }
         rows = Rows::new(&sessions, nominal);
     }
@@ -289,8 +304,7 @@ impl Known<'_> {
                     .error(held.rms_before_arcsec, 3)
                     .plain(" to ")
                     .error(held.rms_after_arcsec, 3)
-                    .plain(" rms, where the nominal model, recalibrated to this unit, is compared with the same with the causes in it. \
-                            Noise and wander of the measurement are ")
+                    .plain(" rms: first the nominal model recalibrated to this unit, then the same with the causes in it. Noise and wander of the measurement are ")
                     .error(left.noise_floor_arcsec, 3)
                     .plain("."),
             ));
@@ -387,6 +401,20 @@ impl Known<'_> {
                 .collect(),
             ..Lines::default()
         };
+        let added = Lines {
+            series: self
+                .sources
+                .parts
+                .iter()
+                .enumerate()
+                .map(|(k, part)| {
+                    let name = words::cause(&part.cause);
+                    thin::envelope(&self.rows, &self.clock, &part.adds_arcsec, &name, k)
+                })
+                .collect(),
+            uprights: self.clock.borders(),
+            ..Lines::default()
+        };
         let y = || Axis::new("Error less model", Quantity::Error);
         let figure = |id: &str, title: &str, caption: &str, x: Axis, lines: Lines| {
             Block::Figure(Figure {
@@ -397,30 +425,39 @@ impl Known<'_> {
                 body: FigureBody::Lines { x, y: y(), charts: vec![(EVERY_CHOICE.into(), lines)] },
             })
         };
-        Section {
-            id: "before-after".into(),
-            title: "Before and after".into(),
-            detail: Detail::Summary,
-            blocks: vec![
-                figure(
-                    "over-time",
-                    "What each model leaves, over time",
-                    "Least and largest of each stretch of rows, so that single rows show. Nominal: the model as it was given. \
+        let mut blocks = vec![
+            figure(
+                "over-time",
+                "What each model leaves, over time",
+                "Least and largest of each stretch of rows, so that single rows show. Nominal: the model as it was given. \
                      Recalibrated: its zero, stiffness, backlash and harmonics as this unit has them, within the spread between \
                      units. With the causes: what was named is in the model. Breaks between sessions are taken out.",
-                    self.time_axis(),
-                    over_time,
-                ),
-                figure(
-                    "over-turn",
-                    "What each model leaves, over the generator's turn",
-                    "Medians of all rows, both directions together. What is flat here may still depend on load or direction: see \
+                self.time_axis(),
+                over_time,
+            ),
+            figure(
+                "over-turn",
+                "What each model leaves, over the generator's turn",
+                "Medians of all rows, both directions together. What is flat here may still depend on load or direction: see \
                      the figures above, with the selector at the top.",
-                    Axis::new("Generator angle in its turn", Quantity::Degree),
-                    over_turn,
-                ),
-            ],
+                Axis::new("Generator angle in its turn", Quantity::Degree),
+                over_turn,
+            ),
+        ];
+        if !added.series.is_empty() {
+            blocks.push(Block::Figure(Figure {
+                id: "added".into(),
+                title: "What each cause adds, over time".into(),
+                caption: Text::new("Least and largest of each stretch of rows of what it adds to the prediction."),
+                alt: "Curves of what each cause adds to the predicted error over time".into(),
+                body: FigureBody::Lines {
+                    x: self.time_axis(),
+                    y: Axis::new("Adds to the error", Quantity::Error),
+                    charts: vec![(EVERY_CHOICE.into(), added)],
+                },
+            }));
         }
+        Section { id: "before-after".into(), title: "Before and after".into(), detail: Detail::Summary, blocks }
     }
 
     fn time_axis(&self) -> Axis {
@@ -568,15 +605,17 @@ impl Known<'_> {
             let place = waves.iter().position(|(_, other)| *other == name).filter(|_| known)?;
             let order = self.sources.nominal.harmonics[place / 2].order_per_generator_turn;
             let phase = if place % 2 == 0 { "in phase" } else { "a quarter before" };
-            Some((place, format!("Harmonic of order {}, {phase}", significant(order, 4))))
+            Some((place, format!("Harmonic of order {}, {phase}", words::order(order))))
         };
         let mut rows: Vec<(usize, Vec<Text>)> = recalibrated
             .iter()
             .map(|(name, p)| {
                 let value = if name == "zero" {
-                    Text::default().error(p.value, 3).plain(" ± ").error(p.std, 2)
+                    Text::default().error(p.value, 3).plain("\u{a0}±\u{a0}").error(p.std, 2)
                 } else {
-                    Text::new(format!("{:+.1} ± {:.1} %", 100.0 * p.value, 100.0 * p.std).replace('-', "−"))
+                    Text::new(
+                        format!("{:+.1}\u{a0}±\u{a0}{:.1}\u{a0}%", 100.0 * p.value, 100.0 * p.std).replace('-', "−"),
+                    )
                 };
                 let plain = if name == "stiffness" { "wind-up".to_owned() } else { name.replace('_', " ") };
                 let (place, name) = wave(name).map_or((0, words::begun(&plain)), |(place, text)| (1 + place, text));

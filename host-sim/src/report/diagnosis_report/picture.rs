@@ -299,7 +299,7 @@ impl Known<'_> {
                         let places =
                             orders::along(cause, angle, nominal).into_iter().filter(|x| (low..=high).contains(x));
                         for x in places {
-                            let name = format!("{}: {}", words::cause(&cause.name), significant(x, 4));
+                            let name = format!("{}: {}", words::cause(&cause.name), words::order(x));
                             lines.uprights.push(Upright { name, x });
                         }
                     }
@@ -342,7 +342,10 @@ impl Known<'_> {
                 };
                 rows.push(vec![
                     Text::new(format!("{} per turn of {symbol}", significant(peak.order, 5))),
-                    Text::default().error(peak.amplitude_arcsec, 3).plain(" ± ").error(peak.amplitude_std_arcsec, 2),
+                    Text::default()
+                        .error(peak.amplitude_arcsec, 3)
+                        .plain("\u{a0}±\u{a0}")
+                        .error(peak.amplitude_std_arcsec, 2),
                     Text::new(parts),
                 ]);
             }
@@ -463,7 +466,7 @@ fn pulse_table(shown: &Shown) -> Option<Block> {
             };
             vec![
                 Text::new(format!("{angle} = {}°", significant(pulse.position_rad.to_degrees(), 3))),
-                Text::default().error(pulse.height_arcsec, 3).plain(" ± ").error(pulse.height_std_arcsec, 2),
+                Text::default().error(pulse.height_arcsec, 3).plain("\u{a0}±\u{a0}").error(pulse.height_std_arcsec, 2),
                 Text::new(format!("{}°", significant(pulse.width_rad.to_degrees(), 2))),
                 Text::new(pulse.per_turn.to_string()),
             ]

@@ -156,7 +156,7 @@ pub(super) fn parameter(name: &str, p: Parameter) -> String {
     }
     let (places, gap) = (decimals(p), if unit.is_empty() || unit.starts_with(['″', '/', '°']) { "" } else { " " });
     let number = |v: f64| format!("{v:.places$}").replace('-', "−");
-    format!("{} {} ± {}{gap}{unit}", words.replace('_', " "), number(p.value), number(p.std))
+    format!("{} {}\u{a0}±\u{a0}{}{gap}{unit}", words.replace('_', " "), number(p.value), number(p.std))
 }
 
 /// All parameters of a cause.
@@ -194,6 +194,12 @@ pub(super) fn treatment(treatment: Treatment) -> &'static str {
     }
 }
 
+/// An order: four digits, whole ones without a point.
+pub(super) fn order(order: f64) -> String {
+    let text = significant(order, 4);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
 /// A time, s.
 pub(super) fn seconds(time_s: f64) -> String {
     format!("{} s", significant(time_s, 5))
@@ -221,7 +227,7 @@ mod tests {
             ("harmonic", 2.0, 0.0, "harmonic 2"),
             ("torque_n_m", 8.1, 0.2, "torque 8.10 ± 0.20 N·m"),
         ] {
-            assert_eq!(parameter(name, Parameter { value, std }), text);
+            assert_eq!(parameter(name, Parameter { value, std }).replace('\u{a0}', " "), text);
         }
     }
 
@@ -229,6 +235,7 @@ mod tests {
     fn lists_read_like_sentences() {
         let items: Vec<String> = ["a", "b", "c"].map(str::to_owned).into();
         assert_eq!((listed(&items[..1]).as_str(), listed(&items).as_str()), ("a", "a, b and c"));
+        assert_eq!((order(2.0).as_str(), order(1.978_9).as_str(), order(188.0).as_str()), ("2", "1.979", "188"));
         assert_eq!((begun("über").as_str(), counted(2).as_str(), counted(14).as_str()), ("Über", "two", "14"));
     }
 }
