@@ -9,12 +9,10 @@ use serde::Serialize;
 use super::context::Context;
 use super::{Failure, report};
 use crate::diagnosis::report::Diagnosis;
-use crate::diagnosis::{Settings, diagnose};
+use crate::diagnosis::{Settings, diagnose_extended};
 use crate::measurement::{ColumnMap, Fault, Gear, Recording, read};
 use crate::nominal::{Fixed, Nominal};
 use crate::output::write_json;
-use crate::report::diagnosis_report::{self, Level};
-use crate::report::page::Page;
 
 /// Find what the simulation gets wrong in measured data, name the cause, measure what the extension gains
 ///
@@ -86,10 +84,11 @@ impl Diagnose {
         let recording = read(&self.data, &map, &gear).map_err(|error| Failure::BadInput(error.to_string()))?;
         let settings = Settings { verbose: context.verbose(), ..Settings::default() };
         let mut progress = context.progress("diagnose");
-        let diagnosis = diagnose(&recording.sessions, &nominal, table.as_ref(), &settings, |done, of, what| {
-            progress.set(done, of, what);
-        })
-        .map_err(|error| Failure::BadInput(format!("{}: {error}", self.data.display())))?;
+        let (diagnosis, extended) =
+            diagnose_extended(&recording.sessions, &nominal, table.as_ref(), &settings, |done, of, what| {
+                progress.set(done, of, what);
+            })
+            .map_err(|error| Failure::BadInput(format!("{}: {error}", self.data.display())))?;
         drop(progress);
         let written = Written {
             diagnosis: &diagnosis,
@@ -100,35 +99,11 @@ impl Diagnose {
         let out = context.out()?;
         write_json(&out.join("diagnosis.json"), &written)?;
         if !self.no_report {
-            report::write(&self.page(context, &recording, &nominal, table.as_ref(), &diagnosis), out)?;
+            let inputs = [Some(self.data.as_path()), self.model.as_deref()];
+            let page = report::diagnosis(context, inputs, &recording, &nominal, table.as_ref(), &diagnosis, &extended);
+            report::write(&page, out)?;
         }
         context.print(&written, || text(&recording, &diagnosis, out))
-    }
-
-    /// The report.
-    fn page(
-        &self,
-        context: &Context,
-        recording: &Recording,
-        nominal: &Nominal,
-        table: Option<&Table<'_>>,
-        diagnosis: &Diagnosis,
-    ) -> Page {
-        let blake3 = |path: &Path| {
-            let hash = std::fs::read(path).map(|bytes| blake3::hash(&bytes).to_string()).unwrap_or_default();
-            (format!("BLAKE3 of {}", path.display()), hash)
-        };
-        let mut inputs = vec![blake3(&self.data)];
-        inputs.extend(self.model.as_deref().map(blake3));
-        inputs.extend(table.map(|table| ("table_id".to_owned(), table.id().to_string())));
-        diagnosis_report::page(diagnosis_report::Sources {
-            recording,
-            nominal,
-            diagnosis,
-            levels: vec![Level::nominal(&recording.sessions, nominal, table)],
-            command: &context.command,
-            inputs,
-        })
     }
 }
 
