@@ -95,15 +95,15 @@ pub struct Base {
 }
 
 /// Standard deviation of what no drawing fixes, arcsec: the zero of the output encoder.
-const FREE: f64 = 1e4;
+pub(super) const FREE: f64 = 1e4;
 /// A play law that leaves this much less (relative) than the first is taken instead.
 const CLEARLY_BETTER: f64 = 0.995;
 /// Rows are uncertain where the torque is below this multiple of friction.
-const NEAR_FRICTION: f64 = 1.25;
+pub(super) const NEAR_FRICTION: f64 = 1.25;
 /// A clearance is crossed within this time, s.
 const CROSSING_S: f64 = 0.08;
 /// If more of the rows than this are uncertain, none is set aside: then they are what the data are about.
-const UNCERTAIN_AT_MOST: f64 = 0.35;
+pub(super) const UNCERTAIN_AT_MOST: f64 = 0.35;
 
 impl Base {
     /// The nominal model over the rows; `table` takes the place of its parts where it is given.

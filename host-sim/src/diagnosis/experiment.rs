@@ -152,13 +152,13 @@ fn least_apart(
     }
     rows.error = truth;
     let imagined = Excitation { rows: &rows, base: &base, ..*on };
-    let problem = Problem::new(&imagined, Whitener::new(&rows, &base.uncertain, 1, noise), 1.0);
+    let problem = Problem::new(&imagined, &base.uncertain, Whitener::new(&rows, &base.uncertain, 1, noise), 1.0);
     let scaffold = Scaffold::new(&problem, Vec::new());
     let own = scaffold.fit(&[&Term::new(&problem, term.law, term.places.clone())])?.solution.misfit;
     let mut least = f64::INFINITY;
     for law in alike {
-        let best = law
-            .tried()
+        let best = scaffold
+            .begin(law)
             .into_iter()
             .filter_map(|places| {
                 let trial = Term::new(&problem, law, places.clone()).main_only();

@@ -118,9 +118,10 @@ impl Extended {
         let scales = Scales::new(&rows, settings.pitch_radius_mm, prepare::jumps(&rows, &base));
         let on = Excitation { rows: &rows, nominal, base: &base, scales: &scales };
         let laws = library(&on);
-        let (noise, worth) = prepare::noise(&on, &laws, &[]);
+        let uncertain = prepare::uncertain(&on, &[]);
+        let (noise, worth) = prepare::noise(&on, &laws, &[], &uncertain);
         let stride = (rows.count_used() / settings.averages).max(1);
-        let problem = Problem::new(&on, Whitener::new(&rows, &base.uncertain, stride, noise), worth);
+        let problem = Problem::new(&on, &uncertain, Whitener::new(&rows, &uncertain, stride, noise), worth);
         let start: Vec<(usize, Vec<f64>)> = super::select::fixed(&problem, &laws, causes)
             .iter()
             .filter_map(|t| Some((laws.iter().position(|law| std::ptr::eq(law, t.law))?, t.places.clone())))

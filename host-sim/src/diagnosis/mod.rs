@@ -178,10 +178,11 @@ impl<'a> Search<'a> {
             }
         };
         let stride = (on.rows.count_used() / settings.averages).max(1);
-        let whiten = |noise| Whitener::new(on.rows, &on.base.uncertain, stride, noise);
-        let (mut noise, mut worth) = prepare::noise(on, &laws, &[]);
+        let mut uncertain = prepare::uncertain(on, &[]);
+        let whiten = |noise, uncertain: &[bool]| Whitener::new(on.rows, uncertain, stride, noise);
+        let (mut noise, mut worth) = prepare::noise(on, &laws, &[], &uncertain);
         say(format!("play {:?}, {noise:?}, worth {worth:.2}, {} rows", on.base.law, on.rows.count_used()));
-        let mut problem = Problem::new(on, whiten(noise), worth);
+        let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain), worth);
         let mut fast: Vec<Unexplained> = Vec::new();
         let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
         // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
@@ -204,6 +205,7 @@ impl<'a> Search<'a> {
                 }
             }
             let explained = remainder::explained(&problem, &selected);
+            let doubtful = prepare::uncertain(on, &selected.terms);
             drop(selected);
             let known = laws.len();
             for (found, size) in slow {
@@ -214,9 +216,12 @@ impl<'a> Search<'a> {
                 }
             }
             let new_line = laws.len() > known;
-            let (again, worth_again) = prepare::noise(on, &laws, if new_line { &[] } else { &explained });
+            let changed = doubtful.iter().zip(&uncertain).filter(|(a, b)| a != b).count();
+            let other_rows = changed > on.rows.len() / 200;
+            uncertain = doubtful;
+            let (again, worth_again) = prepare::noise(on, &laws, if new_line { &[] } else { &explained }, &uncertain);
             let change = again.floor() / noise.floor();
-            if !new_line && (0.85..1.18).contains(&change) {
+            if !new_line && !other_rows && (0.85..1.18).contains(&change) {
                 break;
             }
             if new_line {
@@ -224,7 +229,7 @@ impl<'a> Search<'a> {
             }
             (noise, worth) = (again, worth_again);
             say(format!("once more: {noise:?}, worth {worth:.2}"));
-            problem = Problem::new(on, whiten(noise), worth);
+            problem = Problem::new(on, &uncertain, whiten(noise, &uncertain), worth);
         }
         Ok(Search { laws, problem, noise, start, fast })
     }

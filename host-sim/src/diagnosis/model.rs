@@ -12,6 +12,8 @@ use super::rows::rms;
 pub struct Problem<'a> {
     /// What laws are evaluated on.
     pub on: &'a Excitation<'a>,
+    /// Rows whose flank is not known well.
+    pub uncertain: Vec<bool>,
     /// Noise.
     pub whitener: Whitener,
     /// Averages that are used for sizes: no uncertain row in them.
@@ -31,14 +33,14 @@ pub struct Problem<'a> {
 impl<'a> Problem<'a> {
     /// Averages and whitens.
     #[must_use]
-    pub fn new(on: &'a Excitation<'a>, whitener: Whitener, worth: f64) -> Problem<'a> {
+    pub fn new(on: &'a Excitation<'a>, uncertain: &[bool], whitener: Whitener, worth: f64) -> Problem<'a> {
         let rows: Vec<f64> = on.rows.error.iter().zip(&on.base.prediction).map(|(e, p)| e - p).collect();
         let data = whitener.average(&rows);
         let data_white = whitener.whiten_averaged(&data);
         let base: Vec<Vec<f64>> = on.base.floating.iter().map(|f| whitener.average(&f.values)).collect();
         let base_white = base.iter().map(|column| whitener.whiten_averaged(column)).collect();
-        let certain = whitener.certain(&on.base.uncertain);
-        Problem { on, whitener, certain, data, data_white, base, base_white, worth }
+        let certain = whitener.certain(uncertain);
+        Problem { on, uncertain: uncertain.to_vec(), whitener, certain, data, data_white, base, base_white, worth }
     }
 
     fn base_priors(&self) -> Vec<Prior> {
@@ -68,6 +70,8 @@ pub struct Term<'l> {
     pub tolerances: Vec<Tolerance>,
     /// Root mean square of each averaged column.
     size: Vec<f64>,
+    /// What freedom of the shape parameters costs: logarithm of the share of their range that the data leave (0 before refinement).
+    pub occam: f64,
 }
 
 impl<'l> Term<'l> {
@@ -78,7 +82,15 @@ impl<'l> Term<'l> {
         let averaged: Vec<Vec<f64>> = columns.iter().map(|c| problem.whitener.average(&c.values)).collect();
         let white = averaged.iter().map(|c| problem.whitener.whiten_averaged(c)).collect();
         let size = averaged.iter().map(|c| rms(c)).collect();
-        Term { law, places, averaged, white, tolerances: columns.iter().map(|c| c.tolerance).collect(), size }
+        Term {
+            law,
+            places,
+            averaged,
+            white,
+            tolerances: columns.iter().map(|c| c.tolerance).collect(),
+            size,
+            occam: 0.0,
+        }
     }
 
     /// Only its main columns.
@@ -141,6 +153,37 @@ impl<'l> Term<'l> {
     }
 }
 
+/// Parameters of the nominal model are held within this many standard deviations between units: what is beyond is a discrepancy, however
+/// well the nominal model could follow it.
+pub const TOLERANCE: f64 = 3.3;
+/// Spread of a parameter that is held at its limit, in units of its tolerance.
+const HELD: f64 = 1e-3;
+
+/// Solves with the nominal model's parameters within their tolerance; returns the priors used as well.
+pub(super) fn within_tolerance(
+    gram: &Gram,
+    mut priors: Vec<Prior>,
+    problem: &Problem<'_>,
+) -> Option<(Solution, Vec<Prior>)> {
+    let floating = &problem.on.base.floating;
+    let mut held = vec![false; floating.len()];
+    loop {
+        let solution = solve(gram, &priors, problem.worth)?;
+        let mut beyond = false;
+        for (k, f) in floating.iter().enumerate() {
+            let limit = TOLERANCE * f.spread;
+            if !held[k] && f.spread < super::base::FREE && solution.coefficients[k].abs() > limit {
+                priors[k] = Prior { mean: limit.copysign(solution.coefficients[k]), std: HELD * f.spread };
+                held[k] = true;
+                beyond = true;
+            }
+        }
+        if !beyond {
+            return Some((solution, priors));
+        }
+    }
+}
+
 /// What a law is taken to explain before anything is known, arcsec.
 const FIRST_GUESS_ARCSEC: f64 = 10.0;
 /// Nuisance is scaled to at least this, arcsec.
@@ -151,6 +194,8 @@ const ROUNDS: usize = 3;
 const STEP: f64 = 0.01;
 /// Spread of a shape parameter about where it is, in places.
 const PLACE_SPREAD: f64 = 0.3;
+/// Torques above this share of the load scale leave no doubt about the flank.
+const LOADED: f64 = 0.3;
 /// Gauss-Newton steps at most.
 const STEPS: usize = 6;
 
@@ -260,7 +305,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 priors.extend(term.priors(known));
             }
             priors.extend(further.iter().map(|(_, prior)| *prior));
-            last = Some((solve(&gram, &priors, problem.worth)?, priors));
+            last = Some(within_tolerance(&gram, priors, problem)?);
             if all.iter().all(|t| t.tolerances.iter().all(|t| matches!(t, Tolerance::Main(_)))) {
                 break;
             }
@@ -268,6 +313,50 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         let (solution, priors) = last?;
         let extra = solution.coefficients[at..].to_vec();
         Some((Fit { solution, starts, priors, gram }, extra))
+    }
+
+    /// Places at which to begin with a law: those to be tried, or where its lead points.
+    #[must_use]
+    pub fn begin(&self, law: &Law) -> Vec<Vec<f64>> {
+        let tried = law.tried();
+        let Some(lead) = &law.lead else { return tried };
+        let problem = self.problem;
+        let least = LOADED * problem.on.scales.load;
+        let mask: Vec<bool> = problem
+            .whitener
+            .average(&problem.on.rows.torque)
+            .iter()
+            .map(|torque| !lead.loaded_only || torque.abs() > least)
+            .collect();
+        let some = mask.iter().filter(|m| **m).count() > mask.len() / 10;
+        let masked = |column: &[f64]| -> Vec<f64> {
+            column.iter().zip(&mask).map(|(v, m)| if *m || !some { *v } else { 0.0 }).collect()
+        };
+        let mut known: Vec<Vec<f64>> = problem.base_white.iter().map(|c| masked(c)).collect();
+        known.extend(self.terms.iter().flat_map(|t| &t.white).map(|c| masked(c)));
+        let mut priors = problem.base_priors();
+        priors.extend(self.terms.iter().flat_map(|t| t.priors(None)));
+        let data = masked(&problem.data_white);
+        tried
+            .into_iter()
+            .filter_map(|places| {
+                let values = law.values(&places);
+                let columns = (lead.columns)(problem.on, &values);
+                let mut all = priors.clone();
+                let mut white = known.clone();
+                for column in &columns {
+                    white.push(masked(&problem.whitener.whiten(&column.values)));
+                    if let Tolerance::Main(prior) = column.tolerance {
+                        all.push(prior);
+                    }
+                }
+                white.push(data.clone());
+                let views: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
+                let solution = solve(&Gram::of(&views, 0..data.len()), &all, problem.worth)?;
+                let c = &solution.coefficients[priors.len()..];
+                Some(law.places(&(lead.shape)(&values, c)))
+            })
+            .collect()
     }
 
     /// Columns (white) by which the prediction of `term` changes with each of its places.
@@ -332,6 +421,14 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 break;
             }
         }
+        let coefficients = fit.of(fit.starts.len() - 1).to_vec();
+        let further: Vec<(Vec<f64>, Prior)> = self
+            .derivatives(&term, &coefficients)
+            .into_iter()
+            .map(|d| (d, Prior { mean: 0.0, std: PLACE_SPREAD }))
+            .collect();
+        let (free, _) = self.fit_with(&[&term], &further)?;
+        term.occam = (free.solution.evidence - fit.solution.evidence).min(0.0);
         Some((term, fit))
     }
 

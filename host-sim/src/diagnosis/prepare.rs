@@ -1,8 +1,9 @@
 //! What has to be known before causes are compared: how noisy the data are, and where they jump.
 
-use super::base::Base;
+use super::base::{Base, NEAR_FRICTION, UNCERTAIN_AT_MOST};
 use super::candidate::{Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
+use super::model::Term;
 use super::noise::{Noise, Whitener, white_level};
 use super::rows::{Rows, quantile, rms};
 
@@ -53,17 +54,46 @@ pub fn jumps(rows: &Rows, base: &Base) -> Vec<(f64, f64)> {
     merged.into_iter().map(|(at, height)| (rows.time[at], height)).collect()
 }
 
+/// Rows whose flank is not known well, with what the causes chosen add to the load.
+#[must_use]
+pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>]) -> Vec<bool> {
+    let mut uncertain = on.base.uncertain.clone();
+    // A jump passes over some rows, and the output swings out.
+    for (at, _) in &on.scales.jumps {
+        let beside = JUMPING_S.max(BESIDE as f64 * on.rows.period);
+        for (doubtful, time) in uncertain.iter_mut().zip(&on.rows.time) {
+            *doubtful |= (time - at).abs() < beside;
+        }
+    }
+    let without = uncertain.clone();
+    for term in terms {
+        let Some(load) = &term.law.load else { continue };
+        let added = load(on, &term.law.values(&term.places));
+        for (k, doubtful) in uncertain.iter_mut().enumerate() {
+            let near = NEAR_FRICTION * on.nominal.friction_torque_n_m + LOAD_UNKNOWN * added[k].abs();
+            *doubtful |= (on.rows.torque[k] + added[k]).abs() < near;
+        }
+    }
+    let share = uncertain.iter().filter(|u| **u).count() as f64 / uncertain.len().max(1) as f64;
+    if share > UNCERTAIN_AT_MOST { without } else { uncertain }
+}
+
+/// A jump is over after this time, s.
+const JUMPING_S: f64 = 0.15;
+/// A load that a cause adds is known to this share.
+const LOAD_UNKNOWN: f64 = 0.2;
+
 /// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by its evidence
 /// with the main columns of all laws as free columns. Returns also the worth of the information: below 1 where innovations are
 /// not white. `explained` is what is explained already, row by row.
 #[must_use]
-pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64]) -> (Noise, f64) {
+pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64], uncertain: &[bool]) -> (Noise, f64) {
     let rows = on.rows;
     let left: Vec<f64> =
         (0..rows.len()).map(|k| rows.error[k] - on.base.prediction[k] - explained.get(k).unwrap_or(&0.0)).collect();
     let white = white_level(rows, &left);
     let stride = rows.count_used().div_ceil(WANDER_AVERAGES).max(1);
-    let plain = Whitener::new(rows, &on.base.uncertain, stride, Noise { white, wander: 0.0, correlation_s: 1.0 });
+    let plain = Whitener::new(rows, uncertain, stride, Noise { white, wander: 0.0, correlation_s: 1.0 });
     let mut columns: Vec<(Vec<f64>, Prior)> = Vec::new();
     for floating in &on.base.floating {
         columns.push((plain.average(&floating.values), Prior { mean: 0.0, std: floating.spread }));
@@ -71,8 +101,9 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64]) -> (Noise, f6
     for law in laws {
         let tried = law.tried();
         for places in [tried.first(), tried.get(tried.len() / 2)].into_iter().flatten().take(tried.len().min(2)) {
-            for column in (law.columns)(on, &law.values(places)) {
-                if let Tolerance::Main(_) = column.tolerance {
+            let made = law.lead.as_ref().map_or(&law.columns, |lead| &lead.columns);
+            for column in made(on, &law.values(places)) {
+                if law.free_form || matches!(column.tolerance, Tolerance::Main(_)) {
                     let averaged = plain.average(&column.values);
                     let std = 20.0 / rms(&averaged).max(1e-9);
                     columns.push((averaged, Prior { mean: 0.0, std }));
@@ -82,7 +113,7 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64]) -> (Noise, f6
     }
     let data = plain.average(&left);
     let judge = |noise: Noise| {
-        let whitener = Whitener::new(rows, &on.base.uncertain, stride, noise);
+        let whitener = Whitener::new(rows, uncertain, stride, noise);
         let all: Vec<Vec<f64>> =
             columns.iter().map(|(c, _)| c).chain([&data]).map(|c| whitener.whiten_averaged(c)).collect();
         let views: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();

@@ -50,9 +50,9 @@ pub fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -
     let on = problem.on;
     let explained = explained(problem, selected);
     let left: Vec<f64> = (0..on.rows.len()).map(|k| on.rows.error[k] - on.base.prediction[k] - explained[k]).collect();
-    let whitener = Whitener::new(on.rows, &on.base.uncertain, 1, noise);
+    let whitener = Whitener::new(on.rows, &problem.uncertain, 1, noise);
     let mut white = whitener.in_rows(&whitener.whiten(&left), on.rows.len());
-    for (value, uncertain) in white.iter_mut().zip(&on.base.uncertain) {
+    for (value, uncertain) in white.iter_mut().zip(&problem.uncertain) {
         *value = if *uncertain { 0.0 } else { value.clamp(-6.0, 6.0) };
     }
     white

@@ -45,8 +45,8 @@ pub fn rivals(problem: &Problem<'_>, laws: &[Law], selected: &Selected<'_>, k: u
     let mut rivals: Vec<Rival> = open
         .into_par_iter()
         .filter_map(|law| {
-            let best = law
-                .tried()
+            let best = scaffold
+                .begin(law)
                 .into_iter()
                 .filter_map(|places| {
                     let term = Term::new(problem, law, places.clone()).main_only();

@@ -9,8 +9,10 @@ use super::model::{Fit, Problem, Scaffold, Term};
 
 /// Evidence (natural logarithm of the ratio) below which nothing is named: "very strong" by Kass & Raftery (1995).
 const LEAST_EVIDENCE: f64 = 6.0;
-/// A base parameter is out of tolerance beyond this many standard deviations between units.
-const OUT_OF_TOLERANCE: f64 = 3.3;
+/// A base parameter is out of tolerance when it is held at its limit.
+const OUT_OF_TOLERANCE: f64 = super::model::TOLERANCE - 0.05;
+/// What a term adds counts up to this many times what the nominal model, within its tolerance, cannot take over from it.
+const TAKEN_OVER: f64 = 2.5;
 /// Least size of a contribution, arcsec.
 const LEAST_ARCSEC: f64 = 1.5;
 /// Least size in units of the white noise.
@@ -43,6 +45,8 @@ pub struct Standing {
     pub evidence: f64,
     /// Root mean square of what it adds, arcsec; for what is there at times only, the larger of that and 0.4 of its 97 % quantile.
     pub size: f64,
+    /// Root mean square of what nothing else can take over, arcsec.
+    pub alone: f64,
     /// Relative change of the prediction error of sessions left out (negative: better without it).
     pub left_out: f64,
 }
@@ -57,8 +61,11 @@ pub fn fit(problem: &Problem<'_>, terms: &[Term<'_>]) -> Option<Fit> {
 fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law]) -> Vec<(f64, Term<'l>)> {
     let scaffold = Scaffold::new(problem, terms.iter().collect());
     let Some(before) = scaffold.fit(&[]) else { return Vec::new() };
-    let trials: Vec<(usize, Vec<f64>)> =
-        laws.iter().enumerate().flat_map(|(k, law)| law.tried().into_iter().map(move |places| (k, places))).collect();
+    let trials: Vec<(usize, Vec<f64>)> = laws
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(k, law)| scaffold.begin(law).into_iter().map(move |places| (k, places)))
+        .collect();
     let tried: Vec<(usize, f64, Vec<f64>)> = trials
         .into_par_iter()
         .filter_map(|(k, places)| {
@@ -98,21 +105,33 @@ pub fn standings(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Standing
 pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Standing {
     let others: Vec<&Term<'_>> = selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
     let Some(without) = Scaffold::new(problem, others.clone()).fit(&[]) else {
-        return Standing { evidence: f64::INFINITY, size: f64::INFINITY, left_out: 1.0 };
+        return Standing { evidence: f64::INFINITY, size: f64::INFINITY, alone: f64::INFINITY, left_out: 1.0 };
     };
     let with = predicted(problem, &selected.terms.iter().collect::<Vec<_>>(), &selected.fit);
     let lacking = predicted(problem, &others, &without);
+    let gain = selected.fit.solution.evidence + selected.terms[k].occam - without.solution.evidence;
     if selected.terms[k].law.tolerance_of.is_some() {
         // The base would take its place at once: it is held against the tolerance, not against the fit without it.
         let size = size_of(problem, &selected.terms[k].contribution(selected.fit.of(k)));
-        return Standing { evidence: selected.fit.solution.evidence - without.solution.evidence, size, left_out: 1.0 };
+        return Standing { evidence: gain, size, alone: size, left_out: 1.0 };
     }
     let added: Vec<f64> = with.iter().zip(&lacking).map(|(a, b)| a - b).collect();
+    let alone = size_of(problem, &added);
+    let own = about_mean(problem, selected.terms[k].contribution(selected.fit.of(k)));
     Standing {
-        evidence: selected.fit.solution.evidence - without.solution.evidence,
-        size: size_of(problem, &added),
+        evidence: gain,
+        size: (TAKEN_OVER * alone).min(size_of(problem, &own)).max(alone),
+        alone,
         left_out: left_out_gain(problem, &selected.terms.iter().collect::<Vec<_>>(), &others),
     }
+}
+
+/// Less the mean: the zero of the encoder takes it.
+fn about_mean(problem: &Problem<'_>, mut values: Vec<f64>) -> Vec<f64> {
+    let certain = || problem.certain.iter().filter(|c| **c).count().max(1) as f64;
+    let mean = values.iter().zip(&problem.certain).filter(|(_, c)| **c).map(|(v, _)| v).sum::<f64>() / certain();
+    values.iter_mut().for_each(|v| *v -= mean);
+    values
 }
 
 /// Size of an addition to the prediction.
@@ -224,7 +243,7 @@ impl Limits {
         !in_tolerance
             && standing.evidence > evidence
             && standing.size > self.least
-            && standing.size > share * misfit
+            && standing.alone > share * misfit
             && standing.left_out > 0.0
     }
 }
@@ -313,7 +332,7 @@ fn forward<'l>(
         .into_par_iter()
         .filter_map(|(_, term)| {
             let (term, fit) = scaffold.refine(term)?;
-            let gain = fit.solution.evidence - before;
+            let gain = fit.solution.evidence + term.occam - before;
             let c = fit.of(fit.starts.len() - 1);
             (term.law.physical)(&term.law.values(&term.places), c).then_some((gain, term, fit))
         })
@@ -433,10 +452,11 @@ fn exchange<'l>(
                 let c = fit.of(fit.starts.len() - 1);
                 (term.law.physical)(&term.law.values(&term.places), c).then_some((term, fit))
             })
-            .max_by(|a, b| a.1.solution.evidence.total_cmp(&b.1.solution.evidence));
+            .max_by(|a, b| (a.1.solution.evidence + a.0.occam).total_cmp(&(b.1.solution.evidence + b.0.occam)));
         if let Some((term, fit)) = best {
             let needed = if term.law.named { 3.0 } else { UNNAMED_AHEAD };
-            if fit.solution.evidence > selected.fit.solution.evidence + needed {
+            let now = selected.fit.solution.evidence + selected.terms[k].occam;
+            if fit.solution.evidence + term.occam > now + needed {
                 log(format!("  ~ {} gives way to {}", selected.terms[k].law.cause, term.law.cause));
                 let mut terms = others;
                 terms.push(term);

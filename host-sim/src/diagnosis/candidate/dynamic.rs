@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::{Column, Excitation, Law, Shape, Tolerance, by_row, main};
+use super::{Column, Excitation, Law, Lead, Shape, Tolerance, by_row, main};
 use crate::diagnosis::base::PlayLaw;
 use crate::diagnosis::linear::Prior;
 use crate::tables::ARCSEC_PER_RAD;
@@ -10,12 +10,14 @@ use crate::tables::ARCSEC_PER_RAD;
 /// An unbalanced load, m g l sin of the output angle against gravity: adds to the torque, so it winds the drive up and moves the play.
 fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
     let scale = if on.scales.load > 0.0 { on.scales.load } else { 20.0 };
-    Law::new("gravity_torque", move |on, shape| {
-        let (moment, phase) = (shape[0], shape[1]);
+    let load = move |on: &Excitation<'_>, shape: &[f64]| -> Vec<f64> {
         let rows = on.rows;
-        let torque: Vec<f64> = (0..rows.len())
-            .map(|k| rows.torque[k] + moment * (rows.output[k] + sign * rows.orientation[k] - phase).sin())
-            .collect();
+        by_row(on, |k| shape[0] * (rows.output[k] + sign * rows.orientation[k] - shape[1]).sin())
+    };
+    let mut law = Law::new("gravity_torque", move |on, shape| {
+        let rows = on.rows;
+        let added = load(on, shape);
+        let torque: Vec<f64> = (0..rows.len()).map(|k| rows.torque[k] + added[k]).collect();
         let flank = play.flanks(rows, &torque, on.nominal);
         let half = on.base.half_backlash;
         let wind = by_row(on, |k| on.nominal.wind_up_arcsec(torque[k]) - on.base.wind_up[k]);
@@ -26,8 +28,27 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
             Column { values: play, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 0.5 }) },
         ]
     })
-    .shapes([Shape::by_factors("torque_n_m", 0.01 * scale, 2.0 * scale, 6), Shape::angle("phase_rad", 2.0 * PI, 10)])
-    .parameters(|_, shape, c| vec![("torque_n_m", shape[0] * c[0]), ("phase_rad", shape[1])])
+    .shapes([Shape::by_factors("torque_n_m", 0.003 * scale, 2.0 * scale, 1), Shape::angle("phase_rad", 2.0 * PI, 1)])
+    .parameters(|_, shape, c| vec![("torque_n_m", shape[0] * c[0]), ("phase_rad", shape[1])]);
+    law.load = Some(Box::new(load));
+    law.lead = Some(Lead {
+        columns: Box::new(move |on, _| {
+            let rows = on.rows;
+            // Wind-up for 1 N·m more, at the load that is there.
+            let slope = |k: usize| {
+                on.nominal.wind_up_arcsec(rows.torque[k] + 0.5) - on.nominal.wind_up_arcsec(rows.torque[k] - 0.5)
+            };
+            let at = |k: usize| rows.output[k] + sign * rows.orientation[k];
+            vec![
+                main(by_row(on, |k| slope(k) * at(k).sin()), 0.3 * scale),
+                main(by_row(on, |k| slope(k) * at(k).cos()), 0.3 * scale),
+            ]
+        }),
+        // a sin(x) + b cos(x) = m sin(x - phase).
+        shape: Box::new(|_, c| vec![c[0].hypot(c[1]), (-c[1]).atan2(c[0]).rem_euclid(2.0 * PI)]),
+        loaded_only: true,
+    });
+    law
 }
 
 /// Response of a mass on a spring to `driven`, less what it is driven to.

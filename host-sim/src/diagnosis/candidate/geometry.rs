@@ -5,9 +5,12 @@
 //! flank that carries: orders 2, 4, 6 as 1 : 1/5 : 3/35, phase turned by twice the flank angle between flanks, a mean that eats
 //! backlash, and less the more teeth share the load.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::{Column, Excitation, Law, Named, Shape, by_row, main, nuisance, polar};
+use super::{Column, Excitation, Law, Lead, Named, Shape, by_row, main, nuisance, polar};
+
+/// Share by which a law of shape may be wrong: signatures depend on generator and load (PHYSICS §3.4).
+const SHAPE_MISFIT: f64 = 0.2;
 
 /// Largest plausible amplitude, arcsec, one standard deviation.
 const USUAL_ARCSEC: f64 = 20.0;
@@ -48,78 +51,138 @@ fn half_load(on: &Excitation<'_>) -> Shape {
     Shape::by_factors("half_load_n_m", load / 30.0, load * 3.0, 3)
 }
 
-/// An eccentricity, rectified by the clearance.
+/// Order-2 amplitude of a rectified sine on one flank over its amplitude: 4 / 3 pi.
+const SECOND_ORDER: f64 = 0.424;
+/// Angle on the wheel by which a flank is ahead of the eccentricity, rad: the pressure angle, a little less where teeth give (PHYSICS §1.3, §3.4).
+const FLANK_AHEAD: f64 = 0.36;
+/// Mean and fourth order over second: 3/2 and 1/5 of a sharp rectified sine, less where the corner is rounded by teeth that give.
+const MEAN_OF_SECOND: f64 = 1.15;
+const FOURTH_OF_SECOND: f64 = 0.15;
+
+/// An eccentricity, rectified by the clearance: `-|sin|` of the angle to the eccentricity on the flank that turns the output forward,
+/// `+|sin|` on the other, each ahead by the pressure angle in its own sense.
 fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
     let loaded = on.scales.load > 0.0;
-    Law::new(cause, move |on, shape| {
-        let half = shape.first().copied().unwrap_or(f64::INFINITY);
+    let fade_of = move |shape: &[f64]| shape.get(1).copied().filter(|_| loaded).unwrap_or(f64::INFINITY);
+    let mut law = Law::new(cause, move |on, shape| {
+        let half = fade_of(shape);
         let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
-        let mut columns: Vec<Column> = Vec::new();
-        columns.extend(waves(on, of, 2.0, fade).map(|v| main(v, USUAL_ARCSEC)));
-        columns.extend(waves(on, of, 2.0, |k| fade(k) * flank(k)).map(|v| main(v, USUAL_ARCSEC)));
-        columns.extend(waves(on, of, 4.0, fade).map(|v| nuisance(v, 0.3)));
-        columns.extend(waves(on, of, 4.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.3)));
-        columns.push(nuisance(by_row(on, |k| fade(k) * flank(k)), 1.5));
+        let pattern = by_row(on, |k| {
+            let ahead = angle(on, of, k) - shape[0] + FLANK_AHEAD * flank(k);
+            let wave = (2.0 * ahead).cos() + FOURTH_OF_SECOND * (4.0 * ahead).cos() - MEAN_OF_SECOND;
+            fade(k) * flank(k) * wave
+        });
+        let mut columns: Vec<Column> = vec![main(pattern, USUAL_ARCSEC)];
+        columns.push(nuisance(by_row(on, |k| fade(k) * flank(k)), 0.4));
+        columns.extend(waves(on, of, 2.0, fade).map(|v| nuisance(v, 0.15)));
+        columns.extend(waves(on, of, 2.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.15)));
+        columns.extend(waves(on, of, 4.0, fade).map(|v| nuisance(v, 0.1)));
+        columns.extend(waves(on, of, 4.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.1)));
+        columns.extend(waves(on, of, 6.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.06)));
         if half.is_finite() {
-            columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| nuisance(v, 0.2)));
-            columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.2)));
+            columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| nuisance(v, 0.15)));
+            columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
         }
-        columns.extend(waves(on, of, 6.0, fade).map(|v| nuisance(v, 0.1)));
         columns
     })
-    .shapes(loaded.then(|| half_load(on)))
+    .shapes([Shape::angle("phase_rad", PI, 1)].into_iter().chain(loaded.then(|| half_load(on))))
     .parameters(move |on, shape, c| {
-        // On each flank the second order has 4 / 3 pi = 0.424 of e / (r cos alpha).
-        let plus = polar(c[0] + c[2], c[1] + c[3]);
-        let minus = polar(c[0] - c[2], c[1] - c[3]);
-        let second = 0.5 * (plus.0 + minus.0);
+        let amplitude = c[0] / SECOND_ORDER;
         let mut named: Vec<Named> = vec![
-            ("amplitude_um", second / 0.424 * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", second / 0.424),
-            ("phase_rad", 0.5 * polar(c[0], c[1]).1),
+            ("amplitude_um", amplitude * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um),
+            ("amplitude_arcsec", amplitude),
+            ("phase_rad", shape[0]),
         ];
-        if let Some(half) = shape.first() {
-            named.push(("half_load_n_m", *half));
+        if loaded {
+            named.push(("half_load_n_m", shape[1]));
         }
         named
     })
+    .physical(|_, c| c[0] > 0.0);
+    law.lead = Some(Lead {
+        columns: Box::new(move |on, shape| {
+            let half = fade_of(shape);
+            let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
+            let mut columns: Vec<Column> = Vec::new();
+            // Second order along cos 2 eps and sin 2 eps.
+            for shift in [0.0, FRAC_PI_2] {
+                let along = |k: usize| 2.0 * (angle(on, of, k) + FLANK_AHEAD * flank(k)) - shift;
+                columns.push(main(by_row(on, |k| fade(k) * flank(k) * along(k).cos()), USUAL_ARCSEC));
+            }
+            columns.push(main(by_row(on, |k| fade(k) * flank(k)), USUAL_ARCSEC));
+            columns
+        }),
+        shape: Box::new(|shape, c| {
+            let mut shape = shape.to_vec();
+            shape[0] = (0.5 * polar(c[0], c[1]).1).rem_euclid(PI);
+            shape
+        }),
+        loaded_only: false,
+    });
+    law
 }
 
-/// Errors of position along the pitch: the same on both flanks and under any load.
+/// Errors of position along the pitch: nearly the same on both flanks and under any load. Of the teeth in mesh the foremost carries,
+/// which is another one on each flank: flanks differ somewhat, and a part of the clearance goes.
 fn pitch(cause: &'static str, of: Angle) -> Law {
-    const ORDERS: [(f64, f64); 5] = [(2.0, 20.0), (1.0, 10.0), (3.0, 8.0), (4.0, 8.0), (6.0, 5.0)];
-    Law::new(cause, move |on, _| {
+    let mut law = Law::new(cause, move |on, _| {
+        let flank = |k: usize| on.base.flank[k];
+        let light = |k: usize| if on.scales.load > 0.0 { fading(on, 0.3 * on.scales.load, k) } else { 1.0 };
         let mut columns: Vec<Column> = Vec::new();
-        for (order, usual) in ORDERS {
-            columns.extend(waves(on, of, order, |_| 1.0).map(|v| main(v, usual)));
+        columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC)));
+        columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
+        columns.extend(waves(on, of, 4.0, |_| 1.0).map(|v| nuisance(v, 0.35)));
+        columns.extend(waves(on, of, 4.0, flank).map(|v| nuisance(v, 0.12)));
+        columns.extend(waves(on, of, 6.0, |_| 1.0).map(|v| nuisance(v, 0.12)));
+        columns.extend(waves(on, of, 6.0, flank).map(|v| nuisance(v, 0.06)));
+        // Equal lobes cancel odd harmonics; under light load they are not quite equal.
+        columns.extend(waves(on, of, 1.0, |_| 1.0).map(|v| nuisance(v, 0.1)));
+        columns.extend(waves(on, of, 1.0, light).map(|v| nuisance(v, 0.2)));
+        columns.extend(waves(on, of, 3.0, |_| 1.0).map(|v| nuisance(v, 0.1)));
+        for order in [8.0, 10.0, 12.0, 14.0, 16.0] {
+            columns.extend(waves(on, of, order, |_| 1.0).map(|v| nuisance(v, 0.6 / order)));
         }
-        columns.extend(waves(on, of, 2.0, |k| on.base.flank[k]).map(|v| nuisance(v, 0.15)));
+        for order in [8.0, 10.0] {
+            columns.extend(waves(on, of, order, flank).map(|v| nuisance(v, 0.3 / order)));
+        }
+        columns.push(nuisance(by_row(on, flank), 0.3));
+        columns.push(nuisance(by_row(on, |k| flank(k) * light(k)), 0.3));
         if on.scales.load > 0.0 {
             columns.extend(waves(on, of, 2.0, |k| on.rows.torque[k].abs() / on.scales.load).map(|v| nuisance(v, 0.1)));
         }
         columns
     })
     .parameters(|on, _, c| {
-        let amplitude = |pair: usize| polar(c[2 * pair], c[2 * pair + 1]);
-        let largest = (0..ORDERS.len()).max_by(|a, b| amplitude(*a).0.total_cmp(&amplitude(*b).0)).unwrap_or(0);
+        let (amplitude, phase) = polar(c[0], c[1]);
         vec![
-            ("amplitude_um", amplitude(largest).0 / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", amplitude(largest).0),
-            ("harmonic", ORDERS[largest].0),
-            ("phase_rad", amplitude(largest).1 / ORDERS[largest].0),
+            ("amplitude_um", amplitude / on.scales.arcsec_per_um),
+            ("amplitude_arcsec", amplitude),
+            ("harmonic", 2.0),
+            ("phase_rad", 0.5 * phase),
         ]
-    })
+    });
+    law.free_form = true;
+    law
 }
 
-/// Ring pressed to an oval: order 2 alone; 10 µm of radius are 0.67 of 10 µm on the pitch circle with the tangential part of a ring that keeps its length.
+/// Ring pressed to an oval: order 2 alone. Radius `d cos 2x` with the tangential part `-d/2 sin 2x` of a ring that keeps its length: a flank
+/// at the pressure angle sees both, the radial one with the sign of the flank. 10 µm of radius are 0.67 of 10 µm on the pitch circle.
 fn ovality() -> Law {
     let of = Angle::CircularSpline;
     Law::new("circular_spline_ovality", move |on, _| {
-        let mut columns: Vec<Column> = Vec::new();
-        columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC)));
-        columns.extend(waves(on, of, 2.0, |k| on.base.flank[k]).map(|v| nuisance(v, 0.4)));
+        let flank = |k: usize| on.base.flank[k];
+        let [cos, sin] = waves(on, of, 2.0, |_| 1.0);
+        let together = |a: &[f64], b: &[f64], sign: f64| -> Vec<f64> {
+            let root = 1.0f64.hypot(RADIAL_OF_TANGENTIAL);
+            by_row(on, |k| (a[k] + sign * RADIAL_OF_TANGENTIAL * flank(k) * b[k]) / root)
+        };
+        let mut columns: Vec<Column> =
+            vec![main(together(&cos, &sin, 1.0), USUAL_ARCSEC), main(together(&sin, &cos, -1.0), USUAL_ARCSEC)];
+        columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
+        columns.extend(waves(on, of, 4.0, |_| 1.0).map(|v| nuisance(v, 0.12)));
+        columns.extend(waves(on, of, 4.0, flank).map(|v| nuisance(v, 0.1)));
         if on.scales.load > 0.0 {
-            columns.extend(waves(on, of, 2.0, |k| on.rows.torque[k].abs() / on.scales.load).map(|v| nuisance(v, 0.15)));
+            columns.extend(waves(on, of, 2.0, |k| on.rows.torque[k].abs() / on.scales.load).map(|v| nuisance(v, 0.1)));
         }
         columns
     })
@@ -133,28 +196,37 @@ fn ovality() -> Law {
     })
 }
 
-/// One lobe carries more than the other, so that odd harmonics of both wheels come through: order 1 of each, fading with load.
+/// Radial over tangential part of an oval ring as a flank sees them: twice the tangent of the pressure angle.
+const RADIAL_OF_TANGENTIAL: f64 = 0.8;
+
+/// One lobe deeper in mesh than the other: odd harmonics of both wheels come through, order 1 of each above all, fading with load,
+/// and the deeper lobe takes clearance away.
 fn generator_eccentricity(on: &Excitation<'_>) -> Law {
     let loaded = on.scales.load > 0.0;
     Law::new("generator_eccentricity", |on, shape| {
         let half = shape.first().copied().unwrap_or(f64::INFINITY);
         let fade = |k: usize| fading(on, half, k);
+        let flank = |k: usize| on.base.flank[k];
         let mut columns: Vec<Column> = Vec::new();
         for of in [Angle::Flexspline, Angle::CircularSpline] {
             columns.extend(waves(on, of, 1.0, fade).map(|v| main(v, USUAL_ARCSEC)));
-            columns.extend(waves(on, of, 1.0, |k| fade(k) * on.base.flank[k]).map(|v| nuisance(v, 0.4)));
-            columns.extend(waves(on, of, 3.0, fade).map(|v| nuisance(v, 0.2)));
+        }
+        for of in [Angle::Flexspline, Angle::CircularSpline] {
+            columns.extend(waves(on, of, 1.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.3)));
+            columns.extend(waves(on, of, 2.0, fade).map(|v| nuisance(v, 0.15)));
+            columns.extend(waves(on, of, 3.0, fade).map(|v| nuisance(v, 0.15)));
             if half.is_finite() {
                 columns.extend(waves(on, of, 1.0, |_| 1.0).map(|v| nuisance(v, 0.2)));
             }
         }
+        columns.push(nuisance(by_row(on, flank), 2.0));
+        columns.push(nuisance(by_row(on, |k| fade(k) * flank(k)), 2.0));
         columns
     })
     .shapes(loaded.then(|| half_load(on)))
     .parameters(|on, shape, c| {
-        let per_wheel = if shape.is_empty() { 6 } else { 8 };
         let (on_flexspline, phase) = polar(c[0], c[1]);
-        let on_ring = polar(c[per_wheel], c[per_wheel + 1]).0;
+        let on_ring = polar(c[2], c[3]).0;
         let strongest = on_flexspline.max(on_ring);
         let mut named: Vec<Named> = vec![
             ("amplitude_um", strongest / on.scales.arcsec_per_um),
@@ -168,40 +240,30 @@ fn generator_eccentricity(on: &Excitation<'_>) -> Law {
     })
 }
 
-/// Form error of the generator: a constant shape repeats from tooth to tooth, so its own order is the tooth mesh (z per turn), with a
-/// change of the clearance; with unequal lobes even orders of the generator angle beyond the second come along.
+/// Form error of the generator: a constant shape repeats from tooth to tooth, so its order is the tooth mesh (z per turn), other on each
+/// flank, with a change of the clearance (PHYSICS §1.2).
 fn cam_form_error() -> Law {
     Law::new("cam_form_error", |on, _| {
         let teeth = on.nominal.teeth.map_or(188.0, |t| f64::from(t.flexspline));
         let of = Angle::Flexspline;
         let flank = |k: usize| on.base.flank[k];
+        let light = |k: usize| if on.scales.load > 0.0 { fading(on, 0.5 * on.scales.load, k) } else { 1.0 };
         let mut columns: Vec<Column> = Vec::new();
-        columns.extend(waves(on, of, teeth, |_| 1.0).map(|v| main(v, 8.0)));
-        columns.extend(waves(on, of, teeth, flank).map(|v| main(v, 8.0)));
-        columns.extend(waves(on, of, 4.0, |_| 1.0).map(|v| main(v, 8.0)));
-        columns.extend(waves(on, of, 6.0, |_| 1.0).map(|v| main(v, 8.0)));
-        columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| nuisance(v, 0.5)));
-        columns.extend(waves(on, of, 4.0, flank).map(|v| nuisance(v, 0.5)));
-        columns.extend(waves(on, of, 8.0, |_| 1.0).map(|v| nuisance(v, 0.4)));
+        columns.extend(waves(on, of, teeth, light).map(|v| main(v, 8.0)));
+        columns.extend(waves(on, of, teeth, |k| light(k) * flank(k)).map(|v| main(v, 8.0)));
+        columns.extend(waves(on, of, teeth, |_| 1.0).map(|v| nuisance(v, 0.4)));
+        columns.extend(waves(on, of, teeth, flank).map(|v| nuisance(v, 0.4)));
         columns.extend(waves(on, of, 2.0 * teeth, flank).map(|v| nuisance(v, 0.4)));
+        columns.extend(waves(on, of, 2.0 * teeth, |_| 1.0).map(|v| nuisance(v, 0.4)));
         columns.push(nuisance(by_row(on, flank), 1.0));
-        if on.scales.load > 0.0 {
-            for order in [4.0, 6.0, teeth] {
-                columns.extend(
-                    waves(on, of, order, |k| on.rows.torque[k].abs() / on.scales.load).map(|v| nuisance(v, 0.4)),
-                );
-            }
-        }
         columns
     })
     .parameters(|on, _, c| {
         let mesh = polar(c[0], c[1]).0.hypot(polar(c[2], c[3]).0);
-        let (fourth, sixth) = (polar(c[4], c[5]).0, polar(c[6], c[7]).0);
         vec![
-            ("amplitude_um", mesh.max(fourth).max(sixth) / on.scales.arcsec_per_um),
-            ("mesh_ripple_arcsec", mesh),
-            ("fourth_order_arcsec", fourth),
-            ("sixth_order_arcsec", sixth),
+            ("amplitude_um", mesh / on.scales.arcsec_per_um),
+            ("amplitude_arcsec", mesh),
+            ("phase_rad", polar(c[0], c[1]).1),
         ]
     })
 }
@@ -261,6 +323,9 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     ];
     if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
         laws.push(rectified("gravity_side_load", Angle::Gravity(-1.0), on));
+    }
+    for law in &mut laws {
+        law.misfit = SHAPE_MISFIT;
     }
     laws
 }

@@ -111,6 +111,17 @@ impl Shape {
         if self.log { self.low * (self.high / self.low).powf(place) } else { self.low + (self.high - self.low) * place }
     }
 
+    /// The place of a value.
+    #[must_use]
+    pub fn place(&self, value: f64) -> f64 {
+        if self.log {
+            ((value.max(1e-300) / self.low).ln() / (self.high / self.low).ln()).clamp(0.0, 1.0)
+        } else {
+            let place = (value - self.low) / (self.high - self.low);
+            if self.cyclic { place.rem_euclid(1.0) } else { place.clamp(0.0, 1.0) }
+        }
+    }
+
     /// Places tried first.
     fn places(&self) -> Vec<f64> {
         let count = self.tried.max(1) as f64;
@@ -149,9 +160,20 @@ fn nuisance(values: Vec<f64>, share: f64) -> Column {
 /// A parameter for the report: name with unit, value.
 pub type Named = (&'static str, f64);
 
+type Load = Box<dyn Fn(&Excitation<'_>, &[f64]) -> Vec<f64> + Send + Sync>;
 type Columns = Box<dyn Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync>;
 type Parameters = Box<dyn Fn(&Excitation<'_>, &[f64], &[f64]) -> Vec<Named> + Send + Sync>;
 type Physical = Box<dyn Fn(&[f64], &[f64]) -> bool + Send + Sync>;
+
+/// A linear law close to a law that is none: its coefficients say where to begin with the shape parameters.
+pub struct Lead {
+    /// Columns at the values of the shape parameters tried first; what the lead finds is not looked at.
+    pub columns: Columns,
+    /// Values of the shape parameters from those tried and the coefficients found.
+    pub shape: Box<dyn Fn(&[f64], &[f64]) -> Vec<f64> + Send + Sync>,
+    /// Only where the load leaves no doubt about the flank.
+    pub loaded_only: bool,
+}
 
 /// One law of one cause.
 pub struct Law {
@@ -171,6 +193,12 @@ pub struct Law {
     pub tolerance_of: Option<&'static str>,
     /// How wrong the law may be, as a share of its size: what is smaller than that beside it may be its own misfit.
     pub misfit: f64,
+    /// Where to begin.
+    pub lead: Option<Lead>,
+    /// The law is a free profile: what it may hold has to be taken out before the noise is measured, the finest detail too.
+    pub free_form: bool,
+    /// Load (N·m, row by row) that the cause adds beside the torque that was recorded.
+    pub load: Option<Load>,
 }
 
 /// Share by which the law of a contact, a friction or a lubricant may be wrong.
@@ -189,6 +217,9 @@ impl Law {
             physical: Box::new(|_, _| true),
             tolerance_of: None,
             misfit: USUAL_MISFIT,
+            lead: None,
+            free_form: false,
+            load: None,
         }
     }
     fn exact(mut self) -> Law {
@@ -215,6 +246,12 @@ impl Law {
     #[must_use]
     pub fn values(&self, places: &[f64]) -> Vec<f64> {
         self.shapes.iter().zip(places).map(|(shape, place)| shape.value(*place)).collect()
+    }
+
+    /// Places of values of the shape parameters.
+    #[must_use]
+    pub fn places(&self, values: &[f64]) -> Vec<f64> {
+        self.shapes.iter().zip(values).map(|(shape, value)| shape.place(*value)).collect()
     }
 
     /// All combinations of places tried first.

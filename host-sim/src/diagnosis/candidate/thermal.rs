@@ -1,6 +1,6 @@
 //! What the temperature does (PHYSICS §5, 18-21).
 
-use super::{Column, Excitation, Law, Shape, Tolerance, by_row, main, nuisance};
+use super::{Column, Excitation, Law, Lead, Shape, Tolerance, by_row, main, nuisance};
 use crate::diagnosis::linear::Prior;
 
 /// Temperature above nominal, felt with a lag of `lag_s`, K.
@@ -69,24 +69,23 @@ fn wind_up_arcsec_per_n_m(on: &Excitation<'_>) -> f64 {
     if slope > 0.0 { slope } else { 1.0 }
 }
 
+/// Arcsec for 1 N·m of drag at the mean speed and the nominal temperature.
+fn drag_wind_up(on: &Excitation<'_>, power: f64, per_k: f64, bend: f64) -> Vec<f64> {
+    let (rows, usual) = (on.rows, usual_speed(on));
+    let slope = wind_up_arcsec_per_n_m(on);
+    by_row(on, |k| {
+        let cold = on.nominal.temperature_c - rows.temperature[k];
+        let share = (rows.speed[k] / usual).abs();
+        let thicker = (per_k * cold * (1.0 + bend * cold)).exp();
+        -rows.direction[k] * on.nominal.ratio.signum() * share.powf(power) * thicker * slope
+    })
+}
+
 /// Drag of the lubricant, against the motion: a power of the speed, and thicker in the cold (Vogel, close to exponential).
 fn lubricant_viscosity() -> Law {
     Law::new("lubricant_viscosity", |on, shape| {
         let (power, per_k, bend) = (shape[0], shape[1], shape[2]);
-        let rows = on.rows;
-        let usual = usual_speed(on);
-        // Arcsec for 1 N·m of drag at the mean speed and the nominal temperature.
-        let drag = |power: f64, per_k: f64, bend: f64| {
-            by_row(on, |k| {
-                let cold = on.nominal.temperature_c - rows.temperature[k];
-                let share = (rows.speed[k] / usual).abs();
-                -rows.direction[k]
-                    * on.nominal.ratio.signum()
-                    * share.powf(power)
-                    * (per_k * cold * (1.0 + bend * cold)).exp()
-                    * wind_up_arcsec_per_n_m(on)
-            })
-        };
+        let drag = |power: f64, per_k: f64, bend: f64| drag_wind_up(on, power, per_k, bend);
         let size = super::super::rows::rms(&drag(power, per_k, bend)).max(1e-12);
         vec![
             main(drag(power, per_k, bend), 15.0 / size),
@@ -108,17 +107,19 @@ fn lubricant_viscosity() -> Law {
 /// The same drag as a load: it winds the drive up and, where it exceeds the torque, moves the play to the other flank.
 fn lubricant_load(on: &Excitation<'_>) -> Law {
     let scale = on.scales.load;
-    Law::new("lubricant_viscosity", |on, shape| {
+    let load = |on: &Excitation<'_>, shape: &[f64]| -> Vec<f64> {
         let (drag_n_m, power, per_k) = (shape[0], shape[1], shape[2]);
+        let (rows, usual) = (on.rows, usual_speed(on));
+        by_row(on, |k| {
+            let cold = on.nominal.temperature_c - rows.temperature[k];
+            let share = (rows.speed[k] / usual).abs().powf(power) * (per_k * cold).exp();
+            -drag_n_m * share * rows.direction[k] * on.nominal.ratio.signum()
+        })
+    };
+    let mut law = Law::new("lubricant_viscosity", move |on, shape| {
         let rows = on.rows;
-        let usual = usual_speed(on);
-        let torque: Vec<f64> = (0..rows.len())
-            .map(|k| {
-                let cold = on.nominal.temperature_c - rows.temperature[k];
-                let share = (rows.speed[k] / usual).abs().powf(power) * (per_k * cold).exp();
-                rows.torque[k] - drag_n_m * share * rows.direction[k] * on.nominal.ratio.signum()
-            })
-            .collect();
+        let added = load(on, shape);
+        let torque: Vec<f64> = (0..rows.len()).map(|k| rows.torque[k] + added[k]).collect();
         let flank = on.base.law.flanks(rows, &torque, on.nominal);
         let play = by_row(on, |k| on.base.half_backlash * (flank[k] - on.base.flank[k]));
         let together = by_row(on, |k| on.nominal.wind_up_arcsec(torque[k]) - on.base.wind_up[k] + play[k]);
@@ -128,14 +129,21 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
         ]
     })
     .shapes([
-        Shape::by_factors("drag_n_m", 0.003 * scale, 1.0 * scale, 5),
+        Shape::by_factors("drag_n_m", 0.001 * scale, 1.0 * scale, 1),
         Shape::evenly("speed_exponent", 0.25, 1.05, 2),
         Shape::by_factors("per_k", 0.008, 0.12, 3),
     ])
     .parameters(|_, shape, c| {
         vec![("drag_n_m", shape[0] * c[0]), ("speed_exponent", shape[1]), ("relative_drag_per_k", -shape[2])]
     })
-    .physical(|shape, c| c[0] > 0.0 && viscous(shape[1], shape[2]))
+    .physical(|shape, c| c[0] > 0.0 && viscous(shape[1], shape[2]));
+    law.load = Some(Box::new(load));
+    law.lead = Some(Lead {
+        columns: Box::new(|on, shape| vec![main(drag_wind_up(on, shape[1], shape[2], 0.0), 10.0)]),
+        shape: Box::new(|shape, c| vec![c[0].max(0.0), shape[1], shape[2]]),
+        loaded_only: true,
+    });
+    law
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
