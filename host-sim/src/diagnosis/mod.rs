@@ -293,7 +293,11 @@ fn conclude(
     let described = without_name;
     let without_name = without_name + left_over.iter().map(|l| l.size_arcsec.powi(2)).fold(0.0, f64::max);
     let significant_left = without_name > 0.0;
+    let held = held_out::evaluate(problem, &all);
+    let gains = held.total.rms_after_arcsec < held.total.rms_before_arcsec;
     let verdict = match (named.is_empty(), significant_left) {
+        // Causes that make the prediction of other rows no better are none, whatever they do to their own.
+        (false, _) if !gains => Verdict::Unknown,
         (true, false) => Verdict::None,
         (true, true) => Verdict::Unknown,
         (false, false) => Verdict::Explained,
@@ -306,7 +310,6 @@ fn conclude(
         }
         (false, true) => Verdict::PartlyExplained,
     };
-    let held = held_out::evaluate(problem, &all);
     let mut causes = Vec::new();
     let mut next_experiment = None;
     if verdict != Verdict::Unknown {
