@@ -556,9 +556,14 @@ await check("a link opens its generator at its figure", async () => {
   await check("what is the same for all choices stays, and its numbers can be had", async () => {
     const [download] = await Promise.all([
       page.waitForEvent("download"),
-      page.locator("#over-time").getByRole("button", { name: /as CSV/ }).click(),
+      page
+        .locator("#over-time")
+        .getByRole("button", { name: /as CSV/ })
+        .click(),
     ]);
-    const text = readFileSync(await download.path(), "utf8").trim().split("\r\n");
+    const text = readFileSync(await download.path(), "utf8")
+      .trim()
+      .split("\r\n");
     assert(text[0].split(",").length >= 4, text[0]);
     assert(text.length > 500, `${text.length} lines`);
     // Between sessions the line breaks: a row without values.
@@ -569,7 +574,10 @@ await check("a link opens its generator at its figure", async () => {
   await check("orders of the causes are marked", () => {
     for (const id of ["orders-generator", "orders-generator-less-output"]) {
       const { uprights } = report.figures[id].charts.nominal;
-      assert(uprights.some((u) => u.name.startsWith("eccentricity of the circular spline: ")), id);
+      assert(
+        uprights.some((u) => u.name.startsWith("eccentricity of the circular spline: ")),
+        id,
+      );
     }
     near(report.figures["orders-generator-less-output"].charts.nominal.uprights[0].x, 2, 1e-9, "on its own wheel");
   });

@@ -769,3 +769,156 @@ impl Known<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+    use crate::diagnosis::report::{Cause, Compensation, HeldOut, Residual, Unexplained};
+    use crate::measurement::{Fault, FaultName, Treatment};
+    use crate::report::page::Span;
+    use crate::synthesize::catalogue_drive;
+
+    /// Two short sessions with an error of one wave in a generator turn.
+    fn recording(faults: Vec<Fault>) -> Recording {
+        let session = |from: f64| {
+            let generator_rad: Vec<f64> = (0..3000).map(|k| 0.05 * f64::from(k)).collect();
+            Session {
+                line: (2..3002).collect(),
+                time_s: Some((0..3000).map(|k| from + 0.01 * f64::from(k)).collect()),
+                error_rad: generator_rad.iter().map(|psi| 1e-4 * psi.sin()).collect(),
+                generator_rad,
+                ..Session::default()
+            }
+        };
+        Recording {
+            file: "folder/made <up>.csv".into(),
+            rows: 6000,
+            sessions: vec![session(0.0), session(1000.0)],
+            faults,
+            tooth_steps: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    fn diagnosis(verdict: Verdict, causes: &[&str]) -> Diagnosis {
+        let cause = |name: &&str| Cause {
+            name: (*name).to_owned(),
+            confidence: 0.97,
+            parameters: BTreeMap::new(),
+            held_out_gain: 0.8,
+            size_arcsec: 12.0,
+            look_alikes: vec!["sensor_latency".into()],
+        };
+        Diagnosis {
+            schema_version: 1,
+            verdict,
+            causes: causes.iter().map(cause).collect(),
+            residual: Residual {
+                rms_before_arcsec: 13.0,
+                rms_after_arcsec: 5.0,
+                noise_floor_arcsec: 5.0,
+                unexplained_fraction: 0.0,
+            },
+            held_out: HeldOut { rms_before_arcsec: 10.0, rms_after_arcsec: 5.0 },
+            compensation: Compensation::default(),
+            unexplained: vec![Unexplained { looks_like: "slow motion".into(), size_arcsec: 30.0 }],
+            recalibrated: BTreeMap::new(),
+            noise_arcsec: [5.0, 0.0],
+            wander_correlation_s: 1.0,
+            next_experiment: None,
+        }
+    }
+
+    fn page_of(diagnosis: &Diagnosis, faults: Vec<Fault>) -> Page {
+        let (recording, nominal) = (recording(faults), catalogue_drive());
+        let rows = Rows::new(&recording.sessions, &nominal);
+        let level = Level { id: "nominal", name: "nominal", residual_arcsec: rows.error.clone() };
+        page(Sources {
+            recording: &recording,
+            nominal: &nominal,
+            diagnosis,
+            levels: vec![level],
+            parts: Vec::new(),
+            command: "flexspline diagnose",
+            inputs: Vec::new(),
+        })
+    }
+
+    fn words(text: &Text) -> String {
+        let word = |span: &Span| match span {
+            Span::Plain(words) | Span::Strong(words) => words.clone(),
+            Span::Error { arcsec, .. } => format!("{arcsec:.0}″"),
+        };
+        text.0.iter().map(word).collect()
+    }
+
+    #[test]
+    fn each_verdict_has_its_stamp_its_sentence_and_its_number() {
+        let jump = || Fault {
+            name: FaultName::EncoderIndexJump,
+            channel: None,
+            time_s: Some(41.2),
+            until_s: Some(41.2),
+            first_line: 77,
+            last_line: 77,
+            rows: 1,
+            size_arcsec: Some(53.0),
+            treatment: Treatment::Repaired,
+            what: "the output jumps".into(),
+        };
+        for (verdict, causes, status, begins, number) in [
+            (Verdict::Explained, &["wear"][..], Status::Good, "Explained by wear (97 %, 12″ rms).", "75 %"),
+            (
+                Verdict::PartlyExplained,
+                &["wear", "ratcheting"],
+                Status::PartlyExplained,
+                "Partly explained by wear (97 %, 12″ rms) and ratcheting",
+                "75 %",
+            ),
+            (Verdict::Unknown, &[], Status::Unknown, "Unknown: ", "30″"),
+            (Verdict::None, &[], Status::Good, "Nothing found: ", "13″"),
+        ] {
+            let page = page_of(&diagnosis(verdict, causes), Vec::new());
+            assert_eq!((page.status, page.also.len()), (status, 0));
+            let headline = &page.headlines[0];
+            assert!(words(&headline.answer).starts_with(begins), "{}", words(&headline.answer));
+            assert_eq!(words(&headline.number), number);
+            // With a fault of the data a good page is stamped so, and any other beside what it is.
+            let faulty = page_of(&diagnosis(verdict, causes), vec![jump()]);
+            let stamps: Vec<Status> = [faulty.status].into_iter().chain(faulty.also).collect();
+            assert!(stamps.contains(&Status::DataFaults) && !stamps.contains(&Status::Good), "{stamps:?}");
+            assert_eq!(stamps.contains(&status), status != Status::Good);
+            assert!(faulty.remarks[0].contains("index jump of an encoder; the output jumps."), "{:?}", faulty.remarks);
+        }
+    }
+
+    #[test]
+    fn a_long_record_is_thinned_and_its_page_is_small() {
+        let page = page_of(&diagnosis(Verdict::Explained, &["wear"]), Vec::new());
+        let html = page.html().unwrap();
+        assert!(html.len() < 600_000, "{} bytes", html.len());
+        assert!(
+            html.contains("made &#60;up&#62;.csv") || html.contains("made &lt;up&gt;.csv"),
+            "the name is not escaped"
+        );
+        let session = &recording(Vec::new()).sessions[0];
+        let third = thinned(session, 3);
+        assert_eq!((third.len(), third.generator_rad[1]), (1000, session.generator_rad[3]));
+        assert_eq!(third.time_s.as_ref().unwrap()[999], session.time_s.as_ref().unwrap()[2997]);
+        // The wave is in the spectrum of what was measured, at its order.
+        let figure = |id: &str| {
+            page.sections.iter().flat_map(|s| &s.blocks).find_map(|block| match block {
+                Block::Figure(figure) if figure.id == id => Some(figure.clone()),
+                _ => None,
+            })
+        };
+        let Some(FigureBody::Lines { charts, .. }) = figure("orders-generator").map(|figure| figure.body) else {
+            panic!("no spectrum")
+        };
+        let curve = &charts[0].1.series[0].points;
+        let peak = curve.iter().max_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
+        assert!((peak[0] - 1.0).abs() < 0.02 && (peak[1] - 20.6).abs() < 0.5, "{peak:?}");
+    }
+}
