@@ -7,6 +7,9 @@
 //! held (p stays where it was), pushed (friction holds the output until the generator has used up the clearance and pushes it:
 //! a play operator in the nominal output), by sign alone, and smooth.
 
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use flexspline::{GeneratorAngle, PlayState, Table};
 
 use super::rows::Rows;
@@ -75,6 +78,26 @@ pub struct Floating {
     pub spread: f64,
 }
 
+type Pair = Arc<[Vec<f64>; 2]>;
+
+/// Cosines and sines of angles that many laws share, made when first asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Waves(Arc<Mutex<HashMap<(i8, u64), Pair>>>);
+
+impl Waves {
+    /// Cosine and sine of `order` times the angle called `which`.
+    pub fn of(&self, which: i8, order: f64, make: impl FnOnce() -> [Vec<f64>; 2]) -> Pair {
+        let key = (which, order.to_bits());
+        let known = |waves: &Waves| waves.0.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
+        if let Some(pair) = known(self) {
+            return pair;
+        }
+        let pair = Arc::new(make());
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(key, pair.clone());
+        pair
+    }
+}
+
 /// Nominal prediction and tolerances.
 #[derive(Clone, Debug)]
 pub struct Base {
@@ -90,6 +113,8 @@ pub struct Base {
     pub law: PlayLaw,
     /// What may float.
     pub floating: Vec<Floating>,
+    /// Cosines and sines of angles that many laws share.
+    pub waves: Waves,
     /// Rows where the flank is not known well: crossing the clearance, or torque around friction.
     pub uncertain: Vec<bool>,
 }
@@ -154,7 +179,7 @@ impl Base {
             add("harmonic", wave(std::f64::consts::FRAC_PI_2), nominal.spread.harmonic);
         }
         let uncertain = uncertain(rows, nominal, &flank);
-        Base { prediction, flank, wind_up, half_backlash, law, floating, uncertain }
+        Base { prediction, flank, wind_up, half_backlash, law, floating, waves: Waves::default(), uncertain }
     }
 }
 

@@ -21,6 +21,11 @@ const LEAST_OF_NOISE: f64 = 0.3;
 const LEAST_OF_MISFIT: f64 = 1.0;
 /// The same for a deviation without a name.
 const LEAST_UNNAMED_OF_MISFIT: f64 = 1.5;
+/// Predictions are the same if they are closer than this, arcsec rms, and than this share of what they explain.
+const SAME_ARCSEC: f64 = 0.75;
+const SAME_SHARE: f64 = 0.04;
+/// A law takes the place of another only where what it explains differs from it by less than this share.
+const IN_PLACE: f64 = 0.7;
 /// Causes at most.
 const MOST_CAUSES: usize = 3;
 /// Unnamed deviations at most.
@@ -49,6 +54,21 @@ pub struct Standing {
     pub alone: f64,
     /// Relative change of the prediction error of sessions left out (negative: better without it).
     pub left_out: f64,
+}
+
+/// Columns and shape parameters of a term: how much it can follow.
+fn follows(term: &Term<'_>) -> usize {
+    term.len() + 2 * term.places.len()
+}
+
+/// Whether a term with a name follows much less than another.
+fn simpler(term: &Term<'_>, than: &Term<'_>) -> bool {
+    term.law.named && 3 * follows(term) <= 2 * follows(than)
+}
+
+/// Whether predictions this far apart are the same, as far as laws are known, for something of this size.
+fn same(apart: f64, size: f64) -> bool {
+    apart < SAME_ARCSEC.min(SAME_SHARE * size)
 }
 
 /// Fits a set of terms.
@@ -342,15 +362,37 @@ fn forward<'l>(
         gain - if term.law.named { 0.0 } else { UNNAMED_AHEAD.max(0.01 * gain) }
     };
     refined.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
-    let misfit = standings(problem, selected)
-        .iter()
-        .zip(&selected.terms)
-        .map(|(s, t)| s.size * t.law.misfit)
-        .fold(0.0, f64::max);
-    for (gain, term, fit) in refined {
+    let standing_now = standings(problem, selected);
+    let misfit_as = |law: &Law| {
+        standing_now.iter().zip(&selected.terms).map(|(s, t)| s.size * t.law.misfit_as(law)).fold(0.0, f64::max)
+    };
+    let before = predicted(problem, &selected.terms.iter().collect::<Vec<_>>(), &selected.fit);
+    let mut order: Vec<usize> = (0..refined.len()).collect();
+    // What is simpler and predicts the same goes first.
+    if let Some((_, best, fit)) = refined.first() {
+        let with = |term: &Term<'l>, fit: &Fit| -> Vec<f64> {
+            predicted(problem, &selected.terms.iter().chain([term]).collect::<Vec<_>>(), fit)
+        };
+        let there = with(best, fit);
+        let size = size_of(problem, &there.iter().zip(&before).map(|(a, b)| a - b).collect::<Vec<_>>());
+        let simplest = (1..refined.len())
+            .filter(|k| {
+                let (_, term, fit) = &refined[*k];
+                let apart: Vec<f64> = with(term, fit).iter().zip(&there).map(|(a, b)| a - b).collect();
+                simpler(term, best) && same(size_of(problem, &apart), size)
+            })
+            .min_by_key(|k| follows(&refined[*k].1));
+        if let Some(k) = simplest {
+            order.retain(|j| *j != k);
+            order.insert(0, k);
+        }
+    }
+    for k in order {
+        let (gain, term, fit) = refined[k].clone();
         if gain < 0.5 {
             break;
         }
+        let misfit = misfit_as(term.law);
         let mut terms = selected.terms.clone();
         let (law, line) = (term.law, format!("{} {:?}", term.law.cause, term.law.values(&term.places)));
         terms.push(term);
@@ -411,7 +453,7 @@ fn backward<'l>(
             };
             let misfit = (0..selected.terms.len())
                 .filter(|j| *j != k)
-                .map(|j| standings[j].size * selected.terms[j].law.misfit)
+                .map(|j| standings[j].size * selected.terms[j].law.misfit_as(law))
                 .fold(0.0, f64::max);
             !physical || !limits.passes(law, &standings[k], misfit, in_tolerance)
         };
@@ -430,7 +472,7 @@ fn backward<'l>(
 fn exchange<'l>(
     problem: &Problem<'_>,
     laws: &'l [Law],
-    mut selected: Selected<'l>,
+    selected: Selected<'l>,
     log: &mut impl FnMut(String),
 ) -> Option<Selected<'l>> {
     for k in 0..selected.terms.len() {
@@ -445,24 +487,36 @@ fn exchange<'l>(
         let mut rivals = scan(problem, &others, &open);
         rivals.truncate(4);
         let scaffold = Scaffold::new(problem, others.iter().collect());
-        let best = rivals
+        let refined: Vec<(Term<'l>, Fit)> = rivals
             .into_par_iter()
             .filter_map(|(_, term)| {
                 let (term, fit) = scaffold.refine(term)?;
                 let c = fit.of(fit.starts.len() - 1);
                 (term.law.physical)(&term.law.values(&term.places), c).then_some((term, fit))
             })
+            .collect();
+        let less = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
+        let now = predicted(problem, &selected.terms.iter().collect::<Vec<_>>(), &selected.fit);
+        let size = size_of(problem, &less(&now, &predicted(problem, &others.iter().collect::<Vec<_>>(), &without)));
+        let evidence = selected.fit.solution.evidence + selected.terms[k].occam;
+        let best = refined
+            .into_iter()
+            .filter(|(term, fit)| {
+                let then = predicted(problem, &others.iter().chain([term]).collect::<Vec<_>>(), fit);
+                let apart = size_of(problem, &less(&then, &now));
+                let needed = if term.law.named { 3.0 } else { UNNAMED_AHEAD };
+                let better = fit.solution.evidence + term.occam > evidence + needed;
+                // What follows more does not take the place of what predicts the same.
+                let no_simpler = !(same(apart, size) && simpler(&selected.terms[k], term));
+                apart < IN_PLACE * size
+                    && (better && no_simpler || same(apart, size) && simpler(term, &selected.terms[k]))
+            })
             .max_by(|a, b| (a.1.solution.evidence + a.0.occam).total_cmp(&(b.1.solution.evidence + b.0.occam)));
         if let Some((term, fit)) = best {
-            let needed = if term.law.named { 3.0 } else { UNNAMED_AHEAD };
-            let now = selected.fit.solution.evidence + selected.terms[k].occam;
-            if fit.solution.evidence + term.occam > now + needed {
-                log(format!("  ~ {} gives way to {}", selected.terms[k].law.cause, term.law.cause));
-                let mut terms = others;
-                terms.push(term);
-                selected = settle(problem, Selected { fit, terms })?;
-                return Some(selected);
-            }
+            log(format!("  ~ {} gives way to {}", selected.terms[k].law.cause, term.law.cause));
+            let mut terms = others;
+            terms.push(term);
+            return settle(problem, Selected { fit, terms });
         }
     }
     Some(selected)

@@ -121,7 +121,19 @@ pub fn parameters(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<BTreeMa
                 shifts.iter().map(|s| (0..dimension).map(|j| slope[j] * s[index[j]]).sum::<f64>()).collect();
             let mean = moved.iter().sum::<f64>() / count;
             let jackknife = (count - 1.0) / count * moved.iter().map(|m| (m - mean).powi(2)).sum::<f64>();
-            named.insert(name, Parameter { value, std: laplace.max(0.0).max(jackknife).sqrt() });
+            let angle = name.ends_with("phase_rad") || name == "angle_rad";
+            let counted = ["harmonic", "tooth", "wheel", "events"].contains(&name);
+            let scale = if angle {
+                1.0
+            } else if counted {
+                0.0
+            } else {
+                value.abs()
+            };
+            named.insert(
+                name,
+                Parameter { value, std: laplace.max(0.0).max(jackknife).sqrt().hypot(term.law.doubt * scale) },
+            );
         }
         all.push(named);
     }

@@ -93,7 +93,7 @@ fn transition(omega: f64, damping: f64, dt: f64) -> [f64; 4] {
 /// The load's inertia on the torsion of the drive: rings after steps of the torque and where the kinematic error meets its frequency.
 fn torsional_resonance(on: &Excitation<'_>) -> Law {
     let fastest = 0.45 / on.rows.period;
-    Law::new("torsional_resonance", |on, shape| {
+    let mut law = Law::new("torsional_resonance", |on, shape| {
         let (frequency, damping) = (shape[0], shape[1]);
         let base = on.base;
         let kinematic = by_row(on, |k| base.prediction[k] - base.wind_up[k]);
@@ -109,14 +109,17 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
         ]
     })
     .shapes([
-        Shape::by_factors("frequency_hz", 1.0f64.min(0.3 * fastest), fastest.clamp(0.5, 80.0), 14),
+        Shape::by_factors("frequency_hz", 1.0f64.min(0.3 * fastest), fastest.clamp(0.5, 80.0), 28),
         Shape::by_factors("damping_ratio", 0.008, 0.5, 3),
     ])
     .parameters(|_, shape, c| {
         let gain = [c[0], c[1]].into_iter().fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
         vec![("frequency_hz", shape[0]), ("damping_ratio", shape[1]), ("gain", gain)]
     })
-    .physical(|_, c| c[0] > 0.0 || c[1] > 0.0 || c[2] > 0.0)
+    .physical(|_, c| c[0] > 0.0 || c[1] > 0.0 || c[2] > 0.0);
+    // Rows are joined by straight lines.
+    law.doubt = 0.006;
+    law
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {

@@ -7,7 +7,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::{Column, Excitation, Law, Lead, Named, Shape, by_row, main, nuisance, polar};
+use super::{Column, Excitation, Kin, Law, Lead, Named, Shape, by_row, main, nuisance, polar};
 
 /// Share by which a law of shape may be wrong: signatures depend on generator and load (PHYSICS §3.4).
 const SHAPE_MISFIT: f64 = 0.2;
@@ -44,8 +44,21 @@ fn fading(on: &Excitation<'_>, half_load: f64, k: usize) -> f64 {
 }
 
 fn waves(on: &Excitation<'_>, of: Angle, order: f64, weight: impl Fn(usize) -> f64) -> [Vec<f64>; 2] {
-    let at = |k: usize| order * angle(on, of, k);
-    [by_row(on, |k| weight(k) * at(k).cos()), by_row(on, |k| weight(k) * at(k).sin())]
+    let kept = kept(on, of, order);
+    [by_row(on, |k| weight(k) * kept[0][k]), by_row(on, |k| weight(k) * kept[1][k])]
+}
+
+/// Cosine and sine of a multiple of an angle, made once.
+fn kept(on: &Excitation<'_>, of: Angle, order: f64) -> std::sync::Arc<[Vec<f64>; 2]> {
+    let which = match of {
+        Angle::Flexspline => 0,
+        Angle::CircularSpline => 1,
+        Angle::Gravity(sign) => 2 + i8::from(sign > 0.0),
+    };
+    on.base.waves.of(which, order, || {
+        let (sin, cos) = (0..on.rows.len()).map(|k| (order * angle(on, of, k)).sin_cos()).unzip();
+        [cos, sin]
+    })
 }
 
 /// Half-load of the fading: from a thirtieth of the load scale to three times it.
@@ -62,6 +75,12 @@ const FLANK_AHEAD: f64 = 0.36;
 const MEAN_OF_SECOND: f64 = 1.15;
 const FOURTH_OF_SECOND: f64 = 0.15;
 
+/// Cosine of a kept angle less `shift` plus `by`.
+fn ahead(kept: &[Vec<f64>; 2], k: usize, shift: f64, by: f64) -> f64 {
+    let (sin, cos) = (by - shift).sin_cos();
+    kept[0][k] * cos - kept[1][k] * sin
+}
+
 /// An eccentricity, rectified by the clearance: `-|sin|` of the angle to the eccentricity on the flank that turns the output forward,
 /// `+|sin|` on the other, each ahead by the pressure angle in its own sense.
 fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
@@ -70,9 +89,11 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
     let mut law = Law::new(cause, move |on, shape| {
         let half = fade_of(shape);
         let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
+        let (second, fourth) = (kept(on, of, 2.0), kept(on, of, 4.0));
         let pattern = by_row(on, |k| {
-            let ahead = angle(on, of, k) - shape[0] + FLANK_AHEAD * flank(k);
-            let wave = (2.0 * ahead).cos() + FOURTH_OF_SECOND * (4.0 * ahead).cos() - MEAN_OF_SECOND;
+            let wave = ahead(&second, k, 2.0 * shape[0], 2.0 * FLANK_AHEAD * flank(k))
+                + FOURTH_OF_SECOND * ahead(&fourth, k, 4.0 * shape[0], 4.0 * FLANK_AHEAD * flank(k))
+                - MEAN_OF_SECOND;
             fade(k) * flank(k) * wave
         });
         let mut columns: Vec<Column> = vec![main(pattern, USUAL_ARCSEC)];
@@ -109,8 +130,9 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
             let mut columns: Vec<Column> = Vec::new();
             // Second order along cos 2 eps and sin 2 eps.
             for shift in [0.0, FRAC_PI_2] {
-                let along = |k: usize| 2.0 * (angle(on, of, k) + FLANK_AHEAD * flank(k)) - shift;
-                columns.push(main(by_row(on, |k| fade(k) * flank(k) * along(k).cos()), USUAL_ARCSEC));
+                let second = kept(on, of, 2.0);
+                let along = |k: usize| ahead(&second, k, shift, 2.0 * FLANK_AHEAD * flank(k));
+                columns.push(main(by_row(on, |k| fade(k) * flank(k) * along(k)), USUAL_ARCSEC));
             }
             columns.push(main(by_row(on, |k| fade(k) * flank(k)), USUAL_ARCSEC));
             columns
@@ -150,22 +172,43 @@ fn pitch(cause: &'static str, of: Angle) -> Law {
         }
         columns.push(nuisance(by_row(on, flank), 0.3));
         columns.push(nuisance(by_row(on, |k| flank(k) * light(k)), 0.3));
+        columns.extend(waves(on, of, 2.0, |k| flank(k) * light(k)).map(|v| nuisance(v, 0.2)));
         if on.scales.load > 0.0 {
             columns.extend(waves(on, of, 2.0, |k| on.rows.torque[k].abs() / on.scales.load).map(|v| nuisance(v, 0.1)));
         }
         columns
     })
-    .parameters(|on, _, c| {
-        let (amplitude, phase) = polar(c[0], c[1]);
-        vec![
-            ("amplitude_um", amplitude / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", amplitude),
-            ("harmonic", 2.0),
-            ("phase_rad", 0.5 * phase),
-        ]
-    });
+    .parameters(pitch_parameters);
     law.free_form = true;
     law
+}
+
+/// The same of a wheel whose error is one smooth wave, as of a cutter or a clamping that is off: order 2 with a little of 1 and 4.
+fn smooth_pitch(cause: &'static str, of: Angle) -> Law {
+    Law::new(cause, move |on, _| {
+        let flank = |k: usize| on.base.flank[k];
+        let light = |k: usize| if on.scales.load > 0.0 { fading(on, 0.3 * on.scales.load, k) } else { 1.0 };
+        let mut columns: Vec<Column> = Vec::new();
+        columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC)));
+        columns.extend(waves(on, of, 4.0, |_| 1.0).map(|v| nuisance(v, 0.25)));
+        columns.extend(waves(on, of, 1.0, light).map(|v| nuisance(v, 0.2)));
+        // The clearance makes even orders of the first one, of other phase on each flank (PHYSICS §1.3).
+        columns.extend(waves(on, of, 2.0, |k| flank(k) * light(k)).map(|v| nuisance(v, 0.25)));
+        columns.extend(waves(on, of, 2.0, light).map(|v| nuisance(v, 0.1)));
+        columns.push(nuisance(by_row(on, |k| flank(k) * light(k)), 0.3));
+        columns
+    })
+    .parameters(pitch_parameters)
+}
+
+fn pitch_parameters(on: &Excitation<'_>, _: &[f64], c: &[f64]) -> Vec<Named> {
+    let (amplitude, phase) = polar(c[0], c[1]);
+    vec![
+        ("amplitude_um", amplitude / on.scales.arcsec_per_um),
+        ("amplitude_arcsec", amplitude),
+        ("harmonic", 2.0),
+        ("phase_rad", 0.5 * phase),
+    ]
 }
 
 /// Ring pressed to an oval: order 2 alone. Radius `d cos 2x` with the tangential part `-d/2 sin 2x` of a ring that keeps its length: a flank
@@ -319,6 +362,8 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         ovality(),
         pitch("flexspline_pitch_error", Angle::Flexspline),
         pitch("circular_spline_pitch_error", Angle::CircularSpline),
+        smooth_pitch("flexspline_pitch_error", Angle::Flexspline),
+        smooth_pitch("circular_spline_pitch_error", Angle::CircularSpline),
         generator_eccentricity(on),
         cam_form_error(),
     ];
@@ -331,6 +376,7 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     }
     for law in &mut laws {
         law.misfit = SHAPE_MISFIT;
+        law.kin = Kin::Shape;
     }
     laws
 }

@@ -193,6 +193,10 @@ pub struct Law {
     pub tolerance_of: Option<&'static str>,
     /// How wrong the law may be, as a share of its size: what is smaller than that beside it may be its own misfit.
     pub misfit: f64,
+    /// What it may be taken for.
+    pub kin: Kin,
+    /// Relative uncertainty of its parameters beside that of the data: what the law itself is not sure of.
+    pub doubt: f64,
     /// Where to begin.
     pub lead: Option<Lead>,
     /// The law is a free profile: what it may hold has to be taken out before the noise is measured, the finest detail too.
@@ -201,10 +205,25 @@ pub struct Law {
     pub load: Option<Load>,
 }
 
+/// What the misfit of a law may be taken for: most of all another law of its kin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kin {
+    /// Shape and place of wheels and generator: waves of the generator angle.
+    Shape,
+    /// Everything else.
+    Unlike,
+}
+
+/// Share of a law's misfit that may look like a law that is no kin.
+const NO_KIN: f64 = 0.25;
+
 /// Share by which the law of a contact, a friction or a lubricant may be wrong.
 const USUAL_MISFIT: f64 = 0.10;
 /// The same for pure geometry and counting: sensors, ratio, skipped teeth.
 const EXACT_MISFIT: f64 = 0.02;
+/// Relative uncertainty of parameters of such laws, and of exact ones.
+const USUAL_DOUBT: f64 = 0.03;
+const EXACT_DOUBT: f64 = 0.002;
 
 impl Law {
     fn new(cause: &str, columns: impl Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync + 'static) -> Law {
@@ -217,6 +236,8 @@ impl Law {
             physical: Box::new(|_, _| true),
             tolerance_of: None,
             misfit: USUAL_MISFIT,
+            kin: Kin::Unlike,
+            doubt: USUAL_DOUBT,
             lead: None,
             free_form: false,
             load: None,
@@ -224,6 +245,7 @@ impl Law {
     }
     fn exact(mut self) -> Law {
         self.misfit = EXACT_MISFIT;
+        self.doubt = EXACT_DOUBT;
         self
     }
     fn shapes(mut self, shapes: impl IntoIterator<Item = Shape>) -> Law {
@@ -240,6 +262,14 @@ impl Law {
     fn physical(mut self, physical: impl Fn(&[f64], &[f64]) -> bool + Send + Sync + 'static) -> Law {
         self.physical = Box::new(physical);
         self
+    }
+
+    /// How much of its size another law may be named for wrongly.
+    #[must_use]
+    pub fn misfit_as(&self, other: &Law) -> f64 {
+        // A pulse at a place is what any wrong shape leaves, in time or in angle.
+        let alike = self.kin == other.kin || other.cause == "damaged_tooth";
+        self.misfit * if alike || !other.named { 1.0 } else { NO_KIN }
     }
 
     /// Values of the shape parameters at places between 0 and 1.

@@ -156,6 +156,7 @@ fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
     .exact();
     // The jump is measured, not modelled: nothing of its height is left over.
     law.misfit = 0.0;
+    law.doubt = 1e-5;
     Some(law)
 }
 
