@@ -202,7 +202,7 @@ pub(super) fn order(order: f64) -> String {
 
 /// A time, s.
 pub(super) fn seconds(time_s: f64) -> String {
-    format!("{} s", significant(time_s, 5))
+    format!("{time_s:.2} s")
 }
 
 #[cfg(test)]
