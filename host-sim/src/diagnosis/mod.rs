@@ -84,7 +84,7 @@ const LEAST_ROWS: usize = 200;
 /// Orders per generator turn up to which lines are looked for.
 const HIGHEST_ORDER: f64 = 150.0;
 /// Times that causes are chosen again, at most.
-const MOST_ROUNDS: usize = 3;
+const MOST_ROUNDS: usize = 2;
 /// What is left as a free function counts if it is larger than this against the strongest cause.
 const LEAST_LEFT_OF_STRONGEST: f64 = 0.25;
 /// Named causes that explain less than this share of what is explained at all are not named.
@@ -316,11 +316,7 @@ fn conclude(
     let described = without_name;
     let without_name = without_name + left_over.iter().map(|l| l.size_arcsec.powi(2)).fold(0.0, f64::max);
     let significant_left = without_name > 0.0;
-    let held = held_out::evaluate(problem, &all);
-    let gains = held.total.rms_after_arcsec < held.total.rms_before_arcsec;
     let verdict = match (named.is_empty(), significant_left) {
-        // Causes that make the prediction of other rows no better are none, whatever they do to their own.
-        (false, _) if !gains => Verdict::Unknown,
         (true, false) => Verdict::None,
         (true, true) => Verdict::Unknown,
         (false, false) => Verdict::Explained,
@@ -333,8 +329,16 @@ fn conclude(
         }
         (false, true) => Verdict::PartlyExplained,
     };
+    let held = held_out::evaluate(problem, &all);
+    // What does not predict sessions it was not fitted to is no explanation.
+    let verdict = if !named.is_empty() && held.total.rms_after_arcsec > held.total.rms_before_arcsec {
+        Verdict::Unknown
+    } else {
+        verdict
+    };
     let mut causes = Vec::new();
     let mut next_experiment = None;
+    let mut told_better = Vec::new();
     if verdict != Verdict::Unknown {
         let parameters = uncertainty::parameters(problem, &selected);
         for k in named.iter().copied() {
@@ -346,6 +350,12 @@ fn conclude(
                         selected.terms[k].law.cause, rival.cause, rival.misfit, rival.apart_arcsec
                     );
                 }
+            }
+            let size = standings[k].size;
+            if rivals.iter().any(|r| r.tells_better(size)) {
+                // A rival that no other test lets through tells it better: neither is known.
+                told_better.push(k);
+                continue;
             }
             let alike: Vec<String> = rivals
                 .iter()
@@ -372,8 +382,13 @@ fn conclude(
         }
         causes.sort_by(|a, b| b.size_arcsec.total_cmp(&a.size_arcsec));
     }
+    let verdict = match verdict {
+        Verdict::Explained | Verdict::PartlyExplained if causes.is_empty() => Verdict::Unknown,
+        Verdict::Explained if !told_better.is_empty() => Verdict::PartlyExplained,
+        other => other,
+    };
     let mut unexplained_list: Vec<Unexplained> = (0..selected.terms.len())
-        .filter(|k| !named.contains(k) || verdict == Verdict::Unknown)
+        .filter(|k| !named.contains(k) || told_better.contains(k) || verdict == Verdict::Unknown)
         .map(|k| Unexplained { looks_like: selected.terms[k].law.cause.clone(), size_arcsec: standings[k].size })
         .collect();
     unexplained_list.extend(left_over);

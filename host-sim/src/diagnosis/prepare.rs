@@ -83,6 +83,9 @@ const JUMPING_S: f64 = 0.15;
 /// A load that a cause adds is known to this share.
 const LOAD_UNKNOWN: f64 = 0.2;
 
+/// Largest wander that is tried, in units of the white noise.
+pub(super) const MOST_WANDER: f64 = 3.0;
+
 /// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by its evidence
 /// with the main columns of all laws as free columns. Returns also the worth of the information: below 1 where innovations are
 /// not white. `explained` is what is explained already, row by row.
@@ -131,7 +134,7 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64], uncertain: &[
     let mut hypotheses = vec![Noise { white, wander: 0.0, correlation_s: 1.0 }];
     // A wander is slow: what is faster is a line, or a cause.
     let unit = if rows.recorded.time { 1.0 } else { 100.0 * rows.period };
-    for wander in [0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, 3.0] {
+    for wander in [0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, MOST_WANDER] {
         for correlation in [2.5, 8.0, 25.0, 80.0] {
             hypotheses.push(Noise { white, wander: wander * white, correlation_s: correlation * unit });
         }

@@ -143,6 +143,8 @@ pub fn beyond_noise(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise
     let wander = problem.whitener.followed(&left);
     let size = problem.certain_rms(&wander);
     let restless = problem.worth < LEAST_WORTH && noise.wander > noise.white;
+    // The largest and fastest wander that is tried: what is there is larger or faster still.
+    let restless = restless || noise.wander >= super::prepare::MOST_WANDER * noise.white;
     if restless || size > MOST_WANDER_ARCSEC.max(MOST_WANDER_OF_WHITE * noise.white) {
         vec![Unexplained { looks_like: "slow motion".into(), size_arcsec: size }]
     } else {

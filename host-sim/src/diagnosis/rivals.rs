@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::candidate::Law;
 use super::model::{Problem, Scaffold, Term};
-use super::select::{Selected, predicted, size_of};
+use super::select::{Selected, predicted, size_of, sound};
 
 /// A rival in the place of a cause.
 #[derive(Clone, Debug)]
@@ -23,7 +23,17 @@ const TOLD_APART: f64 = 25.0;
 const SAME_ARCSEC: f64 = 0.5;
 const SAME_SHARE: f64 = 0.12;
 
+/// A rival tells the data better that lowers the misfit by this: five standard deviations, and a share of what was there for one that has
+/// more columns to do it with.
+const TOLD_BETTER: f64 = -100.0;
+
 impl Rival {
+    /// Whether it tells the data better than a cause of this size, and otherwise.
+    #[must_use]
+    pub fn tells_better(&self, size_arcsec: f64) -> bool {
+        self.misfit < TOLD_BETTER && self.apart_arcsec > SAME_ARCSEC.max(2.0 * SAME_SHARE * size_arcsec)
+    }
+
     /// Whether the data cannot tell it from a cause of this size. With a base parameter `out_of_tolerance` any rival predicts the
     /// same, as the base takes its place: there the misfit alone decides, which has the tolerance in it.
     #[must_use]
@@ -61,7 +71,7 @@ pub fn rivals(problem: &Problem<'_>, laws: &[Law], selected: &Selected<'_>, k: u
             }
             let (term, fit) = scaffold.refine(Term::new(problem, law, best.1))?;
             let c = fit.of(fit.starts.len() - 1);
-            if !(law.physical)(&law.values(&term.places), c) {
+            if !sound(&term, c) {
                 return None;
             }
             let mut terms = others.clone();

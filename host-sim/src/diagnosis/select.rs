@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::candidate::Law;
+use super::candidate::{Law, Tolerance};
 use super::linear::{Gram, solve};
 use super::model::{Fit, Problem, Scaffold, Term};
 
@@ -71,6 +71,16 @@ fn same(apart: f64, size: f64) -> bool {
     apart < SAME_ARCSEC.min(SAME_SHARE * size)
 }
 
+/// Whether a fitted term makes sense.
+pub(super) fn sound(term: &Term<'_>, coefficients: &[f64]) -> bool {
+    let part = |main: bool| -> f64 {
+        let of = |j: usize| matches!(term.tolerances[j], Tolerance::Main(_)) == main;
+        let only: Vec<f64> = (0..term.len()).map(|j| if of(j) { coefficients[j] } else { 0.0 }).collect();
+        super::rows::rms(&term.contribution(&only))
+    };
+    term.law.sound(&term.law.values(&term.places), coefficients, part(true), part(false))
+}
+
 /// Fits a set of terms.
 #[must_use]
 pub fn fit(problem: &Problem<'_>, terms: &[Term<'_>]) -> Option<Fit> {
@@ -108,7 +118,7 @@ fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law]) -> Vec<
             let fit = scaffold.fit(&[&term])?;
             let c = fit.of(fit.starts.len() - 1);
             let gain = fit.solution.evidence - before.solution.evidence;
-            let physical = (laws[k].physical)(&laws[k].values(&term.places), c);
+            let physical = sound(&term, c);
             (physical && gain.is_finite()).then_some((gain, term))
         })
         .collect();
@@ -354,7 +364,7 @@ fn forward<'l>(
             let (term, fit) = scaffold.refine(term)?;
             let gain = fit.solution.evidence + term.occam - before;
             let c = fit.of(fit.starts.len() - 1);
-            (term.law.physical)(&term.law.values(&term.places), c).then_some((gain, term, fit))
+            sound(&term, c).then_some((gain, term, fit))
         })
         .collect();
     // Something with a name goes before something without unless that is clearly better.
@@ -445,7 +455,7 @@ fn backward<'l>(
         let failing = |k: usize| {
             let law = selected.terms[k].law;
             let c = selected.fit.of(k);
-            let physical = (law.physical)(&law.values(&selected.terms[k].places), c);
+            let physical = sound(&selected.terms[k], c);
             let in_tolerance = law.tolerance_of.is_some() && {
                 let others: Vec<&Term<'_>> =
                     selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
@@ -492,7 +502,7 @@ fn exchange<'l>(
             .filter_map(|(_, term)| {
                 let (term, fit) = scaffold.refine(term)?;
                 let c = fit.of(fit.starts.len() - 1);
-                (term.law.physical)(&term.law.values(&term.places), c).then_some((term, fit))
+                sound(&term, c).then_some((term, fit))
             })
             .collect();
         let less = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };

@@ -377,6 +377,8 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     for law in &mut laws {
         law.misfit = SHAPE_MISFIT;
         law.kin = Kin::Shape;
+        // The clearance that the deeper lobe takes is more than its waves.
+        law.most_nuisance = if law.cause == "generator_eccentricity" { 6.0 } else { 0.9 };
     }
     laws
 }

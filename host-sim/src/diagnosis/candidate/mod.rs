@@ -193,6 +193,8 @@ pub struct Law {
     pub tolerance_of: Option<&'static str>,
     /// How wrong the law may be, as a share of its size: what is smaller than that beside it may be its own misfit.
     pub misfit: f64,
+    /// Largest size of all nuisance over that of the main columns.
+    pub most_nuisance: f64,
     /// What it may be taken for.
     pub kin: Kin,
     /// Relative uncertainty of its parameters beside that of the data: what the law itself is not sure of.
@@ -210,7 +212,11 @@ pub struct Law {
 pub enum Kin {
     /// Shape and place of wheels and generator: waves of the generator angle.
     Shape,
-    /// Everything else.
+    /// Follows the torque or the speed: springs, friction, drag, and a reading that comes late.
+    Load,
+    /// Width of the clearance.
+    Clearance,
+    /// Like nothing else.
     Unlike,
 }
 
@@ -236,6 +242,7 @@ impl Law {
             physical: Box::new(|_, _| true),
             tolerance_of: None,
             misfit: USUAL_MISFIT,
+            most_nuisance: 1.0,
             kin: Kin::Unlike,
             doubt: USUAL_DOUBT,
             lead: None,
@@ -264,11 +271,18 @@ impl Law {
         self
     }
 
+    /// Whether shape parameters and coefficients make sense: signs, and most of it from the main columns, whose `main` and `nuisance`
+    /// parts are this large.
+    #[must_use]
+    pub fn sound(&self, values: &[f64], coefficients: &[f64], main: f64, nuisance: f64) -> bool {
+        (self.physical)(values, coefficients) && nuisance <= self.most_nuisance * main
+    }
+
     /// How much of its size another law may be named for wrongly.
     #[must_use]
     pub fn misfit_as(&self, other: &Law) -> f64 {
         // A pulse at a place is what any wrong shape leaves, in time or in angle.
-        let alike = self.kin == other.kin || other.cause == "damaged_tooth";
+        let alike = self.kin == other.kin && self.kin != Kin::Unlike || other.cause == "damaged_tooth";
         self.misfit * if alike || !other.named { 1.0 } else { NO_KIN }
     }
 
@@ -311,6 +325,19 @@ pub fn library(on: &Excitation<'_>) -> Vec<Law> {
     laws.extend(thermal::laws(on));
     laws.extend(dynamic::laws(on));
     laws.extend(sensor::laws(on));
+    for law in &mut laws {
+        law.kin = match law.cause.as_str() {
+            "torsional_hysteresis"
+            | "stiffness_hardening"
+            | "stiffness_error"
+            | "thermal_stiffness"
+            | "lubricant_viscosity"
+            | "gravity_torque"
+            | "sensor_latency" => Kin::Load,
+            "backlash_growth" | "wear" | "thermal_clearance" => Kin::Clearance,
+            _ => law.kin,
+        };
+    }
     laws
 }
 
