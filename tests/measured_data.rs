@@ -238,7 +238,7 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
         (
             "another ratio",
             changed(|b| scaled(&mut b.output_rad, 7.7)).into(),
-            Error(&["within a factor of 2", "ratio"]),
+            Error(&["within a factor of 1.25", "ratio"]),
         ),
         (
             "torque of a ship",

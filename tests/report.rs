@@ -1,6 +1,10 @@
 //! `report.html`: what the page says is what the other files and the exit code say. How it looks and moves is for
 //! `tests/run browser`.
 
+#[path = "bench_data.rs"]
+mod bench_data;
+
+use bench_data::{ARCSEC, Bench};
 use flexspline_tests::command::{Desk, names};
 use serde_json::Value;
 
@@ -59,4 +63,68 @@ fn a_missed_bound_is_stamped_and_fails_the_command() {
     assert_eq!(said["status"], "bound missed");
     let remark = json["remarks"].as_array().unwrap().iter().any(|r| r.as_str().unwrap().contains("the bounds are"));
     assert!(remark, "{}", json["remarks"]);
+}
+
+/// The public example: what its page says is what diagnosis.json says, and it is stamped as what is left asks for.
+#[test]
+fn the_page_of_a_diagnosis_agrees_with_diagnosis_json() {
+    let desk = Desk::new();
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/csf17_100");
+    let map = "time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec";
+    let line = format!("diagnose {example}/error_vs_input.csv --model {example}/nominal.toml --columns {map}");
+    desk.line(&format!("{line} --out made")).done();
+    let (html, json) = page(&desk, "made/report.html");
+    let diagnosis: Value = serde_json::from_str(&desk.read("made/diagnosis.json")).unwrap();
+    for field in ["verdict", "causes", "residual", "held_out", "compensation", "unexplained"] {
+        assert_eq!(json["results"]["diagnosis"][field], diagnosis[field], "{field}");
+    }
+    assert_eq!(json["results"]["data_faults"], diagnosis["data_faults"]);
+    assert_eq!(json["provenance"]["Command"], diagnosis["command"]);
+    let hash = json["provenance"][format!("BLAKE3 of {example}/error_vs_input.csv")].as_str().unwrap();
+    assert_eq!(hash.len(), 64);
+    let stamp = match diagnosis["verdict"].as_str().unwrap() {
+        "partly_explained" => "partly explained",
+        "unknown" => "unknown",
+        _ => "good",
+    };
+    assert_eq!(json["status"], stamp);
+    assert!(html.contains(&format!(r#"<span class="stamp {}">{stamp}</span>"#, stamp.replace(' ', "-"))));
+    // The picture of the nominal model and of the same recalibrated are always there.
+    let levels: Vec<&str> =
+        json["choices"].as_array().unwrap().iter().map(|choice| choice["id"].as_str().unwrap()).collect();
+    assert!(levels.starts_with(&["nominal", "recalibrated"]), "{levels:?}");
+    assert_eq!(levels.contains(&"extended"), !diagnosis["causes"].as_array().unwrap().is_empty());
+    for figure in ["over-generator", "angle-generator", "orders-generator", "drift", "over-time", "over-turn"] {
+        assert!(json["figures"][figure]["number"].as_u64().is_some_and(|n| n > 0), "{figure}");
+    }
+    desk.line(&format!("{line} --no-report --out bare")).done();
+    assert_eq!(names(&desk.path("bare")), ["diagnosis.json"]);
+}
+
+/// A count that an encoder lost: found, put right, stamped, and told where and when.
+#[test]
+fn faults_of_the_data_are_stamped_on_the_page_of_a_diagnosis() {
+    let desk = Desk::new();
+    let mut bench = Bench::plain(6000, 1.0, 5);
+    bench.output_rad[2700..].iter_mut().for_each(|angle| *angle += 61.0 * ARCSEC);
+    desk.write("data.csv", &bench.csv());
+    desk.write(
+        "nominal.toml",
+        "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\n[nominal]\nstiffness_n_m_per_rad = 4.4e5\n\
+         backlash_arcsec = 30.0\nfriction_torque_n_m = 1.0\n",
+    );
+    desk.line("diagnose data.csv --model nominal.toml --out made").done();
+    let (html, json) = page(&desk, "made/report.html");
+    let stamps: Vec<&str> = [&json["status"]]
+        .into_iter()
+        .chain(json["also"].as_array().unwrap())
+        .map(|status| status.as_str().unwrap())
+        .collect();
+    assert!(stamps.contains(&"data faults"), "{stamps:?}");
+    assert!(html.contains(r#"<span class="stamp data-faults">data faults</span>"#));
+    let remarks = json["remarks"].as_array().unwrap();
+    assert!(remarks.iter().any(|r| r.as_str().unwrap().starts_with("Data fault: index jump")), "{remarks:?}");
+    assert!(html.contains(">27.00 s<"), "the time of the jump is not in the table");
+    println!("{} kB for {} rows", html.len() / 1000, bench.rows());
+    assert!(html.len() < 1_500_000);
 }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use flexspline_sim::report::pack::Packed;
 use flexspline_sim::report::page::{
     Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity, Section,
-    Series, Status, Table, Text,
+    Series, Status, Table, Text, Upright,
 };
 use serde_json::{Map, Value, json};
 
@@ -72,6 +72,7 @@ fn hostile() -> Page {
     let lines = Lines {
         series: vec![series(Mark::Line, 0), series(Mark::Points, 1)],
         limits: vec![Limit { name: HOSTILE.into(), y: 100.0 }],
+        uprights: vec![Upright { name: HOSTILE.into(), x: 10.0 }],
     };
     let field = Field { x: vec![0.0, 1.0, 2.0], y: vec![0.0, 1.0], z: vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0] };
     let table = Table {
@@ -85,6 +86,7 @@ fn hostile() -> Page {
         title: HOSTILE.into(),
         command_name: "tables",
         status: Status::BoundMissed,
+        also: vec![Status::DataFaults],
         remarks: vec![HOSTILE.into()],
         choices: vec![
             Choice { id: id.clone(), name: HOSTILE.into() },

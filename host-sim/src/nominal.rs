@@ -356,8 +356,16 @@ impl DriveForm {
                 Some((found, None))
             }
             _ => {
-                let what = "expected flexspline_teeth and circular_spline_teeth, or ratio alone";
-                refuse(None, "drive", what.to_owned());
+                let given = [
+                    ("flexspline_teeth", self.flexspline_teeth.is_some()),
+                    ("circular_spline_teeth", self.circular_spline_teeth.is_some()),
+                    ("ratio", self.ratio.is_some()),
+                ];
+                let found: Vec<&str> = given.into_iter().filter(|(_, there)| *there).map(|(name, _)| name).collect();
+                let found = if found.is_empty() { "neither".to_owned() } else { found.join(", ") };
+                let what =
+                    format!("expected flexspline_teeth and circular_spline_teeth, or ratio alone; found {found}");
+                refuse(None, "drive", what);
                 None
             }
         }

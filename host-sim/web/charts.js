@@ -5,6 +5,8 @@ import { factor, onUnits, titled, unit, written } from "./quantities.js";
 import { colour, FONT, onTheme } from "./theme.js";
 
 const LINE_COLOURS = 6;
+/** Between the ticks of an axis of whole numbers. */
+const WHOLE_STEPS = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
 /** Rows that the table view shows; the CSV has all. */
 const TABLE_ROWS = 200;
 
@@ -63,6 +65,43 @@ function drawLimits(limits, scaleOf) {
   };
 }
 
+/** Named places across a plot, each name a little lower than the one before, so that neighbours can be read. */
+function drawUprights(uprights) {
+  return (u) => {
+    const { ctx, bbox } = u;
+    const size = 12 * devicePixelRatio;
+    ctx.save();
+    ctx.strokeStyle = colour("soft");
+    ctx.fillStyle = colour("text");
+    ctx.lineWidth = devicePixelRatio;
+    ctx.font = FONT.replace("12px", `${size}px`);
+    ctx.textAlign = "left";
+    ctx.textBaseline = "top";
+    ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
+    const ends = [];
+    for (const { name, x } of uprights) {
+      const at = u.valToPos(x, "x", true);
+      if (at < bbox.left - 1 || at > bbox.left + bbox.width + 1) continue;
+      ctx.beginPath();
+      ctx.moveTo(at, bbox.top);
+      ctx.lineTo(at, bbox.top + bbox.height);
+      ctx.stroke();
+      const width = ctx.measureText(name).width;
+      const left = Math.max(bbox.left, Math.min(at + 0.3 * size, bbox.left + bbox.width - width - 0.3 * size));
+      // The first row that is free there; with all of them full the line stands without its name.
+      let row = 0;
+      while (row < ends.length && ends[row] > left) row++;
+      if (row > 5) continue;
+      ends[row] = left + width + 0.5 * size;
+      ctx.fillText(name, left, bbox.top + (0.2 + 1.15 * row) * size);
+    }
+    ctx.restore();
+  };
+}
+
+/** Stands for every choice where a figure is the same for all of them. */
+export const EVERY = "every";
+
 /** A chart in `place`; returns { choose(choice) } to show another choice. */
 export function lineChart(place, id, spec) {
   const frame = document.createElement("div");
@@ -73,10 +112,11 @@ export function lineChart(place, id, spec) {
   let chart = null;
   let choice = null;
   let shown = 0;
+  const key = () => (Object.hasOwn(spec.charts, EVERY) ? EVERY : choice);
 
   async function draw() {
     const mine = ++shown;
-    const description = spec.charts[choice];
+    const description = spec.charts[key()];
     place.classList.toggle("empty", !description);
     if (!description) {
       chart?.destroy();
@@ -85,7 +125,7 @@ export function lineChart(place, id, spec) {
       frame.textContent = "Nothing to show here for this choice.";
       return;
     }
-    const { values, shape } = await numbers(`${choice}/${id}`);
+    const { values, shape } = await numbers(`${key()}/${id}`);
     const width = Math.floor(frame.clientWidth);
     if (mine !== shown || width < 50) return;
     const [columns, rows] = shape;
@@ -110,15 +150,16 @@ export function lineChart(place, id, spec) {
     });
     const series = description.series.map((s) => {
       const stroke = lineColour(s.colour);
-      const points = s.mark === "points";
+      const points = s.mark === "points" || s.mark === "dots";
+      const size = s.mark === "dots" ? 3 : 6;
       return {
         label: s.name,
         stroke,
         width: points ? 0 : 1.75,
         dash: s.mark === "dashed" ? [6, 4] : undefined,
-        spanGaps: true,
+        spanGaps: s.mark !== "broken",
         paths: points ? () => null : undefined,
-        points: points ? { show: true, size: 6, fill: stroke, stroke } : { show: false },
+        points: points ? { show: true, size, width: 0, fill: stroke, stroke } : { show: false },
         value: (u, v) => say(u, v, spec.y.quantity, fy),
       };
     });
@@ -138,14 +179,20 @@ export function lineChart(place, id, spec) {
         },
       },
       axes: [
-        axis(spec.x, 44),
+        { ...axis(spec.x, 44), ...(spec.x.quantity === "whole" ? { incrs: WHOLE_STEPS } : {}) },
         // As wide as the longest number wants.
         axis(spec.y, (u, texts) => Math.max(48, 20 + 7 * Math.max(0, ...(texts ?? []).map((t) => t.length)))),
       ],
       series: [{ label: spec.x.label, value: (u, v) => say(u, v, spec.x.quantity, fx) }, ...series],
-      legend: { live: true, markers: { width: 3 } },
+      legend: { live: true, markers: { width: 3, stroke: (u, k) => series[k - 1]?.stroke } },
       cursor: { drag: { x: true, y: true, uni: 20 }, focus: { prox: 24 } },
-      hooks: { draw: [drawLimits(description.limits ?? [], () => factor(spec.y.quantity))], setCursor: [] },
+      hooks: {
+        draw: [
+          drawLimits(description.limits ?? [], () => factor(spec.y.quantity)),
+          drawUprights(description.uprights ?? []),
+        ],
+        setCursor: [],
+      },
     };
     if (spec.x.linked) {
       options.hooks.setCursor.push((u) => {
@@ -162,8 +209,8 @@ export function lineChart(place, id, spec) {
   }
 
   addTools(place, id, spec, async () => {
-    const description = spec.charts[choice];
-    const { values, shape } = await numbers(`${choice}/${id}`);
+    const description = spec.charts[key()];
+    const { values, shape } = await numbers(`${key()}/${id}`);
     const [columns, rows] = shape;
     const names = [spec.x.label, ...description.series.map((s) => s.name)];
     const quantities = [spec.x.quantity, ...description.series.map(() => spec.y.quantity)];

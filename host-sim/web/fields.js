@@ -56,7 +56,9 @@ export function fieldMap(place, id, spec) {
     const py = (row) => MARGIN.top + h - (row / y.length) * h;
     for (let row = 0; row < y.length; row++)
       for (let c = 0; c < x.length; c++) {
-        ctx.fillStyle = css(viridis((z[row * x.length + c] - low) / (high - low)));
+        const value = z[row * x.length + c];
+        if (Number.isNaN(value)) continue;
+        ctx.fillStyle = css(viridis((value - low) / (high - low)));
         const [left, right] = [px(ex[c]), px(ex[c + 1])];
         ctx.fillRect(left, py(row + 1), right - left + 0.5, h / y.length + 0.5);
       }
@@ -133,7 +135,10 @@ export function fieldMap(place, id, spec) {
       const part = async (name) => Array.from((await numbers(`${next}/${id}/${name}`)).values);
       const [x, y, z] = await Promise.all(["x", "y", "z"].map(part));
       if (choice !== next) return;
-      field = { x, y, z, low: Math.min(...z), high: Math.max(...z) };
+      // A few cells that stand out do not take the colours of all others.
+      const there = z.filter((v) => !Number.isNaN(v)).sort((a, b) => a - b);
+      const beside = Math.floor(0.004 * there.length);
+      field = { x, y, z, low: there[beside], high: there[there.length - 1 - beside] };
       if (field.high - field.low < 1e-12) field.high = field.low + 1;
       draw();
       place.refreshTable?.();

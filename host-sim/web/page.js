@@ -1,5 +1,5 @@
 // The page at work: what is chosen is shown; units, detail, links, print.
-import { lineChart } from "./charts.js";
+import { EVERY, lineChart } from "./charts.js";
 import { driveViewer } from "./drive.js";
 import { fieldMap } from "./fields.js";
 import { canInflate } from "./pack.js";
@@ -36,7 +36,10 @@ async function start() {
     const { name } = report.choices.find((c) => c.id === id);
     for (const element of document.querySelectorAll("[data-choice]")) element.hidden = element.dataset.choice !== id;
     if (report.choices.length > 1) {
-      for (const element of document.querySelectorAll(".of-choice")) element.textContent = `, ${name}`;
+      for (const element of document.querySelectorAll(".of-choice")) {
+        const { charts } = report.figures[element.closest("figure").id];
+        element.textContent = Object.hasOwn(charts ?? {}, EVERY) ? "" : `, ${name}`;
+      }
       for (const link of document.querySelectorAll(".tools a")) {
         link.hash = `${id}/${link.closest("figure").id}`;
       }

@@ -7,7 +7,18 @@ const ANGLES = {
 };
 
 /** Units of everything that is not a small angle. */
-const PLAIN = { degree: "°", torque: "N·m", stress: "MPa", force: "N", temperature: "°C", count: "", second: "s" };
+const PLAIN = {
+  degree: "°",
+  torque: "N·m",
+  stress: "MPa",
+  force: "N",
+  temperature: "°C",
+  count: "",
+  whole: "",
+  second: "s",
+  turn: "turns",
+  speed: "rad/s",
+};
 
 let angle = "arcsec";
 const listeners = new Set();

@@ -192,7 +192,13 @@ await check("the drive turns with its generator and carries its load, at any ang
 
 // ---- Every report, at every size, in light and dark
 
-for (const file of ["tables/report.html", "validate/report.html", "hostile.html"]) {
+for (const file of [
+  "tables/report.html",
+  "validate/report.html",
+  "explained/report.html",
+  "faults/report.html",
+  "hostile.html",
+]) {
   const title = file.replace("/report.html", "");
   await check(`${title}: size`, () => {
     const { size } = statSync(path.join(folder, file));
@@ -274,7 +280,8 @@ for (const file of ["tables/report.html", "validate/report.html", "hostile.html"
   await check("the status is stamped and in the JSON", async () => {
     const json = JSON.parse(await page.locator("#flexspline-report").textContent());
     assert(json.status === "bound missed" && json.remarks.length === 1, JSON.stringify(json.status));
-    assert((await page.locator(".stamp").textContent()) === "bound missed", "no stamp");
+    const stamps = await page.locator(".stamp").allTextContents();
+    assert(stamps.join() === "bound missed,data faults", `stamps ${stamps}`);
     assert(await page.locator(".remarks").isVisible(), "no remark");
   });
   await close();
@@ -512,6 +519,99 @@ await check("a link opens its generator at its figure", async () => {
   assert(top > -10 && top < 880, `figure at ${top} px`);
   await opened.close();
 });
+
+// ---- The page of a diagnosis
+
+{
+  const { page, noise, readyMs, close } = await open("explained/report.html");
+  const report = JSON.parse(await page.locator("#flexspline-report").textContent());
+  const { diagnosis } = report.results;
+  await check("a diagnosis answers in one sentence and one number", async () => {
+    const heading = await page.locator("h1").textContent();
+    const number = await page.locator(".number strong").first().textContent();
+    const { rms_before_arcsec: before, rms_after_arcsec: after } = diagnosis.held_out;
+    const share = Math.round(100 * (1 - (after / before) ** 2));
+    assert(heading.startsWith("Explained by eccentricity of the output encoder ("), heading);
+    assert(number.trim() === `${share} %`, `${number} instead of ${share} %`);
+    const box = await page.locator(".number").boundingBox();
+    assert(box.y + box.height < 900, "not on the first screen");
+    return `${heading} ${number}, after ${readyMs} ms`;
+  });
+  await check("the selector takes the causes away from every figure of the picture", async () => {
+    const spread = async () => {
+      const rows = page.locator("#picture .table:visible tbody tr");
+      const cells = await rows.nth(0).locator("td").allTextContents();
+      return Number(cells[3].replace("−", "-").match(/[\d.]+/)[0]);
+    };
+    const before = [await spread(), (await picture(page, "#map canvas")).sum];
+    await page.locator("input[name=choice][value=extended] + span").click();
+    await page.waitForFunction(() => document.documentElement.dataset.ready === "extended");
+    const after = [await spread(), (await picture(page, "#map canvas")).sum];
+    assert(after[0] < 0.5 * before[0], `rms ${before[0]} to ${after[0]}`);
+    assert(after[1] !== before[1], "the map is as it was");
+    const titles = await page.locator("figcaption .of-choice").allTextContents();
+    assert(titles.some((t) => t === ", with the causes") && titles.some((t) => t === ""), titles.join("|"));
+    return `rms of forward rows ${before[0]}″ to ${after[0]}″`;
+  });
+  await check("what is the same for all choices stays, and its numbers can be had", async () => {
+    const [download] = await Promise.all([
+      page.waitForEvent("download"),
+      page
+        .locator("#over-time")
+        .getByRole("button", { name: /as CSV/ })
+        .click(),
+    ]);
+    const text = readFileSync(await download.path(), "utf8")
+      .trim()
+      .split("\r\n");
+    assert(text[0].split(",").length >= 4, text[0]);
+    assert(text.length > 500, `${text.length} lines`);
+    // Between sessions the line breaks: a row without values.
+    const broken = text.filter((line) => /^[^,]+(,)+$/.test(line)).length;
+    const sessions = await page.locator("#data .table tbody tr").count();
+    assert(broken === sessions - 1, `${broken} breaks for ${sessions} sessions`);
+    return `${text.length - 1} rows`;
+  });
+  await check("orders of the causes are marked", () => {
+    const { uprights } = report.figures["orders-output"].charts.nominal;
+    const mine = uprights.filter((u) => u.name.startsWith("eccentricity of the output encoder: "));
+    assert(mine.length === 1, JSON.stringify(uprights));
+    near(mine[0].x, 1, 1e-9, "once in an output turn");
+  });
+  await check("a diagnosis prints", async () => {
+    const pdf = await page.pdf({ format: "A4", path: path.join(shots, "diagnosis.pdf") });
+    const pages = (pdf.toString("latin1").match(/\/Type\s*\/Page[^s]/g) ?? []).length;
+    assert(pages >= 5 && pages <= 24, `${pages} pages`);
+    return `${pages} pages`;
+  });
+  await check("a diagnosis makes no noise", () => assert(!noise.length, noise.join(" | ")));
+  await close();
+  const linked = await open("explained/report.html", { hash: "#recalibrated/over-torque" });
+  await check("a link opens a level at a figure", async () => {
+    await settled(linked.page);
+    const chosen = await linked.page.evaluate(() => document.documentElement.dataset.chosen);
+    const top = (await linked.page.locator("#over-torque").boundingBox()).y;
+    assert(chosen === "recalibrated" && top > -10 && top < 880, `${chosen} at ${top} px`);
+  });
+  await linked.close();
+  const faults = await open("faults/report.html");
+  await check("faults of the data are stamped and in a table", async () => {
+    const stamps = await faults.page.locator(".stamp").allTextContents();
+    assert(stamps.includes("data faults"), stamps.join());
+    assert((await faults.page.locator(".remarks li").count()) > 0, "no remark");
+    const caption = faults.page.locator("#data caption", { hasText: "Faults of the data" });
+    assert(await caption.isVisible(), "no table");
+  });
+  await faults.close();
+  const still = await open("explained/report.html", { script: false });
+  await check("a diagnosis without scripts has sketches", async () => {
+    const sketches = await still.page.locator("noscript svg").count();
+    assert(sketches >= 15, `${sketches} sketches`);
+    await still.page.screenshot({ path: path.join(shots, "diagnosis-noscript.png") });
+    return `${sketches} sketches`;
+  });
+  await still.close();
+}
 
 // ---- Browsers that have less
 

@@ -2,14 +2,15 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 use flexspline::Table;
 use serde::Serialize;
 
-use super::Failure;
 use super::context::Context;
 use super::synthesize::{fresh_table, gear};
+use super::{Failure, report};
 use crate::diagnosis::report::{Compensation, Diagnosis};
 use crate::diagnosis::{Extended, Settings, diagnose_extended};
 use crate::drive::{Drive, GeneratorKind};
@@ -17,6 +18,7 @@ use crate::extension::{
     Agreement, CauseEntry, Evaluation, ExtendedTables, FoundGeometry, Model, Remake, TableSubject, causes_to_toml,
     check_by_fem, evaluate, found_geometry, no_place_in_a_table,
 };
+use crate::kernels::Kernels;
 use crate::measurement::{ColumnMap, Fault, Recording, Session, read};
 use crate::mesh::MeshLevel;
 use crate::nominal::Nominal;
@@ -59,6 +61,9 @@ pub(super) struct Diagnose {
     /// Names and units of columns, for instance generator=wave_gen_turns:turn,error=error_arcsec:arcsec
     #[arg(long, value_name = "MAP", default_value = "")]
     columns: String,
+    /// Do not write report.html
+    #[arg(long)]
+    no_report: bool,
 }
 
 /// `diagnosis.json`: the diagnosis, the faults of the data and what was written.
@@ -176,6 +181,12 @@ impl Diagnose {
             command: &context.command,
         };
         write_json(&out.join("diagnosis.json"), &written)?;
+        if !self.no_report {
+            let inputs = [Some(self.data.as_path()), self.model.as_deref()];
+            let (nominal, table) = (&subject.nominal, subject.table.as_ref());
+            let page = report::diagnosis(context, inputs, &recording, nominal, table, &diagnosis, &extended);
+            report::write(&page, out)?;
+        }
         context.print(&written, || text(&recording, &diagnosis, &extension, out))
     }
 
@@ -213,10 +224,30 @@ impl Diagnose {
                         drive.name
                     )));
                 }
-                Ok(Subject { nominal: Nominal::of_table(&table), table: Some(table), model: None, drive })
+                let nominal = Nominal { kernels: self.kernels(&table)?, ..Nominal::of_table(&table) };
+                Ok(Subject { nominal, table: Some(table), model: None, drive })
             }
             (None, None) => Err(bad("expected --model or --tables".to_owned())),
         }
+    }
+
+    /// The influence kernels that stand beside the table, if there are any.
+    fn kernels(&self, table: &Table<'_>) -> Result<Option<Arc<Kernels>>, Failure> {
+        let path = self.tables.clone().unwrap_or_default().join(format!("{}.kernels.json", self.generator));
+        let bad = |what: String| Failure::BadInput(format!("{}: {what}", path.display()));
+        if !path.exists() {
+            return Ok(None);
+        }
+        let text = std::fs::read_to_string(&path).map_err(|error| bad(error.to_string()))?;
+        let kernels = Kernels::from_json(&text).map_err(bad)?;
+        let of = blake3::Hash::from(table.drive_hash()).to_hex();
+        if kernels.drive_blake3 != of.as_str() || kernels.generator != self.generator {
+            return Err(bad(format!(
+                "found kernels of the {} of the drive with BLAKE3 {}, allowed: those of the {} of {of}, as the table's",
+                kernels.generator, kernels.drive_blake3, self.generator
+            )));
+        }
+        Ok(Some(Arc::new(kernels)))
     }
 
     /// Takes what a model says of causes known before from the errors.

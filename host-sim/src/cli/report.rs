@@ -7,9 +7,14 @@ use flexspline::Table;
 use rayon::prelude::*;
 
 use super::{Context, Failure};
+use crate::diagnosis::Extended;
+use crate::diagnosis::report::Diagnosis;
 use crate::drive::{Drive, GeneratorKind};
+use crate::measurement::Recording;
+use crate::nominal::Nominal;
 use crate::output::write_whole;
 use crate::report::animation::{Animation, AnimationError, animate};
+use crate::report::diagnosis_report::{self, Sources};
 use crate::report::page::Page;
 use crate::report::shown_torque_n_m;
 use crate::stepping::{Method, SolverSettings};
@@ -35,6 +40,28 @@ pub(super) fn animations(
         return Err(Failure::Failed("stopped; report.html was not written".into()));
     }
     Ok(made)
+}
+
+/// The page of a diagnosis; `inputs` are the files it was made from.
+pub(super) fn diagnosis<'p>(
+    context: &Context,
+    inputs: impl IntoIterator<Item = Option<&'p Path>>,
+    recording: &Recording,
+    nominal: &Nominal,
+    table: Option<&Table<'_>>,
+    diagnosis: &Diagnosis,
+    extended: &Extended,
+) -> Page {
+    let hashed = |path: &Path| {
+        let bytes = std::fs::read(path).ok()?;
+        Some((format!("BLAKE3 of {}", path.display()), blake3::hash(&bytes).to_string()))
+    };
+    let mut inputs: Vec<(String, String)> = inputs.into_iter().flatten().filter_map(hashed).collect();
+    inputs.extend(table.map(|table| ("table_id".to_owned(), table.id().to_string())));
+    let series = extended.predict(&recording.sessions, nominal, table);
+    let (levels, parts) = diagnosis_report::levels_and_parts(&series, extended, diagnosis);
+    let command = &context.command;
+    diagnosis_report::page(Sources { recording, nominal, diagnosis, levels, parts, command, inputs })
 }
 
 /// Writes the page; a failure that it is stamped with is that of the command.

@@ -52,6 +52,8 @@ pub fn rivals(problem: &Problem<'_>, laws: &[Law], selected: &Selected<'_>, k: u
     let now = predicted(problem, &all, &selected.fit);
     let open: Vec<&Law> =
         laws.iter().filter(|law| law.named && selected.terms.iter().all(|t| t.law.cause != law.cause)).collect();
+    // Where more is left than noise, as much may hide in any rival: rises count against what is left.
+    let left = selected.fit.solution.misfit / (problem.worth * problem.data_white.len().max(1) as f64);
     let mut rivals: Vec<Rival> = open
         .into_par_iter()
         .filter_map(|law| {
@@ -78,7 +80,7 @@ pub fn rivals(problem: &Problem<'_>, laws: &[Law], selected: &Selected<'_>, k: u
             let apart: Vec<f64> = now.iter().zip(&then).map(|(a, b)| a - b).collect();
             Some(Rival {
                 cause: law.cause.clone(),
-                misfit: fit.solution.misfit - selected.fit.solution.misfit,
+                misfit: (fit.solution.misfit - selected.fit.solution.misfit) / left.max(1.0),
                 apart_arcsec: size_of(problem, &apart),
             })
         })

@@ -8,6 +8,8 @@ pub struct Gear {
     /// Pitch of the teeth by which the output skips when the drive ratchets, rad at the output: 2π over the teeth of the wheel that turns.
     /// `None` for a gear without known teeth.
     pub tooth_pitch_rad: Option<f64>,
+    /// Ratio with the other wheel fixed; `None` for a gear without known teeth.
+    pub other_wheel_ratio: Option<f64>,
     /// Torques beyond this, N·m, are in another unit.
     pub largest_torque_n_m: f64,
 }
@@ -18,13 +20,19 @@ impl Gear {
 
     /// A gear of which the ratio is known.
     pub fn of_ratio(ratio: f64) -> Gear {
-        Gear { ratio, tooth_pitch_rad: None, largest_torque_n_m: Gear::LARGEST_TORQUE_N_M }
+        Gear { ratio, tooth_pitch_rad: None, other_wheel_ratio: None, largest_torque_n_m: Gear::LARGEST_TORQUE_N_M }
     }
 
     /// A strain wave gear by its teeth; the flexspline is fixed, or the circular spline.
     pub fn of_teeth(flexspline: u32, circular_spline: u32, flexspline_fixed: bool) -> Gear {
         let (f, c) = (f64::from(flexspline), f64::from(circular_spline));
-        let (ratio, turning) = if flexspline_fixed { (c / (c - f), c) } else { (-f / (c - f), f) };
-        Gear { tooth_pitch_rad: Some(std::f64::consts::TAU / turning), ..Gear::of_ratio(ratio) }
+        let (on_ring, on_flexspline) = ((c / (c - f), c), (-f / (c - f), f));
+        let ((ratio, turning), (other, _)) =
+            if flexspline_fixed { (on_ring, on_flexspline) } else { (on_flexspline, on_ring) };
+        Gear {
+            tooth_pitch_rad: Some(std::f64::consts::TAU / turning),
+            other_wheel_ratio: Some(other),
+            ..Gear::of_ratio(ratio)
+        }
     }
 }

@@ -266,7 +266,7 @@ impl<'a> Known<'a> {
             let mark = if colour == 1 { Mark::Line } else { Mark::Dashed };
             Series { name: format!("{temperature:.0} °C"), mark, colour, points: points.collect() }
         });
-        Lines { series: series.collect(), limits: Vec::new() }
+        Lines { series: series.collect(), ..Lines::default() }
     }
 
     fn map(&self) -> Field {
@@ -306,7 +306,7 @@ impl<'a> Known<'a> {
                 Series { name: name.into(), mark: Mark::Points, colour, points: worst.collect() }
             },
         );
-        Some(Lines { series: series.collect(), limits: Vec::new() })
+        Some(Lines { series: series.collect(), ..Lines::default() })
     }
 
     fn stress(&self) -> Option<Lines> {
@@ -337,7 +337,7 @@ impl<'a> Known<'a> {
                 series("pressure between flanks", 1, |row| row.peak_flank_pressure_mpa),
                 series("pressure of generator on bore", 2, |row| row.peak_generator_pressure_mpa),
             ],
-            limits: Vec::new(),
+            ..Lines::default()
         })
     }
 
@@ -360,7 +360,7 @@ impl<'a> Known<'a> {
                 series("flank towards falling angles", 1, Mark::Line, 4),
                 series("generator on bore, per tooth", 2, Mark::Dashed, 8),
             ],
-            limits: Vec::new(),
+            ..Lines::default()
         })
     }
 }
@@ -384,7 +384,7 @@ fn misses(v: &Validation, kind: &str, over: fn(&Point) -> f64) -> Lines {
         Series { name: name.into(), mark: Mark::Points, colour, points }
     });
     let limits = [v.max_bound_arcsec, -v.max_bound_arcsec].map(|y| Limit { name: "bound of any point".into(), y });
-    Lines { series: series.collect(), limits: limits.into() }
+    Lines { series: series.collect(), limits: limits.into(), ..Lines::default() }
 }
 
 /// The run back through the clearance.
@@ -404,7 +404,7 @@ fn reversal(v: &Validation) -> Lines {
             Series { name: "table and play, as firmware has them".into(), mark: Mark::Line, colour: 0, points: table },
             Series { name: "fresh FEM".into(), mark: Mark::Points, colour: 1, points: fem },
         ],
-        limits: Vec::new(),
+        ..Lines::default()
     }
 }
 
@@ -460,6 +460,7 @@ pub fn drive_report(sources: Sources<'_>) -> Page {
         title,
         command_name,
         status,
+        also: Vec::new(),
         remarks,
         choices: known.iter().map(|k| Choice { id: k.id(), name: name_of(k.subject.kind).to_owned() }).collect(),
         choice_is: "Generator",

@@ -27,6 +27,12 @@ pub enum Status {
     Good,
     /// Holds, with a remark that the reader has to know.
     Remark,
+    /// Measured data had faults, which were repaired or left out.
+    DataFaults,
+    /// A significant part of what was measured is not explained.
+    PartlyExplained,
+    /// What was measured is not explained.
+    Unknown,
     /// A value is used outside the range it was made for.
     Extrapolates,
     /// A bound was missed.
@@ -41,6 +47,9 @@ impl Status {
         match self {
             Status::Good => "good",
             Status::Remark => "remark",
+            Status::DataFaults => "data faults",
+            Status::PartlyExplained => "partly explained",
+            Status::Unknown => "unknown",
             Status::Extrapolates => "extrapolates",
             Status::BoundMissed => "bound missed",
             Status::NotConverged => "not converged",
@@ -126,6 +135,9 @@ impl Span {
         format!("{}″", significant(*arcsec, *digits))
     }
 }
+
+/// Stands for every choice where a figure is the same for all of them.
+pub const EVERY_CHOICE: &str = "every";
 
 /// Something the page can show one at a time.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -216,6 +228,18 @@ pub struct Table {
     pub rows: Vec<Vec<Text>>,
 }
 
+impl Table {
+    /// Whether a column holds words and no numbers: those stand to the left.
+    fn is_words(&self, column: &usize) -> bool {
+        let cells = || self.rows.iter().filter_map(|row| row.get(*column)).filter_map(|text| text.0.first());
+        let words = |span: &Span| match span {
+            Span::Plain(words) | Span::Strong(words) => words.chars().next().is_some_and(char::is_alphabetic),
+            Span::Error { .. } => false,
+        };
+        cells().count() > 0 && cells().all(words)
+    }
+}
+
 /// A numbered figure.
 #[derive(Debug, Clone)]
 pub struct Figure {
@@ -276,8 +300,14 @@ pub enum Quantity {
     Temperature,
     /// Time, s.
     Second,
+    /// Angle, whole turns.
+    Turn,
+    /// Speed, rad/s.
+    Speed,
     /// A number without a unit.
     Count,
+    /// A whole number without a unit.
+    Whole,
 }
 
 impl Quantity {
@@ -291,7 +321,9 @@ impl Quantity {
             Quantity::Force => "N",
             Quantity::Temperature => "°C",
             Quantity::Second => "s",
-            Quantity::Count => "",
+            Quantity::Turn => "turns",
+            Quantity::Speed => "rad/s",
+            Quantity::Count | Quantity::Whole => "",
         }
     }
 }
@@ -339,10 +371,14 @@ impl Axis {
 pub enum Mark {
     /// A line.
     Line,
+    /// A line that values which are not finite break; other lines join across them.
+    Broken,
     /// A dashed line.
     Dashed,
     /// Points alone.
     Points,
+    /// Many points, small.
+    Dots,
 }
 
 /// Points of a chart that belong together.
@@ -368,6 +404,15 @@ pub struct Limit {
     pub y: f64,
 }
 
+/// A place across a chart that has a name, such as the border between two sessions.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Upright {
+    /// Its name.
+    pub name: String,
+    /// Where.
+    pub x: f64,
+}
+
 /// One chart.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct Lines {
@@ -375,6 +420,8 @@ pub struct Lines {
     pub series: Vec<Series>,
     /// Named levels.
     pub limits: Vec<Limit>,
+    /// Named places.
+    pub uprights: Vec<Upright>,
 }
 
 impl Lines {
@@ -403,7 +450,7 @@ pub struct Field {
     pub x: Vec<f64>,
     /// Nodes up, ascending.
     pub y: Vec<f64>,
-    /// Values, row by row from the lowest.
+    /// Values, row by row from the lowest; NaN where there is none.
     pub z: Vec<f64>,
 }
 
@@ -416,6 +463,8 @@ pub struct Page {
     pub command_name: &'static str,
     /// Whether it can be relied on.
     pub status: Status,
+    /// What is stamped on it beside that.
+    pub also: Vec<Status>,
     /// What makes the status what it is, a sentence each.
     pub remarks: Vec<String>,
     /// What can be selected, at least one.
@@ -457,7 +506,7 @@ impl PageTemplate<'_> {
 
     fn sketches(&self, figure: &Figure) -> Vec<(String, String)> {
         let named = |choice: &str| {
-            self.page.choices.iter().find(|c| c.id == choice).map_or_else(|| choice.to_owned(), |c| c.name.clone())
+            self.page.choices.iter().find(|c| c.id == choice).map_or_else(String::new, |c| c.name.clone())
         };
         match &figure.body {
             FigureBody::Lines { x, y, charts } => {
@@ -494,6 +543,7 @@ impl Page {
             "report": self.command_name,
             "title": self.title,
             "status": self.status.name(),
+            "also": self.also.iter().map(|status| status.name()).collect::<Vec<_>>(),
             "remarks": self.remarks,
             "choices": self.choices,
             "results": self.results,
@@ -588,7 +638,11 @@ mod tests {
 
     fn page(status: Status) -> Page {
         let series = Series { name: HOSTILE.into(), mark: Mark::Line, colour: 0, points: vec![[0.0, 1.0], [1.0, 3.0]] };
-        let lines = Lines { series: vec![series], limits: vec![Limit { name: HOSTILE.into(), y: 2.0 }] };
+        let lines = Lines {
+            series: vec![series],
+            limits: vec![Limit { name: HOSTILE.into(), y: 2.0 }],
+            uprights: vec![Upright { name: HOSTILE.into(), x: 0.5 }],
+        };
         let figure = Figure {
             id: "figure".into(),
             title: HOSTILE.into(),
@@ -604,6 +658,7 @@ mod tests {
             title: HOSTILE.into(),
             command_name: "tables",
             status,
+            also: Vec::new(),
             remarks: vec![HOSTILE.into()],
             choices: vec![Choice { id: "one".into(), name: HOSTILE.into() }],
             choice_is: "Generator",
@@ -649,6 +704,9 @@ mod tests {
         for (status, name, failure) in [
             (Status::Good, "good", false),
             (Status::Remark, "remark", false),
+            (Status::DataFaults, "data faults", false),
+            (Status::PartlyExplained, "partly explained", false),
+            (Status::Unknown, "unknown", false),
             (Status::Extrapolates, "extrapolates", false),
             (Status::BoundMissed, "bound missed", true),
             (Status::NotConverged, "not converged", true),
@@ -679,7 +737,7 @@ mod tests {
     fn series_of_different_points_share_their_axis() {
         let of =
             |points: &[[f64; 2]]| Series { name: String::new(), mark: Mark::Line, colour: 0, points: points.into() };
-        let lines = Lines { series: vec![of(&[[0.0, 1.0], [2.0, 3.0]]), of(&[[1.0, 5.0]])], limits: Vec::new() };
+        let lines = Lines { series: vec![of(&[[0.0, 1.0], [2.0, 3.0]]), of(&[[1.0, 5.0]])], ..Lines::default() };
         let columns = lines.columns();
         assert_eq!(columns[0], [0.0, 1.0, 2.0]);
         assert!(columns[1][1].is_nan() && columns[1][2] == 3.0 && columns[2][1] == 5.0);

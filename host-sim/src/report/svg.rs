@@ -14,6 +14,8 @@ const TOP: f64 = 12.0;
 const RIGHT: f64 = 12.0;
 /// Points of a line at most; a sketch has no use for more.
 const MOST_POINTS: usize = 60;
+/// The same of a line that is drawn from least to largest, and of points.
+const MOST_DOTS: usize = 150;
 const COLOURS: [&str; 6] = ["#0063a6", "#b3470c", "#00725a", "#8a3f8f", "#6b5b00", "#555555"];
 
 fn escape(text: &str) -> String {
@@ -66,18 +68,38 @@ pub(super) fn lines(x: &Axis, y: &Axis, chart: &Lines) -> String {
             escape(&limit.name)
         );
     }
+    for upright in chart.uprights.iter().filter(|u| (x0..=x1).contains(&u.x)) {
+        let _ = write!(
+            svg,
+            r##"<path d="M{:.1} {TOP}V{}" stroke="#888" stroke-dasharray="2 3"><title>{}</title></path>"##,
+            px(upright.x),
+            HEIGHT - BOTTOM,
+            escape(&upright.name)
+        );
+    }
     for series in &chart.series {
         let colour = COLOURS[series.colour % COLOURS.len()];
-        if series.mark == Mark::Points {
-            for [vx, vy] in series.points.iter().filter(|p| p[1].is_finite()) {
-                let _ = write!(svg, r##"<circle cx="{:.1}" cy="{:.1}" r="2.5" fill="{colour}"/>"##, px(*vx), py(*vy));
+        if matches!(series.mark, Mark::Points | Mark::Dots) {
+            let r = if series.mark == Mark::Points { 2.5 } else { 1.2 };
+            let finite: Vec<&[f64; 2]> = series.points.iter().filter(|p| p[1].is_finite()).collect();
+            for [vx, vy] in finite.iter().step_by(finite.len().div_ceil(MOST_DOTS).max(1)) {
+                let _ = write!(svg, r##"<circle cx="{:.1}" cy="{:.1}" r="{r}" fill="{colour}"/>"##, px(*vx), py(*vy));
             }
             continue;
         }
-        let step = series.points.len().div_ceil(MOST_POINTS).max(1);
+        let broken = series.mark == Mark::Broken;
+        let step = series.points.len().div_ceil(if broken { MOST_DOTS } else { MOST_POINTS }).max(1);
+        // An odd step meets least and largest in turn.
+        let step = if broken { step | 1 } else { step };
         let mut d = String::new();
-        for [vx, vy] in series.points.iter().step_by(step).chain(series.points.last()).filter(|p| p[1].is_finite()) {
-            let _ = write!(d, "{}{:.1} {:.1}", if d.is_empty() { "M" } else { "L" }, px(*vx), py(*vy));
+        let mut pen_is_up = true;
+        for [vx, vy] in series.points.iter().step_by(step).chain(series.points.last()) {
+            if vy.is_finite() {
+                let _ = write!(d, "{}{:.1} {:.1}", if pen_is_up { "M" } else { "L" }, px(*vx), py(*vy));
+                pen_is_up = false;
+            } else {
+                pen_is_up |= broken;
+            }
         }
         let dash = if series.mark == Mark::Dashed { r#" stroke-dasharray="6 4""# } else { "" };
         let _ = write!(

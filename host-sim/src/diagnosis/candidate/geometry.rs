@@ -18,6 +18,9 @@ const USUAL_ARCSEC: f64 = 20.0;
 /// Cosine of the pressure angle of a working flank, 20 to 25 degrees (PHYSICS §3.1).
 pub(super) const COS_PRESSURE_ANGLE: f64 = 0.93;
 
+/// Generator turns below which a pulse in one place is not told from a wave; as in the picture of a residual.
+const FEWEST_TURNS_OF_PULSES: f64 = 6.0;
+
 /// Which angle an error is locked to.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Angle {
@@ -363,9 +366,11 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         smooth_pitch("circular_spline_pitch_error", Angle::CircularSpline),
         generator_eccentricity(on),
         cam_form_error(),
-        damaged_tooth(Angle::Flexspline),
-        damaged_tooth(Angle::CircularSpline),
     ];
+    // A pulse is told from what else is in a turn by coming again, turn after turn.
+    if on.rows.travel.last().is_some_and(|travel| *travel >= FEWEST_TURNS_OF_PULSES * 2.0 * PI) {
+        laws.extend([damaged_tooth(Angle::Flexspline), damaged_tooth(Angle::CircularSpline)]);
+    }
     if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
         laws.push(rectified("gravity_side_load", Angle::Gravity(-1.0), on));
     }

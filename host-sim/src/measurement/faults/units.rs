@@ -13,8 +13,12 @@ const ENOUGH_MOTION_RAD: f64 = 20.0 * 120.0 / 206_265.0;
 /// A ratio this near to one that a mistake gives is that mistake; degrees for arc-minutes (60) and radians for degrees (57.3) are
 /// 4.6 % apart.
 const SAME: f64 = 0.02;
-/// A ratio within these factors of the right one is left to the diagnosis, as an error of the ratio.
-const RATIO_ERROR: [f64; 2] = [0.5, 2.0];
+/// A ratio within these factors of the right one is left to the diagnosis, as an error of the ratio; beyond, it is another gear.
+const RATIO_ERROR: [f64; 2] = [0.8, 1.25];
+/// The wheel that is fixed changes the ratio by one: it is seen where the output turned so far that clearance does not hide that, rad.
+const TELLS_WHEELS_APART_RAD: f64 = 0.2;
+/// A ratio is that of the other wheel if it is this near.
+const OTHER_WHEEL: f64 = 1e-3;
 /// Errors that spread by more (robust, 10°) or less (a thousandth of an arc-second) are not errors of a drive in the unit given.
 const SPREADS_RAD: [f64; 2] = [0.174_5, 1e-3 / 206_265.0];
 /// Temperatures at which a drive exists, °C; kelvins taken for them lie beyond.
@@ -155,6 +159,15 @@ fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings
             log.put(Quantity::Output, a);
         }
         return Ok(());
+    }
+    if let Some(other) = gear.other_wheel_ratio
+        && travel > TELLS_WHEELS_APART_RAD
+        && (slope * other - 1.0).abs() <= OTHER_WHEEL
+    {
+        return Err(format!(
+            "{seen}: that is the ratio {other} of the same teeth with the other wheel fixed; allowed: the wheel that is fixed in the drive \
+             measured"
+        ));
     }
     if (found + 1.0).abs() <= 0.1 {
         fault.channel = Some(Quantity::Output);
