@@ -143,7 +143,7 @@ pub enum SweepError {
     #[error(
         "{field}: one tooth pitch in one direction does not say all of this drive; allowed: an ideal drive, uniform wear \
          (flexspline_wear_um, circular_spline_wear_um) and temperature differences (generator_warmer_k, \
-         circular_spline_warmer_k)"
+         circular_spline_warmer_k); others are swept over whole turns (sweep_turns)"
     )]
     NotUniform {
         /// The field of the drive.

@@ -5,7 +5,7 @@
 //!
 //! A drive that does not repeat from tooth to tooth is deformed anew for each torque, anywhere in the turns of generator and
 //! output. Its table says how far it is from its own samples, for it has no room for all that such a drive does: the bounds are
-//! wider by that much.
+//! wider by one and a half times that much.
 
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -83,7 +83,7 @@ pub struct Validation {
     /// "passed" or "bound missed".
     pub status: &'static str,
     /// What it may miss fresh FEM by, arcsec: root mean square. Of a drive that does not repeat from tooth to tooth
-    /// [`RMS_BOUND_ARCSEC`] and what the table states itself.
+    /// [`RMS_BOUND_ARCSEC`] and one and a half times what the table states itself.
     pub rms_bound_arcsec: f64,
     /// Largest, arcsec; likewise.
     pub max_bound_arcsec: f64,

@@ -27,7 +27,7 @@ use crate::validate::{
 /// Torques, temperatures, directions and positions are drawn between the nodes of each table; the drive is settled there and
 /// the table read by the code that firmware links. One run is reversed through the backlash. Ends with exit code 1 if a
 /// table misses the FEM by more than 0.5 arcsec rms or 2 arcsec at any point; the table of a drive with imperfections is
-/// looked at over whole turns, and may miss it by as much more as it states of itself.
+/// looked at over whole turns, and may miss it by half as much again as it states of itself beyond that.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
