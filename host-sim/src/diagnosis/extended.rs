@@ -114,8 +114,8 @@ impl Extended {
     ) -> Result<Extended, DiagnosisError> {
         let rows = Rows::new(sessions, nominal).learning_from(used);
         super::check(&rows)?;
-        let base = Base::new(&rows, nominal, table);
-        let scales = Scales::new(&rows, settings.pitch_radius_mm, prepare::jumps(&rows, &base));
+        let (base, jumps) = prepare::base(&rows, nominal, table);
+        let scales = Scales::new(&rows, settings.pitch_radius_mm, jumps);
         let on = Excitation { rows: &rows, nominal, base: &base, scales: &scales };
         let laws = library(&on);
         let uncertain = prepare::uncertain(&on, &[]);

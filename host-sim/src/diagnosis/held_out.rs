@@ -3,7 +3,6 @@
 use flexspline::Table;
 use rayon::prelude::*;
 
-use super::base::Base;
 use super::candidate::{Excitation, Scales};
 use super::linear::{Gram, solve};
 use super::model::{Problem, Scaffold, Term};
@@ -41,9 +40,9 @@ pub fn nested(problem: &Problem<'_>, table: Option<&Table<'_>>, settings: &Setti
             let learning: Vec<bool> = (0..sessions.len()).map(|k| on.rows.used[k] && k % folds != fold).collect();
             let rows = on.rows.clone().learning_from(&learning);
             super::check(&rows).ok()?;
-            let mut base = Base::new(&rows, on.nominal, table);
+            let (mut base, jumps) = super::prepare::base(&rows, on.nominal, table);
             base.waves = on.base.waves.clone();
-            let scales = Scales { jumps: super::prepare::jumps(&rows, &base), ..on.scales.clone() };
+            let scales = Scales { jumps, ..on.scales.clone() };
             let on = Excitation { rows: &rows, nominal: on.nominal, base: &base, scales: &scales };
             let extended = if causes {
                 Search::new(&on, &settings).ok()?.extended()?

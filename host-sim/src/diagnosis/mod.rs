@@ -34,7 +34,6 @@ use thiserror::Error;
 
 use crate::measurement::Session;
 use crate::nominal::Nominal;
-use base::Base;
 use candidate::{Excitation, Law, Scales, library, line, unnamed};
 use extended::Found;
 pub use extended::{Extended, FittedCause, Series};
@@ -122,8 +121,8 @@ pub fn diagnose_extended(
     let rows = Rows::new(sessions, nominal);
     check(&rows)?;
     progress(0, 4, "nominal model");
-    let base = Base::new(&rows, nominal, table);
-    let scales = Scales::new(&rows, settings.pitch_radius_mm, prepare::jumps(&rows, &base));
+    let (base, jumps) = prepare::base(&rows, nominal, table);
+    let scales = Scales::new(&rows, settings.pitch_radius_mm, jumps);
     let on = Excitation { rows: &rows, nominal, base: &base, scales: &scales };
     progress(1, 4, "causes");
     let search = Search::new(&on, settings)?;

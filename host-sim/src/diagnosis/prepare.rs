@@ -1,11 +1,14 @@
 //! What has to be known before causes are compared: how noisy the data are, and where they jump.
 
+use flexspline::Table;
+
 use super::base::{Base, NEAR_FRICTION, UNCERTAIN_AT_MOST};
 use super::candidate::{Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
 use super::model::Term;
 use super::noise::{Noise, Whitener, white_level};
 use super::rows::{Rows, quantile, rms};
+use crate::nominal::Nominal;
 
 /// Averages used to find the wander, about.
 const WANDER_AVERAGES: usize = 2500;
@@ -13,6 +16,24 @@ const WANDER_AVERAGES: usize = 2500;
 const BESIDE: usize = 12;
 /// Least height of what is taken for a jump before anything else is known, arcsec.
 const LEAST_JUMP: f64 = 1000.0;
+
+/// The nominal model over the rows, and the jumps: these are taken out before the law of the play is chosen.
+#[must_use]
+pub fn base(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>) -> (Base, Vec<(f64, f64)>) {
+    let base = Base::new(rows, nominal, table);
+    let jumps = jumps(rows, &base);
+    if jumps.is_empty() {
+        return (base, jumps);
+    }
+    let mut level = rows.clone();
+    for (at, height) in &jumps {
+        for (error, time) in level.error.iter_mut().zip(&rows.time) {
+            *error -= if time >= at { *height } else { 0.0 };
+        }
+    }
+    let play = Base::new(&level, nominal, table).law;
+    (Base::with_play(rows, nominal, table, play), jumps)
+}
 
 /// Times at which the error leaves for another level at once, and by how much (arcsec).
 #[must_use]
@@ -103,7 +124,8 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64], uncertain: &[
     }
     for law in laws {
         let tried = law.tried();
-        for places in [tried.first(), tried.get(tried.len() / 2)].into_iter().flatten().take(tried.len().min(2)) {
+        let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
+        for places in tried.iter().step_by(spread) {
             let made = law.lead.as_ref().map_or(&law.columns, |lead| &lead.columns);
             for column in made(on, &law.values(places)) {
                 if law.free_form || matches!(column.tolerance, Tolerance::Main(_)) {

@@ -29,7 +29,9 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
         ]
     })
     .shapes([Shape::by_factors("torque_n_m", 0.003 * scale, 2.0 * scale, 1), Shape::angle("phase_rad", 2.0 * PI, 1)])
-    .parameters(|_, shape, c| vec![("torque_n_m", shape[0] * c[0]), ("phase_rad", shape[1])]);
+    .parameters(|_, shape, c| vec![("torque_n_m", shape[0] * c[0]), ("phase_rad", shape[1])])
+    // Without a moment the law is another play alone.
+    .physical(move |shape, _| shape[0] > 0.004 * scale);
     law.load = Some(Box::new(load));
     law.lead = Some(Lead {
         columns: Box::new(move |on, _| {

@@ -259,8 +259,8 @@ fn generator_eccentricity(on: &Excitation<'_>) -> Law {
         }
         for of in [Angle::Flexspline, Angle::CircularSpline] {
             columns.extend(waves(on, of, 1.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.3)));
-            columns.extend(waves(on, of, 2.0, fade).map(|v| nuisance(v, 0.15)));
-            columns.extend(waves(on, of, 3.0, fade).map(|v| nuisance(v, 0.15)));
+            columns.extend(waves(on, of, 2.0, fade).map(|v| nuisance(v, 0.05)));
+            columns.extend(waves(on, of, 3.0, fade).map(|v| nuisance(v, 0.1)));
             if half.is_finite() {
                 columns.extend(waves(on, of, 1.0, |_| 1.0).map(|v| nuisance(v, 0.2)));
             }
