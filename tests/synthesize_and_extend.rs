@@ -40,7 +40,7 @@ fn an_effect_is_found_and_the_extended_tables_leave_less_of_it() {
     let desk = Desk::new();
     desk.write("nominal.toml", NOMINAL);
     for (k, (effect, parameter, tolerance, gain)) in [
-        ("circular_spline_ovality:amplitude_um=8,phase_rad=1.1", "amplitude_arcsec", 3.0, 0.9),
+        ("circular_spline_pitch_error:amplitude_um=6,phase_rad=1.1", "amplitude_arcsec", 3.0, 0.6),
         ("backlash_growth:growth_arcsec=60", "growth_arcsec", 15.0, 0.6),
         ("circular_spline_eccentricity:amplitude_um=10", "amplitude_arcsec", 12.0, 0.9),
     ]
@@ -66,13 +66,20 @@ fn an_effect_is_found_and_the_extended_tables_leave_less_of_it() {
         println!("{name}: no table {none:.2}\", nominal {nominal:.2}\", extended {extended:.2}\"");
         assert!(extended < gain * nominal, "{name}: {nominal}\" to {extended}\"");
         let files = names(&desk.path(&format!("found{k}")));
-        let wanted =
-            ["cam-extended.fxt", "cam-extended.h", "cam-extended.json", "cam-extended.rs", "diagnosis.json", "drive-extended.toml"];
+        let wanted = [
+            "cam-extended.fxt",
+            "cam-extended.h",
+            "cam-extended.json",
+            "cam-extended.rs",
+            "diagnosis.json",
+            "drive-extended.toml",
+        ];
         assert_eq!(files, wanted);
 
         // The extended table is one that the core reads, and it leaves less of all rows too.
         let left = |table: &str, out: &str| -> f64 {
-            let replayed = desk.line(&format!("replay --tables {table} made{k}/data.csv --out {out} --json")).done().json();
+            let replayed =
+                desk.line(&format!("replay --tables {table} made{k}/data.csv --out {out} --json")).done().json();
             number(&replayed, &["rms_residual_arcsec"])
         };
         let by_extended = left(&format!("found{k}/cam-extended.fxt"), "replayed");
@@ -167,12 +174,14 @@ fn every_cause_can_be_made_and_reads_back() {
     assert!(plain.stdout.contains("no effect"));
     let nothing = desk.read("plain/data.csv");
     for cause in causes {
-        let line = format!("synthesize --model nominal.toml --effect {cause} --rows 300 --sessions 3 --seed 2 --out {cause}");
+        let line =
+            format!("synthesize --model nominal.toml --effect {cause} --rows 300 --sessions 3 --seed 2 --out {cause}");
         desk.line(&line).done();
         let data = desk.read(&format!("{cause}/data.csv"));
         assert!(data != nothing && data.lines().count() == 901, "{cause}");
         // The same seed makes the same data, and motion like that of a file keeps its rows.
-        let like = format!("synthesize --model nominal.toml --like {cause}/data.csv --seed 4 --out like-{cause} --json");
+        let like =
+            format!("synthesize --model nominal.toml --like {cause}/data.csv --seed 4 --out like-{cause} --json");
         assert_eq!(desk.line(&like).done().json()["rows"], 900, "{cause}");
         desk.line(&line.replace("--out ", "--out again-")).done();
         assert_eq!(desk.read(&format!("again-{cause}/data.csv")), data, "{cause}");

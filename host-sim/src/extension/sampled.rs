@@ -259,8 +259,7 @@ mod tests {
             rest.min(POSITIONS as i64 - rest)
         };
         let orders = ORDERS.iter().flat_map(|k| [95 * i64::from(*k), 94 * i64::from(*k)]);
-        let mut all: Vec<i64> =
-            orders.chain([1, 2]).chain((1..=4).map(|k| 17860 * k)).map(folded).chain([0]).collect();
+        let mut all: Vec<i64> = orders.chain([1, 2]).chain((1..=4).map(|k| 17860 * k)).map(folded).chain([0]).collect();
         all.sort_unstable();
         assert!(all.windows(2).all(|pair| pair[0] < pair[1]), "{all:?}");
     }
