@@ -14,8 +14,8 @@ use crate::diagnosis::report::{Compensation, Diagnosis};
 use crate::diagnosis::{Extended, Settings, diagnose_extended};
 use crate::drive::{Drive, GeneratorKind};
 use crate::extension::{
-    Agreement, CauseEntry, Evaluation, EvaluationError, ExtendedTables, FoundGeometry, Model, Remake, TableSubject, causes_to_toml,
-    check_by_fem, evaluate, found_geometry, no_place_in_a_table,
+    Agreement, CauseEntry, Evaluation, EvaluationError, ExtendedTables, FoundGeometry, Model, Remake, TableSubject,
+    causes_to_toml, check_by_fem, evaluate, found_geometry, no_place_in_a_table,
 };
 use crate::measurement::{ColumnMap, Fault, Recording, Session, read};
 use crate::mesh::MeshLevel;
