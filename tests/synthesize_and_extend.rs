@@ -40,7 +40,7 @@ fn an_effect_is_found_and_the_extended_tables_leave_less_of_it() {
     let desk = Desk::new();
     desk.write("nominal.toml", NOMINAL);
     for (k, (effect, parameter, tolerance, gain)) in [
-        ("circular_spline_ovality:amplitude_um=8,phase_rad=1.1", "amplitude_arcsec", 3.0, 0.9),
+        ("circular_spline_pitch_error:amplitude_um=6,phase_rad=1.1", "amplitude_arcsec", 3.0, 0.6),
         ("backlash_growth:growth_arcsec=60", "growth_arcsec", 15.0, 0.6),
         ("circular_spline_eccentricity:amplitude_um=10", "amplitude_arcsec", 12.0, 0.9),
     ]

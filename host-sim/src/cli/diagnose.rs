@@ -15,8 +15,8 @@ use crate::diagnosis::report::{Compensation, Diagnosis};
 use crate::diagnosis::{Extended, Settings, diagnose_extended};
 use crate::drive::{Drive, GeneratorKind};
 use crate::extension::{
-    Agreement, CauseEntry, Evaluation, ExtendedTables, FoundGeometry, Model, Remake, TableSubject, causes_to_toml,
-    check_by_fem, evaluate, found_geometry, no_place_in_a_table,
+    Agreement, CauseEntry, Evaluation, EvaluationError, ExtendedTables, FoundGeometry, Model, Remake, TableSubject,
+    causes_to_toml, check_by_fem, evaluate, found_geometry, no_place_in_a_table,
 };
 use crate::kernels::Kernels;
 use crate::measurement::{ColumnMap, Fault, Recording, Session, read};
@@ -166,6 +166,8 @@ impl Diagnose {
                 extension.tables_not_written = evaluation.worth_writing().err();
                 extension.compensation = Some(evaluation);
             }
+            // The FEM failed, or was stopped.
+            Err(EvaluationError::Remake(what)) => return Err(Failure::Failed(what)),
             Err(error) => extension.tables_not_written = Some(error.to_string()),
         }
         drop(progress);

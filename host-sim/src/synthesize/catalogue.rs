@@ -101,7 +101,7 @@ const CHANNELS: &[&str] = &["generator", "output", "torque", "temperature"];
 #[must_use]
 pub fn effects() -> Vec<Definition> {
     use Factor::{AlongNormal, AlongPitch, Oval, Ratio, Tooth};
-    use Usual::{Drawn, Follows, OfLoad, ToothPitch, Value};
+    use Usual::{Follows, OfLoad, ToothPitch, Value};
     type Twins = &'static [(&'static str, &'static str, Factor)];
     let cause = |name, meaning, parameters: &[Parameter], twins: Twins| Definition {
         name,
@@ -338,7 +338,7 @@ pub fn effects() -> Vec<Definition> {
         fault(
             "drift",
             "a zero that moves with time",
-            &[number("arcsec_per_hour", "how fast", -1e6, 1e6, Drawn(30.0, 90.0))],
+            &[number("arcsec_per_hour", "how fast", -1e6, 1e6, Value(300.0))],
         ),
     ]
 }

@@ -74,7 +74,14 @@ impl Plant<'_> {
 
     /// Error without sensors and before `laws` have added to it, arcsec. Below the friction of a model the output stands until the
     /// generator has used up the clearance and pushes it; or, if not `pushed`, its error stands.
-    pub(super) fn error(&self, on: &Excitation, torque: &[f64], laws: &[Law], unit: &Unit, changed: bool) -> Vec<f64> {
+    pub(super) fn error(
+        &self,
+        on: &Excitation,
+        torque: &[f64],
+        laws: &[Law],
+        unit: &Unit,
+        (changed, pushed): (bool, bool),
+    ) -> Vec<f64> {
         let n = on.time.len();
         let nominal_half = 0.5 * self.nominal.backlash_arcsec;
         let mut half = vec![nominal_half * unit.clearance; n];
