@@ -77,6 +77,8 @@ const LOAD_STEP: f64 = 0.04;
 const DRAG_N_M: f64 = 0.02;
 /// Increments before the first sample under a load.
 const SETTLING: usize = 3;
+/// Where else the drive is deformed, in tooth pitches.
+const BESIDE: [f64; 3] = [0.3, -0.3, 1.4];
 /// Flanks closer than this (mm) may touch.
 const NEAR_MM: f64 = 0.01;
 
@@ -310,6 +312,22 @@ fn eccentric(
     })
 }
 
+/// The drive deformed at a generator angle. Where both flanks of an eccentric drive come to bear at once Newton may go round in a circle:
+/// then it is deformed beside, and turned there.
+fn deformed(solver: &mut Solver<'_>, generator_rad: f64, pitch_rad: f64) -> Result<State, SolveError> {
+    let first = match solver.deform(generator_rad) {
+        Ok((state, _)) => return Ok(state),
+        Err(error) => error,
+    };
+    BESIDE
+        .iter()
+        .find_map(|pitches| {
+            let (beside, _) = solver.deform(generator_rad - pitches * pitch_rad).ok()?;
+            solver.increment(&beside, generator_rad, 0.0).ok().map(|(state, _)| state)
+        })
+        .ok_or(first)
+}
+
 /// To a millionth of an arc-second, which keeps files short.
 fn rounded(arcsec: f64) -> f64 {
     (arcsec * 1e6).round() * 1e-6 + 0.0
@@ -318,7 +336,7 @@ fn rounded(arcsec: f64) -> f64 {
 /// Error of the drive deformed at a generator angle, under one load after the other, arcsec.
 fn loaded(problem: &Problem, generator_rad: f64, torques_n_m: &[f64]) -> Result<Vec<f64>, SolveError> {
     let mut solver = Solver::new(problem);
-    let (mut state, _) = solver.deform(generator_rad)?;
+    let mut state = deformed(&mut solver, generator_rad, problem.flexspline.pitch())?;
     torques_n_m
         .iter()
         .map(|torque| {

@@ -46,7 +46,8 @@ impl Law for Displaced {
     }
 }
 
-/// A circular spline bent to an oval without stretching: half the radial motion goes along the teeth.
+/// A circular spline bent to an oval without stretching: half the radial motion goes along the teeth, and where its spaces are
+/// displaced forward the output lags.
 pub struct Oval {
     pub amplitude: f64,
     pub phase: f64,
@@ -66,7 +67,7 @@ impl Law for Oval {
                 (-0.5 * two.sin() - 0.25 * 0.2 * four.sin(), two.cos() + 0.2 * four.cos())
             }
         };
-        mesh.driven += self.amplitude * along;
+        mesh.driven -= self.amplitude * along;
         mesh.zones.open(self.amplitude * self.pressure_angle_rad.tan() * out);
     }
 }
