@@ -230,7 +230,7 @@ impl<'p> Solver<'p> {
     pub fn jump(&mut self, from: &State, generator_rad: f64) -> Result<(State, Increment), SolveError> {
         // The output goes on at its mean rate, whatever it did last.
         let from = &State { output_rate: 1.0 / self.problem.drive.ratio(), ..from.clone() };
-        let solved = self.from_soft(from, generator_rad, from.torque_n_m, &JUMPING_SOFTNESS)?;
+        let solved = self.newton_softly(from, generator_rad, from.torque_n_m, &JUMPING_SOFTNESS)?;
         self.problem.check_range(&solved.0)?;
         Ok(solved)
     }
@@ -245,11 +245,11 @@ impl<'p> Solver<'p> {
         if torque_n_m == from.torque_n_m {
             return self.newton(from, generator_rad, torque_n_m);
         }
-        self.from_soft(from, generator_rad, torque_n_m, &LOADING_SOFTNESS)
+        self.newton_softly(from, generator_rad, torque_n_m, &LOADING_SOFTNESS)
     }
 
     /// Newton with contact that is soft at first: factors on the penalties in turn, the last of them 1.
-    fn from_soft(
+    fn newton_softly(
         &mut self,
         from: &State,
         generator_rad: f64,
