@@ -185,11 +185,14 @@ impl Extended {
     }
 }
 
+/// Index of a law, places of its shape parameters, coefficients, parameters.
+type FoundTerm = (usize, Vec<f64>, Vec<f64>, BTreeMap<&'static str, Parameter>);
+
 /// What a fit leaves behind when its columns are gone.
 pub(super) struct Found {
     recalibrated: Vec<f64>,
     base: Vec<f64>,
-    terms: Vec<(usize, Vec<f64>, Vec<f64>, BTreeMap<&'static str, Parameter>)>,
+    terms: Vec<FoundTerm>,
 }
 
 impl Found {

@@ -13,6 +13,8 @@ const LEAST_EVIDENCE: f64 = 6.0;
 const OUT_OF_TOLERANCE: f64 = super::model::TOLERANCE - 0.05;
 /// What a term adds counts up to this many times what the nominal model, within its tolerance, cannot take over from it.
 const TAKEN_OVER: f64 = 2.5;
+/// A wind-up or a clearance cannot lose more of itself than this: beyond, something else stands in for it.
+const LARGEST_SHARE_LOST: f64 = 0.95;
 /// Least size of a contribution, arcsec.
 const LEAST_ARCSEC: f64 = 1.5;
 /// Least size in units of the white noise.
@@ -249,7 +251,11 @@ fn out_of_tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> bool {
         // Not floating at all: any change is one.
         return true;
     };
-    let z = fit.solution.coefficients[at] / floating[at].spread;
+    let change = fit.solution.coefficients[at];
+    if change < -LARGEST_SHARE_LOST {
+        return false;
+    }
+    let z = change / floating[at].spread;
     (law.physical)(&[], &[z]) && z.abs() > OUT_OF_TOLERANCE
 }
 

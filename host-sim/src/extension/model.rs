@@ -259,11 +259,9 @@ impl CauseEntry {
             if twice.contains(&parameter.name) && (has("amplitude_arcsec") || has("angle_rad")) {
                 continue;
             }
-            let value = match (self.name.as_str(), parameter.name) {
-                // It is found as sin(output + orientation - phase).
-                ("gravity_torque", "phase_rad") => (-value).rem_euclid(TAU),
-                (_, "phase_rad") => value.rem_euclid(TAU),
-                (_, "wheel" | "harmonic") => value.round(),
+            let value = match parameter.name {
+                "phase_rad" => value.rem_euclid(TAU),
+                "wheel" | "harmonic" => value.round(),
                 _ => value,
             };
             let [low, high] = parameter.range;

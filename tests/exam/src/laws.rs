@@ -117,6 +117,9 @@ pub fn build(effect: &Effect, setting: Setting) -> Box<dyn Law> {
     let What::Cause(cause) = effect.what else { panic!("{effect:?} has no law here") };
     let Effect { family, size, ref shape, .. } = *effect;
     let pressure_angle_rad = if family == Family::A { 24.4_f64 } else { 20.5 }.to_radians();
+    // Where the flexspline turns, a load that turns it forward rests on the other flank of the circular spline.
+    let pressure_angle_rad =
+        if setting.drive.fixed == Fixed::Flexspline { pressure_angle_rad } else { -pressure_angle_rad };
     let displaced = |wheel| errors::Displaced {
         wheel,
         amplitude: size,

@@ -12,7 +12,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
     let scale = if on.scales.load > 0.0 { on.scales.load } else { 20.0 };
     let load = move |on: &Excitation<'_>, shape: &[f64]| -> Vec<f64> {
         let rows = on.rows;
-        by_row(on, |k| shape[0] * (rows.output[k] + sign * rows.orientation[k] - shape[1]).sin())
+        by_row(on, |k| shape[0] * (rows.output[k] + sign * rows.orientation[k] + shape[1]).sin())
     };
     let mut law = Law::new("gravity_torque", move |on, shape| {
         let rows = on.rows;
@@ -46,8 +46,8 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
                 main(by_row(on, |k| slope(k) * at(k).cos()), 0.3 * scale),
             ]
         }),
-        // a sin(x) + b cos(x) = m sin(x - phase).
-        shape: Box::new(|_, c| vec![c[0].hypot(c[1]), (-c[1]).atan2(c[0]).rem_euclid(2.0 * PI)]),
+        // a sin(x) + b cos(x) = m sin(x + phase).
+        shape: Box::new(|_, c| vec![c[0].hypot(c[1]), c[1].atan2(c[0]).rem_euclid(2.0 * PI)]),
         loaded_only: true,
     });
     law

@@ -7,6 +7,8 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use crate::nominal::Fixed;
+
 use super::{Column, Excitation, Kin, Law, Lead, Named, Shape, by_row, main, nuisance, polar};
 
 /// Share by which a law of shape may be wrong: signatures depend on generator and load (PHYSICS §3.4).
@@ -75,6 +77,15 @@ const FLANK_AHEAD: f64 = 0.36;
 const MEAN_OF_SECOND: f64 = 1.15;
 const FOURTH_OF_SECOND: f64 = 0.15;
 
+/// +1 where the circular spline is the output. Where the flexspline is, a load that turns it forward rests on the other flank of the
+/// circular spline, and what a flank is ahead by changes its sign.
+fn sense(on: &Excitation<'_>) -> f64 {
+    match on.nominal.teeth.map(|teeth| teeth.fixed) {
+        Some(Fixed::CircularSpline) => -1.0,
+        _ => 1.0,
+    }
+}
+
 /// Cosine of a kept angle less `shift` plus `by`.
 fn ahead(kept: &[Vec<f64>; 2], k: usize, shift: f64, by: f64) -> f64 {
     let (sin, cos) = (by - shift).sin_cos();
@@ -90,9 +101,10 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
         let half = fade_of(shape);
         let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
         let (second, fourth) = (kept(on, of, 2.0), kept(on, of, 4.0));
+        let by = FLANK_AHEAD * sense(on);
         let pattern = by_row(on, |k| {
-            let wave = ahead(&second, k, 2.0 * shape[0], 2.0 * FLANK_AHEAD * flank(k))
-                + FOURTH_OF_SECOND * ahead(&fourth, k, 4.0 * shape[0], 4.0 * FLANK_AHEAD * flank(k))
+            let wave = ahead(&second, k, 2.0 * shape[0], 2.0 * by * flank(k))
+                + FOURTH_OF_SECOND * ahead(&fourth, k, 4.0 * shape[0], 4.0 * by * flank(k))
                 - MEAN_OF_SECOND;
             fade(k) * flank(k) * wave
         });
@@ -131,7 +143,7 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
             // Second order along cos 2 eps and sin 2 eps.
             for shift in [0.0, FRAC_PI_2] {
                 let second = kept(on, of, 2.0);
-                let along = |k: usize| ahead(&second, k, shift, 2.0 * FLANK_AHEAD * flank(k));
+                let along = |k: usize| ahead(&second, k, shift, 2.0 * FLANK_AHEAD * sense(on) * flank(k));
                 columns.push(main(by_row(on, |k| fade(k) * flank(k) * along(k)), USUAL_ARCSEC));
             }
             columns.push(main(by_row(on, |k| fade(k) * flank(k)), USUAL_ARCSEC));
@@ -211,19 +223,20 @@ fn pitch_parameters(on: &Excitation<'_>, _: &[f64], c: &[f64]) -> Vec<Named> {
     ]
 }
 
-/// Ring pressed to an oval: order 2 alone. Radius `d cos 2x` with the tangential part `-d/2 sin 2x` of a ring that keeps its length: a flank
-/// at the pressure angle sees both, the radial one with the sign of the flank. 10 µm of radius are 0.67 of 10 µm on the pitch circle.
+/// Ring pressed to an oval: order 2 alone. Radius `d cos 2x` with the tangential part `-d/2 sin 2x` of a ring that keeps its length: the
+/// output lags where spaces are displaced forward, and a flank at the pressure angle gives way where they are displaced outward,
+/// `e = d/r (1/2 sin 2x ± tan a cos 2x)`. 10 µm of radius are 0.67 of 10 µm on the pitch circle.
 fn ovality() -> Law {
     let of = Angle::CircularSpline;
     Law::new("circular_spline_ovality", move |on, _| {
         let flank = |k: usize| on.base.flank[k];
         let [cos, sin] = waves(on, of, 2.0, |_| 1.0);
         let together = |a: &[f64], b: &[f64], sign: f64| -> Vec<f64> {
-            let root = 1.0f64.hypot(RADIAL_OF_TANGENTIAL);
-            by_row(on, |k| (a[k] + sign * RADIAL_OF_TANGENTIAL * flank(k) * b[k]) / root)
+            let (root, radial) = (1.0f64.hypot(RADIAL_OF_TANGENTIAL), sign * sense(on) * RADIAL_OF_TANGENTIAL);
+            by_row(on, |k| (a[k] + radial * flank(k) * b[k]) / root)
         };
         let mut columns: Vec<Column> =
-            vec![main(together(&cos, &sin, 1.0), USUAL_ARCSEC), main(together(&sin, &cos, -1.0), USUAL_ARCSEC)];
+            vec![main(together(&sin, &cos, 1.0), USUAL_ARCSEC), main(together(&cos, &sin, -1.0), USUAL_ARCSEC)];
         columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
         columns.extend(waves(on, of, 4.0, |_| 1.0).map(|v| nuisance(v, 0.12)));
         columns.extend(waves(on, of, 4.0, flank).map(|v| nuisance(v, 0.1)));
@@ -233,7 +246,8 @@ fn ovality() -> Law {
         columns
     })
     .parameters(|on, _, c| {
-        let (amplitude, phase) = polar(c[0], c[1]);
+        // sin 2(x - c) = cos 2c sin 2x - sin 2c cos 2x.
+        let (amplitude, phase) = polar(c[0], -c[1]);
         vec![
             ("amplitude_um", amplitude / (0.67 * on.scales.arcsec_per_um)),
             ("amplitude_arcsec", amplitude),

@@ -164,6 +164,7 @@ pub type Named = (&'static str, f64);
 type Load = Box<dyn Fn(&Excitation<'_>, &[f64]) -> Vec<f64> + Send + Sync>;
 type Columns = Box<dyn Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync>;
 type Parameters = Box<dyn Fn(&Excitation<'_>, &[f64], &[f64]) -> Vec<Named> + Send + Sync>;
+type ShapeFound = Box<dyn Fn(&[f64], &[f64]) -> Vec<f64> + Send + Sync>;
 type Physical = Box<dyn Fn(&[f64], &[f64]) -> bool + Send + Sync>;
 
 /// A linear law close to a law that is none: its coefficients say where to begin with the shape parameters.
@@ -171,7 +172,7 @@ pub struct Lead {
     /// Columns at the values of the shape parameters tried first; what the lead finds is not looked at.
     pub columns: Columns,
     /// Values of the shape parameters from those tried and the coefficients found.
-    pub shape: Box<dyn Fn(&[f64], &[f64]) -> Vec<f64> + Send + Sync>,
+    pub shape: ShapeFound,
     /// Only where the load leaves no doubt about the flank.
     pub loaded_only: bool,
 }

@@ -27,9 +27,11 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     let load = on.scales.load;
     Law::new("torsional_hysteresis", |on, shape| {
         let slip = shape[0];
+        let usual = on.nominal.wind_up_arcsec(on.scales.load).mul_add(0.3, 30.0);
         let negative = |values: Vec<f64>| values.into_iter().map(|z| -z).collect::<Vec<f64>>();
         vec![
-            main(negative(stop_operator(on, slip)), 30.0),
+            // The opening is a share of the wind-up: a plastic gear's is wide (PHYSICS §5: 0.5 to 2' of a steel drive's 3').
+            main(negative(stop_operator(on, slip)), usual),
             nuisance(negative(stop_operator(on, 0.35 * slip)), 0.35),
             nuisance(negative(stop_operator(on, 2.5 * slip)), 0.5),
             nuisance(by_row(on, |k| load_share(on, k)), 0.7),
