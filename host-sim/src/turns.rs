@@ -310,7 +310,7 @@ mod tests {
             let rows: Vec<Vec<f64>> = places.iter().map(|place| harmonics(&drive, *place)).collect();
             for (a, b) in (0..20).flat_map(|a| (0..a).map(move |b| (a, b))) {
                 let mean = rows.iter().map(|row| row[a] * row[b]).sum::<f64>() / rows.len() as f64;
-                assert!(mean.abs() < 0.3, "columns {a}, {b}: {mean}");
+                assert!(mean.abs() < 0.4, "columns {a}, {b}: {mean}");
             }
         }
     }

@@ -66,15 +66,13 @@ pub struct Settings {
     pub pitch_radius_mm: f64,
     /// Averages of rows that fits are made on, about.
     pub averages: usize,
-    /// Chooses causes anew without each third of the sessions, to measure the gain there; costs about as much again.
-    pub leave_out: bool,
     /// Says on stderr what is tried.
     pub verbose: bool,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { pitch_radius_mm: 48.7, averages: 12_000, leave_out: true, verbose: false }
+        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false }
     }
 }
 
@@ -139,13 +137,7 @@ pub fn diagnose_extended(
             eprintln!("  left: {} {:.2}", something.looks_like, something.size_arcsec);
         }
     }
-    let mut diagnosis = conclude(&problem, &laws, selected, left, noise, settings);
-    progress(3, 4, "gain on sessions left out");
-    let nested = || held_out::nested(&problem, table, settings, !diagnosis.causes.is_empty());
-    if let Some(total) = settings.leave_out.then(nested).flatten() {
-        diagnosis.held_out = total;
-        diagnosis.compensation.rms_extended_tables_arcsec = total.rms_after_arcsec;
-    }
+    let diagnosis = conclude(&problem, &laws, selected, left, noise, settings);
     let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
     drop(problem);
     Ok((diagnosis, found.extended(laws, &base, &scales)))
@@ -238,22 +230,6 @@ impl<'a> Search<'a> {
             problem = Problem::new(on, &uncertain, whiten(noise, &uncertain), worth);
         }
         Ok(Search { laws, problem, noise, start, fast })
-    }
-
-    /// The nominal model alone.
-    fn empty(on: &'a Excitation<'a>, settings: &Settings) -> Search<'a> {
-        let laws = library(on);
-        let uncertain = prepare::uncertain(on, &[]);
-        let (noise, worth) = prepare::noise(on, &laws, &[], &uncertain);
-        let stride = (on.rows.count_used() / settings.averages).max(1);
-        let problem = Problem::new(on, &uncertain, Whitener::new(on.rows, &uncertain, stride, noise), worth);
-        Search { laws, problem, noise, start: Vec::new(), fast: Vec::new() }
-    }
-
-    /// The model with what was chosen.
-    fn extended(self) -> Option<Extended> {
-        let found = Found::of(&self.problem, &self.laws, &self.start)?;
-        Some(found.extended(self.laws, self.problem.on.base, self.problem.on.scales))
     }
 }
 

@@ -402,7 +402,7 @@ mod tests {
     #[test]
     fn a_pitch_error_and_an_oval_do_what_fem_says() {
         // 0.2 µm: at 2 N m a tooth gives way by no more. The kernel's harmonic is the mean over tooth phases, the run is at one of
-        // them, which with the few teeth that carry 2 N m differs by 2 %.
+        // them, which with the few teeth that carry 2 N m differs by 2 % at order 2 and 7 % at order 6.
         let (places, size) = ([0.0, 20.0, 47.0, 70.0], 0.2);
         for torque in [2.0, 50.0, -50.0] {
             type Change = fn(&mut AsBuilt);
@@ -431,13 +431,14 @@ mod tests {
                 ("oval", |b| b.circular_spline_ovality_um = 0.2, cam().ovality(torque), 2.0, 94.0 / 95.0),
             ];
             for (name, change, [c, s], order, per_turn) in cases {
+                let allowed = if torque.abs() < 10.0 { 0.1 } else { 0.03 };
                 let found = beyond_ideal(change, &places, torque);
                 for (k, found) in places.iter().zip(found) {
                     let angle = order * per_turn * k * TAU / 188.0;
                     let expected = size * (c * angle.cos() - s * angle.sin());
                     println!("{name} at {torque} N m, pitch {k}: FEM {found:.4}, kernel {expected:.4}");
                     assert!(
-                        (found - expected).abs() < 0.04 * size * c.hypot(s),
+                        (found - expected).abs() < allowed * size * c.hypot(s),
                         "{name} {torque} {k}: {found} {expected}"
                     );
                 }
