@@ -73,6 +73,7 @@ fn an_effect_is_found_and_the_extended_tables_leave_less_of_it() {
             "cam-extended.rs",
             "diagnosis.json",
             "drive-extended.toml",
+            "report.html",
         ];
         assert_eq!(files, wanted);
 
@@ -106,7 +107,7 @@ fn where_nothing_is_hidden_nothing_is_extended() {
     println!("nothing hidden: no table {none:.2}\", nominal {nominal:.2}\", extended {extended:.2}\"");
     assert_eq!(nominal, extended);
     assert!(nominal < none);
-    assert_eq!(names(&desk.path("found")), ["diagnosis.json"]);
+    assert_eq!(names(&desk.path("found")), ["diagnosis.json", "report.html"]);
 }
 
 #[test]
@@ -122,7 +123,7 @@ fn what_no_table_can_hold_is_said_and_left_alone() {
     let left = &diagnosis["extension"]["compensation"]["not_applied"][0];
     assert_eq!(left["cause"], "sensor_latency");
     assert!(left["reason"].as_str().unwrap().contains("speed"));
-    assert_eq!(names(&desk.path("found")), ["diagnosis.json", "drive-extended.toml"]);
+    assert_eq!(names(&desk.path("found")), ["diagnosis.json", "drive-extended.toml", "report.html"]);
     assert!(desk.read("found/drive-extended.toml").contains("delay_s"));
 }
 

@@ -23,7 +23,7 @@ use crate::measurement::{ColumnMap, Fault, Recording, Session, read};
 use crate::mesh::MeshLevel;
 use crate::nominal::Nominal;
 use crate::output::{write_json, write_whole};
-use crate::stepping::SolverSettings;
+use crate::stepping::{Method, SolverSettings};
 use crate::synthesize::Sizes;
 use crate::tables::{ARCSEC_PER_RAD, MadeTable, c_header, rust_source};
 
@@ -308,7 +308,13 @@ impl Diagnose {
         }
         let mut made = match made {
             Some(made) => made,
-            None => tables.extended(extended).map_err(|error| Failure::Failed(error.to_string()))?,
+            None => match tables.extended(extended) {
+                Ok(made) => made,
+                Err(error) => {
+                    extension.tables_not_written = Some(error.to_string());
+                    return Ok(());
+                }
+            },
         };
         made.info.command.clone_from(&context.command);
         let json = serde_json::to_vec_pretty(&made.info).map_err(|error| Failure::Failed(error.to_string()))?;
@@ -339,7 +345,7 @@ impl Diagnose {
         }
         let mut progress = context.progress("FEM of the extended drive");
         progress.set(0, 1, "a few places on either flank");
-        let settings = SolverSettings { mesh: self.mesh(subject), ..SolverSettings::default() };
+        let settings = SolverSettings { method: Method::Fast, mesh: self.mesh(subject), ..SolverSettings::default() };
         let agreement =
             check_by_fem((&subject.drive, &found), self.generator, settings, extended, of, tables.orientation_rad)
                 .map_err(|error| Failure::Failed(format!("the FEM of the extended drive: {error}")))?;

@@ -30,7 +30,8 @@ pub struct KernelPlan {
 
 impl KernelPlan {
     /// The default: loads from 0.25 % of the largest that the generator is used to, evenly in their roots above 2 %; the
-    /// displacements that drives of this kind are built with (5 to 15 µm) and twice that; directions 9.5° apart.
+    /// displacements that drives of this kind are built with (up to 15 µm), close where they eat up the clearance, and twice that;
+    /// directions 9.5° apart.
     #[must_use]
     pub fn for_generator(kind: GeneratorKind) -> KernelPlan {
         let largest = rated_torque_n_m(kind);
@@ -38,7 +39,7 @@ impl KernelPlan {
         let even = (1..=steps).map(|k| largest * (f64::from(k) / f64::from(steps)).powi(2));
         KernelPlan {
             torques_n_m: [0.0025, 0.0075].map(|share| share * largest).into_iter().chain(even).collect(),
-            sizes_um: vec![5.0, 15.0, 30.0],
+            sizes_um: vec![2.5, 5.0, 7.0, 9.0, 12.0, 17.0, 30.0],
             directions: 19,
             positions: 8,
         }
