@@ -32,6 +32,11 @@ const SESSIONS: usize = 4;
 const PLACES: usize = 10;
 const LOADS: [f64; 3] = [4.0, 15.0, 50.0];
 
+/// Relative error allowed of a size. Pitch errors and ovals are known by kernels of first order. What an eccentricity does bends sharply
+/// where it has eaten up the clearance (7 to 9 um here), and the sizes between those of the kernels are known by a straight line.
+const LINEAR: f64 = 0.05;
+const ECCENTRIC: f64 = 0.25;
+
 fn coarse() -> SolverSettings {
     SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
 }
@@ -115,14 +120,14 @@ fn diagnosed(change: impl Fn(&mut AsBuilt), seed: u64) -> Diagnosis {
 }
 
 /// The cause is named alone and first, and its size and phase are right.
-fn found(change: impl Fn(&mut AsBuilt), seed: u64, cause: &str, size_um: f64, phase: Option<f64>) {
+fn found(change: impl Fn(&mut AsBuilt), seed: u64, cause: &str, [size_um, within]: [f64; 2], phase: Option<f64>) {
     let diagnosis = diagnosed(change, seed);
     println!("{cause}, {size_um} um:\n{}", diagnosis.text());
     let names: Vec<&str> = diagnosis.causes.iter().map(|c| c.name.as_str()).collect();
     assert_eq!(names, [cause]);
     let parameter = |name: &str| diagnosis.causes[0].parameters[name].value;
     let size = parameter("amplitude_um");
-    assert!((size / size_um - 1.0).abs() < 0.12, "{size} um of {size_um}");
+    assert!((size / size_um - 1.0).abs() < within, "{size} um of {size_um}");
     if let Some(phase) = phase {
         // An angle on a body that two lobes see: modulo half a turn.
         let off = (parameter("phase_rad") - phase + 0.5 * PI).rem_euclid(PI) - 0.5 * PI;
@@ -147,21 +152,27 @@ fn an_eccentric_circular_spline_and_a_runout_of_the_flexspline_are_told_apart_an
         b.circular_spline_eccentricity_um = 8.0;
         b.circular_spline_eccentricity_phase_deg = 0.9f64.to_degrees();
     };
-    found(eccentric, 2, "circular_spline_eccentricity", 8.0, Some(0.9));
+    found(eccentric, 2, "circular_spline_eccentricity", [8.0, ECCENTRIC], Some(0.9));
     let runout = |b: &mut AsBuilt| {
         b.flexspline_runout_um = 6.0;
         b.flexspline_runout_phase_deg = 2.0f64.to_degrees();
     };
-    found(runout, 3, "flexspline_runout", 6.0, Some(2.0));
+    found(runout, 3, "flexspline_runout", [6.0, ECCENTRIC], Some(2.0));
 }
 
 #[test]
 fn pitch_errors_of_either_wheel_and_an_oval_are_told_apart_and_measured() {
-    found(|b| b.flexspline_pitch_harmonics = second(4.0, 0.6), 4, "flexspline_pitch_error", 4.0, Some(0.6));
-    found(|b| b.circular_spline_pitch_harmonics = second(3.0, 1.1), 5, "circular_spline_pitch_error", 3.0, Some(1.1));
+    found(|b| b.flexspline_pitch_harmonics = second(4.0, 0.6), 4, "flexspline_pitch_error", [4.0, LINEAR], Some(0.6));
+    found(
+        |b| b.circular_spline_pitch_harmonics = second(3.0, 1.1),
+        5,
+        "circular_spline_pitch_error",
+        [3.0, LINEAR],
+        Some(1.1),
+    );
     let oval = |b: &mut AsBuilt| {
         b.circular_spline_ovality_um = 6.0;
         b.circular_spline_ovality_phase_deg = 0.4f64.to_degrees();
     };
-    found(oval, 6, "circular_spline_ovality", 6.0, Some(0.4));
+    found(oval, 6, "circular_spline_ovality", [6.0, LINEAR], Some(0.4));
 }

@@ -14,6 +14,8 @@ use crate::kernels::{Gain, Kernels};
 
 /// Share by which a kernel's signature may be wrong: friction, temperature, mesh.
 const KERNEL_MISFIT: f64 = 0.08;
+/// The same of its scale: the size itself is a parameter, and enters otherwise than as a factor.
+const SCALE_MISFIT: f64 = 0.02;
 /// Plausible size of an error of pitch, of an oval, µm: one standard deviation.
 const USUAL_UM: f64 = 6.0;
 /// Plausible eccentricities, µm.
@@ -78,11 +80,14 @@ fn eccentric(cause: &'static str, of: Angle, kernels: Arc<Kernels>) -> Law {
             by_flank(on.base.flank[k], on.rows.torque[k], |torque| field.at(direction, torque < 0.0, place))
         });
         let mut columns =
-            vec![Column { values: pattern, tolerance: Tolerance::Main(Prior { mean: 1.0, std: KERNEL_MISFIT }) }];
+            vec![Column { values: pattern, tolerance: Tolerance::Main(Prior { mean: 1.0, std: SCALE_MISFIT }) }];
         columns.extend(left_open(on, of, 2.0));
         columns
     })
-    .shapes([Shape::by_factors("size_um", ECCENTRICITY_UM[0], ECCENTRICITY_UM[1], 4), Shape::angle("phase_rad", PI, 8)])
+    .shapes([
+        Shape::by_factors("size_um", ECCENTRICITY_UM[0], ECCENTRICITY_UM[1], 10),
+        Shape::angle("phase_rad", PI, 8),
+    ])
     .parameters(|on, shape, c| {
         let size = shape[0] * c[0];
         vec![
