@@ -4,7 +4,7 @@
 //! 1. [`rows`], [`base`]: the nominal prediction on the data's own excitation, its parameters floating within the unit-to-unit spread.
 //! 2. [`prepare`], [`noise`]: white noise and wander, found with everything explainable taken out; data and columns made white.
 //! 3. [`candidate`]: causes as laws, re-simulated; deviations without a name beside them.
-//! 4. [`select`]: forward, backward, exchange; evidence, size, sessions left out.
+//! 4. [`mod@select`]: forward, backward, exchange; evidence, size, sessions left out.
 //! 5. [`rivals`]: every rival refitted; look-alikes.
 //! 6. [`remainder`]: lines and steps left; abstention.
 //! 7. [`report`]: parameters with uncertainty, gain on sessions left out.

@@ -343,7 +343,7 @@ pub fn effects() -> Vec<Definition> {
     ]
 }
 
-/// An effect with the values of its parameters: those given, and once [`Chosen::completed`] all.
+/// An effect with the values of its parameters: those given, and once completed all.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chosen {
     /// What it is.
