@@ -1,8 +1,8 @@
 //! Gain on sessions that took no part in the fit: each session predicted by a fit to the others, without any offset of its own. Which
 //! causes are fitted was chosen on all sessions.
 
-use super::linear::{Gram, solve};
-use super::model::{Problem, Scaffold, Term};
+use super::linear::Gram;
+use super::model::{Problem, Scaffold, Term, white_columns};
 use super::report::HeldOut;
 use super::select::blocks;
 
@@ -35,20 +35,11 @@ pub fn evaluate(problem: &Problem<'_>, terms: &[&Term<'_>]) -> Evaluated {
 fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], linearised: bool) -> Option<f64> {
     let scaffold = Scaffold::new(problem, terms.to_vec());
     let (fit, moves) = if linearised { scaffold.linearised()? } else { (scaffold.fit(&[])?, Vec::new()) };
-    let white: Vec<&[f64]> = problem
-        .base_white
-        .iter()
-        .chain(terms.iter().flat_map(|t| &t.white))
-        .chain(&moves)
-        .chain([&problem.data_white])
-        .map(Vec::as_slice)
-        .collect();
+    let white = white_columns(problem, terms, &moves);
     let columns: Vec<&Vec<f64>> = problem.base.iter().chain(terms.iter().flat_map(|t| &t.averaged)).collect();
     let (mut sum, mut count) = (0.0, 0usize);
     for block in blocks(problem) {
-        let mut outside = fit.gram.clone();
-        outside.add(&Gram::of(&white, block.clone()), -1.0);
-        let c = solve(&outside, &fit.priors, problem.worth)?.coefficients;
+        let c = fit.without(&Gram::of(&white, block.clone()), problem.worth)?.coefficients;
         for g in block.filter(|g| problem.certain[*g]) {
             let predicted: f64 = columns.iter().zip(&c).map(|(column, c)| c * column[g]).sum();
             sum += (problem.data[g] - predicted).powi(2);

@@ -227,6 +227,14 @@ impl Fit {
         &self.solution.coefficients[self.starts[k]..end]
     }
 
+    /// The same columns and priors fitted without a block of the data, whose products are `inside`.
+    #[must_use]
+    pub fn without(&self, inside: &Gram, worth: f64) -> Option<Solution> {
+        let mut outside = self.gram.clone();
+        outside.add(inside, -1.0);
+        solve(&outside, &self.priors, worth)
+    }
+
     /// Coefficients of the base.
     #[must_use]
     pub fn base(&self) -> &[f64] {
@@ -234,18 +242,17 @@ impl Fit {
     }
 }
 
+/// The white columns that a fit has the products of: base, terms, further ones, the data last.
+pub fn white_columns<'c>(problem: &'c Problem<'_>, terms: &[&'c Term<'_>], further: &'c [Vec<f64>]) -> Vec<&'c [f64]> {
+    let terms = terms.iter().flat_map(|t| &t.white);
+    problem.base_white.iter().chain(terms).chain(further).chain([&problem.data_white]).map(Vec::as_slice).collect()
+}
+
 impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// Products of the base and some terms.
     #[must_use]
     pub fn new(problem: &'p Problem<'a>, terms: Vec<&'t Term<'l>>) -> Self {
-        let columns: Vec<&[f64]> = problem
-            .base_white
-            .iter()
-            .chain(terms.iter().flat_map(|t| &t.white))
-            .chain([&problem.data_white])
-            .map(Vec::as_slice)
-            .collect();
-        let gram = Gram::of(&columns, 0..problem.data_white.len());
+        let gram = Gram::of(&white_columns(problem, &terms, &[]), 0..problem.data_white.len());
         Scaffold { problem, terms, gram }
     }
 
@@ -266,8 +273,8 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             .map(Vec::as_slice)
             .chain(further.iter().map(|(column, _)| column.as_slice()))
             .collect();
-        let before: Vec<&[f64]> =
-            problem.base_white.iter().chain(self.terms.iter().flat_map(|t| &t.white)).map(Vec::as_slice).collect();
+        let mut before = white_columns(problem, &self.terms, &[]);
+        before.truncate(old);
         let size = old + new.len() + 1;
         let mut gram = Gram { size, products: vec![0.0; size * size] };
         let mut put = |i: usize, j: usize, value: f64| {
@@ -359,8 +366,8 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             .collect()
     }
 
-    /// Columns (white) by which the prediction of `term` changes with each of its places.
-    fn derivatives(&self, term: &Term<'_>, coefficients: &[f64]) -> Vec<Vec<f64>> {
+    /// Columns (white) by which the prediction of `term` changes with each of its places, and how far the place may move.
+    fn derivatives(&self, term: &Term<'_>, coefficients: &[f64]) -> Vec<(Vec<f64>, Prior)> {
         (0..term.places.len())
             .map(|i| {
                 let mut places = term.places.clone();
@@ -375,7 +382,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                         *d += factor * (a - b);
                     }
                 }
-                change
+                (change, Prior { mean: 0.0, std: PLACE_SPREAD })
             })
             .collect()
     }
@@ -389,12 +396,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         }
         for _ in 0..STEPS {
             let coefficients = fit.of(fit.starts.len() - 1).to_vec();
-            let further: Vec<(Vec<f64>, Prior)> = self
-                .derivatives(&term, &coefficients)
-                .into_iter()
-                .map(|d| (d, Prior { mean: 0.0, std: PLACE_SPREAD }))
-                .collect();
-            let (_, moves) = self.fit_with(&[&term], &further)?;
+            let (_, moves) = self.fit_with(&[&term], &self.derivatives(&term, &coefficients))?;
             let mut better = None;
             for shorter in [1.0, 0.4, 0.1] {
                 let places: Vec<f64> = term
@@ -422,12 +424,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             }
         }
         let coefficients = fit.of(fit.starts.len() - 1).to_vec();
-        let further: Vec<(Vec<f64>, Prior)> = self
-            .derivatives(&term, &coefficients)
-            .into_iter()
-            .map(|d| (d, Prior { mean: 0.0, std: PLACE_SPREAD }))
-            .collect();
-        let (free, _) = self.fit_with(&[&term], &further)?;
+        let (free, _) = self.fit_with(&[&term], &self.derivatives(&term, &coefficients))?;
         term.occam = (free.solution.evidence - fit.solution.evidence).min(0.0);
         Some((term, fit))
     }
@@ -439,9 +436,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         let fit = self.fit(&[])?;
         let mut further = Vec::new();
         for (k, term) in self.terms.iter().enumerate() {
-            for derivative in self.derivatives(term, fit.of(k)) {
-                further.push((derivative, Prior { mean: 0.0, std: PLACE_SPREAD }));
-            }
+            further.extend(self.derivatives(term, fit.of(k)));
         }
         let (fit, _) = self.fit_with(&[], &further)?;
         Some((fit, further.into_iter().map(|(column, _)| column).collect()))

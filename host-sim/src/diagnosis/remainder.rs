@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use realfft::RealFftPlanner;
+
 use super::candidate::Law;
 use super::model::{Problem, Scaffold, Term};
 use super::noise::{Noise, Whitener};
@@ -162,52 +164,20 @@ fn strongest(places: &[f64], values: &[f64], lowest: f64, highest: f64) -> Optio
     let wanted = (span * highest * 4.0).clamp(64.0, 262_144.0);
     let size = (wanted as usize).next_power_of_two().min(1 << 18);
     let step = span / (size as f64 * 0.5);
-    let mut re = vec![0.0; size];
-    let mut im = vec![0.0; size];
+    let transform = RealFftPlanner::new().plan_fft_forward(size);
+    let mut on_grid: Vec<f64> = transform.make_input_vec();
+    let mut spectrum = transform.make_output_vec();
     for (x, v) in places.iter().zip(values) {
         let at = ((x - low) / step) as usize;
-        re[at.min(size - 1)] += v;
+        on_grid[at.min(size - 1)] += v;
     }
-    transform(&mut re, &mut im);
+    transform.process(&mut on_grid, &mut spectrum).ok()?;
     let total: f64 = values.iter().map(|v| v * v).sum();
     let upto = ((highest * step * size as f64) as usize).min(size / 2);
     let from = ((lowest * step * size as f64).ceil() as usize).max(1);
     (from..upto)
-        .map(|k| (k as f64 / (size as f64 * step), (re[k] * re[k] + im[k] * im[k]) / total.max(1e-30)))
+        .map(|k| (k as f64 / (size as f64 * step), spectrum[k].norm_sqr() / total.max(1e-30)))
         .max_by(|a, b| a.1.total_cmp(&b.1))
-}
-
-/// Fourier transform in place, size a power of two (Cooley & Tukey 1965).
-fn transform(re: &mut [f64], im: &mut [f64]) {
-    let n = re.len();
-    let mut j = 0;
-    for i in 1..n {
-        let mut bit = n >> 1;
-        while j & bit != 0 {
-            j ^= bit;
-            bit >>= 1;
-        }
-        j |= bit;
-        if i < j {
-            re.swap(i, j);
-            im.swap(i, j);
-        }
-    }
-    let mut len = 2;
-    while len <= n {
-        let turn = -2.0 * PI / len as f64;
-        let twiddles: Vec<(f64, f64)> =
-            (0..len / 2).map(|k| ((turn * k as f64).cos(), (turn * k as f64).sin())).collect();
-        for start in (0..n).step_by(len) {
-            for (k, (c, s)) in twiddles.iter().enumerate() {
-                let (a, b) = (start + k, start + k + len / 2);
-                let (x, y) = (re[b] * c - im[b] * s, re[b] * s + im[b] * c);
-                (re[b], im[b]) = (re[a] - x, im[a] - y);
-                (re[a], im[a]) = (re[a] + x, im[a] + y);
-            }
-        }
-        len *= 2;
-    }
 }
 
 /// Power that a line of white noise reaches once in about 10⁵ spectra of so many rows.

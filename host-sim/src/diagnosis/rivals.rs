@@ -46,7 +46,7 @@ impl Rival {
 /// Rivals of term `k`, closest first.
 #[must_use]
 pub fn rivals(problem: &Problem<'_>, laws: &[Law], selected: &Selected<'_>, k: usize) -> Vec<Rival> {
-    let others: Vec<&Term<'_>> = selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
+    let others = selected.others(k);
     let scaffold = Scaffold::new(problem, others.clone());
     let all: Vec<&Term<'_>> = selected.terms.iter().collect();
     let now = predicted(problem, &all, &selected.fit);

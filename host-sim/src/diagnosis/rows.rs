@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::measurement::Session;
+use crate::measurement::{Session, quantile_of};
 use crate::nominal::{Fixed, Nominal};
 use crate::tables::ARCSEC_PER_RAD;
 
@@ -163,14 +163,10 @@ impl Rows {
     }
 }
 
-/// Quantile of a set of numbers; 0 of none.
+/// Quantile of those numbers that are finite; 0 of none.
 pub(crate) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-    if values.is_empty() {
-        return 0.0;
-    }
-    let at = ((values.len() - 1) as f64 * share).round() as usize;
-    *values.select_nth_unstable_by(at, f64::total_cmp).1
+    quantile_of(&mut values, share)
 }
 
 /// Root mean square.

@@ -4,8 +4,8 @@
 use rayon::prelude::*;
 
 use super::candidate::{Law, Tolerance};
-use super::linear::{Gram, solve};
-use super::model::{Fit, Problem, Scaffold, Term};
+use super::linear::Gram;
+use super::model::{Fit, Problem, Scaffold, Term, white_columns};
 
 /// Evidence (natural logarithm of the ratio) below which nothing is named: "very strong" by Kass & Raftery (1995).
 const LEAST_EVIDENCE: f64 = 6.0;
@@ -43,6 +43,14 @@ pub struct Selected<'l> {
     pub terms: Vec<Term<'l>>,
     /// Their fit.
     pub fit: Fit,
+}
+
+impl<'l> Selected<'l> {
+    /// All terms but the one at `k`.
+    #[must_use]
+    pub fn others(&self, k: usize) -> Vec<&Term<'l>> {
+        self.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect()
+    }
 }
 
 /// How a term stands in a selection.
@@ -136,7 +144,7 @@ pub fn standings(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Standing
 }
 
 pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Standing {
-    let others: Vec<&Term<'_>> = selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
+    let others = selected.others(k);
     let Some(without) = Scaffold::new(problem, others.clone()).fit(&[]) else {
         return Standing { evidence: f64::INFINITY, size: f64::INFINITY, alone: f64::INFINITY, left_out: 1.0 };
     };
@@ -210,20 +218,12 @@ pub fn blocks(problem: &Problem<'_>) -> Vec<std::ops::Range<usize>> {
 /// Relative gain of squared innovations in blocks left out, by having all `terms` instead of `fewer`.
 fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]) -> f64 {
     let misfit = |terms: &[&Term<'_>]| -> Option<f64> {
-        let columns: Vec<&[f64]> = problem
-            .base_white
-            .iter()
-            .chain(terms.iter().flat_map(|t| &t.white))
-            .chain([&problem.data_white])
-            .map(Vec::as_slice)
-            .collect();
+        let columns = white_columns(problem, terms, &[]);
         let fit = Scaffold::new(problem, terms.to_vec()).fit(&[])?;
         let mut all = 0.0;
         for block in blocks(problem) {
             let inside = Gram::of(&columns, block);
-            let mut outside = fit.gram.clone();
-            outside.add(&inside, -1.0);
-            let solution = solve(&outside, &fit.priors, problem.worth)?;
+            let solution = fit.without(&inside, problem.worth)?;
             let n = fit.priors.len();
             let c = &solution.coefficients;
             let mut left = inside.at(n, n);
@@ -441,8 +441,7 @@ fn settle<'l>(problem: &Problem<'_>, mut selected: Selected<'l>) -> Option<Selec
             continue;
         }
         let term = selected.terms[k].clone();
-        let others: Vec<&Term<'_>> =
-            selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
+        let others = selected.others(k);
         if let Some((term, _)) = Scaffold::new(problem, others).refine(term) {
             selected.terms[k] = term;
         }
@@ -465,8 +464,7 @@ fn backward<'l>(
             let c = selected.fit.of(k);
             let physical = sound(&selected.terms[k], c);
             let in_tolerance = law.tolerance_of.is_some() && {
-                let others: Vec<&Term<'_>> =
-                    selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
+                let others = selected.others(k);
                 Scaffold::new(problem, others).fit(&[]).is_none_or(|without| !out_of_tolerance(problem, &without, law))
             };
             let misfit = (0..selected.terms.len())
@@ -494,8 +492,7 @@ fn exchange<'l>(
     log: &mut impl FnMut(String),
 ) -> Option<Selected<'l>> {
     for k in 0..selected.terms.len() {
-        let others: Vec<Term<'l>> =
-            selected.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t.clone()).collect();
+        let others: Vec<Term<'l>> = selected.others(k).into_iter().cloned().collect();
         let without = fit(problem, &others)?;
         let open: Vec<&Law> = laws
             .iter()

@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use super::linear::{Gram, solve};
-use super::model::{Fit, Problem, Scaffold, Term};
+use super::linear::Gram;
+use super::model::{Fit, Problem, Scaffold, Term, white_columns};
 use super::report::Parameter;
 use super::select::{Selected, blocks};
 
@@ -58,20 +58,11 @@ pub fn parameters(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<BTreeMa
     let Some((fit, moves)) = scaffold.linearised() else { return empty() };
     let n = fit.priors.len();
     // Jackknife over blocks: shifts of all coefficients when a block is left out.
-    let white: Vec<&[f64]> = problem
-        .base_white
-        .iter()
-        .chain(terms.iter().flat_map(|t| &t.white))
-        .chain(&moves)
-        .chain([&problem.data_white])
-        .map(Vec::as_slice)
-        .collect();
+    let white = white_columns(problem, &terms, &moves);
     let shifts: Vec<Vec<f64>> = blocks(problem)
         .into_iter()
         .filter_map(|block| {
-            let mut outside = fit.gram.clone();
-            outside.add(&Gram::of(&white, block), -1.0);
-            let solved = solve(&outside, &fit.priors, problem.worth)?;
+            let solved = fit.without(&Gram::of(&white, block), problem.worth)?;
             Some(solved.coefficients.iter().zip(&fit.solution.coefficients).map(|(a, b)| a - b).collect())
         })
         .collect();
