@@ -11,6 +11,7 @@ use super::candidate::{Excitation, Law, Scales, library};
 use super::model::{Problem, Scaffold, Term};
 use super::noise::Whitener;
 use super::report::Parameter;
+use super::resolution::{Resolution, resolution};
 use super::rows::Rows;
 use super::select::{Selected, fit};
 use super::{DiagnosisError, Settings, prepare, uncertainty};
@@ -119,8 +120,8 @@ impl Extended {
         let on = Excitation { rows: &rows, nominal, base: &base, scales: &scales };
         let laws = library(&on);
         let uncertain = prepare::uncertain(&on, &[]);
-        let (noise, worth) = prepare::noise(&on, &laws, &[], &uncertain);
-        let stride = (rows.count_used() / settings.averages).max(1);
+        let Resolution { stride, fast } = resolution(&on, &laws, &uncertain, settings.averages);
+        let (noise, worth) = prepare::noise(&on, &laws, &fast, &uncertain);
         let problem = Problem::new(&on, &uncertain, Whitener::new(&rows, &uncertain, stride, noise), worth);
         let start: Vec<(usize, Vec<f64>)> = super::select::fixed(&problem, &laws, causes)
             .iter()

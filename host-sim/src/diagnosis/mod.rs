@@ -20,6 +20,7 @@ pub mod noise;
 pub mod prepare;
 pub mod remainder;
 pub mod report;
+mod resolution;
 pub mod rivals;
 pub mod rows;
 pub mod select;
@@ -40,6 +41,7 @@ pub use extended::{Extended, FittedCause, Series};
 use model::{Fit, Problem, Term};
 use noise::{Noise, Whitener};
 use report::{Cause, Compensation, Diagnosis, Parameter, Residual, Unexplained, Verdict};
+use resolution::{Resolution, resolution};
 use rows::Rows;
 use select::{Selected, fit, predicted, select, standings};
 
@@ -175,10 +177,10 @@ impl<'a> Search<'a> {
                 eprintln!("{text}");
             }
         };
-        let stride = (on.rows.count_used() / settings.averages).max(1);
         let mut uncertain = prepare::uncertain(on, &[]);
+        let Resolution { stride, fast: at_first } = resolution(on, &laws, &uncertain, settings.averages);
         let whiten = |noise, uncertain: &[bool]| Whitener::new(on.rows, uncertain, stride, noise);
-        let (mut noise, mut worth) = prepare::noise(on, &laws, &[], &uncertain);
+        let (mut noise, mut worth) = prepare::noise(on, &laws, &at_first, &uncertain);
         say(format!("play {:?}, {noise:?}, worth {worth:.2}, {} rows", on.base.law, on.rows.count_used()));
         let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain), worth);
         let mut fast: Vec<Unexplained> = Vec::new();

@@ -151,3 +151,32 @@ fn a_model_fitted_to_some_sessions_predicts_the_others() {
     let again = Extended::fit_to(&changed, &used, &nominal, None, &causes, &settings).unwrap();
     assert_eq!(again.predict(&sessions, &nominal, None), series);
 }
+
+#[test]
+fn a_form_error_of_the_cam_that_averages_would_hide_is_found_and_costs_nothing_where_there_is_none() {
+    let drive = catalogue_drive();
+    let plan =
+        Plan { sessions: 5, rows: 6000, rate_hz: 100.0, speed_rad_s: 6.0, torque_n_m: 40.0, richness: Richness::Rich };
+    let sensors = Sensors { white_arcsec: 2.0, wander_arcsec: 0.8, wander_s: 12.0 };
+    let rows_to_an_average = |sessions: &[Session]| {
+        let rows = super::Rows::new(sessions, &drive);
+        let (base, jumps) = super::prepare::base(&rows, &drive, None);
+        let settings = Settings::default();
+        let scales = super::Scales::new(&rows, settings.pitch_radius_mm, jumps);
+        let on = super::Excitation { rows: &rows, nominal: &drive, base: &base, scales: &scales };
+        let uncertain = super::prepare::uncertain(&on, &[]);
+        super::resolution(&on, &super::library(&on), &uncertain, settings.averages).stride
+    };
+    let measured = |effects: &[Effect]| measure(&drive, effects, &plan, &sensors, 0, &mut fastrand::Rng::with_seed(5));
+    let cam = measured(&[effect("cam_form_error", 4.0, 0.7, 0.5)]);
+    assert_eq!(rows_to_an_average(&cam), 1);
+    let diagnosis = diagnose(&cam, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::Explained, vec!["cam_form_error"]));
+    for other in [
+        vec![],
+        vec![effect("circular_spline_pitch_error", 12.0, 0.7, 0.5)],
+        vec![effect("sensor_latency", 2.0, 0.0, 0.3)],
+    ] {
+        assert_eq!(rows_to_an_average(&measured(&other)), 2);
+    }
+}

@@ -47,7 +47,7 @@ pub(super) enum Law {
     Pitch { angle: Angle, lines: Vec<(f64, f64, f64)> },
     /// One lobe carries more: order 1 of both wheels.
     Lobes { amplitude: f64, phase_rad: f64, half_load_n_m: f64 },
-    /// Tooth mesh, and even orders of the generator.
+    /// The tooth mesh and its first overtone.
     CamForm { amplitude: f64, phase_rad: f64 },
     /// A pulse where a lobe meets the tooth.
     Damage { angle: Angle, amplitude: f64, place_rad: f64, half_width_rad: f64, both_flanks: bool },
@@ -230,15 +230,15 @@ impl Law {
                 error[k] += amplitude * now.fade(*half_load_n_m, k) * one;
             }),
             Law::CamForm { amplitude, phase_rad } => {
+                // Every tooth meets the same generator: nothing repeats less often than the teeth, and the clearance is another.
                 let teeth = now.nominal().teeth.map_or(188.0, |teeth| f64::from(teeth.flexspline));
-                let top = now.top();
+                let (top, overtone, wider) =
+                    (now.top(), if changed { 0.25 } else { 0.1 }, if changed { 0.4 } else { 0.0 });
                 (0..n).for_each(|k| {
-                    let psi = on.generator[k];
-                    let mesh = (teeth * psi + phase_rad + 0.4 * now.side(k)).cos();
-                    let lobes = (4.0 * psi + 2.0 * phase_rad).cos() + 0.5 * (6.0 * psi + 3.0 * phase_rad).cos();
-                    let share = if changed { 0.4 } else { 0.8 };
+                    let mesh = teeth * now.angle(Angle::Flexspline, k) + phase_rad + 0.4 * now.side(k);
                     let load = 1.0 + 0.2 * torque[k].abs() / top;
-                    error[k] += amplitude * ((1.0 - share) * mesh + share * lobes) * load;
+                    let waves = mesh.cos() + overtone * (2.0 * mesh + 1.0).cos();
+                    error[k] += amplitude * (waves * load + wider * now.side(k));
                 });
             }
             Law::Damage { angle, amplitude, place_rad, half_width_rad, both_flanks } => {

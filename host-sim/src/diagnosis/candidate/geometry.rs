@@ -307,12 +307,15 @@ fn cam_form_error() -> Law {
         let teeth = on.nominal.teeth.map_or(188.0, |t| f64::from(t.flexspline));
         let of = Angle::Flexspline;
         let flank = |k: usize| on.base.flank[k];
-        let light = |k: usize| if on.scales.load > 0.0 { fading(on, 0.5 * on.scales.load, k) } else { 1.0 };
         let mut columns: Vec<Column> = Vec::new();
-        columns.extend(waves(on, of, teeth, light).map(|v| main(v, 8.0)));
-        columns.extend(waves(on, of, teeth, |k| light(k) * flank(k)).map(|v| main(v, 8.0)));
-        columns.extend(waves(on, of, teeth, |_| 1.0).map(|v| nuisance(v, 0.4)));
-        columns.extend(waves(on, of, teeth, flank).map(|v| nuisance(v, 0.4)));
+        columns.extend(waves(on, of, teeth, |_| 1.0).map(|v| main(v, 8.0)));
+        columns.extend(waves(on, of, teeth, flank).map(|v| main(v, 8.0)));
+        if on.scales.load > 0.0 {
+            // More teeth carry, or other ones.
+            let load = |k: usize| (on.rows.torque[k] / on.scales.load).abs();
+            columns.extend(waves(on, of, teeth, load).map(|v| nuisance(v, 0.6)));
+            columns.extend(waves(on, of, teeth, |k| load(k) * flank(k)).map(|v| nuisance(v, 0.6)));
+        }
         columns.extend(waves(on, of, 2.0 * teeth, flank).map(|v| nuisance(v, 0.4)));
         columns.extend(waves(on, of, 2.0 * teeth, |_| 1.0).map(|v| nuisance(v, 0.4)));
         columns.push(nuisance(by_row(on, flank), 1.0));

@@ -1,0 +1,119 @@
+//! How many neighbouring rows are averaged to one. Averages make a diagnosis quick, and hide what changes from row to row: the tooth
+//! mesh, at z periods per generator turn. So the differences that averaging would throw away are looked at first, for the laws that
+//! live in them; where one shows, every row is kept.
+
+use super::candidate::{Excitation, Law, Tolerance};
+use super::linear::{Gram, Prior, solve};
+use super::rows::{Rows, quantile, rms};
+
+/// Rows whose mean is taken from each of them, to see what is fast.
+const TOGETHER: usize = 5;
+/// A column is hidden where averaging leaves less than this share of it.
+const HIDDEN: f64 = 0.8;
+/// A column that the detail holds less than this share of says nothing in it.
+const IN_DETAIL: f64 = 0.3;
+/// Evidence for a fast law from which every row is kept.
+const LEAST_EVIDENCE: f64 = 10.0;
+/// What is farther out than this many standard deviations is no noise, and no wave.
+const OUTLIER: f64 = 5.0;
+
+/// How finely the rows are looked at.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Resolution {
+    /// Rows to an average.
+    pub stride: usize,
+    /// What fast laws explain, row by row, arcsec; empty if none showed.
+    pub fast: Vec<f64>,
+}
+
+/// Rows to an average that leave about `averages` of them, or every row where averaging would hide a law that the data hold.
+/// Rows marked uncertain are not looked at.
+#[must_use]
+pub fn resolution(on: &Excitation<'_>, laws: &[Law], uncertain: &[bool], averages: usize) -> Resolution {
+    let left: Vec<f64> = on.rows.error.iter().zip(&on.base.prediction).map(|(e, p)| e - p).collect();
+    let stride = (on.rows.count_used() / averages).max(1);
+    if stride == 1 {
+        return Resolution { stride, fast: Vec::new() };
+    }
+    let shown = laws.iter().filter(|law| law.named && law.shapes.is_empty()).find_map(|law| {
+        let main: Vec<Vec<f64>> = main_columns(on, law);
+        let hidden = !main.is_empty() && main.iter().all(|c| rms(&averaged(on.rows, c, stride)) < HIDDEN * rms(c));
+        if !hidden {
+            return None;
+        }
+        explained_in_detail(on.rows, &main, &left, uncertain)
+    });
+    match shown {
+        Some(fast) => Resolution { stride: 1, fast },
+        None => Resolution { stride, fast: Vec::new() },
+    }
+}
+
+fn main_columns(on: &Excitation<'_>, law: &Law) -> Vec<Vec<f64>> {
+    let columns = (law.columns)(on, &[]);
+    columns.into_iter().filter(|c| matches!(c.tolerance, Tolerance::Main(_))).map(|c| c.values).collect()
+}
+
+/// Means of `stride` rows, session by session.
+fn averaged(rows: &Rows, column: &[f64], stride: usize) -> Vec<f64> {
+    rows.sessions_used()
+        .flat_map(|session| column[session].chunks(stride).map(|c| c.iter().sum::<f64>() / c.len() as f64))
+        .collect()
+}
+
+/// What is left of each row less the mean of the rows around it: nothing of a straight line.
+fn detail(rows: &Rows, column: &[f64]) -> Vec<f64> {
+    let half = TOGETHER / 2;
+    let mut detail = vec![0.0; column.len()];
+    for session in rows.sessions_used() {
+        for k in session.start + half..session.end.saturating_sub(half) {
+            detail[k] = column[k] - column[k - half..=k + half].iter().sum::<f64>() / TOGETHER as f64;
+        }
+    }
+    detail
+}
+
+/// The columns fitted to the detail of the data, as what they explain in the rows; nothing where the evidence is short.
+fn explained_in_detail(rows: &Rows, columns: &[Vec<f64>], left: &[f64], uncertain: &[bool]) -> Option<Vec<f64>> {
+    let mut data = detail(rows, left);
+    let usable =
+        |k: usize| !uncertain[k.saturating_sub(TOGETHER / 2)..(k + TOGETHER / 2 + 1).min(left.len())].contains(&true);
+    let spread = quantile((0..data.len()).filter(|k| usable(*k)).map(|k| data[k].abs()), 0.5) / 0.6745;
+    let mut used = 0usize;
+    for (k, value) in data.iter_mut().enumerate() {
+        if usable(k) && value.abs() < OUTLIER * spread {
+            used += 1;
+        } else {
+            *value = f64::NAN;
+        }
+    }
+    let details: Vec<Vec<f64>> = columns
+        .iter()
+        .map(|column| {
+            let fine = detail(rows, column);
+            fine.iter().zip(&data).map(|(c, d)| if d.is_nan() { 0.0 } else { *c }).collect()
+        })
+        .collect();
+    if details.iter().zip(columns).any(|(fine, column)| rms(fine) < IN_DETAIL * rms(column))
+        || used < 20 * columns.len()
+    {
+        return None;
+    }
+    let data: Vec<f64> = data.iter().map(|d| if d.is_nan() { 0.0 } else { *d }).collect();
+    let views: Vec<&[f64]> = details.iter().chain([&data]).map(Vec::as_slice).collect();
+    let gram = Gram::of(&views, 0..data.len());
+    let free: Vec<Prior> = columns.iter().map(|c| Prior { mean: 0.0, std: 1e3 * spread / rms(c).max(1e-12) }).collect();
+    let solution = solve(&gram, &free, 1.0)?;
+    let before = gram.at(columns.len(), columns.len());
+    // Schwarz: what the fit gains in likelihood, less what so many free columns gain of noise.
+    let n = used as f64;
+    let evidence = 0.5 * n * (before / solution.residual.max(1e-300)).ln() - 0.5 * columns.len() as f64 * n.ln();
+    if evidence < LEAST_EVIDENCE {
+        return None;
+    }
+    let mut explained = vec![0.0; left.len()];
+    for (column, c) in columns.iter().zip(&solution.coefficients) {
+        explained.iter_mut().zip(column).for_each(|(sum, v)| *sum += c * v);
+    }
+    Some(explained)
+}
