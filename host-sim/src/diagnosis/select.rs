@@ -109,7 +109,8 @@ fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law]) -> Vec<
     let tried: Vec<(usize, f64, Vec<f64>)> = trials
         .into_par_iter()
         .filter_map(|(k, places)| {
-            let term = Term::new(problem, laws[k], places.clone()).main_only();
+            let term = Term::new(problem, laws[k], places.clone());
+            let term = if laws[k].whole { term } else { term.main_only() };
             let fit = scaffold.fit(&[&term])?;
             Some((k, fit.solution.evidence, places))
         })

@@ -205,6 +205,8 @@ pub struct Law {
     pub lead: Option<Lead>,
     /// The law is a free profile: what it may hold has to be taken out before the noise is measured, the finest detail too.
     pub free_form: bool,
+    /// Looked for with its nuisance columns, as its main ones mean nothing without them.
+    pub whole: bool,
     /// Load (N·m, row by row) that the cause adds beside the torque that was recorded.
     pub load: Option<Load>,
 }
@@ -249,12 +251,17 @@ impl Law {
             doubt: USUAL_DOUBT,
             lead: None,
             free_form: false,
+            whole: false,
             load: None,
         }
     }
     fn exact(mut self) -> Law {
         self.misfit = EXACT_MISFIT;
         self.doubt = EXACT_DOUBT;
+        self
+    }
+    fn whole(mut self) -> Law {
+        self.whole = true;
         self
     }
     fn shapes(mut self, shapes: impl IntoIterator<Item = Shape>) -> Law {

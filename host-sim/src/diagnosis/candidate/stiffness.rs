@@ -1,5 +1,8 @@
 //! What the torque does beyond the nominal wind-up and play (PHYSICS §5, 14-17, 22, 24).
 
+use std::ops::Range;
+
+use super::super::rows::rms;
 use super::{Excitation, Law, Shape, by_row, main, nuisance};
 
 /// Torque in units of the load scale.
@@ -7,37 +10,71 @@ fn load_share(on: &Excitation<'_>, k: usize) -> f64 {
     on.rows.torque[k] / on.scales.load.max(1e-9)
 }
 
-/// The spring part of a slip element (stop operator): follows the torque up to ±`slip`, in units of `slip`.
+/// The spring part of a slip element (stop operator): follows the torque up to ±`slip`, in units of `slip`. Each session begins with
+/// the element at rest before its first load.
 pub(super) fn stop_operator(on: &Excitation<'_>, slip: f64) -> Vec<f64> {
     let torque = &on.rows.torque;
     let mut held = vec![0.0; torque.len()];
     for session in &on.rows.sessions {
-        let mut z = 0.0;
-        for k in session.clone() {
-            let step = torque[k] - if k > session.start { torque[k - 1] } else { 0.0 };
-            z = f64::clamp(z + step, -slip, slip);
-            held[k] = z / slip;
-        }
+        let first = torque.get(session.start).map_or(0.0, |t| t.clamp(-slip, slip));
+        follow(torque, session.clone(), slip, first, &mut held);
     }
     held
 }
 
+/// The element through one session, from what it holds at the first row.
+fn follow(torque: &[f64], session: Range<usize>, slip: f64, first: f64, held: &mut [f64]) {
+    let mut z = first;
+    for k in session.clone() {
+        if k > session.start {
+            z = (z + torque[k] - torque[k - 1]).clamp(-slip, slip);
+        }
+        held[k] = z / slip;
+    }
+}
+
+/// Half the difference between the two extremes that the element may have begun a session with: what nobody recorded, until the torque
+/// has swung far enough to wipe it out. One column for each of the sessions that remember longest.
+fn unknown_beginnings(on: &Excitation<'_>, slip: f64) -> Vec<Vec<f64>> {
+    let torque = &on.rows.torque;
+    let mut columns: Vec<Vec<f64>> = on
+        .rows
+        .sessions
+        .iter()
+        .map(|session| {
+            let (mut high, mut low) = (vec![0.0; torque.len()], vec![0.0; torque.len()]);
+            follow(torque, session.clone(), slip, slip, &mut high);
+            follow(torque, session.clone(), slip, -slip, &mut low);
+            high.iter().zip(&low).map(|(h, l)| 0.5 * (h - l)).collect()
+        })
+        .collect();
+    columns.sort_by(|a, b| rms(b).total_cmp(&rms(a)));
+    columns.truncate(MOST_BEGINNINGS);
+    columns
+}
+
+/// Sessions whose beginning is left open, at most.
+const MOST_BEGINNINGS: usize = 10;
+
 /// Springs that slip one after the other (Maxwell slip, Prandtl-Ishlinskii): the output lags the torque by what they hold.
 fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     let load = on.scales.load;
-    Law::new("torsional_hysteresis", |on, shape| {
+    let mut law = Law::new("torsional_hysteresis", |on, shape| {
         let slip = shape[0];
         let usual = on.nominal.wind_up_arcsec(on.scales.load).mul_add(0.3, 30.0);
         let negative = |values: Vec<f64>| values.into_iter().map(|z| -z).collect::<Vec<f64>>();
-        vec![
+        let mut columns = vec![
             // The opening is a share of the wind-up: a plastic gear's is wide (PHYSICS §5: 0.5 to 2' of a steel drive's 3').
             main(negative(stop_operator(on, slip)), usual),
             nuisance(negative(stop_operator(on, 0.35 * slip)), 0.35),
             nuisance(negative(stop_operator(on, 2.5 * slip)), 0.5),
             nuisance(by_row(on, |k| load_share(on, k)), 0.7),
             nuisance(by_row(on, |k| load_share(on, k).powi(3)), 0.15),
-        ]
+        ];
+        columns.extend(unknown_beginnings(on, slip).into_iter().map(|held| nuisance(held, 1.0)));
+        columns
     })
+    .whole()
     .shapes([Shape::by_factors("slip_torque_n_m", 0.03 * load, 1.0 * load, 6)])
     .parameters(|on, shape, c| {
         // On the way back from the full load an element holds this share of what it can when the torque passes zero.
@@ -46,7 +83,10 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
         let half_width: f64 = [1.0, 0.35, 2.5].iter().zip(c).map(|(factor, c)| c * held(factor * shape[0])).sum();
         vec![("half_width_arcsec", half_width), ("slip_torque_n_m", shape[0])]
     })
-    .physical(|_, c| c[0] > 0.0)
+    .physical(|_, c| c[0] > 0.0);
+    // What a spring holds goes with the load; the wind-up beside it takes that back, and the beginnings are nobody's.
+    law.most_nuisance = 2.0;
+    law
 }
 
 /// Stiffer the higher the load: the wind-up lags behind the nominal line by a power of the torque.
