@@ -15,6 +15,8 @@ use crate::effect::{Effect, Family, What};
 use crate::motion::Motion;
 use crate::teeth::Zones;
 
+pub(crate) use damage::Ratchet;
+
 /// The plant at one instant, as a law sees it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Now {
@@ -166,6 +168,6 @@ pub fn build(effect: &Effect, setting: Setting) -> Box<dyn Law> {
         // A delay acts on the readings as a whole: see the plant.
         Cause::SensorLatency => Box::new(errors::Nothing),
         Cause::RatioError => Box::new(errors::Ratio { relative: size, family, start: None }),
-        Cause::Ratcheting => Box::new(damage::Ratchet::new(size, shape[0], family, setting)),
+        Cause::Ratcheting => Box::new(Ratchet::new(size, shape[0], family, setting)),
     }
 }

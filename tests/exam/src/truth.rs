@@ -3,13 +3,14 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-use crate::ARCSEC;
 use crate::bench::Bench;
 use crate::case::{Case, Kind};
 use crate::cause::Cause;
 use crate::chance::Chance;
 use crate::drive::{Drive, Unit};
 use crate::effect::{Effect, Family, What};
+use crate::laws::Ratchet;
+use crate::laws::Setting;
 use crate::rival;
 
 /// One hidden effect, or a fault of the data.
@@ -194,7 +195,8 @@ fn parameters(effect: &Effect, case: &Case) -> BTreeMap<String, f64> {
             list.push(("damping_ratio", effect.shape[1]));
         }
         Cause::Ratcheting => {
-            list.push(("jump_arcsec", std::f64::consts::TAU / drive.output_teeth() * ARCSEC));
+            let setting = Setting { drive, unit, motion: &case.motion };
+            list.push(("jump_arcsec", Ratchet::new(size, effect.shape[0], case.family, setting).slipped_arcsec()));
         }
         _ => {}
     }

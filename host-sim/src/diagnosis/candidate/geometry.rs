@@ -123,7 +123,8 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
     })
     .shapes([Shape::angle("phase_rad", PI, 1)].into_iter().chain(loaded.then(|| half_load(on))))
     .parameters(move |on, shape, c| {
-        let amplitude = c[0] / SECOND_ORDER;
+        let by = FLANK_AHEAD * sense(on);
+        let amplitude = second_order_unloaded(c, shape[0], by) / SECOND_ORDER;
         let mut named: Vec<Named> = vec![
             ("amplitude_um", amplitude * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um),
             ("amplitude_arcsec", amplitude),
@@ -157,6 +158,21 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
         loaded_only: false,
     });
     law
+}
+
+/// Second order of a rectified eccentricity without load, all columns of [`rectified`] together: what fades and what does not share it
+/// in proportions that loads of a narrow range cannot tell. Each column of order 2 is projected on the pattern, flank by flank.
+fn second_order_unloaded(c: &[f64], phase_rad: f64, ahead_by: f64) -> f64 {
+    let at = |j: usize| c.get(j).copied().unwrap_or(0.0);
+    let wave = |j: usize| [at(j), at(j + 1)];
+    let both = [wave(2), wave(12)];
+    let by_flank = [wave(4), wave(14)];
+    let on_pattern = |flank: f64| {
+        let (sin, cos) = (2.0 * phase_rad - 2.0 * ahead_by * flank).sin_cos();
+        let along = |w: &[f64; 2]| w[0] * cos + w[1] * sin;
+        both.iter().map(|w| flank * along(w)).chain(by_flank.iter().map(along)).sum::<f64>()
+    };
+    c[0] + 0.5 * (on_pattern(1.0) + on_pattern(-1.0))
 }
 
 /// Errors of position along the pitch: nearly the same on both flanks and under any load. Of the teeth in mesh the foremost carries,

@@ -163,7 +163,7 @@ fn wear(by: Progress) -> Law {
         ]
     })
     .shapes([Shape::by_factors("exponent", 0.5, 2.0, 1)])
-    .parameters(|_, shape, c| vec![("growth_arcsec", 2.0 * c[0]), ("exponent", shape[0])])
+    .parameters(|_, shape, c| vec![("growth_arcsec", 2.0 * (c[0] + c[1])), ("exponent", shape[0])])
     .physical(|_, c| c[0] > 0.0)
 }
 

@@ -81,6 +81,11 @@ impl Ratchet {
         let jump_arcsec = teeth * (TAU / setting.drive.output_teeth() * ARCSEC).copysign(torque[at]);
         Self { at, second, jump_arcsec, family, jumped: 0.0 }
     }
+
+    /// All jumps together, with the sign of the load that forced them.
+    pub fn slipped_arcsec(&self) -> f64 {
+        self.jump_arcsec * if self.second == usize::MAX { 1.0 } else { 2.0 }
+    }
 }
 
 impl Law for Ratchet {
