@@ -313,6 +313,9 @@ fn conclude(
     } else {
         verdict
     };
+    // Nothing named, nothing extended: what has no name helps to see what is there, and predicts nothing for anybody.
+    let held =
+        if matches!(verdict, Verdict::None | Verdict::Unknown) { held_out::evaluate(problem, &[]) } else { held };
     let mut causes = Vec::new();
     let mut next_experiment = None;
     let mut told_better = Vec::new();

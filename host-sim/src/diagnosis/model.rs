@@ -135,7 +135,9 @@ impl<'l> Term<'l> {
             .zip(&self.size)
             .map(|(tolerance, size)| match tolerance {
                 Tolerance::Main(prior) => *prior,
-                Tolerance::Nuisance(share) => Prior { mean: 0.0, std: share * explained / size.max(1e-9) },
+                Tolerance::Nuisance(share) | Tolerance::Beside(share) => {
+                    Prior { mean: 0.0, std: share * explained / size.max(1e-9) }
+                }
             })
             .collect()
     }

@@ -83,12 +83,13 @@ fn same(apart: f64, size: f64) -> bool {
 
 /// Whether a fitted term makes sense.
 pub(super) fn sound(term: &Term<'_>, coefficients: &[f64]) -> bool {
-    let part = |main: bool| -> f64 {
-        let of = |j: usize| matches!(term.tolerances[j], Tolerance::Main(_)) == main;
-        let only: Vec<f64> = (0..term.len()).map(|j| if of(j) { coefficients[j] } else { 0.0 }).collect();
+    let part = |of: fn(&Tolerance) -> bool| -> f64 {
+        let only: Vec<f64> =
+            term.tolerances.iter().zip(coefficients).map(|(t, c)| if of(t) { *c } else { 0.0 }).collect();
         super::rows::rms(&term.contribution(&only))
     };
-    term.law.sound(&term.law.values(&term.places), coefficients, part(true), part(false))
+    let (main, nuisance) = (part(|t| matches!(t, Tolerance::Main(_))), part(|t| matches!(t, Tolerance::Nuisance(_))));
+    term.law.sound(&term.law.values(&term.places), coefficients, main, nuisance)
 }
 
 /// Fits a set of terms.
@@ -433,17 +434,37 @@ fn forward<'l>(
 }
 
 /// Refines each term beside the others.
-fn settle<'l>(problem: &Problem<'_>, mut selected: Selected<'l>) -> Option<Selected<'l>> {
+fn settle<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
     if selected.terms.len() < 2 {
         return Some(selected);
     }
+    settle_from(problem, selected, |_, term| vec![term.clone()])
+}
+
+/// The same where a term has gone that the others were refined beside: those with a lead begin where it points now, too.
+fn settle_anew<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
+    settle_from(problem, selected, |scaffold, term| {
+        let anew = if term.law.lead.is_some() { scaffold.begin(term.law) } else { Vec::new() };
+        [term.clone()].into_iter().chain(anew.into_iter().map(|places| Term::new(problem, term.law, places))).collect()
+    })
+}
+
+/// Refines each term beside the others from the places that `beginnings` gives, and keeps the best.
+fn settle_from<'l>(
+    problem: &Problem<'_>,
+    mut selected: Selected<'l>,
+    beginnings: impl Fn(&Scaffold<'_, '_, '_, 'l>, &Term<'l>) -> Vec<Term<'l>>,
+) -> Option<Selected<'l>> {
     for k in 0..selected.terms.len() {
         if selected.terms[k].places.is_empty() {
             continue;
         }
-        let term = selected.terms[k].clone();
-        let others = selected.others(k);
-        if let Some((term, _)) = Scaffold::new(problem, others).refine(term) {
+        let scaffold = Scaffold::new(problem, selected.others(k));
+        let refined = beginnings(&scaffold, &selected.terms[k]).into_iter().filter_map(|term| scaffold.refine(term));
+        let best = refined.max_by(|(a, at_a), (b, at_b)| {
+            (at_a.solution.evidence + a.occam).total_cmp(&(at_b.solution.evidence + b.occam))
+        });
+        if let Some((term, _)) = best {
             selected.terms[k] = term;
         }
     }
@@ -480,7 +501,7 @@ fn backward<'l>(
         let Some(k) = weakest else { break };
         log(format!("  - {}: {:?}", selected.terms[k].law.cause, standings[k]));
         selected.terms.remove(k);
-        selected.fit = fit(problem, &selected.terms)?;
+        selected = settle_anew(problem, selected)?;
     }
     Some(selected)
 }

@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::nominal::Fixed;
 
-use super::{Column, Excitation, Kin, Law, Lead, Named, Shape, by_row, main, nuisance, polar};
+use super::{Column, Excitation, Kin, Law, Lead, Named, Shape, beside, by_row, main, nuisance, polar};
 
 /// Share by which a law of shape may be wrong: signatures depend on generator and load (PHYSICS §3.4).
 const SHAPE_MISFIT: f64 = 0.2;
@@ -109,7 +109,7 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
             fade(k) * flank(k) * wave
         });
         let mut columns: Vec<Column> = vec![main(pattern, USUAL_ARCSEC)];
-        columns.push(nuisance(by_row(on, |k| fade(k) * flank(k)), 0.4));
+        columns.push(beside(by_row(on, |k| fade(k) * flank(k)), 0.4));
         columns.extend(waves(on, of, 2.0, fade).map(|v| nuisance(v, 0.15)));
         columns.extend(waves(on, of, 2.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.15)));
         columns.extend(waves(on, of, 4.0, fade).map(|v| nuisance(v, 0.1)));
@@ -295,8 +295,8 @@ fn generator_eccentricity(on: &Excitation<'_>) -> Law {
                 columns.extend(waves(on, of, 1.0, |_| 1.0).map(|v| nuisance(v, 0.2)));
             }
         }
-        columns.push(nuisance(by_row(on, flank), 2.0));
-        columns.push(nuisance(by_row(on, |k| fade(k) * flank(k)), 2.0));
+        columns.push(beside(by_row(on, flank), 2.0));
+        columns.push(beside(by_row(on, |k| fade(k) * flank(k)), 2.0));
         columns
     })
     .shapes(loaded.then(|| half_load(on)))
@@ -334,7 +334,7 @@ fn cam_form_error() -> Law {
         }
         columns.extend(waves(on, of, 2.0 * teeth, flank).map(|v| nuisance(v, 0.4)));
         columns.extend(waves(on, of, 2.0 * teeth, |_| 1.0).map(|v| nuisance(v, 0.4)));
-        columns.push(nuisance(by_row(on, flank), 1.0));
+        columns.push(beside(by_row(on, flank), 1.0));
         columns
     })
     .parameters(|on, _, c| {
@@ -410,8 +410,6 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     for law in &mut laws {
         law.misfit = SHAPE_MISFIT;
         law.kin = Kin::Shape;
-        // The clearance that the deeper lobe takes is more than its waves.
-        law.most_nuisance = if law.cause == "generator_eccentricity" { 6.0 } else { 1.0 };
     }
     laws
 }

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::geometry::{Angle, COS_PRESSURE_ANGLE, angle};
-use super::{Column, Excitation, Law, Shape, Tolerance, by_row, nuisance, polar};
+use super::{Column, Excitation, Law, Shape, Tolerance, beside, by_row, nuisance, polar};
 use crate::diagnosis::linear::Prior;
 use crate::drive::Wheel;
 use crate::kernels::{Gain, Kernels};
@@ -65,7 +65,7 @@ fn left_open(on: &Excitation<'_>, of: Angle, order: f64) -> Vec<Column> {
     let mut columns: Vec<Column> = [(0.0, false), (0.5 * PI, false), (0.0, true), (0.5 * PI, true)]
         .map(|(shift, by_flank)| nuisance(wave(shift, by_flank), 0.05))
         .into();
-    columns.push(nuisance(by_row(on, flank), 0.1));
+    columns.push(beside(by_row(on, flank), 0.1));
     columns
 }
 

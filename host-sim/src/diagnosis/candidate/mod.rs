@@ -137,6 +137,9 @@ pub enum Tolerance {
     Main(Prior),
     /// A deviation of the law: its size is of the order of this share of the main coefficients.
     Nuisance(f64),
+    /// The same of what comes with the cause by right, and may well be the larger part of it: clearance that a wheel beside its place
+    /// takes, what a spring held before anybody looked.
+    Beside(f64),
 }
 
 /// A column of a law.
@@ -156,6 +159,11 @@ fn main(values: Vec<f64>, std: f64) -> Column {
 /// A nuisance column.
 fn nuisance(values: Vec<f64>, share: f64) -> Column {
     Column { values, tolerance: Tolerance::Nuisance(share) }
+}
+
+/// A column of what comes with a cause.
+fn beside(values: Vec<f64>, share: f64) -> Column {
+    Column { values, tolerance: Tolerance::Beside(share) }
 }
 
 /// A parameter for the report: name with unit, value.
@@ -195,8 +203,6 @@ pub struct Law {
     pub tolerance_of: Option<&'static str>,
     /// How wrong the law may be, as a share of its size: what is smaller than that beside it may be its own misfit.
     pub misfit: f64,
-    /// Largest size of all nuisance over that of the main columns.
-    pub most_nuisance: f64,
     /// What it may be taken for.
     pub kin: Kin,
     /// Relative uncertainty of its parameters beside that of the data: what the law itself is not sure of.
@@ -246,7 +252,6 @@ impl Law {
             physical: Box::new(|_, _| true),
             tolerance_of: None,
             misfit: USUAL_MISFIT,
-            most_nuisance: 1.0,
             kin: Kin::Unlike,
             doubt: USUAL_DOUBT,
             lead: None,
@@ -284,7 +289,7 @@ impl Law {
     /// parts are this large.
     #[must_use]
     pub fn sound(&self, values: &[f64], coefficients: &[f64], main: f64, nuisance: f64) -> bool {
-        (self.physical)(values, coefficients) && nuisance <= self.most_nuisance * main
+        (self.physical)(values, coefficients) && nuisance <= main
     }
 
     /// How much of its size another law may be named for wrongly.
