@@ -36,7 +36,7 @@ const NOT_RUN: [(&str, &str); 9] = [
     ("prettier ", "tests/run browser checks what it would do"),
 ];
 /// Programs beside ours that a block may call.
-const HELPERS: [&str; 8] = ["cd", "cp", "mkdir", "cat", "head", "awk", "ls", "rm"];
+const HELPERS: [&str; 9] = ["cd", "cp", "cmp", "mkdir", "cat", "head", "awk", "ls", "rm"];
 /// Parts of `tests/run` that run blocks marked with their name.
 const PARTS: [&str; 2] = ["firmware", "browser"];
 /// Pictures of examples are small, bytes.
