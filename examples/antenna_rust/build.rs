@@ -10,9 +10,12 @@ fn main() {
     let tables = env::var_os("FLEXSPLINE_TABLES").map_or(top.join("out"), PathBuf::from);
     let image = tables.join("cam.fxt");
     fs::copy(&image, out.join("cam.fxt")).unwrap_or_else(|error| panic!("{}: {error}; see README.md", image.display()));
-    fs::copy(top.join("memory.x"), out.join("memory.x")).expect("memory.x at the top of the project");
+    // That of the board in QEMU, or of another one.
+    let memory = env::var_os("FLEXSPLINE_MEMORY").map_or(top.join("memory.x"), PathBuf::from);
+    fs::copy(&memory, out.join("memory.x")).unwrap_or_else(|error| panic!("{}: {error}", memory.display()));
     println!("cargo:rustc-link-search={}", out.display());
     println!("cargo:rerun-if-changed={}", image.display());
-    println!("cargo:rerun-if-changed={}", top.join("memory.x").display());
+    println!("cargo:rerun-if-changed={}", memory.display());
     println!("cargo:rerun-if-env-changed=FLEXSPLINE_TABLES");
+    println!("cargo:rerun-if-env-changed=FLEXSPLINE_MEMORY");
 }
