@@ -6,7 +6,7 @@
 //! ```text
 //! sh             run, block after block, in a copy of the project of each page's own, by the program that was built
 //! sh slow        only parsed here; run by `cargo test -- --include-ignored` (`tests/run host --long`)
-//! sh firmware    run by `tests/run firmware`, which has to name the page; likewise `sh browser`
+//! sh firmware    run by `tests/run firmware`, which has to name the page
 //! rust           compiled and run as a documentation test: `tests/lib.rs` has to hold the page
 //! toml           a drive, or a nominal model if it has [nominal]; `toml cargo` is neither
 //! ```
@@ -24,7 +24,7 @@ use flexspline_sim::extension::Model;
 use flexspline_tests::command::flexspline;
 
 /// Commands that are not run from a page: how they begin, and why.
-const NOT_RUN: [(&str, &str); 9] = [
+const NOT_RUN: [(&str, &str); 12] = [
     ("tests/run", "runs this test; its parts are checked by name"),
     ("git clone", "needs the network"),
     ("rustup ", "changes the toolchains of whoever runs the tests"),
@@ -33,12 +33,15 @@ const NOT_RUN: [(&str, &str); 9] = [
     ("cargo bench ", "minutes of one processor that nothing else may use"),
     ("cargo doc ", "tests/run host builds the documentation"),
     ("cargo mutants ", "hours"),
+    ("cargo build ", "tests/run builds what is built here"),
+    ("flexspline-exam ", "minutes to hours: tests/run exam"),
+    ("target/release/flexspline-exam ", "likewise"),
     ("prettier ", "tests/run browser checks what it would do"),
 ];
 /// Programs beside ours that a block may call.
 const HELPERS: [&str; 9] = ["cd", "cp", "cmp", "mkdir", "cat", "head", "awk", "ls", "rm"];
 /// Parts of `tests/run` that run blocks marked with their name.
-const PARTS: [&str; 2] = ["firmware", "browser"];
+const PARTS: [&str; 1] = ["firmware"];
 /// Pictures of examples are small, bytes.
 const LARGEST_PICTURE: u64 = 150_000;
 /// Lines of an example's page: one screen.
@@ -429,14 +432,17 @@ fn spans(line: &str) -> impl Iterator<Item = &str> {
 #[test]
 fn commands_and_options_in_the_text_exist() {
     let help = |args: &[&str]| {
-        let output = Command::new(flexspline()).args(args).arg("--help").output().unwrap();
+        let output = Command::new(flexspline()).args(args).arg("-h").output().unwrap();
         assert!(output.status.success(), "{args:?}");
         String::from_utf8(output.stdout).unwrap()
     };
     let top = help(&[]);
     let listed = top.split("Commands:").nth(1).and_then(|rest| rest.split("\n\n").next()).unwrap();
-    let commands: BTreeSet<&str> =
-        listed.lines().filter(|l| l.starts_with("  ")).filter_map(|l| l.split_whitespace().next()).collect();
+    let commands: BTreeSet<&str> = listed
+        .lines()
+        .filter(|l| l.starts_with("  ") && !l.starts_with("   "))
+        .filter_map(|l| l.split_whitespace().next())
+        .collect();
     assert!(commands.contains("tables") && commands.contains("diagnose"), "{commands:?}");
     let mut known = fs::read_to_string(root().join("tests/run")).unwrap();
     for command in commands.iter().filter(|command| **command != "help") {
@@ -455,7 +461,9 @@ fn commands_and_options_in_the_text_exist() {
                 if !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase()) && !commands.contains(word) {
                     wrong.push(format!("{}: `{span}`: no command {word}", page.at(*line)));
                 }
-                for option in span.split([' ', '=']).filter(|word| ours && word.starts_with("--") && word.len() > 2) {
+                let others = ["cargo ", "probe-rs ", "prettier "].iter().any(|program| span.starts_with(program));
+                let options = span.split([' ', '=']).filter(|word| word.starts_with("--") && word.len() > 2);
+                for option in options.filter(|_| ours && !others) {
                     if !known.contains(option) {
                         wrong.push(format!("{}: `{span}`: no option {option}", page.at(*line)));
                     }

@@ -270,8 +270,7 @@ fn compare(bytes: &[u8]) {
     let record = image.ripple(0, 0, false).len();
     assert_eq!(image.integer("record_step"), along(torques, record));
     assert_eq!(image.integer("records_step"), along(temperatures, record * torques));
-    let width =
-        if ripple == 0 { 1.0 } else { 4_294_967_296.0 / (ripple as f64 * image.ratio() * image.fixed_teeth()) };
+    let width = if ripple == 0 { 1.0 } else { 4_294_967_296.0 / (ripple as f64 * image.ratio() * image.fixed_teeth()) };
     let stored = f64::from(image.reals("cell_width")[0]);
     assert!((stored / width - 1.0).abs() < 1e-6, "cell width {stored}, by the page {width}");
     for node in 0..torques {
