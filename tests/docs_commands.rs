@@ -268,7 +268,7 @@ fn every_block_says_what_it_is() {
         let name = page.name.to_str().unwrap();
         for block in &page.blocks {
             let said = match (block.language.as_str(), block.mark.as_str()) {
-                ("sh", "" | "slow") | ("text" | "json" | "c" | "csv" | "diff", "") => Ok(()),
+                ("sh", "" | "slow") | ("text" | "math" | "json" | "c" | "csv" | "diff", "") => Ok(()),
                 ("sh", part) if PARTS.contains(&part) => {
                     let runs = format!("page_commands {name} {part}");
                     runner.contains(&runs).then_some(()).ok_or(format!("tests/run does not hold `{runs}`"))
