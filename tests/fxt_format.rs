@@ -327,13 +327,16 @@ fn a_table_of_contact_fem() {
     compare(&made.image);
 }
 
+/// Torque nodes, temperature nodes, ripple nodes, nodes of A, B, C.
+type Shape<'a> = (&'a [f32], &'a [f32], usize, [usize; 3], FixedMember);
+
 /// Numbers drawn at random, in the shapes that an image can have.
 #[test]
 fn tables_of_every_shape() {
     let mut random = fastrand::Rng::with_seed(11);
     let jumps = [-40.0_f32, -12.0, -1.01, -0.99, 0.0, 0.99, 1.01, 15.0, 44.0];
     let smooth = [-30.0_f32, -10.0, 5.0, 22.0, 60.0];
-    let shapes: [(&[f32], &[f32], usize, [usize; 3], FixedMember); 6] = [
+    let shapes: [Shape<'_>; 6] = [
         (&jumps, &[-40.0, 20.0, 80.0], 7, [8, 12, 5], FixedMember::Flexspline),
         (&jumps, &[-10.0, 40.0], 8, [0, 6, 0], FixedMember::CircularSpline),
         (&smooth, &[20.0], 4, [0; 3], FixedMember::Flexspline),
