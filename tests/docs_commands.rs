@@ -161,7 +161,9 @@ fn copied(from: &Path, to: &Path) {
     for entry in fs::read_dir(from).unwrap() {
         let entry = entry.unwrap();
         let to = to.join(entry.file_name());
-        if entry.path().is_dir() {
+        if entry.file_name() == "target" {
+            // Of an example that was built in its own folder.
+        } else if entry.path().is_dir() {
             copied(&entry.path(), &to);
         } else {
             fs::copy(entry.path(), to).unwrap();
