@@ -85,6 +85,8 @@ pub struct Number {
 pub struct Claim {
     /// Looked up by.
     pub id: &'static str,
+    /// What part of the paper it belongs to.
+    pub part: &'static str,
     /// Figure, formula or section.
     pub place: &'static str,
     /// What the paper says.
@@ -125,6 +127,7 @@ pub struct Draft(Claim);
 pub fn claim(id: &'static str, place: &'static str, says: impl Into<String>) -> Draft {
     Draft(Claim {
         id,
+        part: "",
         place,
         says: says.into(),
         paper: Vec::new(),
@@ -186,7 +189,13 @@ impl Draft {
     }
 
     /// The paper's own numbers must keep these bounds.
-    pub fn paper_keeps(self, what: impl Into<String>, value: f64, unit: &'static str, bounds: [Option<f64>; 2]) -> Draft {
+    pub fn paper_keeps(
+        self,
+        what: impl Into<String>,
+        value: f64,
+        unit: &'static str,
+        bounds: [Option<f64>; 2],
+    ) -> Draft {
         self.check(Of::Paper, what, value, unit, bounds)
     }
 
@@ -239,7 +248,10 @@ mod tests {
     #[test]
     fn what_no_run_gave_is_not_judged() {
         let claim = plain().at_most("x", f64::NAN, "", 1.0).because(|_| "because".into());
-        assert_eq!((claim.verdict, claim.reason.as_str()), (Verdict::NotTestable, "A run that would tell did not converge."));
+        assert_eq!(
+            (claim.verdict, claim.reason.as_str()),
+            (Verdict::NotTestable, "A run that would tell did not converge.")
+        );
         assert_eq!(of(plain().at_most("x", 0.0, "", 1.0).missing("a width")), Verdict::NotTestable);
     }
 }

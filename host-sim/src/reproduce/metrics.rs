@@ -87,7 +87,9 @@ fn error_at(rows: &[Row], angle: f64) -> Option<f64> {
     rows.windows(2).find_map(|pair| {
         let (a, b) = (pair[0].generator_rad, pair[1].generator_rad);
         let t = (angle - a) / (b - a);
-        (-1e-9..=1.0 + 1e-9).contains(&t).then(|| pair[0].error_arcsec + t * (pair[1].error_arcsec - pair[0].error_arcsec))
+        (-1e-9..=1.0 + 1e-9)
+            .contains(&t)
+            .then(|| pair[0].error_arcsec + t * (pair[1].error_arcsec - pair[0].error_arcsec))
     })
 }
 

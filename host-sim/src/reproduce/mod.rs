@@ -169,7 +169,8 @@ pub fn reproduce(
         .collect();
     for experiment in &experiments {
         let failed = experiment.effects.iter().filter(|effect| effect.metrics.is_none());
-        not_converged.extend(failed.map(|e| format!("experiment “{}”, {}: {}", experiment.name, e.generator, e.status)));
+        not_converged
+            .extend(failed.map(|e| format!("experiment “{}”, {}: {}", experiment.name, e.generator, e.status)));
     }
     Ok(Reproduction {
         drive: drive.clone(),

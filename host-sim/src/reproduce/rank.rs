@@ -1,5 +1,5 @@
 //! Ranks with their discretisation spread: which generator has more of something is only said where the gap exceeds three times
-//! what mesh, increment and penalty move it by.
+//! what mesh, increment and penalty move that gap by.
 
 use serde::Serialize;
 
@@ -25,11 +25,18 @@ impl Measured {
         Measured { value, spread, variants }
     }
 
-    /// The gap to another over the larger of both spreads, signed: above [`SPREADS`] this one is larger, below −[`SPREADS`] smaller.
+    /// The gap to another over the spread of that gap, signed: above [`SPREADS`] this one is larger, below −[`SPREADS`] smaller. The
+    /// spread is that of the difference in each variant, both being discretised alike: what moves both does not count.
     pub fn gap_in_spreads(&self, other: &Measured) -> f64 {
+        let gap = self.value - other.value;
+        let paired = self.variants.iter().filter_map(|(name, value)| {
+            let (_, theirs) = other.variants.iter().find(|(same, _)| same == name)?;
+            Some(value - theirs)
+        });
+        let (low, high) = paired.fold((gap, gap), |(low, high), d| (low.min(d), high.max(d)));
         // A spread below a thousandth of the value says nothing about what else is uncertain.
         let floor = 1e-3 * self.value.abs().max(other.value.abs()).max(f64::MIN_POSITIVE);
-        (self.value - other.value) / self.spread.max(other.spread).max(floor)
+        gap / (high - low).max(floor)
     }
 }
 
@@ -74,7 +81,7 @@ mod tests {
     use super::*;
 
     fn exact(value: f64) -> Measured {
-        Measured::new(value, vec![("fine".into(), value)])
+        Measured::new(value, vec![("fine".into(), value), ("soft".into(), value)])
     }
 
     #[test]
@@ -84,6 +91,13 @@ mod tests {
         assert!(exact(12.0).gap_in_spreads(&a) > SPREADS);
         assert!(exact(11.4).gap_in_spreads(&a) < SPREADS);
         assert!(exact(8.0).gap_in_spreads(&a) < -SPREADS);
+    }
+
+    /// A notch that every mesh sees larger moves both generators, and not their order.
+    #[test]
+    fn what_moves_both_alike_does_not_count() {
+        let of = |value: f64| Measured::new(value, vec![("fine".into(), value + 40.0)]);
+        assert!(of(200.0).spread > 39.0 && of(200.0).gap_in_spreads(&of(160.0)) > SPREADS);
     }
 
     #[test]
@@ -96,7 +110,7 @@ mod tests {
         let same = of([5.0; 4]);
         assert_eq!((same.tau, same.undecided), (0.0, 5));
         let mut values = [21.0, 20.0, 14.0, 10.0].map(exact);
-        values[3] = Measured::new(10.0, vec![("coarse".into(), 12.5)]);
+        values[3] = Measured::new(10.0, vec![("fine".into(), 12.5)]);
         let agreement = kendall_tau(&ranks, &values);
         assert_eq!((agreement.concordant, agreement.undecided), (4, 1));
     }

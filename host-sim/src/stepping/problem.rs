@@ -254,7 +254,8 @@ impl Problem {
         problem.flexspline = WheelMesh::smooth_ring(bore_radius, drive.flexspline.rim_thickness_mm, sectors, rows)?
             .with_rim(RimVariation::of(drive), drive.flexspline.root_radius_mm)?;
         problem.bore = BoreContact::new(&problem.flexspline, settings.bore_points(kind));
-        (problem.rotation_weights, problem.mean_weights) = bore_averages(&problem.flexspline, &problem.bore, settings.holding);
+        (problem.rotation_weights, problem.mean_weights) =
+            bore_averages(&problem.flexspline, &problem.bore, settings.holding);
         Ok(problem)
     }
 

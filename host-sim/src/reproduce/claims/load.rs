@@ -28,7 +28,8 @@ fn shift(evidence: &Evidence<'_>, kind: GeneratorKind, torque_n_m: f64, forward:
         return [f64::NAN; 2];
     }
     let mean = differences.iter().sum::<f64>() / differences.len() as f64;
-    let range = differences.iter().copied().fold(f64::MIN, f64::max) - differences.iter().copied().fold(f64::MAX, f64::min);
+    let range =
+        differences.iter().copied().fold(f64::MIN, f64::max) - differences.iter().copied().fold(f64::MAX, f64::min);
     [mean.abs(), range / mean.abs()]
 }
 
@@ -36,7 +37,8 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     let torque = paper::TORQUE_N_M;
     let with = |kind, forward| shift(evidence, kind, torque, forward)[0];
     let against = |kind, forward| shift(evidence, kind, -torque, forward)[0];
-    const METRIC: &str = "Mean |output under load less output without load| over settled rows at the same generator angle";
+    const METRIC: &str =
+        "Mean |output under load less output without load| over settled rows at the same generator angle";
 
     let mut same = claim(
         "load-with-motion",
@@ -76,7 +78,8 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
             .into(),
     });
 
-    let grows = least(LOADED.map(|kind| (against(kind, false) - against(kind, true)) / evidence.backlash(kind).value * 60.0));
+    let grows =
+        least(LOADED.map(|kind| (against(kind, false) - against(kind, true)) / evidence.backlash(kind).value * 60.0));
     let mut after = claim(
         "load-after-reversal",
         "Figs. 14 and 15, text",
@@ -88,7 +91,9 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
         after = after.ours(format!("{}, before", name_of(kind)), against(kind, true), "′");
     }
     let after = after.at_least("least growth, in backlashes", grows, "", 0.9).because(|verdict| match verdict {
-        Verdict::Reproduced => "It grows by the backlash, because the unloaded output changes its flank and the loaded does not.".into(),
+        Verdict::Reproduced => {
+            "It grows by the backlash, because the unloaded output changes its flank and the loaded does not.".into()
+        }
         _ => "The shift does not grow by the backlash.".into(),
     });
 
@@ -138,12 +143,7 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
         .paper("label of the load with the motion", f64::from(forward), "")
         .paper("label of the load against it", f64::from(backward), "")
         .metric("Difference of the labels of two different curves")
-        .paper_keeps(
-            "difference of the two labels",
-            f64::from(forward.abs_diff(backward)),
-            "",
-            [Some(1.0), None],
-        )
+        .paper_keeps("difference of the two labels", f64::from(forward.abs_diff(backward)), "", [Some(1.0), None])
         .because(|_| "Two curves bear the same label.".into());
 
     let radius = 0.5 * (evidence.drive.flexspline.tip_radius_mm + evidence.drive.circular_spline.tip_radius_mm);

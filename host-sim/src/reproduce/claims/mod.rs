@@ -48,13 +48,15 @@ impl Evidence<'_> {
 /// All claims, judged.
 pub(super) fn all(evidence: &Evidence<'_>) -> Vec<Claim> {
     [
-        kinematics::claims(evidence),
-        stress::claims(evidence),
-        travel::claims(evidence),
-        load::claims(evidence),
-        reversal::claims(evidence),
+        ("Path of the teeth (Fig. 6)", kinematics::claims(evidence)),
+        ("Stress (Figs. 10, 11)", stress::claims(evidence)),
+        ("Error of four generators (Figs. 12, 13)", travel::claims(evidence)),
+        ("Load (Figs. 14, 15)", load::claims(evidence)),
+        ("Reversal (Figs. 16, 17)", reversal::claims(evidence)),
     ]
-    .concat()
+    .into_iter()
+    .flat_map(|(part, claims)| claims.into_iter().map(move |claim| Claim { part, ..claim }))
+    .collect()
 }
 
 /// A generator in text.

@@ -26,7 +26,9 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     let stands = stands
         .at_most("dwell over the ratio against the backlash, largest deviation", agreement, "", 0.05)
         .because(|verdict| match verdict {
-            Verdict::Reproduced => "The output stands until the generator has crossed the clearance 95 times enlarged.".into(),
+            Verdict::Reproduced => {
+                "The output stands until the generator has crossed the clearance 95 times enlarged.".into()
+            }
             _ => "Dwell and backlash differ.".into(),
         });
 
@@ -36,7 +38,9 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
         .ours("cam", dwell(Cam).value.to_degrees(), "°")
         .at_least("gap, in spreads", dwell(DoubleDisc).gap_in_spreads(&dwell(Cam)), "", SPREADS)
         .because(|verdict| match verdict {
-            Verdict::Reproduced => "A disc of the same deflection flattens the rim beside the axis and leaves a little more room.".into(),
+            Verdict::Reproduced => {
+                "A disc of the same deflection flattens the rim beside the axis and leaves a little more room.".into()
+            }
             _ => "Not beyond the discretisation.".into(),
         });
 
@@ -61,7 +65,8 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
         "The backlash with the double disc is 1.16′.",
         paper::BACKLASH_DOUBLE_DISC_ARCMIN,
     );
-    let cam = size("backlash-cam", Cam, "Below Fig. 17", "The backlash with the cam is 0.98′.", paper::BACKLASH_CAM_ARCMIN);
+    let cam =
+        size("backlash-cam", Cam, "Below Fig. 17", "The backlash with the cam is 0.98′.", paper::BACKLASH_CAM_ARCMIN);
 
     let gap = backlash(DoubleDisc).gap_in_spreads(&backlash(Cam));
     let order = claim("backlash-order", "Below Fig. 17", "The double disc has more backlash than the cam.")
@@ -127,15 +132,19 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     });
 
     let ripple = |kind| evidence.runs.measure(kind, 0.0, |m| m.ripple_pp_arcsec);
-    let recurring = claim("recurring-error", "Below Fig. 17", "The recurring error is lower with the cam than with the double disc.")
-        .metric("Ripple after start-up, peak to peak, no load: double disc less cam, in spreads")
-        .ours("double disc", ripple(DoubleDisc).value, "″")
-        .ours("cam", ripple(Cam).value, "″")
-        .at_least("gap, in spreads", ripple(DoubleDisc).gap_in_spreads(&ripple(Cam)), "", SPREADS)
-        .because(|verdict| match verdict {
-            Verdict::Reproduced => "It is.".into(),
-            _ => "It is not: both are below half an arc-second, and the cam has the larger one.".into(),
-        });
+    let recurring = claim(
+        "recurring-error",
+        "Below Fig. 17",
+        "The recurring error is lower with the cam than with the double disc.",
+    )
+    .metric("Ripple after start-up, peak to peak, no load: double disc less cam, in spreads")
+    .ours("double disc", ripple(DoubleDisc).value, "″")
+    .ours("cam", ripple(Cam).value, "″")
+    .at_least("gap, in spreads", ripple(DoubleDisc).gap_in_spreads(&ripple(Cam)), "", SPREADS)
+    .because(|verdict| match verdict {
+        Verdict::Reproduced => "It is.".into(),
+        _ => "It is not: both are below half an arc-second, and the cam has the larger one.".into(),
+    });
 
     let others = GeneratorKind::ALL.into_iter().filter(|kind| *kind != Cam);
     let best = least(others.map(|kind| backlash(kind).gap_in_spreads(&backlash(Cam))));

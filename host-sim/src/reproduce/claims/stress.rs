@@ -52,10 +52,14 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
             _ => "The peak of at least one generator lies where its rollers or discs end, not at an axis.".into(),
         });
 
-    let allowable = claim("stress-allowable", "Section 4, below Fig. 11", "In none of the models were the allowable stresses exceeded.")
-        .metric("Largest von Mises stress against the allowable one")
-        .ours("largest of all", most(GeneratorKind::ALL.map(|kind| peak(kind).value)), "MPa")
-        .missing("the steel, its allowable stress and the stresses found")
-        .because(|_| "Neither the material nor a stress is given.".into());
+    let allowable = claim(
+        "stress-allowable",
+        "Section 4, below Fig. 11",
+        "In none of the models were the allowable stresses exceeded.",
+    )
+    .metric("Largest von Mises stress against the allowable one")
+    .ours("largest of all", most(GeneratorKind::ALL.map(|kind| peak(kind).value)), "MPa")
+    .missing("the steel, its allowable stress and the stresses found")
+    .because(|_| "Neither the material nor a stress is given.".into());
     vec![highest, axes, allowable]
 }

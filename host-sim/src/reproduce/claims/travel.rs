@@ -14,7 +14,8 @@ const GREATER: f64 = 1.1;
 const CONVERTED: f64 = 0.5;
 
 /// Why no error of a perfect drive is the paper's.
-const WHY_SMALL: &str = "a perfect drive repeats its error with every tooth pitch, and what it loses is half its clearance";
+const WHY_SMALL: &str =
+    "a perfect drive repeats its error with every tooth pitch, and what it loses is half its clearance";
 
 pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     let mut claims = figure_12(evidence);
@@ -26,12 +27,9 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
 fn figure_12(evidence: &Evidence<'_>) -> Vec<Claim> {
     let all = GeneratorKind::ALL;
     let lag = |kind| evidence.arcmin(kind, |m| m.lag_forward_arcsec);
-    let mut nominal = claim(
-        "not-nominal",
-        "Fig. 12, text",
-        "With none of the generators the output follows the nominal line.",
-    )
-    .metric("Mean lag over whole tooth pitches after start-up, forward, no load");
+    let mut nominal =
+        claim("not-nominal", "Fig. 12, text", "With none of the generators the output follows the nominal line.")
+            .metric("Mean lag over whole tooth pitches after start-up, forward, no load");
     for kind in all {
         nominal = nominal.ours(name_of(kind), lag(kind), "′");
     }
@@ -39,27 +37,39 @@ fn figure_12(evidence: &Evidence<'_>) -> Vec<Claim> {
         let lag = evidence.runs.measure(kind, 0.0, |m| m.lag_forward_arcsec);
         lag.value.abs() / lag.spread.max(1e-3 * lag.value.abs())
     }));
-    let nominal = nominal.at_least("least |mean lag|, in spreads", smallest, "", SPREADS).because(|verdict| match verdict {
-        Verdict::Reproduced => "The output lags by half the clearance, at the same rate as the nominal line.".into(),
-        _ => "Some generator shows no lag beyond the discretisation.".into(),
-    });
+    let nominal =
+        nominal.at_least("least |mean lag|, in spreads", smallest, "", SPREADS).because(|verdict| match verdict {
+            Verdict::Reproduced => {
+                "The output lags by half the clearance, at the same rate as the nominal line.".into()
+            }
+            _ => "Some generator shows no lag beyond the discretisation.".into(),
+        });
 
     let rollers = [TwoRoller, FourRoller];
-    let mut first = claim("rollers-delayed", "Fig. 12 (a), (b)", "With rollers the output is delayed in the first phase of motion.")
-        .metric("Mean lag forward, negative when the output is late; angle at which it is first reached");
+    let mut first = claim(
+        "rollers-delayed",
+        "Fig. 12 (a), (b)",
+        "With rollers the output is delayed in the first phase of motion.",
+    )
+    .metric("Mean lag forward, negative when the output is late; angle at which it is first reached");
     for kind in rollers {
         first = first.ours(name_of(kind), lag(kind), "′");
     }
-    let first = first.at_most("largest mean lag (a delay is negative)", most(rollers.map(lag)), "′", 0.0).because(|verdict| {
-        match verdict {
-            Verdict::Reproduced => "It is, by half the clearance, after 1° of generator; only the size differs, see below.".into(),
-            _ => "The output does not lag.".into(),
-        }
-    });
+    let first =
+        first.at_most("largest mean lag (a delay is negative)", most(rollers.map(lag)), "′", 0.0).because(|verdict| {
+            match verdict {
+                Verdict::Reproduced => {
+                    "It is, by half the clearance, after 1° of generator; only the size differs, see below.".into()
+                }
+                _ => "The output does not lag.".into(),
+            }
+        });
 
     let at_turn = |kind| evidence.arcmin(kind, |m| Some(m.error_at_turn_arcsec));
     let vanished = |kind| {
-        evidence.unloaded(kind).map_or(f64::NAN, |s| s.metrics.error_at_turn_arcsec.abs() / s.metrics.largest_out_arcsec)
+        evidence
+            .unloaded(kind)
+            .map_or(f64::NAN, |s| s.metrics.error_at_turn_arcsec.abs() / s.metrics.largest_out_arcsec)
     };
     let mut equal = claim(
         "equal-at-one-radian",
@@ -70,28 +80,38 @@ fn figure_12(evidence: &Evidence<'_>) -> Vec<Claim> {
     for kind in rollers {
         equal = equal.ours(format!("{}, error at +1 rad", name_of(kind)), at_turn(kind), "′");
     }
-    let equal = equal
-        .at_most("error at +1 rad over the largest", most(rollers.map(vanished)), "", VANISHED)
-        .because(|verdict| match verdict {
+    let equal = equal.at_most("error at +1 rad over the largest", most(rollers.map(vanished)), "", VANISHED).because(
+        |verdict| match verdict {
             Verdict::Reproduced => "The error is gone at +1 rad.".into(),
-            _ => "1 rad is 29.9 tooth pitches: after start-up a perfect drive has the same error there as anywhere.".into(),
-        });
+            _ => {
+                "One radian is 29.9 tooth pitches: after start-up a perfect drive has the same error there as anywhere."
+                    .into()
+            }
+        },
+    );
 
     let return_ratio = |kind| {
         evidence.unloaded(kind).map_or(f64::NAN, |s| s.metrics.largest_back_arcsec / s.metrics.largest_out_arcsec)
     };
-    let mut back = claim("return-greater", "Fig. 12, text", "On the way back the delay of the roller drives is even greater.")
-        .metric("Largest |error| on the way back over that on the way there, zero where the drive was deformed, no load");
+    let mut back = claim(
+        "return-greater",
+        "Fig. 12, text",
+        "On the way back the delay of the roller drives is even greater.",
+    )
+    .metric("Largest |error| on the way back over that on the way there, zero where the drive was deformed, no load");
     for kind in rollers {
         back = back.ours(name_of(kind), return_ratio(kind), "");
     }
-    let back = back.at_least("least ratio", least(rollers.map(return_ratio)), "", GREATER).because(|verdict| match verdict {
-        Verdict::Reproduced => "It is greater.".into(),
-        _ => "The two ways are mirror images: half the clearance to either side.".into(),
-    });
+    let back =
+        back.at_least("least ratio", least(rollers.map(return_ratio)), "", GREATER).because(|verdict| match verdict {
+            Verdict::Reproduced => "It is greater.".into(),
+            _ => "The two ways are mirror images: half the clearance to either side.".into(),
+        });
 
     let end_ratio = |kind| {
-        evidence.unloaded(kind).map_or(f64::NAN, |s| s.metrics.error_at_end_arcsec.abs() / s.metrics.largest_back_arcsec)
+        evidence
+            .unloaded(kind)
+            .map_or(f64::NAN, |s| s.metrics.error_at_end_arcsec.abs() / s.metrics.largest_back_arcsec)
     };
     let mut approaches = claim(
         "return-approaches",
@@ -102,12 +122,16 @@ fn figure_12(evidence: &Evidence<'_>) -> Vec<Claim> {
     for kind in rollers {
         approaches = approaches.ours(name_of(kind), end_ratio(kind), "");
     }
-    let approaches = approaches.at_most("largest ratio", most(rollers.map(end_ratio)), "", 0.5).because(|verdict| match verdict {
-        Verdict::Reproduced => "It approaches.".into(),
-        _ => "Once the clearance is crossed the error stays: nothing in a perfect drive would bring it back.".into(),
-    });
+    let approaches =
+        approaches.at_most("largest ratio", most(rollers.map(end_ratio)), "", 0.5).because(|verdict| match verdict {
+            Verdict::Reproduced => "It approaches.".into(),
+            _ => {
+                "Once the clearance is crossed the error stays: nothing in a perfect drive would bring it back.".into()
+            }
+        });
 
-    let closer = [DoubleDisc, Cam].map(|near| rollers.map(|far| evidence.largest(far).gap_in_spreads(&evidence.largest(near))));
+    let closer =
+        [DoubleDisc, Cam].map(|near| rollers.map(|far| evidence.largest(far).gap_in_spreads(&evidence.largest(near))));
     let factor = least(rollers.map(|kind| evidence.largest(kind).value))
         / most([DoubleDisc, Cam].map(|kind| evidence.largest(kind).value));
     let mut course = claim(
@@ -151,29 +175,40 @@ fn sizes(evidence: &Evidence<'_>) -> Vec<Claim> {
     const METRIC: &str = "Largest |error| of the unloaded path, zero where the drive was deformed";
     let why = |verdict, kind| match verdict {
         Verdict::Reproduced => "Within a quarter.".into(),
-        _ => format!("Ours is {:.0} times smaller: {WHY_SMALL}.", paper::error_rad(kind).unwrap_or(0.0) * ARCMIN / largest(kind)),
+        _ => format!(
+            "Ours is {:.0} times smaller: {WHY_SMALL}.",
+            paper::error_rad(kind).unwrap_or(0.0) * ARCMIN / largest(kind)
+        ),
     };
-    let four = claim("error-four-roller", "Fig. 13", "The largest error is that of the four-roller drive, 0.0062247 rad, 21′.")
-        .paper("four-roller", paper::ERROR_FOUR_ROLLER_RAD * ARCMIN, "′")
-        .metric(METRIC)
-        .ours("four-roller", largest(FourRoller), "′")
-        .paper_keeps(
-            "0.0062247 rad less the 21′ it is converted to",
-            paper::ERROR_FOUR_ROLLER_RAD * ARCMIN - paper::ERROR_FOUR_ROLLER_ARCMIN,
-            "′",
-            [Some(-CONVERTED), Some(CONVERTED)],
-        )
-        .within("largest error", largest(FourRoller), "′", paper::ERROR_FOUR_ROLLER_RAD * ARCMIN, SHARE)
-        .because(|verdict| why(verdict, FourRoller));
+    let four = claim(
+        "error-four-roller",
+        "Fig. 13",
+        "The largest error is that of the four-roller drive, 0.0062247 rad, 21′.",
+    )
+    .paper("four-roller", paper::ERROR_FOUR_ROLLER_RAD * ARCMIN, "′")
+    .metric(METRIC)
+    .ours("four-roller", largest(FourRoller), "′")
+    .paper_keeps(
+        "0.0062247 rad less the 21′ it is converted to",
+        paper::ERROR_FOUR_ROLLER_RAD * ARCMIN - paper::ERROR_FOUR_ROLLER_ARCMIN,
+        "′",
+        [Some(-CONVERTED), Some(CONVERTED)],
+    )
+    .within("largest error", largest(FourRoller), "′", paper::ERROR_FOUR_ROLLER_RAD * ARCMIN, SHARE)
+    .because(|verdict| why(verdict, FourRoller));
 
-    let similar = claim("error-two-roller", "Fig. 13", "The two-roller drive has values similar to those of the four-roller drive.")
-        .metric("Largest |error| of the two-roller drive over that of the four-roller drive, unloaded path")
-        .ours("two-roller", largest(TwoRoller), "′")
-        .within("ratio", largest(TwoRoller) / largest(FourRoller), "", 1.0, SHARE)
-        .because(|verdict| match verdict {
-            Verdict::Reproduced => "They are similar, but so are all four.".into(),
-            _ => "They are not.".into(),
-        });
+    let similar = claim(
+        "error-two-roller",
+        "Fig. 13",
+        "The two-roller drive has values similar to those of the four-roller drive.",
+    )
+    .metric("Largest |error| of the two-roller drive over that of the four-roller drive, unloaded path")
+    .ours("two-roller", largest(TwoRoller), "′")
+    .within("ratio", largest(TwoRoller) / largest(FourRoller), "", 1.0, SHARE)
+    .because(|verdict| match verdict {
+        Verdict::Reproduced => "They are similar, but so are all four.".into(),
+        _ => "They are not.".into(),
+    });
 
     let disc = claim("error-double-disc", "Fig. 13", "The error of the double-disc drive is 0.0041344 rad.")
         .paper("double disc", paper::ERROR_DOUBLE_DISC_RAD * ARCMIN, "′")
@@ -190,20 +225,24 @@ fn sizes(evidence: &Evidence<'_>) -> Vec<Claim> {
         .because(|verdict| why(verdict, Cam));
 
     let cam_arcmin = paper::ERROR_CAM_RAD * ARCMIN;
-    let converted = claim("error-cam-converted", "Below Fig. 13", "0.003 rad are about 4 arc-minutes.")
+    let converted = claim("error-cam-converted", "Below Fig. 13", "An error of 0.003 rad is about 4 arc-minutes.")
         .paper("as converted", paper::ERROR_CAM_ARCMIN, "′")
         .paper("0.003 rad", cam_arcmin, "′")
         .metric("0.003 rad in arc-minutes less the 4′ of the text")
         .paper_keeps("difference", cam_arcmin - paper::ERROR_CAM_ARCMIN, "′", [Some(-CONVERTED), Some(CONVERTED)])
-        .because(|_| format!("0.003 rad are {cam_arcmin:.1}′; 4′ would be {:.5} rad.", paper::ERROR_CAM_ARCMIN / ARCMIN));
+        .because(|_| format!("It is {cam_arcmin:.1}′; 4′ would be {:.5} rad.", paper::ERROR_CAM_ARCMIN / ARCMIN));
 
     let [low, high] = paper::RECOMMENDED_ARCMIN;
-    let range = claim("error-cam-in-range", "Below Fig. 13", "The cam drive is within the 1′ to 9′ that makers recommend; rollers are not.")
-        .paper("cam", cam_arcmin, "′")
-        .paper("recommended, at most", high, "′")
-        .metric("The paper's 0.003 rad against its own range")
-        .paper_keeps("0.003 rad", cam_arcmin, "′", [Some(low), Some(high)])
-        .because(|_| format!("By its own number the cam drive is at {cam_arcmin:.1}′ and outside, as are all four."));
+    let range = claim(
+        "error-cam-in-range",
+        "Below Fig. 13",
+        "The cam drive is within the 1′ to 9′ that makers recommend; rollers are not.",
+    )
+    .paper("cam", cam_arcmin, "′")
+    .paper("recommended, at most", high, "′")
+    .metric("The paper's 0.003 rad against its own range")
+    .paper_keeps("0.003 rad", cam_arcmin, "′", [Some(low), Some(high)])
+    .because(|_| format!("By its own number the cam drive is at {cam_arcmin:.1}′ and outside, as are all four."));
 
     let share = paper::share_of_travel(paper::ERROR_FOUR_ROLLER_RAD);
     let accuracy = claim(
