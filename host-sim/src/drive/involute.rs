@@ -314,6 +314,54 @@ mod tests {
         }
     }
 
+    /// The distance from chords is that of the polyline, found by brute force.
+    #[test]
+    fn facets_are_chords() {
+        let drive = Drive::hhd_95();
+        let (space, _) = space();
+        let tooth = ToothFlank::external(&drive.flexspline).unwrap();
+        let tooth = InvoluteFlank::new(&tooth, drive.flexspline.base_radius_mm());
+        for count in [1, 3] {
+            let (chords, smooth) = (space.clone().with_facets(Some(count)), &space);
+            let vertex = |flank: &InvoluteFlank, k: u32| {
+                let (a, b) = (flank.arc_at(flank.start_radius), flank.arc_at(flank.junction_radius));
+                let arc = a + (b - a) * f64::from(k) / f64::from(count);
+                flank.point((flank.base_radius * (flank.base_radius + 2.0 * arc)).sqrt())
+            };
+            let ends: Vec<[f64; 2]> = (0..=count).map(|k| vertex(smooth, k)).collect();
+            let mut deepest = 0.0_f64;
+            for k in 1..40 {
+                let r = smooth.junction_radius + (smooth.start_radius - smooth.junction_radius) * f64::from(k) / 40.0;
+                let ([x, y], foot) = (smooth.point(r), smooth.foot_internal(smooth.point(r)));
+                let p = [x + 0.004 * foot.normal[0], y + 0.004 * foot.normal[1]];
+                let brute = ends
+                    .windows(2)
+                    .map(|ends| {
+                        let along = [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]];
+                        let length = along[0].hypot(along[1]);
+                        let beside = [p[0] - ends[0][0], p[1] - ends[0][1]];
+                        let t = (along[0] * beside[0] + along[1] * beside[1]) / (length * length);
+                        let inside = (-1e-6..=1.0 + 1e-6).contains(&t);
+                        let across = (along[0] * beside[1] - along[1] * beside[0]).abs() / length;
+                        if inside { across } else { f64::INFINITY }
+                    })
+                    .fold(f64::INFINITY, f64::min);
+                // The space lies on the side of the normal and the chord stands in it.
+                let found = chords.foot_internal(p);
+                assert!((found.distance.abs() - brute).abs() < 2e-5, "{count} at {r}: {} {brute}", found.distance);
+                deepest = deepest.max(0.004 - found.distance);
+                let q = tooth.clone().with_facets(Some(count)).facet_point(48.0 + 0.02 * f64::from(k));
+                let material = tooth.half_angle(q[0].hypot(q[1])) - q[1].atan2(q[0]);
+                assert!(material >= -1e-12, "a facet of the tooth stands out of it");
+            }
+            assert!(deepest > 1e-4 && deepest <= chords.deepest_facet() * 1.1, "{deepest} {}", chords.deepest_facet());
+            assert!(
+                (chords.deepest_facet() / space.clone().with_facets(Some(2 * count)).deepest_facet() - 4.0).abs() < 0.3
+            );
+        }
+        assert_eq!((space.deepest_facet(), space.facet_point(48.9)), (0.0, space.point(48.9)));
+    }
+
     #[test]
     fn rounding_meets_flank_and_tip_circle() {
         let drive = Drive::hhd_95();

@@ -122,10 +122,26 @@ impl Change {
                                  in place of the mean of the bore."
                     .into()
             }
-            Change::OnePointAside => format!("The same at a node {ASIDE_DEG}° from the major axis."),
+            Change::OnePointAside => format!("The same at a node −{}° from the major axis.", ASIDE_DEG.abs()),
             Change::FourPoints => {
                 "The flexspline is kept from turning by the mean of four nodes of its bore, 90° apart.".into()
             }
+        }
+    }
+
+    /// The change as the subject of a sentence.
+    fn subject(self) -> &'static str {
+        match self {
+            Change::None => "the drive as it is",
+            Change::StartUp => "an error counted from the other flank",
+            Change::NoDrag => "an output without drag",
+            Change::Facets => "a flank of one facet",
+            Change::SoftContact => "soft contact",
+            Change::Friction => "friction with drag",
+            Change::Drag => "an output braked by 200 N·m",
+            Change::OnePoint => "a rim held at one point",
+            Change::OnePointAside => "a rim held at one point aside",
+            Change::FourPoints => "a rim held at four points",
         }
     }
 
@@ -152,9 +168,11 @@ impl Change {
         }
     }
 
-    /// Whether a generator can be run with it: two rollers do not hold the rim against such a drag.
+    /// Whether a generator is run with it. Two rollers do not hold the rim against such a drag; held at one point between them it finds
+    /// no equilibrium by this solver, near 0.3 rad.
     fn suits(self, kind: GeneratorKind) -> bool {
-        kind != GeneratorKind::TwoRoller || !matches!(self, Change::Drag | Change::Friction)
+        let beyond = matches!(self, Change::Drag | Change::Friction | Change::OnePoint | Change::OnePointAside);
+        kind != GeneratorKind::TwoRoller || !beyond
     }
 
     fn apply(self, drive: &mut Drive, solver: &mut SolverSettings) {
@@ -177,7 +195,7 @@ impl Change {
     }
 }
 
-/// What a change does to one drive.
+/// What a change does to one drive; errors count from where the drive was deformed.
 #[derive(Debug, Clone, Serialize)]
 pub struct Effect {
     /// Wave generator.
@@ -210,6 +228,9 @@ pub struct Experiment {
     pub distance: Option<f64>,
     /// Whether the largest error lies within the paper's 10.3′ to 21.4′ for every generator that has a number.
     pub reaches: bool,
+    /// What is changed, as the subject of a sentence.
+    #[serde(skip)]
+    pub subject: &'static str,
     /// The sentence to take away.
     pub takeaway: String,
 }
@@ -267,9 +288,12 @@ fn effect(kind: GeneratorKind, result: Result<Solved, SimulateError>) -> Effect 
         Err(error) => (error.to_string(), None),
     };
     let curves = solved.as_ref().map_or_else(Default::default, |s| curves(&s.rows));
+    let start_arcsec = solved.as_ref().and_then(|s| s.rows.first()).map_or(0.0, |row| row.error_arcsec);
     let metrics = solved.map(|s| s.metrics);
     let largest_arcmin = metrics.as_ref().map(largest);
-    Effect { generator: kind.name(), status, metrics, largest_arcmin, paper_arcmin, curves }
+    let effect = Effect { generator: kind.name(), status, metrics, largest_arcmin, paper_arcmin, curves };
+    // A rim that is held aside of the axis stands turned from the start.
+    shifted(effect, -start_arcsec)
 }
 
 /// Error over the generator angle, way out and way back, both with growing angle.
@@ -283,20 +307,28 @@ pub(crate) fn curves(rows: &[crate::simulate::Row]) -> [Vec<[f64; 2]>; 2] {
 
 /// The same motion with zero on the flank that the output leaves.
 fn counted_from_the_other_flank(base: &Effect) -> Effect {
-    let mut effect = base.clone();
-    let Some(metrics) = &mut effect.metrics else { return effect };
-    let Some(half) = metrics.half_width_arcsec else { return effect };
-    let shift = |e: f64| e - half;
-    for curve in &mut effect.curves {
-        curve.iter_mut().for_each(|point| point[1] = shift(point[1]));
+    let half = base.metrics.and_then(|metrics| metrics.half_width_arcsec).unwrap_or(0.0);
+    let mut effect = shifted(base.clone(), -half);
+    // It begins there.
+    if let Some(first) = effect.curves[0].first_mut() {
+        first[1] = 0.0;
     }
-    effect.curves[0][0][1] = 0.0;
-    metrics.largest_out_arcsec = effect.curves[0].iter().map(|p| p[1].abs()).fold(0.0, f64::max);
-    metrics.largest_back_arcsec = effect.curves[1].iter().map(|p| p[1].abs()).fold(0.0, f64::max);
-    metrics.lag_forward_arcsec = metrics.lag_forward_arcsec.map(shift);
-    metrics.lag_backward_arcsec = metrics.lag_backward_arcsec.map(shift);
-    metrics.error_at_turn_arcsec = shift(metrics.error_at_turn_arcsec);
-    metrics.error_at_end_arcsec = shift(metrics.error_at_end_arcsec);
+    effect
+}
+
+/// The same with every error more by so much.
+fn shifted(mut effect: Effect, more_arcsec: f64) -> Effect {
+    let Some(metrics) = &mut effect.metrics else { return effect };
+    for curve in &mut effect.curves {
+        curve.iter_mut().for_each(|point| point[1] += more_arcsec);
+    }
+    let most = |curve: &[[f64; 2]]| curve.iter().map(|p| p[1].abs()).fold(0.0, f64::max);
+    metrics.largest_out_arcsec = most(&effect.curves[0]);
+    metrics.largest_back_arcsec = most(&effect.curves[1]);
+    metrics.lag_forward_arcsec = metrics.lag_forward_arcsec.map(|e| e + more_arcsec);
+    metrics.lag_backward_arcsec = metrics.lag_backward_arcsec.map(|e| e + more_arcsec);
+    metrics.error_at_turn_arcsec += more_arcsec;
+    metrics.error_at_end_arcsec += more_arcsec;
     effect.largest_arcmin = Some(largest(metrics));
     effect
 }
@@ -310,8 +342,8 @@ fn experiment(change: Change, effects: Vec<Effect>) -> Experiment {
     let sizes: Vec<String> = effects
         .iter()
         .map(|e| match e.largest_arcmin {
-            Some(largest) => format!("{largest:.1}′ ({})", e.generator),
-            None => format!("no equilibrium ({})", e.generator),
+            Some(largest) => format!("{largest:.1}′ ({})", e.generator.replace("double-", "double ")),
+            None => format!("no equilibrium ({})", e.generator.replace("double-", "double ")),
         })
         .collect();
     let some = pairs.iter().any(|(ours, _)| self::reaches([*ours].into_iter()));
@@ -321,7 +353,16 @@ fn experiment(change: Change, effects: Vec<Effect>) -> Experiment {
         (false, false) => "Such numbers do not come from",
     };
     let takeaway = format!("{begins} {}: {}.", change.source(), sizes.join(", "));
-    Experiment { id: change.id(), name: change.name(), what: change.what(), effects, distance, reaches, takeaway }
+    Experiment {
+        id: change.id(),
+        name: change.name(),
+        what: change.what(),
+        effects,
+        distance,
+        reaches,
+        subject: change.subject(),
+        takeaway,
+    }
 }
 
 /// Whether all errors lie where the paper's do, arc-minutes.
@@ -396,7 +437,8 @@ mod tests {
         let moved = counted_from_the_other_flank(&of(GeneratorKind::Cam, 30.0));
         let metrics = moved.metrics.unwrap();
         assert_eq!((metrics.lag_forward_arcsec, metrics.lag_backward_arcsec), (Some(-60.0), Some(0.0)));
-        assert_eq!((metrics.largest_out_arcsec, moved.largest_arcmin), (60.0, Some(1.0)));
+        assert_eq!((metrics.largest_out_arcsec, metrics.largest_back_arcsec), (60.0, 60.0));
+        assert_eq!((moved.largest_arcmin, moved.curves[0][0][1]), (Some(1.0), 0.0));
         assert_eq!(metrics.half_width_arcsec, Some(30.0));
     }
 

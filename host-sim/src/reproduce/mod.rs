@@ -163,8 +163,8 @@ pub fn reproduce(
         .0
         .iter()
         .filter_map(|run| {
-            let error = run.outcome.as_ref().err()?;
-            Some(format!("{}, {} N·m, {}: {error}", name_of(run.kind), run.torque_n_m, run.variant))
+            let error = run.outcome.as_ref().err()?.to_string();
+            Some(format!("{}, {} N·m, {}: {}", name_of(run.kind), run.torque_n_m, run.variant, without_history(&error)))
         })
         .collect();
     for experiment in &experiments {
@@ -182,6 +182,11 @@ pub fn reproduce(
         not_converged,
         wall_s: begun.elapsed().as_secs_f64(),
     })
+}
+
+/// An error without the residuals of its iterations, which `reproduce.json` has.
+fn without_history(error: &str) -> &str {
+    error.split("; relative residual").next().unwrap_or(error)
 }
 
 fn rankings(runs: &Runs) -> Vec<Ranking> {

@@ -33,6 +33,9 @@ pub const MODEL_THICKNESS_MM: f64 = 1.0;
 pub const FACE_WIDTH_MM: Option<f64> = None;
 /// How the curves of figures 14 and 15 are labelled: no load (black), load with the motion (green), against it (red).
 pub const LOAD_LABELS: [u32; 3] = [0, 2, 2];
+/// Whether the load matters for the accuracy: section 4, above figure 16 ("significant impact"), and section 5 ("no negative effect …
+/// regardless of its direction").
+pub const LOAD_MATTERS: [bool; 2] = [true, false];
 /// Backlash of the double-disc drive, arc-minutes: below figure 17.
 pub const BACKLASH_DOUBLE_DISC_ARCMIN: f64 = 1.16;
 /// Backlash of the cam drive, arc-minutes: below figure 17.

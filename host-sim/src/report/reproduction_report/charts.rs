@@ -9,6 +9,9 @@ use crate::reproduce::{Reproduction, name_of, paper};
 use crate::simulate::Row;
 use std::f64::consts::TAU;
 
+/// Errors beyond this are shown both ways.
+const LARGE_ARCMIN: f64 = 5.0;
+
 fn series(name: impl Into<String>, mark: Mark, colour: usize, points: Vec<[f64; 2]>) -> Series {
     Series { name: name.into(), mark, colour, points }
 }
@@ -72,7 +75,9 @@ pub(super) fn sources(r: &Reproduction, kind: GeneratorKind) -> Option<Lines> {
         };
         let [out, back] = &effect.curves;
         lines.series.push(series(experiment.name, Mark::Line, colour % 6, degrees(out)));
-        lines.series.push(series(format!("{}, back", experiment.name), Mark::Dashed, colour % 6, degrees(back)));
+        if effect.largest_arcmin.is_some_and(|largest| largest > LARGE_ARCMIN) {
+            lines.series.push(series(format!("{}, back", experiment.name), Mark::Dashed, colour % 6, degrees(back)));
+        }
     }
     if let Some(size) = paper::error_rad(kind) {
         let arcsec = 60.0 * size * paper::ARCMIN;

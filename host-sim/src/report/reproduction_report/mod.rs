@@ -163,37 +163,30 @@ fn headline(r: &Reproduction) -> Headline {
     let largest = largest_error(r);
     let four = paper::ERROR_FOUR_ROLLER_RAD * paper::ARCMIN;
     let cam = paper::ERROR_CAM_RAD * paper::ARCMIN;
-    let mut answer = Text::new(format!(
-        "Of {} claims of the paper {} are reproduced and {} are not, in {} the paper contradicts itself and {} cannot be tested: without \
-         load a sound drive is off by half its clearance, ",
+    let mut answer = format!(
+        "Of {} claims of the paper {} are reproduced, {} are not, {} contradict the paper itself and {} cannot be tested: unloaded, a sound drive is \
+         off by half its clearance, {:.1}′, not by {cam:.0}′ to {four:.0}′",
         r.claims.len(),
         n(Verdict::Reproduced),
         n(Verdict::NotReproduced),
         n(Verdict::Inconsistent),
-        n(Verdict::NotTestable)
-    ))
-    .error(largest, 2)
-    .plain(format!(", and not by {cam:.0}′ to {four:.0}′"));
-    match r.nearest().and_then(|e| Some((e, span(e)?))) {
-        Some((nearest, sizes)) if nearest.reaches => {
-            answer = answer.plain(format!("; {sizes} come of a {}.", lower_case(nearest.name)));
-        }
-        Some((nearest, sizes)) => {
-            answer = answer.plain(format!("; of all that was tried “{}” comes nearest, with {sizes}.", nearest.name));
-        }
-        None => answer = answer.plain("."),
+        n(Verdict::NotTestable),
+        largest / 60.0
+    );
+    if let Some((nearest, sizes)) = r.nearest().and_then(|e| Some((e, span(e)?))) {
+        answer += &if nearest.reaches {
+            format!("; {} gives {sizes}", nearest.subject)
+        } else {
+            format!("; nearest of all that was tried comes {}, with {sizes}", nearest.subject)
+        };
     }
+    let answer = Text::new(answer + ".");
     Headline {
         choice: None,
         answer,
         number: Text::default().error(largest, 3),
         number_is: format!("largest error of any of the four drives without load; the paper has up to {four:.1}′"),
     }
-}
-
-fn lower_case(words: &str) -> String {
-    let mut letters = words.chars();
-    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
 }
 
 fn glance(r: &Reproduction) -> Section {
@@ -228,7 +221,7 @@ fn motion(r: &Reproduction, animations: &[Animation]) -> Section {
         blocks.push(lines(
             "ripple",
             "Error over one tooth pitch, after start-up",
-            "Figure 1's states, forward, no load. This repeats with every tooth pitch, 59.7 times in the paper's 2 rad: the scale is all that a \
+            "Figure 1's states, forward, no load. This repeats with every tooth pitch, 59.8 times in the paper's 2 rad: the scale is all that a \
              sound drive has to show.",
             Axis::linked("Generator from the beginning of a pitch"),
             error_axis(),
@@ -247,7 +240,7 @@ fn motion(r: &Reproduction, animations: &[Animation]) -> Section {
     blocks.push(lines(
         "travel",
         "Output over generator: the paper's figure 12",
-        "The output angle of the selected generator with the nominal line, generator over 95. The error is a sixtieth of the travel at most and can \
+        "The output angle of the selected generator with the nominal line, generator over 95. The error is a seventieth of the travel and can \
          hardly be seen: drag across to zoom, double-click to come back.",
         generator_axis(),
         Axis::new("Output angle", Quantity::Error),
@@ -269,9 +262,9 @@ fn sources_of_errors(r: &Reproduction) -> Section {
     blocks.push(lines(
         "sources",
         "What each change of the model does to the error",
-        "The way out (lines) and back (dashed) with the selected generator; linear within 1′ and logarithmic beyond. The paper's sizes are marked.",
+        "The way out with the selected generator and, where it is more than 5′, the way back (dashed). What stays at zero here is in the table. The paper's size is marked.",
         generator_axis(),
-        error_axis().stretched(60.0),
+        error_axis(),
         by_generator(|kind| charts::sources(r, kind)),
     ));
     for kind in GeneratorKind::ALL {

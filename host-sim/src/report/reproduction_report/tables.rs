@@ -38,6 +38,17 @@ fn numbers(of: &[Number]) -> Text {
     if text.0.is_empty() { Text::new("–") } else { text }
 }
 
+/// The paper's numbers and ours.
+fn paper_and_ours(claim: &Claim) -> Text {
+    let finite = |of: &[Number]| of.iter().any(|n| n.value.is_finite());
+    match (finite(&claim.paper), finite(&claim.ours)) {
+        (true, true) => join(join(Text::new("Paper: "), numbers(&claim.paper)).plain(". Ours: "), numbers(&claim.ours)),
+        (true, false) => join(Text::new("Paper: "), numbers(&claim.paper)),
+        (false, true) => join(Text::new("Ours: "), numbers(&claim.ours)),
+        (false, false) => Text::new("None"),
+    }
+}
+
 /// Parts of the paper, in order.
 pub(super) fn parts(r: &Reproduction) -> Vec<&'static str> {
     let mut parts: Vec<&'static str> = r.claims.iter().map(|claim| claim.part).collect();
@@ -71,15 +82,14 @@ pub(super) fn claims(r: &Reproduction, part: &str) -> Table {
         vec![
             Text::new(claim.place),
             Text::new(claim.says.clone()),
-            join(Text::new("Paper: "), numbers(&claim.paper)),
-            join(Text::new("Ours: "), numbers(&claim.ours)),
+            paper_and_ours(claim),
             Text::default().strong(claim.verdict.name()),
             Text::new(claim.reason.clone()),
         ]
     });
     Table {
         caption: part.into(),
-        header: header(["Where", "What the paper says", "Its numbers", "Our numbers", "Verdict", "Why"]),
+        header: header(["Where", "What the paper says", "Numbers", "Verdict", "Why"]),
         rows: rows.collect(),
     }
 }

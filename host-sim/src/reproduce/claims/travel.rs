@@ -281,7 +281,7 @@ fn order(evidence: &Evidence<'_>) -> Claim {
         .because(|verdict| match verdict {
             Verdict::Reproduced => "All pairs stand as in the paper.".into(),
             _ => format!(
-                "{} pairs stand as in the paper, {} the other way, {} undecided; unloaded, the error is half the clearance, which \
+                "Of the pairs {} stand as in the paper, {} the other way, {} undecided; unloaded, the error is half the clearance, which \
                  the generators change by a few arc-seconds.",
                 agreement.concordant, agreement.discordant, agreement.undecided
             ),
