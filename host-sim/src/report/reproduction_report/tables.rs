@@ -80,8 +80,8 @@ pub(super) fn by_part(r: &Reproduction) -> Table {
 pub(super) fn claims(r: &Reproduction, part: &str) -> Table {
     let rows = r.claims.iter().filter(|claim| claim.part == part).map(|claim| {
         vec![
-            Text::new(claim.place),
-            Text::new(claim.says.clone()),
+            Text::new(claim.id),
+            Text::new(format!("{} ({})", claim.says, claim.place)),
             paper_and_ours(claim),
             Text::default().strong(claim.verdict.name()),
             Text::new(claim.reason.clone()),
@@ -89,7 +89,7 @@ pub(super) fn claims(r: &Reproduction, part: &str) -> Table {
     });
     Table {
         caption: part.into(),
-        header: header(["Where", "What the paper says", "Numbers", "Verdict", "Why"]),
+        header: header(["Claim", "What the paper says", "Numbers", "Verdict", "Why"]),
         rows: rows.collect(),
     }
 }
