@@ -435,3 +435,41 @@ fn bore_averages(mesh: &WheelMesh, bore: &BoreContact, holding: Holding) -> (Vec
     }
     (rotation, mean)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whatever is held measures a rotation as a rotation; what the wave does along the circumference only the whole bore leaves out.
+    #[test]
+    fn what_is_held_turns_with_the_rim() {
+        let drive = Drive::hhd_95();
+        let shape = drive.generator.shape(GeneratorKind::Cam);
+        let holdings = [
+            (Holding::WholeBore, 0.0),
+            (Holding::Points { count: 4, first_deg: 10 }, 0.0),
+            (Holding::Points { count: 2, first_deg: 45 }, 1.0),
+            (Holding::Points { count: 1, first_deg: -45 }, -1.0),
+        ];
+        for (holding, sense) in holdings {
+            let settings =
+                SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, holding, ..SolverSettings::default() };
+            let problem = Problem::new(&drive, GeneratorKind::Cam, 20.0, settings).unwrap();
+            let (mesh, _) = problem.wheels();
+            let rotation = |of: &dyn Fn([f64; 2]) -> [f64; 2]| -> f64 {
+                let field = mesh.nodes.iter().flat_map(|&x| of(x));
+                field.zip(&problem.rotation_weights).map(|(u, w)| u * w).sum()
+            };
+            let turned = rotation(&|[x, y]| [-1e-3 * y, 1e-3 * x]);
+            assert!((turned - 1e-3).abs() < 1e-12, "{holding:?}: {turned}");
+            let wave = rotation(&|[x, y]| {
+                let r = x.hypot(y);
+                let v = shape.v(y.atan2(x));
+                [-v * y / r, v * x / r]
+            });
+            // v = -(w0/2) sin 2 phi at the bore, and half a node off.
+            let expected = -sense * 0.25 / drive.flexspline.bore_radius_mm();
+            assert!((wave - expected).abs() < 2e-5, "{holding:?}: {wave}, expected {expected}");
+        }
+    }
+}
