@@ -447,7 +447,7 @@ mod tests {
         let shape = drive.generator.shape(GeneratorKind::Cam);
         let holdings = [
             (Holding::WholeBore, 0.0),
-            (Holding::Points { count: 4, first_deg: 10 }, 0.0),
+            (Holding::Points { count: 4, first_deg: 0 }, 0.0),
             (Holding::Points { count: 2, first_deg: 45 }, 1.0),
             (Holding::Points { count: 1, first_deg: -45 }, -1.0),
         ];
