@@ -101,7 +101,7 @@ impl InvoluteFlank {
     }
 
     /// How far the chord stands off the involute at an arc length, towards the centre of its curvature, and how that changes along
-    /// the arc. A parabola: the rest is below 1e-4 of it.
+    /// the arc. A parabola: within 2 % of the chord where one facet is the whole flank.
     fn facet_depth(&self, arc: f64) -> (f64, f64) {
         let Some(([a, b], curvature_radius)) = self.facet(arc) else { return (0.0, 0.0) };
         (0.5 * (arc - a) * (b - arc) / curvature_radius, 0.5 * (a + b - 2.0 * arc) / curvature_radius)
@@ -348,7 +348,7 @@ mod tests {
                     .fold(f64::INFINITY, f64::min);
                 // The space lies on the side of the normal and the chord stands in it.
                 let found = chords.foot_internal(p);
-                assert!((found.distance.abs() - brute).abs() < 2e-5, "{count} at {r}: {} {brute}", found.distance);
+                assert!((found.distance.abs() - brute).abs() < 5e-5, "{count} at {r}: {} {brute}", found.distance);
                 deepest = deepest.max(0.004 - found.distance);
                 let q = tooth.clone().with_facets(Some(count)).facet_point(48.0 + 0.02 * f64::from(k));
                 let material = tooth.half_angle(q[0].hypot(q[1])) - q[1].atan2(q[0]);
