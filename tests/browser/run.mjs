@@ -275,7 +275,7 @@ await check("the page of reproduce answers, shows each generator and turns the d
   const { counts, claims } = report.results.reproduce;
   const answer = await page.locator("h1").textContent();
   assert(answer.includes(`Of ${claims.length} claims`) && answer.includes(`paper ${counts.reproduced} are reproduced`), answer);
-  const verdicts = await page.locator("#claims tbody tr td:nth-child(4)").allTextContents();
+  const verdicts = await page.locator("#claims tbody tr td:nth-child(2)").allTextContents();
   assert(verdicts.join() === claims.map((claim) => claim.verdict).join(), `verdicts ${verdicts}`);
   for (const choice of report.choices.map((c) => c.id)) {
     await page.locator(`input[name=choice][value=${choice}] + span`).click();

@@ -2,7 +2,7 @@
 //!
 //! Pacana et al. (Appl. Sci. 13, 2023) turned a plane model of a hermetic harmonic drive by +1 rad and −2 rad under four wave
 //! generators. Here the same is done with the drive of this project, by contact FEM; each statement of the paper gets the number that
-//! would bear it out, a criterion that was fixed beforehand, and a verdict that follows from the two.
+//! would bear it out, a criterion, and a verdict that follows from the two.
 //!
 //! 1. [`runs`]: the protocol, standard and with another mesh, increment and penalty;
 //! 2. [`metrics`]: what a run comes to; [`rank`]: when one is more than another;

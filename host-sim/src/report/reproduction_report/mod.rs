@@ -192,7 +192,7 @@ fn headline(r: &Reproduction) -> Headline {
 fn glance(r: &Reproduction) -> Section {
     let mut blocks = vec![Block::Table { choice: None, table: tables::by_part(r) }];
     blocks.push(paragraph(
-        "Each claim of the paper has a metric and a criterion that were fixed before the runs; the verdict follows from the numbers. The paper \
+        "Each claim of the paper has a metric and a criterion, and the verdict follows from the numbers alone. The paper \
          gives no tooth sizes: sizes count as reproduced within a quarter, ranks where the gap exceeds three times what mesh, increment and \
          penalty move it by.",
     ));

@@ -19,6 +19,7 @@ fn number(value: f64, unit: &str, digits: usize) -> Text {
         "′" => Text::default().error(60.0 * value, digits),
         "″" | "arcsec" => Text::default().error(value, digits),
         "" => Text::new(significant(value, digits)),
+        "°" => Text::new(format!("{}°", significant(value, digits))),
         unit => Text::new(format!("{} {unit}", significant(value, digits))),
     }
 }
@@ -81,15 +82,15 @@ pub(super) fn claims(r: &Reproduction, part: &str) -> Table {
     let rows = r.claims.iter().filter(|claim| claim.part == part).map(|claim| {
         vec![
             Text::new(claim.id),
-            Text::new(format!("{} ({})", claim.says, claim.place)),
-            paper_and_ours(claim),
             Text::default().strong(claim.verdict.name()),
+            Text::new(format!("{} [{}]", claim.says, claim.place)),
+            paper_and_ours(claim),
             Text::new(claim.reason.clone()),
         ]
     });
     Table {
         caption: part.into(),
-        header: header(["Claim", "What the paper says", "Numbers", "Verdict", "Why"]),
+        header: header(["Claim", "Verdict", "What the paper says", "Numbers", "Why"]),
         rows: rows.collect(),
     }
 }
