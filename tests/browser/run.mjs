@@ -274,7 +274,10 @@ await check("the page of reproduce answers, shows each generator and turns the d
   const report = JSON.parse(await page.locator("#flexspline-report").textContent());
   const { counts, claims } = report.results.reproduce;
   const answer = await page.locator("h1").textContent();
-  assert(answer.includes(`Of ${claims.length} claims`) && answer.includes(`paper ${counts.reproduced} are reproduced`), answer);
+  assert(
+    answer.includes(`Of ${claims.length} claims`) && answer.includes(`paper ${counts.reproduced} are reproduced`),
+    answer,
+  );
   const verdicts = await page.locator("#claims tbody tr td:nth-child(2)").allTextContents();
   assert(verdicts.join() === claims.map((claim) => claim.verdict).join(), `verdicts ${verdicts}`);
   for (const choice of report.choices.map((c) => c.id)) {
