@@ -10,6 +10,9 @@ use crate::mesh::MeshLevel;
 use crate::simulate::SimulateError;
 use crate::stepping::{Holding, Method, SolverSettings};
 
+/// Errors beyond this are shown and told both ways, arc-minutes.
+pub(crate) const LARGE_ARCMIN: f64 = 5.0;
+
 /// A change of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
@@ -339,18 +342,14 @@ fn experiment(change: Change, effects: Vec<Effect>) -> Experiment {
     let distance = (all && !pairs.is_empty())
         .then(|| pairs.iter().map(|(ours, paper)| (ours / paper).ln().abs()).sum::<f64>() / pairs.len() as f64);
     let reaches = all && reaches(pairs.iter().map(|(ours, _)| *ours));
-    let sizes: Vec<String> = effects
-        .iter()
-        .map(|e| match e.largest_arcmin {
-            Some(largest) => format!("{largest:.1}′ ({})", e.generator.replace("double-", "double ")),
-            None => format!("no equilibrium ({})", e.generator.replace("double-", "double ")),
-        })
-        .collect();
+    let sizes: Vec<String> = effects.iter().map(size).collect();
     let some = pairs.iter().any(|(ours, _)| self::reaches([*ours].into_iter()));
-    let begins = match (reaches, some) {
-        (true, _) => "Such numbers come from",
-        (false, true) => "For some of the generators such numbers come from",
-        (false, false) => "Such numbers do not come from",
+    let beyond = all && pairs.iter().all(|(ours, _)| *ours > paper::ERROR_CAM_RAD * paper::ARCMIN);
+    let begins = match (reaches, beyond, some) {
+        (true, ..) => "Such numbers come from",
+        (false, true, _) => "Such numbers, and larger ones, come from",
+        (false, false, true) => "For some of the generators such numbers come from",
+        (false, false, false) => "Such numbers do not come from",
     };
     let takeaway = format!("{begins} {}: {}.", change.source(), sizes.join(", "));
     Experiment {
@@ -362,6 +361,21 @@ fn experiment(change: Change, effects: Vec<Effect>) -> Experiment {
         reaches,
         subject: change.subject(),
         takeaway,
+    }
+}
+
+/// The size of an error in words: of a large one also where.
+fn size(effect: &Effect) -> String {
+    let name = effect.generator.replace("double-", "double ");
+    match (effect.largest_arcmin, &effect.metrics) {
+        (Some(largest), Some(m)) if largest > LARGE_ARCMIN => format!(
+            "{largest:.1}′ ({name}: {:.1}′ on the way out, {:.1}′ at +1 rad, {:.1}′ on the way back)",
+            m.largest_out_arcsec / 60.0,
+            m.error_at_turn_arcsec.abs() / 60.0,
+            m.largest_back_arcsec / 60.0
+        ),
+        (Some(largest), _) => format!("{largest:.1}′ ({name})"),
+        (None, _) => format!("no equilibrium ({name})"),
     }
 }
 
@@ -423,6 +437,9 @@ mod tests {
         assert!(large.reaches && large.takeaway.starts_with("Such numbers come from a rim"), "{}", large.takeaway);
         let one = experiment(Change::Drag, both(80.0, 630.0));
         assert!(!one.reaches && one.takeaway.starts_with("For some"), "{}", one.takeaway);
+        let more = experiment(Change::OnePointAside, both(1700.0, 1800.0));
+        assert!(!more.reaches && more.takeaway.starts_with("Such numbers, and larger"), "{}", more.takeaway);
+        assert!(more.takeaway.contains("(cam: 28.3′ on the way out, 0.5′ at +1 rad, 14.2′ on the way back)"));
         assert!(large.distance < small.distance);
         let experiments = [small, large];
         assert_eq!(nearest(&experiments).unwrap().id, "one-point");

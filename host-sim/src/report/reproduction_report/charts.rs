@@ -4,13 +4,10 @@ use super::super::animation::{Animation, FRAMES};
 use super::super::page::{Limit, Lines, Mark, Series, Upright};
 use crate::drive::GeneratorKind;
 use crate::reference::ToothPath;
-use crate::reproduce::experiments::curves;
+use crate::reproduce::experiments::{LARGE_ARCMIN, curves};
 use crate::reproduce::{Reproduction, name_of, paper};
 use crate::simulate::Row;
 use std::f64::consts::TAU;
-
-/// Errors beyond this are shown both ways.
-const LARGE_ARCMIN: f64 = 5.0;
 
 fn series(name: impl Into<String>, mark: Mark, colour: usize, points: Vec<[f64; 2]>) -> Series {
     Series { name: name.into(), mark, colour, points }
