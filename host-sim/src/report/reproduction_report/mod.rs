@@ -273,18 +273,42 @@ fn sources_of_errors(r: &Reproduction) -> Section {
         }
     }
     blocks.push(Block::Table { choice: None, table: tables::takeaways(r) });
-    blocks.push(paragraph(
+    blocks.push(paragraph(format!(
         "How the rim is kept from turning matters because the rim is deformed: a point of it moves along the circumference by v, twice around in \
-         each turn of the generator, by ±0.26 mm at the bore. The mean of the whole bore does not move. One point that is held still makes the whole \
-         flexspline turn by v over the radius instead, and the output with it. The paper says that rotation of the flexspline “was blocked” and that \
-         it was tied to a point on the axis “using rigid links”, not which of its nodes were. That its numbers come from there is therefore a \
-         suspicion: the size fits, the order of the generators does not, and its data would be needed to tell.",
-    ));
+         each turn of the generator, by a quarter of a millimetre and more at the bore. The mean of the whole bore does not move. One point that is \
+         held still makes the whole flexspline turn by v over the radius instead, and the output with it. The paper says that rotation of the \
+         flexspline “was blocked” and that it was tied to a point on the axis “using rigid links”, not which of its nodes were. That its numbers come \
+         from there is a suspicion: {}. A hard brake on the output gives delays in the first phase and after each reversal, as the paper has them, but \
+         no equality at 1 rad. What was held, and at which nodes, would tell.",
+        fit_of_one_point(r)
+    )));
     Section {
         id: "sources-of-errors".into(),
         title: "Where errors of 10′ to 21′ come from".into(),
         detail: Detail::Summary,
         blocks,
+    }
+}
+
+/// How the errors of a rim held at one point compare with the paper's, in words.
+fn fit_of_one_point(r: &Reproduction) -> String {
+    let Some(experiment) = r.experiments.iter().find(|e| e.id == "one-point") else {
+        return "it was not tried".into();
+    };
+    let mut pairs: Vec<(f64, f64)> =
+        experiment.effects.iter().filter_map(|e| e.paper_arcmin.zip(e.largest_arcmin)).collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let size = if experiment.reaches { "the size fits" } else { "the size does not fit" };
+    let ordered = pairs.windows(2).all(|two| two[0].1 < two[1].1);
+    let (Some(first), Some(last)) = (pairs.first(), pairs.last()) else { return size.into() };
+    if ordered {
+        format!(
+            "{size}, and the generators stand in the paper's order, but {:.1}′ apart where the paper has {:.1}′",
+            last.1 - first.1,
+            last.0 - first.0
+        )
+    } else {
+        format!("{size}, the order of the generators does not")
     }
 }
 
