@@ -22,6 +22,7 @@ pub mod progress;
 pub mod reference;
 pub mod replay;
 pub mod report;
+pub mod reproduce;
 pub mod residual;
 pub mod samples;
 pub mod simulate;

@@ -197,6 +197,7 @@ for (const file of [
   "validate/report.html",
   "explained/report.html",
   "faults/report.html",
+  "reproduce/report.html",
   "hostile.html",
 ]) {
   const title = file.replace("/report.html", "");
@@ -265,6 +266,35 @@ for (const file of [
     await close();
   }
 }
+
+// ---- The paper beside the model
+
+await check("the page of reproduce answers, shows each generator and turns the drive along its error", async () => {
+  const { page, noise, close } = await open("reproduce/report.html");
+  const report = JSON.parse(await page.locator("#flexspline-report").textContent());
+  const { counts, claims } = report.results.reproduce;
+  const answer = await page.locator("h1").textContent();
+  assert(
+    answer.includes(`Of ${claims.length} claims`) && answer.includes(`paper ${counts.reproduced} are reproduced`),
+    answer,
+  );
+  const verdicts = await page.locator("#claims tbody tr td:nth-child(2)").allTextContents();
+  assert(verdicts.join() === claims.map((claim) => claim.verdict).join(), `verdicts ${verdicts}`);
+  for (const choice of report.choices.map((c) => c.id)) {
+    await page.locator(`input[name=choice][value=${choice}] + span`).click();
+    await page.waitForFunction((id) => document.documentElement.dataset.ready === id, choice);
+  }
+  await page.locator("#ripple").scrollIntoViewIfNeeded();
+  const box = await page.locator("#ripple .u-over").boundingBox();
+  const before = await psi(page);
+  await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.5 * box.height);
+  await settled(page);
+  near((((await psi(page)) / PITCH) % 1) - 0.5, 0, 0.02, "pitches");
+  assert((await psi(page)) !== before, "the generator stands");
+  assert(!noise.length, noise.join(" | "));
+  await close();
+  return `${claims.length} claims`;
+});
 
 // ---- Words and numbers
 

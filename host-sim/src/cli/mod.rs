@@ -10,6 +10,7 @@ mod export;
 mod kernels;
 mod replay;
 mod report;
+mod reproduce;
 mod simulate;
 mod synthesize;
 mod tables;
@@ -87,6 +88,7 @@ enum Command {
     Replay(replay::Replay),
     Synthesize(synthesize::Synthesize),
     Diagnose(diagnose::Diagnose),
+    Reproduce(reproduce::Reproduce),
 }
 
 /// Options of every command.
@@ -152,6 +154,7 @@ impl Command {
             Command::Replay(command) => command.run(context),
             Command::Synthesize(command) => command.run(context),
             Command::Diagnose(command) => command.run(context),
+            Command::Reproduce(command) => command.run(context),
         }
     }
 }

@@ -90,6 +90,8 @@ pub struct FlankContact<'a> {
     fs_turns: Vec<(f64, f64)>,
     cs_turns: Vec<(f64, f64)>,
     rule: Vec<(f64, f64)>,
+    /// What straight facets of the space add to it at most, mm; zero where it is smooth.
+    deepest_facet: f64,
 }
 
 /// Where the gap of a pair is looked at in the search.
@@ -201,7 +203,8 @@ impl<'a> FlankContact<'a> {
         let turns = |mesh: &WheelMesh| (0..mesh.teeth).map(|sector| mesh.sector_angle(sector).sin_cos()).collect();
         let (fs_turns, cs_turns) = (turns(fs_mesh), turns(cs_mesh));
         let rule = gauss_legendre(4);
-        FlankContact { fs_mesh, cs_mesh, tooth, space, deviations, coarse, fs_turns, cs_turns, rule }
+        let deepest_facet = space.deepest_facet();
+        FlankContact { fs_mesh, cs_mesh, tooth, space, deviations, coarse, fs_turns, cs_turns, rule, deepest_facet }
     }
 
     /// Flank nodes of the flexspline side of a pair.
@@ -281,7 +284,7 @@ impl<'a> FlankContact<'a> {
     /// brings the flank nearer than its own length.
     #[inline]
     fn least_distance(&self, field: &LocalField, x: [f64; 2]) -> f64 {
-        self.space.involute_distance(field.space.recover(x)).1 + field.depth - field.largest_cs
+        self.space.involute_distance(field.space.recover(x)).1 + field.depth - field.largest_cs - self.deepest_facet
     }
 
     fn local_field(&self, pair: FlankPair, at: Configuration) -> LocalField {
@@ -380,7 +383,7 @@ impl<'a> FlankContact<'a> {
                 let r = middle + half * xi;
                 let (edge, local) = flank.locate(r);
                 points.push(FlankPoint {
-                    position: self.tooth.point(r),
+                    position: self.tooth.facet_point(r),
                     edge,
                     shape: edge_shape(local),
                     weight: w * half * self.tooth.arc_rate(r),

@@ -27,6 +27,8 @@ pub struct InvoluteFlank {
     pub rounding_radius: f64,
     /// Angle subtended by the rounding, rad.
     pub rounding_sweep: f64,
+    /// Straight facets in place of the involute.
+    facets: Option<u32>,
 }
 
 /// Foot of a point on the flank.
@@ -70,7 +72,54 @@ impl InvoluteFlank {
             rounding_centre: [p[0] - rounding_radius * n[0], p[1] - rounding_radius * n[1]],
             rounding_radius,
             rounding_sweep: rounding.length() / rounding_radius,
+            facets: None,
         }
+    }
+
+    /// The same with so many chords of equal length in place of the involute: what contact on the edges of a mesh sees.
+    pub fn with_facets(self, facets: Option<u32>) -> InvoluteFlank {
+        InvoluteFlank { facets: facets.filter(|count| *count > 0), ..self }
+    }
+
+    /// Arc length of the involute, from where it leaves its base circle, at a radius.
+    fn arc_at(&self, radius: f64) -> f64 {
+        0.5 * (radius * radius - self.base_radius * self.base_radius).max(0.0) / self.base_radius
+    }
+
+    /// The facet at an arc length, if there are facets and it lies on them: arc lengths of its ends, and the radius of curvature of
+    /// the involute half way.
+    fn facet(&self, arc: f64) -> Option<([f64; 2], f64)> {
+        let count = f64::from(self.facets?);
+        let (a, b) = (self.arc_at(self.start_radius), self.arc_at(self.junction_radius));
+        let at = (arc - a) / (b - a) * count;
+        if !(0.0..=count).contains(&at) {
+            return None;
+        }
+        let k = at.floor().min(count - 1.0);
+        let ends = [a + (b - a) * k / count, a + (b - a) * (k + 1.0) / count];
+        Some((ends, (self.base_radius * (ends[0] + ends[1])).sqrt()))
+    }
+
+    /// How far the chord stands off the involute at an arc length, towards the centre of its curvature, and how that changes along
+    /// the arc. A parabola: within 2 % of the chord where one facet is the whole flank.
+    fn facet_depth(&self, arc: f64) -> (f64, f64) {
+        let Some(([a, b], curvature_radius)) = self.facet(arc) else { return (0.0, 0.0) };
+        (0.5 * (arc - a) * (b - arc) / curvature_radius, 0.5 * (a + b - 2.0 * arc) / curvature_radius)
+    }
+
+    /// The point of the flank in place of that of the involute at a radius: on its chord, where there are facets.
+    pub fn facet_point(&self, radius: f64) -> [f64; 2] {
+        let arc = self.arc_at(radius);
+        let Some(([a, b], _)) = self.facet(arc) else { return self.point(radius) };
+        let end = |arc: f64| self.point((self.base_radius * (self.base_radius + 2.0 * arc)).sqrt());
+        let (p, q, t) = (end(a), end(b), (arc - a) / (b - a));
+        [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])]
+    }
+
+    /// What facets add to the material of a space at most, mm.
+    pub fn deepest_facet(&self) -> f64 {
+        let least = self.arc_at(self.start_radius.min(self.junction_radius));
+        self.facet(least).map_or(0.0, |([a, b], curvature_radius)| 0.125 * (b - a) * (b - a) / curvature_radius)
     }
 
     /// Half angle of the flank at a radius (the involute, also beyond the junction), rad.
@@ -147,14 +196,15 @@ impl InvoluteFlank {
             let (sin, cos) = (along / rho_squared, self.base_radius / rho_squared);
             let normal = [-(sin * p[0] - cos * p[1]), -(sin * p[1] + cos * p[0])];
             let tangent = [cos * p[0] + sin * p[1], cos * p[1] - sin * p[0]];
-            Foot {
-                distance,
-                normal,
-                tangent,
-                radius,
-                radius_rate: self.base_radius / radius,
-                arc: 0.5 * foot_along * foot_along / self.base_radius,
+            let arc = 0.5 * foot_along * foot_along / self.base_radius;
+            let mut foot = Foot { distance, normal, tangent, radius, radius_rate: self.base_radius / radius, arc };
+            if self.facets.is_some() {
+                // The chord stands in the space; the gradient of the distance turns with it.
+                let (depth, slope) = self.facet_depth(arc);
+                foot.distance -= depth;
+                foot.normal = [normal[0] - slope * tangent[0], normal[1] - slope * tangent[1]];
             }
+            foot
         } else {
             let arm = [p[0] - self.rounding_centre[0], p[1] - self.rounding_centre[1]];
             let length = (arm[0] * arm[0] + arm[1] * arm[1]).sqrt().max(1e-12);
@@ -262,6 +312,54 @@ mod tests {
             assert!((slope(0.0, h) - foot.normal[1]).abs() < 1e-6, "at {r}");
             assert!((foot.normal[0] * foot.tangent[0] + foot.normal[1] * foot.tangent[1]).abs() < 1e-12);
         }
+    }
+
+    /// The distance from chords is that of the polyline, found by brute force.
+    #[test]
+    fn facets_are_chords() {
+        let drive = Drive::hhd_95();
+        let (space, _) = space();
+        let tooth = ToothFlank::external(&drive.flexspline).unwrap();
+        let tooth = InvoluteFlank::new(&tooth, drive.flexspline.base_radius_mm());
+        for count in [1, 3] {
+            let (chords, smooth) = (space.clone().with_facets(Some(count)), &space);
+            let vertex = |flank: &InvoluteFlank, k: u32| {
+                let (a, b) = (flank.arc_at(flank.start_radius), flank.arc_at(flank.junction_radius));
+                let arc = a + (b - a) * f64::from(k) / f64::from(count);
+                flank.point((flank.base_radius * (flank.base_radius + 2.0 * arc)).sqrt())
+            };
+            let ends: Vec<[f64; 2]> = (0..=count).map(|k| vertex(smooth, k)).collect();
+            let mut deepest = 0.0_f64;
+            for k in 1..40 {
+                let r = smooth.junction_radius + (smooth.start_radius - smooth.junction_radius) * f64::from(k) / 40.0;
+                let ([x, y], foot) = (smooth.point(r), smooth.foot_internal(smooth.point(r)));
+                let p = [x + 0.004 * foot.normal[0], y + 0.004 * foot.normal[1]];
+                let brute = ends
+                    .windows(2)
+                    .map(|ends| {
+                        let along = [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]];
+                        let length = along[0].hypot(along[1]);
+                        let beside = [p[0] - ends[0][0], p[1] - ends[0][1]];
+                        let t = (along[0] * beside[0] + along[1] * beside[1]) / (length * length);
+                        let inside = (-1e-6..=1.0 + 1e-6).contains(&t);
+                        let across = (along[0] * beside[1] - along[1] * beside[0]).abs() / length;
+                        if inside { across } else { f64::INFINITY }
+                    })
+                    .fold(f64::INFINITY, f64::min);
+                // The space lies on the side of the normal and the chord stands in it.
+                let found = chords.foot_internal(p);
+                assert!((found.distance.abs() - brute).abs() < 5e-5, "{count} at {r}: {} {brute}", found.distance);
+                deepest = deepest.max(0.004 - found.distance);
+                let q = tooth.clone().with_facets(Some(count)).facet_point(48.0 + 0.02 * f64::from(k));
+                let material = tooth.half_angle(q[0].hypot(q[1])) - q[1].atan2(q[0]);
+                assert!(material >= -1e-12, "a facet of the tooth stands out of it");
+            }
+            assert!(deepest > 1e-4 && deepest <= chords.deepest_facet() * 1.1, "{deepest} {}", chords.deepest_facet());
+            assert!(
+                (chords.deepest_facet() / space.clone().with_facets(Some(2 * count)).deepest_facet() - 4.0).abs() < 0.3
+            );
+        }
+        assert_eq!((space.deepest_facet(), space.facet_point(48.9)), (0.0, space.point(48.9)));
     }
 
     #[test]

@@ -16,5 +16,5 @@ mod wheels;
 pub use error::SolveError;
 pub use fast::CondensedDrive;
 pub use newton::{Effort, Increment, Solver};
-pub use problem::{Method, Problem, SolverSettings};
+pub use problem::{Holding, Method, Problem, SolverSettings};
 pub use state::State;

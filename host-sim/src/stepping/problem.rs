@@ -1,6 +1,7 @@
 //! The drive as a mechanical problem: meshes, contact, holding, at one temperature. Immutable while it is solved.
 
 use std::borrow::Cow;
+use std::f64::consts::TAU;
 use std::fmt;
 use std::str::FromStr;
 
@@ -42,6 +43,24 @@ impl FromStr for Method {
     }
 }
 
+/// What of the bore may not turn.
+///
+/// A rim that is deformed by its generator turns locally by `v/R`, two waves around it: the mean of the whole bore does not see
+/// that, a single point carries it whole to the output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Holding {
+    /// The mean rotation of the whole bore: what a sleeve holds.
+    #[default]
+    WholeBore,
+    /// The mean rotation of so many points of the bore, equally spaced. To show what that does.
+    Points {
+        /// How many.
+        count: u32,
+        /// Where the first is, degrees from the axis of tooth 0.
+        first_deg: i32,
+    },
+}
+
 /// Settings of the numerical method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverSettings {
@@ -59,6 +78,11 @@ pub struct SolverSettings {
     /// Integration points in each bore edge; `None` chooses by generator: 48 under rollers (a point every 4 µm; 16 leave
     /// 0.07″ of false ripple and a rim that may slip along the roller by steps), 8 under discs and cam.
     pub bore_points: Option<usize>,
+    /// What holds the rotation of the flexspline.
+    pub holding: Holding,
+    /// Straight facets in place of each flank of both wheels, as contact on the edges of a mesh has them; `None`: the curve. To
+    /// show what that does.
+    pub flank_facets: Option<u32>,
     /// Residual force, relative to the largest contact force, at which an increment is done.
     pub tolerance: f64,
     /// Newton iterations before an increment is halved.
@@ -95,6 +119,8 @@ impl Default for SolverSettings {
             bore_penalty: None,
             flank_penalty: 5e7,
             bore_points: None,
+            holding: Holding::default(),
+            flank_facets: None,
             tolerance: 1e-6,
             max_iterations: 60,
             max_halvings: 8,
@@ -166,6 +192,7 @@ impl Problem {
         let tooth = InvoluteFlank::new(&ToothFlank::external(&drive.flexspline)?, drive.flexspline.base_radius_mm());
         let space =
             InvoluteFlank::new(&ToothFlank::internal(&drive.circular_spline)?, drive.circular_spline.base_radius_mm());
+        let [tooth, space] = [tooth, space].map(|flank| flank.with_facets(settings.flank_facets));
         let deviations = FlankDeviations::new(&drive);
         let outer = drive.circular_spline.outer_radius_mm;
         let mut held: Vec<bool> = circular_spline.nodes.iter().map(|p| p[0].hypot(p[1]) > outer - 1e-6).collect();
@@ -179,7 +206,7 @@ impl Problem {
             held = vec![false; condensed.circular_spline.skin.mesh.nodes.len()];
         }
         let bore = BoreContact::new(fs, settings.bore_points(kind));
-        let (rotation_weights, mean_weights) = bore_averages(fs, &bore);
+        let (rotation_weights, mean_weights) = bore_averages(fs, &bore, settings.holding);
         let thermal = &drive.thermal_state;
         Ok(Problem {
             bore_law: BoreLaw::new(settings.bore_penalty(kind), drive.generator.bearing_stiffness_n_per_mm3),
@@ -227,7 +254,8 @@ impl Problem {
         problem.flexspline = WheelMesh::smooth_ring(bore_radius, drive.flexspline.rim_thickness_mm, sectors, rows)?
             .with_rim(RimVariation::of(drive), drive.flexspline.root_radius_mm)?;
         problem.bore = BoreContact::new(&problem.flexspline, settings.bore_points(kind));
-        (problem.rotation_weights, problem.mean_weights) = bore_averages(&problem.flexspline, &problem.bore);
+        (problem.rotation_weights, problem.mean_weights) =
+            bore_averages(&problem.flexspline, &problem.bore, settings.holding);
         Ok(problem)
     }
 
@@ -377,8 +405,8 @@ impl Problem {
     }
 }
 
-/// Linear functionals of the bore displacement: mean rotation, and mean x displacement.
-fn bore_averages(mesh: &WheelMesh, bore: &BoreContact) -> (Vec<f64>, Vec<f64>) {
+/// Linear functionals of the bore displacement: rotation of what is held, and mean x displacement.
+fn bore_averages(mesh: &WheelMesh, bore: &BoreContact, holding: Holding) -> (Vec<f64>, Vec<f64>) {
     let mut rotation = vec![0.0; 2 * mesh.nodes.len()];
     let mut mean = vec![0.0; 2 * mesh.nodes.len()];
     let share = 1.0 / bore.edges.len() as f64;
@@ -392,5 +420,56 @@ fn bore_averages(mesh: &WheelMesh, bore: &BoreContact) -> (Vec<f64>, Vec<f64>) {
             mean[2 * n] += simpson * share;
         }
     }
+    if let Holding::Points { count, first_deg } = holding {
+        rotation.fill(0.0);
+        for k in 0..count {
+            let (sin, cos) = (f64::from(first_deg).to_radians() + TAU * f64::from(k) / f64::from(count)).sin_cos();
+            let along = |n: &u32| mesh.nodes[*n as usize][0] * cos + mesh.nodes[*n as usize][1] * sin;
+            let nearest = bore.edges.iter().map(|edge| edge[0]).max_by(|a, b| along(a).total_cmp(&along(b)));
+            let n = nearest.expect("a bore has edges") as usize;
+            let [x, y] = mesh.nodes[n];
+            let share = 1.0 / (f64::from(count) * (x * x + y * y));
+            rotation[2 * n] -= share * y;
+            rotation[2 * n + 1] += share * x;
+        }
+    }
     (rotation, mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whatever is held measures a rotation as a rotation; what the wave does along the circumference only the whole bore leaves out.
+    #[test]
+    fn what_is_held_turns_with_the_rim() {
+        let drive = Drive::hhd_95();
+        let shape = drive.generator.shape(GeneratorKind::Cam);
+        let holdings = [
+            (Holding::WholeBore, 0.0),
+            (Holding::Points { count: 4, first_deg: 0 }, 0.0),
+            (Holding::Points { count: 2, first_deg: 45 }, 1.0),
+            (Holding::Points { count: 1, first_deg: -45 }, -1.0),
+        ];
+        for (holding, sense) in holdings {
+            let settings =
+                SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, holding, ..SolverSettings::default() };
+            let problem = Problem::new(&drive, GeneratorKind::Cam, 20.0, settings).unwrap();
+            let (mesh, _) = problem.wheels();
+            let rotation = |of: &dyn Fn([f64; 2]) -> [f64; 2]| -> f64 {
+                let field = mesh.nodes.iter().flat_map(|&x| of(x));
+                field.zip(&problem.rotation_weights).map(|(u, w)| u * w).sum()
+            };
+            let turned = rotation(&|[x, y]| [-1e-3 * y, 1e-3 * x]);
+            assert!((turned - 1e-3).abs() < 1e-12, "{holding:?}: {turned}");
+            let wave = rotation(&|[x, y]| {
+                let r = x.hypot(y);
+                let v = shape.v(y.atan2(x));
+                [-v * y / r, v * x / r]
+            });
+            // v = -(w0/2) sin 2 phi at the bore, and half a node off.
+            let expected = -sense * 0.25 / drive.flexspline.bore_radius_mm();
+            assert!((wave - expected).abs() < 2e-5, "{holding:?}: {wave}, expected {expected}");
+        }
+    }
 }
