@@ -92,10 +92,12 @@ fn distance(found: &[String], known: &[String]) -> Option<(usize, usize)> {
         return Some((reordered, 2));
     }
     let (short, long) = if a.len() < b.len() { (&a, known) } else { (&b, found) };
-    let whole_word = |part: &[String]| part.concat() == *short;
-    let within = (1..long.len()).any(|k| whole_word(&long[..k]) || whole_word(&long[k..]));
+    let is_short = |part: &[String]| part.concat() == *short;
+    let first_words = short.len() > 1 && (1..long.len()).any(|k| is_short(&long[..k]));
+    let last_words = (1..long.len()).any(|k| is_short(&long[k..]));
     let beginning = long.len() == 1 && long[0].starts_with(short.as_str());
-    (short.chars().count() >= SHORTEST_WORD && (within || beginning)).then_some((apart, 3))
+    let there = first_words || (short.len() >= SHORTEST_WORD && (last_words || beginning));
+    there.then_some((apart, 3))
 }
 
 #[cfg(test)]
@@ -136,6 +138,7 @@ mod tests {
             ("Flexspline.Teeth", "flexspline.teeth"),
             ("flexspline.module", "flexspline.module_mm"),
             ("generator.w0", "generator.w0_mm"),
+            ("w0_mm", "generator.w0_mm"),
             ("temperature.max_c", "temperature.maximum_c"),
             ("as_built.circular_spline_excentricity_um", "as_built.circular_spline_eccentricity_um"),
             ("two_roller", "two-roller"),

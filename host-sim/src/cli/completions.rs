@@ -17,8 +17,8 @@ Examples:
   flexspline completions fish > ~/.config/fish/completions/flexspline.fish
   flexspline completions powershell >> $PROFILE
 
-For zsh the folder has to be in its path: fpath+=~/.zfunc before compinit in ~/.zshrc. A new shell then completes; in bash
-this one does too after: source <(flexspline completions bash)")]
+For zsh the folder has to be in its path: fpath+=~/.zfunc before compinit in ~/.zshrc. A new shell
+then completes; in bash this one does too after: source <(flexspline completions bash)")]
 pub(super) struct Completions {
     /// The shell
     #[arg(value_name = "SHELL", value_enum)]

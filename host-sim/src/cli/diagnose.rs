@@ -40,7 +40,7 @@ Examples:
   flexspline diagnose measured.csv --tables out --generator cam
   flexspline diagnose measured.csv --tables out --generator cam --remake-tables --out diagnosed")]
 pub(super) struct Diagnose {
-    /// Measured rows: CSV with a header. Columns: see --columns
+    /// Measured rows: CSV with a header; columns as --columns says
     #[arg(value_name = "DATA.csv", value_hint = ValueHint::FilePath)]
     data: PathBuf,
     /// Nominal model from the catalogue, or one that was extended before: then what is found is beyond it
@@ -58,8 +58,10 @@ pub(super) struct Diagnose {
     /// Mesh of FEM runs: coarse, standard or fine [default: that of the table]
     #[arg(long, value_name = "LEVEL", requires = "tables", value_parser = names::mesh(), hide_possible_values = true)]
     mesh: Option<MeshLevel>,
-    /// Names and units of columns, for instance generator=wave_gen_turns:turn,error=error_arcsec:arcsec
-    #[arg(long, value_name = "MAP", default_value = "")]
+    /// Names and units of columns that are not called time_s, generator_rad, output_rad, error_arcsec, torque_n_m, temperature_c,
+    /// orientation_rad, for instance generator=wave_gen_turns:turn,error=error_arcsec:arcsec; units are rad, deg, turn, arcmin,
+    /// arcsec, s, ms, N.m, C, K [default: these names]
+    #[arg(long, value_name = "MAP", default_value = "", hide_default_value = true)]
     columns: String,
     /// Do not write report.html
     #[arg(long)]

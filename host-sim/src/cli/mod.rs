@@ -68,10 +68,10 @@ impl From<OutputError> for Failure {
 #[derive(Debug, Parser)]
 #[command(name = "flexspline", version, propagate_version = true, max_term_width = 100)]
 #[command(after_help = "\
-flexspline COMMAND --help says more, with examples; flexspline man COMMAND | man -l - is the same as a page.
-Exit codes: 0 done, 1 the run failed (no convergence, a bound missed, stopped), 2 bad input or usage.
-Angles are radians, torques N.m, temperatures degrees C, sizes mm or um as the name says; errors are arc-seconds at
-the output, positive where it leads. A positive torque turns the output forward.")]
+flexspline COMMAND --help says more of a command, with examples.
+Angles are radians, torques N.m, temperatures degrees C, sizes mm or um as the name says; errors are
+arc-seconds at the output, positive where it leads. A positive torque turns the output forward.
+Exit codes: 0 done; 1 the run failed (no convergence, a bound missed, stopped); 2 bad input.")]
 struct Cli {
     #[command(flatten)]
     common: Common,
@@ -268,6 +268,8 @@ mod tests {
             let help = help.to_string();
             let examples: Vec<&str> = help.lines().map(str::trim).filter(|l| l.starts_with("flexspline ")).collect();
             assert!(!examples.is_empty(), "{} has no example", command.get_name());
+            let longest = help.lines().map(|line| line.chars().count()).max();
+            assert!(longest <= Some(100), "{}: a line of {longest:?} letters is broken", command.get_name());
             for example in examples {
                 let words = example.split(['>', '|']).next().unwrap().split_whitespace();
                 assert!(parse(words).is_ok(), "{example}");

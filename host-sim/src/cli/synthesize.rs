@@ -116,8 +116,15 @@ pub(super) struct Synthesize {
     /// Take motion, load, temperature and time from this file instead
     #[arg(long, value_name = "DATA.csv", value_hint = ValueHint::FilePath, help_heading = "Excitation")]
     like: Option<PathBuf>,
-    /// Names and units of the columns of that file, as for `flexspline diagnose`
-    #[arg(long, value_name = "MAP", default_value = "", requires = "like", help_heading = "Excitation")]
+    /// Names and units of the columns of that file, as for `flexspline diagnose` [default: the usual names]
+    #[arg(
+        long,
+        value_name = "MAP",
+        default_value = "",
+        hide_default_value = true,
+        requires = "like",
+        help_heading = "Excitation"
+    )]
     columns: String,
     /// Seed of everything drawn [default: drawn, and said]
     #[arg(long, value_name = "N")]

@@ -105,7 +105,11 @@ impl Drive {
             &cold
         };
         let mut text = String::from(HEAD);
-        let _ = writeln!(text, "name = {}", toml::Value::String(drive.name.clone()));
+        let _ = writeln!(
+            text,
+            "{:<44} # what results call it",
+            format!("name = {}", toml::Value::String(drive.name.clone()))
+        );
         let mut open = "";
         fields::for_each(drive, |field, value| {
             let (section, key) = field.split();
