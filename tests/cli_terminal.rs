@@ -216,9 +216,16 @@ fn a_terminal_sees_colour_and_how_long_it_will_take() {
     assert!(shown.contains("\u{1b}[31m") && shown.contains("did you mean `flexspline.teeth`?"), "{shown:?}");
     let plain = on_a_terminal(&desk, &wrong, &[("NO_COLOR", "1")]).unwrap();
     assert!(!plain.contains(ESCAPE) && plain.contains("did you mean"), "{plain:?}");
-    for line in ["tables --generator cam", "simulate --generator cam --solver reference", "kernels --generator cam"] {
-        let shown = on_a_terminal(&desk, &format!("timeout -s INT 2.5 {program} {line}"), &[]).unwrap();
-        assert!(shown.contains(" left"), "{line} shows no time left: {shown:?}");
+    desk.line("new nominal.toml").done();
+    desk.line("synthesize --model nominal.toml --effect wear --seed 5 --rows 20000 --out data").done();
+    for (line, time) in [
+        ("tables --generator cam", " left"),
+        ("simulate --generator cam --solver reference", " left"),
+        ("kernels --generator cam", " left"),
+        ("diagnose data/data.csv --model nominal.toml", " so far"),
+    ] {
+        let shown = on_a_terminal(&desk, &format!("timeout -s INT 2.2 {program} {line}"), &[]).unwrap();
+        assert!(shown.contains(time), "{line} shows no time: {shown:?}");
         // The bar goes before the last word.
         let (_, end) = shown.rsplit_once("\u{1b}[2K").unwrap();
         assert!(end.contains("stopped; nothing was written") && !end.contains(" left"), "{line}: {end:?}");

@@ -20,8 +20,8 @@ pub fn likeliest<'k>(found: &str, known: impl IntoIterator<Item = &'k str>) -> O
         .and_then(|(_, name)| (name != found).then_some(name))
 }
 
-/// The path of `known`, `section.key`, that `found` is likely to mean: the same key in a section like the one found or in any other,
-/// else a key like it.
+/// The path of `known`, `section.key`, that `found` is likely to mean: the same key in a section like the one found, or one there that
+/// goes on where it ends; the same key in any other; else a key like it.
 #[must_use]
 pub fn likeliest_path<'k>(found: &str, known: &[&'k str]) -> Option<&'k str> {
     fn split(path: &str) -> (&str, &str) {
@@ -33,7 +33,10 @@ pub fn likeliest_path<'k>(found: &str, known: &[&'k str]) -> Option<&'k str> {
     let anywhere = |key: &str| known.iter().copied().find(|path| split(path).1 == key);
     let meant = if sections().any(|known| known == section) { Some(section) } else { likeliest(section, sections()) };
     meant
-        .and_then(|section| at(section, key))
+        .and_then(|section| {
+            let goes_on = |path: &&str| split(path).1.strip_prefix(key).is_some_and(|rest| rest.starts_with('_'));
+            at(section, key).or_else(|| known.iter().copied().find(|path| split(path).0 == section && goes_on(path)))
+        })
         .or_else(|| anywhere(key))
         .or_else(|| {
             let section = meant?;

@@ -45,6 +45,12 @@ struct Report {
     kernels: Vec<Told>,
 }
 
+impl Report {
+    fn of(kernels: Vec<Told>) -> Report {
+        Report { schema_version: 1, kernels }
+    }
+}
+
 /// What the command says of one generator.
 #[derive(Serialize)]
 struct Told {
@@ -105,7 +111,7 @@ impl KernelsCommand {
         }
         drop(progress);
         outputs.finish()?;
-        let told = Report { schema_version: 1, kernels: told };
+        let told = Report::of(told);
         context.print(&told, || {
             let texts: Vec<String> = told.kernels.iter().map(text).collect();
             let next =
@@ -127,4 +133,24 @@ fn text(told: &Told) -> String {
          spline's: {:.2}, {:.2}\n  circular spline {} um beside the axis: {at_light:.1}, {at_heavy:.1} p-p\nwrote {}",
         told.generator, fs[0], fs[1], cs[0], cs[1], told.eccentricity_um, told.file
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_is_one_object_with_an_entry_for_each_generator() {
+        let told = Told {
+            generator: "cam".into(),
+            file: "out/cam.kernels.json".into(),
+            second_harmonic_arcsec_per_um: [[4.2; 2]; 2],
+            eccentricity_pp_arcsec: [1.0, 2.0],
+            eccentricity_um: 5.0,
+            torque_n_m: [2.0, 100.0],
+        };
+        let json = serde_json::to_value(Report::of(vec![told])).unwrap();
+        assert!(json.is_object());
+        assert_eq!((json["schema_version"].as_u64(), json["kernels"][0]["generator"].as_str()), (Some(1), Some("cam")));
+    }
 }

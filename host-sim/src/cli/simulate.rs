@@ -29,8 +29,8 @@ Examples:
   flexspline simulate --generator cam --path pitch --set flanks.friction_coefficient=0.08 --json
 
 A path FILE is a CSV with a column generator_rad and, if wanted, torque_n_m and temperature_c: one
-increment, or more where the solver needs them, and one result row for each of its rows. The drive is
-deformed where the first row says.")]
+increment, or more where the solver needs them, and one result row for each of its rows. The drive
+is deformed where the first row says.")]
 pub(super) struct Simulate {
     #[command(flatten)]
     model: ModelOptions,

@@ -35,9 +35,9 @@ use crate::tables::MadeTable;
 Examples:
   flexspline synthesize --list
   flexspline synthesize --effect circular_spline_eccentricity:amplitude_um=8,phase_rad=0.7
-  flexspline synthesize --effect sensor_latency:delay_s=0.001 --effect wear --tables out --generator cam --seed 7
-  flexspline synthesize --effect gravity_torque --model nominal.toml --like measured.csv --out made-up
-  flexspline synthesize --effect encoder_index_jump:size_arcsec=53 --noise-arcsec 1 --sessions 4 --rows 5000
+  flexspline synthesize --effect sensor_latency:delay_s=0.001 --effect wear --tables out --seed 7
+  flexspline synthesize --effect gravity_torque --model nominal.toml --like measured.csv --out try
+  flexspline synthesize --effect encoder_index_jump:size_arcsec=53 --noise-arcsec 1 --rows 5000
 
 Without --effect the data are those of a drive within its spread, in which nothing is to be found.")]
 pub(super) struct Synthesize {

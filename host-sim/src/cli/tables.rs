@@ -45,7 +45,8 @@ Examples:
   flexspline tables --generator cam --from-samples bench.csv
   flexspline tables --generator double-disc --positions 12 --node-tolerance-arcsec 0.2
 
-Sample files have the columns generator_rad, torque_n_m, temperature_c, direction (1 or -1), output_rad.")]
+Sample files have the columns generator_rad, torque_n_m, temperature_c, direction (1 or -1) and
+output_rad.")]
 pub(super) struct Tables {
     /// Wave generator: two-roller, four-roller, double-disc, cam, or all
     #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]

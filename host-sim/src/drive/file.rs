@@ -662,7 +662,7 @@ mod tests {
             ),
             (
                 "[material]\nyoungs_modulus_mpa = 2.06e11",
-                "wrong.toml:3: material.youngs_modulus_mpa: found 206000000000, allowed: 100 to 1000000",
+                "wrong.toml:3: material.youngs_modulus_mpa: found 206000000000, allowed: 100 to 1e6",
             ),
             (
                 "[generator]\nw0_mm = 0.05",
@@ -687,7 +687,7 @@ mod tests {
             ),
             (
                 "[generator]\nbearing_stiffness_n_per_mm3 = \"soft\"",
-                "wrong.toml:3: generator.bearing_stiffness_n_per_mm3: found \"soft\", allowed: above 0 to 10000000 or \"rigid\"",
+                "wrong.toml:3: generator.bearing_stiffness_n_per_mm3: found \"soft\", allowed: above 0 to 1e7 or \"rigid\"",
             ),
             (
                 "[flanks]\nfriction_coefficient = true",
