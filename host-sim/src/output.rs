@@ -191,7 +191,8 @@ impl Outputs {
             for Part { target, file, .. } in &mut self.files {
                 let file = file.take().expect("a part is put in its place once");
                 file.persist(&*target).map_err(|error| failed(target)(error.error))?;
-                unfinished.written = true;
+                // One in a folder that is itself hidden goes with it.
+                unfinished.written |= !unfinished.hidden.iter().any(|folder| target.starts_with(folder));
             }
             Ok(())
         };
