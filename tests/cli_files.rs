@@ -53,10 +53,9 @@ fn a_new_drive_file_is_the_drive_it_was_made_from_and_is_not_lost() {
         // It says of each number what it is and what is allowed.
         let text = desk.read(file);
         assert_eq!(text, desk.line(&format!("drive --drive {file}")).done().stdout);
-        for line in text
-            .lines()
-            .filter(|line| line.contains(" = ") && !line.starts_with(['#', ' ']) && !line.starts_with("name"))
-        {
+        let numbers = text.lines().filter(|line| line.contains(" = ") && !line.starts_with(['#', ' ']));
+        // The comment of a list stands behind its last line.
+        for line in numbers.filter(|line| !line.starts_with("name") && !line.ends_with('[')) {
             assert!(line.contains(" # ") && line.contains(" to "), "{line}");
         }
     }
@@ -158,7 +157,7 @@ fn manual_pages_are_whole_and_render_without_a_warning() {
     }
     for page in &pages {
         let text = desk.read(&format!("pages/{page}"));
-        for part in [".TH flexspline", ".SH NAME", ".SH SYNOPSIS", ".SH DESCRIPTION", ".SH OPTIONS", ".SH EXTRA"] {
+        for part in [".TH flexspline", ".SH NAME", ".SH SYNOPSIS", ".SH DESCRIPTION", ".SH OPTIONS", ".nf\n", ".fi\n"] {
             assert!(text.contains(part), "{page} has no {part}");
         }
         if let Some(mut groff) = installed("groff") {
@@ -167,7 +166,11 @@ fn manual_pages_are_whole_and_render_without_a_warning() {
             let said = String::from_utf8_lossy(&rendered.stderr);
             assert!(rendered.status.success() && said.is_empty(), "{page}: {said}");
             let read = String::from_utf8_lossy(&rendered.stdout);
-            assert!(read.contains("NAME") && read.contains("flexspline"), "{page}");
+            let title = format!("{}(1)", page.trim_end_matches(".1"));
+            assert!(read.contains(&title) && read.contains(env!("CARGO_PKG_VERSION")), "{page}: {read:.200}");
+            let command = page.strip_prefix("flexspline-").map(|name| name.trim_end_matches(".1"));
+            let example = command.map_or("exit codes".to_owned(), |command| format!("flexspline {command}"));
+            assert!(read.to_lowercase().contains(&example), "{page} shows no {example}");
         }
     }
     assert_eq!(desk.line("man").done().stdout.trim_end(), desk.read("pages/flexspline.1").trim_end());

@@ -83,11 +83,28 @@ fn pages() -> Result<Vec<(String, String)>, Failure> {
     std::iter::once(program)
         .chain(commands)
         .map(|command| {
-            let page = Man::new(command).manual("flexspline");
+            let page = Man::new(command);
             let mut text = Vec::new();
             page.render(&mut text).map_err(|error| Failure::Failed(error.to_string()))?;
             let text = String::from_utf8(text).map_err(|error| Failure::Failed(error.to_string()))?;
-            Ok((page.get_filename(), text))
+            Ok((page.get_filename(), as_written(&text)))
         })
         .collect()
+}
+
+/// A page with the program in its title, and with what help has behind the options line by line, as help has it.
+fn as_written(page: &str) -> String {
+    let (head, rest) = page.split_once(".SH EXTRA\n").unwrap_or((page, ""));
+    let (extra, foot) = match rest.find(".SH ") {
+        Some(at) => rest.split_at(at),
+        None => (rest, ""),
+    };
+    let titled = |line: &str| match line.strip_prefix(".TH ").and_then(|title| title.split(' ').next()) {
+        Some(name) => format!(".TH {name} 1 \"\" \"flexspline {}\" \"flexspline\"\n", env!("CARGO_PKG_VERSION")),
+        None => format!("{line}\n"),
+    };
+    let head: String = head.lines().map(titled).collect();
+    let heading = if extra.starts_with("Example") { "EXAMPLES" } else { "NOTES" };
+    let extra = extra.trim_start_matches("Examples:\n").trim_start_matches("Example:\n").trim_end();
+    format!("{head}.SH {heading}\n.nf\n{extra}\n.fi\n{foot}")
 }
