@@ -102,6 +102,29 @@ fn a_stopped_diagnosis_leaves_the_folder_as_it_was() {
 }
 
 #[test]
+fn a_run_that_was_started_to_outlive_its_terminal_does() {
+    let desk = Desk::new();
+    let run = "exec \"$0\" simulate --generator double-disc --mesh coarse --path paper -q";
+    let started = |before: &str| {
+        let mut bash = Command::new("bash");
+        bash.args(["-c", &format!("{before} {run}")]).arg(flexspline()).current_dir(desk.path("."));
+        let child = bash.stderr(Stdio::piped()).spawn().unwrap();
+        sleep(WORKING);
+        signal(&child, "-HUP");
+        child.wait_with_output().unwrap().status.code()
+    };
+    // As `nohup` starts it.
+    assert_eq!(started("trap '' HUP;"), Some(0));
+    assert_eq!(names(&desk.path("out")), ["results.csv", "summary.json"]);
+    // And one that was not, unless this very test was started so.
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).unwrap_or("0");
+    if ignored.trim().ends_with(['0', '2', '4', '6', '8', 'a', 'c', 'e']) {
+        assert_eq!(started(""), Some(1));
+    }
+}
+
+#[test]
 fn a_closed_pipe_is_no_error() {
     let desk = Desk::new();
     desk.write("path.csv", "generator_rad\n0\n");

@@ -11,25 +11,50 @@ use crate::output::abandon;
 use crate::progress;
 
 /// From now on SIGINT, SIGTERM and SIGHUP end the process with exit code 1 and leave no unfinished file. A second one does not wait for
-/// the clearing up.
+/// the clearing up. Who started it with SIGHUP ignored, as `nohup` does, means it to go on without a terminal.
 pub(super) fn end_cleanly_on_signals() {
     static WATCH: Once = Once::new();
+    // Where the signals cannot be heard they end the process as the second would.
+    WATCH.call_once(|| drop(listen(stop)));
+}
+
+fn stop() {
     static STOPPED: AtomicBool = AtomicBool::new(false);
     let end = || std::process::exit(i32::from(Outcome::Failed as u8));
-    WATCH.call_once(|| {
-        // Without a handler a signal ends the process as the second would.
-        let _ = ctrlc::set_handler(move || {
-            if STOPPED.swap(true, Ordering::Relaxed) {
-                end();
-            }
-            // On a thread of its own, so that the next signal is heard.
-            std::thread::spawn(move || {
-                progress::silence();
-                let written = abandon();
-                let left = if written { "what was written is whole" } else { "nothing was written" };
-                say::error(&format!("stopped; {left}"));
-                end();
-            });
-        });
+    if STOPPED.swap(true, Ordering::Relaxed) {
+        end();
+    }
+    // On a thread of its own, so that the next signal is heard.
+    std::thread::spawn(move || {
+        progress::silence();
+        let written = abandon();
+        let left = if written { "what was written is whole" } else { "nothing was written" };
+        say::error(&format!("stopped; {left}"));
+        end();
     });
+}
+
+/// Calls `heard` for each signal.
+#[cfg(unix)]
+fn listen(heard: fn()) -> std::io::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+
+    let hang_up = Some(SIGHUP).filter(|signal| !is_ignored(*signal));
+    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM].into_iter().chain(hang_up))?;
+    std::thread::Builder::new().name("signals".to_owned()).spawn(move || signals.forever().for_each(|_| heard()))?;
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn listen(heard: fn()) -> Result<(), ctrlc::Error> {
+    ctrlc::set_handler(heard)
+}
+
+/// Whether the process was started with a signal ignored; where the system does not say so, it was not.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    mask >> (signal - 1) & 1 == 1
 }
