@@ -374,7 +374,7 @@ fn unknown_keys(section: &str, table: &DeTable<'_>, refuse: &mut impl FnMut(Rang
         if path == "extension" {
             continue;
         }
-        if !KEYS.iter().any(|known| holds(known)) {
+        if !KEYS.iter().any(holds) {
             refuse(key.span(), &path);
             continue;
         }
@@ -398,7 +398,7 @@ fn unknown_key(path: &str) -> String {
         "" => Some(known.split('.').next().unwrap_or(known).to_owned()),
         _ => known.strip_prefix(section)?.strip_prefix('.')?.split('.').next().map(str::to_owned),
     };
-    let mut allowed: Vec<String> = KEYS.iter().filter_map(|known| inside(known)).collect();
+    let mut allowed: Vec<String> = KEYS.iter().filter_map(inside).collect();
     allowed.dedup();
     format!("unknown key{hint}; allowed: {}", allowed.join(", "))
 }
