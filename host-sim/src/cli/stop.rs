@@ -3,8 +3,8 @@
 //! Results are hidden files until all of them are complete, and all of these are known ([`crate::output`]). So nothing that computes
 //! has to look whether it should stop: the thread that hears of the signal removes them and ends the process.
 
-use std::sync::Once;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Once, OnceLock};
+use std::time::{Duration, Instant};
 
 use super::{Outcome, say};
 use crate::output::abandon;
@@ -18,11 +18,19 @@ pub(super) fn end_cleanly_on_signals() {
     WATCH.call_once(|| drop(listen(stop)));
 }
 
+/// A second signal so soon is the first again: `timeout` and shells send one to a process and to its group.
+const ECHO: Duration = Duration::from_millis(300);
+
 fn stop() {
-    static STOPPED: AtomicBool = AtomicBool::new(false);
+    static FIRST: OnceLock<Instant> = OnceLock::new();
     let end = || std::process::exit(i32::from(Outcome::Failed as u8));
-    if STOPPED.swap(true, Ordering::Relaxed) {
+    let now = Instant::now();
+    let since_first = now - *FIRST.get_or_init(|| now);
+    if since_first > ECHO {
         end();
+    }
+    if since_first > Duration::ZERO {
+        return;
     }
     // On a thread of its own, so that the next signal is heard.
     std::thread::spawn(move || {
