@@ -1,13 +1,16 @@
 //! What somebody who misspelt a name may have meant: one rule for keys, columns, effects, generators and units.
 //!
 //! Case and the signs between words do not count. A known name is suggested if it differs by at most one letter in three (Damerau
-//! and Levenshtein: letters changed, left out, put in, exchanged), has its words cut short or in another order, or if one of the two
+//! and Levenshtein: letters changed, left out, put in, exchanged), has its words cut short, in another order or but for the unit at the end, or if one of the two
 //! is a whole word of the other at its beginning or end. Anything farther is no suggestion: a wrong one costs more than none.
 
 use strsim::damerau_levenshtein;
 
 /// Shortest word that stands for the longer name it begins or ends.
 const SHORTEST_WORD: usize = 3;
+
+/// Letters of the longest unit that ends a name, `arcsec`.
+const LONGEST_UNIT: usize = 6;
 
 /// The name of `known` that `found` is likely to mean; `None` if it is one of them, or like none.
 #[must_use]
@@ -81,6 +84,13 @@ fn distance(found: &[String], known: &[String]) -> Option<(usize, usize)> {
     if known.len() > 1 && found.len() == known.len() && found.iter().zip(known).all(|(a, b)| begins(a, b)) {
         return Some((1, 1));
     }
+    // The same in another unit.
+    let unit = |words: &[String]| words.last().is_some_and(|word| word.len() <= LONGEST_UNIT);
+    let besides_unit =
+        known.len() > 1 && found.len() == known.len() && found[..found.len() - 1] == known[..known.len() - 1];
+    if besides_unit && unit(found) && unit(known) {
+        return Some((apart, 1));
+    }
     // A name of two letters is another name as soon as one of them differs.
     if letters > 2 && apart <= (letters / 3).max(1) {
         return Some((apart, 0));
@@ -107,7 +117,7 @@ fn distance(found: &[String], known: &[String]) -> Option<(usize, usize)> {
 mod tests {
     use super::*;
 
-    const KNOWN: [&str; 22] = [
+    const KNOWN: [&str; 23] = [
         "flanks.friction_coefficient",
         "flexspline.teeth",
         "flexspline.module_mm",
@@ -122,6 +132,7 @@ mod tests {
         "HHD-95-typical",
         "generator_rad",
         "torque_n_m",
+        "phase_rad",
         "temperature_c",
         "backlash_growth",
         "torsional_hysteresis",
@@ -158,6 +169,8 @@ mod tests {
             ("typical", "HHD-95-typical"),
             ("generator", "generator_rad"),
             ("torque_nm", "torque_n_m"),
+            ("temperature_kelvin", "temperature_c"),
+            ("phase_deg", "phase_rad"),
             ("torque", "torque_n_m"),
             ("temprature_c", "temperature_c"),
             ("growth_backlash", "backlash_growth"),

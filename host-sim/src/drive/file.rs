@@ -842,7 +842,7 @@ mod tests {
             error.to_string(),
             "e.toml: flexspline.rim_thickness_mm: missing (rim under the root circle, mm); give it, or a base = \"HHD-95\" \
              to start from\ne.toml: generator.w0_mm: missing (radial displacement of the neutral layer on the major axis, \
-             mm); give it, or a base = \"HHD-95\" to start from"
+             outward, mm); give it, or a base = \"HHD-95\" to start from"
         );
         let empty = Drive::from_toml("f.toml", "").unwrap_err();
         let optional = fields::ALL.iter().filter(|field| field.is_optional()).count();
