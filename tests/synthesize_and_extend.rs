@@ -195,8 +195,8 @@ fn wrong_requests_are_refused_and_leave_nothing() {
     desk.write("nominal.toml", NOMINAL);
     let model = "synthesize --model nominal.toml --out made";
     for (line, said) in [
-        (format!("{model} --effect circular_spline_ecentricity"), "did you mean circular_spline_eccentricity?"),
-        (format!("{model} --effect wear:growth=3"), "did you mean growth_arcsec?"),
+        (format!("{model} --effect circular_spline_ecentricity"), "did you mean `circular_spline_eccentricity`?"),
+        (format!("{model} --effect wear:growth=3"), "did you mean `growth_arcsec`?"),
         (format!("{model} --effect wear:growth_arcsec=-3"), "found -3, allowed: 0 to 10000"),
         (format!("{model} --effect damaged_tooth:tooth=188"), "tooth: found 188, allowed: 0 to 187"),
         (format!("{model} --effect ratcheting:time_s=1e9"), "time_s: found 1000000000, allowed: within the data"),

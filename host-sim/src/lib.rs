@@ -28,6 +28,7 @@ pub mod samples;
 pub mod simulate;
 pub mod stepping;
 pub mod stress;
+pub mod suggest;
 pub mod sweep;
 pub mod synthesize;
 pub mod tables;

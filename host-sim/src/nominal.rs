@@ -9,19 +9,33 @@ use std::sync::Arc;
 use flexspline::{FixedMember, GeneratorAngle, PlayState, Table};
 use serde::Deserialize;
 use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 use crate::drive::{DriveError, Problem};
 use crate::kernels::Kernels;
+use crate::suggest::{did_you_mean, likeliest_path, question};
 use crate::tables::ARCSEC_PER_RAD;
 
 /// Which wheel does not turn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fixed {
     /// The flexspline; the circular spline is the output.
     Flexspline,
     /// The circular spline; the flexspline is the output.
     CircularSpline,
+}
+
+impl Fixed {
+    const ALL: [Fixed; 2] = [Fixed::Flexspline, Fixed::CircularSpline];
+
+    /// Its name in a file.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Fixed::Flexspline => "flexspline",
+            Fixed::CircularSpline => "circular_spline",
+        }
+    }
 }
 
 /// Tooth counts of a strain wave drive.
@@ -153,12 +167,62 @@ impl Nominal {
         }
     }
 
+    /// A commented `nominal.toml` to fill in, of a drive with these teeth and a fixed flexspline: every key with unit, meaning, sign
+    /// and what is allowed. It is read back as it stands.
+    #[must_use]
+    pub fn template(flexspline_teeth: u32, circular_spline_teeth: u32) -> String {
+        let Spread { stiffness, backlash, harmonic } = USUAL_SPREAD;
+        let (fewest, most) = (TEETH.start(), TEETH.end());
+        format!(
+            "\
+# A drive known from its catalogue, for `flexspline diagnose DATA.csv --model THIS`: put in the numbers of yours.
+# Output angle = generator / ratio + harmonics + play (backlash, loaded by torque) + wind-up (torque).
+# Errors are arc-seconds at the output, positive where it leads; torque is positive where it turns the output forward.
+
+[drive]  # the teeth, or the ratio alone
+flexspline_teeth = {flexspline_teeth}         # number of teeth; {fewest} to {most}
+circular_spline_teeth = {circular_spline_teeth}    # number of teeth; 1 to {MOST_TEETH_MORE} more than the flexspline
+fixed = \"flexspline\"           # the wheel that does not turn; \"flexspline\" or \"circular_spline\"
+# ratio = -100.0               # generator turns to one of the output, instead of the three above, for a gear of
+                               # another kind; negative: they turn opposite ways; 1 to {LARGEST_RATIO:e} or -{LARGEST_RATIO:e} to -1
+
+[nominal]
+# Torsional stiffness, N.m/rad, {STIFFNESS:e}: one number, or that from each torque (N.m, the first is 0) on, as catalogues
+# give K1, K2, K3 beyond the torques 0, T1, T2.
+stiffness_n_m_per_rad = [[0.0, 20000.0], [10.0, 27000.0], [30.0, 30000.0]]
+backlash_arcsec = 60.0         # whole width of the play at the output, arcsec; {BACKLASH}
+friction_torque_n_m = 1.5      # load below which the output rests inside the play, N.m; {FRICTION}; 0 if left out
+temperature_c = 20.0           # at which these numbers hold, degrees C; {TEMPERATURE}; 20 if left out
+
+[[nominal.harmonic]]  # kinematic error: amplitude sin(order generator + phase); once for each harmonic, or not at all
+order_per_generator_turn = 2.0 # periods to a turn of the generator, need not be whole; {ORDER}
+amplitude_arcsec = 10.0        # half of peak to peak, arcsec; positive: the output leads where the sine is positive; {AMPLITUDE}
+phase_rad = 0.0                # at generator angle 0, rad; {PHASE}
+
+[nominal.unit_to_unit]  # by how much units of this type differ without a fault: one standard deviation over the number
+stiffness = {stiffness:?}               # of the stiffness; {SHARE}; {stiffness} if left out
+backlash = {backlash:?}                # of the backlash; {SHARE}; {backlash} if left out
+harmonic = {harmonic:?}                 # of the harmonics, of their amplitude; {SHARE}; {harmonic} if left out
+"
+        )
+    }
+
     /// Reads `nominal.toml`.
     ///
     /// # Errors
     /// Every problem found, each with file, line, field, value found and what is allowed.
     pub fn from_toml(file_name: &str, text: &str) -> Result<Nominal, DriveError> {
         let line = |span: Range<usize>| 1 + text.get(..span.start).unwrap_or("").matches('\n').count();
+        if let Ok(table) = DeTable::parse(text) {
+            let mut problems = Vec::new();
+            unknown_keys("", table.get_ref(), &mut |span, path| {
+                let place = format!("{file_name}:{}", line(span));
+                problems.push(Problem { place, field: path.to_owned(), what: unknown_key(path) });
+            });
+            if !problems.is_empty() {
+                return Err(DriveError { problems });
+            }
+        }
         let file: FileForm = toml::from_str(text).map_err(|error| {
             let place = error.span().map_or(file_name.to_owned(), |span| format!("{file_name}:{}", line(span)));
             let found = error.span().and_then(|span| text.get(span)).filter(|t| t.len() < 60 && !t.contains('\n'));
@@ -194,7 +258,7 @@ struct FileForm {
 struct DriveForm {
     flexspline_teeth: Option<Spanned<u32>>,
     circular_spline_teeth: Option<Spanned<u32>>,
-    fixed: Option<Fixed>,
+    fixed: Option<Spanned<String>>,
     ratio: Option<Spanned<f64>>,
 }
 
@@ -238,12 +302,105 @@ const USUAL_SPREAD: Spread = Spread { stiffness: 0.03, backlash: 0.05, harmonic:
 
 type Refuse<'a> = dyn FnMut(Option<Range<usize>>, &str, String) + 'a;
 
-fn number(value: &Spanned<f64>, field: &str, low: f64, high: f64, refuse: &mut Refuse<'_>) -> f64 {
+/// Every key of the file; those of `nominal.harmonic` are of each entry.
+const KEYS: [&str; 17] = [
+    "drive",
+    "drive.flexspline_teeth",
+    "drive.circular_spline_teeth",
+    "drive.fixed",
+    "drive.ratio",
+    "nominal",
+    "nominal.stiffness_n_m_per_rad",
+    "nominal.backlash_arcsec",
+    "nominal.friction_torque_n_m",
+    "nominal.temperature_c",
+    "nominal.harmonic",
+    "nominal.harmonic.order_per_generator_turn",
+    "nominal.harmonic.amplitude_arcsec",
+    "nominal.harmonic.phase_rad",
+    "nominal.unit_to_unit.stiffness",
+    "nominal.unit_to_unit.backlash",
+    "nominal.unit_to_unit.harmonic",
+];
+
+/// What a number of the file may be.
+#[derive(Clone, Copy)]
+struct Bounds {
+    low: f64,
+    high: f64,
+}
+
+impl std::fmt::LowerExp for Bounds {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} to {:e}", self.low, self.high)
+    }
+}
+
+impl std::fmt::Display for Bounds {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} to {}", self.low, self.high)
+    }
+}
+
+const TEETH: std::ops::RangeInclusive<u32> = 20..=2000;
+/// Most teeth that the circular spline has more than the flexspline.
+const MOST_TEETH_MORE: u32 = 12;
+const LARGEST_RATIO: f64 = 1e6;
+const STIFFNESS: Bounds = Bounds { low: 1e-3, high: 1e12 };
+const BACKLASH: Bounds = Bounds { low: 0.0, high: 1e5 };
+const FRICTION: Bounds = Bounds { low: 0.0, high: 1e6 };
+const TEMPERATURE: Bounds = Bounds { low: -273.0, high: 500.0 };
+const ORDER: Bounds = Bounds { low: 1e-6, high: 1e5 };
+const AMPLITUDE: Bounds = Bounds { low: -1e5, high: 1e5 };
+const PHASE: Bounds = Bounds { low: -100.0, high: 100.0 };
+const SHARE: Bounds = Bounds { low: 0.0, high: 1.0 };
+
+fn number(value: &Spanned<f64>, field: &str, bounds: Bounds, refuse: &mut Refuse<'_>) -> f64 {
     let found = *value.get_ref();
-    if !(found >= low && found <= high) {
-        refuse(Some(value.span()), field, format!("found {found}, allowed: {low} to {high}"));
+    if !(found >= bounds.low && found <= bounds.high) {
+        refuse(Some(value.span()), field, format!("found {found}, allowed: {bounds}"));
     }
     found
+}
+
+/// Every key of a table that the file may not hold, with its path.
+fn unknown_keys(section: &str, table: &DeTable<'_>, refuse: &mut impl FnMut(Range<usize>, &str)) {
+    for (key, value) in table {
+        let name = key.get_ref().as_ref();
+        let path = if section.is_empty() { name.to_owned() } else { format!("{section}.{name}") };
+        let holds =
+            |known: &&str| **known == path || known.strip_prefix(&*path).is_some_and(|rest| rest.starts_with('.'));
+        // What a diagnosis found stands in [extension], which `crate::extension` reads.
+        if path == "extension" {
+            continue;
+        }
+        if !KEYS.iter().any(holds) {
+            refuse(key.span(), &path);
+            continue;
+        }
+        match value.get_ref() {
+            DeValue::Table(inner) => unknown_keys(&path, inner, refuse),
+            DeValue::Array(entries) => {
+                for entry in entries.iter().filter_map(|entry| entry.get_ref().as_table()) {
+                    unknown_keys(&path, entry, refuse);
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// What to say of a key that is none.
+fn unknown_key(path: &str) -> String {
+    let section = path.rsplit_once('.').map_or("", |(section, _)| section);
+    let hint = likeliest_path(path, &KEYS).map_or_else(String::new, |path| format!("; {}", question(path)));
+    let inside = |known: &&str| match section {
+        "" => Some(known.split('.').next().unwrap_or(known).to_owned()),
+        _ => known.strip_prefix(section)?.strip_prefix('.')?.split('.').next().map(str::to_owned),
+    };
+    let mut allowed: Vec<String> = KEYS.iter().filter_map(inside).collect();
+    allowed.dedup();
+    format!("unknown key{hint}; allowed: {}", allowed.join(", "))
 }
 
 impl FileForm {
@@ -255,7 +412,8 @@ impl FileForm {
             StiffnessForm::Steps(steps) => steps.clone(),
         };
         let rising = stiffness.windows(2).all(|pair| pair[0][0] < pair[1][0]);
-        let sound = stiffness.iter().all(|&[torque, k]| torque.is_finite() && (1e-3..=1e12).contains(&k));
+        let allowed = STIFFNESS.low..=STIFFNESS.high;
+        let sound = stiffness.iter().all(|&[torque, k]| torque.is_finite() && allowed.contains(&k));
         if stiffness.first().is_none_or(|first| first[0] != 0.0) || !rising || !sound {
             refuse(
                 Some(form.stiffness_n_m_per_rad.span()),
@@ -266,8 +424,8 @@ impl FileForm {
             );
         }
         let optional =
-            |value: &Option<Spanned<f64>>, field: &str, range: [f64; 2], usual: f64, refuse: &mut Refuse<'_>| {
-                value.as_ref().map_or(usual, |value| number(value, field, range[0], range[1], refuse))
+            |value: &Option<Spanned<f64>>, field: &str, bounds: Bounds, usual: f64, refuse: &mut Refuse<'_>| {
+                value.as_ref().map_or(usual, |value| number(value, field, bounds, refuse))
             };
         let harmonics = form
             .harmonic
@@ -279,39 +437,32 @@ impl FileForm {
                     order_per_generator_turn: number(
                         &h.order_per_generator_turn,
                         &field("order_per_generator_turn"),
-                        1e-6,
-                        1e5,
+                        ORDER,
                         refuse,
                     ),
-                    amplitude_arcsec: number(&h.amplitude_arcsec, &field("amplitude_arcsec"), -1e5, 1e5, refuse),
-                    phase_rad: number(&h.phase_rad, &field("phase_rad"), -100.0, 100.0, refuse),
+                    amplitude_arcsec: number(&h.amplitude_arcsec, &field("amplitude_arcsec"), AMPLITUDE, refuse),
+                    phase_rad: number(&h.phase_rad, &field("phase_rad"), PHASE, refuse),
                 }
             })
             .collect();
         let spread = form.unit_to_unit.as_ref().map_or(USUAL_SPREAD, |s| Spread {
-            stiffness: optional(
-                &s.stiffness,
-                "nominal.unit_to_unit.stiffness",
-                [0.0, 1.0],
-                USUAL_SPREAD.stiffness,
-                refuse,
-            ),
-            backlash: optional(&s.backlash, "nominal.unit_to_unit.backlash", [0.0, 1.0], USUAL_SPREAD.backlash, refuse),
-            harmonic: optional(&s.harmonic, "nominal.unit_to_unit.harmonic", [0.0, 1.0], USUAL_SPREAD.harmonic, refuse),
+            stiffness: optional(&s.stiffness, "nominal.unit_to_unit.stiffness", SHARE, USUAL_SPREAD.stiffness, refuse),
+            backlash: optional(&s.backlash, "nominal.unit_to_unit.backlash", SHARE, USUAL_SPREAD.backlash, refuse),
+            harmonic: optional(&s.harmonic, "nominal.unit_to_unit.harmonic", SHARE, USUAL_SPREAD.harmonic, refuse),
         });
         Some(Nominal {
             ratio,
             teeth,
             stiffness,
-            backlash_arcsec: number(&form.backlash_arcsec, "nominal.backlash_arcsec", 0.0, 1e5, refuse),
+            backlash_arcsec: number(&form.backlash_arcsec, "nominal.backlash_arcsec", BACKLASH, refuse),
             friction_torque_n_m: optional(
                 &form.friction_torque_n_m,
                 "nominal.friction_torque_n_m",
-                [0.0, 1e6],
+                FRICTION,
                 0.0,
                 refuse,
             ),
-            temperature_c: optional(&form.temperature_c, "nominal.temperature_c", [-273.0, 500.0], 20.0, refuse),
+            temperature_c: optional(&form.temperature_c, "nominal.temperature_c", TEMPERATURE, 20.0, refuse),
             harmonics,
             spread,
             kernels: None,
@@ -324,21 +475,37 @@ impl DriveForm {
         match (&self.flexspline_teeth, &self.circular_spline_teeth, &self.ratio) {
             (Some(flexspline), Some(circular_spline), None) => {
                 let (f, c) = (*flexspline.get_ref(), *circular_spline.get_ref());
-                if !(20..=2000).contains(&f) {
+                if !TEETH.contains(&f) {
                     refuse(
                         Some(flexspline.span()),
                         "drive.flexspline_teeth",
-                        format!("found {f}, allowed: 20 to 2000"),
+                        format!("found {f}, allowed: {} to {}", TEETH.start(), TEETH.end()),
                     );
                     return None;
                 }
-                if c <= f || c > f + 12 {
-                    let allowed =
-                        format!("found {c}, allowed: {} to {}, more than the flexspline's {f}", f + 1, f + 12);
+                if c <= f || c > f + MOST_TEETH_MORE {
+                    let allowed = format!(
+                        "found {c}, allowed: {} to {}, more than the flexspline's {f}",
+                        f + 1,
+                        f + MOST_TEETH_MORE
+                    );
                     refuse(Some(circular_spline.span()), "drive.circular_spline_teeth", allowed);
                     return None;
                 }
-                let fixed = self.fixed.unwrap_or(Fixed::Flexspline);
+                let fixed = match &self.fixed {
+                    None => Fixed::Flexspline,
+                    Some(name) => match Fixed::ALL.into_iter().find(|fixed| fixed.name() == name.get_ref()) {
+                        Some(fixed) => fixed,
+                        None => {
+                            let names = Fixed::ALL.map(Fixed::name);
+                            let found = name.get_ref();
+                            let hint = did_you_mean("; ", found, names);
+                            let what = format!("found {found:?}, allowed: {}{hint}", names.join(", "));
+                            refuse(Some(name.span()), "drive.fixed", what);
+                            return None;
+                        }
+                    },
+                };
                 let waves = f64::from(c - f);
                 let ratio = match fixed {
                     Fixed::Flexspline => f64::from(c) / waves,
@@ -348,7 +515,7 @@ impl DriveForm {
             }
             (None, None, Some(ratio)) => {
                 let found = *ratio.get_ref();
-                if !(found.abs() >= 1.0 && found.abs() <= 1e6) {
+                if !(found.abs() >= 1.0 && found.abs() <= LARGEST_RATIO) {
                     let what = format!("found {found}, allowed: 1 to 1e6 or -1e6 to -1");
                     refuse(Some(ratio.span()), "drive.ratio", what);
                     return None;
@@ -401,8 +568,12 @@ mod tests {
             ("= 60.0", "= -1.0", "n.toml:7: nominal.backlash_arcsec: found -1, allowed: 0 to 100000"),
             ("= 60.0", "= nan", "n.toml:7: nominal.backlash_arcsec: found NaN"),
             ("= 60.0", "= \"wide\"", "n.toml:7: "),
-            ("friction_torque_n_m", "friktion", "n.toml:8: unknown field `friktion`"),
-            ("\"flexspline\"", "\"ring\"", "n.toml:4: unknown variant `ring`"),
+            ("friction_torque_n_m", "friktion", "n.toml:8: nominal.friktion: unknown key; allowed: stiffness"),
+            (
+                "\"flexspline\"",
+                "\"ring\"",
+                "n.toml:4: drive.fixed: found \"ring\", allowed: flexspline, circular_spline",
+            ),
             ("[10.0, 40000.0]", "[-1.0, 40000.0]", "n.toml:6: nominal.stiffness_n_m_per_rad: found"),
             (
                 "amplitude_arcsec = 10.0",
@@ -415,5 +586,70 @@ mod tests {
             let error = Nominal::from_toml("n.toml", &text).unwrap_err().to_string();
             assert!(error.starts_with(message), "{to}: {error}");
         }
+    }
+
+    #[test]
+    fn the_template_is_read_back_as_it_stands() {
+        let text = Nominal::template(188, 190);
+        let nominal = Nominal::from_toml("n.toml", &text).unwrap();
+        assert_eq!((nominal.ratio, nominal.backlash_arcsec, nominal.friction_torque_n_m), (95.0, 60.0, 1.5));
+        assert_eq!((nominal.stiffness.len(), nominal.harmonics.len(), nominal.spread), (3, 1, USUAL_SPREAD));
+        assert_eq!(nominal.teeth.map(|t| t.fixed), Some(Fixed::Flexspline));
+        for key in KEYS {
+            assert!(text.contains(key.rsplit('.').next().unwrap()), "the template says nothing of {key}");
+        }
+        let by_ratio: String = text
+            .lines()
+            .filter(|line| {
+                !["flexspline_teeth", "circular_spline_teeth", "fixed"].iter().any(|key| line.starts_with(key))
+            })
+            .map(|line| line.replace("# ratio", "ratio") + "\n")
+            .collect();
+        assert_eq!(Nominal::from_toml("n.toml", &by_ratio).unwrap().ratio, -100.0);
+    }
+
+    #[test]
+    fn misspelt_keys_get_a_suggestion_all_at_once_and_garbage_gets_none() {
+        for (from, to, message) in [
+            ("[drive]", "[Drive]", "n.toml:1: Drive: unknown key; did you mean `drive`?; allowed: drive, nominal"),
+            ("[nominal]", "[nominel]", "n.toml:5: nominel: unknown key; did you mean `nominal`?"),
+            (
+                "flexspline_teeth",
+                "flexspline_tooth",
+                "n.toml:2: drive.flexspline_tooth: unknown key; did you mean `drive.flexspline_teeth`?",
+            ),
+            (
+                "backlash_arcsec",
+                "backlash",
+                "n.toml:7: nominal.backlash: unknown key; did you mean `nominal.backlash_arcsec`?",
+            ),
+            (
+                "backlash_arcsec",
+                "backlash_arcmin",
+                "n.toml:7: nominal.backlash_arcmin: unknown key; did you mean `nominal.backlash_arcsec`?",
+            ),
+            (
+                "[[nominal.harmonic]]",
+                "[[nominal.harmonics]]",
+                "n.toml:9: nominal.harmonics: unknown key; did you mean `nominal.harmonic`?",
+            ),
+            (
+                "phase_rad",
+                "phase_deg",
+                "n.toml:12: nominal.harmonic.phase_deg: unknown key; did you mean `nominal.harmonic.phase_rad`?",
+            ),
+            (
+                "fixed = \"flexspline\"",
+                "fixed = \"circular-spline\"",
+                "n.toml:4: drive.fixed: found \"circular-spline\", allowed: flexspline, circular_spline; did you mean `circular_spline`?",
+            ),
+            ("friction_torque_n_m", "qwertz", "n.toml:8: nominal.qwertz: unknown key; allowed: "),
+        ] {
+            let text = TEXT.replacen(from, to, 1);
+            let error = Nominal::from_toml("n.toml", &text).unwrap_err().to_string();
+            assert!(error.starts_with(message), "{to}: {error}");
+        }
+        let two = TEXT.replace("friction_torque_n_m", "friction_torque").replace("phase_rad", "phase");
+        assert_eq!(Nominal::from_toml("n.toml", &two).unwrap_err().problems.len(), 2);
     }
 }

@@ -1,11 +1,15 @@
 //! Output files, written whole or not at all: a temporary file in the same folder, made durable, then renamed.
 //!
 //! A reader never sees a half-written file, and a run that fails or is stopped leaves the files of the run before it as
-//! they were.
+//! they were. The files of one run appear together ([`Outputs`]).
+//!
+//! Whatever is on disk and no output yet is known in one place, so that a process that is told to end can clear up at once,
+//! wherever its threads are ([`abandon`]).
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde::Serialize;
 use tempfile::{NamedTempFile, TempDir};
@@ -25,30 +29,199 @@ fn failed(path: &Path) -> impl FnOnce(io::Error) -> OutputError + '_ {
     |source| OutputError { path: path.to_owned(), source }
 }
 
+/// What is on disk and no output yet. Hidden files are made, and become outputs, while this is held.
+struct Unfinished {
+    /// Hidden files and folders.
+    hidden: Vec<PathBuf>,
+    /// Folders made for outputs, the outermost first.
+    folders: Vec<PathBuf>,
+    /// Whether an output stands in its place.
+    written: bool,
+}
+
+static UNFINISHED: Mutex<Unfinished> =
+    Mutex::new(Unfinished { hidden: Vec::new(), folders: Vec::new(), written: false });
+
+fn unfinished() -> MutexGuard<'static, Unfinished> {
+    // The list is whole at every instant, whoever panicked with it.
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Unfinished {
+    /// Removes the folders made for outputs that hold none.
+    fn remove_empty_folders(&mut self) {
+        while let Some(folder) = self.folders.pop() {
+            // One that is not empty stays.
+            let _ = fs::remove_dir(folder);
+        }
+    }
+}
+
+/// A hidden file or folder, known to be unfinished as long as this lives.
+#[derive(Debug)]
+struct Hidden(PathBuf);
+
+impl Hidden {
+    fn new(unfinished: &mut Unfinished, path: &Path) -> Hidden {
+        unfinished.hidden.push(path.to_owned());
+        Hidden(path.to_owned())
+    }
+}
+
+impl Drop for Hidden {
+    fn drop(&mut self) {
+        unfinished().hidden.retain(|path| *path != self.0);
+    }
+}
+
+/// Removes all that is unfinished, and lets nothing be begun or finished any more: for a process that is about to end. True if
+/// outputs of it stand in their place already.
+pub fn abandon() -> bool {
+    let mut unfinished = unfinished();
+    for path in std::mem::take(&mut unfinished.hidden).iter().rev() {
+        // What another thread has cleared away is gone too.
+        let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    }
+    unfinished.remove_empty_folders();
+    let written = unfinished.written;
+    // Held for good.
+    std::mem::forget(unfinished);
+    written
+}
+
+/// Removes the folders made by [`prepare_folder`] that nothing was written to, after a run that failed.
+pub fn remove_empty_folders() {
+    unfinished().remove_empty_folders();
+}
+
 /// Makes the folder and finds out, before any work is done, whether a file can be made in it.
 pub fn prepare_folder(folder: &Path) -> Result<(), OutputError> {
+    let mut unfinished = unfinished();
+    let mut missing: Vec<PathBuf> =
+        folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists()).map(Path::to_owned).collect();
+    missing.reverse();
+    unfinished.folders.append(&mut missing);
     fs::create_dir_all(folder).map_err(failed(folder))?;
     NamedTempFile::new_in(folder).map(drop).map_err(failed(folder))
 }
 
-/// Writes a file through `content`; if that fails, the file keeps its old content or stays absent.
-pub fn write_whole(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), OutputError> {
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let write = || -> io::Result<()> {
-        let mut file = tempfile::Builder::new().prefix(".part-").tempfile_in(folder)?;
+/// The files of one run, which appear under their names together, or not at all.
+#[derive(Debug, Default)]
+pub struct Outputs {
+    files: Vec<Part>,
+    folders: Vec<WholeFolder>,
+}
+
+/// A file that is complete under a hidden name.
+#[derive(Debug)]
+struct Part {
+    target: PathBuf,
+    file: Option<NamedTempFile>,
+    _hidden: Hidden,
+}
+
+impl Part {
+    /// Writes it.
+    fn new(target: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<Part> {
+        let (mut file, hidden) = {
+            let mut unfinished = unfinished();
+            let file = tempfile::Builder::new().prefix(".part-").tempfile_in(parent_of(target))?;
+            let hidden = Hidden::new(&mut unfinished, file.path());
+            (file, hidden)
+        };
         let mut buffer = BufWriter::new(file.as_file_mut());
         content(&mut buffer)?;
         buffer.flush()?;
         drop(buffer);
         file.as_file().sync_all()?;
         readable_by_all(file.path())?;
-        file.persist(path).map_err(|error| error.error)?;
+        Ok(Part { target: target.to_owned(), file: Some(file), _hidden: hidden })
+    }
+}
+
+impl Outputs {
+    /// No file yet.
+    #[must_use]
+    pub fn new() -> Outputs {
+        Outputs::default()
+    }
+
+    /// A file with what `content` writes.
+    pub fn file(
+        &mut self,
+        path: &Path,
+        content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<(), OutputError> {
+        self.files.push(Part::new(path, content).map_err(failed(path))?);
         Ok(())
-    };
-    write().map_err(failed(path))
+    }
+
+    /// A value as indented JSON.
+    pub fn json(&mut self, path: &Path, value: &impl Serialize) -> Result<(), OutputError> {
+        self.file(path, |file| {
+            serde_json::to_writer_pretty(&mut *file, value)?;
+            file.write_all(b"\n")
+        })
+    }
+
+    /// Records as CSV; the header is the names of their fields.
+    pub fn csv<R: Serialize>(&mut self, path: &Path, records: impl IntoIterator<Item = R>) -> Result<(), OutputError> {
+        self.file(path, |file| {
+            let mut table = csv::Writer::from_writer(file);
+            for record in records {
+                table.serialize(record).map_err(io::Error::other)?;
+            }
+            table.flush()
+        })
+    }
+
+    /// A folder that is filled.
+    pub fn folder(&mut self, folder: WholeFolder) {
+        self.folders.push(folder);
+    }
+
+    /// Puts everything in its place.
+    pub fn finish(mut self) -> Result<(), OutputError> {
+        let mut replaced = Vec::new();
+        let mut unfinished = unfinished();
+        let mut put = || -> Result<(), OutputError> {
+            for folder in &mut self.folders {
+                folder.put(&mut unfinished, &mut replaced)?;
+            }
+            for Part { target, file, .. } in &mut self.files {
+                let file = file.take().expect("a part is put in its place once");
+                file.persist(&*target).map_err(|error| failed(target)(error.error))?;
+                // One in a folder that is itself hidden goes with it.
+                unfinished.written |= !unfinished.hidden.iter().any(|folder| target.starts_with(folder));
+            }
+            Ok(())
+        };
+        let result = put();
+        drop(unfinished);
+        // Only now may what was replaced go, and what is in its place be forgotten.
+        result
+    }
+}
+
+/// Writes a file through `content`; if that fails, the file keeps its old content or stays absent.
+pub fn write_whole(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), OutputError> {
+    let mut outputs = Outputs::new();
+    outputs.file(path, content)?;
+    outputs.finish()
+}
+
+/// Writes a value as indented JSON.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), OutputError> {
+    let mut outputs = Outputs::new();
+    outputs.json(path, value)?;
+    outputs.finish()
+}
+
+/// Writes records as CSV; the header is the names of their fields.
+pub fn write_csv<R: Serialize>(path: &Path, records: impl IntoIterator<Item = R>) -> Result<(), OutputError> {
+    let mut outputs = Outputs::new();
+    outputs.csv(path, records)?;
+    outputs.finish()
 }
 
 /// Temporary files are private; outputs are as readable as any other file.
@@ -63,69 +236,71 @@ fn readable_by_all(_path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Writes a value as indented JSON.
-pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), OutputError> {
-    write_whole(path, |file| {
-        serde_json::to_writer_pretty(&mut *file, value)?;
-        file.write_all(b"\n")
-    })
-}
-
-/// Writes records as CSV; the header is the names of their fields.
-pub fn write_csv<R: Serialize>(path: &Path, records: impl IntoIterator<Item = R>) -> Result<(), OutputError> {
-    write_whole(path, |file| {
-        let mut table = csv::Writer::from_writer(file);
-        for record in records {
-            table.serialize(record).map_err(io::Error::other)?;
-        }
-        table.flush()
-    })
-}
-
 /// A folder that appears under its name with all its files at once.
 #[derive(Debug)]
 pub struct WholeFolder {
     target: PathBuf,
-    parts: TempDir,
+    parts: Option<TempDir>,
+    path: Hidden,
 }
 
 impl WholeFolder {
     /// A folder that will stand at `target`, beside which it is filled.
     pub fn new(target: &Path) -> Result<WholeFolder, OutputError> {
-        let parent = target.parent().unwrap_or(Path::new("."));
-        let parts = tempfile::Builder::new().prefix(".part-").tempdir_in(parent).map_err(failed(target))?;
-        Ok(WholeFolder { target: target.to_owned(), parts })
+        let mut unfinished = unfinished();
+        let parts = tempfile::Builder::new().prefix(".part-").tempdir_in(parent_of(target)).map_err(failed(target))?;
+        let path = Hidden::new(&mut unfinished, parts.path());
+        Ok(WholeFolder { target: target.to_owned(), parts: Some(parts), path })
     }
 
     /// Where its files are to be written until it is done.
     pub fn path(&self) -> &Path {
-        self.parts.path()
+        &self.path.0
     }
 
     /// Puts the folder in its place; one that stood there goes.
     pub fn finish(self) -> Result<(), OutputError> {
-        let WholeFolder { target, parts } = self;
+        let mut outputs = Outputs::new();
+        outputs.folder(self);
+        outputs.finish()
+    }
+
+    /// Puts the folder in its place; the one that stood there is in `replaced`.
+    fn put(&mut self, unfinished: &mut Unfinished, replaced: &mut Vec<(TempDir, Hidden)>) -> Result<(), OutputError> {
+        let WholeFolder { target, parts, .. } = self;
+        let parts = parts.take().expect("a folder is put in its place once");
         let swap = || -> io::Result<()> {
-            let mut old = None;
+            let mut before = None;
             if target.exists() {
-                let parent = target.parent().unwrap_or(Path::new("."));
-                let aside = tempfile::Builder::new().prefix(".old-").tempdir_in(parent)?;
-                fs::rename(&target, aside.path().join("old"))?;
-                old = Some(aside);
+                let aside = tempfile::Builder::new().prefix(".old-").tempdir_in(parent_of(target))?;
+                let hidden = Hidden::new(unfinished, aside.path());
+                let old = aside.path().join("old");
+                replaced.push((aside, hidden));
+                fs::rename(&*target, &old)?;
+                before = Some(old);
             }
             #[cfg(unix)]
             {
                 use std::os::unix::fs::PermissionsExt;
                 fs::set_permissions(parts.path(), fs::Permissions::from_mode(0o755))?;
             }
-            fs::rename(parts.path(), &target)?;
+            if let Err(error) = fs::rename(parts.path(), &*target) {
+                // The one before comes back.
+                let _ = before.map(|old| fs::rename(old, &*target));
+                return Err(error);
+            }
             // Its folder is gone from where it was made: nothing is left to clear.
             let _ = parts.keep();
-            drop(old);
+            unfinished.written = true;
             Ok(())
         };
-        swap().map_err(failed(&target))
+        swap().map_err(failed(&self.target))
     }
+}
+
+/// The folder that a file stands in.
+fn parent_of(path: &Path) -> &Path {
+    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 #[cfg(test)]
@@ -189,6 +364,27 @@ mod tests {
         }
         drop(WholeFolder::new(&target).unwrap());
         assert_eq!(names(place.path()), ["frames"]);
+    }
+
+    #[test]
+    fn the_files_of_a_run_appear_together() {
+        let place = tempfile::tempdir().unwrap();
+        let mut outputs = Outputs::new();
+        outputs.file(&place.path().join("a"), |file| file.write_all(b"a")).unwrap();
+        outputs.json(&place.path().join("b"), &1).unwrap();
+        let folder = WholeFolder::new(&place.path().join("c")).unwrap();
+        fs::write(folder.path().join("in"), "c").unwrap();
+        outputs.folder(folder);
+        assert!(names(place.path()).iter().all(|name| name.starts_with(".part-")));
+        outputs.finish().unwrap();
+        assert_eq!(names(place.path()), ["a", "b", "c"]);
+        let mut lost = Outputs::new();
+        lost.file(&place.path().join("a"), |file| file.write_all(b"new")).unwrap();
+        lost.folder(WholeFolder::new(&place.path().join("c")).unwrap());
+        drop(lost);
+        assert_eq!(names(place.path()), ["a", "b", "c"]);
+        assert_eq!(fs::read(place.path().join("a")).unwrap(), b"a");
+        assert!(place.path().join("c/in").exists());
     }
 
     #[test]

@@ -2,57 +2,101 @@
 //!
 //! A bar is drawn only on a terminal, and only for work that takes more than a second.
 
-use std::io::{IsTerminal, stderr};
-use std::time::{Duration, Instant};
+use std::io::{IsTerminal, Write, stderr};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError, mpsc};
+use std::thread;
+use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle, WeakProgressBar};
 
 /// Work shorter than this shows no bar.
 const PATIENCE: Duration = Duration::from_secs(1);
+/// How often the time on a bar moves on.
+const TICK: Duration = Duration::from_millis(250);
+
+/// Bars that are drawn.
+static DRAWN: Mutex<Vec<WeakProgressBar>> = Mutex::new(Vec::new());
+/// Whether no bar may be drawn any more.
+static SILENT: AtomicBool = AtomicBool::new(false);
+
+/// Takes every bar away, for a process that is about to end: nothing is drawn any more.
+pub fn silence() {
+    let drawn = DRAWN.lock().unwrap_or_else(PoisonError::into_inner);
+    SILENT.store(true, Ordering::Relaxed);
+    for bar in drawn.iter().filter_map(WeakProgressBar::upgrade) {
+        bar.finish_and_clear();
+    }
+}
 
 /// A progress bar that may never show.
 pub struct Progress {
-    wanted: bool,
-    title: String,
-    begun: Instant,
     bar: Option<ProgressBar>,
+    /// Ends the wait for the bar to show.
+    _over: Option<mpsc::Sender<()>>,
 }
 
 impl Progress {
     /// Progress of work called `title`; `quiet` keeps it hidden.
     pub fn new(title: impl Into<String>, quiet: bool) -> Progress {
-        Progress { wanted: !quiet && stderr().is_terminal(), title: title.into(), begun: Instant::now(), bar: None }
+        if quiet || !stderr().is_terminal() {
+            return Progress { bar: None, _over: None };
+        }
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()).with_prefix(title.into());
+        let (over, wait) = mpsc::channel();
+        let waiting = bar.clone();
+        thread::spawn(move || {
+            if wait.recv_timeout(PATIENCE) == Err(mpsc::RecvTimeoutError::Timeout) {
+                show(&waiting);
+            }
+        });
+        Progress { bar: Some(bar), _over: Some(over) }
     }
 
     /// `done` of `total` parts are done; `note` says what just happened.
     pub fn set(&mut self, done: usize, total: usize, note: &str) {
-        if !self.wanted {
-            return;
+        if let Some(bar) = self.bar.as_ref().filter(|_| !SILENT.load(Ordering::Relaxed)) {
+            bar.set_length(total as u64);
+            bar.set_position(done as u64);
+            bar.set_message(note.to_owned());
         }
-        let elapsed = self.begun.elapsed();
-        if self.bar.is_none() && elapsed < PATIENCE {
-            return;
-        }
-        let bar = self.bar.get_or_insert_with(|| {
-            let style = ProgressStyle::with_template("{prefix} {bar:30} {pos}/{len}  {msg}  {eta} left")
-                .expect("the template is valid");
-            ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::stderr())
-                .with_style(style)
-                .with_prefix(self.title.clone())
-                .with_elapsed(elapsed)
-        });
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
-        bar.set_message(note.to_owned());
     }
 
     /// A line above the bar, or alone.
     pub fn line(&self, text: &str) {
-        match &self.bar {
+        match self.bar.as_ref().filter(|bar| !bar.is_hidden()) {
             Some(bar) => bar.println(text),
-            None => eprintln!("{text}"),
+            // A reader that has gone is no reason to fail.
+            None => drop(writeln!(stderr(), "{text}")),
         }
     }
+}
+
+/// Draws a bar from now on.
+fn show(bar: &ProgressBar) {
+    let mut drawn = DRAWN.lock().unwrap_or_else(PoisonError::into_inner);
+    if SILENT.load(Ordering::Relaxed) || bar.is_finished() {
+        return;
+    }
+    let style = ProgressStyle::with_template("{prefix} {bar:30} {pos}/{len}  {msg}  {left}");
+    bar.set_style(style.expect("the template is valid").with_key("left", time_left));
+    bar.set_draw_target(ProgressDrawTarget::stderr());
+    bar.enable_steady_tick(TICK);
+    drawn.retain(|bar| bar.upgrade().is_some());
+    drawn.push(bar.downgrade());
+}
+
+/// Parts of the work from which on what they took says what the rest will take; a few large ones are too unlike.
+const TELLING: u64 = 10;
+
+/// How long the work will take, or has taken where that cannot be told.
+fn time_left(state: &ProgressState, to: &mut dyn std::fmt::Write) {
+    let tells = state.pos() > 0 && state.len() >= Some(TELLING);
+    let _ = if tells {
+        write!(to, "{} left", HumanDuration(state.eta()))
+    } else {
+        write!(to, "{} so far", HumanDuration(state.elapsed()))
+    };
 }
 
 impl Drop for Progress {

@@ -8,6 +8,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::measurement::{CsvRows, NotANumber, TableProblem};
+use crate::suggest::question;
 use crate::tables::ARCSEC_PER_RAD;
 
 /// A measured row.
@@ -90,8 +91,17 @@ pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result
     let output = column("output_rad")?;
     let error = column("error_arcsec")?;
     if output.or(error).is_none() {
-        let what = "neither column output_rad nor error_arcsec is there; one is needed".to_owned();
+        let like = rows.like("output_rad").or_else(|| rows.like("error_arcsec"));
+        let hint = like.map_or_else(String::new, |name| format!("; {}", question(name)));
+        let what = format!("neither column output_rad nor error_arcsec is there; one is needed{hint}");
         return Err(refuse(rows.header_problem(what)));
+    }
+    // One that was meant but misspelt would silently not act.
+    for wanted in ["torque_n_m", "temperature_c"] {
+        if let (None, Some(like)) = (column(wanted)?, rows.like(wanted)) {
+            let what = format!("column {like} is not read; {} Rename it, or take it out", question(wanted));
+            return Err(refuse(rows.header_problem(what)));
+        }
     }
     let (torque, temperature) = (column("torque_n_m")?, column("temperature_c")?);
     let header = rows.header().to_vec();

@@ -1,20 +1,18 @@
 //! What every command works with: the drive, the output folder, how to talk, when to stop.
 
 use std::ffi::OsString;
-use std::io::Write;
 use std::path::Path;
-use std::sync::Once;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
 
-use super::{Common, Failure, Outcome};
+use super::{Common, Failure, say};
 use crate::drive::Drive;
 use crate::output::prepare_folder;
 use crate::progress::Progress;
+use crate::suggest::{likeliest, question};
 
-/// Set by Ctrl-C.
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+/// Folder for output files where none is given.
+const OUT: &str = "out";
 
 /// The common options, at work.
 pub(super) struct Context {
@@ -25,15 +23,7 @@ pub(super) struct Context {
 
 impl Context {
     pub(super) fn new(common: Common, args: &[OsString]) -> Context {
-        let words = args.iter().skip(1).map(|arg| {
-            let word = arg.to_string_lossy();
-            let plain = |c: char| c.is_alphanumeric() || "-_=./,:+".contains(c);
-            if !word.is_empty() && word.chars().all(plain) {
-                word.into_owned()
-            } else {
-                format!("'{}'", word.replace('\'', r"'\''"))
-            }
-        });
+        let words = args.iter().skip(1).map(|arg| quoted(&arg.to_string_lossy()));
         let command = ["flexspline".to_owned()].into_iter().chain(words).collect::<Vec<_>>().join(" ");
         Context { common, command }
     }
@@ -50,15 +40,21 @@ impl Context {
 
     /// The drive of `--drive` with every `--set`.
     pub(super) fn drive(&self) -> Result<Drive, Failure> {
-        let name = &self.common.drive;
+        self.drive_called("--drive", &self.common.drive)
+    }
+
+    /// A drive file or a built-in drive, as the option says, with every `--set`.
+    pub(super) fn drive_called(&self, option: &str, name: &str) -> Result<Drive, Failure> {
         let drive = match Drive::built_in(name) {
             Some(drive) => drive,
             None => {
                 let text = std::fs::read_to_string(name).map_err(|error| {
                     let known = Drive::BUILT_IN.join(", ");
+                    let meant = likeliest(name, Drive::BUILT_IN).map(str::to_owned).or_else(|| file_like(name));
+                    let hint = meant.map_or_else(String::new, |meant| format!("; {}", question(&meant)));
                     Failure::BadInput(format!(
-                        "--drive: found {name:?}, which cannot be read as a file ({error}); allowed: a drive file, or one \
-                         of the built-in drives {known}"
+                        "{option}: found {name:?}, which cannot be read as a file ({error}); allowed: a drive file, or one \
+                         of the built-in drives {known}{hint}"
                     ))
                 })?;
                 Drive::from_toml(name, &text).map_err(|error| Failure::BadInput(error.to_string()))?
@@ -67,6 +63,23 @@ impl Context {
         drive
             .with_sets(self.common.sets.iter().map(String::as_str))
             .map_err(|error| Failure::BadInput(error.to_string()))
+    }
+
+    /// Whether a drive other than the usual one was asked for.
+    pub(super) fn has_drive(&self) -> bool {
+        self.common.drive != super::USUAL_DRIVE
+    }
+
+    /// A command to type next, of the same drive.
+    pub(super) fn next(&self, words: &str) -> String {
+        let mut command = format!("flexspline {words}");
+        if self.has_drive() {
+            command += &format!(" --drive {}", quoted(&self.common.drive));
+        }
+        for set in &self.common.sets {
+            command += &format!(" --set {}", quoted(set));
+        }
+        command
     }
 
     /// Name and text of the file of `--drive`; nothing for a built-in drive.
@@ -80,9 +93,19 @@ impl Context {
 
     /// The output folder, which can be written to.
     pub(super) fn out(&self) -> Result<&Path, Failure> {
-        let out = self.common.out.as_path();
+        let out = self.out_path();
         prepare_folder(out).map_err(|error| Failure::BadInput(format!("--out: {error}")))?;
         Ok(out)
+    }
+
+    /// The output folder, whether it is there or not.
+    pub(super) fn out_path(&self) -> &Path {
+        self.common.out.as_deref().unwrap_or(Path::new(OUT))
+    }
+
+    /// Whether an output folder was given.
+    pub(super) fn has_out(&self) -> bool {
+        self.common.out.is_some()
     }
 
     /// A progress bar for work called `title`.
@@ -94,36 +117,44 @@ impl Context {
         self.common.verbose
     }
 
+    /// Prints data that the command is for: as JSON if that was asked for, else as they are.
+    pub(super) fn print_data(&self, result: &impl Serialize, data: impl FnOnce() -> String) -> Result<(), Failure> {
+        if self.common.json { self.print(result, String::new) } else { say::data(&data()) }
+    }
+
     /// Prints the result: as JSON if that was asked for, else as text unless quiet.
     pub(super) fn print(&self, result: &impl Serialize, text: impl FnOnce() -> String) -> Result<(), Failure> {
         if self.common.json {
             let json = serde_json::to_string_pretty(result)
                 .map_err(|error| Failure::Failed(format!("cannot print the result: {error}")))?;
-            put(&json);
+            say::data(&json)
         } else if !self.common.quiet {
-            put(&text());
+            say::result(&text())
+        } else {
+            Ok(())
         }
-        Ok(())
-    }
-
-    /// Whether the user has pressed Ctrl-C (or ended the process politely). From the first call on that no longer ends the process, so that the run can stop
-    /// between two increments and clear up; pressing it again ends it at once and may leave a hidden temporary file.
-    pub(super) fn watch_interrupt(&self) -> impl Fn() -> bool + use<> {
-        static WATCH: Once = Once::new();
-        WATCH.call_once(|| {
-            // Without a handler the first Ctrl-C acts as the second would.
-            let _ = ctrlc::set_handler(|| {
-                if INTERRUPTED.swap(true, Ordering::Relaxed) {
-                    std::process::exit(i32::from(Outcome::Failed as u8));
-                }
-            });
-        });
-        || INTERRUPTED.load(Ordering::Relaxed)
     }
 }
 
-/// Prints data on stdout. A reader that has gone is no reason to fail.
-pub(super) fn put(text: &str) {
-    let mut stdout = std::io::stdout().lock();
-    let _ = writeln!(stdout, "{}", text.trim_end_matches('\n'));
+/// A word as a shell takes it.
+pub(super) fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_=./,:+".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+/// A drive file beside the one that is not there, with a name like it.
+fn file_like(name: &str) -> Option<String> {
+    let path = Path::new(name);
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
+    let names: Vec<String> = entries
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| name.ends_with(".toml"))
+        .collect();
+    let like = likeliest(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
+    Some(folder.map_or_else(|| like.to_owned(), |folder| folder.join(like).display().to_string()))
 }

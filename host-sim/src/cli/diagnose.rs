@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use flexspline::Table;
 use serde::Serialize;
 
-use super::context::Context;
+use super::context::{Context, quoted};
 use super::synthesize::{fresh_table, gear};
-use super::{Failure, report};
+use super::{Failure, names, report, say};
 use crate::diagnosis::report::{Compensation, Diagnosis};
 use crate::diagnosis::{Extended, Settings, diagnose_extended};
 use crate::drive::{Drive, GeneratorKind};
@@ -22,7 +22,7 @@ use crate::kernels::Kernels;
 use crate::measurement::{ColumnMap, Fault, Recording, Session, read};
 use crate::mesh::MeshLevel;
 use crate::nominal::Nominal;
-use crate::output::{write_json, write_whole};
+use crate::output::Outputs;
 use crate::stepping::{Method, SolverSettings};
 use crate::synthesize::Sizes;
 use crate::tables::{ARCSEC_PER_RAD, MadeTable, c_header, rust_source};
@@ -40,26 +40,28 @@ Examples:
   flexspline diagnose measured.csv --tables out --generator cam
   flexspline diagnose measured.csv --tables out --generator cam --remake-tables --out diagnosed")]
 pub(super) struct Diagnose {
-    /// Measured rows
-    #[arg(value_name = "DATA.csv")]
+    /// Measured rows: CSV with a header; columns as --columns says
+    #[arg(value_name = "DATA.csv", value_hint = ValueHint::FilePath)]
     data: PathBuf,
     /// Nominal model from the catalogue, or one that was extended before: then what is found is beyond it
-    #[arg(long, value_name = "nominal.toml", conflicts_with = "tables", required_unless_present = "tables")]
+    #[arg(long, value_name = "nominal.toml", value_hint = ValueHint::FilePath, conflicts_with = "tables", required_unless_present = "tables")]
     model: Option<PathBuf>,
     /// Folder of tables made by `flexspline tables` from the drive of --drive
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     tables: Option<PathBuf>,
-    /// Generator whose table is used, and that names the extended one
-    #[arg(long, value_name = "G", default_value = "cam", value_parser = str::parse::<GeneratorKind>)]
+    /// Wave generator whose table is used, and that names the extended one: two-roller, four-roller, double-disc or cam
+    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true)]
     generator: GeneratorKind,
     /// Make the extended tables by FEM from drive-extended.toml; without it they are sampled from the extended model
     #[arg(long, requires = "tables")]
     remake_tables: bool,
     /// Mesh of FEM runs: coarse, standard or fine [default: that of the table]
-    #[arg(long, value_name = "LEVEL", requires = "tables", value_parser = str::parse::<MeshLevel>)]
+    #[arg(long, value_name = "LEVEL", requires = "tables", value_parser = names::mesh(), hide_possible_values = true)]
     mesh: Option<MeshLevel>,
-    /// Names and units of columns, for instance generator=wave_gen_turns:turn,error=error_arcsec:arcsec
-    #[arg(long, value_name = "MAP", default_value = "")]
+    /// Names and units of columns that are not called time_s, generator_rad, output_rad, error_arcsec, torque_n_m, temperature_c,
+    /// orientation_rad, for instance generator=wave_gen_turns:turn,error=error_arcsec:arcsec; units are rad, deg, turn, arcmin,
+    /// arcsec, s, ms, N.m, C, K [default: these names]
+    #[arg(long, value_name = "MAP", default_value = "", hide_default_value = true)]
     columns: String,
     /// Do not write report.html
     #[arg(long)]
@@ -119,6 +121,8 @@ impl Diagnose {
         let mut recording =
             read(&self.data, &map, &gear(&subject.nominal)).map_err(|error| Failure::BadInput(error.to_string()))?;
         self.take_away_known(&subject, &mut recording)?;
+        // Before there is much work.
+        context.out()?;
         let settings = Settings {
             verbose: context.verbose(),
             pitch_radius_mm: subject.drive.circular_spline.pitch_radius_mm(),
@@ -172,8 +176,9 @@ impl Diagnose {
         }
         drop(progress);
         let out = context.out()?;
+        let mut outputs = Outputs::new();
         if !diagnosis.causes.is_empty() {
-            self.extend(context, &subject, &tables, &diagnosis, &extended, &mut extension, out)?;
+            self.extend(context, &subject, &tables, &diagnosis, &extended, &mut extension, &mut outputs)?;
         }
         let written = Written {
             diagnosis: &diagnosis,
@@ -182,14 +187,34 @@ impl Diagnose {
             notes: &recording.notes,
             command: &context.command,
         };
-        write_json(&out.join("diagnosis.json"), &written)?;
+        outputs.json(&out.join("diagnosis.json"), &written)?;
         if !self.no_report {
             let inputs = [Some(self.data.as_path()), self.model.as_deref()];
             let (nominal, table) = (&subject.nominal, subject.table.as_ref());
             let page = report::diagnosis(context, inputs, &recording, nominal, table, &diagnosis, &extended);
-            report::write(&page, out)?;
+            report::write(&page, out, &mut outputs)?;
         }
-        context.print(&written, || text(&recording, &diagnosis, &extension, out))
+        outputs.finish()?;
+        context.print(&written, || {
+            let next = say::next(&self.next(&diagnosis, &extension, out));
+            text(&recording, &diagnosis, &extension, out, !self.no_report) + &next
+        })
+    }
+
+    /// How the extended drive is used.
+    fn next(&self, diagnosis: &Diagnosis, extension: &Extension, out: &Path) -> Vec<String> {
+        if diagnosis.causes.is_empty() {
+            return Vec::new();
+        }
+        let drive = quoted(&out.join("drive-extended.toml").display().to_string());
+        if self.model.is_some() {
+            return vec![format!("flexspline diagnose NEW.csv --model {drive}")];
+        }
+        if extension.drive_fields.is_empty() {
+            return Vec::new();
+        }
+        let folder = quoted(&out.join("extended").display().to_string());
+        vec![format!("flexspline tables --generator {} --drive {drive} --out {folder}", self.generator)]
     }
 
     /// The mesh of FEM runs.
@@ -276,8 +301,9 @@ impl Diagnose {
         diagnosis: &Diagnosis,
         extended: &Extended,
         extension: &mut Extension,
-        out: &Path,
+        outputs: &mut Outputs,
     ) -> Result<(), Failure> {
+        let out = context.out()?;
         let mut made: Option<MadeTable> = None;
         let toml = match &subject.model {
             Some(known) => {
@@ -298,7 +324,7 @@ impl Diagnose {
             }
         };
         let mut put = |name: String, content: &[u8]| -> Result<(), Failure> {
-            write_whole(&out.join(&name), |file| file.write_all(content))?;
+            outputs.file(&out.join(&name), |file| file.write_all(content))?;
             extension.files.push(name);
             Ok(())
         };
@@ -413,10 +439,13 @@ fn tables_of<'a>(subject: &'a Subject<'_>, of: &'a TableSubject, sessions: &[Ses
     }
 }
 
-fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out: &Path) -> String {
+fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out: &Path, with_page: bool) -> String {
     let mut text = format!("{}: {} rows, {} sessions\n", recording.file, recording.rows, recording.sessions.len());
     for fault in &recording.faults {
         text += &format!("data fault: {}\n", fault.what);
+    }
+    for note in &recording.notes {
+        text += &format!("note: {note}\n");
     }
     text += &diagnosis.text();
     if let Some(evaluation) = &extension.compensation {
@@ -463,7 +492,8 @@ fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out
             let _ = writeln!(text, "no extended tables: {why}");
         }
     }
-    let mut files = vec![out.join("diagnosis.json").display().to_string()];
+    let mut files = vec!["diagnosis.json".to_owned()];
+    files.extend(with_page.then(|| "report.html (for any browser)".to_owned()));
     files.extend(extension.files.iter().cloned());
-    text + &format!("wrote {}", files.join(", "))
+    text + &format!("wrote to {}/: {}", out.display(), files.join(", "))
 }

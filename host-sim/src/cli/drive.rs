@@ -7,13 +7,14 @@ use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Context, Failure};
+use super::{Context, Failure, say};
 use crate::drive::{Drive, GeneratorKind, MeshReport, RigidMesh};
 
 /// Print the drive as a commented TOML file, or check whether its teeth clear one another
 ///
-/// The file that it prints is complete and can be read back with --drive; a file of one's own may be shorter, with base =
-/// "HHD-95" and the fields that differ.
+/// The file that it prints is complete, says of every field what it is, its unit, its sign and what is allowed, and can be read back
+/// with --drive (`flexspline new` writes it to a file); a file of one's own may be shorter, with base = "HHD-95" and the fields that
+/// differ. --check looks for rigid teeth that interfere: gaps in um, backlash in arcmin and ripple in arcsec at the output.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -46,9 +47,13 @@ impl DriveCommand {
             drive: &drive,
             mesh,
         };
-        context.print(&result, || match &result.mesh {
-            Some(reports) => table(&drive, reports),
-            None => drive.to_toml(),
+        let Some(reports) = &result.mesh else {
+            return context.print_data(&result, || drive.to_toml());
+        };
+        let sound = reports.iter().all(|report| report.interferences.is_empty());
+        context.print(&result, || {
+            let next = if sound { say::next(&[context.next("tables")]) } else { String::new() };
+            table(&drive, reports).trim_end().to_owned() + &next
         })?;
         let interfering: Vec<&str> = result
             .mesh

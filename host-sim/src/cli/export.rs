@@ -6,8 +6,9 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use super::context::quoted;
 use super::simulate::{ModelOptions, refused_or_failed, show};
-use super::{Context, Failure};
+use super::{Context, Failure, say};
 use crate::export::{Deck, DeckSettings, outlines, write_vtu};
 use crate::output::{OutputError, write_csv, write_whole};
 use crate::simulate::{Path, PathPoint, simulate};
@@ -81,7 +82,13 @@ impl Export {
             Format::Csv => self.outlines(context)?,
             Format::Inp => self.deck(context)?,
         };
-        let text = format!("wrote {}", written.display());
+        let shown = quoted(&written.display().to_string());
+        let next = match self.format {
+            Format::Vtu => vec![format!("paraview {shown}")],
+            Format::Csv => Vec::new(),
+            Format::Inp => vec![format!("OMP_NUM_THREADS=1 ccx {}", shown.trim_end_matches(".inp"))],
+        };
+        let text = format!("wrote {}{}", written.display(), say::next(&next));
         context.print(&Exported { schema_version: 1, written: vec![written] }, || text)
     }
 
@@ -126,13 +133,9 @@ impl Export {
         settings.check(&drive).map_err(|error| Failure::BadInput(error.to_string()))?;
         let file = context.out()?.join(format!("{}.vtu", self.model.generator));
         let mut progress = context.progress(self.model.generator.name());
-        let interrupted = context.watch_interrupt();
         let mut lost: Option<OutputError> = None;
         let run = simulate(&drive, &settings, &mut |now| {
             show(&mut progress, now);
-            if interrupted() {
-                return ControlFlow::Break(());
-            }
             if now.row.is_some()
                 && let Err(error) = write_whole(&file, |out| write_vtu(out, now.problem, now.state))
             {

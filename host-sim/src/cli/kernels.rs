@@ -6,12 +6,13 @@ use std::sync::Mutex;
 use clap::Args;
 use serde::Serialize;
 
-use super::context::Context;
-use super::{Failure, tables::generators};
+use super::context::{Context, quoted};
+use super::names::{self, Generators};
+use super::{Failure, say};
 use crate::drive::Wheel;
 use crate::kernels::{KernelError, KernelPlan, make};
 use crate::mesh::MeshLevel;
-use crate::output::write_json;
+use crate::output::Outputs;
 use crate::stepping::{Method, SolverSettings};
 
 /// Compute influence kernels: what a deviation of a tooth, of the generator or of an axis does to the output
@@ -26,15 +27,28 @@ Examples:
   flexspline kernels --generator cam
   flexspline kernels --drive my-drive.toml --mesh coarse --out tables")]
 pub(super) struct KernelsCommand {
-    /// Generator, or all
-    #[arg(short, long, value_name = "G", default_value = "all")]
-    generator: String,
+    /// Wave generator: two-roller, four-roller, double-disc, cam, or all
+    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
+    generator: Generators,
     /// Mesh: coarse, standard or fine
-    #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = str::parse::<MeshLevel>)]
+    #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = names::mesh(), hide_possible_values = true)]
     mesh: MeshLevel,
     /// Solver: reference or fast
-    #[arg(long, value_name = "SOLVER", default_value = "fast", value_parser = str::parse::<Method>)]
+    #[arg(long, value_name = "SOLVER", default_value = "fast", value_parser = names::solver(), hide_possible_values = true)]
     solver: Method,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report {
+    schema_version: u32,
+    kernels: Vec<Told>,
+}
+
+impl Report {
+    fn of(kernels: Vec<Told>) -> Report {
+        Report { schema_version: 1, kernels }
+    }
 }
 
 /// What the command says of one generator.
@@ -53,20 +67,21 @@ struct Told {
 impl KernelsCommand {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let drive = context.drive()?;
-        let kinds = generators(&self.generator)?;
+        let kinds = self.generator.0.as_slice();
         let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
         let out = context.out()?;
         let progress = Mutex::new(context.progress("kernels"));
-        let interrupted = context.watch_interrupt();
+        let plans: Vec<KernelPlan> = kinds.iter().map(|kind| KernelPlan::for_generator(*kind)).collect();
+        let steps: usize = plans.iter().map(KernelPlan::steps).sum();
+        let mut before = 0;
         let mut told = Vec::new();
-        for kind in kinds {
-            let plan = KernelPlan::for_generator(kind);
-            let steps = plan.steps();
-            let kernels = make(&drive, kind, &plan, settings, &|done| {
+        let mut outputs = Outputs::new();
+        for (&kind, plan) in kinds.iter().zip(&plans) {
+            let kernels = make(&drive, kind, plan, settings, &|done| {
                 if let Ok(mut bar) = progress.lock() {
-                    bar.set(done, steps, &kind.to_string());
+                    bar.set(before + done, steps, &kind.to_string());
                 }
-                if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                ControlFlow::Continue(())
             })
             .map_err(|error| match error {
                 KernelError::NotIdeal { .. } => Failure::BadInput(error.to_string()),
@@ -74,7 +89,8 @@ impl KernelsCommand {
                 KernelError::Solve(_) => Failure::Failed(format!("{kind}: {error}")),
             })?;
             let path = out.join(format!("{kind}.kernels.json"));
-            write_json(&path, &kernels)?;
+            outputs.json(&path, &kernels)?;
+            before += plan.steps();
             let ends = [plan.torques_n_m[0], plan.torques_n_m[plan.torques_n_m.len() - 1]];
             let size = |g: [f64; 2]| g[0].hypot(g[1]);
             let swing = |torque: f64| {
@@ -94,7 +110,17 @@ impl KernelsCommand {
             });
         }
         drop(progress);
-        context.print(&told, || told.iter().map(text).collect::<Vec<_>>().join("\n"))
+        outputs.finish()?;
+        let told = Report::of(told);
+        context.print(&told, || {
+            let texts: Vec<String> = told.kernels.iter().map(text).collect();
+            let next =
+                format!("diagnose DATA.csv --tables {} --generator {}", quoted(&out.display().to_string()), kinds[0]);
+            let tables = out.join(format!("{}.fxt", kinds[0])).exists();
+            let table = format!("tables --generator {} --out {}", kinds[0], quoted(&out.display().to_string()));
+            let table = (!tables).then(|| context.next(&table));
+            texts.join("\n") + &say::next(&table.into_iter().chain([context.next(&next)]).collect::<Vec<_>>())
+        })
     }
 }
 
@@ -107,4 +133,24 @@ fn text(told: &Told) -> String {
          spline's: {:.2}, {:.2}\n  circular spline {} um beside the axis: {at_light:.1}, {at_heavy:.1} p-p\nwrote {}",
         told.generator, fs[0], fs[1], cs[0], cs[1], told.eccentricity_um, told.file
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_is_one_object_with_an_entry_for_each_generator() {
+        let told = Told {
+            generator: "cam".into(),
+            file: "out/cam.kernels.json".into(),
+            second_harmonic_arcsec_per_um: [[4.2; 2]; 2],
+            eccentricity_pp_arcsec: [1.0, 2.0],
+            eccentricity_um: 5.0,
+            torque_n_m: [2.0, 100.0],
+        };
+        let json = serde_json::to_value(Report::of(vec![told])).unwrap();
+        assert!(json.is_object());
+        assert_eq!((json["schema_version"].as_u64(), json["kernels"][0]["generator"].as_str()), (Some(1), Some("cam")));
+    }
 }

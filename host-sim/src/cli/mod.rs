@@ -3,26 +3,33 @@
 //! What a command computes is a library function that knows nothing of the command line. Here options are read and
 //! checked, the function is called, and its result is written and shown. Data goes to stdout, talk to stderr.
 
+mod completions;
 mod context;
 mod diagnose;
 mod drive;
 mod export;
 mod kernels;
+mod man;
+mod names;
+mod new;
 mod replay;
 mod report;
 mod reproduce;
+mod say;
 mod simulate;
+mod stop;
 mod synthesize;
 mod tables;
 mod validate;
 
 use std::ffi::OsString;
+use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueHint};
 
-use crate::output::OutputError;
+use crate::output::{OutputError, remove_empty_folders};
 use context::Context;
 
 /// How a command ended; the number is the exit code of the process.
@@ -57,24 +64,94 @@ impl From<OutputError> for Failure {
     }
 }
 
-/// Simulates strain wave (harmonic) drives: kinematic error, backlash and wind-up by contact FEM.
+/// Computes the errors of strain wave (harmonic) drives by contact FEM, makes tables that correct them, and finds what a
+/// measured drive does otherwise
 #[derive(Debug, Parser)]
 #[command(name = "flexspline", version, propagate_version = true, max_term_width = 100)]
 #[command(after_help = "\
-Examples:
-  flexspline tables
-  flexspline validate --tables out
-  flexspline simulate --generator cam --path pitch --torque-n-m 50
-  flexspline drive > my-drive.toml
-  flexspline drive --check --drive my-drive.toml
-
-Exit codes: 0 done, 1 the run failed (no convergence, a bound missed), 2 bad input or usage.
-Angles are radians, torques N.m, temperatures degrees C; errors are arc-seconds at the output.")]
+flexspline COMMAND --help says more of a command, with examples.
+Angles are radians, torques N.m, temperatures degrees C, sizes mm or um as the name says; errors are
+arc-seconds at the output, positive where it leads. A positive torque turns the output forward.
+Exit codes: 0 done; 1 the run failed (no convergence, a bound missed, stopped); 2 bad input.")]
 struct Cli {
     #[command(flatten)]
     common: Common,
     #[command(subcommand)]
     command: Command,
+}
+
+/// What one wants to do, and the commands for it.
+const GROUPS: [(&str, &[(&str, &str)]); 4] = [
+    (
+        "Simulate",
+        &[
+            ("simulate", "run the drive along a path: kinematic error, backlash, wind-up, stress"),
+            ("export", "the mesh, the outlines or a CalculiX deck, for other programs"),
+            ("reproduce", "the paper's protocol for all four generators, beside its figures"),
+        ],
+    ),
+    (
+        "Make tables",
+        &[
+            ("tables", "compensation tables for firmware, from FEM or from samples"),
+            ("validate", "are they right? against fresh FEM at other points"),
+            ("kernels", "what a deviation of any tooth does to the output, for diagnose"),
+        ],
+    ),
+    (
+        "Measured data",
+        &[
+            ("diagnose", "what measured data say that the simulation does not, and why"),
+            ("replay", "what a table leaves of a measured error"),
+            ("synthesize", "measured-looking data with effects of your choice, to try diagnose on"),
+        ],
+    ),
+    (
+        "Files and set-up",
+        &[
+            ("new", "a commented drive file, or a catalogue model, to edit"),
+            ("drive", "print a drive, or check that its teeth clear one another"),
+            ("completions", "let the shell complete commands, options and names"),
+            ("man", "manual pages"),
+            ("help", "this page, or that of a command"),
+        ],
+    ),
+];
+
+/// The shortest way to a result, for the first page.
+const USUAL_PATH: [(&str, &str); 3] = [
+    ("flexspline new drive.toml", "your drive, to edit; without it HHD-95"),
+    ("flexspline tables --drive drive.toml", "FEM, about a minute: tables and report.html in out/"),
+    ("flexspline validate --tables out --drive drive.toml", "are they right?"),
+];
+
+/// The drive where none is named.
+const USUAL_DRIVE: &str = "HHD-95";
+
+/// The definition of the command line.
+fn command() -> clap::Command {
+    let header = *clap::builder::Styles::styled().get_header();
+    let literal = *clap::builder::Styles::styled().get_literal();
+    let all = Cli::command();
+    let mut page =
+        format!("{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{header}The usual path:{header:#}\n");
+    for (words, what) in USUAL_PATH {
+        let _ = writeln!(page, "  {literal}{words:<53}{literal:#}{what}");
+    }
+    for (title, commands) in GROUPS {
+        let _ = writeln!(page, "\n{header}{title}:{header:#}");
+        for (name, what) in commands.iter().filter(|(name, _)| *name == "help" || all.find_subcommand(name).is_some()) {
+            let _ = writeln!(page, "  {literal}{name:<13}{literal:#}{what}");
+        }
+    }
+    let _ = write!(page, "\n{header}Common options:{header:#}\n{{options}}{{after-help}}");
+    all.help_template(page)
+}
+
+/// Reads a command line.
+fn parse(args: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> Result<Cli, clap::Error> {
+    let mut matches = command().try_get_matches_from(args)?;
+    Cli::from_arg_matches_mut(&mut matches)
 }
 
 #[derive(Debug, Subcommand)]
@@ -89,20 +166,23 @@ enum Command {
     Synthesize(synthesize::Synthesize),
     Diagnose(diagnose::Diagnose),
     Reproduce(reproduce::Reproduce),
+    New(new::New),
+    Completions(completions::Completions),
+    Man(man::ManPages),
 }
 
 /// Options of every command.
 #[derive(Debug, Args)]
 struct Common {
     /// Drive file, or the name of a built-in drive: HHD-95 (ideal) or HHD-95-typical (friction, compliances, tolerances)
-    #[arg(long, global = true, value_name = "FILE|NAME", default_value = "HHD-95", help_heading = "Common options")]
+    #[arg(long, global = true, value_name = "FILE|NAME", default_value = USUAL_DRIVE, value_hint = ValueHint::FilePath, help_heading = "Common options")]
     drive: String,
     /// Override one field of the drive, for instance flanks.friction_coefficient=0.08; may be repeated
     #[arg(long = "set", global = true, value_name = "PATH=VALUE", help_heading = "Common options")]
     sets: Vec<String>,
-    /// Folder for output files, made if it does not exist
-    #[arg(long, global = true, value_name = "DIR", default_value = "out", help_heading = "Common options")]
-    out: PathBuf,
+    /// Folder for output files, made if it does not exist [default: out]
+    #[arg(long, global = true, value_name = "DIR", value_hint = ValueHint::DirPath, help_heading = "Common options")]
+    out: Option<PathBuf>,
     /// Print the result as one JSON object, and nothing else, on stdout
     #[arg(long, global = true, help_heading = "Common options")]
     json: bool,
@@ -120,26 +200,34 @@ struct Common {
 /// Runs the command line `args`, whose first item is the name of the program.
 pub fn run(args: impl IntoIterator<Item = impl Into<OsString>>) -> Outcome {
     let args: Vec<OsString> = args.into_iter().map(Into::into).collect();
-    let cli = match Cli::try_parse_from(&args) {
+    let cli = match parse(&args) {
         Ok(cli) => cli,
         Err(help_or_error) => {
-            // A closed pipe is no reason to fail.
-            let _ = help_or_error.print();
-            return if help_or_error.use_stderr() { Outcome::BadInput } else { Outcome::Done };
+            let printed = help_or_error.print();
+            return match say::written(printed) {
+                _ if help_or_error.use_stderr() => Outcome::BadInput,
+                Ok(()) => Outcome::Done,
+                Err(failure) => ended(failure),
+            };
         }
     };
     let context = Context::new(cli.common, &args);
+    stop::end_cleanly_on_signals();
     match context.with_threads(|| cli.command.run(&context)) {
         Ok(()) => Outcome::Done,
-        Err(Failure::BadInput(message)) => {
-            eprintln!("error: {message}");
-            Outcome::BadInput
-        }
-        Err(Failure::Failed(message)) => {
-            eprintln!("error: {message}");
-            Outcome::Failed
-        }
+        Err(failure) => ended(failure),
     }
+}
+
+/// Says why there is no result, and leaves no folder that was made for it.
+fn ended(failure: Failure) -> Outcome {
+    remove_empty_folders();
+    let (message, outcome) = match failure {
+        Failure::BadInput(message) => (message, Outcome::BadInput),
+        Failure::Failed(message) => (message, Outcome::Failed),
+    };
+    say::error(&message);
+    outcome
 }
 
 impl Command {
@@ -155,6 +243,9 @@ impl Command {
             Command::Synthesize(command) => command.run(context),
             Command::Diagnose(command) => command.run(context),
             Command::Reproduce(command) => command.run(context),
+            Command::New(command) => command.run(context),
+            Command::Completions(command) => command.run(context),
+            Command::Man(command) => command.run(context),
         }
     }
 }
@@ -162,23 +253,60 @@ impl Command {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_definition_of_the_command_line_is_consistent() {
-        Cli::command().debug_assert();
+        command().debug_assert();
+    }
+
+    /// Every command but `help`.
+    fn commands() -> Vec<clap::Command> {
+        command().get_subcommands().filter(|c| c.get_name() != "help").cloned().collect()
     }
 
     #[test]
     fn every_command_teaches_by_an_example_that_it_accepts() {
-        for command in Cli::command().get_subcommands().filter(|c| c.get_name() != "help") {
+        for command in commands() {
             let help = command.get_after_help().unwrap_or_else(|| panic!("{} has no example", command.get_name()));
             let help = help.to_string();
             let examples: Vec<&str> = help.lines().map(str::trim).filter(|l| l.starts_with("flexspline ")).collect();
             assert!(!examples.is_empty(), "{} has no example", command.get_name());
+            let longest = help.lines().map(|line| line.chars().count()).max();
+            assert!(longest <= Some(100), "{}: a line of {longest:?} letters is broken", command.get_name());
             for example in examples {
-                let words = example.split(" > ").next().unwrap().split(' ');
-                assert!(Cli::try_parse_from(words).is_ok(), "{example}");
+                let words = example.split(['>', '|']).next().unwrap().split_whitespace();
+                assert!(parse(words).is_ok(), "{example}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_page_names_every_command_once_and_shows_a_path_that_is_accepted() {
+        let page = command().render_help().to_string();
+        for name in commands().iter().map(clap::Command::get_name).chain(["help"]) {
+            let groups = GROUPS.iter().flat_map(|(_, commands)| commands.iter());
+            assert_eq!(groups.filter(|(known, _)| *known == name).count(), 1, "{name} in the groups");
+            let lines = page.lines().filter(|line| line.starts_with(&format!("  {name} ")));
+            assert_eq!(lines.count(), 1, "{name} on the first page:\n{page}");
+        }
+        for (words, _) in USUAL_PATH {
+            assert!(page.contains(words) && parse(words.split(' ')).is_ok(), "{words}");
+        }
+        assert!(page.lines().all(|line| line.chars().count() <= 120), "{page}");
+    }
+
+    #[test]
+    fn every_option_says_what_it_is_and_its_default_where_it_has_one() {
+        for command in commands() {
+            for arg in command.get_arguments().filter(|arg| !["help", "version"].contains(&arg.get_id().as_str())) {
+                let (name, id) = (command.get_name(), arg.get_id());
+                let help = arg.get_help().unwrap_or_else(|| panic!("{name} {id} says nothing")).to_string();
+                let stated = !arg.get_default_values().is_empty() || help.contains("default");
+                let needs_none = arg.is_required_set() || !arg.get_action().takes_values() || arg.is_positional();
+                // Without these there is no file, no limit, nothing to change.
+                let absent =
+                    ["sets", "effects", "model", "tables", "like", "from_samples", "half_width_arcsec", "seed"];
+                assert!(stated || needs_none || absent.contains(&id.as_str()), "{name} {id} states no default: {help}");
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Mutex;
 
 use flexspline::Table;
 use rayon::prelude::*;
@@ -12,7 +13,7 @@ use crate::diagnosis::report::Diagnosis;
 use crate::drive::{Drive, GeneratorKind};
 use crate::measurement::Recording;
 use crate::nominal::Nominal;
-use crate::output::write_whole;
+use crate::output::Outputs;
 use crate::report::animation::{Animation, AnimationError, animate};
 use crate::report::diagnosis_report::{self, Sources};
 use crate::report::page::Page;
@@ -25,21 +26,21 @@ pub(super) fn animations(
     drive: &Drive,
     tables: &[(GeneratorKind, Table<'_>)],
     settings: SolverSettings,
-) -> Result<Vec<Result<Animation, AnimationError>>, Failure> {
-    let interrupted = context.watch_interrupt();
+) -> Vec<Result<Animation, AnimationError>> {
+    let progress = Mutex::new((context.progress("report"), 0));
     let solver = SolverSettings { method: Method::Fast, ..settings };
-    let made = tables
+    tables
         .par_iter()
         .map(|(kind, table)| {
-            animate(drive, *kind, shown_torque_n_m(table), solver, &mut || {
-                if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            })
+            let made = animate(drive, *kind, shown_torque_n_m(table), solver, &mut || ControlFlow::Continue(()));
+            if let Ok(mut guard) = progress.lock() {
+                guard.1 += 1;
+                let done = guard.1;
+                guard.0.set(done, tables.len(), &format!("{kind} in motion"));
+            }
+            made
         })
-        .collect();
-    if interrupted() {
-        return Err(Failure::Failed("stopped; report.html was not written".into()));
-    }
-    Ok(made)
+        .collect()
 }
 
 /// The page of a diagnosis; `inputs` are the files it was made from.
@@ -65,10 +66,10 @@ pub(super) fn diagnosis<'p>(
 }
 
 /// Writes the page; a failure that it is stamped with is that of the command.
-pub(super) fn write(page: &Page, out: &Path) -> Result<(), Failure> {
+pub(super) fn write(page: &Page, out: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
     let path = out.join("report.html");
     let html = page.html().map_err(|error| Failure::Failed(format!("{}: {error}", path.display())))?;
-    write_whole(&path, |file| file.write_all(html.as_bytes()))?;
+    outputs.file(&path, |file| file.write_all(html.as_bytes()))?;
     Ok(())
 }
 

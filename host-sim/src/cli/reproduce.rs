@@ -7,10 +7,10 @@ use clap::Args;
 use rayon::prelude::*;
 
 use super::simulate::refused_or_failed;
-use super::{Context, Failure, report};
+use super::{Context, Failure, names, report};
 use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
-use crate::output::write_json;
+use crate::output::Outputs;
 use crate::report::animation::{Animation, AnimationError, animate};
 use crate::report::reproduction_report::{Sources, page};
 use crate::reproduce::claim::Verdict;
@@ -37,7 +37,7 @@ pub(super) struct Reproduce {
     #[arg(long, conflicts_with = "mesh")]
     quick: bool,
     /// Mesh of the standard runs: coarse, standard or fine [default: standard]
-    #[arg(long, value_name = "LEVEL", value_parser = str::parse::<MeshLevel>)]
+    #[arg(long, value_name = "LEVEL", value_parser = names::mesh(), hide_possible_values = true)]
     mesh: Option<MeshLevel>,
 }
 
@@ -48,24 +48,21 @@ impl Reproduce {
         let mesh = if self.quick { MeshLevel::Coarse } else { self.mesh.unwrap_or(MeshLevel::Standard) };
         let settings = ReproduceSettings { mesh, quick: self.quick };
         let progress = Mutex::new(context.progress("reproduce"));
-        let interrupted = context.watch_interrupt();
         let result = reproduce(&drive, settings, &|done, total, note| {
             if let Ok(mut bar) = progress.lock() {
                 bar.set(done, total, note);
             }
-            if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            ControlFlow::Continue(())
         })
         .map_err(refused_or_failed)?;
-        let animations = animations(&drive, mesh, &interrupted);
+        let animations = animations(&drive, mesh);
         drop(progress);
-        if interrupted() {
-            return Err(Failure::Failed("stopped; nothing was written".into()));
-        }
-
         let record = result.record(&context.command);
         let page = page(Sources { reproduction: &result, command: &context.command, animations });
-        write_json(&out.join("reproduce.json"), &record)?;
-        report::write(&page, out)?;
+        let mut outputs = Outputs::new();
+        outputs.json(&out.join("reproduce.json"), &record)?;
+        report::write(&page, out, &mut outputs)?;
+        outputs.finish()?;
         context.print(&record, || text(&result, out))?;
         match result.not_converged.first() {
             Some(first) => Err(Failure::Failed(format!(
@@ -79,19 +76,11 @@ impl Reproduce {
 }
 
 /// The drives in motion, without load.
-fn animations(
-    drive: &Drive,
-    mesh: MeshLevel,
-    interrupted: &(impl Fn() -> bool + Sync),
-) -> Vec<Result<Animation, AnimationError>> {
+fn animations(drive: &Drive, mesh: MeshLevel) -> Vec<Result<Animation, AnimationError>> {
     let solver = SolverSettings { method: Method::Fast, mesh, ..SolverSettings::default() };
     GeneratorKind::ALL
         .into_par_iter()
-        .map(|kind| {
-            animate(drive, kind, 0.0, solver, &mut || {
-                if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            })
-        })
+        .map(|kind| animate(drive, kind, 0.0, solver, &mut || ControlFlow::Continue(())))
         .collect()
 }
 

@@ -4,13 +4,13 @@ use std::fmt::Write;
 use std::ops::ControlFlow;
 use std::path::Path as FilePath;
 
-use clap::{Args, ValueEnum};
+use clap::{Args, ValueEnum, ValueHint};
 
-use super::{Context, Failure};
+use super::{Context, Failure, names, say};
 use crate::drive::{Drive, GeneratorKind};
 use crate::export::{Frame, write_pvd, write_vtu};
 use crate::mesh::MeshLevel;
-use crate::output::{OutputError, WholeFolder, write_csv, write_json, write_whole};
+use crate::output::{OutputError, Outputs, WholeFolder, write_whole};
 use crate::progress::Progress;
 use crate::simulate::{
     Direction, Observation, Path, PathPoint, Phase, SimulateError, SimulationSettings, Summary, read_path, simulate,
@@ -29,14 +29,14 @@ Examples:
   flexspline simulate --generator cam --path pitch --set flanks.friction_coefficient=0.08 --json
 
 A path FILE is a CSV with a column generator_rad and, if wanted, torque_n_m and temperature_c: one
-increment, or more where the solver needs them, and one result row for each of its rows. The drive is
-deformed where the first row says.")]
+increment, or more where the solver needs them, and one result row for each of its rows. The drive
+is deformed where the first row says.")]
 pub(super) struct Simulate {
     #[command(flatten)]
     model: ModelOptions,
     /// Where the generator goes: paper (+1 rad, then -2 rad), pitch (settled, then one flexspline tooth pitch), turn
     /// (settled, then one turn), or a CSV file
-    #[arg(long, value_name = "paper|pitch|turn|FILE", default_value = "paper")]
+    #[arg(long, value_name = "paper|pitch|turn|FILE", default_value = "paper", value_hint = ValueHint::FilePath)]
     path: String,
     /// Largest increment of the generator, rad [default: 0.01 on paper, an eighth of a tooth pitch on pitch and turn]
     #[arg(long, value_name = "RAD", allow_negative_numbers = true)]
@@ -53,7 +53,7 @@ pub(super) struct Simulate {
 #[derive(Debug, Args)]
 pub(super) struct ModelOptions {
     /// Wave generator: two-roller, four-roller, double-disc or cam
-    #[arg(long, value_name = "G", value_parser = str::parse::<GeneratorKind>)]
+    #[arg(long, value_name = "G", value_parser = names::generator(), hide_possible_values = true)]
     pub(super) generator: GeneratorKind,
     /// Load torque on the output, N.m; positive turns it forward [default: 0]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
@@ -62,10 +62,10 @@ pub(super) struct ModelOptions {
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     pub(super) temperature_c: Option<f64>,
     /// Mesh: coarse, standard or fine
-    #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = str::parse::<MeshLevel>)]
+    #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = names::mesh(), hide_possible_values = true)]
     pub(super) mesh: MeshLevel,
     /// Solver: fast condenses the teeth onto the nodes that touch something, reference keeps every node; they agree to 0.1 arcsec
-    #[arg(long, value_name = "SOLVER", default_value = "fast", value_parser = str::parse::<Method>)]
+    #[arg(long, value_name = "SOLVER", default_value = "fast", value_parser = names::solver(), hide_possible_values = true)]
     pub(super) solver: Method,
     /// Contact penalty on the flanks, N/mm^3
     #[arg(long, value_name = "K", default_value_t = SolverSettings::default().flank_penalty, allow_negative_numbers = true, help_heading = "Numerical method")]
@@ -116,7 +116,6 @@ impl Simulate {
 
         let mut frames = if self.frames { Some(Frames::new(&out.join("frames"))?) } else { None };
         let mut progress = context.progress(settings.generator.name());
-        let interrupted = context.watch_interrupt();
         let mut lost: Option<OutputError> = None;
         let run = simulate(&drive, &settings, &mut |now| {
             if context.verbose() {
@@ -129,7 +128,7 @@ impl Simulate {
                 lost = Some(error);
                 return ControlFlow::Break(());
             }
-            if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            ControlFlow::Continue(())
         });
         drop(progress);
         if let Some(error) = lost {
@@ -138,12 +137,18 @@ impl Simulate {
         let mut simulation = run.map_err(refused_or_failed)?;
         simulation.summary.command = context.command.clone();
 
-        write_csv(&out.join("results.csv"), &simulation.rows)?;
-        write_json(&out.join("summary.json"), &simulation.summary)?;
+        let has_frames = frames.is_some();
+        let mut outputs = Outputs::new();
+        outputs.csv(&out.join("results.csv"), &simulation.rows)?;
+        outputs.json(&out.join("summary.json"), &simulation.summary)?;
         if let Some(frames) = frames {
-            frames.finish()?;
+            outputs.folder(frames.finish()?);
         }
-        context.print(&simulation.summary, || report(&simulation.summary, out))
+        outputs.finish()?;
+        context.print(&simulation.summary, || {
+            let next = format!("tables --generator {}", settings.generator);
+            report(&simulation.summary, out, has_frames).trim_end().to_owned() + &say::next(&[context.next(&next)])
+        })
     }
 
     fn settings(&self, drive: &Drive) -> Result<SimulationSettings, Failure> {
@@ -245,14 +250,15 @@ impl Frames {
         Ok(())
     }
 
-    fn finish(self) -> Result<(), OutputError> {
+    /// The folder, complete.
+    fn finish(self) -> Result<WholeFolder, OutputError> {
         write_whole(&self.folder.path().join("frames.pvd"), |out| write_pvd(out, &self.list))?;
-        self.folder.finish()
+        Ok(self.folder)
     }
 }
 
 /// The summary for reading.
-fn report(summary: &Summary, out: &FilePath) -> String {
+fn report(summary: &Summary, out: &FilePath, has_frames: bool) -> String {
     let mut text = format!(
         "{} with {} generator, path {}, {} mesh, {} degrees of freedom\n",
         summary.drive, summary.generator, summary.path, summary.mesh, summary.degrees_of_freedom
@@ -277,11 +283,12 @@ fn report(summary: &Summary, out: &FilePath) -> String {
     put("time", Some(summary.wall_s), "s", 2);
     let _ = writeln!(
         text,
-        "{} increments, {} iterations; wrote {} and {}",
+        "{} increments, {} iterations; wrote {}, {}{}",
         summary.increments,
         summary.iterations,
         out.join("results.csv").display(),
-        out.join("summary.json").display()
+        out.join("summary.json").display(),
+        if has_frames { format!(", {}", out.join("frames/frames.pvd").display()) } else { String::new() }
     );
     text
 }

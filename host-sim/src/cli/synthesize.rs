@@ -2,25 +2,26 @@
 
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use flexspline::Table;
 use serde::Serialize;
 
-use super::Failure;
-use super::context::{Context, put};
+use super::context::{Context, quoted};
+use super::{Failure, names, say};
 use crate::drive::{Drive, GeneratorKind};
 use crate::extension::{self, CauseEntry};
 use crate::measurement::{ColumnMap, Gear, read};
 use crate::mesh::MeshLevel;
 use crate::nominal::{Fixed, Nominal};
-use crate::output::{write_json, write_whole};
+use crate::output::Outputs;
 use crate::stepping::SolverSettings;
 use crate::sweep::{SweepError, SweepProgress};
 use crate::synthesize::{
-    Chosen, Excitation, Plan, Plant, Richness, Sensors, Sizes, Unit, Usual, effects, parse, synthesize, to_csv,
+    Chosen, Definition, Excitation, Parameter, Plan, Plant, Richness, Sensors, Sizes, Unit, Usual, effects, parse,
+    synthesize, to_csv,
 };
 use crate::tables::MadeTable;
 
@@ -34,9 +35,9 @@ use crate::tables::MadeTable;
 Examples:
   flexspline synthesize --list
   flexspline synthesize --effect circular_spline_eccentricity:amplitude_um=8,phase_rad=0.7
-  flexspline synthesize --effect sensor_latency:delay_s=0.001 --effect wear --tables out --generator cam --seed 7
-  flexspline synthesize --effect gravity_torque --model nominal.toml --like measured.csv --out made-up
-  flexspline synthesize --effect encoder_index_jump:size_arcsec=53 --noise-arcsec 1 --sessions 4 --rows 5000
+  flexspline synthesize --effect sensor_latency:delay_s=0.001 --effect wear --tables out --seed 7
+  flexspline synthesize --effect gravity_torque --model nominal.toml --like measured.csv --out try
+  flexspline synthesize --effect encoder_index_jump:size_arcsec=53 --noise-arcsec 1 --rows 5000
 
 Without --effect the data are those of a drive within its spread, in which nothing is to be found.")]
 pub(super) struct Synthesize {
@@ -47,13 +48,13 @@ pub(super) struct Synthesize {
     #[arg(long)]
     list: bool,
     /// Folder of tables made by `flexspline tables`
-    #[arg(long, value_name = "DIR", conflicts_with = "model")]
+    #[arg(long, value_name = "DIR", conflicts_with = "model", value_hint = ValueHint::DirPath)]
     tables: Option<PathBuf>,
-    /// Generator of the drive
-    #[arg(long, value_name = "G", default_value = "cam", value_parser = str::parse::<GeneratorKind>)]
+    /// Wave generator of the drive: two-roller, four-roller, double-disc or cam
+    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true)]
     generator: GeneratorKind,
     /// Nominal model from the catalogue, or one that `flexspline diagnose` has extended
-    #[arg(long, value_name = "nominal.toml")]
+    #[arg(long, value_name = "nominal.toml", value_hint = ValueHint::FilePath)]
     model: Option<PathBuf>,
     /// The drawing itself, not a unit drawn from the spread between units
     #[arg(long)]
@@ -113,10 +114,17 @@ pub(super) struct Synthesize {
     )]
     temperature_c: String,
     /// Take motion, load, temperature and time from this file instead
-    #[arg(long, value_name = "DATA.csv", help_heading = "Excitation")]
+    #[arg(long, value_name = "DATA.csv", value_hint = ValueHint::FilePath, help_heading = "Excitation")]
     like: Option<PathBuf>,
-    /// Names and units of the columns of that file, as for `flexspline diagnose`
-    #[arg(long, value_name = "MAP", default_value = "", requires = "like", help_heading = "Excitation")]
+    /// Names and units of the columns of that file, as for `flexspline diagnose` [default: the usual names]
+    #[arg(
+        long,
+        value_name = "MAP",
+        default_value = "",
+        hide_default_value = true,
+        requires = "like",
+        help_heading = "Excitation"
+    )]
     columns: String,
     /// Seed of everything drawn [default: drawn, and said]
     #[arg(long, value_name = "N")]
@@ -164,8 +172,8 @@ struct Truth {
 impl Synthesize {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         if self.list {
-            put(&list());
-            return Ok(());
+            let all = List { schema_version: 1, effects: effects().iter().map(Listed::of).collect() };
+            return context.print_data(&all, list);
         }
         let chosen = self.effects.iter().map(|text| parse(text)).collect::<Result<Vec<_>, _>>();
         let chosen = chosen.map_err(|what| Failure::BadInput(format!("--effect: {what}")))?;
@@ -177,6 +185,8 @@ impl Synthesize {
         if let Some((file, text)) = context.drive_file() {
             known = extension::causes_in(file, &text).map_err(|error| Failure::BadInput(error.to_string()))?;
         }
+        // Before there is much work.
+        context.out()?;
         let (image, nominal, causes, source) = self.nominal(context, &drive)?;
         known.extend(causes);
         let table = image
@@ -217,9 +227,11 @@ impl Synthesize {
             rows: made.sessions.iter().map(crate::measurement::Session::len).sum(),
         };
         let out = context.out()?;
-        write_whole(&out.join("data.csv"), |file| file.write_all(csv.as_bytes()))?;
-        write_json(&out.join("truth.json"), &truth)?;
-        context.print(&truth, || text(&truth, out))
+        let mut outputs = Outputs::new();
+        outputs.file(&out.join("data.csv"), |file| file.write_all(csv.as_bytes()))?;
+        outputs.json(&out.join("truth.json"), &truth)?;
+        outputs.finish()?;
+        context.print(&truth, || text(&truth, out) + &say::next(&self.next(context, out)))
     }
 
     /// Sensors and temperatures, in range.
@@ -275,6 +287,23 @@ impl Synthesize {
         let gear = gear(nominal);
         let recording = read(path, &map, &gear).map_err(|error| Failure::BadInput(error.to_string()))?;
         Ok(Excitation::of_sessions(&recording.sessions, self.rate_hz, nominal.temperature_c))
+    }
+
+    /// How to diagnose what was made.
+    fn next(&self, context: &Context, out: &Path) -> Vec<String> {
+        let shown = |path: &Path| quoted(&path.display().to_string());
+        let diagnose = format!("diagnose {} --out {}", shown(&out.join("data.csv")), shown(out));
+        match (&self.model, &self.tables) {
+            (Some(model), _) => vec![context.next(&format!("{diagnose} --model {}", shown(model)))],
+            (None, Some(tables)) => {
+                vec![context.next(&format!("{diagnose} --tables {} --generator {}", shown(tables), self.generator))]
+            }
+            // The table that these data were made from is the one of the coarse mesh.
+            (None, None) => vec![
+                context.next(&format!("tables --generator {} --mesh coarse --out {}", self.generator, shown(out))),
+                context.next(&format!("{diagnose} --tables {} --generator {}", shown(out), self.generator)),
+            ],
+        }
     }
 
     /// The nominal drive: the image of a table if there is one, its model, and the causes that a model holds.
@@ -335,7 +364,6 @@ pub(super) fn fresh_table(
 ) -> Result<MadeTable, Failure> {
     let settings = SolverSettings { mesh, ..SolverSettings::default() };
     let progress = Mutex::new((context.progress("tables"), 0_usize));
-    let interrupted = context.watch_interrupt();
     let observe = |now: SweepProgress| {
         if let Ok(mut guard) = progress.lock() {
             let (bar, done) = &mut *guard;
@@ -343,7 +371,7 @@ pub(super) fn fresh_table(
             let note = format!("{kind} {:+.3} N.m {:+.0} °C", now.torque_n_m, now.temperature_c);
             bar.set(*done, extension::usual_increments(drive).max(*done), &note);
         }
-        if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        ControlFlow::Continue(())
     };
     extension::make_table(drive, kind, settings, &observe).map_err(|error| match error {
         extension::RemakeError::Sweep(SweepError::Stopped) => Failure::Failed("stopped; nothing was written".into()),
@@ -370,6 +398,65 @@ fn text(truth: &Truth, out: &std::path::Path) -> String {
     text
 }
 
+/// `--list` with `--json`.
+#[derive(Serialize)]
+struct List {
+    schema_version: u32,
+    effects: Vec<Listed>,
+}
+
+/// An effect of the list.
+#[derive(Serialize)]
+struct Listed {
+    name: &'static str,
+    meaning: &'static str,
+    data_fault: bool,
+    parameters: Vec<ListedParameter>,
+}
+
+/// A parameter of it.
+#[derive(Serialize)]
+struct ListedParameter {
+    name: &'static str,
+    meaning: &'static str,
+    range: [f64; 2],
+    allowed: String,
+    usual: String,
+}
+
+impl Listed {
+    fn of(effect: &Definition) -> Listed {
+        let parameters = effect.parameters.iter().map(|parameter| ListedParameter {
+            name: parameter.name,
+            meaning: parameter.meaning,
+            range: parameter.range,
+            allowed: parameter.allowed(),
+            usual: usual(parameter),
+        });
+        Listed {
+            name: effect.name,
+            meaning: effect.meaning,
+            data_fault: effect.fault,
+            parameters: parameters.collect(),
+        }
+    }
+}
+
+/// What a parameter is if it is not given.
+fn usual(parameter: &Parameter) -> String {
+    match parameter.usual {
+        Usual::Value(value) => match parameter.words.get(value as usize) {
+            Some(word) => format!("default {word}"),
+            None => format!("default {value:.6}").trim_end_matches('0').trim_end_matches('.').to_owned(),
+        },
+        Usual::OfLoad(share) => format!("default {share} of the largest torque"),
+        Usual::Drawn(low, high) => format!("default drawn from {low:.4} to {high:.4}"),
+        Usual::Instant(..) => "default drawn within the data".to_owned(),
+        Usual::ToothPitch => "default one tooth pitch".to_owned(),
+        Usual::Follows => "instead of the one above".to_owned(),
+    }
+}
+
 /// Every effect.
 fn list() -> String {
     let mut text = String::from("Causes:\n");
@@ -381,23 +468,12 @@ fn list() -> String {
         }
         let _ = writeln!(text, "  {}: {}", effect.name, effect.meaning);
         for parameter in &effect.parameters {
-            let usual = match parameter.usual {
-                Usual::Value(value) => match parameter.words.get(value as usize) {
-                    Some(word) => format!("default {word}"),
-                    None => format!("default {value:.6}").trim_end_matches('0').trim_end_matches('.').to_owned(),
-                },
-                Usual::OfLoad(share) => format!("default {share} of the largest torque"),
-                Usual::Drawn(low, high) => format!("default drawn from {low:.4} to {high:.4}"),
-                Usual::Instant(..) => "default drawn within the data".to_owned(),
-                Usual::ToothPitch => "default one tooth pitch".to_owned(),
-                Usual::Follows => "instead of the one above".to_owned(),
-            };
             let _ = writeln!(
                 text,
                 "    {:<28} {}; {}, allowed {}",
                 parameter.name,
                 parameter.meaning,
-                usual,
+                usual(parameter),
                 parameter.allowed()
             );
         }

@@ -6,18 +6,19 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use flexspline::Table;
 use flexspline::precompute::Sample;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::context::Context;
-use super::{Failure, report};
+use super::context::{Context, quoted};
+use super::names::{self, Generators};
+use super::{Failure, report, say};
 use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
 use crate::nodes::{NodeChoice, choose_torque_nodes};
-use crate::output::{write_json, write_whole};
+use crate::output::Outputs;
 use crate::report::page::Page;
 use crate::report::{Sources, Subject, drive_report};
 use crate::samples;
@@ -44,13 +45,14 @@ Examples:
   flexspline tables --generator cam --from-samples bench.csv
   flexspline tables --generator double-disc --positions 12 --node-tolerance-arcsec 0.2
 
-Sample files have the columns generator_rad, torque_n_m, temperature_c, direction (1 or -1), output_rad.")]
+Sample files have the columns generator_rad, torque_n_m, temperature_c, direction (1 or -1) and
+output_rad.")]
 pub(super) struct Tables {
-    /// Generator, or all: two-roller, four-roller, double-disc, cam
-    #[arg(short, long, value_name = "G", default_value = "all")]
-    generator: String,
+    /// Wave generator: two-roller, four-roller, double-disc, cam, or all
+    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
+    generator: Generators,
     /// Make the table from this file of samples instead of FEM; needs one --generator
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
     from_samples: Option<PathBuf>,
     /// Half-width of the play in arcsec where a sample file has one direction only
     #[arg(long, value_name = "ARCSEC", requires = "from_samples", allow_negative_numbers = true)]
@@ -81,10 +83,10 @@ pub(super) struct Tables {
     )]
     temperatures_c: Option<Vec<f64>>,
     /// Mesh: coarse, standard or fine
-    #[arg(long, value_name = "LEVEL", default_value = "standard", conflicts_with = "from_samples", value_parser = str::parse::<MeshLevel>)]
+    #[arg(long, value_name = "LEVEL", default_value = "standard", conflicts_with = "from_samples", value_parser = names::mesh(), hide_possible_values = true)]
     mesh: MeshLevel,
     /// Solver: fast or reference
-    #[arg(long, value_name = "SOLVER", default_value = "fast", conflicts_with = "from_samples", value_parser = str::parse::<Method>)]
+    #[arg(long, value_name = "SOLVER", default_value = "fast", conflicts_with = "from_samples", value_parser = names::solver(), hide_possible_values = true)]
     solver: Method,
     /// Do not write report.html, which takes a FEM run over one more tooth pitch for each generator
     #[arg(long)]
@@ -107,34 +109,41 @@ impl Tables {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let clock = Instant::now();
         let drive = context.drive()?;
-        let generators = generators(&self.generator)?;
+        let generators = self.generator.0.as_slice();
         let mut made = match &self.from_samples {
-            Some(file) => vec![(self.project(&drive, &generators, file)?, None)],
-            None => self.sweep(context, &drive, &generators)?,
+            Some(file) => vec![(self.project(&drive, generators, file)?, None)],
+            None => self.sweep(context, &drive, generators)?,
         };
         let out = context.out()?;
+        let mut outputs = Outputs::new();
         for (table, samples) in &mut made {
             table.info.command.clone_from(&context.command);
             let path = |ending: &str| out.join(format!("{}.{ending}", table.kind));
-            write_whole(&path("fxt"), |file| file.write_all(&table.image))?;
-            write_json(&path("json"), &table.info)?;
-            write_whole(&path("rs"), |file| file.write_all(rust_source(table).as_bytes()))?;
-            write_whole(&path("h"), |file| file.write_all(c_header(table).as_bytes()))?;
+            outputs.file(&path("fxt"), |file| file.write_all(&table.image))?;
+            outputs.json(&path("json"), &table.info)?;
+            outputs.file(&path("rs"), |file| file.write_all(rust_source(table).as_bytes()))?;
+            outputs.file(&path("h"), |file| file.write_all(c_header(table).as_bytes()))?;
             if let Some(samples) = samples {
-                write_whole(&path("samples.csv"), |file| file.write_all(samples::to_csv(samples).as_bytes()))?;
+                outputs.file(&path("samples.csv"), |file| file.write_all(samples::to_csv(samples).as_bytes()))?;
             }
         }
         let page = if self.no_report { None } else { Some(self.page(context, &drive, &made)?) };
         if let Some(page) = &page {
-            report::write(page, out)?;
+            report::write(page, out, &mut outputs)?;
         }
+        outputs.finish()?;
         let report = Report {
             schema_version: 1,
             status: page.as_ref().filter(|page| page.status.is_failure()).map_or("made", |page| page.status.name()),
             tables: made.iter().map(|(table, _)| &table.info).collect(),
             wall_s: clock.elapsed().as_secs_f64(),
         };
-        context.print(&report, || text(&report, out, page.is_some()))?;
+        context.print(&report, || {
+            let tables = quoted(&out.display().to_string());
+            let next = format!("validate --tables {tables}");
+            let next = if generators.len() == 1 { format!("{next} --generator {}", generators[0]) } else { next };
+            text(&report, out, page.is_some()) + &say::next(&[context.next(&next)])
+        })?;
         page.map_or(Ok(()), |page| report::stamped(&page, out))
     }
 
@@ -145,7 +154,7 @@ impl Tables {
             .map(|(table, _)| Ok((table.kind, Table::check(&table.image).map_err(|e| Failure::Failed(e.to_string()))?)))
             .collect::<Result<Vec<_>, Failure>>()?;
         let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
-        let animations = report::animations(context, drive, &tables, settings)?;
+        let animations = report::animations(context, drive, &tables, settings);
         let inputs = made.iter().filter_map(|(table, _)| match &table.info.source {
             Source::File { name, blake3 } => Some((format!("BLAKE3 of {name}"), blake3.clone())),
             Source::Fem { .. } => None,
@@ -235,6 +244,8 @@ impl Tables {
         let repeats = drive.as_built.first_not_uniform().is_none();
         let plans =
             generators.iter().map(|kind| Ok((*kind, self.plan(drive, *kind)?))).collect::<Result<Vec<_>, Failure>>()?;
+        // Before there is much work.
+        context.out()?;
         // How many nodes there will be is known only once they are chosen; until then the most is assumed.
         let expected = |plan: &SweepPlan, choice: &NodeChoice| {
             let a_node = plan.positions + 2;
@@ -243,7 +254,6 @@ impl Tables {
         };
         let totals = plans.iter().map(|(_, (plan, choice))| expected(plan, choice)).collect::<Vec<usize>>();
         let progress = Mutex::new((context.progress("tables"), 0_usize, totals));
-        let interrupted = context.watch_interrupt();
         let verbose = context.verbose();
         plans
             .par_iter()
@@ -267,7 +277,7 @@ impl Tables {
                         }
                         bar.set(*done, total, &note);
                     }
-                    if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                    ControlFlow::Continue(())
                 };
                 let failed = |error: SweepError| match error {
                     SweepError::Stopped => Failure::Failed("stopped; nothing was written".into()),
@@ -292,17 +302,6 @@ impl Tables {
             })
             .collect()
     }
-}
-
-/// The generators of `--generator`.
-pub(super) fn generators(name: &str) -> Result<Vec<GeneratorKind>, Failure> {
-    if name == "all" {
-        return Ok(GeneratorKind::ALL.to_vec());
-    }
-    name.parse().map(|kind| vec![kind]).map_err(|_| {
-        let known = GeneratorKind::ALL.map(|kind| kind.to_string()).join(", ");
-        Failure::BadInput(format!("--generator: found {name:?}; allowed: {known}, all"))
-    })
 }
 
 fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
@@ -335,10 +334,10 @@ fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
         text.push_str(&format!("{}: {}\n", info.generator, turns.remark));
     }
     text.push_str(&format!(
-        "wrote {} table{}{} to {} in {:.0} s",
+        "wrote {} table{}{} to {}/ in {:.0} s",
         report.tables.len(),
         if report.tables.len() == 1 { "" } else { "s" },
-        if with_page { " and report.html" } else { "" },
+        if with_page { " and report.html (for any browser)" } else { "" },
         out.display(),
         report.wall_s
     ));

@@ -4,16 +4,17 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-use clap::Args;
+use clap::{Args, ValueHint};
 use flexspline::Table;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::context::Context;
-use super::{Failure, report, tables::generators};
+use super::context::{Context, quoted};
+use super::names::{self, Generators};
+use super::{Failure, report, say};
 use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
-use crate::output::write_json;
+use crate::output::Outputs;
 use crate::report::page::Page;
 use crate::report::{Sources, Subject, drive_report};
 use crate::stepping::{Method, SolverSettings};
@@ -35,11 +36,11 @@ Examples:
   flexspline validate --tables out --generator cam --torques 24 --seed 7")]
 pub(super) struct Validate {
     /// Folder with <G>.fxt files, as `tables` writes them
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     tables: PathBuf,
-    /// Generator, or all that are in the folder
-    #[arg(short, long, value_name = "G", default_value = "all")]
-    generator: String,
+    /// Wave generator: two-roller, four-roller, double-disc, cam, or all that are in the folder
+    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
+    generator: Generators,
     /// Torques drawn for each table
     #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(2..=1000))]
     torques: u16,
@@ -53,10 +54,10 @@ pub(super) struct Validate {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Mesh of the fresh FEM: coarse, standard or fine
-    #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = str::parse::<MeshLevel>)]
+    #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = names::mesh(), hide_possible_values = true)]
     mesh: MeshLevel,
     /// Solver of the fresh FEM: reference or fast
-    #[arg(long, value_name = "SOLVER", default_value = "reference", value_parser = str::parse::<Method>)]
+    #[arg(long, value_name = "SOLVER", default_value = "reference", value_parser = names::solver(), hide_possible_values = true)]
     solver: Method,
     /// Do not write report.html, which takes a FEM run over one more tooth pitch for each generator
     #[arg(long)]
@@ -96,7 +97,6 @@ impl Validate {
             solver: SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() },
         };
         let progress = Mutex::new((context.progress("validate"), vec![(0, 0); images.len()]));
-        let interrupted = context.watch_interrupt();
         let tables = images
             .par_iter()
             .enumerate()
@@ -112,7 +112,7 @@ impl Validate {
                         let generator = generator_of(&table).map_or_else(String::new, |kind| kind.to_string());
                         bar.set(done, guess, &generator);
                     }
-                    if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                    ControlFlow::Continue(())
                 })
                 .map_err(|error| match error {
                     ValidateError::OtherDrive { .. } | ValidateError::UnknownGenerator => refuse(error.to_string()),
@@ -135,11 +135,18 @@ impl Validate {
             tables,
         };
         drop(progress);
-        write_json(&out.join("validation.json"), &report)?;
+        let mut outputs = Outputs::new();
+        outputs.json(&out.join("validation.json"), &report)?;
         if !self.no_report {
-            report::write(&self.page(context, &drive, &images, &report)?, out)?;
+            report::write(&self.page(context, &drive, &images, &report)?, out, &mut outputs)?;
         }
-        context.print(&report, || text(&report, out))?;
+        outputs.finish()?;
+        context.print(&report, || {
+            let tables = quoted(&self.tables.display().to_string());
+            let next = format!("diagnose DATA.csv --tables {tables} --generator {}", report.tables[0].generator);
+            let next = if passed { say::next(&[context.next(&next)]) } else { String::new() };
+            text(&report, out, !self.no_report) + &next
+        })?;
         if passed {
             Ok(())
         } else {
@@ -173,7 +180,7 @@ impl Validate {
         }
         inputs.push(("Fresh FEM".into(), format!("{} solver, {} mesh, seed {}", self.solver, self.mesh, self.seed)));
         let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
-        let animations = report::animations(context, drive, &tables, settings)?;
+        let animations = report::animations(context, drive, &tables, settings);
         let subjects = tables.into_iter().zip(&report.tables).zip(animations).map(|(((kind, table), v), animation)| {
             Subject { kind, table, info: None, samples: None, validation: Some(v), animation }
         });
@@ -188,7 +195,7 @@ impl Validate {
 
     /// The images in the folder.
     fn images(&self) -> Result<Vec<(PathBuf, Vec<u8>)>, Failure> {
-        let wanted = generators(&self.generator)?;
+        let wanted = self.generator.0.as_slice();
         let path = |kind: &GeneratorKind| self.tables.join(format!("{kind}.fxt"));
         let present: Vec<PathBuf> = wanted.iter().map(path).filter(|p| p.exists() || wanted.len() == 1).collect();
         if present.is_empty() {
@@ -208,7 +215,7 @@ impl Validate {
     }
 }
 
-fn text(report: &Report, out: &std::path::Path) -> String {
+fn text(report: &Report, out: &std::path::Path, with_page: bool) -> String {
     let mut text = String::from(
         "generator    table_id          points  rms\"    max\"    reversal rms\"  max\"    without table, rms\"\n",
     );
@@ -227,5 +234,8 @@ fn text(report: &Report, out: &std::path::Path) -> String {
         ));
     }
     text.push_str(&format!("wrote {}", out.join("validation.json").display()));
+    if with_page {
+        text.push_str(&format!(" and {}, for any browser", out.join("report.html").display()));
+    }
     text
 }

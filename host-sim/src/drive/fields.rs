@@ -78,7 +78,11 @@ impl Range {
 impl std::fmt::Display for Range {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let from = if self.above { "above " } else { "" };
-        write!(f, "{from}{} to {}", self.low, self.high)
+        if self.high >= 1e6 {
+            write!(f, "{from}{} to {:e}", self.low, self.high)
+        } else {
+            write!(f, "{from}{} to {}", self.low, self.high)
+        }
     }
 }
 
@@ -101,12 +105,28 @@ macro_rules! fields {
     };
 }
 
+/// What a section of the file holds, for the comment in a written file.
+pub(super) const SECTIONS: &[(&str, &str)] = &[
+    ("flexspline", "the thin wheel with external teeth, undeformed; held by its sleeve"),
+    ("circular_spline", "the ring with internal teeth; the output"),
+    ("material", "of both wheels"),
+    ("generator", "of all four wave generators; each takes what it has"),
+    ("output", "what brakes the output beside its load"),
+    ("sleeve", "what holds the rim of the flexspline"),
+    ("flanks", "where the teeth touch"),
+    ("temperature", "what warmth changes"),
+    (
+        "as_built",
+        "errors of the drive as it was made; 0 or [] is as drawn. A harmonic is amplitude cos(order (angle - phase))",
+    ),
+];
+
 /// All fields, in the order of a written file.
 pub(super) const ALL: &[Field] = fields! {
     flexspline.teeth: Count, from(20.0, 2000.0), "number of teeth, even";
     flexspline.module_mm: Real, from(0.05, 10.0), "module, mm";
     flexspline.pressure_angle_deg: Real, from(10.0, 35.0), "pressure angle of the basic rack, degrees";
-    flexspline.profile_shift: Real, from(-2.0, 10.0), "profile shift, modules";
+    flexspline.profile_shift: Real, from(-2.0, 10.0), "profile shift, modules; positive: teeth stand further out";
     flexspline.root_radius_mm: Real, above(0.0, 1000.0), "radius of the root circle, mm";
     flexspline.tip_radius_mm: Real, above(0.0, 1000.0), "radius of the tip circle, mm";
     flexspline.rim_thickness_mm: Real, above(0.0, 100.0), "rim under the root circle, mm";
@@ -116,7 +136,7 @@ pub(super) const ALL: &[Field] = fields! {
     circular_spline.teeth: Count, from(22.0, 2002.0), "number of teeth, two more than the flexspline";
     circular_spline.module_mm: Real, from(0.05, 10.0), "module, mm";
     circular_spline.pressure_angle_deg: Real, from(10.0, 35.0), "pressure angle of the basic rack, degrees";
-    circular_spline.profile_shift: Real, from(-2.0, 10.0), "profile shift of the space, modules";
+    circular_spline.profile_shift: Real, from(-2.0, 10.0), "profile shift of the space, modules; positive: further out";
     circular_spline.root_radius_mm: Real, above(0.0, 1000.0), "radius of the root circle, mm";
     circular_spline.tip_radius_mm: Real, above(0.0, 1000.0), "radius of the tip circle, mm";
     circular_spline.outer_radius_mm: Real, above(0.0, 1000.0), "outer radius of the ring, held by the output, mm";
@@ -125,51 +145,65 @@ pub(super) const ALL: &[Field] = fields! {
     material.youngs_modulus_mpa: Real, from(100.0, 1.0e6), "Young's modulus, MPa";
     material.poissons_ratio: Real, from(0.0, 0.49), "Poisson's ratio";
     material.density_kg_m3: Real, from(100.0, 30_000.0), "density, kg/m^3";
-    generator.w0_mm: Real, above(0.0, 20.0), "radial displacement of the neutral layer on the major axis, mm";
+    generator.w0_mm: Real, above(0.0, 20.0), "radial displacement of the neutral layer on the major axis, outward, mm";
     generator.roller_diameter_mm: Real, above(0.0, 1000.0), "diameter of each roller, mm";
     generator.four_roller_angle_deg: Real, from(15.0, 38.0), "angle of the four rollers from the major axis, degrees";
     generator.disc_half_angle_deg: Real, from(5.0, 50.0), "half the contact angle of a disc, degrees";
     generator.bearing_stiffness_n_per_mm3: RealOrRigid, above(0.0, 1.0e7), "pressure per approach of the generator bearing, N/mm^3";
-    output.drag_torque_n_m: Real, from(0.0, 1.0e4), "Coulomb drag on the circular spline, N.m";
+    output.drag_torque_n_m: Real, from(0.0, 1.0e4), "Coulomb drag on the circular spline, against its motion, N.m";
     sleeve.torsion_stiffness_n_m_per_rad: RealOrRigid, above(0.0, 1.0e12), "torsional stiffness, rim to flange, N.m/rad";
     sleeve.lateral_stiffness_n_per_mm: Real, from(0.0, 1.0e9), "lateral stiffness, rim to flange, N/mm";
     flanks.friction_coefficient: Real, from(0.0, 0.5), "Coulomb friction between the flanks";
     temperature.reference_c: Real, from(-200.0, 300.0), "temperature at which the sizes hold, degrees C";
     temperature.minimum_c: Real, from(-200.0, 300.0), "lowest operating temperature, degrees C";
     temperature.maximum_c: Real, from(-200.0, 300.0), "highest operating temperature, degrees C";
-    temperature.flexspline_expansion_per_k: Real, from(-1.0e-5, 1.0e-4), "linear expansion of the flexspline, 1/K";
-    temperature.circular_spline_expansion_per_k: Real, from(-1.0e-5, 1.0e-4), "linear expansion of the circular spline, 1/K";
-    temperature.generator_expansion_per_k: Real, from(-1.0e-5, 1.0e-4), "linear expansion of the generator, 1/K";
-    temperature.housing_expansion_per_k: Real, from(-1.0e-5, 1.0e-4), "linear expansion of the circular spline's seat, 1/K";
-    temperature.youngs_modulus_per_k: Real, from(-0.001, 0.001), "relative change of Young's modulus, 1/K";
+    temperature.flexspline_expansion_per_k: Real, from(-1.0e-5, 1.0e-4), "linear expansion of the flexspline, 1/K; positive: longer when warmer";
+    temperature.circular_spline_expansion_per_k: Real, from(-1.0e-5, 1.0e-4), "linear expansion of the circular spline, 1/K; positive: longer when warmer";
+    temperature.generator_expansion_per_k: Real, from(-1.0e-5, 1.0e-4), "linear expansion of the generator, 1/K; positive: longer when warmer";
+    temperature.housing_expansion_per_k: Real, from(-1.0e-5, 1.0e-4), "linear expansion of the circular spline's seat, 1/K; positive: longer when warmer";
+    temperature.youngs_modulus_per_k: Real, from(-0.001, 0.001), "relative change of Young's modulus, 1/K; negative: softer when warmer";
     as_built.circular_spline_eccentricity_um: Real, from(0.0, 100.0), "toothing beside the axis it turns about, µm";
-    as_built.circular_spline_eccentricity_phase_deg: Real, PHASE, "whereto, degrees on the circular spline";
+    as_built.circular_spline_eccentricity_phase_deg: Real, PHASE, "whereto, degrees on the circular spline, positive counter-clockwise from space 0";
     as_built.circular_spline_ovality_um: Real, from(0.0, 100.0), "amplitude of the oval, length kept, µm";
-    as_built.circular_spline_ovality_phase_deg: Real, PHASE, "angle of a crest, degrees on the circular spline";
-    as_built.circular_spline_pitch_harmonics: Harmonics, from(0.0, 100.0), "cumulative pitch error, [{ order, amplitude_um, phase_deg }, ...]";
-    as_built.circular_spline_pitch_error_um: List, from(-100.0, 100.0), "the same of each space, or none, µm";
+    as_built.circular_spline_ovality_phase_deg: Real, PHASE, "angle of a crest, degrees on the circular spline, positive counter-clockwise from space 0";
+    as_built.circular_spline_pitch_harmonics: Harmonics, from(0.0, 100.0), "cumulative pitch error, positive counter-clockwise, [{ order, amplitude_um, phase_deg of a crest }, ...]";
+    as_built.circular_spline_pitch_error_um: List, from(-100.0, 100.0), "position error of each space, or none, µm; positive counter-clockwise";
     as_built.circular_spline_offset_um: Real, from(0.0, 100.0), "its axis beside that of the housing, µm";
-    as_built.circular_spline_offset_direction_deg: Real, PHASE, "whereto, degrees in the housing";
+    as_built.circular_spline_offset_direction_deg: Real, PHASE, "whereto, degrees in the housing, positive counter-clockwise from the major axis at generator angle 0";
     as_built.flexspline_runout_um: Real, from(0.0, 100.0), "toothing beside the axis of the bore, µm";
-    as_built.flexspline_runout_phase_deg: Real, PHASE, "whereto, degrees on the flexspline";
-    as_built.flexspline_pitch_harmonics: Harmonics, from(0.0, 100.0), "cumulative pitch error, [{ order, amplitude_um, phase_deg }, ...]";
-    as_built.flexspline_pitch_error_um: List, from(-100.0, 100.0), "the same of each tooth, or none, µm";
-    as_built.rim_thickness_harmonics: Harmonics, from(0.0, 1000.0), "thickness of the rim, [{ order, amplitude_um, phase_deg }, ...]";
+    as_built.flexspline_runout_phase_deg: Real, PHASE, "whereto, degrees on the flexspline, positive counter-clockwise from tooth 0";
+    as_built.flexspline_pitch_harmonics: Harmonics, from(0.0, 100.0), "cumulative pitch error, positive counter-clockwise, [{ order, amplitude_um, phase_deg of a crest }, ...]";
+    as_built.flexspline_pitch_error_um: List, from(-100.0, 100.0), "position error of each tooth, or none, µm; positive counter-clockwise";
+    as_built.rim_thickness_harmonics: Harmonics, from(0.0, 1000.0), "thickness of the rim, positive: thicker, [{ order, amplitude_um, phase_deg of a crest }, ...]";
     as_built.generator_eccentricity_um: Real, from(0.0, 100.0), "generator beside the axis it turns about, µm";
-    as_built.generator_eccentricity_phase_deg: Real, PHASE, "whereto, degrees on the generator";
-    as_built.generator_lobe_asymmetry_um: Real, from(-100.0, 100.0), "lobe at 0 degrees higher than that at 180, µm";
-    as_built.cam_form_harmonics: Harmonics, from(0.0, 100.0), "form error of the cam, [{ order, amplitude_um, phase_deg }, ...]";
+    as_built.generator_eccentricity_phase_deg: Real, PHASE, "whereto, degrees on the generator, positive counter-clockwise from the major axis";
+    as_built.generator_lobe_asymmetry_um: Real, from(-100.0, 100.0), "lobe at 0 degrees less that at 180, µm; positive: the one at 0 is higher";
+    as_built.cam_form_harmonics: Harmonics, from(0.0, 100.0), "form error of the cam, positive outward, [{ order, amplitude_um, phase_deg of a crest }, ...]";
     as_built.flexspline_wear_um: Real, from(0.0, 200.0), "depth worn off every flank, µm";
     as_built.circular_spline_wear_um: Real, from(0.0, 200.0), "depth worn off every flank, µm";
     as_built.damaged_teeth: Damage, DEPTH, "[{ wheel, tooth, flank = \"plus\", \"minus\" or \"both\", depth_um }, ...]";
-    as_built.generator_warmer_k: Real, from(-100.0, 100.0), "generator warmer than the flexspline, K";
-    as_built.circular_spline_warmer_k: Real, from(-100.0, 100.0), "circular spline and its seat warmer than the flexspline, K";
+    as_built.generator_warmer_k: Real, from(-100.0, 100.0), "generator less flexspline, K; positive: the generator is warmer";
+    as_built.circular_spline_warmer_k: Real, from(-100.0, 100.0), "circular spline and its seat less flexspline, K; positive: they are warmer";
 };
 
 impl Field {
     /// `(section, key)`.
     pub fn split(&self) -> (&'static str, &'static str) {
         self.path.split_once('.').expect("every path has a section")
+    }
+
+    /// Meaning, unit, sign and what is allowed, for the comment in a written file.
+    pub fn comment(&self) -> String {
+        let range = &self.range;
+        let allowed = match self.slot(&mut Drive::hhd_95()) {
+            Slot::Real(_) => range.to_string(),
+            Slot::RealOrRigid(_) => format!("{range} or \"rigid\""),
+            Slot::Count(_) => format!("a whole number, {range}"),
+            Slot::List(_) => format!("{range} each"),
+            Slot::Harmonics(_) => format!("order {ORDER}, amplitude {range} µm, phase {PHASE}"),
+            Slot::Damage(_) => format!("tooth from 0, depth {range} µm"),
+        };
+        format!("{}; {allowed}", self.meaning)
     }
 
     /// True if a file may leave it out: a stiffness that is not there is rigid, an imperfection that is not there is none.
@@ -225,5 +259,35 @@ pub(super) fn ranged<'f>(field: &'f Field, value: &Value) -> Vec<(String, f64, &
             .enumerate()
             .map(|(k, tooth)| (format!("[{k}].depth_um"), tooth.depth_um, &field.range))
             .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_field_says_its_unit_its_sign_and_its_range() {
+        for field in ALL {
+            let (section, key) = field.split();
+            assert!(SECTIONS.iter().any(|(name, _)| *name == section), "{section} is not described");
+            let comment = field.comment();
+            assert!(comment.contains(" to ") && comment.len() > 20, "{comment}");
+            let units = [
+                ("_mm", "mm"),
+                ("_um", "µm"),
+                ("_deg", "degrees"),
+                ("_n_m", "N.m"),
+                ("_mpa", "MPa"),
+                ("_per_k", "1/K"),
+            ];
+            for (ending, unit) in units {
+                assert!(!key.ends_with(ending) || comment.contains(unit), "{key}: {comment}");
+            }
+            // Temperatures need no word for their sign.
+            let signed = field.range.low < 0.0 && !key.ends_with("_c");
+            let said = ["positive", "negative"].iter().any(|sign| comment.contains(sign));
+            assert!(!signed || said, "{}: which way is positive? {comment}", field.path);
+        }
     }
 }

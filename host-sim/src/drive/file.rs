@@ -17,11 +17,20 @@ use super::as_built::{DamagedFlank, DamagedTooth, Harmonic, Wheel};
 use super::error::{DriveError, Problem};
 use super::fields::{self, DEPTH, Field, ORDER, PHASE, Range as Allowed, Slot, TOOTH, Value};
 use super::spec::{Drive, ThermalState};
+use crate::suggest::{did_you_mean, likeliest, likeliest_path, question};
 use serde_spanned::Spanned;
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
+
+/// The first lines of a written file.
+const HEAD: &str = "\
+# A harmonic drive: flexspline fixed, circular spline the output, two waves.
+# Each line: key = value  # what it is, unit, sign; allowed values. Sizes hold at temperature.reference_c.
+# A shorter file starts from a built-in drive and gives what differs: base = \"HHD-95\" above the first section.
+# Angles count counter-clockwise, on the part that they are on. \"rigid\" is a stiffness without end.
+";
 
 impl Drive {
     /// Reads a drive file. Every unknown key, wrong type, value out of range and missing field of the file is
@@ -48,11 +57,14 @@ impl Drive {
     /// This drive with several fields changed, checked once all of them are.
     pub fn with_sets<'a>(&self, assignments: impl IntoIterator<Item = &'a str>) -> Result<Drive, DriveError> {
         let mut drive = self.clone();
+        let mut problems = Vec::new();
         for assignment in assignments {
-            drive.set(assignment).map_err(|mut problem| {
-                problem.place = format!("--set {assignment}");
-                problem
-            })?;
+            if let Err(problem) = drive.set(assignment) {
+                problems.push(Problem { place: format!("--set {assignment}"), ..problem });
+            }
+        }
+        if !problems.is_empty() {
+            return Err(DriveError { problems });
         }
         drive.check().map_err(|mut refused| {
             for problem in &mut refused.problems {
@@ -92,13 +104,18 @@ impl Drive {
             cold = self.as_dimensioned();
             &cold
         };
-        let mut text = String::from("# A harmonic drive: flexspline fixed, circular spline the output, two waves.\n");
-        let _ = writeln!(text, "name = {}", toml::Value::String(drive.name.clone()));
+        let mut text = String::from(HEAD);
+        let _ = writeln!(
+            text,
+            "{:<44} # what results call it",
+            format!("name = {}", toml::Value::String(drive.name.clone()))
+        );
         let mut open = "";
         fields::for_each(drive, |field, value| {
             let (section, key) = field.split();
             if section != open {
-                let _ = writeln!(text, "\n[{section}]");
+                let about = fields::SECTIONS.iter().find(|(name, _)| *name == section).map_or("", |(_, about)| about);
+                let _ = writeln!(text, "\n[{section}]  # {about}");
                 open = section;
             }
             let value = match value {
@@ -123,7 +140,7 @@ impl Drive {
                     format!("{{ wheel = \"{wheel}\", tooth = {tooth}, flank = \"{flank}\", depth_um = {depth_um:?} }}")
                 })),
             };
-            let _ = writeln!(text, "{:<44} # {}", format!("{key} = {value}"), field.meaning);
+            let _ = writeln!(text, "{:<44} # {}", format!("{key} = {value}"), field.comment());
         });
         text
     }
@@ -221,7 +238,8 @@ fn one_of<T: Copy>(known: &[(&'static str, T)], value: &DeValue) -> Result<T, Re
     let found = known.iter().find(|(name, _)| value.as_str() == Some(name));
     found.map(|(_, meant)| *meant).ok_or_else(|| {
         let names: Vec<String> = known.iter().map(|(name, _)| format!("{name:?}")).collect();
-        Refused::found(value, names.join(", "))
+        let hint = value.as_str().map(|found| did_you_mean("; ", found, known.iter().map(|(name, _)| *name)));
+        Refused::found(value, names.join(", ") + &hint.unwrap_or_default())
     })
 }
 
@@ -247,7 +265,7 @@ impl<'a, 'i> Entries<'a, 'i> {
         for key in table.keys() {
             let name = key.get_ref().as_ref();
             if !known.contains(&name) {
-                let hint = did_you_mean(name, known.iter().copied());
+                let hint = did_you_mean("; ", name, known.iter().copied());
                 let what = format!("unknown key{hint}; allowed: {}", known.join(", "));
                 return Err(Refused { at: format!(".{name}"), what });
             }
@@ -309,7 +327,7 @@ impl<'a> Reader<'a> {
             let drive = Drive::built_in(&name);
             if drive.is_none() {
                 let what = format!("found {name:?}, allowed: {}", Drive::BUILT_IN.join(", "));
-                self.refuse(at, "base", what + &did_you_mean(&name, Drive::BUILT_IN));
+                self.refuse(at, "base", what + &did_you_mean("; ", &name, Drive::BUILT_IN));
             }
             drive
         });
@@ -327,11 +345,12 @@ impl<'a> Reader<'a> {
                 continue;
             }
             if !sections().any(|known| known == section) {
-                let hint = match fields::ALL.iter().find(|field| field.split().1 == section) {
-                    Some(field) => format!("; it belongs to [{}]", field.split().0),
-                    None => did_you_mean(section, sections().chain(["base", "name"])),
-                };
-                self.refuse(key.span(), section, format!("unknown key{hint}"));
+                let known = || sections().chain(["base", "name"]);
+                let keys: Vec<&str> = fields::ALL.iter().map(|field| field.path).collect();
+                let meant = likeliest(section, known()).or_else(|| likeliest_path(section, &keys));
+                let hint = meant.map_or_else(String::new, |name| format!("; {}", question(name)));
+                let allowed = known().collect::<Vec<_>>().join(", ");
+                self.refuse(key.span(), section, format!("unknown key{hint}; allowed: {allowed}"));
                 continue;
             }
             match value.get_ref().as_table() {
@@ -413,33 +432,16 @@ fn sections() -> impl Iterator<Item = &'static str> {
 
 /// What to say of a path that is no field.
 fn unknown_path(path: &str) -> String {
-    let (section, key) = path.split_once('.').unwrap_or(("", path));
+    let section = path.split_once('.').map_or("", |(section, _)| section);
+    let paths: Vec<&str> = fields::ALL.iter().map(|field| field.path).collect();
+    let hint = likeliest_path(path, &paths).map_or_else(String::new, |path| format!("; {}", question(path)));
     let known: Vec<&str> =
         fields::ALL.iter().map(Field::split).filter(|(s, _)| *s == section).map(|(_, key)| key).collect();
     if known.is_empty() {
-        if let Some(field) = fields::ALL.iter().find(|field| field.split().1 == key) {
-            return format!("unknown key; did you mean {:?}?", field.path);
-        }
-        return format!("unknown key{}", did_you_mean(path, fields::ALL.iter().map(|field| field.path)));
+        let sections: Vec<&str> = sections().collect();
+        return format!("unknown key{hint}; allowed: SECTION.KEY, sections are {}", sections.join(", "));
     }
-    let elsewhere = fields::ALL.iter().map(Field::split).find(|(s, k)| *k == key && *s != section);
-    let hint = match elsewhere {
-        Some((other, _)) => format!("; it belongs to [{other}]"),
-        None => did_you_mean(key, known.iter().copied()),
-    };
     format!("unknown key{hint}; allowed: {}", known.join(", "))
-}
-
-/// `; did you mean "…"?` for the likeliest of `known`, or nothing.
-fn did_you_mean(found: &str, known: impl IntoIterator<Item = &'static str>) -> String {
-    // below this Jaro-Winkler similarity suggestions are noise
-    const LIKELY: f64 = 0.8;
-    known
-        .into_iter()
-        .map(|name| (strsim::jaro_winkler(found, name), name))
-        .filter(|(likeness, _)| *likeness > LIKELY)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or(String::new(), |(_, name)| format!("; did you mean {name:?}?"))
 }
 
 /// The number of a TOML value, if it is one.
@@ -590,7 +592,7 @@ mod tests {
             ),
             (
                 "[flexspline]\nmodule = 0.5",
-                "wrong.toml:3: flexspline.module: unknown key; did you mean \"module_mm\"?; allowed: teeth, module_mm",
+                "wrong.toml:3: flexspline.module: unknown key; did you mean `flexspline.module_mm`?; allowed: teeth, module_mm",
             ),
             (
                 "[flexspline]\nprofile_shift = nan",
@@ -656,11 +658,11 @@ mod tests {
             ),
             (
                 "[material]\nyoungs_modulus_gpa = 206",
-                "wrong.toml:3: material.youngs_modulus_gpa: unknown key; did you mean \"youngs_modulus_mpa\"?",
+                "wrong.toml:3: material.youngs_modulus_gpa: unknown key; did you mean `material.youngs_modulus_mpa`?",
             ),
             (
                 "[material]\nyoungs_modulus_mpa = 2.06e11",
-                "wrong.toml:3: material.youngs_modulus_mpa: found 206000000000, allowed: 100 to 1000000",
+                "wrong.toml:3: material.youngs_modulus_mpa: found 206000000000, allowed: 100 to 1e6",
             ),
             (
                 "[generator]\nw0_mm = 0.05",
@@ -677,7 +679,7 @@ mod tests {
             ),
             (
                 "[generator]\nfriction_coefficient = 0.1",
-                "wrong.toml:3: generator.friction_coefficient: unknown key; it belongs to [flanks]; allowed: w0_mm",
+                "wrong.toml:3: generator.friction_coefficient: unknown key; did you mean `flanks.friction_coefficient`?; allowed: w0_mm",
             ),
             (
                 "[generator]\nbearing_stiffness_n_per_mm3 = 0",
@@ -685,7 +687,7 @@ mod tests {
             ),
             (
                 "[generator]\nbearing_stiffness_n_per_mm3 = \"soft\"",
-                "wrong.toml:3: generator.bearing_stiffness_n_per_mm3: found \"soft\", allowed: above 0 to 10000000 or \"rigid\"",
+                "wrong.toml:3: generator.bearing_stiffness_n_per_mm3: found \"soft\", allowed: above 0 to 1e7 or \"rigid\"",
             ),
             (
                 "[flanks]\nfriction_coefficient = true",
@@ -725,7 +727,7 @@ mod tests {
             ),
             (
                 "[as_built]\nflexspline_runout_mm = 0.01",
-                "wrong.toml:3: as_built.flexspline_runout_mm: unknown key; did you mean \"flexspline_runout_um\"?",
+                "wrong.toml:3: as_built.flexspline_runout_mm: unknown key; did you mean `as_built.flexspline_runout_um`?",
             ),
             (
                 "[as_built]\ncircular_spline_ovality_phase_deg = 400",
@@ -773,7 +775,7 @@ mod tests {
             ),
             (
                 "[as_built]\ncam_form_harmonics = [{ order = 2, amplitude = 1.0 }]",
-                "wrong.toml:3: as_built.cam_form_harmonics[0].amplitude: unknown key; did you mean \"amplitude_um\"?",
+                "wrong.toml:3: as_built.cam_form_harmonics[0].amplitude: unknown key; did you mean `amplitude_um`?",
             ),
             (
                 "[as_built]\ncam_form_harmonics = [2, 1.0]",
@@ -800,9 +802,12 @@ mod tests {
                 "wrong.toml:2: as_built.damaged_teeth[0].depth_um: found 501, allowed: 0 to 500",
             ),
             ("as_built = 3", "wrong.toml:2: as_built: found 3, allowed: a table [as_built]"),
-            ("[flexpline]\nteeth = 188", "wrong.toml:2: flexpline: unknown key; did you mean \"flexspline\"?"),
+            ("[flexpline]\nteeth = 188", "wrong.toml:2: flexpline: unknown key; did you mean `flexspline`?"),
             ("[qqq]\nteeth = 188", "wrong.toml:2: qqq: unknown key"),
-            ("friction_coefficient = 0.1", "wrong.toml:2: friction_coefficient: unknown key; it belongs to [flanks]"),
+            (
+                "friction_coefficient = 0.1",
+                "wrong.toml:2: friction_coefficient: unknown key; did you mean `flanks.friction_coefficient`?",
+            ),
             ("sleeve = 4.6e5", "wrong.toml:2: sleeve: found 4.6e5, allowed: a table [sleeve]"),
             ("name = 95", "wrong.toml:2: name: found 95, allowed: a string"),
             ("[flexspline]\nteeth = 188\nteeth = 188", "wrong.toml:4: not TOML: duplicate key"),
@@ -823,10 +828,7 @@ mod tests {
     #[test]
     fn a_wrong_base_is_named() {
         let message = Drive::from_toml("d.toml", "base = \"HHD95\"").unwrap_err().to_string();
-        assert_eq!(
-            message,
-            "d.toml:1: base: found \"HHD95\", allowed: HHD-95, HHD-95-typical; did you mean \"HHD-95\"?"
-        );
+        assert_eq!(message, "d.toml:1: base: found \"HHD95\", allowed: HHD-95, HHD-95-typical; did you mean `HHD-95`?");
         let message = Drive::from_toml("d.toml", "base = 95").unwrap_err().to_string();
         assert_eq!(message, "d.toml:1: base: found 95, allowed: a string");
     }
@@ -840,7 +842,7 @@ mod tests {
             error.to_string(),
             "e.toml: flexspline.rim_thickness_mm: missing (rim under the root circle, mm); give it, or a base = \"HHD-95\" \
              to start from\ne.toml: generator.w0_mm: missing (radial displacement of the neutral layer on the major axis, \
-             mm); give it, or a base = \"HHD-95\" to start from"
+             outward, mm); give it, or a base = \"HHD-95\" to start from"
         );
         let empty = Drive::from_toml("f.toml", "").unwrap_err();
         let optional = fields::ALL.iter().filter(|field| field.is_optional()).count();
@@ -857,7 +859,7 @@ mod tests {
         let lines: Vec<&str> = error.lines().collect();
         assert_eq!(lines.len(), 3, "{error}");
         assert!(lines[0].starts_with("wrong.toml:3: material.poissons_ratio"));
-        assert!(lines[1].starts_with("wrong.toml:5: flexspline.teeths: unknown key; did you mean \"teeth\"?"));
+        assert!(lines[1].starts_with("wrong.toml:5: flexspline.teeths: unknown key; did you mean `flexspline.teeth`?"));
         assert!(lines[2].starts_with("wrong.toml:6: flexspline.width_mm"));
     }
 
@@ -865,8 +867,10 @@ mod tests {
     fn wrong_overrides_are_named() {
         let set = |assignment: &str| Drive::hhd_95().with_set(assignment).unwrap_err().to_string();
         assert!(set("teeth").starts_with("--set teeth: expected PATH=VALUE"));
-        assert!(set("flexspline.teeths=3").contains("flexspline.teeths: unknown key; did you mean \"teeth\"?"));
-        assert!(set("w0_mm=0.4").contains("w0_mm: unknown key; did you mean \"generator.w0_mm\"?"));
+        assert!(
+            set("flexspline.teeths=3").contains("flexspline.teeths: unknown key; did you mean `flexspline.teeth`?")
+        );
+        assert!(set("w0_mm=0.4").contains("w0_mm: unknown key; did you mean `generator.w0_mm`?"));
         assert!(set("generator.w0_mm=abc").ends_with("generator.w0_mm: found \"abc\", allowed: above 0 to 20"));
         assert!(set("flexspline.teeth=186").starts_with("--set: circular_spline.teeth: found 190, allowed: 188"));
         assert!(
@@ -876,5 +880,35 @@ mod tests {
         let both = ["flexspline.teeth=186", "circular_spline.teeth=190"];
         assert!(Drive::hhd_95().with_sets(both).unwrap_err().to_string().contains("found 190, allowed: 188"));
         assert_eq!(Drive::hhd_95().with_set("name=mine").unwrap().name, "mine");
+    }
+
+    #[test]
+    fn misspelt_keys_get_a_suggestion_and_garbage_gets_none() {
+        let set = |path: &str| Drive::hhd_95().with_set(&format!("{path}=1")).unwrap_err().to_string();
+        for (path, meant) in [
+            ("flanks.friction_coeficient", "flanks.friction_coefficient"),
+            ("flank.friction_coefficient", "flanks.friction_coefficient"),
+            ("flank.friction", "flanks.friction_coefficient"),
+            ("friction_coefficient", "flanks.friction_coefficient"),
+            ("friction", "flanks.friction_coefficient"),
+            ("flexspline.friction_coefficient", "flanks.friction_coefficient"),
+            ("flexspline.Teeth", "flexspline.teeth"),
+            ("circular-spline.teeth", "circular_spline.teeth"),
+            ("circularspline.teth", "circular_spline.teeth"),
+            ("as_built.cam_form_harmonic", "as_built.cam_form_harmonics"),
+            ("asbuilt.flexspline_wear_um", "as_built.flexspline_wear_um"),
+            ("temperature.max_c", "temperature.maximum_c"),
+            ("generator.w0", "generator.w0_mm"),
+            ("w0", "generator.w0_mm"),
+            ("material.young_modulus_mpa", "material.youngs_modulus_mpa"),
+            ("sleeve.torsional_stiffness_n_m_per_rad", "sleeve.torsion_stiffness_n_m_per_rad"),
+        ] {
+            let said = set(path);
+            assert!(said.contains(&format!("{path}: unknown key; did you mean `{meant}`?; allowed: ")), "{said}");
+        }
+        for path in ["flexspline.qwertz", "gearbox.x", "42", "", "flanks.viscosity"] {
+            let said = set(path);
+            assert!(said.contains("unknown key; allowed: "), "{said}");
+        }
     }
 }

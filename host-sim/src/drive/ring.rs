@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::{fmt, str::FromStr};
 
+use crate::suggest::did_you_mean;
+
 /// The four wave generators of the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -49,8 +51,12 @@ impl fmt::Display for GeneratorKind {
 
 /// A generator name that is none of the four.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("generator {0:?} is not known; allowed: two-roller, four-roller, double-disc, cam")]
+#[error("generator {0:?} is not known; allowed: two-roller, four-roller, double-disc, cam{hint}", hint = hint(.0))]
 pub struct UnknownGenerator(String);
+
+fn hint(found: &str) -> String {
+    did_you_mean("; ", found, GeneratorKind::ALL.map(GeneratorKind::name))
+}
 
 impl FromStr for GeneratorKind {
     type Err = UnknownGenerator;

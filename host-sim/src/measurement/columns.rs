@@ -5,6 +5,7 @@ use std::fmt;
 use thiserror::Error;
 
 use super::csv_rows::TableProblem;
+use crate::suggest::{did_you_mean, likeliest, question};
 
 /// What a column may hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
@@ -229,8 +230,9 @@ impl ColumnMap {
             })?;
             let name = name.trim();
             let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name).ok_or_else(|| {
-                let names = Quantity::ALL.map(Quantity::name).join(", ");
-                MappingError(format!("found the name \"{name}\", allowed: {names}"))
+                let names = Quantity::ALL.map(Quantity::name);
+                let hint = did_you_mean("; ", name, names);
+                MappingError(format!("found the name \"{name}\", allowed: {}{hint}", names.join(", ")))
             })?;
             let (column, unit) = match column.rsplit_once(':') {
                 None => {
@@ -243,7 +245,9 @@ impl ColumnMap {
                     let known = Unit::ALL.into_iter().find(|u| u.name() == unit);
                     let fits = known.filter(|u| quantity.units().contains(u)).ok_or_else(|| {
                         let units: Vec<_> = quantity.units().iter().map(|u| u.name()).collect();
-                        MappingError(format!("{name}: found the unit \"{unit}\", allowed: {}", units.join(", ")))
+                        let hint = did_you_mean("; ", unit, units.iter().copied());
+                        let units = units.join(", ");
+                        MappingError(format!("{name}: found the unit \"{unit}\", allowed: {units}{hint}"))
                     })?;
                     (column.trim(), fits)
                 }
@@ -279,7 +283,8 @@ impl ColumnMap {
                 (Some(_), Some(_)) => return Err(problem(format!("column {name} is there twice"))),
                 (Some(place), None) => columns.push(Column { quantity, name: name.to_owned(), place, unit }),
                 (None, _) if given.is_some() => {
-                    let mut what = format!("column {name} is missing, which --columns gives for {quantity}; ");
+                    let hint = meant(name, names);
+                    let mut what = format!("column {name} is missing, which --columns gives for {quantity}; {hint}");
                     what.push_str(&found(names));
                     return Err(problem(what));
                 }
@@ -295,14 +300,40 @@ impl ColumnMap {
         }
         let hint = separator(names);
         if !has(&columns, Quantity::Generator) {
-            return Err(problem(format!("column generator_rad is missing; {hint}{}", found(names))));
+            let meant = meant("generator_rad", names);
+            return Err(problem(format!("column generator_rad is missing; {hint}{meant}{}", found(names))));
         }
         if !has(&columns, Quantity::Output) && !has(&columns, Quantity::Error) {
             let what = "neither column output_rad nor error_arcsec is there; one is needed";
-            return Err(problem(format!("{what}; {hint}{}", found(names))));
+            let meant = [meant("output_rad", names), meant("error_arcsec", names)].concat();
+            return Err(problem(format!("{what}; {hint}{meant}{}", found(names))));
         }
         Ok(columns)
     }
+
+    /// What to say of columns that are not among the `used` ones, though they are nearly called as one that is missing.
+    pub(super) fn misspelt(&self, names: &[String], used: &[Column]) -> Vec<String> {
+        let spare: Vec<&str> =
+            names.iter().map(String::as_str).filter(|name| used.iter().all(|column| column.name != *name)).collect();
+        let missing = Quantity::ALL.into_iter().filter(|q| used.iter().all(|column| column.quantity != *q));
+        // Of output and error one is used.
+        let missing = missing.filter(|q| !matches!(q, Quantity::Output | Quantity::Error));
+        missing
+            .filter_map(|quantity| {
+                let (default, _) = quantity.default_column();
+                let name = likeliest(default, spare.iter().copied())?;
+                let unit = Unit::ending(name).filter(|unit| quantity.units().contains(unit)).map_or("UNIT", Unit::name);
+                Some(format!(
+                    "column {name} is not used; if it is {default}, say so with --columns {quantity}={name}:{unit}"
+                ))
+            })
+            .collect()
+    }
+}
+
+/// The column that may be meant by `wanted`, if there is one.
+fn meant(wanted: &str, names: &[String]) -> String {
+    likeliest(wanted, names.iter().map(String::as_str)).map_or_else(String::new, |name| question(name) + " ")
 }
 
 /// What the header holds, and how to name it.
@@ -378,9 +409,49 @@ mod tests {
             ("time=a:K", "time: found the unit \"K\", allowed: s, ms"),
             ("time=a,time=b", "time is there twice"),
             ("generator=a:rad,output=a:rad", "column a stands for both generator and output"),
+            ("generater=a", "temperature, orientation; did you mean `generator`?"),
+            ("temp=a", "did you mean `temperature`?"),
+            ("generator=a:degrees", "arcmin, arcsec; did you mean `deg`?"),
+            ("torque=a:Nm", "allowed: N.m; did you mean `N.m`?"),
+            ("temperature=a:c", "allowed: C, K; did you mean `C`?"),
+            ("qwertz=a", "temperature, orientation; for instance"),
+            ("error=a:parsec", "arcmin, arcsec; did you mean `arcsec`?"),
+            ("error=a:mil", "arcmin, arcsec; for instance"),
         ] {
             let error = ColumnMap::parse(text).unwrap_err().to_string();
             assert!(error.starts_with("--columns: ") && error.contains(said), "{text:?} gave {error:?}");
         }
+    }
+
+    #[test]
+    fn a_missing_column_whose_misspelling_is_there_is_named() {
+        let refused = |header: &str| ColumnMap::default().resolve(&names(header), 1).unwrap_err().what;
+        for (header, said) in [
+            ("generator_deg,output_rad", "generator_rad is missing; did you mean `generator_deg`? found: "),
+            ("Generator_Rad,output_rad", "did you mean `Generator_Rad`?"),
+            ("generator_rad,ouput_rad", "did you mean `ouput_rad`?"),
+            ("generator_rad,error_arcmin", "did you mean `error_arcmin`?"),
+            ("generator_rad,qwertz", "one is needed; found: generator_rad, qwertz"),
+            ("psi,output_rad", "generator_rad is missing; found: psi"),
+        ] {
+            assert!(refused(header).contains(said), "{header}: {}", refused(header));
+        }
+        let map = ColumnMap::parse("torque=load_nm:N.m").unwrap();
+        let what = map.resolve(&names("generator_rad,output_rad,load_n_m"), 1).unwrap_err().what;
+        assert!(what.contains("did you mean `load_n_m`?"), "{what}");
+        // One that may be missing is not asked for, but told.
+        let noted = |header: &str| {
+            let names = names(header);
+            let map = ColumnMap::default();
+            map.misspelt(&names, &map.resolve(&names, 1).unwrap())
+        };
+        assert_eq!(
+            noted("generator_rad,output_rad,torque_Nm,time_ms"),
+            [
+                "column time_ms is not used; if it is time_s, say so with --columns time=time_ms:ms",
+                "column torque_Nm is not used; if it is torque_n_m, say so with --columns torque=torque_Nm:UNIT"
+            ]
+        );
+        assert_eq!(noted("generator_rad,output_rad,torque_n_m,torque_Nm,current_a,error_arcsec"), [""; 0]);
     }
 }

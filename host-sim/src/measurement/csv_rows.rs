@@ -5,6 +5,8 @@
 
 use std::io::{BufRead, BufReader, Read};
 
+use crate::suggest::{likeliest, question};
+
 /// What is wrong, and in which line, from 1.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TableProblem {
@@ -120,7 +122,15 @@ impl<R: Read> CsvRows<R> {
 
     /// Where the column `name` stands; an error if it is missing or there are two.
     pub fn need(&self, name: &str) -> Result<usize, TableProblem> {
-        self.find(name)?.ok_or_else(|| self.header_problem(format!("column {name} is missing")))
+        self.find(name)?.ok_or_else(|| {
+            let hint = self.like(name).map_or_else(String::new, |like| format!("; {}", question(like)));
+            self.header_problem(format!("column {name} is missing{hint}"))
+        })
+    }
+
+    /// A column that is nearly called `name`.
+    pub fn like(&self, name: &str) -> Option<&str> {
+        likeliest(name, self.header.iter().map(String::as_str))
     }
 
     /// A problem of the header.
@@ -241,5 +251,14 @@ mod tests {
         assert_eq!(row.number(0), Ok(1e-3));
         assert_eq!(row.number(1), Err(NotANumber::Text("x\u{fffd}".to_owned())));
         assert_eq!(row.number(2), Err(NotANumber::Absent(2)));
+    }
+
+    #[test]
+    fn a_missing_column_is_sought_under_a_name_like_it() {
+        let rows = CsvRows::new(&b"generator_rad,torque_nm,x\n"[..]).unwrap();
+        let what = |name: &str| rows.need(name).unwrap_err().what;
+        assert_eq!(what("torque_n_m"), "column torque_n_m is missing; did you mean `torque_nm`?");
+        assert_eq!(what("direction"), "column direction is missing");
+        assert_eq!(rows.need("generator_rad"), Ok(0));
     }
 }

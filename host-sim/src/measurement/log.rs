@@ -99,6 +99,8 @@ pub(super) struct Found {
     pub columns: Vec<Column>,
     /// The last line, if it broke off.
     pub broken_off: Option<u64>,
+    /// Columns that are not used though their name is nearly that of one that is missing.
+    pub misspelt: Vec<String>,
 }
 
 /// Reads a file called `file`.
@@ -107,6 +109,7 @@ pub(super) fn read(file: &str, source: impl Read, map: &ColumnMap) -> Result<(Lo
         |problem: TableProblem| MeasuredError { file: file.to_owned(), line: Some(problem.line), what: problem.what };
     let mut rows = CsvRows::new(source).map_err(refuse)?;
     let columns = map.resolve(rows.header(), rows.header_line()).map_err(refuse)?;
+    let misspelt = map.misspelt(rows.header(), &columns);
     let width = rows.header().len();
     let header_line = rows.header_line();
     let mut values: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
@@ -145,7 +148,7 @@ pub(super) fn read(file: &str, source: impl Read, map: &ColumnMap) -> Result<(Lo
         values.shrink_to_fit();
         log.put(column.quantity, values);
     }
-    Ok((log, Found { columns, broken_off }))
+    Ok((log, Found { columns, broken_off, misspelt }))
 }
 
 /// The value of a column, NaN if it is missing or not finite.

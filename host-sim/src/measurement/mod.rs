@@ -149,7 +149,7 @@ pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) ->
     }
     let (mut log, found) = log::read(file, source, columns)?;
     let rows = log.len();
-    let mut findings = Findings::default();
+    let mut findings = Findings { notes: found.misspelt, ..Findings::default() };
     if let Some(line) = found.broken_off {
         findings.faults.push(Fault {
             name: FaultName::MissingSamples,

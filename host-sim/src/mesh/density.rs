@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::suggest::did_you_mean;
+
 /// Elements of one half sector of a wheel, in each direction.
 ///
 /// ```text
@@ -83,9 +85,9 @@ impl FromStr for MeshLevel {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        MeshLevel::ALL
-            .into_iter()
-            .find(|level| level.to_string() == text)
-            .ok_or_else(|| format!("mesh level \"{text}\": allowed are coarse, standard, fine"))
+        MeshLevel::ALL.into_iter().find(|level| level.to_string() == text).ok_or_else(|| {
+            let hint = did_you_mean("; ", text, ["coarse", "standard", "fine"]);
+            format!("mesh level \"{text}\": allowed are coarse, standard, fine{hint}")
+        })
     }
 }

@@ -5,6 +5,8 @@ use std::ops::RangeInclusive;
 
 use thiserror::Error;
 
+use crate::suggest::{likeliest, question};
+
 /// Largest generator angle of a path, rad: 1600 turns, far beyond what a quasi-static run is for.
 const LARGEST_ANGLE_RAD: f64 = 1e4;
 /// Largest torque of a path, N m: beyond it no drive of this kind is in one piece.
@@ -144,10 +146,9 @@ fn find_columns(header: &[&str]) -> Result<[Option<usize>; 3], String> {
     }
     // A column that was meant but misspelt would silently not act.
     for (known, _) in COLUMNS.iter().zip(found).filter(|(_, found)| found.is_none()) {
-        let word = known.split('_').next().unwrap_or(known);
-        let near = |name: &&&str| **name == word || strsim::damerau_levenshtein(name, known) <= 3;
-        if let Some(name) = header.iter().find(near) {
-            return Err(format!("found column {name:?}; did you mean {known:?}?"));
+        let spare = header.iter().copied().filter(|name| !COLUMNS.contains(name));
+        if let Some(name) = likeliest(known, spare) {
+            return Err(format!("found column {name:?}; {}", question(known)));
         }
     }
     if found[0].is_none() {
@@ -187,9 +188,9 @@ mod tests {
             ("", "p.csv:1: found columns \"\", required: generator_rad"),
             ("generator_rad\n", "p.csv: no rows after the header"),
             ("angle,torque_n_m\n0,0\n", "p.csv:1: found columns \"angle, torque_n_m\", required: generator_rad"),
-            ("generator_deg\n0\n", "p.csv:1: found column \"generator_deg\"; did you mean \"generator_rad\"?"),
-            ("generator_rad,torque\n0,0\n", "p.csv:1: found column \"torque\"; did you mean \"torque_n_m\"?"),
-            ("generator_rad,torque_nm\n0,0\n", "p.csv:1: found column \"torque_nm\"; did you mean \"torque_n_m\"?"),
+            ("generator_deg\n0\n", "p.csv:1: found column \"generator_deg\"; did you mean `generator_rad`?"),
+            ("generator_rad,torque\n0,0\n", "p.csv:1: found column \"torque\"; did you mean `torque_n_m`?"),
+            ("generator_rad,torque_nm\n0,0\n", "p.csv:1: found column \"torque_nm\"; did you mean `torque_n_m`?"),
             ("generator_rad,generator_rad\n0,0\n", "p.csv:1: column generator_rad stands there twice"),
             (
                 "generator_rad\n0\n# x\nNaN\n",

@@ -9,6 +9,7 @@ use crate::contact::{BoreContact, BoreLaw, FlankContact, FlankLaw};
 use crate::drive::{Drive, FlankDeviations, GeneratorKind, GeneratorOutline, InvoluteFlank, RimVariation, ToothFlank};
 use crate::material::PlaneStrain;
 use crate::mesh::{MeshLevel, WheelMesh};
+use crate::suggest::did_you_mean;
 
 use super::error::SolveError;
 use super::fast::CondensedDrive;
@@ -36,10 +37,10 @@ impl FromStr for Method {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        [Method::Reference, Method::Fast]
-            .into_iter()
-            .find(|method| method.to_string() == text)
-            .ok_or_else(|| format!("solver \"{text}\": allowed are reference, fast"))
+        [Method::Reference, Method::Fast].into_iter().find(|method| method.to_string() == text).ok_or_else(|| {
+            let hint = did_you_mean("; ", text, ["reference", "fast"]);
+            format!("solver \"{text}\": allowed are reference, fast{hint}")
+        })
     }
 }
 

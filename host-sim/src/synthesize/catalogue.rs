@@ -12,6 +12,7 @@ use super::Sizes;
 use super::excitation::Excitation;
 use super::law::{Angle, Encoder, Law};
 use crate::nominal::{Fixed, Nominal};
+use crate::suggest::did_you_mean;
 use crate::tables::ARCSEC_PER_RAD;
 
 /// Value of a parameter that is not given.
@@ -383,7 +384,11 @@ pub fn parse(text: &str) -> Result<Chosen, String> {
     let all = effects();
     let Some(definition) = all.iter().find(|effect| effect.name == name) else {
         let names: Vec<&str> = all.iter().map(|effect| effect.name).collect();
-        return Err(format!("found \"{name}\"{}; allowed: {}", like(name, &names), names.join(", ")));
+        return Err(format!(
+            "found \"{name}\"{}; allowed: {}",
+            did_you_mean("; ", name, names.iter().copied()),
+            names.join(", ")
+        ));
     };
     let mut chosen = Chosen { definition: definition.clone(), values: vec![None; definition.parameters.len()] };
     for part in rest.split(',').filter(|part| !part.trim().is_empty()) {
@@ -399,23 +404,14 @@ pub fn parse(text: &str) -> Result<Chosen, String> {
     Ok(chosen)
 }
 
-/// A suggestion.
-fn like(name: &str, names: &[&str]) -> String {
-    names
-        .iter()
-        .map(|known| (strsim::jaro_winkler(name, known), known))
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .filter(|(likeness, _)| *likeness > 0.8)
-        .map_or_else(String::new, |(_, known)| format!(" (did you mean {known}?)"))
-}
-
 impl Chosen {
     fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
         let name = self.definition.name;
         let Some(place) = self.definition.parameters.iter().position(|parameter| parameter.name == key) else {
             let names: Vec<&str> = self.definition.parameters.iter().map(|parameter| parameter.name).collect();
             let allowed = if names.is_empty() { "no parameter".to_owned() } else { names.join(", ") };
-            return Err(format!("{name}: found parameter \"{key}\"{}; allowed: {allowed}", like(key, &names)));
+            let hint = did_you_mean("; ", key, names);
+            return Err(format!("{name}: found parameter \"{key}\"{hint}; allowed: {allowed}"));
         };
         let parameter = self.definition.parameters[place];
         if self.values[place].is_some() {
@@ -657,9 +653,15 @@ mod tests {
     #[test]
     fn what_is_wrong_with_an_effect_is_said() {
         for (text, message) in [
-            ("circular_spline_ecentricity", "(did you mean circular_spline_eccentricity?); allowed: circular_spline_"),
+            (
+                "circular_spline_ecentricity",
+                "; did you mean `circular_spline_eccentricity`?; allowed: circular_spline_",
+            ),
             ("zzz", "found \"zzz\"; allowed: "),
-            ("wear:growth=3", "wear: found parameter \"growth\" (did you mean growth_arcsec?); allowed: growth_arcsec"),
+            (
+                "wear:growth=3",
+                "wear: found parameter \"growth\"; did you mean `growth_arcsec`?; allowed: growth_arcsec",
+            ),
             ("wear:growth_arcsec=-3", "wear: growth_arcsec: found -3, allowed: 0 to 10000"),
             ("wear:growth_arcsec=nan", "wear: growth_arcsec: found nan, allowed"),
             ("wear:growth_arcsec=wide", "wear: growth_arcsec: found wide, allowed"),

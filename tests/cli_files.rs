@@ -1,0 +1,277 @@
+//! Files to start from, what a shell and `man` need, suggestions, and `--json` of every command.
+
+use std::fs;
+use std::process::{Command, Stdio};
+
+use flexspline_tests::command::{Desk, Output, names};
+
+/// Samples that make a table without FEM.
+fn samples() -> String {
+    let mut text = "generator_rad,torque_n_m,temperature_c,direction,output_rad\n".to_owned();
+    for torque in [-10, 10] {
+        for direction in [1, -1] {
+            for k in 0..8 {
+                let psi = f64::from(k) * 0.033_421_2 / 8.0;
+                text.push_str(&format!("{psi},{torque},20,{direction},{}\n", psi / 95.0 - 1e-4 * f64::from(direction)));
+            }
+        }
+    }
+    text
+}
+
+/// The program `name`, or nothing where it is not installed.
+fn installed(name: &str) -> Option<Command> {
+    let there = Command::new(name).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
+    if !there {
+        println!("{name} is not installed: this part is not tested");
+    }
+    there.then(|| Command::new(name))
+}
+
+/// The commands that a result says to type next.
+fn next(run: &Output) -> Vec<&str> {
+    run.stdout.lines().filter_map(|line| line.strip_prefix("next: flexspline ")).collect()
+}
+
+#[test]
+fn a_new_drive_file_is_the_drive_it_was_made_from_and_is_not_lost() {
+    let desk = Desk::new();
+    let hash = |line: &str| desk.line(line).done().json()["drive_hash"].as_str().unwrap().to_owned();
+    for (made, same) in [
+        ("new a.toml", "--drive HHD-95"),
+        ("new b.toml --from HHD-95-typical", "--drive HHD-95-typical"),
+        (
+            "new c.toml --drive HHD-95-typical --set generator.w0_mm=0.49",
+            "--drive HHD-95-typical --set generator.w0_mm=0.49",
+        ),
+        ("new d.toml --from c.toml", "--drive c.toml"),
+    ] {
+        let file = made.split(' ').nth(1).unwrap();
+        let told = hash(&format!("{made} --json"));
+        assert_eq!(hash(&format!("drive --drive {file} --json")), told, "{made}");
+        assert_eq!(hash(&format!("drive {same} --json")), told, "{made}");
+        // It says of each number what it is and what is allowed.
+        let text = desk.read(file);
+        assert_eq!(text, desk.line(&format!("drive --drive {file}")).done().stdout);
+        let numbers = text.lines().filter(|line| line.contains(" = ") && !line.starts_with(['#', ' ']));
+        // The comment of a list stands behind its last line.
+        for line in numbers.filter(|line| !line.starts_with("name") && !line.ends_with('[')) {
+            assert!(line.contains(" # ") && line.contains(" to "), "{line}");
+        }
+    }
+    desk.write("mine.toml", "my own work");
+    let refused = desk.line("new mine.toml");
+    assert_eq!(refused.code, 2);
+    assert_eq!(refused.stderr, "error: mine.toml: is there already; give another name, or --force to replace it\n");
+    assert_eq!(desk.read("mine.toml"), "my own work");
+    let run = desk.line("new mine.toml --force").done();
+    assert!(run.stdout.starts_with("wrote mine.toml"), "{}", run.stdout);
+    assert_eq!(next(&run), ["drive --check --drive mine.toml", "tables --drive mine.toml"]);
+    let checked = desk.line(next(&run)[0]).done();
+    assert_eq!(next(&checked), ["tables --drive mine.toml"]);
+    for (line, said) in [
+        ("new out.d/x.toml", "out.d/x.toml: there is no folder out.d"),
+        ("new .", ".: is a folder"),
+        ("new x.toml --from HHD-9", "--from: found \"HHD-9\""),
+        ("new x.toml --from HHD-95 --drive a.toml", "give one of the two"),
+        ("new x.toml --set flanks.friction_coefficent=0.1", "did you mean `flanks.friction_coefficient`?"),
+        ("new", "FILE"),
+    ] {
+        let run = desk.line(line);
+        assert_eq!(run.code, 2, "{line}");
+        assert!(run.stderr.contains(said), "{line}: {}", run.stderr);
+    }
+    assert_eq!(names(&desk.path(".")), ["a.toml", "b.toml", "c.toml", "d.toml", "mine.toml"]);
+}
+
+#[test]
+fn a_new_catalogue_model_is_read_and_the_commands_it_names_run() {
+    let desk = Desk::new();
+    let run = desk.line("new nominal.toml").done();
+    assert!(desk.read("nominal.toml").contains("backlash_arcsec"));
+    let mut commands = next(&run).into_iter();
+    desk.line(&(commands.next().unwrap().to_owned() + " --rows 400 --sessions 4 --seed 3")).done();
+    let diagnosed = desk.line(commands.next().unwrap()).done();
+    assert!(
+        diagnosed.stdout.contains("report.html") && desk.path("try/diagnosis.json").exists(),
+        "{}",
+        diagnosed.stdout
+    );
+    assert_eq!(desk.line("new other.toml --kind nominal --json").done().json()["kind"], "nominal");
+    assert_eq!(desk.read("other.toml"), desk.read("nominal.toml"));
+    assert_eq!(desk.line("new my-nominal.toml --kind drive --json").done().json()["kind"], "drive");
+}
+
+#[cfg(unix)]
+#[test]
+fn the_shell_completes_commands_options_and_names() {
+    let desk = Desk::new();
+    let script = desk.line("completions bash").done().stdout;
+    desk.write("flexspline.bash", &script);
+    let checked = Command::new("bash").arg("-n").arg(desk.path("flexspline.bash")).output().unwrap();
+    assert!(checked.status.success() && checked.stderr.is_empty(), "{}", String::from_utf8_lossy(&checked.stderr));
+    // As bash calls it: the words, which of them is being typed, and the two that matter.
+    let completed = |line: &str| -> Vec<String> {
+        let words: Vec<&str> = line.split(' ').collect();
+        let (last, before) = (words[words.len() - 1], words[words.len() - 2]);
+        let call = format!(
+            "source flexspline.bash; COMP_WORDS=({line}); COMP_CWORD={}; _flexspline flexspline '{last}' '{before}'; \
+             printf '%s\\n' \"${{COMPREPLY[@]}}\"",
+            words.len() - 1
+        );
+        let output = Command::new("bash").args(["--norc", "-c", &call]).current_dir(desk.path(".")).output().unwrap();
+        assert!(output.stderr.is_empty(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap().lines().map(str::to_owned).collect()
+    };
+    assert_eq!(completed("flexspline simu"), ["simulate"]);
+    assert_eq!(completed("flexspline dia"), ["diagnose"]);
+    assert_eq!(completed("flexspline simulate --generator dou"), ["double-disc"]);
+    assert_eq!(completed("flexspline tables -g a"), ["all"]);
+    assert_eq!(completed("flexspline validate --mesh c"), ["coarse"]);
+    assert_eq!(completed("flexspline tables --node-t"), ["--node-tolerance-arcsec"]);
+    assert_eq!(completed("flexspline completions fi"), ["fish"]);
+    for (shell, sign) in [
+        ("zsh", "#compdef flexspline"),
+        ("fish", "complete -c flexspline"),
+        ("powershell", "Register-ArgumentCompleter"),
+        ("elvish", "edit:completion:arg-completer[flexspline]"),
+    ] {
+        let script = desk.line(&format!("completions {shell}")).done().stdout;
+        assert!(script.contains(sign) && script.contains("double-disc"), "{shell}");
+    }
+    let wrong = desk.line("completions basch");
+    assert_eq!(wrong.code, 2);
+    assert!(wrong.stderr.contains("bash"), "{}", wrong.stderr);
+}
+
+#[test]
+fn manual_pages_are_whole_and_render_without_a_warning() {
+    let desk = Desk::new();
+    let run = desk.line("man --out pages").done();
+    assert!(run.stdout.contains("next: man -l pages/flexspline.1"), "{}", run.stdout);
+    let pages = names(&desk.path("pages"));
+    let commands = commands(&desk);
+    assert_eq!(pages.len(), commands.len() + 1, "{pages:?}");
+    for command in &commands {
+        assert!(pages.contains(&format!("flexspline-{command}.1")), "{command}");
+    }
+    for page in &pages {
+        let text = desk.read(&format!("pages/{page}"));
+        for part in [".TH flexspline", ".SH NAME", ".SH SYNOPSIS", ".SH DESCRIPTION", ".SH OPTIONS", ".nf\n", ".fi\n"] {
+            assert!(text.contains(part), "{page} has no {part}");
+        }
+        if let Some(mut groff) = installed("groff") {
+            let rendered =
+                groff.args(["-k", "-man", "-ww", "-Tutf8", page]).current_dir(desk.path("pages")).output().unwrap();
+            let said = String::from_utf8_lossy(&rendered.stderr);
+            assert!(rendered.status.success() && said.is_empty(), "{page}: {said}");
+            let read = String::from_utf8_lossy(&rendered.stdout);
+            let title = format!("{}(1)", page.trim_end_matches(".1"));
+            assert!(read.contains(&title) && read.contains(env!("CARGO_PKG_VERSION")), "{page}: {read:.200}");
+            let command = page.strip_prefix("flexspline-").map(|name| name.trim_end_matches(".1"));
+            let example = command.map_or("exit codes".to_owned(), |command| format!("flexspline {command}"));
+            assert!(read.to_lowercase().contains(&example), "{page} shows no {example}");
+        }
+    }
+    assert_eq!(desk.line("man").done().stdout.trim_end(), desk.read("pages/flexspline.1").trim_end());
+    let one = desk.line("man diagnose").done().stdout;
+    assert_eq!(one.trim_end(), desk.read("pages/flexspline-diagnose.1").trim_end());
+    let wrong = desk.line("man diagnos");
+    assert_eq!(wrong.code, 2);
+    assert!(wrong.stderr.contains("did you mean `diagnose`?"), "{}", wrong.stderr);
+}
+
+/// The names of the commands, from the first page of help.
+fn commands(desk: &Desk) -> Vec<String> {
+    let page = desk.line("help").done().stdout;
+    let listed = page.lines().filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    let first = listed.filter_map(|line| line.split_whitespace().next());
+    first
+        .filter(|word| word.bytes().all(|b| b.is_ascii_lowercase()) && !["flexspline", "help"].contains(word))
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn every_command_prints_one_json_object_and_nothing_else() {
+    let desk = Desk::new();
+    desk.write("path.csv", "generator_rad\n0\n");
+    desk.write("samples.csv", &samples());
+    desk.write("measured.csv", "generator_rad,output_rad\n0,0\n1,0.0105\n2,0.021\n");
+    let lines = [
+        "new nominal.toml",
+        "new drive.toml",
+        "drive",
+        "drive --check",
+        "completions bash",
+        "man",
+        "man tables",
+        "man --out pages",
+        "simulate --generator cam --mesh coarse --path path.csv",
+        "export --generator cam --format csv",
+        "tables --generator cam --from-samples samples.csv --no-report",
+        "replay --tables out/cam.fxt measured.csv",
+        "validate --tables out --mesh coarse --solver fast --torques 2 --positions 1 --temperatures 1 --no-report",
+        "synthesize --list",
+        "synthesize --model nominal.toml --rows 300 --sessions 4 --seed 1",
+        "diagnose out/data.csv --model nominal.toml --no-report",
+    ];
+    for line in lines {
+        let run = desk.line(&format!("{line} --json"));
+        // A table of few samples need not meet the FEM.
+        assert!(run.code == 0 || (line.starts_with("validate") && run.code == 1), "{line}: {}", run.stderr);
+        assert!(run.json().is_object(), "{line}: {:.80}", run.stdout);
+        assert!(run.code == 1 || run.stderr.is_empty(), "{line}: {}", run.stderr);
+    }
+    for command in commands(&desk) {
+        // These take minutes: what they print is tested beside their code.
+        let long = ["kernels", "reproduce"].contains(&&*command);
+        let tried = lines.iter().any(|line| line.split(' ').next() == Some(&command));
+        assert!(tried != long, "{command} is not tried with --json");
+    }
+}
+
+#[test]
+fn misspelt_names_get_a_suggestion_and_garbage_gets_none() {
+    let desk = Desk::new();
+    desk.line("new nominal.toml").done();
+    desk.line("new my-drive.toml").done();
+    desk.write("flat.toml", "base = \"HHD-95\"\n[flank]\nfriction_coefficient = 0.1\n[sleeve]\nlateral = 1\n");
+    desk.write("data.csv", "generater_rad,output_rad\n0,0\n1,0.01\n");
+    desk.write("short.csv", "generator_rad,torque_nm\n0,1\n");
+    desk.write("wrong.toml", &desk.read("nominal.toml").replace("backlash_arcsec", "backlash_arcsecs"));
+    let cases = [
+        ("drive --drive HHD95", Some("HHD-95")),
+        ("drive --drive my-drvie.toml", Some("my-drive.toml")),
+        ("drive --drive other.txt", None),
+        ("drive --set flank.friction_coefficient=0.1", Some("flanks.friction_coefficient")),
+        ("drive --set viscosity=0.1", None),
+        ("drive --drive flat.toml", Some("flanks")),
+        ("drive --drive flat.toml", Some("sleeve.lateral_stiffness_n_per_mm")),
+        ("simulate --generator camm", Some("cam")),
+        ("simulate --generator gears", None),
+        ("tables --generator two_roller", Some("two-roller")),
+        ("synthesize --effect circular_spline_excentricity", Some("circular_spline_eccentricity")),
+        ("synthesize --effect wear:growth=3", Some("growth_arcsec")),
+        ("synthesize --effect sunspots", None),
+        ("diagnose data.csv --model nominal.toml", Some("generater_rad")),
+        ("diagnose data.csv --model nominal.toml --columns genrator=a:rad", Some("generator")),
+        ("diagnose data.csv --model nominal.toml --columns generator=a:degrees", Some("deg")),
+        ("diagnose data.csv --model nominal.toml --columns generator=a:furlong", None),
+        ("diagnose data.csv --model wrong.toml", Some("nominal.backlash_arcsec")),
+        ("simulate --generator cam --path short.csv", Some("torque_n_m")),
+        ("tables --generator cam --from-samples short.csv", Some("torque_nm")),
+    ];
+    for (line, meant) in cases {
+        let run = desk.line(line);
+        assert_eq!(run.code, 2, "{line}: {}", run.stderr);
+        match meant {
+            Some(meant) => assert!(run.stderr.contains(&format!("did you mean `{meant}`?")), "{line}: {}", run.stderr),
+            None => assert!(!run.stderr.contains("did you mean"), "{line}: {}", run.stderr),
+        }
+    }
+    // Each where it stands, and all of them at once.
+    let both = desk.line("drive --drive flat.toml").stderr;
+    assert!(both.contains("flat.toml:2: flank: ") && both.contains("flat.toml:5: sleeve.lateral: "), "{both}");
+    assert!(fs::read_dir(desk.path("out")).is_err());
+}
