@@ -29,6 +29,7 @@ mod tests;
 mod uncertainty;
 
 use std::collections::BTreeMap;
+use std::io::Write as _;
 
 use flexspline::Table;
 use thiserror::Error;
@@ -136,13 +137,18 @@ pub fn diagnose_extended(
     left.extend(remainder::beyond_noise(&problem, &selected, noise));
     if settings.verbose {
         for something in &left {
-            eprintln!("  left: {} {:.2}", something.looks_like, something.size_arcsec);
+            tell(&format!("  left: {} {:.2}", something.looks_like, something.size_arcsec));
         }
     }
     let diagnosis = conclude(&problem, &laws, selected, left, noise, settings);
     let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
     drop(problem);
     Ok((diagnosis, found.extended(laws, &base, &scales)))
+}
+
+/// Says on stderr what is tried; a reader that has gone is no reason to fail.
+fn tell(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// Whether rows can be diagnosed at all.
@@ -174,7 +180,7 @@ impl<'a> Search<'a> {
         laws.extend(unnamed(on));
         let say = |text: String| {
             if settings.verbose {
-                eprintln!("{text}");
+                tell(&text);
             }
         };
         let mut uncertain = prepare::uncertain(on, &[]);
@@ -325,10 +331,10 @@ fn conclude(
             let rivals = rivals::rivals(problem, laws, &selected, k);
             if settings.verbose {
                 for rival in rivals.iter().take(4) {
-                    eprintln!(
+                    tell(&format!(
                         "  rival of {}: {} misfit +{:.0}, apart {:.2}",
                         selected.terms[k].law.cause, rival.cause, rival.misfit, rival.apart_arcsec
-                    );
+                    ));
                 }
             }
             let size = standings[k].size;
