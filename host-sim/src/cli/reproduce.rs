@@ -30,8 +30,8 @@ Examples:
   flexspline reproduce --quick --out quick
   flexspline reproduce --json > claims.json
 
-A claim that is not reproduced is a result, not a failure: the exit code is 1 only if some run found no
-equilibrium.")]
+A claim that is not reproduced is a result, not a failure: the exit code is 1 only if some run found
+no equilibrium.")]
 pub(super) struct Reproduce {
     /// Coarse mesh, one other discretisation and few changes of the model: about a minute on two cores instead of some minutes
     #[arg(long, conflicts_with = "mesh")]

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use flexspline::Table;
 
 use super::base::{Base, PlayLaw};
-use super::candidate::{Excitation, Law, Scales, library};
+use super::candidate::{Column, Excitation, Law, Scales, Tolerance, library};
 use super::model::{Problem, Scaffold, Term};
 use super::noise::Whitener;
 use super::report::Parameter;
@@ -176,7 +176,8 @@ impl Extended {
         for cause in &self.causes {
             let mut part = vec![0.0; on.rows.len()];
             let columns = (cause.law.columns)(on, &cause.law.values(&cause.places));
-            for (column, c) in columns.iter().zip(&cause.coefficients) {
+            let predicts = |column: &Column| !matches!(column.tolerance, Tolerance::History(_));
+            for (column, c) in columns.iter().zip(&cause.coefficients).filter(|(column, _)| predicts(column)) {
                 add(&mut part, &column.values, *c);
             }
             add(&mut extended, &part, 1.0);

@@ -135,7 +135,7 @@ impl<'l> Term<'l> {
             .zip(&self.size)
             .map(|(tolerance, size)| match tolerance {
                 Tolerance::Main(prior) => *prior,
-                Tolerance::Nuisance(share) | Tolerance::Beside(share) => {
+                Tolerance::Nuisance(share) | Tolerance::Beside(share) | Tolerance::History(share) => {
                     Prior { mean: 0.0, std: share * explained / size.max(1e-9) }
                 }
             })

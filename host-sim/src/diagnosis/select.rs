@@ -88,7 +88,8 @@ pub(super) fn sound(term: &Term<'_>, coefficients: &[f64]) -> bool {
             term.tolerances.iter().zip(coefficients).map(|(t, c)| if of(t) { *c } else { 0.0 }).collect();
         super::rows::rms(&term.contribution(&only))
     };
-    let (main, nuisance) = (part(|t| matches!(t, Tolerance::Main(_))), part(|t| matches!(t, Tolerance::Nuisance(_))));
+    let main = part(|t| matches!(t, Tolerance::Main(_)));
+    let nuisance = part(|t| matches!(t, Tolerance::Nuisance(_) | Tolerance::History(_)));
     term.law.sound(&term.law.values(&term.places), coefficients, main, nuisance)
 }
 

@@ -70,7 +70,7 @@ impl std::str::FromStr for Cause {
 }
 
 impl Cause {
-    /// Size, range and shape. Ranges: PHYSICS §4 and §5, from below what a good encoder shows to what stops a drive.
+    /// Size, range and shape. Ranges: from below what a good encoder shows to what stops a drive.
     pub fn spec(self, drive: &Drive) -> Spec {
         use Range::{Linear, Log, Phase, Seed};
         let rated = drive.rated_n_m;

@@ -119,7 +119,7 @@ const CREEP_S: [f64; 6] = [0.7, 2.2, 7.0, 22.0, 70.0, 220.0];
 impl Law for Stranger {
     fn mesh(&mut self, now: &Now, mesh: &mut Mesh) {
         match self.kind {
-            // The generator is driven through a slot: its angle lags by half the lash each way (PHYSICS §4: 5 to 18").
+            // The generator is driven through a slot: its angle lags by half the lash each way (5 to 18", Harmonic Drive HFUS-2A manual, table 24.5).
             Outside::OldhamDeadZone => {
                 let lash = self.size * self.ratio.abs() / crate::ARCSEC;
                 let angle = now.generator_rad;

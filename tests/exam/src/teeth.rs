@@ -103,7 +103,7 @@ mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    /// Closed form (PHYSICS 1.3): one flank of an eccentric wheel follows -|sin|, of mean 2/π and second and fourth order
+    /// Closed form: one flank of an eccentric wheel follows -|sin|, of mean 2/π and second and fourth order
     /// 0.424 and 0.085 of the amplitude.
     #[test]
     fn an_eccentric_wheel_rectifies() {

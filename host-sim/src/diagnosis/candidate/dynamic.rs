@@ -1,4 +1,4 @@
-//! What moves the load: gravity that the torque column does not hold, and the load's inertia on the drive's spring (PHYSICS §5, 25, 28).
+//! What moves the load: gravity that the torque column does not hold, and the load's inertia on the drive's spring.
 
 use std::f64::consts::PI;
 

@@ -3,7 +3,7 @@
 //! A [`Law`] turns shape parameters (what enters non-linearly: a slip torque, a time constant, a place) into columns whose
 //! coefficients enter linearly. Laws in the field differ from those here in detail, so each carries *nuisance* columns: the
 //! directions in which its law is likely to be wrong, with coefficients of the order of a share of the main ones. A deviation
-//! of that kind then breeds no second cause. Sources: PHYSICS §1.3, §5.
+//! of that kind then breeds no second cause. What each follows and why: docs/theory.md, "Signatures of causes".
 
 mod dynamic;
 mod generic;
@@ -137,9 +137,11 @@ pub enum Tolerance {
     Main(Prior),
     /// A deviation of the law: its size is of the order of this share of the main coefficients.
     Nuisance(f64),
-    /// The same of what comes with the cause by right, and may well be the larger part of it: clearance that a wheel beside its place
-    /// takes, what a spring held before anybody looked.
+    /// The same of what comes with the cause by right, and may well be the larger part of it: clearance that a wheel beside its
+    /// place takes.
     Beside(f64),
+    /// A nuisance of these rows alone: what was before anybody recorded. It predicts nothing.
+    History(f64),
 }
 
 /// A column of a law.
@@ -164,6 +166,11 @@ fn nuisance(values: Vec<f64>, share: f64) -> Column {
 /// A column of what comes with a cause.
 fn beside(values: Vec<f64>, share: f64) -> Column {
     Column { values, tolerance: Tolerance::Beside(share) }
+}
+
+/// A column of what was before the first row of a session.
+fn history(values: Vec<f64>, share: f64) -> Column {
+    Column { values, tolerance: Tolerance::History(share) }
 }
 
 /// A parameter for the report: name with unit, value.
@@ -203,6 +210,8 @@ pub struct Law {
     pub tolerance_of: Option<&'static str>,
     /// How wrong the law may be, as a share of its size: what is smaller than that beside it may be its own misfit.
     pub misfit: f64,
+    /// Largest size of all nuisance over that of the main columns.
+    pub most_nuisance: f64,
     /// What it may be taken for.
     pub kin: Kin,
     /// Relative uncertainty of its parameters beside that of the data: what the law itself is not sure of.
@@ -252,6 +261,7 @@ impl Law {
             physical: Box::new(|_, _| true),
             tolerance_of: None,
             misfit: USUAL_MISFIT,
+            most_nuisance: 1.0,
             kin: Kin::Unlike,
             doubt: USUAL_DOUBT,
             lead: None,
@@ -289,7 +299,7 @@ impl Law {
     /// parts are this large.
     #[must_use]
     pub fn sound(&self, values: &[f64], coefficients: &[f64], main: f64, nuisance: f64) -> bool {
-        (self.physical)(values, coefficients) && nuisance <= main
+        (self.physical)(values, coefficients) && nuisance <= self.most_nuisance * main
     }
 
     /// How much of its size another law may be named for wrongly.

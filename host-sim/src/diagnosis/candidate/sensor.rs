@@ -1,4 +1,4 @@
-//! What the sensors do (PHYSICS §5, 7-12): geometry of the encoders, time between their readings, a wrong ratio. None knows of load.
+//! What the sensors do: geometry of the encoders, time between their readings, a wrong ratio. None knows of load.
 
 use super::{Excitation, Law, by_row, main, nuisance, polar};
 

@@ -1,9 +1,9 @@
-//! What the torque does beyond the nominal wind-up and play (PHYSICS §5, 14-17, 22, 24).
+//! What the torque does beyond the nominal wind-up and play.
 
 use std::ops::Range;
 
 use super::super::rows::rms;
-use super::{Excitation, Law, Shape, beside, by_row, main, nuisance};
+use super::{Excitation, Law, Shape, by_row, history, main, nuisance};
 
 /// Torque in units of the load scale.
 fn load_share(on: &Excitation<'_>, k: usize) -> f64 {
@@ -59,20 +59,19 @@ const MOST_BEGINNINGS: usize = 10;
 /// Springs that slip one after the other (Maxwell slip, Prandtl-Ishlinskii): the output lags the torque by what they hold.
 fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     let load = on.scales.load;
-    Law::new("torsional_hysteresis", |on, shape| {
+    let mut law = Law::new("torsional_hysteresis", |on, shape| {
         let slip = shape[0];
         let usual = on.nominal.wind_up_arcsec(on.scales.load).mul_add(0.3, 30.0);
         let negative = |values: Vec<f64>| values.into_iter().map(|z| -z).collect::<Vec<f64>>();
         let mut columns = vec![
-            // The opening is a share of the wind-up: a plastic gear's is wide (PHYSICS §5: 0.5 to 2' of a steel drive's 3').
+            // The opening is a share of the wind-up: a plastic gear's is wide, a steel drive's at rated load 0.5 to 2' of 3'.
             main(negative(stop_operator(on, slip)), usual),
             nuisance(negative(stop_operator(on, 0.35 * slip)), 0.35),
             nuisance(negative(stop_operator(on, 2.5 * slip)), 0.5),
-            // What springs hold goes with the load, and the wind-up beside them takes a part of that back.
-            beside(by_row(on, |k| load_share(on, k)), 0.35),
+            nuisance(by_row(on, |k| load_share(on, k)), 0.7),
             nuisance(by_row(on, |k| load_share(on, k).powi(3)), 0.15),
         ];
-        columns.extend(unknown_beginnings(on, slip).into_iter().map(|held| beside(held, 1.0)));
+        columns.extend(unknown_beginnings(on, slip).into_iter().map(|held| history(held, 1.0)));
         columns
     })
     .whole()
@@ -84,7 +83,12 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
         let half_width: f64 = [1.0, 0.35, 2.5].iter().zip(c).map(|(factor, c)| c * held(factor * shape[0])).sum();
         vec![("half_width_arcsec", half_width), ("slip_torque_n_m", shape[0])]
     })
-    .physical(|_, c| c[0] > 0.0)
+    .physical(|_, c| c[0] > 0.0);
+    // Three elements stand for the many of a real drive: where the load passes zero they hold about, not exactly, as much.
+    law.doubt = 0.08;
+    // What springs hold goes with the load; the wind-up beside them takes that back, and the beginnings are nobody's.
+    law.most_nuisance = 2.0;
+    law
 }
 
 /// Stiffer the higher the load: the wind-up lags behind the nominal line by a power of the torque.

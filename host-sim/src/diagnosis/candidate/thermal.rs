@@ -1,4 +1,4 @@
-//! What the temperature does (PHYSICS §5, 18-21).
+//! What the temperature does.
 
 use super::{Column, Excitation, Law, Lead, Shape, Tolerance, by_row, main, nuisance};
 use crate::diagnosis::linear::Prior;

@@ -8,7 +8,7 @@ use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::log::Log;
 use crate::measurement::robust::{median_and_std, median_of, sampled};
 
-/// A gap longer than so many sample periods starts a new session (CONTRACT).
+/// A gap longer than so many sample periods starts a new session.
 pub const SESSION_GAP_PERIODS: f64 = 10.0;
 /// A step of time above so many periods, jitter aside, has a row missing in it: half way between one lost row and none.
 const LOST_ROW_PERIODS: f64 = 1.5;

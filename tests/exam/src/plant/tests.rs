@@ -1,5 +1,5 @@
 //! The plant against its own claims: the nominal model where nothing is hidden, convergence in the step, and each effect at
-//! the orders that PHYSICS §1.3 and §5 give it.
+//! the orders that theory gives it.
 
 use super::*;
 use crate::bench::rms;
@@ -8,7 +8,7 @@ use crate::motion::Poor;
 use crate::outside::Outside;
 use std::f64::consts::TAU;
 
-/// Nominal output as CONTRACT describes it, written once more and differently: error at each point.
+/// Nominal output as the format of nominal.toml describes it, written once more and differently: error at each point.
 fn nominal(drive: &Drive, motion: &Motion) -> Vec<f64> {
     let half = 0.5 * drive.backlash_arcsec;
     let mut at_rest: Option<f64> = None;
@@ -186,7 +186,7 @@ fn each_effect_stands_at_its_order() {
     }
 }
 
-/// PHYSICS 1.3: eccentricity of 10 µm on 48.7 mm, one flank, light load: 19.5" at order two and 3.9" at four.
+/// Closed form: eccentricity of 10 µm on 48.7 mm, one flank, light load: 19.5" at order two and 3.9" at four.
 #[test]
 fn ten_micrometres_of_eccentricity() {
     // Wide enough that the flanks do not clash.
@@ -229,7 +229,7 @@ fn a_delay_is_the_output_speed_times_the_delay() {
         let effect = Effect { what: What::Cause(Cause::SensorLatency), family: Family::A, size, shape: vec![0.0] };
         run(&drive, &Unit::nominal(&drive), &motion, &[effect]).error_arcsec[30_000]
     };
-    // PHYSICS §5 #12: the output's reading is old by τ, so it stands back by its speed times τ.
+    // The output's reading is old by τ, so it stands back by its speed times τ.
     let expected = 4.0 / 95.0 * 1e-3 * ARCSEC;
     assert!((error_at(0.0) - error_at(1e-3) - expected).abs() < 1e-3);
     assert!((error_at(-1e-3) - error_at(0.0) - expected).abs() < 1e-3);
