@@ -466,6 +466,7 @@ fn a_table_over_whole_turns_holds_pitch_errors_of_both_wheels() {
 /// An eccentricity is felt by the one flank from another side than by the other, and less under load: a table with one curve for
 /// all loads cannot hold that, and says how much it leaves.
 #[test]
+#[ignore = "a minute and a half: a second table over whole turns"]
 fn what_a_table_leaves_of_an_eccentricity_is_stated_in_it() {
     let (made, checked) = table_of(|drive| drive.as_built.circular_spline_eccentricity_um = 5.0);
     let stated = made.info.projection_rms_arcsec;
