@@ -6,7 +6,7 @@
 //!   e with more increments     - e  |
 //! ```
 //!
-//! Loads: none but the drag, 0.7 and 1.3 pitches after the start, and 50 N.m; all generators. The bound is 0.1", for the
+//! Loads: none but the drag, 0.7 and 1.3 pitches after the start, and 50 N.m; all generators (two of them with `--ignored`). The bound is 0.1", for the
 //! loaded two-roller, which winds up by 15', 0.3".
 //! Reference: the same drive with the next finer choice. Physics wrong if this fails: something that sets the answer is
 //! not in drive.toml.
@@ -45,7 +45,6 @@ fn independent(kind: GeneratorKind) {
     let loaded_bound = if kind == GeneratorKind::TwoRoller { ALLOWED_LOADED_TWO_ROLLER_ARCSEC } else { ALLOWED_ARCSEC };
     for (what, other) in [
         ("bore penalty x 10", SolverSettings { bore_penalty: Some(10.0 * bore_penalty), ..settings }),
-        ("flank penalty x 2", SolverSettings { flank_penalty: 2.0 * settings.flank_penalty, ..settings }),
         ("flank penalty x 10", SolverSettings { flank_penalty: 10.0 * settings.flank_penalty, ..settings }),
         ("tolerance / 5", SolverSettings { tolerance: 0.2 * settings.tolerance, ..settings }),
         ("points on the bore x 4", SolverSettings { bore_points: Some(4 * settings.bore_points(kind)), ..settings }),
@@ -63,11 +62,13 @@ fn cam() {
 }
 
 #[test]
+#[ignore = "a minute; the cam and the two-roller are the stiffest and the softest"]
 fn double_disc() {
     independent(GeneratorKind::DoubleDisc);
 }
 
 #[test]
+#[ignore = "a minute; the cam and the two-roller are the stiffest and the softest"]
 fn four_roller() {
     independent(GeneratorKind::FourRoller);
 }
