@@ -20,23 +20,35 @@ use crate::report::page::Page;
 use crate::report::shown_torque_n_m;
 use crate::stepping::{Method, SolverSettings};
 
-/// The drives in motion, by the fast solver, each at half of what its table spans. One that cannot be shown is said on the page.
+/// The drives of tables in motion, each at half of what its table spans.
 pub(super) fn animations(
     context: &Context,
     drive: &Drive,
     tables: &[(GeneratorKind, Table<'_>)],
     settings: SolverSettings,
 ) -> Vec<Result<Animation, AnimationError>> {
+    let shown: Vec<(GeneratorKind, f64)> =
+        tables.iter().map(|(kind, table)| (*kind, shown_torque_n_m(table))).collect();
+    in_motion(context, drive, &shown, settings)
+}
+
+/// Drives in motion, each under its load (N·m), by the fast solver. One that cannot be shown is said on the page.
+pub(super) fn in_motion(
+    context: &Context,
+    drive: &Drive,
+    shown: &[(GeneratorKind, f64)],
+    settings: SolverSettings,
+) -> Vec<Result<Animation, AnimationError>> {
     let progress = Mutex::new((context.progress("report"), 0));
     let solver = SolverSettings { method: Method::Fast, ..settings };
-    tables
+    shown
         .par_iter()
-        .map(|(kind, table)| {
-            let made = animate(drive, *kind, shown_torque_n_m(table), solver, &mut || ControlFlow::Continue(()));
+        .map(|(kind, torque_n_m)| {
+            let made = animate(drive, *kind, *torque_n_m, solver, &mut || ControlFlow::Continue(()));
             if let Ok(mut guard) = progress.lock() {
                 guard.1 += 1;
                 let done = guard.1;
-                guard.0.set(done, tables.len(), &format!("{kind} in motion"));
+                guard.0.set(done, shown.len(), &format!("{kind} in motion"));
             }
             made
         })

@@ -4,18 +4,16 @@ use std::ops::ControlFlow;
 use std::sync::Mutex;
 
 use clap::Args;
-use rayon::prelude::*;
 
 use super::simulate::refused_or_failed;
 use super::{Context, Failure, names, report};
-use crate::drive::{Drive, GeneratorKind};
+use crate::drive::GeneratorKind;
 use crate::mesh::MeshLevel;
 use crate::output::Outputs;
-use crate::report::animation::{Animation, AnimationError, animate};
 use crate::report::reproduction_report::{Sources, page};
 use crate::reproduce::claim::Verdict;
 use crate::reproduce::{ReproduceSettings, Reproduction, reproduce};
-use crate::stepping::{Method, SolverSettings};
+use crate::stepping::SolverSettings;
 
 /// Run the protocol of the paper with all four generators, beside the paper's results
 ///
@@ -55,8 +53,9 @@ impl Reproduce {
             ControlFlow::Continue(())
         })
         .map_err(refused_or_failed)?;
-        let animations = animations(&drive, mesh);
         drop(progress);
+        let solver = SolverSettings { mesh, ..SolverSettings::default() };
+        let animations = report::in_motion(context, &drive, &GeneratorKind::ALL.map(|kind| (kind, 0.0)), solver);
         let record = result.record(&context.command);
         let page = page(Sources { reproduction: &result, command: &context.command, animations });
         let mut outputs = Outputs::new();
@@ -73,15 +72,6 @@ impl Reproduce {
             None => Ok(()),
         }
     }
-}
-
-/// The drives in motion, without load.
-fn animations(drive: &Drive, mesh: MeshLevel) -> Vec<Result<Animation, AnimationError>> {
-    let solver = SolverSettings { method: Method::Fast, mesh, ..SolverSettings::default() };
-    GeneratorKind::ALL
-        .into_par_iter()
-        .map(|kind| animate(drive, kind, 0.0, solver, &mut || ControlFlow::Continue(())))
-        .collect()
 }
 
 /// The verdicts for reading.

@@ -319,9 +319,6 @@ fn conclude(
     } else {
         verdict
     };
-    // Nothing named, nothing extended: what has no name helps to see what is there, and predicts nothing for anybody.
-    let held =
-        if matches!(verdict, Verdict::None | Verdict::Unknown) { held_out::evaluate(problem, &[]) } else { held };
     let mut causes = Vec::new();
     let mut next_experiment = None;
     let mut told_better = Vec::new();
@@ -373,6 +370,11 @@ fn conclude(
         Verdict::Explained if !told_better.is_empty() => Verdict::PartlyExplained,
         other => other,
     };
+    // Nothing named, nothing extended: what has no name helps to see what is there, and predicts nothing for anybody.
+    let mut held_out = held.total;
+    if causes.is_empty() {
+        held_out.rms_after_arcsec = held_out.rms_before_arcsec;
+    }
     let mut unexplained_list: Vec<Unexplained> = (0..selected.terms.len())
         .filter(|k| !named.contains(k) || told_better.contains(k) || verdict == Verdict::Unknown)
         .map(|k| Unexplained { looks_like: selected.terms[k].law.cause.clone(), size_arcsec: standings[k].size })
@@ -388,8 +390,8 @@ fn conclude(
             noise_floor_arcsec: floor,
             unexplained_fraction: if explainable > 0.0 { (unexplained / explainable).min(1.0) } else { 0.0 },
         },
-        held_out: held.total,
-        compensation: compensation(problem, held.total.rms_after_arcsec),
+        held_out,
+        compensation: compensation(problem, held_out.rms_after_arcsec),
         unexplained: unexplained_list,
         recalibrated: recalibrated(problem, &selected),
         noise_arcsec: [noise.white, noise.wander],

@@ -4,7 +4,7 @@
 //! alike, into innovations of unit variance; least squares on those is generalised least squares on the rows, and forty
 //! thousand correlated rows weigh what they are worth (n_eff).
 
-use super::rows::{Rows, quantile};
+use super::rows::{Rows, rms, robust_std};
 
 /// White noise and wander.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,6 +40,8 @@ pub struct Whitener {
     decay: Vec<f64>,
 }
 
+/// A column is hidden where averages hold less than this share of it.
+const HIDDEN: f64 = 0.8;
 /// Weight of a row whose flank is uncertain: its noise is this many times white.
 const UNCERTAIN_NOISE: f64 = 1e3;
 
@@ -100,6 +102,12 @@ impl Whitener {
     #[must_use]
     pub fn average(&self, column: &[f64]) -> Vec<f64> {
         self.groups.iter().map(|g| column[g.clone()].iter().sum::<f64>() / g.len() as f64).collect()
+    }
+
+    /// Whether averages take most of a column away.
+    #[must_use]
+    pub fn hides(&self, column: &[f64]) -> bool {
+        rms(&self.average(column)) < HIDDEN * rms(column)
     }
 
     /// Averages that no uncertain row is part of.
@@ -170,6 +178,6 @@ pub fn white_level(rows: &Rows, left: &[f64]) -> f64 {
             differences.push((left[k] - 2.0 * left[k - 1] + left[k - 2]).abs());
         }
     }
-    // Median of |N(0, 6)| is 0.6745 sqrt 6.
-    (quantile(differences.into_iter(), 0.5) / (0.6745 * 6f64.sqrt())).max(1e-3)
+    // Their variance is six times that of a row.
+    (robust_std(differences.into_iter()) / 6f64.sqrt()).max(1e-3)
 }

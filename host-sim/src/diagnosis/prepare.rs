@@ -7,7 +7,7 @@ use super::candidate::{Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
 use super::model::Term;
 use super::noise::{Noise, Whitener, white_level};
-use super::rows::{Rows, quantile, rms};
+use super::rows::{Rows, quantile, rms, robust_std};
 use crate::nominal::Nominal;
 
 /// Averages used to find the wander, about.
@@ -185,8 +185,7 @@ fn worth_of(innovations: &[f64], whitener: &Whitener) -> f64 {
             }
         }
         if sums.len() >= 30 {
-            // Robust: half the blocks lie within 0.6745 standard deviations.
-            let spread = quantile(sums.iter().map(|s| s.abs()), 0.5) / 0.6745;
+            let spread = robust_std(sums.into_iter());
             worst = worst.max(spread * spread);
         }
     }

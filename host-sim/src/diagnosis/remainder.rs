@@ -102,7 +102,7 @@ pub fn averaged_away(problem: &Problem<'_>, line: &Line) -> bool {
         _ => rows.generator.iter().map(|psi| line.order * psi).collect(),
     };
     let wave: Vec<f64> = angle.iter().map(|a| a.cos()).collect();
-    super::rows::rms(&problem.whitener.average(&wave)) < 0.8 * super::rows::rms(&wave)
+    problem.whitener.hides(&wave)
 }
 
 /// What is left as a free function of what was measured, largest first.

@@ -4,12 +4,11 @@
 
 use super::candidate::{Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
-use super::rows::{Rows, quantile, rms};
+use super::noise::{Noise, Whitener};
+use super::rows::{Rows, rms, robust_std};
 
 /// Rows whose mean is taken from each of them, to see what is fast.
 const TOGETHER: usize = 5;
-/// A column is hidden where averaging leaves less than this share of it.
-const HIDDEN: f64 = 0.8;
 /// A column that the detail holds less than this share of says nothing in it.
 const IN_DETAIL: f64 = 0.3;
 /// Evidence for a fast law from which every row is kept.
@@ -35,9 +34,11 @@ pub fn resolution(on: &Excitation<'_>, laws: &[Law], uncertain: &[bool], average
     if stride == 1 {
         return Resolution { stride, fast: Vec::new() };
     }
+    let plain = Noise { white: 1.0, wander: 0.0, correlation_s: 1.0 };
+    let averages = Whitener::new(on.rows, uncertain, stride, plain);
     let shown = laws.iter().filter(|law| law.named && law.shapes.is_empty()).find_map(|law| {
         let main: Vec<Vec<f64>> = main_columns(on, law);
-        let hidden = !main.is_empty() && main.iter().all(|c| rms(&averaged(on.rows, c, stride)) < HIDDEN * rms(c));
+        let hidden = !main.is_empty() && main.iter().all(|column| averages.hides(column));
         if !hidden {
             return None;
         }
@@ -52,13 +53,6 @@ pub fn resolution(on: &Excitation<'_>, laws: &[Law], uncertain: &[bool], average
 fn main_columns(on: &Excitation<'_>, law: &Law) -> Vec<Vec<f64>> {
     let columns = (law.columns)(on, &[]);
     columns.into_iter().filter(|c| matches!(c.tolerance, Tolerance::Main(_))).map(|c| c.values).collect()
-}
-
-/// Means of `stride` rows, session by session.
-fn averaged(rows: &Rows, column: &[f64], stride: usize) -> Vec<f64> {
-    rows.sessions_used()
-        .flat_map(|session| column[session].chunks(stride).map(|c| c.iter().sum::<f64>() / c.len() as f64))
-        .collect()
 }
 
 /// What is left of each row less the mean of the rows around it: nothing of a straight line.
@@ -78,7 +72,7 @@ fn explained_in_detail(rows: &Rows, columns: &[Vec<f64>], left: &[f64], uncertai
     let mut data = detail(rows, left);
     let usable =
         |k: usize| !uncertain[k.saturating_sub(TOGETHER / 2)..(k + TOGETHER / 2 + 1).min(left.len())].contains(&true);
-    let spread = quantile((0..data.len()).filter(|k| usable(*k)).map(|k| data[k].abs()), 0.5) / 0.6745;
+    let spread = robust_std((0..data.len()).filter(|k| usable(*k)).map(|k| data[k]));
     let mut used = 0usize;
     for (k, value) in data.iter_mut().enumerate() {
         if usable(k) && value.abs() < OUTLIER * spread {

@@ -169,6 +169,11 @@ pub(crate) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     quantile_of(&mut values, share)
 }
 
+/// Standard deviation about zero that a few outliers do not move: half of normal numbers lie within 0.6745 of it.
+pub(crate) fn robust_std(values: impl Iterator<Item = f64>) -> f64 {
+    quantile(values.map(f64::abs), 0.5) / 0.6745
+}
+
 /// Root mean square.
 pub(crate) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()

@@ -41,6 +41,14 @@ impl GeneratorKind {
             Self::Cam => "cam",
         }
     }
+
+    /// What it is called in a sentence.
+    pub const fn in_words(self) -> &'static str {
+        match self {
+            Self::DoubleDisc => "double disc",
+            other => other.name(),
+        }
+    }
 }
 
 impl fmt::Display for GeneratorKind {

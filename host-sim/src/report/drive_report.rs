@@ -64,16 +64,6 @@ fn torque_text(torque_n_m: f32) -> String {
     if digits == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').to_owned() }
 }
 
-/// What a generator is called in text.
-fn name_of(kind: GeneratorKind) -> &'static str {
-    match kind {
-        GeneratorKind::TwoRoller => "two-roller",
-        GeneratorKind::FourRoller => "four-roller",
-        GeneratorKind::DoubleDisc => "double disc",
-        GeneratorKind::Cam => "cam",
-    }
-}
-
 /// A subject with what is derived from it.
 struct Known<'a> {
     subject: Subject<'a>,
@@ -155,7 +145,7 @@ impl<'a> Known<'a> {
     }
 
     fn headline(&self) -> Headline {
-        let name = name_of(self.subject.kind);
+        let name = self.subject.kind.in_words();
         let choice = Some(self.id());
         if let Some(v) = self.subject.validation {
             return Headline {
@@ -431,12 +421,12 @@ pub fn drive_report(sources: Sources<'_>) -> Page {
     ];
     provenance.extend(inputs);
     for k in &known {
-        provenance.push((format!("table_id, {}", name_of(k.subject.kind)), k.subject.table.id().to_string()));
+        provenance.push((format!("table_id, {}", k.subject.kind.in_words()), k.subject.table.id().to_string()));
         if let Some(Source::Fem { solver, mesh, degrees_of_freedom, worst_residual, .. }) =
             k.subject.info.map(|info| &info.source)
         {
             provenance.push((
-                format!("FEM, {}", name_of(k.subject.kind)),
+                format!("FEM, {}", k.subject.kind.in_words()),
                 format!("{solver} solver, {mesh} mesh, {degrees_of_freedom} degrees of freedom, residual at most {worst_residual:.1e}"),
             ));
         }
@@ -444,7 +434,7 @@ pub fn drive_report(sources: Sources<'_>) -> Page {
     for a in known.iter().filter_map(|k| k.subject.animation.as_ref().ok()) {
         let residual = a.rows.iter().map(|row| row.residual).fold(0.0, f64::max);
         provenance.push((
-            format!("In motion, {}", name_of(a.kind)),
+            format!("In motion, {}", a.kind.in_words()),
             format!(
                 "fast solver, {FRAMES} frames of one pitch, {} N·m, {} °C, residual at most {residual:.1e}",
                 a.torque_n_m, a.temperature_c
@@ -462,7 +452,7 @@ pub fn drive_report(sources: Sources<'_>) -> Page {
         status,
         also: Vec::new(),
         remarks,
-        choices: known.iter().map(|k| Choice { id: k.id(), name: name_of(k.subject.kind).to_owned() }).collect(),
+        choices: known.iter().map(|k| Choice { id: k.id(), name: k.subject.kind.in_words().to_owned() }).collect(),
         choice_is: "Generator",
         headlines: known.iter().map(Known::headline).collect(),
         sections,
@@ -481,7 +471,7 @@ fn judge(known: &[Known<'_>]) -> (Status, Vec<String>) {
         remarks.push(words);
     };
     for k in known {
-        let name = name_of(k.subject.kind);
+        let name = k.subject.kind.in_words();
         if k.subject.info.is_some_and(|info| info.torque_nodes_resolved == Some(false)) {
             let words = "the torque nodes ran out before the table met the FEM everywhere; see --most-nodes";
             remark(Status::Remark, format!("{name}: {words}."));
@@ -571,7 +561,7 @@ fn comparison(known: &[Known<'_>], validated: bool) -> Section {
             (None, None) => Text::new("–"),
         };
         vec![
-            Text::new(name_of(k.subject.kind)),
+            Text::new(k.subject.kind.in_words()),
             Text::new(torque_text(highest)),
             error(k.largest_error, 3),
             error(backlash, 3),
@@ -824,7 +814,7 @@ fn table_section(known: &[Known<'_>]) -> Section {
         blocks.push(Block::Table {
             choice: Some(k.id()),
             table: PageTable {
-                caption: format!("The {} table", name_of(k.subject.kind)),
+                caption: format!("The {} table", k.subject.kind.in_words()),
                 header: vec!["Property".into(), "Value".into()],
                 rows,
             },
@@ -871,27 +861,21 @@ fn load_section(known: &[Known<'_>]) -> Section {
 }
 
 fn reading_section() -> Section {
-    let paragraph = |words: &str| Block::Paragraph { choice: None, text: Text::new(words) };
-    Section {
-        id: "reading".into(),
-        title: "How to read this page".into(),
-        detail: Detail::Full,
-        blocks: vec![
-            paragraph(
-                "Error: output angle less generator angle over the ratio; positive when the output leads. The flexspline is \
+    Section::reading(vec![
+        Block::paragraph(
+            "Error: output angle less generator angle over the ratio; positive when the output leads. The flexspline is \
                  fixed, the circular spline is the output. Forward is growing generator angle.",
-            ),
-            paragraph(
-                "Fresh FEM means runs that made none of the tables, by the same model: agreement says that the table holds what \
+        ),
+        Block::paragraph(
+            "Fresh FEM means runs that made none of the tables, by the same model: agreement says that the table holds what \
                  the model says, not that the model holds what a real drive does. Plane strain, quasi-static: the cup of the \
                  flexspline, its skew, lubricant and speed are left out.",
-            ),
-            paragraph(
-                "Figures zoom by dragging and come back by a double click. Pointing along figure 2 turns the drive of figure 1. \
+        ),
+        Block::paragraph(
+            "Figures zoom by dragging and come back by a double click. Pointing along figure 2 turns the drive of figure 1. \
                  Every figure has its numbers as a table and as CSV, in the unit that is selected.",
-            ),
-        ],
-    }
+        ),
+    ])
 }
 
 #[cfg(test)]

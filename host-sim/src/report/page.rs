@@ -228,6 +228,20 @@ pub struct Table {
     pub rows: Vec<Vec<Text>>,
 }
 
+impl Block {
+    /// Words, whatever is chosen.
+    pub fn paragraph(text: impl Into<Text>) -> Block {
+        Block::Paragraph { choice: None, text: text.into() }
+    }
+}
+
+impl Section {
+    /// How to read the page: the last section, folded.
+    pub fn reading(blocks: Vec<Block>) -> Section {
+        Section { id: "reading".into(), title: "How to read this page".into(), detail: Detail::Full, blocks }
+    }
+}
+
 impl Table {
     /// Whether a column holds words and no numbers: those stand to the left.
     fn is_words(&self, column: &usize) -> bool {

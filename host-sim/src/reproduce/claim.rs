@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::drive::GeneratorKind;
+
 /// What comes of a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, PartialOrd, Ord)]
 pub enum Verdict {
@@ -157,6 +159,17 @@ impl Draft {
     pub fn ours(mut self, name: impl Into<String>, value: f64, unit: &'static str) -> Draft {
         self.0.ours.push(Number { name: name.into(), value, unit });
         self
+    }
+
+    /// A number of ours for each of some generators; `of` goes behind their names.
+    pub fn ours_each(
+        self,
+        kinds: impl IntoIterator<Item = GeneratorKind>,
+        of: &str,
+        value: impl Fn(GeneratorKind) -> f64,
+        unit: &'static str,
+    ) -> Draft {
+        kinds.into_iter().fold(self, |draft, kind| draft.ours(format!("{}{of}", kind.in_words()), value(kind), unit))
     }
 
     fn check(

@@ -31,8 +31,6 @@ use experiments::Experiment;
 use rank::{Agreement, Measured, kendall_tau};
 use runs::{ProtocolRun, RunRecord, Runs, Variant};
 
-pub(crate) use claims::name_of;
-
 /// Version of the layout of `reproduce.json`.
 pub const REPRODUCE_SCHEMA: u32 = 1;
 
@@ -164,7 +162,13 @@ pub fn reproduce(
         .iter()
         .filter_map(|run| {
             let error = run.outcome.as_ref().err()?.to_string();
-            Some(format!("{}, {} N·m, {}: {}", name_of(run.kind), run.torque_n_m, run.variant, without_history(&error)))
+            Some(format!(
+                "{}, {} N·m, {}: {}",
+                run.kind.in_words(),
+                run.torque_n_m,
+                run.variant,
+                without_history(&error)
+            ))
         })
         .collect();
     for experiment in &experiments {

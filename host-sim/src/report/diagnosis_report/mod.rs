@@ -161,10 +161,6 @@ fn thinned(session: &Session, every: usize) -> Session {
     }
 }
 
-fn paragraph(text: impl Into<Text>) -> Block {
-    Block::Paragraph { choice: None, text: text.into() }
-}
-
 fn table(caption: &str, header: &[&str], rows: Vec<Vec<Text>>) -> Block {
     let header = header.iter().map(|&cell| cell.to_owned()).collect();
     Block::Table { choice: None, table: PageTable { caption: caption.into(), header, rows } }
@@ -299,7 +295,7 @@ impl Known<'_> {
         let (held, left) = (diagnosis.held_out, diagnosis.residual);
         let mut blocks = Vec::new();
         if !diagnosis.causes.is_empty() {
-            blocks.push(paragraph(
+            blocks.push(Block::paragraph(
                 Text::new(format!("In {} the error of the prediction falls from ", self.left_out()))
                     .error(held.rms_before_arcsec, 3)
                     .plain(" to ")
@@ -309,7 +305,7 @@ impl Known<'_> {
                     .plain("."),
             ));
         } else {
-            blocks.push(paragraph(
+            blocks.push(Block::paragraph(
                 Text::new("The nominal model, recalibrated to this unit, leaves ")
                     .error(left.rms_before_arcsec, 3)
                     .plain(" rms. Noise and wander of the measurement are ")
@@ -319,7 +315,7 @@ impl Known<'_> {
         }
         for cause in diagnosis.causes.iter().filter(|cause| !cause.look_alikes.is_empty()) {
             let alike: Vec<String> = cause.look_alikes.iter().map(|name| words::cause(name)).collect();
-            blocks.push(paragraph(
+            blocks.push(Block::paragraph(
                 Text::new("These data do not tell ")
                     .strong(words::cause(&cause.name))
                     .plain(format!(" from {}.", words::listed(&alike))),
@@ -340,10 +336,10 @@ impl Known<'_> {
             } else {
                 " rms.".into()
             });
-            blocks.push(paragraph(text));
+            blocks.push(Block::paragraph(text));
         }
         if let Some(next) = &diagnosis.next_experiment {
-            blocks.push(paragraph(Text::new("To record next: ").plain(format!("{next}."))));
+            blocks.push(Block::paragraph(Text::new("To record next: ").plain(format!("{next}."))));
         }
         Section { id: "short".into(), title: "In short".into(), detail: Detail::Summary, blocks }
     }
@@ -500,14 +496,14 @@ impl Known<'_> {
                 ],
                 rows,
             ));
-            blocks.push(paragraph(format!(
+            blocks.push(Block::paragraph(format!(
                 "Confidence: that it is this cause and not its best rival, given that it is one of the library. Gain: share of the \
                  squared error of the recalibrated nominal model that it removes in {}. Look-alikes: causes that these data \
                  cannot tell from it. Parameters are of the law that was fitted; µm are displacements on the pitch circle.",
                 self.left_out()
             )));
             for cause in diagnosis.causes.iter().filter(|cause| !words::effect(&cause.name).is_empty()) {
-                blocks.push(paragraph(
+                blocks.push(Block::paragraph(
                     Text::default()
                         .strong(words::begun(&words::cause(&cause.name)))
                         .plain(format!(": {}.", words::effect(&cause.name))),
@@ -531,7 +527,7 @@ impl Known<'_> {
             } else {
                 "These describe the remainder; they are no causes, and nothing of them is in the extended model."
             };
-            blocks.push(paragraph(sure));
+            blocks.push(Block::paragraph(sure));
         }
         (!blocks.is_empty()).then(|| Section {
             id: "causes".into(),
@@ -557,7 +553,7 @@ impl Known<'_> {
                 row(self.left_out().into(), held_out.rms_before_arcsec, held_out.rms_after_arcsec),
             ],
         );
-        let noise = paragraph(
+        let noise = Block::paragraph(
             Text::new("Noise and wander of the measurement are ").error(residual.noise_floor_arcsec, 3).plain(format!(
                 " of it; {} of the squared error beyond that is left unexplained.",
                 words::percent(residual.unexplained_fraction)
@@ -582,7 +578,7 @@ impl Known<'_> {
         let rows = self.recalibrated_rows();
         if !rows.is_empty() {
             blocks.push(table("The nominal model as this unit has it", &["Parameter", "Against nominal"], rows));
-            blocks.push(paragraph(
+            blocks.push(Block::paragraph(
                 "Within the spread between units: wind-up and clearance by these shares of nominal, each harmonic by a share of its \
                  amplitude in phase with it and a quarter of a wave before it. The zero is that of the encoder.",
             ));
@@ -639,7 +635,7 @@ impl Known<'_> {
             id: "next".into(),
             title: "What to record next".into(),
             detail: Detail::Summary,
-            blocks: vec![paragraph(text)],
+            blocks: vec![Block::paragraph(text)],
         }
     }
 
@@ -649,7 +645,7 @@ impl Known<'_> {
         let recording = self.sources.recording;
         let mut blocks = Vec::new();
         if recording.faults.is_empty() {
-            blocks.push(paragraph("No faults were found in the data."));
+            blocks.push(Block::paragraph("No faults were found in the data."));
         } else {
             let rows = recording
                 .faults
@@ -683,7 +679,7 @@ impl Known<'_> {
                 rows,
             ));
             if recording.faults.len() > MOST {
-                blocks.push(paragraph(format!("{} more are in diagnosis.json.", recording.faults.len() - MOST)));
+                blocks.push(Block::paragraph(format!("{} more are in diagnosis.json.", recording.faults.len() - MOST)));
             }
         }
         if !recording.tooth_steps.is_empty() {
@@ -702,7 +698,10 @@ impl Known<'_> {
             blocks.push(table("Steps of whole teeth", &["When", "Size", "Tooth pitches"], rows));
         }
         blocks.extend(
-            recording.notes.iter().map(|note| paragraph(format!("{}.", words::begun(note.trim_end_matches('.'))))),
+            recording
+                .notes
+                .iter()
+                .map(|note| Block::paragraph(format!("{}.", words::begun(note.trim_end_matches('.'))))),
         );
         let range = |values: Option<&Vec<f64>>| {
             let Some(values) = values else { return "–".to_owned() };
@@ -734,39 +733,34 @@ impl Known<'_> {
             rows,
         ));
         if recording.sessions.len() > MOST {
-            blocks.push(paragraph(format!("{} more sessions.", recording.sessions.len() - MOST)));
+            blocks.push(Block::paragraph(format!("{} more sessions.", recording.sessions.len() - MOST)));
         }
         let detail = if recording.faults.is_empty() { Detail::Engineering } else { Detail::Summary };
         Section { id: "data".into(), title: "The data".into(), detail, blocks }
     }
 
     fn reading(&self) -> Section {
-        Section {
-            id: "reading".into(),
-            title: "How to read this page".into(),
-            detail: Detail::Full,
-            blocks: vec![
-                paragraph(
-                    "Error: output angle less generator angle over the ratio; positive when the output leads. ψ is the angle of the \
+        Section::reading(vec![
+            Block::paragraph(
+                "Error: output angle less generator angle over the ratio; positive when the output leads. ψ is the angle of the \
                      generator, δ that of the output. Forward is growing generator angle.",
-                ),
-                paragraph(
-                    "The selector shows the same figures of what the nominal model leaves, of what it leaves recalibrated to this \
+            ),
+            Block::paragraph(
+                "The selector shows the same figures of what the nominal model leaves, of what it leaves recalibrated to this \
                      unit, and of what is left with the causes that were named. A cause that is right takes its marks away in the \
                      last without putting others in their place.",
-                ),
-                paragraph(format!(
-                    "A name is given only where a cause gains in {}, where no rival does as well, and where it is large enough \
+            ),
+            Block::paragraph(format!(
+                "A name is given only where a cause gains in {}, where no rival does as well, and where it is large enough \
                      against noise and against how wrong its law may be. What does not meet that is described and not named.",
-                    self.left_out()
-                )),
-                paragraph(
-                    "Figures zoom by dragging and come back by a double click. Every figure has its numbers as a table and as CSV, in \
+                self.left_out()
+            )),
+            Block::paragraph(
+                "Figures zoom by dragging and come back by a double click. Every figure has its numbers as a table and as CSV, in \
                      the unit that is selected; of many rows it holds what is drawn, which is a part of them.",
-                ),
-                paragraph(format!("Verdict: {}.", words::verdict(self.sources.diagnosis.verdict))),
-            ],
-        }
+            ),
+            Block::paragraph(format!("Verdict: {}.", words::verdict(self.sources.diagnosis.verdict))),
+        ])
     }
 }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::thin::{dots, medians, middle, peaks_kept, some_rows};
-use super::{Known, Shown, orders, paragraph, words};
+use super::{Known, Shown, orders, words};
 use crate::nominal::Fixed;
 use crate::report::page::{
     Axis, Block, Detail, Field, Figure, FigureBody, Lines, Mark, Quantity, Section, Series, Table, Text, Upright,
@@ -311,7 +311,7 @@ impl Known<'_> {
         blocks.extend(self.shown.iter().filter_map(|shown| self.peak_table(shown)));
         blocks.extend(self.shown.iter().filter_map(pulse_table));
         if blocks.is_empty() {
-            blocks.push(paragraph("The drive turned too little for orders."));
+            blocks.push(Block::paragraph("The drive turned too little for orders."));
         }
         Section { id: "orders".into(), title: "Orders".into(), detail: Detail::Engineering, blocks }
     }

@@ -5,7 +5,7 @@ use super::super::page::{Limit, Lines, Mark, Series, Upright};
 use crate::drive::GeneratorKind;
 use crate::reference::ToothPath;
 use crate::reproduce::experiments::{LARGE_ARCMIN, curves};
-use crate::reproduce::{Reproduction, name_of, paper};
+use crate::reproduce::{Reproduction, paper};
 use crate::simulate::Row;
 use std::f64::consts::TAU;
 
@@ -37,7 +37,8 @@ pub(super) fn ripple(a: &Animation) -> Lines {
 /// Figure 13.
 pub(super) fn errors(r: &Reproduction) -> Lines {
     let runs = GeneratorKind::ALL.into_iter().enumerate();
-    let series = runs.filter_map(|(colour, kind)| Some(both_ways(name_of(kind), colour, &r.runs.get(kind, 0.0)?.rows)));
+    let series =
+        runs.filter_map(|(colour, kind)| Some(both_ways(kind.in_words(), colour, &r.runs.get(kind, 0.0)?.rows)));
     Lines { series: series.flatten().collect(), ..Lines::default() }
 }
 
@@ -132,7 +133,7 @@ pub(super) fn stress(r: &Reproduction) -> Lines {
     let runs = GeneratorKind::ALL.into_iter().enumerate();
     let curves = runs.filter_map(|(colour, kind)| {
         let snapshot = r.runs.get(kind, 0.0)?.snapshot.as_ref()?;
-        Some(series(name_of(kind), Mark::Line, colour, snapshot.stress.clone()))
+        Some(series(kind.in_words(), Mark::Line, colour, snapshot.stress.clone()))
     });
     let uprights = [("M", -90.0), ("D", 0.0), ("M", 90.0)].map(|(name, x)| Upright { name: name.into(), x });
     Lines { series: curves.collect(), uprights: uprights.into(), ..Lines::default() }

@@ -11,10 +11,10 @@ use super::page::{
     Text,
 };
 use crate::drive::GeneratorKind;
+use crate::reproduce::Reproduction;
 use crate::reproduce::claim::Verdict;
 use crate::reproduce::experiments::Experiment;
 use crate::reproduce::paper;
-use crate::reproduce::{Reproduction, name_of};
 
 /// What the page is made from.
 pub struct Sources<'a> {
@@ -55,10 +55,6 @@ fn error_axis() -> Axis {
     Axis::new("Output error", Quantity::Error)
 }
 
-fn paragraph(text: impl Into<Text>) -> Block {
-    Block::Paragraph { choice: None, text: text.into() }
-}
-
 /// The page.
 pub fn page(sources: Sources<'_>) -> Page {
     let Sources { reproduction: r, command, animations } = sources;
@@ -94,7 +90,7 @@ pub fn page(sources: Sources<'_>) -> Page {
     for kind in GeneratorKind::ALL {
         if let Some(solved) = r.runs.get(kind, 0.0) {
             provenance.push((
-                format!("FEM, {}", name_of(kind)),
+                format!("FEM, {}", kind.in_words()),
                 format!(
                     "fast solver, {} mesh, {} degrees of freedom, residual at most {:.1e}",
                     r.settings.mesh, solved.degrees_of_freedom, solved.residual
@@ -109,7 +105,7 @@ pub fn page(sources: Sources<'_>) -> Page {
         also: Vec::new(),
         remarks,
         choices: [GeneratorKind::FourRoller, GeneratorKind::TwoRoller, GeneratorKind::DoubleDisc, GeneratorKind::Cam]
-            .map(|kind| Choice { id: kind.to_string(), name: name_of(kind).to_owned() })
+            .map(|kind| Choice { id: kind.to_string(), name: kind.in_words().to_owned() })
             .into(),
         choice_is: "Generator",
         headlines: vec![headline(r)],
@@ -191,7 +187,7 @@ fn headline(r: &Reproduction) -> Headline {
 
 fn glance(r: &Reproduction) -> Section {
     let mut blocks = vec![Block::Table { choice: None, table: tables::by_part(r) }];
-    blocks.push(paragraph(
+    blocks.push(Block::paragraph(
         "Each claim of the paper has a metric and a criterion, and the verdict follows from the numbers alone. The paper \
          gives no tooth sizes: sizes count as reproduced within a quarter, ranks where the gap exceeds three times what mesh, increment and \
          penalty move it by.",
@@ -255,7 +251,7 @@ fn claims(r: &Reproduction) -> Section {
 }
 
 fn sources_of_errors(r: &Reproduction) -> Section {
-    let mut blocks = vec![paragraph(
+    let mut blocks = vec![Block::paragraph(
         "The paper's errors are 20 to 40 times what a sound drive shows. Each suspect was put into the model alone and run through the same \
          protocol, on the coarse mesh, without load.",
     )];
@@ -273,7 +269,7 @@ fn sources_of_errors(r: &Reproduction) -> Section {
         }
     }
     blocks.push(Block::Table { choice: None, table: tables::takeaways(r) });
-    blocks.push(paragraph(format!(
+    blocks.push(Block::paragraph(format!(
         "How the rim is kept from turning matters because the rim is deformed: a point of it moves along the circumference by v, twice around in \
          each turn of the generator, by a quarter of a millimetre and more at the bore. The mean of the whole bore does not move. One point that is \
          held still makes the whole flexspline turn by v over the radius instead, and the output with it. The paper says that rotation of the \
@@ -346,10 +342,10 @@ fn path_and_stress(r: &Reproduction) -> Section {
 }
 
 fn load_and_reversal(r: &Reproduction) -> Section {
-    let load = |id: &str, number: u32, kind| {
+    let load = |id: &str, number: u32, kind: GeneratorKind| {
         lines(
             id,
-            &format!("Under load, {}: the paper's figure {number}", name_of(kind)),
+            &format!("Under load, {}: the paper's figure {number}", kind.in_words()),
             "Error under +200, 0 and −200 N·m (10 N·m to the millimetre of width), forward (lines) and back (dashed). The paper shows the output angle, \
              in which this is hard to see.",
             generator_axis(),
@@ -376,7 +372,7 @@ fn load_and_reversal(r: &Reproduction) -> Section {
 }
 
 fn spread(r: &Reproduction) -> Section {
-    let mut blocks = vec![paragraph(
+    let mut blocks = vec![Block::paragraph(
         "Every metric that ranks generators was computed again with other meshes, increments and penalties. A rank holds where the gap between two \
          generators exceeds three times the spread of that gap. Kendall's tau compares with the paper's order four-roller ≥ two-roller > double disc > \
          cam.",
@@ -392,7 +388,7 @@ fn spread(r: &Reproduction) -> Section {
 
 fn judged(r: &Reproduction) -> Section {
     let blocks = vec![
-        paragraph(
+        Block::paragraph(
             "A failed check of the paper's own numbers makes a claim inconsistent; else what is missing, or a run without equilibrium, leaves it \
              untestable; else the checks of the model decide.",
         ),
@@ -402,21 +398,16 @@ fn judged(r: &Reproduction) -> Section {
 }
 
 fn reading() -> Section {
-    Section {
-        id: "reading".into(),
-        title: "How to read this page".into(),
-        detail: Detail::Full,
-        blocks: vec![
-            paragraph(
-                "Error: output angle less generator angle over the ratio; positive when the output leads. Mean lag: its mean over whole tooth pitches after \
+    Section::reading(vec![
+        Block::paragraph(
+            "Error: output angle less generator angle over the ratio; positive when the output leads. Mean lag: its mean over whole tooth pitches after \
                  start-up. Ripple: its range in that time. Half-width at reversal: half of what is lost between forward and backward; the whole is the \
                  backlash. Dwell: generator travel while the output stands. They are different things, and a claim is held against one of them.",
-            ),
-            paragraph(format!(
-                "The drive is built in: 188 and 190 teeth of module 0.5 mm, 20 mm wide, ideal, without friction, drag of 0.02 N·m on the output. Its clearance \
+        ),
+        Block::paragraph(format!(
+            "The drive is built in: 188 and 190 teeth of module 0.5 mm, 20 mm wide, ideal, without friction, drag of 0.02 N·m on the output. Its clearance \
                  was chosen to give the cam a backlash near 1′, so that the size of the paper's backlash is no evidence. {FRAMES} states of one pitch show it \
                  in motion. Plane strain, quasi-static: speed, inertia and the third dimension are left out, in the paper too.",
-            )),
-        ],
-    }
+        )),
+    ])
 }

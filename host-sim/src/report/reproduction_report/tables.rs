@@ -2,11 +2,11 @@
 
 use super::super::page::{Table, Text, significant};
 use crate::drive::GeneratorKind;
+use crate::reproduce::Reproduction;
 use crate::reproduce::claim::{Check, Claim, Number, Of, Verdict};
 use crate::reproduce::metrics::ProtocolMetrics;
 use crate::reproduce::rank::Agreement;
 use crate::reproduce::runs::torques_of;
-use crate::reproduce::{Reproduction, name_of};
 
 fn header<const N: usize>(words: [&str; N]) -> Vec<String> {
     words.map(str::to_owned).into()
@@ -130,9 +130,9 @@ pub(super) fn experiments(r: &Reproduction, kind: GeneratorKind) -> Option<Table
     (!rows.is_empty()).then(|| Table {
         caption: match paper {
             Some(arcmin) => {
-                format!("Changes of the model, {}; the paper has {arcmin:.1}′ as the largest error", name_of(kind))
+                format!("Changes of the model, {}; the paper has {arcmin:.1}′ as the largest error", kind.in_words())
             }
-            None => format!("Changes of the model, {}; the paper gives no number", name_of(kind)),
+            None => format!("Changes of the model, {}; the paper gives no number", kind.in_words()),
         },
         header: header([
             "Change",
@@ -179,7 +179,7 @@ pub(super) fn metrics(r: &Reproduction) -> Table {
     let rows = runs.filter_map(|(kind, torque)| {
         let solved = r.runs.get(kind, torque)?;
         let name =
-            if torque == 0.0 { name_of(kind).to_owned() } else { format!("{}, {torque:+.0} N·m", name_of(kind)) };
+            if torque == 0.0 { kind.in_words().to_owned() } else { format!("{}, {torque:+.0} N·m", kind.in_words()) };
         let mut row = vec![Text::new(name.replace('-', "\u{2011}").replace(" \u{2011}", " −"))];
         row.extend(columns.iter().map(|(_, of)| error(of(&solved.metrics))));
         row.push(number(solved.metrics.peak_mpa, "MPa", 3));

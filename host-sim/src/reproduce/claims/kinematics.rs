@@ -2,7 +2,7 @@
 
 use super::super::claim::{Claim, Verdict, claim};
 use super::super::paper;
-use super::{Evidence, least, most, name_of};
+use super::{Evidence, least, most};
 use crate::drive::{GeneratorKind, RigidMesh};
 use crate::reference::ToothPath;
 
@@ -28,7 +28,7 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     let mut path = claim("tip-path", "Fig. 6, (7) and (9)", "The tip of a flexspline tooth moves along the path of formulas (7) and (9).")
         .metric("Largest distance of that path from the path of the tooth tip in the FEM, deformed, no load, over a quarter turn");
     for (kind, [outward, around]) in all.iter().zip(differences) {
-        path = path.ours(name_of(*kind), outward.max(around), "µm");
+        path = path.ours(kind.in_words(), outward.max(around), "µm");
     }
     let path = path
         .at_most("largest distance over the working depth", worst / (1e3 * depth_mm), "", OF_WORKING_DEPTH)
@@ -100,7 +100,7 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     )
     .metric("Least gap between the tooth outlines over the whole mesh cycle, both flanks, rigid teeth");
     for (kind, gap) in all.iter().zip(gaps) {
-        clear = clear.ours(name_of(*kind), gap, "µm");
+        clear = clear.ours(kind.in_words(), gap, "µm");
     }
     let clear = clear.at_least("least gap", least(gaps), "µm", 0.0).because(|verdict| match verdict {
         Verdict::Reproduced => "One pair of wheels clears under all four generators.".into(),

@@ -3,7 +3,7 @@
 use super::super::claim::{Claim, Verdict, claim};
 use super::super::paper;
 use super::super::rank::SPREADS;
-use super::{Evidence, least, most, name_of};
+use super::{Evidence, least, most};
 use crate::drive::GeneratorKind::{self, Cam, DoubleDisc};
 use crate::simulate::Row;
 
@@ -40,15 +40,13 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     const METRIC: &str =
         "Mean |output under load less output without load| over settled rows at the same generator angle";
 
-    let mut same = claim(
+    let same = claim(
         "load-with-motion",
         "Figs. 14 and 15, text",
         "A torque with the motion makes no clear difference to the unloaded output; the curves almost overlap.",
     )
-    .metric(METRIC);
-    for kind in LOADED {
-        same = same.ours(format!("{}, +200 N·m, forward", name_of(kind)), with(kind, true), "′");
-    }
+    .metric(METRIC)
+    .ours_each(LOADED, ", +200 N·m, forward", |kind| with(kind, true), "′");
     let same = same
         .at_most(
             "largest shift, against the smallest difference that the paper reads from its charts",
@@ -62,15 +60,13 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
         });
 
     let more = least(LOADED.map(|kind| against(kind, true) / with(kind, true)));
-    let mut opposite = claim(
+    let opposite = claim(
         "load-against-larger",
         "Figs. 14 and 15, text",
         "Discrepancies are larger when the torque is opposite to the motion.",
     )
-    .metric("The same shift under −200 N·m over that under +200 N·m, forward");
-    for kind in LOADED {
-        opposite = opposite.ours(format!("{}, −200 N·m, forward", name_of(kind)), against(kind, true), "′");
-    }
+    .metric("The same shift under −200 N·m over that under +200 N·m, forward")
+    .ours_each(LOADED, ", −200 N·m, forward", |kind| against(kind, true), "′");
     let opposite = opposite.at_least("least ratio of the two", more, "", 1.0).because(|verdict| match verdict {
         Verdict::Reproduced => "They are larger.".into(),
         _ => "The other way round: without load the output already lies on the flank that a load against the motion presses, so that \
@@ -87,8 +83,8 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     )
     .metric("The shift under −200 N·m after the reversal less that before it, over the backlash at no load");
     for kind in LOADED {
-        after = after.ours(format!("{}, after", name_of(kind)), against(kind, false), "′");
-        after = after.ours(format!("{}, before", name_of(kind)), against(kind, true), "′");
+        after = after.ours(format!("{}, after", kind.in_words()), against(kind, false), "′");
+        after = after.ours(format!("{}, before", kind.in_words()), against(kind, true), "′");
     }
     let after = after.at_least("least growth, in backlashes", grows, "", 0.9).because(|verdict| match verdict {
         Verdict::Reproduced => {
@@ -113,11 +109,9 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
 
     let loaded_error = |kind| evidence.runs.measure(kind, -torque, |m| Some(m.lag_forward_arcsec?.abs()));
     let gap = loaded_error(DoubleDisc).gap_in_spreads(&loaded_error(Cam));
-    let mut better = claim("load-cam-better", "Below Fig. 15", "The cam drive is more accurate under load too.")
-        .metric("Mean lag forward under −200 N·m: double disc less cam, in spreads");
-    for kind in LOADED {
-        better = better.ours(name_of(kind), loaded_error(kind).value / 60.0, "′");
-    }
+    let better = claim("load-cam-better", "Below Fig. 15", "The cam drive is more accurate under load too.")
+        .metric("Mean lag forward under −200 N·m: double disc less cam, in spreads")
+        .ours_each(LOADED, "", |kind| loaded_error(kind).value / 60.0, "′");
     let better = better.at_least("gap, in spreads", gap, "", SPREADS).because(|verdict| match verdict {
         Verdict::Reproduced => format!(
             "The cam holds the rim all around; the discs let it go between their arcs, and it winds up {:.1} times as far.",

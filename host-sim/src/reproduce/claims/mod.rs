@@ -59,16 +59,6 @@ pub(super) fn all(evidence: &Evidence<'_>) -> Vec<Claim> {
     .collect()
 }
 
-/// A generator in text.
-pub(crate) fn name_of(kind: GeneratorKind) -> &'static str {
-    match kind {
-        GeneratorKind::TwoRoller => "two-roller",
-        GeneratorKind::FourRoller => "four-roller",
-        GeneratorKind::DoubleDisc => "double disc",
-        GeneratorKind::Cam => "cam",
-    }
-}
-
 /// The larger of values, NaN if one of them is.
 fn most(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(f64::NEG_INFINITY, |m, v| if m.is_nan() || v.is_nan() { f64::NAN } else { m.max(v) })

@@ -3,7 +3,7 @@
 use super::super::claim::{Claim, Verdict, claim};
 use super::super::paper;
 use super::super::rank::SPREADS;
-use super::{Evidence, SHARE, least, most, name_of};
+use super::{Evidence, SHARE, least, most};
 use crate::drive::GeneratorKind::{self, Cam, DoubleDisc};
 
 const REVERSED: [GeneratorKind; 2] = [DoubleDisc, Cam];
@@ -13,15 +13,12 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     let by_dwell = |kind| evidence.arcmin(kind, |m| m.dwell_arcsec);
     let backlash = |kind: GeneratorKind| evidence.backlash(kind);
 
-    let mut stands = claim(
+    let stands = claim(
         "dwell",
         "Figs. 16 and 17",
         "After the reversal the output stands (A–B) because of the backlash.",
     )
-    .metric("Generator travel from the reversal while the output stays within 0.05″, over the ratio, against the backlash of both ways");
-    for kind in REVERSED {
-        stands = stands.ours(format!("{}, generator", name_of(kind)), dwell(kind).value.to_degrees(), "°");
-    }
+    .metric("Generator travel from the reversal while the output stays within 0.05″, over the ratio, against the backlash of both ways").ours_each(REVERSED, ", generator", |kind| dwell(kind).value.to_degrees(), "°");
     let agreement = most(REVERSED.map(|kind| (by_dwell(kind) * 60.0 / backlash(kind).value - 1.0).abs()));
     let stands = stands
         .at_most("dwell over the ratio against the backlash, largest deviation", agreement, "", 0.05)
@@ -47,9 +44,9 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     let size = |id, kind, place, says: &str, paper_arcmin| {
         let ours = backlash(kind).value / 60.0;
         claim(id, place, says)
-            .paper(name_of(kind), paper_arcmin, "′")
+            .paper(kind.in_words(), paper_arcmin, "′")
             .metric("Mean error backward less mean error forward over whole pitches, no load but the drag of 0.02 N·m")
-            .ours(name_of(kind), ours, "′")
+            .ours(kind.in_words(), ours, "′")
             .within("backlash", ours, "′", paper_arcmin, SHARE)
             .because(move |verdict| match verdict {
                 Verdict::Reproduced => "Of the same size, but that is no evidence: the clearance of the built-in drive was chosen to give the \
@@ -94,16 +91,14 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
             ),
         });
 
-    let mut paths = claim(
+    let paths = claim(
         "path-differs",
         "Figs. 16 and 17",
         "The first motion 0–A does not follow the same curve as the return B–C.",
     )
     .metric("Lost motion: mean |e(B–C) − e(0–A)| at the same generator angles, no load; over the backlash")
-    .paper("difference of the two, not given", f64::NAN, "′");
-    for kind in REVERSED {
-        paths = paths.ours(name_of(kind), evidence.arcmin(kind, |m| m.lost_motion_arcsec), "′");
-    }
+    .paper("difference of the two, not given", f64::NAN, "′")
+    .ours_each(REVERSED, "", |kind| evidence.arcmin(kind, |m| m.lost_motion_arcsec), "′");
     let apart = least(REVERSED.map(|kind| {
         let lost = evidence.runs.measure(kind, 0.0, |m| m.lost_motion_arcsec);
         lost.value / lost.spread.max(1e-3 * lost.value)
@@ -148,15 +143,13 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
 
     let others = GeneratorKind::ALL.into_iter().filter(|kind| *kind != Cam);
     let best = least(others.map(|kind| backlash(kind).gap_in_spreads(&backlash(Cam))));
-    let mut winner = claim(
+    let winner = claim(
         "cam-most-accurate",
         "Abstract; end of sections 4 and 5",
         "Of the four, the cam allows the highest accuracy, in reversing motion too.",
     )
-    .metric("Backlash at no load of each other generator less that of the cam, least of them, in spreads");
-    for kind in GeneratorKind::ALL {
-        winner = winner.ours(name_of(kind), backlash(kind).value / 60.0, "′");
-    }
+    .metric("Backlash at no load of each other generator less that of the cam, least of them, in spreads")
+    .ours_each(GeneratorKind::ALL, "", |kind| backlash(kind).value / 60.0, "′");
     let winner = winner.at_least("least gap, in spreads", best, "", SPREADS).because(|verdict| match verdict {
         Verdict::Reproduced => "It loses least.".into(),
         _ => "Without load the two-roller drive has slightly less backlash, and all are within 0.07′; under load the cam is best by far.".into(),

@@ -2,7 +2,7 @@
 
 use super::super::claim::{Claim, Verdict, claim};
 use super::super::rank::SPREADS;
-use super::{Evidence, least, most, name_of};
+use super::{Evidence, least, most};
 use crate::drive::GeneratorKind;
 
 /// A stress this near to an axis is at it, degrees: the height of a tooth seen from the centre is about one.
@@ -13,15 +13,12 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     let two = peak(GeneratorKind::TwoRoller);
     let others = [GeneratorKind::FourRoller, GeneratorKind::DoubleDisc, GeneratorKind::Cam];
     let gap = least(others.map(|kind| two.gap_in_spreads(&peak(kind))));
-    let mut highest = claim(
+    let highest = claim(
         "stress-two-roller",
         "Fig. 10; section 5",
         "The highest stress occurs in the rim of the flexspline with the two-roller generator.",
     )
-    .metric("Largest von Mises stress on the unloaded path; gap to each other generator over the larger discretisation spread");
-    for kind in GeneratorKind::ALL {
-        highest = highest.ours(name_of(kind), peak(kind).value, "MPa");
-    }
+    .metric("Largest von Mises stress on the unloaded path; gap to each other generator over the larger discretisation spread").ours_each(GeneratorKind::ALL, "", |kind| peak(kind).value, "MPa");
     let spread = most(GeneratorKind::ALL.map(|kind| peak(kind).spread));
     let highest = highest
         .at_least("least gap to another generator, in spreads", gap, "", SPREADS)
@@ -36,15 +33,12 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
 
     let place = |kind| evidence.unloaded(kind).map_or(f64::NAN, |s| s.peak_from_major_deg);
     let off_axis = |kind| f64::min(place(kind), 90.0 - place(kind));
-    let mut axes = claim(
+    let axes = claim(
         "stress-at-axes",
         "Figs. 10 and 11",
         "In all variants stresses are increased at the major (D) and the minor (M) axis, where the deformation is largest.",
     )
-    .metric("Angle of the largest von Mises stress from the nearer axis of the generator");
-    for kind in GeneratorKind::ALL {
-        axes = axes.ours(format!("{}, from the major axis", name_of(kind)), place(kind), "°");
-    }
+    .metric("Angle of the largest von Mises stress from the nearer axis of the generator").ours_each(GeneratorKind::ALL, ", from the major axis", place, "°");
     let axes = axes
         .at_most("largest angle from an axis", most(GeneratorKind::ALL.map(off_axis)), "°", AT_AXIS_DEG)
         .because(|verdict| match verdict {

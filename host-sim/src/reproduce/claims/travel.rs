@@ -3,7 +3,7 @@
 use super::super::claim::{Claim, Verdict, claim};
 use super::super::paper::{self, ARCMIN};
 use super::super::rank::{SPREADS, kendall_tau};
-use super::{Evidence, SHARE, least, most, name_of};
+use super::{Evidence, SHARE, least, most};
 use crate::drive::GeneratorKind::{self, Cam, DoubleDisc, FourRoller, TwoRoller};
 
 /// A remaining error counts as vanished below this share of the largest.
@@ -27,12 +27,10 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
 fn figure_12(evidence: &Evidence<'_>) -> Vec<Claim> {
     let all = GeneratorKind::ALL;
     let lag = |kind| evidence.arcmin(kind, |m| m.lag_forward_arcsec);
-    let mut nominal =
+    let nominal =
         claim("not-nominal", "Fig. 12, text", "With none of the generators the output follows the nominal line.")
-            .metric("Mean lag over whole tooth pitches after start-up, forward, no load");
-    for kind in all {
-        nominal = nominal.ours(name_of(kind), lag(kind), "′");
-    }
+            .metric("Mean lag over whole tooth pitches after start-up, forward, no load")
+            .ours_each(all, "", lag, "′");
     let smallest = least(all.map(|kind| {
         let lag = evidence.runs.measure(kind, 0.0, |m| m.lag_forward_arcsec);
         lag.value.abs() / lag.spread.max(1e-3 * lag.value.abs())
@@ -46,15 +44,13 @@ fn figure_12(evidence: &Evidence<'_>) -> Vec<Claim> {
         });
 
     let rollers = [TwoRoller, FourRoller];
-    let mut first = claim(
+    let first = claim(
         "rollers-delayed",
         "Fig. 12 (a), (b)",
         "With rollers the output is delayed in the first phase of motion.",
     )
-    .metric("Mean lag forward, negative when the output is late; angle at which it is first reached");
-    for kind in rollers {
-        first = first.ours(name_of(kind), lag(kind), "′");
-    }
+    .metric("Mean lag forward, negative when the output is late; angle at which it is first reached")
+    .ours_each(rollers, "", lag, "′");
     let first =
         first.at_most("largest mean lag (a delay is negative)", most(rollers.map(lag)), "′", 0.0).because(|verdict| {
             match verdict {
@@ -71,15 +67,12 @@ fn figure_12(evidence: &Evidence<'_>) -> Vec<Claim> {
             .unloaded(kind)
             .map_or(f64::NAN, |s| s.metrics.error_at_turn_arcsec.abs() / s.metrics.largest_out_arcsec)
     };
-    let mut equal = claim(
+    let equal = claim(
         "equal-at-one-radian",
         "Fig. 12, text",
         "After 1 rad the output of the roller drives is equal to the nominal value; therefore the motion is reversed there.",
     )
-    .metric("Error at +1 rad over the largest error up to there, no load");
-    for kind in rollers {
-        equal = equal.ours(format!("{}, error at +1 rad", name_of(kind)), at_turn(kind), "′");
-    }
+    .metric("Error at +1 rad over the largest error up to there, no load").ours_each(rollers, ", error at +1 rad", at_turn, "′");
     let equal = equal.at_most("error at +1 rad over the largest", most(rollers.map(vanished)), "", VANISHED).because(
         |verdict| match verdict {
             Verdict::Reproduced => "The error is gone at +1 rad.".into(),
@@ -93,15 +86,13 @@ fn figure_12(evidence: &Evidence<'_>) -> Vec<Claim> {
     let return_ratio = |kind| {
         evidence.unloaded(kind).map_or(f64::NAN, |s| s.metrics.largest_back_arcsec / s.metrics.largest_out_arcsec)
     };
-    let mut back = claim(
+    let back = claim(
         "return-greater",
         "Fig. 12, text",
         "On the way back the delay of the roller drives is even greater.",
     )
-    .metric("Largest |error| on the way back over that on the way there, zero where the drive was deformed, no load");
-    for kind in rollers {
-        back = back.ours(name_of(kind), return_ratio(kind), "");
-    }
+    .metric("Largest |error| on the way back over that on the way there, zero where the drive was deformed, no load")
+    .ours_each(rollers, "", return_ratio, "");
     let back =
         back.at_least("least ratio", least(rollers.map(return_ratio)), "", GREATER).because(|verdict| match verdict {
             Verdict::Reproduced => "It is greater.".into(),
@@ -113,15 +104,13 @@ fn figure_12(evidence: &Evidence<'_>) -> Vec<Claim> {
             .unloaded(kind)
             .map_or(f64::NAN, |s| s.metrics.error_at_end_arcsec.abs() / s.metrics.largest_back_arcsec)
     };
-    let mut approaches = claim(
+    let approaches = claim(
         "return-approaches",
         "Fig. 12, text",
         "On the way back the output of the roller drives approaches the theoretical values after the first phase.",
     )
-    .metric("Error at −1 rad over the largest on the way back, no load");
-    for kind in rollers {
-        approaches = approaches.ours(name_of(kind), end_ratio(kind), "");
-    }
+    .metric("Error at −1 rad over the largest on the way back, no load")
+    .ours_each(rollers, "", end_ratio, "");
     let approaches =
         approaches.at_most("largest ratio", most(rollers.map(end_ratio)), "", 0.5).because(|verdict| match verdict {
             Verdict::Reproduced => "It approaches.".into(),
@@ -134,15 +123,12 @@ fn figure_12(evidence: &Evidence<'_>) -> Vec<Claim> {
         [DoubleDisc, Cam].map(|near| rollers.map(|far| evidence.largest(far).gap_in_spreads(&evidence.largest(near))));
     let factor = least(rollers.map(|kind| evidence.largest(kind).value))
         / most([DoubleDisc, Cam].map(|kind| evidence.largest(kind).value));
-    let mut course = claim(
+    let course = claim(
         "disc-and-cam-closer",
         "Fig. 12 (c), (d)",
         "With double disc and cam the curve is much closer to the nominal one than with rollers.",
     )
-    .metric("Largest |error| of the unloaded path: each roller drive against each of the others, in spreads, and least ratio");
-    for kind in all {
-        course = course.ours(name_of(kind), evidence.largest(kind).value / 60.0, "′");
-    }
+    .metric("Largest |error| of the unloaded path: each roller drive against each of the others, in spreads, and least ratio").ours_each(all, "", |kind| evidence.largest(kind).value / 60.0, "′");
     let course = course
         .at_least("least gap, in spreads", least(closer.into_iter().flatten()), "", SPREADS)
         .at_least("least ratio of a roller drive to another (much: 1.5)", factor, "", 1.5)
@@ -274,7 +260,7 @@ fn order(evidence: &Evidence<'_>) -> Claim {
     let mut order = claim("error-order", "Fig. 13", "Errors rank four-roller ≥ two-roller > double disc > cam.")
         .metric("Kendall's tau of the largest |error| of the unloaded path against that order, pairs closer than three spreads undecided");
     for ((kind, _), measured) in paper::ERROR_RANK.iter().zip(&ours) {
-        order = order.ours(name_of(*kind), measured.value / 60.0, "′");
+        order = order.ours(kind.in_words(), measured.value / 60.0, "′");
     }
     order
         .at_least("Kendall's tau", if missing { f64::NAN } else { agreement.tau }, "", 1.0)
