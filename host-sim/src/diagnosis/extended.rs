@@ -11,7 +11,7 @@ use super::candidate::{Column, Excitation, Law, Scales, Tolerance, library};
 use super::model::{Problem, Scaffold, Term};
 use super::noise::Whitener;
 use super::report::Parameter;
-use super::resolution::{Resolution, resolution};
+use super::resolution::{Resolution, averages_hide, resolution};
 use super::rows::Rows;
 use super::select::{Selected, fit};
 use super::{DiagnosisError, Settings, prepare, uncertainty};
@@ -120,7 +120,10 @@ impl Extended {
         let on = Excitation { rows: &rows, nominal, base: &base, scales: &scales };
         let laws = library(&on);
         let uncertain = prepare::uncertain(&on, &[]);
-        let Resolution { stride, fast } = resolution(&on, &laws, &uncertain, settings.averages);
+        let Resolution { mut stride, fast } = resolution(&on, &laws, &uncertain, settings.averages, &[]);
+        if averages_hide(&on, &laws, causes, &uncertain, stride) {
+            stride = 1;
+        }
         let (noise, worth) = prepare::noise(&on, &laws, &fast, &uncertain);
         let problem = Problem::new(&on, &uncertain, Whitener::new(&rows, &uncertain, stride, noise), worth);
         let start: Vec<(usize, Vec<f64>)> = super::select::fixed(&problem, &laws, causes)

@@ -3,6 +3,11 @@
 //! With whitened data y, columns X, prior mean m and precision P: `A = XᵀX + P`, `b = Xᵀy + P m`, `J = |y|² + mᵀP m − bᵀA⁻¹b`, and
 //! `ln evidence = −J/2 − ln|A|/2 + ln|P|/2` but for what all models share.
 
+use std::ops::Range;
+use std::sync::LazyLock;
+
+use pulp::{Arch, Simd, WithSimd};
+
 /// Symmetric products of columns, the data last.
 #[derive(Clone, Debug, Default)]
 pub struct Gram {
@@ -15,14 +20,12 @@ pub struct Gram {
 impl Gram {
     /// Products of `columns`, whose last is the data, over a range of rows.
     #[must_use]
-    pub fn of(columns: &[&[f64]], range: std::ops::Range<usize>) -> Gram {
+    pub fn of(columns: &[&[f64]], range: Range<usize>) -> Gram {
         let size = columns.len();
-        let mut products = vec![0.0; size * size];
+        let mut products = products(columns, columns, range, true);
         for i in 0..size {
-            for j in 0..=i {
-                let product = dot(&columns[i][range.clone()], &columns[j][range.clone()]);
-                products[i * size + j] = product;
-                products[j * size + i] = product;
+            for j in 0..i {
+                products[j * size + i] = products[i * size + j];
             }
         }
         Gram { size, products }
@@ -53,15 +56,65 @@ impl Gram {
 /// Sum of products.
 #[must_use]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a8.zip(b8) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Products of each column of `a` with each of `b` over a range of rows, row by row of the result; with `lower`, only as many of `b` as
+/// the place of the column of `a` says, for products that are symmetric.
+///
+/// Rows are taken in blocks that stay in the cache while all pairs meet, with the widest registers that the machine has.
+#[must_use]
+pub fn products(a: &[&[f64]], b: &[&[f64]], range: Range<usize>, lower: bool) -> Vec<f64> {
+    static ARCH: LazyLock<Arch> = LazyLock::new(Arch::new);
+    let mut sums = vec![0.0; a.len() * b.len()];
+    let mut from = range.start;
+    while from < range.end {
+        let rows = from..(from + BLOCK_ROWS).min(range.end);
+        from = rows.end;
+        ARCH.dispatch(Block { a, b, rows, lower, sums: &mut sums });
+    }
+    sums
+}
+
+/// Rows of a block: 2 KiB of each column.
+const BLOCK_ROWS: usize = 256;
+/// Columns that meet one column at a time.
+const ABREAST: usize = 4;
+
+struct Block<'c> {
+    a: &'c [&'c [f64]],
+    b: &'c [&'c [f64]],
+    rows: Range<usize>,
+    lower: bool,
+    sums: &'c mut [f64],
+}
+
+impl WithSimd for Block<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let width = self.b.len();
+        for (i, column) in self.a.iter().enumerate() {
+            let (x, x_rest) = S::as_simd_f64s(&column[self.rows.clone()]);
+            let upto = if self.lower { (i + 1).min(width) } else { width };
+            for (at, others) in self.b[..upto].chunks(ABREAST).enumerate() {
+                // Fewer than four: the first one stands in, and is not written.
+                let other = |j: usize| &others.get(j).unwrap_or(&others[0])[self.rows.clone()];
+                let split: [_; ABREAST] = std::array::from_fn(|j| S::as_simd_f64s(other(j)));
+                let mut sums = [simd.splat_f64s(0.0); ABREAST];
+                for (k, x) in x.iter().enumerate() {
+                    for (sum, (y, _)) in sums.iter_mut().zip(&split) {
+                        *sum = simd.mul_add_f64s(*x, y[k], *sum);
+                    }
+                }
+                for j in 0..others.len() {
+                    let rest: f64 = x_rest.iter().zip(split[j].1).map(|(x, y)| x * y).sum();
+                    self.sums[i * width + at * ABREAST + j] += simd.reduce_sum_f64s(sums[j]) + rest;
+                }
+            }
         }
     }
-    rest + sums.iter().sum::<f64>()
 }
 
 /// Prior of a coefficient.
@@ -84,8 +137,48 @@ pub struct Solution {
     pub residual: f64,
     /// Logarithm of the evidence.
     pub evidence: f64,
+    /// Cholesky factor of `A` in units of the priors, lower triangle, row by row.
+    factor: Vec<f64>,
+    /// Standard deviations of the priors.
+    scale: Vec<f64>,
+}
+
+impl Solution {
     /// Covariance of the coefficients, row by row.
-    pub covariance: Vec<f64>,
+    #[must_use]
+    pub fn covariance(&self) -> Vec<f64> {
+        let n = self.scale.len();
+        let mut covariance = vec![0.0; n * n];
+        let mut unit = vec![0.0; n];
+        for j in 0..n {
+            unit.fill(0.0);
+            unit[j] = 1.0;
+            forward(&self.factor, &mut unit);
+            backward(&self.factor, &mut unit);
+            for i in 0..n {
+                covariance[i * n + j] = unit[i] * self.scale[i] * self.scale[j];
+            }
+        }
+        covariance
+    }
+}
+
+/// Solves `L x = b` in place.
+fn forward(l: &[f64], x: &mut [f64]) {
+    let n = x.len();
+    for i in 0..n {
+        let sum: f64 = (0..i).map(|k| l[i * n + k] * x[k]).sum();
+        x[i] = (x[i] - sum) / l[i * n + i];
+    }
+}
+
+/// Solves `Lᵀ x = b` in place.
+fn backward(l: &[f64], x: &mut [f64]) {
+    let n = x.len();
+    for i in (0..n).rev() {
+        let sum: f64 = (i + 1..n).map(|k| l[k * n + i] * x[k]).sum();
+        x[i] = (x[i] - sum) / l[i * n + i];
+    }
 }
 
 /// Solves with priors. `worth` scales all information in the data: below 1 where the noise is not as white as it was taken for.
@@ -112,59 +205,33 @@ pub fn solve(gram: &Gram, priors: &[Prior], worth: f64) -> Option<Solution> {
     }
     let mut l = a;
     let mut log_det = 0.0;
-    for j in 0..n {
-        for k in 0..j {
-            let factor = l[j * n + k];
-            for i in j..n {
-                l[i * n + j] -= l[i * n + k] * factor;
-            }
+    for i in 0..n {
+        let (above, row) = l.split_at_mut(i * n);
+        for j in 0..i {
+            let known = &above[j * n..=j * n + j];
+            row[j] = (row[j] - dot(&known[..j], &row[..j])) / known[j];
         }
-        let pivot = l[j * n + j];
+        let pivot = row[i] - dot(&row[..i], &row[..i]);
         if pivot <= 0.0 || !pivot.is_finite() {
             return None;
         }
-        let root = pivot.sqrt();
-        log_det += 2.0 * root.ln();
-        for i in j..n {
-            l[i * n + j] /= root;
-        }
+        row[i] = pivot.sqrt();
+        log_det += pivot.ln();
     }
-    let forward = |x: &mut [f64]| {
-        for i in 0..n {
-            let sum: f64 = (0..i).map(|k| l[i * n + k] * x[k]).sum();
-            x[i] = (x[i] - sum) / l[i * n + i];
-        }
-    };
-    let backward = |x: &mut [f64]| {
-        for i in (0..n).rev() {
-            let sum: f64 = (i + 1..n).map(|k| l[k * n + i] * x[k]).sum();
-            x[i] = (x[i] - sum) / l[i * n + i];
-        }
-    };
     let mut z = b;
-    forward(&mut z);
+    forward(&l, &mut z);
     let explained: f64 = z.iter().map(|v| v * v).sum();
-    backward(&mut z);
+    backward(&l, &mut z);
     let coefficients: Vec<f64> = (0..n).map(|i| shift[i] + s[i] * z[i]).collect();
     let misfit = worth * power - explained;
-    let mut covariance = vec![0.0; n * n];
-    let mut unit = vec![0.0; n];
-    for j in 0..n {
-        unit.fill(0.0);
-        unit[j] = 1.0;
-        forward(&mut unit);
-        backward(&mut unit);
-        for i in 0..n {
-            covariance[i * n + j] = unit[i] * s[i] * s[j];
-        }
-    }
     let penalty: f64 = z.iter().map(|v| v * v).sum();
     Some(Solution {
         coefficients,
         misfit,
         residual: misfit - penalty,
         evidence: -0.5 * misfit - 0.5 * log_det,
-        covariance,
+        factor: l,
+        scale: s,
     })
 }
 
@@ -181,7 +248,7 @@ mod tests {
         let precision = 6.0 + 1.0 / 0.49;
         let value = (13.0 + 0.5 / 0.49) / precision;
         assert!((solution.coefficients[0] - value).abs() < 1e-12);
-        assert!((solution.covariance[0] - 1.0 / precision).abs() < 1e-12);
+        assert!((solution.covariance()[0] - 1.0 / precision).abs() < 1e-12);
         let misfit = |c: f64| -> f64 {
             x.iter().zip(&y).map(|(x, y)| (y - c * x).powi(2)).sum::<f64>() + ((c - 0.5) / 0.7).powi(2)
         };

@@ -88,7 +88,7 @@ const MOST_ROUNDS: usize = 2;
 /// What is left as a free function counts if it is larger than this against the strongest cause.
 const LEAST_LEFT_OF_STRONGEST: f64 = 0.25;
 /// Named causes that explain less than this share of what is explained at all are not named.
-const LEAST_NAMED_SHARE: f64 = 0.3;
+const LEAST_NAMED_SHARE: f64 = 0.7;
 /// The same beside a deviation that is described well though it has no name.
 const LEAST_BESIDE_DESCRIBED: f64 = 0.05;
 
@@ -136,6 +136,10 @@ pub fn diagnose_extended(
     left.extend(fast.into_iter().filter(|f| f.size_arcsec > select::least_size(noise.white)));
     left.extend(remainder::beyond_noise(&problem, &selected, noise));
     if settings.verbose {
+        for (k, term) in selected.terms.iter().enumerate() {
+            let [main, nuisance, beside] = select::parts(term, selected.fit.of(k));
+            tell(&format!("  {}: law {main:.2}, deviations {nuisance:.2}, beside {beside:.2}", term.law.cause));
+        }
         for something in &left {
             tell(&format!("  left: {} {:.2}", something.looks_like, something.size_arcsec));
         }
@@ -184,11 +188,11 @@ impl<'a> Search<'a> {
             }
         };
         let mut uncertain = prepare::uncertain(on, &[]);
-        let Resolution { stride, fast: at_first } = resolution(on, &laws, &uncertain, settings.averages);
-        let whiten = |noise, uncertain: &[bool]| Whitener::new(on.rows, uncertain, stride, noise);
+        let Resolution { mut stride, fast: at_first } = resolution(on, &laws, &uncertain, settings.averages, &[]);
+        let whiten = |noise, uncertain: &[bool], stride| Whitener::new(on.rows, uncertain, stride, noise);
         let (mut noise, mut worth) = prepare::noise(on, &laws, &at_first, &uncertain);
         say(format!("play {:?}, {noise:?}, worth {worth:.2}, {} rows", on.base.law, on.rows.count_used()));
-        let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain), worth);
+        let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth);
         let mut fast: Vec<Unexplained> = Vec::new();
         let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
         // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
@@ -210,7 +214,7 @@ impl<'a> Search<'a> {
                     fast.push(Unexplained { looks_like, size_arcsec: size });
                 }
             }
-            let explained = remainder::explained(&problem, &selected);
+            let mut explained = remainder::explained(&problem, &selected);
             let doubtful = prepare::uncertain(on, &selected.terms);
             drop(selected);
             let known = laws.len();
@@ -225,9 +229,14 @@ impl<'a> Search<'a> {
             let changed = doubtful.iter().zip(&uncertain).filter(|(a, b)| a != b).count();
             let other_rows = changed > on.rows.len() / 200;
             uncertain = doubtful;
+            // What was large may have hidden what is fast.
+            let finer = resolution(on, &laws, &uncertain, settings.averages, &explained);
+            let closer_look = finer.stride < stride;
+            stride = stride.min(finer.stride);
+            explained.iter_mut().zip(&finer.fast).for_each(|(sum, fast)| *sum += fast);
             let (again, worth_again) = prepare::noise(on, &laws, if new_line { &[] } else { &explained }, &uncertain);
             let change = again.floor() / noise.floor();
-            if !new_line && !other_rows && (0.85..1.18).contains(&change) {
+            if !new_line && !other_rows && !closer_look && (0.85..1.18).contains(&change) {
                 break;
             }
             if new_line {
@@ -235,7 +244,7 @@ impl<'a> Search<'a> {
             }
             (noise, worth) = (again, worth_again);
             say(format!("once more: {noise:?}, worth {worth:.2}"));
-            problem = Problem::new(on, &uncertain, whiten(noise, &uncertain), worth);
+            problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth);
         }
         Ok(Search { laws, problem, noise, start, fast })
     }
@@ -325,7 +334,7 @@ fn conclude(
     if verdict != Verdict::Unknown {
         let parameters = uncertainty::parameters(problem, &selected);
         for k in named.iter().copied() {
-            let rivals = rivals::rivals(problem, laws, &selected, k);
+            let rivals = rivals::rivals(problem, laws, &selected, &standings, k);
             if settings.verbose {
                 for rival in rivals.iter().take(4) {
                     tell(&format!(
@@ -421,15 +430,13 @@ fn compensation(problem: &Problem<'_>, rms_extended: f64) -> Compensation {
 fn recalibrated(problem: &Problem<'_>, selected: &Selected<'_>) -> BTreeMap<String, Parameter> {
     let n = selected.fit.priors.len();
     let mut named = BTreeMap::new();
+    let covariance = selected.fit.solution.covariance();
     for (k, floating) in problem.on.base.floating.iter().enumerate() {
         let name =
             if named.contains_key(&floating.name) { format!("{} {k}", floating.name) } else { floating.name.clone() };
         named.insert(
             name,
-            Parameter {
-                value: selected.fit.solution.coefficients[k],
-                std: selected.fit.solution.covariance[k * n + k].max(0.0).sqrt(),
-            },
+            Parameter { value: selected.fit.solution.coefficients[k], std: covariance[k * n + k].max(0.0).sqrt() },
         );
     }
     named

@@ -4,7 +4,7 @@
 //! get a prior in proportion to what the main columns of their law explain, found by iteration.
 
 use super::candidate::{Excitation, Law, Tolerance};
-use super::linear::{Gram, Prior, Solution, dot, solve};
+use super::linear::{Gram, Prior, Solution, products, solve};
 use super::noise::Whitener;
 use super::rows::rms;
 
@@ -275,8 +275,10 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             .map(Vec::as_slice)
             .chain(further.iter().map(|(column, _)| column.as_slice()))
             .collect();
-        let mut before = white_columns(problem, &self.terms, &[]);
-        before.truncate(old);
+        // Those before, the data, and the new ones up to each itself.
+        let mut all = white_columns(problem, &self.terms, &[]);
+        all.extend(&new);
+        let meeting = products(&new, &all, 0..problem.data_white.len(), false);
         let size = old + new.len() + 1;
         let mut gram = Gram { size, products: vec![0.0; size * size] };
         let mut put = |i: usize, j: usize, value: f64| {
@@ -290,14 +292,14 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             put(i, size - 1, self.gram.at(i, old));
         }
         put(size - 1, size - 1, self.gram.at(old, old));
-        for (a, column) in new.iter().enumerate() {
-            for (j, other) in before.iter().enumerate() {
-                put(old + a, j, dot(column, other));
+        for (a, of) in meeting.chunks_exact(all.len()).enumerate() {
+            for (j, product) in of[..old].iter().enumerate() {
+                put(old + a, j, *product);
             }
-            for (b, other) in new.iter().enumerate().take(a + 1) {
-                put(old + a, old + b, dot(column, other));
+            put(old + a, size - 1, of[old]);
+            for (b, product) in of[old + 1..=old + 1 + a].iter().enumerate() {
+                put(old + a, old + b, *product);
             }
-            put(old + a, size - 1, dot(column, &problem.data_white));
         }
         let mut starts = Vec::new();
         let mut at = problem.base_white.len();

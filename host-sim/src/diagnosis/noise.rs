@@ -38,6 +38,17 @@ pub struct Whitener {
     scale: Vec<f64>,
     /// Decay of the wander to the next average.
     decay: Vec<f64>,
+    /// The same, ready for use.
+    filter: Vec<Step>,
+}
+
+/// One step of the filter: what is expected next is `keep` of what was expected now and `take` of what came.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    keep: f64,
+    take: f64,
+    /// Inverse standard deviation of the innovation.
+    worth: f64,
 }
 
 /// A column is hidden where averages hold less than this share of it.
@@ -83,7 +94,10 @@ impl Whitener {
                 }
             }
         }
-        Whitener { groups, sessions, gain, scale, decay }
+        let filter = (0..count)
+            .map(|g| Step { keep: decay[g] * (1.0 - gain[g]), take: decay[g] * gain[g], worth: 1.0 / scale[g] })
+            .collect();
+        Whitener { groups, sessions, gain, scale, decay, filter }
     }
 
     /// Averages.
@@ -129,14 +143,12 @@ impl Whitener {
     /// Innovations of averaged values, in units of their standard deviation.
     #[must_use]
     pub fn whiten_averaged(&self, averaged: &[f64]) -> Vec<f64> {
+        // Each session begins anew: nothing is kept past its last average.
+        let mut expected = 0.0;
         let mut white = vec![0.0; averaged.len()];
-        for session in &self.sessions {
-            let mut expected = 0.0;
-            for g in session.clone() {
-                let innovation = averaged[g] - expected;
-                white[g] = innovation / self.scale[g];
-                expected = self.decay[g] * (expected + self.gain[g] * innovation);
-            }
+        for ((white, value), step) in white.iter_mut().zip(averaged).zip(&self.filter) {
+            *white = (value - expected) * step.worth;
+            expected = step.keep * expected + step.take * value;
         }
         white
     }

@@ -26,28 +26,49 @@ pub struct Resolution {
 }
 
 /// Rows to an average that leave about `averages` of them, or every row where averaging would hide a law that the data hold.
-/// Rows marked uncertain are not looked at.
+/// Rows marked uncertain are not looked at; `explained` is what is explained already, row by row, arcsec (nothing if it is empty).
 #[must_use]
-pub fn resolution(on: &Excitation<'_>, laws: &[Law], uncertain: &[bool], averages: usize) -> Resolution {
-    let left: Vec<f64> = on.rows.error.iter().zip(&on.base.prediction).map(|(e, p)| e - p).collect();
+pub fn resolution(
+    on: &Excitation<'_>,
+    laws: &[Law],
+    uncertain: &[bool],
+    averages: usize,
+    explained: &[f64],
+) -> Resolution {
+    let known = |k: usize| on.base.prediction[k] + explained.get(k).unwrap_or(&0.0);
+    let left: Vec<f64> = on.rows.error.iter().enumerate().map(|(k, e)| e - known(k)).collect();
     let stride = (on.rows.count_used() / averages).max(1);
     if stride == 1 {
         return Resolution { stride, fast: Vec::new() };
     }
-    let plain = Noise { white: 1.0, wander: 0.0, correlation_s: 1.0 };
-    let averages = Whitener::new(on.rows, uncertain, stride, plain);
-    let shown = laws.iter().filter(|law| law.named && law.shapes.is_empty()).find_map(|law| {
-        let main: Vec<Vec<f64>> = main_columns(on, law);
-        let hidden = !main.is_empty() && main.iter().all(|column| averages.hides(column));
-        if !hidden {
-            return None;
-        }
-        explained_in_detail(on.rows, &main, &left, uncertain)
-    });
+    let averages = averages_of(on, uncertain, stride);
+    let shown = laws
+        .iter()
+        .filter(|law| law.named && law.shapes.is_empty())
+        .filter_map(|law| hidden(on, law, &averages))
+        .find_map(|main| explained_in_detail(on.rows, &main, &left, uncertain));
     match shown {
         Some(fast) => Resolution { stride: 1, fast },
         None => Resolution { stride, fast: Vec::new() },
     }
+}
+
+/// Whether averages of `stride` rows hide any of these causes.
+#[must_use]
+pub fn averages_hide(on: &Excitation<'_>, laws: &[Law], causes: &[&str], uncertain: &[bool], stride: usize) -> bool {
+    let averages = averages_of(on, uncertain, stride);
+    let asked = laws.iter().filter(|law| law.shapes.is_empty() && causes.contains(&law.cause.as_str()));
+    asked.into_iter().any(|law| hidden(on, law, &averages).is_some())
+}
+
+fn averages_of(on: &Excitation<'_>, uncertain: &[bool], stride: usize) -> Whitener {
+    Whitener::new(on.rows, uncertain, stride, Noise { white: 1.0, wander: 0.0, correlation_s: 1.0 })
+}
+
+/// The main columns of a law, if averages hide all of them.
+fn hidden(on: &Excitation<'_>, law: &Law, averages: &Whitener) -> Option<Vec<Vec<f64>>> {
+    let main = main_columns(on, law);
+    (!main.is_empty() && main.iter().all(|column| averages.hides(column))).then_some(main)
 }
 
 fn main_columns(on: &Excitation<'_>, law: &Law) -> Vec<Vec<f64>> {

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::candidate::Law;
 use super::model::{Problem, Scaffold, Term};
-use super::select::{Selected, predicted, size_of, sound};
+use super::select::{Selected, Standing, predicted, size_of, sound};
 
 /// A rival in the place of a cause.
 #[derive(Clone, Debug)]
@@ -15,6 +15,8 @@ pub struct Rival {
     pub misfit: f64,
     /// Difference of the predictions, rms arcsec.
     pub apart_arcsec: f64,
+    /// What it adds to the others is no more than what their laws may be wrong by.
+    pub mops_up: bool,
 }
 
 /// Rise of the misfit up to which two causes are not told apart: five standard deviations.
@@ -28,10 +30,12 @@ const SAME_SHARE: f64 = 0.12;
 const TOLD_BETTER: f64 = -100.0;
 
 impl Rival {
-    /// Whether it tells the data better than a cause of this size, and otherwise.
+    /// Whether it tells the data better than a cause of this size, and otherwise: not by telling what the laws of the other causes leave.
     #[must_use]
     pub fn tells_better(&self, size_arcsec: f64) -> bool {
-        self.misfit < TOLD_BETTER && self.apart_arcsec > SAME_ARCSEC.max(2.0 * SAME_SHARE * size_arcsec)
+        !self.mops_up
+            && self.misfit < TOLD_BETTER
+            && self.apart_arcsec > SAME_ARCSEC.max(2.0 * SAME_SHARE * size_arcsec)
     }
 
     /// Whether the data cannot tell it from a cause of this size. With a base parameter `out_of_tolerance` any rival predicts the
@@ -45,7 +49,13 @@ impl Rival {
 
 /// Rivals of term `k`, closest first.
 #[must_use]
-pub fn rivals(problem: &Problem<'_>, laws: &[Law], selected: &Selected<'_>, k: usize) -> Vec<Rival> {
+pub fn rivals(
+    problem: &Problem<'_>,
+    laws: &[Law],
+    selected: &Selected<'_>,
+    standings: &[Standing],
+    k: usize,
+) -> Vec<Rival> {
     let others = selected.others(k);
     let scaffold = Scaffold::new(problem, others.clone());
     let all: Vec<&Term<'_>> = selected.terms.iter().collect();
@@ -54,6 +64,11 @@ pub fn rivals(problem: &Problem<'_>, laws: &[Law], selected: &Selected<'_>, k: u
         laws.iter().filter(|law| law.named && selected.terms.iter().all(|t| t.law.cause != law.cause)).collect();
     // Where more is left than noise, as much may hide in any rival: rises count against what is left.
     let left = selected.fit.solution.misfit / (problem.worth * problem.data_white.len().max(1) as f64);
+    let lacking = scaffold.fit(&[]).map(|fit| predicted(problem, &others, &fit));
+    let others_may_err = |law: &Law| {
+        let of = |j: usize| standings[j].size * selected.terms[j].law.misfit_as(law);
+        (0..selected.terms.len()).filter(|j| *j != k).map(of).fold(0.0, f64::max)
+    };
     let mut rivals: Vec<Rival> = open
         .into_par_iter()
         .filter_map(|law| {
@@ -77,11 +92,13 @@ pub fn rivals(problem: &Problem<'_>, laws: &[Law], selected: &Selected<'_>, k: u
             let mut terms = others.clone();
             terms.push(&term);
             let then = predicted(problem, &terms, &fit);
-            let apart: Vec<f64> = now.iter().zip(&then).map(|(a, b)| a - b).collect();
+            let less =
+                |from: &[f64]| size_of(problem, &from.iter().zip(&then).map(|(a, b)| a - b).collect::<Vec<f64>>());
             Some(Rival {
                 cause: law.cause.clone(),
                 misfit: (fit.solution.misfit - selected.fit.solution.misfit) / left.max(1.0),
-                apart_arcsec: size_of(problem, &apart),
+                apart_arcsec: less(&now),
+                mops_up: lacking.as_ref().is_some_and(|lacking| less(lacking) < others_may_err(law)),
             })
         })
         .collect();

@@ -83,14 +83,22 @@ fn same(apart: f64, size: f64) -> bool {
 
 /// Whether a fitted term makes sense.
 pub(super) fn sound(term: &Term<'_>, coefficients: &[f64]) -> bool {
+    let [main, nuisance, _] = parts(term, coefficients);
+    term.law.sound(&term.law.values(&term.places), coefficients, main, nuisance)
+}
+
+/// Root mean squares of what a term adds by its main columns, by nuisance, and beside them, arcsec.
+pub(super) fn parts(term: &Term<'_>, coefficients: &[f64]) -> [f64; 3] {
     let part = |of: fn(&Tolerance) -> bool| -> f64 {
         let only: Vec<f64> =
             term.tolerances.iter().zip(coefficients).map(|(t, c)| if of(t) { *c } else { 0.0 }).collect();
         super::rows::rms(&term.contribution(&only))
     };
-    let main = part(|t| matches!(t, Tolerance::Main(_)));
-    let nuisance = part(|t| matches!(t, Tolerance::Nuisance(_) | Tolerance::History(_)));
-    term.law.sound(&term.law.values(&term.places), coefficients, main, nuisance)
+    [
+        part(|t| matches!(t, Tolerance::Main(_))),
+        part(|t| matches!(t, Tolerance::Nuisance(_) | Tolerance::History(_))),
+        part(|t| matches!(t, Tolerance::Beside(_))),
+    ]
 }
 
 /// Fits a set of terms.
@@ -154,21 +162,22 @@ pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize)
     let with = predicted(problem, &selected.terms.iter().collect::<Vec<_>>(), &selected.fit);
     let lacking = predicted(problem, &others, &without);
     let gain = selected.fit.solution.evidence + selected.terms[k].occam - without.solution.evidence;
-    if selected.terms[k].law.tolerance_of.is_some() {
-        // The base would take its place at once: it is held against the tolerance, not against the fit without it.
-        // At one load throughout, the zero of the encoder takes all of it.
-        let size = size_of(problem, &about_mean(problem, selected.terms[k].contribution(selected.fit.of(k))));
-        return Standing { evidence: gain, size, alone: size, left_out: 1.0 };
-    }
     let added: Vec<f64> = with.iter().zip(&lacking).map(|(a, b)| a - b).collect();
     let alone = size_of(problem, &added);
+    // At one load throughout, the zero of the encoder takes all of it.
     let own = about_mean(problem, selected.terms[k].contribution(selected.fit.of(k)));
-    Standing {
-        evidence: gain,
-        size: (TAKEN_OVER * alone).min(size_of(problem, &own)).max(alone),
-        alone,
-        left_out: left_out_gain(problem, &selected.terms.iter().collect::<Vec<_>>(), &others),
+    if selected.terms[k].law.tolerance_of.is_some() {
+        // Without it the base goes to its limit: what is beyond that is alone, all of it counts.
+        return Standing { evidence: gain, size: size_of(problem, &own), alone, left_out: 1.0 };
     }
+    let mut left_out = left_out_gain(problem, &selected.terms.iter().collect::<Vec<_>>(), &others);
+    if left_out <= 0.0 {
+        // Its deviations may not reach to other sessions, where the law itself does.
+        let bare = selected.terms[k].clone().main_only();
+        let with_bare: Vec<&Term<'_>> = others.iter().copied().chain([&bare]).collect();
+        left_out = left_out.max(left_out_gain(problem, &with_bare, &others));
+    }
+    Standing { evidence: gain, size: (TAKEN_OVER * alone).min(size_of(problem, &own)).max(alone), alone, left_out }
 }
 
 /// Less the mean: the zero of the encoder takes it.
@@ -473,6 +482,11 @@ fn settle_from<'l>(
     Some(selected)
 }
 
+/// Whether terms make no sense in a fit without another, for which they only stand in.
+fn stood_in_for(others: &[&Term<'_>], without: Option<&Fit>) -> bool {
+    without.is_some_and(|fit| others.iter().enumerate().any(|(j, other)| !sound(other, fit.of(j))))
+}
+
 /// Drops what no longer earns its place, weakest first.
 fn backward<'l>(
     problem: &Problem<'_>,
@@ -486,10 +500,12 @@ fn backward<'l>(
             let law = selected.terms[k].law;
             let c = selected.fit.of(k);
             let physical = sound(&selected.terms[k], c);
-            let in_tolerance = law.tolerance_of.is_some() && {
-                let others = selected.others(k);
-                Scaffold::new(problem, others).fit(&[]).is_none_or(|without| !out_of_tolerance(problem, &without, law))
-            };
+            let without = || Scaffold::new(problem, selected.others(k)).fit(&[]);
+            if law.tolerance_of.is_some() && physical && stood_in_for(&selected.others(k), without().as_ref()) {
+                return false;
+            }
+            let in_tolerance =
+                law.tolerance_of.is_some() && without().is_none_or(|fit| !out_of_tolerance(problem, &fit, law));
             let misfit = (0..selected.terms.len())
                 .filter(|j| *j != k)
                 .map(|j| standings[j].size * selected.terms[j].law.misfit_as(law))

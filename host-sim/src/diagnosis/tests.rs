@@ -165,7 +165,7 @@ fn a_form_error_of_the_cam_that_averages_would_hide_is_found_and_costs_nothing_w
         let scales = super::Scales::new(&rows, settings.pitch_radius_mm, jumps);
         let on = super::Excitation { rows: &rows, nominal: &drive, base: &base, scales: &scales };
         let uncertain = super::prepare::uncertain(&on, &[]);
-        super::resolution(&on, &super::library(&on), &uncertain, settings.averages).stride
+        super::resolution(&on, &super::library(&on), &uncertain, settings.averages, &[]).stride
     };
     let measured = |effects: &[Effect]| measure(&drive, effects, &plan, &sensors, 0, &mut fastrand::Rng::with_seed(5));
     let cam = measured(&[effect("cam_form_error", 4.0, 0.7, 0.5)]);

@@ -34,7 +34,7 @@ fn stretched(problem: &Problem<'_>, fit: &Fit, white: &[&[f64]]) -> Vec<f64> {
             }
         }
     }
-    let bread = &fit.solution.covariance;
+    let bread = fit.solution.covariance();
     let times = |a: &[f64], b: &[f64]| -> Vec<f64> {
         let mut product = vec![0.0; n * n];
         for i in 0..n {
@@ -46,7 +46,7 @@ fn stretched(problem: &Problem<'_>, fit: &Fit, white: &[&[f64]]) -> Vec<f64> {
         }
         product
     };
-    times(&times(bread, &meat), bread)
+    times(&times(&bread, &meat), &bread)
 }
 
 /// Parameters of each term.
@@ -66,6 +66,7 @@ pub fn parameters(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<BTreeMa
             Some(solved.coefficients.iter().zip(&fit.solution.coefficients).map(|(a, b)| a - b).collect())
         })
         .collect();
+    let covariance = fit.solution.covariance();
     let by_stretches = stretched(problem, &fit, &white);
     let mut place = n - moves.len();
     let mut all = Vec::new();
@@ -79,7 +80,7 @@ pub fn parameters(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<BTreeMa
         place += term.places.len();
         let mut slopes = vec![vec![0.0; dimension]; at.len()];
         for j in 0..dimension {
-            let std = fit.solution.covariance[index[j] * n + index[j]].max(0.0).sqrt();
+            let std = covariance[index[j] * n + index[j]].max(0.0).sqrt();
             let step = (STEP * std).max(1e-9);
             let (mut c, mut p) = (coefficients.to_vec(), term.places.clone());
             if j < c.len() {
@@ -106,7 +107,7 @@ pub fn parameters(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<BTreeMa
                     .map(|(i, j)| slope[i] * slope[j] * covariance[index[i] * n + index[j]])
                     .sum()
             };
-            let laplace = spread(&fit.solution.covariance).max(spread(&by_stretches));
+            let laplace = spread(&covariance).max(spread(&by_stretches));
             let count = shifts.len().max(1) as f64;
             let moved: Vec<f64> =
                 shifts.iter().map(|s| (0..dimension).map(|j| slope[j] * s[index[j]]).sum::<f64>()).collect();

@@ -85,21 +85,11 @@ impl Truth {
             let over_limit = weight.over_limit(case.sensors.white_arcsec);
             let mut look_alikes = BTreeMap::new();
             if over_limit >= 1.0 {
-                for (rival, d) in match effect.what {
-                    What::Cause(Cause::Ratcheting) => Vec::new(),
-                    What::Cause(cause) => rival::look_alikes(
-                        &mut bench,
-                        &case.drive,
-                        Some(cause),
-                        case.family,
-                        &contribution,
-                        &mut chance,
-                    ),
-                    What::Outside(_) => {
-                        rival::look_alikes(&mut bench, &case.drive, None, case.family, &contribution, &mut chance)
+                // A jump of teeth is like nothing else.
+                if effect.what != What::Cause(Cause::Ratcheting) {
+                    for (rival, d) in rival::look_alikes(&mut bench, &case.drive, effect, &contribution, &mut chance) {
+                        look_alikes.insert(rival.name().to_owned(), rounded(d));
                     }
-                } {
-                    look_alikes.insert(rival.name().to_owned(), rounded(d));
                 }
             }
             let spec = effect.what.spec(&case.drive);

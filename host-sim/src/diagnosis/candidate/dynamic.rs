@@ -128,7 +128,11 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = Vec::new();
     if on.nominal.wind_up_arcsec(1.0) > 0.0 {
         // The load that gravity adds moves the torque at which the play turns over: which law it follows there shows only now.
-        for play in [PlayLaw::Held, PlayLaw::Pushed] {
+        let mut plays = vec![PlayLaw::Held, PlayLaw::Pushed];
+        if !plays.contains(&on.base.law) {
+            plays.push(on.base.law);
+        }
+        for play in plays {
             laws.push(gravity_torque(1.0, play, on));
             if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
                 laws.push(gravity_torque(-1.0, play, on));

@@ -1,7 +1,8 @@
 //! Deviations without a cause in the library. They compete with the causes: where one of them tells the data better, no cause is
 //! named for it.
 
-use super::{Excitation, Law, by_row, main};
+use super::{Excitation, Law, Shape, by_row, main};
+use crate::tables::ARCSEC_PER_RAD;
 
 fn law(name: &str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send + Sync + 'static) -> Law {
     let mut law = Law::new(name, move |on, _| {
@@ -19,6 +20,50 @@ fn wave(name: String, angle: fn(&Excitation<'_>, usize) -> f64, order: f64) -> L
             main(by_row(on, |k| (order * angle(on, k)).cos()), 15.0),
             main(by_row(on, |k| (order * angle(on, k)).sin()), 15.0),
         ]
+    });
+    law.named = false;
+    law
+}
+
+/// Lost motion before the generator, as of an Oldham coupling: whatever the load, the output lags by half of it either way.
+fn lash_before_the_generator() -> Law {
+    let mut law = Law::new("lost motion before the generator", |on, shape| {
+        let half_rad = shape[0] * on.nominal.ratio.abs() / ARCSEC_PER_RAD;
+        let mut behind = vec![0.0; on.rows.len()];
+        for session in &on.rows.sessions {
+            let mut held = 0.0;
+            for k in session.clone() {
+                if k > session.start {
+                    held = (held + on.rows.generator[k] - on.rows.generator[k - 1]).clamp(-half_rad, half_rad);
+                }
+                behind[k] = -held / half_rad * on.nominal.ratio.signum();
+            }
+        }
+        vec![main(behind, 20.0)]
+    })
+    .shapes([Shape::by_factors("half_lash_arcsec", 0.5, 60.0, 5)])
+    .physical(|_, c| c[0] > 0.0);
+    law.named = false;
+    law
+}
+
+/// Wind-up that comes late: what relaxes within about a second, ten, a hundred and a thousand, from rest under the first load.
+fn creep_under_load() -> Law {
+    let mut law = Law::new("creep under load", |on, _| {
+        let late = |lasts_s: f64| {
+            let rows = on.rows;
+            let mut missing = vec![0.0; rows.len()];
+            for session in &rows.sessions {
+                let mut reached = on.base.wind_up[session.start];
+                for k in session.clone() {
+                    let step = if k > session.start { rows.time[k] - rows.time[k - 1] } else { 0.0 };
+                    reached += (on.base.wind_up[k] - reached) * (1.0 - (-step.max(0.0) / lasts_s).exp());
+                    missing[k] = reached - on.base.wind_up[k];
+                }
+            }
+            main(missing, 0.3)
+        };
+        [1.0, 10.0, 100.0, 1000.0].into_iter().map(late).collect()
     });
     law.named = false;
     law
@@ -82,11 +127,13 @@ pub fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
         }));
     }
     laws.push(law("offset by direction", |on, k| on.rows.direction[k]));
+    laws.push(lash_before_the_generator());
     if on.scales.load > 0.0 {
         laws.push(law("offset with the magnitude of torque", |on, k| on.rows.torque[k].abs()));
         laws.push(law("offset with torque squared", |on, k| on.rows.torque[k].powi(2)));
         laws.push(law("torque by direction", |on, k| on.rows.torque[k].abs() * on.rows.direction[k]));
         if rows.recorded.time {
+            laws.push(creep_under_load());
             laws.push(law("wind-up with time", |on, k| on.base.wind_up[k] * (on.rows.time[k] - on.rows.time[0])));
         }
     }

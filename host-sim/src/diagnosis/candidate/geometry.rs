@@ -29,7 +29,7 @@ const FEWEST_TURNS_OF_PULSES: f64 = 6.0;
 
 /// Which angle an error is locked to.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Angle {
+pub(in crate::diagnosis) enum Angle {
     Flexspline,
     CircularSpline,
     /// Gravity as the wave sees it, orientation counted with this sign.
@@ -49,7 +49,7 @@ fn fading(on: &Excitation<'_>, half_load: f64, k: usize) -> f64 {
     1.0 / (1.0 + (on.rows.torque[k] / half_load).abs())
 }
 
-fn waves(on: &Excitation<'_>, of: Angle, order: f64, weight: impl Fn(usize) -> f64) -> [Vec<f64>; 2] {
+pub(super) fn waves(on: &Excitation<'_>, of: Angle, order: f64, weight: impl Fn(usize) -> f64) -> [Vec<f64>; 2] {
     let kept = kept(on, of, order);
     [by_row(on, |k| weight(k) * kept[0][k]), by_row(on, |k| weight(k) * kept[1][k])]
 }
@@ -81,6 +81,9 @@ const FLANK_AHEAD: f64 = 0.36;
 const MEAN_OF_SECOND: f64 = 1.15;
 const FOURTH_OF_SECOND: f64 = 0.15;
 
+/// Share of the pattern's second order that deviations have to leave of an eccentricity.
+const LEAST_OF_PATTERN: f64 = 0.35;
+
 /// +1 where the circular spline is the output. Where the flexspline is, a load that turns it forward rests on the other flank of the
 /// circular spline, and what a flank is ahead by changes its sign.
 fn sense(on: &Excitation<'_>) -> f64 {
@@ -100,12 +103,13 @@ fn ahead(kept: &[Vec<f64>; 2], k: usize, shift: f64, by: f64) -> f64 {
 /// `+|sin|` on the other, each ahead by the pressure angle in its own sense.
 fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
     let loaded = on.scales.load > 0.0;
+    let sense = sense(on);
     let fade_of = move |shape: &[f64]| shape.get(1).copied().filter(|_| loaded).unwrap_or(f64::INFINITY);
     let mut law = Law::new(cause, move |on, shape| {
         let half = fade_of(shape);
         let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
         let (second, fourth) = (kept(on, of, 2.0), kept(on, of, 4.0));
-        let by = FLANK_AHEAD * sense(on);
+        let by = FLANK_AHEAD * sense;
         let pattern = by_row(on, |k| {
             let wave = ahead(&second, k, 2.0 * shape[0], 2.0 * by * flank(k))
                 + FOURTH_OF_SECOND * ahead(&fourth, k, 4.0 * shape[0], 4.0 * by * flank(k))
@@ -127,7 +131,7 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
     })
     .shapes([Shape::angle("phase_rad", PI, 1)].into_iter().chain(loaded.then(|| half_load(on))))
     .parameters(move |on, shape, c| {
-        let by = FLANK_AHEAD * sense(on);
+        let by = FLANK_AHEAD * sense;
         let amplitude = second_order_unloaded(c, shape[0], by) / SECOND_ORDER;
         let mut named: Vec<Named> = vec![
             ("amplitude_um", amplitude * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um),
@@ -139,7 +143,11 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
         }
         named
     })
-    .physical(|_, c| c[0] > 0.0);
+    // Where its deviations take back what the law says, it is another error of order 2.
+    .physical(move |shape, c| {
+        let by = FLANK_AHEAD * sense;
+        c[0] > 0.0 && second_order_unloaded(c, shape[0], by) > LEAST_OF_PATTERN * c[0]
+    });
     law.doubt = ECCENTRICITY_DOUBT;
     law.lead = Some(Lead {
         columns: Box::new(move |on, shape| {
@@ -149,7 +157,7 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
             // Second order along cos 2 eps and sin 2 eps.
             for shift in [0.0, FRAC_PI_2] {
                 let second = kept(on, of, 2.0);
-                let along = |k: usize| ahead(&second, k, shift, 2.0 * FLANK_AHEAD * sense(on) * flank(k));
+                let along = |k: usize| ahead(&second, k, shift, 2.0 * FLANK_AHEAD * sense * flank(k));
                 columns.push(main(by_row(on, |k| fade(k) * flank(k) * along(k)), USUAL_ARCSEC));
             }
             columns.push(main(by_row(on, |k| fade(k) * flank(k)), USUAL_ARCSEC));
@@ -205,7 +213,8 @@ fn pitch(cause: &'static str, of: Angle) -> Law {
         }
         columns.push(nuisance(by_row(on, flank), 0.3));
         columns.push(nuisance(by_row(on, |k| flank(k) * light(k)), 0.3));
-        columns.extend(waves(on, of, 2.0, |k| flank(k) * light(k)).map(|v| nuisance(v, 0.2)));
+        // The first order of the wheel, which most cutting leaves, is rectified by the clearance like an eccentricity.
+        columns.extend(waves(on, of, 2.0, |k| flank(k) * light(k)).map(|v| nuisance(v, 0.4)));
         if on.scales.load > 0.0 {
             columns.extend(waves(on, of, 2.0, |k| on.rows.torque[k].abs() / on.scales.load).map(|v| nuisance(v, 0.1)));
         }
@@ -226,7 +235,7 @@ fn smooth_pitch(cause: &'static str, of: Angle) -> Law {
         columns.extend(waves(on, of, 4.0, |_| 1.0).map(|v| nuisance(v, 0.25)));
         columns.extend(waves(on, of, 1.0, light).map(|v| nuisance(v, 0.2)));
         // The clearance makes even orders of the first one, of other phase on each flank.
-        columns.extend(waves(on, of, 2.0, |k| flank(k) * light(k)).map(|v| nuisance(v, 0.25)));
+        columns.extend(waves(on, of, 2.0, |k| flank(k) * light(k)).map(|v| nuisance(v, 0.4)));
         columns.extend(waves(on, of, 2.0, light).map(|v| nuisance(v, 0.1)));
         columns.push(nuisance(by_row(on, |k| flank(k) * light(k)), 0.3));
         columns
@@ -414,7 +423,8 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     }
     for law in &mut laws {
         law.misfit = SHAPE_MISFIT;
-        law.kin = Kin::Shape;
+        // The tooth mesh is an order of its own.
+        law.kin = if law.cause == "cam_form_error" { Kin::Unlike } else { Kin::Shape };
     }
     laws
 }

@@ -231,12 +231,27 @@ pub struct Law {
 pub enum Kin {
     /// Shape and place of wheels and generator: waves of the generator angle.
     Shape,
-    /// Follows the torque or the speed: springs, friction, drag, and a reading that comes late.
-    Load,
+    /// Follows the torque: springs.
+    Torque,
+    /// Follows the motion: a reading that comes late.
+    Motion,
+    /// Follows both: friction and drag.
+    Friction,
     /// Width of the clearance.
     Clearance,
     /// Like nothing else.
     Unlike,
+}
+
+impl Kin {
+    /// Whether what one is wrong by may look like the other.
+    fn like(self, other: Kin) -> bool {
+        match (self, other) {
+            (Kin::Unlike, _) | (_, Kin::Unlike) => false,
+            (Kin::Friction, Kin::Torque | Kin::Motion) | (Kin::Torque | Kin::Motion, Kin::Friction) => true,
+            (a, b) => a == b,
+        }
+    }
 }
 
 /// Share of a law's misfit that may look like a law that is no kin.
@@ -306,7 +321,7 @@ impl Law {
     #[must_use]
     pub fn misfit_as(&self, other: &Law) -> f64 {
         // A pulse at a place is what any wrong shape leaves, in time or in angle.
-        let alike = self.kin == other.kin && self.kin != Kin::Unlike || other.cause == "damaged_tooth";
+        let alike = self.kin.like(other.kin) || other.cause == "damaged_tooth";
         self.misfit * if alike || !other.named { 1.0 } else { NO_KIN }
     }
 
@@ -356,13 +371,9 @@ pub fn library(on: &Excitation<'_>) -> Vec<Law> {
     laws.extend(sensor::laws(on));
     for law in &mut laws {
         law.kin = match law.cause.as_str() {
-            "torsional_hysteresis"
-            | "stiffness_hardening"
-            | "stiffness_error"
-            | "thermal_stiffness"
-            | "lubricant_viscosity"
-            | "gravity_torque"
-            | "sensor_latency" => Kin::Load,
+            "stiffness_hardening" | "stiffness_error" | "thermal_stiffness" | "gravity_torque" => Kin::Torque,
+            "sensor_latency" => Kin::Motion,
+            "torsional_hysteresis" | "lubricant_viscosity" => Kin::Friction,
             "backlash_growth" | "wear" | "thermal_clearance" => Kin::Clearance,
             _ => law.kin,
         };

@@ -28,7 +28,13 @@ fn encoder(cause: &'static str, phase: fn(&Excitation<'_>, usize) -> f64, per_ra
 fn sensor_latency() -> Law {
     Law::new("sensor_latency", |on, _| {
         let per_s = crate::tables::ARCSEC_PER_RAD / on.nominal.ratio;
-        vec![main(by_row(on, |k| -on.rows.speed[k] * per_s), 5e-3)]
+        let begun = on.scales.begin_s + 0.5 * on.scales.duration_s;
+        let since = |k: usize| 2.0 * (on.rows.time[k] - begun) / on.scales.duration_s.max(1e-9);
+        vec![
+            main(by_row(on, |k| -on.rows.speed[k] * per_s), 5e-3),
+            // Two clocks seldom run at the same rate.
+            nuisance(by_row(on, |k| -on.rows.speed[k] * per_s * since(k)), 0.3),
+        ]
     })
     .parameters(|_, _, c| vec![("delay_s", c[0])])
 }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::super::rows::rms;
+use super::geometry::{Angle, waves};
 use super::{Excitation, Law, Shape, by_row, history, main, nuisance};
 
 /// Torque in units of the load scale.
@@ -111,10 +112,20 @@ fn stiffness_error() -> Law {
     law
 }
 
+/// Share of a grown clearance by which it may differ around a wheel.
+const UNEVEN_WEAR: f64 = 0.15;
+
 fn backlash_growth() -> Law {
     let mut law = Law::new("backlash_growth", |on, _| {
         let half = on.base.half_backlash.max(1.0);
-        vec![main(by_row(on, |k| half * on.base.flank[k]), 1.0)]
+        let mut columns = vec![main(by_row(on, |k| half * on.base.flank[k]), 1.0)];
+        // Teeth that are used most wear most.
+        if on.nominal.teeth.is_some() {
+            for wheel in [Angle::Flexspline, Angle::CircularSpline] {
+                columns.extend(waves(on, wheel, 2.0, |k| on.base.flank[k]).map(|v| nuisance(v, UNEVEN_WEAR)));
+            }
+        }
+        columns
     })
     .parameters(|on, _, c| vec![("growth_arcsec", 2.0 * c[0] * on.base.half_backlash.max(1.0))])
     .physical(|_, c| c[0] > 0.0);

@@ -47,6 +47,8 @@ const LOAD_STEP: f64 = 0.03;
 const LOAD_NOISE: f64 = 8.0;
 /// And its usual pace no more than so many times.
 const LOAD_PACE: f64 = 6.0;
+/// A step that leaves less than this share of the misfit of what it might be instead is told from it.
+const TELLS: f64 = 0.95;
 /// A jump stands alone: so many rows before and after it change the error by less than half as much.
 const APART: usize = 12;
 
@@ -332,11 +334,36 @@ fn others_change_as_much(session: &Session, row: usize, size: f64) -> bool {
     near.filter(|k| *k != row).any(|k| (session.error_rad[k] - session.error_rad[k - 1]).abs() > 0.5 * size.abs())
 }
 
+/// Whether a step that happens under light load, where friction alone holds a flank, is seen under loads that hold one: a change of
+/// flank is not.
+fn lasts_under_load(sessions: &[Session], state: &State, steps: &[Step], place: Place, size: f64) -> bool {
+    let held = HELD * largest_torque(sessions);
+    let loaded = |s: usize, r: usize| sessions[s].torque_n_m.as_ref().is_some_and(|torque| torque[r].abs() >= held);
+    if held == 0.0 || loaded(place.session, place.row) {
+        return true;
+    }
+    let others: Vec<_> = steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
+    let mut extras: Vec<Extra> = others.iter().map(|column| column as Extra).collect();
+    let lasting = column(place);
+    let under_load = |s: usize, r: usize| if loaded(s, r) { lasting(s, r) } else { 0.0 };
+    let under_none = |s: usize, r: usize| if loaded(s, r) { 0.0 } else { lasting(s, r) };
+    extras.extend([&under_none as Extra, &under_load]);
+    let Some(fit) = state.fit(&extras) else { return false };
+    let seen = |k: usize| {
+        let (value, std) = (fit.value[fit.value.len() - k], fit.std[fit.std.len() - k]);
+        (value - size).abs() < AGREES * size.abs() && value.abs() > LASTS * std
+    };
+    seen(1) && seen(2)
+}
+
 /// Whether a step cannot be a change of flank: the output came back to where it happened and the step did not, or load held the flank,
 /// or no clearance is so wide.
 fn no_flank_was_changed(sessions: &[Session], state: &State, steps: &[Step], place: Place, size: f64) -> bool {
     if size.abs() > WIDER_THAN_CLEARANCE_RAD {
         return true;
+    }
+    if !lasts_under_load(sessions, state, steps, place, size) {
+        return false;
     }
     let here = sessions[place.session].generator_rad[place.row];
     let mut crossings = 0;
@@ -364,7 +391,7 @@ fn no_flank_was_changed(sessions: &[Session], state: &State, steps: &[Step], pla
             state.fit(&extras)
         };
         let (Some(time), Some(angle)) = (with(&in_time), with(&in_angle)) else { return false };
-        return time.misfit < 0.95 * angle.misfit;
+        return time.misfit < TELLS * angle.misfit;
     }
     let session = &sessions[place.session];
     let held =
