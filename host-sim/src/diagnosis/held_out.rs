@@ -3,8 +3,8 @@
 
 use super::linear::Gram;
 use super::model::{Problem, Scaffold, Term, white_columns};
-use super::report::HeldOut;
-use super::select::blocks;
+use super::report::{HeldOut, Unexplained};
+use super::select::{self, Selected, blocks};
 
 /// Errors of prediction in blocks left out.
 pub struct Evaluated {
@@ -28,6 +28,30 @@ pub fn evaluate(problem: &Problem<'_>, terms: &[&Term<'_>]) -> Evaluated {
         .collect();
     let rms = |square: f64| if square.is_finite() { square.sqrt() } else { 0.0 };
     Evaluated { total: HeldOut { rms_before_arcsec: rms(before), rms_after_arcsec: rms(after) }, gains }
+}
+
+/// The terms that predict sessions they were not fitted to: while all together predict them worse than none, the one that harms most is
+/// set aside, as long as that helps and another is left. Also what was set aside.
+#[must_use]
+pub fn proved<'l>(problem: &Problem<'_>, mut selected: Selected<'l>) -> (Selected<'l>, Vec<Unexplained>) {
+    let square = |terms: &[&Term<'l>]| left_out(problem, terms, true).unwrap_or(f64::INFINITY);
+    let none = square(&[]);
+    let mut aside = Vec::new();
+    while selected.terms.len() > 1 && square(&selected.terms.iter().collect::<Vec<_>>()) > none {
+        let all = square(&selected.terms.iter().collect::<Vec<_>>());
+        let best = (0..selected.terms.len())
+            .map(|k| (square(&selected.others(k)), k))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .filter(|(without, _)| *without < all);
+        let Some((_, k)) = best else { break };
+        let size_arcsec = select::standing(problem, &selected, k).size;
+        let mut terms = selected.terms.clone();
+        let looks_like = terms.remove(k).law.cause.clone();
+        let Some(fit) = select::fit(problem, &terms) else { break };
+        aside.push(Unexplained { looks_like, size_arcsec });
+        selected = Selected { terms, fit };
+    }
+    (selected, aside)
 }
 
 /// Mean squared error of prediction, arcsec², over averages without uncertain rows. With `linearised` the shape parameters are

@@ -131,6 +131,8 @@ pub fn diagnose_extended(
     let Search { laws, problem, noise, start, fast } = search;
     let terms: Vec<Term<'_>> = start.iter().map(|(k, p)| Term::new(&problem, &laws[*k], p.clone())).collect();
     let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
+    let (selected, mut unproved) = held_out::proved(&problem, selected);
+    let start = remembered(&laws, &selected);
     let maps = candidate::maps(&on);
     let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);
     left.extend(fast.into_iter().filter(|f| f.size_arcsec > select::least_size(noise.white)));
@@ -144,6 +146,7 @@ pub fn diagnose_extended(
             tell(&format!("  left: {} {:.2}", something.looks_like, something.size_arcsec));
         }
     }
+    left.append(&mut unproved);
     let diagnosis = conclude(&problem, &laws, selected, left, noise, settings);
     let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
     drop(problem);

@@ -180,3 +180,31 @@ fn a_form_error_of_the_cam_that_averages_would_hide_is_found_and_costs_nothing_w
         assert_eq!(rows_to_an_average(&measured(&other)), 2);
     }
 }
+
+#[test]
+fn hysteresis_does_not_stand_in_for_a_spring_that_is_softer() {
+    for law in [0, 1] {
+        let effects = [effect("torsional_hysteresis", 15.0, 0.0, 0.4), effect("stiffness_error", 0.6, 0.0, 0.0)];
+        let diagnosis = diagnosed(&effects, law, 41);
+        assert_eq!(names(&diagnosis), ["stiffness_error", "torsional_hysteresis"], "law {law}: {}", diagnosis.text());
+    }
+}
+
+#[test]
+fn a_delay_is_seen_beside_a_spring_that_is_much_softer() {
+    let effects = [effect("stiffness_error", 0.6, 0.0, 0.0), effect("sensor_latency", 0.5, 0.0, 0.0)];
+    let diagnosis = diagnosed(&effects, 0, 42);
+    assert_eq!(names(&diagnosis), ["sensor_latency", "stiffness_error"], "{}", diagnosis.text());
+}
+
+#[test]
+fn a_tooth_mesh_is_seen_behind_what_is_larger() {
+    let drive = catalogue_drive();
+    let plan =
+        Plan { sessions: 5, rows: 6000, rate_hz: 100.0, speed_rad_s: 6.0, torque_n_m: 40.0, richness: Richness::Rich };
+    let sensors = Sensors { white_arcsec: 2.0, wander_arcsec: 0.8, wander_s: 12.0 };
+    let effects = [effect("damaged_tooth", 40.0, 0.7, 0.5), effect("cam_form_error", 2.5, 0.7, 0.5)];
+    let measured = measure(&drive, &effects, &plan, &sensors, 0, &mut fastrand::Rng::with_seed(6));
+    let diagnosis = diagnose(&measured, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!(names(&diagnosis), ["cam_form_error", "damaged_tooth"], "{}", diagnosis.text());
+}

@@ -82,7 +82,7 @@ const MEAN_OF_SECOND: f64 = 1.15;
 const FOURTH_OF_SECOND: f64 = 0.15;
 
 /// Share of the pattern's second order that deviations have to leave of an eccentricity.
-const LEAST_OF_PATTERN: f64 = 0.35;
+const LEAST_OF_PATTERN: f64 = 0.15;
 
 /// +1 where the circular spline is the output. Where the flexspline is, a load that turns it forward rests on the other flank of the
 /// circular spline, and what a flank is ahead by changes its sign.
@@ -284,6 +284,7 @@ fn ovality() -> Law {
             ("phase_rad", 0.5 * phase),
         ]
     })
+    .well_known()
 }
 
 /// Radial over tangential part of an oval ring as a flank sees them: twice the tangent of the pressure angle.

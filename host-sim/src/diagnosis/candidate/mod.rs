@@ -257,6 +257,11 @@ impl Kin {
 /// Share of a law's misfit that may look like a law that is no kin.
 const NO_KIN: f64 = 0.25;
 
+/// Size of all deviations over that of the law, at most: beyond, the law is there for its deviations.
+const MOST_NUISANCE: f64 = 0.9;
+/// The same for laws that are well known, and whose deviations are those of another cause.
+const MOST_NUISANCE_OF_KNOWN: f64 = 0.6;
+
 /// Share by which the law of a contact, a friction or a lubricant may be wrong.
 const USUAL_MISFIT: f64 = 0.10;
 /// The same for pure geometry and counting: sensors, ratio, skipped teeth.
@@ -276,7 +281,7 @@ impl Law {
             physical: Box::new(|_, _| true),
             tolerance_of: None,
             misfit: USUAL_MISFIT,
-            most_nuisance: 1.0,
+            most_nuisance: MOST_NUISANCE,
             kin: Kin::Unlike,
             doubt: USUAL_DOUBT,
             lead: None,
@@ -288,6 +293,10 @@ impl Law {
     fn exact(mut self) -> Law {
         self.misfit = EXACT_MISFIT;
         self.doubt = EXACT_DOUBT;
+        self
+    }
+    fn well_known(mut self) -> Law {
+        self.most_nuisance = MOST_NUISANCE_OF_KNOWN;
         self
     }
     fn whole(mut self) -> Law {

@@ -178,6 +178,7 @@ fn wear(by: Progress) -> Law {
     .shapes([Shape::by_factors("exponent", 0.5, 2.0, 1)])
     .parameters(|_, shape, c| vec![("growth_arcsec", 2.0 * (c[0] + c[1])), ("exponent", shape[0])])
     .physical(|_, c| c[0] > 0.0)
+    .well_known()
 }
 
 /// Teeth that skipped: the output is off by whole teeth from then on.

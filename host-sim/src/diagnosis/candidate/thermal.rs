@@ -39,6 +39,7 @@ fn thermal_clearance(on: &Excitation<'_>) -> Law {
         }
         named
     })
+    .well_known()
 }
 
 /// Wind-up that grows or falls with temperature.
@@ -51,6 +52,7 @@ fn thermal_stiffness() -> Law {
         ]
     })
     .parameters(|_, _, c| vec![("stiffness_relative_per_k", -0.01 * c[0])])
+    .well_known()
 }
 
 /// Whether a drag is one of a lubricant: at the edge of the range it is dry friction or lash, which knows neither speed nor cold.
