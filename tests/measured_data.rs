@@ -55,6 +55,38 @@ fn physics_is_not_taken_for_a_fault_of_the_data() {
     assert!(alarms.len() as f64 <= 0.01 * seeds as f64, "{} in {seeds}:\n{}", alarms.len(), alarms.join("\n"));
 }
 
+/// Friction holds a flank until the load is worth a few percent of its largest; then the clearance is crossed within a row, while the
+/// wind-up still creeps after the load.
+#[test]
+fn a_flank_that_friction_lets_go_is_no_lost_index() {
+    for seed in 0..30 {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut bench = Bench { torque_n_m: Some(Vec::new()), ..Bench::default() };
+        let (mut psi, mut flank, mut crept, mut time) = (0.0, 1.0_f64, 0.0, 0.0);
+        let (pace, period, let_go) = (0.004 + 0.01 * random.f64(), 80.0 + 80.0 * random.f64(), 0.6 + 1.2 * random.f64());
+        for k in 0..15_000 {
+            if k % 3000 == 0 {
+                time += 400.0;
+                flank = if random.bool() { 1.0 } else { -1.0 };
+            }
+            time += 0.01;
+            psi += if k % 5000 < 3500 { pace } else { -pace };
+            let torque: f64 = 30.0 * (std::f64::consts::TAU * time / period).sin() * (0.3 + 0.7 * (k % 3000) as f64 / 3e3);
+            if torque.abs() > let_go {
+                flank = torque.signum();
+            }
+            crept += (torque - crept) * 0.01 / 40.0;
+            let error = 3.0 * torque + 4.0 * crept + 28.0 * flank + 12.0 * (2.0 * psi).sin() + 1.2 * normal(&mut random);
+            bench.time_s.push(time);
+            bench.generator_rad.push(psi);
+            bench.output_rad.push(psi / RATIO + error * ARCSEC);
+            bench.torque_n_m.as_mut().unwrap().push(torque + 0.04 * normal(&mut random));
+        }
+        let read = read(bench.csv().as_bytes()).unwrap();
+        assert!(!names(&read).contains(&FaultName::EncoderIndexJump), "seed {seed}: {:?}", read.faults);
+    }
+}
+
 /// What a damaged file must end in.
 enum Ends {
     /// An error that says all this.

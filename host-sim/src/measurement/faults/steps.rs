@@ -25,7 +25,7 @@ const LASTS: f64 = 8.0;
 /// The lasting part and the sudden part agree within this share.
 const AGREES: f64 = 0.4;
 /// A step is taken back by one of the other sign that differs by less than this share.
-const TAKEN_BACK: f64 = 0.2;
+const TAKEN_BACK: f64 = 0.35;
 /// No step smaller than this is looked for, rad.
 const LEAST_RAD: f64 = 5.0 * ARCSEC;
 /// Nor one that is not seen from one row to the next: so many standard deviations of the white noise.
@@ -49,6 +49,8 @@ const LOAD_NOISE: f64 = 8.0;
 const LOAD_PACE: f64 = 6.0;
 /// A step that leaves less than this share of the misfit of what it might be instead is told from it.
 const TELLS: f64 = 0.95;
+/// Medians of six rows before and after differ by no more than so many standard deviations of the white noise.
+const LOCAL_NOISE: f64 = 2.2;
 /// A jump stands alone: so many rows before and after it change the error by less than half as much.
 const APART: usize = 12;
 
@@ -295,7 +297,7 @@ fn strength(
         .map(|error| (error[1] - error[0]).abs())
         .collect();
     let moves = beside as f64 * median_of(&mut paces);
-    if (local - size).abs() > AGREES * size.abs() + 4.0 * noise + moves {
+    if (local - size).abs() > AGREES * size.abs() + LOCAL_NOISE * noise + moves {
         return 0.0;
     }
     size.abs() / (LASTS * std).max(1e-300)
