@@ -63,7 +63,8 @@ fn a_flank_that_friction_lets_go_is_no_lost_index() {
         let mut random = fastrand::Rng::with_seed(seed);
         let mut bench = Bench { torque_n_m: Some(Vec::new()), ..Bench::default() };
         let (mut psi, mut flank, mut crept, mut time) = (0.0, 1.0_f64, 0.0, 0.0);
-        let (pace, period, let_go) = (0.004 + 0.01 * random.f64(), 80.0 + 80.0 * random.f64(), 0.6 + 1.2 * random.f64());
+        let (pace, period, let_go) =
+            (0.004 + 0.01 * random.f64(), 80.0 + 80.0 * random.f64(), 0.6 + 1.2 * random.f64());
         for k in 0..15_000 {
             if k % 3000 == 0 {
                 time += 400.0;
@@ -71,12 +72,14 @@ fn a_flank_that_friction_lets_go_is_no_lost_index() {
             }
             time += 0.01;
             psi += if k % 5000 < 3500 { pace } else { -pace };
-            let torque: f64 = 30.0 * (std::f64::consts::TAU * time / period).sin() * (0.3 + 0.7 * (k % 3000) as f64 / 3e3);
+            let torque: f64 =
+                30.0 * (std::f64::consts::TAU * time / period).sin() * (0.3 + 0.7 * (k % 3000) as f64 / 3e3);
             if torque.abs() > let_go {
                 flank = torque.signum();
             }
             crept += (torque - crept) * 0.01 / 40.0;
-            let error = 3.0 * torque + 4.0 * crept + 28.0 * flank + 12.0 * (2.0 * psi).sin() + 1.2 * normal(&mut random);
+            let error =
+                3.0 * torque + 4.0 * crept + 28.0 * flank + 12.0 * (2.0 * psi).sin() + 1.2 * normal(&mut random);
             bench.time_s.push(time);
             bench.generator_rad.push(psi);
             bench.output_rad.push(psi / RATIO + error * ARCSEC);

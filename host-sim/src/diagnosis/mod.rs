@@ -88,7 +88,7 @@ const MOST_ROUNDS: usize = 2;
 /// What is left as a free function counts if it is larger than this against the strongest cause.
 const LEAST_LEFT_OF_STRONGEST: f64 = 0.25;
 /// Named causes that explain less than this share of what is explained at all are not named.
-const LEAST_NAMED_SHARE: f64 = 0.7;
+const LEAST_NAMED_SHARE: f64 = 0.6;
 /// The same beside a deviation that is described well though it has no name.
 const LEAST_BESIDE_DESCRIBED: f64 = 0.05;
 

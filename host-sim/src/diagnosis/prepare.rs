@@ -46,16 +46,20 @@ pub fn jumps(rows: &Rows, base: &Base) -> Vec<(f64, f64)> {
             found.push((at, height));
         }
     };
+    // Teeth slide into the next space, and the output swings out: what counts is where it comes to rest.
+    let over = (JUMPING_S / rows.period.max(1e-9)).ceil().clamp(0.0, MOST_ROWS_OF_A_JUMP) as usize;
     let mut last: Option<usize> = None;
     for session in rows.sessions_used() {
         if let Some(end) = last {
-            let (a, b) = (end.saturating_sub(BESIDE), (session.start + BESIDE).min(session.end));
-            between(session.start, &left[a..end], &left[session.start..b]);
+            let at_rest = (session.start + over).min(session.end - 1);
+            let after = &left[at_rest..(at_rest + BESIDE).min(session.end)];
+            between(session.start, &left[end.saturating_sub(BESIDE)..end], after);
         }
         for k in session.start + 1..session.end {
             if (left[k] - left[k - 1]).abs() > 0.5 * LEAST_JUMP {
-                let (a, b) = (k.saturating_sub(BESIDE).max(session.start), (k + BESIDE).min(session.end));
-                between(k, &left[a..k], &left[k..b]);
+                // At the end of a recording the next one says where.
+                let (a, at_rest) = (k.saturating_sub(BESIDE).max(session.start), (k + over).min(rows.len() - 1));
+                between(k, &left[a..k], &left[at_rest..(at_rest + BESIDE).min(rows.len())]);
             }
         }
         last = Some(session.end);
@@ -64,7 +68,7 @@ pub fn jumps(rows: &Rows, base: &Base) -> Vec<(f64, f64)> {
     let mut merged: Vec<(usize, f64)> = Vec::new();
     for (at, height) in found {
         match merged.last_mut() {
-            Some((before, h)) if at - *before < BESIDE => {
+            Some((before, h)) if at - *before < BESIDE + over => {
                 if height.abs() > h.abs() {
                     (*before, *h) = (at, height);
                 }
@@ -99,8 +103,9 @@ pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>]) -> Vec<bool> {
     if share > UNCERTAIN_AT_MOST { without } else { uncertain }
 }
 
-/// A jump is over after this time, s.
+/// A jump is over after this time, s, and after so many rows.
 const JUMPING_S: f64 = 0.15;
+const MOST_ROWS_OF_A_JUMP: f64 = 500.0;
 /// A load that a cause adds is known to this share.
 const LOAD_UNKNOWN: f64 = 0.2;
 

@@ -208,3 +208,28 @@ fn a_tooth_mesh_is_seen_behind_what_is_larger() {
     let diagnosis = diagnose(&measured, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
     assert_eq!(names(&diagnosis), ["cam_form_error", "damaged_tooth"], "{}", diagnosis.text());
 }
+
+#[test]
+fn teeth_that_slide_into_the_next_space_between_two_recordings_have_ratcheted() {
+    let drive = catalogue_drive();
+    let plan =
+        Plan { sessions: 4, rows: 4000, rate_hz: 200.0, speed_rad_s: 6.0, torque_n_m: 40.0, richness: Richness::Rich };
+    let sensors = Sensors { white_arcsec: 1.0, wander_arcsec: 0.4, wander_s: 12.0 };
+    let mut sessions = measure(&drive, &[], &plan, &sensors, 0, &mut fastrand::Rng::with_seed(8));
+    let pitch = std::f64::consts::TAU / f64::from(drive.teeth.unwrap().circular_spline);
+    let slide = |rows: usize| pitch * (1.0 - (-(rows as f64) / 200.0 / 0.012).exp());
+    for (k, error) in sessions[1].error_rad.iter_mut().enumerate().skip(1500) {
+        *error -= slide(k - 1500);
+    }
+    sessions[2].error_rad.iter_mut().enumerate().for_each(|(k, error)| *error -= pitch + slide(k));
+    sessions[3].error_rad.iter_mut().for_each(|error| *error -= 2.0 * pitch);
+    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!(
+        (diagnosis.verdict, names(&diagnosis)),
+        (Verdict::Explained, vec!["ratcheting"]),
+        "{}",
+        diagnosis.text()
+    );
+    let slipped = diagnosis.causes[0].parameters["jump_arcsec"].value;
+    assert!((slipped + 2.0 * pitch * 206_264.8).abs() < 15.0, "{slipped}");
+}
