@@ -11,6 +11,9 @@ use super::select::{Selected, blocks};
 /// Step of numerical derivatives, standard deviations.
 const STEP: f64 = 0.1;
 
+/// A parameter is no longer determined where its standard deviation grows by this factor.
+const UNDETERMINED: f64 = 100.0;
+
 /// Stretches of the data whose misfits are taken as independent, in each session.
 const STRETCHES: usize = 12;
 
@@ -59,11 +62,12 @@ pub fn parameters(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<BTreeMa
     let n = fit.priors.len();
     // Jackknife over blocks: shifts of all coefficients when a block is left out.
     let white = white_columns(problem, &terms, &moves);
-    let shifts: Vec<Vec<f64>> = blocks(problem)
+    let shifts: Vec<(Vec<f64>, Vec<f64>)> = blocks(problem)
         .into_iter()
         .filter_map(|block| {
             let solved = fit.without(&Gram::of(&white, block), problem.worth)?;
-            Some(solved.coefficients.iter().zip(&fit.solution.coefficients).map(|(a, b)| a - b).collect())
+            let moved = solved.coefficients.iter().zip(&fit.solution.coefficients).map(|(a, b)| a - b).collect();
+            Some((moved, solved.covariance()))
         })
         .collect();
     let covariance = fit.solution.covariance();
@@ -108,9 +112,13 @@ pub fn parameters(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<BTreeMa
                     .sum()
             };
             let laplace = spread(&covariance).max(spread(&by_stretches));
-            let count = shifts.len().max(1) as f64;
-            let moved: Vec<f64> =
-                shifts.iter().map(|s| (0..dimension).map(|j| slope[j] * s[index[j]]).sum::<f64>()).collect();
+            // A session without which the rest says nothing of the parameter, such as the one after a jump, is no repetition.
+            let moved: Vec<f64> = shifts
+                .iter()
+                .filter(|(_, without)| spread(without) < UNDETERMINED * UNDETERMINED * laplace)
+                .map(|(s, _)| (0..dimension).map(|j| slope[j] * s[index[j]]).sum::<f64>())
+                .collect();
+            let count = moved.len().max(1) as f64;
             let mean = moved.iter().sum::<f64>() / count;
             let jackknife = (count - 1.0) / count * moved.iter().map(|m| (m - mean).powi(2)).sum::<f64>();
             let angle = name.ends_with("phase_rad") || name == "angle_rad";
