@@ -90,6 +90,26 @@ fn a_flank_that_friction_lets_go_is_no_lost_index() {
     }
 }
 
+/// Under a generator that stands, an output that leaves by a tooth pitch has ratcheted; one that moves on slowly is a frozen generator.
+#[test]
+fn a_generator_that_stands_while_teeth_skip_is_not_frozen() {
+    let pitch = std::f64::consts::TAU / 190.0;
+    let stands = |slides: usize| {
+        let mut bench = Bench::plain(6000, 1.0, 3);
+        let still = bench.generator_rad[1500];
+        bench.generator_rad[1500..1700].fill(still);
+        for k in 1500..6000 {
+            bench.output_rad[k] -= pitch * ((k as f64 - 1580.0) / slides as f64).clamp(0.0, 1.0);
+        }
+        for k in 1500..1700 {
+            bench.output_rad[k] += (still - bench.generator_rad[1499] - 0.05 * (k as f64 - 1499.0)) / RATIO;
+        }
+        names(&read(bench.csv().as_bytes()).unwrap())
+    };
+    assert!(!stands(4).contains(&FaultName::FrozenChannel), "{:?}", stands(4));
+    assert!(stands(110).contains(&FaultName::FrozenChannel), "{:?}", stands(110));
+}
+
 /// What a damaged file must end in.
 enum Ends {
     /// An error that says all this.

@@ -233,3 +233,28 @@ fn teeth_that_slide_into_the_next_space_between_two_recordings_have_ratcheted() 
     let slipped = diagnosis.causes[0].parameters["jump_arcsec"];
     assert!((slipped.value + 2.0 * pitch * 206_264.8).abs() < 15.0 && slipped.std < 15.0, "{slipped:?}");
 }
+
+#[test]
+fn a_clearance_shut_by_the_cold_is_never_less_than_nothing() {
+    let drive = catalogue_drive();
+    let sessions = data(&[], Richness::Rich, 0, 9);
+    let rows = super::Rows::new(&sessions, &drive);
+    let (base, jumps) = super::prepare::base(&rows, &drive, None);
+    let scales = super::Scales::new(&rows, Settings::default().pitch_radius_mm, jumps);
+    let on = super::Excitation { rows: &rows, nominal: &drive, base: &base, scales: &scales };
+    let laws = super::library(&on);
+    let shut = |law: &&super::Law| law.shapes.iter().any(|s| s.name == "clearance_arcsec_per_k");
+    let law = laws.iter().find(shut).unwrap();
+    assert_eq!(law.cause, "thermal_clearance");
+    let mut reached = false;
+    for per_k in [-4.0, 4.0] {
+        let values = [per_k, 1.0];
+        let changed = &(law.columns)(&on, &values)[0].values;
+        for (k, change) in changed.iter().enumerate() {
+            let left = base.half_backlash * base.flank[k] + change;
+            assert!(left * base.flank[k] >= -1e-9, "row {k}: {left}");
+            reached |= left.abs() < 1e-9 && base.flank[k] != 0.0;
+        }
+    }
+    assert!(reached, "the data must be cold or hot enough to shut it");
+}

@@ -42,6 +42,37 @@ fn thermal_clearance(on: &Excitation<'_>) -> Law {
     .well_known()
 }
 
+/// The same where it goes so far that the clearance is shut in the cold or in the heat: it cannot be less than nothing.
+fn thermal_clearance_shut(on: &Excitation<'_>) -> Law {
+    let timed = on.rows.recorded.time;
+    Law::new("thermal_clearance", move |on, shape| {
+        let warmer = lagged(on, if timed { shape[1] } else { 1e-3 });
+        let width = 2.0 * on.base.half_backlash;
+        let changed = by_row(on, |k| 0.5 * on.base.flank[k] * ((width + shape[0] * warmer[k]).max(0.0) - width));
+        vec![
+            Column { values: changed, tolerance: Tolerance::Main(Prior { mean: 1.0, std: 0.1 }) },
+            nuisance(by_row(on, |k| on.base.flank[k] * warmer[k]), 0.15),
+        ]
+    })
+    .shapes(
+        [Shape::evenly("clearance_arcsec_per_k", -SHUT_ARCSEC_PER_K, SHUT_ARCSEC_PER_K, 8)]
+            .into_iter()
+            .chain(timed.then(|| Shape::by_factors("lag_s", 0.5, 600.0, 2))),
+    )
+    .parameters(move |_, shape, c| {
+        let mut named = vec![("clearance_arcsec_per_k", shape[0] * c[0])];
+        if timed {
+            named.push(("lag_s", shape[1]));
+        }
+        named
+    })
+    .physical(|_, c| c[0] > 0.5)
+    .well_known()
+}
+
+/// Largest change of the clearance with temperature, arcsec/K: twice that of a hot generator in a cold ring (2″/K).
+const SHUT_ARCSEC_PER_K: f64 = 4.5;
+
 /// Wind-up that grows or falls with temperature.
 fn thermal_stiffness() -> Law {
     Law::new("thermal_stiffness", |on, _| {
@@ -158,6 +189,9 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     // At one temperature nothing thermal can be told from a changed constant.
     if rows.recorded.temperature && (high - low > 2.0 || (low - on.nominal.temperature_c).abs() > 5.0) {
         laws.push(thermal_clearance(on));
+        if on.base.half_backlash > 0.0 {
+            laws.push(thermal_clearance_shut(on));
+        }
         if on.scales.load > 0.0 {
             laws.push(thermal_stiffness());
         }

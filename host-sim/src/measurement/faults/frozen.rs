@@ -46,6 +46,23 @@ fn beyond_chance(rows: usize) -> usize {
     SHORTEST.max(length.ceil() as usize)
 }
 
+/// Whether an output beside a generator that stands leaves by whole tooth pitches and has done so within a part of the stretch: teeth that
+/// skip move it, not a generator that is not read.
+fn slips_a_tooth(output: &[f64], stretch: &Range<usize>, gear: &Gear) -> bool {
+    let Some(pitch) = gear.tooth_pitch_rad else { return false };
+    let angles = &output[stretch.clone()];
+    let (first, last) = (angles[0], angles[angles.len() - 1]);
+    let pitches = ((last - first) / pitch).round();
+    let whole = pitches != 0.0 && (last - first - pitches * pitch).abs() < WHOLE_PITCH * pitch;
+    let apart = (angles.len() / 4).max(1);
+    whole && angles.windows(apart + 1).any(|a| (a[apart] - a[0]).abs() > SUDDEN * (last - first).abs())
+}
+
+/// A motion is that many whole tooth pitches if it differs by less than this share of one…
+const WHOLE_PITCH: f64 = 0.01;
+/// …and sudden if this share of it happens within a quarter of the time.
+const SUDDEN: f64 = 0.9;
+
 /// Finds frozen stretches and leaves their rows out; a channel that is frozen throughout is an error.
 pub(in crate::measurement) fn check(
     sessions: &mut Vec<Session>,
@@ -92,7 +109,8 @@ pub(in crate::measurement) fn check(
                 let due = (output[stretch.end] - output[stretch.start]) * gear.ratio;
                 (next - generator[stretch.start]) * due.signum() > 0.5 * due.abs()
             });
-            if !error_recorded && (moved > LONG_DWELL_RAD || (moved > DWELL_RAD && catches_up)) {
+            let stands = moved > LONG_DWELL_RAD && slips_a_tooth(output, &stretch, gear);
+            if !error_recorded && !stands && (moved > LONG_DWELL_RAD || (moved > DWELL_RAD && catches_up)) {
                 frozen.push((Quantity::Generator, stretch, moved));
             }
         }
