@@ -37,8 +37,11 @@ pub fn proved<'l>(problem: &Problem<'_>, mut selected: Selected<'l>) -> (Selecte
     let square = |terms: &[&Term<'l>]| left_out(problem, terms, true).unwrap_or(f64::INFINITY);
     let none = square(&[]);
     let mut aside = Vec::new();
-    while selected.terms.len() > 1 && square(&selected.terms.iter().collect::<Vec<_>>()) > none {
+    while selected.terms.len() > 1 {
         let all = square(&selected.terms.iter().collect::<Vec<_>>());
+        if all <= none {
+            break;
+        }
         let best = (0..selected.terms.len())
             .map(|k| (square(&selected.others(k)), k))
             .min_by(|a, b| a.0.total_cmp(&b.0))

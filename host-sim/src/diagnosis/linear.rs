@@ -54,8 +54,7 @@ impl Gram {
 }
 
 /// Sum of products.
-#[must_use]
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 

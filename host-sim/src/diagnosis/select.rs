@@ -500,12 +500,14 @@ fn backward<'l>(
             let law = selected.terms[k].law;
             let c = selected.fit.of(k);
             let physical = sound(&selected.terms[k], c);
-            let without = || Scaffold::new(problem, selected.others(k)).fit(&[]);
-            if law.tolerance_of.is_some() && physical && stood_in_for(&selected.others(k), without().as_ref()) {
-                return false;
-            }
-            let in_tolerance =
-                law.tolerance_of.is_some() && without().is_none_or(|fit| !out_of_tolerance(problem, &fit, law));
+            let in_tolerance = law.tolerance_of.is_some() && {
+                let others = selected.others(k);
+                let without = Scaffold::new(problem, others.clone()).fit(&[]);
+                if physical && stood_in_for(&others, without.as_ref()) {
+                    return false;
+                }
+                without.is_none_or(|fit| !out_of_tolerance(problem, &fit, law))
+            };
             let misfit = (0..selected.terms.len())
                 .filter(|j| *j != k)
                 .map(|j| standings[j].size * selected.terms[j].law.misfit_as(law))

@@ -15,6 +15,13 @@ fn data(effects: &[Effect], richness: Richness, law: u8, seed: u64) -> Vec<Sessi
     measure(&catalogue_drive(), effects, &plan, &sensors, law, &mut fastrand::Rng::with_seed(seed))
 }
 
+/// Sessions of so many rows at a rate, under rich excitation and white noise (arcsec).
+fn recorded(effects: &[Effect], sessions: usize, rows: usize, rate_hz: f64, white: f64, seed: u64) -> Vec<Session> {
+    let plan = Plan { sessions, rows, rate_hz, speed_rad_s: 6.0, torque_n_m: 40.0, richness: Richness::Rich };
+    let sensors = Sensors { white_arcsec: white, wander_arcsec: 0.4 * white, wander_s: 12.0 };
+    measure(&catalogue_drive(), effects, &plan, &sensors, 0, &mut fastrand::Rng::with_seed(seed))
+}
+
 fn diagnosed(effects: &[Effect], law: u8, seed: u64) -> Diagnosis {
     let sessions = data(effects, Richness::Rich, law, seed);
     diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap()
@@ -155,9 +162,6 @@ fn a_model_fitted_to_some_sessions_predicts_the_others() {
 #[test]
 fn a_form_error_of_the_cam_that_averages_would_hide_is_found_and_costs_nothing_where_there_is_none() {
     let drive = catalogue_drive();
-    let plan =
-        Plan { sessions: 5, rows: 6000, rate_hz: 100.0, speed_rad_s: 6.0, torque_n_m: 40.0, richness: Richness::Rich };
-    let sensors = Sensors { white_arcsec: 2.0, wander_arcsec: 0.8, wander_s: 12.0 };
     let rows_to_an_average = |sessions: &[Session]| {
         let rows = super::Rows::new(sessions, &drive);
         let (base, jumps) = super::prepare::base(&rows, &drive, None);
@@ -167,7 +171,7 @@ fn a_form_error_of_the_cam_that_averages_would_hide_is_found_and_costs_nothing_w
         let uncertain = super::prepare::uncertain(&on, &[]);
         super::resolution(&on, &super::library(&on), &uncertain, settings.averages, &[]).stride
     };
-    let measured = |effects: &[Effect]| measure(&drive, effects, &plan, &sensors, 0, &mut fastrand::Rng::with_seed(5));
+    let measured = |effects: &[Effect]| recorded(effects, 5, 6000, 100.0, 2.0, 5);
     let cam = measured(&[effect("cam_form_error", 4.0, 0.7, 0.5)]);
     assert_eq!(rows_to_an_average(&cam), 1);
     let diagnosis = diagnose(&cam, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
@@ -200,11 +204,8 @@ fn a_delay_is_seen_beside_a_spring_that_is_much_softer() {
 #[test]
 fn a_tooth_mesh_is_seen_behind_what_is_larger() {
     let drive = catalogue_drive();
-    let plan =
-        Plan { sessions: 5, rows: 6000, rate_hz: 100.0, speed_rad_s: 6.0, torque_n_m: 40.0, richness: Richness::Rich };
-    let sensors = Sensors { white_arcsec: 2.0, wander_arcsec: 0.8, wander_s: 12.0 };
     let effects = [effect("damaged_tooth", 40.0, 0.7, 0.5), effect("cam_form_error", 2.5, 0.7, 0.5)];
-    let measured = measure(&drive, &effects, &plan, &sensors, 0, &mut fastrand::Rng::with_seed(6));
+    let measured = recorded(&effects, 5, 6000, 100.0, 2.0, 6);
     let diagnosis = diagnose(&measured, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
     assert_eq!(names(&diagnosis), ["cam_form_error", "damaged_tooth"], "{}", diagnosis.text());
 }
@@ -212,10 +213,7 @@ fn a_tooth_mesh_is_seen_behind_what_is_larger() {
 #[test]
 fn teeth_that_slide_into_the_next_space_between_two_recordings_have_ratcheted() {
     let drive = catalogue_drive();
-    let plan =
-        Plan { sessions: 4, rows: 4000, rate_hz: 200.0, speed_rad_s: 6.0, torque_n_m: 40.0, richness: Richness::Rich };
-    let sensors = Sensors { white_arcsec: 1.0, wander_arcsec: 0.4, wander_s: 12.0 };
-    let mut sessions = measure(&drive, &[], &plan, &sensors, 0, &mut fastrand::Rng::with_seed(8));
+    let mut sessions = recorded(&[], 4, 4000, 200.0, 1.0, 8);
     let pitch = std::f64::consts::TAU / f64::from(drive.teeth.unwrap().circular_spline);
     let slide = |rows: usize| pitch * (1.0 - (-(rows as f64) / 200.0 / 0.012).exp());
     for (k, error) in sessions[1].error_rad.iter_mut().enumerate().skip(1500) {

@@ -34,16 +34,15 @@ pub fn look_alikes(
         if What::Cause(rival) == hidden.what || rival == Cause::Ratcheting {
             continue;
         }
-        let rival = What::Cause(rival);
-        let mut d = distance(bench, drive, rival, hidden.family, contribution, chance);
+        let what = What::Cause(rival);
+        let mut d = distance(bench, drive, what, hidden.family, contribution, chance);
         // Numbers that mean the same: the valley of a displacement beyond the clearance is too narrow to be met by chance.
-        let twin = twin(rival, hidden, drive, chance);
+        let twin = twin(what, hidden, drive, chance);
         if d >= LEAST_D
             && let Some(twin) = twin
         {
             d = d.min(refit(bench, drive, twin, contribution));
         }
-        let What::Cause(rival) = rival else { continue };
         if d < LEAST_D {
             found.push((rival, d));
         }

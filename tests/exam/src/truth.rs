@@ -84,12 +84,10 @@ impl Truth {
             let weight = bench.weigh(&contribution);
             let over_limit = weight.over_limit(case.sensors.white_arcsec);
             let mut look_alikes = BTreeMap::new();
-            if over_limit >= 1.0 {
-                // A jump of teeth is like nothing else.
-                if effect.what != What::Cause(Cause::Ratcheting) {
-                    for (rival, d) in rival::look_alikes(&mut bench, &case.drive, effect, &contribution, &mut chance) {
-                        look_alikes.insert(rival.name().to_owned(), rounded(d));
-                    }
+            // A jump of teeth is like nothing else.
+            if over_limit >= 1.0 && effect.what != What::Cause(Cause::Ratcheting) {
+                for (rival, d) in rival::look_alikes(&mut bench, &case.drive, effect, &contribution, &mut chance) {
+                    look_alikes.insert(rival.name().to_owned(), rounded(d));
                 }
             }
             let spec = effect.what.spec(&case.drive);

@@ -1,7 +1,8 @@
 //! Deviations without a cause in the library. They compete with the causes: where one of them tells the data better, no cause is
 //! named for it.
 
-use super::{Excitation, Law, Shape, by_row, main};
+use super::stiffness::follow;
+use super::{Excitation, Law, Shape, by_row, lagged, main};
 use crate::tables::ARCSEC_PER_RAD;
 
 fn law(name: &str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send + Sync + 'static) -> Law {
@@ -29,17 +30,11 @@ fn wave(name: String, angle: fn(&Excitation<'_>, usize) -> f64, order: f64) -> L
 fn lash_before_the_generator() -> Law {
     let mut law = Law::new("lost motion before the generator", |on, shape| {
         let half_rad = shape[0] * on.nominal.ratio.abs() / ARCSEC_PER_RAD;
-        let mut behind = vec![0.0; on.rows.len()];
+        let mut held = vec![0.0; on.rows.len()];
         for session in &on.rows.sessions {
-            let mut held = 0.0;
-            for k in session.clone() {
-                if k > session.start {
-                    held = (held + on.rows.generator[k] - on.rows.generator[k - 1]).clamp(-half_rad, half_rad);
-                }
-                behind[k] = -held / half_rad * on.nominal.ratio.signum();
-            }
+            follow(&on.rows.generator, session.clone(), half_rad, 0.0, &mut held);
         }
-        vec![main(behind, 20.0)]
+        vec![main(by_row(on, |k| -held[k] * on.nominal.ratio.signum()), 20.0)]
     })
     .shapes([Shape::by_factors("half_lash_arcsec", 0.5, 60.0, 5)])
     .physical(|_, c| c[0] > 0.0);
@@ -51,17 +46,8 @@ fn lash_before_the_generator() -> Law {
 fn creep_under_load() -> Law {
     let mut law = Law::new("creep under load", |on, _| {
         let late = |lasts_s: f64| {
-            let rows = on.rows;
-            let mut missing = vec![0.0; rows.len()];
-            for session in &rows.sessions {
-                let mut reached = on.base.wind_up[session.start];
-                for k in session.clone() {
-                    let step = if k > session.start { rows.time[k] - rows.time[k - 1] } else { 0.0 };
-                    reached += (on.base.wind_up[k] - reached) * (1.0 - (-step.max(0.0) / lasts_s).exp());
-                    missing[k] = reached - on.base.wind_up[k];
-                }
-            }
-            main(missing, 0.3)
+            let reached = lagged(on, &on.base.wind_up, lasts_s);
+            main(by_row(on, |k| reached[k] - on.base.wind_up[k]), 0.3)
         };
         [1.0, 10.0, 100.0, 1000.0].into_iter().map(late).collect()
     });

@@ -29,7 +29,7 @@ const FEWEST_TURNS_OF_PULSES: f64 = 6.0;
 
 /// Which angle an error is locked to.
 #[derive(Clone, Copy, PartialEq)]
-pub(in crate::diagnosis) enum Angle {
+pub(super) enum Angle {
     Flexspline,
     CircularSpline,
     /// Gravity as the wave sees it, orientation counted with this sign.
@@ -103,13 +103,12 @@ fn ahead(kept: &[Vec<f64>; 2], k: usize, shift: f64, by: f64) -> f64 {
 /// `+|sin|` on the other, each ahead by the pressure angle in its own sense.
 fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
     let loaded = on.scales.load > 0.0;
-    let sense = sense(on);
+    let by = FLANK_AHEAD * sense(on);
     let fade_of = move |shape: &[f64]| shape.get(1).copied().filter(|_| loaded).unwrap_or(f64::INFINITY);
     let mut law = Law::new(cause, move |on, shape| {
         let half = fade_of(shape);
         let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
         let (second, fourth) = (kept(on, of, 2.0), kept(on, of, 4.0));
-        let by = FLANK_AHEAD * sense;
         let pattern = by_row(on, |k| {
             let wave = ahead(&second, k, 2.0 * shape[0], 2.0 * by * flank(k))
                 + FOURTH_OF_SECOND * ahead(&fourth, k, 4.0 * shape[0], 4.0 * by * flank(k))
@@ -131,7 +130,6 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
     })
     .shapes([Shape::angle("phase_rad", PI, 1)].into_iter().chain(loaded.then(|| half_load(on))))
     .parameters(move |on, shape, c| {
-        let by = FLANK_AHEAD * sense;
         let amplitude = second_order_unloaded(c, shape[0], by) / SECOND_ORDER;
         let mut named: Vec<Named> = vec![
             ("amplitude_um", amplitude * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um),
@@ -144,10 +142,7 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
         named
     })
     // Where its deviations take back what the law says, it is another error of order 2.
-    .physical(move |shape, c| {
-        let by = FLANK_AHEAD * sense;
-        c[0] > 0.0 && second_order_unloaded(c, shape[0], by) > LEAST_OF_PATTERN * c[0]
-    });
+    .physical(move |shape, c| c[0] > 0.0 && second_order_unloaded(c, shape[0], by) > LEAST_OF_PATTERN * c[0]);
     law.doubt = ECCENTRICITY_DOUBT;
     law.lead = Some(Lead {
         columns: Box::new(move |on, shape| {
@@ -157,7 +152,7 @@ fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
             // Second order along cos 2 eps and sin 2 eps.
             for shift in [0.0, FRAC_PI_2] {
                 let second = kept(on, of, 2.0);
-                let along = |k: usize| ahead(&second, k, shift, 2.0 * FLANK_AHEAD * sense * flank(k));
+                let along = |k: usize| ahead(&second, k, shift, 2.0 * by * flank(k));
                 columns.push(main(by_row(on, |k| fade(k) * flank(k) * along(k)), USUAL_ARCSEC));
             }
             columns.push(main(by_row(on, |k| fade(k) * flank(k)), USUAL_ARCSEC));

@@ -390,6 +390,23 @@ pub fn library(on: &Excitation<'_>) -> Vec<Law> {
     laws
 }
 
+/// What follows `values` with a lag of `lag_s`, each session from where it begins.
+fn lagged(on: &Excitation<'_>, values: &[f64], lag_s: f64) -> Vec<f64> {
+    let rows = on.rows;
+    let mut reached = vec![0.0; rows.len()];
+    for session in &rows.sessions {
+        let mut state = values[session.start];
+        for k in session.clone() {
+            if k > session.start {
+                let dt = (rows.time[k] - rows.time[k - 1]).max(0.0);
+                state += (values[k] - state) * (1.0 - (-dt / lag_s).exp());
+            }
+            reached[k] = state;
+        }
+    }
+    reached
+}
+
 /// A column made row by row.
 fn by_row(on: &Excitation<'_>, value: impl Fn(usize) -> f64) -> Vec<f64> {
     (0..on.rows.len()).map(value).collect()

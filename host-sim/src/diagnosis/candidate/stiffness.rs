@@ -24,7 +24,7 @@ pub(super) fn stop_operator(on: &Excitation<'_>, slip: f64) -> Vec<f64> {
 }
 
 /// The element through one session, from what it holds at the first row.
-fn follow(torque: &[f64], session: Range<usize>, slip: f64, first: f64, held: &mut [f64]) {
+pub(super) fn follow(torque: &[f64], session: Range<usize>, slip: f64, first: f64, held: &mut [f64]) {
     let mut z = first;
     for k in session.clone() {
         if k > session.start {

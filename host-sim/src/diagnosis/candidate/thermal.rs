@@ -1,29 +1,18 @@
 //! What the temperature does.
 
-use super::{Column, Excitation, Law, Lead, Shape, Tolerance, by_row, main, nuisance};
+use super::{Column, Excitation, Law, Lead, Shape, Tolerance, by_row, lagged, main, nuisance};
 use crate::diagnosis::linear::Prior;
 
 /// Temperature above nominal, felt with a lag of `lag_s`, K.
-fn lagged(on: &Excitation<'_>, lag_s: f64) -> Vec<f64> {
-    let rows = on.rows;
-    let mut felt = vec![0.0; rows.len()];
-    for session in &rows.sessions {
-        let mut state = rows.temperature[session.start];
-        for k in session.clone() {
-            if k > session.start {
-                let dt = (rows.time[k] - rows.time[k - 1]).max(0.0);
-                state += (rows.temperature[k] - state) * (1.0 - (-dt / lag_s).exp());
-            }
-            felt[k] = state - on.nominal.temperature_c;
-        }
-    }
-    felt
+fn warmer_by(on: &Excitation<'_>, lag_s: f64) -> Vec<f64> {
+    let felt = lagged(on, &on.rows.temperature, lag_s);
+    by_row(on, |k| felt[k] - on.nominal.temperature_c)
 }
 
 /// Warm parts close the clearance, cold ones open it (or the reverse): −2″/K of generator and flexspline against the circular spline.
 fn thermal_clearance(on: &Excitation<'_>) -> Law {
     Law::new("thermal_clearance", |on, shape| {
-        let warmer = lagged(on, shape.first().copied().unwrap_or(1e-3));
+        let warmer = warmer_by(on, shape.first().copied().unwrap_or(1e-3));
         let flank = |k: usize| on.base.flank[k];
         vec![
             main(by_row(on, |k| flank(k) * warmer[k]), 1.0),
@@ -46,7 +35,7 @@ fn thermal_clearance(on: &Excitation<'_>) -> Law {
 fn thermal_clearance_shut(on: &Excitation<'_>) -> Law {
     let timed = on.rows.recorded.time;
     Law::new("thermal_clearance", move |on, shape| {
-        let warmer = lagged(on, if timed { shape[1] } else { 1e-3 });
+        let warmer = warmer_by(on, if timed { shape[1] } else { 1e-3 });
         let width = 2.0 * on.base.half_backlash;
         let changed = by_row(on, |k| 0.5 * on.base.flank[k] * ((width + shape[0] * warmer[k]).max(0.0) - width));
         vec![

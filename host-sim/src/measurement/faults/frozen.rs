@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::lattice::lattice;
+use super::steps::whole_pitches;
 use super::{ARCSEC, Findings, of_rows};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
@@ -49,18 +50,14 @@ fn beyond_chance(rows: usize) -> usize {
 /// Whether an output beside a generator that stands leaves by whole tooth pitches and has done so within a part of the stretch: teeth that
 /// skip move it, not a generator that is not read.
 fn slips_a_tooth(output: &[f64], stretch: &Range<usize>, gear: &Gear) -> bool {
-    let Some(pitch) = gear.tooth_pitch_rad else { return false };
     let angles = &output[stretch.clone()];
     let (first, last) = (angles[0], angles[angles.len() - 1]);
-    let pitches = ((last - first) / pitch).round();
-    let whole = pitches != 0.0 && (last - first - pitches * pitch).abs() < WHOLE_PITCH * pitch;
     let apart = (angles.len() / 4).max(1);
-    whole && angles.windows(apart + 1).any(|a| (a[apart] - a[0]).abs() > SUDDEN * (last - first).abs())
+    whole_pitches(last - first, gear)
+        && angles.windows(apart + 1).any(|a| (a[apart] - a[0]).abs() > SUDDEN * (last - first).abs())
 }
 
-/// A motion is that many whole tooth pitches if it differs by less than this share of one…
-const WHOLE_PITCH: f64 = 0.01;
-/// …and sudden if this share of it happens within a quarter of the time.
+/// A motion is sudden if this share of it happens within a quarter of the time.
 const SUDDEN: f64 = 0.9;
 
 /// Finds frozen stretches and leaves their rows out; a channel that is frozen throughout is an error.

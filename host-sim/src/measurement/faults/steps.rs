@@ -303,7 +303,8 @@ fn strength(
     size.abs() / (LASTS * std).max(1e-300)
 }
 
-fn whole_pitches(size: f64, gear: &Gear) -> bool {
+/// Whether an angle is one tooth pitch or several.
+pub(super) fn whole_pitches(size: f64, gear: &Gear) -> bool {
     gear.tooth_pitch_rad.is_some_and(|pitch| {
         let pitches = (size / pitch).round();
         pitches != 0.0 && (size - pitches * pitch).abs() < WHOLE_PITCH * pitch
