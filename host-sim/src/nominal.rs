@@ -67,8 +67,10 @@ pub struct Spread {
     pub stiffness: f64,
     /// Of the backlash.
     pub backlash: f64,
-    /// Of each harmonic, in phase and in quadrature.
+    /// Of the amplitude of each harmonic.
     pub harmonic: f64,
+    /// Of its phase, rad.
+    pub harmonic_phase_rad: f64,
 }
 
 /// The nominal model.
@@ -171,7 +173,7 @@ impl Nominal {
     /// and what is allowed. It is read back as it stands.
     #[must_use]
     pub fn template(flexspline_teeth: u32, circular_spline_teeth: u32) -> String {
-        let Spread { stiffness, backlash, harmonic } = USUAL_SPREAD;
+        let Spread { stiffness, backlash, harmonic, .. } = USUAL_SPREAD;
         let (fewest, most) = (TEETH.start(), TEETH.end());
         format!(
             "\
@@ -203,6 +205,7 @@ phase_rad = 0.0                # at generator angle 0, rad; {PHASE}
 stiffness = {stiffness:?}               # of the stiffness; {SHARE}; {stiffness} if left out
 backlash = {backlash:?}                # of the backlash; {SHARE}; {backlash} if left out
 harmonic = {harmonic:?}                 # of the harmonics, of their amplitude; {SHARE}; {harmonic} if left out
+# harmonic_phase_rad = 0.05    # of their phases, rad; {SHARE}; the number of the amplitudes if left out: a wave of any phase, so large
 "
         )
     }
@@ -295,15 +298,16 @@ struct SpreadForm {
     stiffness: Option<Spanned<f64>>,
     backlash: Option<Spanned<f64>>,
     harmonic: Option<Spanned<f64>>,
+    harmonic_phase_rad: Option<Spanned<f64>>,
 }
 
 /// Spread assumed where the file gives none: stiffness, backlash, harmonics of drives of one type.
-const USUAL_SPREAD: Spread = Spread { stiffness: 0.03, backlash: 0.05, harmonic: 0.20 };
+const USUAL_SPREAD: Spread = Spread { stiffness: 0.03, backlash: 0.05, harmonic: 0.20, harmonic_phase_rad: 0.20 };
 
 type Refuse<'a> = dyn FnMut(Option<Range<usize>>, &str, String) + 'a;
 
 /// Every key of the file; those of `nominal.harmonic` are of each entry.
-const KEYS: [&str; 17] = [
+const KEYS: [&str; 18] = [
     "drive",
     "drive.flexspline_teeth",
     "drive.circular_spline_teeth",
@@ -321,6 +325,7 @@ const KEYS: [&str; 17] = [
     "nominal.unit_to_unit.stiffness",
     "nominal.unit_to_unit.backlash",
     "nominal.unit_to_unit.harmonic",
+    "nominal.unit_to_unit.harmonic_phase_rad",
 ];
 
 /// What a number of the file may be.
@@ -445,10 +450,17 @@ impl FileForm {
                 }
             })
             .collect();
-        let spread = form.unit_to_unit.as_ref().map_or(USUAL_SPREAD, |s| Spread {
-            stiffness: optional(&s.stiffness, "nominal.unit_to_unit.stiffness", SHARE, USUAL_SPREAD.stiffness, refuse),
-            backlash: optional(&s.backlash, "nominal.unit_to_unit.backlash", SHARE, USUAL_SPREAD.backlash, refuse),
-            harmonic: optional(&s.harmonic, "nominal.unit_to_unit.harmonic", SHARE, USUAL_SPREAD.harmonic, refuse),
+        let spread = form.unit_to_unit.as_ref().map_or(USUAL_SPREAD, |s| {
+            let mut share = |value: &Option<Spanned<f64>>, name: &str, usual: f64| {
+                optional(value, &format!("nominal.unit_to_unit.{name}"), SHARE, usual, refuse)
+            };
+            let harmonic = share(&s.harmonic, "harmonic", USUAL_SPREAD.harmonic);
+            Spread {
+                stiffness: share(&s.stiffness, "stiffness", USUAL_SPREAD.stiffness),
+                backlash: share(&s.backlash, "backlash", USUAL_SPREAD.backlash),
+                harmonic,
+                harmonic_phase_rad: share(&s.harmonic_phase_rad, "harmonic_phase_rad", harmonic),
+            }
         });
         Some(Nominal {
             ratio,

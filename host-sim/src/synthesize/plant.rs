@@ -50,7 +50,7 @@ impl Unit {
         let harmonics = nominal
             .harmonics
             .iter()
-            .map(|_| (1.0 + spread.harmonic * limited(), spread.harmonic * 0.5 * limited()))
+            .map(|_| (1.0 + spread.harmonic * limited(), spread.harmonic_phase_rad * 0.5 * limited()))
             .collect();
         Unit { wind_up, clearance, harmonics, zero_arcsec: 200.0 * (random.f64() - 0.5) }
     }

@@ -55,7 +55,7 @@ pub const STIFFNESS_SPREAD: f64 = 0.03;
 pub const BACKLASH_SPREAD: f64 = 0.05;
 /// Relative spread of the amplitude of each line.
 pub const HARMONIC_SPREAD: f64 = 0.20;
-/// Spread of the phase of each line, rad: half of what its amplitude spreads.
+/// Spread of the phase of each line, rad.
 pub const PHASE_SPREAD_RAD: f64 = 0.05;
 /// Relative spread of the friction in the clearance. Not told: it moves single rows at a reversal.
 pub const FRICTION_SPREAD: f64 = 0.02;
@@ -171,7 +171,8 @@ impl Drive {
         }
         let _ = write!(
             text,
-            "\n[nominal.unit_to_unit]\nstiffness = {STIFFNESS_SPREAD}\nbacklash = {BACKLASH_SPREAD}\nharmonic = {HARMONIC_SPREAD}\n"
+            "\n[nominal.unit_to_unit]\nstiffness = {STIFFNESS_SPREAD}\nbacklash = {BACKLASH_SPREAD}\nharmonic = {HARMONIC_SPREAD}\n\
+             harmonic_phase_rad = {PHASE_SPREAD_RAD}\n"
         );
         text
     }
