@@ -139,6 +139,17 @@ impl<'a> Bench<'a> {
         }
     }
 
+    /// Angles between the axes of the housing and those of gravity, either way: none, and those of the run.
+    pub fn orientations_rad(&self) -> Vec<f64> {
+        let mut all = vec![0.0];
+        for turned in self.rows.orientation_rad.iter().flat_map(|o| [*o, -o]) {
+            if all.iter().all(|known| (turned - known).abs() > 1e-6) {
+                all.push(turned);
+            }
+        }
+        all
+    }
+
     /// What an effect adds to the error at the thinned rows.
     pub fn signature(&mut self, effect: &Effect) -> Vec<f64> {
         self.signature_of(std::slice::from_ref(effect))

@@ -38,10 +38,13 @@ pub fn look_alikes(
         let mut d = distance(bench, drive, what, hidden.family, contribution, chance);
         // Numbers that mean the same: the valley of a displacement beyond the clearance is too narrow to be met by chance.
         let twin = twin(what, hidden, drive, chance);
-        if d >= LEAST_D
-            && let Some(twin) = twin
-        {
-            d = d.min(refit(bench, drive, twin, contribution));
+        for turned in bench.orientations_rad() {
+            if d >= LEAST_D
+                && let Some(mut twin) = twin.clone()
+            {
+                twin.shape[0] += turned;
+                d = d.min(refit(bench, drive, twin, contribution));
+            }
         }
         if d < LEAST_D {
             found.push((rival, d));
