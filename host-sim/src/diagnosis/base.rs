@@ -121,6 +121,8 @@ pub struct Base {
 
 /// Standard deviation of what no drawing fixes, arcsec: the zero of the output encoder.
 pub(super) const FREE: f64 = 1e4;
+/// Least spread of a phase, over that of the amplitude.
+const LEAST_TURN: f64 = 1e-3;
 /// A play law that leaves this much less (relative) than the first is taken instead.
 const CLEARLY_BETTER: f64 = 0.995;
 /// The same for a law that leaves the flank in doubt far beyond friction.
@@ -180,10 +182,39 @@ impl Base {
                 rows.generator.iter().map(|psi| harmonic.amplitude_arcsec * at(psi).sin()).collect()
             };
             add("harmonic", wave(0.0), nominal.spread.harmonic);
-            add("harmonic", wave(std::f64::consts::FRAC_PI_2), nominal.spread.harmonic);
+            // A wave a quarter of a period ahead turns the phase. It floats with the amplitude: they are read as a pair.
+            let turns = nominal.spread.harmonic_phase_rad.max(LEAST_TURN * nominal.spread.harmonic);
+            add("harmonic", wave(std::f64::consts::FRAC_PI_2), turns);
         }
         let uncertain = uncertain(rows, nominal, &flank);
         Base { prediction, flank, wind_up, half_backlash, law, floating, waves: Waves::default(), uncertain }
+    }
+}
+
+impl Base {
+    /// A copy to be changed, without what floats.
+    pub(super) fn without_floating(&self) -> Base {
+        Base {
+            prediction: self.prediction.clone(),
+            flank: self.flank.clone(),
+            wind_up: self.wind_up.clone(),
+            half_backlash: self.half_backlash,
+            law: self.law,
+            floating: Vec::new(),
+            waves: self.waves.clone(),
+            uncertain: Vec::new(),
+        }
+    }
+
+    /// Flanks, wind-up and prediction under the torque that `rows` have now.
+    pub(super) fn load_with(&mut self, rows: &Rows, nominal: &Nominal) {
+        let flank = self.law.flanks(rows, &rows.torque, nominal);
+        for k in 0..rows.len() {
+            let wind_up = nominal.wind_up_arcsec(rows.torque[k]);
+            self.prediction[k] += wind_up - self.wind_up[k] + self.half_backlash * (flank[k] - self.flank[k]);
+            self.wind_up[k] = wind_up;
+        }
+        self.flank = flank;
     }
 }
 

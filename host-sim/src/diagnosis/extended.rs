@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use flexspline::Table;
 
 use super::base::{Base, PlayLaw};
-use super::candidate::{Column, Excitation, Law, Scales, Tolerance, library};
-use super::model::{Problem, Scaffold, Term};
+use super::candidate::{Acting, Column, Excitation, Law, Scales, Tolerance, library, together};
+use super::model::{Problem, Scaffold, Term, among_each_other};
 use super::noise::Whitener;
 use super::report::Parameter;
 use super::resolution::{Resolution, averages_hide, resolution};
@@ -117,7 +117,7 @@ impl Extended {
         super::check(&rows)?;
         let (base, jumps) = prepare::base(&rows, nominal, table);
         let scales = Scales::new(&rows, settings.pitch_radius_mm, jumps);
-        let on = Excitation { rows: &rows, nominal, base: &base, scales: &scales };
+        let on = Excitation::new(&rows, nominal, &base, &scales);
         let laws = library(&on);
         let uncertain = prepare::uncertain(&on, &[]);
         let Resolution { mut stride, fast } = resolution(&on, &laws, &uncertain, settings.averages, &[]);
@@ -148,7 +148,7 @@ impl Extended {
             return vec![Series::default(); sessions.len()];
         }
         let base = Base::with_play(&rows, nominal, table, self.play);
-        let on = Excitation { rows: &rows, nominal, base: &base, scales: &self.scales };
+        let on = Excitation::new(&rows, nominal, &base, &self.scales);
         let (recalibrated, extended, parts) = self.rows(&on);
         rows.sessions
             .iter()
@@ -176,9 +176,13 @@ impl Extended {
             add(&mut extended, &floating.values, self.base.get(k).copied().unwrap_or(0.0));
         }
         let mut parts = Vec::new();
-        for cause in &self.causes {
+        let causes: Vec<Acting<'_>> = self
+            .causes
+            .iter()
+            .map(|c| Acting { law: &c.law, values: c.law.values(&c.places), coefficients: c.coefficients.clone() })
+            .collect();
+        for (cause, columns) in self.causes.iter().zip(together(on, &causes)) {
             let mut part = vec![0.0; on.rows.len()];
-            let columns = (cause.law.columns)(on, &cause.law.values(&cause.places));
             let predicts = |column: &Column| !matches!(column.tolerance, Tolerance::History(_));
             for (column, c) in columns.iter().zip(&cause.coefficients).filter(|(column, _)| predicts(column)) {
                 add(&mut part, &column.values, *c);
@@ -203,7 +207,8 @@ pub(super) struct Found {
 impl Found {
     /// Fits the laws at `start` (index and places), and the nominal model alone.
     pub(super) fn of(problem: &Problem<'_>, laws: &[Law], start: &[(usize, Vec<f64>)]) -> Option<Found> {
-        let terms: Vec<Term<'_>> = start.iter().map(|(k, p)| Term::new(problem, &laws[*k], p.clone())).collect();
+        let terms = start.iter().map(|(k, p)| Term::new(problem, &laws[*k], p.clone())).collect();
+        let terms = among_each_other(problem, terms);
         let alone = Scaffold::new(problem, Vec::new()).fit(&[])?;
         let selected = Selected { fit: fit(problem, &terms)?, terms };
         let parameters = uncertainty::parameters(problem, &selected);

@@ -57,21 +57,44 @@ pub fn proved<'l>(problem: &Problem<'_>, mut selected: Selected<'l>) -> (Selecte
     (selected, aside)
 }
 
-/// Mean squared error of prediction, arcsec², over averages without uncertain rows. With `linearised` the shape parameters are
-/// found anew without the session as well, to first order.
-fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], linearised: bool) -> Option<f64> {
+/// Mean squared error of prediction, arcsec², over averages without uncertain rows. With `anew` the shape parameters are
+/// found without the session as well, by a step of Gauss-Newton where that tells the others better.
+fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], anew: bool) -> Option<f64> {
     let scaffold = Scaffold::new(problem, terms.to_vec());
-    let (fit, moves) = if linearised { scaffold.linearised()? } else { (scaffold.fit(&[])?, Vec::new()) };
-    let white = white_columns(problem, terms, &moves);
-    let columns: Vec<&Vec<f64>> = problem.base.iter().chain(terms.iter().flat_map(|t| &t.averaged)).collect();
+    let fit = scaffold.fit(&[])?;
+    let white = white_columns(problem, terms, &[]);
+    let free = if anew && terms.iter().any(|t| !t.places.is_empty()) { Some(scaffold.linearised()?) } else { None };
     let (mut sum, mut count) = (0.0, 0usize);
     for block in blocks(problem) {
-        let c = fit.without(&Gram::of(&white, block.clone()), problem.worth)?.coefficients;
+        let solution = fit.without(&Gram::of(&white, block.clone()), problem.worth)?;
+        let mut best = (solution, None);
+        if let Some((free, moves)) = &free {
+            let white = white_columns(problem, terms, moves);
+            let to_first_order = free.without(&Gram::of(&white, block.clone()), problem.worth)?;
+            let moved = moved(problem, terms, &to_first_order.coefficients[fit.priors.len()..]);
+            let there: Vec<&Term<'_>> = moved.iter().collect();
+            let white = white_columns(problem, &there, &[]);
+            let solution = Scaffold::new(problem, there.clone())
+                .fit(&[])?
+                .without(&Gram::of(&white, block.clone()), problem.worth)?;
+            if solution.misfit < best.0.misfit {
+                best = (solution, Some(moved));
+            }
+        }
+        let (solution, moved) = &best;
+        let there = moved.as_ref().map_or_else(|| terms.to_vec(), |moved| moved.iter().collect());
+        let columns: Vec<&Vec<f64>> = problem.base.iter().chain(there.iter().flat_map(|t| &t.averaged)).collect();
         for g in block.filter(|g| problem.certain[*g]) {
-            let predicted: f64 = columns.iter().zip(&c).map(|(column, c)| c * column[g]).sum();
+            let predicted: f64 = columns.iter().zip(&solution.coefficients).map(|(column, c)| c * column[g]).sum();
             sum += (problem.data[g] - predicted).powi(2);
             count += 1;
         }
     }
     Some(sum / count.max(1) as f64)
+}
+
+/// Terms with their shape parameters moved, one after another.
+fn moved<'l>(problem: &Problem<'_>, terms: &[&Term<'l>], moves: &[f64]) -> Vec<Term<'l>> {
+    let mut moves = moves.iter();
+    terms.iter().map(|term| term.moved(problem, |_| *moves.next().unwrap_or(&0.0))).collect()
 }

@@ -39,7 +39,7 @@ use crate::nominal::Nominal;
 use candidate::{Excitation, Law, Scales, library, line, unnamed};
 use extended::Found;
 pub use extended::{Extended, FittedCause, Series};
-use model::{Fit, Problem, Term};
+use model::{Fit, Problem, Term, among_each_other};
 use noise::{Noise, Whitener};
 use report::{Cause, Compensation, Diagnosis, Parameter, Residual, Unexplained, Verdict};
 use resolution::{Resolution, resolution};
@@ -85,6 +85,8 @@ const LEAST_ROWS: usize = 200;
 const HIGHEST_ORDER: f64 = 150.0;
 /// Times that causes are chosen again, at most.
 const MOST_ROUNDS: usize = 2;
+/// Sessions left out are predicted no worse up to this: the least that counts is a small part of what noise leaves.
+const NO_WORSE: f64 = 1.001;
 /// What is left as a free function counts if it is larger than this against the strongest cause.
 const LEAST_LEFT_OF_STRONGEST: f64 = 0.25;
 /// Named causes that explain less than this share of what is explained at all are not named.
@@ -124,12 +126,13 @@ pub fn diagnose_extended(
     progress(0, 4, "nominal model");
     let (base, jumps) = prepare::base(&rows, nominal, table);
     let scales = Scales::new(&rows, settings.pitch_radius_mm, jumps);
-    let on = Excitation { rows: &rows, nominal, base: &base, scales: &scales };
+    let on = Excitation::new(&rows, nominal, &base, &scales);
     progress(1, 4, "causes");
     let search = Search::new(&on, settings)?;
     progress(2, 4, "rivals");
     let Search { laws, problem, noise, start, fast } = search;
-    let terms: Vec<Term<'_>> = start.iter().map(|(k, p)| Term::new(&problem, &laws[*k], p.clone())).collect();
+    let terms = start.iter().map(|(k, p)| Term::new(&problem, &laws[*k], p.clone())).collect();
+    let terms = among_each_other(&problem, terms);
     let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
     let (selected, mut unproved) = held_out::proved(&problem, selected);
     let start = remembered(&laws, &selected);
@@ -202,6 +205,7 @@ impl<'a> Search<'a> {
         for round in 0.. {
             fast.clear();
             let terms = start.drain(..).map(|(k, places)| Term::new(&problem, &laws[k], places)).collect();
+            let terms = among_each_other(&problem, terms);
             let selected = select(&problem, &laws, noise.white, terms, say).ok_or(DiagnosisError::NotFinite)?;
             start = remembered(&laws, &selected);
             if round == MOST_ROUNDS {
@@ -300,7 +304,8 @@ fn conclude(
     let explainable = (rms_before * rms_before - floor * floor).max(0.0);
     let unexplained = (rms_after * rms_after - floor * floor).max(0.0);
 
-    let named: Vec<usize> = (0..selected.terms.len()).filter(|k| selected.terms[*k].law.named).collect();
+    let counts = |k: &usize| selected.terms[*k].law.named && standings[*k].size > select::least_named(noise.white);
+    let named: Vec<usize> = (0..selected.terms.len()).filter(counts).collect();
     let size = |k: &usize| standings[*k].size.powi(2);
     let (by_name, without_name) = (
         named.iter().map(size).sum::<f64>(),
@@ -326,7 +331,7 @@ fn conclude(
     };
     let held = held_out::evaluate(problem, &all);
     // What does not predict sessions it was not fitted to is no explanation.
-    let verdict = if !named.is_empty() && held.total.rms_after_arcsec > held.total.rms_before_arcsec {
+    let verdict = if !named.is_empty() && held.total.rms_after_arcsec > NO_WORSE * held.total.rms_before_arcsec {
         Verdict::Unknown
     } else {
         verdict

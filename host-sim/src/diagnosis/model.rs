@@ -3,7 +3,9 @@
 //! Coefficients are solved exactly; shape parameters by Gauss-Newton around the best of the values tried first. Nuisance columns
 //! get a prior in proportion to what the main columns of their law explain, found by iteration.
 
-use super::candidate::{Excitation, Law, Tolerance};
+use std::sync::{Arc, OnceLock};
+
+use super::candidate::{Acting, Among, Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, Solution, products, solve};
 use super::noise::Whitener;
 use super::rows::rms;
@@ -72,13 +74,31 @@ pub struct Term<'l> {
     size: Vec<f64>,
     /// What freedom of the shape parameters costs: logarithm of the share of their range that the data leave (0 before refinement).
     pub occam: f64,
+    /// What other causes leave to it.
+    among: Option<Arc<Among>>,
 }
 
 impl<'l> Term<'l> {
-    /// Evaluates a law.
+    /// Evaluates a law by itself.
     #[must_use]
     pub fn new(problem: &Problem<'_>, law: &'l Law, places: Vec<f64>) -> Term<'l> {
-        let columns = (law.columns)(problem.on, &law.values(&places));
+        Term::among(problem, law, places, None, false)
+    }
+
+    /// Evaluates a law on what other causes leave.
+    fn among(
+        problem: &Problem<'_>,
+        law: &'l Law,
+        places: Vec<f64>,
+        among: Option<Arc<Among>>,
+        main_only: bool,
+    ) -> Term<'l> {
+        let values = law.values(&places);
+        let mut columns = match &among {
+            Some(among) => (law.columns)(&among.excitation(problem.on), &values),
+            None => (law.columns)(problem.on, &values),
+        };
+        columns.retain(|c| !main_only || matches!(c.tolerance, Tolerance::Main(_)));
         let averaged: Vec<Vec<f64>> = columns.iter().map(|c| problem.whitener.average(&c.values)).collect();
         let white = averaged.iter().map(|c| problem.whitener.whiten_averaged(c)).collect();
         let size = averaged.iter().map(|c| rms(c)).collect();
@@ -90,7 +110,23 @@ impl<'l> Term<'l> {
             tolerances: columns.iter().map(|c| c.tolerance).collect(),
             size,
             occam: 0.0,
+            among,
         }
+    }
+
+    /// The same with each place moved, within its range and no farther than a step reaches.
+    #[must_use]
+    pub fn moved(&self, problem: &Problem<'_>, mut by: impl FnMut(usize) -> f64) -> Term<'l> {
+        let places = self.places.iter().zip(&self.law.shapes).enumerate().map(|(k, (place, shape))| {
+            let moved = place + by(k).clamp(-FARTHEST, FARTHEST);
+            if shape.cyclic { moved.rem_euclid(1.0) } else { moved.clamp(0.0, 1.0) }
+        });
+        Term::among(problem, self.law, places.collect(), self.among.clone(), false)
+    }
+
+    /// As a cause that acts on others.
+    pub(super) fn acting(&self, coefficients: &[f64]) -> Acting<'l> {
+        Acting { law: self.law, values: self.law.values(&self.places), coefficients: coefficients.to_vec() }
     }
 
     /// Only its main columns.
@@ -161,43 +197,60 @@ pub const TOLERANCE: f64 = 3.3;
 /// Spread of a parameter that is held at its limit, in units of its tolerance.
 const HELD: f64 = 1e-3;
 
-/// Solves with the nominal model's parameters within their tolerance; returns the priors used as well.
+/// Solves with the nominal model's parameters within their tolerance, and deviations of laws (`deviations` tells which coefficients
+/// are some) within as many of theirs; returns the priors used as well.
 pub(super) fn within_tolerance(
     gram: &Gram,
     mut priors: Vec<Prior>,
     problem: &Problem<'_>,
+    deviations: &[bool],
 ) -> Option<(Solution, Vec<Prior>)> {
     let floating = &problem.on.base.floating;
-    let mut held = vec![false; floating.len()];
-    loop {
+    let held_at = |k: usize, prior: &Prior| match floating.get(k) {
+        Some(f) => (f.spread < super::base::FREE).then_some(TOLERANCE * f.spread),
+        None => deviations.get(k).is_some_and(|d| *d).then_some(TOLERANCE * prior.std),
+    };
+    let limits: Vec<Option<f64>> = priors.iter().enumerate().map(|(k, prior)| held_at(k, prior)).collect();
+    let mut held = vec![false; priors.len()];
+    for _ in 0..MOST_HOLDS {
         let solution = solve(gram, &priors, problem.worth)?;
         let mut beyond = false;
-        for (k, f) in floating.iter().enumerate() {
-            let limit = TOLERANCE * f.spread;
-            if !held[k] && f.spread < super::base::FREE && solution.coefficients[k].abs() > limit {
-                priors[k] = Prior { mean: limit.copysign(solution.coefficients[k]), std: HELD * f.spread };
-                held[k] = true;
-                beyond = true;
-            }
+        for (k, limit) in limits.iter().enumerate() {
+            let Some(limit) = limit.filter(|limit| !held[k] && solution.coefficients[k].abs() > *limit) else {
+                continue;
+            };
+            priors[k] = Prior { mean: limit.copysign(solution.coefficients[k]), std: HELD * limit / TOLERANCE };
+            held[k] = true;
+            beyond = true;
         }
         if !beyond {
             return Some((solution, priors));
         }
     }
+    Some((solve(gram, &priors, problem.worth)?, priors))
 }
 
+/// Times that parameters beyond their tolerance are held, at most.
+const MOST_HOLDS: usize = 12;
 /// What a law is taken to explain before anything is known, arcsec.
 const FIRST_GUESS_ARCSEC: f64 = 10.0;
 /// Nuisance is scaled to at least this, arcsec.
 const LEAST_ARCSEC: f64 = 1.0;
 /// Rounds of scaling the nuisance priors.
 const ROUNDS: usize = 3;
+/// Farthest step of a shape parameter, in places.
+const FARTHEST: f64 = 0.2;
 /// Step of numerical derivatives, in places.
 const STEP: f64 = 0.01;
 /// Spread of a shape parameter about where it is, in places.
 const PLACE_SPREAD: f64 = 0.3;
 /// Torques above this share of the load scale leave no doubt about the flank.
 const LOADED: f64 = 0.3;
+/// Directions and sizes (places below the other's) at which a second displacement is tried.
+const DIRECTIONS: usize = 8;
+const SMALLER: [f64; 2] = [0.05, 0.2];
+/// Sizes at which one is tried under an eccentric generator, arcsec.
+const BESIDE_ARCSEC: [f64; 2] = [5.0, 20.0];
 /// Gauss-Newton steps at most.
 const STEPS: usize = 6;
 
@@ -206,6 +259,30 @@ pub struct Scaffold<'p, 'a, 't, 'l> {
     problem: &'p Problem<'a>,
     terms: Vec<&'t Term<'l>>,
     gram: Gram,
+    /// Terms that come before what is tried, where the order matters.
+    ahead: usize,
+    /// What the terms leave to a law that adds a load, or meets them in the zones of teeth, or not.
+    left: [OnceLock<Option<Arc<Among>>>; 4],
+}
+
+/// The terms evaluated anew, each on what the others leave to it.
+#[must_use]
+pub fn among_each_other<'l>(problem: &Problem<'_>, mut terms: Vec<Term<'l>>) -> Vec<Term<'l>> {
+    let meet = |terms: &[Term<'l>]| terms.iter().any(|a| terms.iter().any(|b| a.law.acts_on(b.law)));
+    // What acts on nothing here may still have been evaluated among what is no longer there.
+    if !meet(&terms) && terms.iter().all(|t| t.among.is_none()) {
+        return terms;
+    }
+    for k in 0..terms.len() {
+        let others: Vec<&Term<'l>> = terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect();
+        let scaffold = Scaffold::new(problem, others).ahead(k);
+        let (left, occam) = (scaffold.left_to(terms[k].law), terms[k].occam);
+        if left.is_some() || terms[k].among.is_some() {
+            let term = Term::among(problem, terms[k].law, terms[k].places.clone(), left, false);
+            terms[k] = Term { occam, ..term };
+        }
+    }
+    terms
 }
 
 /// A solved set of terms.
@@ -255,7 +332,43 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     #[must_use]
     pub fn new(problem: &'p Problem<'a>, terms: Vec<&'t Term<'l>>) -> Self {
         let gram = Gram::of(&white_columns(problem, &terms, &[]), 0..problem.data_white.len());
-        Scaffold { problem, terms, gram }
+        let ahead = terms.len();
+        Scaffold { problem, terms, gram, ahead, left: Default::default() }
+    }
+
+    /// What is tried has this many of the terms before it.
+    #[must_use]
+    pub fn ahead(mut self, ahead: usize) -> Self {
+        self.ahead = ahead;
+        self
+    }
+
+    /// A law among the terms.
+    #[must_use]
+    pub fn term<'n>(&self, law: &'n Law, places: Vec<f64>) -> Term<'n> {
+        Term::among(self.problem, law, places, self.left_to(law), false)
+    }
+
+    /// The same with its main columns alone.
+    #[must_use]
+    pub fn bare_term<'n>(&self, law: &'n Law, places: Vec<f64>) -> Term<'n> {
+        Term::among(self.problem, law, places, self.left_to(law), true)
+    }
+
+    /// What the terms leave to a law.
+    fn left_to(&self, law: &Law) -> Option<Arc<Among>> {
+        let kind = usize::from(law.load.is_some()) + 2 * usize::from(law.meets_zones);
+        let acts = |k: usize| self.terms[k].law.acts_on(law) && (k < self.ahead || !self.terms[k].law.meets(law));
+        if !(0..self.terms.len()).any(acts) {
+            return None;
+        }
+        let left = self.left[kind].get_or_init(|| {
+            let fit = self.fit(&[])?;
+            let acting: Vec<Acting<'l>> =
+                (0..self.terms.len()).filter(|k| acts(*k)).map(|k| self.terms[k].acting(fit.of(k))).collect();
+            Among::of(self.problem.on, &acting).map(Arc::new)
+        });
+        left.clone()
     }
 
     /// Fits the terms of the scaffold and `added` ones.
@@ -309,14 +422,19 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             at += term.len();
         }
         let mut last: Option<(Solution, Vec<Prior>)> = None;
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             let mut priors = problem.base_priors();
             for (term, start) in all.iter().zip(&starts) {
                 let known = last.as_ref().map(|(s, _)| &s.coefficients[*start..start + term.len()]);
                 priors.extend(term.priors(known));
             }
             priors.extend(further.iter().map(|(_, prior)| *prior));
-            last = Some(within_tolerance(&gram, priors, problem)?);
+            let mut deviations = vec![false; starts.first().copied().unwrap_or(0)];
+            if round + 1 == ROUNDS {
+                deviations
+                    .extend(all.iter().flat_map(|t| t.tolerances.iter().map(|t| matches!(t, Tolerance::Nuisance(_)))));
+            }
+            last = Some(within_tolerance(&gram, priors, problem, &deviations)?);
             if all.iter().all(|t| t.tolerances.iter().all(|t| matches!(t, Tolerance::Main(_)))) {
                 break;
             }
@@ -329,9 +447,41 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// Places at which to begin with a law: those to be tried, or where its lead points.
     #[must_use]
     pub fn begin(&self, law: &Law) -> Vec<Vec<f64>> {
+        let mut places = self.begin_alone(law);
+        // Beside one that is there, another displacement may stand in any direction: together they are not what either is alone.
+        if let Some(met) = self.terms.iter().find(|t| t.law.meets(law)) {
+            for k in 0..DIRECTIONS {
+                for smaller in SMALLER {
+                    let mut beside = met.places.clone();
+                    beside[0] = k as f64 / DIRECTIONS as f64;
+                    beside[1] = (beside[1] - smaller).max(0.0);
+                    places.push(beside);
+                }
+            }
+        }
+        // Under a generator beside its axis it shows as another order than alone: no lead points there.
+        let under = |t: &&&Term<'_>| t.law.zones.is_some() && t.law.acts_on(law) && !t.law.meets(law);
+        if let Some(lobes) = self.terms.iter().find(under) {
+            for k in 0..DIRECTIONS {
+                for arcsec in BESIDE_ARCSEC {
+                    let mut beside = vec![0.5; law.shapes.len()];
+                    beside[0] = k as f64 / DIRECTIONS as f64;
+                    beside[1] = law.shapes[1].place(arcsec);
+                    if let ([_, _, _, pressed], Some(known)) = (&mut beside[..], lobes.places.get(1)) {
+                        *pressed = *known;
+                    }
+                    places.push(beside);
+                }
+            }
+        }
+        places
+    }
+
+    fn begin_alone(&self, law: &Law) -> Vec<Vec<f64>> {
         let tried = law.tried();
         let Some(lead) = &law.lead else { return tried };
         let problem = self.problem;
+        let among = self.left_to(law);
         let least = LOADED * problem.on.scales.load;
         let mask: Vec<bool> = problem
             .whitener
@@ -350,9 +500,12 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         let data = masked(&problem.data_white);
         tried
             .into_iter()
-            .filter_map(|places| {
+            .flat_map(|places| {
                 let values = law.values(&places);
-                let columns = (lead.columns)(problem.on, &values);
+                let columns = match &among {
+                    Some(among) => (lead.columns)(&among.excitation(problem.on), &values),
+                    None => (lead.columns)(problem.on, &values),
+                };
                 let mut all = priors.clone();
                 let mut white = known.clone();
                 for column in &columns {
@@ -363,9 +516,9 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 }
                 white.push(data.clone());
                 let views: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
-                let solution = solve(&Gram::of(&views, 0..data.len()), &all, problem.worth)?;
-                let c = &solution.coefficients[priors.len()..];
-                Some(law.places(&(lead.shape)(&values, c)))
+                let solution = solve(&Gram::of(&views, 0..data.len()), &all, problem.worth);
+                let found = solution.map(|s| (lead.shape)(&values, &s.coefficients[priors.len()..]));
+                found.unwrap_or_default().into_iter().map(|values| law.places(&values)).collect::<Vec<_>>()
             })
             .collect()
     }
@@ -378,7 +531,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 let cyclic = term.law.shapes[i].cyclic;
                 let step = if cyclic || places[i] + STEP <= 1.0 { STEP } else { -STEP };
                 places[i] += step;
-                let moved = Term::new(self.problem, term.law, places);
+                let moved = Term::among(self.problem, term.law, places, term.among.clone(), false);
                 let mut change = vec![0.0; self.problem.data_white.len()];
                 for ((there, here), c) in moved.white.iter().zip(&term.white).zip(coefficients) {
                     let factor = c / step;
@@ -403,17 +556,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             let (_, moves) = self.fit_with(&[&term], &self.derivatives(&term, &coefficients))?;
             let mut better = None;
             for shorter in [1.0, 0.4, 0.1] {
-                let places: Vec<f64> = term
-                    .places
-                    .iter()
-                    .zip(&moves)
-                    .zip(&term.law.shapes)
-                    .map(|((place, by), shape)| {
-                        let moved = place + (shorter * by).clamp(-0.2, 0.2);
-                        if shape.cyclic { moved.rem_euclid(1.0) } else { moved.clamp(0.0, 1.0) }
-                    })
-                    .collect();
-                let trial = Term::new(self.problem, term.law, places);
+                let trial = term.moved(self.problem, |k| shorter * moves[k]);
                 let trial_fit = self.fit(&[&trial])?;
                 if trial_fit.solution.evidence > fit.solution.evidence {
                     better = Some((trial, trial_fit));

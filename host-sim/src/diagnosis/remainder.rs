@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use realfft::RealFftPlanner;
 
-use super::candidate::Law;
+use super::candidate::{Acting, Law, together};
 use super::model::{Problem, Scaffold, Term};
 use super::noise::{Noise, Whitener};
 use super::report::Unexplained;
@@ -37,8 +37,9 @@ pub fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
     for (floating, c) in on.base.floating.iter().zip(selected.fit.base()) {
         take(&floating.values, *c);
     }
-    for (k, term) in selected.terms.iter().enumerate() {
-        let columns = (term.law.columns)(on, &term.law.values(&term.places));
+    let causes: Vec<Acting<'_>> =
+        selected.terms.iter().enumerate().map(|(k, term)| term.acting(selected.fit.of(k))).collect();
+    for (k, columns) in together(on, &causes).into_iter().enumerate() {
         for (column, c) in columns.iter().zip(selected.fit.of(k)) {
             take(&column.values, *c);
         }

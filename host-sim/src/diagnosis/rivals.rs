@@ -29,6 +29,9 @@ const SAME_SHARE: f64 = 0.12;
 /// more columns to do it with.
 const TOLD_BETTER: f64 = -100.0;
 
+/// A rival whose prediction differs by more than this share of a cause's size tells something else.
+const IN_ITS_PLACE: f64 = 0.9;
+
 impl Rival {
     /// Whether it tells the data better than a cause of this size, and otherwise: not by telling what the laws of the other causes leave.
     #[must_use]
@@ -36,6 +39,7 @@ impl Rival {
         !self.mops_up
             && self.misfit < TOLD_BETTER
             && self.apart_arcsec > SAME_ARCSEC.max(2.0 * SAME_SHARE * size_arcsec)
+            && self.apart_arcsec < IN_ITS_PLACE * size_arcsec
     }
 
     /// Whether the data cannot tell it from a cause of this size. With a base parameter `out_of_tolerance` any rival predicts the
@@ -56,7 +60,8 @@ pub fn rivals(
     standings: &[Standing],
     k: usize,
 ) -> Vec<Rival> {
-    let others = selected.others(k);
+    let apart = selected.without(problem, k);
+    let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
     let scaffold = Scaffold::new(problem, others.clone());
     let all: Vec<&Term<'_>> = selected.terms.iter().collect();
     let now = predicted(problem, &all, &selected.fit);
@@ -76,15 +81,15 @@ pub fn rivals(
                 .begin(law)
                 .into_iter()
                 .filter_map(|places| {
-                    let term = Term::new(problem, law, places.clone()).main_only();
+                    let term = scaffold.bare_term(law, places.clone());
                     Some((scaffold.fit(&[&term])?.solution.misfit, places))
                 })
                 .min_by(|a, b| a.0.total_cmp(&b.0))?;
-            // Far away already: no refinement brings it back.
-            if best.0 > 3.0 * selected.fit.solution.misfit + 3000.0 {
+            // Far away already: no refinement brings it back, but for what a lead only points at.
+            if law.lead.is_none() && best.0 > 3.0 * selected.fit.solution.misfit + 3000.0 {
                 return None;
             }
-            let (term, fit) = scaffold.refine(Term::new(problem, law, best.1))?;
+            let (term, fit) = scaffold.refine(scaffold.term(law, best.1))?;
             let c = fit.of(fit.starts.len() - 1);
             if !sound(&term, c) {
                 return None;

@@ -1,11 +1,13 @@
 //! Which causes: forward by evidence, each held against all others and against deviations without a name; then backward, then
 //! exchange. A cause has to earn its place four times: evidence, size, size against the misfit of the other laws, sessions it was not fitted to.
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 
 use super::candidate::{Law, Tolerance};
 use super::linear::Gram;
-use super::model::{Fit, Problem, Scaffold, Term, white_columns};
+use super::model::{Fit, Problem, Scaffold, Term, among_each_other, white_columns};
 
 /// Evidence (natural logarithm of the ratio) below which nothing is named: "very strong" by Kass & Raftery (1995).
 const LEAST_EVIDENCE: f64 = 6.0;
@@ -19,6 +21,13 @@ const LARGEST_SHARE_LOST: f64 = 0.95;
 const LEAST_ARCSEC: f64 = 1.5;
 /// Least size in units of the white noise.
 const LEAST_OF_NOISE: f64 = 0.3;
+/// Evidence beyond which a cause may be smaller than that, and how much smaller.
+const CLEAR_EVIDENCE: f64 = 15.0;
+const LEAST_IF_CLEAR: f64 = 0.55;
+/// And at least this share of the strongest.
+const LEAST_OF_STRONGEST: f64 = 0.1;
+/// Where a cause moves the play, rows in which it does count up to this many times what it adds elsewhere.
+const MOVES_PLAY: f64 = 3.0;
 /// Least size against what the laws of the other terms may be wrong by.
 const LEAST_OF_MISFIT: f64 = 1.0;
 /// The same for a deviation without a name.
@@ -50,6 +59,17 @@ impl<'l> Selected<'l> {
     #[must_use]
     pub fn others(&self, k: usize) -> Vec<&Term<'l>> {
         self.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect()
+    }
+
+    /// The same as they are where it is not there.
+    #[must_use]
+    pub fn without<'s>(&'s self, problem: &Problem<'_>, k: usize) -> Vec<Cow<'s, Term<'l>>> {
+        let others = self.others(k);
+        if others.iter().any(|t| self.terms[k].law.acts_on(t.law)) {
+            let apart = among_each_other(problem, others.into_iter().cloned().collect());
+            return apart.into_iter().map(Cow::Owned).collect();
+        }
+        others.into_iter().map(Cow::Borrowed).collect()
     }
 }
 
@@ -119,8 +139,11 @@ fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law]) -> Vec<
     let tried: Vec<(usize, f64, Vec<f64>)> = trials
         .into_par_iter()
         .filter_map(|(k, places)| {
-            let term = Term::new(problem, laws[k], places.clone());
-            let term = if laws[k].whole { term } else { term.main_only() };
+            let term = if laws[k].whole {
+                scaffold.term(laws[k], places.clone())
+            } else {
+                scaffold.bare_term(laws[k], places.clone())
+            };
             let fit = scaffold.fit(&[&term])?;
             Some((k, fit.solution.evidence, places))
         })
@@ -135,7 +158,7 @@ fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law]) -> Vec<
         .into_par_iter()
         .enumerate()
         .filter_map(|(k, best)| {
-            let term = Term::new(problem, laws[k], best?.1);
+            let term = scaffold.term(laws[k], best?.1);
             let fit = scaffold.fit(&[&term])?;
             let c = fit.of(fit.starts.len() - 1);
             let gain = fit.solution.evidence - before.solution.evidence;
@@ -155,7 +178,8 @@ pub fn standings(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Standing
 }
 
 pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Standing {
-    let others = selected.others(k);
+    let apart = selected.without(problem, k);
+    let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
     let Some(without) = Scaffold::new(problem, others.clone()).fit(&[]) else {
         return Standing { evidence: f64::INFINITY, size: f64::INFINITY, alone: f64::INFINITY, left_out: 1.0 };
     };
@@ -177,7 +201,11 @@ pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize)
         let with_bare: Vec<&Term<'_>> = others.iter().copied().chain([&bare]).collect();
         left_out = left_out.max(left_out_gain(problem, &with_bare, &others));
     }
-    Standing { evidence: gain, size: (TAKEN_OVER * alone).min(size_of(problem, &own)).max(alone), alone, left_out }
+    let mut size = (TAKEN_OVER * alone).min(size_of(problem, &own)).max(alone);
+    if selected.terms[k].law.load.is_some() {
+        size = size.max(super::rows::rms(&own).min(MOVES_PLAY * size));
+    }
+    Standing { evidence: gain, size, alone, left_out }
 }
 
 /// Less the mean: the zero of the encoder takes it.
@@ -277,6 +305,12 @@ pub fn least_size(white: f64) -> f64 {
     LEAST_ARCSEC.max(LEAST_OF_NOISE * white)
 }
 
+/// Least size of a cause, arcsec, at this white noise, however clear.
+#[must_use]
+pub fn least_named(white: f64) -> f64 {
+    LEAST_IF_CLEAR * least_size(white)
+}
+
 struct Limits {
     least: f64,
 }
@@ -287,14 +321,27 @@ impl Limits {
     }
 
     /// `misfit`: what the laws of the other terms may be wrong by, arcsec.
-    fn passes(&self, law: &Law, standing: &Standing, misfit: f64, in_tolerance: bool) -> bool {
+    /// `strongest`: the largest size, arcsec.
+    fn passes(&self, law: &Law, standing: &Standing, misfit: f64, strongest: f64, in_tolerance: bool) -> bool {
         let share = if law.named { LEAST_OF_MISFIT } else { LEAST_UNNAMED_OF_MISFIT };
         let evidence = if law.tolerance_of.is_some() { 0.5 } else { LEAST_EVIDENCE };
         !in_tolerance
             && standing.evidence > evidence
-            && standing.size > self.least
+            && (standing.size > self.least || law.named && self.small_but_clear(standing, strongest))
             && standing.alone > share * misfit
             && standing.left_out > 0.0
+    }
+}
+
+/// The largest size of those that may be wrong at all: a jump of teeth is counted.
+fn strongest(terms: &[Term<'_>], standings: &[Standing]) -> f64 {
+    terms.iter().zip(standings).filter(|(t, _)| t.law.misfit > 0.0).map(|(_, s)| s.size).fold(0.0, f64::max)
+}
+
+impl Limits {
+    fn small_but_clear(&self, standing: &Standing, strongest: f64) -> bool {
+        standing.evidence > CLEAR_EVIDENCE
+            && standing.size > (LEAST_IF_CLEAR * self.least).max(LEAST_OF_STRONGEST * strongest)
     }
 }
 
@@ -315,7 +362,7 @@ pub fn select<'l>(
         selected = settle(problem, next)?;
         selected = backward(problem, selected, &limits, &mut log)?;
         if round > 0 || selected.terms.len() > 1 {
-            selected = exchange(problem, laws, selected, &mut log)?;
+            selected = exchange(problem, laws, selected, &limits, &mut log)?;
             selected = backward(problem, selected, &limits, &mut log)?;
         }
         let mut causes: Vec<&str> = selected.terms.iter().map(|t| t.law.cause.as_str()).collect();
@@ -428,7 +475,8 @@ fn forward<'l>(
         terms.push(term);
         let next = Selected { terms, fit };
         let standing = standing(problem, &next, next.terms.len() - 1);
-        let passes = limits.passes(law, &standing, misfit, false);
+        let strongest = strongest(&selected.terms, &standing_now);
+        let passes = limits.passes(law, &standing, misfit, strongest, false);
         log(format!(
             "  {} {line}: evidence {:.1}, size {:.2}, left out {:.1}",
             if passes { "+" } else { "?" },
@@ -455,7 +503,7 @@ fn settle<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<
 fn settle_anew<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
     settle_from(problem, selected, |scaffold, term| {
         let anew = if term.law.lead.is_some() { scaffold.begin(term.law) } else { Vec::new() };
-        [term.clone()].into_iter().chain(anew.into_iter().map(|places| Term::new(problem, term.law, places))).collect()
+        [term.clone()].into_iter().chain(anew.into_iter().map(|places| scaffold.term(term.law, places))).collect()
     })
 }
 
@@ -465,11 +513,12 @@ fn settle_from<'l>(
     mut selected: Selected<'l>,
     beginnings: impl Fn(&Scaffold<'_, '_, '_, 'l>, &Term<'l>) -> Vec<Term<'l>>,
 ) -> Option<Selected<'l>> {
+    selected.terms = among_each_other(problem, selected.terms);
     for k in 0..selected.terms.len() {
         if selected.terms[k].places.is_empty() {
             continue;
         }
-        let scaffold = Scaffold::new(problem, selected.others(k));
+        let scaffold = Scaffold::new(problem, selected.others(k)).ahead(k);
         let refined = beginnings(&scaffold, &selected.terms[k]).into_iter().filter_map(|term| scaffold.refine(term));
         let best = refined.max_by(|(a, at_a), (b, at_b)| {
             (at_a.solution.evidence + a.occam).total_cmp(&(at_b.solution.evidence + b.occam))
@@ -478,6 +527,7 @@ fn settle_from<'l>(
             selected.terms[k] = term;
         }
     }
+    selected.terms = among_each_other(problem, selected.terms);
     selected.fit = fit(problem, &selected.terms)?;
     Some(selected)
 }
@@ -485,6 +535,27 @@ fn settle_from<'l>(
 /// Whether terms make no sense in a fit without another, for which they only stand in.
 fn stood_in_for(others: &[&Term<'_>], without: Option<&Fit>) -> bool {
     without.is_some_and(|fit| others.iter().enumerate().any(|(j, other)| !sound(other, fit.of(j))))
+}
+
+/// Whether a term does not earn its place.
+fn fails(problem: &Problem<'_>, selected: &Selected<'_>, standings: &[Standing], k: usize, limits: &Limits) -> bool {
+    let law = selected.terms[k].law;
+    let physical = sound(&selected.terms[k], selected.fit.of(k));
+    let in_tolerance = law.tolerance_of.is_some() && {
+        let apart = selected.without(problem, k);
+        let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
+        let without = Scaffold::new(problem, others.clone()).fit(&[]);
+        if physical && stood_in_for(&others, without.as_ref()) {
+            return false;
+        }
+        without.is_none_or(|fit| !out_of_tolerance(problem, &fit, law))
+    };
+    let misfit = (0..selected.terms.len())
+        .filter(|j| *j != k)
+        .map(|j| standings[j].size * selected.terms[j].law.misfit_as(law))
+        .fold(0.0, f64::max);
+    let strongest = strongest(&selected.terms, standings);
+    !physical || !limits.passes(law, &standings[k], misfit, strongest, in_tolerance)
 }
 
 /// Drops what no longer earns its place, weakest first.
@@ -496,30 +567,13 @@ fn backward<'l>(
 ) -> Option<Selected<'l>> {
     while !selected.terms.is_empty() {
         let standings = standings(problem, &selected);
-        let failing = |k: usize| {
-            let law = selected.terms[k].law;
-            let c = selected.fit.of(k);
-            let physical = sound(&selected.terms[k], c);
-            let in_tolerance = law.tolerance_of.is_some() && {
-                let others = selected.others(k);
-                let without = Scaffold::new(problem, others.clone()).fit(&[]);
-                if physical && stood_in_for(&others, without.as_ref()) {
-                    return false;
-                }
-                without.is_none_or(|fit| !out_of_tolerance(problem, &fit, law))
-            };
-            let misfit = (0..selected.terms.len())
-                .filter(|j| *j != k)
-                .map(|j| standings[j].size * selected.terms[j].law.misfit_as(law))
-                .fold(0.0, f64::max);
-            !physical || !limits.passes(law, &standings[k], misfit, in_tolerance)
-        };
         let weakest = (0..selected.terms.len())
-            .filter(|k| failing(*k))
+            .filter(|k| fails(problem, &selected, &standings, *k, limits))
             .min_by(|a, b| standings[*a].evidence.total_cmp(&standings[*b].evidence));
         let Some(k) = weakest else { break };
         log(format!("  - {}: {:?}", selected.terms[k].law.cause, standings[k]));
         selected.terms.remove(k);
+        selected.fit = fit(problem, &selected.terms)?;
         selected = settle_anew(problem, selected)?;
     }
     Some(selected)
@@ -530,10 +584,11 @@ fn exchange<'l>(
     problem: &Problem<'_>,
     laws: &'l [Law],
     selected: Selected<'l>,
+    limits: &Limits,
     log: &mut impl FnMut(String),
 ) -> Option<Selected<'l>> {
     for k in 0..selected.terms.len() {
-        let others: Vec<Term<'l>> = selected.others(k).into_iter().cloned().collect();
+        let others: Vec<Term<'l>> = selected.without(problem, k).into_iter().map(Cow::into_owned).collect();
         let without = fit(problem, &others)?;
         let open: Vec<&Law> = laws
             .iter()
@@ -569,10 +624,15 @@ fn exchange<'l>(
             })
             .max_by(|a, b| (a.1.solution.evidence + a.0.occam).total_cmp(&(b.1.solution.evidence + b.0.occam)));
         if let Some((term, fit)) = best {
-            log(format!("  ~ {} gives way to {}", selected.terms[k].law.cause, term.law.cause));
+            let line = format!("  ~ {} gives way to {}", selected.terms[k].law.cause, term.law.cause);
             let mut terms = others;
             terms.push(term);
-            return settle(problem, Selected { fit, terms });
+            let exchanged = settle(problem, Selected { fit, terms })?;
+            // It has to earn the place that it takes.
+            if !fails(problem, &exchanged, &standings(problem, &exchanged), exchanged.terms.len() - 1, limits) {
+                log(line);
+                return Some(exchanged);
+            }
         }
     }
     Some(selected)

@@ -167,7 +167,7 @@ fn a_form_error_of_the_cam_that_averages_would_hide_is_found_and_costs_nothing_w
         let (base, jumps) = super::prepare::base(&rows, &drive, None);
         let settings = Settings::default();
         let scales = super::Scales::new(&rows, settings.pitch_radius_mm, jumps);
-        let on = super::Excitation { rows: &rows, nominal: &drive, base: &base, scales: &scales };
+        let on = super::Excitation::new(&rows, &drive, &base, &scales);
         let uncertain = super::prepare::uncertain(&on, &[]);
         super::resolution(&on, &super::library(&on), &uncertain, settings.averages, &[]).stride
     };
@@ -239,7 +239,7 @@ fn a_clearance_shut_by_the_cold_is_never_less_than_nothing() {
     let rows = super::Rows::new(&sessions, &drive);
     let (base, jumps) = super::prepare::base(&rows, &drive, None);
     let scales = super::Scales::new(&rows, Settings::default().pitch_radius_mm, jumps);
-    let on = super::Excitation { rows: &rows, nominal: &drive, base: &base, scales: &scales };
+    let on = super::Excitation::new(&rows, &drive, &base, &scales);
     let laws = super::library(&on);
     let shut = |law: &&super::Law| law.shapes.iter().any(|s| s.name == "clearance_arcsec_per_k");
     let law = laws.iter().find(shut).unwrap();

@@ -47,7 +47,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
             ]
         }),
         // a sin(x) + b cos(x) = m sin(x + phase).
-        shape: Box::new(|_, c| vec![c[0].hypot(c[1]), c[1].atan2(c[0]).rem_euclid(2.0 * PI)]),
+        shape: Box::new(|_, c| vec![vec![c[0].hypot(c[1]), c[1].atan2(c[0]).rem_euclid(2.0 * PI)]]),
         loaded_only: true,
     });
     law

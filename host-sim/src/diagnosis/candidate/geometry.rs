@@ -5,21 +5,19 @@
 //! flank that carries: orders 2, 4, 6 as 1 : 1/5 : 3/35, phase turned by twice the flank angle between flanks, a mean that eats
 //! backlash, and less the more teeth share the load.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 
 use crate::nominal::Fixed;
 
-use super::{Column, Excitation, Kin, Law, Lead, Named, Shape, beside, by_row, main, nuisance, polar};
+use super::displaced::displaced;
+use super::lobes::generator_eccentricity;
+use super::{Column, Excitation, Kin, Law, Named, Shape, beside, by_row, main, nuisance, polar};
 
 /// Share by which a law of shape may be wrong: signatures depend on generator and load.
 const SHAPE_MISFIT: f64 = 0.2;
 
-/// Relative uncertainty of an eccentricity: how much of it a wave shows depends on the teeth that give and on a rim that centres
-/// itself, which differ between generators (FEM: from 5 % to a factor).
-const ECCENTRICITY_DOUBT: f64 = 0.15;
-
 /// Largest plausible amplitude, arcsec, one standard deviation.
-const USUAL_ARCSEC: f64 = 20.0;
+pub(super) const USUAL_ARCSEC: f64 = 20.0;
 
 /// Cosine of the pressure angle of a working flank, 20 to 25 degrees.
 pub(super) const COS_PRESSURE_ANGLE: f64 = 0.93;
@@ -45,7 +43,7 @@ pub(super) fn angle(on: &Excitation<'_>, of: Angle, k: usize) -> f64 {
 }
 
 /// How an error fades as the load brings more teeth to bear.
-fn fading(on: &Excitation<'_>, half_load: f64, k: usize) -> f64 {
+pub(super) fn fading(on: &Excitation<'_>, half_load: f64, k: usize) -> f64 {
     1.0 / (1.0 + (on.rows.torque[k] / half_load).abs())
 }
 
@@ -55,7 +53,7 @@ pub(super) fn waves(on: &Excitation<'_>, of: Angle, order: f64, weight: impl Fn(
 }
 
 /// Cosine and sine of a multiple of an angle, made once.
-fn kept(on: &Excitation<'_>, of: Angle, order: f64) -> std::sync::Arc<[Vec<f64>; 2]> {
+pub(super) fn kept(on: &Excitation<'_>, of: Angle, order: f64) -> std::sync::Arc<[Vec<f64>; 2]> {
     let which = match of {
         Angle::Flexspline => 0,
         Angle::CircularSpline => 1,
@@ -68,119 +66,18 @@ fn kept(on: &Excitation<'_>, of: Angle, order: f64) -> std::sync::Arc<[Vec<f64>;
 }
 
 /// Half-load of the fading: from a thirtieth of the load scale to where nothing fades.
-fn half_load(on: &Excitation<'_>) -> Shape {
+pub(super) fn half_load(on: &Excitation<'_>) -> Shape {
     let load = on.scales.load.max(1e-3);
     Shape::by_factors("half_load_n_m", load / 30.0, load * 30.0, 3)
 }
 
-/// Order-2 amplitude of a rectified sine on one flank over its amplitude: 4 / 3 pi.
-const SECOND_ORDER: f64 = 0.424;
-/// Angle on the wheel by which a flank is ahead of the eccentricity, rad: the pressure angle, a little less where teeth give (0.358 rad for the cam by FEM).
-const FLANK_AHEAD: f64 = 0.36;
-/// Mean and fourth order over second: 3/2 and 1/5 of a sharp rectified sine, less where the corner is rounded by teeth that give.
-const MEAN_OF_SECOND: f64 = 1.15;
-const FOURTH_OF_SECOND: f64 = 0.15;
-
-/// Share of the pattern's second order that deviations have to leave of an eccentricity.
-const LEAST_OF_PATTERN: f64 = 0.15;
-
 /// +1 where the circular spline is the output. Where the flexspline is, a load that turns it forward rests on the other flank of the
 /// circular spline, and what a flank is ahead by changes its sign.
-fn sense(on: &Excitation<'_>) -> f64 {
+pub(super) fn sense(on: &Excitation<'_>) -> f64 {
     match on.nominal.teeth.map(|teeth| teeth.fixed) {
         Some(Fixed::CircularSpline) => -1.0,
         _ => 1.0,
     }
-}
-
-/// Cosine of a kept angle less `shift` plus `by`.
-fn ahead(kept: &[Vec<f64>; 2], k: usize, shift: f64, by: f64) -> f64 {
-    let (sin, cos) = (by - shift).sin_cos();
-    kept[0][k] * cos - kept[1][k] * sin
-}
-
-/// An eccentricity, rectified by the clearance: `-|sin|` of the angle to the eccentricity on the flank that turns the output forward,
-/// `+|sin|` on the other, each ahead by the pressure angle in its own sense.
-fn rectified(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
-    let loaded = on.scales.load > 0.0;
-    let by = FLANK_AHEAD * sense(on);
-    let fade_of = move |shape: &[f64]| shape.get(1).copied().filter(|_| loaded).unwrap_or(f64::INFINITY);
-    let mut law = Law::new(cause, move |on, shape| {
-        let half = fade_of(shape);
-        let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
-        let (second, fourth) = (kept(on, of, 2.0), kept(on, of, 4.0));
-        let pattern = by_row(on, |k| {
-            let wave = ahead(&second, k, 2.0 * shape[0], 2.0 * by * flank(k))
-                + FOURTH_OF_SECOND * ahead(&fourth, k, 4.0 * shape[0], 4.0 * by * flank(k))
-                - MEAN_OF_SECOND;
-            fade(k) * flank(k) * wave
-        });
-        let mut columns: Vec<Column> = vec![main(pattern, USUAL_ARCSEC)];
-        columns.push(beside(by_row(on, |k| fade(k) * flank(k)), 0.4));
-        columns.extend(waves(on, of, 2.0, fade).map(|v| nuisance(v, 0.15)));
-        columns.extend(waves(on, of, 2.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.15)));
-        columns.extend(waves(on, of, 4.0, fade).map(|v| nuisance(v, 0.1)));
-        columns.extend(waves(on, of, 4.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.1)));
-        columns.extend(waves(on, of, 6.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.06)));
-        if half.is_finite() {
-            columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| nuisance(v, 0.15)));
-            columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
-        }
-        columns
-    })
-    .shapes([Shape::angle("phase_rad", PI, 1)].into_iter().chain(loaded.then(|| half_load(on))))
-    .parameters(move |on, shape, c| {
-        let amplitude = second_order_unloaded(c, shape[0], by) / SECOND_ORDER;
-        let mut named: Vec<Named> = vec![
-            ("amplitude_um", amplitude * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", amplitude),
-            ("phase_rad", shape[0]),
-        ];
-        if loaded {
-            named.push(("half_load_n_m", shape[1]));
-        }
-        named
-    })
-    // Where its deviations take back what the law says, it is another error of order 2.
-    .physical(move |shape, c| c[0] > 0.0 && second_order_unloaded(c, shape[0], by) > LEAST_OF_PATTERN * c[0]);
-    law.doubt = ECCENTRICITY_DOUBT;
-    law.lead = Some(Lead {
-        columns: Box::new(move |on, shape| {
-            let half = fade_of(shape);
-            let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
-            let mut columns: Vec<Column> = Vec::new();
-            // Second order along cos 2 eps and sin 2 eps.
-            for shift in [0.0, FRAC_PI_2] {
-                let second = kept(on, of, 2.0);
-                let along = |k: usize| ahead(&second, k, shift, 2.0 * by * flank(k));
-                columns.push(main(by_row(on, |k| fade(k) * flank(k) * along(k)), USUAL_ARCSEC));
-            }
-            columns.push(main(by_row(on, |k| fade(k) * flank(k)), USUAL_ARCSEC));
-            columns
-        }),
-        shape: Box::new(|shape, c| {
-            let mut shape = shape.to_vec();
-            shape[0] = (0.5 * polar(c[0], c[1]).1).rem_euclid(PI);
-            shape
-        }),
-        loaded_only: false,
-    });
-    law
-}
-
-/// Second order of a rectified eccentricity without load, all columns of [`rectified`] together: what fades and what does not share it
-/// in proportions that loads of a narrow range cannot tell. Each column of order 2 is projected on the pattern, flank by flank.
-fn second_order_unloaded(c: &[f64], phase_rad: f64, ahead_by: f64) -> f64 {
-    let at = |j: usize| c.get(j).copied().unwrap_or(0.0);
-    let wave = |j: usize| [at(j), at(j + 1)];
-    let both = [wave(2), wave(12)];
-    let by_flank = [wave(4), wave(14)];
-    let on_pattern = |flank: f64| {
-        let (sin, cos) = (2.0 * phase_rad - 2.0 * ahead_by * flank).sin_cos();
-        let along = |w: &[f64; 2]| w[0] * cos + w[1] * sin;
-        both.iter().map(|w| flank * along(w)).chain(by_flank.iter().map(along)).sum::<f64>()
-    };
-    c[0] + 0.5 * (on_pattern(1.0) + on_pattern(-1.0))
 }
 
 /// Errors of position along the pitch: nearly the same on both flanks and under any load. Of the teeth in mesh the foremost carries,
@@ -197,9 +94,9 @@ fn pitch(cause: &'static str, of: Angle) -> Law {
         columns.extend(waves(on, of, 6.0, |_| 1.0).map(|v| nuisance(v, 0.12)));
         columns.extend(waves(on, of, 6.0, flank).map(|v| nuisance(v, 0.06)));
         // Equal lobes cancel odd harmonics; under light load they are not quite equal.
-        columns.extend(waves(on, of, 1.0, |_| 1.0).map(|v| nuisance(v, 0.1)));
+        columns.extend(waves(on, of, 1.0, |_| 1.0).map(|v| nuisance(v, 0.03)));
         columns.extend(waves(on, of, 1.0, light).map(|v| nuisance(v, 0.2)));
-        columns.extend(waves(on, of, 3.0, |_| 1.0).map(|v| nuisance(v, 0.1)));
+        columns.extend(waves(on, of, 3.0, |_| 1.0).map(|v| nuisance(v, 0.05)));
         for order in [8.0, 10.0, 12.0, 14.0, 16.0] {
             columns.extend(waves(on, of, order, |_| 1.0).map(|v| nuisance(v, 0.6 / order)));
         }
@@ -285,47 +182,6 @@ fn ovality() -> Law {
 /// Radial over tangential part of an oval ring as a flank sees them: twice the tangent of the pressure angle.
 const RADIAL_OF_TANGENTIAL: f64 = 0.8;
 
-/// One lobe deeper in mesh than the other: odd harmonics of both wheels come through, order 1 of each above all, fading with load,
-/// and the deeper lobe takes clearance away.
-fn generator_eccentricity(on: &Excitation<'_>) -> Law {
-    let loaded = on.scales.load > 0.0;
-    Law::new("generator_eccentricity", |on, shape| {
-        let half = shape.first().copied().unwrap_or(f64::INFINITY);
-        let fade = |k: usize| fading(on, half, k);
-        let flank = |k: usize| on.base.flank[k];
-        let mut columns: Vec<Column> = Vec::new();
-        for of in [Angle::Flexspline, Angle::CircularSpline] {
-            columns.extend(waves(on, of, 1.0, fade).map(|v| main(v, USUAL_ARCSEC)));
-        }
-        for of in [Angle::Flexspline, Angle::CircularSpline] {
-            columns.extend(waves(on, of, 1.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.3)));
-            columns.extend(waves(on, of, 2.0, fade).map(|v| nuisance(v, 0.05)));
-            columns.extend(waves(on, of, 3.0, fade).map(|v| nuisance(v, 0.1)));
-            if half.is_finite() {
-                columns.extend(waves(on, of, 1.0, |_| 1.0).map(|v| nuisance(v, 0.2)));
-            }
-        }
-        columns.push(beside(by_row(on, flank), 2.0));
-        columns.push(beside(by_row(on, |k| fade(k) * flank(k)), 2.0));
-        columns
-    })
-    .shapes(loaded.then(|| half_load(on)))
-    .parameters(|on, shape, c| {
-        let (on_flexspline, phase) = polar(c[0], c[1]);
-        let on_ring = polar(c[2], c[3]).0;
-        let strongest = on_flexspline.max(on_ring);
-        let mut named: Vec<Named> = vec![
-            ("amplitude_um", strongest / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", strongest),
-            ("phase_rad", phase),
-        ];
-        if let Some(half) = shape.first() {
-            named.push(("half_load_n_m", *half));
-        }
-        named
-    })
-}
-
 /// Form error of the generator: a constant shape repeats from tooth to tooth, so its order is the tooth mesh (z per turn), other on each
 /// flank, with a change of the clearance.
 fn cam_form_error() -> Law {
@@ -399,9 +255,9 @@ fn damaged_tooth(of: Angle) -> Law {
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = vec![
-        rectified("circular_spline_eccentricity", Angle::CircularSpline, on),
-        rectified("flexspline_runout", Angle::Flexspline, on),
-        rectified("gravity_side_load", Angle::Gravity(1.0), on),
+        displaced("circular_spline_eccentricity", Angle::CircularSpline, on),
+        displaced("flexspline_runout", Angle::Flexspline, on),
+        displaced("gravity_side_load", Angle::Gravity(1.0), on),
         ovality(),
         pitch("flexspline_pitch_error", Angle::Flexspline),
         pitch("circular_spline_pitch_error", Angle::CircularSpline),
@@ -415,10 +271,12 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         laws.extend([damaged_tooth(Angle::Flexspline), damaged_tooth(Angle::CircularSpline)]);
     }
     if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
-        laws.push(rectified("gravity_side_load", Angle::Gravity(-1.0), on));
+        laws.push(displaced("gravity_side_load", Angle::Gravity(-1.0), on));
     }
     for law in &mut laws {
-        law.misfit = SHAPE_MISFIT;
+        if law.zones.is_none() {
+            law.misfit = SHAPE_MISFIT;
+        }
         // The tooth mesh is an order of its own.
         law.kin = if law.cause == "cam_form_error" { Kin::Unlike } else { Kin::Shape };
     }

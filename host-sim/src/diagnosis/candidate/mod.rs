@@ -5,10 +5,13 @@
 //! directions in which its law is likely to be wrong, with coefficients of the order of a share of the main ones. A deviation
 //! of that kind then breeds no second cause. What each follows and why: docs/theory.md, "Signatures of causes".
 
+mod among;
+mod displaced;
 mod dynamic;
 mod generic;
 mod geometry;
 mod kernel;
+mod lobes;
 mod sensor;
 mod stiffness;
 mod thermal;
@@ -18,9 +21,11 @@ use super::linear::Prior;
 use super::rows::Rows;
 use crate::nominal::Nominal;
 
+pub use among::{Acting, Among, Zones, together};
 pub use generic::{line, maps, unnamed};
 
 /// What laws are evaluated on.
+#[derive(Clone, Copy)]
 pub struct Excitation<'a> {
     /// The rows.
     pub rows: &'a Rows,
@@ -30,6 +35,18 @@ pub struct Excitation<'a> {
     pub base: &'a Base,
     /// What coefficients are counted in.
     pub scales: &'a Scales,
+    /// What other causes add to half the clearance, row by row, arcsec.
+    pub widened: Option<&'a [f64]>,
+    /// How far other causes bring one zone of teeth ahead of the other.
+    pub zones: Option<&'a Zones>,
+}
+
+impl<'a> Excitation<'a> {
+    /// The recorded one.
+    #[must_use]
+    pub fn new(rows: &'a Rows, nominal: &'a Nominal, base: &'a Base, scales: &'a Scales) -> Excitation<'a> {
+        Excitation { rows, nominal, base, scales, widened: None, zones: None }
+    }
 }
 
 /// What the coefficients of laws are counted in: taken from the rows that a model is fitted to, kept where it predicts others.
@@ -179,14 +196,15 @@ pub type Named = (&'static str, f64);
 type Load = Box<dyn Fn(&Excitation<'_>, &[f64]) -> Vec<f64> + Send + Sync>;
 type Columns = Box<dyn Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync>;
 type Parameters = Box<dyn Fn(&Excitation<'_>, &[f64], &[f64]) -> Vec<Named> + Send + Sync>;
-type ShapeFound = Box<dyn Fn(&[f64], &[f64]) -> Vec<f64> + Send + Sync>;
+type ShapeFound = Box<dyn Fn(&[f64], &[f64]) -> Vec<Vec<f64>> + Send + Sync>;
+type Apart = Box<dyn Fn(&Excitation<'_>, &[f64], &[f64]) -> Zones + Send + Sync>;
 type Physical = Box<dyn Fn(&[f64], &[f64]) -> bool + Send + Sync>;
 
 /// A linear law close to a law that is none: its coefficients say where to begin with the shape parameters.
 pub struct Lead {
     /// Columns at the values of the shape parameters tried first; what the lead finds is not looked at.
     pub columns: Columns,
-    /// Values of the shape parameters from those tried and the coefficients found.
+    /// Values of the shape parameters to begin at, from those tried and the coefficients found.
     pub shape: ShapeFound,
     /// Only where the load leaves no doubt about the flank.
     pub loaded_only: bool,
@@ -224,6 +242,10 @@ pub struct Law {
     pub whole: bool,
     /// Load (N·m, row by row) that the cause adds beside the torque that was recorded.
     pub load: Option<Load>,
+    /// How far it brings one zone of teeth ahead of the other, from shape parameters and coefficients.
+    pub zones: Option<Apart>,
+    /// What other causes do to the zones of teeth and to the clearance enters the law.
+    pub meets_zones: bool,
 }
 
 /// What the misfit of a law may be taken for: most of all another law of its kin.
@@ -288,6 +310,8 @@ impl Law {
             free_form: false,
             whole: false,
             load: None,
+            zones: None,
+            meets_zones: false,
         }
     }
     fn exact(mut self) -> Law {

@@ -69,7 +69,7 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
             main(negative(stop_operator(on, slip)), usual),
             nuisance(negative(stop_operator(on, 0.35 * slip)), 0.35),
             nuisance(negative(stop_operator(on, 2.5 * slip)), 0.5),
-            nuisance(by_row(on, |k| load_share(on, k)), 0.7),
+            nuisance(by_row(on, |k| load_share(on, k)), 0.25),
             nuisance(by_row(on, |k| load_share(on, k).powi(3)), 0.15),
         ];
         columns.extend(unknown_beginnings(on, slip).into_iter().map(|held| history(held, 1.0)));

@@ -162,7 +162,7 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
     law.load = Some(Box::new(load));
     law.lead = Some(Lead {
         columns: Box::new(|on, shape| vec![main(drag_wind_up(on, shape[1], shape[2], 0.0), 10.0)]),
-        shape: Box::new(|shape, c| vec![c[0].max(0.0), shape[1], shape[2]]),
+        shape: Box::new(|shape, c| vec![vec![c[0].max(0.0), shape[1], shape[2]]]),
         loaded_only: true,
     });
     law

@@ -1,0 +1,141 @@
+//! Causes among each other. Most add up. Some do not: a load that gravity adds passes through the springs that slip, makes the load
+//! ring and turns the flank over like any other load; a clearance that has grown decides when an eccentric wheel binds; and two wheels
+//! beside their axis, or one under a generator that is, meet in the same two zones of teeth, of which only the one ahead carries.
+//!
+//! So a law is evaluated on the excitation as the causes that act on it leave it. Of two that meet in the zones the later one is
+//! evaluated beside the earlier, and together they make what both do.
+
+use super::{Excitation, Kin, Law};
+use crate::diagnosis::base::Base;
+use crate::diagnosis::rows::Rows;
+
+/// How far causes bring one zone of teeth ahead of the other, row by row, arcsec.
+#[derive(Clone, Debug, Default)]
+pub struct Zones {
+    /// On the flank that turns the output forward.
+    pub upper: Vec<f64>,
+    /// On the other one.
+    pub lower: Vec<f64>,
+}
+
+/// A cause as it was fitted.
+pub struct Acting<'l> {
+    /// Its law.
+    pub law: &'l Law,
+    /// Shape parameters.
+    pub values: Vec<f64>,
+    /// Coefficients of its columns.
+    pub coefficients: Vec<f64>,
+}
+
+/// What causes leave to another one.
+pub struct Among {
+    /// Under the load with what they add.
+    loaded: Option<(Rows, Base)>,
+    /// What they add to half the clearance, arcsec.
+    widened: Option<Vec<f64>>,
+    zones: Option<Zones>,
+}
+
+impl Law {
+    /// Whether this cause changes what another one does. Two that meet in the zones act on each other: the order decides.
+    #[must_use]
+    pub fn acts_on(&self, other: &Law) -> bool {
+        self.load.is_some() && other.load.is_none()
+            || other.meets_zones && (self.zones.is_some() || self.kin == Kin::Clearance)
+    }
+
+    /// Whether two act on each other.
+    #[must_use]
+    pub fn meets(&self, other: &Law) -> bool {
+        self.meets_zones && other.meets_zones
+    }
+}
+
+impl Among {
+    /// What `acting` causes leave; nothing where none of them does anything to others.
+    #[must_use]
+    pub fn of(on: &Excitation<'_>, acting: &[Acting<'_>]) -> Option<Among> {
+        let mut among = Among { loaded: None, widened: None, zones: None };
+        for cause in acting {
+            if let Some(load) = &cause.law.load {
+                let (rows, _) = among.loaded.get_or_insert_with(|| (on.rows.clone(), on.base.without_floating()));
+                for (torque, added) in rows.torque.iter_mut().zip(load(on, &cause.values)) {
+                    *torque += added;
+                }
+            }
+        }
+        if let Some((rows, base)) = &mut among.loaded {
+            base.load_with(rows, on.nominal);
+        }
+        let (mut widened, mut zones): (Option<Vec<f64>>, Option<Zones>) = (None, None);
+        {
+            let on = among.excitation(on);
+            for cause in acting {
+                if cause.law.kin == Kin::Clearance {
+                    let sum = widened.get_or_insert_with(|| vec![0.0; on.rows.len()]);
+                    add(sum, &half_width(&on, cause));
+                }
+                if let Some(apart) = &cause.law.zones {
+                    let more = apart(&on, &cause.values, &cause.coefficients);
+                    let sum = zones.get_or_insert_with(|| Zones {
+                        upper: vec![0.0; on.rows.len()],
+                        lower: vec![0.0; on.rows.len()],
+                    });
+                    add(&mut sum.upper, &more.upper);
+                    add(&mut sum.lower, &more.lower);
+                }
+            }
+        }
+        (among.widened, among.zones) = (widened, zones);
+        (among.loaded.is_some() || among.widened.is_some() || among.zones.is_some()).then_some(among)
+    }
+
+    /// The excitation as it is left.
+    #[must_use]
+    pub fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
+        let (rows, base) = self.loaded.as_ref().map_or((on.rows, on.base), |(rows, base)| (rows, base));
+        Excitation { rows, base, widened: self.widened.as_deref(), zones: self.zones.as_ref(), ..*on }
+    }
+}
+
+fn add(sum: &mut [f64], more: &[f64]) {
+    for (s, m) in sum.iter_mut().zip(more) {
+        *s += m;
+    }
+}
+
+/// What a cause that changes the clearance adds to half of it: what it does where the forward flank carries.
+fn half_width(on: &Excitation<'_>, cause: &Acting<'_>) -> Vec<f64> {
+    let mut forward = on.base.without_floating();
+    forward.flank.fill(1.0);
+    let on = Excitation { base: &forward, ..*on };
+    let mut sum = vec![0.0; on.rows.len()];
+    for (column, c) in (cause.law.columns)(&on, &cause.values).iter().zip(&cause.coefficients) {
+        for (s, v) in sum.iter_mut().zip(&column.values) {
+            *s += c * v;
+        }
+    }
+    sum
+}
+
+/// Columns of causes that are there together, in their order.
+#[must_use]
+pub fn together(on: &Excitation<'_>, causes: &[Acting<'_>]) -> Vec<Vec<super::Column>> {
+    (0..causes.len())
+        .map(|k| {
+            let others = causes.iter().enumerate().filter(|(j, other)| {
+                *j != k && other.law.acts_on(causes[k].law) && (*j < k || !other.law.meets(causes[k].law))
+            });
+            let acting: Vec<Acting<'_>> = others
+                .map(|(_, a)| Acting { law: a.law, values: a.values.clone(), coefficients: a.coefficients.clone() })
+                .collect();
+            let among = Among::of(on, &acting);
+            let columns = &causes[k].law.columns;
+            among.map_or_else(
+                || columns(on, &causes[k].values),
+                |among| columns(&among.excitation(on), &causes[k].values),
+            )
+        })
+        .collect()
+}

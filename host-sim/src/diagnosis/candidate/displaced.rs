@@ -1,0 +1,197 @@
+//! A wheel beside the axis of the generator: an eccentric circular spline, a flexspline that runs out of true, an axis that gravity
+//! pushes aside.
+//!
+//! Two zones of engaged teeth lie half a turn apart. A displacement `A = ε / (r cos a)` brings the teeth of one zone forward by
+//! `A sin(x ± a)` and those of the other back by as much, other on each flank: the zone that is ahead stops the output, which
+//! therefore rests `A |sin(x ± a)|` short of where it would. A load presses that zone in until the other one carries as well, and moves
+//! a rim that gives towards the middle. Where the flanks come so far that no clearance is left between them, both bind, and the output
+//! stands in the middle, whatever the load.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use super::geometry::{Angle, COS_PRESSURE_ANGLE, USUAL_ARCSEC, fading, half_load, kept, sense, waves};
+use super::{Column, Excitation, Law, Lead, Named, Shape, Tolerance, Zones, by_row, main, nuisance, polar};
+use crate::diagnosis::linear::Prior;
+
+/// Relative uncertainty of an eccentricity: how much of it a wave shows depends on the teeth that give and on a rim that centres
+/// itself, which differ between generators (FEM: from 5 % to a factor).
+const ECCENTRICITY_DOUBT: f64 = 0.15;
+/// Angle on the wheel by which a flank is ahead of the eccentricity, rad: the pressure angle, 20 to 25 degrees.
+const FLANK_AHEAD: f64 = 0.39;
+/// Spread of that angle, one standard deviation.
+const AHEAD_SPREAD: f64 = 0.03;
+/// Plausible eccentricities over radius and cosine of the pressure angle, arcsec.
+const RANGE_ARCSEC: [f64; 2] = [0.7, 250.0];
+/// By how much the full load presses the zone in that carries first, arcsec.
+pub(super) const PRESSED_ARCSEC: [f64; 2] = [0.3, 60.0];
+/// Teeth of a zone come to bear one after another: share of the pressing over which the second zone comes in.
+const ROUNDED: f64 = 0.5;
+/// Share by which such a law may be wrong.
+pub(super) const ZONES_MISFIT: f64 = 0.12;
+/// The size is a shape parameter: what is left for the factor.
+const SCALE_MISFIT: f64 = 0.02;
+/// Order-2 amplitude of a rectified sine on one flank over its amplitude: 4 / 3 pi.
+const SECOND_ORDER: f64 = 0.424;
+/// Share of the pattern's second order that deviations have to leave of an eccentricity.
+const LEAST_OF_PATTERN: f64 = 0.15;
+
+/// How far a zone that is `ahead` stops the output, when the load presses it in by `pressed`.
+pub(super) fn stopped(ahead: f64, pressed: f64) -> f64 {
+    let left = ahead.abs() - pressed;
+    let round = ROUNDED * pressed;
+    0.5 * (left + (left * left + round * round).sqrt())
+}
+
+/// What the displacement adds to the error, row by row.
+struct Displacement {
+    of: Angle,
+    phase: f64,
+    size: f64,
+    /// Load that halves the displacement, N·m.
+    half_load: f64,
+    /// Pressing in per load, arcsec/N·m.
+    pressed_per_n_m: f64,
+    /// Angle by which a flank is ahead, rad.
+    flank_ahead: f64,
+}
+
+impl Displacement {
+    fn of(of: Angle, loaded: bool, on: &Excitation<'_>, shape: &[f64]) -> Displacement {
+        let [half_load, pressed_per_n_m] =
+            if loaded { [shape[2], shape[3] / on.scales.load] } else { [f64::INFINITY, 0.0] };
+        Displacement { of, phase: shape[0], size: shape[1], half_load, pressed_per_n_m, flank_ahead: FLANK_AHEAD }
+    }
+
+    /// How far it brings one zone ahead of the other.
+    fn zones(&self, on: &Excitation<'_>) -> Zones {
+        let first = kept(on, self.of, 1.0);
+        let by = self.flank_ahead * sense(on);
+        let ahead = |flank: f64| {
+            let (sin, cos) = (flank * by - self.phase).sin_cos();
+            let size = |k: usize| self.size * fading(on, self.half_load, k);
+            by_row(on, |k| size(k) * (first[1][k] * cos + first[0][k] * sin))
+        };
+        Zones { upper: ahead(1.0), lower: ahead(-1.0) }
+    }
+
+    /// What it adds to what causes besides do in the zones.
+    fn pattern(&self, on: &Excitation<'_>) -> Vec<f64> {
+        let own = self.zones(on);
+        by_row(on, |k| {
+            let half = (on.base.half_backlash + on.widened.map_or(0.0, |w| w[k])).max(0.0);
+            let flank = on.base.flank[k];
+            let pressed = self.pressed_per_n_m * on.rows.torque[k];
+            let rests = |upper: f64, lower: f64| {
+                let high = half - stopped(upper, pressed.max(0.0));
+                let low = -half + stopped(lower, (-pressed).max(0.0));
+                0.5 * (high + low) + flank * 0.5 * (high - low).max(0.0)
+            };
+            let (upper, lower) = on.zones.map_or((0.0, 0.0), |z| (z.upper[k], z.lower[k]));
+            rests(upper + own.upper[k], lower + own.lower[k]) - rests(upper, lower)
+        })
+    }
+}
+
+/// An axis beside its place.
+pub(super) fn displaced(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
+    let loaded = on.scales.load > 0.0;
+    let by = FLANK_AHEAD * sense(on);
+    let half_of = move |shape: &[f64]| if loaded { shape[2] } else { f64::INFINITY };
+    let mut law = Law::new(cause, move |on, shape| {
+        let half = half_of(shape);
+        let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
+        let displacement = Displacement::of(of, loaded, on, shape);
+        let pattern = displacement.pattern(on);
+        let steeper = Displacement { flank_ahead: FLANK_AHEAD + AHEAD_SPREAD, ..displacement }.pattern(on);
+        let change = by_row(on, |k| steeper[k] - pattern[k]);
+        let scale = Tolerance::Main(Prior { mean: 1.0, std: SCALE_MISFIT });
+        let mut columns: Vec<Column> = vec![Column { values: pattern, tolerance: scale }];
+        columns.push(nuisance(by_row(on, |k| fade(k) * flank(k)), 0.08));
+        columns.extend(waves(on, of, 2.0, fade).map(|v| nuisance(v, 0.12)));
+        columns.extend(waves(on, of, 2.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.12)));
+        columns.extend(waves(on, of, 4.0, fade).map(|v| nuisance(v, 0.08)));
+        columns.extend(waves(on, of, 4.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.08)));
+        columns.extend(waves(on, of, 6.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.04)));
+        if loaded {
+            columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| nuisance(v, 0.12)));
+            columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.12)));
+        }
+        columns.push(Column { values: change, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 1.0 }) });
+        columns
+    })
+    .shapes(
+        [Shape::angle("phase_rad", 2.0 * PI, 1), Shape::by_factors("size_arcsec", RANGE_ARCSEC[0], RANGE_ARCSEC[1], 1)]
+            .into_iter()
+            .chain(loaded.then(|| half_load(on)))
+            .chain(loaded.then(|| Shape::by_factors("pressed_arcsec", PRESSED_ARCSEC[0], PRESSED_ARCSEC[1], 2))),
+    )
+    .parameters(move |on, shape, c| {
+        let amplitude = second_order_unloaded(c, shape, by) / SECOND_ORDER;
+        let mut named: Vec<Named> = vec![
+            ("amplitude_um", amplitude * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um),
+            ("amplitude_arcsec", amplitude),
+            ("phase_rad", shape[0]),
+        ];
+        if loaded {
+            named.push(("half_load_n_m", shape[2]));
+            named.push(("pressed_arcsec", shape[3]));
+        }
+        named
+    })
+    // Where its deviations take back what the law says, it is another error of order 2.
+    .physical(move |shape, c| {
+        c[0] > 0.5 && second_order_unloaded(c, shape, by) > LEAST_OF_PATTERN * SECOND_ORDER * shape[1] * c[0]
+    });
+    law.doubt = ECCENTRICITY_DOUBT;
+    law.meets_zones = true;
+    law.misfit = ZONES_MISFIT;
+    law.zones = Some(Box::new(move |on, shape, _| Displacement::of(of, loaded, on, shape).zones(on)));
+    law.lead = Some(Lead {
+        columns: Box::new(move |on, shape| {
+            let half = half_of(shape);
+            let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
+            let second = kept(on, of, 2.0);
+            let mut columns: Vec<Column> = Vec::new();
+            // Second order along cos 2 eps and sin 2 eps.
+            for shift in [0.0, FRAC_PI_2] {
+                let along = |k: usize| {
+                    let (sin, cos) = (2.0 * by * flank(k) - shift).sin_cos();
+                    second[0][k] * cos - second[1][k] * sin
+                };
+                columns.push(main(by_row(on, |k| fade(k) * flank(k) * along(k)), USUAL_ARCSEC));
+            }
+            columns.extend(waves(on, of, 2.0, fade).map(|v| main(v, USUAL_ARCSEC)));
+            columns.push(main(by_row(on, |k| fade(k) * flank(k)), USUAL_ARCSEC));
+            columns
+        }),
+        shape: Box::new(move |shape, c| {
+            let beginning = |size: f64, twice: f64| {
+                let mut shape = shape.to_vec();
+                (shape[0], shape[1]) = ((0.5 * twice).rem_euclid(PI), size);
+                shape
+            };
+            let (free, twice) = polar(c[0], c[1]);
+            // Both flanks bind: -0.424 A sin 2a sin 2x, whichever carries.
+            let both = (2.0 * by).sin();
+            let (bound, twice_bound) = polar(-c[3] / both, c[2] / both);
+            vec![beginning(free / SECOND_ORDER, twice), beginning(bound / SECOND_ORDER, twice_bound)]
+        }),
+        loaded_only: false,
+    });
+    law
+}
+
+/// Second order of a rectified eccentricity without load, all columns together: what fades and what does not share it
+/// in proportions that loads of a narrow range cannot tell. Each column of order 2 is projected on the pattern, flank by flank.
+fn second_order_unloaded(c: &[f64], shape: &[f64], ahead_by: f64) -> f64 {
+    let at = |j: usize| c.get(j).copied().unwrap_or(0.0);
+    let wave = |j: usize| [at(j), at(j + 1)];
+    let both = [wave(2), wave(12)];
+    let by_flank = [wave(4), wave(14)];
+    let on_pattern = |flank: f64| {
+        let (sin, cos) = (2.0 * shape[0] - 2.0 * ahead_by * flank).sin_cos();
+        let along = |w: &[f64; 2]| w[0] * cos + w[1] * sin;
+        both.iter().map(|w| flank * along(w)).chain(by_flank.iter().map(along)).sum::<f64>()
+    };
+    SECOND_ORDER * shape[1] * c[0] + 0.5 * (on_pattern(1.0) + on_pattern(-1.0))
+}
