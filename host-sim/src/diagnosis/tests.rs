@@ -256,3 +256,100 @@ fn a_clearance_shut_by_the_cold_is_never_less_than_nothing() {
     }
     assert!(reached, "the data must be cold or hot enough to shut it");
 }
+
+/// Hands a law's excitation on made-up rows to `look`.
+fn excited(look: impl Fn(&super::Excitation<'_>, &[super::Law])) {
+    let drive = catalogue_drive();
+    let sessions = data(&[], Richness::Rich, 0, 9);
+    let rows = super::Rows::new(&sessions, &drive);
+    let (base, jumps) = super::prepare::base(&rows, &drive, None);
+    let scales = super::Scales::new(&rows, Settings::default().pitch_radius_mm, jumps);
+    let on = super::Excitation::new(&rows, &drive, &base, &scales);
+    look(&on, &super::library(&on));
+}
+
+fn law<'l>(laws: &'l [super::Law], cause: &str) -> &'l super::Law {
+    laws.iter().find(|law| law.cause == cause).unwrap()
+}
+
+#[test]
+fn flanks_that_bind_leave_the_output_in_the_middle_and_a_load_presses_the_zone_ahead_in() {
+    excited(|on, laws| {
+        let eccentricity = law(laws, "circular_spline_eccentricity");
+        // Phase, size, load that halves it, pressed in by the full load.
+        let pattern = |size: f64, pressed: f64| -> Vec<f64> {
+            (eccentricity.columns)(on, &[0.3, size, 1e9, pressed])[0].values.clone()
+        };
+        let half = on.base.half_backlash;
+        let carried = |k: &usize| on.base.flank[*k].abs() == 1.0;
+        let loaded: Vec<usize> = (0..on.rows.len()).filter(carried).collect();
+        // Small beside the clearance, and nothing pressed in: short of the flank by A |sin|, on either.
+        for k in &loaded {
+            let short = -on.base.flank[*k] * pattern(0.2 * half, 1e-9)[*k];
+            assert!((-1e-9..=0.2 * half + 1e-9).contains(&short), "{short}");
+            if *k > 50 {
+                break;
+            }
+        }
+        // Far beyond the clearance: where it stands no longer tells which flank would carry.
+        let bound = pattern(20.0 * half, 1e-9);
+        let stands = |k: &usize| bound[*k] + on.base.flank[*k] * half;
+        let first = |k: &usize| (on.rows.on_circular_spline[*k] - 0.3).sin();
+        let mut ends = [0.0f64; 2];
+        for k in loaded.iter().filter(|k| first(k).abs() > 0.7) {
+            ends[usize::from(on.base.flank[*k] > 0.0)] =
+                ends[usize::from(on.base.flank[*k] > 0.0)].max(stands(k).abs());
+        }
+        assert!((ends[0] - ends[1]).abs() < 0.05 * ends[0], "{ends:?}");
+        // Pressed in by more than it is displaced, the full load sees next to nothing of it.
+        let pressed = pattern(5.0, 400.0);
+        let full = loaded.iter().filter(|k| on.rows.torque[**k].abs() > 0.9 * on.scales.load);
+        for k in full {
+            assert!(pressed[*k].abs() < 0.5, "{}", pressed[*k]);
+        }
+    });
+}
+
+#[test]
+fn two_displacements_together_are_the_same_in_either_order_and_not_the_sum_of_both() {
+    use super::candidate::{Acting, together};
+    excited(|on, laws| {
+        let acting = |cause: &str, phase: f64, size: f64| {
+            let law = law(laws, cause);
+            let values = vec![phase, size, 50.0, 10.0];
+            let coefficients = std::iter::once(1.0).chain(std::iter::repeat_n(0.0, 40)).collect();
+            Acting { law, values, coefficients }
+        };
+        let pair = || [acting("circular_spline_eccentricity", 0.4, 18.0), acting("flexspline_runout", 2.1, 12.0)];
+        let sum = |causes: &[Acting<'_>]| -> Vec<f64> {
+            let columns = together(on, causes);
+            (0..on.rows.len()).map(|k| columns.iter().map(|c| c[0].values[k]).sum()).collect()
+        };
+        let [a, b] = pair();
+        let one_way = sum(&[a, b]);
+        let [a, b] = pair();
+        let other_way = sum(&[b, a]);
+        let [a, b] = pair();
+        let alone: Vec<f64> = sum(&[a]).iter().zip(sum(&[b])).map(|(a, b)| a + b).collect();
+        let apart = |x: &[f64], y: &[f64]| super::rows::rms(&x.iter().zip(y).map(|(x, y)| x - y).collect::<Vec<f64>>());
+        assert!(apart(&one_way, &other_way) < 1e-9);
+        assert!(apart(&one_way, &alone) > 2.0, "{}", apart(&one_way, &alone));
+    });
+}
+
+#[test]
+fn a_load_that_gravity_adds_passes_through_the_springs_that_slip() {
+    use super::candidate::{Acting, together};
+    excited(|on, laws| {
+        let gravity =
+            || Acting { law: law(laws, "gravity_torque"), values: vec![15.0, 0.7], coefficients: vec![1.0, 0.0] };
+        let slipping =
+            || Acting { law: law(laws, "torsional_hysteresis"), values: vec![10.0], coefficients: vec![20.0] };
+        let beside = together(on, &[gravity(), slipping()]);
+        let alone = together(on, &[slipping()]);
+        let held: Vec<f64> = beside[1][0].values.iter().zip(&alone[0][0].values).map(|(a, b)| a - b).collect();
+        assert!(super::rows::rms(&held) > 0.1, "{}", super::rows::rms(&held));
+        // The load itself is what it is.
+        assert_eq!(beside[0][0].values, together(on, &[gravity()])[0][0].values);
+    });
+}

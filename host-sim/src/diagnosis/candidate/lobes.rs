@@ -34,7 +34,7 @@ impl Lobe {
         // A small step deeper.
         let step = 1e-3 * deeper.max(1.0);
         Lobe {
-            stops: by_row(on, |k| stopped(deeper, pressed(k))),
+            stops: by_row(on, |k| stopped(deeper, pressed(k)) - stopped(0.0, pressed(k))),
             shows: by_row(on, |k| (stopped(deeper + step, pressed(k)) - stopped(deeper, pressed(k))) / step),
         }
     }
