@@ -160,6 +160,30 @@ fn an_eccentric_circular_spline_and_a_runout_of_the_flexspline_are_told_apart_an
     found(runout, 3, "flexspline_runout", [6.0, ECCENTRIC], Some(2.0));
 }
 
+/// What is assumed of the two zones of teeth where no kernels are at hand, held against contact FEM: below the clearance and where both
+/// flanks bind (7 to 9 um here eat it up).
+#[test]
+fn an_eccentric_circular_spline_is_told_without_kernels_before_and_after_its_flanks_bind() {
+    let table = Table::check(&known().0).unwrap();
+    for (size_um, seed) in [(4.0, 12), (14.0, 13)] {
+        let eccentric = |b: &mut AsBuilt| {
+            b.circular_spline_eccentricity_um = size_um;
+            b.circular_spline_eccentricity_phase_deg = 0.9f64.to_degrees();
+        };
+        let sessions = measured(eccentric, seed);
+        let diagnosis =
+            diagnose(&sessions, &Nominal::of_table(&table), Some(&table), &Settings::default(), |_, _, _| {}).unwrap();
+        println!("{size_um} um without kernels:\n{}", diagnosis.text());
+        let names: Vec<&str> = diagnosis.causes.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, ["circular_spline_eccentricity"]);
+        // Found when this was written: 4.03 of 4 um, 14.4 of 14 um.
+        let size = diagnosis.causes[0].parameters["amplitude_um"].value;
+        assert!((size / size_um - 1.0).abs() < 0.1, "{size} um of {size_um}");
+        let held = diagnosis.held_out;
+        assert!(held.rms_after_arcsec < 0.5 * held.rms_before_arcsec, "{held:?}");
+    }
+}
+
 #[test]
 fn pitch_errors_of_either_wheel_and_an_oval_are_told_apart_and_measured() {
     found(|b| b.flexspline_pitch_harmonics = second(4.0, 0.6), 4, "flexspline_pitch_error", [4.0, LINEAR], Some(0.6));
