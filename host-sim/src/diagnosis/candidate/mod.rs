@@ -290,7 +290,7 @@ const USUAL_MISFIT: f64 = 0.10;
 const EXACT_MISFIT: f64 = 0.02;
 /// Relative uncertainty of parameters of such laws, and of exact ones.
 const USUAL_DOUBT: f64 = 0.03;
-const EXACT_DOUBT: f64 = 0.002;
+const EXACT_DOUBT: f64 = 0.005;
 
 impl Law {
     fn new(cause: &str, columns: impl Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync + 'static) -> Law {
