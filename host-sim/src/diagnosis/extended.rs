@@ -8,7 +8,7 @@ use flexspline::Table;
 
 use super::base::{Base, PlayLaw};
 use super::candidate::{Acting, Column, Excitation, Law, Scales, Tolerance, library, together};
-use super::model::{Problem, Scaffold, Term, among_each_other};
+use super::model::{Problem, Scaffold, terms_at};
 use super::noise::Whitener;
 use super::report::Parameter;
 use super::resolution::{Resolution, averages_hide, resolution};
@@ -207,8 +207,7 @@ pub(super) struct Found {
 impl Found {
     /// Fits the laws at `start` (index and places), and the nominal model alone.
     pub(super) fn of(problem: &Problem<'_>, laws: &[Law], start: &[(usize, Vec<f64>)]) -> Option<Found> {
-        let terms = start.iter().map(|(k, p)| Term::new(problem, &laws[*k], p.clone())).collect();
-        let terms = among_each_other(problem, terms);
+        let terms = terms_at(problem, laws, start);
         let alone = Scaffold::new(problem, Vec::new()).fit(&[])?;
         let selected = Selected { fit: fit(problem, &terms)?, terms };
         let parameters = uncertainty::parameters(problem, &selected);

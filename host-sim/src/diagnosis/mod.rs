@@ -39,7 +39,7 @@ use crate::nominal::Nominal;
 use candidate::{Excitation, Law, Scales, library, line, unnamed};
 use extended::Found;
 pub use extended::{Extended, FittedCause, Series};
-use model::{Fit, Problem, Term, among_each_other};
+use model::{Fit, Problem, Term, terms_at};
 use noise::{Noise, Whitener};
 use report::{Cause, Compensation, Diagnosis, Parameter, Residual, Unexplained, Verdict};
 use resolution::{Resolution, resolution};
@@ -131,8 +131,7 @@ pub fn diagnose_extended(
     let search = Search::new(&on, settings)?;
     progress(2, 4, "rivals");
     let Search { laws, problem, noise, start, fast } = search;
-    let terms = start.iter().map(|(k, p)| Term::new(&problem, &laws[*k], p.clone())).collect();
-    let terms = among_each_other(&problem, terms);
+    let terms = terms_at(&problem, &laws, &start);
     let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
     let (selected, mut unproved) = held_out::proved(&problem, selected);
     let start = remembered(&laws, &selected);
@@ -204,8 +203,7 @@ impl<'a> Search<'a> {
         // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
         for round in 0.. {
             fast.clear();
-            let terms = start.drain(..).map(|(k, places)| Term::new(&problem, &laws[k], places)).collect();
-            let terms = among_each_other(&problem, terms);
+            let terms = terms_at(&problem, &laws, &start);
             let selected = select(&problem, &laws, noise.white, terms, say).ok_or(DiagnosisError::NotFinite)?;
             start = remembered(&laws, &selected);
             if round == MOST_ROUNDS {

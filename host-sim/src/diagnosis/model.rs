@@ -5,7 +5,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::candidate::{Acting, Among, Excitation, Law, Tolerance};
+use super::candidate::{Acting, Among, Excitation, Law, Tolerance, left_by};
 use super::linear::{Gram, Prior, Solution, products, solve};
 use super::noise::Whitener;
 use super::rows::rms;
@@ -94,10 +94,7 @@ impl<'l> Term<'l> {
         main_only: bool,
     ) -> Term<'l> {
         let values = law.values(&places);
-        let mut columns = match &among {
-            Some(among) => (law.columns)(&among.excitation(problem.on), &values),
-            None => (law.columns)(problem.on, &values),
-        };
+        let mut columns = (law.columns)(&left_by(among.as_deref(), problem.on), &values);
         columns.retain(|c| !main_only || matches!(c.tolerance, Tolerance::Main(_)));
         let averaged: Vec<Vec<f64>> = columns.iter().map(|c| problem.whitener.average(&c.values)).collect();
         let white = averaged.iter().map(|c| problem.whitener.whiten_averaged(c)).collect();
@@ -263,6 +260,12 @@ pub struct Scaffold<'p, 'a, 't, 'l> {
     ahead: usize,
     /// What the terms leave to a law that adds a load, or meets them in the zones of teeth, or not.
     left: [OnceLock<Option<Arc<Among>>>; 4],
+}
+
+/// Terms of laws (index) at places of their shape parameters, each on what the others leave to it.
+#[must_use]
+pub fn terms_at<'l>(problem: &Problem<'_>, laws: &'l [Law], start: &[(usize, Vec<f64>)]) -> Vec<Term<'l>> {
+    among_each_other(problem, start.iter().map(|(k, p)| Term::new(problem, &laws[*k], p.clone())).collect())
 }
 
 /// The terms evaluated anew, each on what the others leave to it.
@@ -502,10 +505,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             .into_iter()
             .flat_map(|places| {
                 let values = law.values(&places);
-                let columns = match &among {
-                    Some(among) => (lead.columns)(&among.excitation(problem.on), &values),
-                    None => (lead.columns)(problem.on, &values),
-                };
+                let columns = (lead.columns)(&left_by(among.as_deref(), problem.on), &values);
                 let mut all = priors.clone();
                 let mut white = known.clone();
                 for column in &columns {

@@ -331,18 +331,16 @@ impl Limits {
             && standing.alone > share * misfit
             && standing.left_out > 0.0
     }
+
+    fn small_but_clear(&self, standing: &Standing, strongest: f64) -> bool {
+        standing.evidence > CLEAR_EVIDENCE
+            && standing.size > (LEAST_IF_CLEAR * self.least).max(LEAST_OF_STRONGEST * strongest)
+    }
 }
 
 /// The largest size of those that may be wrong at all: a jump of teeth is counted.
 fn strongest(terms: &[Term<'_>], standings: &[Standing]) -> f64 {
     terms.iter().zip(standings).filter(|(t, _)| t.law.misfit > 0.0).map(|(_, s)| s.size).fold(0.0, f64::max)
-}
-
-impl Limits {
-    fn small_but_clear(&self, standing: &Standing, strongest: f64) -> bool {
-        standing.evidence > CLEAR_EVIDENCE
-            && standing.size > (LEAST_IF_CLEAR * self.least).max(LEAST_OF_STRONGEST * strongest)
-    }
 }
 
 /// Chooses causes among `laws`.

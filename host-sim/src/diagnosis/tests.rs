@@ -232,31 +232,6 @@ fn teeth_that_slide_into_the_next_space_between_two_recordings_have_ratcheted() 
     assert!((slipped.value + 2.0 * pitch * 206_264.8).abs() < 15.0 && slipped.std < 15.0, "{slipped:?}");
 }
 
-#[test]
-fn a_clearance_shut_by_the_cold_is_never_less_than_nothing() {
-    let drive = catalogue_drive();
-    let sessions = data(&[], Richness::Rich, 0, 9);
-    let rows = super::Rows::new(&sessions, &drive);
-    let (base, jumps) = super::prepare::base(&rows, &drive, None);
-    let scales = super::Scales::new(&rows, Settings::default().pitch_radius_mm, jumps);
-    let on = super::Excitation::new(&rows, &drive, &base, &scales);
-    let laws = super::library(&on);
-    let shut = |law: &&super::Law| law.shapes.iter().any(|s| s.name == "clearance_arcsec_per_k");
-    let law = laws.iter().find(shut).unwrap();
-    assert_eq!(law.cause, "thermal_clearance");
-    let mut reached = false;
-    for per_k in [-4.0, 4.0] {
-        let values = [per_k, 1.0];
-        let changed = &(law.columns)(&on, &values)[0].values;
-        for (k, change) in changed.iter().enumerate() {
-            let left = base.half_backlash * base.flank[k] + change;
-            assert!(left * base.flank[k] >= -1e-9, "row {k}: {left}");
-            reached |= left.abs() < 1e-9 && base.flank[k] != 0.0;
-        }
-    }
-    assert!(reached, "the data must be cold or hot enough to shut it");
-}
-
 /// Hands a law's excitation on made-up rows to `look`.
 fn excited(look: impl Fn(&super::Excitation<'_>, &[super::Law])) {
     let drive = catalogue_drive();
@@ -266,6 +241,26 @@ fn excited(look: impl Fn(&super::Excitation<'_>, &[super::Law])) {
     let scales = super::Scales::new(&rows, Settings::default().pitch_radius_mm, jumps);
     let on = super::Excitation::new(&rows, &drive, &base, &scales);
     look(&on, &super::library(&on));
+}
+
+#[test]
+fn a_clearance_shut_by_the_cold_is_never_less_than_nothing() {
+    excited(|on, laws| {
+        let shut = |law: &&super::Law| law.shapes.iter().any(|s| s.name == "clearance_arcsec_per_k");
+        let law = laws.iter().find(shut).unwrap();
+        assert_eq!(law.cause, "thermal_clearance");
+        let mut reached = false;
+        for per_k in [-4.0, 4.0] {
+            let values = [per_k, 1.0];
+            let changed = &(law.columns)(on, &values)[0].values;
+            for (k, change) in changed.iter().enumerate() {
+                let left = on.base.half_backlash * on.base.flank[k] + change;
+                assert!(left * on.base.flank[k] >= -1e-9, "row {k}: {left}");
+                reached |= left.abs() < 1e-9 && on.base.flank[k] != 0.0;
+            }
+        }
+        assert!(reached, "the data must be cold or hot enough to shut it");
+    });
 }
 
 fn law<'l>(laws: &'l [super::Law], cause: &str) -> &'l super::Law {
@@ -284,8 +279,9 @@ fn flanks_that_bind_leave_the_output_in_the_middle_and_a_load_presses_the_zone_a
         let carried = |k: &usize| on.base.flank[*k].abs() == 1.0;
         let loaded: Vec<usize> = (0..on.rows.len()).filter(carried).collect();
         // Small beside the clearance, and nothing pressed in: short of the flank by A |sin|, on either.
+        let free = pattern(0.2 * half, 1e-9);
         for k in &loaded {
-            let short = -on.base.flank[*k] * pattern(0.2 * half, 1e-9)[*k];
+            let short = -on.base.flank[*k] * free[*k];
             assert!((-1e-9..=0.2 * half + 1e-9).contains(&short), "{short}");
             if *k > 50 {
                 break;

@@ -99,6 +99,12 @@ impl Among {
     }
 }
 
+/// The excitation as others leave it, or as it was recorded.
+#[must_use]
+pub fn left_by<'a>(among: Option<&'a Among>, on: &Excitation<'a>) -> Excitation<'a> {
+    among.map_or(*on, |among| among.excitation(on))
+}
+
 fn add(sum: &mut [f64], more: &[f64]) {
     for (s, m) in sum.iter_mut().zip(more) {
         *s += m;
@@ -131,11 +137,7 @@ pub fn together(on: &Excitation<'_>, causes: &[Acting<'_>]) -> Vec<Vec<super::Co
                 .map(|(_, a)| Acting { law: a.law, values: a.values.clone(), coefficients: a.coefficients.clone() })
                 .collect();
             let among = Among::of(on, &acting);
-            let columns = &causes[k].law.columns;
-            among.map_or_else(
-                || columns(on, &causes[k].values),
-                |among| columns(&among.excitation(on), &causes[k].values),
-            )
+            (causes[k].law.columns)(&left_by(among.as_ref(), on), &causes[k].values)
         })
         .collect()
 }

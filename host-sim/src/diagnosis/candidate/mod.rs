@@ -21,7 +21,7 @@ use super::linear::Prior;
 use super::rows::Rows;
 use crate::nominal::Nominal;
 
-pub use among::{Acting, Among, Zones, together};
+pub use among::{Acting, Among, Zones, left_by, together};
 pub use generic::{line, maps, unnamed};
 
 /// What laws are evaluated on.
