@@ -154,7 +154,7 @@ fn least_apart(
     let imagined = Excitation { rows: &rows, base: &base, ..*on };
     let problem = Problem::new(&imagined, &base.uncertain, Whitener::new(&rows, &base.uncertain, 1, noise), 1.0);
     let scaffold = Scaffold::new(&problem, Vec::new());
-    let own = scaffold.fit(&[&Term::new(&problem, term.law, term.places.clone())])?.solution.misfit;
+    let own = scaffold.fit(Some(&Term::new(&problem, term.law, term.places.clone())))?.solution.misfit;
     let mut least = f64::INFINITY;
     for law in alike {
         let best = scaffold
@@ -162,7 +162,7 @@ fn least_apart(
             .into_iter()
             .filter_map(|places| {
                 let trial = Term::new(&problem, law, places.clone()).main_only();
-                Some((scaffold.fit(&[&trial])?.solution.misfit, places))
+                Some((scaffold.fit(Some(&trial))?.solution.misfit, places))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))?;
         let (_, fit) = scaffold.refine(Term::new(&problem, law, best.1))?;

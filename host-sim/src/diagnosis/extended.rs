@@ -208,17 +208,19 @@ impl Found {
     /// Fits the laws at `start` (index and places), and the nominal model alone.
     pub(super) fn of(problem: &Problem<'_>, laws: &[Law], start: &[(usize, Vec<f64>)]) -> Option<Found> {
         let terms = terms_at(problem, laws, start);
-        let alone = Scaffold::new(problem, Vec::new()).fit(&[])?;
+        let alone = Scaffold::new(problem, Vec::new()).fit(None)?;
         let selected = Selected { fit: fit(problem, &terms)?, terms };
-        let parameters = uncertainty::parameters(problem, &selected);
+        let known = uncertainty::known(problem, &selected);
         Some(Found {
             recalibrated: alone.solution.coefficients,
             base: selected.fit.base().to_vec(),
             terms: start
                 .iter()
                 .enumerate()
-                .zip(parameters)
-                .map(|((k, (law, places)), named)| (*law, places.clone(), selected.fit.of(k).to_vec(), named))
+                .zip(known)
+                .map(|((k, (law, places)), known)| {
+                    (*law, places.clone(), selected.fit.of(k).to_vec(), known.parameters)
+                })
                 .collect(),
         })
     }

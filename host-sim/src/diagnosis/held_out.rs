@@ -61,7 +61,7 @@ pub fn proved<'l>(problem: &Problem<'_>, mut selected: Selected<'l>) -> (Selecte
 /// found without the session as well, by a step of Gauss-Newton where that tells the others better.
 fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], anew: bool) -> Option<f64> {
     let scaffold = Scaffold::new(problem, terms.to_vec());
-    let fit = scaffold.fit(&[])?;
+    let fit = scaffold.fit(None)?;
     let white = white_columns(problem, terms, &[]);
     let free = if anew && terms.iter().any(|t| !t.places.is_empty()) { Some(scaffold.linearised()?) } else { None };
     let (mut sum, mut count) = (0.0, 0usize);
@@ -75,7 +75,7 @@ fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], anew: bool) -> Option<f6
             let there: Vec<&Term<'_>> = moved.iter().collect();
             let white = white_columns(problem, &there, &[]);
             let solution = Scaffold::new(problem, there.clone())
-                .fit(&[])?
+                .fit(None)?
                 .without(&Gram::of(&white, block.clone()), problem.worth)?;
             if solution.misfit < best.0.misfit {
                 best = (solution, Some(moved));

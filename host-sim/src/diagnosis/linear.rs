@@ -44,6 +44,35 @@ impl Gram {
         }
     }
 
+    /// With new columns before the data: `meeting` holds their products, each with those before, the data, and the new ones.
+    #[must_use]
+    pub fn with(&self, meeting: &[Vec<f64>]) -> Gram {
+        let old = self.size - 1;
+        let size = self.size + meeting.len();
+        let mut products = vec![0.0; size * size];
+        let mut put = |i: usize, j: usize, value: f64| {
+            products[i * size + j] = value;
+            products[j * size + i] = value;
+        };
+        for i in 0..old {
+            for j in 0..=i {
+                put(i, j, self.at(i, j));
+            }
+            put(i, size - 1, self.at(i, old));
+        }
+        put(size - 1, size - 1, self.at(old, old));
+        for (a, of) in meeting.iter().enumerate() {
+            for (j, product) in of[..old].iter().enumerate() {
+                put(old + a, j, *product);
+            }
+            put(old + a, size - 1, of[old]);
+            for (b, product) in of[self.size..=self.size + a].iter().enumerate() {
+                put(old + a, old + b, *product);
+            }
+        }
+        Gram { size, products }
+    }
+
     /// Only some of the columns; the data is kept.
     #[must_use]
     pub fn select(&self, keep: &[usize]) -> Gram {

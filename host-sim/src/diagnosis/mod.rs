@@ -302,6 +302,12 @@ fn conclude(
     let explainable = (rms_before * rms_before - floor * floor).max(0.0);
     let unexplained = (rms_after * rms_after - floor * floor).max(0.0);
 
+    let known = uncertainty::known(problem, &selected);
+    if settings.verbose {
+        for (term, known) in selected.terms.iter().zip(&known) {
+            tell(&format!("  {}: {:.1} times its doubt", term.law.cause, known.times_its_doubt));
+        }
+    }
     let counts = |k: &usize| selected.terms[*k].law.named && standings[*k].size > select::least_named(noise.white);
     let named: Vec<usize> = (0..selected.terms.len()).filter(counts).collect();
     let size = |k: &usize| standings[*k].size.powi(2);
@@ -338,7 +344,6 @@ fn conclude(
     let mut next_experiment = None;
     let mut told_better = Vec::new();
     if verdict != Verdict::Unknown {
-        let parameters = uncertainty::parameters(problem, &selected);
         for k in named.iter().copied() {
             let rivals = rivals::rivals(problem, laws, &selected, &standings, k);
             if settings.verbose {
@@ -372,7 +377,7 @@ fn conclude(
             causes.push(Cause {
                 name: selected.terms[k].law.cause.clone(),
                 confidence: confidence(closest, alike.len()),
-                parameters: parameters[k].clone(),
+                parameters: known[k].parameters.clone(),
                 held_out_gain: held.gains.get(k).copied().unwrap_or(0.0),
                 size_arcsec: standings[k].size,
                 look_alikes: alike,

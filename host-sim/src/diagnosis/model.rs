@@ -3,9 +3,10 @@
 //! Coefficients are solved exactly; shape parameters by Gauss-Newton around the best of the values tried first. Nuisance columns
 //! get a prior in proportion to what the main columns of their law explain, found by iteration.
 
-use std::sync::{Arc, OnceLock};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use super::candidate::{Acting, Among, Excitation, Law, Tolerance, left_by};
+use super::candidate::{Acting, Among, Column, Excitation, Law, Tolerance, left_by};
 use super::linear::{Gram, Prior, Solution, products, solve};
 use super::noise::Whitener;
 use super::rows::rms;
@@ -30,6 +31,29 @@ pub struct Problem<'a> {
     pub base_white: Vec<Vec<f64>>,
     /// Worth of the information, at most 1.
     pub worth: f64,
+    /// What was evaluated where laws are tried first.
+    tried: Mutex<Tried>,
+}
+
+/// White columns by law, extent and places (their bits), as long as there is room.
+#[derive(Default)]
+struct Tried {
+    columns: HashMap<(u64, Extent, Vec<u64>), Arc<White>>,
+    values: usize,
+}
+
+/// Values that are kept of what was tried: 768 MiB.
+const MOST_KEPT: usize = 96 << 20;
+
+/// How much of a law is evaluated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Extent {
+    /// All columns.
+    Whole,
+    /// The main ones.
+    Bare,
+    /// The columns of its lead.
+    Lead,
 }
 
 impl<'a> Problem<'a> {
@@ -42,7 +66,26 @@ impl<'a> Problem<'a> {
         let base: Vec<Vec<f64>> = on.base.floating.iter().map(|f| whitener.average(&f.values)).collect();
         let base_white = base.iter().map(|column| whitener.whiten_averaged(column)).collect();
         let certain = whitener.certain(uncertain);
-        Problem { on, uncertain: uncertain.to_vec(), whitener, certain, data, data_white, base, base_white, worth }
+        let (uncertain, tried) = (uncertain.to_vec(), Mutex::default());
+        Problem { on, uncertain, whitener, certain, data, data_white, base, base_white, worth, tried }
+    }
+
+    /// White columns of a law by itself at places where it is tried again and again.
+    fn tried(&self, law: &Law, extent: Extent, places: &[f64]) -> Arc<White> {
+        let key = (law.id(), extent, places.iter().map(|place| place.to_bits()).collect());
+        let kept = || self.tried.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = kept().columns.get(&key) {
+            return known.clone();
+        }
+        let (_, white) = White::of(self, columns(law, extent, self.on, places));
+        let white = Arc::new(white);
+        let values = white.len() * self.data.len();
+        let mut kept = kept();
+        if kept.values + values <= MOST_KEPT {
+            kept.values += values;
+            kept.columns.insert(key, white.clone());
+        }
+        white
     }
 
     fn base_priors(&self) -> Vec<Prior> {
@@ -57,99 +100,71 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// A law at given places of its shape parameters, with its columns.
-#[derive(Clone)]
-pub struct Term<'l> {
-    /// The law.
-    pub law: &'l Law,
-    /// Places of the shape parameters, 0 to 1.
-    pub places: Vec<f64>,
-    /// Columns, averaged.
-    pub averaged: Vec<Vec<f64>>,
-    /// Columns, white.
-    pub white: Vec<Vec<f64>>,
+/// Columns of a law as rows give them.
+fn columns(law: &Law, extent: Extent, on: &Excitation<'_>, places: &[f64]) -> Vec<Column> {
+    let made = match (&law.lead, extent) {
+        (Some(lead), Extent::Lead) => &lead.columns,
+        _ => &law.columns,
+    };
+    let mut columns = made(on, &law.values(places));
+    columns.retain(|c| extent == Extent::Whole || matches!(c.tolerance, Tolerance::Main(_)));
+    columns
+}
+
+/// Columns made white, and what their coefficients may be.
+#[derive(Clone, Debug)]
+pub struct White {
+    /// Columns.
+    pub columns: Vec<Vec<f64>>,
     /// What coefficients may be.
     pub tolerances: Vec<Tolerance>,
     /// Root mean square of each averaged column.
     size: Vec<f64>,
-    /// What freedom of the shape parameters costs: logarithm of the share of their range that the data leave (0 before refinement).
-    pub occam: f64,
-    /// What other causes leave to it.
-    among: Option<Arc<Among>>,
+    /// Products of the columns with base, data, and themselves.
+    products: OnceLock<Vec<f64>>,
 }
 
-impl<'l> Term<'l> {
-    /// Evaluates a law by itself.
-    #[must_use]
-    pub fn new(problem: &Problem<'_>, law: &'l Law, places: Vec<f64>) -> Term<'l> {
-        Term::among(problem, law, places, None, false)
-    }
-
-    /// Evaluates a law on what other causes leave.
-    fn among(
-        problem: &Problem<'_>,
-        law: &'l Law,
-        places: Vec<f64>,
-        among: Option<Arc<Among>>,
-        main_only: bool,
-    ) -> Term<'l> {
-        let values = law.values(&places);
-        let mut columns = (law.columns)(&left_by(among.as_deref(), problem.on), &values);
-        columns.retain(|c| !main_only || matches!(c.tolerance, Tolerance::Main(_)));
+impl White {
+    /// Averages columns and makes them white; returns the averages as well.
+    fn of(problem: &Problem<'_>, columns: Vec<Column>) -> (Vec<Vec<f64>>, White) {
         let averaged: Vec<Vec<f64>> = columns.iter().map(|c| problem.whitener.average(&c.values)).collect();
         let white = averaged.iter().map(|c| problem.whitener.whiten_averaged(c)).collect();
         let size = averaged.iter().map(|c| rms(c)).collect();
-        Term {
-            law,
-            places,
-            averaged,
-            white,
-            tolerances: columns.iter().map(|c| c.tolerance).collect(),
-            size,
-            occam: 0.0,
-            among,
-        }
-    }
-
-    /// The same with each place moved, within its range and no farther than a step reaches.
-    #[must_use]
-    pub fn moved(&self, problem: &Problem<'_>, mut by: impl FnMut(usize) -> f64) -> Term<'l> {
-        let places = self.places.iter().zip(&self.law.shapes).enumerate().map(|(k, (place, shape))| {
-            let moved = place + by(k).clamp(-FARTHEST, FARTHEST);
-            if shape.cyclic { moved.rem_euclid(1.0) } else { moved.clamp(0.0, 1.0) }
-        });
-        Term::among(problem, self.law, places.collect(), self.among.clone(), false)
-    }
-
-    /// As a cause that acts on others.
-    pub(super) fn acting(&self, coefficients: &[f64]) -> Acting<'l> {
-        Acting { law: self.law, values: self.law.values(&self.places), coefficients: coefficients.to_vec() }
-    }
-
-    /// Only its main columns.
-    #[must_use]
-    pub fn main_only(mut self) -> Term<'l> {
-        let keep: Vec<bool> = self.tolerances.iter().map(|t| matches!(t, Tolerance::Main(_))).collect();
-        let mut at = keep.iter();
-        self.averaged.retain(|_| *at.next().unwrap_or(&true));
-        let mut at = keep.iter();
-        self.white.retain(|_| *at.next().unwrap_or(&true));
-        let mut at = keep.iter();
-        self.size.retain(|_| *at.next().unwrap_or(&true));
-        self.tolerances.retain(|t| matches!(t, Tolerance::Main(_)));
-        self
+        let tolerances = columns.iter().map(|c| c.tolerance).collect();
+        (averaged, White { columns: white, tolerances, size, products: OnceLock::new() })
     }
 
     /// Columns.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.white.len()
+        self.columns.len()
     }
 
-    /// Whether the law gave no column.
+    /// Whether there are none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.white.is_empty()
+        self.columns.is_empty()
+    }
+
+    /// Products of the columns with base, data, and themselves, column by column.
+    fn bare_products(&self, problem: &Problem<'_>) -> &[f64] {
+        self.products.get_or_init(|| {
+            let own: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).collect();
+            let mut with = white_columns(problem, &[], &[]);
+            with.extend(&own);
+            products(&own, &with, 0..problem.data_white.len(), false)
+        })
+    }
+
+    /// Only the main columns.
+    fn main_only(mut self) -> White {
+        let main: Vec<bool> = self.tolerances.iter().map(|t| matches!(t, Tolerance::Main(_))).collect();
+        let mut at = main.iter();
+        self.columns.retain(|_| *at.next().unwrap_or(&true));
+        let mut at = main.iter();
+        self.size.retain(|_| *at.next().unwrap_or(&true));
+        self.tolerances.retain(|t| matches!(t, Tolerance::Main(_)));
+        White { products: OnceLock::new(), ..self }
     }
 
     /// Priors, nuisance scaled to what the main columns explain with `coefficients`.
@@ -173,6 +188,75 @@ impl<'l> Term<'l> {
                 }
             })
             .collect()
+    }
+}
+
+/// A law at given places of its shape parameters, with its columns.
+#[derive(Clone)]
+pub struct Term<'l> {
+    /// The law.
+    pub law: &'l Law,
+    /// Places of the shape parameters, 0 to 1.
+    pub places: Vec<f64>,
+    /// Columns, averaged.
+    pub averaged: Vec<Vec<f64>>,
+    /// Columns, white.
+    pub white: White,
+    /// What freedom of the shape parameters costs: logarithm of the share of their range that the data leave (0 before refinement).
+    pub occam: f64,
+    /// What other causes leave to it.
+    among: Option<Arc<Among>>,
+}
+
+impl<'l> Term<'l> {
+    /// Evaluates a law by itself.
+    #[must_use]
+    pub fn new(problem: &Problem<'_>, law: &'l Law, places: Vec<f64>) -> Term<'l> {
+        Term::among(problem, law, places, None)
+    }
+
+    /// Evaluates a law on what other causes leave.
+    fn among(problem: &Problem<'_>, law: &'l Law, places: Vec<f64>, among: Option<Arc<Among>>) -> Term<'l> {
+        let on = left_by(among.as_deref(), problem.on);
+        let (averaged, white) = White::of(problem, columns(law, Extent::Whole, &on, &places));
+        Term { law, places, averaged, white, occam: 0.0, among }
+    }
+
+    /// The same with each place moved, within its range and no farther than a step reaches.
+    #[must_use]
+    pub fn moved(&self, problem: &Problem<'_>, mut by: impl FnMut(usize) -> f64) -> Term<'l> {
+        let places = self.places.iter().zip(&self.law.shapes).enumerate().map(|(k, (place, shape))| {
+            let moved = place + by(k).clamp(-FARTHEST, FARTHEST);
+            if shape.cyclic { moved.rem_euclid(1.0) } else { moved.clamp(0.0, 1.0) }
+        });
+        Term::among(problem, self.law, places.collect(), self.among.clone())
+    }
+
+    /// As a cause that acts on others.
+    pub(super) fn acting(&self, coefficients: &[f64]) -> Acting<'l> {
+        Acting { law: self.law, values: self.law.values(&self.places), coefficients: coefficients.to_vec() }
+    }
+
+    /// Only its main columns.
+    #[must_use]
+    pub fn main_only(mut self) -> Term<'l> {
+        let mut main = self.white.tolerances.iter().map(|t| matches!(t, Tolerance::Main(_)));
+        self.averaged.retain(|_| main.next().unwrap_or(true));
+        drop(main);
+        self.white = self.white.main_only();
+        self
+    }
+
+    /// Columns.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.white.len()
+    }
+
+    /// Whether the law gave no column.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.white.is_empty()
     }
 
     /// What the term adds to the error, averaged.
@@ -281,7 +365,7 @@ pub fn among_each_other<'l>(problem: &Problem<'_>, mut terms: Vec<Term<'l>>) -> 
         let scaffold = Scaffold::new(problem, others).ahead(k);
         let (left, occam) = (scaffold.left_to(terms[k].law), terms[k].occam);
         if left.is_some() || terms[k].among.is_some() {
-            let term = Term::among(problem, terms[k].law, terms[k].places.clone(), left, false);
+            let term = Term::among(problem, terms[k].law, terms[k].places.clone(), left);
             terms[k] = Term { occam, ..term };
         }
     }
@@ -326,7 +410,7 @@ impl Fit {
 
 /// The white columns that a fit has the products of: base, terms, further ones, the data last.
 pub fn white_columns<'c>(problem: &'c Problem<'_>, terms: &[&'c Term<'_>], further: &'c [Vec<f64>]) -> Vec<&'c [f64]> {
-    let terms = terms.iter().flat_map(|t| &t.white);
+    let terms = terms.iter().flat_map(|t| &t.white.columns);
     problem.base_white.iter().chain(terms).chain(further).chain([&problem.data_white]).map(Vec::as_slice).collect()
 }
 
@@ -349,13 +433,31 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// A law among the terms.
     #[must_use]
     pub fn term<'n>(&self, law: &'n Law, places: Vec<f64>) -> Term<'n> {
-        Term::among(self.problem, law, places, self.left_to(law), false)
+        Term::among(self.problem, law, places, self.left_to(law))
     }
 
-    /// The same with its main columns alone.
+    /// White columns of a law among the terms.
+    fn white(&self, law: &Law, extent: Extent, places: &[f64]) -> Arc<White> {
+        match self.left_to(law) {
+            None => self.problem.tried(law, extent, places),
+            among => {
+                let on = left_by(among.as_deref(), self.problem.on);
+                Arc::new(White::of(self.problem, columns(law, extent, &on, places)).1)
+            }
+        }
+    }
+
+    /// The solution with a law tried at some places: with its main columns alone, or where they mean nothing by themselves all of them.
     #[must_use]
-    pub fn bare_term<'n>(&self, law: &'n Law, places: Vec<f64>) -> Term<'n> {
-        Term::among(self.problem, law, places, self.left_to(law), true)
+    pub fn trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
+        let extent = if law.whole { Extent::Whole } else { Extent::Bare };
+        Some(self.fit_with(Some(&self.white(law, extent, places)), &[])?.0.solution)
+    }
+
+    /// The solution with all columns of a law at some places.
+    #[must_use]
+    pub fn whole_trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
+        Some(self.fit_with(Some(&self.white(law, Extent::Whole, places)), &[])?.0.solution)
     }
 
     /// What the terms leave to a law.
@@ -366,7 +468,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             return None;
         }
         let left = self.left[kind].get_or_init(|| {
-            let fit = self.fit(&[])?;
+            let fit = self.fit(None)?;
             let acting: Vec<Acting<'l>> =
                 (0..self.terms.len()).filter(|k| acts(*k)).map(|k| self.terms[k].acting(fit.of(k))).collect();
             Among::of(self.problem.on, &acting).map(Arc::new)
@@ -374,52 +476,20 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         left.clone()
     }
 
-    /// Fits the terms of the scaffold and `added` ones.
+    /// Fits the terms of the scaffold and one more.
     #[must_use]
-    pub fn fit(&self, added: &[&Term<'_>]) -> Option<Fit> {
-        let (fit, _) = self.fit_with(added, &[])?;
+    pub fn fit(&self, added: Option<&Term<'_>>) -> Option<Fit> {
+        let (fit, _) = self.fit_with(added.map(|t| &t.white), &[])?;
         Some(fit)
     }
 
     /// The same with further columns, each with its prior, after all others; returns their coefficients.
-    fn fit_with(&self, added: &[&Term<'_>], further: &[(Vec<f64>, Prior)]) -> Option<(Fit, Vec<f64>)> {
+    fn fit_with(&self, added: Option<&White>, further: &[(Vec<f64>, Prior)]) -> Option<(Fit, Vec<f64>)> {
         let problem = self.problem;
-        let old = self.gram.size - 1;
-        let new: Vec<&[f64]> = added
-            .iter()
-            .flat_map(|t| &t.white)
-            .map(Vec::as_slice)
-            .chain(further.iter().map(|(column, _)| column.as_slice()))
-            .collect();
-        // Those before, the data, and the new ones up to each itself.
-        let mut all = white_columns(problem, &self.terms, &[]);
-        all.extend(&new);
-        let meeting = products(&new, &all, 0..problem.data_white.len(), false);
-        let size = old + new.len() + 1;
-        let mut gram = Gram { size, products: vec![0.0; size * size] };
-        let mut put = |i: usize, j: usize, value: f64| {
-            gram.products[i * size + j] = value;
-            gram.products[j * size + i] = value;
-        };
-        for i in 0..old {
-            for j in 0..=i {
-                put(i, j, self.gram.at(i, j));
-            }
-            put(i, size - 1, self.gram.at(i, old));
-        }
-        put(size - 1, size - 1, self.gram.at(old, old));
-        for (a, of) in meeting.chunks_exact(all.len()).enumerate() {
-            for (j, product) in of[..old].iter().enumerate() {
-                put(old + a, j, *product);
-            }
-            put(old + a, size - 1, of[old]);
-            for (b, product) in of[old + 1..=old + 1 + a].iter().enumerate() {
-                put(old + a, old + b, *product);
-            }
-        }
+        let gram = self.gram.with(&self.meeting(added, further));
         let mut starts = Vec::new();
         let mut at = problem.base_white.len();
-        let all: Vec<&Term<'_>> = self.terms.iter().map(|t| *t as &Term<'_>).chain(added.iter().copied()).collect();
+        let all: Vec<&White> = self.terms.iter().map(|t| &t.white).chain(added).collect();
         for term in &all {
             starts.push(at);
             at += term.len();
@@ -445,6 +515,33 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         let (solution, priors) = last?;
         let extra = solution.coefficients[at..].to_vec();
         Some((Fit { solution, starts, priors, gram }, extra))
+    }
+
+    /// Products of new columns: those of a law, then further ones; each with base, terms, data, and the new ones.
+    fn meeting(&self, added: Option<&White>, further: &[(Vec<f64>, Prior)]) -> Vec<Vec<f64>> {
+        let problem = self.problem;
+        let rows = 0..problem.data_white.len();
+        let mut meeting = Vec::new();
+        if let Some(white) = added {
+            // What does not depend on the terms is known from the last time.
+            let bare = white.bare_products(problem);
+            let new: Vec<&[f64]> = white.columns.iter().map(Vec::as_slice).collect();
+            let terms: Vec<&[f64]> = self.terms.iter().flat_map(|t| &t.white.columns).map(Vec::as_slice).collect();
+            let with_terms = products(&new, &terms, rows.clone(), false);
+            let base = problem.base_white.len();
+            for (k, bare) in bare.chunks_exact((base + 1 + new.len()).max(1)).enumerate() {
+                let with_terms = &with_terms[k * terms.len()..(k + 1) * terms.len()];
+                meeting.push([&bare[..base], with_terms, &bare[base..]].concat());
+            }
+        }
+        if !further.is_empty() {
+            let further: Vec<&[f64]> = further.iter().map(|(column, _)| column.as_slice()).collect();
+            let mut all = white_columns(problem, &self.terms, &[]);
+            all.extend(added.iter().flat_map(|t| &t.columns).map(Vec::as_slice));
+            all.extend(&further);
+            meeting.extend(products(&further, &all, rows, false).chunks_exact(all.len()).map(<[f64]>::to_vec));
+        }
+        meeting
     }
 
     /// Places at which to begin with a law: those to be tried, or where its lead points.
@@ -484,7 +581,6 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         let tried = law.tried();
         let Some(lead) = &law.lead else { return tried };
         let problem = self.problem;
-        let among = self.left_to(law);
         let least = LOADED * problem.on.scales.load;
         let mask: Vec<bool> = problem
             .whitener
@@ -496,28 +592,24 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         let masked = |column: &[f64]| -> Vec<f64> {
             column.iter().zip(&mask).map(|(v, m)| if *m || !some { *v } else { 0.0 }).collect()
         };
-        let mut known: Vec<Vec<f64>> = problem.base_white.iter().map(|c| masked(c)).collect();
-        known.extend(self.terms.iter().flat_map(|t| &t.white).map(|c| masked(c)));
+        let known: Vec<Vec<f64>> = white_columns(problem, &self.terms, &[]).into_iter().map(masked).collect();
+        let known: Vec<&[f64]> = known.iter().map(Vec::as_slice).collect();
+        let gram = Gram::of(&known, 0..mask.len());
         let mut priors = problem.base_priors();
-        priors.extend(self.terms.iter().flat_map(|t| t.priors(None)));
-        let data = masked(&problem.data_white);
+        priors.extend(self.terms.iter().flat_map(|t| t.white.priors(None)));
         tried
             .into_iter()
             .flat_map(|places| {
-                let values = law.values(&places);
-                let columns = (lead.columns)(&left_by(among.as_deref(), problem.on), &values);
+                let lead_columns = self.white(law, Extent::Lead, &places);
                 let mut all = priors.clone();
-                let mut white = known.clone();
-                for column in &columns {
-                    white.push(masked(&problem.whitener.whiten(&column.values)));
-                    if let Tolerance::Main(prior) = column.tolerance {
-                        all.push(prior);
-                    }
-                }
-                white.push(data.clone());
-                let views: Vec<&[f64]> = white.iter().map(Vec::as_slice).collect();
-                let solution = solve(&Gram::of(&views, 0..data.len()), &all, problem.worth);
-                let found = solution.map(|s| (lead.shape)(&values, &s.coefficients[priors.len()..]));
+                all.extend(lead_columns.priors(None));
+                let new: Vec<Vec<f64>> = lead_columns.columns.iter().map(|c| masked(c)).collect();
+                let new: Vec<&[f64]> = new.iter().map(Vec::as_slice).collect();
+                let with: Vec<&[f64]> = known.iter().chain(&new).copied().collect();
+                let meeting: Vec<Vec<f64>> =
+                    products(&new, &with, 0..mask.len(), false).chunks_exact(with.len()).map(<[f64]>::to_vec).collect();
+                let solution = solve(&gram.with(&meeting), &all, problem.worth);
+                let found = solution.map(|s| (lead.shape)(&law.values(&places), &s.coefficients[priors.len()..]));
                 found.unwrap_or_default().into_iter().map(|values| law.places(&values)).collect::<Vec<_>>()
             })
             .collect()
@@ -531,9 +623,9 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 let cyclic = term.law.shapes[i].cyclic;
                 let step = if cyclic || places[i] + STEP <= 1.0 { STEP } else { -STEP };
                 places[i] += step;
-                let moved = Term::among(self.problem, term.law, places, term.among.clone(), false);
+                let moved = Term::among(self.problem, term.law, places, term.among.clone());
                 let mut change = vec![0.0; self.problem.data_white.len()];
-                for ((there, here), c) in moved.white.iter().zip(&term.white).zip(coefficients) {
+                for ((there, here), c) in moved.white.columns.iter().zip(&term.white.columns).zip(coefficients) {
                     let factor = c / step;
                     for (d, (a, b)) in change.iter_mut().zip(there.iter().zip(here)) {
                         *d += factor * (a - b);
@@ -547,17 +639,17 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// Moves the shape parameters of `term` to where the misfit is least, beside the terms of the scaffold.
     #[must_use]
     pub fn refine<'n>(&self, mut term: Term<'n>) -> Option<(Term<'n>, Fit)> {
-        let mut fit = self.fit(&[&term])?;
+        let mut fit = self.fit(Some(&term))?;
         if term.places.is_empty() {
             return Some((term, fit));
         }
         for _ in 0..STEPS {
             let coefficients = fit.of(fit.starts.len() - 1).to_vec();
-            let (_, moves) = self.fit_with(&[&term], &self.derivatives(&term, &coefficients))?;
+            let (_, moves) = self.fit_with(Some(&term.white), &self.derivatives(&term, &coefficients))?;
             let mut better = None;
             for shorter in [1.0, 0.4, 0.1] {
                 let trial = term.moved(self.problem, |k| shorter * moves[k]);
-                let trial_fit = self.fit(&[&trial])?;
+                let trial_fit = self.fit(Some(&trial))?;
                 if trial_fit.solution.evidence > fit.solution.evidence {
                     better = Some((trial, trial_fit));
                     break;
@@ -571,7 +663,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             }
         }
         let coefficients = fit.of(fit.starts.len() - 1).to_vec();
-        let (free, _) = self.fit_with(&[&term], &self.derivatives(&term, &coefficients))?;
+        let (free, _) = self.fit_with(Some(&term.white), &self.derivatives(&term, &coefficients))?;
         term.occam = (free.solution.evidence - fit.solution.evidence).min(0.0);
         Some((term, fit))
     }
@@ -580,12 +672,12 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// last coefficients are moves of the shape parameters, term after term.
     #[must_use]
     pub fn linearised(&self) -> Option<(Fit, Vec<Vec<f64>>)> {
-        let fit = self.fit(&[])?;
+        let fit = self.fit(None)?;
         let mut further = Vec::new();
         for (k, term) in self.terms.iter().enumerate() {
             further.extend(self.derivatives(term, fit.of(k)));
         }
-        let (fit, _) = self.fit_with(&[], &further)?;
+        let (fit, _) = self.fit_with(None, &further)?;
         Some((fit, further.into_iter().map(|(column, _)| column).collect()))
     }
 }

@@ -115,7 +115,7 @@ pub fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[Law], whi
         .par_iter()
         .filter_map(|law| {
             let term = Term::new(problem, law, Vec::new());
-            let fit = scaffold.fit(&[&term])?;
+            let fit = scaffold.fit(Some(&term))?;
             let mut terms = selected.terms.clone();
             terms.push(term);
             let standing = super::select::standing(problem, &Selected { terms, fit }, selected.terms.len());

@@ -69,7 +69,7 @@ pub fn rivals(
         laws.iter().filter(|law| law.named && selected.terms.iter().all(|t| t.law.cause != law.cause)).collect();
     // Where more is left than noise, as much may hide in any rival: rises count against what is left.
     let left = selected.fit.solution.misfit / (problem.worth * problem.data_white.len().max(1) as f64);
-    let lacking = scaffold.fit(&[]).map(|fit| predicted(problem, &others, &fit));
+    let lacking = scaffold.fit(None).map(|fit| predicted(problem, &others, &fit));
     let others_may_err = |law: &Law| {
         let of = |j: usize| standings[j].size * selected.terms[j].law.misfit_as(law);
         (0..selected.terms.len()).filter(|j| *j != k).map(of).fold(0.0, f64::max)
@@ -80,10 +80,7 @@ pub fn rivals(
             let best = scaffold
                 .begin(law)
                 .into_iter()
-                .filter_map(|places| {
-                    let term = scaffold.bare_term(law, places.clone());
-                    Some((scaffold.fit(&[&term])?.solution.misfit, places))
-                })
+                .filter_map(|places| Some((scaffold.trial(law, &places)?.misfit, places)))
                 .min_by(|a, b| a.0.total_cmp(&b.0))?;
             // Far away already: no refinement brings it back, but for what a lead only points at.
             if law.lead.is_none() && best.0 > 3.0 * selected.fit.solution.misfit + 3000.0 {

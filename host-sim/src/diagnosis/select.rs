@@ -42,7 +42,9 @@ const MOST_CAUSES: usize = 3;
 /// Unnamed deviations at most.
 const MOST_UNNAMED: usize = 3;
 /// Laws that are refined in each round.
-const REFINED: usize = 7;
+const REFINED: usize = 9;
+/// Laws that are refined for the place of another.
+const EXCHANGED: usize = 4;
 /// Evidence by which something unnamed has to be ahead of the best cause to be taken before it.
 const UNNAMED_AHEAD: f64 = 5.0;
 
@@ -111,7 +113,7 @@ pub(super) fn sound(term: &Term<'_>, coefficients: &[f64]) -> bool {
 pub(super) fn parts(term: &Term<'_>, coefficients: &[f64]) -> [f64; 3] {
     let part = |of: fn(&Tolerance) -> bool| -> f64 {
         let only: Vec<f64> =
-            term.tolerances.iter().zip(coefficients).map(|(t, c)| if of(t) { *c } else { 0.0 }).collect();
+            term.white.tolerances.iter().zip(coefficients).map(|(t, c)| if of(t) { *c } else { 0.0 }).collect();
         super::rows::rms(&term.contribution(&only))
     };
     [
@@ -124,13 +126,12 @@ pub(super) fn parts(term: &Term<'_>, coefficients: &[f64]) -> [f64; 3] {
 /// Fits a set of terms.
 #[must_use]
 pub fn fit(problem: &Problem<'_>, terms: &[Term<'_>]) -> Option<Fit> {
-    Scaffold::new(problem, terms.iter().collect()).fit(&[])
+    Scaffold::new(problem, terms.iter().collect()).fit(None)
 }
 
-/// The strongest of each law at its best place tried, beside some terms; not refined. Best evidence first.
-fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law]) -> Vec<(f64, Term<'l>)> {
+/// The strongest laws (`most` of them) at their best places tried, beside some terms; not refined. Best evidence first.
+fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law], most: usize) -> Vec<Term<'l>> {
     let scaffold = Scaffold::new(problem, terms.iter().collect());
-    let Some(before) = scaffold.fit(&[]) else { return Vec::new() };
     let trials: Vec<(usize, Vec<f64>)> = laws
         .par_iter()
         .enumerate()
@@ -138,15 +139,7 @@ fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law]) -> Vec<
         .collect();
     let tried: Vec<(usize, f64, Vec<f64>)> = trials
         .into_par_iter()
-        .filter_map(|(k, places)| {
-            let term = if laws[k].whole {
-                scaffold.term(laws[k], places.clone())
-            } else {
-                scaffold.bare_term(laws[k], places.clone())
-            };
-            let fit = scaffold.fit(&[&term])?;
-            Some((k, fit.solution.evidence, places))
-        })
+        .filter_map(|(k, places)| Some((k, scaffold.trial(laws[k], &places)?.evidence, places)))
         .collect();
     let mut best: Vec<Option<(f64, Vec<f64>)>> = vec![None; laws.len()];
     for (k, evidence, places) in tried {
@@ -154,21 +147,26 @@ fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law]) -> Vec<
             best[k] = Some((evidence, places));
         }
     }
-    let mut found: Vec<(f64, Term<'l>)> = best
+    let mut found: Vec<(f64, &'l Law, Vec<f64>)> = best
         .into_par_iter()
-        .enumerate()
-        .filter_map(|(k, best)| {
-            let term = scaffold.term(laws[k], best?.1);
-            let fit = scaffold.fit(&[&term])?;
-            let c = fit.of(fit.starts.len() - 1);
-            let gain = fit.solution.evidence - before.solution.evidence;
-            // Where a lead points is only near.
-            let physical = laws[k].lead.is_some() || sound(&term, c);
-            (physical && gain.is_finite()).then_some((gain, term))
+        .zip(laws)
+        .filter_map(|(best, law)| {
+            let (_, places) = best?;
+            let evidence = scaffold.whole_trial(law, &places)?.evidence;
+            evidence.is_finite().then_some((evidence, *law, places))
         })
         .collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    found
+    let physical = |(_, law, places): (f64, &'l Law, Vec<f64>)| {
+        let term = scaffold.term(law, places);
+        // Where a lead points is only near.
+        if law.lead.is_some() {
+            return Some(term);
+        }
+        let fit = scaffold.fit(Some(&term))?;
+        sound(&term, fit.of(fit.starts.len() - 1)).then_some(term)
+    };
+    found.into_iter().filter_map(physical).take(most).collect()
 }
 
 /// What each term adds that the others cannot, and what it is worth on sessions left out.
@@ -180,7 +178,7 @@ pub fn standings(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Standing
 pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Standing {
     let apart = selected.without(problem, k);
     let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
-    let Some(without) = Scaffold::new(problem, others.clone()).fit(&[]) else {
+    let Some(without) = Scaffold::new(problem, others.clone()).fit(None) else {
         return Standing { evidence: f64::INFINITY, size: f64::INFINITY, alone: f64::INFINITY, left_out: 1.0 };
     };
     let with = predicted(problem, &selected.terms.iter().collect::<Vec<_>>(), &selected.fit);
@@ -259,7 +257,7 @@ pub fn blocks(problem: &Problem<'_>) -> Vec<std::ops::Range<usize>> {
 fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]) -> f64 {
     let misfit = |terms: &[&Term<'_>]| -> Option<f64> {
         let columns = white_columns(problem, terms, &[]);
-        let fit = Scaffold::new(problem, terms.to_vec()).fit(&[])?;
+        let fit = Scaffold::new(problem, terms.to_vec()).fit(None)?;
         let mut all = 0.0;
         for block in blocks(problem) {
             let inside = Gram::of(&columns, block);
@@ -381,14 +379,14 @@ pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[&str]) -> Vec
             .iter()
             .filter(|law| causes.contains(&law.cause.as_str()) && terms.iter().all(|t| t.law.cause != law.cause))
             .collect();
-        let found = scan(problem, &terms, &open);
+        let found = scan(problem, &terms, &open, usize::MAX);
         if found.is_empty() {
             break;
         }
         let scaffold = Scaffold::new(problem, terms.iter().collect());
         let best = found
             .into_par_iter()
-            .filter_map(|(_, term)| {
+            .filter_map(|term| {
                 let (term, fit) = scaffold.refine(term)?;
                 Some((fit.solution.evidence, term))
             })
@@ -419,13 +417,12 @@ fn forward<'l>(
         .filter(|law| if law.named { named < MOST_CAUSES } else { unnamed < MOST_UNNAMED })
         .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &selected.fit, law))
         .collect();
-    let mut found = scan(problem, &selected.terms, &open);
-    found.truncate(REFINED + 2);
+    let found = scan(problem, &selected.terms, &open, REFINED);
     let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
     let before = selected.fit.solution.evidence;
     let mut refined: Vec<(f64, Term<'l>, Fit)> = found
         .into_par_iter()
-        .filter_map(|(_, term)| {
+        .filter_map(|term| {
             let (term, fit) = scaffold.refine(term)?;
             let gain = fit.solution.evidence + term.occam - before;
             let c = fit.of(fit.starts.len() - 1);
@@ -542,7 +539,7 @@ fn fails(problem: &Problem<'_>, selected: &Selected<'_>, standings: &[Standing],
     let in_tolerance = law.tolerance_of.is_some() && {
         let apart = selected.without(problem, k);
         let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
-        let without = Scaffold::new(problem, others.clone()).fit(&[]);
+        let without = Scaffold::new(problem, others.clone()).fit(None);
         if physical && stood_in_for(&others, without.as_ref()) {
             return false;
         }
@@ -593,12 +590,11 @@ fn exchange<'l>(
             .filter(|law| selected.terms.iter().all(|t| t.law.cause != law.cause))
             .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &without, law))
             .collect();
-        let mut rivals = scan(problem, &others, &open);
-        rivals.truncate(4);
+        let rivals = scan(problem, &others, &open, EXCHANGED);
         let scaffold = Scaffold::new(problem, others.iter().collect());
         let refined: Vec<(Term<'l>, Fit)> = rivals
             .into_par_iter()
-            .filter_map(|(_, term)| {
+            .filter_map(|term| {
                 let (term, fit) = scaffold.refine(term)?;
                 let c = fit.of(fit.starts.len() - 1);
                 sound(&term, c).then_some((term, fit))

@@ -52,17 +52,62 @@ fn stretched(problem: &Problem<'_>, fit: &Fit, white: &[&[f64]]) -> Vec<f64> {
     times(&times(&bread, &meat), &bread)
 }
 
-/// Parameters of each term.
+/// How well a term is known.
+#[derive(Clone, Debug, Default)]
+pub struct Known {
+    /// Its parameters.
+    pub parameters: BTreeMap<&'static str, Parameter>,
+    /// What it adds to the prediction, in units of the uncertainty of that (both as lengths in the whitened data).
+    pub times_its_doubt: f64,
+}
+
+/// How far the coefficients and moves of one term may be off.
+struct Spread {
+    /// Covariance by Laplace's approximation, and by stretches of the data; row by row.
+    covariances: [Vec<f64>; 2],
+    /// Shift of each when a block of the data is left out, and the covariance then.
+    shifts: Vec<(Vec<f64>, Vec<f64>)>,
+}
+
+impl Spread {
+    /// Variance of a quadratic form, row by row: the largest of Laplace's, that by stretches, and that of a jackknife.
+    fn of(&self, form: &[f64]) -> f64 {
+        let trace = |covariance: &[f64]| -> f64 { form.iter().zip(covariance).map(|(a, b)| a * b).sum() };
+        let [laplace, stretched] = &self.covariances;
+        let within = trace(laplace).max(trace(stretched)).max(0.0);
+        // A session without which the rest says nothing of it, such as the one after a jump, is no repetition.
+        let repeated: Vec<&Vec<f64>> = self
+            .shifts
+            .iter()
+            .filter(|(_, without)| trace(without) < UNDETERMINED * UNDETERMINED * within)
+            .map(|(shift, _)| shift)
+            .collect();
+        let count = repeated.len().max(1) as f64;
+        let dimension = form.len().isqrt();
+        let mean: Vec<f64> = (0..dimension).map(|i| repeated.iter().map(|s| s[i]).sum::<f64>() / count).collect();
+        let square = |shift: &[f64]| -> f64 {
+            let from_mean: Vec<f64> = shift.iter().zip(&mean).map(|(s, m)| s - m).collect();
+            trace(&outer(&from_mean))
+        };
+        let jackknife = (count - 1.0) / count * repeated.iter().map(|s| square(s)).sum::<f64>();
+        within.max(jackknife)
+    }
+}
+
+/// Products of each with each, row by row.
+fn outer(values: &[f64]) -> Vec<f64> {
+    values.iter().flat_map(|a| values.iter().map(move |b| a * b)).collect()
+}
+
+/// How well each term is known.
 #[must_use]
-pub fn parameters(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<BTreeMap<&'static str, Parameter>> {
+pub fn known(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Known> {
     let terms: Vec<&Term<'_>> = selected.terms.iter().collect();
-    let empty = || selected.terms.iter().map(|_| BTreeMap::new()).collect();
     let scaffold = Scaffold::new(problem, terms.clone());
-    let Some((fit, moves)) = scaffold.linearised() else { return empty() };
+    let Some((fit, moves)) = scaffold.linearised() else { return vec![Known::default(); terms.len()] };
     let n = fit.priors.len();
-    // Jackknife over blocks: shifts of all coefficients when a block is left out.
     let white = white_columns(problem, &terms, &moves);
-    let shifts: Vec<(Vec<f64>, Vec<f64>)> = blocks(problem)
+    let left_out: Vec<(Vec<f64>, Vec<f64>)> = blocks(problem)
         .into_iter()
         .filter_map(|block| {
             let solved = fit.without(&Gram::of(&white, block), problem.worth)?;
@@ -74,68 +119,75 @@ pub fn parameters(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<BTreeMa
     let by_stretches = stretched(problem, &fit, &white);
     let mut place = n - moves.len();
     let mut all = Vec::new();
-    for (k, term) in selected.terms.iter().enumerate() {
+    for (k, term) in terms.into_iter().enumerate() {
         let coefficients = selected.fit.of(k);
-        let value = |c: &[f64], places: &[f64]| (term.law.parameters)(problem.on, &term.law.values(places), c);
-        let at = value(coefficients, &term.places);
-        let (start, dimension) = (fit.starts[k], coefficients.len() + term.places.len());
-        let index: Vec<usize> =
-            (0..coefficients.len()).map(|j| start + j).chain((0..term.places.len()).map(|j| place + j)).collect();
+        let index: Vec<usize> = (fit.starts[k]..fit.starts[k] + coefficients.len())
+            .chain(place..place + term.places.len())
+            .collect();
         place += term.places.len();
-        let mut slopes = vec![vec![0.0; dimension]; at.len()];
-        for j in 0..dimension {
-            let std = covariance[index[j] * n + index[j]].max(0.0).sqrt();
-            let step = (STEP * std).max(1e-9);
-            let (mut c, mut p) = (coefficients.to_vec(), term.places.clone());
-            if j < c.len() {
-                c[j] += step;
-            } else {
-                let i = j - c.len();
-                p[i] += if term.law.shapes[i].cyclic || p[i] + step <= 1.0 { step } else { -step };
-            }
-            let sign = if j >= c.len() && p[j - c.len()] < term.places[j - c.len()] { -1.0 } else { 1.0 };
-            for (slope, (new, old)) in slopes.iter_mut().zip(value(&c, &p).iter().zip(&at)) {
-                let mut change = new.1 - old.1;
-                if old.0 == "phase_rad" || old.0 == "angle_rad" {
-                    change = (change + std::f64::consts::FRAC_PI_2).rem_euclid(std::f64::consts::PI)
-                        - std::f64::consts::FRAC_PI_2;
-                }
-                slope[j] = sign * change / step;
-            }
-        }
-        let mut named = BTreeMap::new();
-        for ((name, value), slope) in at.into_iter().zip(&slopes) {
-            let spread = |covariance: &[f64]| -> f64 {
-                (0..dimension)
-                    .flat_map(|i| (0..dimension).map(move |j| (i, j)))
-                    .map(|(i, j)| slope[i] * slope[j] * covariance[index[i] * n + index[j]])
-                    .sum()
-            };
-            let laplace = spread(&covariance).max(spread(&by_stretches));
-            // A session without which the rest says nothing of the parameter, such as the one after a jump, is no repetition.
-            let moved: Vec<f64> = shifts
+        let block = |square: &[f64]| -> Vec<f64> {
+            index.iter().flat_map(|i| index.iter().map(move |j| square[i * n + j])).collect()
+        };
+        let spread = Spread {
+            covariances: [block(&covariance), block(&by_stretches)],
+            shifts: left_out
                 .iter()
-                .filter(|(_, without)| spread(without) < UNDETERMINED * UNDETERMINED * laplace)
-                .map(|(s, _)| (0..dimension).map(|j| slope[j] * s[index[j]]).sum::<f64>())
-                .collect();
-            let count = moved.len().max(1) as f64;
-            let mean = moved.iter().sum::<f64>() / count;
-            let jackknife = (count - 1.0) / count * moved.iter().map(|m| (m - mean).powi(2)).sum::<f64>();
-            let angle = name.ends_with("phase_rad") || name == "angle_rad";
-            let counted = ["harmonic", "tooth", "wheel", "events"].contains(&name);
-            let scale = if angle {
-                1.0
-            } else if counted {
-                0.0
-            } else {
-                value.abs()
-            };
-            named.insert(
-                name,
-                Parameter { value, std: laplace.max(0.0).max(jackknife).sqrt().hypot(term.law.doubt * scale) },
-            );
-        }
-        all.push(named);
+                .map(|(shift, without)| (index.iter().map(|i| shift[*i]).collect(), block(without)))
+                .collect(),
+        };
+        let products: Vec<f64> = index.iter().flat_map(|i| index.iter().map(|j| fit.gram.at(*i, *j))).collect();
+        let mut adds = coefficients.to_vec();
+        adds.resize(index.len(), 0.0);
+        let adds: f64 = outer(&adds).iter().zip(&products).map(|(a, b)| a * b).sum();
+        all.push(Known {
+            parameters: parameters(problem, term, coefficients, &spread),
+            times_its_doubt: (adds / spread.of(&products).max(1e-30)).sqrt(),
+        });
     }
     all
+}
+
+/// Parameters of a term with their standard deviations.
+fn parameters(
+    problem: &Problem<'_>,
+    term: &Term<'_>,
+    coefficients: &[f64],
+    spread: &Spread,
+) -> BTreeMap<&'static str, Parameter> {
+    let value = |c: &[f64], places: &[f64]| (term.law.parameters)(problem.on, &term.law.values(places), c);
+    let at = value(coefficients, &term.places);
+    let dimension = coefficients.len() + term.places.len();
+    let mut slopes = vec![vec![0.0; dimension]; at.len()];
+    for j in 0..dimension {
+        let std = spread.covariances[0][j * dimension + j].max(0.0).sqrt();
+        let step = (STEP * std).max(1e-9);
+        let (mut c, mut p) = (coefficients.to_vec(), term.places.clone());
+        if j < c.len() {
+            c[j] += step;
+        } else {
+            let i = j - c.len();
+            p[i] += if term.law.shapes[i].cyclic || p[i] + step <= 1.0 { step } else { -step };
+        }
+        let sign = if j >= c.len() && p[j - c.len()] < term.places[j - c.len()] { -1.0 } else { 1.0 };
+        for (slope, (new, old)) in slopes.iter_mut().zip(value(&c, &p).iter().zip(&at)) {
+            let mut change = new.1 - old.1;
+            if old.0 == "phase_rad" || old.0 == "angle_rad" {
+                change = (change + std::f64::consts::FRAC_PI_2).rem_euclid(std::f64::consts::PI)
+                    - std::f64::consts::FRAC_PI_2;
+            }
+            slope[j] = sign * change / step;
+        }
+    }
+    let with_doubt = |((name, value), slope): ((&'static str, f64), &Vec<f64>)| {
+        let counted = ["harmonic", "tooth", "wheel", "events"].contains(&name);
+        let scale = if name.ends_with("phase_rad") || name == "angle_rad" {
+            1.0
+        } else if counted {
+            0.0
+        } else {
+            value.abs()
+        };
+        (name, Parameter { value, std: spread.of(&outer(slope)).sqrt().hypot(term.law.doubt * scale) })
+    };
+    at.into_iter().zip(&slopes).map(with_doubt).collect()
 }

@@ -16,6 +16,8 @@ mod sensor;
 mod stiffness;
 mod thermal;
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use super::base::Base;
 use super::linear::Prior;
 use super::rows::Rows;
@@ -210,8 +212,12 @@ pub struct Lead {
     pub loaded_only: bool,
 }
 
+/// Laws made so far: each has a number of its own.
+static LAWS: AtomicU64 = AtomicU64::new(0);
+
 /// One law of one cause.
 pub struct Law {
+    id: u64,
     /// Cause in snake case, or what an unnamed deviation looks like.
     pub cause: String,
     /// False for a deviation that has no cause in the library.
@@ -295,6 +301,7 @@ const EXACT_DOUBT: f64 = 0.005;
 impl Law {
     fn new(cause: &str, columns: impl Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync + 'static) -> Law {
         Law {
+            id: LAWS.fetch_add(1, Ordering::Relaxed),
             cause: cause.to_owned(),
             named: true,
             shapes: Vec::new(),
@@ -313,6 +320,11 @@ impl Law {
             zones: None,
             meets_zones: false,
         }
+    }
+    /// A number that no other law has.
+    #[must_use]
+    pub fn id(&self) -> u64 {
+        self.id
     }
     fn exact(mut self) -> Law {
         self.misfit = EXACT_MISFIT;
