@@ -32,7 +32,7 @@ pub enum Kind {
 /// Which cases are drawn.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct Draw {
-    /// Laws of one family alone [default: both, case by case]
+    /// Laws of one family alone [default: all three, case by case]
     #[arg(long, value_enum, ignore_case = true)]
     pub family: Option<Family>,
     /// Cases of one kind alone [default: in 25 cases 5 nulls, 10 singles, 6 compounds, 4 outside the library]
@@ -113,7 +113,7 @@ impl Case {
     pub fn draw(seed: u64, index: u64, draw: &Draw) -> Self {
         let plan = Plan::new(seed, index, draw);
         let mut chance = Chance::new(seed, "case", index);
-        let family = draw.family.unwrap_or(if chance.one_in(0.5) { Family::A } else { Family::B });
+        let family = draw.family.unwrap_or(*chance.of(&Family::ALL));
         let name = format!("{:012x}", Chance::new(seed, "name", index).number() >> 16);
         let drive = Drive::draw(&mut chance);
         let unit = Unit::draw(&drive, family, &mut chance);
@@ -263,6 +263,16 @@ mod tests {
         assert_eq!(plans.iter().filter(|plan| plan.kind == Kind::Compound && plan.hidden.len() == 3).count(), 8);
     }
 
+    #[test]
+    fn every_family_comes_up_as_often_as_the_others() {
+        let nulls = Draw { kind: Some(Kind::Null), ..Draw::default() };
+        let drawn: Vec<_> = (0..90).map(|index| Case::draw(5, index, &nulls).family).collect();
+        for family in Family::ALL {
+            let count = drawn.iter().filter(|one| **one == family).count();
+            assert!((18..=42).contains(&count), "{family:?}: {count} of 90");
+        }
+    }
+
     /// Errors of the wheels that two zones share grow faster than their size: the search must not swing from one side to the other.
     #[test]
     fn sizes_are_found_where_an_effect_grows_faster_than_its_size() {
@@ -270,7 +280,7 @@ mod tests {
             .into_iter()
             .enumerate()
         {
-            for family in [Family::A, Family::B] {
+            for family in Family::ALL {
                 let draw =
                     Draw { family: Some(family), cause: Some(cause), clear: true, rich: true, ..Draw::default() };
                 for index in 0..3 {
