@@ -32,7 +32,7 @@ pub enum Kind {
 /// Which cases are drawn.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct Draw {
-    /// Laws of one family alone [default: both, case by case]
+    /// Laws of one family alone [default: all three, case by case]
     #[arg(long, value_enum, ignore_case = true)]
     pub family: Option<Family>,
     /// Cases of one kind alone [default: in 25 cases 5 nulls, 10 singles, 6 compounds, 4 outside the library]
@@ -113,7 +113,7 @@ impl Case {
     pub fn draw(seed: u64, index: u64, draw: &Draw) -> Self {
         let plan = Plan::new(seed, index, draw);
         let mut chance = Chance::new(seed, "case", index);
-        let family = draw.family.unwrap_or(if chance.one_in(0.5) { Family::A } else { Family::B });
+        let family = draw.family.unwrap_or(*chance.of(&Family::ALL));
         let name = format!("{:012x}", Chance::new(seed, "name", index).number() >> 16);
         let drive = Drive::draw(&mut chance);
         let unit = Unit::draw(&drive, family, &mut chance);
@@ -161,13 +161,23 @@ fn sized(mut effect: Effect, target: f64, bench: &mut Bench, drive: &Drive, sens
         effect.size = effect.size.round();
         return effect;
     }
-    for _ in 0..4 {
+    // Size and miss of the last step, in logarithms.
+    let mut last: Option<(f64, f64)> = None;
+    for _ in 0..6 {
         let contribution = bench.signature(&effect);
         let over = bench.weigh(&contribution).over_limit(sensors.white_arcsec);
-        if over < 1e-4 || (over / target).ln().abs() < 0.1 {
+        let miss = (over / target).ln();
+        if over < 1e-4 || miss.abs() < 0.1 {
             break;
         }
-        let size = effect.size.abs() * (target / over).clamp(0.03, 30.0);
+        let at = effect.size.abs().ln();
+        let step = match last {
+            // Beyond the aim: the effect grows faster than its size, so the aim lies between the two (false position).
+            Some((was_at, was_miss)) if was_miss * miss < 0.0 => -miss * (at - was_at) / (miss - was_miss),
+            _ => -miss,
+        };
+        last = Some((at, miss));
+        let size = (at + step.clamp(-3.5, 3.4)).exp();
         effect.size = size.clamp(0.02 * spec.range.0, spec.range.1).copysign(effect.size);
     }
     effect
@@ -251,6 +261,40 @@ mod tests {
         assert_eq!((count(Kind::Null), count(Kind::Outside), count(Kind::Compound)), (20, 16, 24));
         assert_eq!(plans.iter().filter(|plan| !plan.poor.is_empty()).count(), 24);
         assert_eq!(plans.iter().filter(|plan| plan.kind == Kind::Compound && plan.hidden.len() == 3).count(), 8);
+    }
+
+    #[test]
+    fn every_family_comes_up_as_often_as_the_others() {
+        let nulls = Draw { kind: Some(Kind::Null), ..Draw::default() };
+        let drawn: Vec<_> = (0..90).map(|index| Case::draw(5, index, &nulls).family).collect();
+        for family in Family::ALL {
+            let count = drawn.iter().filter(|one| **one == family).count();
+            assert!((18..=42).contains(&count), "{family:?}: {count} of 90");
+        }
+    }
+
+    /// Errors of the wheels that two zones share grow faster than their size: the search must not swing from one side to the other.
+    #[test]
+    fn sizes_are_found_where_an_effect_grows_faster_than_its_size() {
+        for (at, cause) in [Cause::CircularSplineEccentricity, Cause::GeneratorEccentricity, Cause::GravitySideLoad]
+            .into_iter()
+            .enumerate()
+        {
+            for family in Family::ALL {
+                let draw =
+                    Draw { family: Some(family), cause: Some(cause), clear: true, rich: true, ..Draw::default() };
+                for index in 0..3 {
+                    let case = Case::draw(8, 3 * at as u64 + index, &draw);
+                    let mut bench = Bench::new(&case.drive, &case.unit, &case.motion, &case.sensors, &[]);
+                    let contribution = bench.signature(&case.effects[0]);
+                    let over = bench.weigh(&contribution).over_limit(case.sensors.white_arcsec);
+                    let largest = case.effects[0].what.spec(&case.drive).range.1;
+                    // Asked from 3 to 20.
+                    let found = (2.5..24.0).contains(&over) || case.effects[0].size == largest;
+                    assert!(found, "{} {family:?}: {over} at {}", cause.name(), case.effects[0].size);
+                }
+            }
+        }
     }
 
     #[test]

@@ -7,13 +7,20 @@ use crate::chance::Chance;
 use crate::drive::Drive;
 use crate::outside::Outside;
 
-/// Two sets of constitutive laws for the same causes.
+/// Three sets of constitutive laws for the same causes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
 pub enum Family {
     /// The plainer textbook law.
     A,
     /// Another law for the same physics.
     B,
+    /// A third, from another part of the literature.
+    C,
+}
+
+impl Family {
+    /// All.
+    pub const ALL: [Self; 3] = [Self::A, Self::B, Self::C];
 }
 
 /// A cause that has a name in the contract, or an effect that has none.

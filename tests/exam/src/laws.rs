@@ -1,11 +1,13 @@
-//! The laws of the named causes, two for each. Sources stand in the README of this crate.
+//! The laws of the named causes, three for each. Sources stand in the README of this crate.
 
 mod damage;
-mod errors;
+mod encoders;
+mod generator;
 mod hysteresis;
 mod load;
 mod mode;
 mod stiffness;
+mod wheels;
 mod width;
 
 use crate::ARCSEC;
@@ -118,29 +120,39 @@ impl Setting<'_> {
 pub fn build(effect: &Effect, setting: Setting) -> Box<dyn Law> {
     let What::Cause(cause) = effect.what else { panic!("{effect:?} has no law here") };
     let Effect { family, size, ref shape, .. } = *effect;
-    let pressure_angle_rad = if family == Family::A { 24.4_f64 } else { 20.5 }.to_radians();
+    let pressure_angle_rad = match family {
+        Family::A => 24.4_f64,
+        Family::B => 20.5,
+        Family::C => 22.7,
+    }
+    .to_radians();
     // Where the flexspline turns, a load that turns it forward rests on the other flank of the circular spline.
     let pressure_angle_rad =
         if setting.drive.fixed == Fixed::Flexspline { pressure_angle_rad } else { -pressure_angle_rad };
-    let displaced = |wheel| errors::Displaced {
+    let rated_n_m = setting.drive.rated_n_m;
+    let displaced = |wheel| wheels::Displaced {
         wheel,
         amplitude: size,
         phase: shape[0],
         pressure_angle_rad,
-        wall: if wheel == errors::Axis::Flexspline && family == Family::B { Some(shape[1]) } else { None },
-        centring_n_m: if family == Family::B { 3.0 * setting.drive.rated_n_m } else { f64::INFINITY },
+        wall: if wheel == wheels::Axis::Flexspline && family == Family::B { Some(shape[1]) } else { None },
+        centring_n_m: if family == Family::B { 3.0 * rated_n_m } else { f64::INFINITY },
+        float: match family {
+            Family::A | Family::B => wheels::Float::HELD,
+            Family::C => wheels::Float { share: 0.3, clamps_n_m: 0.4 * rated_n_m },
+        },
     };
     match cause {
-        Cause::CircularSplineEccentricity => Box::new(displaced(errors::Axis::CircularSpline)),
-        Cause::FlexsplineRunout => Box::new(displaced(errors::Axis::Flexspline)),
-        Cause::GravitySideLoad => Box::new(displaced(errors::Axis::Gravity)),
+        Cause::CircularSplineEccentricity => Box::new(displaced(wheels::Axis::CircularSpline)),
+        Cause::FlexsplineRunout => Box::new(displaced(wheels::Axis::Flexspline)),
+        Cause::GravitySideLoad => Box::new(displaced(wheels::Axis::Gravity)),
         Cause::CircularSplineOvality => {
-            Box::new(errors::Oval { amplitude: size, phase: shape[0], pressure_angle_rad, family })
+            Box::new(wheels::Oval { amplitude: size, phase: shape[0], pressure_angle_rad, family })
         }
-        Cause::FlexsplinePitchError => Box::new(errors::Pitch::new(Fixed::Flexspline, size, shape, family)),
-        Cause::CircularSplinePitchError => Box::new(errors::Pitch::new(Fixed::CircularSpline, size, shape, family)),
-        Cause::GeneratorEccentricity => Box::new(errors::Lobes::new(size, shape, family)),
-        Cause::CamFormError => Box::new(errors::CamForm::new(size, shape, family, setting)),
+        Cause::FlexsplinePitchError => Box::new(wheels::Pitch::new(Fixed::Flexspline, size, shape, family)),
+        Cause::CircularSplinePitchError => Box::new(wheels::Pitch::new(Fixed::CircularSpline, size, shape, family)),
+        Cause::GeneratorEccentricity => Box::new(generator::Lobes::new(size, shape, family)),
+        Cause::CamFormError => Box::new(generator::CamForm::new(size, shape, family, setting)),
         Cause::DamagedTooth => Box::new(damage::DamagedTooth::new(size, shape, family, setting)),
         Cause::BacklashGrowth => Box::new(width::Growth { size, phase: shape[0], family }),
         Cause::Wear => Box::new(width::Wear::new(size, shape[0], family, setting)),
@@ -151,23 +163,29 @@ pub fn build(effect: &Effect, setting: Setting) -> Box<dyn Law> {
         Cause::TorsionalHysteresis => match family {
             Family::A => Box::new(hysteresis::MaxwellSlip::new(size, shape[0], setting)),
             Family::B => Box::new(hysteresis::BoucWen::new(size, shape[0], setting)),
+            Family::C => Box::new(hysteresis::PartialSlip::new(size, shape[0], setting)),
         },
         Cause::LubricantViscosity => {
             Box::new(load::Drag { drag_n_m: size, steepness: shape[0], family, sense: setting.drive.ratio().signum() })
         }
-        Cause::GravityTorque => Box::new(load::Unbalance { torque_n_m: size, phase: shape[0], family }),
+        Cause::GravityTorque => Box::new(load::Unbalance {
+            torque_n_m: size,
+            phase: shape[0],
+            family,
+            sense: setting.drive.ratio().signum(),
+        }),
         Cause::TorsionalResonance => Box::new(mode::Mode::new(size, shape[0], shape[1], family)),
         Cause::OutputEncoderEccentricity => {
-            Box::new(errors::OutputEncoder { amplitude: size, phase: shape[0], family })
+            Box::new(encoders::OutputEncoder { amplitude: size, phase: shape[0], family })
         }
-        Cause::GeneratorEncoderEccentricity => Box::new(errors::GeneratorEncoder {
+        Cause::GeneratorEncoderEccentricity => Box::new(encoders::GeneratorEncoder {
             amplitude_rad: size / ARCSEC * setting.drive.ratio().abs(),
             phase: shape[0],
             family,
         }),
         // A delay acts on the readings as a whole: see the plant.
-        Cause::SensorLatency => Box::new(errors::Nothing),
-        Cause::RatioError => Box::new(errors::Ratio { relative: size, family, start: None }),
+        Cause::SensorLatency => Box::new(encoders::Nothing),
+        Cause::RatioError => Box::new(encoders::Ratio { relative: size, family, start: None }),
         Cause::Ratcheting => Box::new(Ratchet::new(size, shape[0], family, setting)),
     }
 }

@@ -19,6 +19,9 @@ pub struct Readings {
     pub error_arcsec: Vec<f64>,
 }
 
+/// Time in which a free-running clock falls behind by one cycle of the bus, s.
+const BEAT_S: f64 = 7.3;
+
 /// Runs the plant.
 pub fn run(drive: &Drive, unit: &Unit, motion: &Motion, effects: &[Effect]) -> Readings {
     let setting = Setting { drive, unit, motion };
@@ -137,6 +140,8 @@ pub fn run(drive: &Drive, unit: &Unit, motion: &Motion, effects: &[Effect]) -> R
                 Family::A => effect.size,
                 // The clocks drift apart as well.
                 Family::B => effect.size * (1.0 + effect.shape[0] * (2.0 * elapsed - 1.0)),
+                // Two clocks that run free: the age of a reading sweeps through the cycle of the bus, again and again.
+                Family::C => effect.size * (1.0 + effect.shape[0] * (2.0 * (motion.time_s[at] / BEAT_S).fract() - 1.0)),
             })
             .sum();
         // Positive: the output's reading is old; negative: the generator's.

@@ -237,6 +237,7 @@ impl Scores {
             ("first_name_poor", rate(&|j| when(!j.poor.is_empty(), j.first))),
             ("first_name_family_a", rate(&|j| when(single(j) && j.family == "A", j.first))),
             ("first_name_family_b", rate(&|j| when(single(j) && j.family == "B", j.first))),
+            ("first_name_family_c", rate(&|j| when(single(j) && j.family == "C", j.first))),
             ("first_name_strict", rate(&|j| when(single(j), j.first_strict))),
             ("first_name_or_listed", rate(&|j| when(single(j), j.first_or_listed))),
             ("exact", rate(&|j| when(single(j), j.exact))),

@@ -64,7 +64,37 @@ fn first(a: f64, b: f64, press: f64, family: Family) -> f64 {
         Family::A => (mean - half + press).min(mean),
         // Many teeth in each zone, entering one after another: a smooth transition.
         Family::B => mean - half * (2.0 * half / (4.0 + 1.6 * press)).tanh(),
+        Family::C => mean - half + entering(half, press),
     }
+}
+
+/// Deflection of the teeth (arcsec) at which a force that grows with its power 3/2 is as stiff as the linear spring.
+const EQUAL_PRESS_ARCSEC: f64 = 20.0;
+
+/// How far a load presses the output beyond where it would rest on two zones that touch together, from where the first of two
+/// zones touches that are `2 half` apart, arcsec.
+///
+/// The gaps of a zone grow with the square of the distance from its middle, so teeth enter as the root of the deflection δ and
+/// the force is as δ^(3/2) (derived here; the power of Hertz 1882 for a sphere): δ₁^(3/2) + (δ₁ - 2 half)₊^(3/2) = 2 δ₀^(3/2),
+/// where δ₀ is the deflection of equal zones.
+fn entering(half: f64, press: f64) -> f64 {
+    let force = |deflection: f64| deflection.max(0.0).powf(1.5);
+    let equal = (EQUAL_PRESS_ARCSEC * press * press).cbrt();
+    let alone = 2.0_f64.powf(2.0 / 3.0) * equal;
+    if alone <= 2.0 * half {
+        return alone - equal;
+    }
+    // Newton from above: the force is convex.
+    let mut deflection = equal + half;
+    for _ in 0..20 {
+        let second = (deflection - 2.0 * half).max(0.0);
+        let excess = force(deflection) + force(second) - 2.0 * force(equal);
+        if excess <= 1e-12 * force(deflection) {
+            break;
+        }
+        deflection -= excess / (1.5 * (deflection.sqrt() + second.sqrt()));
+    }
+    deflection - equal
 }
 
 /// Position of the teeth of a wheel around its circumference, as a sum of harmonics; forward positive, arcsec.
@@ -74,11 +104,19 @@ pub struct Profile(Vec<(f64, f64, f64)>);
 impl Profile {
     /// From order, amplitude and phase, each averaged over the engaged arc (`half_arc_rad` to both sides).
     pub fn new(lines: impl IntoIterator<Item = (f64, f64, f64)>, half_arc_rad: f64) -> Self {
-        let averaged = lines.into_iter().map(|(k, amplitude, phase)| {
+        Self::averaged(lines, |k| (k * half_arc_rad).sin() / (k * half_arc_rad))
+    }
+
+    /// The same where the teeth in the middle of the arc carry more: weights fall as a parabola to its ends.
+    pub fn carried_by_the_middle(lines: impl IntoIterator<Item = (f64, f64, f64)>, half_arc_rad: f64) -> Self {
+        Self::averaged(lines, |k| {
             let x = k * half_arc_rad;
-            (k, amplitude * x.sin() / x, phase)
-        });
-        Self(averaged.collect())
+            3.0 * (x.sin() - x * x.cos()) / x.powi(3)
+        })
+    }
+
+    fn averaged(lines: impl IntoIterator<Item = (f64, f64, f64)>, left: impl Fn(f64) -> f64) -> Self {
+        Self(lines.into_iter().map(|(k, amplitude, phase)| (k, amplitude * left(k), phase)).collect())
     }
 
     /// At an angle on the wheel.
@@ -131,11 +169,31 @@ mod tests {
     fn load_brings_both_zones_in_and_odd_errors_vanish() {
         let mut zones = Zones::default();
         zones.displace(0.7, 10.0, 0.42);
-        for family in [Family::A, Family::B] {
+        for family in Family::ALL {
             let free = zones.limits(60.0, 0.0, family).1;
             let pressed = zones.limits(60.0, 500.0, family).1;
             assert!(free < 30.0 - 4.0 && (pressed - 30.0).abs() < 0.3, "{free} {pressed}");
         }
+    }
+
+    /// The second zone comes in without a jump, and the forces of both zones are those of the load.
+    #[test]
+    fn teeth_that_enter_by_their_gaps_balance_the_load() {
+        let half = 6.0;
+        let mut last = 0.0;
+        for at in 1..4000 {
+            let press = 0.02 * f64::from(at);
+            let equal = (EQUAL_PRESS_ARCSEC * press * press).cbrt();
+            let gained = entering(half, press);
+            let (first, second) = (gained + equal, (gained + equal - 2.0 * half).max(0.0));
+            let missing = first.powf(1.5) + second.powf(1.5) - 2.0 * equal.powf(1.5);
+            assert!(missing.abs() < 1e-6 * equal.powf(1.5), "{missing} at {press}");
+            assert!(gained > last && gained - last < 0.2 && gained < half, "{last} {gained} at {press}");
+            last = gained;
+        }
+        // Far beyond their distance the two zones share all but half²/4δ₀ of it.
+        let equal = (EQUAL_PRESS_ARCSEC * 6400.0_f64).cbrt();
+        assert!((half - entering(half, 80.0) - half * half / (4.0 * equal)).abs() < 0.02);
     }
 
     #[test]

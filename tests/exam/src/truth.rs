@@ -55,7 +55,7 @@ pub struct Truth {
     pub index: u64,
     /// null, single, compound, outside, fault.
     pub kind: String,
-    /// A or B.
+    /// A, B or C.
     pub family: String,
     /// What the excitation lacks.
     pub poor: Vec<String>,
@@ -146,11 +146,13 @@ fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }
 
-/// Parameters whose definition the contract's units leave no choice in; those of family B only where its law has them.
+/// Parameters whose definition the contract's units leave no choice in; those of families B and C only where their laws
+/// have them.
 fn parameters(effect: &Effect, case: &Case) -> BTreeMap<String, f64> {
     let What::Cause(cause) = effect.what else { return BTreeMap::new() };
     let (drive, unit): (&Drive, &Unit) = (&case.drive, &case.unit);
     let a = case.family == Family::A;
+    let a_or_c = case.family != Family::B;
     let size = effect.size;
     let mut list: Vec<(&str, f64)> = Vec::new();
     match cause {
@@ -162,7 +164,7 @@ fn parameters(effect: &Effect, case: &Case) -> BTreeMap<String, f64> {
         Cause::SensorLatency if a => list.push(("delay_s", size)),
         Cause::OutputEncoderEccentricity => {
             list.push(("amplitude_arcsec", size));
-            if a {
+            if a_or_c {
                 list.push(("phase_rad", effect.shape[0]));
             }
         }
@@ -174,7 +176,7 @@ fn parameters(effect: &Effect, case: &Case) -> BTreeMap<String, f64> {
             list.push(("amplitude_arcsec", size));
         }
         Cause::RatioError => list.push(("ratio_relative_error", size)),
-        Cause::GravityTorque if a => list.push(("torque_n_m", size)),
+        Cause::GravityTorque if a_or_c => list.push(("torque_n_m", size)),
         Cause::TorsionalHysteresis => list.push(("half_width_arcsec", size)),
         Cause::ThermalClearance if a => list.push(("clearance_arcsec_per_k", size)),
         Cause::ThermalStiffness if a => list.push(("stiffness_relative_per_k", size)),

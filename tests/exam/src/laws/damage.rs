@@ -3,7 +3,7 @@
 use super::{Law, Mesh, Now, Setting};
 use crate::ARCSEC;
 use crate::effect::Family;
-use crate::teeth::pulse;
+use crate::teeth::{pulse, wrapped};
 use std::f64::consts::{PI, TAU};
 
 /// One tooth of one wheel gives no support on one flank.
@@ -54,6 +54,14 @@ impl Law for DamagedTooth {
                         mesh.wind_up += self.amplitude * give * now.load_n_m / self.rated_n_m;
                     }
                 }
+                // Teeth enter over a gap that grows with the square of the distance from the middle of the zone, so its force
+                // is as δ^(3/2), its width as δ^(1/2). The missing tooth carried (1 - distance²/width²) δ, the zone is as stiff
+                // as δ^(1/2): both the pulse and its width grow with the root of δ, the cube root of the load (derived here).
+                Family::C => {
+                    let root = (now.load_n_m * self.flank / self.rated_n_m).max(0.0).cbrt();
+                    let distance = wrapped(angle).abs() / (self.half_width * root.max(1e-3));
+                    mesh.wind_up += self.flank * self.amplitude * root * (1.0 - distance * distance).max(0.0);
+                }
             }
         }
     }
@@ -66,6 +74,8 @@ pub struct Ratchet {
     jump_arcsec: f64,
     family: Family,
     jumped: f64,
+    /// Travel of the generator since the teeth began to climb, rad, and its last angle.
+    climbed: (f64, Option<f64>),
 }
 
 impl Ratchet {
@@ -79,7 +89,7 @@ impl Ratchet {
         let at = highest(when - 0.05, when + 0.05);
         let second = if family == Family::B { highest(when + 0.06, when + 0.16) } else { usize::MAX };
         let jump_arcsec = teeth * (TAU / setting.drive.output_teeth() * ARCSEC).copysign(torque[at]);
-        Self { at, second, jump_arcsec, family, jumped: 0.0 }
+        Self { at, second, jump_arcsec, family, jumped: 0.0, climbed: (0.0, None) }
     }
 
     /// All jumps together, with the sign of the load that forced them.
@@ -96,6 +106,15 @@ impl Law for Ratchet {
             Family::A => self.jumped = aim,
             // The teeth slide into the next space.
             Family::B => self.jumped += (aim - self.jumped) * (1.0 - (-now.step_s / 0.01).exp()),
+            // The teeth of one lobe climb, and the next lobe takes the others over: done in half a turn of the generator.
+            Family::C => {
+                let (travel, last) = &mut self.climbed;
+                if now.at >= self.at {
+                    *travel += (now.generator_rad - last.unwrap_or(now.generator_rad)).abs();
+                }
+                *last = Some(now.generator_rad);
+                self.jumped = aim * (0.5 - 0.5 * travel.min(PI).cos());
+            }
         }
         mesh.driven += self.jumped;
     }
