@@ -91,6 +91,13 @@ const NO_WORSE: f64 = 1.001;
 const LEAST_LEFT_OF_STRONGEST: f64 = 0.25;
 /// Named causes that explain less than this share of what is explained at all are not named.
 const LEAST_NAMED_SHARE: f64 = 0.6;
+/// Share of the square of what is beyond noise that may stay without any description where causes are named.
+const MOST_UNEXPLAINED: f64 = 0.5;
+/// What a cause adds has to be this many times the uncertainty of that.
+const KNOWN: f64 = 1.0;
+/// The same beside something without a name that is larger than this against it: what that is may reach into it.
+const KNOWN_BESIDE: f64 = 5.0;
+const LARGE_BESIDE: f64 = 0.7;
 /// The same beside a deviation that is described well though it has no name.
 const LEAST_BESIDE_DESCRIBED: f64 = 0.05;
 
@@ -308,7 +315,15 @@ fn conclude(
             tell(&format!("  {}: {:.1} times its doubt", term.law.cause, known.times_its_doubt));
         }
     }
-    let counts = |k: &usize| selected.terms[*k].law.named && standings[*k].size > select::least_named(noise.white);
+    let largest = |sizes: &mut dyn Iterator<Item = f64>| sizes.fold(0.0, f64::max);
+    let unnamed = (0..selected.terms.len()).filter(|k| !selected.terms[*k].law.named).map(|k| standings[k].size);
+    let not_understood = largest(&mut unnamed.chain(left_over.iter().map(|l| l.size_arcsec)));
+    let counts = |k: &usize| {
+        let beside = not_understood > LARGE_BESIDE * standings[*k].size;
+        selected.terms[*k].law.named
+            && standings[*k].size > select::least_named(noise.white)
+            && known[*k].times_its_doubt > if beside { KNOWN_BESIDE } else { KNOWN }
+    };
     let named: Vec<usize> = (0..selected.terms.len()).filter(counts).collect();
     let size = |k: &usize| standings[*k].size.powi(2);
     let (by_name, without_name) = (
@@ -333,6 +348,10 @@ fn conclude(
         }
         (false, true) => Verdict::PartlyExplained,
     };
+    // Names for a small part of what is there, with the rest in the dark, are no understanding.
+    let in_the_dark =
+        unexplained.sqrt() > select::least_size(noise.white) && unexplained > MOST_UNEXPLAINED * explainable;
+    let verdict = if named.is_empty() || !in_the_dark { verdict } else { Verdict::Unknown };
     let held = held_out::evaluate(problem, &all);
     // What does not predict sessions it was not fitted to is no explanation.
     let verdict = if !named.is_empty() && held.total.rms_after_arcsec > NO_WORSE * held.total.rms_before_arcsec {

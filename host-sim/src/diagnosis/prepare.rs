@@ -1,5 +1,7 @@
 //! What has to be known before causes are compared: how noisy the data are, and where they jump.
 
+use std::f64::consts::PI;
+
 use flexspline::Table;
 
 use super::base::{Base, NEAR_FRICTION, UNCERTAIN_AT_MOST};
@@ -19,64 +21,117 @@ const LEAST_JUMP: f64 = 1000.0;
 
 /// The nominal model over the rows, and the jumps: these are taken out before the law of the play is chosen.
 #[must_use]
-pub fn base(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>) -> (Base, Vec<(f64, f64)>) {
+pub fn base(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>) -> (Base, Vec<Jump>) {
     let base = Base::new(rows, nominal, table);
-    let jumps = jumps(rows, &base);
+    let jumps = jumps(rows, &base, nominal);
     if jumps.is_empty() {
         return (base, jumps);
     }
     let mut level = rows.clone();
-    for (at, height) in &jumps {
+    for jump in &jumps {
         for (error, time) in level.error.iter_mut().zip(&rows.time) {
-            *error -= if time >= at { *height } else { 0.0 };
+            *error -= if *time >= jump.time_s[1] { jump.height_arcsec } else { 0.0 };
         }
     }
     let play = Base::new(&level, nominal, table).law;
     (Base::with_play(rows, nominal, table, play), jumps)
 }
 
-/// Times at which the error leaves for another level at once, and by how much (arcsec).
+/// A change of the error to another level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jump {
+    /// When it begins, has half its height, and is over, s.
+    pub time_s: [f64; 3],
+    /// Height, arcsec.
+    pub height_arcsec: f64,
+}
+
+/// Where the error leaves for another level: at once, or, where that shows no whole pitches, while the wave passes (half a turn of the
+/// generator): so long teeth take to climb over each other.
 #[must_use]
-pub fn jumps(rows: &Rows, base: &Base) -> Vec<(f64, f64)> {
+pub fn jumps(rows: &Rows, base: &Base, nominal: &Nominal) -> Vec<Jump> {
     let left: Vec<f64> = rows.error.iter().zip(&base.prediction).map(|(e, p)| e - p).collect();
-    let mut found: Vec<(usize, f64)> = Vec::new();
-    let mut between = |at: usize, before: &[f64], after: &[f64]| {
-        let height = quantile(after.iter().copied(), 0.5) - quantile(before.iter().copied(), 0.5);
-        if height.abs() > LEAST_JUMP && (left[at] - left[at - 1]).abs() > 0.5 * LEAST_JUMP {
-            found.push((at, height));
-        }
+    let whole = |found: &[Jump]| {
+        !found.is_empty() && found.iter().all(|jump| whole_pitches(nominal, jump.height_arcsec).is_some())
     };
-    // Teeth slide into the next space, and the output swings out: what counts is where it comes to rest.
-    let over = (JUMPING_S / rows.period.max(1e-9)).ceil().clamp(0.0, MOST_ROWS_OF_A_JUMP) as usize;
-    let mut last: Option<usize> = None;
+    let at_once = jumps_within(rows, &left, 0.0);
+    if whole(&at_once) {
+        return at_once;
+    }
+    let climbed = jumps_within(rows, &left, PI);
+    if whole(&climbed) { climbed } else { at_once }
+}
+
+/// How many pitches of either wheel a jump is, if it is a whole number of them.
+#[must_use]
+pub fn whole_pitches(nominal: &Nominal, height_arcsec: f64) -> Option<f64> {
+    let teeth = nominal.teeth?;
+    [teeth.circular_spline, teeth.flexspline].into_iter().find_map(|count| {
+        let pitch = super::rows::ARCSEC_PER_TURN / f64::from(count);
+        let pitches = (height_arcsec / pitch).round();
+        let near = (height_arcsec - pitches * pitch).abs() < PITCH_SHARE * pitch * pitches.abs() + PITCH_ARCSEC;
+        (pitches != 0.0 && near).then_some(pitches)
+    })
+}
+
+/// Jumps that are over after [`JUMPING_S`] and after the generator has turned by `turned_rad`.
+fn jumps_within(rows: &Rows, left: &[f64], turned_rad: f64) -> Vec<Jump> {
+    let last = rows.len().saturating_sub(1);
+    let middle = |range: std::ops::Range<usize>| quantile(range.map(|k| left[k]), 0.5);
+    // First row of the level before, first row after the jump begins, row at rest, height.
+    let mut found: Vec<[usize; 3]> = Vec::new();
+    let mut heights: Vec<f64> = Vec::new();
+    let mut before_gap: Option<usize> = None;
     for session in rows.sessions_used() {
-        if let Some(end) = last {
-            let at_rest = (session.start + over).min(session.end - 1);
-            let after = &left[at_rest..(at_rest + BESIDE).min(session.end)];
-            between(session.start, &left[end.saturating_sub(BESIDE)..end], after);
-        }
-        for k in session.start + 1..session.end {
-            if (left[k] - left[k - 1]).abs() > 0.5 * LEAST_JUMP {
-                // At the end of a recording the next one says where.
-                let (a, at_rest) = (k.saturating_sub(BESIDE).max(session.start), (k + over).min(rows.len() - 1));
-                between(k, &left[a..k], &left[at_rest..(at_rest + BESIDE).min(rows.len())]);
+        // Teeth slide into the next space, and the output swings out: what counts is where it comes to rest. At the end of a
+        // recording the next one says where.
+        let mut rest = session.start;
+        for k in session.clone() {
+            let from = k.saturating_sub(1).max(session.start);
+            let over = |row: usize| {
+                rows.time[row] - rows.time[from] >= JUMPING_S && rows.travel[row] - rows.travel[from] >= turned_rad
+            };
+            while rest < session.end && rest - from < MOST_ROWS_OF_A_JUMP && !over(rest) {
+                rest += 1;
+            }
+            let begins =
+                if k == session.start { before_gap } else { Some(k.saturating_sub(BESIDE).max(session.start)) };
+            let (Some(begins), at_rest) = (begins, rest.min(last)) else { continue };
+            if (left[at_rest] - left[k - 1]).abs() < 0.5 * LEAST_JUMP {
+                continue;
+            }
+            let height = middle(at_rest..(at_rest + BESIDE).min(rows.len())) - middle(begins..k);
+            if height.abs() > LEAST_JUMP {
+                found.push([begins, k, at_rest]);
+                heights.push(height);
             }
         }
-        last = Some(session.end);
+        before_gap = Some(session.end.saturating_sub(BESIDE).max(session.start));
     }
-    // One jump may pass over several rows.
-    let mut merged: Vec<(usize, f64)> = Vec::new();
-    for (at, height) in found {
-        match merged.last_mut() {
-            Some((before, h)) if at - *before < BESIDE + over => {
-                if height.abs() > h.abs() {
-                    (*before, *h) = (at, height);
+    // Rows one after another that see the same one: the one that sees the most of it.
+    let mut seen: Vec<(usize, usize)> = Vec::new();
+    for k in 0..found.len() {
+        match seen.last_mut() {
+            Some((best, latest)) if found[k][1] - *latest < BESIDE => {
+                *latest = found[k][1];
+                if heights[k].abs() > heights[*best].abs() {
+                    *best = k;
                 }
             }
-            _ => merged.push((at, height)),
+            _ => seen.push((k, found[k][1])),
         }
     }
-    merged.into_iter().map(|(at, height)| (rows.time[at], height)).collect()
+    seen.into_iter()
+        .map(|(best, _)| {
+            let ([begins, from, at_rest], height_arcsec) = (found[best], heights[best]);
+            let level = middle(begins..from);
+            let passed = |share: f64| {
+                let beyond = |k: &usize| (left[*k] - level) * height_arcsec.signum() > share * height_arcsec.abs();
+                rows.time[(from..=at_rest).find(beyond).unwrap_or(at_rest)]
+            };
+            Jump { time_s: [passed(0.02), passed(0.5), passed(0.98)], height_arcsec }
+        })
+        .collect()
 }
 
 /// Rows whose flank is not known well, with what the causes chosen add to the load.
@@ -84,10 +139,10 @@ pub fn jumps(rows: &Rows, base: &Base) -> Vec<(f64, f64)> {
 pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>]) -> Vec<bool> {
     let mut uncertain = on.base.uncertain.clone();
     // A jump passes over some rows, and the output swings out.
-    for (at, _) in &on.scales.jumps {
-        let beside = JUMPING_S.max(BESIDE as f64 * on.rows.period);
+    for jump in &on.scales.jumps {
+        let ([begins, _, over], beside) = (jump.time_s, JUMPING_S.max(BESIDE as f64 * on.rows.period));
         for (doubtful, time) in uncertain.iter_mut().zip(&on.rows.time) {
-            *doubtful |= (time - at).abs() < beside;
+            *doubtful |= (begins - beside..over + beside).contains(time);
         }
     }
     let without = uncertain.clone();
@@ -105,7 +160,10 @@ pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>]) -> Vec<bool> {
 
 /// A jump is over after this time, s, and after so many rows.
 const JUMPING_S: f64 = 0.15;
-const MOST_ROWS_OF_A_JUMP: f64 = 500.0;
+const MOST_ROWS_OF_A_JUMP: usize = 2000;
+/// A jump is of whole pitches within this share, and this many arcsec that the rest of the error may move meanwhile.
+const PITCH_SHARE: f64 = 0.004;
+const PITCH_ARCSEC: f64 = 100.0;
 /// A load that a cause adds is known to this share.
 const LOAD_UNKNOWN: f64 = 0.2;
 

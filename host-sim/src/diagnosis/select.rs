@@ -330,6 +330,24 @@ impl Limits {
             && standing.left_out > 0.0
     }
 
+    /// Whether the last term is clear beside something without a name that tells the data better, and is too small to count.
+    fn clear_beside(
+        &self,
+        problem: &Problem<'_>,
+        selected: &Selected<'_>,
+        standing: &Standing,
+        other: &Term<'_>,
+    ) -> bool {
+        let Some((last, before)) = selected.terms.split_last() else { return true };
+        let scaffold = Scaffold::new(problem, before.iter().chain([other]).collect());
+        let evidence = |term: Option<&Term<'_>>| scaffold.fit(term).map(|fit| fit.solution.evidence);
+        let needed = if standing.size > self.least { LEAST_EVIDENCE } else { CLEAR_EVIDENCE };
+        match (evidence(Some(last)), evidence(None)) {
+            (Some(with), Some(without)) => with + last.occam - without > needed,
+            _ => false,
+        }
+    }
+
     fn small_but_clear(&self, standing: &Standing, strongest: f64) -> bool {
         standing.evidence > CLEAR_EVIDENCE
             && standing.size > (LEAST_IF_CLEAR * self.least).max(LEAST_OF_STRONGEST * strongest)
@@ -429,9 +447,11 @@ fn forward<'l>(
             sound(&term, c).then_some((gain, term, fit))
         })
         .collect();
-    // Something with a name goes before something without unless that is clearly better.
+    refined.sort_by(|a, b| b.0.total_cmp(&a.0));
+    // Something with a name goes before something without unless that is clearly better: by more than the law may be wrong by.
+    let misfit = refined.iter().find(|(_, term, _)| term.law.named).map_or(0.0, |(_, term, _)| term.law.misfit);
     let ahead = |(gain, term, _): &(f64, Term<'l>, Fit)| {
-        gain - if term.law.named { 0.0 } else { UNNAMED_AHEAD.max(0.01 * gain) }
+        gain - if term.law.named { 0.0 } else { UNNAMED_AHEAD.max(misfit * misfit * gain) }
     };
     refined.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
     let standing_now = standings(problem, selected);
@@ -459,11 +479,14 @@ fn forward<'l>(
             order.insert(0, k);
         }
     }
+    // What tells the data better, only that it is too small.
+    let mut too_small: Vec<Term<'l>> = Vec::new();
     for k in order {
         let (gain, term, fit) = refined[k].clone();
         if gain < 0.5 {
             break;
         }
+        let named = term.law.named;
         let misfit = misfit_as(term.law);
         let mut terms = selected.terms.clone();
         let (law, line) = (term.law, format!("{} {:?}", term.law.cause, term.law.values(&term.places)));
@@ -471,7 +494,8 @@ fn forward<'l>(
         let next = Selected { terms, fit };
         let standing = standing(problem, &next, next.terms.len() - 1);
         let strongest = strongest(&selected.terms, &standing_now);
-        let passes = limits.passes(law, &standing, misfit, strongest, false);
+        let passes = limits.passes(law, &standing, misfit, strongest, false)
+            && (!named || too_small.iter().all(|other| limits.clear_beside(problem, &next, &standing, other)));
         log(format!(
             "  {} {line}: evidence {:.1}, size {:.2}, left out {:.1}",
             if passes { "+" } else { "?" },
@@ -481,6 +505,9 @@ fn forward<'l>(
         ));
         if passes {
             return Some(next);
+        }
+        if !named && standing.evidence > LEAST_EVIDENCE && standing.left_out > 0.0 && standing.size <= limits.least {
+            too_small.extend(next.terms.last().cloned());
         }
     }
     None

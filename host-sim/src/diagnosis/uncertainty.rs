@@ -121,9 +121,8 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Known> {
     let mut all = Vec::new();
     for (k, term) in terms.into_iter().enumerate() {
         let coefficients = selected.fit.of(k);
-        let index: Vec<usize> = (fit.starts[k]..fit.starts[k] + coefficients.len())
-            .chain(place..place + term.places.len())
-            .collect();
+        let index: Vec<usize> =
+            (fit.starts[k]..fit.starts[k] + coefficients.len()).chain(place..place + term.places.len()).collect();
         place += term.places.len();
         let block = |square: &[f64]| -> Vec<f64> {
             index.iter().flat_map(|i| index.iter().map(move |j| square[i * n + j])).collect()

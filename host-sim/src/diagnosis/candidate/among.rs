@@ -2,6 +2,8 @@
 //! ring and turns the flank over like any other load; a clearance that has grown decides when an eccentric wheel binds; and two wheels
 //! beside their axis, or one under a generator that is, meet in the same two zones of teeth, of which only the one ahead carries.
 //!
+//! A softer spring gives way to what is added to the load as well.
+//!
 //! So a law is evaluated on the excitation as the causes that act on it leave it. Of two that meet in the zones the later one is
 //! evaluated beside the earlier, and together they make what both do.
 
@@ -35,14 +37,25 @@ pub struct Among {
     /// What they add to half the clearance, arcsec.
     widened: Option<Vec<f64>>,
     zones: Option<Zones>,
+    softer: f64,
 }
+
+/// The base parameter that a stiffness error is out of tolerance of.
+pub(super) const STIFFNESS: &str = "stiffness";
 
 impl Law {
     /// Whether this cause changes what another one does. Two that meet in the zones act on each other: the order decides.
     #[must_use]
     pub fn acts_on(&self, other: &Law) -> bool {
-        self.load.is_some() && other.load.is_none()
+        // What a load winds up in a softer spring is in the load's law.
+        self.load.is_some() && other.load.is_none() && !other.is_spring()
+            || self.is_spring() && other.load.is_some()
             || other.meets_zones && (self.zones.is_some() || self.kin == Kin::Clearance)
+    }
+
+    /// Whether it is the spring of the nominal model that is softer or stiffer.
+    fn is_spring(&self) -> bool {
+        self.tolerance_of == Some(STIFFNESS)
     }
 
     /// Whether two act on each other.
@@ -56,8 +69,11 @@ impl Among {
     /// What `acting` causes leave; nothing where none of them does anything to others.
     #[must_use]
     pub fn of(on: &Excitation<'_>, acting: &[Acting<'_>]) -> Option<Among> {
-        let mut among = Among { loaded: None, widened: None, zones: None };
+        let mut among = Among { loaded: None, widened: None, zones: None, softer: 1.0 };
         for cause in acting {
+            if cause.law.is_spring() {
+                among.softer += cause.coefficients.first().unwrap_or(&0.0);
+            }
             if let Some(load) = &cause.law.load {
                 let (rows, _) = among.loaded.get_or_insert_with(|| (on.rows.clone(), on.base.without_floating()));
                 for (torque, added) in rows.torque.iter_mut().zip(load(on, &cause.values)) {
@@ -88,14 +104,22 @@ impl Among {
             }
         }
         (among.widened, among.zones) = (widened, zones);
-        (among.loaded.is_some() || among.widened.is_some() || among.zones.is_some()).then_some(among)
+        let changed = among.loaded.is_some() || among.widened.is_some() || among.zones.is_some() || among.softer != 1.0;
+        changed.then_some(among)
     }
 
     /// The excitation as it is left.
     #[must_use]
     pub fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
         let (rows, base) = self.loaded.as_ref().map_or((on.rows, on.base), |(rows, base)| (rows, base));
-        Excitation { rows, base, widened: self.widened.as_deref(), zones: self.zones.as_ref(), ..*on }
+        Excitation {
+            rows,
+            base,
+            widened: self.widened.as_deref(),
+            zones: self.zones.as_ref(),
+            softer: self.softer,
+            ..*on
+        }
     }
 }
 

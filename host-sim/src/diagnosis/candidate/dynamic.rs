@@ -20,7 +20,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
         let torque: Vec<f64> = (0..rows.len()).map(|k| rows.torque[k] + added[k]).collect();
         let flank = play.flanks(rows, &torque, on.nominal);
         let half = on.base.half_backlash;
-        let wind = by_row(on, |k| on.nominal.wind_up_arcsec(torque[k]) - on.base.wind_up[k]);
+        let wind = by_row(on, |k| on.wound_up(k, torque[k]));
         let play = by_row(on, |k| half * (flank[k] - on.base.flank[k]));
         let together = by_row(on, |k| wind[k] + play[k]);
         vec![
@@ -38,7 +38,8 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
             let rows = on.rows;
             // Wind-up for 1 N·m more, at the load that is there.
             let slope = |k: usize| {
-                on.nominal.wind_up_arcsec(rows.torque[k] + 0.5) - on.nominal.wind_up_arcsec(rows.torque[k] - 0.5)
+                let more = on.nominal.wind_up_arcsec(rows.torque[k] + 0.5);
+                on.softer * (more - on.nominal.wind_up_arcsec(rows.torque[k] - 0.5))
             };
             let at = |k: usize| rows.output[k] + sign * rows.orientation[k];
             vec![

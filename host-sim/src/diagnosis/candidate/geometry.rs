@@ -160,8 +160,11 @@ fn ovality() -> Law {
         let mut columns: Vec<Column> =
             vec![main(together(&sin, &cos, 1.0), USUAL_ARCSEC), main(together(&cos, &sin, -1.0), USUAL_ARCSEC)];
         columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
-        columns.extend(waves(on, of, 4.0, |_| 1.0).map(|v| nuisance(v, 0.12)));
-        columns.extend(waves(on, of, 4.0, flank).map(|v| nuisance(v, 0.1)));
+        // Screws and seats leave further waves on the ring: of n per turn, 1/n of the radial part is tangential.
+        for order in [3.0, 4.0, 6.0] {
+            columns.extend(waves(on, of, order, |_| 1.0).map(|v| nuisance(v, 0.12)));
+            columns.extend(waves(on, of, order, flank).map(|v| nuisance(v, 0.12)));
+        }
         if on.scales.load > 0.0 {
             columns.extend(waves(on, of, 2.0, |k| on.rows.torque[k].abs() / on.scales.load).map(|v| nuisance(v, 0.1)));
         }

@@ -20,6 +20,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::base::Base;
 use super::linear::Prior;
+use super::prepare::Jump;
 use super::rows::Rows;
 use crate::nominal::Nominal;
 
@@ -41,13 +42,22 @@ pub struct Excitation<'a> {
     pub widened: Option<&'a [f64]>,
     /// How far other causes bring one zone of teeth ahead of the other.
     pub zones: Option<&'a Zones>,
+    /// By how much more the drive winds up than the nominal one.
+    pub softer: f64,
 }
 
 impl<'a> Excitation<'a> {
     /// The recorded one.
     #[must_use]
     pub fn new(rows: &'a Rows, nominal: &'a Nominal, base: &'a Base, scales: &'a Scales) -> Excitation<'a> {
-        Excitation { rows, nominal, base, scales, widened: None, zones: None }
+        Excitation { rows, nominal, base, scales, widened: None, zones: None, softer: 1.0 }
+    }
+}
+
+impl Excitation<'_> {
+    /// What wind-up (arcsec) a load beside the torque that was recorded adds at row `k`, `torque` (N·m) being both.
+    fn wound_up(&self, k: usize, torque: f64) -> f64 {
+        self.softer * (self.nominal.wind_up_arcsec(torque) - self.base.wind_up[k])
     }
 }
 
@@ -68,14 +78,14 @@ pub struct Scales {
     pub work: f64,
     /// Arcsec at the output for 1 µm on the pitch circle.
     pub arcsec_per_um: f64,
-    /// Jumps found in the data: time (s) and height (arcsec).
-    pub jumps: Vec<(f64, f64)>,
+    /// Jumps found in the data.
+    pub jumps: Vec<Jump>,
 }
 
 impl Scales {
     /// Of these rows.
     #[must_use]
-    pub fn new(rows: &Rows, pitch_radius_mm: f64, jumps: Vec<(f64, f64)>) -> Scales {
+    pub fn new(rows: &Rows, pitch_radius_mm: f64, jumps: Vec<Jump>) -> Scales {
         let (mut moving, mut turned) = (0usize, 0.0);
         for speed in rows.speed.iter().filter(|speed| **speed != 0.0) {
             moving += 1;

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::super::rows::rms;
+use super::super::prepare::{Jump, whole_pitches};
+use super::super::rows::{ARCSEC_PER_TURN, rms};
 use super::geometry::{Angle, waves};
 use super::{Excitation, Law, Shape, by_row, history, main, nuisance};
 
@@ -109,7 +110,7 @@ fn stiffness_hardening() -> Law {
 fn stiffness_error() -> Law {
     let mut law = Law::new("stiffness_error", |on, _| vec![main(on.base.wind_up.clone(), 0.5)])
         .parameters(|_, _, c| vec![("stiffness_ratio", 1.0 / (1.0 + c[0]))]);
-    law.tolerance_of = Some("stiffness");
+    law.tolerance_of = Some(super::among::STIFFNESS);
     law
 }
 
@@ -184,31 +185,19 @@ fn wear(by: Progress) -> Law {
 
 /// Teeth that skipped: the output is off by whole teeth from then on.
 fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
-    let teeth = on.nominal.teeth?;
-    let pitch = 1_296_000.0 / f64::from(teeth.circular_spline);
-    let other = 1_296_000.0 / f64::from(teeth.flexspline);
-    let whole = |height: f64| {
-        [pitch, other].iter().any(|pitch| {
-            let count = (height / pitch).round();
-            count != 0.0 && (height - count * pitch).abs() < 0.004 * pitch * count.abs() + 60.0
-        })
-    };
-    if on.scales.jumps.is_empty() || !on.scales.jumps.iter().all(|(_, height)| whole(*height)) {
+    let pitch = ARCSEC_PER_TURN / f64::from(on.nominal.teeth?.circular_spline);
+    let jumps = on.scales.jumps.clone();
+    if jumps.is_empty() || !jumps.iter().all(|jump| whole_pitches(on.nominal, jump.height_arcsec).is_some()) {
         return None;
     }
-    let jumps = on.scales.jumps.to_vec();
     let columns = jumps.clone();
     let mut law = Law::new("ratcheting", move |on, _| {
-        columns
-            .iter()
-            .map(|(at, height)| {
-                main(by_row(on, |k| if on.rows.time[k] >= *at { height / pitch } else { 0.0 }), 2.0 * pitch)
-            })
-            .collect()
+        let slipped = |jump: &Jump, k: usize| if on.rows.time[k] >= jump.time_s[1] { jump.height_arcsec } else { 0.0 };
+        columns.iter().map(|jump| main(by_row(on, |k| slipped(jump, k) / pitch), 2.0 * pitch)).collect()
     })
     .parameters(move |_, _, c| {
-        let slipped: f64 = jumps.iter().zip(c).map(|((_, height), c)| c * height / pitch).sum();
-        vec![("jump_arcsec", slipped), ("time_s", jumps[0].0), ("events", jumps.len() as f64)]
+        let slipped: f64 = jumps.iter().zip(c).map(|(jump, c)| c * jump.height_arcsec / pitch).sum();
+        vec![("jump_arcsec", slipped), ("time_s", jumps[0].time_s[1]), ("events", jumps.len() as f64)]
     })
     .exact();
     // The jump is measured, not modelled: nothing of its height is left over.

@@ -85,10 +85,10 @@ fn usual_speed(on: &Excitation<'_>) -> f64 {
     on.scales.mean_speed.max(1e-9)
 }
 
-/// Slope of the nominal wind-up at no load, arcsec/N·m; 1 for a drive that does not give.
+/// Slope of the wind-up at no load, arcsec/N·m; 1 for a drive that does not give.
 fn wind_up_arcsec_per_n_m(on: &Excitation<'_>) -> f64 {
     let slope = on.nominal.wind_up_arcsec(1e-3) / 1e-3;
-    if slope > 0.0 { slope } else { 1.0 }
+    if slope > 0.0 { on.softer * slope } else { 1.0 }
 }
 
 /// Arcsec for 1 N·m of drag at the mean speed and the nominal temperature.
@@ -144,7 +144,7 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
         let torque: Vec<f64> = (0..rows.len()).map(|k| rows.torque[k] + added[k]).collect();
         let flank = on.base.law.flanks(rows, &torque, on.nominal);
         let play = by_row(on, |k| on.base.half_backlash * (flank[k] - on.base.flank[k]));
-        let together = by_row(on, |k| on.nominal.wind_up_arcsec(torque[k]) - on.base.wind_up[k] + play[k]);
+        let together = by_row(on, |k| on.wound_up(k, torque[k]) + play[k]);
         vec![
             Column { values: together, tolerance: Tolerance::Main(Prior { mean: 1.0, std: 0.02 }) },
             Column { values: play, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 0.5 }) },

@@ -24,6 +24,13 @@ const CONFUSED: f64 = 4.0;
 /// Share of rows that each flank must have.
 const BOTH_FLANKS: f64 = 0.1;
 
+/// What moves by this within so many seconds, and by this share of the drift, is none: beyond any wind-up and clearance.
+const LEAST_LEAP_RAD: f64 = 1200.0 * ARCSEC;
+const LEAP_S: f64 = 2.0;
+const LEAP_SHARE: f64 = 0.3;
+/// Rows whose median is a level.
+const LEVEL_ROWS: usize = 12;
+
 /// Finds a linear drift over the whole recording, names it and takes it out.
 pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
     let Some((per_s, from_s, std)) = slope(sessions, gear) else { return };
@@ -93,6 +100,10 @@ fn slope(sessions: &[Session], gear: &Gear) -> Option<(f64, f64, f64)> {
     if drift.abs() * 2.0 < LEAST_RAD || unlike > ALIKE * drift.abs() {
         return None;
     }
+    // Teeth that slip have a trend, too.
+    if largest_leap(sessions) > LEAST_LEAP_RAD.max(LEAP_SHARE * 2.0 * drift.abs()) {
+        return None;
+    }
     // Sessions that all have load of one sign lie on one flank, whatever their direction.
     let loaded = sessions.iter().filter_map(|s| s.torque_n_m.as_ref()).flatten();
     let (mut plus, mut minus) = (0, 0);
@@ -128,6 +139,23 @@ fn slope(sessions: &[Session], gear: &Gear) -> Option<(f64, f64, f64)> {
     let steady = (trend - drift).abs() < 0.5 * drift.abs();
     let per_s = 2.0 / (end - begin);
     (certain && steady).then_some((drift * per_s, 0.5 * (begin + end), std.max(formal) * per_s))
+}
+
+/// The largest change within [`LEAP_S`], rad, between medians of a few rows.
+fn largest_leap(sessions: &[Session]) -> f64 {
+    let mut largest = 0.0f64;
+    for session in sessions {
+        let Some(time) = &session.time_s else { continue };
+        let level = |row: usize| median_of(&mut session.error_rad[row..(row + LEVEL_ROWS).min(session.len())].to_vec());
+        let mut later = 0;
+        for row in (0..session.len()).step_by(LEVEL_ROWS / 2) {
+            while later + 1 < session.len() && time[later] < time[row] + LEAP_S {
+                later += 1;
+            }
+            largest = largest.max((level(later) - level(row)).abs());
+        }
+    }
+    largest
 }
 
 /// Slope of a straight line and its standard deviation, neighbours being correlated as their residuals are.
