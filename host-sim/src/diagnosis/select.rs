@@ -2,6 +2,7 @@
 //! exchange. A cause has to earn its place four times: evidence, size, size against the misfit of the other laws, sessions it was not fitted to.
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 
 use rayon::prelude::*;
 
@@ -26,8 +27,8 @@ const CLEAR_EVIDENCE: f64 = 15.0;
 const LEAST_IF_CLEAR: f64 = 0.55;
 /// And at least this share of the strongest.
 const LEAST_OF_STRONGEST: f64 = 0.1;
-/// Where a cause moves the play, rows in which it does count up to this many times what it adds elsewhere.
-const MOVES_PLAY: f64 = 3.0;
+/// Where much of a cause shows while the play is crossed, those rows count up to this many times what it adds elsewhere.
+const IN_CROSSINGS: f64 = 3.0;
 /// Least size against what the laws of the other terms may be wrong by.
 const LEAST_OF_MISFIT: f64 = 1.0;
 /// The same for a deviation without a name.
@@ -41,6 +42,8 @@ const IN_PLACE: f64 = 0.7;
 const MOST_CAUSES: usize = 3;
 /// Unnamed deviations at most.
 const MOST_UNNAMED: usize = 3;
+/// Rounds at most.
+const MOST_ROUNDS: usize = 10;
 /// Laws that are refined in each round.
 const REFINED: usize = 9;
 /// Laws that are refined for the place of another.
@@ -200,8 +203,8 @@ pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize)
         left_out = left_out.max(left_out_gain(problem, &with_bare, &others));
     }
     let mut size = (TAKEN_OVER * alone).min(size_of(problem, &own)).max(alone);
-    if selected.terms[k].law.load.is_some() {
-        size = size.max(super::rows::rms(&own).min(MOVES_PLAY * size));
+    if selected.terms[k].law.in_crossings {
+        size = size.max(super::rows::rms(&own).min(IN_CROSSINGS * size));
     }
     Standing { evidence: gain, size, alone, left_out }
 }
@@ -370,18 +373,19 @@ pub fn select<'l>(
 ) -> Option<Selected<'l>> {
     let limits = Limits::of(white);
     let mut selected = Selected { fit: fit(problem, &start)?, terms: start };
-    let mut seen = std::collections::HashSet::new();
-    for round in 0..MOST_CAUSES + MOST_UNNAMED + 1 {
+    // What has given way once and come back does not give way to the same again: so rounds end.
+    let (mut seen, mut given) = (HashSet::new(), HashSet::new());
+    for round in 0..MOST_ROUNDS {
         let Some(next) = forward(problem, laws, &selected, &limits, &mut log) else { break };
         selected = settle(problem, next)?;
         selected = backward(problem, selected, &limits, &mut log)?;
         if round > 0 || selected.terms.len() > 1 {
-            selected = exchange(problem, laws, selected, &limits, &mut log)?;
+            selected = exchange(problem, laws, selected, &limits, &mut given, &mut log)?;
             selected = backward(problem, selected, &limits, &mut log)?;
         }
         let mut causes: Vec<&str> = selected.terms.iter().map(|t| t.law.cause.as_str()).collect();
         causes.sort_unstable();
-        if !seen.insert(causes.join("+")) {
+        if !seen.insert((causes.join("+"), given.len())) {
             break;
         }
     }
@@ -607,6 +611,7 @@ fn exchange<'l>(
     laws: &'l [Law],
     selected: Selected<'l>,
     limits: &Limits,
+    given: &mut HashSet<(u64, u64)>,
     log: &mut impl FnMut(String),
 ) -> Option<Selected<'l>> {
     for k in 0..selected.terms.len() {
@@ -616,6 +621,7 @@ fn exchange<'l>(
             .iter()
             .filter(|law| selected.terms.iter().all(|t| t.law.cause != law.cause))
             .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &without, law))
+            .filter(|law| !given.contains(&(selected.terms[k].law.id(), law.id())))
             .collect();
         let rivals = scan(problem, &others, &open, EXCHANGED);
         let scaffold = Scaffold::new(problem, others.iter().collect());
@@ -652,6 +658,7 @@ fn exchange<'l>(
             // It has to earn the place that it takes.
             if !fails(problem, &exchanged, &standings(problem, &exchanged), exchanged.terms.len() - 1, limits) {
                 log(line);
+                given.extend(exchanged.terms.last().map(|term| (selected.terms[k].law.id(), term.law.id())));
                 return Some(exchanged);
             }
         }

@@ -33,6 +33,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
     // Without a moment the law is another play alone.
     .physical(move |shape, _| shape[0] > 0.004 * scale);
     law.load = Some(Box::new(load));
+    law.in_crossings = true;
     law.lead = Some(Lead {
         columns: Box::new(move |on, _| {
             let rows = on.rows;
@@ -120,6 +121,8 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
         vec![("frequency_hz", shape[0]), ("damping_ratio", shape[1]), ("gain", gain)]
     })
     .physical(|_, c| c[0] > 0.0 || c[1] > 0.0 || c[2] > 0.0);
+    // It rings most when the load turns over.
+    law.in_crossings = true;
     // Rows are joined by straight lines.
     law.doubt = 0.006;
     law

@@ -258,6 +258,8 @@ pub struct Law {
     pub whole: bool,
     /// Load (N·m, row by row) that the cause adds beside the torque that was recorded.
     pub load: Option<Load>,
+    /// Much of it shows while the play is crossed, in rows that do not count for the sizes of others.
+    pub in_crossings: bool,
     /// How far it brings one zone of teeth ahead of the other, from shape parameters and coefficients.
     pub zones: Option<Apart>,
     /// What other causes do to the zones of teeth and to the clearance enters the law.
@@ -273,8 +275,10 @@ pub enum Kin {
     Torque,
     /// Follows the motion: a reading that comes late.
     Motion,
-    /// Follows both: friction and drag.
+    /// Follows both: friction inside.
     Friction,
+    /// Drag that follows the speed.
+    Drag,
     /// Width of the clearance.
     Clearance,
     /// Like nothing else.
@@ -286,7 +290,10 @@ impl Kin {
     fn like(self, other: Kin) -> bool {
         match (self, other) {
             (Kin::Unlike, _) | (_, Kin::Unlike) => false,
-            (Kin::Friction, Kin::Torque | Kin::Motion) | (Kin::Torque | Kin::Motion, Kin::Friction) => true,
+            (Kin::Friction, Kin::Torque | Kin::Motion | Kin::Drag)
+            | (Kin::Torque | Kin::Motion | Kin::Drag, Kin::Friction)
+            | (Kin::Drag, Kin::Motion)
+            | (Kin::Motion, Kin::Drag) => true,
             (a, b) => a == b,
         }
     }
@@ -327,6 +334,7 @@ impl Law {
             free_form: false,
             whole: false,
             load: None,
+            in_crossings: false,
             zones: None,
             meets_zones: false,
         }
@@ -428,7 +436,8 @@ pub fn library(on: &Excitation<'_>) -> Vec<Law> {
         law.kin = match law.cause.as_str() {
             "stiffness_hardening" | "stiffness_error" | "thermal_stiffness" | "gravity_torque" => Kin::Torque,
             "sensor_latency" => Kin::Motion,
-            "torsional_hysteresis" | "lubricant_viscosity" => Kin::Friction,
+            "torsional_hysteresis" => Kin::Friction,
+            "lubricant_viscosity" => Kin::Drag,
             "backlash_growth" | "wear" | "thermal_clearance" => Kin::Clearance,
             _ => law.kin,
         };

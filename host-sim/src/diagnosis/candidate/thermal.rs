@@ -160,6 +160,7 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
     })
     .physical(|shape, c| c[0] > 0.0 && viscous(shape[1], shape[2]));
     law.load = Some(Box::new(load));
+    law.in_crossings = true;
     law.lead = Some(Lead {
         columns: Box::new(|on, shape| vec![main(drag_wind_up(on, shape[1], shape[2], 0.0), 10.0)]),
         shape: Box::new(|shape, c| vec![vec![c[0].max(0.0), shape[1], shape[2]]]),
