@@ -330,7 +330,7 @@ impl Limits {
             && standing.evidence > evidence
             && (standing.size > self.least || law.named && self.small_but_clear(standing, strongest))
             && standing.alone > share * misfit
-            && standing.left_out > 0.0
+            && (standing.left_out > 0.0 || !law.foretells)
     }
 
     /// Whether the last term is clear beside something without a name that tells the data better, and is too small to count.

@@ -55,6 +55,17 @@ fn creep_under_load() -> Law {
     law
 }
 
+/// Another zero in each session: a sensor that was taken off and put back. No session tells the next one's.
+fn zero_of_each_session() -> Law {
+    let mut law = Law::new("another zero in each session", |on, _| {
+        let of = |session: &std::ops::Range<usize>| by_row(on, |k| f64::from(u8::from(session.contains(&k))));
+        on.rows.sessions_used().skip(1).map(|session| main(of(&session), 20.0)).collect()
+    });
+    law.named = false;
+    law.foretells = false;
+    law
+}
+
 /// A line at any order of an angle or of time: `unit` is what it is counted against.
 #[must_use]
 pub fn line(unit: &str, order: f64) -> Law {
@@ -111,6 +122,9 @@ pub fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
         laws.push(law("offset with speed squared, by direction", |on, k| {
             on.rows.speed[k].powi(2) * on.rows.direction[k]
         }));
+    }
+    if rows.sessions_used().count() > 2 {
+        laws.push(zero_of_each_session());
     }
     laws.push(law("offset by direction", |on, k| on.rows.direction[k]));
     laws.push(lash_before_the_generator());

@@ -250,6 +250,8 @@ pub struct Law {
     pub kin: Kin,
     /// Relative uncertainty of its parameters beside that of the data: what the law itself is not sure of.
     pub doubt: f64,
+    /// Says something about sessions that it was not fitted to.
+    pub foretells: bool,
     /// Where to begin.
     pub lead: Option<Lead>,
     /// The law is a free profile: what it may hold has to be taken out before the noise is measured, the finest detail too.
@@ -330,6 +332,7 @@ impl Law {
             most_nuisance: MOST_NUISANCE,
             kin: Kin::Unlike,
             doubt: USUAL_DOUBT,
+            foretells: true,
             lead: None,
             free_form: false,
             whole: false,
