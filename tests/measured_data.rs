@@ -679,6 +679,21 @@ fn a_drive_that_ratchets_is_the_drive_and_not_an_encoder() {
 }
 
 #[test]
+fn teeth_that_slide_twice_are_no_drift_of_the_zero() {
+    let pitch = std::f64::consts::TAU / 190.0;
+    let slide = |rows: usize| pitch * (1.0 - (-(rows as f64) / 8.0).exp());
+    let text = changed(|b| {
+        for k in 0..b.rows() {
+            b.output_rad[k] -= slide(k.saturating_sub(1500)) + slide(k.saturating_sub(2500));
+        }
+    });
+    let read = read(text.as_bytes()).unwrap();
+    assert_eq!(names(&read), []);
+    let left = read.sessions[0].error_rad[3900] - read.sessions[0].error_rad[100];
+    assert!((left + 2.0 * pitch).abs() < 100.0 * ARCSEC, "both are still there");
+}
+
+#[test]
 fn a_generator_that_turns_half_way_round_between_rows_is_counted_by_the_output() {
     let bench = Bench::plain(4000, 1.0, 5);
     let mut fast = bench.clone();

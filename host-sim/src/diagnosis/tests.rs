@@ -232,6 +232,35 @@ fn teeth_that_slide_into_the_next_space_between_two_recordings_have_ratcheted() 
     assert!((slipped.value + 2.0 * pitch * 206_264.8).abs() < 15.0 && slipped.std < 15.0, "{slipped:?}");
 }
 
+#[test]
+fn teeth_that_climb_while_the_wave_passes_have_ratcheted() {
+    let drive = catalogue_drive();
+    let mut sessions = recorded(&[], 3, 4000, 200.0, 1.0, 8);
+    let pitch = std::f64::consts::TAU / f64::from(drive.teeth.unwrap().circular_spline);
+    let session = &mut sessions[1];
+    let mut climbed = 0.0;
+    for k in 1500..session.len() {
+        climbed += (session.generator_rad[k] - session.generator_rad[k - 1]).abs() / std::f64::consts::PI;
+        session.error_rad[k] += pitch * f64::min(climbed, 1.0);
+    }
+    sessions[2].error_rad.iter_mut().for_each(|error| *error += pitch);
+    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!(names(&diagnosis), ["ratcheting"], "{}", diagnosis.text());
+    let slipped = diagnosis.causes[0].parameters["jump_arcsec"];
+    assert!((slipped.value - pitch * 206_264.8).abs() < 15.0, "{slipped:?}");
+}
+
+#[test]
+fn a_sensor_put_back_elsewhere_before_each_session_is_described_and_nothing_blamed_for_it() {
+    let mut sessions = recorded(&[], 5, 4000, 100.0, 2.0, 12);
+    for (session, zero) in sessions.iter_mut().zip([0.0, 14.0, -9.0, 21.0, 6.0]) {
+        session.error_rad.iter_mut().for_each(|error| *error += zero / 206_264.8);
+    }
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::Unknown, vec![]), "{}", diagnosis.text());
+    assert!(diagnosis.unexplained[0].looks_like.contains("another zero"), "{}", diagnosis.text());
+}
+
 /// Hands a law's excitation on made-up rows to `look`.
 fn excited(look: impl Fn(&super::Excitation<'_>, &[super::Law])) {
     let drive = catalogue_drive();
@@ -347,5 +376,26 @@ fn a_load_that_gravity_adds_passes_through_the_springs_that_slip() {
         assert!(super::rows::rms(&held) > 0.1, "{}", super::rows::rms(&held));
         // The load itself is what it is.
         assert_eq!(beside[0][0].values, together(on, &[gravity()])[0][0].values);
+    });
+}
+
+#[test]
+fn a_softer_spring_gives_way_to_drag_and_gravity_as_well() {
+    use super::candidate::{Acting, together};
+    excited(|on, laws| {
+        let spring = || Acting { law: law(laws, "stiffness_error"), values: vec![], coefficients: vec![0.6] };
+        let drags = |law: &&super::Law| law.cause == "lubricant_viscosity" && law.load.is_some();
+        let drag = laws.iter().find(drags).unwrap();
+        for (law, values) in [(drag, vec![3.0, 0.8, 0.03]), (law(laws, "gravity_torque"), vec![5.0, 0.7])] {
+            let load = || Acting { law, values: values.clone(), coefficients: vec![1.0, 0.0] };
+            let (alone, beside) = (together(on, &[load()]), together(on, &[spring(), load()]));
+            // Wind-up and play together, and play alone: what is left is wind-up.
+            let [of_alone, of_beside] = [&alone[0], &beside[1]];
+            for k in 0..on.rows.len() {
+                let wound = |columns: &[super::candidate::Column]| columns[0].values[k] - columns[1].values[k];
+                assert!((wound(of_beside) - 1.6 * wound(of_alone)).abs() < 1e-9, "{} row {k}", law.cause);
+            }
+            assert_eq!(beside[0][0].values, on.base.wind_up, "the load is not counted twice");
+        }
     });
 }
