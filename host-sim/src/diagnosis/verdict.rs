@@ -20,11 +20,10 @@ const LEAST_NAMED_SHARE: f64 = 0.6;
 const LEAST_BESIDE_DESCRIBED: f64 = 0.05;
 /// Share of the square of what is beyond noise that may stay without any description where causes are named.
 const MOST_UNEXPLAINED: f64 = 0.5;
-/// What a cause adds has to be this many times the uncertainty of that.
-const KNOWN: f64 = 1.0;
-/// The same beside something without a name that is larger than this against it: what that is may reach into it.
-const KNOWN_BESIDE: f64 = 5.0;
+/// Beside something without a name that is larger than this against a cause, what the cause adds has to be so many times the
+/// uncertainty of that: what is not understood may reach into it.
 const LARGE_BESIDE: f64 = 0.7;
+const KNOWN_BESIDE: f64 = 5.0;
 
 /// The verdict, with its causes and what is left.
 pub(super) fn conclude(
@@ -183,8 +182,8 @@ fn understood(
     let not_understood = unnamed.chain(left_over.iter().map(|l| l.size_arcsec)).fold(0.0, f64::max);
     let counts = |k: &usize| {
         let size = standings[*k].size;
-        let needed = if not_understood > LARGE_BESIDE * size { KNOWN_BESIDE } else { KNOWN };
-        is_named(k) && size > select::least_named(noise.white) && known[*k].times_its_doubt > needed
+        let clear = not_understood <= LARGE_BESIDE * size || known[*k].times_its_doubt > KNOWN_BESIDE;
+        is_named(k) && size > select::least_named(noise.white) && clear
     };
     (0..selected.terms.len()).filter(counts).collect()
 }
