@@ -81,9 +81,9 @@ impl<'a> Problem<'a> {
         let white = Arc::new(white);
         let values = white.len() * self.data.len();
         let mut kept = kept();
-        if kept.values + values <= MOST_KEPT {
+        // Another thread may have evaluated the same meanwhile: it counts once.
+        if kept.values + values <= MOST_KEPT && kept.columns.insert(key, white.clone()).is_none() {
             kept.values += values;
-            kept.columns.insert(key, white.clone());
         }
         white
     }

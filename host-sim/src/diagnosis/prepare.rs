@@ -11,6 +11,7 @@ use super::model::Term;
 use super::noise::{Noise, Whitener, white_level};
 use super::rows::{Rows, quantile, rms, robust_std};
 use crate::nominal::Nominal;
+use crate::tables::ARCSEC_PER_TURN;
 
 /// Averages used to find the wander, about.
 const WANDER_AVERAGES: usize = 2500;
@@ -67,7 +68,7 @@ pub fn jumps(rows: &Rows, base: &Base, nominal: &Nominal) -> Vec<Jump> {
 pub fn whole_pitches(nominal: &Nominal, height_arcsec: f64) -> Option<f64> {
     let teeth = nominal.teeth?;
     [teeth.circular_spline, teeth.flexspline].into_iter().find_map(|count| {
-        let pitch = super::rows::ARCSEC_PER_TURN / f64::from(count);
+        let pitch = ARCSEC_PER_TURN / f64::from(count);
         let pitches = (height_arcsec / pitch).round();
         let near = (height_arcsec - pitches * pitch).abs() < PITCH_SHARE * pitch * pitches.abs() + PITCH_ARCSEC;
         (pitches != 0.0 && near).then_some(pitches)

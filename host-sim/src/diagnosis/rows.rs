@@ -6,9 +6,6 @@ use crate::measurement::{Session, quantile_of};
 use crate::nominal::{Fixed, Nominal};
 use crate::tables::ARCSEC_PER_RAD;
 
-/// Arc-seconds of a turn.
-pub const ARCSEC_PER_TURN: f64 = 1_296_000.0;
-
 /// Which columns were recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Recorded {

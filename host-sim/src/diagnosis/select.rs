@@ -451,9 +451,9 @@ fn forward<'l>(
             sound(&term, c).then_some((gain, term, fit))
         })
         .collect();
-    refined.sort_by(|a, b| b.0.total_cmp(&a.0));
     // Something with a name goes before something without unless that is clearly better: by more than the law may be wrong by.
-    let misfit = refined.iter().find(|(_, term, _)| term.law.named).map_or(0.0, |(_, term, _)| term.law.misfit);
+    let best_named = refined.iter().filter(|(_, term, _)| term.law.named).max_by(|a, b| a.0.total_cmp(&b.0));
+    let misfit = best_named.map_or(0.0, |(_, term, _)| term.law.misfit);
     let ahead = |(gain, term, _): &(f64, Term<'l>, Fit)| {
         gain - if term.law.named { 0.0 } else { UNNAMED_AHEAD.max(misfit * misfit * gain) }
     };

@@ -611,7 +611,7 @@ impl Setting<'_> {
 
     fn tooth_pitch_arcsec(&self) -> Result<f64, String> {
         let fixed = self.nominal.teeth.map(|teeth| teeth.fixed);
-        Ok(1_296_000.0 / self.teeth(if fixed == Some(Fixed::CircularSpline) { 0.0 } else { 1.0 })?)
+        Ok(crate::tables::ARCSEC_PER_TURN / self.teeth(if fixed == Some(Fixed::CircularSpline) { 0.0 } else { 1.0 })?)
     }
 
     fn factor(&self, factor: Factor, effect: &Chosen) -> Result<f64, String> {

@@ -52,9 +52,7 @@ impl<'a> Excitation<'a> {
     pub fn new(rows: &'a Rows, nominal: &'a Nominal, base: &'a Base, scales: &'a Scales) -> Excitation<'a> {
         Excitation { rows, nominal, base, scales, widened: None, zones: None, softer: 1.0 }
     }
-}
 
-impl Excitation<'_> {
     /// What wind-up (arcsec) a load beside the torque that was recorded adds at row `k`, `torque` (N·m) being both.
     fn wound_up(&self, k: usize, torque: f64) -> f64 {
         self.softer * (self.nominal.wind_up_arcsec(torque) - self.base.wind_up[k])

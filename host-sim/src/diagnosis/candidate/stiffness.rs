@@ -3,9 +3,10 @@
 use std::ops::Range;
 
 use super::super::prepare::{Jump, whole_pitches};
-use super::super::rows::{ARCSEC_PER_TURN, rms};
+use super::super::rows::rms;
 use super::geometry::{Angle, waves};
 use super::{Excitation, Law, Shape, by_row, history, main, nuisance};
+use crate::tables::ARCSEC_PER_TURN;
 
 /// Torque in units of the load scale.
 fn load_share(on: &Excitation<'_>, k: usize) -> f64 {
