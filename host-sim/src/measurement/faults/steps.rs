@@ -26,6 +26,8 @@ const LASTS: f64 = 8.0;
 const AGREES: f64 = 0.4;
 /// A step is taken back by one of the other sign that differs by less than this share.
 const TAKEN_BACK: f64 = 0.35;
+/// By several together, whose sum is less than this share of the largest.
+const TAKEN_BACK_TOGETHER: f64 = 0.1;
 /// No step smaller than this is looked for, rad.
 const LEAST_RAD: f64 = 5.0 * ARCSEC;
 /// Nor one that is not seen from one row to the next: so many standard deviations of the white noise.
@@ -160,16 +162,41 @@ fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<Step>)> {
         places.extend(more);
         places.sort_by_key(|place| (place.session, place.row));
     }
-    // What comes and goes by the same amount does not last: teeth and clearance that fast motion samples once.
-    let taken_back = |(place, size, _): &Step| {
-        steps.iter().any(|(other, back, _)| other != place && (size + back).abs() < TAKEN_BACK * size.abs())
-    };
-    steps = steps.iter().copied().filter(|step| !taken_back(step)).collect();
+    steps = lasting(steps);
     let (sure, doubtful): (Vec<Step>, Vec<Step>) = steps
         .iter()
         .copied()
         .partition(|(place, size, _)| no_flank_was_changed(sessions, &state, &steps, *place, *size));
-    Some((sure, doubtful))
+    // Where one step may be a change of flank, one of the other sign may be its way back.
+    let way_back = |(_, size, _): &Step| {
+        size.abs() <= WIDER_THAN_CLEARANCE_RAD && doubtful.iter().any(|(_, other, _)| size * other < 0.0)
+    };
+    let (back, sure): (Vec<Step>, Vec<Step>) = sure.into_iter().partition(way_back);
+    Some((sure, [doubtful, back].concat()))
+}
+
+/// The steps without those that come and go by the same amount, which do not last: teeth and clearance that fast motion samples once, a
+/// flank that drag turns over until the drive slows down. Each is taken back once, by its nearest neighbour first.
+fn lasting(mut steps: Vec<Step>) -> Vec<Step> {
+    let together = |run: &[Step], share: f64| {
+        let largest = run.iter().fold(0.0, |most: f64, (_, size, _)| most.max(size.abs()));
+        let sum: f64 = run.iter().map(|(_, size, _)| size).sum();
+        sum.abs() < share * largest
+    };
+    let apart = |a: Place, b: Place| (b.session - a.session, b.row.abs_diff(a.row));
+    loop {
+        let pairs = (0..steps.len()).flat_map(|k| (0..k).map(move |j| (j, k)));
+        let there_and_back = pairs.filter(|(j, k)| together(&[steps[*j], steps[*k]], TAKEN_BACK));
+        let Some((j, k)) = there_and_back.min_by_key(|(j, k)| apart(steps[*j].0, steps[*k].0)) else { break };
+        steps.remove(k);
+        steps.remove(j);
+    }
+    for long in 3..=steps.len() {
+        while let Some(from) = steps.windows(long).position(|run| together(run, TAKEN_BACK_TOGETHER)) {
+            steps.drain(from..from + long);
+        }
+    }
+    steps
 }
 
 /// The change of the error into a row beyond what a dwell could give, 0 if less. An output dwells after the generator turned back.
@@ -401,4 +428,28 @@ fn no_flank_was_changed(sessions: &[Session], state: &State, steps: &[Step], pla
         session.torque_n_m.as_ref().is_some_and(|torque| torque[place.row].abs() > HELD * largest_torque(sessions));
     // The same direction before and after, and a load that says which flank.
     held && state.flank(place.session, place.row) == state.flank(place.session, place.row - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is left of steps in some rows.
+    fn left(steps: &[(usize, f64)]) -> Vec<f64> {
+        let step = |(row, size): &(usize, f64)| (Place { session: 0, row: *row }, *size, 0.1);
+        lasting(steps.iter().map(step).collect()).into_iter().map(|(_, size, _)| size).collect()
+    }
+
+    #[test]
+    fn a_step_is_taken_back_once_and_by_its_nearest_neighbour() {
+        assert_eq!(left(&[(1287, -60.5), (1364, 60.4), (9000, 76.3)]), [76.3]);
+        assert_eq!(left(&[(21, 47.2), (490, -45.7), (525, 46.4)]), [47.2]);
+        assert_eq!(left(&[(21, 46.1), (80, 30.0)]), [46.1, 30.0]);
+    }
+
+    #[test]
+    fn several_steps_that_end_where_they_began_do_not_last() {
+        assert_eq!(left(&[(39, 46.1), (132, -19.3), (3067, -25.1)]), [0.0; 0]);
+        assert_eq!(left(&[(39, 46.1), (132, -19.3), (3067, -10.1)]), [46.1, -19.3, -10.1]);
+    }
 }

@@ -117,13 +117,23 @@ fn slope(log: &Log) -> Option<(f64, f64, f64)> {
     if pieces.iter().any(|(_, delta)| *delta != 0.0) {
         pieces.retain(|(_, delta)| *delta != 0.0);
     }
-    let far = pieces.iter().map(|(psi, _)| *psi).fold(0.0, f64::max);
-    let mut slopes: Vec<f64> =
-        pieces.iter().filter(|(psi, _)| *psi > 0.2 * far).map(|(psi, delta)| delta / psi).collect();
-    let median = median_of(&mut slopes);
+    let median = typical_slope(pieces);
     let slope = if (delta / psi - median).abs() <= 0.1 * median.abs() { delta / psi } else { median };
     let travel = output.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), d| (a.min(*d), b.max(*d)));
     Some((slope, psi, travel.1 - travel.0))
+}
+
+/// The slope that half of all motion falls short of: a generator that froze and leaps on is one piece of many, however far it leaps.
+fn typical_slope(mut pieces: Vec<(f64, f64)>) -> f64 {
+    pieces.retain(|(psi, _)| *psi > 0.0);
+    pieces.sort_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0)));
+    let half = 0.5 * pieces.iter().map(|(psi, _)| psi).sum::<f64>();
+    let mut passed = 0.0;
+    let middle = pieces.iter().find(|(psi, _)| {
+        passed += psi;
+        passed >= half
+    });
+    middle.map_or(0.0, |(psi, delta)| delta / psi)
 }
 
 fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings) -> Result<(), String> {
@@ -238,4 +248,18 @@ fn error_size(log: &Log, columns: &[Column]) -> Result<(), String> {
         ));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::typical_slope;
+
+    #[test]
+    fn one_leap_of_a_generator_that_froze_does_not_change_the_ratio() {
+        // Slow pieces of a drive of ratio 80, and the piece in which it leaps by more than six of them together.
+        let mut pieces = vec![(10.0, 0.125); 20];
+        pieces.push((70.0, 0.05));
+        assert_eq!(typical_slope(pieces), 0.0125);
+        assert_eq!(typical_slope(vec![(0.0, 0.0)]), 0.0);
+    }
 }
