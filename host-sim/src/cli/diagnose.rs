@@ -112,6 +112,9 @@ struct Subject<'a> {
     drive: Drive,
 }
 
+/// Rows that are diagnosed at most: 1.5 GB of memory.
+const MOST_ROWS: usize = 1_000_000;
+
 impl Diagnose {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let map = if self.columns.is_empty() { Ok(ColumnMap::default()) } else { ColumnMap::parse(&self.columns) };
@@ -121,6 +124,7 @@ impl Diagnose {
         let mut recording =
             read(&self.data, &map, &gear(&subject.nominal)).map_err(|error| Failure::BadInput(error.to_string()))?;
         self.take_away_known(&subject, &mut recording)?;
+        recording.average_to(MOST_ROWS);
         // Before there is much work.
         context.out()?;
         let settings = Settings {

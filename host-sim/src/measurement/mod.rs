@@ -7,6 +7,7 @@
 //! as the borders of sessions, and the faults of the data found, named and dealt with ([`Fault`]) before anything is asked of the
 //! drive.
 
+mod averages;
 mod columns;
 mod csv_rows;
 mod fault;

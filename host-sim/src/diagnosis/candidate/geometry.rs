@@ -103,8 +103,9 @@ fn pitch(cause: &'static str, of: Angle) -> Law {
         for order in [8.0, 10.0] {
             columns.extend(waves(on, of, order, flank).map(|v| nuisance(v, 0.3 / order)));
         }
-        columns.push(nuisance(by_row(on, flank), 0.3));
-        columns.push(nuisance(by_row(on, |k| flank(k) * light(k)), 0.3));
+        // What odd orders take of the clearance, which nothing in the even ones tells.
+        columns.push(beside(by_row(on, flank), 0.6));
+        columns.push(beside(by_row(on, |k| flank(k) * light(k)), 0.4));
         // The first order of the wheel, which most cutting leaves, is rectified by the clearance like an eccentricity.
         columns.extend(waves(on, of, 2.0, |k| flank(k) * light(k)).map(|v| nuisance(v, 0.4)));
         if on.scales.load > 0.0 {
