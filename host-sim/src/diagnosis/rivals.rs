@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::candidate::Law;
 use super::model::{Problem, Scaffold, Term};
-use super::select::{Selected, Standing, predicted, size_of, sound};
+use super::select::{Selected, Standing, begun, predicted, size_of, sound};
 
 /// A rival in the place of a cause.
 #[derive(Clone, Debug)]
@@ -77,16 +77,20 @@ pub fn rivals(
     let mut rivals: Vec<Rival> = open
         .into_par_iter()
         .filter_map(|law| {
-            let best = scaffold
+            let tried: Vec<(f64, Vec<f64>)> = scaffold
                 .begin(law)
                 .into_iter()
-                .filter_map(|places| Some((scaffold.trial(law, &places)?.misfit, places)))
-                .min_by(|a, b| a.0.total_cmp(&b.0))?;
+                .filter_map(|places| Some((-scaffold.trial(law, &places)?.misfit, places)))
+                .collect();
+            let best = tried.iter().fold(f64::NEG_INFINITY, |best: f64, (worth, _)| best.max(*worth));
             // Far away already: no refinement brings it back, but for what a lead only points at.
-            if law.lead.is_none() && best.0 > 3.0 * selected.fit.solution.misfit + 3000.0 {
+            if law.lead.is_none() && -best > 3.0 * selected.fit.solution.misfit + 3000.0 {
                 return None;
             }
-            let (term, fit) = scaffold.refine(scaffold.term(law, best.1))?;
+            let (term, fit) = begun(law, tried)
+                .into_iter()
+                .filter_map(|places| scaffold.refine(scaffold.term(law, places)))
+                .min_by(|a, b| a.1.solution.misfit.total_cmp(&b.1.solution.misfit))?;
             let c = fit.of(fit.starts.len() - 1);
             if !sound(&term, c) {
                 return None;

@@ -132,6 +132,26 @@ pub fn fit(problem: &Problem<'_>, terms: &[Term<'_>]) -> Option<Fit> {
     Scaffold::new(problem, terms.iter().collect()).fit(None)
 }
 
+/// Sizes this far apart on the scale of a shape parameter, from least to largest, are begun with both.
+const ANOTHER_SIZE: f64 = 0.1;
+
+/// The places of those tried, with what each is worth, that a law is refined from: the best, and for a wheel beside its place the best of
+/// another size. Small ones leave clearance and large ones none, and no refinement goes from one to the other.
+pub(super) fn begun(law: &Law, mut tried: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
+    tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut begun: Vec<Vec<f64>> = Vec::new();
+    for (_, places) in tried {
+        let other = |first: &Vec<f64>| law.meets_zones && (places[1] - first[1]).abs() > ANOTHER_SIZE;
+        if begun.first().is_none_or(other) {
+            begun.push(places);
+        }
+        if begun.len() == 2 {
+            break;
+        }
+    }
+    begun
+}
+
 /// The strongest laws (`most` of them) at their best places tried, beside some terms; not refined. Best evidence first.
 fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law], most: usize) -> Vec<Term<'l>> {
     let scaffold = Scaffold::new(problem, terms.iter().collect());
@@ -144,19 +164,20 @@ fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law], most: u
         .into_par_iter()
         .filter_map(|(k, places)| Some((k, scaffold.trial(laws[k], &places)?.evidence, places)))
         .collect();
-    let mut best: Vec<Option<(f64, Vec<f64>)>> = vec![None; laws.len()];
+    let mut by_law: Vec<Vec<(f64, Vec<f64>)>> = vec![Vec::new(); laws.len()];
     for (k, evidence, places) in tried {
-        if best[k].as_ref().is_none_or(|(least, _)| evidence > *least) {
-            best[k] = Some((evidence, places));
-        }
+        by_law[k].push((evidence, places));
     }
-    let mut found: Vec<(f64, &'l Law, Vec<f64>)> = best
+    let begun: Vec<(&'l Law, Vec<f64>)> = laws
+        .iter()
+        .zip(by_law)
+        .flat_map(|(law, tried)| begun(law, tried).into_iter().map(|places| (*law, places)))
+        .collect();
+    let mut found: Vec<(f64, &'l Law, Vec<f64>)> = begun
         .into_par_iter()
-        .zip(laws)
-        .filter_map(|(best, law)| {
-            let (_, places) = best?;
+        .filter_map(|(law, places)| {
             let evidence = scaffold.whole_trial(law, &places)?.evidence;
-            evidence.is_finite().then_some((evidence, *law, places))
+            evidence.is_finite().then_some((evidence, law, places))
         })
         .collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -169,7 +190,14 @@ fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law], most: u
         let fit = scaffold.fit(Some(&term))?;
         sound(&term, fit.of(fit.starts.len() - 1)).then_some(term)
     };
-    found.into_iter().filter_map(physical).take(most).collect()
+    let mut counted = Vec::new();
+    let within = |term: &Term<'l>| {
+        if !counted.contains(&term.law.id()) {
+            counted.push(term.law.id());
+        }
+        counted.len() <= most
+    };
+    found.into_iter().filter_map(physical).take_while(within).collect()
 }
 
 /// What each term adds that the others cannot, and what it is worth on sessions left out.

@@ -162,6 +162,8 @@ pub(super) fn displaced(cause: &'static str, of: Angle, on: &Excitation<'_>) -> 
             }
             columns.extend(waves(on, of, 2.0, fade).map(|v| main(v, USUAL_ARCSEC)));
             columns.push(main(by_row(on, |k| fade(k) * flank(k)), USUAL_ARCSEC));
+            // What no load takes would go to the nominal wave of the same order, far from its tolerance.
+            columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC)));
             columns
         }),
         shape: Box::new(move |shape, c| {
@@ -173,7 +175,7 @@ pub(super) fn displaced(cause: &'static str, of: Angle, on: &Excitation<'_>) -> 
             let (free, twice) = polar(c[0], c[1]);
             // Both flanks bind: -0.424 A sin 2a sin 2x, whichever carries.
             let both = (2.0 * by).sin();
-            let (bound, twice_bound) = polar(-c[3] / both, c[2] / both);
+            let (bound, twice_bound) = polar(-(c[3] + c[6]) / both, (c[2] + c[5]) / both);
             vec![beginning(free / SECOND_ORDER, twice), beginning(bound / SECOND_ORDER, twice_bound)]
         }),
         loaded_only: false,
