@@ -262,7 +262,7 @@ fn a_sensor_put_back_elsewhere_before_each_session_is_described_and_nothing_blam
 }
 
 /// Hands a law's excitation on made-up rows to `look`.
-fn excited(look: impl Fn(&super::Excitation<'_>, &[super::Law])) {
+fn excited(look: impl FnOnce(&super::Excitation<'_>, &[super::Law])) {
     let drive = catalogue_drive();
     let sessions = data(&[], Richness::Rich, 0, 9);
     let rows = super::Rows::new(&sessions, &drive);
@@ -333,6 +333,41 @@ fn flanks_that_bind_leave_the_output_in_the_middle_and_a_load_presses_the_zone_a
             assert!(pressed[*k].abs() < 0.5, "{}", pressed[*k]);
         }
     });
+}
+
+#[test]
+fn a_wheel_so_far_off_that_no_clearance_is_left_is_begun_with_its_own_size() {
+    // A nominal wave of the order that such a wheel shows.
+    let mut drive = catalogue_drive();
+    let mut sessions = data(&[], Richness::Rich, 0, 9);
+    let of_wheel = |psi: f64| 2.0 * (psi - psi / drive.ratio);
+    let (phase, size) = (0.3, 5.0 * 0.5 * drive.backlash_arcsec);
+    for session in &mut sessions {
+        for (error, psi) in session.error_rad.iter_mut().zip(&session.generator_rad) {
+            *error += 5.0 * of_wheel(*psi).cos() / crate::tables::ARCSEC_PER_RAD;
+        }
+    }
+    drive.harmonics.push(crate::nominal::Harmonic {
+        order_per_generator_turn: of_wheel(1.0),
+        amplitude_arcsec: 5.0,
+        phase_rad: 0.0,
+    });
+    excited(|on, laws| {
+        let law = law(laws, "circular_spline_eccentricity");
+        let pattern = &(law.columns)(on, &[phase, size, 1e9, 3.0])[0].values;
+        let errors = sessions.iter_mut().flat_map(|session| &mut session.error_rad);
+        errors.zip(pattern).for_each(|(error, arcsec)| *error += arcsec / crate::tables::ARCSEC_PER_RAD);
+    });
+    let rows = super::Rows::new(&sessions, &drive);
+    let (base, jumps) = super::prepare::base(&rows, &drive, None);
+    let scales = super::Scales::new(&rows, Settings::default().pitch_radius_mm, jumps);
+    let on = super::Excitation::new(&rows, &drive, &base, &scales);
+    let search = super::Search::new(&on, &Settings::default()).unwrap();
+    let law = law(&search.laws, "circular_spline_eccentricity");
+    let scaffold = super::model::Scaffold::new(&search.problem, Vec::new());
+    let begun: Vec<Vec<f64>> = scaffold.begin(law).iter().map(|places| law.values(places)).collect();
+    let near = |v: &&Vec<f64>| (v[1] / size - 1.0).abs() < 0.25 && (2.0 * (v[0] - phase)).cos() > 0.95;
+    assert!(begun.iter().any(|v| near(&v)), "{size}: {begun:?}");
 }
 
 #[test]
