@@ -25,6 +25,10 @@ pub(super) const COS_PRESSURE_ANGLE: f64 = 0.93;
 /// Generator turns below which a pulse in one place is not told from a wave; as in the picture of a residual.
 const FEWEST_TURNS_OF_PULSES: f64 = 6.0;
 
+/// Clearance that odd orders of a pitch error take on a flank, over its second order: a first order as large as the second takes 2/π of it,
+/// and a wheel that takes more and shows little is one beside its place.
+const MOST_CLEARANCE_TAKEN: f64 = 0.85;
+
 /// Which angle an error is locked to.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Angle {
@@ -88,6 +92,9 @@ fn pitch(cause: &'static str, of: Angle) -> Law {
         let light = |k: usize| if on.scales.load > 0.0 { fading(on, 0.3 * on.scales.load, k) } else { 1.0 };
         let mut columns: Vec<Column> = Vec::new();
         columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC)));
+        // What odd orders take of the clearance, which nothing in the even ones tells.
+        columns.push(beside(by_row(on, flank), 0.6));
+        columns.push(beside(by_row(on, |k| flank(k) * light(k)), 0.4));
         columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
         columns.extend(waves(on, of, 4.0, |_| 1.0).map(|v| nuisance(v, 0.35)));
         columns.extend(waves(on, of, 4.0, flank).map(|v| nuisance(v, 0.12)));
@@ -103,9 +110,6 @@ fn pitch(cause: &'static str, of: Angle) -> Law {
         for order in [8.0, 10.0] {
             columns.extend(waves(on, of, order, flank).map(|v| nuisance(v, 0.3 / order)));
         }
-        // What odd orders take of the clearance, which nothing in the even ones tells.
-        columns.push(beside(by_row(on, flank), 0.6));
-        columns.push(beside(by_row(on, |k| flank(k) * light(k)), 0.4));
         // The first order of the wheel, which most cutting leaves, is rectified by the clearance like an eccentricity.
         columns.extend(waves(on, of, 2.0, |k| flank(k) * light(k)).map(|v| nuisance(v, 0.4)));
         if on.scales.load > 0.0 {
@@ -113,7 +117,8 @@ fn pitch(cause: &'static str, of: Angle) -> Law {
         }
         columns
     })
-    .parameters(pitch_parameters);
+    .parameters(pitch_parameters)
+    .physical(|_, c| c[2].abs().max((c[2] + c[3]).abs()) < MOST_CLEARANCE_TAKEN * c[0].hypot(c[1]));
     law.free_form = true;
     law
 }
