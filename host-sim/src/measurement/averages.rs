@@ -44,10 +44,11 @@ mod tests {
 
     #[test]
     fn rows_are_averaged_within_sessions_alone() {
-        let mut text = "session,time_s,generator_rad,error_rad,torque_n_m\n".to_owned();
+        let mut text = "time_s,generator_rad,error_arcsec,torque_n_m\n".to_owned();
         for row in 0..50 {
             let t = f64::from(row);
-            text += &format!("{},{},{},{},{}\n", row / 25, 0.01 * t, 0.1 * t, 1e-5 * (t * 0.7).sin(), t);
+            let gap = f64::from(row / 25);
+            text += &format!("{},{},{},{t}\n", 0.01 * t + gap, 0.1 * t, 2.0 * (t * 0.7).sin());
         }
         let gear = Gear::of_ratio(-94.0);
         let whole = parse("x.csv", text.as_bytes(), &ColumnMap::default(), &gear).unwrap();
