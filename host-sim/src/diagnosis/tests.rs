@@ -3,6 +3,7 @@
 use super::report::{Diagnosis, Verdict};
 use super::{DiagnosisError, Extended, Settings, diagnose};
 use crate::measurement::Session;
+use crate::nominal::{Harmonic, Nominal};
 use crate::synthesize::{Effect, Plan, Richness, Sensors, catalogue_drive, measure};
 
 fn effect(name: &str, size: f64, phase: f64, other: f64) -> Effect {
@@ -263,13 +264,15 @@ fn a_sensor_put_back_elsewhere_before_each_session_is_described_and_nothing_blam
 
 /// Hands a law's excitation on made-up rows to `look`.
 fn excited(look: impl FnOnce(&super::Excitation<'_>, &[super::Law])) {
-    let drive = catalogue_drive();
-    let sessions = data(&[], Richness::Rich, 0, 9);
-    let rows = super::Rows::new(&sessions, &drive);
-    let (base, jumps) = super::prepare::base(&rows, &drive, None);
+    excited_by(&data(&[], Richness::Rich, 0, 9), &catalogue_drive(), |on| look(on, &super::library(on)));
+}
+
+/// Hands the excitation of these sessions to `look`.
+fn excited_by(sessions: &[Session], drive: &Nominal, look: impl FnOnce(&super::Excitation<'_>)) {
+    let rows = super::Rows::new(sessions, drive);
+    let (base, jumps) = super::prepare::base(&rows, drive, None);
     let scales = super::Scales::new(&rows, Settings::default().pitch_radius_mm, jumps);
-    let on = super::Excitation::new(&rows, &drive, &base, &scales);
-    look(&on, &super::library(&on));
+    look(&super::Excitation::new(&rows, drive, &base, &scales));
 }
 
 #[test]
@@ -347,27 +350,21 @@ fn a_wheel_so_far_off_that_no_clearance_is_left_is_begun_with_its_own_size() {
             *error += 5.0 * of_wheel(*psi).cos() / crate::tables::ARCSEC_PER_RAD;
         }
     }
-    drive.harmonics.push(crate::nominal::Harmonic {
-        order_per_generator_turn: of_wheel(1.0),
-        amplitude_arcsec: 5.0,
-        phase_rad: 0.0,
-    });
+    drive.harmonics.push(Harmonic { order_per_generator_turn: of_wheel(1.0), amplitude_arcsec: 5.0, phase_rad: 0.0 });
     excited(|on, laws| {
         let law = law(laws, "circular_spline_eccentricity");
         let pattern = &(law.columns)(on, &[phase, size, 1e9, 3.0])[0].values;
         let errors = sessions.iter_mut().flat_map(|session| &mut session.error_rad);
         errors.zip(pattern).for_each(|(error, arcsec)| *error += arcsec / crate::tables::ARCSEC_PER_RAD);
     });
-    let rows = super::Rows::new(&sessions, &drive);
-    let (base, jumps) = super::prepare::base(&rows, &drive, None);
-    let scales = super::Scales::new(&rows, Settings::default().pitch_radius_mm, jumps);
-    let on = super::Excitation::new(&rows, &drive, &base, &scales);
-    let search = super::Search::new(&on, &Settings::default()).unwrap();
-    let law = law(&search.laws, "circular_spline_eccentricity");
-    let scaffold = super::model::Scaffold::new(&search.problem, Vec::new());
-    let begun: Vec<Vec<f64>> = scaffold.begin(law).iter().map(|places| law.values(places)).collect();
-    let near = |v: &&Vec<f64>| (v[1] / size - 1.0).abs() < 0.25 && (2.0 * (v[0] - phase)).cos() > 0.95;
-    assert!(begun.iter().any(|v| near(&v)), "{size}: {begun:?}");
+    excited_by(&sessions, &drive, |on| {
+        let search = super::Search::new(on, &Settings::default()).unwrap();
+        let law = law(&search.laws, "circular_spline_eccentricity");
+        let scaffold = super::model::Scaffold::new(&search.problem, Vec::new());
+        let begun: Vec<Vec<f64>> = scaffold.begin(law).iter().map(|places| law.values(places)).collect();
+        let near = |v: &Vec<f64>| (v[1] / size - 1.0).abs() < 0.25 && (2.0 * (v[0] - phase)).cos() > 0.95;
+        assert!(begun.iter().any(near), "{size}: {begun:?}");
+    });
 }
 
 #[test]
