@@ -36,17 +36,26 @@ impl PlayLaw {
     /// Which flank carries in each row, −1 to 1, under a torque.
     #[must_use]
     pub fn flanks(self, rows: &Rows, torque: &[f64], nominal: &Nominal) -> Vec<f64> {
+        // Before the first load: where the friction of a moving output puts it.
+        let begun = |first: usize| -rows.direction[first] * nominal.ratio.signum();
+        self.flanks_from(begun, 1.0, rows, torque, nominal)
+    }
+
+    /// The same with a clearance `wider` than nominal, from where each session has `begun` if no load says (first row).
+    fn flanks_from(
+        self,
+        begun: impl Fn(usize) -> f64,
+        wider: f64,
+        rows: &Rows,
+        torque: &[f64],
+        nominal: &Nominal,
+    ) -> Vec<f64> {
         let friction = nominal.friction_torque_n_m;
-        let half_rad = (0.5 * nominal.backlash_arcsec / ARCSEC_PER_RAD).max(1e-12);
+        let half_rad = (0.5 * wider * nominal.backlash_arcsec / ARCSEC_PER_RAD).max(1e-12);
         let mut flanks = vec![0.0; rows.len()];
         for session in &rows.sessions {
             let first = session.start;
-            // Before the first load: where the friction of a moving output puts it.
-            let mut p = if torque[first].abs() > friction {
-                torque[first].signum()
-            } else {
-                -rows.direction[first] * nominal.ratio.signum()
-            };
+            let mut p = if torque[first].abs() > friction { torque[first].signum() } else { begun(first) };
             for k in session.clone() {
                 let load = torque[k];
                 p = match self {
@@ -131,6 +140,8 @@ const FAR_BETTER: f64 = 0.8;
 pub(super) const NEAR_FRICTION: f64 = 1.25;
 /// A clearance is crossed within this time, s.
 const CROSSING_S: f64 = 0.08;
+/// A clearance may be this many times as wide as the nominal one before anything else is known.
+const WIDER: f64 = 1.6;
 /// If more of the rows than this are uncertain, none is set aside: then they are what the data are about.
 pub(super) const UNCERTAIN_AT_MOST: f64 = 0.35;
 
@@ -186,7 +197,7 @@ impl Base {
             let turns = nominal.spread.harmonic_phase_rad.max(LEAST_TURN * nominal.spread.harmonic);
             add("harmonic", wave(std::f64::consts::FRAC_PI_2), turns);
         }
-        let uncertain = uncertain(rows, nominal, &flank);
+        let uncertain = uncertain(rows, nominal, law, &flank);
         Base { prediction, flank, wind_up, half_backlash, law, floating, waves: Waves::default(), uncertain }
     }
 }
@@ -239,7 +250,34 @@ fn predicted_by_table(rows: &Rows, table: &Table<'_>) -> Vec<f64> {
     predicted
 }
 
-fn uncertain(rows: &Rows, nominal: &Nominal, flank: &[f64]) -> Vec<bool> {
+fn uncertain(rows: &Rows, nominal: &Nominal, law: PlayLaw, flank: &[f64]) -> Vec<bool> {
+    let enough = |doubted: &[bool]| {
+        doubted.iter().filter(|u| **u).count() as f64 / rows.len().max(1) as f64 <= UNCERTAIN_AT_MOST
+    };
+    let by_load = uncertain_by_load(rows, nominal, flank);
+    if enough(&by_load) {
+        return by_load;
+    }
+    // Where hardly any load says which flank carries, the motion does.
+    let by_motion = if law == PlayLaw::Pushed { uncertain_by_motion(rows, nominal) } else { Vec::new() };
+    if !by_motion.is_empty() && enough(&by_motion) { by_motion } else { vec![false; rows.len()] }
+}
+
+/// Rows before the generator has pushed the output to a flank, wherever it stood and were the clearance [`WIDER`].
+fn uncertain_by_motion(rows: &Rows, nominal: &Nominal) -> Vec<bool> {
+    let from = |begun: f64, wider: f64| PlayLaw::Pushed.flanks_from(|_| begun, wider, rows, &rows.torque, nominal);
+    let all = [from(1.0, 1.0), from(-1.0, 1.0), from(1.0, WIDER), from(-1.0, WIDER)];
+    let carries = |flank: f64| if flank.abs() < 0.999 { 0.0 } else { flank.signum() };
+    (0..rows.len())
+        .map(|k| {
+            let first = carries(all[0][k]);
+            first == 0.0 || all.iter().any(|flank| carries(flank[k]) != first)
+        })
+        .collect()
+}
+
+/// Rows with a torque around friction, and those while the clearance is crossed.
+fn uncertain_by_load(rows: &Rows, nominal: &Nominal, flank: &[f64]) -> Vec<bool> {
     let near = NEAR_FRICTION * nominal.friction_torque_n_m;
     let mut uncertain: Vec<bool> =
         (0..rows.len()).map(|k| rows.torque[k].abs() <= near || flank[k].abs() < 0.999).collect();
@@ -251,10 +289,6 @@ fn uncertain(rows: &Rows, nominal: &Nominal, flank: &[f64]) -> Vec<bool> {
                 uncertain[around].fill(true);
             }
         }
-    }
-    let share = uncertain.iter().filter(|u| **u).count() as f64 / rows.len().max(1) as f64;
-    if share > UNCERTAIN_AT_MOST {
-        uncertain.fill(false);
     }
     uncertain
 }

@@ -44,7 +44,7 @@ use noise::{Noise, Whitener};
 use report::{Diagnosis, Unexplained};
 use resolution::{Resolution, resolution};
 use rows::Rows;
-use select::{Selected, fit, select};
+use select::{Bests, Selected, fit, select};
 
 /// Why data cannot be diagnosed.
 #[derive(Debug, Error, PartialEq, Eq)]
@@ -121,7 +121,7 @@ pub fn diagnose_extended(
     progress(1, 4, "causes");
     let search = Search::new(&on, settings)?;
     progress(2, 4, "rivals");
-    let Search { laws, problem, noise, start, fast } = search;
+    let Search { laws, problem, noise, start, bests, fast } = search;
     let terms = terms_at(&problem, &laws, &start);
     let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
     let (selected, mut unproved) = held_out::proved(&problem, selected);
@@ -140,7 +140,7 @@ pub fn diagnose_extended(
         }
     }
     left.append(&mut unproved);
-    let diagnosis = verdict::conclude(&problem, &laws, selected, left, noise, settings);
+    let diagnosis = verdict::conclude(&problem, &laws, selected, &bests, left, noise, settings);
     let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
     drop(problem);
     Ok((diagnosis, found.extended(laws, &base, &scales)))
@@ -170,6 +170,8 @@ struct Search<'a> {
     noise: Noise,
     /// Index and places of each law chosen.
     start: Vec<(usize, Vec<f64>)>,
+    /// Where each law was at its best.
+    bests: Bests,
     /// Lines too fast for averages.
     fast: Vec<Unexplained>,
 }
@@ -191,11 +193,13 @@ impl<'a> Search<'a> {
         let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth);
         let mut fast: Vec<Unexplained> = Vec::new();
         let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
+        let mut bests = Bests::default();
         // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
         for round in 0.. {
             fast.clear();
             let terms = terms_at(&problem, &laws, &start);
-            let selected = select(&problem, &laws, noise.white, terms, say).ok_or(DiagnosisError::NotFinite)?;
+            let selected =
+                select(&problem, &laws, noise.white, terms, &mut bests, say).ok_or(DiagnosisError::NotFinite)?;
             start = remembered(&laws, &selected);
             if round == MOST_ROUNDS {
                 break;
@@ -242,7 +246,7 @@ impl<'a> Search<'a> {
             say(format!("once more: {noise:?}, worth {worth:.2}"));
             problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth);
         }
-        Ok(Search { laws, problem, noise, start, fast })
+        Ok(Search { laws, problem, noise, start, bests, fast })
     }
 }
 

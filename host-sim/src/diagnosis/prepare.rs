@@ -3,9 +3,10 @@
 use std::f64::consts::PI;
 
 use flexspline::Table;
+use rayon::prelude::*;
 
 use super::base::{Base, NEAR_FRICTION, UNCERTAIN_AT_MOST};
-use super::candidate::{Excitation, Law, Tolerance};
+use super::candidate::{Column, Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
 use super::model::Term;
 use super::noise::{Noise, Whitener, white_level};
@@ -170,6 +171,11 @@ const LOAD_UNKNOWN: f64 = 0.2;
 
 /// Largest wander that is tried, in units of the white noise.
 pub(super) const MOST_WANDER: f64 = 3.0;
+/// Shortest correlation time of a wander that is tried, s.
+const FASTEST_S: f64 = 2.5;
+
+/// Evidence (natural logarithm of the ratio) within which one wander is as likely as another.
+const AS_LIKELY: f64 = 0.5;
 
 /// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by its evidence
 /// with the main columns of all laws as free columns. Returns also the worth of the information: below 1 where innovations are
@@ -186,20 +192,21 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64], uncertain: &[
     for floating in &on.base.floating {
         columns.push((plain.average(&floating.values), Prior { mean: 0.0, std: floating.spread }));
     }
-    for law in laws {
+    let of_law = |law: &Law| -> Vec<(Vec<f64>, Prior)> {
         let tried = law.tried();
         let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
-        for places in tried.iter().step_by(spread) {
-            let made = law.lead.as_ref().map_or(&law.columns, |lead| &lead.columns);
-            for column in made(on, &law.values(places)) {
-                if law.free_form || matches!(column.tolerance, Tolerance::Main(_)) {
-                    let averaged = plain.average(&column.values);
-                    let std = 20.0 / rms(&averaged).max(1e-9);
-                    columns.push((averaged, Prior { mean: 0.0, std }));
-                }
-            }
-        }
-    }
+        let made = law.lead.as_ref().map_or(&law.columns, |lead| &lead.columns);
+        let all = tried.iter().step_by(spread).flat_map(|places| made(on, &law.values(places)));
+        let counts = |column: &Column| law.free_form || matches!(column.tolerance, Tolerance::Main(_));
+        all.filter(counts)
+            .map(|column| {
+                let averaged = plain.average(&column.values);
+                let std = 20.0 / rms(&averaged).max(1e-9);
+                (averaged, Prior { mean: 0.0, std })
+            })
+            .collect()
+    };
+    columns.extend(laws.par_iter().with_max_len(1).map(of_law).collect::<Vec<_>>().into_iter().flatten());
     let data = plain.average(&left);
     let judge = |noise: Noise| {
         let whitener = Whitener::new(rows, uncertain, stride, noise);
@@ -221,19 +228,22 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64], uncertain: &[
     // A wander is slow: what is faster is a line, or a cause.
     let unit = if rows.recorded.time { 1.0 } else { 100.0 * rows.period };
     for wander in [0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, MOST_WANDER] {
-        for correlation in [2.5, 8.0, 25.0, 80.0] {
+        for correlation in [FASTEST_S, 8.0, 25.0, 80.0] {
             hypotheses.push(Noise { white, wander: wander * white, correlation_s: correlation * unit });
         }
     }
-    use rayon::prelude::*;
     let judged: Vec<_> = hypotheses.par_iter().map(|n| judge(*n)).collect();
+    let evidence = |k: usize| judged[k].as_ref().map_or(f64::NEG_INFINITY, |(evidence, _, _)| *evidence);
+    let most = (0..judged.len()).map(evidence).fold(f64::NEG_INFINITY, f64::max);
+    // A short recording does not tell a wander from none: then what it could hide is no cause.
+    let power = |k: &usize| hypotheses[*k].wander * hypotheses[*k].correlation_s.sqrt();
     let best = (0..judged.len())
-        .filter(|k| judged[*k].is_some())
-        .max_by(|a, b| {
-            let of = |k: usize| judged[k].as_ref().map_or(f64::NEG_INFINITY, |(e, _, _)| *e);
-            of(*a).total_cmp(&of(*b))
-        })
+        .filter(|k| evidence(*k) >= most - AS_LIKELY)
+        .max_by(|a, b| power(a).total_cmp(&power(b)))
         .unwrap_or(0);
+    // As restless as this no sensor is: what is left is a cause, which a wander that follows everything would hide.
+    let restless = hypotheses[best].wander >= MOST_WANDER * white && hypotheses[best].correlation_s <= FASTEST_S * unit;
+    let best = if restless { hypotheses.len() - 1 } else { best };
     let worth = judged[best].as_ref().map_or(1.0, |(_, innovations, whitener)| worth_of(innovations, whitener));
     (hypotheses[best], worth)
 }

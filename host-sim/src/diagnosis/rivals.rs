@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::candidate::Law;
 use super::model::{Problem, Scaffold, Term};
-use super::select::{Selected, Standing, begun, predicted, size_of, sound};
+use super::select::{Bests, Selected, Standing, begun, predicted, size_of, sound};
 
 /// A rival in the place of a cause.
 #[derive(Clone, Debug)]
@@ -58,6 +58,7 @@ pub fn rivals(
     laws: &[Law],
     selected: &Selected<'_>,
     standings: &[Standing],
+    bests: &Bests,
     k: usize,
 ) -> Vec<Rival> {
     let apart = selected.without(problem, k);
@@ -76,9 +77,10 @@ pub fn rivals(
     };
     let mut rivals: Vec<Rival> = open
         .into_par_iter()
+        .with_max_len(1)
         .filter_map(|law| {
-            let tried: Vec<(f64, Vec<f64>)> = scaffold
-                .begin(law)
+            let tried: Vec<(f64, Vec<f64>)> = bests
+                .begin(&scaffold, law)
                 .into_iter()
                 .filter_map(|places| Some((-scaffold.trial(law, &places)?.misfit, places)))
                 .collect();

@@ -2,7 +2,7 @@
 //! exchange. A cause has to earn its place four times: evidence, size, size against the misfit of the other laws, sessions it was not fitted to.
 
 use std::borrow::Cow;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -46,6 +46,8 @@ const MOST_UNNAMED: usize = 3;
 const MOST_ROUNDS: usize = 10;
 /// Laws that are refined in each round.
 const REFINED: usize = 9;
+/// Best places noted of each time that a law is tried at all.
+const NOTED: usize = 2;
 /// Laws that are refined for the place of another.
 const EXCHANGED: usize = 4;
 /// Evidence by which something unnamed has to be ahead of the best cause to be taken before it.
@@ -152,21 +154,64 @@ pub(super) fn begun(law: &Law, mut tried: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>>
     begun
 }
 
-/// The strongest laws (`most` of them) at their best places tried, beside some terms; not refined. Best evidence first.
-fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law], most: usize) -> Vec<Term<'l>> {
+/// Where laws were at their best, each time that they were tried at all places.
+#[derive(Default)]
+pub struct Bests(HashMap<u64, Vec<Vec<f64>>>);
+
+impl Bests {
+    /// Notes the best of those tried, with what each is worth.
+    fn note(&mut self, law: &Law, tried: &[(f64, Vec<f64>)]) {
+        let mut best: Vec<&(f64, Vec<f64>)> = tried.iter().collect();
+        best.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let known = self.0.entry(law.id()).or_default();
+        for (_, places) in best.into_iter().take(NOTED) {
+            if !known.contains(places) {
+                known.push(places.clone());
+            }
+        }
+    }
+
+    /// Places to begin with a law that takes the place of a term: where it was at its best beside all terms so far or before, and
+    /// where its lead points now.
+    pub fn begin(&self, scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law) -> Vec<Vec<f64>> {
+        match self.0.get(&law.id()).filter(|_| law.lead.is_none()) {
+            Some(known) => known.clone(),
+            None => scaffold.begin(law),
+        }
+    }
+}
+
+/// The strongest laws (`most` of them) at their best places tried, beside some terms; not refined. Best evidence first. All places are
+/// tried and the best noted, or where `known` says them only those.
+fn scan<'l>(
+    problem: &Problem<'_>,
+    terms: &[Term<'l>],
+    laws: &[&'l Law],
+    most: usize,
+    bests: &mut Bests,
+    known: bool,
+) -> Vec<Term<'l>> {
     let scaffold = Scaffold::new(problem, terms.iter().collect());
+    let begin = |law: &Law| if known { bests.begin(&scaffold, law) } else { scaffold.begin(law) };
     let trials: Vec<(usize, Vec<f64>)> = laws
         .par_iter()
+        .with_max_len(1)
         .enumerate()
-        .flat_map_iter(|(k, law)| scaffold.begin(law).into_iter().map(move |places| (k, places)))
+        .flat_map_iter(|(k, law)| begin(law).into_iter().map(move |places| (k, places)))
         .collect();
     let tried: Vec<(usize, f64, Vec<f64>)> = trials
         .into_par_iter()
+        .with_max_len(4)
         .filter_map(|(k, places)| Some((k, scaffold.trial(laws[k], &places)?.evidence, places)))
         .collect();
     let mut by_law: Vec<Vec<(f64, Vec<f64>)>> = vec![Vec::new(); laws.len()];
     for (k, evidence, places) in tried {
         by_law[k].push((evidence, places));
+    }
+    if !known {
+        for (law, tried) in laws.iter().zip(&by_law) {
+            bests.note(law, tried);
+        }
     }
     let begun: Vec<(&'l Law, Vec<f64>)> = laws
         .iter()
@@ -175,6 +220,7 @@ fn scan<'l>(problem: &Problem<'_>, terms: &[Term<'l>], laws: &[&'l Law], most: u
         .collect();
     let mut found: Vec<(f64, &'l Law, Vec<f64>)> = begun
         .into_par_iter()
+        .with_max_len(1)
         .filter_map(|(law, places)| {
             let evidence = scaffold.whole_trial(law, &places)?.evidence;
             evidence.is_finite().then_some((evidence, law, places))
@@ -397,6 +443,7 @@ pub fn select<'l>(
     laws: &'l [Law],
     white: f64,
     start: Vec<Term<'l>>,
+    bests: &mut Bests,
     mut log: impl FnMut(String),
 ) -> Option<Selected<'l>> {
     let limits = Limits::of(white);
@@ -404,11 +451,14 @@ pub fn select<'l>(
     // What has given way once and come back does not give way to the same again: so rounds end.
     let (mut seen, mut given) = (HashSet::new(), HashSet::new());
     for round in 0..MOST_ROUNDS {
-        let Some(next) = forward(problem, laws, &selected, &limits, &mut log) else { break };
+        let Some(next) = forward(problem, laws, &selected, &limits, bests, &mut log) else { break };
+        let taken = next.terms.len();
         selected = settle(problem, next)?;
         selected = backward(problem, selected, &limits, &mut log)?;
         if round > 0 || selected.terms.len() > 1 {
-            selected = exchange(problem, laws, selected, &limits, &mut given, &mut log)?;
+            // What was taken just now was held against all others beside the same terms, unless one of them has gone since.
+            let compared = if selected.terms.len() == taken { taken - 1 } else { usize::MAX };
+            selected = exchange(problem, laws, selected, &limits, compared, &mut given, bests, &mut log)?;
             selected = backward(problem, selected, &limits, &mut log)?;
         }
         let mut causes: Vec<&str> = selected.terms.iter().map(|t| t.law.cause.as_str()).collect();
@@ -429,13 +479,14 @@ pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[&str]) -> Vec
             .iter()
             .filter(|law| causes.contains(&law.cause.as_str()) && terms.iter().all(|t| t.law.cause != law.cause))
             .collect();
-        let found = scan(problem, &terms, &open, usize::MAX);
+        let found = scan(problem, &terms, &open, usize::MAX, &mut Bests::default(), false);
         if found.is_empty() {
             break;
         }
         let scaffold = Scaffold::new(problem, terms.iter().collect());
         let best = found
             .into_par_iter()
+            .with_max_len(1)
             .filter_map(|term| {
                 let (term, fit) = scaffold.refine(term)?;
                 Some((fit.solution.evidence, term))
@@ -457,6 +508,7 @@ fn forward<'l>(
     laws: &'l [Law],
     selected: &Selected<'l>,
     limits: &Limits,
+    bests: &mut Bests,
     log: &mut impl FnMut(String),
 ) -> Option<Selected<'l>> {
     let named = selected.terms.iter().filter(|t| t.law.named).count();
@@ -467,11 +519,12 @@ fn forward<'l>(
         .filter(|law| if law.named { named < MOST_CAUSES } else { unnamed < MOST_UNNAMED })
         .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &selected.fit, law))
         .collect();
-    let found = scan(problem, &selected.terms, &open, REFINED);
+    let found = scan(problem, &selected.terms, &open, REFINED, bests, false);
     let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
     let before = selected.fit.solution.evidence;
     let mut refined: Vec<(f64, Term<'l>, Fit)> = found
         .into_par_iter()
+        .with_max_len(1)
         .filter_map(|term| {
             let (term, fit) = scaffold.refine(term)?;
             let gain = fit.solution.evidence + term.occam - before;
@@ -633,16 +686,19 @@ fn backward<'l>(
     Some(selected)
 }
 
-/// Replaces a term by another law where that tells the data better.
+/// Replaces a term, but for the one at `compared`, by another law where that tells the data better.
+#[allow(clippy::too_many_arguments, reason = "all that a search remembers")]
 fn exchange<'l>(
     problem: &Problem<'_>,
     laws: &'l [Law],
     selected: Selected<'l>,
     limits: &Limits,
+    compared: usize,
     given: &mut HashSet<(u64, u64)>,
+    bests: &mut Bests,
     log: &mut impl FnMut(String),
 ) -> Option<Selected<'l>> {
-    for k in 0..selected.terms.len() {
+    for k in (0..selected.terms.len()).filter(|k| *k != compared) {
         let others: Vec<Term<'l>> = selected.without(problem, k).into_iter().map(Cow::into_owned).collect();
         let without = fit(problem, &others)?;
         let open: Vec<&Law> = laws
@@ -651,10 +707,11 @@ fn exchange<'l>(
             .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &without, law))
             .filter(|law| !given.contains(&(selected.terms[k].law.id(), law.id())))
             .collect();
-        let rivals = scan(problem, &others, &open, EXCHANGED);
+        let rivals = scan(problem, &others, &open, EXCHANGED, bests, true);
         let scaffold = Scaffold::new(problem, others.iter().collect());
         let refined: Vec<(Term<'l>, Fit)> = rivals
             .into_par_iter()
+            .with_max_len(1)
             .filter_map(|term| {
                 let (term, fit) = scaffold.refine(term)?;
                 let c = fit.of(fit.starts.len() - 1);

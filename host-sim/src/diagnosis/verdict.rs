@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use super::candidate::Law;
 use super::model::{Fit, Problem, Term};
 use super::noise::Noise;
@@ -30,6 +32,7 @@ pub(super) fn conclude(
     problem: &Problem<'_>,
     laws: &[Law],
     selected: Selected<'_>,
+    bests: &select::Bests,
     mut left_over: Vec<Unexplained>,
     noise: Noise,
     settings: &Settings,
@@ -93,8 +96,12 @@ pub(super) fn conclude(
     let mut next_experiment = None;
     let mut told_better = Vec::new();
     if verdict != Verdict::Unknown {
-        for k in named.iter().copied() {
-            let rivals = rivals::rivals(problem, laws, &selected, &standings, k);
+        let of_all: Vec<Vec<rivals::Rival>> = named
+            .par_iter()
+            .with_max_len(1)
+            .map(|k| rivals::rivals(problem, laws, &selected, &standings, bests, *k))
+            .collect();
+        for (k, rivals) in named.iter().copied().zip(of_all) {
             if settings.verbose {
                 for rival in rivals.iter().take(4) {
                     tell(&format!(

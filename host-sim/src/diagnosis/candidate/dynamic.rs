@@ -7,13 +7,63 @@ use crate::diagnosis::base::PlayLaw;
 use crate::diagnosis::linear::Prior;
 use crate::tables::ARCSEC_PER_RAD;
 
+/// Moments, over the scale of the load, and directions that are tried on a drive without load; and how closely the best is followed.
+const MOMENTS: [f64; 5] = [0.2, 0.35, 0.6, 1.0, 1.6];
+const DIRECTIONS: usize = 16;
+const CLOSER: usize = 6;
+
+/// Moment and phase with which the `load` leaves least of the error by the flanks that it turns over. Where it turns one over too early or
+/// too late rows are off by the whole clearance, which a wander would follow: so all rows count alike.
+fn moment_that_turns_flanks(
+    on: &Excitation<'_>,
+    play: PlayLaw,
+    scale: f64,
+    load: impl Fn(&Excitation<'_>, &[f64]) -> Vec<f64> + Sync,
+) -> Vec<f64> {
+    use rayon::prelude::*;
+    let (rows, base) = (on.rows, on.base);
+    let used: Vec<usize> = rows.sessions_used().flatten().collect();
+    let spread = |shape: &[f64; 2]| -> f64 {
+        let torque: Vec<f64> = rows.torque.iter().zip(load(on, shape)).map(|(t, added)| t + added).collect();
+        let flank = play.flanks(rows, &torque, on.nominal);
+        let left = |k: &usize| {
+            let turned_over = base.half_backlash * (flank[*k] - base.flank[*k]);
+            rows.error[*k] - base.prediction[*k] - on.wound_up(*k, torque[*k]) - turned_over
+        };
+        let mean = used.iter().map(left).sum::<f64>() / used.len().max(1) as f64;
+        used.iter().map(|k| (left(k) - mean).powi(2)).sum()
+    };
+    let least = |tried: Vec<[f64; 2]>| -> ([f64; 2], f64) {
+        let judged = tried.into_par_iter().map(|shape| (shape, spread(&shape)));
+        judged.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or(([scale, 0.0], f64::INFINITY))
+    };
+    let (mut turn, mut factor) = (2.0 * PI / DIRECTIONS as f64, 1.6f64);
+    let every = |moment: f64| (0..DIRECTIONS).map(move |k| [moment * scale, turn * k as f64]);
+    let (mut best, mut spread_of_best) = least(MOMENTS.into_iter().flat_map(every).collect());
+    for _ in 0..CLOSER {
+        (turn, factor) = (0.5 * turn, factor.sqrt());
+        let [moment, phase] = best;
+        let beside = [1.0 / factor, 1.0, factor]
+            .into_iter()
+            .flat_map(|by| [-turn, 0.0, turn].map(|of| [by * moment, phase + of]));
+        let (better, spread) = least(beside.collect());
+        if spread < spread_of_best {
+            (best, spread_of_best) = (better, spread);
+        }
+    }
+    vec![best[0], best[1].rem_euclid(2.0 * PI)]
+}
+
 /// An unbalanced load, m g l sin of the output angle against gravity: adds to the torque, so it winds the drive up and moves the play.
 fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
-    let scale = if on.scales.load > 0.0 { on.scales.load } else { 20.0 };
+    let scale = on.plausible_load();
     let load = move |on: &Excitation<'_>, shape: &[f64]| -> Vec<f64> {
         let rows = on.rows;
         by_row(on, |k| shape[0] * (rows.output[k] + sign * rows.orientation[k] + shape[1]).sin())
     };
+    // Where nothing else loads the drive, its moment decides which flank carries, and no linear law is near.
+    let unloaded = on.scales.load < on.nominal.friction_torque_n_m;
+    let by_flank = unloaded.then(|| moment_that_turns_flanks(on, play, scale, load));
     let mut law = Law::new("gravity_torque", move |on, shape| {
         let rows = on.rows;
         let added = load(on, shape);
@@ -48,8 +98,11 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
                 main(by_row(on, |k| slope(k) * at(k).cos()), 0.3 * scale),
             ]
         }),
-        // a sin(x) + b cos(x) = m sin(x + phase).
-        shape: Box::new(|_, c| vec![vec![c[0].hypot(c[1]), c[1].atan2(c[0]).rem_euclid(2.0 * PI)]]),
+        shape: Box::new(move |_, c| {
+            // a sin(x) + b cos(x) = m sin(x + phase).
+            let by_wind_up = vec![c[0].hypot(c[1]), c[1].atan2(c[0]).rem_euclid(2.0 * PI)];
+            [by_wind_up].into_iter().chain(by_flank.iter().cloned()).collect()
+        }),
         loaded_only: true,
     });
     law

@@ -46,11 +46,23 @@ pub struct Excitation<'a> {
     pub softer: f64,
 }
 
+/// A load that nobody recorded on an unloaded drive may be so many times its friction, or wind it up by so much, arcsec.
+const UNLOADED_FRICTIONS: f64 = 4.0;
+const UNLOADED_ARCSEC: f64 = 20.0;
+
 impl<'a> Excitation<'a> {
     /// The recorded one.
     #[must_use]
     pub fn new(rows: &'a Rows, nominal: &'a Nominal, base: &'a Base, scales: &'a Scales) -> Excitation<'a> {
         Excitation { rows, nominal, base, scales, widened: None, zones: None, softer: 1.0 }
+    }
+
+    /// Scale of a load that the torque column does not hold, N·m. Without a load on the output that column is noise, and says nothing
+    /// of what its friction and its spring bear.
+    fn plausible_load(&self) -> f64 {
+        let slope = self.nominal.wind_up_arcsec(1e-3) / 1e-3;
+        let wound_up = if slope > 0.0 { UNLOADED_ARCSEC / slope } else { 0.0 };
+        self.scales.load.max(UNLOADED_FRICTIONS * self.nominal.friction_torque_n_m).max(wound_up)
     }
 
     /// What wind-up (arcsec) a load beside the torque that was recorded adds at row `k`, `torque` (N·m) being both.

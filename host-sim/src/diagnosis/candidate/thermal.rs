@@ -91,16 +91,31 @@ fn wind_up_arcsec_per_n_m(on: &Excitation<'_>) -> f64 {
     if slope > 0.0 { on.softer * slope } else { 1.0 }
 }
 
+/// How much thicker a lubricant is that is `cold` K below the nominal temperature. Vogel's `ln ν = B / (T + C)` written by its slope
+/// there, `per_k`, and `bend` = 1 / (nominal temperature + C): 0 is an exponential, 1/293 K Andrade's law at 20 °C, 1/115 K Vogel's.
+fn thicker(cold: f64, per_k: f64, bend: f64) -> f64 {
+    (per_k * cold / (1.0 - bend * cold).max(LEAST_ABOVE_SETTING)).exp()
+}
+
+/// Vogel's law holds down to where a lubricant sets: not closer to it than this share of the way from the nominal temperature.
+const LEAST_ABOVE_SETTING: f64 = 0.2;
+/// Largest [`thicker`] bend, 1/K.
+const MOST_BEND: f64 = 0.01;
+
+/// Share of a drag of 1 at the mean speed and the nominal temperature, against the motion.
+fn drag(on: &Excitation<'_>, power: f64, per_k: f64, bend: f64) -> Vec<f64> {
+    let (rows, usual) = (on.rows, usual_speed(on));
+    by_row(on, |k| {
+        let share = (rows.speed[k] / usual).abs().powf(power);
+        let thicker = thicker(on.nominal.temperature_c - rows.temperature[k], per_k, bend);
+        -rows.direction[k] * on.nominal.ratio.signum() * share * thicker
+    })
+}
+
 /// Arcsec for 1 N·m of drag at the mean speed and the nominal temperature.
 fn drag_wind_up(on: &Excitation<'_>, power: f64, per_k: f64, bend: f64) -> Vec<f64> {
-    let (rows, usual) = (on.rows, usual_speed(on));
     let slope = wind_up_arcsec_per_n_m(on);
-    by_row(on, |k| {
-        let cold = on.nominal.temperature_c - rows.temperature[k];
-        let share = (rows.speed[k] / usual).abs();
-        let thicker = (per_k * cold * (1.0 + bend * cold)).exp();
-        -rows.direction[k] * on.nominal.ratio.signum() * share.powf(power) * thicker * slope
-    })
+    drag(on, power, per_k, bend).into_iter().map(|share| share * slope).collect()
 }
 
 /// Drag of the lubricant, against the motion: a power of the speed, and thicker in the cold (Vogel, close to exponential).
@@ -118,7 +133,7 @@ fn lubricant_viscosity() -> Law {
     .shapes([
         Shape::evenly("speed_exponent", 0.25, 1.05, 3),
         Shape::by_factors("per_k", 0.008, 0.12, 4),
-        Shape::evenly("bend_per_k", -0.002, 0.01, 1),
+        Shape::evenly("bend_per_k", 0.0, MOST_BEND, 1),
     ])
     .parameters(|_, shape, c| {
         vec![("drag_n_m", c[0]), ("speed_exponent", shape[0]), ("relative_drag_per_k", -shape[1])]
@@ -128,15 +143,9 @@ fn lubricant_viscosity() -> Law {
 
 /// The same drag as a load: it winds the drive up and, where it exceeds the torque, moves the play to the other flank.
 fn lubricant_load(on: &Excitation<'_>) -> Law {
-    let scale = on.scales.load;
+    let scale = on.plausible_load();
     let load = |on: &Excitation<'_>, shape: &[f64]| -> Vec<f64> {
-        let (drag_n_m, power, per_k) = (shape[0], shape[1], shape[2]);
-        let (rows, usual) = (on.rows, usual_speed(on));
-        by_row(on, |k| {
-            let cold = on.nominal.temperature_c - rows.temperature[k];
-            let share = (rows.speed[k] / usual).abs().powf(power) * (per_k * cold).exp();
-            -drag_n_m * share * rows.direction[k] * on.nominal.ratio.signum()
-        })
+        drag(on, shape[1], shape[2], shape[3]).into_iter().map(|share| shape[0] * share).collect()
     };
     let mut law = Law::new("lubricant_viscosity", move |on, shape| {
         let rows = on.rows;
@@ -154,6 +163,7 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
         Shape::by_factors("drag_n_m", 0.001 * scale, 1.0 * scale, 1),
         Shape::evenly("speed_exponent", 0.25, 1.05, 2),
         Shape::by_factors("per_k", 0.008, 0.12, 3),
+        Shape::evenly("bend_per_k", 0.0, MOST_BEND, 1),
     ])
     .parameters(|_, shape, c| {
         vec![("drag_n_m", shape[0] * c[0]), ("speed_exponent", shape[1]), ("relative_drag_per_k", -shape[2])]
@@ -162,8 +172,8 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
     law.load = Some(Box::new(load));
     law.in_crossings = true;
     law.lead = Some(Lead {
-        columns: Box::new(|on, shape| vec![main(drag_wind_up(on, shape[1], shape[2], 0.0), 10.0)]),
-        shape: Box::new(|shape, c| vec![vec![c[0].max(0.0), shape[1], shape[2]]]),
+        columns: Box::new(|on, shape| vec![main(drag_wind_up(on, shape[1], shape[2], shape[3]), 10.0)]),
+        shape: Box::new(|shape, c| vec![vec![c[0].max(0.0), shape[1], shape[2], shape[3]]]),
         loaded_only: true,
     });
     law

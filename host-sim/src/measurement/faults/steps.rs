@@ -27,7 +27,9 @@ const AGREES: f64 = 0.4;
 /// A step is taken back by one of the other sign that differs by less than this share.
 const TAKEN_BACK: f64 = 0.35;
 /// By several together, whose sum is less than this share of the largest.
-const TAKEN_BACK_TOGETHER: f64 = 0.1;
+const TAKEN_BACK_TOGETHER: f64 = 0.15;
+/// A clearance that is thrown over at two other places is thrown over here.
+const ELSEWHERE: usize = 2;
 /// No step smaller than this is looked for, rad.
 const LEAST_RAD: f64 = 5.0 * ARCSEC;
 /// Nor one that is not seen from one row to the next: so many standard deviations of the white noise.
@@ -163,10 +165,11 @@ fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<Step>)> {
         places.sort_by_key(|place| (place.session, place.row));
     }
     steps = lasting(steps);
-    let (sure, doubtful): (Vec<Step>, Vec<Step>) = steps
-        .iter()
-        .copied()
-        .partition(|(place, size, _)| no_flank_was_changed(sessions, &state, &steps, *place, *size));
+    let turned_over =
+        |place: Place, size: f64| !says_flank(sessions) && comes_elsewhere(sessions, &settled, place, size);
+    let (sure, doubtful): (Vec<Step>, Vec<Step>) = steps.iter().copied().partition(|(place, size, _)| {
+        !turned_over(*place, *size) && no_flank_was_changed(sessions, &state, &steps, *place, *size)
+    });
     // Where one step may be a change of flank, one of the other sign may be its way back.
     let way_back = |(_, size, _): &Step| {
         size.abs() <= WIDER_THAN_CLEARANCE_RAD && doubtful.iter().any(|(_, other, _)| size * other < 0.0)
@@ -346,6 +349,29 @@ fn largest_torque(sessions: &[Session]) -> f64 {
         .fold(0.0, |most: f64, torque| most.max(torque.abs()))
 }
 
+/// Whether torque was recorded, and more of it than noise: then it says which flank carries.
+fn says_flank(sessions: &[Session]) -> bool {
+    let noise = white_noise(sessions.iter().filter_map(|session| session.torque_n_m.as_deref()));
+    largest_torque(sessions) > LOAD_NOISE * noise
+}
+
+/// Whether the error changes by as much, within a row, at other places that no reversal is near to: under a load that nobody recorded.
+fn comes_elsewhere(sessions: &[Session], settled: &[Vec<bool>], place: Place, size: f64) -> bool {
+    if size.abs() > WIDER_THAN_CLEARANCE_RAD {
+        return false;
+    }
+    let mut elsewhere = 0;
+    for (number, session) in sessions.iter().enumerate() {
+        for row in 1..session.len() {
+            let near = number == place.session && row.abs_diff(place.row) < WINDOW;
+            let change = session.error_rad[row] - session.error_rad[row - 1];
+            let as_much = (change.abs() - size.abs()).abs() < TAKEN_BACK * size.abs();
+            elsewhere += usize::from(!near && settled[number][row] && as_much);
+        }
+    }
+    elsewhere >= ELSEWHERE
+}
+
 /// Whether load changes at once, by more than its noise and its usual pace, near a row.
 fn load_changes(session: &Session, row: usize, largest: f64) -> bool {
     session.torque_n_m.as_ref().is_some_and(|torque| {
@@ -362,6 +388,16 @@ fn load_changes(session: &Session, row: usize, largest: f64) -> bool {
 fn others_change_as_much(session: &Session, row: usize, size: f64) -> bool {
     let near = row.saturating_sub(APART).max(1)..(row + APART + 1).min(session.len());
     near.filter(|k| *k != row).any(|k| (session.error_rad[k] - session.error_rad[k - 1]).abs() > 0.5 * size.abs())
+}
+
+/// Whether a row lies between a load that holds one flank and one that holds the other: there a flank is changed.
+fn load_turns_over(session: &Session, row: usize, largest: f64) -> bool {
+    let Some(torque) = session.torque_n_m.as_ref().filter(|_| largest > 0.0) else { return false };
+    let held = (HELD * largest).max(LOAD_NOISE * white_noise([torque.as_slice()]));
+    let holds = |torque: &&f64| torque.abs() >= held;
+    let before = torque[..row].iter().rev().find(holds);
+    let after = torque[row..].iter().find(holds);
+    torque[row].abs() < held && before.zip(after).is_some_and(|(before, after)| before * after < 0.0)
 }
 
 /// Whether a step that happens under light load, where friction alone holds a flank, is seen under loads that hold one: a change of
@@ -392,7 +428,9 @@ fn no_flank_was_changed(sessions: &[Session], state: &State, steps: &[Step], pla
     if size.abs() > WIDER_THAN_CLEARANCE_RAD {
         return true;
     }
-    if !lasts_under_load(sessions, state, steps, place, size) {
+    if load_turns_over(&sessions[place.session], place.row, largest_torque(sessions))
+        || !lasts_under_load(sessions, state, steps, place, size)
+    {
         return false;
     }
     let here = sessions[place.session].generator_rad[place.row];
