@@ -241,8 +241,12 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64], uncertain: &[
         .filter(|k| evidence(*k) >= most - AS_LIKELY)
         .max_by(|a, b| power(a).total_cmp(&power(b)))
         .unwrap_or(0);
-    // As restless as this no sensor is: what is left is a cause, which a wander that follows everything would hide.
-    let restless = hypotheses[best].wander >= MOST_WANDER * white && hypotheses[best].correlation_s <= FASTEST_S * unit;
+    // As restless as this no sensor is: what is left is a cause. On a drive without load it is one that turns flanks over, which a wander
+    // that follows everything would hide.
+    let unloaded = on.scales.load < on.nominal.friction_torque_n_m;
+    let restless = unloaded
+        && hypotheses[best].wander >= MOST_WANDER * white
+        && hypotheses[best].correlation_s <= FASTEST_S * unit;
     let best = if restless { hypotheses.len() - 1 } else { best };
     let worth = judged[best].as_ref().map_or(1.0, |(_, innovations, whitener)| worth_of(innovations, whitener));
     (hypotheses[best], worth)

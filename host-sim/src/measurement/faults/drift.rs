@@ -28,6 +28,8 @@ const BOTH_FLANKS: f64 = 0.1;
 const LEAST_LEAP_RAD: f64 = 1200.0 * ARCSEC;
 const LEAP_S: f64 = 2.0;
 const LEAP_SHARE: f64 = 0.3;
+/// Nor what moves between two recordings by so many times what the drift gives in that time.
+const GAP_SHARE: f64 = 2.0;
 /// Rows whose median is a level.
 const LEVEL_ROWS: usize = 12;
 
@@ -101,7 +103,9 @@ fn slope(sessions: &[Session], gear: &Gear) -> Option<(f64, f64, f64)> {
         return None;
     }
     // Teeth that slip have a trend, too.
-    if largest_leap(sessions) > LEAST_LEAP_RAD.max(LEAP_SHARE * 2.0 * drift.abs()) {
+    let per_s = 2.0 / (end - begin);
+    let leap = largest_leap(sessions).max(largest_leap_between(sessions, drift.abs() * per_s));
+    if leap > LEAST_LEAP_RAD.max(LEAP_SHARE * 2.0 * drift.abs()) {
         return None;
     }
     // Sessions that all have load of one sign lie on one flank, whatever their direction.
@@ -137,7 +141,6 @@ fn slope(sessions: &[Session], gear: &Gear) -> Option<(f64, f64, f64)> {
     let (trend, std) = line(&points)?;
     let certain = (drift / formal).abs() > CERTAIN && (trend / std).abs() > CERTAIN && trend * drift > 0.0;
     let steady = (trend - drift).abs() < 0.5 * drift.abs();
-    let per_s = 2.0 / (end - begin);
     (certain && steady).then_some((drift * per_s, 0.5 * (begin + end), std.max(formal) * per_s))
 }
 
@@ -156,6 +159,19 @@ fn largest_leap(sessions: &[Session]) -> f64 {
         }
     }
     largest
+}
+
+/// The largest change from one session to the next, rad, beyond [`GAP_SHARE`] times a drift of `per_s` rad/s.
+fn largest_leap_between(sessions: &[Session], per_s: f64) -> f64 {
+    let leap = |pair: &[Session]| {
+        let [before, after] = pair else { return 0.0 };
+        let (Some(then), Some(now)) = (&before.time_s, &after.time_s) else { return 0.0 };
+        let passed = now.first().zip(then.last()).map_or(0.0, |(now, then)| now - then);
+        let last = &before.error_rad[before.len().saturating_sub(LEVEL_ROWS)..];
+        let first = &after.error_rad[..LEVEL_ROWS.min(after.len())];
+        (median_of(&mut first.to_vec()) - median_of(&mut last.to_vec())).abs() - GAP_SHARE * per_s * passed
+    };
+    sessions.windows(2).map(leap).fold(0.0, f64::max)
 }
 
 /// Slope of a straight line and its standard deviation, neighbours being correlated as their residuals are.
