@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use flexspline::Table;
 use rayon::prelude::*;
 
-use super::base::{Base, NEAR_FRICTION, UNCERTAIN_AT_MOST};
+use super::base::{Base, Floating, NEAR_FRICTION, UNCERTAIN_AT_MOST};
 use super::candidate::{Column, Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
 use super::model::Term;
@@ -171,11 +171,17 @@ const LOAD_UNKNOWN: f64 = 0.2;
 
 /// Largest wander that is tried, in units of the white noise.
 pub(super) const MOST_WANDER: f64 = 3.0;
-/// Shortest correlation time of a wander that is tried, s.
+/// Shortest correlation time of a wander that is tried, s, and a usual one.
 const FASTEST_S: f64 = 2.5;
+const USUAL_S: f64 = 25.0;
 
 /// Evidence (natural logarithm of the ratio) within which one wander is as likely as another.
 const AS_LIKELY: f64 = 0.5;
+
+/// Innovations beyond so many of their robust standard deviations are no noise, whatever it is…
+const NO_NOISE: f64 = 8.0;
+/// …as long as they are rare: at most this share.
+const RARE: f64 = 0.1;
 
 /// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by its evidence
 /// with the main columns of all laws as free columns. Returns also the worth of the information: below 1 where innovations are
@@ -188,52 +194,18 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64], uncertain: &[
     let white = white_level(rows, &left);
     let stride = rows.count_used().div_ceil(WANDER_AVERAGES).max(1);
     let plain = Whitener::new(rows, uncertain, stride, Noise { white, wander: 0.0, correlation_s: 1.0 });
-    let mut columns: Vec<(Vec<f64>, Prior)> = Vec::new();
-    for floating in &on.base.floating {
-        columns.push((plain.average(&floating.values), Prior { mean: 0.0, std: floating.spread }));
-    }
-    let of_law = |law: &Law| -> Vec<(Vec<f64>, Prior)> {
-        let tried = law.tried();
-        let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
-        let made = law.lead.as_ref().map_or(&law.columns, |lead| &lead.columns);
-        let all = tried.iter().step_by(spread).flat_map(|places| made(on, &law.values(places)));
-        let counts = |column: &Column| law.free_form || matches!(column.tolerance, Tolerance::Main(_));
-        all.filter(counts)
-            .map(|column| {
-                let averaged = plain.average(&column.values);
-                let std = 20.0 / rms(&averaged).max(1e-9);
-                (averaged, Prior { mean: 0.0, std })
-            })
-            .collect()
-    };
-    columns.extend(laws.par_iter().with_max_len(1).map(of_law).collect::<Vec<_>>().into_iter().flatten());
-    let data = plain.average(&left);
-    let judge = |noise: Noise| {
-        let whitener = Whitener::new(rows, uncertain, stride, noise);
-        let all: Vec<Vec<f64>> =
-            columns.iter().map(|(c, _)| c).chain([&data]).map(|c| whitener.whiten_averaged(c)).collect();
-        let views: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();
-        let gram = Gram::of(&views, 0..data.len());
-        let priors: Vec<Prior> = columns.iter().map(|(_, prior)| *prior).collect();
-        let solution = solve(&gram, &priors, 1.0)?;
-        let mut innovations = all[columns.len()].clone();
-        for (column, c) in all.iter().zip(&solution.coefficients) {
-            for (i, v) in innovations.iter_mut().zip(column) {
-                *i -= c * v;
-            }
-        }
-        Some((solution.evidence - whitener.log_scale(), innovations, whitener))
-    };
-    let mut hypotheses = vec![Noise { white, wander: 0.0, correlation_s: 1.0 }];
-    // A wander is slow: what is faster is a line, or a cause.
+    let free = Free { columns: free_columns(on, laws, &plain), data: plain.average(&left) };
     let unit = if rows.recorded.time { 1.0 } else { 100.0 * rows.period };
-    for wander in [0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, MOST_WANDER] {
-        for correlation in [FASTEST_S, 8.0, 25.0, 80.0] {
-            hypotheses.push(Noise { white, wander: wander * white, correlation_s: correlation * unit });
-        }
-    }
-    let judged: Vec<_> = hypotheses.par_iter().map(|n| judge(*n)).collect();
-    let evidence = |k: usize| judged[k].as_ref().map_or(f64::NEG_INFINITY, |(evidence, _, _)| *evidence);
+    let hypotheses = hypotheses(white, unit);
+    // Rows that a flank turned over too early or a ringing throws out are no noise: they would make a fast wander of it.
+    let usual = Noise { white, wander: white, correlation_s: USUAL_S * unit };
+    let uncertain = match free.judge(Whitener::new(rows, uncertain, stride, usual)) {
+        Some(judged) => thrown_out(&judged, uncertain, NO_NOISE),
+        None => uncertain.to_vec(),
+    };
+    let judged: Vec<_> =
+        hypotheses.par_iter().map(|noise| free.judge(Whitener::new(rows, &uncertain, stride, *noise))).collect();
+    let evidence = |k: usize| judged[k].as_ref().map_or(f64::NEG_INFINITY, |judged| judged.evidence);
     let most = (0..judged.len()).map(evidence).fold(f64::NEG_INFINITY, f64::max);
     // A short recording does not tell a wander from none: then what it could hide is no cause.
     let power = |k: &usize| hypotheses[*k].wander * hypotheses[*k].correlation_s.sqrt();
@@ -248,8 +220,83 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64], uncertain: &[
         && hypotheses[best].wander >= MOST_WANDER * white
         && hypotheses[best].correlation_s <= FASTEST_S * unit;
     let best = if restless { hypotheses.len() - 1 } else { best };
-    let worth = judged[best].as_ref().map_or(1.0, |(_, innovations, whitener)| worth_of(innovations, whitener));
+    let worth = judged[best].as_ref().map_or(1.0, |judged| worth_of(&judged.innovations, &judged.whitener));
     (hypotheses[best], worth)
+}
+
+/// White noise alone, and with each wander that is tried. A wander is slow: what is faster is a line, or a cause.
+fn hypotheses(white: f64, unit: f64) -> Vec<Noise> {
+    let mut hypotheses = vec![Noise { white, wander: 0.0, correlation_s: 1.0 }];
+    for wander in [0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, MOST_WANDER] {
+        for correlation in [FASTEST_S, 8.0, USUAL_S, 80.0] {
+            hypotheses.push(Noise { white, wander: wander * white, correlation_s: correlation * unit });
+        }
+    }
+    hypotheses
+}
+
+/// Columns of what floats and of all laws at some places, averaged, with wide priors.
+fn free_columns(on: &Excitation<'_>, laws: &[Law], plain: &Whitener) -> Vec<(Vec<f64>, Prior)> {
+    let floating = |f: &Floating| (plain.average(&f.values), Prior { mean: 0.0, std: f.spread });
+    let of_law = |law: &Law| -> Vec<(Vec<f64>, Prior)> {
+        let tried = law.tried();
+        let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
+        let made = law.lead.as_ref().map_or(&law.columns, |lead| &lead.columns);
+        let all = tried.iter().step_by(spread).flat_map(|places| made(on, &law.values(places)));
+        let counts = |column: &Column| law.free_form || matches!(column.tolerance, Tolerance::Main(_));
+        all.filter(counts)
+            .map(|column| {
+                let averaged = plain.average(&column.values);
+                let std = 20.0 / rms(&averaged).max(1e-9);
+                (averaged, Prior { mean: 0.0, std })
+            })
+            .collect()
+    };
+    let mut columns: Vec<(Vec<f64>, Prior)> = on.base.floating.iter().map(floating).collect();
+    columns.extend(laws.par_iter().with_max_len(1).map(of_law).collect::<Vec<_>>().into_iter().flatten());
+    columns
+}
+
+/// Everything a law could explain, and what there is to explain.
+struct Free {
+    columns: Vec<(Vec<f64>, Prior)>,
+    data: Vec<f64>,
+}
+
+/// How well a hypothesis of the noise tells what is left.
+struct Judged {
+    evidence: f64,
+    innovations: Vec<f64>,
+    whitener: Whitener,
+}
+
+impl Free {
+    fn judge(&self, whitener: Whitener) -> Option<Judged> {
+        let all: Vec<Vec<f64>> =
+            self.columns.iter().map(|(c, _)| c).chain([&self.data]).map(|c| whitener.whiten_averaged(c)).collect();
+        let views: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();
+        let gram = Gram::of(&views, 0..self.data.len());
+        let priors: Vec<Prior> = self.columns.iter().map(|(_, prior)| *prior).collect();
+        let solution = solve(&gram, &priors, 1.0)?;
+        let mut innovations = all[self.columns.len()].clone();
+        for (column, c) in all.iter().zip(&solution.coefficients) {
+            for (i, v) in innovations.iter_mut().zip(column) {
+                *i -= c * v;
+            }
+        }
+        Some(Judged { evidence: solution.evidence - whitener.log_scale(), innovations, whitener })
+    }
+}
+
+/// Rows that were uncertain, and those of averages whose innovations are beyond so `many` of their robust standard deviations, if rare.
+fn thrown_out(judged: &Judged, uncertain: &[bool], many: f64) -> Vec<bool> {
+    let spread = robust_std(judged.innovations.iter().copied());
+    let beyond: Vec<f64> = judged.innovations.iter().map(|i| f64::from(u8::from(i.abs() > many * spread))).collect();
+    if beyond.iter().sum::<f64>() > RARE * beyond.len() as f64 {
+        return uncertain.to_vec();
+    }
+    let thrown = judged.whitener.in_rows(&beyond, uncertain.len());
+    uncertain.iter().zip(thrown).map(|(doubtful, thrown)| *doubtful || thrown > 0.0).collect()
 }
 
 /// Worth of innovations that should be white with unit variance: the inverse of the variance of their sums over blocks.
