@@ -694,6 +694,21 @@ fn teeth_that_slide_twice_are_no_drift_of_the_zero() {
 }
 
 #[test]
+fn teeth_that_slip_between_two_recordings_are_no_drift_of_the_zero() {
+    let pitch = std::f64::consts::TAU / 190.0;
+    let text = changed(|b| {
+        for k in 0..b.rows() {
+            b.time_s[k] += 2.0 * (k / 400) as f64;
+            b.output_rad[k] -= if k >= 1600 { 2.0 * pitch } else { 0.0 };
+        }
+    });
+    let read = read(text.as_bytes()).unwrap();
+    assert_eq!(names(&read), []);
+    let left = read.sessions[9].error_rad[200] - read.sessions[0].error_rad[200];
+    assert!((left + 2.0 * pitch).abs() < 100.0 * ARCSEC, "the slip is still there: {left}");
+}
+
+#[test]
 fn a_generator_that_turns_half_way_round_between_rows_is_counted_by_the_output() {
     let bench = Bench::plain(4000, 1.0, 5);
     let mut fast = bench.clone();

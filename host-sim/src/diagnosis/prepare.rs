@@ -171,9 +171,8 @@ const LOAD_UNKNOWN: f64 = 0.2;
 
 /// Largest wander that is tried, in units of the white noise.
 pub(super) const MOST_WANDER: f64 = 3.0;
-/// Shortest correlation time of a wander that is tried, s, and a usual one.
+/// Shortest correlation time of a wander that is tried, s.
 const FASTEST_S: f64 = 2.5;
-const USUAL_S: f64 = 25.0;
 
 /// Evidence (natural logarithm of the ratio) within which one wander is as likely as another.
 const AS_LIKELY: f64 = 0.5;
@@ -198,8 +197,7 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64], uncertain: &[
     let unit = if rows.recorded.time { 1.0 } else { 100.0 * rows.period };
     let hypotheses = hypotheses(white, unit);
     // Rows that a flank turned over too early or a ringing throws out are no noise: they would make a fast wander of it.
-    let usual = Noise { white, wander: white, correlation_s: USUAL_S * unit };
-    let uncertain = match free.judge(Whitener::new(rows, uncertain, stride, usual)) {
+    let uncertain = match free.judge(plain) {
         Some(judged) => thrown_out(&judged, uncertain, NO_NOISE),
         None => uncertain.to_vec(),
     };
@@ -228,7 +226,7 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64], uncertain: &[
 fn hypotheses(white: f64, unit: f64) -> Vec<Noise> {
     let mut hypotheses = vec![Noise { white, wander: 0.0, correlation_s: 1.0 }];
     for wander in [0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, MOST_WANDER] {
-        for correlation in [FASTEST_S, 8.0, USUAL_S, 80.0] {
+        for correlation in [FASTEST_S, 8.0, 25.0, 80.0] {
             hypotheses.push(Noise { white, wander: wander * white, correlation_s: correlation * unit });
         }
     }

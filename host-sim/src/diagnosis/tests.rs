@@ -262,6 +262,128 @@ fn a_sensor_put_back_elsewhere_before_each_session_is_described_and_nothing_blam
     assert!(diagnosis.unexplained[0].looks_like.contains("another zero"), "{}", diagnosis.text());
 }
 
+/// Sessions of a drive that nothing loads.
+fn unloaded(effects: &[Effect], seed: u64) -> Vec<Session> {
+    let plan =
+        Plan { sessions: 5, rows: 5000, rate_hz: 100.0, speed_rad_s: 6.0, torque_n_m: 0.0, richness: Richness::Rich };
+    let sensors = Sensors { white_arcsec: 2.0, wander_arcsec: 0.8, wander_s: 12.0 };
+    measure(&catalogue_drive(), effects, &plan, &sensors, 0, &mut fastrand::Rng::with_seed(seed))
+}
+
+#[test]
+fn without_a_load_nothing_is_named_on_a_drive_within_its_spread() {
+    let drive = catalogue_drive();
+    for seed in 0..3 {
+        let diagnosis = diagnose(&unloaded(&[], seed), &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+        assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::None, vec![]), "{seed}: {}", diagnosis.text());
+    }
+}
+
+#[test]
+fn a_moment_that_turns_flanks_over_without_a_load_is_found_and_measured() {
+    let drive = catalogue_drive();
+    for (moment, phase, seed) in [(3.0, 1.0, 1), (6.0, 4.0, 2)] {
+        let sessions = unloaded(&[effect("gravity_torque", moment, phase, 0.0)], seed);
+        let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+        assert_eq!(names(&diagnosis), ["gravity_torque"], "{moment} N·m: {}", diagnosis.text());
+        let found = diagnosis.causes[0].parameters["torque_n_m"];
+        assert!((found.value / moment - 1.0).abs() < 0.15, "{found:?} for {moment}");
+    }
+}
+
+#[test]
+fn without_a_load_only_rows_that_cross_the_clearance_are_uncertain() {
+    // Friction holds the output until the generator pushes it.
+    let drive = catalogue_drive();
+    let mut sessions = unloaded(&[], 4);
+    let mut random = fastrand::Rng::with_seed(5);
+    let half = 0.5 * drive.backlash_arcsec / crate::tables::ARCSEC_PER_RAD;
+    for session in &mut sessions {
+        let (mut stands, mut before) = (0.0f64, session.generator_rad[0]);
+        for (error, psi) in session.error_rad.iter_mut().zip(&session.generator_rad) {
+            stands = (stands - (psi - before) / drive.ratio).clamp(-half, half);
+            before = *psi;
+            let noise = (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+            *error = stands + (drive.harmonics_arcsec(*psi) + noise) / crate::tables::ARCSEC_PER_RAD;
+        }
+    }
+    excited_by(&sessions, &drive, |on| {
+        assert_eq!(on.base.law, super::base::PlayLaw::Pushed);
+        let share = |of: &[bool]| of.iter().filter(|u| **u).count() as f64 / of.len() as f64;
+        let uncertain = &on.base.uncertain;
+        assert!((0.002..0.3).contains(&share(uncertain)), "{}", share(uncertain));
+        for session in &on.rows.sessions {
+            assert!(uncertain[session.start], "nobody knows where the output was before");
+            // After any motion one way by several clearances the flank is known.
+            let far = 6.0 * on.base.half_backlash / crate::tables::ARCSEC_PER_RAD;
+            for k in session.clone().skip(300) {
+                let before = &on.rows.output[k - 300..=k];
+                let steady = before.windows(2).all(|o| (o[1] - o[0]) * (before[300] - before[0]) > 0.0);
+                if steady && (before[300] - before[0]).abs() > far {
+                    assert!(!uncertain[k], "row {k}");
+                }
+            }
+        }
+    });
+}
+
+/// The noise that is found in these sessions, with nothing explained.
+fn noise_of(sessions: &[Session]) -> super::Noise {
+    let mut found = None;
+    excited_by(sessions, &catalogue_drive(), |on| {
+        let laws = super::library(on);
+        found = Some(super::prepare::noise(on, &laws, &[], &super::prepare::uncertain(on, &[])).0);
+    });
+    found.unwrap()
+}
+
+#[test]
+fn rows_thrown_out_make_no_fast_wander_of_the_noise() {
+    let mut sessions = recorded(&[], 5, 6000, 100.0, 2.0, 14);
+    let calm = noise_of(&sessions);
+    assert!(calm.wander < 1.0 * calm.white, "{calm:?}");
+    // As where a flank is turned over some rows too late, now and then.
+    for session in &mut sessions {
+        for from in (700..5900).step_by(2500) {
+            session.error_rad[from..from + 24].iter_mut().for_each(|e| *e += 90.0 / crate::tables::ARCSEC_PER_RAD);
+        }
+    }
+    let thrown = noise_of(&sessions);
+    assert!(thrown.wander < 1.3 * calm.wander.max(0.2 * calm.white), "{thrown:?}, {calm:?} without");
+}
+
+#[test]
+fn a_recording_too_short_to_tell_a_wander_from_none_is_taken_to_have_one() {
+    let still = |rows: usize| {
+        let plan =
+            Plan { sessions: 1, rows, rate_hz: 100.0, speed_rad_s: 6.0, torque_n_m: 40.0, richness: Richness::Rich };
+        let sensors = Sensors { white_arcsec: 4.0, wander_arcsec: 0.0, wander_s: 12.0 };
+        noise_of(&measure(&catalogue_drive(), &[], &plan, &sensors, 0, &mut fastrand::Rng::with_seed(3)))
+    };
+    let (short, long) = (still(2000), still(40000));
+    assert!(short.wander > 0.2 * short.white, "{short:?}");
+    assert!(long.wander < 0.2 * long.white, "{long:?}");
+}
+
+#[test]
+fn a_lubricant_thickens_by_vogels_law_and_as_an_exponential_where_it_does_not_bend() {
+    excited(|on, laws| {
+        let law = laws.iter().find(|law| law.cause == "lubricant_viscosity" && law.load.is_none()).unwrap();
+        let (per_k, bend) = (0.02, 1.0 / 115.0);
+        let bent = &(law.columns)(on, &[1.0, per_k, bend])[0].values;
+        let straight = &(law.columns)(on, &[1.0, per_k, 0.0])[0].values;
+        // ln ν = B / (T + C): C where it sets, B by the slope at the nominal temperature.
+        let nominal = on.nominal.temperature_c;
+        let c = 1.0 / bend - nominal;
+        let b = per_k * (nominal + c).powi(2);
+        for (k, warm) in on.rows.temperature.iter().enumerate().filter(|(k, _)| straight[*k] != 0.0) {
+            let vogel = b * (1.0 / (warm + c) - 1.0 / (nominal + c));
+            let due = (vogel - per_k * (nominal - warm)).exp();
+            assert!((bent[k] / straight[k] / due - 1.0).abs() < 1e-9, "{warm} °C");
+        }
+    });
+}
+
 /// Hands a law's excitation on made-up rows to `look`.
 fn excited(look: impl FnOnce(&super::Excitation<'_>, &[super::Law])) {
     excited_by(&data(&[], Richness::Rich, 0, 9), &catalogue_drive(), |on| look(on, &super::library(on)));
@@ -418,7 +540,7 @@ fn a_softer_spring_gives_way_to_drag_and_gravity_as_well() {
         let spring = || Acting { law: law(laws, "stiffness_error"), values: vec![], coefficients: vec![0.6] };
         let drags = |law: &&super::Law| law.cause == "lubricant_viscosity" && law.load.is_some();
         let drag = laws.iter().find(drags).unwrap();
-        for (law, values) in [(drag, vec![3.0, 0.8, 0.03]), (law(laws, "gravity_torque"), vec![5.0, 0.7])] {
+        for (law, values) in [(drag, vec![3.0, 0.8, 0.03, 0.005]), (law(laws, "gravity_torque"), vec![5.0, 0.7])] {
             let load = || Acting { law, values: values.clone(), coefficients: vec![1.0, 0.0] };
             let (alone, beside) = (together(on, &[load()]), together(on, &[spring(), load()]));
             // Wind-up and play together, and play alone: what is left is wind-up.

@@ -1,6 +1,6 @@
 //! What the temperature does.
 
-use super::{Column, Excitation, Law, Lead, Shape, Tolerance, by_row, lagged, main, nuisance};
+use super::{Column, Excitation, Law, Lead, Named, Shape, Tolerance, by_row, lagged, main, nuisance};
 use crate::diagnosis::linear::Prior;
 
 /// Temperature above nominal, felt with a lag of `lag_s`, K.
@@ -112,6 +112,16 @@ fn drag(on: &Excitation<'_>, power: f64, per_k: f64, bend: f64) -> Vec<f64> {
     })
 }
 
+/// A drag by name: its size, and its power, slope and bend.
+fn named_drag(drag_n_m: f64, shape: &[f64]) -> Vec<Named> {
+    vec![
+        ("drag_n_m", drag_n_m),
+        ("speed_exponent", shape[0]),
+        ("relative_drag_per_k", -shape[1]),
+        ("drag_bend_per_k", shape[2]),
+    ]
+}
+
 /// Arcsec for 1 N·m of drag at the mean speed and the nominal temperature.
 fn drag_wind_up(on: &Excitation<'_>, power: f64, per_k: f64, bend: f64) -> Vec<f64> {
     let slope = wind_up_arcsec_per_n_m(on);
@@ -135,9 +145,7 @@ fn lubricant_viscosity() -> Law {
         Shape::by_factors("per_k", 0.008, 0.12, 4),
         Shape::evenly("bend_per_k", 0.0, MOST_BEND, 1),
     ])
-    .parameters(|_, shape, c| {
-        vec![("drag_n_m", c[0]), ("speed_exponent", shape[0]), ("relative_drag_per_k", -shape[1])]
-    })
+    .parameters(|_, shape, c| named_drag(c[0], &shape[..3]))
     .physical(|shape, c| c[0] > 0.0 && viscous(shape[0], shape[1]))
 }
 
@@ -165,9 +173,7 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
         Shape::by_factors("per_k", 0.008, 0.12, 3),
         Shape::evenly("bend_per_k", 0.0, MOST_BEND, 1),
     ])
-    .parameters(|_, shape, c| {
-        vec![("drag_n_m", shape[0] * c[0]), ("speed_exponent", shape[1]), ("relative_drag_per_k", -shape[2])]
-    })
+    .parameters(|_, shape, c| named_drag(shape[0] * c[0], &shape[1..]))
     .physical(|shape, c| c[0] > 0.0 && viscous(shape[1], shape[2]));
     law.load = Some(Box::new(load));
     law.in_crossings = true;

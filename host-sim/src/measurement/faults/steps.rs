@@ -485,6 +485,46 @@ mod tests {
         assert_eq!(left(&[(21, 46.1), (80, 30.0)]), [46.1, 30.0]);
     }
 
+    /// A session at rest with this error and torque in each row.
+    fn session(error_rad: Vec<f64>, torque_n_m: Vec<f64>) -> Session {
+        let rows = error_rad.len();
+        Session {
+            line: (0..rows as u64).collect(),
+            time_s: None,
+            generator_rad: vec![0.0; rows],
+            error_rad,
+            torque_n_m: Some(torque_n_m),
+            temperature_c: None,
+            orientation_rad: None,
+        }
+    }
+
+    #[test]
+    fn between_loads_of_either_sign_a_flank_is_changed() {
+        let ramp: Vec<f64> = (0..400).map(|k| 0.1 * f64::from(k) - 20.0).collect();
+        let there_and_back: Vec<f64> = (0..400).map(|k| 20.0 - (0.2 * f64::from(k) - 40.0).abs()).collect();
+        let turns = |torque: Vec<f64>, row: usize| load_turns_over(&session(vec![0.0; 400], torque), row, 20.0);
+        assert!(turns(ramp.clone(), 210), "1 N·m, from -20 to 20");
+        assert!(!turns(ramp, 300), "10 N·m hold the flank");
+        assert!(!turns(there_and_back.iter().map(|t| t.abs()).collect(), 100), "never below nothing");
+    }
+
+    #[test]
+    fn a_step_that_comes_at_other_places_too_is_a_clearance_thrown_over() {
+        let mut error = vec![0.0; 900];
+        let step = 80.0 * ARCSEC;
+        error[200..].iter_mut().for_each(|e| *e += step);
+        error[400..].iter_mut().for_each(|e| *e -= step);
+        let settled = vec![vec![true; 900]];
+        let place = Place { session: 0, row: 600 };
+        let elsewhere =
+            |error: &[f64]| comes_elsewhere(&[session(error.to_vec(), vec![0.0; 900])], &settled, place, step);
+        error[600..].iter_mut().for_each(|e| *e += step);
+        assert!(elsewhere(&error));
+        error[400..600].iter_mut().for_each(|e| *e += step);
+        assert!(!elsewhere(&error), "one other place is no habit");
+    }
+
     #[test]
     fn several_steps_that_end_where_they_began_do_not_last() {
         assert_eq!(left(&[(39, 46.1), (132, -19.3), (3067, -25.1)]), [0.0; 0]);
