@@ -448,6 +448,11 @@ pub fn select<'l>(
 ) -> Option<Selected<'l>> {
     let limits = Limits::of(white);
     let mut selected = Selected { fit: fit(problem, &start)?, terms: start };
+    if !selected.terms.is_empty() {
+        // They were found in other noise, and in rows that some of them have put in doubt since.
+        selected = settle_from(problem, selected, |_, term| vec![term.clone()])?;
+        selected = backward(problem, selected, &limits, &mut log)?;
+    }
     // What has given way once and come back does not give way to the same again: so rounds end.
     let (mut seen, mut given) = (HashSet::new(), HashSet::new());
     for round in 0..MOST_ROUNDS {
