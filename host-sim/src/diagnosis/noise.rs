@@ -4,7 +4,7 @@
 //! alike, into innovations of unit variance; least squares on those is generalised least squares on the rows, and forty
 //! thousand correlated rows weigh what they are worth (n_eff).
 
-use super::rows::{Rows, rms, robust_std};
+use super::rows::{Rows, quantile, rms, robust_std};
 
 /// White noise and wander.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -190,6 +190,8 @@ pub fn white_level(rows: &Rows, left: &[f64]) -> f64 {
             differences.push((left[k] - 2.0 * left[k - 1] + left[k - 2]).abs());
         }
     }
-    // Their variance is six times that of a row.
-    (robust_std(differences.into_iter()) / 6f64.sqrt()).max(1e-3)
+    // Their variance is six times that of a row; more where a line close to half the rate of rows swings them, but no more than is there.
+    let middle = quantile(rows.sessions_used().flatten().map(|k| left[k]), 0.5);
+    let there = robust_std(rows.sessions_used().flatten().map(|k| left[k] - middle));
+    (robust_std(differences.into_iter()) / 6f64.sqrt()).min(there).max(1e-3)
 }

@@ -69,11 +69,13 @@ pub fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -
 pub fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> Vec<Line> {
     let rows = problem.on.rows;
     let mut found = Vec::new();
-    found.extend(strongest(&rows.generator, innovations, 0.0, highest_order / (2.0 * PI)).map(|(f, power)| Line {
-        unit: "generator turn",
-        order: f * 2.0 * PI,
-        power,
-    }));
+    found.extend(
+        strongest(&rows.generator, innovations, 0.0, highest_order / (2.0 * PI), None).map(|(f, power)| Line {
+            unit: "generator turn",
+            order: f * 2.0 * PI,
+            power,
+        }),
+    );
     if rows.recorded.time {
         // Gaps between sessions would only make the transform long.
         let mut time = rows.time.clone();
@@ -85,7 +87,8 @@ pub fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> 
             }
             shift += last - first + 1.0;
         }
-        found.extend(strongest(&time, innovations, SLOWEST_LINE_HZ, 0.45 / rows.period).map(|(f, power)| Line {
+        let cell = Some(0.5 * rows.period);
+        found.extend(strongest(&time, innovations, SLOWEST_LINE_HZ, 0.5 / rows.period, cell).map(|(f, power)| Line {
             unit: "second",
             order: f,
             power,
@@ -155,21 +158,26 @@ pub fn beyond_noise(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise
     }
 }
 
-/// Frequency (per unit of `places`) and power of the strongest line from `lowest` to `highest`.
-fn strongest(places: &[f64], values: &[f64], lowest: f64, highest: f64) -> Option<(f64, f64)> {
+/// Cells of a grid at most: a power of two.
+const MOST_CELLS: usize = 1 << 18;
+
+/// Frequency (per unit of `places`) and power of the strongest line from `lowest` to `highest`. Places that are even are laid on a grid of
+/// this `cell` (a part of their distance), which loses nothing of what is fast.
+fn strongest(places: &[f64], values: &[f64], lowest: f64, highest: f64, cell: Option<f64>) -> Option<(f64, f64)> {
     let (low, high) = places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
     let span = high - low;
     if !(span > 0.0 && highest > 0.0) {
         return None;
     }
-    let wanted = (span * highest * 4.0).clamp(64.0, 262_144.0);
-    let size = (wanted as usize).next_power_of_two().min(1 << 18);
-    let step = span / (size as f64 * 0.5);
+    let size = (span * highest * 4.0).clamp(64.0, MOST_CELLS as f64) as usize;
+    let even = cell.filter(|cell| span / cell < 0.5 * MOST_CELLS as f64);
+    let size = even.map_or(size, |cell| (2.0 * span / cell) as usize).next_power_of_two();
+    let step = even.unwrap_or(span / (size as f64 * 0.5));
     let transform = RealFftPlanner::new().plan_fft_forward(size);
     let mut on_grid: Vec<f64> = transform.make_input_vec();
     let mut spectrum = transform.make_output_vec();
     for (x, v) in places.iter().zip(values) {
-        let at = ((x - low) / step) as usize;
+        let at = ((x - low) / step + 1e-6) as usize;
         on_grid[at.min(size - 1)] += v;
     }
     transform.process(&mut on_grid, &mut spectrum).ok()?;
@@ -203,7 +211,7 @@ mod tests {
     fn a_line_at_uneven_places_is_found_where_it_is() {
         let places: Vec<f64> = (0..4000).map(|k| 0.05 * f64::from(k) + 0.02 * f64::from(k % 7)).collect();
         let values: Vec<f64> = places.iter().map(|x| (2.0 * PI * 0.731 * x).cos()).collect();
-        let (frequency, power) = strongest(&places, &values, 0.0, 2.0).unwrap();
+        let (frequency, power) = strongest(&places, &values, 0.0, 2.0, None).unwrap();
         assert!((frequency - 0.731).abs() < 0.005, "{frequency}");
         assert!(power > 1000.0, "{power}");
     }

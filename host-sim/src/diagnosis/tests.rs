@@ -262,6 +262,22 @@ fn a_sensor_put_back_elsewhere_before_each_session_is_described_and_nothing_blam
     assert!(diagnosis.unexplained[0].looks_like.contains("another zero"), "{}", diagnosis.text());
 }
 
+#[test]
+fn a_line_of_the_mains_close_to_half_the_rate_of_rows_is_seen() {
+    let mut sessions = recorded(&[], 5, 6000, 100.0, 2.0, 16);
+    for session in &mut sessions {
+        let time = session.time_s.as_ref().unwrap();
+        for (error, t) in session.error_rad.iter_mut().zip(time) {
+            let hum = 27.0 * (std::f64::consts::TAU * 49.82 * t).sin();
+            *error += hum / crate::tables::ARCSEC_PER_RAD;
+        }
+    }
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::Unknown, vec![]), "{}", diagnosis.text());
+    let seen = |left: &super::report::Unexplained| left.looks_like.starts_with("line of 49.8");
+    assert!(diagnosis.unexplained.iter().any(seen), "{}", diagnosis.text());
+}
+
 /// Sessions of a drive that nothing loads.
 fn unloaded(effects: &[Effect], seed: u64) -> Vec<Session> {
     let plan =
