@@ -143,7 +143,7 @@ const CROSSING_S: f64 = 0.08;
 /// A clearance may be this many times as wide as the nominal one before anything else is known.
 const WIDER: f64 = 1.6;
 /// If more of the rows than this are uncertain, none is set aside: then they are what the data are about.
-pub(super) const UNCERTAIN_AT_MOST: f64 = 0.35;
+const UNCERTAIN_AT_MOST: f64 = 0.35;
 
 impl Base {
     /// The nominal model over the rows; `table` takes the place of its parts where it is given.
@@ -251,16 +251,19 @@ fn predicted_by_table(rows: &Rows, table: &Table<'_>) -> Vec<f64> {
 }
 
 fn uncertain(rows: &Rows, nominal: &Nominal, law: PlayLaw, flank: &[f64]) -> Vec<bool> {
-    let enough = |doubted: &[bool]| {
-        doubted.iter().filter(|u| **u).count() as f64 / rows.len().max(1) as f64 <= UNCERTAIN_AT_MOST
-    };
     let by_load = uncertain_by_load(rows, nominal, flank);
-    if enough(&by_load) {
+    if few(&by_load) {
         return by_load;
     }
     // Where hardly any load says which flank carries, the motion does.
-    let by_motion = if law == PlayLaw::Pushed { uncertain_by_motion(rows, nominal) } else { Vec::new() };
-    if !by_motion.is_empty() && enough(&by_motion) { by_motion } else { vec![false; rows.len()] }
+    let by_motion = (law == PlayLaw::Pushed).then(|| uncertain_by_motion(rows, nominal));
+    by_motion.filter(|uncertain| few(uncertain)).unwrap_or_else(|| vec![false; rows.len()])
+}
+
+/// Whether so few rows are uncertain that they can be set aside.
+pub(super) fn few(uncertain: &[bool]) -> bool {
+    let share = uncertain.iter().filter(|u| **u).count() as f64 / uncertain.len().max(1) as f64;
+    share <= UNCERTAIN_AT_MOST
 }
 
 /// Rows before the generator has pushed the output to a flank, wherever it stood and were the clearance [`WIDER`].

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use flexspline::Table;
 use rayon::prelude::*;
 
-use super::base::{Base, Floating, NEAR_FRICTION, UNCERTAIN_AT_MOST};
+use super::base::{Base, Floating, NEAR_FRICTION, few};
 use super::candidate::{Column, Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
 use super::model::Term;
@@ -156,8 +156,7 @@ pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>]) -> Vec<bool> {
             *doubtful |= (on.rows.torque[k] + added[k]).abs() < near;
         }
     }
-    let share = uncertain.iter().filter(|u| **u).count() as f64 / uncertain.len().max(1) as f64;
-    if share > UNCERTAIN_AT_MOST { without } else { uncertain }
+    if few(&uncertain) { uncertain } else { without }
 }
 
 /// A jump is over after this time, s, and after so many rows.
@@ -198,7 +197,7 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64], uncertain: &[
     let hypotheses = hypotheses(white, unit);
     // Rows that a flank turned over too early or a ringing throws out are no noise: they would make a fast wander of it.
     let uncertain = match free.judge(plain) {
-        Some(judged) => thrown_out(&judged, uncertain, NO_NOISE),
+        Some(judged) => thrown_out(&judged, uncertain),
         None => uncertain.to_vec(),
     };
     let judged: Vec<_> =
@@ -213,8 +212,7 @@ pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64], uncertain: &[
         .unwrap_or(0);
     // As restless as this no sensor is: what is left is a cause. On a drive without load it is one that turns flanks over, which a wander
     // that follows everything would hide.
-    let unloaded = on.scales.load < on.nominal.friction_torque_n_m;
-    let restless = unloaded
+    let restless = on.unloaded()
         && hypotheses[best].wander >= MOST_WANDER * white
         && hypotheses[best].correlation_s <= FASTEST_S * unit;
     let best = if restless { hypotheses.len() - 1 } else { best };
@@ -286,10 +284,11 @@ impl Free {
     }
 }
 
-/// Rows that were uncertain, and those of averages whose innovations are beyond so `many` of their robust standard deviations, if rare.
-fn thrown_out(judged: &Judged, uncertain: &[bool], many: f64) -> Vec<bool> {
+/// Rows that were uncertain, and those of averages whose innovations are no noise, if rare.
+fn thrown_out(judged: &Judged, uncertain: &[bool]) -> Vec<bool> {
     let spread = robust_std(judged.innovations.iter().copied());
-    let beyond: Vec<f64> = judged.innovations.iter().map(|i| f64::from(u8::from(i.abs() > many * spread))).collect();
+    let beyond: Vec<f64> =
+        judged.innovations.iter().map(|i| f64::from(u8::from(i.abs() > NO_NOISE * spread))).collect();
     if beyond.iter().sum::<f64>() > RARE * beyond.len() as f64 {
         return uncertain.to_vec();
     }

@@ -181,18 +181,12 @@ impl Bests {
     }
 }
 
-/// The strongest laws (`most` of them) at their best places tried, beside some terms; not refined. Best evidence first. All places are
-/// tried and the best noted, or where `known` says them only those.
-fn scan<'l>(
-    problem: &Problem<'_>,
-    terms: &[Term<'l>],
-    laws: &[&'l Law],
-    most: usize,
-    bests: &mut Bests,
-    known: bool,
-) -> Vec<Term<'l>> {
-    let scaffold = Scaffold::new(problem, terms.iter().collect());
-    let begin = |law: &Law| if known { bests.begin(&scaffold, law) } else { scaffold.begin(law) };
+/// What each law is worth beside the terms of a scaffold, not refined, at the places that `begin` gives.
+fn tried(
+    scaffold: &Scaffold<'_, '_, '_, '_>,
+    laws: &[&Law],
+    begin: impl Fn(&Law) -> Vec<Vec<f64>> + Sync,
+) -> Vec<Vec<(f64, Vec<f64>)>> {
     let trials: Vec<(usize, Vec<f64>)> = laws
         .par_iter()
         .with_max_len(1)
@@ -208,14 +202,19 @@ fn scan<'l>(
     for (k, evidence, places) in tried {
         by_law[k].push((evidence, places));
     }
-    if !known {
-        for (law, tried) in laws.iter().zip(&by_law) {
-            bests.note(law, tried);
-        }
-    }
+    by_law
+}
+
+/// The strongest laws (`most` of them) at the best of the places tried, law by law; not refined. Best evidence first.
+fn best_tried<'l>(
+    scaffold: &Scaffold<'_, '_, '_, 'l>,
+    laws: &[&'l Law],
+    tried: Vec<Vec<(f64, Vec<f64>)>>,
+    most: usize,
+) -> Vec<Term<'l>> {
     let begun: Vec<(&'l Law, Vec<f64>)> = laws
         .iter()
-        .zip(by_law)
+        .zip(tried)
         .flat_map(|(law, tried)| begun(law, tried).into_iter().map(|places| (*law, places)))
         .collect();
     let mut found: Vec<(f64, &'l Law, Vec<f64>)> = begun
@@ -450,7 +449,7 @@ pub fn select<'l>(
     let mut selected = Selected { fit: fit(problem, &start)?, terms: start };
     if !selected.terms.is_empty() {
         // They were found in other noise, and in rows that some of them have put in doubt since.
-        selected = settle_from(problem, selected, |_, term| vec![term.clone()])?;
+        selected = settle_all(problem, selected)?;
         selected = backward(problem, selected, &limits, &mut log)?;
     }
     // What has given way once and come back does not give way to the same again: so rounds end.
@@ -484,11 +483,9 @@ pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[&str]) -> Vec
             .iter()
             .filter(|law| causes.contains(&law.cause.as_str()) && terms.iter().all(|t| t.law.cause != law.cause))
             .collect();
-        let found = scan(problem, &terms, &open, usize::MAX, &mut Bests::default(), false);
-        if found.is_empty() {
-            break;
-        }
         let scaffold = Scaffold::new(problem, terms.iter().collect());
+        let tried = tried(&scaffold, &open, |law| scaffold.begin(law));
+        let found = best_tried(&scaffold, &open, tried, usize::MAX);
         let best = found
             .into_par_iter()
             .with_max_len(1)
@@ -524,8 +521,12 @@ fn forward<'l>(
         .filter(|law| if law.named { named < MOST_CAUSES } else { unnamed < MOST_UNNAMED })
         .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &selected.fit, law))
         .collect();
-    let found = scan(problem, &selected.terms, &open, REFINED, bests, false);
     let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
+    let tried = tried(&scaffold, &open, |law| scaffold.begin(law));
+    for (law, tried) in open.iter().zip(&tried) {
+        bests.note(law, tried);
+    }
+    let found = best_tried(&scaffold, &open, tried, REFINED);
     let before = selected.fit.solution.evidence;
     let mut refined: Vec<(f64, Term<'l>, Fit)> = found
         .into_par_iter()
@@ -608,6 +609,11 @@ fn settle<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<
     if selected.terms.len() < 2 {
         return Some(selected);
     }
+    settle_all(problem, selected)
+}
+
+/// The same for one alone, too.
+fn settle_all<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
     settle_from(problem, selected, |_, term| vec![term.clone()])
 }
 
@@ -700,7 +706,7 @@ fn exchange<'l>(
     limits: &Limits,
     compared: usize,
     given: &mut HashSet<(u64, u64)>,
-    bests: &mut Bests,
+    bests: &Bests,
     log: &mut impl FnMut(String),
 ) -> Option<Selected<'l>> {
     for k in (0..selected.terms.len()).filter(|k| *k != compared) {
@@ -712,8 +718,9 @@ fn exchange<'l>(
             .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &without, law))
             .filter(|law| !given.contains(&(selected.terms[k].law.id(), law.id())))
             .collect();
-        let rivals = scan(problem, &others, &open, EXCHANGED, bests, true);
         let scaffold = Scaffold::new(problem, others.iter().collect());
+        let tried = tried(&scaffold, &open, |law| bests.begin(&scaffold, law));
+        let rivals = best_tried(&scaffold, &open, tried, EXCHANGED);
         let refined: Vec<(Term<'l>, Fit)> = rivals
             .into_par_iter()
             .with_max_len(1)

@@ -30,8 +30,9 @@ fn moment_that_turns_flanks(
             let turned_over = base.half_backlash * (flank[*k] - base.flank[*k]);
             rows.error[*k] - base.prediction[*k] - on.wound_up(*k, torque[*k]) - turned_over
         };
-        let mean = used.iter().map(left).sum::<f64>() / used.len().max(1) as f64;
-        used.iter().map(|k| (left(k) - mean).powi(2)).sum()
+        let left: Vec<f64> = used.iter().map(left).collect();
+        let mean = left.iter().sum::<f64>() / left.len().max(1) as f64;
+        left.iter().map(|left| (left - mean).powi(2)).sum()
     };
     let least = |tried: Vec<[f64; 2]>| -> ([f64; 2], f64) {
         let judged = tried.into_par_iter().map(|shape| (shape, spread(&shape)));
@@ -62,8 +63,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
         by_row(on, |k| shape[0] * (rows.output[k] + sign * rows.orientation[k] + shape[1]).sin())
     };
     // Where nothing else loads the drive, its moment decides which flank carries, and no linear law is near.
-    let unloaded = on.scales.load < on.nominal.friction_torque_n_m;
-    let by_flank = unloaded.then(|| moment_that_turns_flanks(on, play, scale, load));
+    let by_flank = on.unloaded().then(|| moment_that_turns_flanks(on, play, scale, load));
     let mut law = Law::new("gravity_torque", move |on, shape| {
         let rows = on.rows;
         let added = load(on, shape);

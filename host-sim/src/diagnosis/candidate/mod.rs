@@ -57,11 +57,22 @@ impl<'a> Excitation<'a> {
         Excitation { rows, nominal, base, scales, widened: None, zones: None, softer: 1.0 }
     }
 
+    /// Whether the output is not loaded beyond friction, which then says nothing of the flank that carries.
+    #[must_use]
+    pub fn unloaded(&self) -> bool {
+        self.scales.load < self.nominal.friction_torque_n_m
+    }
+
+    /// Nominal wind-up at rest, arcsec/N·m; none for a drive that does not give.
+    fn slope_at_rest(&self) -> Option<f64> {
+        let slope = self.nominal.wind_up_arcsec(1e-3) / 1e-3;
+        (slope > 0.0).then_some(slope)
+    }
+
     /// Scale of a load that the torque column does not hold, N·m. Without a load on the output that column is noise, and says nothing
     /// of what its friction and its spring bear.
     fn plausible_load(&self) -> f64 {
-        let slope = self.nominal.wind_up_arcsec(1e-3) / 1e-3;
-        let wound_up = if slope > 0.0 { UNLOADED_ARCSEC / slope } else { 0.0 };
+        let wound_up = self.slope_at_rest().map_or(0.0, |slope| UNLOADED_ARCSEC / slope);
         self.scales.load.max(UNLOADED_FRICTIONS * self.nominal.friction_torque_n_m).max(wound_up)
     }
 

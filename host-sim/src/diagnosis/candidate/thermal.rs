@@ -87,8 +87,7 @@ fn usual_speed(on: &Excitation<'_>) -> f64 {
 
 /// Slope of the wind-up at no load, arcsec/N·m; 1 for a drive that does not give.
 fn wind_up_arcsec_per_n_m(on: &Excitation<'_>) -> f64 {
-    let slope = on.nominal.wind_up_arcsec(1e-3) / 1e-3;
-    if slope > 0.0 { on.softer * slope } else { 1.0 }
+    on.slope_at_rest().map_or(1.0, |slope| on.softer * slope)
 }
 
 /// How much thicker a lubricant is that is `cold` K below the nominal temperature. Vogel's `ln ν = B / (T + C)` written by its slope

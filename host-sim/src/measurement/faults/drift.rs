@@ -144,12 +144,17 @@ fn slope(sessions: &[Session], gear: &Gear) -> Option<(f64, f64, f64)> {
     (certain && steady).then_some((drift * per_s, 0.5 * (begin + end), std.max(formal) * per_s))
 }
 
+/// Median of a few rows from this one on, rad.
+fn level(session: &Session, row: usize) -> f64 {
+    median_of(&mut session.error_rad[row..(row + LEVEL_ROWS).min(session.len())].to_vec())
+}
+
 /// The largest change within [`LEAP_S`], rad, between medians of a few rows.
 fn largest_leap(sessions: &[Session]) -> f64 {
     let mut largest = 0.0f64;
     for session in sessions {
         let Some(time) = &session.time_s else { continue };
-        let level = |row: usize| median_of(&mut session.error_rad[row..(row + LEVEL_ROWS).min(session.len())].to_vec());
+        let level = |row: usize| level(session, row);
         let mut later = 0;
         for row in (0..session.len()).step_by(LEVEL_ROWS / 2) {
             while later + 1 < session.len() && time[later] < time[row] + LEAP_S {
@@ -167,9 +172,8 @@ fn largest_leap_between(sessions: &[Session], per_s: f64) -> f64 {
         let [before, after] = pair else { return 0.0 };
         let (Some(then), Some(now)) = (&before.time_s, &after.time_s) else { return 0.0 };
         let passed = now.first().zip(then.last()).map_or(0.0, |(now, then)| now - then);
-        let last = &before.error_rad[before.len().saturating_sub(LEVEL_ROWS)..];
-        let first = &after.error_rad[..LEVEL_ROWS.min(after.len())];
-        (median_of(&mut first.to_vec()) - median_of(&mut last.to_vec())).abs() - GAP_SHARE * per_s * passed
+        let last = level(before, before.len().saturating_sub(LEVEL_ROWS));
+        (level(after, 0) - last).abs() - GAP_SHARE * per_s * passed
     };
     sessions.windows(2).map(leap).fold(0.0, f64::max)
 }

@@ -165,8 +165,8 @@ fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<Step>)> {
         places.sort_by_key(|place| (place.session, place.row));
     }
     steps = lasting(steps);
-    let turned_over =
-        |place: Place, size: f64| !says_flank(sessions) && comes_elsewhere(sessions, &settled, place, size);
+    let unsaid = !steps.is_empty() && !says_flank(sessions);
+    let turned_over = |place: Place, size: f64| unsaid && comes_elsewhere(sessions, &settled, place, size);
     let (sure, doubtful): (Vec<Step>, Vec<Step>) = steps.iter().copied().partition(|(place, size, _)| {
         !turned_over(*place, *size) && no_flank_was_changed(sessions, &state, &steps, *place, *size)
     });
