@@ -460,6 +460,12 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         Some(self.fit_with(Some(&self.white(law, Extent::Whole, places)), &[])?.0.solution)
     }
 
+    /// Whether a law changes what some of the terms do, and they do not change it.
+    #[must_use]
+    pub fn acted_on_by(&self, law: &Law) -> bool {
+        self.terms.iter().any(|term| law.acts_on(term.law) && !law.meets(term.law))
+    }
+
     /// What the terms leave to a law.
     fn left_to(&self, law: &Law) -> Option<Arc<Among>> {
         let kind = usize::from(law.load.is_some()) + 2 * usize::from(law.meets_zones);

@@ -49,19 +49,20 @@ pub struct Jump {
 }
 
 /// Where the error leaves for another level: at once, or, where that shows no whole pitches, while the wave passes (half a turn of the
-/// generator): so long teeth take to climb over each other.
+/// generator): so long teeth take to climb over each other. Where the load rings after that, the level is what it rings about.
 #[must_use]
 pub fn jumps(rows: &Rows, base: &Base, nominal: &Nominal) -> Vec<Jump> {
     let left: Vec<f64> = rows.error.iter().zip(&base.prediction).map(|(e, p)| e - p).collect();
     let whole = |found: &[Jump]| {
         !found.is_empty() && found.iter().all(|jump| whole_pitches(nominal, jump.height_arcsec).is_some())
     };
-    let at_once = jumps_within(rows, &left, 0.0);
+    let at_once = jumps_within(rows, &left, 0.0, 0.0);
     if whole(&at_once) {
         return at_once;
     }
-    let climbed = jumps_within(rows, &left, PI);
-    if whole(&climbed) { climbed } else { at_once }
+    let others = [(PI, 0.0), (0.0, RINGING_S), (PI, RINGING_S)];
+    let found = others.iter().map(|(turned_rad, level_s)| jumps_within(rows, &left, *turned_rad, *level_s));
+    found.into_iter().find(|found| whole(found)).unwrap_or(at_once)
 }
 
 /// How many pitches of either wheel a jump is, if it is a whole number of them.
@@ -76,8 +77,8 @@ pub fn whole_pitches(nominal: &Nominal, height_arcsec: f64) -> Option<f64> {
     })
 }
 
-/// Jumps that are over after [`JUMPING_S`] and after the generator has turned by `turned_rad`.
-fn jumps_within(rows: &Rows, left: &[f64], turned_rad: f64) -> Vec<Jump> {
+/// Jumps that are over after [`JUMPING_S`] and after the generator has turned by `turned_rad`, to the level of `level_s` from there on.
+fn jumps_within(rows: &Rows, left: &[f64], turned_rad: f64, level_s: f64) -> Vec<Jump> {
     let last = rows.len().saturating_sub(1);
     let middle = |range: std::ops::Range<usize>| quantile(range.map(|k| left[k]), 0.5);
     // First row of the level before, first row after the jump begins, row at rest, height.
@@ -102,7 +103,10 @@ fn jumps_within(rows: &Rows, left: &[f64], turned_rad: f64) -> Vec<Jump> {
             if (left[at_rest] - left[k - 1]).abs() < 0.5 * LEAST_JUMP {
                 continue;
             }
-            let height = middle(at_rest..(at_rest + BESIDE).min(rows.len())) - middle(begins..k);
+            let level = (at_rest..rows.len()).take_while(|row| {
+                *row < at_rest + BESIDE || *row < session.end && rows.time[*row] < rows.time[at_rest] + level_s
+            });
+            let height = quantile(level.map(|row| left[row]), 0.5) - middle(begins..k);
             if height.abs() > LEAST_JUMP {
                 found.push([begins, k, at_rest]);
                 heights.push(height);
@@ -162,6 +166,8 @@ pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>]) -> Vec<bool> {
 /// A jump is over after this time, s, and after so many rows.
 const JUMPING_S: f64 = 0.15;
 const MOST_ROWS_OF_A_JUMP: usize = 2000;
+/// A load rings about its new level for so long that its median is that level, s.
+const RINGING_S: f64 = 4.0;
 /// A jump is of whole pitches within this share, and this many arcsec that the rest of the error may move meanwhile.
 const PITCH_SHARE: f64 = 0.004;
 const PITCH_ARCSEC: f64 = 100.0;

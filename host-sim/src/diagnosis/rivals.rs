@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::candidate::Law;
-use super::model::{Problem, Scaffold, Term};
-use super::select::{Bests, Selected, Standing, begun, predicted, size_of, sound};
+use super::model::{Fit, Problem, Scaffold, Term};
+use super::select::{Bests, Selected, Standing, begun, predicted, settle, size_of, sound};
 
 /// A rival in the place of a cause.
 #[derive(Clone, Debug)]
@@ -21,6 +21,10 @@ pub struct Rival {
 
 /// Rise of the misfit up to which two causes are not told apart: five standard deviations.
 const TOLD_APART: f64 = 25.0;
+/// Up to this rise the other causes are refined anew beside a rival.
+const SETTLED_BELOW: f64 = 400.0;
+/// How much farther away a law may begin that a lead leads to.
+const FARTHER: f64 = 10.0;
 /// Predictions closer than this (arcsec rms, or this share of the cause's size) are not told apart by any law known this well.
 const SAME_ARCSEC: f64 = 0.5;
 const SAME_SHARE: f64 = 0.12;
@@ -85,8 +89,9 @@ pub fn rivals(
                 .filter_map(|places| Some((-scaffold.trial(law, &places)?.misfit, places)))
                 .collect();
             let best = tried.iter().fold(f64::NEG_INFINITY, |best: f64, (worth, _)| best.max(*worth));
-            // Far away already: no refinement brings it back, but for what a lead only points at.
-            if law.lead.is_none() && -best > 3.0 * selected.fit.solution.misfit + 3000.0 {
+            // Far away already: no refinement brings it back; farther for what a lead only points at.
+            let far = if law.lead.is_none() { 1.0 } else { FARTHER };
+            if -best > far * (3.0 * selected.fit.solution.misfit + 3000.0) {
                 return None;
             }
             let (term, fit) = begun(law, tried)
@@ -97,14 +102,18 @@ pub fn rivals(
             if !sound(&term, c) {
                 return None;
             }
-            let mut terms = others.clone();
-            terms.push(&term);
-            let then = predicted(problem, &terms, &fit);
+            let rise = |fit: &Fit| (fit.solution.misfit - selected.fit.solution.misfit) / left.max(1.0);
+            let with =
+                || Selected { terms: others.iter().copied().chain([&term]).cloned().collect(), fit: fit.clone() };
+            // The others were refined beside the cause: beside a rival that is close they may be otherwise.
+            let near = (TOLD_APART..SETTLED_BELOW).contains(&rise(&fit));
+            let instead = if near { settle(problem, with()).unwrap_or_else(with) } else { with() };
+            let then = predicted(problem, &instead.terms.iter().collect::<Vec<_>>(), &instead.fit);
             let less =
                 |from: &[f64]| size_of(problem, &from.iter().zip(&then).map(|(a, b)| a - b).collect::<Vec<f64>>());
             Some(Rival {
                 cause: law.cause.clone(),
-                misfit: (fit.solution.misfit - selected.fit.solution.misfit) / left.max(1.0),
+                misfit: rise(&instead.fit),
                 apart_arcsec: less(&now),
                 mops_up: lacking.as_ref().is_some_and(|lacking| less(lacking) < others_may_err(law)),
             })

@@ -36,6 +36,8 @@ const LEAST_UNNAMED_OF_MISFIT: f64 = 1.5;
 /// Predictions are the same if they are closer than this, arcsec rms, and than this share of what they explain.
 const SAME_ARCSEC: f64 = 0.75;
 const SAME_SHARE: f64 = 0.04;
+/// Evidence within which what is simpler is taken: "not worth more than a bare mention" and "positive" by Kass & Raftery (1995).
+const AS_LIKELY: f64 = 3.0;
 /// A law takes the place of another only where what it explains differs from it by less than this share.
 const IN_PLACE: f64 = 0.7;
 /// Causes at most.
@@ -44,6 +46,9 @@ const MOST_CAUSES: usize = 3;
 const MOST_UNNAMED: usize = 3;
 /// Rounds at most.
 const MOST_ROUNDS: usize = 10;
+/// Of the laws refined, so many of the best settle with all other terms where they gain this share of what the best gains.
+const CONTENDERS: usize = 3;
+const CONTENDS: f64 = 0.6;
 /// Laws that are refined in each round.
 const REFINED: usize = 9;
 /// Best places noted of each time that a law is tried at all.
@@ -54,6 +59,7 @@ const EXCHANGED: usize = 4;
 const UNNAMED_AHEAD: f64 = 5.0;
 
 /// A selection and its fit.
+#[derive(Clone)]
 pub struct Selected<'l> {
     /// Terms.
     pub terms: Vec<Term<'l>>,
@@ -62,6 +68,16 @@ pub struct Selected<'l> {
 }
 
 impl<'l> Selected<'l> {
+    /// The term that came last.
+    fn newest(&self) -> &Term<'l> {
+        &self.terms[self.terms.len() - 1]
+    }
+
+    /// Whether each term makes sense.
+    fn sound(&self) -> Vec<bool> {
+        self.terms.iter().enumerate().map(|(k, term)| sound(term, self.fit.of(k))).collect()
+    }
+
     /// All terms but the one at `k`.
     #[must_use]
     pub fn others(&self, k: usize) -> Vec<&Term<'l>> {
@@ -197,6 +213,7 @@ fn tried(
         .into_par_iter()
         .with_max_len(4)
         .filter_map(|(k, places)| Some((k, scaffold.trial(laws[k], &places)?.evidence, places)))
+        .filter(|(_, evidence, _)| evidence.is_finite())
         .collect();
     let mut by_law: Vec<Vec<(f64, Vec<f64>)>> = vec![Vec::new(); laws.len()];
     for (k, evidence, places) in tried {
@@ -228,8 +245,8 @@ fn best_tried<'l>(
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let physical = |(_, law, places): (f64, &'l Law, Vec<f64>)| {
         let term = scaffold.term(law, places);
-        // Where a lead points is only near.
-        if law.lead.is_some() {
+        // Where a lead points is only near; what changes other terms may make sense where they have settled.
+        if law.lead.is_some() || scaffold.acted_on_by(law) {
             return Some(term);
         }
         let fit = scaffold.fit(Some(&term))?;
@@ -528,84 +545,112 @@ fn forward<'l>(
     }
     let found = best_tried(&scaffold, &open, tried, REFINED);
     let before = selected.fit.solution.evidence;
-    let mut refined: Vec<(f64, Term<'l>, Fit)> = found
+    let mut grown: Vec<(f64, Selected<'l>)> = found
         .into_par_iter()
         .with_max_len(1)
         .filter_map(|term| {
             let (term, fit) = scaffold.refine(term)?;
-            let gain = fit.solution.evidence + term.occam - before;
-            let c = fit.of(fit.starts.len() - 1);
-            sound(&term, c).then_some((gain, term, fit))
+            let acts = scaffold.acted_on_by(term.law);
+            let next = Selected { terms: [&selected.terms[..], &[term]].concat(), fit };
+            // What changes others was refined beside what they do without it.
+            let next = if next.sound().last() == Some(&true) {
+                next
+            } else if acts {
+                settle(problem, next).filter(|settled| settled.sound().iter().all(|sound| *sound))?
+            } else {
+                return None;
+            };
+            Some((next.fit.solution.evidence + next.newest().occam - before, next))
         })
         .collect();
+    contenders_settled(problem, &mut grown, before);
     // Something with a name goes before something without unless that is clearly better: by more than the law may be wrong by.
-    let best_named = refined.iter().filter(|(_, term, _)| term.law.named).max_by(|a, b| a.0.total_cmp(&b.0));
-    let misfit = best_named.map_or(0.0, |(_, term, _)| term.law.misfit);
-    let ahead = |(gain, term, _): &(f64, Term<'l>, Fit)| {
-        gain - if term.law.named { 0.0 } else { UNNAMED_AHEAD.max(misfit * misfit * gain) }
+    let best_named = grown.iter().filter(|(_, next)| next.newest().law.named).max_by(|a, b| a.0.total_cmp(&b.0));
+    let misfit = best_named.map_or(0.0, |(_, next)| next.newest().law.misfit);
+    let ahead = |(gain, next): &(f64, Selected<'l>)| {
+        gain - if next.newest().law.named { 0.0 } else { UNNAMED_AHEAD.max(misfit * misfit * gain) }
     };
-    refined.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
+    grown.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
     let standing_now = standings(problem, selected);
     let misfit_as = |law: &Law| {
         standing_now.iter().zip(&selected.terms).map(|(s, t)| s.size * t.law.misfit_as(law)).fold(0.0, f64::max)
     };
-    let before = predicted(problem, &selected.terms.iter().collect::<Vec<_>>(), &selected.fit);
-    let mut order: Vec<usize> = (0..refined.len()).collect();
-    // What is simpler and predicts the same goes first.
-    if let Some((_, best, fit)) = refined.first() {
-        let with = |term: &Term<'l>, fit: &Fit| -> Vec<f64> {
-            predicted(problem, &selected.terms.iter().chain([term]).collect::<Vec<_>>(), fit)
-        };
-        let there = with(best, fit);
-        let size = size_of(problem, &there.iter().zip(&before).map(|(a, b)| a - b).collect::<Vec<_>>());
-        let simplest = (1..refined.len())
-            .filter(|k| {
-                let (_, term, fit) = &refined[*k];
-                let apart: Vec<f64> = with(term, fit).iter().zip(&there).map(|(a, b)| a - b).collect();
-                simpler(term, best) && same(size_of(problem, &apart), size)
-            })
-            .min_by_key(|k| follows(&refined[*k].1));
-        if let Some(k) = simplest {
-            order.retain(|j| *j != k);
-            order.insert(0, k);
-        }
-    }
+    simplest_first(problem, selected, &mut grown);
     // What tells the data better, only that it is too small.
     let mut too_small: Vec<Term<'l>> = Vec::new();
-    for k in order {
-        let (gain, term, fit) = refined[k].clone();
+    for (gain, next) in grown {
         if gain < 0.5 {
             break;
         }
-        let named = term.law.named;
-        let misfit = misfit_as(term.law);
-        let mut terms = selected.terms.clone();
-        let (law, line) = (term.law, format!("{} {:?}", term.law.cause, term.law.values(&term.places)));
-        terms.push(term);
-        let next = Selected { terms, fit };
+        let term = next.newest();
         let standing = standing(problem, &next, next.terms.len() - 1);
         let strongest = strongest(&selected.terms, &standing_now);
-        let passes = limits.passes(law, &standing, misfit, strongest, false)
-            && (!named || too_small.iter().all(|other| limits.clear_beside(problem, &next, &standing, other)));
+        let passes = limits.passes(term.law, &standing, misfit_as(term.law), strongest, false)
+            && (!term.law.named || too_small.iter().all(|other| limits.clear_beside(problem, &next, &standing, other)));
         log(format!(
-            "  {} {line}: evidence {:.1}, size {:.2}, left out {:.1}",
+            "  {} {} {:?}: evidence {:.1}, size {:.2}, alone {:.2} of {:.2}, left out {:.1}",
             if passes { "+" } else { "?" },
+            term.law.cause,
+            term.law.values(&term.places),
             standing.evidence,
             standing.size,
+            standing.alone,
+            misfit_as(term.law),
             standing.left_out
         ));
         if passes {
             return Some(next);
         }
-        if !named && standing.evidence > LEAST_EVIDENCE && standing.left_out > 0.0 && standing.size <= limits.least {
-            too_small.extend(next.terms.last().cloned());
+        if standing.evidence > LEAST_EVIDENCE && standing.left_out > 0.0 && standing.size <= limits.least {
+            too_small.push(term.clone());
         }
     }
     None
 }
 
+/// The best by name of selections that have grown by a term, and those close to it, settle before they are compared: what they were
+/// refined beside has taken some of what is there, which is not the same share of each. Gains are over `before`.
+fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [(f64, Selected<'l>)], before: f64) {
+    let mut named: Vec<&mut (f64, Selected<'l>)> =
+        grown.iter_mut().filter(|(_, next)| next.newest().law.named).collect();
+    named.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let least = named.first().map_or(f64::INFINITY, |(best, _)| (CONTENDS * best).max(LEAST_EVIDENCE));
+    named.truncate(CONTENDERS);
+    named.retain(|(gain, next)| {
+        *gain >= least && next.others(next.terms.len() - 1).iter().any(|t| !t.places.is_empty())
+    });
+    if named.len() < 2 {
+        return;
+    }
+    named.into_par_iter().with_max_len(1).for_each(|(gain, next)| {
+        if let Some(settled) = settle(problem, next.clone()) {
+            *gain = settled.fit.solution.evidence + settled.newest().occam - before;
+            *next = settled;
+        }
+    });
+}
+
+/// Of selections that have grown by a term, best first, the simplest that predicts the same as the best, or is as likely, goes first.
+fn simplest_first<'l>(problem: &Problem<'_>, selected: &Selected<'l>, grown: &mut [(f64, Selected<'l>)]) {
+    let Some((best_gain, best)) = grown.first() else { return };
+    let less = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
+    let by = |selected: &Selected<'l>| predicted(problem, &selected.terms.iter().collect::<Vec<_>>(), &selected.fit);
+    let there = by(best);
+    let size = size_of(problem, &less(&there, &by(selected)));
+    let simplest = (1..grown.len())
+        .filter(|k| {
+            let (gain, next) = &grown[*k];
+            simpler(next.newest(), best.newest())
+                && (best_gain - gain < AS_LIKELY || same(size_of(problem, &less(&by(next), &there)), size))
+        })
+        .min_by_key(|k| follows(grown[*k].1.newest()));
+    if let Some(k) = simplest {
+        grown[..=k].rotate_right(1);
+    }
+}
+
 /// Refines each term beside the others.
-fn settle<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
+pub(super) fn settle<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
     if selected.terms.len() < 2 {
         return Some(selected);
     }

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use super::{Column, Excitation, Law, Lead, Shape, Tolerance, by_row, main};
 use crate::diagnosis::base::PlayLaw;
 use crate::diagnosis::linear::Prior;
+use crate::diagnosis::prepare::Jump;
 use crate::tables::ARCSEC_PER_RAD;
 
 /// Moments, over the scale of the load, and directions that are tried on a drive without load; and how closely the best is followed.
@@ -108,6 +109,12 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
     law
 }
 
+/// What all jumps add, each from where it has half its height on.
+fn skipped(on: &Excitation<'_>) -> Vec<f64> {
+    let by = |k: usize, jump: &Jump| if on.rows.time[k] >= jump.time_s[1] { jump.height_arcsec } else { 0.0 };
+    by_row(on, |k| on.scales.jumps.iter().map(|jump| by(k, jump)).sum())
+}
+
 /// Response of a mass on a spring to `driven`, less what it is driven to.
 fn ringing(on: &Excitation<'_>, driven: &[f64], frequency_hz: f64, damping: f64) -> Vec<f64> {
     let rows = on.rows;
@@ -147,7 +154,8 @@ fn transition(omega: f64, damping: f64, dt: f64) -> [f64; 4] {
     ]
 }
 
-/// The load's inertia on the torsion of the drive: rings after steps of the torque and where the kinematic error meets its frequency.
+/// The load's inertia on the torsion of the drive: rings after steps of the torque, where the kinematic error meets its frequency, and
+/// where teeth skip.
 fn torsional_resonance(on: &Excitation<'_>) -> Law {
     let fastest = 0.45 / on.rows.period;
     let mut law = Law::new("torsional_resonance", |on, shape| {
@@ -159,11 +167,15 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
         let moved = ringing(on, &turning, frequency, damping);
         // A steady speed is no lag of a mass whose damper is inside the drive.
         let moved = by_row(on, |k| moved[k] + lag * on.rows.speed[k] / on.nominal.ratio * ARCSEC_PER_RAD);
-        vec![
+        let mut columns = vec![
             main(ringing(on, &base.wind_up, frequency, damping), 1.0),
             main(ringing(on, &kinematic, frequency, damping), 1.0),
             main(moved, 0.5),
-        ]
+        ];
+        if !on.scales.jumps.is_empty() {
+            columns.push(main(ringing(on, &skipped(on), frequency, damping), 1.0));
+        }
+        columns
     })
     .shapes([
         Shape::by_factors("frequency_hz", 1.0f64.min(0.3 * fastest), fastest.clamp(0.5, 80.0), 28),
