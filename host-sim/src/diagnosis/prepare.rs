@@ -114,17 +114,20 @@ fn jumps_within(rows: &Rows, left: &[f64], turned_rad: f64, level_s: f64) -> Vec
         }
         before_gap = Some(session.end.saturating_sub(BESIDE).max(session.start));
     }
-    // Rows one after another that see the same one: the one that sees the most of it.
+    // Rows one after another that see the same one: the one that sees the most of it; the first where all later ones see it ring.
     let mut seen: Vec<(usize, usize)> = Vec::new();
     for k in 0..found.len() {
+        let row = found[k][1];
+        let same =
+            |best: usize, latest: usize| row - latest < BESIDE || rows.time[row] - rows.time[found[best][1]] < level_s;
         match seen.last_mut() {
-            Some((best, latest)) if found[k][1] - *latest < BESIDE => {
-                *latest = found[k][1];
-                if heights[k].abs() > heights[*best].abs() {
+            Some((best, latest)) if same(*best, *latest) => {
+                *latest = row;
+                if level_s == 0.0 && heights[k].abs() > heights[*best].abs() {
                     *best = k;
                 }
             }
-            _ => seen.push((k, found[k][1])),
+            _ => seen.push((k, row)),
         }
     }
     seen.into_iter()

@@ -243,23 +243,24 @@ fn best_tried<'l>(
         })
         .collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let physical = |(_, law, places): (f64, &'l Law, Vec<f64>)| {
+    let mut terms = Vec::new();
+    let mut counted = HashSet::new();
+    for (_, law, places) in found {
         let term = scaffold.term(law, places);
         // Where a lead points is only near; what changes other terms may make sense where they have settled.
-        if law.lead.is_some() || scaffold.acted_on_by(law) {
-            return Some(term);
+        let open = law.lead.is_some() || scaffold.acted_on_by(law);
+        if open || scaffold.fit(Some(&term)).is_some_and(|fit| sound(&term, fit.of(fit.starts.len() - 1))) {
+            counted.insert(law.id());
+        } else if law.shapes.is_empty() || !counted.is_empty() {
+            // What tells the data better than all these may make sense at places nearby; others do not.
+            continue;
         }
-        let fit = scaffold.fit(Some(&term))?;
-        sound(&term, fit.of(fit.starts.len() - 1)).then_some(term)
-    };
-    let mut counted = Vec::new();
-    let within = |term: &Term<'l>| {
-        if !counted.contains(&term.law.id()) {
-            counted.push(term.law.id());
+        if counted.len() > most {
+            break;
         }
-        counted.len() <= most
-    };
-    found.into_iter().filter_map(physical).take_while(within).collect()
+        terms.push(term);
+    }
+    terms
 }
 
 /// What each term adds that the others cannot, and what it is worth on sessions left out.
@@ -508,10 +509,10 @@ pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[&str]) -> Vec
             .with_max_len(1)
             .filter_map(|term| {
                 let (term, fit) = scaffold.refine(term)?;
-                Some((fit.solution.evidence, term))
+                Some((sound(&term, fit.of(fit.starts.len() - 1)), fit.solution.evidence, term))
             })
-            .max_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((_, term)) = best else { break };
+            .max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let Some((_, _, term)) = best else { break };
         terms.push(term);
         for _ in 0..2 {
             let Some(fit) = fit(problem, &terms) else { return terms };

@@ -6,6 +6,9 @@ use crate::measurement::Session;
 use crate::nominal::{Harmonic, Nominal};
 use crate::synthesize::{Effect, Plan, Richness, Sensors, catalogue_drive, measure};
 
+/// A flank meets the tooth behind a zone's centre by this angle, rad.
+const FLANK_AHEAD_RAD: f64 = 0.35;
+
 fn effect(name: &str, size: f64, phase: f64, other: f64) -> Effect {
     Effect { name: name.into(), size, phase, other }
 }
@@ -249,6 +252,76 @@ fn teeth_that_climb_while_the_wave_passes_have_ratcheted() {
     assert_eq!(names(&diagnosis), ["ratcheting"], "{}", diagnosis.text());
     let slipped = diagnosis.causes[0].parameters["jump_arcsec"];
     assert!((slipped.value - pitch * 206_264.8).abs() < 15.0, "{slipped:?}");
+}
+
+/// Teeth that skip into the next space within a row, and the load that swings about it on the drive's spring.
+#[test]
+fn teeth_that_skip_are_seen_to_where_the_load_rings_about_their_new_place() {
+    let drive = catalogue_drive();
+    let pitch = std::f64::consts::TAU / f64::from(drive.teeth.unwrap().circular_spline);
+    let (decay, omega) = (1.5, std::f64::consts::TAU * 5.0);
+    for share in [0.0, 0.15, 0.4, 1.0] {
+        let mut sessions = recorded(&[], 2, 6000, 200.0, 1.0, 8);
+        for (k, error) in sessions[0].error_rad.iter_mut().enumerate().skip(3000) {
+            let passed = (k - 3000) as f64 / 200.0;
+            *error += pitch * (1.0 - share * (-decay * passed).exp() * (omega * passed).cos());
+        }
+        sessions[1].error_rad.iter_mut().for_each(|error| *error += pitch);
+        let rows = super::Rows::new(&sessions, &drive);
+        let (_, jumps) = super::prepare::base(&rows, &drive, None);
+        let heights: Vec<f64> = jumps.iter().map(|jump| jump.height_arcsec).collect();
+        assert_eq!(heights.len(), 1, "{share}: {jumps:?}");
+        assert!((heights[0] - pitch * 206_264.8).abs() < 100.0, "{share}: {heights:?}");
+        let skipped_s = rows.time[rows.sessions[0].start + 3000];
+        assert!((jumps[0].time_s[1] - skipped_s).abs() < 0.06, "{share}: {jumps:?} for {skipped_s}");
+    }
+}
+
+/// The clearance that a drive loses in the cold decides where a runout binds: neither is what it is alone.
+#[test]
+fn a_clearance_that_shuts_is_found_beside_a_runout_that_binds_in_it() {
+    let (drive, mut sessions) = (catalogue_drive(), data(&[], Richness::Rich, 0, 45));
+    let half = 0.5 * drive.backlash_arcsec;
+    for session in &mut sessions {
+        let (torque, temperature) = (session.torque_n_m.clone().unwrap(), session.temperature_c.clone().unwrap());
+        let mut flank = torque[0].signum();
+        for k in 0..session.len() {
+            if torque[k].abs() > drive.friction_torque_n_m {
+                flank = torque[k].signum();
+            }
+            let open = (half + 0.5 * 1.7 * (temperature[k] - drive.temperature_c)).max(0.0);
+            let stopped = |ahead: f64| 25.0 * (session.generator_rad[k] - 0.5 + ahead).sin().abs();
+            let (high, low) = (open - stopped(FLANK_AHEAD_RAD), stopped(-FLANK_AHEAD_RAD) - open);
+            let rests = 0.5 * (high + low) + flank * 0.5 * (high - low).max(0.0);
+            session.error_rad[k] += (rests - flank * half) / 206_264.8;
+        }
+    }
+    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!(names(&diagnosis), ["flexspline_runout", "thermal_clearance"], "{}", diagnosis.text());
+    let width = diagnosis.causes.iter().find(|cause| cause.name == "thermal_clearance").unwrap();
+    let per_k = width.parameters["clearance_arcsec_per_k"];
+    assert!((per_k.value - 1.7).abs() < 2.0 * per_k.std && per_k.std < 0.6, "{per_k:?}");
+}
+
+#[test]
+fn what_tells_the_data_worse_than_something_too_small_to_name_is_not_named_for_it() {
+    let effects =
+        [effect("stiffness_hardening", 20.0, 0.0, 0.0), effect("generator_encoder_eccentricity", 1.6, 2.2, 0.0)];
+    let measured = recorded(&effects, 5, 6000, 100.0, 1.0, 6);
+    let diagnosis = diagnose(&measured, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!(names(&diagnosis), ["stiffness_hardening"], "{}", diagnosis.text());
+}
+
+/// At one load a softer spring and a wider clearance differ by what the drag does in them.
+#[test]
+fn at_one_load_a_spring_softer_in_the_cold_is_named_beside_a_drag_or_listed() {
+    let effects = [effect("thermal_stiffness", 0.004, 0.0, 0.0), effect("lubricant_viscosity", 20.0, 0.0, 0.5)];
+    let sessions = data(&effects, Richness::ConstantTorque, 0, 46);
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    let called = |name: &str| {
+        diagnosis.causes.iter().any(|cause| cause.name == name || cause.look_alikes.iter().any(|other| other == name))
+    };
+    assert!(called("thermal_stiffness") && called("lubricant_viscosity"), "{}", diagnosis.text());
 }
 
 #[test]

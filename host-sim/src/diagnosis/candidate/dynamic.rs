@@ -109,10 +109,13 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
     law
 }
 
-/// What all jumps add, each from where it has half its height on.
-fn skipped(on: &Excitation<'_>) -> Vec<f64> {
+/// Spread of the share of a jump that makes the load ring, beside that of a step of the torque.
+const SLIDING: f64 = 0.3;
+
+/// What all jumps add, each from where it has half its height on, if there are any.
+fn skipped(on: &Excitation<'_>) -> Option<Vec<f64>> {
     let by = |k: usize, jump: &Jump| if on.rows.time[k] >= jump.time_s[1] { jump.height_arcsec } else { 0.0 };
-    by_row(on, |k| on.scales.jumps.iter().map(|jump| by(k, jump)).sum())
+    (!on.scales.jumps.is_empty()).then(|| by_row(on, |k| on.scales.jumps.iter().map(|jump| by(k, jump)).sum()))
 }
 
 /// Response of a mass on a spring to `driven`, less what it is driven to.
@@ -167,14 +170,15 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
         let moved = ringing(on, &turning, frequency, damping);
         // A steady speed is no lag of a mass whose damper is inside the drive.
         let moved = by_row(on, |k| moved[k] + lag * on.rows.speed[k] / on.nominal.ratio * ARCSEC_PER_RAD);
+        let skipped = skipped(on);
+        let moved_to = by_row(on, |k| base.wind_up[k] + skipped.as_ref().map_or(0.0, |skipped| skipped[k]));
         let mut columns = vec![
-            main(ringing(on, &base.wind_up, frequency, damping), 1.0),
+            main(ringing(on, &moved_to, frequency, damping), 1.0),
             main(ringing(on, &kinematic, frequency, damping), 1.0),
             main(moved, 0.5),
         ];
-        if !on.scales.jumps.is_empty() {
-            columns.push(main(ringing(on, &skipped(on), frequency, damping), 1.0));
-        }
+        // Teeth that slide into the next space do so less suddenly.
+        columns.extend(skipped.map(|skipped| main(ringing(on, &skipped, frequency, damping), SLIDING)));
         columns
     })
     .shapes([

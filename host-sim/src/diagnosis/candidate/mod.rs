@@ -471,10 +471,32 @@ pub fn library(on: &Excitation<'_>) -> Vec<Law> {
 
 /// What follows `values` with a lag of `lag_s`, each session from where it begins.
 fn lagged(on: &Excitation<'_>, values: &[f64], lag_s: f64) -> Vec<f64> {
+    lagged_from(on, values, lag_s, |_, first| first)
+}
+
+/// The same where it goes on from one session to the next: between them it nears what the next one begins with.
+fn lagged_through(on: &Excitation<'_>, values: &[f64], lag_s: f64) -> Vec<f64> {
+    lagged_from(on, values, lag_s, |before, first| match before {
+        // Where clocks begin anew nobody knows how long it had.
+        Some((state, gap_s)) if gap_s >= 0.0 => first + (state - first) * (-gap_s / lag_s).exp(),
+        _ => first,
+    })
+}
+
+/// What follows `values` with a lag; `begin` gives the state at the first row of a session, of what it was at the last row of the session
+/// before and how many seconds ago that was, and of the value.
+fn lagged_from(
+    on: &Excitation<'_>,
+    values: &[f64],
+    lag_s: f64,
+    begin: impl Fn(Option<(f64, f64)>, f64) -> f64,
+) -> Vec<f64> {
     let rows = on.rows;
     let mut reached = vec![0.0; rows.len()];
+    let mut last: Option<usize> = None;
     for session in &rows.sessions {
-        let mut state = values[session.start];
+        let before = last.map(|last| (reached[last], rows.time[session.start] - rows.time[last]));
+        let mut state = begin(before, values[session.start]);
         for k in session.clone() {
             if k > session.start {
                 let dt = (rows.time[k] - rows.time[k - 1]).max(0.0);
@@ -482,6 +504,7 @@ fn lagged(on: &Excitation<'_>, values: &[f64], lag_s: f64) -> Vec<f64> {
             }
             reached[k] = state;
         }
+        last = session.clone().last();
     }
     reached
 }

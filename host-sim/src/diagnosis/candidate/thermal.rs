@@ -1,11 +1,12 @@
 //! What the temperature does.
 
-use super::{Column, Excitation, Law, Lead, Named, Shape, Tolerance, by_row, lagged, main, nuisance};
+use super::{Column, Excitation, Law, Lead, Named, Shape, Tolerance, by_row, lagged_through, main, nuisance};
 use crate::diagnosis::linear::Prior;
 
-/// Temperature above nominal, felt with a lag of `lag_s`, K.
+/// Temperature above nominal, felt with a lag of `lag_s`, K. Metal does not know when it is recorded: what was felt when a session ended
+/// nears the temperature at which the next one begins.
 fn warmer_by(on: &Excitation<'_>, lag_s: f64) -> Vec<f64> {
-    let felt = lagged(on, &on.rows.temperature, lag_s);
+    let felt = lagged_through(on, &on.rows.temperature, lag_s);
     by_row(on, |k| felt[k] - on.nominal.temperature_c)
 }
 
