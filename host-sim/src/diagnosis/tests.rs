@@ -303,6 +303,38 @@ fn a_clearance_that_shuts_is_found_beside_a_runout_that_binds_in_it() {
     assert!((per_k.value - 1.7).abs() < 2.0 * per_k.std && per_k.std < 0.6, "{per_k:?}");
 }
 
+/// A drive brought into the cold minutes before it is recorded has not cooled down: its teeth lag behind the sensor for as long as they do
+/// while it is recorded.
+#[test]
+fn what_lags_behind_the_temperature_goes_on_between_sessions() {
+    let (drive, mut sessions) = (catalogue_drive(), data(&[], Richness::Rich, 0, 47));
+    let (per_k, lag_s) = (0.6, 300.0);
+    let (mut felt, mut last_s) = (sessions[0].temperature_c.as_ref().unwrap()[0], None);
+    let mut begins = 0.0;
+    for session in &mut sessions {
+        let (torque, temperature) = (session.torque_n_m.clone().unwrap(), session.temperature_c.clone().unwrap());
+        let time = session.time_s.as_mut().unwrap();
+        let first = time[0];
+        time.iter_mut().for_each(|time| *time += begins - first);
+        begins = time[time.len() - 1] + 150.0;
+        let mut flank = torque[0].signum();
+        for k in 0..torque.len() {
+            let passed: f64 = last_s.map_or(0.0, |last| time[k] - last);
+            felt += (temperature[k] - felt) * (1.0 - (-passed / lag_s).exp());
+            last_s = Some(time[k]);
+            if torque[k].abs() > drive.friction_torque_n_m {
+                flank = torque[k].signum();
+            }
+            session.error_rad[k] += flank * 0.5 * per_k * (felt - drive.temperature_c) / 206_264.8;
+        }
+    }
+    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!(names(&diagnosis), ["thermal_clearance"], "{}", diagnosis.text());
+    let found = &diagnosis.causes[0].parameters;
+    assert!((found["clearance_arcsec_per_k"].value - per_k).abs() < 0.1, "{found:?}");
+    assert!((found["lag_s"].value / lag_s - 1.0).abs() < 0.2, "{found:?}");
+}
+
 #[test]
 fn what_tells_the_data_worse_than_something_too_small_to_name_is_not_named_for_it() {
     let effects =
