@@ -344,18 +344,6 @@ fn what_tells_the_data_worse_than_something_too_small_to_name_is_not_named_for_i
     assert_eq!(names(&diagnosis), ["stiffness_hardening"], "{}", diagnosis.text());
 }
 
-/// At one load a softer spring and a wider clearance differ by what the drag does in them.
-#[test]
-fn at_one_load_a_spring_softer_in_the_cold_is_named_beside_a_drag_or_listed() {
-    let effects = [effect("thermal_stiffness", 0.004, 0.0, 0.0), effect("lubricant_viscosity", 20.0, 0.0, 0.5)];
-    let sessions = data(&effects, Richness::ConstantTorque, 0, 46);
-    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
-    let called = |name: &str| {
-        diagnosis.causes.iter().any(|cause| cause.name == name || cause.look_alikes.iter().any(|other| other == name))
-    };
-    assert!(called("thermal_stiffness") && called("lubricant_viscosity"), "{}", diagnosis.text());
-}
-
 #[test]
 fn a_sensor_put_back_elsewhere_before_each_session_is_described_and_nothing_blamed_for_it() {
     let mut sessions = recorded(&[], 5, 4000, 100.0, 2.0, 12);
