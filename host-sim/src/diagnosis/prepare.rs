@@ -32,7 +32,7 @@ pub fn base(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>) -> (Base,
     let mut level = rows.clone();
     for jump in &jumps {
         for (error, time) in level.error.iter_mut().zip(&rows.time) {
-            *error -= if *time >= jump.time_s[1] { jump.height_arcsec } else { 0.0 };
+            *error -= jump.reached(*time);
         }
     }
     let play = Base::new(&level, nominal, table).law;
@@ -48,6 +48,14 @@ pub struct Jump {
     pub height_arcsec: f64,
 }
 
+impl Jump {
+    /// What it has added at a time (s), arcsec: all of it from where it has half its height on.
+    #[must_use]
+    pub fn reached(&self, time_s: f64) -> f64 {
+        if time_s >= self.time_s[1] { self.height_arcsec } else { 0.0 }
+    }
+}
+
 /// Where the error leaves for another level: at once, or, where that shows no whole pitches, while the wave passes (half a turn of the
 /// generator): so long teeth take to climb over each other. Where the load rings after that, the level is what it rings about.
 #[must_use]
@@ -61,8 +69,8 @@ pub fn jumps(rows: &Rows, base: &Base, nominal: &Nominal) -> Vec<Jump> {
         return at_once;
     }
     let others = [(PI, 0.0), (0.0, RINGING_S), (PI, RINGING_S)];
-    let found = others.iter().map(|(turned_rad, level_s)| jumps_within(rows, &left, *turned_rad, *level_s));
-    found.into_iter().find(|found| whole(found)).unwrap_or(at_once)
+    let mut found = others.iter().map(|(turned_rad, level_s)| jumps_within(rows, &left, *turned_rad, *level_s));
+    found.find(|found| whole(found)).unwrap_or(at_once)
 }
 
 /// How many pitches of either wheel a jump is, if it is a whole number of them.

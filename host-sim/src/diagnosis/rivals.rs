@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::candidate::Law;
 use super::model::{Fit, Problem, Scaffold, Term};
-use super::select::{Bests, Selected, Standing, begun, predicted, settle, size_of, sound};
+use super::select::{Bests, Selected, Standing, begun, less, predicted, settle, size_of, sound};
 
 /// A rival in the place of a cause.
 #[derive(Clone, Debug)]
@@ -68,8 +68,7 @@ pub fn rivals(
     let apart = selected.without(problem, k);
     let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
     let scaffold = Scaffold::new(problem, others.clone());
-    let all: Vec<&Term<'_>> = selected.terms.iter().collect();
-    let now = predicted(problem, &all, &selected.fit);
+    let now = selected.predicted(problem);
     let open: Vec<&Law> =
         laws.iter().filter(|law| law.named && selected.terms.iter().all(|t| t.law.cause != law.cause)).collect();
     // Where more is left than noise, as much may hide in any rival: rises count against what is left.
@@ -103,19 +102,22 @@ pub fn rivals(
                 return None;
             }
             let rise = |fit: &Fit| (fit.solution.misfit - selected.fit.solution.misfit) / left.max(1.0);
-            let with =
-                || Selected { terms: others.iter().copied().chain([&term]).cloned().collect(), fit: fit.clone() };
+            let with: Vec<&Term<'_>> = others.iter().copied().chain([&term]).collect();
             // The others were refined beside the cause: beside a rival that is close they may be otherwise.
             let near = (TOLD_APART..SETTLED_BELOW).contains(&rise(&fit));
-            let instead = if near { settle(problem, with()).unwrap_or_else(with) } else { with() };
-            let then = predicted(problem, &instead.terms.iter().collect::<Vec<_>>(), &instead.fit);
-            let less =
-                |from: &[f64]| size_of(problem, &from.iter().zip(&then).map(|(a, b)| a - b).collect::<Vec<f64>>());
+            let settled = near
+                .then(|| settle(problem, Selected { terms: with.iter().copied().cloned().collect(), fit: fit.clone() }))
+                .flatten();
+            let (misfit, then) = match &settled {
+                Some(settled) => (rise(&settled.fit), settled.predicted(problem)),
+                None => (rise(&fit), predicted(problem, &with, &fit)),
+            };
+            let differs = |from: &[f64]| size_of(problem, &less(from, &then));
             Some(Rival {
                 cause: law.cause.clone(),
-                misfit: rise(&instead.fit),
-                apart_arcsec: less(&now),
-                mops_up: lacking.as_ref().is_some_and(|lacking| less(lacking) < others_may_err(law)),
+                misfit,
+                apart_arcsec: differs(&now),
+                mops_up: lacking.as_ref().is_some_and(|lacking| differs(lacking) < others_may_err(law)),
             })
         })
         .collect();

@@ -73,9 +73,15 @@ impl<'l> Selected<'l> {
         &self.terms[self.terms.len() - 1]
     }
 
-    /// Whether each term makes sense.
-    fn sound(&self) -> Vec<bool> {
-        self.terms.iter().enumerate().map(|(k, term)| sound(term, self.fit.of(k))).collect()
+    /// Whether all terms make sense.
+    fn is_sound(&self) -> bool {
+        self.terms.iter().enumerate().all(|(k, term)| sound(term, self.fit.of(k)))
+    }
+
+    /// Prediction beside the nominal one, averaged.
+    #[must_use]
+    pub fn predicted(&self, problem: &Problem<'_>) -> Vec<f64> {
+        predicted(problem, &self.terms.iter().collect::<Vec<_>>(), &self.fit)
     }
 
     /// All terms but the one at `k`.
@@ -275,10 +281,10 @@ pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize)
     let Some(without) = Scaffold::new(problem, others.clone()).fit(None) else {
         return Standing { evidence: f64::INFINITY, size: f64::INFINITY, alone: f64::INFINITY, left_out: 1.0 };
     };
-    let with = predicted(problem, &selected.terms.iter().collect::<Vec<_>>(), &selected.fit);
+    let with = selected.predicted(problem);
     let lacking = predicted(problem, &others, &without);
     let gain = selected.fit.solution.evidence + selected.terms[k].occam - without.solution.evidence;
-    let added: Vec<f64> = with.iter().zip(&lacking).map(|(a, b)| a - b).collect();
+    let added = less(&with, &lacking);
     let alone = size_of(problem, &added);
     // At one load throughout, the zero of the encoder takes all of it.
     let own = about_mean(problem, selected.terms[k].contribution(selected.fit.of(k)));
@@ -314,6 +320,11 @@ pub fn size_of(problem: &Problem<'_>, added: &[f64]) -> f64 {
     let used: Vec<f64> = added.iter().zip(&problem.certain).filter(|(_, c)| **c).map(|(v, _)| v.abs()).collect();
     let high = super::rows::quantile(used.iter().copied(), 0.97);
     super::rows::rms(&used).max(0.4 * high)
+}
+
+/// One prediction less another.
+pub(super) fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
 /// Prediction beside the nominal one, averaged.
@@ -551,16 +562,15 @@ fn forward<'l>(
         .with_max_len(1)
         .filter_map(|term| {
             let (term, fit) = scaffold.refine(term)?;
-            let acts = scaffold.acted_on_by(term.law);
-            let next = Selected { terms: [&selected.terms[..], &[term]].concat(), fit };
-            // What changes others was refined beside what they do without it.
-            let next = if next.sound().last() == Some(&true) {
-                next
-            } else if acts {
-                settle(problem, next).filter(|settled| settled.sound().iter().all(|sound| *sound))?
-            } else {
+            let makes_sense = sound(&term, fit.of(fit.starts.len() - 1));
+            if !makes_sense && !scaffold.acted_on_by(term.law) {
                 return None;
-            };
+            }
+            let mut next = Selected { terms: [&selected.terms[..], &[term]].concat(), fit };
+            if !makes_sense {
+                // What changes others was refined beside what they do without it.
+                next = settle(problem, next).filter(Selected::is_sound)?;
+            }
             Some((next.fit.solution.evidence + next.newest().occam - before, next))
         })
         .collect();
@@ -634,15 +644,14 @@ fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [(f64, Selected<'l>
 /// Of selections that have grown by a term, best first, the simplest that predicts the same as the best, or is as likely, goes first.
 fn simplest_first<'l>(problem: &Problem<'_>, selected: &Selected<'l>, grown: &mut [(f64, Selected<'l>)]) {
     let Some((best_gain, best)) = grown.first() else { return };
-    let less = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
-    let by = |selected: &Selected<'l>| predicted(problem, &selected.terms.iter().collect::<Vec<_>>(), &selected.fit);
-    let there = by(best);
-    let size = size_of(problem, &less(&there, &by(selected)));
+    let there = best.predicted(problem);
+    let size = size_of(problem, &less(&there, &selected.predicted(problem)));
     let simplest = (1..grown.len())
         .filter(|k| {
             let (gain, next) = &grown[*k];
             simpler(next.newest(), best.newest())
-                && (best_gain - gain < AS_LIKELY || same(size_of(problem, &less(&by(next), &there)), size))
+                && (best_gain - gain < AS_LIKELY
+                    || same(size_of(problem, &less(&next.predicted(problem), &there)), size))
         })
         .min_by_key(|k| follows(grown[*k].1.newest()));
     if let Some(k) = simplest {
@@ -776,8 +785,7 @@ fn exchange<'l>(
                 sound(&term, c).then_some((term, fit))
             })
             .collect();
-        let less = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
-        let now = predicted(problem, &selected.terms.iter().collect::<Vec<_>>(), &selected.fit);
+        let now = selected.predicted(problem);
         let size = size_of(problem, &less(&now, &predicted(problem, &others.iter().collect::<Vec<_>>(), &without)));
         let evidence = selected.fit.solution.evidence + selected.terms[k].occam;
         let best = refined

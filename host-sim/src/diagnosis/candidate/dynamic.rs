@@ -5,7 +5,6 @@ use std::f64::consts::PI;
 use super::{Column, Excitation, Law, Lead, Shape, Tolerance, by_row, main};
 use crate::diagnosis::base::PlayLaw;
 use crate::diagnosis::linear::Prior;
-use crate::diagnosis::prepare::Jump;
 use crate::tables::ARCSEC_PER_RAD;
 
 /// Moments, over the scale of the load, and directions that are tried on a drive without load; and how closely the best is followed.
@@ -114,8 +113,8 @@ const SLIDING: f64 = 0.3;
 
 /// What all jumps add, each from where it has half its height on, if there are any.
 fn skipped(on: &Excitation<'_>) -> Option<Vec<f64>> {
-    let by = |k: usize, jump: &Jump| if on.rows.time[k] >= jump.time_s[1] { jump.height_arcsec } else { 0.0 };
-    (!on.scales.jumps.is_empty()).then(|| by_row(on, |k| on.scales.jumps.iter().map(|jump| by(k, jump)).sum()))
+    let jumps = &on.scales.jumps;
+    (!jumps.is_empty()).then(|| by_row(on, |k| jumps.iter().map(|jump| jump.reached(on.rows.time[k])).sum()))
 }
 
 /// Response of a mass on a spring to `driven`, less what it is driven to.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::prepare::{Jump, whole_pitches};
+use super::super::prepare::whole_pitches;
 use super::super::rows::rms;
 use super::geometry::{Angle, waves};
 use super::{Excitation, Law, Shape, by_row, history, main, nuisance};
@@ -193,8 +193,7 @@ fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
     }
     let columns = jumps.clone();
     let mut law = Law::new("ratcheting", move |on, _| {
-        let slipped = |jump: &Jump, k: usize| if on.rows.time[k] >= jump.time_s[1] { jump.height_arcsec } else { 0.0 };
-        columns.iter().map(|jump| main(by_row(on, |k| slipped(jump, k) / pitch), 2.0 * pitch)).collect()
+        columns.iter().map(|jump| main(by_row(on, |k| jump.reached(on.rows.time[k]) / pitch), 2.0 * pitch)).collect()
     })
     .parameters(move |_, _, c| {
         let slipped: f64 = jumps.iter().zip(c).map(|(jump, c)| c * jump.height_arcsec / pitch).sum();
