@@ -217,6 +217,20 @@ impl Base {
         }
     }
 
+    /// With each column changed by `of`, without what floats.
+    pub(super) fn each(&self, of: impl Fn(&[f64]) -> Vec<f64>) -> Base {
+        Base {
+            prediction: of(&self.prediction),
+            flank: of(&self.flank),
+            wind_up: of(&self.wind_up),
+            half_backlash: self.half_backlash,
+            law: self.law,
+            floating: Vec::new(),
+            waves: Waves::default(),
+            uncertain: Vec::new(),
+        }
+    }
+
     /// Flanks, wind-up and prediction under the torque that `rows` have now.
     pub(super) fn load_with(&mut self, rows: &Rows, nominal: &Nominal) {
         let flank = self.law.flanks(rows, &rows.torque, nominal);

@@ -3,9 +3,11 @@
 //! [`Extended::fit_to`] learns from some of the sessions alone, so that what it says of the others was not seen by it.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use flexspline::Table;
 
+use super::averaged::Averaged;
 use super::base::{Base, PlayLaw};
 use super::candidate::{Acting, Column, Excitation, Law, Scales, Tolerance, library, together};
 use super::model::{Problem, Scaffold, terms_at};
@@ -124,8 +126,10 @@ impl Extended {
         if averages_hide(&on, &laws, causes, &uncertain, stride) {
             stride = 1;
         }
-        let (noise, worth) = prepare::noise(&on, &laws, &fast, &uncertain);
-        let problem = Problem::new(&on, &uncertain, Whitener::new(&rows, &uncertain, stride, noise), worth);
+        let averaged = Averaged::of(&on, stride).map(Arc::new);
+        let free = prepare::FreeColumns::of(&on, &laws, averaged.clone());
+        let (noise, worth) = prepare::noise(&on, &free, &fast, &uncertain);
+        let problem = Problem::new(&on, &uncertain, Whitener::new(&rows, &uncertain, stride, noise), worth, averaged);
         let start: Vec<(usize, Vec<f64>)> = super::select::fixed(&problem, &laws, causes)
             .iter()
             .filter_map(|t| Some((laws.iter().position(|law| std::ptr::eq(law, t.law))?, t.places.clone())))

@@ -6,6 +6,8 @@
 use std::ops::Range;
 use std::sync::LazyLock;
 
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::{Accum, Mat, Par};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Symmetric products of columns, the data last.
@@ -22,12 +24,30 @@ impl Gram {
     #[must_use]
     pub fn of(columns: &[&[f64]], range: Range<usize>) -> Gram {
         let size = columns.len();
+        if size >= MANY {
+            return Gram::of_many(columns, range);
+        }
         let mut products = products(columns, columns, range, true);
         for i in 0..size {
             for j in 0..i {
                 products[j * size + i] = products[i * size + j];
             }
         }
+        Gram { size, products }
+    }
+
+    /// As [`Gram::of`], the columns side by side in one matrix: many of them do not fit the cache.
+    fn of_many(columns: &[&[f64]], range: Range<usize>) -> Gram {
+        let size = columns.len();
+        let mut all = Mat::<f64>::zeros(range.len(), size);
+        for (j, column) in columns.iter().enumerate() {
+            all.col_as_slice_mut(j).copy_from_slice(&column[range.clone()]);
+        }
+        let mut lower = Mat::<f64>::zeros(size, size);
+        let (half, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+        matmul(&mut lower, half, Accum::Replace, all.transpose(), whole, &all, whole, 1.0, Par::Seq);
+        let products =
+            (0..size).flat_map(|i| (0..size).map(move |j| (i.max(j), i.min(j)))).map(|at| lower[at]).collect();
         Gram { size, products }
     }
 
@@ -82,9 +102,20 @@ impl Gram {
     }
 }
 
-/// Sum of products.
+/// From so many columns on their products are a product of matrices.
+const MANY: usize = 24;
+
+/// Sum of products, in eight sums side by side.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
+    let (a_eights, a_rest) = a.as_chunks::<8>();
+    let (b_eights, b_rest) = b.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for (x, y) in a_eights.iter().zip(b_eights) {
+        for j in 0..8 {
+            sums[j] += x[j] * y[j];
+        }
+    }
+    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum::<f64>()
 }
 
 /// Products of each column of `a` with each of `b` over a range of rows, row by row of the result; with `lower`, only as many of `b` as

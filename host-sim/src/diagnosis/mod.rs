@@ -9,6 +9,7 @@
 //! 6. [`remainder`]: lines and steps left; abstention.
 //! 7. `verdict`: which causes may be named, with parameters, uncertainty, and the gain on sessions left out ([`report`]).
 
+mod averaged;
 pub mod base;
 pub mod candidate;
 mod experiment;
@@ -30,17 +31,20 @@ mod uncertainty;
 mod verdict;
 
 use std::io::Write as _;
+use std::sync::Arc;
 
 use flexspline::Table;
 use thiserror::Error;
 
 use crate::measurement::Session;
 use crate::nominal::Nominal;
+use averaged::Averaged;
 use candidate::{Excitation, Law, Scales, library, line, unnamed};
 use extended::Found;
 pub use extended::{Extended, FittedCause, Series};
 use model::{Problem, terms_at};
 use noise::{Noise, Whitener};
+use prepare::FreeColumns;
 use report::{Diagnosis, Unexplained};
 use resolution::{Resolution, resolution};
 use rows::Rows;
@@ -188,9 +192,11 @@ impl<'a> Search<'a> {
         let mut uncertain = prepare::uncertain(on, &[]);
         let Resolution { mut stride, fast: at_first } = resolution(on, &laws, &uncertain, settings.averages, &[]);
         let whiten = |noise, uncertain: &[bool], stride| Whitener::new(on.rows, uncertain, stride, noise);
-        let (mut noise, mut worth) = prepare::noise(on, &laws, &at_first, &uncertain);
+        let mut averaged = Averaged::of(on, stride).map(Arc::new);
+        let mut free = FreeColumns::of(on, &laws, averaged.clone());
+        let (mut noise, mut worth) = prepare::noise(on, &free, &at_first, &uncertain);
         say(format!("play {:?}, {noise:?}, worth {worth:.2}, {} rows", on.base.law, on.rows.count_used()));
-        let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth);
+        let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
         let mut fast: Vec<Unexplained> = Vec::new();
         let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
         let mut bests = Bests::default();
@@ -233,8 +239,14 @@ impl<'a> Search<'a> {
             let finer = resolution(on, &laws, &uncertain, settings.averages, &explained);
             let closer_look = finer.stride < stride;
             stride = stride.min(finer.stride);
+            if closer_look {
+                averaged = Averaged::of(on, stride).map(Arc::new);
+            }
+            if closer_look || !free.are_of(&laws) {
+                free = FreeColumns::of(on, &laws, averaged.clone());
+            }
             explained.iter_mut().zip(&finer.fast).for_each(|(sum, fast)| *sum += fast);
-            let (again, worth_again) = prepare::noise(on, &laws, if new_line { &[] } else { &explained }, &uncertain);
+            let (again, worth_again) = prepare::noise(on, &free, if new_line { &[] } else { &explained }, &uncertain);
             let change = again.floor() / noise.floor();
             if !new_line && !other_rows && !closer_look && (0.85..1.18).contains(&change) {
                 break;
@@ -244,7 +256,7 @@ impl<'a> Search<'a> {
             }
             (noise, worth) = (again, worth_again);
             say(format!("once more: {noise:?}, worth {worth:.2}"));
-            problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth);
+            problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
         }
         Ok(Search { laws, problem, noise, start, bests, fast })
     }

@@ -6,6 +6,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use super::averaged::{Averaged, Grain};
 use super::candidate::{Acting, Among, Column, Excitation, Law, Tolerance, left_by};
 use super::linear::{Gram, Prior, Solution, products, solve};
 use super::noise::Whitener;
@@ -31,6 +32,8 @@ pub struct Problem<'a> {
     pub base_white: Vec<Vec<f64>>,
     /// Worth of the information, at most 1.
     pub worth: f64,
+    /// What laws are evaluated on.
+    grain: Grain,
     /// What was evaluated where laws are tried first.
     tried: Mutex<Tried>,
 }
@@ -59,7 +62,14 @@ enum Extent {
 impl<'a> Problem<'a> {
     /// Averages and whitens.
     #[must_use]
-    pub fn new(on: &'a Excitation<'a>, uncertain: &[bool], whitener: Whitener, worth: f64) -> Problem<'a> {
+    pub fn new(
+        on: &'a Excitation<'a>,
+        uncertain: &[bool],
+        whitener: Whitener,
+        worth: f64,
+        averaged: Option<Arc<Averaged>>,
+    ) -> Problem<'a> {
+        let grain = Grain::new(averaged, &whitener);
         let rows: Vec<f64> = on.rows.error.iter().zip(&on.base.prediction).map(|(e, p)| e - p).collect();
         let data = whitener.average(&rows);
         let data_white = whitener.whiten_averaged(&data);
@@ -67,7 +77,7 @@ impl<'a> Problem<'a> {
         let base_white = base.iter().map(|column| whitener.whiten_averaged(column)).collect();
         let certain = whitener.certain(uncertain);
         let (uncertain, tried) = (uncertain.to_vec(), Mutex::default());
-        Problem { on, uncertain, whitener, certain, data, data_white, base, base_white, worth, tried }
+        Problem { on, uncertain, whitener, certain, data, data_white, base, base_white, worth, grain, tried }
     }
 
     /// White columns of a law by itself at places where it is tried again and again.
@@ -77,7 +87,7 @@ impl<'a> Problem<'a> {
         if let Some(known) = kept().columns.get(&key) {
             return known.clone();
         }
-        let (_, white) = White::of(self, columns(law, extent, self.on, places));
+        let (_, white) = White::of(self, law, columns(law, extent, &self.excitation(law), places));
         let white = Arc::new(white);
         let values = white.len() * self.data.len();
         let mut kept = kept();
@@ -86,6 +96,11 @@ impl<'a> Problem<'a> {
             kept.values += values;
         }
         white
+    }
+
+    /// What a law is evaluated on, with nothing that other causes change.
+    fn excitation(&self, law: &Law) -> Excitation<'_> {
+        self.grain.excitation(law.smooth, self.on)
     }
 
     fn base_priors(&self) -> Vec<Prior> {
@@ -126,9 +141,10 @@ pub struct White {
 
 impl White {
     /// Averages columns and makes them white; returns the averages as well.
-    fn of(problem: &Problem<'_>, columns: Vec<Column>) -> (Vec<Vec<f64>>, White) {
-        let averaged: Vec<Vec<f64>> = columns.iter().map(|c| problem.whitener.average(&c.values)).collect();
-        let white = averaged.iter().map(|c| problem.whitener.whiten_averaged(c)).collect();
+    fn of(problem: &Problem<'_>, law: &Law, columns: Vec<Column>) -> (Vec<Vec<f64>>, White) {
+        let average = |c: &Column| problem.grain.average(law.smooth, &problem.whitener, &c.values);
+        let averaged: Vec<Vec<f64>> = columns.iter().map(average).collect();
+        let white = problem.whitener.whiten_each(&averaged);
         let size = averaged.iter().map(|c| rms(c)).collect();
         let tolerances = columns.iter().map(|c| c.tolerance).collect();
         (averaged, White { columns: white, tolerances, size, products: OnceLock::new() })
@@ -217,8 +233,9 @@ impl<'l> Term<'l> {
 
     /// Evaluates a law on what other causes leave.
     fn among(problem: &Problem<'_>, law: &'l Law, places: Vec<f64>, among: Option<Arc<Among>>) -> Term<'l> {
-        let on = left_by(among.as_deref(), problem.on);
-        let (averaged, white) = White::of(problem, columns(law, Extent::Whole, &on, &places));
+        let recorded = problem.excitation(law);
+        let on = left_by(among.as_deref(), &recorded);
+        let (averaged, white) = White::of(problem, law, columns(law, Extent::Whole, &on, &places));
         Term { law, places, averaged, white, occam: 0.0, among }
     }
 
@@ -332,6 +349,9 @@ const DIRECTIONS: usize = 8;
 const SMALLER: [f64; 2] = [0.05, 0.2];
 /// Sizes at which one is tried under an eccentric generator, arcsec.
 const BESIDE_ARCSEC: [f64; 2] = [5.0, 20.0];
+/// All steps together gain no more than so many times what the linear model of the first one promises, and this much evidence.
+const FARTHER_THAN_LINEAR: f64 = 3.0;
+const BEYOND_LINEAR: f64 = 10.0;
 /// Gauss-Newton steps at most.
 const STEPS: usize = 6;
 
@@ -342,8 +362,8 @@ pub struct Scaffold<'p, 'a, 't, 'l> {
     gram: Gram,
     /// Terms that come before what is tried, where the order matters.
     ahead: usize,
-    /// What the terms leave to a law that adds a load, or meets them in the zones of teeth, or not.
-    left: [OnceLock<Option<Arc<Among>>>; 4],
+    /// What the terms leave to a law that adds a load, or meets them in the zones of teeth, or is smooth, or not.
+    left: [OnceLock<Option<Arc<Among>>>; 8],
 }
 
 /// Terms of laws (index) at places of their shape parameters, each on what the others leave to it.
@@ -441,8 +461,9 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         match self.left_to(law) {
             None => self.problem.tried(law, extent, places),
             among => {
-                let on = left_by(among.as_deref(), self.problem.on);
-                Arc::new(White::of(self.problem, columns(law, extent, &on, places)).1)
+                let recorded = self.problem.excitation(law);
+                let on = left_by(among.as_deref(), &recorded);
+                Arc::new(White::of(self.problem, law, columns(law, extent, &on, places)).1)
             }
         }
     }
@@ -468,7 +489,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
 
     /// What the terms leave to a law.
     fn left_to(&self, law: &Law) -> Option<Arc<Among>> {
-        let kind = usize::from(law.load.is_some()) + 2 * usize::from(law.meets_zones);
+        let kind = usize::from(law.load.is_some()) + 2 * usize::from(law.meets_zones) + 4 * usize::from(law.smooth);
         let acts = |k: usize| self.terms[k].law.acts_on(law) && (k < self.ahead || !self.terms[k].law.meets(law));
         if !(0..self.terms.len()).any(acts) {
             return None;
@@ -477,7 +498,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             let fit = self.fit(None)?;
             let acting: Vec<Acting<'l>> =
                 (0..self.terms.len()).filter(|k| acts(*k)).map(|k| self.terms[k].acting(fit.of(k))).collect();
-            Among::of(self.problem.on, &acting).map(Arc::new)
+            Among::of(&self.problem.excitation(law), &acting).map(Arc::new)
         });
         left.clone()
     }
@@ -644,14 +665,25 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
 
     /// Moves the shape parameters of `term` to where the misfit is least, beside the terms of the scaffold.
     #[must_use]
-    pub fn refine<'n>(&self, mut term: Term<'n>) -> Option<(Term<'n>, Fit)> {
+    pub fn refine<'n>(&self, term: Term<'n>) -> Option<(Term<'n>, Fit)> {
+        self.refine_towards(term, f64::NEG_INFINITY)
+    }
+
+    /// As [`Scaffold::refine`], but nothing where the first step shows that this evidence is out of reach.
+    #[must_use]
+    pub fn refine_towards<'n>(&self, mut term: Term<'n>, least_evidence: f64) -> Option<(Term<'n>, Fit)> {
         let mut fit = self.fit(Some(&term))?;
         if term.places.is_empty() {
             return Some((term, fit));
         }
-        for _ in 0..STEPS {
+        for step in 0..STEPS {
             let coefficients = fit.of(fit.starts.len() - 1).to_vec();
-            let (_, moves) = self.fit_with(Some(&term.white), &self.derivatives(&term, &coefficients))?;
+            let (free, moves) = self.fit_with(Some(&term.white), &self.derivatives(&term, &coefficients))?;
+            let now = fit.solution.evidence;
+            let in_reach = now + FARTHER_THAN_LINEAR * (free.solution.evidence - now).max(0.0) + BEYOND_LINEAR;
+            if step == 0 && in_reach < least_evidence {
+                return None;
+            }
             let mut better = None;
             for shorter in [1.0, 0.4, 0.1] {
                 let trial = term.moved(self.problem, |k| shorter * moves[k]);

@@ -51,6 +51,8 @@ struct Step {
     worth: f64,
 }
 
+/// Columns that are made white side by side.
+const ABREAST: usize = 8;
 /// A column is hidden where averages hold less than this share of it.
 const HIDDEN: f64 = 0.8;
 /// Weight of a row whose flank is uncertain: its noise is this many times white.
@@ -98,6 +100,12 @@ impl Whitener {
             .map(|g| Step { keep: decay[g] * (1.0 - gain[g]), take: decay[g] * gain[g], worth: 1.0 / scale[g] })
             .collect();
         Whitener { groups, sessions, gain, scale, decay, filter }
+    }
+
+    /// Rows of each average.
+    #[must_use]
+    pub fn groups(&self) -> &[std::ops::Range<usize>] {
+        &self.groups
     }
 
     /// Averages.
@@ -151,6 +159,31 @@ impl Whitener {
             expected = step.keep * expected + step.take * value;
         }
         white
+    }
+
+    /// Innovations of several columns of averaged values. Each value waits for the one before it, so columns go side by side.
+    #[must_use]
+    pub fn whiten_each(&self, averaged: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        averaged.chunks(ABREAST).flat_map(|columns| self.whiten_abreast(columns)).collect()
+    }
+
+    fn whiten_abreast(&self, averaged: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let count = self.filter.len();
+        // Fewer than there are places: the first one stands in, and is dropped.
+        let from: [&[f64]; ABREAST] = std::array::from_fn(|j| &averaged.get(j).unwrap_or(&averaged[0])[..count]);
+        let mut white: [Vec<f64>; ABREAST] =
+            std::array::from_fn(|j| if j < averaged.len() { vec![0.0; count] } else { Vec::new() });
+        let mut expected = [0.0; ABREAST];
+        for (g, step) in self.filter.iter().enumerate() {
+            for j in 0..ABREAST {
+                let value = from[j][g];
+                if let Some(white) = white[j].get_mut(g) {
+                    *white = (value - expected[j]) * step.worth;
+                }
+                expected[j] = step.keep * expected[j] + step.take * value;
+            }
+        }
+        white.into_iter().take(averaged.len()).collect()
     }
 
     /// Innovations of a column of rows.

@@ -1,10 +1,12 @@
 //! What has to be known before causes are compared: how noisy the data are, and where they jump.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use flexspline::Table;
 use rayon::prelude::*;
 
+use super::averaged::{Averaged, Grain};
 use super::base::{Base, Floating, NEAR_FRICTION, few};
 use super::candidate::{Column, Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
@@ -198,18 +200,52 @@ const NO_NOISE: f64 = 8.0;
 /// …as long as they are rare: at most this share.
 const RARE: f64 = 0.1;
 
+/// Everything that laws could explain, as free columns; of laws and rows alone, whatever is known of the noise.
+pub struct FreeColumns {
+    /// Averages of so many rows.
+    stride: usize,
+    /// Laws that they are of.
+    laws: usize,
+    columns: Vec<Vec<f64>>,
+    priors: Vec<Prior>,
+}
+
+impl FreeColumns {
+    /// Main columns of laws, at some places of their shape parameters. Smooth laws are evaluated on `averaged`, if there is any.
+    #[must_use]
+    pub fn of(on: &Excitation<'_>, laws: &[Law], averaged: Option<Arc<Averaged>>) -> FreeColumns {
+        let finest = averaged.as_ref().map_or(1, |averaged| averaged.stride());
+        let stride = finest * on.rows.count_used().div_ceil(WANDER_AVERAGES * finest).max(1);
+        let plain = plain(on.rows, stride, 1.0);
+        let grain = Grain::new(averaged, &plain);
+        let (columns, priors) = free_columns(on, laws, &plain, &grain).into_iter().unzip();
+        FreeColumns { stride, laws: laws.len(), columns, priors }
+    }
+
+    /// Whether they are still those of the laws.
+    #[must_use]
+    pub fn are_of(&self, laws: &[Law]) -> bool {
+        self.laws == laws.len()
+    }
+}
+
+/// Averages under white noise alone.
+fn plain(rows: &Rows, stride: usize, white: f64) -> Whitener {
+    Whitener::new(rows, &vec![false; rows.len()], stride, Noise { white, wander: 0.0, correlation_s: 1.0 })
+}
+
 /// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by its evidence
 /// with the main columns of all laws as free columns. Returns also the worth of the information: below 1 where innovations are
 /// not white. `explained` is what is explained already, row by row.
 #[must_use]
-pub fn noise(on: &Excitation<'_>, laws: &[Law], explained: &[f64], uncertain: &[bool]) -> (Noise, f64) {
+pub fn noise(on: &Excitation<'_>, columns: &FreeColumns, explained: &[f64], uncertain: &[bool]) -> (Noise, f64) {
     let rows = on.rows;
     let left: Vec<f64> =
         (0..rows.len()).map(|k| rows.error[k] - on.base.prediction[k] - explained.get(k).unwrap_or(&0.0)).collect();
     let white = white_level(rows, &left);
-    let stride = rows.count_used().div_ceil(WANDER_AVERAGES).max(1);
+    let stride = columns.stride;
     let plain = Whitener::new(rows, uncertain, stride, Noise { white, wander: 0.0, correlation_s: 1.0 });
-    let free = Free { columns: free_columns(on, laws, &plain), data: plain.average(&left) };
+    let free = Free { columns: &columns.columns, priors: &columns.priors, data: plain.average(&left) };
     let unit = if rows.recorded.time { 1.0 } else { 100.0 * rows.period };
     let hypotheses = hypotheses(white, unit);
     // Rows that a flank turned over too early or a ringing throws out are no noise: they would make a fast wander of it.
@@ -249,17 +285,18 @@ fn hypotheses(white: f64, unit: f64) -> Vec<Noise> {
 }
 
 /// Columns of what floats and of all laws at some places, averaged, with wide priors.
-fn free_columns(on: &Excitation<'_>, laws: &[Law], plain: &Whitener) -> Vec<(Vec<f64>, Prior)> {
+fn free_columns(on: &Excitation<'_>, laws: &[Law], plain: &Whitener, grain: &Grain) -> Vec<(Vec<f64>, Prior)> {
     let floating = |f: &Floating| (plain.average(&f.values), Prior { mean: 0.0, std: f.spread });
     let of_law = |law: &Law| -> Vec<(Vec<f64>, Prior)> {
         let tried = law.tried();
         let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
         let made = law.lead.as_ref().map_or(&law.columns, |lead| &lead.columns);
-        let all = tried.iter().step_by(spread).flat_map(|places| made(on, &law.values(places)));
+        let on = grain.excitation(law.smooth, on);
+        let all = tried.iter().step_by(spread).flat_map(|places| made(&on, &law.values(places)));
         let counts = |column: &Column| law.free_form || matches!(column.tolerance, Tolerance::Main(_));
         all.filter(counts)
             .map(|column| {
-                let averaged = plain.average(&column.values);
+                let averaged = grain.average(law.smooth, plain, &column.values);
                 let std = 20.0 / rms(&averaged).max(1e-9);
                 (averaged, Prior { mean: 0.0, std })
             })
@@ -271,8 +308,9 @@ fn free_columns(on: &Excitation<'_>, laws: &[Law], plain: &Whitener) -> Vec<(Vec
 }
 
 /// Everything a law could explain, and what there is to explain.
-struct Free {
-    columns: Vec<(Vec<f64>, Prior)>,
+struct Free<'c> {
+    columns: &'c [Vec<f64>],
+    priors: &'c [Prior],
     data: Vec<f64>,
 }
 
@@ -283,14 +321,13 @@ struct Judged {
     whitener: Whitener,
 }
 
-impl Free {
+impl Free<'_> {
     fn judge(&self, whitener: Whitener) -> Option<Judged> {
-        let all: Vec<Vec<f64>> =
-            self.columns.iter().map(|(c, _)| c).chain([&self.data]).map(|c| whitener.whiten_averaged(c)).collect();
+        let mut all = whitener.whiten_each(self.columns);
+        all.push(whitener.whiten_averaged(&self.data));
         let views: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();
         let gram = Gram::of(&views, 0..self.data.len());
-        let priors: Vec<Prior> = self.columns.iter().map(|(_, prior)| *prior).collect();
-        let solution = solve(&gram, &priors, 1.0)?;
+        let solution = solve(&gram, self.priors, 1.0)?;
         let mut innovations = all[self.columns.len()].clone();
         for (column, c) in all.iter().zip(&solution.coefficients) {
             for (i, v) in innovations.iter_mut().zip(column) {

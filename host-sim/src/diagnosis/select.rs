@@ -561,7 +561,7 @@ fn forward<'l>(
         .into_par_iter()
         .with_max_len(1)
         .filter_map(|term| {
-            let (term, fit) = scaffold.refine(term)?;
+            let (term, fit) = scaffold.refine_towards(term, before)?;
             let makes_sense = sound(&term, fit.of(fit.starts.len() - 1));
             if !makes_sense && !scaffold.acted_on_by(term.law) {
                 return None;

@@ -142,6 +142,7 @@ pub(super) fn displaced(cause: &'static str, of: Angle, on: &Excitation<'_>) -> 
     .physical(move |shape, c| {
         c[0] > 0.5 && second_order_unloaded(c, shape, by) > LEAST_OF_PATTERN * SECOND_ORDER * shape[1] * c[0]
     });
+    law.smooth = true;
     law.doubt = ECCENTRICITY_DOUBT;
     law.meets_zones = true;
     law.misfit = ZONES_MISFIT;

@@ -82,6 +82,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
     .parameters(|_, shape, c| vec![("torque_n_m", shape[0] * c[0]), ("phase_rad", shape[1])])
     // Without a moment the law is another play alone.
     .physical(move |shape, _| shape[0] > 0.004 * scale);
+    law.smooth = true;
     law.load = Some(Box::new(load));
     law.in_crossings = true;
     law.lead = Some(Lead {

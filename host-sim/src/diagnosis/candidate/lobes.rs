@@ -89,6 +89,7 @@ pub(super) fn generator_eccentricity(on: &Excitation<'_>) -> Law {
         }
         named
     });
+    law.smooth = true;
     law.misfit = ZONES_MISFIT;
     law.physical = Box::new(|shape, c| {
         // Teeth farther out than the lobe is deep would make the other lobe the deeper one, once a turn.

@@ -287,6 +287,8 @@ pub struct Law {
     pub zones: Option<Apart>,
     /// What other causes do to the zones of teeth and to the clearance enters the law.
     pub meets_zones: bool,
+    /// It changes little from one row to the next: averages of rows tell what it says of their average.
+    pub smooth: bool,
 }
 
 /// What the misfit of a law may be taken for: most of all another law of its kin.
@@ -361,6 +363,7 @@ impl Law {
             in_crossings: false,
             zones: None,
             meets_zones: false,
+            smooth: false,
         }
     }
     /// A number that no other law has.
@@ -375,6 +378,10 @@ impl Law {
     }
     fn well_known(mut self) -> Law {
         self.most_nuisance = MOST_NUISANCE_OF_KNOWN;
+        self
+    }
+    fn smooth(mut self) -> Law {
+        self.smooth = true;
         self
     }
     fn whole(mut self) -> Law {

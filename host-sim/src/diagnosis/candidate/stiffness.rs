@@ -78,6 +78,7 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
         columns
     })
     .whole()
+    .smooth()
     .shapes([Shape::by_factors("slip_torque_n_m", 0.03 * load, 1.0 * load, 6)])
     .parameters(|on, shape, c| {
         // On the way back from the full load an element holds this share of what it can when the torque passes zero.
@@ -101,6 +102,7 @@ fn stiffness_hardening() -> Law {
         let power = |n: f64| by_row(on, |k| -load_share(on, k).signum() * load_share(on, k).abs().powf(n));
         vec![main(power(shape[0]), 30.0), nuisance(power(1.0), 0.4), nuisance(power(shape[0] + 1.5), 0.3)]
     })
+    .smooth()
     .shapes([Shape::evenly("exponent", 1.6, 4.4, 3)])
     .parameters(|on, shape, c| {
         vec![("hardening_arcsec", c[0]), ("hardening_exponent", shape[0]), ("full_load_n_m", on.scales.load)]
@@ -178,6 +180,7 @@ fn wear(by: Progress) -> Law {
             nuisance(by_row(on, |k| on.base.flank[k]), 0.25),
         ]
     })
+    .smooth()
     .shapes([Shape::by_factors("exponent", 0.5, 2.0, 1)])
     .parameters(|_, shape, c| vec![("growth_arcsec", 2.0 * (c[0] + c[1])), ("exponent", shape[0])])
     .physical(|_, c| c[0] > 0.0)

@@ -30,6 +30,7 @@ fn thermal_clearance(on: &Excitation<'_>) -> Law {
         named
     })
     .well_known()
+    .smooth()
 }
 
 /// The same where it goes so far that the clearance is shut in the cold or in the heat: it cannot be less than nothing.
@@ -58,6 +59,7 @@ fn thermal_clearance_shut(on: &Excitation<'_>) -> Law {
     })
     .physical(|_, c| c[0] > 0.5)
     .well_known()
+    .smooth()
 }
 
 /// Largest change of the clearance with temperature, arcsec/K: twice that of a hot generator in a cold ring (2″/K).
@@ -74,6 +76,7 @@ fn thermal_stiffness() -> Law {
     })
     .parameters(|_, _, c| vec![("stiffness_relative_per_k", -0.01 * c[0])])
     .well_known()
+    .smooth()
 }
 
 /// Whether a drag is one of a lubricant: at the edge of the range it is dry friction or lash, which knows neither speed nor cold.
@@ -147,6 +150,7 @@ fn lubricant_viscosity() -> Law {
     ])
     .parameters(|_, shape, c| named_drag(c[0], &shape[..3]))
     .physical(|shape, c| c[0] > 0.0 && viscous(shape[0], shape[1]))
+    .smooth()
 }
 
 /// The same drag as a load: it winds the drive up and, where it exceeds the torque, moves the play to the other flank.
@@ -175,6 +179,7 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
     ])
     .parameters(|_, shape, c| named_drag(shape[0] * c[0], &shape[1..]))
     .physical(|shape, c| c[0] > 0.0 && viscous(shape[1], shape[2]));
+    law.smooth = true;
     law.load = Some(Box::new(load));
     law.in_crossings = true;
     law.lead = Some(Lead {

@@ -3,8 +3,11 @@
 //!
 //! It names no cause and is not the diagnosis; it only has to be rich enough that no cause is taken for a fault of the data.
 
+use std::sync::OnceLock;
+
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
+use faer::{Accum, ColRef, Mat, Par, Side};
 
 use crate::measurement::Session;
 use crate::measurement::gear::Gear;
@@ -30,6 +33,18 @@ pub(super) struct State<'a> {
     torque_scale: f64,
     motion_scale: f64,
     temperature: (f64, f64),
+    /// Rows that fits use, once there is one.
+    sampled: OnceLock<Sampled>,
+}
+
+/// Rows that a fit uses.
+#[derive(Default)]
+struct Sampled {
+    /// Session and row.
+    places: Vec<(usize, usize)>,
+    error: Vec<f64>,
+    /// Columns of the state.
+    columns: Vec<Vec<f64>>,
 }
 
 /// A fit of some columns.
@@ -66,6 +81,7 @@ impl<'a> State<'a> {
             torque_scale: largest(&|s| s.torque_n_m.as_deref()),
             motion_scale: largest(&|s| Some(&s.generator_rad)).max(1e-12),
             temperature: (middle, warmest),
+            sampled: OnceLock::new(),
         }
     }
 
@@ -150,54 +166,68 @@ impl<'a> State<'a> {
             .collect()
     }
 
-    /// Fits state and extra columns to the error; coefficients of the extra ones come last.
-    pub fn fit(&self, extras: &[Extra]) -> Option<Fit> {
+    /// Rows spread evenly, with the columns of the state.
+    fn sample(&self) -> Sampled {
         let rows: usize = self.sessions.iter().map(Session::len).sum();
         let step = rows.div_ceil(FIT_ROWS).max(1);
-        let mut table: Vec<f64> = Vec::new();
-        let (mut error, mut begins) = (Vec::new(), Vec::new());
+        let mut sampled = Sampled::default();
+        let mut at_row = Vec::new();
         for (number, session) in self.sessions.iter().enumerate() {
             for row in (0..session.len()).step_by(step) {
-                begins.push(row == 0);
-                self.fill(number, row, &mut table);
-                table.extend(extras.iter().map(|extra| extra(number, row)));
-                error.push(session.error_rad[row]);
+                at_row.clear();
+                self.fill(number, row, &mut at_row);
+                sampled.columns.resize_with(at_row.len(), Vec::new);
+                sampled.columns.iter_mut().zip(&at_row).for_each(|(column, value)| column.push(*value));
+                sampled.places.push((number, row));
+                sampled.error.push(session.error_rad[row]);
             }
         }
+        sampled
+    }
+
+    /// Fits state and extra columns to the error; coefficients of the extra ones come last.
+    pub fn fit(&self, extras: &[Extra]) -> Option<Fit> {
+        let Sampled { places, error, columns } = self.sampled.get_or_init(|| self.sample());
         let n = error.len();
-        let width = table.len() / n.max(1);
+        let width = columns.len() + extras.len();
         if n < 2 * width {
             return None;
         }
+        let mut table = Mat::<f64>::zeros(n, width);
+        for (c, column) in columns.iter().enumerate() {
+            table.col_as_slice_mut(c).copy_from_slice(column);
+        }
+        for (c, extra) in extras.iter().enumerate() {
+            let column = table.col_as_slice_mut(columns.len() + c);
+            column.iter_mut().zip(places).for_each(|(value, (session, row))| *value = extra(*session, *row));
+        }
         // Columns of one size, so that one small ridge suits all of them.
         let size: Vec<f64> = (0..width)
-            .map(|c| (table.iter().skip(c).step_by(width).map(|x| x * x).sum::<f64>() / n as f64).sqrt().max(1e-300))
+            .map(|c| {
+                let column = table.col_as_slice_mut(c);
+                let size = (column.iter().map(|x| x * x).sum::<f64>() / n as f64).sqrt().max(1e-300);
+                column.iter_mut().for_each(|x| *x /= size);
+                size
+            })
             .collect();
-        table.chunks_exact_mut(width).for_each(|row| row.iter_mut().zip(&size).for_each(|(x, size)| *x /= size));
         let mut weight = vec![1.0; n];
         let (mut value, mut inverse, mut left, mut sigma) = (vec![0.0; width], Mat::zeros(0, 0), error.clone(), 0.0);
         for _ in 0..4 {
-            let mut normal = vec![0.0; width * width];
-            let mut right = Mat::<f64>::zeros(width, 1);
-            for ((row, y), w) in table.chunks_exact(width).zip(&error).zip(&weight) {
-                for a in 0..width {
-                    let wa = w * row[a];
-                    right[(a, 0)] += wa * y;
-                    for b in 0..=a {
-                        normal[a * width + b] += wa * row[b];
-                    }
-                }
+            let mut weighted = table.clone();
+            for c in 0..width {
+                weighted.col_as_slice_mut(c).iter_mut().zip(&weight).for_each(|(x, w)| *x *= w);
             }
-            let matrix = Mat::from_fn(width, width, |a, b| {
-                normal[a.max(b) * width + a.min(b)] + if a == b { 1e-9 * n as f64 } else { 0.0 }
-            });
-            let factor = matrix.llt(Side::Lower).ok()?;
+            let mut normal = Mat::<f64>::zeros(width, width);
+            let (lower, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+            matmul(&mut normal, lower, Accum::Replace, weighted.transpose(), whole, &table, whole, 1.0, Par::Seq);
+            (0..width).for_each(|c| normal[(c, c)] += 1e-9 * n as f64);
+            let right = weighted.transpose() * ColRef::from_slice(error);
+            let factor = normal.llt(Side::Lower).ok()?;
             let solution = factor.solve(&right);
-            value = (0..width).map(|a| solution[(a, 0)]).collect();
+            value = solution.iter().copied().collect();
             inverse = factor.solve(Mat::<f64>::identity(width, width));
-            for (left, (row, y)) in left.iter_mut().zip(table.chunks_exact(width).zip(&error)) {
-                *left = y - row.iter().zip(&value).map(|(x, v)| x * v).sum::<f64>();
-            }
+            let said = &table * &solution;
+            left = error.iter().zip(said.iter()).map(|(y, said)| y - said).collect();
             sigma = median_and_std(&mut left.clone()).1;
             if sigma <= 0.0 {
                 break;
@@ -210,7 +240,7 @@ impl<'a> State<'a> {
         let cut = |x: f64| x.clamp(-3.0 * sigma, 3.0 * sigma);
         let (mut own, mut next) = (0.0, 0.0);
         for k in 1..n {
-            if !begins[k] {
+            if places[k].1 != 0 {
                 own += cut(left[k]).powi(2);
                 next += cut(left[k]) * cut(left[k - 1]);
             }

@@ -1,0 +1,144 @@
+//! Rows averaged before laws are evaluated on them. A law that changes little from one row to the next says the same of an average as
+//! the average of what it says of the rows, and is evaluated on a third or a tenth of them.
+
+use std::ops::Range;
+
+use super::base::Base;
+use super::candidate::Excitation;
+use super::noise::Whitener;
+use super::rows::{Rows, quantile};
+
+/// Highest order per generator turn of a column that smooth laws have.
+const HIGHEST_ORDER: f64 = 6.0;
+/// Turned by this much of its period (rad) within an average, a wave loses 2 % of its amplitude.
+const MOST_TURNED_RAD: f64 = 0.7;
+/// Share of the averages in which the generator may turn farther.
+const SLOW_SHARE: f64 = 0.98;
+
+/// Averages of so many neighbouring rows, with the nominal model over them.
+#[derive(Clone, Debug)]
+pub struct Averaged {
+    rows: Rows,
+    base: Base,
+    stride: usize,
+    /// Rows in each average.
+    counts: Vec<f64>,
+    /// First row and first average of each session.
+    firsts: Vec<(usize, usize)>,
+}
+
+impl Averaged {
+    /// Averages of `stride` rows, none across sessions; nothing where rows are taken one by one, or move too far within an average.
+    #[must_use]
+    pub fn of(on: &Excitation<'_>, stride: usize) -> Option<Averaged> {
+        let from = on.rows;
+        let groups: Vec<Vec<Range<usize>>> = from.sessions.iter().map(|s| chunks(s, stride)).collect();
+        let turned = groups.iter().flatten().map(|g| (from.generator[g.end - 1] - from.generator[g.start]).abs());
+        if stride < 2 || HIGHEST_ORDER * quantile(turned, SLOW_SHARE) > MOST_TURNED_RAD {
+            return None;
+        }
+        let mean = |column: &[f64]| -> Vec<f64> {
+            groups.iter().flatten().map(|g| column[g.clone()].iter().sum::<f64>() / g.len() as f64).collect()
+        };
+        let (mut sessions, mut firsts, mut count) = (Vec::new(), Vec::new(), 0);
+        for (session, groups) in from.sessions.iter().zip(&groups) {
+            firsts.push((session.start, count));
+            sessions.push(count..count + groups.len());
+            count += groups.len();
+        }
+        let rows = Rows {
+            sessions,
+            used: from.used.clone(),
+            recorded: from.recorded,
+            time: mean(&from.time),
+            generator: mean(&from.generator),
+            error: mean(&from.error),
+            torque: mean(&from.torque),
+            temperature: mean(&from.temperature),
+            orientation: mean(&from.orientation),
+            speed: mean(&from.speed),
+            direction: mean(&from.direction),
+            travel: mean(&from.travel),
+            output: mean(&from.output),
+            on_flexspline: mean(&from.on_flexspline),
+            on_circular_spline: mean(&from.on_circular_spline),
+            period: from.period * stride as f64,
+        };
+        let base = on.base.each(mean);
+        let counts = groups.iter().flatten().map(|g| g.len() as f64).collect();
+        Some(Averaged { rows, base, stride, counts, firsts })
+    }
+
+    /// The excitation of the averages, with nothing that other causes change.
+    #[must_use]
+    pub fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
+        Excitation { rows: &self.rows, base: &self.base, ..*on }
+    }
+
+    /// Rows to an average.
+    #[must_use]
+    pub fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// The averages that each group of rows consists of. Groups hold whole averages.
+    #[must_use]
+    pub fn in_groups(&self, groups: &[Range<usize>]) -> Vec<Range<usize>> {
+        let of = |group: &Range<usize>| {
+            let session = self.firsts.partition_point(|(first, _)| *first <= group.start) - 1;
+            let (row, average) = self.firsts[session];
+            average + (group.start - row) / self.stride..average + (group.end - row).div_ceil(self.stride)
+        };
+        groups.iter().map(of).collect()
+    }
+
+    /// Means of a column of averages over groups of them.
+    #[must_use]
+    pub fn means(&self, column: &[f64], groups: &[Range<usize>]) -> Vec<f64> {
+        let of = |group: &Range<usize>| {
+            if group.len() == 1 {
+                return column[group.start];
+            }
+            let (values, counts) = (&column[group.clone()], &self.counts[group.clone()]);
+            values.iter().zip(counts).map(|(v, n)| v * n).sum::<f64>() / counts.iter().sum::<f64>()
+        };
+        groups.iter().map(of).collect()
+    }
+}
+
+/// A session in parts of `stride` rows; the last may be shorter.
+fn chunks(session: &Range<usize>, stride: usize) -> Vec<Range<usize>> {
+    session.clone().step_by(stride.max(1)).map(|from| from..(from + stride.max(1)).min(session.end)).collect()
+}
+
+/// Groups of a whitener as columns of rows, or of averages of them, are laid on them.
+#[derive(Clone, Debug, Default)]
+pub struct Grain {
+    averaged: Option<(std::sync::Arc<Averaged>, Vec<Range<usize>>)>,
+}
+
+impl Grain {
+    /// Smooth laws are evaluated on `averaged`, if there is any.
+    #[must_use]
+    pub fn new(averaged: Option<std::sync::Arc<Averaged>>, whitener: &Whitener) -> Grain {
+        Grain { averaged: averaged.map(|averaged| (averaged.clone(), averaged.in_groups(whitener.groups()))) }
+    }
+
+    /// What a law is evaluated on.
+    #[must_use]
+    pub fn excitation<'a>(&'a self, smooth: bool, on: &Excitation<'a>) -> Excitation<'a> {
+        match &self.averaged {
+            Some((averaged, _)) if smooth => averaged.excitation(on),
+            _ => *on,
+        }
+    }
+
+    /// A column of a law, evaluated on what [`Grain::excitation`] gives, averaged over the groups of the whitener.
+    #[must_use]
+    pub fn average(&self, smooth: bool, whitener: &Whitener, column: &[f64]) -> Vec<f64> {
+        match &self.averaged {
+            Some((averaged, groups)) if smooth => averaged.means(column, groups),
+            _ => whitener.average(column),
+        }
+    }
+}
