@@ -34,10 +34,11 @@
 #![allow(clippy::arithmetic_side_effects)] // Floating-point numbers: nothing overflows. Integers are handled by name.
 
 use crate::angle::{COUNTS_PER_RAD, GeneratorAngle, OutputAngle, RAD_PER_COUNT, counts_from_rad};
+use crate::crc::crc32;
 use crate::hysteresis::PlayState;
-use crate::image::crc32;
+use crate::num;
 use crate::runtime::{Adjustment, Flags, Input, Output};
-use crate::table::{self, Quality};
+use crate::table::Quality;
 use core::fmt;
 
 /// A coefficient beside the table.
@@ -390,7 +391,7 @@ impl<const N: usize> Adapter<N> {
     fn row(&self, generator: GeneratorAngle, torque_n_m: f32, side: i32) -> [f32; N] {
         // Not finite: nothing of the wind-up.
         let torque = if torque_n_m.is_finite() { torque_n_m } else { 0.0 };
-        let torque = table::within(torque, [-self.torque_limit, self.torque_limit]);
+        let torque = num::within(torque, [-self.torque_limit, self.torque_limit]);
         let turned = |order: u8| generator.fraction().wrapping_mul(order as u32);
         let mut row = self.per_noise;
         for (row, term) in row.iter_mut().zip(self.terms) {
@@ -465,7 +466,7 @@ impl<const N: usize> Adapter<N> {
         let excess = if innovation < 0.0 { -excess } else { excess };
         for (x, gain) in state.x.iter_mut().zip(gains) {
             let free = *x + gain * excess;
-            *x = table::within(free, [-1.0, 1.0]);
+            *x = num::within(free, [-1.0, 1.0]);
             state.counters.limited = state.counters.limited.saturating_add(u32::from(*x != free));
         }
         Verdict::Used
@@ -475,7 +476,7 @@ impl<const N: usize> Adapter<N> {
     fn bound_variances(&self, state: &mut AdaptState<N>) {
         let mut scale = [1.0; N];
         for ((scale, variance), first) in scale.iter_mut().zip(state.variances()).zip(self.first) {
-            *scale = if variance > first { table::sqrt(first / variance) } else { 1.0 };
+            *scale = if variance > first { num::sqrt(first / variance) } else { 1.0 };
         }
         for ((column, d), by) in state.u.iter_mut().zip(&mut state.d).zip(scale) {
             *d *= by * by;
@@ -499,7 +500,7 @@ impl<const N: usize> Adapter<N> {
         let variance: f32 = transform(&state.u, row).iter().zip(state.d).map(|(f, d)| d * f * f).sum();
         Adapted {
             adjustment: Adjustment::from_rad(mean * noise_rad, half * noise_rad),
-            uncertainty_rad: table::sqrt(variance) * noise_rad,
+            uncertainty_rad: num::sqrt(variance) * noise_rad,
             verdict,
         }
     }
@@ -510,7 +511,7 @@ impl<const N: usize> Adapter<N> {
         let mut found = [(0.0, 0.0); N];
         let parts = state.x.iter().zip(state.variances()).zip(self.limits);
         for (to, ((x, variance), limit)) in found.iter_mut().zip(parts) {
-            *to = (x * limit, table::sqrt(variance) * limit);
+            *to = (x * limit, num::sqrt(variance) * limit);
         }
         found
     }

@@ -55,13 +55,13 @@
 //! the two-roller generator needs: 7872. Both are below 8 KiB.
 
 use crate::angle::RAD_PER_COUNT;
+use crate::bounds::{Bounds, HOLD_COUNTS, InverseBound, MAX_INVERSE_ERROR_RAD};
+use crate::crc::crc32;
 use crate::drive::{Drive, FixedMember};
 use crate::error::{Field, ImageError};
 use crate::grid::{self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis};
-use crate::model::{HOLD_COUNTS, MAX_INVERSE_ERROR_RAD};
-use crate::table::{
-    self, Bounds, GeneratorKind, InverseBound, NODE_WORDS, Table, TableId, Words, f32_at, larger, word, word_at,
-};
+use crate::num::{self, larger, larger64};
+use crate::table::{self, GeneratorKind, NODE_WORDS, Table, TableId, Words, f32_at, word, word_at};
 use crate::windup::Slopes;
 use core::f64::consts::TAU;
 use core::fmt;
@@ -99,14 +99,6 @@ const ID_OFFSET: usize = 48;
 const RESERVED: core::ops::Range<usize> = 200..HEADER_BYTES;
 /// |torque| N·m and |temperature| °C of any node or range: keeps differences of nodes finite.
 pub(crate) const MAX_AXIS_VALUE: f32 = 1e6;
-
-/// Its table for bytes is in flash.
-pub(crate) static CRC: crc::Crc<u32, crc::Table<1>> = crc::Crc::<u32, crc::Table<1>>::new(&crc::CRC_32_ISO_HDLC);
-
-/// CRC-32 (ISO-HDLC), 5.3 instructions a byte on a Cortex-M4.
-pub(crate) fn crc32(bytes: &[u8]) -> u32 {
-    CRC.checksum(bytes)
-}
 
 /// What made a table and how far it holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -364,7 +356,7 @@ impl TableData<'_> {
     fn ripple_unit(&self) -> u32 {
         let pairs = self.mean_ripple_rad.iter().zip(self.half_width_ripple_rad);
         let largest = pairs.fold(0.0f64, |most, (r, h)| larger64(most, (*r as f64).abs() + (*h as f64).abs()));
-        let unit = table::counts(largest) / i16::MAX as f64 * UNITS_PER_COUNT;
+        let unit = num::counts(largest) / i16::MAX as f64 * UNITS_PER_COUNT;
         let whole = unit as u32;
         if unit > whole as f64 { whole.saturating_add(1) } else { whole }
     }
@@ -377,9 +369,9 @@ impl TableData<'_> {
         for (means, halves) in self.mean_rad.chunks_exact(torques).zip(self.half_width_rad.chunks_exact(torques)) {
             for (node, (mean, half)) in means.iter().zip(halves).enumerate() {
                 let slope = slopes.at(node).of(means);
-                let half = (table::counts(*half as f64) as f32).to_bits() & !1 | grid::is_jump(jumps, node) as u32;
+                let half = (num::counts(*half as f64) as f32).to_bits() & !1 | grid::is_jump(jumps, node) as u32;
                 for _ in 0..if nodes.len() == 1 { 2 } else { 1 } {
-                    out.put_numbers(&[*mean as f64, slope].map(|rad| table::counts(rad) as f32));
+                    out.put_numbers(&[*mean as f64, slope].map(|rad| num::counts(rad) as f32));
                     out.put(&half.to_le_bytes());
                 }
             }
@@ -388,7 +380,7 @@ impl TableData<'_> {
 
     fn put_records(&self, out: &mut Writer<'_>, unit: u32) {
         let Some(axis) = PeriodicAxis::new(self.ripple_nodes).filter(|axis| !axis.is_empty()) else { return };
-        let units = |rad: f64| if unit == 0 { 0 } else { quantise(table::counts(rad) * UNITS_PER_COUNT / unit as f64) };
+        let units = |rad: f64| if unit == 0 { 0 } else { quantise(num::counts(rad) * UNITS_PER_COUNT / unit as f64) };
         let mean_ripples = self.mean_ripple_rad.chunks_exact(axis.len());
         for (mean, half) in mean_ripples.zip(self.half_width_ripple_rad.chunks_exact(axis.len())) {
             for side in [-1.0, 1.0] {
@@ -399,10 +391,6 @@ impl TableData<'_> {
             }
         }
     }
-}
-
-fn larger64(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }
 
 /// Writes the image of a table to the front of `out` and returns its length.
@@ -478,7 +466,7 @@ pub fn write_image(
         let axis = PeriodicAxis::new(curve.len()).unwrap_or_default();
         for position in 0..axis.stored_len() {
             let value = curve.get(axis.stored_node(position)).copied().unwrap_or(0.0);
-            writer.put(&quantise(2.0 * table::counts(value as f64)).to_le_bytes());
+            writer.put(&quantise(2.0 * num::counts(value as f64)).to_le_bytes());
         }
     }
     data.put_nodes(&mut writer);
@@ -511,7 +499,7 @@ const DERIVED_WORDS: [usize; 2] = [word::CELL_WIDTH.saturating_add(8), word::CEL
 
 /// An error limit in counts, rounded up; the per mille takes up the rounding of single precision, the counts that of integers.
 fn limit_counts(limit_rad: f32) -> u32 {
-    (table::counts(limit_rad as f64) * 1.001 + 16.0) as u32
+    (num::counts(limit_rad as f64) * 1.001 + 16.0) as u32
 }
 
 /// Computes and stores every checksum of an image whose body is complete.
@@ -761,7 +749,7 @@ impl<'a> Table<'a> {
 
     /// Values of [`DERIVED_WORDS`].
     fn derived(&self) -> [u32; 2] {
-        let hold = table::counts(self.inverse.error_rad as f64) as i32;
+        let hold = num::counts(self.inverse.error_rad as f64) as i32;
         [self.inverse.iterations as u32, hold.saturating_add(HOLD_COUNTS) as u32]
     }
 
@@ -825,7 +813,7 @@ impl<'a> Table<'a> {
     /// coefficients.
     fn check_nodes(&self, layout: &Layout, bounds: &mut Bounds) -> Result<(), ImageError> {
         let jumps = self.torque_jumps();
-        let most = table::counts(MAX_ERROR_RAD as f64) as f32;
+        let most = num::counts(MAX_ERROR_RAD as f64) as f32;
         // Torque, D, slope of D and H of the node before.
         let mut before: Option<[f32; 4]> = None;
         for index in 0..self.torque_nodes.saturating_mul(self.temperature_nodes) {

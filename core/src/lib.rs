@@ -182,12 +182,14 @@ extern crate std;
 
 mod adapt;
 mod angle;
+mod bounds;
 #[cfg(all(feature = "c-api", not(feature = "fuzzing")))]
 mod c_api;
 #[cfg(all(feature = "c-api", feature = "fuzzing"))]
 #[doc(hidden)]
 #[allow(clippy::not_unsafe_ptr_arg_deref)] // As C calls them; public for `tests/fuzz` alone.
 pub mod c_api;
+mod crc;
 #[cfg(feature = "defmt")]
 mod defmt_impls;
 mod drive;
@@ -199,6 +201,7 @@ pub mod grid;
 mod hysteresis;
 mod image;
 mod model;
+mod num;
 #[cfg(feature = "parts")]
 #[doc(hidden)]
 pub mod parts;
@@ -217,6 +220,7 @@ pub use adapt::{
     saved_adapt_bytes,
 };
 pub use angle::{GeneratorAngle, OutputAngle};
+pub use bounds::{Bounds, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS};
 pub use drive::{Drive, FixedMember, Phases};
 pub use error::{DriveError, Field, ImageError};
 pub use events::{Event, Events, Watch};
@@ -228,7 +232,7 @@ pub use image::{
     FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance, TEXT_BYTES,
     TableData, WriteError, image_bytes, write_image,
 };
-pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, Prediction};
+pub use model::{Approach, Command, Prediction};
 pub use predictor::{
     Ahead, Disturbance, Inertias, Measured, Noise, Now, OutputAhead, PREDICTOR_PARTS, Predictor, PredictorError,
     PredictorState,
@@ -242,6 +246,6 @@ pub use slip::{
     saved_slip_bytes,
 };
 pub use store::{ActivateError, Counters, Health, Images, STORE_PAGES, STORE_WORDS, Store, mend_page};
-pub use table::{Bounds, GeneratorKind, OperatingPoint, Quality, Table, TableId};
+pub use table::{GeneratorKind, OperatingPoint, Quality, Table, TableId};
 pub use telemetry::{Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Writer};
 pub use upload::{Upload, UploadError};

@@ -21,40 +21,7 @@
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
 use crate::hysteresis::{Direction, PlayState};
-use crate::table::{self, Bounds, Doubt, InverseBound, Memory, OperatingPoint, Plan, Quality, Table, larger};
-
-/// Error of the inverse that the number of its iterations aims at, rad at the output: 0.02″, far below what a table misses of
-/// its samples.
-pub const INVERSE_TOLERANCE_RAD: f32 = 1.0e-7;
-/// Most iterations of an inverse.
-pub const MAX_INVERSE_ITERATIONS: u8 = 8;
-
-/// No table is accepted whose inverse is left with more, rad at the output: 0.2″.
-pub const MAX_INVERSE_ERROR_RAD: f32 = 1.0e-6;
-
-impl Bounds {
-    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], 1 to 8, and what they and rounding leave; `cell_rad` is a cell of the
-    /// ripple at the output.
-    pub(crate) fn inverse(self, cell_rad: f32) -> InverseBound {
-        let rate = self.curve_slope / (1.0 - self.slope);
-        let mut bound = InverseBound { iterations: 0, error_rad: self.periodic_rad };
-        // How far the solution for A, B, C held fixed can be.
-        let mut away_rad = self.ripple_cells * cell_rad + self.periodic_rad * rate;
-        while bound.iterations < MAX_INVERSE_ITERATIONS {
-            let short_rad = larger(away_rad - cell_rad, 0.0);
-            bound.error_rad = bound.error_rad * rate + short_rad;
-            away_rad = bound.error_rad * (1.0 + rate);
-            bound.iterations = bound.iterations.saturating_add(1);
-            if bound.error_rad <= INVERSE_TOLERANCE_RAD {
-                break;
-            }
-        }
-        // Places in a cell are in single precision.
-        let place_rad = if cell_rad.is_finite() { 4.0 * f32::EPSILON * cell_rad } else { 0.0 };
-        bound.error_rad += (self.rounding_rad + place_rad) / (1.0 - self.slope);
-        bound
-    }
-}
+use crate::table::{self, Doubt, Memory, OperatingPoint, Plan, Quality, Table};
 
 /// What the output is expected to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,9 +66,6 @@ pub enum Approach<'s> {
     /// A state that was never updated gives the middle of the play, with its half-width as uncertainty.
     From(&'s PlayState),
 }
-
-/// Targets this close to the output leave the generator where it is: the rounding of forward and inverse, counts.
-pub(crate) const HOLD_COUNTS: i32 = 8;
 
 /// What a motion ends in: which side of the play, what is not known of it, and how far the target is.
 #[derive(Clone, Copy)]

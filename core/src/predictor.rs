@@ -30,9 +30,10 @@
 use crate::angle::{GeneratorAngle, OutputAngle};
 use crate::hysteresis::PlayState;
 use crate::model::Prediction;
+use crate::num::larger;
 use crate::runtime::Joint;
 use crate::store::Store;
-use crate::table::{Quality, larger};
+use crate::table::Quality;
 use core::fmt;
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Matrix4x2, RowVector4, Vector2, Vector4};
 

@@ -17,12 +17,13 @@
 //! | reset | [`JointState::restore`] goes on where it was, [`JointState::new`] starts with no correction and the side of the play unknown; both within the limits | |
 
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT, counts_from_rad};
+use crate::crc::crc32;
 use crate::drive::Drive;
-use crate::hysteresis::{MOST_ERROR_COUNTS, PlayState, SAVED_STATE_BYTES};
-use crate::image::crc32;
+use crate::hysteresis::{MAX_ADDED_COUNTS, MOST_ERROR_COUNTS, PlayState, SAVED_STATE_BYTES};
 use crate::model::{self, Approach, Command, Estimate, Model, Prediction};
+use crate::num;
 use crate::store::{Images, Store};
-use crate::table::{self, Memory, Quality};
+use crate::table::{Memory, Quality};
 use core::fmt;
 
 /// What a joint does with its correction.
@@ -177,7 +178,7 @@ impl Adjustment {
     /// Largest magnitude, rad: 0.049.
     pub const MAX_RAD: f32 = Self::MAX_COUNTS as f32 * RAD_PER_COUNT;
     /// The same in counts.
-    pub const MAX_COUNTS: i32 = (1 << 25) - 1;
+    pub const MAX_COUNTS: i32 = MAX_ADDED_COUNTS;
 
     /// From radians at the output, rounded to a count; saturates at ±[`Self::MAX_RAD`], NaN is taken as none.
     #[must_use]
@@ -431,20 +432,20 @@ impl Joint {
             return Err(error);
         }
         // Slower than one part in a tick would be no correction at all.
-        let bounds = [1.0, table::counts(0.05) * FINE as f64];
-        let rate =
-            match checked("rate_rad_s", rate_rad_s, table::counts(rate_rad_s as f64 * tick) * FINE as f64, bounds) {
-                Ok(rate) => rate,
-                Err(error) => return Err(error),
-            };
-        let per_tick = table::counts(acceleration_rad_s2 as f64 * tick * tick) * FINE as f64;
+        let bounds = [1.0, num::counts(0.05) * FINE as f64];
+        let rate = match checked("rate_rad_s", rate_rad_s, num::counts(rate_rad_s as f64 * tick) * FINE as f64, bounds)
+        {
+            Ok(rate) => rate,
+            Err(error) => return Err(error),
+        };
+        let per_tick = num::counts(acceleration_rad_s2 as f64 * tick * tick) * FINE as f64;
         let acceleration = match checked("acceleration_rad_s2", acceleration_rad_s2, per_tick, [0.0, 1.0e12]) {
             Ok(acceleration) => acceleration,
             Err(error) => return Err(error),
         };
         // More than from full speed to full speed back is not needed, and would drown what is left to go in rounding.
         let acceleration = if acceleration < 2.0 * rate { acceleration } else { 2.0 * rate };
-        let per_tick = table::counts(generator_rate_rad_s as f64 * tick);
+        let per_tick = num::counts(generator_rate_rad_s as f64 * tick);
         let largest_move = match checked("generator_rate_rad_s", generator_rate_rad_s, per_tick, [0.0, 2_147_483_000.0])
         {
             Ok(counts) => counts as i32,
@@ -622,7 +623,7 @@ impl Joint {
         state.aimed = goal;
         let away = lag.unsigned_abs();
         let gain = self.acceleration as f32;
-        let stoppable = table::sqrt(self.quarter_square + (gain + gain) * away as f32) - 0.5 * gain;
+        let stoppable = num::sqrt(self.quarter_square + (gain + gain) * away as f32) - 0.5 * gain;
         let stoppable = stoppable as u32;
         let stoppable = (if stoppable < away { stoppable } else { away }) as i32;
         let side = lag >> 31;

@@ -15,8 +15,9 @@
 //! together, and one stroke of `2wᵢ` makes them one.
 
 use crate::angle::{COUNTS_PER_RAD, OutputAngle, RAD_PER_COUNT, counts_from_rad};
+use crate::crc::crc32;
 use crate::hysteresis::MAX_HALF_COUNTS;
-use crate::image::crc32;
+use crate::num;
 use crate::runtime::Adjustment;
 use core::marker::PhantomData;
 
@@ -182,7 +183,7 @@ impl<const N: usize> SlipBank<N, LoadTorque> {
 }
 
 fn torque_counts(torque_n_m: f32) -> Option<i64> {
-    torque_n_m.is_finite().then(|| crate::table::within(torque_n_m, [-MAX_N_M, MAX_N_M]) * PER_N_M).map(|c| c as i64)
+    torque_n_m.is_finite().then(|| num::within(torque_n_m, [-MAX_N_M, MAX_N_M]) * PER_N_M).map(|c| c as i64)
 }
 
 /// Bytes of the saved state of `elements` springs.

@@ -15,13 +15,15 @@
 //! A new table comes in chunks ([`crate::Upload`]) and is checked in full; the one in use stays until [`Store::activate`] is
 //! called between two ticks.
 
+use crate::crc::{CRC_START, crc_word};
 use crate::drive::Drive;
 use crate::error::ImageError;
 use crate::grid;
-use crate::image::{CRC, PAGE_BYTES, page_intact, ripple_row};
+use crate::image::{PAGE_BYTES, page_intact, ripple_row};
+use crate::num;
 use crate::table::{
-    self, Doubt, Memory, NODE_WORDS, OperatingPoint, Plan, Table, TableId, TorquePlace, Words, f32_at, halves, word,
-    word_at, words_from,
+    Doubt, Memory, NODE_WORDS, OperatingPoint, Plan, Table, TableId, TorquePlace, Words, f32_at, halves, word, word_at,
+    words_from,
 };
 use core::fmt;
 
@@ -224,9 +226,6 @@ impl Scrub {
     const START: Self = Self { second: false, page: 0, word: 0, crc: CRC_START, damaged: [0; 2] };
 }
 
-/// Before the first byte of a CRC-32.
-const CRC_START: u32 = 0xffff_ffff;
-
 /// One copy: words, lowest byte first.
 #[repr(align(8))]
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -423,7 +422,7 @@ impl Store {
         }
         let number = |i: usize| f32_at(first, i);
         let range = [number(range_at), number(range_at.wrapping_add(1))];
-        let temperature = table::within(temperature_c, range);
+        let temperature = num::within(temperature_c, range);
         let [last_temperature, _] = halves(word_at(first, last_at));
         let node = |i: usize| number(word::TEMPERATURE_NODES.wrapping_add(i));
         let plane = grid::search_8(node, temperature).min(last_temperature);
@@ -510,7 +509,7 @@ impl Store {
     pub(crate) fn locate_here(&self, torque_n_m: f32, mean: i32, half_width: i32) -> OperatingPoint {
         let source = &self.source;
         let changed = source.sum() ^ self.sum;
-        let torque = table::within(torque_n_m, source.torque_range);
+        let torque = num::within(torque_n_m, source.torque_range);
         let start = |i: usize| f32::from_bits(u32::from_le_bytes(self.first.0.get(i).copied().unwrap_or([0; 4])));
         let interval = grid::search_64(start, torque).min(source.last_torque as usize);
         let at = (source.nodes_from as usize).wrapping_add(interval.wrapping_mul(NODE_WORDS));
@@ -524,7 +523,7 @@ impl Store {
         let first = (source.records_from as usize).wrapping_add(interval.wrapping_mul(source.record as usize));
         let rows = [first, source.record as usize, 0].map(|words: usize| words.wrapping_mul(2));
         let marks =
-            (table::finite(torque_n_m) & self.active, (torque == torque_n_m) & (source.temperature_in_range != 0));
+            (num::finite(torque_n_m) & self.active, (torque == torque_n_m) & (source.temperature_in_range != 0));
         let mut point = OperatingPoint::new(place, around, 0.0, rows, marks, doubt);
         point.whole = changed == 0;
         point.adjusted(&source.plan, mean, half_width)
@@ -667,14 +666,6 @@ impl Source {
             ..Self::default()
         }
     }
-}
-
-/// CRC-32 over one more word, lowest byte first; before the last inversion.
-#[inline(always)]
-fn crc_word(crc: u32, word: u32) -> u32 {
-    let mut digest = CRC.digest_with_initial(crc.reverse_bits());
-    digest.update(&word.to_le_bytes());
-    !digest.finalize()
 }
 
 #[cfg(test)]

@@ -25,8 +25,10 @@
 
 #[cfg(test)]
 use crate::angle::RAD_PER_COUNT;
+use crate::bounds::{Bounds, InverseBound, MAX_INVERSE_ITERATIONS};
 use crate::drive::{Drive, Phases};
 use crate::grid::{self, Cell, PeriodicAxis};
+use crate::num::{finite, sqrt, within};
 use crate::windup;
 
 /// How far an answer can be trusted, worst last.
@@ -108,11 +110,6 @@ pub(crate) fn word_at(words: Words<'_>, index: usize) -> u32 {
     words.get(index).map_or(0, |word| u32::from_le_bytes(*word))
 }
 
-/// The larger of two numbers; the second if the first is NaN. (`f32::max` is a library call on a Cortex-M4F.)
-pub(crate) fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
 /// Where a step finds things in an image, in words; the layout is told in [`crate::image`].
 pub(crate) mod word {
     /// Here two words: ripple unit, error limit.
@@ -190,7 +187,7 @@ impl Plan {
     /// Iterations of an inverse; whatever the memory that holds the table says, no more than the most allowed.
     #[inline(always)]
     pub const fn iterations(&self) -> u32 {
-        let most = crate::model::MAX_INVERSE_ITERATIONS as u32;
+        let most = MAX_INVERSE_ITERATIONS as u32;
         if self.iterations < most { self.iterations } else { most }
     }
 
@@ -260,30 +257,6 @@ pub struct Table<'a> {
     pub(crate) plan: Plan,
     pub(crate) bounds: Bounds,
     pub(crate) inverse: InverseBound,
-}
-
-/// What a table can give at most, from its coefficients.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Bounds {
-    /// Largest |e|, rad.
-    pub error_rad: f32,
-    /// Largest deviation of `centre ± half-width` from `D ± H`: the periodic parts together, rad.
-    pub periodic_rad: f32,
-    /// Largest |ratio·de/dψ| in steady motion: how much the output departs from following the generator.
-    pub slope: f32,
-    /// The part of the slope that A, B and C have.
-    pub curve_slope: f32,
-    /// Largest ripple, in cells of the ripple's axis: how far off a first guess of the inverse can be.
-    pub ripple_cells: f32,
-    /// What the integers of a step round of A, B, C and the ripple, rad: the place in a cell and the weights have 15 bits.
-    pub rounding_rad: f32,
-}
-
-/// What the iterations of the inverse leave.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct InverseBound {
-    pub iterations: u8,
-    pub error_rad: f32,
 }
 
 /// A torque and temperature, located in the table: [`Table::at`]. What forward and inverse of one tick share.
@@ -378,33 +351,6 @@ const fn mul_high(a: i32, b: i32) -> i32 {
 #[inline(always)]
 const fn weighed([a, b, c]: [i32; 3], [first, second, third]: [i32; 3]) -> i32 {
     mul_high(a, first << 16).wrapping_add(mul_high(b, second << 16)).wrapping_add(mul_high(c, third << 16))
-}
-
-/// Square root of a number, 0 of one below 0, to 3e-7 of it: an estimate of 1/√x from the exponent and three steps of Newton.
-///
-/// The same on every machine, and a tenth of the instructions that `libm` takes without a processor's own root.
-#[inline(always)]
-pub(crate) fn sqrt(x: f32) -> f32 {
-    let bits = x.to_bits() & !((x.to_bits() as i32 >> 31) as u32);
-    let x = f32::from_bits(bits);
-    let mut inverse = f32::from_bits(0x5f37_59df_u32.wrapping_sub(bits >> 1));
-    let half = 0.5 * x;
-    for _ in 0..3 {
-        inverse *= 1.5 - half * inverse * inverse;
-    }
-    x * inverse
-}
-
-/// `value` within a range; its lower end if NaN.
-#[inline(always)]
-pub(crate) fn within(value: f32, [least, most]: [f32; 2]) -> f32 {
-    let above = if value > least { value } else { least };
-    if above < most { above } else { most }
-}
-
-#[inline(always)]
-pub(crate) fn finite(value: f32) -> bool {
-    value.to_bits() & 0x7fff_ffff < 0x7f80_0000
 }
 
 /// The high and the low half of a word.
@@ -715,11 +661,6 @@ impl<'a> Table<'a> {
     pub fn at(&self, torque_n_m: f32, temperature_c: f32) -> Option<OperatingPoint> {
         Some(locate(self, torque_n_m, temperature_c)).filter(|point| point.finite)
     }
-}
-
-/// Radians in counts.
-pub(crate) const fn counts(rad: f64) -> f64 {
-    rad * (4_294_967_296.0 / core::f64::consts::TAU)
 }
 
 #[cfg(test)]

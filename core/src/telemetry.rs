@@ -36,7 +36,7 @@
 //! | 48 | `u32` | CRC-32 of the 48 bytes before |
 
 use crate::angle::OutputAngle;
-use crate::image::crc32;
+use crate::crc::crc32;
 use crate::runtime::{Flags, JointState, Mode, Output, RateGroup};
 use crate::store::{Counters, Health, Store};
 use crate::table::Quality;
