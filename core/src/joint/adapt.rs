@@ -33,11 +33,11 @@
 
 #![allow(clippy::arithmetic_side_effects)] // Floating-point numbers: nothing overflows. Integers are handled by name.
 
+use super::runtime::{Adjustment, Flags, Input, Output};
 use crate::angle::{COUNTS_PER_RAD, GeneratorAngle, OutputAngle, RAD_PER_COUNT, counts_from_rad};
 use crate::crc::crc32;
-use crate::hysteresis::PlayState;
 use crate::num;
-use crate::runtime::{Adjustment, Flags, Input, Output};
+use crate::play::PlayState;
 use crate::table::Quality;
 use core::fmt;
 
@@ -1062,8 +1062,7 @@ mod tests {
     #[test]
     fn a_joint_that_learns_comes_where_it_is_wanted() {
         use crate::fixture;
-        use crate::runtime::{Joint, JointState, Limits, Mode, Overrun};
-        use crate::store::{Images, Store};
+        use crate::{Images, Joint, JointState, Limits, Mode, Overrun, Store};
         let image = fixture::image(true);
         let images = Images::new(&image, &image);
         let limits = Limits { rate_rad_s: 0.5, acceleration_rad_s2: 100.0, ..fixture::LIMITS };

@@ -11,7 +11,7 @@
 //! Between torque nodes D is a cubic through the values and slopes of the two around the torque, but straight inside a jump:
 //! D and its slope are continuous from one jump, or end of the axis, to the next. H, R, h are linear in torque. All are
 //! linear in temperature and constant beyond the range of the table. R, h, A, B, C are periodic quadratic B-splines
-//! ([`crate::grid`]).
+//! ([`grid`]).
 //!
 //! A run fixes the torque axis: with frictionless flanks and a drag torque `Td` at the output, steady motion in direction
 //! `d` loads the flanks by `τ − d·Td`, and the error jumps by the backlash where that load changes sign. So the tables
@@ -23,13 +23,29 @@
 //! for word while they are read (`Memory`). The error is in counts of 2⁻³² output turn from there on, in integers but for
 //! the cubic and one division: the same bits on every machine.
 
+mod bounds;
+pub mod grid;
+mod image;
+mod model;
+pub(crate) mod windup;
+
+pub use bounds::{Bounds, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS};
+#[cfg(any(test, feature = "fuzzing"))]
+pub use image::reseal;
+pub use image::{
+    FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance, TEXT_BYTES,
+    TableData, WriteError, image_bytes, write_image,
+};
+pub(crate) use image::{MAX_AXIS_VALUE, counted, page_intact, ripple_row};
+pub use model::{Approach, Command, Prediction};
+pub(crate) use model::{Estimate, Model, departure};
+
 #[cfg(test)]
 use crate::angle::RAD_PER_COUNT;
-use crate::bounds::{Bounds, InverseBound, MAX_INVERSE_ITERATIONS};
 use crate::drive::{Drive, Phases};
-use crate::grid::{self, Cell, PeriodicAxis};
 use crate::num::{finite, sqrt, within};
-use crate::windup;
+use bounds::InverseBound;
+use grid::{Cell, PeriodicAxis};
 
 /// How far an answer can be trusted, worst last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -110,7 +126,7 @@ pub(crate) fn word_at(words: Words<'_>, index: usize) -> u32 {
     words.get(index).map_or(0, |word| u32::from_le_bytes(*word))
 }
 
-/// Where a step finds things in an image, in words; the layout is told in [`crate::image`].
+/// Where a step finds things in an image, in words; the layout is told in [`image`].
 pub(crate) mod word {
     /// Here two words: ripple unit, error limit.
     pub const RIPPLE_UNIT: usize = 29;
@@ -191,7 +207,7 @@ impl Plan {
         if self.iterations < most { self.iterations } else { most }
     }
 
-    /// Values of one direction in a record: [`crate::image::ripple_row`], of a number that is known to be small.
+    /// Values of one direction in a record: [`ripple_row`], of a number that is known to be small.
     #[inline(always)]
     const fn row(&self) -> usize {
         (self.ripple_nodes as usize).wrapping_add(5) & !1
@@ -667,7 +683,6 @@ impl<'a> Table<'a> {
 mod tests {
     use super::*;
     use crate::drive::FixedMember;
-    use crate::image::ripple_row;
     use proptest::prelude::*;
     use std::vec::Vec;
 

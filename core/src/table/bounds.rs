@@ -1,4 +1,4 @@
-//! What a table can give at most, and what the iterations of its inverse leave; how they converge is told in [`crate::model`].
+//! What a table can give at most, and what the iterations of its inverse leave; how they converge is told in [`model`](super::model).
 
 use crate::num::larger;
 

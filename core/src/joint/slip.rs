@@ -14,11 +14,11 @@
 //! After a reset no deflection is known. Each is an interval, moved at both ends by the same operator: motion brings the ends
 //! together, and one stroke of `2wᵢ` makes them one.
 
+use super::runtime::Adjustment;
 use crate::angle::{COUNTS_PER_RAD, OutputAngle, RAD_PER_COUNT, counts_from_rad};
 use crate::crc::crc32;
-use crate::hysteresis::MAX_HALF_COUNTS;
 use crate::num;
-use crate::runtime::Adjustment;
+use crate::play::MAX_HALF_COUNTS;
 use core::marker::PhantomData;
 
 /// One spring that slips with the nominal output.

@@ -15,15 +15,17 @@
 //! A new table comes in chunks ([`crate::Upload`]) and is checked in full; the one in use stays until [`Store::activate`] is
 //! called between two ticks.
 
+mod upload;
+
+pub use upload::{Upload, UploadError};
+
 use crate::crc::{CRC_START, crc_word};
 use crate::drive::Drive;
 use crate::error::ImageError;
-use crate::grid;
-use crate::image::{PAGE_BYTES, page_intact, ripple_row};
 use crate::num;
 use crate::table::{
-    Doubt, Memory, NODE_WORDS, OperatingPoint, Plan, Table, TableId, TorquePlace, Words, f32_at, halves, word, word_at,
-    words_from,
+    Doubt, Memory, NODE_WORDS, OperatingPoint, PAGE_BYTES, Plan, Table, TableId, TorquePlace, Words, f32_at, grid,
+    halves, page_intact, ripple_row, word, word_at, words_from,
 };
 use core::fmt;
 
@@ -1013,7 +1015,7 @@ mod tests {
         let mut other = IMAGE.clone();
         // Another drive description: a table all the same.
         other[16] ^= 1;
-        crate::image::reseal(&mut other);
+        crate::table::reseal(&mut other);
         assert!(Table::check(&other).is_ok());
         let mut store = active(20.0);
         let refused = store.activate(&Images::new(&other, &IMAGE), &fixture::drive(), 60.0);

@@ -19,11 +19,10 @@
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT, counts_from_rad};
 use crate::crc::crc32;
 use crate::drive::Drive;
-use crate::hysteresis::{MAX_ADDED_COUNTS, MOST_ERROR_COUNTS, PlayState, SAVED_STATE_BYTES};
-use crate::model::{self, Approach, Command, Estimate, Model, Prediction};
 use crate::num;
+use crate::play::{MAX_ADDED_COUNTS, MOST_ERROR_COUNTS, PlayState, SAVED_STATE_BYTES};
 use crate::store::{Images, Store};
-use crate::table::{Memory, Quality};
+use crate::table::{Approach, Command, Estimate, Memory, Model, Prediction, Quality, departure};
 use core::fmt;
 
 /// What a joint does with its correction.
@@ -527,7 +526,7 @@ impl Joint {
         let now = model.estimate(&point, &mut state.play, generator);
         state.output = state.told_twice();
         let Estimate { output, error, mut doubt, .. } = now;
-        let from = model::departure(store.plan(), &point, input.target, &state.play, output);
+        let from = departure(store.plan(), &point, input.target, &state.play, output);
         let (found, allowed) = model.solve(&point, input.target, from.backward, &mut doubt);
         let sane = now.sane & allowed & doubt.none();
         // The correction that leaves the generator where it is.

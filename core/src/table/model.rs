@@ -20,7 +20,7 @@
 
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
-use crate::hysteresis::{Direction, PlayState};
+use crate::play::{Direction, PlayState};
 use crate::table::{self, Doubt, Memory, OperatingPoint, Plan, Quality, Table};
 
 /// What the output is expected to do.

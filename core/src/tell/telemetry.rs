@@ -37,7 +37,7 @@
 
 use crate::angle::OutputAngle;
 use crate::crc::crc32;
-use crate::runtime::{Flags, JointState, Mode, Output, RateGroup};
+use crate::joint::{Flags, JointState, Mode, Output, RateGroup};
 use crate::store::{Counters, Health, Store};
 use crate::table::Quality;
 use core::fmt;

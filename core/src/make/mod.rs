@@ -36,7 +36,7 @@
 //! say nothing about either side of it; they are left out and counted.
 //!
 //! ```
-//! use flexspline::precompute::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
+//! use flexspline::make::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
 //! use flexspline::{Direction, Drive, FixedMember, GeneratorKind, Provenance, Table};
 //!
 //! let plan = Plan {
@@ -85,14 +85,15 @@
 use crate::angle::GeneratorAngle;
 use crate::drive::Drive;
 use crate::error::{Field, ImageError};
-use crate::grid::{self, MAX_CLAMPED_NODES, MAX_HALVINGS, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis, Place};
-use crate::hysteresis::Direction;
-use crate::image::{
-    MAX_AXIS_VALUE, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, Provenance, TableData, WriteError, counted,
-    write_image,
+use crate::play::Direction;
+use crate::table::grid::{
+    self, MAX_CLAMPED_NODES, MAX_HALVINGS, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis, Place,
 };
-use crate::table::Table;
-use crate::windup::{self, STENCIL, Slopes};
+use crate::table::windup::{self, STENCIL, Slopes};
+use crate::table::{
+    MAX_AXIS_VALUE, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, Provenance, Table, TableData, WriteError,
+    counted, image_bytes, write_image,
+};
 use core::f64::consts::TAU;
 use core::fmt;
 
@@ -477,7 +478,7 @@ impl<'a> Plan<'a> {
     /// Length of the image.
     #[must_use]
     pub fn image_bytes(&self) -> usize {
-        crate::image::image_bytes(
+        image_bytes(
             self.torque_nodes_n_m.len(),
             self.temperature_nodes_c.len(),
             self.ripple_nodes,

@@ -54,15 +54,15 @@
 //! 544 + 4·3·35 + 75·(12 + 48) = 5464, and 22 pages and the end 4·23 = 92: 5556 bytes. With 2 temperatures and 60 torques, as
 //! the two-roller generator needs: 7872. Both are below 8 KiB.
 
+use super::bounds::{Bounds, HOLD_COUNTS, InverseBound, MAX_INVERSE_ERROR_RAD};
+use super::grid::{self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis};
+use super::windup::Slopes;
+use super::{GeneratorKind, NODE_WORDS, Table, TableId, Words, f32_at, halves, word, word_at};
 use crate::angle::RAD_PER_COUNT;
-use crate::bounds::{Bounds, HOLD_COUNTS, InverseBound, MAX_INVERSE_ERROR_RAD};
 use crate::crc::crc32;
 use crate::drive::{Drive, FixedMember};
 use crate::error::{Field, ImageError};
-use crate::grid::{self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis};
 use crate::num::{self, larger, larger64};
-use crate::table::{self, GeneratorKind, NODE_WORDS, Table, TableId, Words, f32_at, word, word_at};
-use crate::windup::Slopes;
 use core::f64::consts::TAU;
 use core::fmt;
 
@@ -122,7 +122,7 @@ pub struct Provenance<'a> {
 }
 
 /// The numbers of a table. All angles are radians at the output; curves and ripple are B-spline coefficients
-/// ([`crate::grid`]).
+/// ([`grid`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TableData<'a> {
     /// Tooth counts and fixed member.
@@ -133,7 +133,7 @@ pub struct TableData<'a> {
     pub temperature_nodes_c: &'a [f32],
     /// Nodes over one tooth pitch; 0 for no ripple.
     pub ripple_nodes: usize,
-    /// D, `[temperature][torque]`; its slopes follow from it ([`crate::precompute`]).
+    /// D, `[temperature][torque]`; its slopes follow from it ([`crate::make`]).
     pub mean_rad: &'a [f32],
     /// H, `[temperature][torque]`, ≥ 0.
     pub half_width_rad: &'a [f32],
@@ -890,7 +890,7 @@ impl<'a> Table<'a> {
     /// How far the ripple takes the half-width of the play below H at most, counts, rounded up.
     pub(crate) fn play_ripple_counts(&self) -> i32 {
         let layout = Layout::new(self.torque_nodes, self.temperature_nodes, self.ripple.len(), [0; 3]);
-        let [_, first] = table::halves(word_at(self.words, word::CELL_WIDTH.saturating_add(3)));
+        let [_, first] = halves(word_at(self.words, word::CELL_WIDTH.saturating_add(3)));
         let words = layout.record.saturating_mul(self.torque_nodes).saturating_mul(self.temperature_nodes);
         let records = self.words.get(first..first.saturating_add(words)).unwrap_or_default();
         let mut narrowest = 0;
@@ -1129,7 +1129,7 @@ mod tests {
                 for node in 0..8 {
                     let phase = table.ripple_axis().node_phase(node);
                     let phases = Phases { generator: 0, material: 0, output: 0, tooth: phase };
-                    let play = table::play_at(&table, &point, phases, &mut Default::default());
+                    let play = crate::table::play_at(&table, &point, phases, &mut Default::default());
                     let ripple = |values: &[f32]| {
                         let value = |node: usize| {
                             let record = (2 * temperature_node) * 8 + node % 8;
