@@ -18,10 +18,12 @@
 //! needed is found from the coefficients, stands in the image and is found again when the table is accepted: one, without
 //! A, B, C and with a ripple below a cell.
 
+use super::memory::{Doubt, Memory, Plan};
+use super::point::{OperatingPoint, Quality};
+use super::{Table, read};
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
 use crate::play::{Direction, PlayState};
-use crate::table::{self, Doubt, Memory, OperatingPoint, Plan, Quality, Table};
 
 /// What the output is expected to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,7 +123,7 @@ impl<M: Memory> Model<'_, M> {
         let nominal = self.drive.nominal_output(generator);
         let phases = self.drive.phases(generator, nominal);
         let mut doubt = point.doubt;
-        let play = table::play_at(self.memory, point, phases, &mut doubt);
+        let play = read::play_at(self.memory, point, phases, &mut doubt);
         let sane = point.finite & play.sane & doubt.none();
         let mask = (sane as i32).wrapping_neg();
         let error = state.update(nominal, play.centre, play.half, sane) & mask;
@@ -197,7 +199,7 @@ impl<M: Memory> Model<'_, M> {
         doubt: &mut Doubt,
     ) -> i32 {
         let tooth = self.drive.tooth_at_output(minus(target, base));
-        let moved = table::to_solution(self.memory, point, (tooth, 0), backward, doubt);
+        let moved = read::to_solution(self.memory, point, (tooth, 0), backward, doubt);
         base.wrapping_sub(self.memory.plan().counts_of(moved))
     }
 
@@ -220,7 +222,7 @@ impl<M: Memory> Model<'_, M> {
             let mut guess = error;
             if plan.has_curves() {
                 let before = curves;
-                curves = table::curves_at(self.memory, self.drive.phases_at_output(minus(target, error)), doubt);
+                curves = read::curves_at(self.memory, self.drive.phases_at_output(minus(target, error)), doubt);
                 guess = guess.wrapping_add(curves).wrapping_sub(before);
             }
             // Where the solution would be without ripple.
@@ -228,7 +230,7 @@ impl<M: Memory> Model<'_, M> {
             error = here;
             if plan.ripple_nodes > 0 {
                 let tooth = self.drive.tooth_at_output(minus(target, guess));
-                ahead = table::to_solution(self.memory, point, (tooth, ahead), backward, doubt);
+                ahead = read::to_solution(self.memory, point, (tooth, ahead), backward, doubt);
                 error = here.wrapping_sub(plan.counts_of(ahead));
             }
         }
@@ -278,7 +280,7 @@ impl<'a> Table<'a> {
         torque_n_m: f32,
         temperature_c: f32,
     ) -> Prediction {
-        self.model().follow(&table::locate(self, torque_n_m, temperature_c), state, generator)
+        self.model().follow(&read::locate(self, torque_n_m, temperature_c), state, generator)
     }
 
     /// Generator angle that brings the output to `target`.
@@ -287,7 +289,7 @@ impl<'a> Table<'a> {
     /// `Disabled`.
     #[must_use]
     pub fn inverse(&self, target: OutputAngle, torque_n_m: f32, temperature_c: f32, approach: Approach<'_>) -> Command {
-        self.model().aim(&table::locate(self, torque_n_m, temperature_c), target, approach)
+        self.model().aim(&read::locate(self, torque_n_m, temperature_c), target, approach)
     }
 
     /// One tick: [`Self::forward`] at the measured generator angle, then [`Self::inverse`] from there to the target. Locates
@@ -301,7 +303,7 @@ impl<'a> Table<'a> {
         torque_n_m: f32,
         temperature_c: f32,
     ) -> (Prediction, Command) {
-        let point = table::locate(self, torque_n_m, temperature_c);
+        let point = read::locate(self, torque_n_m, temperature_c);
         let model = self.model();
         let prediction = model.follow(&point, state, measured);
         (prediction, model.aim(&point, target, Approach::From(state)))
@@ -318,7 +320,7 @@ impl<'a> Table<'a> {
     ) -> Option<f32> {
         let point = self.at(torque_n_m, temperature_c)?;
         let phases = self.drive.phases(generator, self.drive.nominal_output(generator));
-        let play = table::play_at(self, &point, phases, &mut Default::default());
+        let play = read::play_at(self, &point, phases, &mut Default::default());
         let error = match direction {
             Direction::Forward => play.centre.wrapping_sub(play.half),
             Direction::Backward => play.centre.wrapping_add(play.half),
