@@ -14,7 +14,7 @@
 //! After a reset no deflection is known. Each is an interval, moved at both ends by the same operator: motion brings the ends
 //! together, and one stroke of `2wᵢ` makes them one.
 
-use super::runtime::Adjustment;
+use super::adjustment::Adjustment;
 use crate::angle::{COUNTS_PER_RAD, OutputAngle, RAD_PER_COUNT, counts_from_rad};
 use crate::crc::crc32;
 use crate::num;
