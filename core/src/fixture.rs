@@ -3,11 +3,10 @@
 //! Own arithmetic in `f64`: shares nothing with the grid, the table or the projection.
 
 use crate::drive::{Drive, FixedMember};
-use crate::hysteresis::Direction;
-use crate::image::Provenance;
-use crate::precompute::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
-use crate::runtime::Limits;
-use crate::table::GeneratorKind;
+use crate::joint::Limits;
+use crate::make::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
+use crate::play::Direction;
+use crate::table::{GeneratorKind, Provenance};
 use core::f64::consts::TAU;
 use std::vec::Vec;
 

@@ -147,7 +147,7 @@
 //! * NaN or infinity in torque or temperature gives [`Quality::Disabled`] and no correction.
 //! * Angles are integers: turning for years, or a million small steps, adds no error.
 //! * The host makes tables with the code that reads them: one definition of where a node sits ([`grid`]), and the
-//!   deviation from the samples is measured on the finished image ([`precompute`]).
+//!   deviation from the samples is measured on the finished image ([`make`]).
 //!
 //! # Signs and units
 //! * Angles in radians at the interface, positive counter-clockwise; torque N·m, temperature °C.
@@ -155,7 +155,7 @@
 //!   ([`Drive::corrected_command`]).
 //! * The ratio is signed: `+cs/(cs − fs)` with the flexspline fixed, `−fs/(cs − fs)` with the circular spline fixed.
 //! * Positive load torque turns the output forward and gives positive wind-up.
-//! * A [`Direction`] is that of the output, in samples ([`precompute::Sample::direction`], a column `direction`: +1 where the
+//! * A [`Direction`] is that of the output, in samples ([`make::Sample::direction`], a column `direction`: +1 where the
 //!   output turns forward, −1 where backward) as in the play; with the circular spline fixed the generator turns against it.
 //!
 //! # Not in here
@@ -180,7 +180,6 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
-mod adapt;
 mod angle;
 #[cfg(all(feature = "c-api", not(feature = "fuzzing")))]
 mod c_api;
@@ -188,60 +187,42 @@ mod c_api;
 #[doc(hidden)]
 #[allow(clippy::not_unsafe_ptr_arg_deref)] // As C calls them; public for `tests/fuzz` alone.
 pub mod c_api;
-#[cfg(feature = "defmt")]
-mod defmt_impls;
+mod crc;
 mod drive;
 mod error;
-mod events;
 #[cfg(test)]
 mod fixture;
-pub mod grid;
-mod hysteresis;
-mod image;
-mod model;
+mod joint;
+pub mod make;
+mod num;
 #[cfg(feature = "parts")]
 #[doc(hidden)]
 pub mod parts;
-pub mod precompute;
-mod predictor;
-mod runtime;
-mod slip;
+mod play;
 mod store;
 mod table;
-mod telemetry;
-mod upload;
-mod windup;
+mod tell;
 
-pub use adapt::{
-    AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Coefficient, Learning, Seen, Term, Verdict,
-    saved_adapt_bytes,
-};
 pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};
 pub use error::{DriveError, Field, ImageError};
-pub use events::{Event, Events, Watch};
-pub use hysteresis::{Direction, PlayState, SAVED_STATE_BYTES};
+pub use joint::{
+    AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Ahead, Coefficient,
+    Disturbance, FittedSlip, Flags, Inertias, Input, Joint, JointState, Learning, Limits, LoadTorque, Measured, Mode,
+    ModeError, Noise, NominalOutput, Now, Output, OutputAhead, Overrun, PREDICTOR_PARTS, Predictor, PredictorError,
+    PredictorState, RateGroup, SAVED_JOINT_BYTES, Seen, SettingError, Slip, SlipBank, SlipElement, SlipState,
+    SlipVariable, Term, TorqueSlipElement, Verdict, saved_adapt_bytes, saved_slip_bytes,
+};
+pub use play::{Direction, PlayState, SAVED_STATE_BYTES};
+pub use store::{
+    ActivateError, Counters, Health, Images, STORE_PAGES, STORE_WORDS, Store, Upload, UploadError, mend_page,
+};
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
-pub use image::reseal;
-pub use image::{
-    FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance, TEXT_BYTES,
-    TableData, WriteError, image_bytes, write_image,
+pub use table::reseal;
+pub use table::{
+    Approach, Bounds, Command, FORMAT_VERSION, GeneratorKind, INVERSE_TOLERANCE_RAD, MAX_ERROR_RAD,
+    MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, OperatingPoint, PAGE_BYTES,
+    Prediction, Provenance, Quality, TEXT_BYTES, Table, TableData, TableId, WriteError, grid, image_bytes, write_image,
 };
-pub use model::{Approach, Command, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, Prediction};
-pub use predictor::{
-    Ahead, Disturbance, Inertias, Measured, Noise, Now, OutputAhead, PREDICTOR_PARTS, Predictor, PredictorError,
-    PredictorState,
-};
-pub use runtime::{
-    Adjustment, Flags, Input, Joint, JointState, Limits, Mode, ModeError, Output, Overrun, RateGroup,
-    SAVED_JOINT_BYTES, SettingError,
-};
-pub use slip::{
-    FittedSlip, LoadTorque, NominalOutput, Slip, SlipBank, SlipElement, SlipState, SlipVariable, TorqueSlipElement,
-    saved_slip_bytes,
-};
-pub use store::{ActivateError, Counters, Health, Images, STORE_PAGES, STORE_WORDS, Store, mend_page};
-pub use table::{Bounds, GeneratorKind, OperatingPoint, Quality, Table, TableId};
-pub use telemetry::{Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Writer};
-pub use upload::{Upload, UploadError};
+pub use tell::{Event, Events, Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Watch, Writer};

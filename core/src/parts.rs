@@ -1,10 +1,9 @@
 //! The parts of [`Joint::tick`] one by one, so that `tests/firmware` can count what each takes. Not for flight.
 
 use crate::drive::Drive;
-use crate::hysteresis::PlayState;
-use crate::model::Model;
+use crate::play::PlayState;
 use crate::store::{Images, Store};
-use crate::table::Doubt;
+use crate::table::{Doubt, Model};
 use crate::{GeneratorAngle, Joint, OperatingPoint, OutputAngle};
 
 fn model<'s>(drive: &'s Drive, store: &'s Store) -> Model<'s, Store> {

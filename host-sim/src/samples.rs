@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use flexspline::Direction;
-use flexspline::precompute::Sample;
+use flexspline::make::Sample;
 use thiserror::Error;
 
 use crate::measurement::{CsvRows, NotANumber, Row, TableProblem};

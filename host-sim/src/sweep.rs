@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
 use flexspline::Direction;
-use flexspline::precompute::Sample;
+use flexspline::make::Sample;
 
 use rayon::prelude::*;
 

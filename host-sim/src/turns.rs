@@ -25,7 +25,7 @@ use std::ops::ControlFlow;
 
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
-use flexspline::precompute::Sample;
+use flexspline::make::Sample;
 use rayon::prelude::*;
 
 use crate::drive::{Drive, GeneratorKind};

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use flexspline::precompute::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
+use flexspline::make::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};
 use flexspline::{Direction, Drive, FixedMember, GeneratorKind, Inertias, Noise, Predictor, Provenance};
 
 fn main() {

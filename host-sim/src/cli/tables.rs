@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueHint};
 use flexspline::Table;
-use flexspline::precompute::Sample;
+use flexspline::make::Sample;
 use rayon::prelude::*;
 use serde::Serialize;
 

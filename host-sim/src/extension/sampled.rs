@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use flexspline::precompute::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
+use flexspline::make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
 use flexspline::{Direction, FixedMember, Table};
 
 use crate::diagnosis::Extended;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use flexspline::precompute::Sample;
+use flexspline::make::Sample;
 use flexspline::{Direction, GeneratorAngle, Table};
 use serde_json::{Map, Value, json};
 

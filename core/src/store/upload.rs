@@ -111,7 +111,7 @@ impl<'b> Upload<'b> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{fixture, image};
+    use crate::{fixture, table};
     use std::vec;
     use std::vec::Vec;
 
@@ -199,7 +199,7 @@ mod tests {
                 }
             }
             if sealed {
-                image::reseal(&mut image);
+                table::reseal(&mut image);
             }
             match Table::check(&image) {
                 Err(_) => refused += 1,

@@ -13,7 +13,7 @@
 //! many steps a motion is cut into, and no rounding builds up.
 
 use crate::angle::{OutputAngle, RAD_PER_COUNT};
-use crate::image::crc32;
+use crate::crc::crc32;
 
 /// A direction of motion of the *output*.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -37,12 +37,14 @@ impl Direction {
 
 /// Largest half-width of a table in counts, 0.05 rad.
 pub(crate) const MAX_HALF_COUNTS: i32 = 34_178_720;
+/// Most that may be added to the mean or the half-width of a table, counts, 0.049 rad.
+pub(crate) const MAX_ADDED_COUNTS: i32 = (1 << 25) - 1;
 /// Largest half-width of a play in counts, 0.2 rad: far above any table with what may be added to it, far below overflow.
 const MAX_PLAY_COUNTS: i32 = 1 << 27;
 
 /// Largest error that any table can give, with its rounding and the largest adjustment of mean and half-width, counts.
 pub(crate) const MOST_ERROR_COUNTS: u32 =
-    MAX_HALF_COUNTS as u32 + (MAX_HALF_COUNTS as u32 >> 8) + 2 * crate::runtime::Adjustment::MAX_COUNTS as u32;
+    MAX_HALF_COUNTS as u32 + (MAX_HALF_COUNTS as u32 >> 8) + 2 * MAX_ADDED_COUNTS as u32;
 
 /// The same while nothing was known of the table.
 const MOST_KEPT_COUNTS: u32 = MOST_ERROR_COUNTS + MAX_PLAY_COUNTS as u32;

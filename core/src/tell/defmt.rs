@@ -1,15 +1,11 @@
 //! `defmt::Format` of what is worth a log, for the types whose files know nothing of logs.
 
-use crate::adapt::Adapted;
 use crate::drive::FixedMember;
 use crate::error::{DriveError, Field, ImageError};
-use crate::hysteresis::{Direction, PlayState};
-use crate::predictor::PredictorError;
-use crate::runtime::{Adjustment, Flags, Mode, ModeError, Output, SettingError};
-use crate::slip::Slip;
-use crate::store::{ActivateError, Counters, Health};
+use crate::joint::{Adapted, Adjustment, Flags, Mode, ModeError, Output, PredictorError, SettingError, Slip};
+use crate::play::{Direction, PlayState};
+use crate::store::{ActivateError, Counters, Health, UploadError};
 use crate::table::{GeneratorKind, Quality, TableId};
-use crate::upload::UploadError;
 use defmt::{Format, Formatter, write};
 
 /// Enums whose variants hold nothing, by name.

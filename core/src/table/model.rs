@@ -18,43 +18,12 @@
 //! needed is found from the coefficients, stands in the image and is found again when the table is accepted: one, without
 //! A, B, C and with a ripple below a cell.
 
+use super::memory::{Doubt, Memory, Plan};
+use super::point::{OperatingPoint, Quality};
+use super::{Table, read};
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
-use crate::hysteresis::{Direction, PlayState};
-use crate::table::{self, Bounds, Doubt, InverseBound, Memory, OperatingPoint, Plan, Quality, Table, larger};
-
-/// Error of the inverse that the number of its iterations aims at, rad at the output: 0.02″, far below what a table misses of
-/// its samples.
-pub const INVERSE_TOLERANCE_RAD: f32 = 1.0e-7;
-/// Most iterations of an inverse.
-pub const MAX_INVERSE_ITERATIONS: u8 = 8;
-
-/// No table is accepted whose inverse is left with more, rad at the output: 0.2″.
-pub const MAX_INVERSE_ERROR_RAD: f32 = 1.0e-6;
-
-impl Bounds {
-    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], 1 to 8, and what they and rounding leave; `cell_rad` is a cell of the
-    /// ripple at the output.
-    pub(crate) fn inverse(self, cell_rad: f32) -> InverseBound {
-        let rate = self.curve_slope / (1.0 - self.slope);
-        let mut bound = InverseBound { iterations: 0, error_rad: self.periodic_rad };
-        // How far the solution for A, B, C held fixed can be.
-        let mut away_rad = self.ripple_cells * cell_rad + self.periodic_rad * rate;
-        while bound.iterations < MAX_INVERSE_ITERATIONS {
-            let short_rad = larger(away_rad - cell_rad, 0.0);
-            bound.error_rad = bound.error_rad * rate + short_rad;
-            away_rad = bound.error_rad * (1.0 + rate);
-            bound.iterations = bound.iterations.saturating_add(1);
-            if bound.error_rad <= INVERSE_TOLERANCE_RAD {
-                break;
-            }
-        }
-        // Places in a cell are in single precision.
-        let place_rad = if cell_rad.is_finite() { 4.0 * f32::EPSILON * cell_rad } else { 0.0 };
-        bound.error_rad += (self.rounding_rad + place_rad) / (1.0 - self.slope);
-        bound
-    }
-}
+use crate::play::{Direction, PlayState};
 
 /// What the output is expected to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,9 +68,6 @@ pub enum Approach<'s> {
     /// A state that was never updated gives the middle of the play, with its half-width as uncertainty.
     From(&'s PlayState),
 }
-
-/// Targets this close to the output leave the generator where it is: the rounding of forward and inverse, counts.
-pub(crate) const HOLD_COUNTS: i32 = 8;
 
 /// What a motion ends in: which side of the play, what is not known of it, and how far the target is.
 #[derive(Clone, Copy)]
@@ -157,7 +123,7 @@ impl<M: Memory> Model<'_, M> {
         let nominal = self.drive.nominal_output(generator);
         let phases = self.drive.phases(generator, nominal);
         let mut doubt = point.doubt;
-        let play = table::play_at(self.memory, point, phases, &mut doubt);
+        let play = read::play_at(self.memory, point, phases, &mut doubt);
         let sane = point.finite & play.sane & doubt.none();
         let mask = (sane as i32).wrapping_neg();
         let error = state.update(nominal, play.centre, play.half, sane) & mask;
@@ -233,7 +199,7 @@ impl<M: Memory> Model<'_, M> {
         doubt: &mut Doubt,
     ) -> i32 {
         let tooth = self.drive.tooth_at_output(minus(target, base));
-        let moved = table::to_solution(self.memory, point, (tooth, 0), backward, doubt);
+        let moved = read::to_solution(self.memory, point, (tooth, 0), backward, doubt);
         base.wrapping_sub(self.memory.plan().counts_of(moved))
     }
 
@@ -256,7 +222,7 @@ impl<M: Memory> Model<'_, M> {
             let mut guess = error;
             if plan.has_curves() {
                 let before = curves;
-                curves = table::curves_at(self.memory, self.drive.phases_at_output(minus(target, error)), doubt);
+                curves = read::curves_at(self.memory, self.drive.phases_at_output(minus(target, error)), doubt);
                 guess = guess.wrapping_add(curves).wrapping_sub(before);
             }
             // Where the solution would be without ripple.
@@ -264,7 +230,7 @@ impl<M: Memory> Model<'_, M> {
             error = here;
             if plan.ripple_nodes > 0 {
                 let tooth = self.drive.tooth_at_output(minus(target, guess));
-                ahead = table::to_solution(self.memory, point, (tooth, ahead), backward, doubt);
+                ahead = read::to_solution(self.memory, point, (tooth, ahead), backward, doubt);
                 error = here.wrapping_sub(plan.counts_of(ahead));
             }
         }
@@ -314,7 +280,7 @@ impl<'a> Table<'a> {
         torque_n_m: f32,
         temperature_c: f32,
     ) -> Prediction {
-        self.model().follow(&table::locate(self, torque_n_m, temperature_c), state, generator)
+        self.model().follow(&read::locate(self, torque_n_m, temperature_c), state, generator)
     }
 
     /// Generator angle that brings the output to `target`.
@@ -323,7 +289,7 @@ impl<'a> Table<'a> {
     /// `Disabled`.
     #[must_use]
     pub fn inverse(&self, target: OutputAngle, torque_n_m: f32, temperature_c: f32, approach: Approach<'_>) -> Command {
-        self.model().aim(&table::locate(self, torque_n_m, temperature_c), target, approach)
+        self.model().aim(&read::locate(self, torque_n_m, temperature_c), target, approach)
     }
 
     /// One tick: [`Self::forward`] at the measured generator angle, then [`Self::inverse`] from there to the target. Locates
@@ -337,7 +303,7 @@ impl<'a> Table<'a> {
         torque_n_m: f32,
         temperature_c: f32,
     ) -> (Prediction, Command) {
-        let point = table::locate(self, torque_n_m, temperature_c);
+        let point = read::locate(self, torque_n_m, temperature_c);
         let model = self.model();
         let prediction = model.follow(&point, state, measured);
         (prediction, model.aim(&point, target, Approach::From(state)))
@@ -354,7 +320,7 @@ impl<'a> Table<'a> {
     ) -> Option<f32> {
         let point = self.at(torque_n_m, temperature_c)?;
         let phases = self.drive.phases(generator, self.drive.nominal_output(generator));
-        let play = table::play_at(self, &point, phases, &mut Default::default());
+        let play = read::play_at(self, &point, phases, &mut Default::default());
         let error = match direction {
             Direction::Forward => play.centre.wrapping_sub(play.half),
             Direction::Backward => play.centre.wrapping_add(play.half),

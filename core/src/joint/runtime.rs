@@ -3,145 +3,33 @@
 //! In this order: the measured generator angle is judged; torque and temperature are located in the table; the play follows the
 //! generator (forward); the target is turned into a correction (inverse); mode and overrun policy say how much of it is wanted;
 //! a limiter moves the correction there; the scrubber of the table does its slice. What slower rate groups do is called by the
-//! firmware after [`Joint::tick`], in an order that is fixed in its source ([`RateGroup`]).
+//! firmware after [`Joint::tick`], in an order that is fixed in its source ([`RateGroup`](crate::RateGroup)).
 //!
 //! | what happens | what the joint does | flag |
 //! |---|---|---|
 //! | no sample | keeps the last generator angle: the play does not move | [`Flags::SAMPLE_LOST`] |
 //! | a sample further from the last one than a tick allows | takes it for a glitch, as no sample; if it stays for `patience` ticks, takes it as true, with the side of the play unknown | [`Flags::GLITCH`] |
 //! | torque or temperature not finite, or the table in doubt | keeps the last correction for `patience` ticks, then fades it out | [`Flags::NOT_CORRECTED`] |
-//! | torque or temperature out of range | corrects with the value at the edge | [`Quality::Extrapolated`] |
+//! | torque or temperature out of range | corrects with the value at the edge | [`Quality::Extrapolated`](crate::Quality::Extrapolated) |
 //! | a tick came late | by [`Overrun`] | [`Flags::OVERRUN`] |
 //! | a reversal, or anything else that wants a faster correction | the limiter holds it back; by how much is in [`Output::held_back_rad`] | [`Flags::HELD_BACK`] |
 //! | an upset in the state | an interval of the play that cannot be is taken for unknown; of two corrections that differ the nearer to the goal counts | [`Flags::STATE_TORN`] |
 //! | reset | [`JointState::restore`] goes on where it was, [`JointState::new`] starts with no correction and the side of the play unknown; both within the limits | |
 
-use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT, counts_from_rad};
+use super::adjustment::{Adjustment, bounded};
+use super::limits::{Limits, SettingError, checked};
+use super::mode::{Mode, Overrun};
+use super::signals::{Flags, Input, Output};
+use super::state::{FINE, JointState};
+use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
-use crate::hysteresis::{MOST_ERROR_COUNTS, PlayState, SAVED_STATE_BYTES};
-use crate::image::crc32;
-use crate::model::{self, Approach, Command, Estimate, Model, Prediction};
+use crate::num;
+use crate::play::PlayState;
 use crate::store::{Images, Store};
-use crate::table::{self, Memory, Quality};
-use core::fmt;
+use crate::table::{Approach, Command, Estimate, Memory, Model, Prediction, departure};
 
-/// What a joint does with its correction.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Mode {
-    /// No correction: it is taken back within the limits. The start.
-    Off,
-    /// The correction follows the table.
-    Tracking,
-    /// The correction stays as it is.
-    Hold,
-    /// No correction, and none before [`Mode::Off`] was asked for: after a fault.
-    Safe,
-}
-
-/// A transition that is not legal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ModeError {
-    /// The mode now.
-    pub from: Mode,
-    /// The mode asked for.
-    pub to: Mode,
-}
-
-impl fmt::Display for ModeError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "no transition from {:?} to {:?}", self.from, self.to)
-    }
-}
-
-impl core::error::Error for ModeError {}
-
-impl Mode {
-    /// Whether `self` may be followed by `to`: everything may stop, tracking starts from off or hold, hold only from tracking,
-    /// and safe is left to off alone.
-    #[must_use]
-    pub const fn may_become(self, to: Self) -> bool {
-        matches!(
-            (self, to),
-            (_, Self::Safe | Self::Off)
-                | (Self::Off | Self::Tracking | Self::Hold, Self::Tracking)
-                | (Self::Tracking | Self::Hold, Self::Hold)
-        )
-    }
-}
-
-/// What a tick that came late does to the correction. Missed ticks are counted with each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Overrun {
-    /// Nothing more: the ticks missed are skipped.
-    SkipAndCount,
-    /// The correction stays as it is in this tick.
-    HoldLast,
-    /// The correction fades to none within so many ticks, stays there as long, and comes back.
-    FadeOut {
-        /// Ticks, at least 1.
-        ticks: u16,
-    },
-}
-
-/// Ticks in which a slower group runs: every `divisor`-th, from `offset` on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RateGroup {
-    divisor: u32,
-    offset: u32,
-}
-
-impl RateGroup {
-    /// A group; `None` unless 1 ≤ `divisor` and `offset` < `divisor`.
-    #[must_use]
-    pub const fn new(divisor: u32, offset: u32) -> Option<Self> {
-        if divisor == 0 || offset >= divisor { None } else { Some(Self { divisor, offset }) }
-    }
-
-    /// Whether it runs in tick number `tick`.
-    #[must_use]
-    pub fn is_due(self, tick: u32) -> bool {
-        tick.checked_rem(self.divisor) == Some(self.offset)
-    }
-}
-
-/// What a joint cannot be set to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SettingError {
-    /// Which setting.
-    pub name: &'static str,
-    /// Value found.
-    pub found: f32,
-}
-
-impl fmt::Display for SettingError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} = {}: must be finite and above zero, and not beyond what one tick can do", self.name, self.found)
-    }
-}
-
-impl core::error::Error for SettingError {}
-
-/// Limits of one joint, in units of its output and of seconds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// Time from tick to tick, s.
-    pub tick_s: f32,
-    /// Fastest correction at the output, rad/s.
-    pub rate_rad_s: f32,
-    /// Largest acceleration of the correction at the output, rad/s².
-    pub acceleration_rad_s2: f32,
-    /// Fastest generator, rad/s: what moves faster from tick to tick is a glitch.
-    pub generator_rate_rad_s: f32,
-    /// Ticks for which a glitch is not believed, and for which the last correction is kept where none can be made.
-    pub patience: u16,
-}
-
-/// Parts of a count that the correction is kept in: the difference of any two corrections fits 32 bits.
-const FINE: i32 = 8;
 /// Less than a count.
 const WITHIN: i32 = FINE - 1;
-/// No table with its adjustment gives a larger correction, and no joint a faster one, fine counts.
-const MOST_FINE: u32 = MOST_ERROR_COUNTS * FINE as u32;
 
 /// One joint: all that does not change while it runs. Can be made at compile time and lie in flash.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -160,261 +48,10 @@ pub struct Joint {
     fade_step: f32,
 }
 
-/// What is added to the table in one tick: what a friction model, or what was learnt on board, knows beyond it.
-///
-/// Counts of 2⁻³² output turn. Each is taken within ±[`Adjustment::MAX_RAD`]. The half-width never falls below zero anywhere on the
-/// tooth pitch: a reduction is taken only that far. The error that a table may give
-/// ([`Table::error_limit_rad`](crate::Table::error_limit_rad)) is that much larger.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Adjustment {
-    /// Added to the mean error (actual less nominal).
-    pub mean_counts: i32,
-    /// Added to the half-width of the play.
-    pub half_width_counts: i32,
-}
-
-impl Adjustment {
-    /// Largest magnitude, rad: 0.049.
-    pub const MAX_RAD: f32 = Self::MAX_COUNTS as f32 * RAD_PER_COUNT;
-    /// The same in counts.
-    pub const MAX_COUNTS: i32 = (1 << 25) - 1;
-
-    /// From radians at the output, rounded to a count; saturates at ±[`Self::MAX_RAD`], NaN is taken as none.
-    #[must_use]
-    pub fn from_rad(mean_rad: f32, half_width_rad: f32) -> Self {
-        let counts = |rad: f32| bounded(counts_from_rad(rad));
-        Self { mean_counts: counts(mean_rad), half_width_counts: counts(half_width_rad) }
-    }
-}
-
-/// An adjustment within its magnitude.
-#[inline(always)]
-const fn bounded(counts: i32) -> i32 {
-    // From −2²⁵ on: one instruction.
-    let above = if counts > !Adjustment::MAX_COUNTS { counts } else { !Adjustment::MAX_COUNTS };
-    if above < Adjustment::MAX_COUNTS { above } else { Adjustment::MAX_COUNTS }
-}
-
-/// One tick's measurements.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Input {
-    /// Generator angle; `None` if there is no sample.
-    pub generator: Option<GeneratorAngle>,
-    /// Where the output shall be.
-    pub target: OutputAngle,
-    /// Load torque at the output, N·m, positive when it turns the output forward.
-    pub torque_n_m: f32,
-    /// Ticks that were missed since the last call.
-    pub missed_ticks: u16,
-    /// Added to the table in this tick; `Adjustment::default()` for none.
-    pub adjustment: Adjustment,
-}
-
-/// What happened in a tick; a set of the constants.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Flags(u16);
-
-impl Flags {
-    /// There was no sample.
-    pub const SAMPLE_LOST: Self = Self(1);
-    /// The sample was not believed.
-    pub const GLITCH: Self = Self(2);
-    /// The tick came late.
-    pub const OVERRUN: Self = Self(4);
-    /// The limiter held the correction back.
-    pub const HELD_BACK: Self = Self(8);
-    /// No correction could be made; the last one is kept or fades out.
-    pub const NOT_CORRECTED: Self = Self(16);
-    /// The copies of the table disagree in what was read.
-    pub const TABLE_DOUBT: Self = Self(32);
-    /// The state was not whole.
-    pub const STATE_TORN: Self = Self(64);
-
-    /// Whether all of `other` are set.
-    #[must_use]
-    pub const fn contains(self, other: Self) -> bool {
-        self.0 & other.0 == other.0
-    }
-
-    /// The flags as bits, for telemetry.
-    #[must_use]
-    pub const fn bits(self) -> u16 {
-        self.0
-    }
-
-    #[inline(always)]
-    const fn with(self, other: Self, set: bool) -> Self {
-        Self(self.0 | if set { other.0 } else { 0 })
-    }
-}
-
-/// One tick's results.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Output {
-    /// Generator angle to command.
-    pub command: GeneratorAngle,
-    /// Where the output is estimated to be now.
-    pub output: OutputAngle,
-    /// The transmission error now, rad; 0 if disabled.
-    pub transmission_error_rad: f32,
-    /// It lies within ± this, as far as play and jumps go, rad.
-    pub uncertainty_rad: f32,
-    /// The correction in the command: the target less the nominal output of the command, rad.
-    pub correction_rad: f32,
-    /// What the limiter held back of the correction, rad.
-    pub held_back_rad: f32,
-    /// How far to trust estimate and correction.
-    pub quality: Quality,
-    /// What happened.
-    pub flags: Flags,
-}
-
-/// What changes while a joint runs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JointState {
-    play: PlayState,
-    /// Mean of the last adjustment, counts.
-    adjusted: i32,
-    /// Output of the play and the last adjustment, added up: once more.
-    output: OutputAngle,
-    generator: GeneratorAngle,
-    /// The correction in fine counts, twice.
-    correction: [i32; 2],
-    /// What is wanted, and what of it was asked of the limiter.
-    goal: i32,
-    aimed: i32,
-    speed: i32,
-    /// Ticks in a row with a glitch, and without a correction.
-    glitches: u32,
-    uncorrected: u32,
-    fading: u32,
-    missed_ticks: u32,
-    mode: Mode,
-    started: bool,
-}
-
-/// Size of a saved joint state.
-pub const SAVED_JOINT_BYTES: usize = SAVED_STATE_BYTES + 12;
-
-impl Default for JointState {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl JointState {
-    /// After a reset: no correction, the side of the play unknown, off.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            play: PlayState::unknown(),
-            adjusted: 0,
-            output: OutputAngle::ZERO,
-            generator: GeneratorAngle::ZERO,
-            correction: [0; 2],
-            goal: 0,
-            aimed: 0,
-            speed: 0,
-            glitches: 0,
-            uncorrected: 0,
-            fading: 0,
-            missed_ticks: 0,
-            mode: Mode::Off,
-            started: false,
-        }
-    }
-
-    /// The mode.
-    #[must_use]
-    pub const fn mode(&self) -> Mode {
-        self.mode
-    }
-
-    /// Changes the mode from the next tick on.
-    ///
-    /// # Errors
-    /// [`ModeError`] if [`Mode::may_become`] says no; the mode stays.
-    pub const fn request(&mut self, to: Mode) -> Result<(), ModeError> {
-        if !self.mode.may_become(to) {
-            return Err(ModeError { from: self.mode, to });
-        }
-        self.mode = to;
-        Ok(())
-    }
-
-    /// What [`Self::output`] must be.
-    #[inline(always)]
-    const fn told_twice(&self) -> OutputAngle {
-        self.play.output_or_zero().offset_counts(self.adjusted as i64)
-    }
-
-    /// The play.
-    #[must_use]
-    pub const fn play(&self) -> &PlayState {
-        &self.play
-    }
-
-    /// Ticks missed since the start; wraps.
-    #[must_use]
-    pub const fn missed_ticks(&self) -> u32 {
-        self.missed_ticks
-    }
-
-    /// What must survive a reset: the play and the correction, with checksums.
-    #[must_use]
-    pub fn save(&self) -> [u8; SAVED_JOINT_BYTES] {
-        let mut bytes = [0; SAVED_JOINT_BYTES];
-        let [correction, _] = self.correction;
-        let parts = self.play.save().into_iter().chain(correction.to_le_bytes()).chain(self.speed.to_le_bytes());
-        for (to, from) in bytes.iter_mut().zip(parts) {
-            *to = from;
-        }
-        if let Some((before, sum)) = bytes.split_last_chunk_mut::<4>() {
-            *sum = crc32(before).to_le_bytes();
-        }
-        bytes
-    }
-
-    /// A state from [`Self::save`], in [`Mode::Off`] with the correction still there; `None` if the bytes are damaged.
-    ///
-    /// Restore only if the joint cannot have moved meanwhile, else start from [`Self::new`]. Ask for [`Mode::Tracking`] before
-    /// the first tick to keep the correction.
-    #[must_use]
-    pub fn restore(bytes: &[u8; SAVED_JOINT_BYTES]) -> Option<Self> {
-        let (before, sum) = bytes.split_last_chunk::<4>()?;
-        let (play, rest) = before.split_first_chunk::<SAVED_STATE_BYTES>()?;
-        let (correction, speed) = rest.split_first_chunk::<4>()?;
-        let correction = i32::from_le_bytes(*correction);
-        let speed = i32::from_le_bytes(*speed.first_chunk::<4>()?);
-        let play = PlayState::restore(play)?;
-        let possible = correction.unsigned_abs() <= MOST_FINE && speed.unsigned_abs() <= MOST_FINE;
-        let intact = crc32(before) == u32::from_le_bytes(*sum) && possible;
-        let state = Self {
-            play,
-            output: play.output_or_zero(),
-            correction: [correction; 2],
-            goal: correction,
-            aimed: correction,
-            speed,
-            ..Self::new()
-        };
-        intact.then_some(state)
-    }
-}
-
 #[inline(always)]
 const fn within(value: i32, least: i32, most: i32) -> i32 {
     let above = if value > least { value } else { least };
     if above < most { above } else { most }
-}
-
-/// A positive, finite number of counts, at least `least`.
-const fn checked(name: &'static str, found: f32, counts: f64, [least, most]: [f64; 2]) -> Result<f32, SettingError> {
-    if counts > 0.0 && counts >= least && counts <= most {
-        Ok(counts as f32)
-    } else {
-        Err(SettingError { name, found })
-    }
 }
 
 impl Joint {
@@ -431,20 +68,20 @@ impl Joint {
             return Err(error);
         }
         // Slower than one part in a tick would be no correction at all.
-        let bounds = [1.0, table::counts(0.05) * FINE as f64];
-        let rate =
-            match checked("rate_rad_s", rate_rad_s, table::counts(rate_rad_s as f64 * tick) * FINE as f64, bounds) {
-                Ok(rate) => rate,
-                Err(error) => return Err(error),
-            };
-        let per_tick = table::counts(acceleration_rad_s2 as f64 * tick * tick) * FINE as f64;
+        let bounds = [1.0, num::counts(0.05) * FINE as f64];
+        let rate = match checked("rate_rad_s", rate_rad_s, num::counts(rate_rad_s as f64 * tick) * FINE as f64, bounds)
+        {
+            Ok(rate) => rate,
+            Err(error) => return Err(error),
+        };
+        let per_tick = num::counts(acceleration_rad_s2 as f64 * tick * tick) * FINE as f64;
         let acceleration = match checked("acceleration_rad_s2", acceleration_rad_s2, per_tick, [0.0, 1.0e12]) {
             Ok(acceleration) => acceleration,
             Err(error) => return Err(error),
         };
         // More than from full speed to full speed back is not needed, and would drown what is left to go in rounding.
         let acceleration = if acceleration < 2.0 * rate { acceleration } else { 2.0 * rate };
-        let per_tick = table::counts(generator_rate_rad_s as f64 * tick);
+        let per_tick = num::counts(generator_rate_rad_s as f64 * tick);
         let largest_move = match checked("generator_rate_rad_s", generator_rate_rad_s, per_tick, [0.0, 2_147_483_000.0])
         {
             Ok(counts) => counts as i32,
@@ -526,7 +163,7 @@ impl Joint {
         let now = model.estimate(&point, &mut state.play, generator);
         state.output = state.told_twice();
         let Estimate { output, error, mut doubt, .. } = now;
-        let from = model::departure(store.plan(), &point, input.target, &state.play, output);
+        let from = departure(store.plan(), &point, input.target, &state.play, output);
         let (found, allowed) = model.solve(&point, input.target, from.backward, &mut doubt);
         let sane = now.sane & allowed & doubt.none();
         // The correction that leaves the generator where it is.
@@ -622,7 +259,7 @@ impl Joint {
         state.aimed = goal;
         let away = lag.unsigned_abs();
         let gain = self.acceleration as f32;
-        let stoppable = table::sqrt(self.quarter_square + (gain + gain) * away as f32) - 0.5 * gain;
+        let stoppable = num::sqrt(self.quarter_square + (gain + gain) * away as f32) - 0.5 * gain;
         let stoppable = stoppable as u32;
         let stoppable = (if stoppable < away { stoppable } else { away }) as i32;
         let side = lag >> 31;
@@ -640,7 +277,12 @@ impl Joint {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::crc::crc32;
     use crate::fixture::{self, ARCSEC, LIMITS};
+    use crate::joint::mode::ModeError;
+    use crate::joint::state::{MOST_FINE, SAVED_JOINT_BYTES};
+    use crate::play::SAVED_STATE_BYTES;
+    use crate::table::Quality;
     use proptest::prelude::*;
     use std::sync::LazyLock;
     use std::vec::Vec;
@@ -969,13 +611,6 @@ mod tests {
             there = now;
         }
         assert!(run.tick(&back).uncertainty_rad == 0.0);
-    }
-
-    #[test]
-    fn rate_groups_run_when_they_are_due() {
-        let group = RateGroup::new(10, 3).unwrap();
-        assert!((0..100).filter(|&tick| group.is_due(tick)).eq((0..10).map(|i| 10 * i + 3)));
-        assert_eq!((RateGroup::new(0, 0), RateGroup::new(5, 5)), (None, None));
     }
 
     #[test]

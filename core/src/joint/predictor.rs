@@ -27,12 +27,12 @@
 
 #![allow(clippy::arithmetic_side_effects)] // Matrices of floating-point numbers: nothing overflows.
 
+use super::runtime::Joint;
 use crate::angle::{GeneratorAngle, OutputAngle};
-use crate::hysteresis::PlayState;
-use crate::model::Prediction;
-use crate::runtime::Joint;
+use crate::num::larger;
+use crate::play::PlayState;
 use crate::store::Store;
-use crate::table::{Quality, larger};
+use crate::table::{Prediction, Quality};
 use core::fmt;
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Matrix4x2, RowVector4, Vector2, Vector4};
 
@@ -531,9 +531,7 @@ impl PredictorState {
 mod tests {
     use super::*;
     use crate::fixture;
-    use crate::runtime::Overrun;
-    use crate::store::Images;
-    use crate::table::Table;
+    use crate::{Images, Overrun, Table};
 
     const INERTIAS: Inertias =
         Inertias { motor_kg_m2: 1.0, load_kg_m2: 3.0, stiffness_n_m_per_rad: 3.0e4, damping_n_m_s_per_rad: 20.0 };
@@ -700,7 +698,7 @@ mod tests {
         }
 
         fn follow(&mut self, motor_rad: f64) -> f64 {
-            use crate::hysteresis::Direction::{Backward, Forward};
+            use crate::Direction::{Backward, Forward};
             let torque = INERTIAS.stiffness_n_m_per_rad * self.plant.x[0];
             let [forward, backward] =
                 [Forward, Backward].map(|side| fixture::error(motor_rad * 95.0, torque, 20.0, side, true));

@@ -4,7 +4,7 @@
 //! [`Watch::see`] compares a tick with the one before; what it returns can be sent, counted, or, with the feature `defmt`, logged
 //! ([`Events::log`]). Only edges are events, so a fault that stays gives one line.
 
-use crate::runtime::{Flags, JointState, Mode, Output};
+use crate::joint::{Flags, JointState, Mode, Output};
 use crate::store::{Health, Store};
 
 /// Something that changed.
@@ -133,10 +133,8 @@ impl Watch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::angle::{GeneratorAngle, OutputAngle};
     use crate::fixture;
-    use crate::runtime::{Adjustment, Input, Joint, Overrun};
-    use crate::store::Images;
+    use crate::{Adjustment, GeneratorAngle, Images, Input, Joint, OutputAngle, Overrun};
     use std::vec::Vec;
 
     #[test]

@@ -36,8 +36,8 @@
 //! | 48 | `u32` | CRC-32 of the 48 bytes before |
 
 use crate::angle::OutputAngle;
-use crate::image::crc32;
-use crate::runtime::{Flags, JointState, Mode, Output, RateGroup};
+use crate::crc::crc32;
+use crate::joint::{Flags, JointState, Mode, Output, RateGroup};
 use crate::store::{Counters, Health, Store};
 use crate::table::Quality;
 use core::fmt;

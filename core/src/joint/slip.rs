@@ -14,10 +14,11 @@
 //! After a reset no deflection is known. Each is an interval, moved at both ends by the same operator: motion brings the ends
 //! together, and one stroke of `2wᵢ` makes them one.
 
+use super::adjustment::Adjustment;
 use crate::angle::{COUNTS_PER_RAD, OutputAngle, RAD_PER_COUNT, counts_from_rad};
-use crate::hysteresis::MAX_HALF_COUNTS;
-use crate::image::crc32;
-use crate::runtime::Adjustment;
+use crate::crc::crc32;
+use crate::num;
+use crate::play::MAX_HALF_COUNTS;
 use core::marker::PhantomData;
 
 /// One spring that slips with the nominal output.
@@ -182,7 +183,7 @@ impl<const N: usize> SlipBank<N, LoadTorque> {
 }
 
 fn torque_counts(torque_n_m: f32) -> Option<i64> {
-    torque_n_m.is_finite().then(|| crate::table::within(torque_n_m, [-MAX_N_M, MAX_N_M]) * PER_N_M).map(|c| c as i64)
+    torque_n_m.is_finite().then(|| num::within(torque_n_m, [-MAX_N_M, MAX_N_M]) * PER_N_M).map(|c| c as i64)
 }
 
 /// Bytes of the saved state of `elements` springs.

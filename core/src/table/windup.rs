@@ -4,10 +4,10 @@
 //! linear, and each of its two nodes has the slope of its own side.
 //!
 //! Slopes come from the node values alone and linearly: [`Slopes`] is what the image writer stores and what the least squares
-//! of [`crate::precompute`] assumes; [`bend`] is what the control step and the least squares evaluate. A limiter against
+//! of [`crate::make`] assumes; [`bend`] is what the control step and the least squares evaluate. A limiter against
 //! overshoot would not be linear; what a cubic can reach is bounded when a table is accepted instead.
 
-use crate::grid::{self, MAX_CLAMPED_NODES};
+use super::grid::{self, MAX_CLAMPED_NODES};
 
 /// Most nodes that a slope depends on.
 pub(crate) const STENCIL: usize = 5;
@@ -135,8 +135,7 @@ fn differentiate(places: &[f64], centre: usize) -> [f64; STENCIL] {
 mod tests {
     use super::*;
     use crate::fixture::{self, ARCSEC};
-    use crate::image::{Provenance, TableData, image_bytes, write_image};
-    use crate::{Quality, Table};
+    use crate::{Provenance, Quality, Table, TableData, image_bytes, write_image};
     use proptest::prelude::*;
     use std::vec;
     use std::vec::Vec;

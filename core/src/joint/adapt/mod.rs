@@ -1,0 +1,428 @@
+//! What measurements of the output teach beside the table: a few coefficients, by recursive least squares.
+//!
+//! ```text
+//! y − ŷ = h·x + v,      error = table + m + g·τ + Σ (aₙ·cos nψ + bₙ·sin nψ) − s·w
+//! ```
+//!
+//! with `y` the measured output and `ŷ` what the table says, `m` a mean offset, `g` a wind-up beside the table's, `w` a half-width
+//! beside the table's with `s` = ±1 the side of the play in contact, and `a`, `b` the cosine and sine of a few orders of the
+//! generator angle. Which of them are estimated is a list of [`Term`]s; their number is a type.
+//!
+//! [`Adapter::update`] is called once each tick after [`Joint::tick`](crate::Joint::tick), with a measurement if there is one: an
+//! encoder at the output each tick, or a star or beacon now and then. What it returns is added in the next tick.
+//!
+//! # How
+//! A Kalman filter for coefficients that wander, in the form `P = U·D·Uᵀ` (Bierman, *Factorization Methods for Discrete Sequential
+//! Estimation*, 1977, ch. V: the measurement; Agee and Turner 1972: the wandering). `D ≥ 0` holds whatever the rounding, so the
+//! covariance stays symmetric and positive in `f32`, for any number of updates.
+//!
+//! * Forgetting is directional: a measurement in direction `h` adds `h·hᵀ/(|h|⁴·M²)` to the covariance first, `M` the
+//!   [memory](AdaptSettings::memory_measurements). In directions in which nothing is measured nothing is forgotten, so nothing
+//!   drifts there and no variance winds up; a correlation learnt long ago fades where only one of the two is excited.
+//! * No variance grows beyond its first one.
+//! * An innovation beyond so many standard deviations is an outlier: counted, not used.
+//! * Where the error is known to within ± an interval only (side of the play unknown, torque inside a jump), that much of an
+//!   innovation says nothing: only what exceeds it is used (a dead zone), with the interval added to the noise.
+//! * After a reversal, from where contact is lost until the play has moved on by four times the limit of the half-width (it is taken
+//!   up later or earlier than estimated by no more) and [`AdaptSettings::settle_rad`], nothing is learnt.
+//! * Every coefficient stays within its limit.
+//!
+//! # Not in here
+//! The measurement must be of the same moment as the generator sample of the tick. What a delay does looks like an offset that
+//! changes with the direction, and would be taken for play.
+
+#![allow(clippy::arithmetic_side_effects)] // Floating-point numbers: nothing overflows. Integers are handled by name.
+
+mod factors;
+mod settings;
+mod state;
+#[cfg(test)]
+mod tests;
+
+pub use settings::{AdaptError, AdaptSettings, Coefficient, Term};
+pub use state::{AdaptCounters, AdaptState, Learning, Verdict};
+
+use super::adjustment::Adjustment;
+use super::signals::{Flags, Input, Output};
+use crate::angle::{COUNTS_PER_RAD, GeneratorAngle, OutputAngle, RAD_PER_COUNT, counts_from_rad};
+use crate::crc::crc32;
+use crate::num;
+use crate::play::PlayState;
+use crate::table::Quality;
+use factors::{dot, measure, transform, wander_by};
+
+/// One tick as the adapter sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'s> {
+    /// What the tick was given: generator, torque, and the adjustment that was in force.
+    pub input: &'s Input,
+    /// The play after the tick.
+    pub play: &'s PlayState,
+    /// What the tick gave.
+    pub output: &'s Output,
+    /// The output angle as measured at the same moment; `None` if there is no measurement.
+    pub measured: Option<OutputAngle>,
+}
+
+/// What is to be added to the table in the next tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adapted {
+    /// For [`Input`](crate::Input) of the next tick.
+    pub adjustment: Adjustment,
+    /// Standard deviation of what it adds to the error, rad.
+    pub uncertainty_rad: f32,
+    /// What became of the measurement.
+    pub verdict: Verdict,
+}
+
+/// Estimates `N` coefficients: all that does not change while it runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adapter<const N: usize> {
+    terms: [Term; N],
+    /// Limits, rad or rad/(N·m): the units of the coefficients inside.
+    limits: [f32; N],
+    /// First variances in those units, and the row of a measurement in units of noise and limit.
+    first: [f32; N],
+    per_noise: [f32; N],
+    noise_counts: f32,
+    /// 1/M, and the square of the gate.
+    forget: f32,
+    gate: f32,
+    settle: i32,
+    /// Half-width that is in doubt while the side is not known, in units of the noise.
+    half_limit: f32,
+    torque_limit: f32,
+    /// Of the settings: a saved state of others is not taken.
+    sum: u32,
+}
+
+/// Bytes of the saved state of `coefficients` coefficients.
+#[must_use]
+pub const fn saved_adapt_bytes(coefficients: usize) -> usize {
+    let upper = coefficients.saturating_mul(coefficients.saturating_sub(1)) >> 1;
+    coefficients.saturating_mul(2).saturating_add(upper).saturating_add(2).saturating_mul(4)
+}
+
+/// Weakest excitation that is used: all coefficients at their limits move the output by a tenth of the noise.
+const WEAKEST: f32 = 0.01;
+/// Steps back from contact that are noise of the generator's encoder, counts (2.9e-8 rad).
+const JITTER: i32 = 20;
+
+/// `sin 2πx` of a fraction of a turn, to 2e-7: Taylor to the eleventh order of the angle folded to ±¼ turn.
+fn sine(fraction: u32) -> f32 {
+    let half_turns = fraction as i32 as f32 * (1.0 / 2_147_483_648.0);
+    let beyond = if half_turns < 0.0 { -1.0 - half_turns } else { 1.0 - half_turns };
+    let x = core::f32::consts::PI * if half_turns.abs() > 0.5 { beyond } else { half_turns };
+    let y = x * x;
+    let high = -1.984_127e-4 + y * (2.755_732e-6 - y * 2.505_211e-8);
+    x * (1.0 + y * (-0.166_666_67 + y * (8.333_333e-3 + y * high)))
+}
+
+/// Where the play is.
+#[derive(Clone, Copy)]
+enum Contact {
+    Unknown,
+    Crossing,
+    /// On this side, far enough.
+    Side(i32),
+}
+
+impl<const N: usize> Adapter<N> {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`AdaptError`] names the first that is out of its range.
+    pub fn new(settings: &AdaptSettings<N>) -> Result<Self, AdaptError> {
+        let AdaptSettings { coefficients, noise_rad, memory_measurements, gate, settle_rad, torque_limit_n_m } =
+            *settings;
+        let most = Adjustment::MAX_RAD;
+        let checked = |name, found: f32, least: f32, most: f32| {
+            if found >= least && found <= most { Ok(()) } else { Err(AdaptError { name, found }) }
+        };
+        checked("noise_rad", noise_rad, 1e-10, 0.05)?;
+        checked("memory_measurements", memory_measurements, 1.0, 1e6)?;
+        checked("gate", gate, 1.0, 100.0)?;
+        checked("settle_rad", settle_rad, 0.0, most)?;
+        checked("torque_limit_n_m", torque_limit_n_m, 0.0, 1e6)?;
+        let mut half_limit = 0.0;
+        for Coefficient { term, limit, initial_std } in coefficients {
+            checked("limit", limit, 1e-12, most)?;
+            checked("initial_std", initial_std, 1e-6 * limit, 10.0 * limit)?;
+            match term {
+                Term::HalfWidth => half_limit += limit,
+                Term::Cos(0) | Term::Sin(0) => return Err(AdaptError { name: "order", found: 0.0 }),
+                _ => {}
+            }
+        }
+        let square = |value: f32| value * value;
+        let mut sum = 0u32;
+        for Coefficient { term, limit, initial_std } in coefficients {
+            let (kind, order) = match term {
+                Term::Mean => (0, 0),
+                Term::WindUp => (1, 0),
+                Term::HalfWidth => (2, 0),
+                Term::Cos(order) => (3, order),
+                Term::Sin(order) => (4, order),
+            };
+            let mut bytes = [kind, order, 0, 0, 0, 0, 0, 0, 0, 0];
+            let numbers = limit.to_le_bytes().into_iter().chain(initial_std.to_le_bytes());
+            bytes.iter_mut().skip(2).zip(numbers).for_each(|(to, from)| *to = from);
+            sum = sum.rotate_left(7) ^ crc32(&bytes);
+        }
+        Ok(Self {
+            terms: coefficients.map(|c| c.term),
+            limits: coefficients.map(|c| c.limit),
+            first: coefficients.map(|c| square(c.initial_std / c.limit)),
+            per_noise: coefficients.map(|c| c.limit / noise_rad),
+            noise_counts: noise_rad * COUNTS_PER_RAD,
+            forget: 1.0 / memory_measurements,
+            gate: square(gate),
+            settle: counts_from_rad(4.0 * half_limit).saturating_add(counts_from_rad(settle_rad)),
+            half_limit: half_limit / noise_rad,
+            torque_limit: torque_limit_n_m,
+            sum,
+        })
+    }
+
+    /// A state in which nothing is learnt yet, [`Learning::Off`].
+    #[must_use]
+    pub const fn start(&self) -> AdaptState<N> {
+        AdaptState {
+            x: [0.0; N],
+            d: self.first,
+            u: [[0.0; N]; N],
+            learning: Learning::Off,
+            counters: AdaptCounters {
+                used: 0,
+                quiet: 0,
+                outliers: 0,
+                outliers_in_a_row: 0,
+                unsettled: 0,
+                unexcited: 0,
+                untrusted: 0,
+                limited: 0,
+                restarts: 0,
+            },
+            generator: GeneratorAngle::ZERO,
+            contact: None,
+            touched: OutputAngle::ZERO,
+            side: 0,
+            run: 0,
+        }
+    }
+
+    /// Forgets what was learnt; counters and [`Learning`] stay. The joint's limiter takes the adjustment out.
+    pub fn reset(&self, state: &mut AdaptState<N>) {
+        let AdaptState { learning, counters, .. } = *state;
+        *state = AdaptState { learning, counters, ..self.start() };
+    }
+
+    /// One tick: follows the play, learns from the measurement if there is one, and tells what to add in the next tick.
+    ///
+    /// Call it every tick, in order, also without a measurement. Nothing that comes in can make the adjustment exceed the limits
+    /// or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement that is used takes 1573
+    /// instructions for five coefficients, whatever the values, and one without at most 445 (counted by `tests/firmware`).
+    pub fn update(&self, state: &mut AdaptState<N>, seen: &Seen<'_>) -> Adapted {
+        let contact = self.follow(state, seen.play);
+        let generator = seen.input.generator.unwrap_or(state.generator);
+        let moved = generator.minus_counts(state.generator);
+        state.generator = generator;
+        let verdict = match (state.learning, seen.measured) {
+            (Learning::On, Some(measured)) => self.learn(state, seen, measured, generator, contact),
+            _ => Verdict::Idle,
+        };
+        state.counters.note(verdict);
+        let side = if state.side < 0 { -1 } else { 1 };
+        let next = self.row(generator.offset_counts(moved), seen.input.torque_n_m, side);
+        self.adapted(state, &next, verdict)
+    }
+
+    /// Where the play is, from how it moved.
+    fn follow(&self, state: &mut AdaptState<N>, play: &PlayState) -> Contact {
+        let (Some(nominal), true) = (play.nominal(), play.is_known()) else {
+            (state.contact, state.run) = (None, 0);
+            return Contact::Unknown;
+        };
+        let at = nominal.offset_counts(play.offset_counts() as i64);
+        let moved = state.contact.map_or(0, |last| at.minus_small_counts(last));
+        state.contact = Some(at);
+        let way = moved.saturating_abs();
+        if way > 0 {
+            let side = moved.signum();
+            state.run = if side == state.side { state.run.saturating_add(way) } else { way };
+            (state.side, state.touched) = (side, nominal);
+        }
+        let back = nominal.minus_small_counts(state.touched).saturating_mul(state.side.wrapping_neg());
+        if state.side != 0 && state.run >= self.settle && back <= JITTER {
+            Contact::Side(state.side)
+        } else {
+            Contact::Crossing
+        }
+    }
+
+    /// How much of each coefficient, at its limit, is in the error there: in units of the noise.
+    fn row(&self, generator: GeneratorAngle, torque_n_m: f32, side: i32) -> [f32; N] {
+        // Not finite: nothing of the wind-up.
+        let torque = if torque_n_m.is_finite() { torque_n_m } else { 0.0 };
+        let torque = num::within(torque, [-self.torque_limit, self.torque_limit]);
+        let turned = |order: u8| generator.fraction().wrapping_mul(order as u32);
+        let mut row = self.per_noise;
+        for (row, term) in row.iter_mut().zip(self.terms) {
+            *row *= match term {
+                Term::Mean => 1.0,
+                Term::WindUp => torque,
+                Term::HalfWidth => side.wrapping_neg() as f32,
+                Term::Cos(order) => sine(turned(order).wrapping_add(1 << 30)),
+                Term::Sin(order) => sine(turned(order)),
+            };
+        }
+        row
+    }
+
+    /// Learns from one measurement.
+    fn learn(
+        &self,
+        state: &mut AdaptState<N>,
+        seen: &Seen<'_>,
+        measured: OutputAngle,
+        generator: GeneratorAngle,
+        contact: Contact,
+    ) -> Verdict {
+        let out = seen.output;
+        let doubtful = [Flags::SAMPLE_LOST, Flags::GLITCH, Flags::NOT_CORRECTED, Flags::TABLE_DOUBT, Flags::STATE_TORN];
+        let trusted = matches!(out.quality, Quality::InRange | Quality::Uncertain)
+            && seen.input.generator.is_some()
+            && seen.input.torque_n_m.is_finite()
+            && !doubtful.iter().any(|&flag| out.flags.contains(flag));
+        if !trusted {
+            return Verdict::Untrusted;
+        }
+        let side = match contact {
+            Contact::Unknown => 0,
+            Contact::Crossing => return Verdict::Unsettled,
+            Contact::Side(side) => side,
+        };
+        let row = self.row(generator, seen.input.torque_n_m, side);
+        let strength = dot(&row, &row);
+        if strength < WEAKEST {
+            return Verdict::Unexcited;
+        }
+        if !state.is_sound() {
+            self.reset(state);
+            state.counters.restarts = state.counters.restarts.saturating_add(1);
+        }
+        // What the table alone missed, less what is known of it already.
+        let most = Adjustment::MAX_COUNTS;
+        let applied = |counts: i32| counts.max(most.wrapping_neg()).min(most);
+        let Adjustment { mean_counts, half_width_counts } = seen.input.adjustment;
+        let half = side.wrapping_mul(applied(half_width_counts));
+        let beside = applied(mean_counts).wrapping_sub(half) as i64;
+        let missed = measured.offset_counts(beside).minus_small_counts(out.output) as f32;
+        let innovation = missed / self.noise_counts - dot(&row, &state.x);
+        let open = out.uncertainty_rad * COUNTS_PER_RAD / self.noise_counts;
+        let open = if side == 0 { open + self.half_limit } else { open };
+        let excess = innovation.abs() - open;
+        if !(open >= 0.0 && (excess > 0.0 || open == 0.0)) {
+            return Verdict::Quiet;
+        }
+        let noise = 1.0 + open * open;
+        let (seen_as, expected) = (transform(&state.u, &row), state.d);
+        let spread = noise + seen_as.iter().zip(expected).map(|(f, d)| d * f * f).sum::<f32>();
+        let plausible = excess * excess <= self.gate * spread;
+        if !plausible {
+            return Verdict::Outlier;
+        }
+        let wander = row.map(|h| h * self.forget / strength);
+        wander_by(&mut state.d, &mut state.u, wander);
+        let gains = measure(&mut state.d, &mut state.u, &row, noise);
+        self.bound_variances(state);
+        let excess = if innovation < 0.0 { -excess } else { excess };
+        for (x, gain) in state.x.iter_mut().zip(gains) {
+            let free = *x + gain * excess;
+            *x = num::within(free, [-1.0, 1.0]);
+            state.counters.limited = state.counters.limited.saturating_add(u32::from(*x != free));
+        }
+        Verdict::Used
+    }
+
+    /// Scales rows and columns so that no variance exceeds its first one: what is symmetric and positive stays so.
+    fn bound_variances(&self, state: &mut AdaptState<N>) {
+        let mut scale = [1.0; N];
+        for ((scale, variance), first) in scale.iter_mut().zip(state.variances()).zip(self.first) {
+            *scale = if variance > first { num::sqrt(first / variance) } else { 1.0 };
+        }
+        for ((column, d), by) in state.u.iter_mut().zip(&mut state.d).zip(scale) {
+            *d *= by * by;
+            column.iter_mut().zip(scale).for_each(|(u, own)| *u *= own / by);
+        }
+    }
+
+    fn adapted(&self, state: &AdaptState<N>, row: &[f32; N], verdict: Verdict) -> Adapted {
+        if state.learning == Learning::Off || !state.x.iter().all(|x| x.abs() <= 1.0) {
+            return Adapted { adjustment: Adjustment::default(), uncertainty_rad: 0.0, verdict };
+        }
+        let (mut mean, mut half) = (0.0, 0.0);
+        let parts = self.terms.iter().zip(state.x).zip(row.iter().zip(self.per_noise));
+        for ((term, x), (h, per_noise)) in parts {
+            match term {
+                Term::HalfWidth => half += x * per_noise,
+                _ => mean += x * h,
+            }
+        }
+        let noise_rad = self.noise_counts * RAD_PER_COUNT;
+        let variance: f32 = transform(&state.u, row).iter().zip(state.d).map(|(f, d)| d * f * f).sum();
+        Adapted {
+            adjustment: Adjustment::from_rad(mean * noise_rad, half * noise_rad),
+            uncertainty_rad: num::sqrt(variance) * noise_rad,
+            verdict,
+        }
+    }
+
+    /// The coefficients in the order of the settings, and their standard deviations: rad, or rad/(N·m).
+    #[must_use]
+    pub fn coefficients(&self, state: &AdaptState<N>) -> [(f32, f32); N] {
+        let mut found = [(0.0, 0.0); N];
+        let parts = state.x.iter().zip(state.variances()).zip(self.limits);
+        for (to, ((x, variance), limit)) in found.iter_mut().zip(parts) {
+            *to = (x * limit, num::sqrt(variance) * limit);
+        }
+        found
+    }
+
+    /// Writes what was learnt, with a CRC-32, for storage across a reset: the first [`saved_adapt_bytes`]`(N)` bytes.
+    /// `None` if there are fewer.
+    ///
+    /// | bytes | what, little endian |
+    /// |---|---|
+    /// | 4·N | coefficients in units of their limits, `f32` |
+    /// | 4·N | `D`, `f32` |
+    /// | 2·N·(N−1) | `U` above its diagonal, by columns, `f32` |
+    /// | 4 | sum of the settings |
+    /// | 4 | CRC-32 of all before |
+    pub fn save(&self, state: &AdaptState<N>, bytes: &mut [u8]) -> Option<usize> {
+        let bytes = bytes.get_mut(..saved_adapt_bytes(N))?;
+        let (contents, crc) = bytes.split_last_chunk_mut::<4>()?;
+        let above = state.u.iter().enumerate().flat_map(|(j, column)| column.iter().take(j));
+        let numbers = state.x.iter().chain(&state.d).chain(above).map(|number| number.to_bits());
+        for (to, from) in contents.as_chunks_mut::<4>().0.iter_mut().zip(numbers.chain([self.sum])) {
+            *to = from.to_le_bytes();
+        }
+        *crc = crc32(contents).to_le_bytes();
+        Some(saved_adapt_bytes(N))
+    }
+
+    /// A state from [`Self::save`], in [`Learning::Off`]; `None` if the bytes are damaged or were saved with other coefficients.
+    #[must_use]
+    pub fn restore(&self, bytes: &[u8]) -> Option<AdaptState<N>> {
+        let bytes = bytes.get(..saved_adapt_bytes(N))?;
+        let (contents, crc) = bytes.split_last_chunk::<4>()?;
+        let mut words = contents.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word));
+        let mut state = self.start();
+        let above = state.u.iter_mut().enumerate().flat_map(|(j, column)| column.iter_mut().take(j));
+        for to in state.x.iter_mut().chain(&mut state.d).chain(above) {
+            *to = f32::from_bits(words.next()?);
+        }
+        let same = words.next()? == self.sum && u32::from_le_bytes(*crc) == crc32(contents);
+        (same && state.is_sound()).then_some(state)
+    }
+}

@@ -1,0 +1,49 @@
+//! Limits of one joint, and what it cannot be set to.
+
+use core::fmt;
+
+/// What a joint cannot be set to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SettingError {
+    /// Which setting.
+    pub name: &'static str,
+    /// Value found.
+    pub found: f32,
+}
+
+impl fmt::Display for SettingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {}: must be finite and above zero, and not beyond what one tick can do", self.name, self.found)
+    }
+}
+
+impl core::error::Error for SettingError {}
+
+/// Limits of one joint, in units of its output and of seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Time from tick to tick, s.
+    pub tick_s: f32,
+    /// Fastest correction at the output, rad/s.
+    pub rate_rad_s: f32,
+    /// Largest acceleration of the correction at the output, rad/s².
+    pub acceleration_rad_s2: f32,
+    /// Fastest generator, rad/s: what moves faster from tick to tick is a glitch.
+    pub generator_rate_rad_s: f32,
+    /// Ticks for which a glitch is not believed, and for which the last correction is kept where none can be made.
+    pub patience: u16,
+}
+
+/// A positive, finite number of counts, at least `least`.
+pub(super) const fn checked(
+    name: &'static str,
+    found: f32,
+    counts: f64,
+    [least, most]: [f64; 2],
+) -> Result<f32, SettingError> {
+    if counts > 0.0 && counts >= least && counts <= most {
+        Ok(counts as f32)
+    } else {
+        Err(SettingError { name, found })
+    }
+}

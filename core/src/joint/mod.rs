@@ -1,0 +1,32 @@
+//! One joint in its loop: the tick, what is added to the table, what is learnt beside it, and what lies ahead.
+
+mod adapt;
+mod adjustment;
+mod limits;
+mod mode;
+mod predictor;
+mod rate_group;
+mod runtime;
+mod signals;
+mod slip;
+mod state;
+
+pub use adapt::{
+    AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Coefficient, Learning, Seen, Term, Verdict,
+    saved_adapt_bytes,
+};
+pub use adjustment::Adjustment;
+pub use limits::{Limits, SettingError};
+pub use mode::{Mode, ModeError, Overrun};
+pub use predictor::{
+    Ahead, Disturbance, Inertias, Measured, Noise, Now, OutputAhead, PREDICTOR_PARTS, Predictor, PredictorError,
+    PredictorState,
+};
+pub use rate_group::RateGroup;
+pub use runtime::Joint;
+pub use signals::{Flags, Input, Output};
+pub use slip::{
+    FittedSlip, LoadTorque, NominalOutput, Slip, SlipBank, SlipElement, SlipState, SlipVariable, TorqueSlipElement,
+    saved_slip_bytes,
+};
+pub use state::{JointState, SAVED_JOINT_BYTES};

@@ -1,0 +1,61 @@
+//! What a joint does with its correction: by its mode, and in a tick that came late.
+
+use core::fmt;
+
+/// What a joint does with its correction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Mode {
+    /// No correction: it is taken back within the limits. The start.
+    Off,
+    /// The correction follows the table.
+    Tracking,
+    /// The correction stays as it is.
+    Hold,
+    /// No correction, and none before [`Mode::Off`] was asked for: after a fault.
+    Safe,
+}
+
+/// A transition that is not legal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ModeError {
+    /// The mode now.
+    pub from: Mode,
+    /// The mode asked for.
+    pub to: Mode,
+}
+
+impl fmt::Display for ModeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "no transition from {:?} to {:?}", self.from, self.to)
+    }
+}
+
+impl core::error::Error for ModeError {}
+
+impl Mode {
+    /// Whether `self` may be followed by `to`: everything may stop, tracking starts from off or hold, hold only from tracking,
+    /// and safe is left to off alone.
+    #[must_use]
+    pub const fn may_become(self, to: Self) -> bool {
+        matches!(
+            (self, to),
+            (_, Self::Safe | Self::Off)
+                | (Self::Off | Self::Tracking | Self::Hold, Self::Tracking)
+                | (Self::Tracking | Self::Hold, Self::Hold)
+        )
+    }
+}
+
+/// What a tick that came late does to the correction. Missed ticks are counted with each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Overrun {
+    /// Nothing more: the ticks missed are skipped.
+    SkipAndCount,
+    /// The correction stays as it is in this tick.
+    HoldLast,
+    /// The correction fades to none within so many ticks, stays there as long, and comes back.
+    FadeOut {
+        /// Ticks, at least 1.
+        ticks: u16,
+    },
+}

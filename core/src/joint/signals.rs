@@ -1,0 +1,79 @@
+//! What a tick is given and what it gives.
+
+use super::adjustment::Adjustment;
+use crate::angle::{GeneratorAngle, OutputAngle};
+use crate::table::Quality;
+
+/// One tick's measurements.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Input {
+    /// Generator angle; `None` if there is no sample.
+    pub generator: Option<GeneratorAngle>,
+    /// Where the output shall be.
+    pub target: OutputAngle,
+    /// Load torque at the output, N·m, positive when it turns the output forward.
+    pub torque_n_m: f32,
+    /// Ticks that were missed since the last call.
+    pub missed_ticks: u16,
+    /// Added to the table in this tick; `Adjustment::default()` for none.
+    pub adjustment: Adjustment,
+}
+
+/// What happened in a tick; a set of the constants.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Flags(u16);
+
+impl Flags {
+    /// There was no sample.
+    pub const SAMPLE_LOST: Self = Self(1);
+    /// The sample was not believed.
+    pub const GLITCH: Self = Self(2);
+    /// The tick came late.
+    pub const OVERRUN: Self = Self(4);
+    /// The limiter held the correction back.
+    pub const HELD_BACK: Self = Self(8);
+    /// No correction could be made; the last one is kept or fades out.
+    pub const NOT_CORRECTED: Self = Self(16);
+    /// The copies of the table disagree in what was read.
+    pub const TABLE_DOUBT: Self = Self(32);
+    /// The state was not whole.
+    pub const STATE_TORN: Self = Self(64);
+
+    /// Whether all of `other` are set.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// The flags as bits, for telemetry.
+    #[must_use]
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+
+    #[inline(always)]
+    pub(super) const fn with(self, other: Self, set: bool) -> Self {
+        Self(self.0 | if set { other.0 } else { 0 })
+    }
+}
+
+/// One tick's results.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Output {
+    /// Generator angle to command.
+    pub command: GeneratorAngle,
+    /// Where the output is estimated to be now.
+    pub output: OutputAngle,
+    /// The transmission error now, rad; 0 if disabled.
+    pub transmission_error_rad: f32,
+    /// It lies within ± this, as far as play and jumps go, rad.
+    pub uncertainty_rad: f32,
+    /// The correction in the command: the target less the nominal output of the command, rad.
+    pub correction_rad: f32,
+    /// What the limiter held back of the correction, rad.
+    pub held_back_rad: f32,
+    /// How far to trust estimate and correction.
+    pub quality: Quality,
+    /// What happened.
+    pub flags: Flags,
+}

@@ -1,0 +1,46 @@
+//! The copies in memory of what a step reads.
+
+use crate::table::{Doubt, words_from};
+
+/// Largest copy that fits into a [`Store`](crate::Store), words: 72 for the axes, curves, and for each torque node 3 and its ripple.
+pub const STORE_WORDS: usize = 1024;
+/// Words that a read may take from the last place on.
+const SLACK: usize = 8;
+
+/// One copy: words, lowest byte first.
+#[repr(align(8))]
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Copied(pub [[u8; 4]; STORE_WORDS + SLACK]);
+
+impl Copied {
+    pub const EMPTY: Self = Self([[0; 4]; STORE_WORDS + SLACK]);
+
+    // Places of an accepted table are below; the masks show that to the compiler.
+
+    #[inline(always)]
+    pub fn words<const N: usize>(&self, at: usize) -> [u32; N] {
+        let words = self.0.get(at & (STORE_WORDS - 1)..).and_then(|words| words.first_chunk::<N>());
+        words.map_or([0; N], |words| words.map(u32::from_le_bytes))
+    }
+
+    #[inline(always)]
+    pub fn halves<const N: usize>(&self, at: usize) -> [u32; N] {
+        words_from(self.0.as_flattened(), (at & (2 * STORE_WORDS - 1)).wrapping_mul(2))
+    }
+
+    #[inline(always)]
+    pub fn set(&mut self, at: usize, value: u32) {
+        if let Some(word) = self.0.get_mut(at & (STORE_WORDS - 1)) {
+            *word = value.to_le_bytes();
+        }
+    }
+}
+
+/// Adds to the doubt what two copies disagree in; the first.
+#[inline(always)]
+pub(super) fn agreed<const N: usize>(first: [u32; N], second: [u32; N], doubt: &mut Doubt) -> [u32; N] {
+    for (a, b) in first.into_iter().zip(second) {
+        doubt.0 |= a ^ b;
+    }
+    first
+}

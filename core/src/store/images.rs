@@ -1,0 +1,42 @@
+//! Two images of one table, and how a page of one is written again from the other.
+
+use crate::table::{PAGE_BYTES, Words, page_intact, word, word_at};
+
+/// Two images of one table, read where they lie. Made anew for every call: it holds nothing but where they are.
+#[derive(Clone, Copy, Debug)]
+pub struct Images<'a> {
+    pub(super) words: [Words<'a>; 2],
+}
+
+impl<'a> Images<'a> {
+    /// Two images. The same one twice is allowed, and protects only the copies.
+    #[must_use]
+    pub const fn new(first: &'a [u8], second: &'a [u8]) -> Self {
+        Self { words: [first.as_chunks::<4>().0, second.as_chunks::<4>().0] }
+    }
+
+    #[inline(always)]
+    pub(super) fn at(&self, place: usize) -> [u32; 2] {
+        let [first, second] = self.words;
+        [word_at(first, place), word_at(second, place)]
+    }
+}
+
+/// Writes a page of `good` over the same page of `damaged`, and its checksum, and tells whether it did: not if the page of `good` is
+/// damaged too. Both are whole images of the same table. Then tell the store: [`Store::mended`](crate::Store::mended).
+#[must_use]
+pub fn mend_page(damaged: &mut [u8], good: &[u8], page: usize) -> bool {
+    let body_bytes = (word_at(good.as_chunks::<4>().0, word::BODY) as usize).saturating_mul(4);
+    if damaged.len() != good.len() || !page_intact(good, body_bytes, page) {
+        return false;
+    }
+    let sum = body_bytes.saturating_add(page.saturating_mul(4));
+    let start = page.saturating_mul(PAGE_BYTES);
+    let end = start.saturating_add(PAGE_BYTES).min(body_bytes);
+    for range in [start..end, sum..sum.saturating_add(4)] {
+        if let (Some(to), Some(from)) = (damaged.get_mut(range.clone()), good.get(range)) {
+            to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+        }
+    }
+    true
+}

@@ -1,0 +1,423 @@
+use super::*;
+use crate::error::ImageError;
+use crate::fixture::{self, ARCSEC};
+use crate::{
+    Adjustment, Flags, GeneratorAngle, Input, Joint, JointState, Limits, Mode, Output, OutputAngle, Overrun, PlayState,
+    Quality,
+};
+use std::sync::LazyLock;
+use std::vec::Vec;
+
+static IMAGE: LazyLock<Vec<u8>> = LazyLock::new(|| fixture::image(true));
+
+fn joint() -> Joint {
+    let limits = Limits { rate_rad_s: 0.1, acceleration_rad_s2: 20.0, ..fixture::LIMITS };
+    Joint::new(fixture::drive(), limits, Overrun::SkipAndCount).unwrap()
+}
+
+fn active(temperature_c: f32) -> Store {
+    let mut store = Store::new();
+    let images = Images::new(&IMAGE, &IMAGE);
+    assert_eq!(store.activate(&images, &fixture::drive(), temperature_c).map(|id| id.0), Ok(fixture::id(&unnamed())));
+    store
+}
+
+/// The body with the id zero.
+fn unnamed() -> Vec<u8> {
+    let table = Table::check(&IMAGE).unwrap();
+    let mut body = IMAGE[..table.body_bytes].to_vec();
+    body[48..56].fill(0);
+    body
+}
+
+/// Numbers that look random, the same in every run.
+struct Mixed(u64);
+
+impl Mixed {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, limit: usize) -> usize {
+        (self.next() % limit as u64) as usize
+    }
+
+    /// −1 to 1.
+    fn part(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
+/// A motion with reversals over all torques.
+struct Motion {
+    mixed: Mixed,
+    generator: GeneratorAngle,
+    speed: f64,
+    torque: f32,
+}
+
+impl Motion {
+    fn new(seed: u64) -> Self {
+        Self { mixed: Mixed(seed), generator: GeneratorAngle::ZERO, speed: 0.0, torque: 0.0 }
+    }
+
+    fn next(&mut self) -> Input {
+        if self.mixed.below(50) == 0 {
+            self.speed = 0.3 * self.mixed.part();
+            self.torque = (50.0 * self.mixed.part()) as f32;
+        }
+        self.generator = self.generator.offset_rad(self.speed as f32);
+        let target = fixture::drive().nominal_output(self.generator).offset_rad(1e-4 * self.mixed.part() as f32);
+        Input {
+            generator: Some(self.generator),
+            target,
+            torque_n_m: self.torque,
+            missed_ticks: 0,
+            adjustment: Adjustment::default(),
+        }
+    }
+}
+
+fn unlike(a: &Output, b: &Output) -> bool {
+    let flagged = |out: &Output| out.flags.contains(Flags::NOT_CORRECTED) && out.quality == Quality::Disabled;
+    a != b && !flagged(a)
+}
+
+#[test]
+fn the_copies_say_what_the_table_says() {
+    for temperature in [-40.0, -11.0, 20.0, 33.3, 80.0] {
+        let (mut store, table) = (active(temperature), Table::check(&IMAGE).unwrap());
+        let images = Images::new(&IMAGE, &IMAGE);
+        let (mut state, mut play) = (JointState::new(), PlayState::unknown());
+        let mut motion = Motion::new(1);
+        for _ in 0..5000 {
+            let input = motion.next();
+            let found = joint().tick(&images, &mut store, &mut state, &input);
+            let expected = table.forward(&mut play, motion.generator, input.torque_n_m, temperature);
+            let off = (found.transmission_error_rad - expected.transmission_error_rad).abs() as f64;
+            // The ripple is rounded once more, to its unit.
+            assert!(off < 0.004 * ARCSEC, "{} arcsec at {temperature}", off / ARCSEC);
+        }
+    }
+}
+
+#[test]
+fn the_copies_follow_the_temperature_within_a_pass() {
+    let (mut moved, still) = (active(-40.0), active(55.0));
+    let images = Images::new(&IMAGE, &IMAGE);
+    assert!(moved.set_temperature(&images, 55.0));
+    assert_ne!(moved.first, still.first);
+    for _ in 0..moved.used_words() {
+        moved.tend(&images, Doubt(0), true);
+    }
+    assert!(moved.first == still.first && moved.second == still.second);
+    assert!(!moved.set_temperature(&images, f32::NAN));
+    assert_eq!((moved.counters().passes, moved.counters().words_skipped), (1, 0));
+    // Beyond the range the edge holds and is marked.
+    assert!(moved.set_temperature(&images, 81.0));
+    let point = moved.locate(5.0, 0, 0);
+    assert_eq!(point.quality(true, true), Quality::Extrapolated);
+}
+
+#[test]
+fn every_bit_of_what_a_step_reads_is_compared() {
+    let sound = active(20.0);
+    let images = Images::new(&IMAGE, &IMAGE);
+    let input = Motion::new(3).next();
+    let reference = joint().tick(&images, &mut sound.clone(), &mut JointState::new(), &input);
+    let mut noticed = 0;
+    for word in 0..sound.used_words() {
+        for (copy, bit) in [(0, word % 32), (1, (word + 7) % 32)] {
+            let mut store = sound.clone();
+            store.upset(copy, word, 1 << bit);
+            let found = joint().tick(&images, &mut store, &mut JointState::new(), &input);
+            assert!(!unlike(&found, &reference), "copy {copy} word {word} bit {bit}");
+            noticed += usize::from(found.flags.contains(Flags::TABLE_DOUBT));
+        }
+    }
+    // Two nodes, three of each, and the ripple and curves around two phases, in both copies.
+    assert!(noticed > 2 * (2 + 6 + 2 * 3 + 2 * 9), "{noticed}");
+}
+
+/// Random flips in copies and images while the loop runs: every output either equals that of a joint without upsets or says
+/// that it is not to be used. Returns flips, ticks in doubt, words mended, pages found damaged.
+fn campaign(flips: usize, seed: u64) -> [usize; 4] {
+    let (mut sound, mut hit) = (active(20.0), active(20.0));
+    let mut images = [IMAGE.clone(), IMAGE.clone()];
+    let (mut state, mut motion, mut mixed) = (JointState::new(), Motion::new(seed), Mixed(seed ^ 0xabcd));
+    state.request(Mode::Tracking).unwrap();
+    let (mut done, mut flagged) = (0, 0);
+    while done < flips {
+        // Single bits, neighbours, whole words, bursts over words.
+        let used = hit.used_words();
+        let word = mixed.below(used);
+        let mask = match mixed.below(4) {
+            0 | 1 => 1 << mixed.below(32),
+            2 => 3u32.rotate_left(mixed.below(32) as u32),
+            _ => mixed.next() as u32 | 1,
+        };
+        match mixed.below(8) {
+            0 => {
+                let (image, at) = (mixed.below(2), mixed.below(IMAGE.len()));
+                images[image][at] ^= 1 << mixed.below(8);
+            }
+            1 => (0..4).for_each(|i| hit.upset(mixed.below(2), (word + i) % used, mask.rotate_left(i as u32))),
+            _ => hit.upset(mixed.below(2), word, mask),
+        }
+        done += mask.count_ones() as usize;
+        let input = motion.next();
+        let mut copy = state;
+        let both = Images::new(&IMAGE, &IMAGE);
+        let expected = joint().tick(&both, &mut sound, &mut state, &input);
+        let seen = Images::new(&images[0], &images[1]);
+        let found = joint().tick(&seen, &mut hit, &mut copy, &input);
+        assert!(!unlike(&found, &expected), "after {done} flips: {found:?} {expected:?}");
+        flagged += usize::from(found.flags.contains(Flags::TABLE_DOUBT));
+        hit.check_images(&seen, 64);
+        if let Some((image, page)) = hit.damaged_page() {
+            let good = images[1 - image].clone();
+            if mend_page(&mut images[image], &good, page) {
+                hit.mended(image, page);
+            }
+        }
+        if hit.health() == Health::Lost {
+            // What firmware would do: send the table again.
+            images = [IMAGE.clone(), IMAGE.clone()];
+            hit.activate(&Images::new(&images[0], &images[1]), &fixture::drive(), 20.0).unwrap();
+        }
+    }
+    let counters = hit.counters();
+    [done, flagged, counters.words_mended as usize, counters.pages_damaged as usize]
+}
+
+#[test]
+fn no_upset_is_used() {
+    let [flips, flagged, mended, pages] = campaign(30_000, 1);
+    assert!(flips >= 30_000 && flagged > 100 && mended > 500 && pages > 50, "{flagged} {mended} {pages}");
+}
+
+#[test]
+#[ignore = "a million flips"]
+fn no_upset_of_a_million_is_used() {
+    let mut sum = [0; 4];
+    for seed in 2..6 {
+        let found = campaign(300_000, seed);
+        sum.iter_mut().zip(found).for_each(|(sum, found)| *sum += found);
+    }
+    let [flips, flagged, mended, pages] = sum;
+    std::println!(
+        "{flips} flips: {flagged} ticks in doubt, {mended} words mended, {pages} pages of images found damaged"
+    );
+}
+
+#[test]
+fn a_damaged_page_of_one_image_is_named_and_mended() {
+    let mut damaged = IMAGE.clone();
+    damaged[1000] ^= 4;
+    let mut store = active(20.0);
+    let images = Images::new(&damaged, &IMAGE);
+    store.check_images(&images, 2 * IMAGE.len() / 4 + 128);
+    assert_eq!((store.health(), store.damaged_page()), (Health::OneImage, Some((0, 3))));
+    // Meanwhile the copies are made from the other.
+    let before = store.first.clone();
+    store.set_temperature(&images, 21.0);
+    store.set_temperature(&images, 20.0);
+    for _ in 0..store.used_words() {
+        store.tend(&images, Doubt(0), true);
+    }
+    assert!(store.first == before && store.counters().words_skipped == 0);
+    assert!(mend_page(&mut damaged, &IMAGE, 3));
+    assert_eq!(damaged, *IMAGE);
+    // Not from a page that is damaged itself, nor beyond the last, nor for an image of another size.
+    let mut bad = IMAGE.clone();
+    bad[800] ^= 1;
+    for (good, page) in [(&bad[..], 3), (&IMAGE[..], 99), (&IMAGE[4..], 3)] {
+        assert!(!mend_page(&mut damaged, good, page));
+        assert_eq!(damaged, *IMAGE);
+    }
+    let images = Images::new(&damaged, &IMAGE);
+    store.check_images(&images, 2 * IMAGE.len() / 4 + 128);
+    assert_eq!((store.health(), store.damaged_page()), (Health::Sound, None));
+}
+
+#[test]
+fn a_page_damaged_in_both_images_is_lost_and_the_copies_stay() {
+    let (mut first, mut second) = (IMAGE.clone(), IMAGE.clone());
+    (first[1000], second[1001]) = (first[1000] ^ 4, second[1001] ^ 4);
+    let mut store = active(20.0);
+    let before = (store.first.clone(), store.second.clone());
+    let images = Images::new(&first, &second);
+    store.check_images(&images, 2 * IMAGE.len() / 4 + 128);
+    assert_eq!((store.health(), store.damaged_page()), (Health::Lost, None));
+    assert!(store.set_temperature(&images, 60.0));
+    for _ in 0..store.used_words() {
+        store.tend(&images, Doubt(0), true);
+    }
+    assert!(store.counters().words_skipped > 0);
+    let kept = (0..store.used_words()).filter(|&i| store.first.0[i] == before.0.0[i]).count();
+    assert!(kept > 64, "{kept}");
+    assert!(store.first == store.second);
+}
+
+#[test]
+fn what_is_no_table_of_this_drive_is_not_activated() {
+    let mut damaged = IMAGE.clone();
+    damaged[2000] ^= 1;
+    let drive = fixture::drive();
+    let mut store = Store::new();
+    assert_eq!(store.health(), Health::Empty);
+    let nothing = joint().tick(&Images::new(&[], &[]), &mut store, &mut JointState::new(), &Motion::new(1).next());
+    assert_eq!((nothing.quality, nothing.correction_rad), (Quality::Disabled, 0.0));
+    let refused = store.activate(&Images::new(&damaged, &damaged), &drive, 20.0);
+    assert!(matches!(refused, Err(ActivateError::Image(ImageError::Crc { .. }))), "{refused:?}");
+    let other = Drive::new(190, 192, drive.fixed()).unwrap();
+    let refused = store.activate(&Images::new(&IMAGE, &IMAGE), &other, 20.0);
+    assert_eq!(refused, Err(ActivateError::OtherDrive));
+    assert_eq!(store.health(), Health::Empty);
+    // One image is enough.
+    assert!(store.activate(&Images::new(&damaged, &IMAGE), &drive, 20.0).is_ok());
+    assert_eq!(store.first, active(20.0).first);
+}
+
+/// Found by a fuzzer: page 3 of one image is damaged, found, and written again; then the same page of the other is hit.
+#[test]
+fn after_a_page_is_mended_the_other_image_is_no_longer_believed_alone() {
+    let mut images = [IMAGE.clone(), IMAGE.clone()];
+    images[0][1000] ^= 4;
+    let mut store = active(20.0);
+    store.check_images(&Images::new(&images[0], &images[1]), 2 * IMAGE.len() / 4 + 128);
+    assert_eq!(store.damaged_page(), Some((0, 3)));
+    let good = images[1].clone();
+    assert!(mend_page(&mut images[0], &good, 3));
+    store.mended(0, 3);
+    assert_eq!((store.health(), store.damaged_page()), (Health::Sound, None));
+    let before = store.first.clone();
+    (768..1024).step_by(4).for_each(|at| images[1][at] ^= 0x40);
+    for _ in 0..store.used_words() {
+        store.tend(&Images::new(&images[0], &images[1]), Doubt(0), true);
+    }
+    assert!(store.first == before);
+    assert!(store.counters().words_skipped > 0);
+}
+
+/// With a bit for each page modulo 32, damage of page 33 of one image would have been looked for in page 1 of the other.
+#[test]
+fn an_image_with_more_pages_than_bits_is_not_activated() {
+    let torque: Vec<f32> = (0..40).map(|i| i as f32).collect();
+    let zeros = std::vec![0.0; 40 * 3 * 16];
+    let data = crate::TableData {
+        drive: fixture::drive(),
+        torque_nodes_n_m: &torque,
+        temperature_nodes_c: &[-40.0, 20.0, 80.0],
+        ripple_nodes: 16,
+        mean_rad: &zeros[..120],
+        half_width_rad: &zeros[..120],
+        mean_ripple_rad: &zeros,
+        half_width_ripple_rad: &zeros,
+        generator_curve_rad: &[],
+        material_curve_rad: &[],
+        output_curve_rad: &[],
+        projection_worst_rad: 0.0,
+        projection_rms_rad: 0.0,
+    };
+    let provenance = crate::Provenance { torque_range_n_m: [0.0, 39.0], ..fixture::provenance() };
+    let mut image = std::vec![0; crate::image_bytes(40, 3, 16, [0; 3])];
+    crate::write_image(&data, &provenance, &mut image, fixture::id).unwrap();
+    let pages = Table::check(&image).unwrap().page_count();
+    assert!(pages > STORE_PAGES && 64 + 40 * 22 <= STORE_WORDS, "{pages}");
+    let refused = Store::new().activate(&Images::new(&image, &image), &fixture::drive(), 20.0);
+    assert_eq!(refused, Err(ActivateError::TooManyPages { found: pages }));
+}
+
+/// Words that both have would follow the temperature, the others not.
+#[test]
+fn two_tables_are_not_activated_as_one() {
+    let mut other = IMAGE.clone();
+    // Another drive description: a table all the same.
+    other[16] ^= 1;
+    crate::table::reseal(&mut other);
+    assert!(Table::check(&other).is_ok());
+    let mut store = active(20.0);
+    let refused = store.activate(&Images::new(&other, &IMAGE), &fixture::drive(), 60.0);
+    assert_eq!(refused, Err(ActivateError::TwoTables));
+    assert_eq!(store.first, active(20.0).first);
+}
+
+#[test]
+fn a_changed_plan_is_noticed() {
+    let sound = active(20.0);
+    let images = Images::new(&IMAGE, &IMAGE);
+    let changes: [fn(&mut Source); 13] = [
+        |s| s.plan.ripple_cells ^= 1 << 11,
+        |s| s.plan.ripple_unit ^= 1 << 9,
+        |s| s.plan.curves[1] ^= 1,
+        |s| s.plan.limit ^= 1 << 20,
+        |s| s.plan.iterations ^= 2,
+        |s| s.plan.hold ^= 1 << 4,
+        |s| s.plan.cell_width = -s.plan.cell_width,
+        |s| s.torque_range[0] *= 2.0,
+        |s| s.last_torque ^= 1,
+        |s| s.records_from ^= 8,
+        |s| s.record ^= 1,
+        |s| s.temperature_in_range ^= 1,
+        |s| s.plan.ripple_nodes ^= 4,
+    ];
+    for (number, change) in changes.into_iter().enumerate() {
+        let mut store = sound.clone();
+        change(&mut store.source);
+        let found = joint().tick(&images, &mut store, &mut JointState::new(), &Motion::new(3).next());
+        assert!(found.flags.contains(Flags::TABLE_DOUBT), "{number}");
+    }
+    let feed: [fn(&mut Source); 6] = [
+        |s| s.warm += 0.25,
+        |s| s.nodes_from ^= 64,
+        |s| s.node_plane ^= 1,
+        |s| s.nodes_ahead ^= 1,
+        |s| s.record_plane ^= 4,
+        |s| s.used ^= 64,
+    ];
+    for (number, change) in feed.into_iter().enumerate() {
+        let mut store = sound.clone();
+        change(&mut store.source);
+        for _ in 0..1000 {
+            let whole = store.locate(5.0, 0, 0).whole;
+            assert!(!whole && !store.set_temperature(&images, 30.0));
+            store.tend(&images, Doubt(0), whole);
+        }
+        assert_eq!(store.first, sound.first, "{number}");
+    }
+}
+
+#[test]
+fn targets_are_met_as_by_the_table_in_place() {
+    let (mut store, images) = (active(20.0), Images::new(&IMAGE, &IMAGE));
+    let mut state = JointState::new();
+    state.request(Mode::Tracking).unwrap();
+    let mut generator = GeneratorAngle::ZERO;
+    let mut worst: f64 = 0.0;
+    for i in 0..20_000i32 {
+        let place = if (i / 4000) % 2 == 0 { i % 4000 } else { 4000 - i % 4000 };
+        let target = OutputAngle::from_rad(1e-3 + place as f64 * 1.0e-5).unwrap();
+        let input = Input {
+            generator: Some(generator),
+            target,
+            torque_n_m: 5.0,
+            missed_ticks: 0,
+            adjustment: Adjustment::default(),
+        };
+        let found = joint().tick(&images, &mut store, &mut state, &input);
+        // The generator goes where it is told; a while after a reversal the correction has caught up.
+        generator = found.command;
+        if i > 200 && i % 4000 > 200 {
+            let mut play = *state.play();
+            let table = Table::check(&IMAGE).unwrap();
+            let there = table.forward(&mut play, generator, 5.0, 20.0);
+            worst = worst.max(there.output.minus_rad(target).abs() as f64);
+        }
+    }
+    assert!(worst < 0.01 * ARCSEC, "{} arcsec", worst / ARCSEC);
+}

@@ -1,0 +1,63 @@
+//! What a table can give at most, and what the iterations of its inverse leave; how they converge is told in [`model`](super::model).
+
+use crate::num::larger;
+
+/// Error of the inverse that the number of its iterations aims at, rad at the output: 0.02″, far below what a table misses of
+/// its samples.
+pub const INVERSE_TOLERANCE_RAD: f32 = 1.0e-7;
+/// Most iterations of an inverse.
+pub const MAX_INVERSE_ITERATIONS: u8 = 8;
+
+/// No table is accepted whose inverse is left with more, rad at the output: 0.2″.
+pub const MAX_INVERSE_ERROR_RAD: f32 = 1.0e-6;
+
+/// Targets this close to the output leave the generator where it is: the rounding of forward and inverse, counts.
+pub(crate) const HOLD_COUNTS: i32 = 8;
+
+/// What a table can give at most, from its coefficients.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bounds {
+    /// Largest |e|, rad.
+    pub error_rad: f32,
+    /// Largest deviation of `centre ± half-width` from `D ± H`: the periodic parts together, rad.
+    pub periodic_rad: f32,
+    /// Largest |ratio·de/dψ| in steady motion: how much the output departs from following the generator.
+    pub slope: f32,
+    /// The part of the slope that A, B and C have.
+    pub curve_slope: f32,
+    /// Largest ripple, in cells of the ripple's axis: how far off a first guess of the inverse can be.
+    pub ripple_cells: f32,
+    /// What the integers of a step round of A, B, C and the ripple, rad: the place in a cell and the weights have 15 bits.
+    pub rounding_rad: f32,
+}
+
+/// What the iterations of the inverse leave.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct InverseBound {
+    pub iterations: u8,
+    pub error_rad: f32,
+}
+
+impl Bounds {
+    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], 1 to 8, and what they and rounding leave; `cell_rad` is a cell of the
+    /// ripple at the output.
+    pub(crate) fn inverse(self, cell_rad: f32) -> InverseBound {
+        let rate = self.curve_slope / (1.0 - self.slope);
+        let mut bound = InverseBound { iterations: 0, error_rad: self.periodic_rad };
+        // How far the solution for A, B, C held fixed can be.
+        let mut away_rad = self.ripple_cells * cell_rad + self.periodic_rad * rate;
+        while bound.iterations < MAX_INVERSE_ITERATIONS {
+            let short_rad = larger(away_rad - cell_rad, 0.0);
+            bound.error_rad = bound.error_rad * rate + short_rad;
+            away_rad = bound.error_rad * (1.0 + rate);
+            bound.iterations = bound.iterations.saturating_add(1);
+            if bound.error_rad <= INVERSE_TOLERANCE_RAD {
+                break;
+            }
+        }
+        // Places in a cell are in single precision.
+        let place_rad = if cell_rad.is_finite() { 4.0 * f32::EPSILON * cell_rad } else { 0.0 };
+        bound.error_rad += (self.rounding_rad + place_rad) / (1.0 - self.slope);
+        bound
+    }
+}

@@ -1,0 +1,174 @@
+//! The header of an image: what it is, what made it, and for which drive.
+
+use super::layout::{
+    BYTE_ORDER_MARK, CRC_BYTES, FORMAT_VERSION, HEADER_BYTES, ID_OFFSET, MAGIC, PAGE_BYTES, RESERVED, TEXT_BYTES,
+    image_bytes,
+};
+use super::sums::{page_intact, page_of};
+use crate::crc::crc32;
+use crate::drive::{Drive, FixedMember};
+use crate::error::{Field, ImageError};
+use crate::table::{Table, TableId};
+
+/// Reads fields of the header; the offsets are all inside it.
+#[derive(Clone, Copy)]
+pub(super) struct Header<'a>(&'a [u8; HEADER_BYTES]);
+
+impl<'a> Header<'a> {
+    fn bytes<const N: usize>(self, offset: usize) -> [u8; N] {
+        self.0.get(offset..).and_then(|rest| rest.first_chunk::<N>()).copied().unwrap_or([0; N])
+    }
+
+    pub fn u8(self, offset: usize) -> u8 {
+        u8::from_le_bytes(self.bytes(offset))
+    }
+
+    fn u16(self, offset: usize) -> u16 {
+        u16::from_le_bytes(self.bytes(offset))
+    }
+
+    fn u32(self, offset: usize) -> u32 {
+        u32::from_le_bytes(self.bytes(offset))
+    }
+
+    pub fn f32(self, offset: usize) -> f32 {
+        f32::from_le_bytes(self.bytes(offset))
+    }
+
+    /// The text at `offset` without its padding.
+    fn text(self, offset: usize, field: Field) -> Result<&'a str, ImageError> {
+        let bytes = self.0.get(offset..offset.saturating_add(TEXT_BYTES)).unwrap_or_default();
+        let length = bytes.iter().position(|byte| *byte == 0).unwrap_or(TEXT_BYTES);
+        let (text, padding) = bytes.split_at_checked(length).unwrap_or_default();
+        let printable = text.iter().all(|byte| (0x20..0x7f).contains(byte)) && padding.iter().all(|byte| *byte == 0);
+        match core::str::from_utf8(text) {
+            Ok(text) if printable => Ok(text),
+            _ => Err(ImageError::Text { field }),
+        }
+    }
+}
+
+impl<'a> Table<'a> {
+    fn header(&self) -> Header<'a> {
+        Header(self.image.first_chunk().unwrap_or(&[0; HEADER_BYTES]))
+    }
+
+    /// The table id: printed by tools, matched with devices in the field.
+    #[must_use]
+    pub fn id(&self) -> TableId {
+        TableId(self.header().bytes(ID_OFFSET))
+    }
+
+    /// BLAKE3 of the drive description the table was made from.
+    #[must_use]
+    pub fn drive_hash(&self) -> [u8; 32] {
+        self.header().bytes(16)
+    }
+
+    /// The largest error the image states it may give, rad.
+    #[must_use]
+    pub fn error_limit_rad(&self) -> f32 {
+        self.header().f32(152)
+    }
+
+    /// Program that made the table.
+    #[must_use]
+    pub fn tool_version(&self) -> &'a str {
+        self.header().text(56, Field::ToolVersion).unwrap_or_default()
+    }
+
+    /// Mesh or data the samples came from.
+    #[must_use]
+    pub fn mesh_level(&self) -> &'a str {
+        self.header().text(80, Field::MeshLevel).unwrap_or_default()
+    }
+
+    /// Relative residual the solver reached; 0 for measured samples.
+    #[must_use]
+    pub fn solver_residual(&self) -> f32 {
+        self.header().f32(124)
+    }
+
+    /// Largest deviation of the table from the samples it was made of, rad.
+    #[must_use]
+    pub fn projection_worst_rad(&self) -> f32 {
+        self.header().f32(128)
+    }
+
+    /// Root mean square deviation of the table from the samples it was made of, rad.
+    #[must_use]
+    pub fn projection_rms_rad(&self) -> f32 {
+        self.header().f32(132)
+    }
+
+    /// The image the table is read from.
+    #[must_use]
+    pub const fn image(&self) -> &'a [u8] {
+        self.image
+    }
+
+    /// Number of [`PAGE_BYTES`] pages in the body.
+    #[must_use]
+    pub const fn page_count(&self) -> usize {
+        self.body_bytes.div_ceil(PAGE_BYTES)
+    }
+
+    /// The bytes of one page; `None` beyond the last.
+    #[must_use]
+    pub fn page(&self, page: usize) -> Option<&'a [u8]> {
+        page_of(self.image, self.body_bytes, page)
+    }
+
+    /// Whether a page still matches its CRC-32; false beyond the last. At most 256 bytes, 1400 instructions.
+    #[must_use]
+    pub fn is_page_intact(&self, page: usize) -> bool {
+        page_intact(self.image, self.body_bytes, page)
+    }
+}
+
+/// Everything about an image that needs no knowledge of tables.
+pub(super) fn check_envelope(image: &[u8]) -> Result<Header<'_>, ImageError> {
+    let needed = image_bytes(1, 1, 0, [0; 3]);
+    let found = image.len();
+    let too_short = ImageError::TooShort { found, needed };
+    let header = Header(image.first_chunk().ok_or(too_short)?);
+    if found < needed {
+        return Err(too_short);
+    }
+    if header.bytes(0) != MAGIC {
+        return Err(ImageError::Magic);
+    }
+    // The mark before the version: swapped bytes would make the version look wrong.
+    if header.u16(10) != BYTE_ORDER_MARK {
+        return Err(ImageError::ByteOrder { found: header.u16(10) });
+    }
+    if header.u16(8) != FORMAT_VERSION {
+        return Err(ImageError::Version { found: header.u16(8), allowed: FORMAT_VERSION });
+    }
+    let stated = header.u32(12) as usize;
+    if stated != found {
+        return Err(ImageError::Length { stated, found });
+    }
+    let (before, sum) = image.split_last_chunk::<CRC_BYTES>().ok_or(too_short)?;
+    let (stated, computed) = (u32::from_le_bytes(*sum), crc32(before));
+    if stated != computed {
+        return Err(ImageError::Crc { stated, computed });
+    }
+    Ok(header)
+}
+
+/// Reserved bytes, texts, and the drive.
+pub(super) fn check_identity(header: Header<'_>) -> Result<Drive, ImageError> {
+    let reserved = header.0.get(RESERVED).unwrap_or_default();
+    if let Some(at) = reserved.iter().position(|byte| *byte != 0) {
+        return Err(ImageError::Reserved { offset: at.saturating_add(RESERVED.start) });
+    }
+    header.text(56, Field::ToolVersion)?;
+    header.text(80, Field::MeshLevel)?;
+    let fixed = match header.u8(105) {
+        0 => FixedMember::Flexspline,
+        1 => FixedMember::CircularSpline,
+        found => return Err(ImageError::FixedMember { found }),
+    };
+    Drive::new(header.u16(106), header.u16(108), fixed).map_err(ImageError::Teeth)
+}

@@ -1,0 +1,146 @@
+//! A torque and temperature, located in the table, and how far an answer there can be trusted.
+
+use super::image::NODE_WORDS;
+use super::memory::{Doubt, Plan};
+use super::windup;
+#[cfg(test)]
+use crate::angle::RAD_PER_COUNT;
+
+/// How far an answer can be trusted, worst last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Quality {
+    /// Inside the range of the table, side of the play known.
+    InRange,
+    /// The error is known only to within the uncertainty reported: the torque lies inside a jump, or the side of the
+    /// play is not known yet.
+    Uncertain,
+    /// Torque or temperature outside the range the table holds for; the value at its edge is used.
+    Extrapolated,
+    /// An input was not finite, or the table gave a number it cannot give: no correction is made.
+    Disabled,
+}
+
+/// A torque and temperature, located in the table: [`Table::at`](crate::Table::at). What forward and inverse of one tick share.
+#[derive(Clone, Copy, Debug)]
+pub struct OperatingPoint {
+    /// Half words: where the record below the torque starts, its torque step and its temperature step.
+    pub(super) rows: [usize; 3],
+    /// Their shares in 2⁻³⁰, to 2⁻¹⁴: low torque, high torque; the same at the higher temperature.
+    pub(super) shares: [i32; 4],
+    /// D and H there, counts.
+    pub(crate) mean: i32,
+    pub(crate) half_width: i32,
+    /// What of them was added to the table's.
+    added: [i32; 2],
+    /// Height of the jump the torque lies in, else 0, counts.
+    pub(crate) jump: i32,
+    /// All inputs are finite.
+    pub(crate) finite: bool,
+    /// What the store knows of its table is what it was told.
+    pub(crate) whole: bool,
+    in_range: bool,
+    /// What two copies of the table disagreed in while it was read.
+    pub(crate) doubt: Doubt,
+}
+
+impl OperatingPoint {
+    /// The quality here, lowered while the side of the play is not known.
+    #[inline(always)]
+    pub(crate) const fn quality(&self, sane: bool, known: bool) -> Quality {
+        let inside = if known & (self.jump == 0) { Quality::InRange } else { Quality::Uncertain };
+        let quality = if self.in_range { inside } else { Quality::Extrapolated };
+        if sane { quality } else { Quality::Disabled }
+    }
+
+    /// The point with this added to D and H, each within ±2²⁵ counts. H stays where the ripple can take no play below zero, or
+    /// where it is.
+    #[inline(always)]
+    pub(crate) fn adjusted(mut self, plan: &Plan, mean: i32, half_width: i32) -> Self {
+        let before = self.half_width;
+        let least = if before < plan.play_ripple { before } else { plan.play_ripple };
+        let half = before.wrapping_add(half_width);
+        let half = if half > least { half } else { least };
+        self.mean = self.mean.wrapping_add(mean);
+        self.half_width = half;
+        self.added = [mean, half.wrapping_sub(before)];
+        self
+    }
+
+    /// Whether |centre| + |half| is within what an accepted table can give, and what was added to it.
+    #[inline(always)]
+    pub(crate) const fn allows(&self, plan: &Plan, centre: i32, half: i32) -> bool {
+        let [mean, half_width] = self.added;
+        let (centre, half) = (centre.wrapping_sub(mean), half.wrapping_sub(half_width));
+        // Negative numbers have room for every magnitude.
+        let centre = if centre > 0 { centre.wrapping_neg() } else { centre };
+        let half = if half > 0 { half.wrapping_neg() } else { half };
+        centre.saturating_add(half) >= plan.limit.wrapping_neg()
+    }
+
+    /// Whether an error on this side is.
+    #[inline(always)]
+    pub(crate) const fn allows_error(&self, plan: &Plan, error: i32, backward: bool) -> bool {
+        let [mean, half_width] = self.added;
+        let mask = (backward as i32).wrapping_neg();
+        let added = (half_width ^ !mask).wrapping_sub(!mask).wrapping_add(mean);
+        error.wrapping_sub(added).wrapping_add(plan.limit) as u32 <= plan.limit.wrapping_mul(2) as u32
+    }
+
+    /// D, rad.
+    #[cfg(test)]
+    pub(crate) fn mean_rad(&self) -> f32 {
+        self.mean as f32 * RAD_PER_COUNT
+    }
+}
+
+/// D, slope of D and H of a torque node.
+pub(crate) type Node = [f32; NODE_WORDS];
+
+/// The torque among nodes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TorquePlace {
+    /// Place in the interval, 0 to 1, and the interval's width, N·m.
+    pub weight: f32,
+    pub width: f32,
+    /// Whether the interval is a jump.
+    pub jump: bool,
+}
+
+impl OperatingPoint {
+    /// From the nodes around the torque; `warm` is how far from the lower of two temperatures to the other, 0 to 1.
+    #[inline(always)]
+    pub(crate) fn new(
+        place: TorquePlace,
+        [low, high]: [Node; 2],
+        warm: f32,
+        rows: [usize; 3],
+        (finite, in_range): (bool, bool),
+        doubt: Doubt,
+    ) -> Self {
+        let TorquePlace { weight, width, jump } = place;
+        let ([mean_low, slope_low, half_low], [mean_high, slope_high, half_high]) = (low, high);
+        let (rise, widening) = (mean_high - mean_low, half_high - half_low);
+        let bend = windup::bend(weight, width, [rise, slope_low, slope_high]);
+        let bend = if jump { 0.0 } else { bend };
+        let (t, w) = ((weight * 16_384.0) as i32, (warm * 16_384.0) as i32);
+        // A search that was led astray ends in an interval that does not hold the torque.
+        let doubt = Doubt(doubt.0 | (t as u32 > 16_384) as u32);
+        // In doubt strictly inside a jump.
+        let inside = (t.wrapping_sub(1) as u32) < 16_383;
+        let height = (rise.abs() + widening.abs()) as i32 & ((jump & inside) as i32).wrapping_neg();
+        let both = t.wrapping_mul(w) >> 14;
+        let rest = 16_384i32.wrapping_sub(t).wrapping_sub(w).wrapping_add(both);
+        Self {
+            rows,
+            shares: [rest, t.wrapping_sub(both), w.wrapping_sub(both), both].map(|share| share << 16),
+            mean: (mean_low + weight * rise + bend) as i32,
+            half_width: (half_low + weight * widening) as i32,
+            added: [0; 2],
+            jump: height,
+            finite,
+            whole: true,
+            in_range,
+            doubt,
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! What a joint tells of itself: records for the ground, events for a log.
+
+#[cfg(feature = "defmt")]
+mod defmt;
+mod events;
+mod telemetry;
+
+pub use events::{Event, Events, Watch};
+pub use telemetry::{Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Writer};
