@@ -18,7 +18,8 @@ use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::nodes::{NodeChoice, choose_torque_nodes};
 use flexspline_sim::stepping::{Method, SolverSettings};
 use flexspline_sim::sweep::{SweepPlan, sweep};
-use flexspline_sim::tables::{ARCSEC_PER_RAD, MadeTable, from_sweep};
+use flexspline_sim::tables::{MadeTable, from_sweep};
+use flexspline_sim::units::ARCSEC_PER_RAD;
 
 use common::CpuTime;
 

@@ -33,4 +33,5 @@ pub mod sweep;
 pub mod synthesize;
 pub mod tables;
 pub mod turns;
+pub mod units;
 pub mod validate;

@@ -14,7 +14,7 @@ use toml::de::{DeTable, DeValue};
 use crate::drive::{DriveError, Problem};
 use crate::kernels::Kernels;
 use crate::suggest::{did_you_mean, likeliest_path, question};
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Which wheel does not turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

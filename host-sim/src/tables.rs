@@ -13,11 +13,7 @@ use thiserror::Error;
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::SolverSettings;
 use crate::sweep::{KnownNode, Sweep, SweepPlan, mirror};
-
-/// Arc-seconds in a radian.
-pub const ARCSEC_PER_RAD: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
-/// Arc-seconds in a turn.
-pub const ARCSEC_PER_TURN: f64 = 360.0 * 3600.0;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Full turns that separate 2 per generator turn from 2 per turn of the generator against the output, less a margin.
 const TURNS_FOR_HARMONICS: f64 = 47.5;

@@ -16,7 +16,8 @@ use thiserror::Error;
 
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
-use crate::tables::{ARCSEC_PER_RAD, core_kind};
+use crate::tables::core_kind;
+use crate::units::ARCSEC_PER_RAD;
 
 /// What a table may miss fresh FEM by, arcsec: root mean square and largest.
 pub const RMS_BOUND_ARCSEC: f64 = 0.5;

@@ -25,7 +25,8 @@ use crate::nominal::Nominal;
 use crate::output::Outputs;
 use crate::stepping::{Method, SolverSettings};
 use crate::synthesize::Sizes;
-use crate::tables::{ARCSEC_PER_RAD, MadeTable, c_header, rust_source};
+use crate::tables::{MadeTable, c_header, rust_source};
+use crate::units::ARCSEC_PER_RAD;
 
 /// Find what the simulation gets wrong in measured data, name the cause, measure what the extension gains
 ///

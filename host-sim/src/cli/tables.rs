@@ -25,10 +25,10 @@ use crate::samples;
 use crate::stepping::{Method, SolverSettings};
 use crate::sweep::{SweepError, SweepPlan, SweepProgress};
 use crate::tables::{
-    ARCSEC_PER_RAD, MadeTable, SampleOptions, Source, TableError, TableInfo, c_header, from_samples, from_sweep,
-    rust_source,
+    MadeTable, SampleOptions, Source, TableError, TableInfo, c_header, from_samples, from_sweep, rust_source,
 };
 use crate::turns::{deviation_increments, sweep_turns};
+use crate::units::ARCSEC_PER_RAD;
 
 /// Make compensation tables: from FEM sweeps of the drive, or from samples of another program or a bench
 ///

@@ -8,7 +8,7 @@ use thiserror::Error;
 use super::flight::gear::{GearMap, Header, MOST, node_share, parse};
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Temperatures of the map, °C: the ends of the flight's; tables of HHD-95 have nodes at −60 and 80.
 pub const TEMPERATURES_C: [f64; 2] = [0.0, 40.0];

@@ -23,7 +23,7 @@ use crate::drive::{DamagedFlank, DamagedTooth, Drive, DriveError, GeneratorKind,
 use crate::measurement::Session;
 use crate::nominal::Nominal;
 use crate::stepping::{Problem, SolveError, Solver, SolverSettings};
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Load under which causes are looked at, N·m: light, as loads let more teeth share what is displaced.
 const PROBE_N_M: f64 = 2.0;

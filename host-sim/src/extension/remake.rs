@@ -8,8 +8,9 @@ use crate::drive::{Drive, GeneratorKind};
 use crate::nodes::{NodeChoice, choose_torque_nodes};
 use crate::stepping::SolverSettings;
 use crate::sweep::{Observer, SweepError, SweepPlan, rated_torque_n_m};
-use crate::tables::{ARCSEC_PER_RAD, MadeTable, TableError, from_sweep};
+use crate::tables::{MadeTable, TableError, from_sweep};
 use crate::turns::{deviation_increments, sweep_turns};
+use crate::units::ARCSEC_PER_RAD;
 
 /// Why no table was made.
 #[derive(Debug, Error)]

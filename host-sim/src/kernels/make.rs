@@ -13,7 +13,7 @@ use crate::drive::{AsBuilt, Drive, GeneratorKind, Side};
 use crate::mesh::rotate;
 use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
 use crate::sweep::rated_torque_n_m;
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// What to compute.
 #[derive(Debug, Clone, PartialEq)]

@@ -21,6 +21,7 @@ use thiserror::Error;
 use crate::drive::{Drive, GeneratorKind, ThermalState};
 use crate::stepping::{Increment, Problem, SolveError, Solver, SolverSettings, State};
 use crate::stress::{PeakStress, peak_stress};
+use crate::units::ARCSEC_PER_RAD;
 
 pub use path::{Path, PathError, PathPoint, read_path};
 pub use row::Row;
@@ -28,7 +29,7 @@ pub use summary::{SUMMARY_SCHEMA, Summary};
 
 use path::LARGEST_TORQUE_N_M;
 use row::Motion;
-use summary::{ARCSEC, Metrics, Touches, largest, shared, wheel_name};
+use summary::{Metrics, Touches, largest, shared, wheel_name};
 
 /// Increment of the paper's path, rad.
 const PAPER_INCREMENT_RAD: f64 = 0.01;
@@ -620,7 +621,7 @@ impl<'a> Run<'a> {
 
 /// Output angle minus nominal, arc-seconds.
 fn error_arcsec(problem: &Problem, state: &State) -> f64 {
-    (state.output_rad - state.generator_rad / problem.drive.ratio()) * ARCSEC
+    (state.output_rad - state.generator_rad / problem.drive.ratio()) * ARCSEC_PER_RAD
 }
 
 /// Equally spaced angles from `from` (left out) to `to` (exactly), `increment` apart or less.
@@ -724,7 +725,7 @@ mod tests {
         let summary = &run.summary;
         let backlash = summary.backlash_arcsec.unwrap();
         assert!((54.0..64.0).contains(&backlash), "{backlash}");
-        let dwell = summary.dwell_generator_rad.unwrap() * ARCSEC / 95.0;
+        let dwell = summary.dwell_generator_rad.unwrap() * ARCSEC_PER_RAD / 95.0;
         assert!((dwell - backlash).abs() < 1.0, "{dwell}, {backlash}");
         assert_eq!(summary.reversal_lost_motion_arcsec, None);
     }

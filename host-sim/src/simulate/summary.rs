@@ -8,6 +8,7 @@ use std::ops::Range;
 use super::row::Row;
 use crate::mesh::WheelKind;
 use crate::stress::PeakStress;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Version of the layout of `summary.json`; grows when a field changes its meaning or goes.
 pub const SUMMARY_SCHEMA: u32 = 1;
@@ -16,8 +17,6 @@ pub const SUMMARY_SCHEMA: u32 = 1;
 const STANDING_ARCSEC: f64 = 0.05;
 /// Rows that a peak-to-peak value needs at least.
 const ROWS_OF_A_RIPPLE: usize = 8;
-/// Arc-seconds in a radian.
-pub(super) const ARCSEC: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
 
 /// The content of `summary.json`.
 ///
@@ -213,7 +212,7 @@ fn dwell(rows: &[Row], at: usize, ratio: f64) -> Option<f64> {
     for row in onward {
         let travelled = (row.generator_rad - here.generator_rad).abs();
         let moved = row.output_rad - here.output_rad;
-        if moved.abs() * ARCSEC > STANDING_ARCSEC {
+        if moved.abs() * ARCSEC_PER_RAD > STANDING_ARCSEC {
             return Some((travelled - (moved * way * ratio)).clamp(stood, travelled));
         }
         stood = travelled;
@@ -306,12 +305,12 @@ mod tests {
             let mut rows: Vec<Row> = Vec::new();
             for (step, &(generator, torque)) in path.iter().enumerate() {
                 let nominal = generator / RATIO;
-                let wave = 0.5 * self.ripple * (188.0 * generator).sin() / ARCSEC;
-                let half = 0.5 * self.backlash / ARCSEC;
+                let wave = 0.5 * self.ripple * (188.0 * generator).sin() / ARCSEC_PER_RAD;
+                let half = 0.5 * self.backlash / ARCSEC_PER_RAD;
                 let loaded = torque.abs() > self.drag;
                 let before = output;
                 output = if loaded {
-                    nominal + wave + torque.signum() * half + self.wind_up * torque / ARCSEC
+                    nominal + wave + torque.signum() * half + self.wind_up * torque / ARCSEC_PER_RAD
                 } else {
                     output.clamp(nominal + wave - half, nominal + wave + half)
                 };
@@ -335,7 +334,7 @@ mod tests {
                     step,
                     generator_rad: generator,
                     output_rad: output,
-                    error_arcsec: (output - nominal) * ARCSEC,
+                    error_arcsec: (output - nominal) * ARCSEC_PER_RAD,
                     torque_n_m: torque,
                     flank_contacts: 0,
                     generator_contacts: 0,
@@ -376,11 +375,11 @@ mod tests {
         assert!((metrics.reversal.unwrap() - 60.0).abs() < 0.04);
         assert!((metrics.kinematic_error_pp.unwrap() - 0.8).abs() < 0.01);
         // The clearance, and up to the ripple before and after, at the ratio.
-        let dwell = metrics.dwell_rad.unwrap() * ARCSEC / RATIO;
+        let dwell = metrics.dwell_rad.unwrap() * ARCSEC_PER_RAD / RATIO;
         assert!((dwell - 60.0).abs() < 0.8, "{dwell}");
         // Much finer than the increment of 0.01 rad, which is 21.7″.
         let fine = Metrics::new(&TOY.walk(&paper(0.001, 0.0)), PITCH, RATIO).dwell_rad.unwrap();
-        assert!((fine * ARCSEC / RATIO - dwell).abs() < 0.8);
+        assert!((fine * ARCSEC_PER_RAD / RATIO - dwell).abs() < 0.8);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use super::excitation::Excitation;
 use super::plant::Plant;
 use crate::nominal::Nominal;
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Share of `e / (r cos a)` that the second order of the rectified sine has: `4 / 3 pi`.
 pub(super) const SECOND_OF_RECTIFIED: f64 = 0.424;
