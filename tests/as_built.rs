@@ -26,10 +26,10 @@ use flexspline::Table;
 use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::stepping::{Increment, Method, Problem, Solver, SolverSettings, State};
-use flexspline_sim::sweep::{SweepPlan, SweepProgress, symmetric_nodes};
+use flexspline_sim::tables::sweep::{SweepPlan, SweepProgress, symmetric_nodes};
+use flexspline_sim::tables::turns::sweep_turns;
+use flexspline_sim::tables::validate::{Validation, ValidationSettings, validate};
 use flexspline_sim::tables::{MadeTable, from_sweep};
-use flexspline_sim::turns::sweep_turns;
-use flexspline_sim::validate::{Validation, ValidationSettings, validate};
 use flexspline_tests::command::Desk;
 use flexspline_tests::motion::{ARCSEC, imperfect, on, problem};
 

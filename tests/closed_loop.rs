@@ -20,8 +20,7 @@ use flexspline_sim::closed_loop::map::DenseMap;
 use flexspline_sim::closed_loop::{Single, Step, fly};
 use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::stepping::{Method, Problem, Solver, SolverSettings};
-use flexspline_sim::sweep::rated_torque_n_m;
-use flexspline_sim::{samples, tables};
+use flexspline_sim::tables::{self, samples};
 
 const FAST: fn() -> SolverSettings = || SolverSettings { method: Method::Fast, ..SolverSettings::default() };
 
@@ -44,7 +43,7 @@ static CAM: LazyLock<(Vec<u8>, DenseMap)> = LazyLock::new(|| (image(GeneratorKin
 /// Errors of all controllers over a flight, and the lines that say so.
 fn flown<P: Plant + Clone>(kind: GeneratorKind, image: &[u8], plant: P, profile: &Profile) -> ([Scores; 5], String) {
     let plants = std::array::from_fn(|_| plant.clone());
-    let antenna = fly(image, plants, SERVO, profile, rated_torque_n_m(kind), &mut |_| ()).unwrap();
+    let antenna = fly(image, plants, SERVO, profile, kind.rated_torque_n_m(), &mut |_| ()).unwrap();
     let mut text = String::new();
     antenna.write(&kind.to_string(), &mut text).unwrap();
     (*antenna.scores(), text)
@@ -145,7 +144,7 @@ fn contact_fem_in_the_loop_gives_the_same_errors() {
     let problem = Problem::new(&Drive::hhd_95(), kind, temperature_c, FAST()).unwrap();
     let fem = FemPlant::new(&problem, map.view(), temperature_c, Windows::default()).unwrap();
     let drive = tables::core_drive(&Drive::hhd_95()).unwrap();
-    let largest = rated_torque_n_m(kind);
+    let largest = kind.rated_torque_n_m();
     let mut by_fem = Single::new(image, drive, fem, largest, temperature_c, Overrun::SkipAndCount).unwrap();
     let gear = Gear::new(map.view(), temperature_c);
     let mut by_map = Single::new(image, drive, gear, largest, temperature_c, Overrun::SkipAndCount).unwrap();

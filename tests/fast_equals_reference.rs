@@ -13,8 +13,8 @@
 
 use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
 use flexspline_sim::mesh::MeshLevel;
+use flexspline_sim::simulate::stress::peak_stress;
 use flexspline_sim::stepping::{Method, Problem, SolverSettings};
-use flexspline_sim::stress::peak_stress;
 use flexspline_tests::motion::{ARCSEC, Run, imperfect, on};
 
 const OUTPUT_ARCSEC: f64 = 0.1;

@@ -27,11 +27,11 @@ use flexspline_sim::condense::{
 };
 use flexspline_sim::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
 use flexspline_sim::drive::GeneratorKind;
-use flexspline_sim::element::{PACKED, add_tangent_and_force, linear_stiffness};
+use flexspline_sim::fem::element::{PACKED, add_tangent_and_force, linear_stiffness};
 use flexspline_sim::fem::{Cholesky, ElementPositions, Factor, Pattern};
 use flexspline_sim::mesh::WheelMesh;
+use flexspline_sim::simulate::stress::peak_stress;
 use flexspline_sim::stepping::{CondensedDrive, Method, Problem, State};
-use flexspline_sim::stress::peak_stress;
 
 use common::{CpuTime, Motion, STEP_RAD};
 

@@ -15,9 +15,9 @@ use std::time::Duration;
 
 use criterion::{Criterion, SamplingMode, criterion_group, criterion_main};
 use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::nodes::{NodeChoice, choose_torque_nodes};
 use flexspline_sim::stepping::{Method, SolverSettings};
-use flexspline_sim::sweep::{SweepPlan, sweep};
+use flexspline_sim::tables::sweep::{SweepPlan, sweep};
+use flexspline_sim::tables::torque_nodes::{NodeChoice, choose_torque_nodes};
 use flexspline_sim::tables::{MadeTable, from_sweep};
 use flexspline_sim::units::ARCSEC_PER_RAD;
 

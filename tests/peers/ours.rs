@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cpu_time::ProcessTime;
-use flexspline_sim::element::cauchy_stress;
+use flexspline_sim::fem::element::cauchy_stress;
 use flexspline_sim::stepping::{Method, Problem, Solver, State};
 
 /// Our solvers, the one that the others are measured against first.

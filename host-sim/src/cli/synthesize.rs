@@ -18,12 +18,12 @@ use crate::mesh::MeshLevel;
 use crate::nominal::{Fixed, Nominal};
 use crate::output::Outputs;
 use crate::stepping::SolverSettings;
-use crate::sweep::{SweepError, SweepProgress};
 use crate::synthesize::{
     Chosen, Definition, Excitation, Parameter, Plan, Plant, Richness, Sensors, Sizes, Unit, Usual, effects, parse,
     synthesize, to_csv,
 };
 use crate::tables::MadeTable;
+use crate::tables::sweep::{SweepError, SweepProgress};
 
 /// Make data that look measured: the drive of the simulation, with effects, noise and sensors of your choice
 ///

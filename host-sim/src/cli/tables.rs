@@ -17,17 +17,17 @@ use super::names::{self, Generators};
 use super::{Failure, report, say};
 use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
-use crate::nodes::{NodeChoice, choose_torque_nodes};
 use crate::output::Outputs;
 use crate::report::page::Page;
 use crate::report::{Sources, Subject, drive_report};
-use crate::samples;
 use crate::stepping::{Method, SolverSettings};
-use crate::sweep::{SweepError, SweepPlan, SweepProgress};
+use crate::tables::samples;
+use crate::tables::sweep::{SweepError, SweepPlan, SweepProgress};
+use crate::tables::torque_nodes::{NodeChoice, choose_torque_nodes};
+use crate::tables::turns::{deviation_increments, sweep_turns};
 use crate::tables::{
     MadeTable, SampleOptions, Source, TableError, TableInfo, c_header, from_samples, from_sweep, rust_source,
 };
-use crate::turns::{deviation_increments, sweep_turns};
 use crate::units::ARCSEC_PER_RAD;
 
 /// Make compensation tables: from FEM sweeps of the drive, or from samples of another program or a bench
@@ -204,7 +204,7 @@ impl Tables {
     fn plan(&self, drive: &Drive, kind: GeneratorKind) -> Result<(SweepPlan, NodeChoice), Failure> {
         let mut plan = SweepPlan::for_generator(drive, kind);
         let drag = drive.output.drag_torque_n_m;
-        let largest = self.torque_n_m.unwrap_or(crate::sweep::rated_torque_n_m(kind));
+        let largest = self.torque_n_m.unwrap_or(kind.rated_torque_n_m());
         if !(largest > 20.0 * drag && largest <= 1e4) {
             return Err(Failure::BadInput(format!(
                 "--torque-n-m: found {largest}; allowed: more than {} (20 times the drag of the output), at most 10000",

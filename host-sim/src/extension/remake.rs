@@ -5,11 +5,11 @@ use std::time::Instant;
 use thiserror::Error;
 
 use crate::drive::{Drive, GeneratorKind};
-use crate::nodes::{NodeChoice, choose_torque_nodes};
 use crate::stepping::SolverSettings;
-use crate::sweep::{Observer, SweepError, SweepPlan, rated_torque_n_m};
+use crate::tables::sweep::{Observer, SweepError, SweepPlan};
+use crate::tables::torque_nodes::{NodeChoice, choose_torque_nodes};
+use crate::tables::turns::{deviation_increments, sweep_turns};
 use crate::tables::{MadeTable, TableError, from_sweep};
-use crate::turns::{deviation_increments, sweep_turns};
 use crate::units::ARCSEC_PER_RAD;
 
 /// Why no table was made.
@@ -49,7 +49,7 @@ pub fn make_table(
     let mut plan = SweepPlan::for_generator(drive, kind);
     let turns = usize::from(drive.as_built.first_not_uniform().is_some());
     let choice = NodeChoice {
-        largest_n_m: rated_torque_n_m(kind),
+        largest_n_m: kind.rated_torque_n_m(),
         most: MOST_NODES[turns],
         tolerance_rad: NODE_TOLERANCE_ARCSEC[turns] / ARCSEC_PER_RAD,
     };

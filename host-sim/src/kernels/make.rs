@@ -12,7 +12,6 @@ use crate::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
 use crate::drive::{AsBuilt, Drive, GeneratorKind, Side};
 use crate::mesh::rotate;
 use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
-use crate::sweep::rated_torque_n_m;
 use crate::units::ARCSEC_PER_RAD;
 
 /// What to compute.
@@ -34,7 +33,7 @@ impl KernelPlan {
     /// directions 9.5° apart.
     #[must_use]
     pub fn for_generator(kind: GeneratorKind) -> KernelPlan {
-        let largest = rated_torque_n_m(kind);
+        let largest = kind.rated_torque_n_m();
         let steps = 7;
         let even = (1..=steps).map(|k| largest * (f64::from(k) / f64::from(steps)).powi(2));
         KernelPlan {

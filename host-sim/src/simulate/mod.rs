@@ -10,6 +10,7 @@
 
 mod path;
 mod row;
+pub mod stress;
 mod summary;
 
 use std::f64::consts::TAU;
@@ -20,7 +21,6 @@ use thiserror::Error;
 
 use crate::drive::{Drive, GeneratorKind, ThermalState};
 use crate::stepping::{Increment, Problem, SolveError, Solver, SolverSettings, State};
-use crate::stress::{PeakStress, peak_stress};
 use crate::units::ARCSEC_PER_RAD;
 
 pub use path::{Path, PathError, PathPoint, read_path};
@@ -29,6 +29,7 @@ pub use summary::{SUMMARY_SCHEMA, Summary};
 
 use path::LARGEST_TORQUE_N_M;
 use row::Motion;
+use stress::{PeakStress, peak_stress};
 use summary::{Metrics, Touches, largest, shared, wheel_name};
 
 /// Increment of the paper's path, rad.

@@ -6,8 +6,8 @@ use serde::Serialize;
 use std::ops::Range;
 
 use super::row::Row;
+use super::stress::PeakStress;
 use crate::mesh::WheelKind;
-use crate::stress::PeakStress;
 use crate::units::ARCSEC_PER_RAD;
 
 /// Version of the layout of `summary.json`; grows when a field changes its meaning or goes.

@@ -43,7 +43,7 @@ impl SweepPlan {
     pub fn for_generator(drive: &Drive, kind: GeneratorKind) -> SweepPlan {
         let temperature = &drive.temperature;
         SweepPlan {
-            torque_nodes_n_m: symmetric_nodes(drive.output.drag_torque_n_m, rated_torque_n_m(kind), 9),
+            torque_nodes_n_m: symmetric_nodes(drive.output.drag_torque_n_m, kind.rated_torque_n_m(), 9),
             temperature_nodes_c: [temperature.minimum_c, temperature.maximum_c].map(|t| t as f32).to_vec(),
             positions: 8,
             settling_pitches: if drive.flanks.friction_coefficient > 0.0 { 2.0 } else { 0.0 },
@@ -57,15 +57,6 @@ impl SweepPlan {
 
     fn settling_increments(&self) -> usize {
         ((self.settling_pitches * self.positions as f64).ceil() as usize).max(1)
-    }
-}
-
-/// Torque up to which the model of a generator holds with the rim of HHD-95: rollers leave the rim unsupported.
-pub fn rated_torque_n_m(kind: GeneratorKind) -> f64 {
-    match kind {
-        GeneratorKind::TwoRoller => 20.0,
-        GeneratorKind::FourRoller => 100.0,
-        GeneratorKind::DoubleDisc | GeneratorKind::Cam => 200.0,
     }
 }
 
@@ -130,7 +121,7 @@ pub enum SweepError {
     Solve(#[from] SolveError),
     /// The samples make no trial table.
     #[error(transparent)]
-    Table(#[from] crate::tables::TableError),
+    Table(#[from] super::project::TableError),
     /// The output does not follow.
     #[error("under {torque_n_m} N.m the output does not follow the generator within {pitches} tooth pitches")]
     NeverMoves {

@@ -7,10 +7,10 @@
 
 use flexspline::{Direction, GeneratorAngle, Table};
 
+use super::project::trial_table;
+use super::sweep::{Chain, Computed, KnownNode, Observer, SweepError, SweepPlan, symmetric_nodes};
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::{Problem, Solver, SolverSettings, State};
-use crate::sweep::{Chain, Computed, KnownNode, Observer, SweepError, SweepPlan, symmetric_nodes};
-use crate::tables::trial_table;
 
 /// How nodes are chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]

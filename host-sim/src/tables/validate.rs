@@ -14,9 +14,9 @@ use flexspline::{Direction, GeneratorAngle, PlayState, Quality, Table};
 use serde::Serialize;
 use thiserror::Error;
 
+use super::project::core_kind;
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
-use crate::tables::core_kind;
 use crate::units::ARCSEC_PER_RAD;
 
 /// What a table may miss fresh FEM by, arcsec: root mean square and largest.

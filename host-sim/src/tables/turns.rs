@@ -5,7 +5,7 @@
 //! geometry: friction has little part in it, and without friction contact converges several times faster. So two sweeps are put
 //! together:
 //!
-//! * the drive without the imperfections, over one tooth pitch at every node, as [`crate::sweep`] does it;
+//! * the drive without the imperfections, over one tooth pitch at every node, as [`crate::tables::sweep`] does it;
 //! * the *deviation*, the output with the imperfections less the output without, both frictionless, at a few loads of either
 //!   sign, from many places. The places cover the turn of the generator and the turn of the output as evenly as so few points
 //!   can (the additive recurrence of the plastic number), so that harmonics of ψ, δ and ψ − δ do not pass for one another.
@@ -28,10 +28,10 @@ use faer::{Mat, Side};
 use flexspline::precompute::Sample;
 use rayon::prelude::*;
 
+use super::project::{GENERATOR_ORDERS, MATERIAL_ORDERS, OUTPUT_ORDERS};
+use super::sweep::{KnownNode, Observer, Sweep, SweepError, SweepPlan, SweepProgress, sweep};
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::{Increment, Problem, SolveError, Solver, SolverSettings, State};
-use crate::sweep::{KnownNode, Observer, Sweep, SweepError, SweepPlan, SweepProgress, sweep};
-use crate::tables::{GENERATOR_ORDERS, MATERIAL_ORDERS, OUTPUT_ORDERS};
 
 /// Places of generator and output for each sign of the load.
 const PLACES: usize = 32;
