@@ -13,6 +13,7 @@ pub mod fem;
 pub mod kernels;
 pub mod measurement;
 pub mod mesh;
+pub mod motion;
 pub mod nominal;
 pub mod output;
 pub mod progress;

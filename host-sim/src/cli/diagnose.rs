@@ -9,7 +9,8 @@ use flexspline::Table;
 use serde::Serialize;
 
 use super::context::{Context, quoted};
-use super::synthesize::{fresh_table, gear};
+use super::synthesize::gear;
+use super::tables::fresh_table;
 use super::{Failure, names, report, say};
 use crate::diagnosis::report::{Compensation, Diagnosis};
 use crate::diagnosis::{Extended, Settings, diagnose_extended};

@@ -21,8 +21,9 @@ use super::model::CauseEntry;
 use crate::diagnosis::Extended;
 use crate::drive::{DamagedFlank, DamagedTooth, Drive, DriveError, GeneratorKind, Harmonic, Wheel};
 use crate::measurement::Session;
+use crate::motion::Motion;
 use crate::nominal::Nominal;
-use crate::stepping::{Problem, SolveError, Solver, SolverSettings};
+use crate::stepping::{Problem, SolveError, SolverSettings};
 use crate::units::ARCSEC_PER_RAD;
 
 /// Load under which causes are looked at, N·m: light, as loads let more teeth share what is displaced.
@@ -425,10 +426,9 @@ pub fn check_by_fem(
 
 /// Error of the drive deformed at a generator angle, then loaded, arcsec.
 fn stands(problem: &Problem, generator_rad: f64, torque_n_m: f64) -> Result<f64, SolveError> {
-    let mut solver = Solver::new(problem);
-    let (state, _) = solver.deform(generator_rad)?;
-    let (state, _) = solver.increment(&state, generator_rad, torque_n_m)?;
-    Ok((state.output_rad - generator_rad / problem.drive.ratio()) * ARCSEC_PER_RAD)
+    let mut motion = Motion::deformed_or_turned_in(problem, generator_rad)?;
+    motion.load(torque_n_m)?;
+    Ok(motion.error_arcsec())
 }
 
 #[cfg(test)]

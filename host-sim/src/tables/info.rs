@@ -1,5 +1,6 @@
 //! A finished table and what is said about it in JSON.
 
+use flexspline::precompute::Sample;
 use serde::Serialize;
 
 use crate::drive::GeneratorKind;
@@ -13,6 +14,8 @@ pub struct MadeTable {
     pub image: Vec<u8>,
     /// What is said about it in JSON.
     pub info: TableInfo,
+    /// The samples of its sweep, if it was swept.
+    pub samples: Option<Vec<Sample>>,
 }
 
 /// What made a table, what is in it and how far it holds.

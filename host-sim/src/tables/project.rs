@@ -71,7 +71,7 @@ impl Default for SampleOptions {
 pub fn from_sweep(
     drive: &Drive,
     plan: &SweepPlan,
-    sweep: &Sweep,
+    sweep: Sweep,
     solver: SolverSettings,
     wall_s: f64,
 ) -> Result<MadeTable, TableError> {
@@ -91,18 +91,26 @@ pub fn from_sweep(
              places spread over the turns of generator and output, at reference temperature"
         }
         .to_owned(),
-        increments: sweep.increments,
-        iterations: sweep.iterations,
-        worst_residual: sweep.worst_residual,
+        increments: sweep.work.increments,
+        iterations: sweep.work.iterations,
+        worst_residual: sweep.work.worst_residual,
         wall_s,
     };
     let core_plan = fem_plan(drive, plan)?;
-    let mut made =
-        make((&drive.name, drive.hash()), sweep.kind, &core_plan, &sweep.samples, source, &mesh, sweep.worst_residual)?;
+    let mut made = make(
+        (&drive.name, drive.hash()),
+        sweep.kind,
+        &core_plan,
+        &sweep.samples,
+        source,
+        &mesh,
+        sweep.work.worst_residual,
+    )?;
     if sweep.places > 0 {
         let table = Table::check(&made.image).map_err(|e| TableError::Project(e.into()))?;
-        made.info.turns = Some(turns_info(drive, plan, sweep, &table));
+        made.info.turns = Some(turns_info(drive, plan, &sweep, &table));
     }
+    made.samples = Some(sweep.samples);
     Ok(made)
 }
 
@@ -300,7 +308,7 @@ fn make(
         turns: None,
         command: String::new(),
     };
-    Ok(MadeTable { kind, info, image })
+    Ok(MadeTable { kind, info, image, samples: None })
 }
 
 /// The finished table, read by the core, against the samples over whole turns.
