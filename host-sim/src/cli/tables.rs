@@ -269,7 +269,7 @@ pub(super) fn fresh_table(
     mesh: MeshLevel,
 ) -> Result<MadeTable, Failure> {
     let mut settings = TableSettings::for_generator(drive, kind);
-    settings.solver = SolverSettings { method: Method::Reference, mesh, ..settings.solver };
+    settings.solver.mesh = mesh;
     let mut made = by_fem(context, drive, &[(kind, settings)])?;
     Ok(made.remove(0))
 }
