@@ -283,7 +283,7 @@ pub(super) fn wheel_name(peak: &PeakStress) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::row::Motion;
+    use crate::motion::Travel;
     use std::f64::consts::TAU;
 
     const PITCH: f64 = TAU / 188.0;
@@ -300,7 +300,7 @@ mod tests {
     impl Toy {
         /// Rows along generator angles and torques; the first is the start, in the middle of the play.
         fn walk(&self, path: &[(f64, f64)]) -> Vec<Row> {
-            let mut motion = Motion::default();
+            let mut travel = Travel::default();
             let mut output = path[0].0 / RATIO;
             let mut rows: Vec<Row> = Vec::new();
             for (step, &(generator, torque)) in path.iter().enumerate() {
@@ -315,21 +315,8 @@ mod tests {
                     output.clamp(nominal + wave - half, nominal + wave + half)
                 };
                 let from = rows.last().map_or(generator, |row| row.generator_rad);
-                let state = |generator_rad: f64, torque_n_m: f64, output_rad: f64| crate::stepping::State {
-                    u: vec![],
-                    v: vec![],
-                    generator_rad,
-                    torque_n_m,
-                    output_rad,
-                    drag_anchor_rad: 0.0,
-                    sleeve_moment: 0.0,
-                    lateral_force: [0.0; 2],
-                    friction: Default::default(),
-                    output_rate: 0.0,
-                    travel: 0.0,
-                };
                 let torque_before = rows.last().map_or(torque, |row| row.torque_n_m);
-                motion.go(&state(from, torque_before, before), &state(generator, torque, output), RATIO);
+                travel = travel.on([generator - from, output - before], torque == torque_before, RATIO);
                 rows.push(Row {
                     step,
                     generator_rad: generator,
@@ -347,7 +334,7 @@ mod tests {
                     peak_flank_pressure_mpa: 0.0,
                     peak_generator_pressure_mpa: 0.0,
                     residual: 0.0,
-                    settled: motion.settled(PITCH),
+                    settled: travel.settled(0.0),
                     turn_rad: generator - from,
                 });
             }
