@@ -26,4 +26,5 @@ pub mod stepping;
 pub mod suggest;
 pub mod synthesize;
 pub mod tables;
+pub mod toml_file;
 pub mod units;

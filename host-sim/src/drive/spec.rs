@@ -1,11 +1,12 @@
 //! The drive as a value: every number of `drive.toml`, the built-in drives, derived sizes, temperature.
 
 use super::as_built::{AsBuilt, DamagedFlank, Harmonic, Wheel};
-use super::error::{DriveError, Problem};
+use super::error::DriveError;
 use super::fields::{self, Value};
 use super::generator::GeneratorOutline;
 use super::ring::GeneratorKind;
 use super::tooth::ToothFlank;
+use crate::toml_file::Problem;
 use serde::Serialize;
 use std::f64::consts::{FRAC_PI_2, PI};
 
