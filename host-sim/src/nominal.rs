@@ -47,6 +47,17 @@ pub struct Teeth {
     pub fixed: Fixed,
 }
 
+impl Teeth {
+    /// Of the wheel that is the output.
+    #[must_use]
+    pub const fn of_output(self) -> u32 {
+        match self.fixed {
+            Fixed::Flexspline => self.circular_spline,
+            Fixed::CircularSpline => self.flexspline,
+        }
+    }
+}
+
 /// One harmonic of the nominal output error, `amplitude sin(order generator + phase)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Harmonic {
@@ -116,6 +127,20 @@ impl Nominal {
             .iter()
             .map(|h| h.amplitude_arcsec * (h.order_per_generator_turn * generator_rad + h.phase_rad).sin())
             .sum()
+    }
+
+    /// The teeth; of a model that gives a ratio alone, those of the strain wave drive of two waves that has it: `z_c / 2` with the
+    /// flexspline fixed, `-z_f / 2` with the circular spline fixed, and two teeth of difference.
+    #[must_use]
+    pub fn teeth_or_of_two_waves(&self) -> Teeth {
+        self.teeth.unwrap_or_else(|| {
+            let more = (2.0 * self.ratio.abs()).round().max(3.0) as u32;
+            if self.ratio > 0.0 {
+                Teeth { flexspline: more - 2, circular_spline: more, fixed: Fixed::Flexspline }
+            } else {
+                Teeth { flexspline: more, circular_spline: more + 2, fixed: Fixed::CircularSpline }
+            }
+        })
     }
 
     /// What a table says of wind-up and backlash: the part of the error that is odd in the torque, at mid temperature; the backlash is
@@ -400,6 +425,9 @@ mod tests {
         let by_ratio = "[drive]\nratio = -6.0\n[nominal]\nstiffness_n_m_per_rad = 3e4\nbacklash_arcsec = 60\n";
         let nominal = Nominal::from_toml("n.toml", by_ratio).unwrap();
         assert_eq!((nominal.ratio, nominal.teeth, nominal.friction_torque_n_m), (-6.0, None, 0.0));
+        let teeth = |ratio: f64| Nominal { ratio, ..nominal.clone() }.teeth_or_of_two_waves();
+        assert_eq!(teeth(95.0), Teeth { flexspline: 188, circular_spline: 190, fixed: Fixed::Flexspline });
+        assert_eq!(teeth(-94.0), Teeth { flexspline: 188, circular_spline: 190, fixed: Fixed::CircularSpline });
     }
 
     #[test]

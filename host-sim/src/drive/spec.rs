@@ -227,6 +227,12 @@ impl CircularSpline {
     pub fn base_radius_mm(&self) -> f64 {
         self.pitch_radius_mm() * self.pressure_angle_rad().cos()
     }
+
+    /// Angle between the circumference and the normal of a flank at the tip circle, where the flexspline's teeth come to bear, rad:
+    /// `cos a = r_b / r` of the involute.
+    pub fn bearing_flank_angle_rad(&self) -> f64 {
+        (self.base_radius_mm() / self.tip_radius_mm).acos()
+    }
 }
 
 impl Material {
