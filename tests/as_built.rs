@@ -25,13 +25,14 @@ use std::ops::ControlFlow;
 use flexspline::Table;
 use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
 use flexspline_sim::mesh::MeshLevel;
+use flexspline_sim::motion::Motion;
 use flexspline_sim::stepping::{Increment, Method, Problem, Solver, SolverSettings, State};
-use flexspline_sim::sweep::{SweepPlan, SweepProgress, symmetric_nodes};
-use flexspline_sim::tables::{MadeTable, from_sweep};
-use flexspline_sim::turns::sweep_turns;
-use flexspline_sim::validate::{Validation, ValidationSettings, validate};
+use flexspline_sim::tables::sweep::symmetric_nodes;
+use flexspline_sim::tables::validate::{Validation, ValidationSettings, validate};
+use flexspline_sim::tables::{MadeTable, TableSettings, TorqueNodes, make};
+use flexspline_sim::units::ARCSEC_PER_RAD;
 use flexspline_tests::command::Desk;
-use flexspline_tests::motion::{ARCSEC, imperfect, on, problem};
+use flexspline_tests::motion::{imperfect, on, problem};
 
 const LOAD_N_M: f64 = 2.0;
 /// Flexspline pitch of generator angle, rad.
@@ -45,15 +46,15 @@ fn cam(change: impl FnOnce(&mut Drive)) -> Problem {
 
 /// The drive deformed at a generator angle, then loaded.
 fn stands(problem: &Problem, generator_rad: f64, torque_n_m: f64) -> (State, Increment) {
-    let mut solver = Solver::new(problem);
-    let (state, _) = solver.deform(generator_rad).unwrap_or_else(|error| panic!("{error}"));
-    solver.increment(&state, generator_rad, torque_n_m).unwrap_or_else(|error| panic!("{error}"))
+    let mut motion = Motion::deformed(problem, generator_rad).unwrap_or_else(|error| panic!("{error}"));
+    motion.load(torque_n_m).unwrap_or_else(|error| panic!("{error}"));
+    (motion.state().clone(), motion.last().clone())
 }
 
 /// Transmission error, arc-seconds.
 fn error(problem: &Problem, generator_rad: f64, torque_n_m: f64) -> f64 {
     let (state, _) = stands(problem, generator_rad, torque_n_m);
-    (state.output_rad - generator_rad / problem.drive.ratio()) * ARCSEC
+    (state.output_rad - generator_rad / problem.drive.ratio()) * ARCSEC_PER_RAD
 }
 
 /// The error that an imperfect drive has beyond the ideal one, at `whole` flexspline pitches, arc-seconds.
@@ -91,7 +92,7 @@ fn a_second_harmonic_of_the_circular_spline_pitch_has_order_2_times_94_95() {
     let found =
         beyond_ideal(|drive| drive.as_built.circular_spline_pitch_harmonics = second(5.0), &positions, LOAD_N_M);
     let (mean, [(amplitude, phase), (twice, _)]) = harmonics(&found[..5]);
-    let rigid = 5e-3 / 49.05 * ARCSEC;
+    let rigid = 5e-3 / 49.05 * ARCSEC_PER_RAD;
     let lobe = (phase.to_degrees() / 2.0).abs();
     println!(
         "circular-spline pitch, k = 2, 5 um: {amplitude:.2}\" of p/r = {rigid:.2}\", crest {:.1} deg, mean {mean:.3}\", order 4 \
@@ -113,7 +114,7 @@ fn a_second_harmonic_of_the_circular_spline_pitch_has_order_2_times_94_95() {
 fn a_second_harmonic_of_the_flexspline_pitch_has_order_2_and_the_other_sign() {
     let positions: Vec<u32> = vec![0, 47, 94, 95];
     let found = beyond_ideal(|drive| drive.as_built.flexspline_pitch_harmonics = second(5.0), &positions, LOAD_N_M);
-    let rigid = 5e-3 / 48.35 * ARCSEC;
+    let rigid = 5e-3 / 48.35 * ARCSEC_PER_RAD;
     println!("flexspline pitch, k = 2, 5 um: {found:.3?}\" at {positions:?} pitches, p/r = {rigid:.2}\"");
     // Crest and trough of the error stand on the major axis: teeth displaced forward push the output ahead.
     assert!(found[0] > 0.85 * rigid && found[0] < rigid && found[1] < -0.85 * rigid && found[1] > -rigid);
@@ -124,9 +125,10 @@ fn a_second_harmonic_of_the_flexspline_pitch_has_order_2_and_the_other_sign() {
 #[test]
 fn teeth_all_displaced_alike_turn_the_output_by_just_that() {
     // An arc on the flexspline is an arc on the radius of the lobe, where the tooth bears.
-    for (wheel, expected) in
-        [(Wheel::Flexspline, 3e-3 / (48.35 + 0.5) * ARCSEC), (Wheel::CircularSpline, -3e-3 / 49.05 * ARCSEC)]
-    {
+    for (wheel, expected) in [
+        (Wheel::Flexspline, 3e-3 / (48.35 + 0.5) * ARCSEC_PER_RAD),
+        (Wheel::CircularSpline, -3e-3 / 49.05 * ARCSEC_PER_RAD),
+    ] {
         let change = |drive: &mut Drive| match wheel {
             Wheel::Flexspline => drive.as_built.flexspline_pitch_error_um = vec![3.0; 188],
             Wheel::CircularSpline => drive.as_built.circular_spline_pitch_error_um = vec![3.0; 190],
@@ -145,7 +147,7 @@ fn an_oval_circular_spline_has_order_2_times_94_95() {
     let (mean, [(amplitude, phase), (twice, _)]) = harmonics(&found[..5]);
     // Radius and tangent together, flank at a = 24 deg: (w tan a) cos 2x against (w/2) sin 2x.
     let a = 24f64.to_radians();
-    let rigid = 5e-3 / 48.7 * 0.5f64.hypot(a.tan()) * ARCSEC;
+    let rigid = 5e-3 / 48.7 * 0.5f64.hypot(a.tan()) * ARCSEC_PER_RAD;
     println!(
         "circular-spline ovality 5 um: {amplitude:.2}\", rigid {rigid:.2}\", crest {:.1} deg, mean {mean:.2}\", order 4 {twice:.2}\"",
         phase.to_degrees() / 2.0
@@ -161,7 +163,7 @@ fn an_eccentric_circular_spline_is_seen_as_a_rectified_sine() {
     let found = beyond_ideal(|drive| drive.as_built.circular_spline_eccentricity_um = 5.0, &positions, 0.5);
     let (mean, [(second, phase), (fourth, _)]) = harmonics(&found);
     // r cos a is the base radius.
-    let rigid = 5e-3 / 44.635 * ARCSEC;
+    let rigid = 5e-3 / 44.635 * ARCSEC_PER_RAD;
     let angle = -0.5 * phase;
     println!(
         "circular-spline eccentricity 5 um: mean {mean:.2}\" ({:.2}), order 2*94/95 {second:.2}\" ({:.2}), order 4*94/95 {fourth:.2}\" \
@@ -235,7 +237,7 @@ fn wear_widens_the_backlash_by_its_depth_over_the_base_radius() {
             drive.as_built.flexspline_wear_um = flexspline;
             drive.as_built.circular_spline_wear_um = circular_spline;
         }));
-        let expected = 2.0 * 1e-3 * (flexspline + circular_spline) / 44.6354 * ARCSEC;
+        let expected = 2.0 * 1e-3 * (flexspline + circular_spline) / 44.6354 * ARCSEC_PER_RAD;
         println!(
             "wear {flexspline} + {circular_spline} um: backlash wider by {:.4}\", 2w/(r cos a) = {expected:.4}\"",
             worn - ideal
@@ -395,7 +397,7 @@ fn with_every_imperfection_forces_balance_and_work_is_reciprocal() {
             println!(
                 "{kind}, all imperfections, psi {psi}: e {:.2}\", {} flanks, torque out of balance {unbalanced:.1e} N.m; 95 dM/dT \
                  {:.5}, 95 d(delta)/d(psi) {:.5}; compliance by difference over tangent {:.5}",
-                (state.output_rad - psi / 95.0) * ARCSEC,
+                (state.output_rad - psi / 95.0) * ARCSEC_PER_RAD,
                 here.flank_contacts,
                 95.0 * torque_rate,
                 95.0 * rate,
@@ -412,14 +414,13 @@ fn table_of(change: impl FnOnce(&mut Drive)) -> (MadeTable, Validation) {
     let mut drive = Drive::hhd_95();
     change(&mut drive);
     let solver = SolverSettings { method: Method::Fast, ..on(MeshLevel::Coarse) };
-    let plan = SweepPlan {
-        torque_nodes_n_m: symmetric_nodes(drive.output.drag_torque_n_m, 50.0, 6),
+    let how = TableSettings {
+        torque_nodes: TorqueNodes::Given(symmetric_nodes(drive.output.drag_torque_n_m, 50.0, 6)),
         temperature_nodes_c: vec![drive.temperature.reference_c as f32],
-        ..SweepPlan::for_generator(&drive, GeneratorKind::Cam)
+        solver,
+        ..TableSettings::for_generator(&drive, GeneratorKind::Cam)
     };
-    let go_on = |_: SweepProgress| ControlFlow::Continue(());
-    let swept = sweep_turns(&drive, GeneratorKind::Cam, &plan, &[], solver, &go_on).unwrap();
-    let made = from_sweep(&drive, &plan, &swept, solver, 0.0).unwrap();
+    let made = make(&drive, GeneratorKind::Cam, &how, &|_| ControlFlow::Continue(())).unwrap();
     let table = Table::check(&made.image).unwrap();
     let settings = ValidationSettings { torques: 16, temperatures: 1, positions: 2, seed: 7, solver };
     let checked = validate(&drive, &table, &settings, &mut |_, _| ControlFlow::Continue(())).unwrap();

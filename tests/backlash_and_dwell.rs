@@ -19,18 +19,19 @@
 
 use flexspline_sim::drive::{Drive, GeneratorKind, GeneratorOutline};
 use flexspline_sim::mesh::MeshLevel;
-use flexspline_tests::motion::{ARCMIN, ARCSEC, Run, hhd_95, mean_error, problem};
+use flexspline_sim::units::{ARCMIN_PER_RAD, ARCSEC_PER_RAD};
+use flexspline_tests::motion::{deformed, hhd_95, mean_error, problem};
 
 const DRAG_N_M: f64 = 0.02;
 
 /// Backlash as the torque goes to nothing, arc-minutes, and its slope, arc-minutes per N m.
 fn backlash(drive: &Drive, kind: GeneratorKind) -> (f64, f64) {
     let problem = problem(drive, kind, flexspline_tests::motion::on(MeshLevel::Standard));
-    let mut run = Run::new(&problem);
-    run.turn(run.pitch(), 2);
+    let mut run = deformed(&problem);
+    run.turn_in(run.pitch(), 2).unwrap();
     let [high, low] = [0.02, 0.01].map(|net_n_m| {
-        run.to(run.state.generator_rad + 0.25 * run.pitch(), net_n_m + DRAG_N_M);
-        2.0 * mean_error(&run.turn(run.pitch(), 4)) / 60.0
+        run.to(run.state().generator_rad + 0.25 * run.pitch(), net_n_m + DRAG_N_M).unwrap();
+        2.0 * mean_error(&run.turn_in(run.pitch(), 4).unwrap()) / 60.0
     });
     (2.0 * low - high, (high - low) / 0.01)
 }
@@ -88,18 +89,16 @@ fn backlash_falls_with_the_deflection() {
 #[test]
 fn the_output_dwells_while_the_generator_crosses_the_backlash() {
     let problem = hhd_95(GeneratorKind::Cam, MeshLevel::Standard);
-    let mut run = Run::new(&problem);
-    run.turn(1.25 * run.pitch(), 5);
-    let (psi, output) = (run.state.generator_rad, run.state.output_rad);
-    let crossing = 95.0 * 0.987 / ARCMIN;
+    let mut run = deformed(&problem);
+    run.turn_in(1.25 * run.pitch(), 5).unwrap();
+    let (psi, output) = (run.state().generator_rad, run.state().output_rad);
+    let crossing = 95.0 * 0.987 / ARCMIN_PER_RAD;
     let mut moved_by = |part: f64| {
-        let sample = run.to(psi - part * crossing, 0.0);
-        let moved = (run.state.output_rad - output) * ARCSEC;
-        println!(
-            "after {part:.2} of 95 b: output moved {moved:.5}\", {} flanks touch",
-            sample.increment.flank_contacts
-        );
-        (moved, sample.increment.flank_contacts)
+        run.turn_to(psi - part * crossing).unwrap();
+        let moved = (run.state().output_rad - output) * ARCSEC_PER_RAD;
+        let touching = run.last().flank_contacts;
+        println!("after {part:.2} of 95 b: output moved {moved:.5}\", {touching} flanks touch");
+        (moved, touching)
     };
     for part in [0.05, 0.3, 0.6, 0.9, 0.97] {
         let (moved, touching) = moved_by(part);

@@ -19,9 +19,9 @@ use flexspline_sim::closed_loop::inertia::{DISH, InertGear};
 use flexspline_sim::closed_loop::map::DenseMap;
 use flexspline_sim::closed_loop::{Single, Step, fly};
 use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::stepping::{Method, Problem, Solver, SolverSettings};
-use flexspline_sim::sweep::rated_torque_n_m;
-use flexspline_sim::{samples, tables};
+use flexspline_sim::motion::Motion;
+use flexspline_sim::stepping::{Method, Problem, SolverSettings};
+use flexspline_sim::tables::{self, samples};
 
 const FAST: fn() -> SolverSettings = || SolverSettings { method: Method::Fast, ..SolverSettings::default() };
 
@@ -44,7 +44,7 @@ static CAM: LazyLock<(Vec<u8>, DenseMap)> = LazyLock::new(|| (image(GeneratorKin
 /// Errors of all controllers over a flight, and the lines that say so.
 fn flown<P: Plant + Clone>(kind: GeneratorKind, image: &[u8], plant: P, profile: &Profile) -> ([Scores; 5], String) {
     let plants = std::array::from_fn(|_| plant.clone());
-    let antenna = fly(image, plants, SERVO, profile, rated_torque_n_m(kind), &mut |_| ()).unwrap();
+    let antenna = fly(image, plants, SERVO, profile, kind.rated_torque_n_m(), &mut |_| ()).unwrap();
     let mut text = String::new();
     antenna.write(&kind.to_string(), &mut text).unwrap();
     (*antenna.scores(), text)
@@ -95,9 +95,8 @@ fn the_plant_is_what_contact_fem_says() {
         let (drive, map) = (Drive::hhd_95(), map(kind));
         let (temperature_c, pitch) = (29.0, std::f64::consts::TAU / 188.0);
         let problem = Problem::new(&drive, kind, temperature_c, FAST()).unwrap();
-        let mut solver = Solver::new(&problem);
         let mut gear = Gear::new(map.view(), temperature_c);
-        let (mut state, _) = solver.deform(0.0).unwrap();
+        let mut motion = Motion::deformed(&problem, 0.0).unwrap();
         let image = image(kind);
         let (table, mut play) = (Table::check(&image).unwrap(), PlayState::after_motion(Direction::Forward));
         let mut by_table = |angle: f64, torque_n_m: f64| {
@@ -108,21 +107,23 @@ fn the_plant_is_what_contact_fem_says() {
         for torque_n_m in torques {
             // Forward, then back: the plant's own law of play against the drag and contact of the FEM.
             for turn in [0.0, 0.21, 0.33, 0.27, -0.19, -0.31] {
-                let angle = state.generator_rad + turn * pitch;
-                state = solver.increment(&state, angle, torque_n_m).unwrap().0;
-                let missed = (gear.go(angle, torque_n_m) - state.output_rad) * ARCSEC_PER_RAD;
+                let angle = motion.state().generator_rad + turn * pitch;
+                motion.to(angle, torque_n_m).unwrap();
+                let output_rad = motion.state().output_rad;
+                let missed = (gear.go(angle, torque_n_m) - output_rad) * ARCSEC_PER_RAD;
                 worst = worst.max(missed.abs());
-                let missed = (by_table(angle, torque_n_m) - state.output_rad) * ARCSEC_PER_RAD;
+                let missed = (by_table(angle, torque_n_m) - output_rad) * ARCSEC_PER_RAD;
                 table_worst[0] = table_worst[0].max(missed.abs());
             }
         }
         // Without load, through the clearance.
         for turn in [0.3, -0.4, -0.4, -0.4, -0.4, 0.3, 0.5] {
-            let angle = state.generator_rad + turn * pitch;
-            state = solver.increment(&state, angle, 0.0).unwrap().0;
-            let missed = (gear.go(angle, 0.0) - state.output_rad) * ARCSEC_PER_RAD;
+            let angle = motion.state().generator_rad + turn * pitch;
+            motion.to(angle, 0.0).unwrap();
+            let output_rad = motion.state().output_rad;
+            let missed = (gear.go(angle, 0.0) - output_rad) * ARCSEC_PER_RAD;
             worst = worst.max(missed.abs());
-            let missed = (by_table(angle, 0.0) - state.output_rad) * ARCSEC_PER_RAD;
+            let missed = (by_table(angle, 0.0) - output_rad) * ARCSEC_PER_RAD;
             table_worst[1] = table_worst[1].max(missed.abs());
         }
         let [loaded, let_go] = table_worst;
@@ -145,7 +146,7 @@ fn contact_fem_in_the_loop_gives_the_same_errors() {
     let problem = Problem::new(&Drive::hhd_95(), kind, temperature_c, FAST()).unwrap();
     let fem = FemPlant::new(&problem, map.view(), temperature_c, Windows::default()).unwrap();
     let drive = tables::core_drive(&Drive::hhd_95()).unwrap();
-    let largest = rated_torque_n_m(kind);
+    let largest = kind.rated_torque_n_m();
     let mut by_fem = Single::new(image, drive, fem, largest, temperature_c, Overrun::SkipAndCount).unwrap();
     let gear = Gear::new(map.view(), temperature_c);
     let mut by_map = Single::new(image, drive, gear, largest, temperature_c, Overrun::SkipAndCount).unwrap();

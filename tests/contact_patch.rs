@@ -16,7 +16,7 @@ use flexspline_sim::contact::{BoreContact, BoreLaw, Configuration, FlankLaw, Fla
 use flexspline_sim::drive::{Drive, GeneratorKind, GeneratorOutline};
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::stepping::{Problem, Solver};
-use flexspline_tests::motion::{Run, imperfect, mean, on, problem};
+use flexspline_tests::motion::{imperfect, loaded, mean, on, problem};
 
 /// Numbers in [-1, 1] that look random and are always the same.
 struct Noise(u64);
@@ -205,13 +205,13 @@ fn as_built_flank_forces_are_derivatives_of_the_energy_and_balance() {
 
 fn flank_derivatives(drive: &Drive, moment_bound: f64) {
     let problem = problem(drive, GeneratorKind::TwoRoller, on(MeshLevel::Standard));
-    let run = Run::loaded(&problem, 20.0);
+    let run = loaded(&problem, 20.0);
     let flanks = problem.flanks();
     let mut noise = Noise(7);
     let disturb = |x: &[f64], noise: &mut Noise| moved(x, 1e-5, &noise.vector(x.len()));
     // More load than equilibrium has, so that many points touch.
-    let output = run.state.output_rad + 2e-6;
-    let (u, v) = (disturb(&run.state.u, &mut noise), disturb(&run.state.v, &mut noise));
+    let output = run.state().output_rad + 2e-6;
+    let (u, v) = (disturb(&run.state().u, &mut noise), disturb(&run.state().v, &mut noise));
     let at = Configuration { u: &u, v: &v, output_rad: output };
 
     let mut worst = [0.0_f64; 6];
@@ -222,7 +222,7 @@ fn flank_derivatives(drive: &Drive, moment_bound: f64) {
         for pair in flanks.near_pairs(at, 0.015) {
             let mut layout = flanks.layout(pair, at);
             if friction > 0.0 {
-                let before = Configuration { u: &run.state.u, v: &run.state.v, output_rad: run.state.output_rad };
+                let before = Configuration { u: &run.state().u, v: &run.state().v, output_rad: run.state().output_rad };
                 flanks.start_friction(pair, before, &Vec::new(), &mut layout.points);
             }
             let Some(here) = flanks.evaluate(pair, at, law, &layout.points) else { continue };

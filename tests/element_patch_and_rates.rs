@@ -13,10 +13,12 @@
 //! Element Method for Elliptic Problems, th. 3.2.5). Physics wrong if this fails: gradients, Jacobian, integration rule,
 //! a strain that does not vanish under rotation.
 
-use flexspline_sim::element::{GaussPoint, add_internal_force, cauchy_stress, gauss_points, linear_stiffness, shape};
-use flexspline_sim::element::{shape_gradient, strain_energy};
+use flexspline_sim::fem::element::{
+    GaussPoint, add_internal_force, cauchy_stress, gauss_points, linear_stiffness, shape,
+};
+use flexspline_sim::fem::element::{shape_gradient, strain_energy};
+use flexspline_sim::fem::material::PlaneStrain;
 use flexspline_sim::fem::{Cholesky, Factor, Pattern};
-use flexspline_sim::material::PlaneStrain;
 
 type Point = [f64; 2];
 

@@ -13,9 +13,10 @@
 
 use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
 use flexspline_sim::mesh::MeshLevel;
+use flexspline_sim::simulate::stress::peak_stress;
 use flexspline_sim::stepping::{Method, Problem, SolverSettings};
-use flexspline_sim::stress::peak_stress;
-use flexspline_tests::motion::{ARCSEC, Run, imperfect, on};
+use flexspline_sim::units::ARCSEC_PER_RAD;
+use flexspline_tests::motion::{deformed, imperfect, on};
 
 const OUTPUT_ARCSEC: f64 = 0.1;
 const WIND_UP: f64 = 0.005;
@@ -51,18 +52,21 @@ fn answers(
     path: &[Place],
 ) -> Vec<Answer> {
     let problem = Problem::new(drive, kind, temperature_c, settings).unwrap_or_else(|error| panic!("{kind}: {error}"));
-    let mut run = Run::new(&problem);
+    let mut run = deformed(&problem);
     std::iter::once(None)
         .chain(path.iter().map(Some))
         .map(|place| {
-            let sample = place.map(|(generator_rad, torque)| run.to(*generator_rad, *torque));
-            let whole = problem.whole_state(&run.state);
+            let moved = place.map(|(generator_rad, torque_n_m)| {
+                run.to(*generator_rad, *torque_n_m).unwrap_or_else(|error| panic!("{kind}: {error}"));
+                run.last().clone()
+            });
+            let whole = problem.whole_state(run.state());
             Answer {
-                output_rad: run.state.output_rad,
+                output_rad: run.state().output_rad,
                 error_arcsec: run.error_arcsec(),
-                generator_torque_n_m: sample.as_ref().map_or(0.0, |s| s.increment.generator_torque_n_m),
-                compliance_rad_per_n_m: sample.as_ref().map_or(0.0, |s| s.increment.compliance_rad_per_n_m),
-                peak_mpa: peak_stress(&problem, &run.state).von_mises_mpa,
+                generator_torque_n_m: moved.as_ref().map_or(0.0, |last| last.generator_torque_n_m),
+                compliance_rad_per_n_m: moved.as_ref().map_or(0.0, |last| last.compliance_rad_per_n_m),
+                peak_mpa: peak_stress(&problem, run.state()).von_mises_mpa,
                 field: whole.u.iter().chain(&whole.v).copied().collect(),
             }
         })
@@ -82,7 +86,7 @@ fn compare(
     let worst = |difference: &dyn Fn(&Answer, &Answer) -> f64| {
         fast.iter().zip(&reference).map(|(f, r)| difference(f, r)).fold(0.0_f64, f64::max)
     };
-    let output = worst(&|f, r| (f.output_rad - r.output_rad).abs() * ARCSEC);
+    let output = worst(&|f, r| (f.output_rad - r.output_rad).abs() * ARCSEC_PER_RAD);
     let stress = worst(&|f, r| (f.peak_mpa / r.peak_mpa - 1.0).abs());
     let field = worst(&|f, r| f.field.iter().zip(&r.field).map(|(f, r)| (f - r).abs()).fold(0.0, f64::max));
     let torque = worst(&|f, r| (f.generator_torque_n_m - r.generator_torque_n_m).abs());

@@ -21,13 +21,14 @@ use flexspline_sim::drive::{AsBuilt, Drive, GeneratorKind, Harmonic};
 use flexspline_sim::kernels::{KernelPlan, Kernels, make};
 use flexspline_sim::measurement::Session;
 use flexspline_sim::mesh::MeshLevel;
+use flexspline_sim::motion::Motion;
 use flexspline_sim::nominal::Nominal;
-use flexspline_sim::stepping::{Method, Problem, Solver, SolverSettings, State};
+use flexspline_sim::stepping::{Method, Problem, SolverSettings};
+use flexspline_sim::units::ARCSEC_PER_RAD;
 use flexspline_tests::command::Desk;
 use rayon::prelude::*;
 
 const NOISE_ARCSEC: f64 = 0.5;
-const ARCSEC: f64 = 180.0 * 3600.0 / PI;
 const SESSIONS: usize = 4;
 const PLACES: usize = 10;
 const LOADS: [f64; 3] = [4.0, 15.0, 50.0];
@@ -57,15 +58,6 @@ fn known() -> &'static (Vec<u8>, Arc<Kernels>) {
     })
 }
 
-/// The drive put together at a generator angle, or beside it and turned there.
-fn deformed(solver: &mut Solver<'_>, psi: f64) -> State {
-    let beside = |by: f64| {
-        let (state, _) = solver.deform(psi - by).ok()?;
-        solver.increment(&state, psi, 0.0).ok().map(|(state, _)| state)
-    };
-    [0.0, 0.01, -0.01, 0.05].into_iter().find_map(beside).unwrap_or_else(|| panic!("no way to {psi} rad"))
-}
-
 /// What a bench would record of the drive with a deviation.
 fn measured(change: impl Fn(&mut AsBuilt), seed: u64) -> Vec<Session> {
     let mut drive = Drive::hhd_95();
@@ -79,11 +71,10 @@ fn measured(change: impl Fn(&mut AsBuilt), seed: u64) -> Vec<Session> {
             [1.0, -1.0]
                 .into_iter()
                 .flat_map(|sign| {
-                    let mut solver = Solver::new(&problem);
-                    let mut state = deformed(&mut solver, *psi);
+                    let mut motion = Motion::deformed_or_turned_in(&problem, *psi).unwrap();
                     LOADS.map(|load| {
-                        state = solver.increment(&state, *psi, sign * load).unwrap().0;
-                        state.output_rad - psi / 95.0
+                        motion.load(sign * load).unwrap();
+                        motion.error_rad()
                     })
                 })
                 .collect()
@@ -92,7 +83,7 @@ fn measured(change: impl Fn(&mut AsBuilt), seed: u64) -> Vec<Session> {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut noise = || {
         let (u, v) = (random.f64().max(1e-12), random.f64());
-        NOISE_ARCSEC / ARCSEC * (-2.0 * u.ln()).sqrt() * (TAU * v).cos()
+        NOISE_ARCSEC / ARCSEC_PER_RAD * (-2.0 * u.ln()).sqrt() * (TAU * v).cos()
     };
     (0..SESSIONS)
         .map(|session| {

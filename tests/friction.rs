@@ -14,8 +14,9 @@
 
 use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::mesh::MeshLevel;
+use flexspline_sim::motion::Place;
 use flexspline_sim::stepping::SolverSettings;
-use flexspline_tests::motion::{Run, Sample, mean, mean_error, mean_generator_torque, mean_iterations, on, problem};
+use flexspline_tests::motion::{loaded, mean, mean_error, mean_generator_torque, mean_iterations, on, problem};
 
 const TORQUE_N_M: f64 = 50.0;
 
@@ -28,20 +29,20 @@ fn loop_of(kind: GeneratorKind, friction: f64, increments: usize) -> [(f64, f64)
     // comes on with friction at standstill.
     let settings = SolverSettings { bore_points: Some(16), ..on(MeshLevel::Standard) };
     let problem = problem(&drive, kind, settings);
-    let mut run = Run::loaded(&problem, TORQUE_N_M);
+    let mut run = loaded(&problem, TORQUE_N_M);
     let pitch = run.pitch();
-    let describe = |way: &str, samples: &[Sample]| {
-        let (error, torque) = (mean_error(samples), mean_generator_torque(samples));
+    let describe = |way: &str, places: &[Place]| {
+        let (error, torque) = (mean_error(places), mean_generator_torque(places));
         println!(
             "{kind}, friction {friction}, {way}: e {error:.4}\", generator {torque:.5} N.m, {:.1} iterations, at most {}",
-            mean_iterations(samples),
-            samples.iter().map(|s| s.increment.iterations).max().unwrap()
+            mean_iterations(places),
+            places.iter().map(|p| p.increment.iterations).max().unwrap()
         );
         (error, torque)
     };
     [1.0, -1.0].map(|sense| {
-        let settling = run.turn(sense * pitch, increments);
-        let steady = run.turn(sense * pitch, increments);
+        let settling = run.turn_in(sense * pitch, increments).unwrap();
+        let steady = run.turn_in(sense * pitch, increments).unwrap();
         let way = if sense > 0.0 { "forward" } else { "backward" };
         describe(&format!("{way}, settling"), &settling);
         describe(way, &steady)
@@ -92,10 +93,10 @@ fn lifting_the_rated_load_converges() {
     let mut drive = Drive::hhd_95();
     drive.flanks.friction_coefficient = 0.08;
     let problem = problem(&drive, GeneratorKind::Cam, on(MeshLevel::Coarse));
-    let mut run = Run::loaded(&problem, -200.0);
+    let mut run = loaded(&problem, -200.0);
     let pitch = run.pitch();
-    let settling = run.turn(pitch, 8);
-    let steady = run.turn(pitch, 8);
+    let settling = run.turn_in(pitch, 8).unwrap();
+    let steady = run.turn_in(pitch, 8).unwrap();
     println!(
         "cam, friction 0.08, -200 N.m: e {:.3}\", {:.1} iterations settling, {:.1} settled",
         mean_error(&steady),

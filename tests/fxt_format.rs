@@ -13,7 +13,7 @@ use flexspline::{
     write_image,
 };
 use flexspline_sim::drive::{Drive as HostDrive, GeneratorKind as HostKind};
-use flexspline_sim::samples;
+use flexspline_sim::tables::samples;
 use flexspline_sim::tables::{SampleOptions, from_samples};
 
 const PAGE: &str = include_str!("../docs/fxt.md");

@@ -14,7 +14,7 @@
 use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::stepping::SolverSettings;
-use flexspline_tests::motion::{Run, on, problem};
+use flexspline_tests::motion::{deformed, loaded, on, problem};
 
 const TORQUE_N_M: f64 = 50.0;
 const ALLOWED_ARCSEC: f64 = 0.1;
@@ -23,11 +23,15 @@ const ALLOWED_LOADED_TWO_ROLLER_ARCSEC: f64 = 0.3;
 /// Errors (arc-seconds) at two points without load and at one with it.
 fn errors(kind: GeneratorKind, settings: SolverSettings) -> ([f64; 2], f64) {
     let problem = problem(&Drive::hhd_95(), kind, settings);
-    let mut run = Run::new(&problem);
+    let mut run = deformed(&problem);
     let pitch = run.pitch();
-    let idle = [0.7, 1.3].map(|pitches| run.to(pitches * pitch, 0.0).error_arcsec);
-    run.to(1.3 * pitch, TORQUE_N_M);
-    (idle, run.to(1.5 * pitch, TORQUE_N_M).error_arcsec)
+    let mut at = |pitches: f64, torque_n_m: f64| {
+        run.to(pitches * pitch, torque_n_m).unwrap();
+        run.error_arcsec()
+    };
+    let idle = [0.7, 1.3].map(|pitches| at(pitches, 0.0));
+    at(1.3, TORQUE_N_M);
+    (idle, at(1.5, TORQUE_N_M))
 }
 
 /// Prints and returns how far two choices are apart without load and with it.
@@ -93,8 +97,8 @@ fn increments_do_not_matter() {
     for kind in [GeneratorKind::Cam, GeneratorKind::TwoRoller] {
         let problem = problem(&Drive::hhd_95(), kind, on(MeshLevel::Standard));
         let at = |increments: usize| {
-            let mut run = Run::loaded(&problem, TORQUE_N_M);
-            run.turn(0.5 * run.pitch(), increments);
+            let mut run = loaded(&problem, TORQUE_N_M);
+            run.turn_in(0.5 * run.pitch(), increments).unwrap();
             run.error_arcsec()
         };
         let found = [2, 4, 8].map(at);

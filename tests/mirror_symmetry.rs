@@ -14,15 +14,16 @@
 
 use flexspline_sim::drive::GeneratorKind;
 use flexspline_sim::mesh::MeshLevel;
-use flexspline_tests::motion::{Run, Sample, hhd_95};
+use flexspline_sim::motion::Place;
+use flexspline_tests::motion::{hhd_95, loaded};
 
 fn mirrors(kind: GeneratorKind) {
     let problem = hhd_95(kind, MeshLevel::Coarse);
     for torque_n_m in [0.0, 20.0] {
-        let go = |sense: f64| -> Vec<Sample> {
-            let mut run = Run::loaded(&problem, sense * torque_n_m);
+        let go = |sense: f64| -> Vec<Place> {
+            let mut run = loaded(&problem, sense * torque_n_m);
             // Not commensurate with the pitch: every phase of the mesh cycle is met.
-            run.turn(sense * 1.7 * run.pitch(), 6)
+            run.turn_in(sense * 1.7 * run.pitch(), 6).unwrap()
         };
         let (forwards, backwards) = (go(1.0), go(-1.0));
         let worst =

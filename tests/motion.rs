@@ -1,15 +1,9 @@
-//! A drive taken through a path, with the errors it makes on the way.
-
-use std::f64::consts::{PI, TAU};
+//! Drives for the claims, and means over places on their way.
 
 use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
 use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::stepping::{Increment, Problem, Solver, SolverSettings, State};
-
-/// Arc-seconds in a radian.
-pub const ARCSEC: f64 = 180.0 * 3600.0 / PI;
-/// Arc-minutes in a radian.
-pub const ARCMIN: f64 = 180.0 * 60.0 / PI;
+use flexspline_sim::motion::{Motion, Place};
+use flexspline_sim::stepping::{Problem, SolverSettings};
 
 /// Default settings on a mesh.
 pub fn on(mesh: MeshLevel) -> SolverSettings {
@@ -73,93 +67,29 @@ pub fn range(values: impl IntoIterator<Item = f64> + Clone) -> f64 {
     values.clone().into_iter().fold(f64::NEG_INFINITY, f64::max) - values.into_iter().fold(f64::INFINITY, f64::min)
 }
 
-/// A converged increment and the transmission error at its end.
-#[derive(Debug, Clone)]
-pub struct Sample {
-    /// Generator angle, rad.
-    pub generator_rad: f64,
-    /// Output angle minus generator angle over the ratio, arc-seconds.
-    pub error_arcsec: f64,
-    /// What the solver says of it.
-    pub increment: Increment,
+/// The drive deformed with its generator at zero, and a load on its output.
+pub fn loaded(problem: &Problem, torque_n_m: f64) -> Motion<'_> {
+    let mut motion = deformed(problem);
+    motion.load(torque_n_m).unwrap_or_else(|error| panic!("{}: {error}", problem.kind));
+    motion
 }
 
-/// A drive on its way.
-pub struct Run<'p> {
-    /// The solver; its memory of the states it passed is that of this run alone.
-    pub solver: Solver<'p>,
-    /// Where the drive stands.
-    pub state: State,
-    problem: &'p Problem,
-}
-
-impl<'p> Run<'p> {
-    /// The drive assembled with its generator at zero, and without load.
-    pub fn new(problem: &'p Problem) -> Run<'p> {
-        let mut solver = Solver::new(problem);
-        let (state, _) = solver.deform(0.0).unwrap_or_else(|error| panic!("{}: {error}", problem.kind));
-        Run { solver, state, problem }
-    }
-
-    /// The same with a load on the output.
-    pub fn loaded(problem: &'p Problem, torque_n_m: f64) -> Run<'p> {
-        let mut run = Run::new(problem);
-        run.to(0.0, torque_n_m);
-        run
-    }
-
-    /// A solver that remembers nothing goes on from here.
-    pub fn forget(&mut self) {
-        self.solver = Solver::new(self.problem);
-    }
-
-    /// One increment to a generator angle and a load.
-    pub fn to(&mut self, generator_rad: f64, torque_n_m: f64) -> Sample {
-        let (state, increment) = self
-            .solver
-            .increment(&self.state, generator_rad, torque_n_m)
-            .unwrap_or_else(|error| panic!("{}: {error}", self.problem.kind));
-        self.state = state;
-        Sample { generator_rad, error_arcsec: self.error_arcsec(), increment }
-    }
-
-    /// Turns the generator by `turn_rad` in equal increments under the load there is.
-    pub fn turn(&mut self, turn_rad: f64, increments: usize) -> Vec<Sample> {
-        let start = self.state.generator_rad;
-        (1..=increments)
-            .map(|k| self.to(start + turn_rad * k as f64 / increments as f64, self.state.torque_n_m))
-            .collect()
-    }
-
-    /// One flexspline pitch to settle in the sense of `sense` (+1 or -1), the next in equal increments reported.
-    pub fn settled_pitch(&mut self, sense: f64, increments: usize) -> Vec<Sample> {
-        let pitch = self.pitch();
-        self.turn(sense * pitch, increments);
-        self.turn(sense * pitch, increments)
-    }
-
-    /// Transmission error here, arc-seconds.
-    pub fn error_arcsec(&self) -> f64 {
-        (self.state.output_rad - self.state.generator_rad / self.problem.drive.ratio()) * ARCSEC
-    }
-
-    /// Pitch of the flexspline, rad: the period of a perfect drive.
-    pub fn pitch(&self) -> f64 {
-        TAU / f64::from(self.problem.drive.flexspline.teeth)
-    }
+/// The drive deformed with its generator at zero, without load.
+pub fn deformed(problem: &Problem) -> Motion<'_> {
+    Motion::deformed(problem, 0.0).unwrap_or_else(|error| panic!("{}: {error}", problem.kind))
 }
 
 /// Mean error of a stretch, arc-seconds.
-pub fn mean_error(samples: &[Sample]) -> f64 {
-    mean(samples.iter().map(|sample| sample.error_arcsec))
+pub fn mean_error(places: &[Place]) -> f64 {
+    mean(places.iter().map(|place| place.error_arcsec))
 }
 
 /// Mean generator torque of a stretch, N m.
-pub fn mean_generator_torque(samples: &[Sample]) -> f64 {
-    mean(samples.iter().map(|sample| sample.increment.generator_torque_n_m))
+pub fn mean_generator_torque(places: &[Place]) -> f64 {
+    mean(places.iter().map(|place| place.increment.generator_torque_n_m))
 }
 
 /// Mean Newton iterations of a stretch.
-pub fn mean_iterations(samples: &[Sample]) -> f64 {
-    mean(samples.iter().map(|sample| sample.increment.iterations as f64))
+pub fn mean_iterations(places: &[Place]) -> f64 {
+    mean(places.iter().map(|place| place.increment.iterations as f64))
 }

@@ -16,17 +16,17 @@
 
 use flexspline_sim::drive::GeneratorKind;
 use flexspline_sim::mesh::MeshLevel;
-use flexspline_tests::motion::{Run, hhd_95, range};
+use flexspline_tests::motion::{hhd_95, loaded, range};
 
 /// Increments in a pitch.
 const INCREMENTS: usize = 5;
 
 fn repeats(kind: GeneratorKind, mesh: MeshLevel, torque_n_m: f64) {
     let problem = hhd_95(kind, mesh);
-    let mut run = Run::loaded(&problem, torque_n_m);
-    let first = run.settled_pitch(1.0, INCREMENTS);
+    let mut run = loaded(&problem, torque_n_m);
+    let first = run.settled_pitch(1.0, INCREMENTS).unwrap();
     run.forget();
-    let second = run.turn(run.pitch(), INCREMENTS);
+    let second = run.turn_in(run.pitch(), INCREMENTS).unwrap();
     let errors = || first.iter().map(|sample| sample.error_arcsec);
     let difference =
         errors().zip(&second).map(|(first, second)| (second.error_arcsec - first).abs()).fold(0.0, f64::max);

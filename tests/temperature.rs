@@ -14,7 +14,7 @@
 use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::stepping::{Problem, SolverSettings};
-use flexspline_tests::motion::{Run, mean_error, on};
+use flexspline_tests::motion::{deformed, loaded, mean_error, on};
 
 fn similar(kind: GeneratorKind) {
     let cold = Drive::hhd_95();
@@ -32,9 +32,9 @@ fn similar(kind: GeneratorKind) {
     warm.output.drag_torque_n_m *= f * s.powi(3);
     let sweep = |drive: &Drive, temperature_c: f64, settings: SolverSettings, torque_n_m: f64| {
         let problem = Problem::new(drive, kind, temperature_c, settings).unwrap();
-        let mut run = Run::loaded(&problem, torque_n_m);
-        run.turn(run.pitch(), 3);
-        mean_error(&run.turn(run.pitch(), 3))
+        let mut run = loaded(&problem, torque_n_m);
+        run.turn_in(run.pitch(), 3).unwrap();
+        mean_error(&run.turn_in(run.pitch(), 3).unwrap())
     };
     let at_cold = sweep(&cold, 20.0, settings(1.0), torque_n_m);
     let at_warm = sweep(&warm, warm_c, settings(f / s), f * s.powi(3) * torque_n_m);
@@ -67,9 +67,9 @@ fn a_warm_flexspline_takes_the_backlash() {
     drive.temperature.housing_expansion_per_k = 0.0;
     let backlash = |temperature_c: f64| {
         let problem = Problem::new(&drive, GeneratorKind::Cam, temperature_c, on(MeshLevel::Standard)).unwrap();
-        let mut run = Run::new(&problem);
-        run.turn(run.pitch(), 3);
-        -2.0 * mean_error(&run.turn(run.pitch(), 4)) / 60.0
+        let mut run = deformed(&problem);
+        run.turn_in(run.pitch(), 3).unwrap();
+        -2.0 * mean_error(&run.turn_in(run.pitch(), 4).unwrap()) / 60.0
     };
     let [cold, middle, warm] = [10.0, 20.0, 30.0].map(backlash);
     let per_k = (warm - cold) / 20.0;
@@ -83,9 +83,9 @@ fn warming_everything_leaves_the_backlash() {
     let drive = Drive::hhd_95();
     let [cold, warm] = [-40.0, 70.0].map(|temperature_c| {
         let problem = Problem::new(&drive, GeneratorKind::Cam, temperature_c, on(MeshLevel::Coarse)).unwrap();
-        let mut run = Run::new(&problem);
-        run.turn(run.pitch(), 3);
-        mean_error(&run.turn(run.pitch(), 3))
+        let mut run = deformed(&problem);
+        run.turn_in(run.pitch(), 3).unwrap();
+        mean_error(&run.turn_in(run.pitch(), 3).unwrap())
     });
     println!("cam: lag {cold:.5}\" at -40 C, {warm:.5}\" at 70 C");
     assert!((cold - warm).abs() < 0.01);

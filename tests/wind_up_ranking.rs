@@ -16,7 +16,9 @@
 
 use flexspline_sim::drive::GeneratorKind;
 use flexspline_sim::mesh::MeshLevel;
-use flexspline_tests::motion::{ARCSEC, Run, Sample, hhd_95, mean_error, mean_generator_torque, range};
+use flexspline_sim::motion::Place;
+use flexspline_sim::units::ARCSEC_PER_RAD;
+use flexspline_tests::motion::{hhd_95, loaded, mean_error, mean_generator_torque, range};
 
 const TORQUE_N_M: f64 = 50.0;
 
@@ -30,14 +32,14 @@ fn increments(kind: GeneratorKind) -> usize {
 }
 
 /// A pitch under load, and how far the output came in it (rad).
-fn loaded_pitch(kind: GeneratorKind) -> (Vec<Sample>, f64) {
+fn loaded_pitch(kind: GeneratorKind) -> (Vec<Place>, f64) {
     let problem = hhd_95(kind, MeshLevel::Standard);
-    let mut run = Run::loaded(&problem, TORQUE_N_M);
+    let mut run = loaded(&problem, TORQUE_N_M);
     let pitch = run.pitch();
-    run.turn(pitch, 4);
-    let from = run.state.output_rad;
-    let samples = run.turn(pitch, increments(kind));
-    (samples, run.state.output_rad - from)
+    run.turn_in(pitch, 4).unwrap();
+    let from = run.state().output_rad;
+    let samples = run.turn_in(pitch, increments(kind)).unwrap();
+    (samples, run.state().output_rad - from)
 }
 
 fn balances(kind: GeneratorKind) {
@@ -72,7 +74,7 @@ fn balances(kind: GeneratorKind) {
         (by_generator + by_load) / by_load
     );
     assert!(((by_generator + by_load) / by_load).abs() <= 1e-3, "{kind}: work {by_generator} and {by_load}");
-    assert!((output_turn * ARCSEC - pitch / 95.0 * ARCSEC).abs() < 1e-3);
+    assert!((output_turn * ARCSEC_PER_RAD - pitch / 95.0 * ARCSEC_PER_RAD).abs() < 1e-3);
 }
 
 #[test]
@@ -100,8 +102,8 @@ fn cam_is_stiffest_and_two_roller_softest() {
     let order = [GeneratorKind::Cam, GeneratorKind::DoubleDisc, GeneratorKind::FourRoller, GeneratorKind::TwoRoller];
     let errors = order.map(|kind| {
         let problem = hhd_95(kind, MeshLevel::Standard);
-        let mut run = Run::loaded(&problem, TORQUE_N_M);
-        mean_error(&run.turn(run.pitch(), 3))
+        let mut run = loaded(&problem, TORQUE_N_M);
+        mean_error(&run.turn_in(run.pitch(), 3).unwrap())
     });
     for (kind, error) in order.iter().zip(errors) {
         println!("{kind}: {error:.2}\" = {:.3}' at {TORQUE_N_M} N.m", error / 60.0);

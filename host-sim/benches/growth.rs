@@ -25,7 +25,7 @@ use flexspline_sim::drive::{Drive, GeneratorKind, RigidMesh};
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::stepping::{Effort, Method, Problem, SolverSettings};
 
-use common::{Motion, SETTLING, STEP_RAD};
+use common::{Run, SETTLING, STEP_RAD};
 
 const GENERATORS: [GeneratorKind; 2] = [GeneratorKind::Cam, GeneratorKind::FourRoller];
 const TEETH: [u32; 3] = [100, 188, 300];
@@ -96,19 +96,19 @@ fn measure(drive: &Drive, kind: GeneratorKind, mesh: MeshLevel) -> Case {
     let clock = ProcessTime::now();
     let problem = Problem::new(drive, kind, drive.temperature.reference_c, settings).expect("the drive is sound");
     let set_up = clock.elapsed();
-    let mut motion = Motion::new(&problem, TORQUE_N_M * scale, STEP_RAD / scale, SETTLING);
+    let mut run = Run::new(&problem, TORQUE_N_M * scale, STEP_RAD / scale, SETTLING);
     let mut rounds: Vec<(Duration, usize, Effort)> = (0..ROUNDS)
         .map(|_| {
-            motion.reset();
+            run.reset();
             let clock = ProcessTime::now();
-            (0..ROUND).for_each(|_| motion.advance());
-            (clock.elapsed(), motion.iterations, motion.solver.effort)
+            (0..ROUND).for_each(|_| run.advance());
+            (clock.elapsed(), run.iterations, run.motion.take_effort())
         })
         .collect();
     rounds.sort_by_key(|(time, ..)| *time);
     let (time, iterations, effort) = rounds[ROUNDS / 2];
     let each = |time: Duration| time.as_secs_f64() * 1e3 / ROUND as f64;
-    let [flanks, bore_edges] = motion.contacts;
+    let [flanks, bore_edges] = run.contacts;
     println!(
         "{kind} {}/{} {mesh}, {} dof: {:.2} ms CPU, {:.1} iterations, {:.2} factorisations, {flanks} flanks and {bore_edges} \
          bore edges touch; clocks: assembly {:.2}, contact {:.2}, factorisation {:.2}, solution {:.2} ms; set-up {:.0} ms CPU",

@@ -21,7 +21,7 @@ use criterion::{BenchmarkGroup, Criterion, SamplingMode, criterion_group, criter
 use flexspline_sim::drive::GeneratorKind;
 use flexspline_sim::stepping::{Method, Problem};
 
-use common::{CpuTime, Motion, SETTLING, STEP_RAD};
+use common::{CpuTime, Run, SETTLING, STEP_RAD};
 
 const CASES: [(GeneratorKind, f64); 5] = [
     (GeneratorKind::Cam, 0.0),
@@ -51,30 +51,30 @@ fn increments(criterion: &mut Criterion<CpuTime>) {
 /// Benchmarks one case; mean CPU milliseconds of its increments, if the filter of the command let it run.
 fn mean_ms<M: Measurement>(group: &mut BenchmarkGroup<'_, M>, problem: &Problem, torque_n_m: f64) -> Option<f64> {
     let (kind, method) = (problem.kind, problem.settings.method);
-    let settle = if method == Method::Fast { Motion::new } else { Motion::taken_over };
+    let settle = if method == Method::Fast { Run::new } else { Run::taken_over };
     // Settled when it first runs: a case that is filtered out costs nothing.
-    let run: RefCell<Option<(Motion, Duration)>> = RefCell::new(None);
+    let run: RefCell<Option<(Run, Duration)>> = RefCell::new(None);
     group.bench_function(format!("{kind} {torque_n_m} N.m/{method}"), |bencher| {
         let mut run = run.borrow_mut();
-        let (motion, time) =
+        let (settled, time) =
             run.get_or_insert_with(|| (settle(problem, torque_n_m, STEP_RAD, SETTLING), Duration::ZERO));
         bencher.iter(|| {
             let clock = ProcessTime::now();
-            motion.advance();
+            settled.advance();
             *time += clock.elapsed();
         });
     });
-    let (motion, time) = run.into_inner()?;
-    let each = |time: Duration| time.as_secs_f64() * 1e3 / motion.increments as f64;
-    let effort = motion.solver.effort;
+    let (mut settled, time) = run.into_inner()?;
+    let each = |time: Duration| time.as_secs_f64() * 1e3 / settled.increments as f64;
+    let effort = settled.motion.take_effort();
     println!(
         "    {kind} {torque_n_m} N.m, {method}, {} dof: {:.2} ms CPU, {:.1} iterations, {:.2} factorisations (mean of {}); \
          clocks: assembly {:.2}, contact {:.2}, analysis {:.2}, factorisation {:.2}, solution {:.2} ms",
         problem.degrees_of_freedom(),
         each(time),
-        motion.iterations as f64 / motion.increments as f64,
-        effort.factorisations as f64 / motion.increments as f64,
-        motion.increments,
+        settled.iterations as f64 / settled.increments as f64,
+        effort.factorisations as f64 / settled.increments as f64,
+        settled.increments,
         each(effort.assembly),
         each(effort.contact),
         each(effort.analysis),

@@ -27,13 +27,13 @@ use flexspline_sim::condense::{
 };
 use flexspline_sim::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
 use flexspline_sim::drive::GeneratorKind;
-use flexspline_sim::element::{PACKED, add_tangent_and_force, linear_stiffness};
+use flexspline_sim::fem::element::{PACKED, add_tangent_and_force, linear_stiffness};
 use flexspline_sim::fem::{Cholesky, ElementPositions, Factor, Pattern};
 use flexspline_sim::mesh::WheelMesh;
+use flexspline_sim::simulate::stress::peak_stress;
 use flexspline_sim::stepping::{CondensedDrive, Method, Problem, State};
-use flexspline_sim::stress::peak_stress;
 
-use common::{CpuTime, Motion, STEP_RAD};
+use common::{CpuTime, Run, STEP_RAD};
 
 const TORQUE_N_M: f64 = 50.0;
 /// Gap (mm) up to which flank pairs are looked at, and have a place in the sparsity pattern.
@@ -44,7 +44,7 @@ const SPRING: f64 = 1.0;
 
 fn parts(criterion: &mut Criterion<CpuTime>) {
     let problem = common::problem(GeneratorKind::Cam, Method::Fast);
-    let state = Motion::new(&problem, TORQUE_N_M, STEP_RAD, 5).state;
+    let state = Run::new(&problem, TORQUE_N_M, STEP_RAD, 5).motion.state().clone();
     let whole = problem.whole_state(&state).into_owned();
     let mut group = criterion.benchmark_group("part");
     group.sample_size(10).warm_up_time(Duration::from_millis(200)).measurement_time(Duration::from_millis(800));

@@ -24,7 +24,6 @@ use flexspline_sim::closed_loop::{fly, write_flight};
 use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::output::write_whole;
 use flexspline_sim::stepping::{Method, SolverSettings};
-use flexspline_sim::sweep::rated_torque_n_m;
 
 /// The order of the target's programs.
 const KINDS: [GeneratorKind; 4] =
@@ -67,7 +66,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn make_maps(folder: &Path, kinds: &[&str]) -> Result<(), Box<dyn Error>> {
     let settings = SolverSettings { method: Method::Fast, ..SolverSettings::default() };
     for kind in KINDS.iter().filter(|kind| kinds.is_empty() || kinds.contains(&kind.to_string().as_str())) {
-        let map = DenseMap::compute(&Drive::hhd_95(), *kind, rated_torque_n_m(*kind), settings)?;
+        let map = DenseMap::compute(&Drive::hhd_95(), *kind, kind.rated_torque_n_m(), settings)?;
         write_whole(&folder.join(format!("{kind}.csv")), |file| file.write_all(map.to_csv().as_bytes()))?;
         println!("{kind}");
     }
@@ -84,7 +83,7 @@ fn run<P: Plant + Clone>(
 ) -> Result<(), Box<dyn Error>> {
     let mut rows = Vec::new();
     let plants = std::array::from_fn(|_| plant.clone());
-    let antenna = fly(image, plants, servo, profile, rated_torque_n_m(kind), &mut |row| rows.push(row))
+    let antenna = fly(image, plants, servo, profile, kind.rated_torque_n_m(), &mut |row| rows.push(row))
         .ok_or_else(|| format!("{kind}: the table cannot be flown"))?;
     let mut text = String::new();
     antenna.write(&kind.to_string(), &mut text)?;
@@ -102,7 +101,7 @@ fn rover(tables: &Path) -> Result<(), Box<dyn Error>> {
         let plant = format!("tests/firmware/plant/{kind}.csv");
         let map = DenseMap::parse(kind, &plant, &std::fs::read_to_string(&plant)?)?;
         let image = std::fs::read(tables.join(format!("{kind}.fxt")))?;
-        let (name, largest) = (kind.to_string(), rated_torque_n_m(kind));
+        let (name, largest) = (kind.to_string(), kind.rated_torque_n_m());
         let gear = Gear::new(map.view(), first_c);
         let mut joint = RoverJoint::new(number as u32, &name, &image, gear, largest, first_c)
             .ok_or_else(|| format!("{kind}: the table cannot be flown"))?;

@@ -3,18 +3,16 @@
 //! Nominal output = generator / ratio + harmonics + play (backlash, loaded by torque) + wind-up (torque). Angles are radians,
 //! errors arc-seconds at the output, torque N·m, positive where it turns the output forward.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use flexspline::{FixedMember, GeneratorAngle, PlayState, Table};
-use serde::Deserialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::drive::{DriveError, Problem};
+use crate::drive::DriveError;
 use crate::kernels::Kernels;
-use crate::suggest::{did_you_mean, likeliest_path, question};
-use crate::tables::ARCSEC_PER_RAD;
+use crate::toml_file::{Allowed, Refused, Section, TomlFile, from, number, one_of, real, whole};
+use crate::units::ARCSEC_PER_RAD;
 
 /// Which wheel does not turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +45,17 @@ pub struct Teeth {
     pub circular_spline: u32,
     /// Which of them is fixed.
     pub fixed: Fixed,
+}
+
+impl Teeth {
+    /// Of the wheel that is the output.
+    #[must_use]
+    pub const fn of_output(self) -> u32 {
+        match self.fixed {
+            Fixed::Flexspline => self.circular_spline,
+            Fixed::CircularSpline => self.flexspline,
+        }
+    }
 }
 
 /// One harmonic of the nominal output error, `amplitude sin(order generator + phase)`.
@@ -120,6 +129,20 @@ impl Nominal {
             .sum()
     }
 
+    /// The teeth; of a model that gives a ratio alone, those of the strain wave drive of two waves that has it: `z_c / 2` with the
+    /// flexspline fixed, `-z_f / 2` with the circular spline fixed, and two teeth of difference.
+    #[must_use]
+    pub fn teeth_or_of_two_waves(&self) -> Teeth {
+        self.teeth.unwrap_or_else(|| {
+            let more = (2.0 * self.ratio.abs()).round().max(3.0) as u32;
+            if self.ratio > 0.0 {
+                Teeth { flexspline: more - 2, circular_spline: more, fixed: Fixed::Flexspline }
+            } else {
+                Teeth { flexspline: more, circular_spline: more + 2, fixed: Fixed::CircularSpline }
+            }
+        })
+    }
+
     /// What a table says of wind-up and backlash: the part of the error that is odd in the torque, at mid temperature; the backlash is
     /// what is left of it as the torque goes to zero. Kinematic error is left to the table's own prediction.
     #[must_use]
@@ -174,7 +197,7 @@ impl Nominal {
     #[must_use]
     pub fn template(flexspline_teeth: u32, circular_spline_teeth: u32) -> String {
         let Spread { stiffness, backlash, harmonic, .. } = USUAL_SPREAD;
-        let (fewest, most) = (TEETH.start(), TEETH.end());
+        let (fewest, most) = (TEETH.low, TEETH.high);
         format!(
             "\
 # A drive known from its catalogue, for `flexspline diagnose DATA.csv --model THIS`: put in the numbers of yours.
@@ -189,7 +212,7 @@ fixed = \"flexspline\"           # the wheel that does not turn; \"flexspline\" 
                                # another kind; negative: they turn opposite ways; 1 to {LARGEST_RATIO:e} or -{LARGEST_RATIO:e} to -1
 
 [nominal]
-# Torsional stiffness, N.m/rad, {STIFFNESS:e}: one number, or that from each torque (N.m, the first is 0) on, as catalogues
+# Torsional stiffness, N.m/rad, {STIFFNESS}: one number, or that from each torque (N.m, the first is 0) on, as catalogues
 # give K1, K2, K3 beyond the torques 0, T1, T2.
 stiffness_n_m_per_rad = [[0.0, 20000.0], [10.0, 27000.0], [30.0, 30000.0]]
 backlash_arcsec = 60.0         # whole width of the play at the output, arcsec; {BACKLASH}
@@ -215,96 +238,50 @@ harmonic = {harmonic:?}                 # of the harmonics, of their amplitude; 
     /// # Errors
     /// Every problem found, each with file, line, field, value found and what is allowed.
     pub fn from_toml(file_name: &str, text: &str) -> Result<Nominal, DriveError> {
-        let line = |span: Range<usize>| 1 + text.get(..span.start).unwrap_or("").matches('\n').count();
-        if let Ok(table) = DeTable::parse(text) {
-            let mut problems = Vec::new();
-            unknown_keys("", table.get_ref(), &mut |span, path| {
-                let place = format!("{file_name}:{}", line(span));
-                problems.push(Problem { place, field: path.to_owned(), what: unknown_key(path) });
-            });
-            if !problems.is_empty() {
-                return Err(DriveError { problems });
-            }
-        }
-        let file: FileForm = toml::from_str(text).map_err(|error| {
-            let place = error.span().map_or(file_name.to_owned(), |span| format!("{file_name}:{}", line(span)));
-            let found = error.span().and_then(|span| text.get(span)).filter(|t| t.len() < 60 && !t.contains('\n'));
-            let found = found.map(|t| format!(", found {t}")).unwrap_or_default();
-            DriveError {
-                problems: vec![Problem { place, field: String::new(), what: format!("{}{found}", error.message()) }],
-            }
-        })?;
-        let mut problems = Vec::new();
-        let nominal = file.check(&mut |span, field: &str, what| {
-            let place = span.map_or(file_name.to_owned(), |span| format!("{file_name}:{}", line(span)));
-            problems.push(Problem { place, field: field.to_owned(), what });
-        });
-        match nominal {
-            Some(nominal) if problems.is_empty() => Ok(nominal),
-            _ => Err(DriveError { problems }),
+        let mut file = TomlFile::new(file_name, text);
+        let nominal = file.parse().and_then(|table| Nominal::of_file(&mut file, &table));
+        match nominal.filter(|_| file.is_sound()) {
+            Some(nominal) => Ok(nominal),
+            None => Err(DriveError { problems: file.problems() }),
         }
     }
-}
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FileForm {
-    drive: DriveForm,
-    nominal: NominalForm,
-    /// Causes beside the nominal model, which [`crate::extension::Model`] reads.
-    #[serde(default, rename = "extension")]
-    _extension: serde::de::IgnoredAny,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct DriveForm {
-    flexspline_teeth: Option<Spanned<u32>>,
-    circular_spline_teeth: Option<Spanned<u32>>,
-    fixed: Option<Spanned<String>>,
-    ratio: Option<Spanned<f64>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct NominalForm {
-    stiffness_n_m_per_rad: Spanned<StiffnessForm>,
-    backlash_arcsec: Spanned<f64>,
-    friction_torque_n_m: Option<Spanned<f64>>,
-    temperature_c: Option<Spanned<f64>>,
-    #[serde(default)]
-    harmonic: Vec<HarmonicForm>,
-    unit_to_unit: Option<SpreadForm>,
-}
-
-#[derive(Deserialize)]
-#[serde(untagged, expecting = "expected a stiffness in N.m/rad or a list [[0.0, K1], [T1, K2], ...]")]
-enum StiffnessForm {
-    One(f64),
-    Steps(Vec<[f64; 2]>),
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct HarmonicForm {
-    order_per_generator_turn: Spanned<f64>,
-    amplitude_arcsec: Spanned<f64>,
-    phase_rad: Spanned<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SpreadForm {
-    stiffness: Option<Spanned<f64>>,
-    backlash: Option<Spanned<f64>>,
-    harmonic: Option<Spanned<f64>>,
-    harmonic_phase_rad: Option<Spanned<f64>>,
+    /// Reads a file that has been parsed; nothing where what is wrong with it leaves no model.
+    fn of_file(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Option<Nominal> {
+        // What a diagnosis found stands in [extension], which `crate::extension` reads.
+        file.refuse_unknown_keys(table, &KEYS, &["extension"]);
+        if !file.is_sound() {
+            return None;
+        }
+        let drive = file.section(table, "drive");
+        let nominal = file.section(table, "nominal");
+        let (ratio, teeth) = drive.and_then(|drive| ratio_and_teeth(file, &drive))?;
+        let nominal = nominal?;
+        let stiffness = nominal.needed(file, "stiffness_n_m_per_rad", stiffness);
+        let backlash = nominal.needed(file, "backlash_arcsec", |v| real(&BACKLASH, v));
+        let friction = nominal.given(file, "friction_torque_n_m", |v| real(&FRICTION, v));
+        let temperature = nominal.given(file, "temperature_c", |v| real(&TEMPERATURE, v));
+        let harmonics = nominal.sections(file, "harmonic").iter().map(|section| harmonic(file, section)).collect();
+        let spread = nominal.section(file, "unit_to_unit").map_or(USUAL_SPREAD, |section| spread(file, &section));
+        Some(Nominal {
+            ratio,
+            teeth,
+            stiffness: stiffness?,
+            backlash_arcsec: backlash?,
+            friction_torque_n_m: friction.unwrap_or(0.0),
+            temperature_c: temperature.unwrap_or(USUAL_TEMPERATURE_C),
+            harmonics,
+            spread,
+            kernels: None,
+        })
+    }
 }
 
 /// Spread assumed where the file gives none: stiffness, backlash, harmonics of drives of one type.
 const USUAL_SPREAD: Spread = Spread { stiffness: 0.03, backlash: 0.05, harmonic: 0.20, harmonic_phase_rad: 0.20 };
 
-type Refuse<'a> = dyn FnMut(Option<Range<usize>>, &str, String) + 'a;
+/// Temperature at which the numbers of a file hold that gives none, °C.
+const USUAL_TEMPERATURE_C: f64 = 20.0;
 
 /// Every key of the file; those of `nominal.harmonic` are of each entry.
 const KEYS: [&str; 18] = [
@@ -328,225 +305,102 @@ const KEYS: [&str; 18] = [
     "nominal.unit_to_unit.harmonic_phase_rad",
 ];
 
-/// What a number of the file may be.
-#[derive(Clone, Copy)]
-struct Bounds {
-    low: f64,
-    high: f64,
-}
-
-impl std::fmt::LowerExp for Bounds {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} to {:e}", self.low, self.high)
-    }
-}
-
-impl std::fmt::Display for Bounds {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} to {}", self.low, self.high)
-    }
-}
-
-const TEETH: std::ops::RangeInclusive<u32> = 20..=2000;
+const TEETH: Allowed = from(20.0, 2000.0);
 /// Most teeth that the circular spline has more than the flexspline.
 const MOST_TEETH_MORE: u32 = 12;
 const LARGEST_RATIO: f64 = 1e6;
-const STIFFNESS: Bounds = Bounds { low: 1e-3, high: 1e12 };
-const BACKLASH: Bounds = Bounds { low: 0.0, high: 1e5 };
-const FRICTION: Bounds = Bounds { low: 0.0, high: 1e6 };
-const TEMPERATURE: Bounds = Bounds { low: -273.0, high: 500.0 };
-const ORDER: Bounds = Bounds { low: 1e-6, high: 1e5 };
-const AMPLITUDE: Bounds = Bounds { low: -1e5, high: 1e5 };
-const PHASE: Bounds = Bounds { low: -100.0, high: 100.0 };
-const SHARE: Bounds = Bounds { low: 0.0, high: 1.0 };
+const STIFFNESS: Allowed = from(1e-3, 1e12);
+const BACKLASH: Allowed = from(0.0, 1e5);
+const FRICTION: Allowed = from(0.0, 1e6);
+const TEMPERATURE: Allowed = from(-273.0, 500.0);
+const ORDER: Allowed = from(1e-6, 1e5);
+const AMPLITUDE: Allowed = from(-1e5, 1e5);
+const PHASE: Allowed = from(-100.0, 100.0);
+const SHARE: Allowed = from(0.0, 1.0);
 
-fn number(value: &Spanned<f64>, field: &str, bounds: Bounds, refuse: &mut Refuse<'_>) -> f64 {
-    let found = *value.get_ref();
-    if !(found >= bounds.low && found <= bounds.high) {
-        refuse(Some(value.span()), field, format!("found {found}, allowed: {bounds}"));
-    }
-    found
-}
-
-/// Every key of a table that the file may not hold, with its path.
-fn unknown_keys(section: &str, table: &DeTable<'_>, refuse: &mut impl FnMut(Range<usize>, &str)) {
-    for (key, value) in table {
-        let name = key.get_ref().as_ref();
-        let path = if section.is_empty() { name.to_owned() } else { format!("{section}.{name}") };
-        let holds =
-            |known: &&str| **known == path || known.strip_prefix(&*path).is_some_and(|rest| rest.starts_with('.'));
-        // What a diagnosis found stands in [extension], which `crate::extension` reads.
-        if path == "extension" {
-            continue;
-        }
-        if !KEYS.iter().any(holds) {
-            refuse(key.span(), &path);
-            continue;
-        }
-        match value.get_ref() {
-            DeValue::Table(inner) => unknown_keys(&path, inner, refuse),
-            DeValue::Array(entries) => {
-                for entry in entries.iter().filter_map(|entry| entry.get_ref().as_table()) {
-                    unknown_keys(&path, entry, refuse);
-                }
-            }
-            _ => {}
-        }
-    }
-}
-
-/// What to say of a key that is none.
-fn unknown_key(path: &str) -> String {
-    let section = path.rsplit_once('.').map_or("", |(section, _)| section);
-    let hint = likeliest_path(path, &KEYS).map_or_else(String::new, |path| format!("; {}", question(path)));
-    let inside = |known: &&str| match section {
-        "" => Some(known.split('.').next().unwrap_or(known).to_owned()),
-        _ => known.strip_prefix(section)?.strip_prefix('.')?.split('.').next().map(str::to_owned),
+/// One stiffness, or that from each torque on: `[torque, stiffness]`.
+fn stiffness(value: &Spanned<DeValue>) -> Result<Vec<[f64; 2]>, Refused> {
+    let allowed = "a stiffness in N.m/rad or a list [[0.0, K1], [T1, K2], ...]";
+    let pair = |step: &Spanned<DeValue>| match step.get_ref().as_array().map(|pair| (pair.len(), pair)) {
+        Some((2, pair)) => number(pair[0].get_ref()).zip(number(pair[1].get_ref())).map(|(torque, k)| [torque, k]),
+        _ => None,
     };
-    let mut allowed: Vec<String> = KEYS.iter().filter_map(inside).collect();
-    allowed.dedup();
-    format!("unknown key{hint}; allowed: {}", allowed.join(", "))
+    let steps: Option<Vec<[f64; 2]>> = match value.get_ref() {
+        DeValue::Array(steps) => steps.iter().map(pair).collect(),
+        one => number(one).map(|stiffness| vec![[0.0, stiffness]]),
+    };
+    let steps = steps.ok_or_else(|| Refused::found(value, allowed))?;
+    let rising = steps.windows(2).all(|pair| pair[0][0] < pair[1][0]);
+    let sound = steps.iter().all(|&[torque, k]| torque.is_finite() && STIFFNESS.refusal(k).is_none());
+    if steps.first().is_none_or(|first| first[0] != 0.0) || !rising || !sound {
+        let what =
+            format!("found {steps:?} as [torque, stiffness], allowed: torques from 0 upward, stiffness {STIFFNESS}");
+        return Err(Refused::because(value, what));
+    }
+    Ok(steps)
 }
 
-impl FileForm {
-    fn check(self, refuse: &mut Refuse<'_>) -> Option<Nominal> {
-        let (ratio, teeth) = self.drive.check(refuse)?;
-        let form = self.nominal;
-        let stiffness = match form.stiffness_n_m_per_rad.get_ref() {
-            StiffnessForm::One(stiffness) => vec![[0.0, *stiffness]],
-            StiffnessForm::Steps(steps) => steps.clone(),
-        };
-        let rising = stiffness.windows(2).all(|pair| pair[0][0] < pair[1][0]);
-        let allowed = STIFFNESS.low..=STIFFNESS.high;
-        let sound = stiffness.iter().all(|&[torque, k]| torque.is_finite() && allowed.contains(&k));
-        if stiffness.first().is_none_or(|first| first[0] != 0.0) || !rising || !sound {
-            refuse(
-                Some(form.stiffness_n_m_per_rad.span()),
-                "nominal.stiffness_n_m_per_rad",
-                format!(
-                    "found {stiffness:?} as [torque, stiffness], allowed: torques from 0 upward, stiffness 0.001 to 1e12"
-                ),
-            );
-        }
-        let optional =
-            |value: &Option<Spanned<f64>>, field: &str, bounds: Bounds, usual: f64, refuse: &mut Refuse<'_>| {
-                value.as_ref().map_or(usual, |value| number(value, field, bounds, refuse))
-            };
-        let harmonics = form
-            .harmonic
-            .iter()
-            .enumerate()
-            .map(|(k, h)| {
-                let field = |name: &str| format!("nominal.harmonic[{k}].{name}");
-                Harmonic {
-                    order_per_generator_turn: number(
-                        &h.order_per_generator_turn,
-                        &field("order_per_generator_turn"),
-                        ORDER,
-                        refuse,
-                    ),
-                    amplitude_arcsec: number(&h.amplitude_arcsec, &field("amplitude_arcsec"), AMPLITUDE, refuse),
-                    phase_rad: number(&h.phase_rad, &field("phase_rad"), PHASE, refuse),
-                }
-            })
-            .collect();
-        let spread = form.unit_to_unit.as_ref().map_or(USUAL_SPREAD, |s| {
-            let mut share = |value: &Option<Spanned<f64>>, name: &str, usual: f64| {
-                optional(value, &format!("nominal.unit_to_unit.{name}"), SHARE, usual, refuse)
-            };
-            let harmonic = share(&s.harmonic, "harmonic", USUAL_SPREAD.harmonic);
-            Spread {
-                stiffness: share(&s.stiffness, "stiffness", USUAL_SPREAD.stiffness),
-                backlash: share(&s.backlash, "backlash", USUAL_SPREAD.backlash),
-                harmonic,
-                harmonic_phase_rad: share(&s.harmonic_phase_rad, "harmonic_phase_rad", harmonic),
-            }
-        });
-        Some(Nominal {
-            ratio,
-            teeth,
-            stiffness,
-            backlash_arcsec: number(&form.backlash_arcsec, "nominal.backlash_arcsec", BACKLASH, refuse),
-            friction_torque_n_m: optional(
-                &form.friction_torque_n_m,
-                "nominal.friction_torque_n_m",
-                FRICTION,
-                0.0,
-                refuse,
-            ),
-            temperature_c: optional(&form.temperature_c, "nominal.temperature_c", TEMPERATURE, 20.0, refuse),
-            harmonics,
-            spread,
-            kernels: None,
-        })
+fn harmonic(file: &mut TomlFile<'_>, section: &Section<'_, '_>) -> Harmonic {
+    // What is refused has been told; the file is not read then, whatever stands here.
+    let mut needed = |key: &str, allowed: &Allowed| section.needed(file, key, |v| real(allowed, v)).unwrap_or(f64::NAN);
+    Harmonic {
+        order_per_generator_turn: needed("order_per_generator_turn", &ORDER),
+        amplitude_arcsec: needed("amplitude_arcsec", &AMPLITUDE),
+        phase_rad: needed("phase_rad", &PHASE),
     }
 }
 
-impl DriveForm {
-    fn check(&self, refuse: &mut Refuse<'_>) -> Option<(f64, Option<Teeth>)> {
-        match (&self.flexspline_teeth, &self.circular_spline_teeth, &self.ratio) {
-            (Some(flexspline), Some(circular_spline), None) => {
-                let (f, c) = (*flexspline.get_ref(), *circular_spline.get_ref());
-                if !TEETH.contains(&f) {
-                    refuse(
-                        Some(flexspline.span()),
-                        "drive.flexspline_teeth",
-                        format!("found {f}, allowed: {} to {}", TEETH.start(), TEETH.end()),
-                    );
-                    return None;
-                }
-                if c <= f || c > f + MOST_TEETH_MORE {
-                    let allowed = format!(
-                        "found {c}, allowed: {} to {}, more than the flexspline's {f}",
-                        f + 1,
-                        f + MOST_TEETH_MORE
-                    );
-                    refuse(Some(circular_spline.span()), "drive.circular_spline_teeth", allowed);
-                    return None;
-                }
-                let fixed = match &self.fixed {
-                    None => Fixed::Flexspline,
-                    Some(name) => match Fixed::ALL.into_iter().find(|fixed| fixed.name() == name.get_ref()) {
-                        Some(fixed) => fixed,
-                        None => {
-                            let names = Fixed::ALL.map(Fixed::name);
-                            let found = name.get_ref();
-                            let hint = did_you_mean("; ", found, names);
-                            let what = format!("found {found:?}, allowed: {}{hint}", names.join(", "));
-                            refuse(Some(name.span()), "drive.fixed", what);
-                            return None;
-                        }
-                    },
-                };
-                let waves = f64::from(c - f);
-                let ratio = match fixed {
-                    Fixed::Flexspline => f64::from(c) / waves,
-                    Fixed::CircularSpline => -f64::from(f) / waves,
-                };
-                Some((ratio, Some(Teeth { flexspline: f, circular_spline: c, fixed })))
-            }
-            (None, None, Some(ratio)) => {
-                let found = *ratio.get_ref();
-                if !(found.abs() >= 1.0 && found.abs() <= LARGEST_RATIO) {
-                    let what = format!("found {found}, allowed: 1 to 1e6 or -1e6 to -1");
-                    refuse(Some(ratio.span()), "drive.ratio", what);
-                    return None;
-                }
-                Some((found, None))
-            }
-            _ => {
-                let given = [
-                    ("flexspline_teeth", self.flexspline_teeth.is_some()),
-                    ("circular_spline_teeth", self.circular_spline_teeth.is_some()),
-                    ("ratio", self.ratio.is_some()),
-                ];
-                let found: Vec<&str> = given.into_iter().filter(|(_, there)| *there).map(|(name, _)| name).collect();
-                let found = if found.is_empty() { "neither".to_owned() } else { found.join(", ") };
-                let what =
-                    format!("expected flexspline_teeth and circular_spline_teeth, or ratio alone; found {found}");
-                refuse(None, "drive", what);
-                None
-            }
+fn spread(file: &mut TomlFile<'_>, section: &Section<'_, '_>) -> Spread {
+    let mut share = |key: &str, usual: f64| section.given(file, key, |v| real(&SHARE, v)).unwrap_or(usual);
+    let harmonic = share("harmonic", USUAL_SPREAD.harmonic);
+    Spread {
+        stiffness: share("stiffness", USUAL_SPREAD.stiffness),
+        backlash: share("backlash", USUAL_SPREAD.backlash),
+        harmonic,
+        harmonic_phase_rad: share("harmonic_phase_rad", harmonic),
+    }
+}
+
+/// The ratio, and the teeth if they are given instead of it.
+fn ratio_and_teeth(file: &mut TomlFile<'_>, drive: &Section<'_, '_>) -> Option<(f64, Option<Teeth>)> {
+    match ["flexspline_teeth", "circular_spline_teeth", "ratio"].map(|key| drive.has(key)) {
+        [true, true, false] => {
+            let f = drive.needed(file, "flexspline_teeth", |v| whole(&TEETH, v))?;
+            let more = from(f64::from(f + 1), f64::from(f + MOST_TEETH_MORE));
+            let c = drive.needed(file, "circular_spline_teeth", |v| {
+                whole(&more, v).map_err(|refused| Refused {
+                    what: format!("{}, more than the flexspline's {f}", refused.what),
+                    ..refused
+                })
+            })?;
+            let names = Fixed::ALL.map(|fixed| (fixed.name(), fixed));
+            let fixed = match drive.has("fixed") {
+                true => drive.needed(file, "fixed", |v| one_of(&names, v))?,
+                false => Fixed::Flexspline,
+            };
+            let waves = f64::from(c - f);
+            let ratio = match fixed {
+                Fixed::Flexspline => f64::from(c) / waves,
+                Fixed::CircularSpline => -f64::from(f) / waves,
+            };
+            Some((ratio, Some(Teeth { flexspline: f, circular_spline: c, fixed })))
+        }
+        [false, false, true] => {
+            let sizes = from(1.0, LARGEST_RATIO);
+            let ratio = drive.needed(file, "ratio", |v| match number(v.get_ref()) {
+                Some(ratio) if sizes.refusal(ratio.abs()).is_none() => Ok(ratio),
+                _ => Err(Refused::found(v, "1 to 1e6 or -1e6 to -1")),
+            })?;
+            Some((ratio, None))
+        }
+        given => {
+            let names = ["flexspline_teeth", "circular_spline_teeth", "ratio"];
+            let found: Vec<&str> =
+                names.into_iter().zip(given).filter(|(_, there)| *there).map(|(name, _)| name).collect();
+            let found = if found.is_empty() { "neither".to_owned() } else { found.join(", ") };
+            let what = format!("expected flexspline_teeth and circular_spline_teeth, or ratio alone; found {found}");
+            file.refuse_whole("drive", what);
+            None
         }
     }
 }
@@ -571,6 +425,9 @@ mod tests {
         let by_ratio = "[drive]\nratio = -6.0\n[nominal]\nstiffness_n_m_per_rad = 3e4\nbacklash_arcsec = 60\n";
         let nominal = Nominal::from_toml("n.toml", by_ratio).unwrap();
         assert_eq!((nominal.ratio, nominal.teeth, nominal.friction_torque_n_m), (-6.0, None, 0.0));
+        let teeth = |ratio: f64| Nominal { ratio, ..nominal.clone() }.teeth_or_of_two_waves();
+        assert_eq!(teeth(95.0), Teeth { flexspline: 188, circular_spline: 190, fixed: Fixed::Flexspline });
+        assert_eq!(teeth(-94.0), Teeth { flexspline: 188, circular_spline: 190, fixed: Fixed::CircularSpline });
     }
 
     #[test]
@@ -579,12 +436,12 @@ mod tests {
             ("= 190", "= 187", "n.toml:3: drive.circular_spline_teeth: found 187, allowed: 189 to 200"),
             ("= 60.0", "= -1.0", "n.toml:7: nominal.backlash_arcsec: found -1, allowed: 0 to 100000"),
             ("= 60.0", "= nan", "n.toml:7: nominal.backlash_arcsec: found NaN"),
-            ("= 60.0", "= \"wide\"", "n.toml:7: "),
+            ("= 60.0", "= \"wide\"", "n.toml:7: nominal.backlash_arcsec: found \"wide\", allowed: 0 to 100000"),
             ("friction_torque_n_m", "friktion", "n.toml:8: nominal.friktion: unknown key; allowed: stiffness"),
             (
                 "\"flexspline\"",
                 "\"ring\"",
-                "n.toml:4: drive.fixed: found \"ring\", allowed: flexspline, circular_spline",
+                "n.toml:4: drive.fixed: found \"ring\", allowed: \"flexspline\", \"circular_spline\"",
             ),
             ("[10.0, 40000.0]", "[-1.0, 40000.0]", "n.toml:6: nominal.stiffness_n_m_per_rad: found"),
             (
@@ -653,7 +510,7 @@ mod tests {
             (
                 "fixed = \"flexspline\"",
                 "fixed = \"circular-spline\"",
-                "n.toml:4: drive.fixed: found \"circular-spline\", allowed: flexspline, circular_spline; did you mean `circular_spline`?",
+                "n.toml:4: drive.fixed: found \"circular-spline\", allowed: \"flexspline\", \"circular_spline\"; did you mean `circular_spline`?",
             ),
             ("friction_torque_n_m", "qwertz", "n.toml:8: nominal.qwertz: unknown key; allowed: "),
         ] {

@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use cpu_time::ProcessTime;
-use flexspline_sim::element::cauchy_stress;
-use flexspline_sim::stepping::{Method, Problem, Solver, State};
+use flexspline_sim::fem::element::cauchy_stress;
+use flexspline_sim::motion::Motion;
+use flexspline_sim::stepping::{Method, Problem, State};
 
 /// Our solvers, the one that the others are measured against first.
 pub const SOLVERS: [Method; 2] = [Method::Reference, Method::Fast];
@@ -26,13 +27,12 @@ pub fn journey(problem: &Problem, stops: &[Stop], repeat: usize) -> Result<Journ
     let mut cpu = vec![Vec::new(); stops.len()];
     for _ in 0..repeat {
         states.clear();
-        let mut solver = Solver::new(problem);
-        let (mut state, _) = solver.deform(stops[0].0).map_err(|error| error.to_string())?;
+        let mut motion = Motion::deformed(problem, stops[0].0).map_err(|error| error.to_string())?;
         for ((generator_rad, torque_n_m), cpu) in stops.iter().zip(&mut cpu) {
             let clock = ProcessTime::now();
-            (state, _) = solver.increment(&state, *generator_rad, *torque_n_m).map_err(|error| error.to_string())?;
+            motion.to(*generator_rad, *torque_n_m).map_err(|error| error.to_string())?;
             cpu.push(clock.elapsed());
-            states.push(problem.whole_state(&state).into_owned());
+            states.push(problem.whole_state(motion.state()).into_owned());
         }
     }
     let median = |mut times: Vec<Duration>| {
@@ -45,14 +45,10 @@ pub fn journey(problem: &Problem, stops: &[Stop], repeat: usize) -> Result<Journ
 /// Processor time (s) of an increment in a run: from the stop `start` on, the generator turned `increments` times by `step_rad`
 /// under its load. The first of them know nothing of the motion yet and cost most.
 pub fn run_cpu_s(problem: &Problem, start: Stop, step_rad: f64, increments: usize) -> Result<f64, String> {
-    let mut solver = Solver::new(problem);
-    let (mut state, _) = solver.deform(start.0).map_err(|error| error.to_string())?;
-    (state, _) = solver.increment(&state, start.0, start.1).map_err(|error| error.to_string())?;
+    let mut motion = Motion::deformed(problem, start.0).map_err(|error| error.to_string())?;
+    motion.load(start.1).map_err(|error| error.to_string())?;
     let clock = ProcessTime::now();
-    for k in 1..=increments {
-        let to = start.0 + step_rad * k as f64;
-        (state, _) = solver.increment(&state, to, start.1).map_err(|error| error.to_string())?;
-    }
+    motion.turn_in(step_rad * increments as f64, increments).map_err(|error| error.to_string())?;
     Ok(clock.elapsed().as_secs_f64() / increments as f64)
 }
 

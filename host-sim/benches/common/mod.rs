@@ -7,7 +7,8 @@ use cpu_time::ProcessTime;
 use criterion::Criterion;
 use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::stepping::{Effort, Method, Problem, Solver, SolverSettings, State};
+use flexspline_sim::motion::Motion;
+use flexspline_sim::stepping::{Method, Problem, SolverSettings};
 
 /// One increment of the generator, rad.
 pub const STEP_RAD: f64 = 0.01;
@@ -61,50 +62,46 @@ pub fn problem(kind: GeneratorKind, method: Method) -> Problem {
 
 /// A drive that turns forward under a load. Every increment is a new one: the solver remembers where it was, and one that is
 /// repeated would be predicted by its own answer.
-pub struct Motion<'p> {
-    pub solver: Solver<'p>,
-    pub state: State,
+pub struct Run<'p> {
+    pub motion: Motion<'p>,
     pub step_rad: f64,
-    /// Newton iterations and increments since [`Motion::reset`].
+    /// Newton iterations and increments since [`Run::reset`].
     pub iterations: usize,
     pub increments: usize,
     /// Flanks and bore edges in contact, last increment.
     pub contacts: [usize; 2],
 }
 
-impl<'p> Motion<'p> {
+impl<'p> Run<'p> {
     /// Deformed, loaded, and turned by `increments`.
-    pub fn new(problem: &'p Problem, torque_n_m: f64, step_rad: f64, increments: usize) -> Motion<'p> {
-        let mut solver = Solver::new(problem);
-        let (mut state, _) = solver.deform(0.0).expect("the drive deforms");
+    pub fn new(problem: &'p Problem, torque_n_m: f64, step_rad: f64, increments: usize) -> Run<'p> {
+        let mut motion = Motion::deformed(problem, 0.0).expect("the drive deforms");
         if torque_n_m != 0.0 {
-            state = solver.increment(&state, 0.0, torque_n_m).expect("the load comes on").0;
+            motion.load(torque_n_m).expect("the load comes on");
         }
-        Motion::settled(solver, state, step_rad, increments)
+        Run::settled(motion, step_rad, increments)
     }
 
     /// The same for the reference solver, which takes over from the fast one: deforming and loading the drive by itself takes it
     /// longer than all that is timed here.
-    pub fn taken_over(problem: &'p Problem, torque_n_m: f64, step_rad: f64, increments: usize) -> Motion<'p> {
+    pub fn taken_over(problem: &'p Problem, torque_n_m: f64, step_rad: f64, increments: usize) -> Run<'p> {
         let fast = self::problem(problem.kind, Method::Fast);
-        let before = Motion::new(&fast, torque_n_m, step_rad, 5);
-        let state = fast.whole_state(&before.state).into_owned();
-        Motion::settled(Solver::new(problem), state, step_rad, increments)
+        let before = Run::new(&fast, torque_n_m, step_rad, 5).motion;
+        let state = fast.whole_state(before.state()).into_owned();
+        Run::settled(Motion::taken_over(problem, state, before.last().clone()), step_rad, increments)
     }
 
-    fn settled(solver: Solver<'p>, state: State, step_rad: f64, increments: usize) -> Motion<'p> {
-        let mut motion = Motion { solver, state, step_rad, iterations: 0, increments: 0, contacts: [0; 2] };
-        (0..increments).for_each(|_| motion.advance());
-        motion.reset();
-        motion
+    fn settled(motion: Motion<'p>, step_rad: f64, increments: usize) -> Run<'p> {
+        let mut run = Run { motion, step_rad, iterations: 0, increments: 0, contacts: [0; 2] };
+        (0..increments).for_each(|_| run.advance());
+        run.reset();
+        run
     }
 
     /// One increment.
     pub fn advance(&mut self) {
-        let to = self.state.generator_rad + self.step_rad;
-        let (next, increment) =
-            self.solver.increment(&self.state, to, self.state.torque_n_m).expect("steady motion goes on");
-        self.state = next;
+        self.motion.turn(self.step_rad).expect("steady motion goes on");
+        let increment = self.motion.last();
         self.increments += 1;
         self.iterations += increment.iterations;
         self.contacts = [increment.flank_contacts, increment.generator_contacts];
@@ -112,6 +109,7 @@ impl<'p> Motion<'p> {
 
     /// Counts and effort from here on.
     pub fn reset(&mut self) {
-        (self.iterations, self.increments, self.solver.effort) = (0, 0, Effort::default());
+        (self.iterations, self.increments) = (0, 0);
+        self.motion.take_effort();
     }
 }

@@ -9,7 +9,8 @@ use flexspline::Table;
 use serde::Serialize;
 
 use super::context::{Context, quoted};
-use super::synthesize::{fresh_table, gear};
+use super::synthesize::gear;
+use super::tables::fresh_table;
 use super::{Failure, names, report, say};
 use crate::diagnosis::report::{Compensation, Diagnosis};
 use crate::diagnosis::{Extended, Settings, diagnose_extended};
@@ -25,7 +26,8 @@ use crate::nominal::Nominal;
 use crate::output::Outputs;
 use crate::stepping::{Method, SolverSettings};
 use crate::synthesize::Sizes;
-use crate::tables::{ARCSEC_PER_RAD, MadeTable, c_header, rust_source};
+use crate::tables::{MadeTable, c_header, rust_source};
+use crate::units::ARCSEC_PER_RAD;
 
 /// Find what the simulation gets wrong in measured data, name the cause, measure what the extension gains
 ///

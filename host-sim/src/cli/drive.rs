@@ -1,6 +1,5 @@
 //! `flexspline drive`: the drive as a commented file, and whether its teeth clear one another.
 
-use std::f64::consts::PI;
 use std::fmt::Write;
 
 use clap::Args;
@@ -9,6 +8,7 @@ use serde::Serialize;
 
 use super::{Context, Failure, say};
 use crate::drive::{Drive, GeneratorKind, MeshReport, RigidMesh};
+use crate::units::{ARCMIN_PER_RAD, ARCSEC_PER_RAD};
 
 /// Print the drive as a commented TOML file, or check whether its teeth clear one another
 ///
@@ -95,8 +95,8 @@ fn table(drive: &Drive, reports: &[MeshReport]) -> String {
             "{:<12} {:>13.2} {:>16.3} {:>16.2}",
             report.generator,
             1e3 * report.least.gap_mm,
-            report.backlash_rad * 180.0 * 60.0 / PI,
-            report.ripple_rad * 180.0 * 3600.0 / PI,
+            report.backlash_rad * ARCMIN_PER_RAD,
+            report.ripple_rad * ARCSEC_PER_RAD,
         );
     }
     for report in reports {

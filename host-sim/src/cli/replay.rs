@@ -9,7 +9,7 @@ use super::context::{Context, quoted};
 use super::{Failure, say};
 use crate::drive::GeneratorKind;
 use crate::output::Outputs;
-use crate::replay::{ReplaySummary, parse, replay};
+use crate::tables::replay::{ReplaySummary, parse, replay};
 
 /// Run the core over measured rows, open loop, and show what it leaves
 ///

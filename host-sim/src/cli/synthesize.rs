@@ -1,15 +1,14 @@
 //! `flexspline synthesize`: measured-looking data of a drive with known effects.
 
 use std::fmt::Write as _;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 
 use clap::{Args, ValueHint};
 use flexspline::Table;
 use serde::Serialize;
 
 use super::context::{Context, quoted};
+use super::tables::fresh_table;
 use super::{Failure, names, say};
 use crate::drive::{Drive, GeneratorKind};
 use crate::extension::{self, CauseEntry};
@@ -17,13 +16,10 @@ use crate::measurement::{ColumnMap, Gear, read};
 use crate::mesh::MeshLevel;
 use crate::nominal::{Fixed, Nominal};
 use crate::output::Outputs;
-use crate::stepping::SolverSettings;
-use crate::sweep::{SweepError, SweepProgress};
 use crate::synthesize::{
     Chosen, Definition, Excitation, Parameter, Plan, Plant, Richness, Sensors, Sizes, Unit, Usual, effects, parse,
     synthesize, to_csv,
 };
-use crate::tables::MadeTable;
 
 /// Make data that look measured: the drive of the simulation, with effects, noise and sensors of your choice
 ///
@@ -353,31 +349,6 @@ pub(super) fn gear(nominal: &Nominal) -> Gear {
         Some(teeth) => Gear::of_teeth(teeth.flexspline, teeth.circular_spline, teeth.fixed == Fixed::Flexspline),
         None => Gear::of_ratio(nominal.ratio),
     }
-}
-
-/// A table made by FEM now.
-pub(super) fn fresh_table(
-    context: &Context,
-    drive: &Drive,
-    kind: GeneratorKind,
-    mesh: MeshLevel,
-) -> Result<MadeTable, Failure> {
-    let settings = SolverSettings { mesh, ..SolverSettings::default() };
-    let progress = Mutex::new((context.progress("tables"), 0_usize));
-    let observe = |now: SweepProgress| {
-        if let Ok(mut guard) = progress.lock() {
-            let (bar, done) = &mut *guard;
-            *done += 1;
-            let note = format!("{kind} {:+.3} N.m {:+.0} °C", now.torque_n_m, now.temperature_c);
-            bar.set(*done, extension::usual_increments(drive).max(*done), &note);
-        }
-        ControlFlow::Continue(())
-    };
-    extension::make_table(drive, kind, settings, &observe).map_err(|error| match error {
-        extension::RemakeError::Sweep(SweepError::Stopped) => Failure::Failed("stopped; nothing was written".into()),
-        extension::RemakeError::Sweep(error @ SweepError::NotUniform { .. }) => Failure::BadInput(error.to_string()),
-        error => Failure::Failed(format!("{kind}: {error}")),
-    })
 }
 
 fn text(truth: &Truth, out: &std::path::Path) -> String {

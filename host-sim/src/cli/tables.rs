@@ -3,12 +3,10 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use clap::{Args, ValueHint};
 use flexspline::Table;
-use flexspline::make::Sample;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -17,18 +15,16 @@ use super::names::{self, Generators};
 use super::{Failure, report, say};
 use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
-use crate::nodes::{NodeChoice, choose_torque_nodes};
 use crate::output::Outputs;
 use crate::report::page::Page;
 use crate::report::{Sources, Subject, drive_report};
-use crate::samples;
 use crate::stepping::{Method, SolverSettings};
-use crate::sweep::{SweepError, SweepPlan, SweepProgress};
+use crate::tables::sweep::SweepProgress;
 use crate::tables::{
-    ARCSEC_PER_RAD, MadeTable, SampleOptions, Source, TableError, TableInfo, c_header, from_samples, from_sweep,
-    rust_source,
+    MadeTable, MakeError, SampleOptions, Source, TableInfo, TableProgress, TableSettings, TorqueNodes, c_header,
+    from_samples, make, rust_source, samples,
 };
-use crate::turns::{deviation_increments, sweep_turns};
+use crate::units::ARCSEC_PER_RAD;
 
 /// Make compensation tables: from FEM sweeps of the drive, or from samples of another program or a bench
 ///
@@ -60,7 +56,7 @@ pub(super) struct Tables {
     /// How far, in arcsec, a sample of a file may lie from the table [default: 20]
     #[arg(long, value_name = "ARCSEC", requires = "from_samples", allow_negative_numbers = true)]
     deviation_arcsec: Option<f64>,
-    /// Largest torque, N.m [default: 200; four-roller 100, two-roller 50]
+    /// Largest torque, N.m [default: 200; four-roller 100, two-roller 20]
     #[arg(long, value_name = "T", conflicts_with = "from_samples", allow_negative_numbers = true)]
     torque_n_m: Option<f64>,
     /// Torque nodes on each side of zero, at most, beside the pair at the drag torque
@@ -93,9 +89,6 @@ pub(super) struct Tables {
     no_report: bool,
 }
 
-/// A table, with the samples of its sweep if it was swept.
-type Made = (MadeTable, Option<Vec<Sample>>);
-
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Report<'a> {
@@ -111,19 +104,19 @@ impl Tables {
         let drive = context.drive()?;
         let generators = self.generator.0.as_slice();
         let mut made = match &self.from_samples {
-            Some(file) => vec![(self.project(&drive, generators, file)?, None)],
+            Some(file) => vec![self.project(&drive, generators, file)?],
             None => self.sweep(context, &drive, generators)?,
         };
         let out = context.out()?;
         let mut outputs = Outputs::new();
-        for (table, samples) in &mut made {
+        for table in &mut made {
             table.info.command.clone_from(&context.command);
             let path = |ending: &str| out.join(format!("{}.{ending}", table.kind));
             outputs.file(&path("fxt"), |file| file.write_all(&table.image))?;
             outputs.json(&path("json"), &table.info)?;
             outputs.file(&path("rs"), |file| file.write_all(rust_source(table).as_bytes()))?;
             outputs.file(&path("h"), |file| file.write_all(c_header(table).as_bytes()))?;
-            if let Some(samples) = samples {
+            if let Some(samples) = &table.samples {
                 outputs.file(&path("samples.csv"), |file| file.write_all(samples::to_csv(samples).as_bytes()))?;
             }
         }
@@ -135,7 +128,7 @@ impl Tables {
         let report = Report {
             schema_version: 1,
             status: page.as_ref().filter(|page| page.status.is_failure()).map_or("made", |page| page.status.name()),
-            tables: made.iter().map(|(table, _)| &table.info).collect(),
+            tables: made.iter().map(|table| &table.info).collect(),
             wall_s: clock.elapsed().as_secs_f64(),
         };
         context.print(&report, || {
@@ -148,26 +141,25 @@ impl Tables {
     }
 
     /// The report.
-    fn page(&self, context: &Context, drive: &Drive, made: &[Made]) -> Result<Page, Failure> {
+    fn page(&self, context: &Context, drive: &Drive, made: &[MadeTable]) -> Result<Page, Failure> {
         let tables = made
             .iter()
-            .map(|(table, _)| Ok((table.kind, Table::check(&table.image).map_err(|e| Failure::Failed(e.to_string()))?)))
+            .map(|table| Ok((table.kind, Table::check(&table.image).map_err(|e| Failure::Failed(e.to_string()))?)))
             .collect::<Result<Vec<_>, Failure>>()?;
         let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
         let animations = report::animations(context, drive, &tables, settings);
-        let inputs = made.iter().filter_map(|(table, _)| match &table.info.source {
+        let inputs = made.iter().filter_map(|table| match &table.info.source {
             Source::File { name, blake3 } => Some((format!("BLAKE3 of {name}"), blake3.clone())),
             Source::Fem { .. } => None,
         });
-        let subjects =
-            tables.into_iter().zip(made).zip(animations).map(|(((kind, table), (made, samples)), animation)| Subject {
-                kind,
-                table,
-                info: Some(&made.info),
-                samples: samples.as_deref(),
-                validation: None,
-                animation,
-            });
+        let subjects = tables.into_iter().zip(made).zip(animations).map(|(((kind, table), made), animation)| Subject {
+            kind,
+            table,
+            info: Some(&made.info),
+            samples: made.samples.as_deref(),
+            validation: None,
+            animation,
+        });
         Ok(drive_report(Sources {
             drive,
             command_name: "tables",
@@ -201,107 +193,85 @@ impl Tables {
         from_samples(drive, kind, &read, &name, &bytes, options).map_err(|e| bad(format!("{name}: {e}")))
     }
 
-    fn plan(&self, drive: &Drive, kind: GeneratorKind) -> Result<(SweepPlan, NodeChoice), Failure> {
-        let mut plan = SweepPlan::for_generator(drive, kind);
-        let drag = drive.output.drag_torque_n_m;
-        let largest = self.torque_n_m.unwrap_or(crate::sweep::rated_torque_n_m(kind));
-        if !(largest > 20.0 * drag && largest <= 1e4) {
-            return Err(Failure::BadInput(format!(
-                "--torque-n-m: found {largest}; allowed: more than {} (20 times the drag of the output), at most 10000",
-                20.0 * drag
-            )));
+    fn settings(&self, drive: &Drive, kind: GeneratorKind) -> Result<TableSettings, Failure> {
+        let mut settings = TableSettings::for_generator(drive, kind);
+        settings.solver = SolverSettings { method: self.solver, mesh: self.mesh, ..settings.solver };
+        settings.positions = usize::from(self.positions);
+        if let TorqueNodes::Chosen(choice) = &mut settings.torque_nodes {
+            choice.largest_n_m = self.torque_n_m.unwrap_or(choice.largest_n_m);
+            choice.most = self.most_nodes.map_or(choice.most, usize::from);
+            choice.tolerance_arcsec = self.node_tolerance_arcsec.unwrap_or(choice.tolerance_arcsec);
         }
-        // Imperfections are sampled at every node, and leave more than nodes do.
-        let repeats = drive.as_built.first_not_uniform().is_none();
-        let tolerance = self.node_tolerance_arcsec.unwrap_or(if repeats { 0.6 } else { 2.0 });
-        if !(0.01..=60.0).contains(&tolerance) {
-            return Err(Failure::BadInput(format!("--node-tolerance-arcsec: found {tolerance}; allowed: 0.01 to 60")));
-        }
-        let choice = NodeChoice {
-            largest_n_m: largest,
-            most: usize::from(self.most_nodes.unwrap_or(if repeats { 28 } else { 12 })),
-            tolerance_rad: tolerance / ARCSEC_PER_RAD,
-        };
-        plan.positions = usize::from(self.positions);
         if let Some(temperatures) = &self.temperatures_c {
-            let range = &drive.temperature;
-            let mut nodes: Vec<f32> = temperatures.iter().map(|t| *t as f32).collect();
-            nodes.sort_by(f32::total_cmp);
-            nodes.dedup();
-            if let Some(wrong) = temperatures.iter().find(|t| !(range.minimum_c..=range.maximum_c).contains(*t)) {
-                return Err(Failure::BadInput(format!(
-                    "--temperatures-c: found {wrong}; allowed: {} to {} C, the operating range of the drive",
-                    range.minimum_c, range.maximum_c
-                )));
-            }
-            plan.temperature_nodes_c = nodes;
+            settings.temperature_nodes_c = temperatures.iter().map(|t| *t as f32).collect();
+            settings.temperature_nodes_c.sort_by(f32::total_cmp);
+            settings.temperature_nodes_c.dedup();
         }
-        Ok((plan, choice))
+        settings.check(drive).map_err(|error| match error {
+            MakeError::Setting { setting, found, allowed } => {
+                Failure::BadInput(format!("--{}: found {found}; allowed: {allowed}", setting.replace('_', "-")))
+            }
+            error => Failure::BadInput(error.to_string()),
+        })?;
+        Ok(settings)
     }
 
-    fn sweep(&self, context: &Context, drive: &Drive, generators: &[GeneratorKind]) -> Result<Vec<Made>, Failure> {
-        let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
-        let repeats = drive.as_built.first_not_uniform().is_none();
-        let plans =
-            generators.iter().map(|kind| Ok((*kind, self.plan(drive, *kind)?))).collect::<Result<Vec<_>, Failure>>()?;
+    fn sweep(&self, context: &Context, drive: &Drive, generators: &[GeneratorKind]) -> Result<Vec<MadeTable>, Failure> {
+        let wanted = generators
+            .iter()
+            .map(|kind| Ok((*kind, self.settings(drive, *kind)?)))
+            .collect::<Result<Vec<_>, Failure>>()?;
         // Before there is much work.
         context.out()?;
-        // How many nodes there will be is known only once they are chosen; until then the most is assumed.
-        let expected = |plan: &SweepPlan, choice: &NodeChoice| {
-            let a_node = plan.positions + 2;
-            let turns = if repeats { 0 } else { deviation_increments() };
-            choice.most * (plan.temperature_nodes_c.len() + 1) * a_node + turns
-        };
-        let totals = plans.iter().map(|(_, (plan, choice))| expected(plan, choice)).collect::<Vec<usize>>();
-        let progress = Mutex::new((context.progress("tables"), 0_usize, totals));
-        let verbose = context.verbose();
-        plans
-            .par_iter()
-            .enumerate()
-            .map(|(k, (kind, (plan, choice)))| {
-                let clock = Instant::now();
-                let mine = AtomicUsize::new(0);
-                let observe = |now: SweepProgress| {
-                    let mine = mine.fetch_add(1, Ordering::Relaxed) + 1;
-                    if let Ok(mut guard) = progress.lock() {
-                        let (bar, done, totals) = &mut *guard;
-                        *done += 1;
-                        totals[k] = totals[k].max(mine);
-                        let total: usize = totals.iter().sum();
-                        let note = format!(
-                            "{kind} {:+.3} N.m {:+.0} °C, {} iterations",
-                            now.torque_n_m, now.temperature_c, now.iterations
-                        );
-                        if verbose {
-                            bar.line(&format!("{:>5}/{total}  {note}", *done));
-                        }
-                        bar.set(*done, total, &note);
-                    }
-                    ControlFlow::Continue(())
-                };
-                let failed = |error: SweepError| match error {
-                    SweepError::Stopped => Failure::Failed("stopped; nothing was written".into()),
-                    error => Failure::Failed(format!("{kind}: {error}")),
-                };
-                let mut plan = plan.clone();
-                let chosen = choose_torque_nodes(drive, *kind, &plan, *choice, settings, &observe).map_err(failed)?;
-                plan.torque_nodes_n_m = chosen.torque_nodes_n_m;
-                let mut swept = sweep_turns(drive, *kind, &plan, &chosen.known, settings, &observe).map_err(failed)?;
-                swept.increments += chosen.increments;
-                swept.iterations += chosen.iterations;
-                swept.worst_residual = swept.worst_residual.max(chosen.worst_residual);
-                if let Ok(mut guard) = progress.lock() {
-                    guard.2[k] = mine.load(Ordering::Relaxed);
-                }
-                let wall_s = clock.elapsed().as_secs_f64();
-                let table = from_sweep(drive, &plan, &swept, settings, wall_s)
-                    .map_err(|error: TableError| Failure::Failed(format!("{kind}: {error}")))?;
-                let mut table = table;
-                table.info.torque_nodes_resolved = Some(chosen.resolved);
-                Ok((table, Some(swept.samples)))
-            })
-            .collect()
+        by_fem(context, drive, &wanted)
     }
+}
+
+/// Tables by FEM, several at once, with one bar for all of them.
+fn by_fem(
+    context: &Context,
+    drive: &Drive,
+    wanted: &[(GeneratorKind, TableSettings)],
+) -> Result<Vec<MadeTable>, Failure> {
+    let progress = Mutex::new((context.progress("tables"), vec![[0; 2]; wanted.len()]));
+    wanted
+        .par_iter()
+        .enumerate()
+        .map(|(k, (kind, settings))| {
+            let observe = |now: TableProgress| {
+                if let Ok(mut guard) = progress.lock() {
+                    let (bar, tables) = &mut *guard;
+                    tables[k] = [tables[k][0] + 1, now.expected];
+                    let [done, expected] = [0, 1].map(|of: usize| tables.iter().map(|table| table[of]).sum::<usize>());
+                    let SweepProgress { torque_n_m, temperature_c, iterations } = now.last;
+                    let note = format!("{kind} {torque_n_m:+.3} N.m {temperature_c:+.0} °C, {iterations} iterations");
+                    if context.verbose() {
+                        bar.line(&format!("{done:>5}/{expected}  {note}"));
+                    }
+                    bar.set(done, expected, &note);
+                }
+                ControlFlow::Continue(())
+            };
+            make(drive, *kind, settings, &observe).map_err(|error| match error {
+                error if error.is_stopped() => Failure::Failed("stopped; nothing was written".into()),
+                error if error.is_bad_input() => Failure::BadInput(error.to_string()),
+                error => Failure::Failed(format!("{kind}: {error}")),
+            })
+        })
+        .collect()
+}
+
+/// A table made by FEM now, as the command makes it if it is told no more than the mesh.
+pub(super) fn fresh_table(
+    context: &Context,
+    drive: &Drive,
+    kind: GeneratorKind,
+    mesh: MeshLevel,
+) -> Result<MadeTable, Failure> {
+    let mut settings = TableSettings::for_generator(drive, kind);
+    settings.solver.mesh = mesh;
+    let mut made = by_fem(context, drive, &[(kind, settings)])?;
+    Ok(made.remove(0))
 }
 
 fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {

@@ -18,7 +18,7 @@ use crate::output::Outputs;
 use crate::report::page::Page;
 use crate::report::{Sources, Subject, drive_report};
 use crate::stepping::{Method, SolverSettings};
-use crate::validate::{
+use crate::tables::validate::{
     MAX_BOUND_ARCSEC, RMS_BOUND_ARCSEC, ValidateError, Validation, ValidationSettings, check_drive, generator_of,
     validate,
 };

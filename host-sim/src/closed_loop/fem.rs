@@ -6,7 +6,8 @@
 //! misses, with its law of play.
 
 use crate::drive::{Drive, GeneratorKind};
-use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
+use crate::motion::Motion;
+use crate::stepping::{Problem, SolveError, SolverSettings};
 
 use super::flight::Plant;
 use super::flight::gear::{Gear, GearMap};
@@ -46,8 +47,7 @@ pub struct Missed {
 
 /// The drive by FEM.
 pub struct FemPlant<'p> {
-    solver: Solver<'p>,
-    state: State,
+    motion: Motion<'p>,
     gear: Gear<'p>,
     offset_rad: f64,
     /// Generator angle and load of the last two ticks.
@@ -78,11 +78,8 @@ impl<'p> FemPlant<'p> {
         temperature_c: f64,
         windows: Windows,
     ) -> Result<Self, SolveError> {
-        let mut solver = Solver::new(problem);
-        let (state, _) = solver.deform(0.0)?;
         Ok(Self {
-            solver,
-            state,
+            motion: Motion::deformed(problem, 0.0)?,
             gear: Gear::new(map, temperature_c),
             offset_rad: 0.0,
             last: [(0.0, 0.0); 2],
@@ -100,9 +97,9 @@ impl<'p> FemPlant<'p> {
 
     fn due(&self, generator_rad: f64, torque_n_m: f64) -> bool {
         let Windows { generator_rad: angle, torque_share, torque_n_m: least } = self.windows;
-        let window = (torque_share * self.state.torque_n_m.abs()).max(least);
-        (generator_rad - self.state.generator_rad).abs() >= angle
-            || (torque_n_m - self.state.torque_n_m).abs() >= window
+        let window = (torque_share * self.motion.state().torque_n_m.abs()).max(least);
+        (generator_rad - self.motion.state().generator_rad).abs() >= angle
+            || (torque_n_m - self.motion.state().torque_n_m).abs() >= window
     }
 
     /// An increment; the output by the FEM there.
@@ -110,9 +107,8 @@ impl<'p> FemPlant<'p> {
         if !self.solvable(torque_n_m) {
             return;
         }
-        match self.solver.increment(&self.state, generator_rad, torque_n_m) {
-            Ok((state, _)) => self.state = state,
-            Err(error) => self.failed = Some(error),
+        if let Err(error) = self.motion.to(generator_rad, torque_n_m) {
+            self.failed = Some(error);
         }
     }
 }
@@ -121,15 +117,15 @@ impl Plant for FemPlant<'_> {
     fn go(&mut self, generator_rad: f64, torque_n_m: f64) -> f64 {
         let [(before, _), (turned_at, load)] = self.last;
         let turned = (generator_rad - turned_at) * (turned_at - before) < 0.0;
-        if turned && (turned_at - self.state.generator_rad).abs() > TURNING_POINT_RAD {
+        if turned && (turned_at - self.motion.state().generator_rad).abs() > TURNING_POINT_RAD {
             self.advance(turned_at, load);
         }
         self.last = [self.last[1], (generator_rad, torque_n_m)];
         let by_map = self.gear.go(generator_rad, torque_n_m);
         if self.due(generator_rad, torque_n_m) {
             self.advance(generator_rad, torque_n_m);
-            if self.state.generator_rad == generator_rad && self.state.torque_n_m == torque_n_m {
-                self.offset_rad = self.state.output_rad - by_map;
+            if self.motion.state().generator_rad == generator_rad && self.motion.state().torque_n_m == torque_n_m {
+                self.offset_rad = self.motion.state().output_rad - by_map;
                 self.missed.push(Missed { generator_rad, torque_n_m, map_less_fem_rad: -self.offset_rad });
             }
         }

@@ -7,15 +7,14 @@ use thiserror::Error;
 
 use super::flight::gear::{GearMap, Header, MOST, node_share, parse};
 use crate::drive::{Drive, GeneratorKind};
-use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
-use crate::tables::ARCSEC_PER_RAD;
+use crate::motion::Motion;
+use crate::stepping::{Problem, SolveError, SolverSettings};
+use crate::units::ARCSEC_PER_RAD;
 
 /// Temperatures of the map, °C: the ends of the flight's; tables of HHD-95 have nodes at −60 and 80.
 pub const TEMPERATURES_C: [f64; 2] = [0.0, 40.0];
 /// Least flank torque that is solved for, N·m; below it the error runs on along the straight line through the first two nodes.
 const LEAST_N_M: f64 = 1e-3;
-/// Pitches within which the output must follow the generator.
-const MOST_SETTLING_PITCHES: usize = 10;
 
 /// A map that owns its numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,12 +28,9 @@ pub struct DenseMap {
 /// Why there is no map.
 #[derive(Debug, Error)]
 pub enum MapError {
-    /// The FEM failed.
+    /// The FEM failed, or the drive did not settle.
     #[error(transparent)]
     Solve(#[from] SolveError),
-    /// The output does not follow.
-    #[error("under {0} N.m the output does not follow the generator")]
-    NeverMoves(f64),
     /// Friction on the flanks makes the error depend on more than phase and flank torque.
     #[error("flanks.friction_coefficient: found {0}, allowed: 0, as the plant of the closed loop is elastic")]
     Friction(f64),
@@ -140,31 +136,22 @@ fn plane(
     let (nodes, phases) = size(kind);
     let share = |node| node_share(node, nodes);
     let problem = Problem::new(drive, kind, temperature_c, settings)?;
-    let mut solver = Solver::new(&problem);
     let step = TAU / f64::from(drive.flexspline.teeth) / phases as f64;
     let at = |index: usize| (index as f64 + 0.5) * step;
-    let (mut state, _) = solver.deform(at(0))?;
+    let mut motion = Motion::deformed(&problem, at(0))?;
     let mut index = 0;
     let mut plane = vec![0.0; nodes * phases];
     let solved = (0..nodes).find(|node| largest_n_m * share(*node) >= LEAST_N_M).unwrap_or(nodes);
     for node in solved..nodes {
         let torque_n_m = drive.output.drag_torque_n_m + largest_n_m * share(node);
-        state = solver.increment(&state, state.generator_rad, torque_n_m)?.0;
-        let mut advance = |state: &State, index: &mut usize| {
-            *index += 1;
-            solver.increment(state, at(*index), torque_n_m).map(|(state, _)| state)
-        };
-        let mut settling = 0;
-        while settling == 0 || state.output_rate < 0.5 / drive.ratio() {
-            state = advance(&state, &mut index)?;
-            settling += 1;
-            if settling > MOST_SETTLING_PITCHES * phases {
-                return Err(MapError::NeverMoves(torque_n_m));
-            }
+        motion.load(torque_n_m)?;
+        while motion.settle_on(step)? {
+            index += 1;
         }
         for _ in 0..phases {
-            state = advance(&state, &mut index)?;
-            plane[node * phases + index % phases] = state.output_rad - state.generator_rad / drive.ratio();
+            index += 1;
+            motion.turn_to(at(index))?;
+            plane[node * phases + index % phases] = motion.error_rad();
         }
     }
     let [first, second] = [solved, solved + 1].map(share);

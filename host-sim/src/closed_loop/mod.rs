@@ -16,7 +16,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::output::{OutputError, write_csv};
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 use flight::Plant;
 use flight::antenna::{Antenna, CORE, Pointing};
 use flight::profile::{Moment, Profile};

@@ -132,7 +132,7 @@ impl CoRotation {
 mod tests {
     use super::*;
     use crate::drive::Drive;
-    use crate::material::PlaneStrain;
+    use crate::fem::material::PlaneStrain;
     use crate::mesh::{MeshLevel, WheelMesh};
 
     use super::super::dense::Kernels;

@@ -5,7 +5,7 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
-use crate::material::PlaneStrain;
+use crate::fem::material::PlaneStrain;
 use crate::mesh::WheelMesh;
 
 use super::corotation::CoRotation;
@@ -186,7 +186,7 @@ impl CondensedWheel {
 mod tests {
     use super::*;
     use crate::drive::Drive;
-    use crate::element::{PACKED, linear_stiffness, packed_index};
+    use crate::fem::element::{PACKED, linear_stiffness, packed_index};
     use crate::mesh::MeshLevel;
 
     const STEEL: (f64, f64) = (206_000.0, 0.3);

@@ -12,8 +12,8 @@
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side as Triangle};
 
-use crate::element::{linear_stiffness, packed_index};
-use crate::material::PlaneStrain;
+use crate::fem::element::{linear_stiffness, packed_index};
+use crate::fem::material::PlaneStrain;
 use crate::mesh::{WheelMesh, rotate};
 
 /// The nodes of a cell, by number in the mesh of the wheel.

@@ -1,7 +1,7 @@
 //! Wave generator on the bore of the flexspline: unilateral, frictionless (it rolls).
 
 use crate::drive::{GeneratorOutline, OutlineFoot};
-use crate::element::edge_shape;
+use crate::fem::element::edge_shape;
 use crate::mesh::WheelMesh;
 
 use super::quadrature::gauss_legendre;

@@ -16,7 +16,7 @@
 //! origin on the axis of the output bearing: `x` counts from there, and the torque on the output is the moment about it, wherever
 //! toothing and housing have theirs.
 
-use crate::element::edge_shape;
+use crate::fem::element::edge_shape;
 use crate::mesh::{FlankMesh, WheelMesh, rotate};
 
 use super::quadrature::gauss_legendre;
@@ -554,7 +554,7 @@ impl<'a> FlankContact<'a> {
             let cs_shape = edge_shape(xi);
             // Slope of the displacement along the flank; none beyond the ends of the mesh.
             let slope: f64 = if xi.abs() < 1.0 {
-                let derivative = crate::element::edge_shape_derivative(xi);
+                let derivative = crate::fem::element::edge_shape_derivative(xi);
                 let span = cs.radii[2 * cs_edge + 2] - cs.radii[2 * cs_edge];
                 let rate = 2.0 / span * foot.radius_rate;
                 (0..3)

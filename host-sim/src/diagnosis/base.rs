@@ -14,7 +14,7 @@ use flexspline::{GeneratorAngle, PlayState, Table};
 
 use super::rows::Rows;
 use crate::nominal::Nominal;
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// How the flank changes where the torque is below friction.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -14,7 +14,7 @@ use super::model::Term;
 use super::noise::{Noise, Whitener, white_level};
 use super::rows::{Rows, quantile, rms, robust_std};
 use crate::nominal::Nominal;
-use crate::tables::ARCSEC_PER_TURN;
+use crate::units::ARCSEC_PER_TURN;
 
 /// Averages used to find the wander, about.
 const WANDER_AVERAGES: usize = 2500;

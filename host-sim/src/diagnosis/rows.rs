@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::measurement::{Session, quantile_of};
 use crate::nominal::{Fixed, Nominal};
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Which columns were recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

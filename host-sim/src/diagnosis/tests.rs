@@ -362,7 +362,7 @@ fn a_line_of_the_mains_close_to_half_the_rate_of_rows_is_seen() {
         let time = session.time_s.as_ref().unwrap();
         for (error, t) in session.error_rad.iter_mut().zip(time) {
             let hum = 27.0 * (std::f64::consts::TAU * 49.82 * t).sin();
-            *error += hum / crate::tables::ARCSEC_PER_RAD;
+            *error += hum / crate::units::ARCSEC_PER_RAD;
         }
     }
     let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
@@ -406,14 +406,14 @@ fn without_a_load_only_rows_that_cross_the_clearance_are_uncertain() {
     let drive = catalogue_drive();
     let mut sessions = unloaded(&[], 4);
     let mut random = fastrand::Rng::with_seed(5);
-    let half = 0.5 * drive.backlash_arcsec / crate::tables::ARCSEC_PER_RAD;
+    let half = 0.5 * drive.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
     for session in &mut sessions {
         let (mut stands, mut before) = (0.0f64, session.generator_rad[0]);
         for (error, psi) in session.error_rad.iter_mut().zip(&session.generator_rad) {
             stands = (stands - (psi - before) / drive.ratio).clamp(-half, half);
             before = *psi;
             let noise = (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
-            *error = stands + (drive.harmonics_arcsec(*psi) + noise) / crate::tables::ARCSEC_PER_RAD;
+            *error = stands + (drive.harmonics_arcsec(*psi) + noise) / crate::units::ARCSEC_PER_RAD;
         }
     }
     excited_by(&sessions, &drive, |on| {
@@ -424,7 +424,7 @@ fn without_a_load_only_rows_that_cross_the_clearance_are_uncertain() {
         for session in &on.rows.sessions {
             assert!(uncertain[session.start], "nobody knows where the output was before");
             // After any motion one way by several clearances the flank is known.
-            let far = 6.0 * on.base.half_backlash / crate::tables::ARCSEC_PER_RAD;
+            let far = 6.0 * on.base.half_backlash / crate::units::ARCSEC_PER_RAD;
             for k in session.clone().skip(300) {
                 let before = &on.rows.output[k - 300..=k];
                 let steady = before.windows(2).all(|o| (o[1] - o[0]) * (before[300] - before[0]) > 0.0);
@@ -454,7 +454,7 @@ fn rows_thrown_out_make_no_fast_wander_of_the_noise() {
     // As where a flank is turned over some rows too late, now and then.
     for session in &mut sessions {
         for from in (700..5900).step_by(2500) {
-            session.error_rad[from..from + 24].iter_mut().for_each(|e| *e += 90.0 / crate::tables::ARCSEC_PER_RAD);
+            session.error_rad[from..from + 24].iter_mut().for_each(|e| *e += 90.0 / crate::units::ARCSEC_PER_RAD);
         }
     }
     let thrown = noise_of(&sessions);
@@ -578,7 +578,7 @@ fn a_wheel_so_far_off_that_no_clearance_is_left_is_begun_with_its_own_size() {
     let (phase, size) = (0.3, 5.0 * 0.5 * drive.backlash_arcsec);
     for session in &mut sessions {
         for (error, psi) in session.error_rad.iter_mut().zip(&session.generator_rad) {
-            *error += 5.0 * of_wheel(*psi).cos() / crate::tables::ARCSEC_PER_RAD;
+            *error += 5.0 * of_wheel(*psi).cos() / crate::units::ARCSEC_PER_RAD;
         }
     }
     drive.harmonics.push(Harmonic { order_per_generator_turn: of_wheel(1.0), amplitude_arcsec: 5.0, phase_rad: 0.0 });
@@ -586,7 +586,7 @@ fn a_wheel_so_far_off_that_no_clearance_is_left_is_begun_with_its_own_size() {
         let law = law(laws, "circular_spline_eccentricity");
         let pattern = &(law.columns)(on, &[phase, size, 1e9, 3.0])[0].values;
         let errors = sessions.iter_mut().flat_map(|session| &mut session.error_rad);
-        errors.zip(pattern).for_each(|(error, arcsec)| *error += arcsec / crate::tables::ARCSEC_PER_RAD);
+        errors.zip(pattern).for_each(|(error, arcsec)| *error += arcsec / crate::units::ARCSEC_PER_RAD);
     });
     excited_by(&sessions, &drive, |on| {
         let search = super::Search::new(on, &Settings::default()).unwrap();

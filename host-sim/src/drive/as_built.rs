@@ -23,8 +23,8 @@
 //! An imperfect drive does not repeat from tooth to tooth any more. What still does, with period `2 pi / z_f` in the generator
 //! angle: any generator (a constant shape), uniform wear, a difference in temperature.
 
-use super::error::Problem;
 use super::spec::Drive;
+use crate::toml_file::Problem;
 use serde::Serialize;
 use std::f64::consts::PI;
 

@@ -3,6 +3,7 @@
 
 use super::as_built::{DamagedTooth, Harmonic};
 use super::spec::Drive;
+use crate::toml_file::{Allowed, above, from};
 
 /// One number of the file.
 pub(super) struct Field {
@@ -10,7 +11,7 @@ pub(super) struct Field {
     pub path: &'static str,
     /// What it is, for the comment in a written file.
     pub meaning: &'static str,
-    pub range: Range,
+    pub range: Allowed,
     slot: fn(&mut Drive) -> Slot<'_>,
 }
 
@@ -50,49 +51,13 @@ impl Value {
 }
 
 /// Allowed phases, degrees.
-pub(super) const PHASE: Range = from(-360.0, 360.0);
+pub(super) const PHASE: Allowed = from(-360.0, 360.0);
 /// Allowed orders of a harmonic; the drive narrows them.
-pub(super) const ORDER: Range = from(1.0, 1000.0);
+pub(super) const ORDER: Allowed = from(1.0, 1000.0);
 /// Allowed depths of a damage, µm.
-pub(super) const DEPTH: Range = from(0.0, 500.0);
+pub(super) const DEPTH: Allowed = from(0.0, 500.0);
 /// Allowed numbers of a damaged tooth; the drive narrows them.
-pub(super) const TOOTH: Range = from(0.0, 2001.0);
-
-/// Allowed values; the lower end belongs to it unless `above`.
-pub(super) struct Range {
-    pub low: f64,
-    pub high: f64,
-    above: bool,
-}
-
-impl Range {
-    /// Why `number` is refused, if it is.
-    pub fn refusal(&self, number: f64) -> Option<String> {
-        // false for NaN
-        let high_enough = if self.above { number > self.low } else { number >= self.low };
-        let inside = high_enough && number <= self.high;
-        (!inside).then(|| format!("found {number}, allowed: {self}"))
-    }
-}
-
-impl std::fmt::Display for Range {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let from = if self.above { "above " } else { "" };
-        if self.high >= 1e6 {
-            write!(f, "{from}{} to {:e}", self.low, self.high)
-        } else {
-            write!(f, "{from}{} to {}", self.low, self.high)
-        }
-    }
-}
-
-const fn from(low: f64, high: f64) -> Range {
-    Range { low, high, above: false }
-}
-
-const fn above(low: f64, high: f64) -> Range {
-    Range { low, high, above: true }
-}
+pub(super) const TOOTH: Allowed = from(0.0, 2001.0);
 
 macro_rules! fields {
     ($($section:ident . $key:ident : $slot:ident, $range:expr, $meaning:literal;)*) => {
@@ -238,7 +203,7 @@ pub(super) fn for_each(drive: &Drive, mut visit: impl FnMut(&Field, &Value)) {
 }
 
 /// Every number of a value that has a range of its own: where it stands within the value, the number, the range.
-pub(super) fn ranged<'f>(field: &'f Field, value: &Value) -> Vec<(String, f64, &'f Range)> {
+pub(super) fn ranged<'f>(field: &'f Field, value: &Value) -> Vec<(String, f64, &'f Allowed)> {
     match value {
         Value::Number(number) => vec![(String::new(), *number, &field.range)],
         Value::Rigid => Vec::new(),

@@ -14,14 +14,15 @@
 //! ```
 
 use super::as_built::{DamagedFlank, DamagedTooth, Harmonic, Wheel};
-use super::error::{DriveError, Problem};
-use super::fields::{self, DEPTH, Field, ORDER, PHASE, Range as Allowed, Slot, TOOTH, Value};
+use super::error::DriveError;
+use super::fields::{self, DEPTH, Field, ORDER, PHASE, Slot, TOOTH, Value};
 use super::spec::{Drive, ThermalState};
 use crate::suggest::{did_you_mean, likeliest, likeliest_path, question};
-use serde_spanned::Spanned;
+use crate::toml_file::{Entries, Problem, Refused, TomlFile, each_of, number, one_of, real, shown, text, whole};
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::ops::Range;
+use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// The first lines of a written file.
@@ -36,16 +37,10 @@ impl Drive {
     /// Reads a drive file. Every unknown key, wrong type, value out of range and missing field of the file is
     /// reported; if there is none, the parts are fitted to one another ([`Drive::check`]).
     pub fn from_toml(file_name: &str, text: &str) -> Result<Drive, DriveError> {
-        let mut reader = Reader::new(file_name, text);
-        match DeTable::parse(text) {
-            Ok(table) => reader.read(table.get_ref()),
-            Err(error) => {
-                let at = error.span().unwrap_or(0..0);
-                let found = text.get(at.clone()).filter(|t| !t.trim().is_empty() && t.len() < 40 && !t.contains('\n'));
-                let found = found.map(|t| format!(" {t:?}")).unwrap_or_default();
-                reader.refuse(at, "", format!("not TOML: {}{found}", error.message()));
-                Err(reader.finish())
-            }
+        let mut reader = Reader { file: TomlFile::new(file_name, text), lines: HashMap::new() };
+        match reader.file.parse() {
+            Some(table) => reader.read(&table),
+            None => Err(reader.finish()),
         }
     }
 
@@ -88,8 +83,8 @@ impl Drive {
             fields::ALL.iter().find(|field| field.path == path).ok_or_else(|| Problem::of(path, unknown_path(path)))?;
         // a bare word is a string
         match DeValue::parse(text) {
-            Ok(value) => field.put(self, value.get_ref()),
-            Err(_) => field.put(self, &DeValue::String(text.into())),
+            Ok(value) => field.put(self, &value),
+            Err(_) => field.put(self, &Spanned::new(0..0, DeValue::String(text.into()))),
         }
         .map_err(|refused| refused.of(path))
     }
@@ -153,13 +148,13 @@ impl Field {
     }
 
     /// Stores `value` in `drive` if its type and range are right; says what is wrong otherwise.
-    fn put(&self, drive: &mut Drive, value: &DeValue) -> Result<(), Refused> {
+    fn put(&self, drive: &mut Drive, value: &Spanned<DeValue>) -> Result<(), Refused> {
         match self.slot(drive) {
             Slot::RealOrRigid(slot) => {
-                *slot = match number(value) {
-                    None if value.as_str() == Some("rigid") => None,
-                    Some(number) => Some(in_range(&self.range, number)?),
-                    None => return Err(Refused::found(value, format!("{} or \"rigid\"", self.range))),
+                *slot = match value.get_ref() {
+                    DeValue::String(word) if word == "rigid" => None,
+                    other if number(other).is_some() => Some(real(&self.range, value)?),
+                    _ => return Err(Refused::found(value, format!("{} or \"rigid\"", self.range))),
                 }
             }
             Slot::Real(slot) => *slot = real(&self.range, value)?,
@@ -198,91 +193,6 @@ impl Field {
     }
 }
 
-/// Why a value is refused.
-struct Refused {
-    /// Where within the value, `[1].order`; empty for the value itself.
-    at: String,
-    what: String,
-}
-
-impl Refused {
-    fn found(value: &DeValue, allowed: impl std::fmt::Display) -> Refused {
-        Refused { at: String::new(), what: format!("found {}, allowed: {allowed}", shown(value)) }
-    }
-
-    /// The same, seen from outside of the part `at`.
-    fn within(self, at: impl std::fmt::Display) -> Refused {
-        Refused { at: format!("{at}{}", self.at), ..self }
-    }
-
-    fn of(self, path: &str) -> Problem {
-        Problem::of(&format!("{path}{}", self.at), self.what)
-    }
-}
-
-fn in_range(range: &Allowed, number: f64) -> Result<f64, Refused> {
-    range.refusal(number).map_or(Ok(number), |what| Err(Refused { at: String::new(), what }))
-}
-
-fn real(range: &Allowed, value: &DeValue) -> Result<f64, Refused> {
-    in_range(range, number(value).ok_or_else(|| Refused::found(value, range))?)
-}
-
-fn whole(range: &Allowed, value: &DeValue) -> Result<u32, Refused> {
-    let whole = number(value).filter(|_| value.is_integer());
-    let whole = whole.ok_or_else(|| Refused::found(value, format!("a whole number, {range}")))?;
-    Ok(in_range(range, whole)? as u32)
-}
-
-fn one_of<T: Copy>(known: &[(&'static str, T)], value: &DeValue) -> Result<T, Refused> {
-    let found = known.iter().find(|(name, _)| value.as_str() == Some(name));
-    found.map(|(_, meant)| *meant).ok_or_else(|| {
-        let names: Vec<String> = known.iter().map(|(name, _)| format!("{name:?}")).collect();
-        let hint = value.as_str().map(|found| did_you_mean("; ", found, known.iter().map(|(name, _)| *name)));
-        Refused::found(value, names.join(", ") + &hint.unwrap_or_default())
-    })
-}
-
-/// The elements of an array, each read by `read`.
-fn each_of<T>(
-    value: &DeValue,
-    allowed: &str,
-    mut read: impl FnMut(&DeValue) -> Result<T, Refused>,
-) -> Result<Vec<T>, Refused> {
-    let array = value.as_array().ok_or_else(|| Refused::found(value, allowed))?;
-    let element = |(k, element): (usize, &Spanned<DeValue>)| {
-        read(element.get_ref()).map_err(|refused| refused.within(format!("[{k}]")))
-    };
-    array.iter().enumerate().map(element).collect()
-}
-
-/// The entries of a small table within an array.
-struct Entries<'a, 'i>(&'a DeTable<'i>);
-
-impl<'a, 'i> Entries<'a, 'i> {
-    fn of(value: &'a DeValue<'i>, known: &[&'static str]) -> Result<Self, Refused> {
-        let table = value.as_table().ok_or_else(|| Refused::found(value, format!("{{ {} }}", known.join(", "))))?;
-        for key in table.keys() {
-            let name = key.get_ref().as_ref();
-            if !known.contains(&name) {
-                let hint = did_you_mean("; ", name, known.iter().copied());
-                let what = format!("unknown key{hint}; allowed: {}", known.join(", "));
-                return Err(Refused { at: format!(".{name}"), what });
-            }
-        }
-        Ok(Entries(table))
-    }
-
-    fn given<T>(&self, key: &str, read: impl Fn(&DeValue) -> Result<T, Refused>) -> Result<Option<T>, Refused> {
-        let value: Option<&Spanned<DeValue>> = self.0.get(key);
-        value.map(|value| read(value.get_ref()).map_err(|refused| refused.within(format!(".{key}")))).transpose()
-    }
-
-    fn needed<T>(&self, key: &str, read: impl Fn(&DeValue) -> Result<T, Refused>) -> Result<T, Refused> {
-        self.given(key, read)?.ok_or_else(|| Refused { at: format!(".{key}"), what: "missing".to_owned() })
-    }
-}
-
 /// A TOML array of tables, one to a line where there are several.
 fn array(entries: impl Iterator<Item = String>) -> String {
     let entries: Vec<String> = entries.collect();
@@ -295,31 +205,14 @@ fn array(entries: impl Iterator<Item = String>) -> String {
 
 /// One pass over a file.
 struct Reader<'a> {
-    file_name: &'a str,
-    text: &'a str,
-    /// problems with the byte they start at, for the order
-    problems: Vec<(usize, Problem)>,
+    file: TomlFile<'a>,
     /// line of every field that the file sets
     lines: HashMap<&'static str, usize>,
 }
 
-impl<'a> Reader<'a> {
-    fn new(file_name: &'a str, text: &'a str) -> Self {
-        Reader { file_name, text, problems: Vec::new(), lines: HashMap::new() }
-    }
-
-    fn line(&self, byte: usize) -> usize {
-        1 + self.text.as_bytes().iter().take(byte).filter(|&&b| b == b'\n').count()
-    }
-
-    fn refuse(&mut self, at: Range<usize>, field: &str, what: String) {
-        let place = format!("{}:{}", self.file_name, self.line(at.start));
-        self.problems.push((at.start, Problem { place, field: field.to_owned(), what }));
-    }
-
-    fn finish(mut self) -> DriveError {
-        self.problems.sort_by_key(|(at, _)| *at);
-        DriveError { problems: self.problems.into_iter().map(|(_, problem)| problem).collect() }
+impl Reader<'_> {
+    fn finish(self) -> DriveError {
+        DriveError { problems: self.file.problems() }
     }
 
     fn read(mut self, table: &DeTable) -> Result<Drive, DriveError> {
@@ -327,7 +220,7 @@ impl<'a> Reader<'a> {
             let drive = Drive::built_in(&name);
             if drive.is_none() {
                 let what = format!("found {name:?}, allowed: {}", Drive::BUILT_IN.join(", "));
-                self.refuse(at, "base", what + &did_you_mean("; ", &name, Drive::BUILT_IN));
+                self.file.refuse(at, "base", what + &did_you_mean("; ", &name, Drive::BUILT_IN));
             }
             drive
         });
@@ -336,7 +229,9 @@ impl<'a> Reader<'a> {
         let mut drive = base.unwrap_or_else(Drive::hhd_95);
         drive.name = match self.text_of(table, "name") {
             Some((_, name)) => name,
-            None => self.file_name.rsplit(['/', '\\']).next().unwrap_or_default().trim_end_matches(".toml").to_owned(),
+            None => {
+                self.file.name().rsplit(['/', '\\']).next().unwrap_or_default().trim_end_matches(".toml").to_owned()
+            }
         };
         for (key, value) in table {
             let section = key.get_ref().as_ref();
@@ -350,29 +245,29 @@ impl<'a> Reader<'a> {
                 let meant = likeliest(section, known()).or_else(|| likeliest_path(section, &keys));
                 let hint = meant.map_or_else(String::new, |name| format!("; {}", question(name)));
                 let allowed = known().collect::<Vec<_>>().join(", ");
-                self.refuse(key.span(), section, format!("unknown key{hint}; allowed: {allowed}"));
+                self.file.refuse(key.span(), section, format!("unknown key{hint}; allowed: {allowed}"));
                 continue;
             }
             match value.get_ref().as_table() {
                 Some(entries) => self.read_section(section, entries, &mut drive),
                 None => {
                     let what = format!("found {}, allowed: a table [{section}]", shown(value.get_ref()));
-                    self.refuse(value.span(), section, what);
+                    self.file.refuse(value.span(), section, what);
                 }
             }
         }
         if !has_base {
             self.refuse_missing();
         }
-        if !self.problems.is_empty() {
+        if !self.file.is_sound() {
             return Err(self.finish());
         }
         drive.check().map_err(|mut refused| {
             for problem in &mut refused.problems {
                 let field = problem.field.split('[').next().unwrap_or_default();
                 problem.place = match self.lines.get(field) {
-                    Some(line) => format!("{}:{line}", self.file_name),
-                    None => self.file_name.to_owned(),
+                    Some(line) => format!("{}:{line}", self.file.name()),
+                    None => self.file.name().to_owned(),
                 };
             }
             refused
@@ -385,37 +280,26 @@ impl<'a> Reader<'a> {
             let name = key.get_ref().as_ref();
             let path = format!("{section}.{name}");
             match fields::ALL.iter().find(|field| field.path == path) {
-                None => self.refuse(key.span(), &path, unknown_path(&path)),
+                None => self.file.refuse(key.span(), &path, unknown_path(&path)),
                 Some(field) => {
-                    self.lines.insert(field.path, self.line(key.span().start));
-                    if let Err(refused) = field.put(drive, value.get_ref()) {
-                        let Problem { field, what, .. } = refused.of(&path);
-                        self.refuse(key.span(), &field, what);
-                    }
+                    self.lines.insert(field.path, self.file.line(key.span().start));
+                    self.file.take(&path, field.put(drive, value));
                 }
             }
         }
     }
 
-    /// A top-level string; refuses another type.
+    /// A top-level string and where it stands; refuses another type.
     fn text_of(&mut self, table: &DeTable, key: &str) -> Option<(Range<usize>, String)> {
         let value: &Spanned<DeValue> = table.get(key)?;
-        match value.get_ref().as_str() {
-            Some(text) => Some((value.span(), text.to_owned())),
-            None => {
-                self.refuse(value.span(), key, format!("found {}, allowed: a string", shown(value.get_ref())));
-                None
-            }
-        }
+        self.file.take(key, text(value)).map(|text| (value.span(), text))
     }
 
     fn refuse_missing(&mut self) {
-        let at = self.text.len();
         for field in fields::ALL {
             if !field.is_optional() && !self.lines.contains_key(field.path) {
                 let what = format!("missing ({}); give it, or a base = \"HHD-95\" to start from", field.meaning);
-                let place = self.file_name.to_owned();
-                self.problems.push((at, Problem { place, field: field.path.to_owned(), what }));
+                self.file.refuse_whole(field.path, what);
             }
         }
     }
@@ -442,30 +326,6 @@ fn unknown_path(path: &str) -> String {
         return format!("unknown key{hint}; allowed: SECTION.KEY, sections are {}", sections.join(", "));
     }
     format!("unknown key{hint}; allowed: {}", known.join(", "))
-}
-
-/// The number of a TOML value, if it is one.
-fn number(value: &DeValue) -> Option<f64> {
-    match value {
-        DeValue::Integer(integer) => {
-            i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix()).ok().map(|n| n as f64)
-        }
-        DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
-        _ => None,
-    }
-}
-
-/// A value as a message shows it.
-fn shown(value: &DeValue) -> String {
-    match value {
-        DeValue::String(text) => format!("{text:?}"),
-        DeValue::Integer(integer) => integer.to_string(),
-        DeValue::Float(float) => float.to_string(),
-        DeValue::Boolean(truth) => truth.to_string(),
-        DeValue::Datetime(_) => "a date".to_owned(),
-        DeValue::Array(_) => "an array".to_owned(),
-        DeValue::Table(_) => "a table".to_owned(),
-    }
 }
 
 #[cfg(test)]

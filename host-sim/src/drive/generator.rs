@@ -10,10 +10,11 @@
 //! of 2e-3.
 
 use super::as_built::{Harmonic, direction};
-use super::error::{DriveError, Problem};
+use super::error::DriveError;
 use super::neutral::NeutralCurve;
 use super::ring::{GeneratorKind, RingShape};
 use super::spec::Drive;
+use crate::toml_file::Problem;
 use std::f64::consts::TAU;
 
 /// A Newton step, rad, below which the next one is below round-off: convergence is quadratic, with a factor near one.

@@ -25,7 +25,7 @@ mod spec;
 mod tooth;
 
 pub use as_built::{AsBuilt, DamagedFlank, DamagedTooth, Harmonic, RimVariation, Wheel};
-pub use error::{DriveError, Problem};
+pub use error::DriveError;
 pub use generator::{GeneratorOutline, OutlineFoot};
 pub use interference::{FlankGap, MeshReport, RigidMesh, Side};
 pub use involute::{Foot, InvoluteFlank};
@@ -36,3 +36,5 @@ pub use spec::{
     CircularSpline, Drive, Flanks, Flexspline, Generators, Material, OutputLoadPath, Sleeve, Temperature, ThermalState,
 };
 pub use tooth::{OutlinePiece, PieceKind, ToothFlank};
+
+pub use crate::toml_file::Problem;

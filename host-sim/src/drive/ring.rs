@@ -49,6 +49,16 @@ impl GeneratorKind {
             other => other.name(),
         }
     }
+
+    /// Largest load (N m) that tables, kernels and closed loops are made for unless told otherwise: up to where the model holds
+    /// with the rim of HHD-95. Rollers leave the rim unsupported: beyond these loads teeth slip or no equilibrium is found.
+    pub const fn rated_torque_n_m(self) -> f64 {
+        match self {
+            Self::TwoRoller => 20.0,
+            Self::FourRoller => 100.0,
+            Self::DoubleDisc | Self::Cam => 200.0,
+        }
+    }
 }
 
 impl fmt::Display for GeneratorKind {

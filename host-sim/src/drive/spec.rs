@@ -1,11 +1,12 @@
 //! The drive as a value: every number of `drive.toml`, the built-in drives, derived sizes, temperature.
 
 use super::as_built::{AsBuilt, DamagedFlank, Harmonic, Wheel};
-use super::error::{DriveError, Problem};
+use super::error::DriveError;
 use super::fields::{self, Value};
 use super::generator::GeneratorOutline;
 use super::ring::GeneratorKind;
 use super::tooth::ToothFlank;
+use crate::toml_file::Problem;
 use serde::Serialize;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -225,6 +226,12 @@ impl CircularSpline {
     /// Radius of the base circle, mm.
     pub fn base_radius_mm(&self) -> f64 {
         self.pitch_radius_mm() * self.pressure_angle_rad().cos()
+    }
+
+    /// Angle between the circumference and the normal of a flank at the tip circle, where the flexspline's teeth come to bear, rad:
+    /// `cos a = r_b / r` of the involute.
+    pub fn bearing_flank_angle_rad(&self) -> f64 {
+        (self.base_radius_mm() / self.tip_radius_mm).acos()
     }
 }
 

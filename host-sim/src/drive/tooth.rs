@@ -21,8 +21,9 @@
 //! is `r_b e(beta) + r_b u e'(beta)` with `beta = half angle at the base - u`, which makes offset curves, and so the
 //! centres of fillets and roundings, closed forms.
 
-use super::error::{DriveError, Problem};
+use super::error::DriveError;
 use super::spec::{CircularSpline, Flexspline};
+use crate::toml_file::Problem;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// What a piece of the outline is.

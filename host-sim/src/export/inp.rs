@@ -5,7 +5,7 @@
 //!
 //! | part | in the deck |
 //! |---|---|
-//! | wheels | our nodes and elements, `CPE8R`: the 8-node quadrilateral with 2 x 2 points that [`crate::element`] is |
+//! | wheels | our nodes and elements, `CPE8R`: the 8-node quadrilateral with 2 x 2 points that [`crate::fem::element`] is |
 //! | material | `*ELASTIC` under `NLGEOM`: St Venant-Kirchhoff, as ours |
 //! | generator | bodies with the exact outline, every node prescribed ([`generator`]) |
 //! | contact | `SURFACE TO SURFACE`, linear penalty of our stiffness, `*FRICTION` if the drive has any |

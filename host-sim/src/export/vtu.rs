@@ -19,8 +19,8 @@ use std::f64::consts::TAU;
 use std::io::{self, Write};
 
 use crate::mesh::WheelMesh;
+use crate::simulate::stress::nodal_von_mises;
 use crate::stepping::{Problem, State};
-use crate::stress::nodal_von_mises;
 
 /// Type number of the 8-node quadrilateral.
 const VTK_QUADRATIC_QUAD: u8 = 23;
@@ -174,7 +174,7 @@ pub(crate) fn base64(bytes: &[u8]) -> Vec<u8> {
 mod tests {
     use super::*;
     use crate::drive::{Drive, GeneratorKind};
-    use crate::element::shape;
+    use crate::fem::element::shape;
     use crate::mesh::MeshLevel;
     use crate::stepping::SolverSettings;
 

@@ -10,7 +10,8 @@ use serde::Serialize;
 use super::sampled::ExtendedTables;
 use crate::diagnosis::{DiagnosisError, Extended, Settings};
 use crate::measurement::Session;
-use crate::tables::{ARCSEC_PER_RAD, TableError};
+use crate::tables::TableError;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Extended tables are written if they improve on the nominal ones in at least this share of the sessions held out.
 pub const LEAST_SHARE_IMPROVED: f64 = 2.0 / 3.0;

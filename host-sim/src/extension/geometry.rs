@@ -21,14 +21,13 @@ use super::model::CauseEntry;
 use crate::diagnosis::Extended;
 use crate::drive::{DamagedFlank, DamagedTooth, Drive, DriveError, GeneratorKind, Harmonic, Wheel};
 use crate::measurement::Session;
+use crate::motion::Motion;
 use crate::nominal::Nominal;
-use crate::stepping::{Problem, SolveError, Solver, SolverSettings};
-use crate::tables::ARCSEC_PER_RAD;
+use crate::stepping::{Problem, SolveError, SolverSettings};
+use crate::units::ARCSEC_PER_RAD;
 
 /// Load under which causes are looked at, N·m: light, as loads let more teeth share what is displaced.
 const PROBE_N_M: f64 = 2.0;
-/// Flank angle where teeth bear, rad: 22.5 degrees in HHD-95 (`tests/as_built.rs`).
-const FLANK_ANGLE_RAD: f64 = 22.5 * PI / 180.0;
 /// Positions over a turn of the output; a prime.
 const POSITIONS: usize = 1009;
 /// The largest sizes that a drive file takes, µm.
@@ -130,15 +129,15 @@ impl Probe {
     }
 }
 
-/// `A exp(2 i d)` of what is displaced towards `d`.
-fn displaced([plus, minus]: [Wave; 2]) -> Wave {
+/// `A exp(2 i d)` of what is displaced towards `d`; `a` is the flank angle.
+fn displaced([plus, minus]: [Wave; 2], a: f64) -> Wave {
     let second = 4.0 / (3.0 * PI);
-    plus.turned(2.0 * FLANK_ANGLE_RAD).plus(minus.turned(-2.0 * FLANK_ANGLE_RAD).times(-1.0)).times(0.5 / second)
+    plus.turned(2.0 * a).plus(minus.turned(-2.0 * a).times(-1.0)).times(0.5 / second)
 }
 
-/// `A exp(2 i c)` of an oval with a crest at `c`.
-fn oval([plus, minus]: [Wave; 2]) -> Wave {
-    let tan = FLANK_ANGLE_RAD.tan();
+/// `A exp(2 i c)` of an oval with a crest at `c`; `a` is the flank angle.
+fn oval([plus, minus]: [Wave; 2], a: f64) -> Wave {
+    let tan = a.tan();
     // Least squares of z = A exp(2 i c) (i/2 +- tan a) on both flanks.
     let part = |z: Wave, sign: f64| z.turned(-PI / 2.0).times(0.5).plus(z.times(sign * tan));
     part(plus, 1.0).plus(part(minus, -1.0)).times(0.5 / (0.25 + tan * tan))
@@ -164,6 +163,7 @@ pub fn found_geometry(
     let probe = Probe::new(extended, nominal, table, generator, orientation_rad.unwrap_or(0.0));
     let um = |arcsec: f64, radius_mm: f64| 1e3 * arcsec / ARCSEC_PER_RAD * radius_mm;
     let base_mm = drive.circular_spline.base_radius_mm();
+    let flank_angle_rad = drive.circular_spline.bearing_flank_angle_rad();
     let mut found = drive.clone();
     let (mut mapped, mut rest) = (Vec::new(), Vec::new());
     for cause in causes {
@@ -179,7 +179,7 @@ pub fn found_geometry(
         let middle = |root: f64, tip: f64| 0.5 * (root + tip);
         match (cause.name.as_str(), place) {
             ("circular_spline_eccentricity", Some(k)) => {
-                let wave = displaced(probe.wave(k, true, 2.0));
+                let wave = displaced(probe.wave(k, true, 2.0), flank_angle_rad);
                 set(
                     "as_built.circular_spline_eccentricity_um",
                     &mut built.circular_spline_eccentricity_um,
@@ -192,7 +192,7 @@ pub fn found_geometry(
                 );
             }
             ("flexspline_runout", Some(k)) => {
-                let wave = displaced(probe.wave(k, false, 2.0));
+                let wave = displaced(probe.wave(k, false, 2.0), flank_angle_rad);
                 set("as_built.flexspline_runout_um", &mut built.flexspline_runout_um, um(wave.size(), base_mm));
                 set(
                     "as_built.flexspline_runout_phase_deg",
@@ -201,7 +201,7 @@ pub fn found_geometry(
                 );
             }
             ("gravity_side_load", Some(k)) if orientation_rad.is_some() => {
-                let wave = displaced(probe.wave(k, false, 2.0));
+                let wave = displaced(probe.wave(k, false, 2.0), flank_angle_rad);
                 set(
                     "as_built.circular_spline_offset_um",
                     &mut built.circular_spline_offset_um,
@@ -214,7 +214,7 @@ pub fn found_geometry(
                 );
             }
             ("circular_spline_ovality", Some(k)) => {
-                let wave = oval(probe.wave(k, true, 2.0));
+                let wave = oval(probe.wave(k, true, 2.0), flank_angle_rad);
                 let radius = drive.circular_spline.pitch_radius_mm();
                 set(
                     "as_built.circular_spline_ovality_um",
@@ -295,7 +295,7 @@ pub fn found_geometry(
                 by_angle = false;
                 if let Some(per_k) = value("clearance_arcsec_per_k") {
                     // A ring that grows by dr opens its spaces by 2 dr tan a / r.
-                    let more = per_k / ARCSEC_PER_RAD / (2.0 * FLANK_ANGLE_RAD.tan());
+                    let more = per_k / ARCSEC_PER_RAD / (2.0 * flank_angle_rad.tan());
                     let t = &mut found.temperature;
                     for (field, slot) in [
                         ("temperature.circular_spline_expansion_per_k", &mut t.circular_spline_expansion_per_k),
@@ -425,10 +425,9 @@ pub fn check_by_fem(
 
 /// Error of the drive deformed at a generator angle, then loaded, arcsec.
 fn stands(problem: &Problem, generator_rad: f64, torque_n_m: f64) -> Result<f64, SolveError> {
-    let mut solver = Solver::new(problem);
-    let (state, _) = solver.deform(generator_rad)?;
-    let (state, _) = solver.increment(&state, generator_rad, torque_n_m)?;
-    Ok((state.output_rad - generator_rad / problem.drive.ratio()) * ARCSEC_PER_RAD)
+    let mut motion = Motion::deformed_or_turned_in(problem, generator_rad)?;
+    motion.load(torque_n_m)?;
+    Ok(motion.error_arcsec())
 }
 
 #[cfg(test)]
@@ -444,11 +443,11 @@ mod tests {
 
     #[test]
     fn size_and_place_come_back_from_the_closed_forms() {
-        let a = FLANK_ANGLE_RAD;
-        let wave = displaced(waves(|x, flank| -flank * 30.0 * (x - 0.7 + flank * a).sin().abs(), 2.0));
+        let a = 0.4;
+        let wave = displaced(waves(|x, flank| -flank * 30.0 * (x - 0.7 + flank * a).sin().abs(), 2.0), a);
         assert!((wave.size() - 30.0).abs() < 0.01 && (0.5 * wave.phase() - 0.7).abs() < 1e-3, "{wave:?}");
         let two = |x: f64| 2.0 * (x - 0.4);
-        let wave = oval(waves(|x, flank| 20.0 * (0.5 * two(x).sin() + flank * a.tan() * two(x).cos()), 2.0));
+        let wave = oval(waves(|x, flank| 20.0 * (0.5 * two(x).sin() + flank * a.tan() * two(x).cos()), 2.0), a);
         assert!((wave.size() - 20.0).abs() < 0.01 && (0.5 * wave.phase() - 0.4).abs() < 1e-3, "{wave:?}");
     }
 
@@ -456,9 +455,9 @@ mod tests {
     #[test]
     fn the_fem_agrees_with_the_closed_forms_in_sign_place_and_size() {
         type Change = fn(&mut Drive);
-        type Read = fn([Wave; 2]) -> Wave;
+        type Read = fn([Wave; 2], f64) -> Wave;
         const PARTS: usize = 5;
-        fn whole([plus, minus]: [Wave; 2]) -> Wave {
+        fn whole([plus, minus]: [Wave; 2], _: f64) -> Wave {
             plus.plus(minus).times(0.5)
         }
         let settings = SolverSettings { mesh: MeshLevel::Coarse, ..SolverSettings::default() };
@@ -530,7 +529,7 @@ mod tests {
                     d.as_built.circular_spline_pitch_harmonics =
                         vec![Harmonic { order: 2, amplitude_um: 5.0, phase_deg: 50.0 }];
                 },
-                |waves| whole(waves).times(-1.0),
+                |waves, a| whole(waves, a).times(-1.0),
                 true,
                 49.05,
                 5.0,
@@ -549,7 +548,7 @@ mod tests {
                 let error: Vec<f64> = (0..PARTS).map(|k| at(&problem, k) - at(&ideal, k)).collect();
                 Wave::of(&error, |k| share * psi(k), 2.0)
             });
-            let wave = read(found);
+            let wave = read(found, drive.circular_spline.bearing_flank_angle_rad());
             let size = 1e3 * wave.size() / ARCSEC_PER_RAD * radius;
             let place = (0.5 * wave.phase()).to_degrees().rem_euclid(180.0);
             println!("{what}: {size:.3} um at {place:.2} degrees, made {size_um} at {place_deg}");

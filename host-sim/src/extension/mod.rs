@@ -2,7 +2,6 @@
 //!
 //! * [`Model`]: `drive-extended.toml` of a catalogue drive: the nominal model recalibrated, and `[[extension.cause]]` entries.
 //! * [`FoundGeometry`]: causes that are geometry, as `[as_built]` of a drive that the FEM runs, checked against the FEM.
-//! * [`make_table`]: a table by FEM, as the command `tables` makes it.
 //! * [`ExtendedTables`]: tables of the extended model, sampled in steady motion at the nodes of a table.
 //! * [`evaluate`]: what the core leaves of the error in sessions that took no part in the fit, without tables, with nominal
 //!   and with extended ones.
@@ -10,7 +9,6 @@
 mod compensation;
 mod geometry;
 mod model;
-mod remake;
 mod sampled;
 
 pub use compensation::{
@@ -18,5 +16,4 @@ pub use compensation::{
 };
 pub use geometry::{Agreement, FoundGeometry, Mapped, check_by_fem, found_geometry};
 pub use model::{CauseEntry, Model, causes_in, causes_to_toml};
-pub use remake::{RemakeError, make_table, usual_increments};
 pub use sampled::{ExtendedTables, TableSubject, no_place_in_a_table};

@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use serde::Deserialize;
+use toml::de::DeTable;
 
 use crate::diagnosis::FittedCause;
 use crate::diagnosis::report::{Cause, Diagnosis, Parameter};
@@ -23,15 +23,14 @@ use crate::drive::{DriveError, Problem};
 use crate::measurement::Session;
 use crate::nominal::{Fixed, Nominal};
 use crate::synthesize::{Chosen, Excitation, Plant, Sizes, added_arcsec, effects, parse};
+use crate::toml_file::{Entries, Refused, TomlFile, any, entries_of, one_of};
 
 /// A cause with the values of its parameters.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CauseEntry {
     /// Name, snake case.
     pub name: String,
     /// Parameters by name; the unit is the end of the name.
-    #[serde(default)]
     pub parameters: BTreeMap<String, f64>,
 }
 
@@ -42,18 +41,6 @@ pub struct Model {
     pub nominal: Nominal,
     /// What was found beside it.
     pub causes: Vec<CauseEntry>,
-}
-
-#[derive(Deserialize)]
-struct FileForm {
-    extension: Option<ExtensionForm>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ExtensionForm {
-    #[serde(default)]
-    cause: Vec<CauseEntry>,
 }
 
 impl Model {
@@ -176,25 +163,30 @@ impl Model {
 /// # Errors
 /// What is wrong, and in which line.
 pub fn causes_in(file_name: &str, text: &str) -> Result<Vec<CauseEntry>, DriveError> {
-    let refuse =
-        |place: String, field: String, what: String| DriveError { problems: vec![Problem { place, field, what }] };
-    let form: FileForm = toml::from_str(text).map_err(|error| {
-        let line = error.span().map_or(0, |span| text.get(..span.start).unwrap_or("").matches('\n').count() + 1);
-        refuse(format!("{file_name}:{line}"), "extension".to_owned(), error.message().to_owned())
-    })?;
-    let causes = form.extension.map_or_else(Vec::new, |extension| extension.cause);
-    let known: Vec<&str> = effects().iter().filter(|effect| !effect.fault).map(|effect| effect.name).collect();
-    for (k, cause) in causes.iter().enumerate() {
-        let field = format!("extension.cause[{k}]");
-        if !known.contains(&cause.name.as_str()) {
-            let what = format!("found \"{}\", allowed: {}", cause.name, known.join(", "));
-            return Err(refuse(file_name.to_owned(), format!("{field}.name"), what));
-        }
-        if let Err(what) = cause.checked_effect() {
-            return Err(refuse(file_name.to_owned(), field, what));
-        }
+    let mut file = TomlFile::new(file_name, text);
+    let causes = file.parse().map_or_else(Vec::new, |table| causes_of(&mut file, &table));
+    if file.is_sound() { Ok(causes) } else { Err(DriveError { problems: file.problems() }) }
+}
+
+fn causes_of(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Vec<CauseEntry> {
+    let Some(extension) = table.get("extension").and_then(|_| file.section(table, "extension")) else {
+        return Vec::new();
+    };
+    for key in extension.keys().filter(|key| key.get_ref() != "cause") {
+        let field = extension.path(key.get_ref());
+        file.refuse(key.span(), &field, "unknown key; allowed: cause".to_owned());
     }
-    Ok(causes)
+    let known: Vec<(&'static str, &'static str)> =
+        effects().iter().filter(|effect| !effect.fault).map(|effect| (effect.name, effect.name)).collect();
+    let causes = extension.each(file, "cause", |entry| {
+        let cause = Entries::of(entry, &["name", "parameters"])?;
+        let name = cause.needed("name", |v| one_of(&known, v))?.to_owned();
+        let parameters = cause.given("parameters", |v| entries_of(v, any))?.unwrap_or_default();
+        let cause = CauseEntry { name, parameters };
+        cause.checked_effect().map_err(|what| Refused::because(entry, what))?;
+        Ok(cause)
+    });
+    causes.unwrap_or_default()
 }
 
 /// The part `[extension]` of a file; nothing without causes.
@@ -307,9 +299,21 @@ mod tests {
     fn a_wrong_extension_is_refused_by_field_and_value() {
         let text = model().to_toml();
         for (from, to, message) in [
-            ("sensor_latency", "sensor_lag", "d.toml: extension.cause[0].name: found \"sensor_lag\", allowed: circ"),
-            ("delay_s = 0.0021", "delay_s = \"old\"", "d.toml:"),
-            ("[extension.cause.parameters]", "[extension.cause.numbers]", "d.toml:"),
+            (
+                "sensor_latency",
+                "sensor_lag",
+                "d.toml:24: extension.cause[0].name: found \"sensor_lag\", allowed: \"circ",
+            ),
+            (
+                "delay_s = 0.0021",
+                "delay_s = \"old\"",
+                "d.toml:26: extension.cause[0].parameters.delay_s: found \"old\", allowed: a number",
+            ),
+            (
+                "[extension.cause.parameters]",
+                "[extension.cause.numbers]",
+                "d.toml:25: extension.cause[0].numbers: unknown key; allowed: name, parameters",
+            ),
         ] {
             let error = Model::from_toml("d.toml", &text.replacen(from, to, 1)).unwrap_err().to_string();
             assert!(error.starts_with(message), "{to}: {error}");

@@ -10,7 +10,8 @@ use crate::diagnosis::Extended;
 use crate::drive::GeneratorKind;
 use crate::measurement::Session;
 use crate::nominal::{Fixed, Nominal};
-use crate::tables::{ARCSEC_PER_RAD, MadeTable, Source, TableError, from_plan};
+use crate::tables::{MadeTable, Source, TableError, from_plan};
+use crate::units::ARCSEC_PER_RAD;
 
 /// Positions over a whole turn of the output. A prime, on which no order of the teeth (17860 times 1 to 4), of the generator (95), of the
 /// generator against the output (94) or of the output folds onto another.

@@ -1,7 +1,10 @@
-//! Sparse linear algebra of the whole drive: pattern, assembly positions, Cholesky factor with a dense border.
+//! Finite elements: the element and its material; sparse linear algebra of the whole drive: pattern, assembly positions, Cholesky
+//! factor with a dense border.
 
 mod border;
 mod cholesky;
+pub mod element;
+pub mod material;
 mod pattern;
 
 pub use border::{Border, BorderedSystem, Factor};

@@ -21,9 +21,9 @@ pub struct ElementPositions {
 }
 
 impl ElementPositions {
-    /// Adds a packed lower triangle (see [`crate::element`]) to the values.
+    /// Adds a packed lower triangle (see [`crate::fem::element`]) to the values.
     #[inline]
-    pub fn scatter(&self, packed: &[f64; crate::element::PACKED], values: &mut [f64]) {
+    pub fn scatter(&self, packed: &[f64; crate::fem::element::PACKED], values: &mut [f64]) {
         for a in 0..8 {
             let row_x = a * (2 * a + 1);
             let row_y = row_x + 2 * a + 1;

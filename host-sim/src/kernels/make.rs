@@ -11,9 +11,9 @@ use super::{Eccentric, KERNELS_SCHEMA, Kernels, LoadKernels, WheelKernels};
 use crate::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
 use crate::drive::{AsBuilt, Drive, GeneratorKind, Side};
 use crate::mesh::rotate;
-use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
-use crate::sweep::rated_torque_n_m;
-use crate::tables::ARCSEC_PER_RAD;
+use crate::motion::Motion;
+use crate::stepping::{Problem, SolveError, SolverSettings, State};
+use crate::units::ARCSEC_PER_RAD;
 
 /// What to compute.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,7 +34,7 @@ impl KernelPlan {
     /// directions 9.5° apart.
     #[must_use]
     pub fn for_generator(kind: GeneratorKind) -> KernelPlan {
-        let largest = rated_torque_n_m(kind);
+        let largest = kind.rated_torque_n_m();
         let steps = 7;
         let even = (1..=steps).map(|k| largest * (f64::from(k) / f64::from(steps)).powi(2));
         KernelPlan {
@@ -76,10 +76,6 @@ pub enum KernelError {
 const LOAD_STEP: f64 = 0.04;
 /// Drag of the output, N m: small, so that it holds back none of the load.
 const DRAG_N_M: f64 = 0.02;
-/// Increments before the first sample under a load.
-const SETTLING: usize = 3;
-/// Where else the drive is deformed, in tooth pitches.
-const BESIDE: [f64; 3] = [0.3, -0.3, 1.4];
 /// Flanks closer than this (mm) may touch.
 const NEAR_MM: f64 = 0.01;
 
@@ -157,13 +153,10 @@ impl Forces {
     /// Of the drive moving on forward under a load.
     fn under(problem: &Problem, torque_n_m: f64, positions: usize) -> Result<Forces, SolveError> {
         let step = problem.flexspline.pitch() / positions as f64;
-        let mut solver = Solver::new(problem);
-        let start = -((SETTLING + 1) as f64) * step;
-        let (mut state, _) = solver.deform(start)?;
-        (state, _) = solver.increment(&state, start, torque_n_m)?;
-        for k in (1..=SETTLING).rev() {
-            (state, _) = solver.increment(&state, -(k as f64) * step, torque_n_m)?;
-        }
+        let mut motion = Motion::deformed(problem, -step)?;
+        motion.load(torque_n_m)?;
+        motion.settle(step)?;
+        let settled = (motion.state().generator_rad / step).round() as usize;
         let middle = |root: f64, tip: f64| 0.5 * (root + tip);
         let (f, c) = (&problem.drive.flexspline, &problem.drive.circular_spline);
         let mut forces = Forces {
@@ -173,10 +166,10 @@ impl Forces {
             middle: [middle(f.root_radius_mm, f.tip_radius_mm), middle(c.root_radius_mm, c.tip_radius_mm)],
         };
         let bore = BoreContact::new(problem.wheels().0, problem.settings.bore_points(problem.kind));
-        for position in 0..positions {
-            (state, _) = solver.increment(&state, position as f64 * step, torque_n_m)?;
-            forces.add_flanks(problem, &state, positions, position);
-            forces.add_bore(problem, &bore, &state, positions, position);
+        for position in settled + 1..=settled + positions {
+            motion.turn_to(position as f64 * step)?;
+            forces.add_flanks(problem, motion.state(), positions, position);
+            forces.add_bore(problem, &bore, motion.state(), positions, position);
         }
         Ok(forces)
     }
@@ -313,22 +306,6 @@ fn eccentric(
     })
 }
 
-/// The drive deformed at a generator angle. Where both flanks of an eccentric drive come to bear at once Newton may go round in a circle:
-/// then it is deformed beside, and turned there.
-fn deformed(solver: &mut Solver<'_>, generator_rad: f64, pitch_rad: f64) -> Result<State, SolveError> {
-    let first = match solver.deform(generator_rad) {
-        Ok((state, _)) => return Ok(state),
-        Err(error) => error,
-    };
-    BESIDE
-        .iter()
-        .find_map(|pitches| {
-            let (beside, _) = solver.deform(generator_rad - pitches * pitch_rad).ok()?;
-            solver.increment(&beside, generator_rad, 0.0).ok().map(|(state, _)| state)
-        })
-        .ok_or(first)
-}
-
 /// To a millionth of an arc-second, which keeps files short.
 fn rounded(arcsec: f64) -> f64 {
     (arcsec * 1e6).round() * 1e-6 + 0.0
@@ -336,13 +313,12 @@ fn rounded(arcsec: f64) -> f64 {
 
 /// Error of the drive deformed at a generator angle, under one load after the other, arcsec.
 fn loaded(problem: &Problem, generator_rad: f64, torques_n_m: &[f64]) -> Result<Vec<f64>, SolveError> {
-    let mut solver = Solver::new(problem);
-    let mut state = deformed(&mut solver, generator_rad, problem.flexspline.pitch())?;
+    let mut motion = Motion::deformed_or_turned_in(problem, generator_rad)?;
     torques_n_m
         .iter()
         .map(|torque| {
-            (state, _) = solver.increment(&state, generator_rad, *torque)?;
-            Ok((state.output_rad - generator_rad / problem.drive.ratio()) * ARCSEC_PER_RAD)
+            motion.load(*torque)?;
+            Ok(motion.error_arcsec())
         })
         .collect()
 }

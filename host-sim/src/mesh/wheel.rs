@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 use super::density::{MeshDensity, MeshLevel};
 use super::sector::{EdgeTag, HalfOutline, HalfSector, MeshError, Point};
 use crate::drive::{Drive, InvoluteFlank, RimVariation, Side, ToothFlank};
-use crate::element::{GaussPoint, gauss_points};
+use crate::fem::element::{GaussPoint, gauss_points};
 
 /// Which wheel a mesh is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -14,9 +14,9 @@ use super::pack::Packed;
 use crate::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
 use crate::drive::{Drive, GeneratorKind, Side};
 use crate::mesh::{WheelMesh, rotate};
+use crate::simulate::stress::nodal_von_mises;
 use crate::simulate::{Direction, Path, Row, SimulateError, SimulationSettings, simulate};
 use crate::stepping::{Problem, SolverSettings, State};
-use crate::stress::nodal_von_mises;
 use std::ops::ControlFlow;
 
 /// Frames to a flexspline pitch, which are also the increments of [`Path::Pitch`].

@@ -12,8 +12,9 @@ use super::page::{
     Series, Status, Table as PageTable, Text,
 };
 use crate::drive::{Drive, GeneratorKind};
-use crate::tables::{ARCSEC_PER_RAD, Source, TableInfo};
-use crate::validate::{MAX_BOUND_ARCSEC, Point, Validation};
+use crate::tables::validate::{MAX_BOUND_ARCSEC, Point, Validation};
+use crate::tables::{Source, TableInfo};
+use crate::units::ARCSEC_PER_RAD;
 
 /// Positions over a pitch at which tables are read for curves and means.
 const POSITIONS: usize = 48;

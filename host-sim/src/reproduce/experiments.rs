@@ -9,6 +9,7 @@ use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
 use crate::simulate::SimulateError;
 use crate::stepping::{Holding, Method, SolverSettings};
+use crate::units::ARCMIN_PER_RAD;
 
 /// Errors beyond this are shown and told both ways, arc-minutes.
 pub(crate) const LARGE_ARCMIN: f64 = 5.0;
@@ -285,7 +286,7 @@ pub(super) fn conclude(results: Vec<Result<Solved, SimulateError>>, quick: bool)
 }
 
 fn effect(kind: GeneratorKind, result: Result<Solved, SimulateError>) -> Effect {
-    let paper_arcmin = paper::error_rad(kind).map(|rad| rad * paper::ARCMIN);
+    let paper_arcmin = paper::error_rad(kind).map(|rad| rad * ARCMIN_PER_RAD);
     let (status, solved) = match result {
         Ok(solved) => ("converged".to_owned(), Some(solved)),
         Err(error) => (error.to_string(), None),
@@ -344,7 +345,7 @@ fn experiment(change: Change, effects: Vec<Effect>) -> Experiment {
     let reaches = all && reaches(pairs.iter().map(|(ours, _)| *ours));
     let sizes: Vec<String> = effects.iter().map(size).collect();
     let some = pairs.iter().any(|(ours, _)| self::reaches([*ours].into_iter()));
-    let beyond = all && pairs.iter().all(|(ours, _)| *ours > paper::ERROR_CAM_RAD * paper::ARCMIN);
+    let beyond = all && pairs.iter().all(|(ours, _)| *ours > paper::ERROR_CAM_RAD * ARCMIN_PER_RAD);
     let begins = match (reaches, beyond, some) {
         (true, ..) => "Such numbers come from",
         (false, true, _) => "Such numbers, and larger ones, come from",
@@ -381,7 +382,7 @@ fn size(effect: &Effect) -> String {
 
 /// Whether all errors lie where the paper's do, arc-minutes.
 fn reaches(mut largest_arcmin: impl Iterator<Item = f64>) -> bool {
-    let [low, high] = [paper::ERROR_CAM_RAD, paper::ERROR_FOUR_ROLLER_RAD].map(|rad| rad * paper::ARCMIN);
+    let [low, high] = [paper::ERROR_CAM_RAD, paper::ERROR_FOUR_ROLLER_RAD].map(|rad| rad * ARCMIN_PER_RAD);
     largest_arcmin.all(|largest| (low..=high).contains(&largest))
 }
 
@@ -422,7 +423,7 @@ mod tests {
             status: "converged".into(),
             largest_arcmin: Some(largest(&metrics)),
             metrics: Some(metrics),
-            paper_arcmin: paper::error_rad(kind).map(|rad| rad * paper::ARCMIN),
+            paper_arcmin: paper::error_rad(kind).map(|rad| rad * ARCMIN_PER_RAD),
             curves: [vec![[0.0, 0.0], [1.0, -30.0]], vec![[-1.0, 30.0], [1.0, -30.0]]],
         }
     }

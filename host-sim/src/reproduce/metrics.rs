@@ -16,6 +16,7 @@
 //! - *lost motion* 0–A against B–C: e on the way back less e on the way there, at the same generator angle.
 
 use crate::simulate::{Row, Simulation};
+use crate::units::ARCMIN_PER_RAD;
 use serde::Serialize;
 
 /// Metrics of a run of the protocol, errors in arc-seconds.
@@ -72,7 +73,7 @@ impl ProtocolMetrics {
             ripple_pp_arcsec: summary.kinematic_error_pp_arcsec,
             half_width_arcsec: forward.zip(backward).map(|(f, b)| 0.5 * (b - f)),
             dwell_rad,
-            dwell_arcsec: dwell_rad.map(|rad| rad / ratio * 60.0 * super::paper::ARCMIN),
+            dwell_arcsec: dwell_rad.map(|rad| rad / ratio * 60.0 * ARCMIN_PER_RAD),
             error_at_turn_arcsec: rows[turn].error_arcsec,
             error_at_end_arcsec: rows[rows.len() - 1].error_arcsec,
             lost_motion_arcsec: lost_motion(out, back, pitch),

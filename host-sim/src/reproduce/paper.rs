@@ -4,10 +4,8 @@
 //! Vehicles*, Appl. Sci. 13 (2023). Charts without numbers in the text are not read off.
 
 use crate::drive::GeneratorKind;
+use crate::units::ARCMIN_PER_RAD;
 use std::f64::consts::{FRAC_PI_2, PI};
-
-/// Arc-minutes in a radian.
-pub const ARCMIN: f64 = 180.0 * 60.0 / PI;
 
 /// Gear ratio `i`: section 4, first paragraph on the angle of rotation.
 pub const RATIO: f64 = 95.0;
@@ -67,12 +65,12 @@ pub const ERROR_RANK: [(GeneratorKind, u32); 4] = [
 
 /// Travel of the output while the generator turns by [`TRAVEL_RAD`], arc-minutes.
 pub fn output_travel_arcmin() -> f64 {
-    TRAVEL_RAD / RATIO * ARCMIN
+    TRAVEL_RAD / RATIO * ARCMIN_PER_RAD
 }
 
 /// An error of the paper as a share of what the output turns in all.
 pub fn share_of_travel(error_rad: f64) -> f64 {
-    error_rad * ARCMIN / output_travel_arcmin()
+    error_rad * ARCMIN_PER_RAD / output_travel_arcmin()
 }
 
 /// Circular-spline teeth for which formula (6) puts a tooth that is on a tooth at the minor axis into a space at the major axis:
@@ -92,10 +90,10 @@ mod tests {
 
     #[test]
     fn the_papers_numbers_in_arc_minutes() {
-        assert!((ERROR_FOUR_ROLLER_RAD * ARCMIN - 21.40).abs() < 0.005);
-        assert!((ERROR_DOUBLE_DISC_RAD * ARCMIN - 14.21).abs() < 0.005);
+        assert!((ERROR_FOUR_ROLLER_RAD * ARCMIN_PER_RAD - 21.40).abs() < 0.005);
+        assert!((ERROR_DOUBLE_DISC_RAD * ARCMIN_PER_RAD - 14.21).abs() < 0.005);
         // Not 4.
-        assert!((ERROR_CAM_RAD * ARCMIN - 10.31).abs() < 0.005);
+        assert!((ERROR_CAM_RAD * ARCMIN_PER_RAD - 10.31).abs() < 0.005);
         assert!((output_travel_arcmin() - 36.19).abs() < 0.005);
         assert!((share_of_travel(ERROR_FOUR_ROLLER_RAD) - 0.591).abs() < 5e-4);
         assert!((share_of_travel(ERROR_CAM_RAD) - 0.285).abs() < 5e-4);

@@ -14,9 +14,9 @@ use super::paper;
 use super::rank::Measured;
 use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
+use crate::simulate::stress::nodal_von_mises;
 use crate::simulate::{Observation, Path, Row, SimulateError, SimulationSettings, simulate};
 use crate::stepping::{Method, SolverSettings};
-use crate::stress::nodal_von_mises;
 
 /// Told how many increments are done of how many, and of what the last was; may stop everything.
 pub type Observe<'o> = dyn Fn(usize, usize, &str) -> ControlFlow<()> + Sync + 'o;

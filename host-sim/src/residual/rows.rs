@@ -6,7 +6,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::measurement::{Session, median_of, sampled};
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// The generator must turn back by so much, rad, before the direction has changed: its noise does not.
 const TURNED_BACK_RAD: f64 = 0.02;

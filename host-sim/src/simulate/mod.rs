@@ -10,6 +10,7 @@
 
 mod path;
 mod row;
+pub mod stress;
 mod summary;
 
 use std::f64::consts::TAU;
@@ -19,23 +20,21 @@ use std::time::Instant;
 use thiserror::Error;
 
 use crate::drive::{Drive, GeneratorKind, ThermalState};
+use crate::motion::Motion;
 use crate::stepping::{Increment, Problem, SolveError, Solver, SolverSettings, State};
-use crate::stress::{PeakStress, peak_stress};
 
 pub use path::{Path, PathError, PathPoint, read_path};
 pub use row::Row;
 pub use summary::{SUMMARY_SCHEMA, Summary};
 
 use path::LARGEST_TORQUE_N_M;
-use row::Motion;
-use summary::{ARCSEC, Metrics, Touches, largest, shared, wheel_name};
+use stress::{PeakStress, peak_stress};
+use summary::{Metrics, Touches, largest, shared, wheel_name};
 
 /// Increment of the paper's path, rad.
 const PAPER_INCREMENT_RAD: f64 = 0.01;
 /// Increments to a flexspline tooth pitch on the other paths: ripple is sampled eight times and no order folds onto another.
 const INCREMENTS_PER_PITCH: f64 = 8.0;
-/// Pitches after which an output that still does not follow the generator is an error.
-const LONGEST_START_UP: f64 = 40.0;
 /// Torque of a light touch, N m, at least; and in terms of the drag.
 const LIGHT_TOUCH: (f64, f64) = (0.02, 2.0);
 /// Halvings of a change of temperature before giving up.
@@ -166,18 +165,9 @@ pub enum SimulateError {
         /// What is allowed.
         allowed: String,
     },
-    /// The drive is impossible, or an increment did not converge.
+    /// The drive is impossible, an increment did not converge, or the drive did not settle.
     #[error(transparent)]
     Solve(#[from] SolveError),
-    /// The output does not follow the generator.
-    #[error(
-        "the output does not follow: the generator has turned {travelled_rad:.3} rad and the teeth have not taken up \
-         their clearance; check the clearance between the teeth, or the drag, of the drive"
-    )]
-    NotFollowing {
-        /// Generator travel so far, rad.
-        travelled_rad: f64,
-    },
     /// The observer asked to stop.
     #[error("stopped after {done} of {total} increments")]
     Stopped {
@@ -264,7 +254,6 @@ struct Run<'a> {
     begun: Instant,
     pitch: f64,
     temperature_c: f64,
-    motion: Motion,
     rows: Vec<Row>,
     peak: Option<(PeakStress, usize)>,
     touches: Option<Touches>,
@@ -289,7 +278,6 @@ impl<'a> Run<'a> {
             begun: Instant::now(),
             pitch: TAU / f64::from(drive.flexspline.teeth),
             temperature_c: settings.temperature_c.unwrap_or(drive.temperature.reference_c),
-            motion: Motion::default(),
             rows: Vec::new(),
             peak: None,
             touches: None,
@@ -341,25 +329,24 @@ impl<'a> Run<'a> {
                 None => (self.problem(temperature_c)?, None),
                 Some(state) => {
                     let from_c = self.temperature_c;
-                    let (problem, state) =
+                    let (problem, state, increment) =
                         self.change_temperature(state, from_c, temperature_c, TEMPERATURE_HALVINGS)?;
-                    (problem, Some(state))
+                    (problem, Some((state, increment)))
                 }
             };
             self.temperature_c = temperature_c;
-            let mut solver = Solver::new(&problem);
-            let (mut state, rest) = match warmed {
-                Some(state) => (state, group),
+            let (mut motion, rest) = match warmed {
+                Some((state, increment)) => (Motion::taken_over(&problem, state, increment), group),
                 None => {
-                    let (state, increment) = self.start(&problem, &mut solver, group[0], one_load)?;
-                    self.record(&problem, &state, &increment, 0.0)?;
-                    (state, &group[1..])
+                    let (motion, increment) = self.start(&problem, group[0], one_load)?;
+                    self.record(&motion, &increment, 0.0)?;
+                    (motion, &group[1..])
                 }
             };
             for target in rest {
-                state = self.advance(&problem, &mut solver, &state, *target)?;
+                self.advance(&mut motion, *target)?;
             }
-            carried = Some(state);
+            carried = Some(motion.state().clone());
         }
         Ok(())
     }
@@ -376,26 +363,14 @@ impl<'a> Run<'a> {
         let start = self.target(0.0);
         self.total = self.increments_to_start(start.torque_n_m, true) + INCREMENTS_PER_PITCH as usize + path(0.0).len();
         let problem = self.problem(start.temperature_c)?;
-        let mut solver = Solver::new(&problem);
-        let (mut state, _) = self.start(&problem, &mut solver, start, true)?;
-        let expected = INCREMENTS_PER_PITCH as usize;
-        for i in 1.. {
-            if self.motion.settled(self.pitch) {
-                break;
-            }
-            if self.motion.travelled_rad() > LONGEST_START_UP * self.pitch {
-                return Err(SimulateError::NotFollowing { travelled_rad: self.motion.travelled_rad() });
-            }
-            if i > expected {
-                self.total += 1;
-            }
-            let (next, increment) = solver.increment(&state, sign * eighth * i as f64, start.torque_n_m)?;
-            self.motion.go(&state, &next, problem.drive.ratio());
-            self.solved(Phase::Settling, &increment, &problem, &next)?;
-            state = next;
+        let (mut motion, _) = self.start(&problem, start, true)?;
+        while motion.settle_on(sign * eighth)? {
+            self.solved(Phase::Settling, &motion)?;
         }
-        for angle in path(state.generator_rad) {
-            state = self.advance(&problem, &mut solver, &state, self.target(angle))?;
+        let angles = path(motion.state().generator_rad);
+        self.total = self.increments + angles.len();
+        for angle in angles {
+            self.advance(&mut motion, self.target(angle))?;
         }
         Ok(())
     }
@@ -417,59 +392,52 @@ impl<'a> Run<'a> {
     }
 
     /// Deforms the drive, touches, loads. Gives the last increment with the iterations of deforming and loading.
-    fn start(
+    fn start<'p>(
         &mut self,
-        problem: &Problem,
-        solver: &mut Solver,
+        problem: &'p Problem,
         at: Target,
         one_load: bool,
-    ) -> Result<(State, Increment), SimulateError> {
-        let (mut state, mut increment) = solver.deform(at.generator_rad)?;
-        self.solved(Phase::Deforming, &increment, problem, &state)?;
+    ) -> Result<(Motion<'p>, Increment), SimulateError> {
+        let mut motion = Motion::deformed(problem, at.generator_rad)?;
+        let mut increment = motion.last().clone();
+        self.solved(Phase::Deforming, &motion)?;
         if one_load && self.exceeds_drag(at.torque_n_m) {
+            let deformed = motion.state().clone();
             let (least, of_drag) = LIGHT_TOUCH;
             let torque = least.max(of_drag * self.drive.output.drag_torque_n_m);
             let mut touch = |torque_n_m: f64| -> Result<f64, SimulateError> {
-                let (touched, increment) = solver.increment(&state, at.generator_rad, torque_n_m)?;
-                self.solved(Phase::Touching, &increment, problem, &touched)?;
-                Ok(error_arcsec(problem, &touched))
+                motion.load(torque_n_m)?;
+                self.solved(Phase::Touching, &motion)?;
+                let touched = motion.error_arcsec();
+                motion.go_back(deformed.clone());
+                Ok(touched)
             };
-            self.touches = Some(Touches { forward: touch(torque)?, backward: touch(-torque)? });
+            let (forward, backward) = (touch(torque)?, touch(-torque)?);
+            self.touches = Some(Touches { forward, backward });
         }
         if at.torque_n_m != 0.0 {
+            motion.load(at.torque_n_m)?;
+            self.solved(Phase::Loading, &motion)?;
             let deforming = increment.iterations;
-            (state, increment) = solver.increment(&state, at.generator_rad, at.torque_n_m)?;
-            self.solved(Phase::Loading, &increment, problem, &state)?;
+            increment = motion.last().clone();
             increment.iterations += deforming;
         }
-        Ok((state, increment))
+        Ok((motion, increment))
     }
 
     /// One increment along the path, with its row.
-    fn advance(
-        &mut self,
-        problem: &Problem,
-        solver: &mut Solver,
-        from: &State,
-        to: Target,
-    ) -> Result<State, SimulateError> {
-        let (state, increment) = solver.increment(from, to.generator_rad, to.torque_n_m)?;
-        self.motion.go(from, &state, problem.drive.ratio());
+    fn advance(&mut self, motion: &mut Motion<'_>, to: Target) -> Result<(), SimulateError> {
+        let from_rad = motion.state().generator_rad;
+        motion.to(to.generator_rad, to.torque_n_m)?;
         self.increments += 1;
-        self.iterations += increment.iterations;
-        self.record(problem, &state, &increment, to.generator_rad - from.generator_rad)?;
-        Ok(state)
+        self.iterations += motion.last().iterations;
+        self.record(motion, motion.last(), to.generator_rad - from_rad)
     }
 
     /// Adds a row and shows it.
-    fn record(
-        &mut self,
-        problem: &Problem,
-        state: &State,
-        increment: &Increment,
-        turn_rad: f64,
-    ) -> Result<(), SimulateError> {
-        let peak = peak_stress(problem, state);
+    fn record(&mut self, motion: &Motion<'_>, increment: &Increment, turn_rad: f64) -> Result<(), SimulateError> {
+        let state = motion.state();
+        let peak = peak_stress(motion.problem(), state);
         // Rows of a path that begins with the deformed drive count from 0, others from 1.
         let step = match self.rows.last() {
             Some(row) => row.step + 1,
@@ -479,7 +447,7 @@ impl<'a> Run<'a> {
             step,
             generator_rad: state.generator_rad,
             output_rad: state.output_rad,
-            error_arcsec: error_arcsec(problem, state),
+            error_arcsec: motion.error_arcsec(),
             torque_n_m: state.torque_n_m,
             flank_contacts: increment.flank_contacts,
             generator_contacts: increment.generator_contacts,
@@ -492,19 +460,23 @@ impl<'a> Run<'a> {
             peak_flank_pressure_mpa: increment.peak_pressure_mpa[0],
             peak_generator_pressure_mpa: increment.peak_pressure_mpa[1],
             residual: increment.residual,
-            settled: self.motion.settled(self.pitch),
+            settled: motion.settled(),
             turn_rad,
         };
         if self.peak.is_none_or(|(highest, _)| peak.von_mises_mpa > highest.von_mises_mpa) {
             self.peak = Some((peak, step));
         }
-        self.show(Phase::Following, increment.iterations, problem, state, Some(&row))?;
+        self.show(Phase::Following, increment.iterations, motion.problem(), state, Some(&row))?;
         self.rows.push(row);
         Ok(())
     }
 
     /// Counts an increment that makes no row, and shows it.
-    fn solved(
+    fn solved(&mut self, phase: Phase, motion: &Motion<'_>) -> Result<(), SimulateError> {
+        self.counted(phase, motion.last(), motion.problem(), motion.state())
+    }
+
+    fn counted(
         &mut self,
         phase: Phase,
         increment: &Increment,
@@ -539,23 +511,22 @@ impl<'a> Run<'a> {
         from_c: f64,
         to_c: f64,
         halvings: usize,
-    ) -> Result<(Problem, State), SimulateError> {
+    ) -> Result<(Problem, State, Increment), SimulateError> {
         let problem = self.problem(to_c)?;
         let guess = resized(&state, &self.drive.at_temperature(from_c).thermal_state, &problem);
         let solved = Solver::new(&problem).increment(&guess, guess.generator_rad, guess.torque_n_m);
         match solved {
             Ok((state, increment)) => {
-                self.motion = Motion::default();
                 self.pending_iterations += increment.iterations;
                 self.total += 1;
-                self.solved(Phase::ChangingTemperature, &increment, &problem, &state)?;
-                Ok((problem, state))
+                self.counted(Phase::ChangingTemperature, &increment, &problem, &state)?;
+                Ok((problem, state, increment))
             }
             Err(SolveError::NotConverged { history, .. }) if halvings > 0 => {
                 self.pending_iterations += history.len();
                 self.iterations += history.len();
                 let middle_c = 0.5 * (from_c + to_c);
-                let (_, state) = self.change_temperature(state, from_c, middle_c, halvings - 1)?;
+                let (_, state, _) = self.change_temperature(state, from_c, middle_c, halvings - 1)?;
                 self.change_temperature(state, middle_c, to_c, halvings - 1)
             }
             Err(error) => Err(error.into()),
@@ -616,11 +587,6 @@ impl<'a> Run<'a> {
         };
         Simulation { rows: self.rows, summary }
     }
-}
-
-/// Output angle minus nominal, arc-seconds.
-fn error_arcsec(problem: &Problem, state: &State) -> f64 {
-    (state.output_rad - state.generator_rad / problem.drive.ratio()) * ARCSEC
 }
 
 /// Equally spaced angles from `from` (left out) to `to` (exactly), `increment` apart or less.
@@ -724,7 +690,7 @@ mod tests {
         let summary = &run.summary;
         let backlash = summary.backlash_arcsec.unwrap();
         assert!((54.0..64.0).contains(&backlash), "{backlash}");
-        let dwell = summary.dwell_generator_rad.unwrap() * ARCSEC / 95.0;
+        let dwell = summary.dwell_generator_rad.unwrap() * crate::units::ARCSEC_PER_RAD / 95.0;
         assert!((dwell - backlash).abs() < 1.0, "{dwell}, {backlash}");
         assert_eq!(summary.reversal_lost_motion_arcsec, None);
     }

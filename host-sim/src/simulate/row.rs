@@ -1,8 +1,6 @@
-//! One row of `results.csv`, and when a moving drive has settled.
+//! One row of `results.csv`.
 
 use serde::Serialize;
-
-use crate::stepping::State;
 
 /// The drive after an increment; the fields are the columns of `results.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -39,41 +37,10 @@ pub struct Row {
     pub peak_generator_pressure_mpa: f64,
     /// Residual force relative to the largest contact force.
     pub residual: f64,
-    /// Whether the drive has been moving one way, under one load, for at least a flexspline tooth pitch and the output
-    /// follows: start-up and clearance are behind it.
+    /// Whether the drive has settled since the last reversal or change of load or temperature, by the rule of [`crate::motion`]: the
+    /// output follows, and friction between the flanks has had two tooth pitches.
     pub settled: bool,
     /// Generator travel of the increment, rad, signed.
     #[serde(skip)]
     pub turn_rad: f64,
-}
-
-/// Motion since the last reversal or change of load or temperature.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Motion {
-    direction: f64,
-    travelled_rad: f64,
-    following: bool,
-}
-
-impl Motion {
-    /// Goes from one state to the next. The output follows once it has moved at more than half its nominal rate: it
-    /// stands while it crosses its clearance, then moves on.
-    pub(super) fn go(&mut self, from: &State, to: &State, ratio: f64) {
-        let turn = to.generator_rad - from.generator_rad;
-        if turn == 0.0 || to.torque_n_m != from.torque_n_m || turn.signum() != self.direction {
-            *self = Motion { direction: if turn == 0.0 { 0.0 } else { turn.signum() }, ..Motion::default() };
-        }
-        self.travelled_rad += turn.abs();
-        self.following |= turn != 0.0 && (to.output_rad - from.output_rad) * ratio / turn > 0.5;
-    }
-
-    /// Whether start-up is over.
-    pub(super) fn settled(&self, pitch_rad: f64) -> bool {
-        self.following && self.travelled_rad > pitch_rad * (1.0 - 1e-9)
-    }
-
-    /// Travel since the last reversal, rad.
-    pub(super) fn travelled_rad(&self) -> f64 {
-        self.travelled_rad
-    }
 }

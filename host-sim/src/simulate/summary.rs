@@ -6,8 +6,9 @@ use serde::Serialize;
 use std::ops::Range;
 
 use super::row::Row;
+use super::stress::PeakStress;
 use crate::mesh::WheelKind;
-use crate::stress::PeakStress;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Version of the layout of `summary.json`; grows when a field changes its meaning or goes.
 pub const SUMMARY_SCHEMA: u32 = 1;
@@ -16,8 +17,6 @@ pub const SUMMARY_SCHEMA: u32 = 1;
 const STANDING_ARCSEC: f64 = 0.05;
 /// Rows that a peak-to-peak value needs at least.
 const ROWS_OF_A_RIPPLE: usize = 8;
-/// Arc-seconds in a radian.
-pub(super) const ARCSEC: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
 
 /// The content of `summary.json`.
 ///
@@ -213,7 +212,7 @@ fn dwell(rows: &[Row], at: usize, ratio: f64) -> Option<f64> {
     for row in onward {
         let travelled = (row.generator_rad - here.generator_rad).abs();
         let moved = row.output_rad - here.output_rad;
-        if moved.abs() * ARCSEC > STANDING_ARCSEC {
+        if moved.abs() * ARCSEC_PER_RAD > STANDING_ARCSEC {
             return Some((travelled - (moved * way * ratio)).clamp(stood, travelled));
         }
         stood = travelled;
@@ -284,7 +283,7 @@ pub(super) fn wheel_name(peak: &PeakStress) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::row::Motion;
+    use crate::motion::Travel;
     use std::f64::consts::TAU;
 
     const PITCH: f64 = TAU / 188.0;
@@ -301,41 +300,28 @@ mod tests {
     impl Toy {
         /// Rows along generator angles and torques; the first is the start, in the middle of the play.
         fn walk(&self, path: &[(f64, f64)]) -> Vec<Row> {
-            let mut motion = Motion::default();
+            let mut travel = Travel::default();
             let mut output = path[0].0 / RATIO;
             let mut rows: Vec<Row> = Vec::new();
             for (step, &(generator, torque)) in path.iter().enumerate() {
                 let nominal = generator / RATIO;
-                let wave = 0.5 * self.ripple * (188.0 * generator).sin() / ARCSEC;
-                let half = 0.5 * self.backlash / ARCSEC;
+                let wave = 0.5 * self.ripple * (188.0 * generator).sin() / ARCSEC_PER_RAD;
+                let half = 0.5 * self.backlash / ARCSEC_PER_RAD;
                 let loaded = torque.abs() > self.drag;
                 let before = output;
                 output = if loaded {
-                    nominal + wave + torque.signum() * half + self.wind_up * torque / ARCSEC
+                    nominal + wave + torque.signum() * half + self.wind_up * torque / ARCSEC_PER_RAD
                 } else {
                     output.clamp(nominal + wave - half, nominal + wave + half)
                 };
                 let from = rows.last().map_or(generator, |row| row.generator_rad);
-                let state = |generator_rad: f64, torque_n_m: f64, output_rad: f64| crate::stepping::State {
-                    u: vec![],
-                    v: vec![],
-                    generator_rad,
-                    torque_n_m,
-                    output_rad,
-                    drag_anchor_rad: 0.0,
-                    sleeve_moment: 0.0,
-                    lateral_force: [0.0; 2],
-                    friction: Default::default(),
-                    output_rate: 0.0,
-                    travel: 0.0,
-                };
                 let torque_before = rows.last().map_or(torque, |row| row.torque_n_m);
-                motion.go(&state(from, torque_before, before), &state(generator, torque, output), RATIO);
+                travel = travel.on([generator - from, output - before], torque == torque_before, RATIO);
                 rows.push(Row {
                     step,
                     generator_rad: generator,
                     output_rad: output,
-                    error_arcsec: (output - nominal) * ARCSEC,
+                    error_arcsec: (output - nominal) * ARCSEC_PER_RAD,
                     torque_n_m: torque,
                     flank_contacts: 0,
                     generator_contacts: 0,
@@ -348,7 +334,7 @@ mod tests {
                     peak_flank_pressure_mpa: 0.0,
                     peak_generator_pressure_mpa: 0.0,
                     residual: 0.0,
-                    settled: motion.settled(PITCH),
+                    settled: travel.settled(0.0),
                     turn_rad: generator - from,
                 });
             }
@@ -376,11 +362,11 @@ mod tests {
         assert!((metrics.reversal.unwrap() - 60.0).abs() < 0.04);
         assert!((metrics.kinematic_error_pp.unwrap() - 0.8).abs() < 0.01);
         // The clearance, and up to the ripple before and after, at the ratio.
-        let dwell = metrics.dwell_rad.unwrap() * ARCSEC / RATIO;
+        let dwell = metrics.dwell_rad.unwrap() * ARCSEC_PER_RAD / RATIO;
         assert!((dwell - 60.0).abs() < 0.8, "{dwell}");
         // Much finer than the increment of 0.01 rad, which is 21.7″.
         let fine = Metrics::new(&TOY.walk(&paper(0.001, 0.0)), PITCH, RATIO).dwell_rad.unwrap();
-        assert!((fine * ARCSEC / RATIO - dwell).abs() < 0.8);
+        assert!((fine * ARCSEC_PER_RAD / RATIO - dwell).abs() < 0.8);
     }
 
     #[test]

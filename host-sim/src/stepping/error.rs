@@ -41,4 +41,20 @@ pub enum SolveError {
         /// Which limit, with the value found and the limit.
         what: String,
     },
+    /// The output does not follow the generator.
+    #[error(
+        "the drive has not settled after {pitches:.1} tooth pitches of motion one way, at generator angle {generator_rad:.4} rad and load \
+         {torque_n_m} N.m: in the last increment the output turned by {rate:.3} of what the ratio says; check the clearance between the \
+         teeth, or the drag, of the drive"
+    )]
+    NotSettled {
+        /// Where, rad.
+        generator_rad: f64,
+        /// Under which load.
+        torque_n_m: f64,
+        /// Flexspline pitches that the generator has travelled one way.
+        pitches: f64,
+        /// Turn of the output in the last increment, as a share of what the ratio says.
+        rate: f64,
+    },
 }

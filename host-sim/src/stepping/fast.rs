@@ -15,9 +15,9 @@ use crate::condense::{
 };
 use crate::contact::{BorePressure, FlankPair, PairContribution};
 use crate::drive::Side;
-use crate::element::packed_index;
 use crate::fem::Factor;
-use crate::material::PlaneStrain;
+use crate::fem::element::packed_index;
+use crate::fem::material::PlaneStrain;
 use crate::mesh::{WheelMesh, rotate};
 
 use super::newton::ANCHOR;

@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use crate::contact::{BoreContact, BoreLaw, FlankContact, FlankLaw};
 use crate::drive::{Drive, FlankDeviations, GeneratorKind, GeneratorOutline, InvoluteFlank, RimVariation, ToothFlank};
-use crate::material::PlaneStrain;
+use crate::fem::material::PlaneStrain;
 use crate::mesh::{MeshLevel, WheelMesh};
 use crate::suggest::did_you_mean;
 

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use crate::contact::{BorePressure, FlankPair, PairContribution};
-use crate::element::{PACKED, add_tangent_and_force, linear_stiffness};
+use crate::fem::element::{PACKED, add_tangent_and_force, linear_stiffness};
 use crate::fem::{BlockPosition, Cholesky, ElementPositions, Factor, Pattern};
 
 use super::newton::ANCHOR;

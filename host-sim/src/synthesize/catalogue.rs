@@ -13,7 +13,7 @@ use super::excitation::Excitation;
 use super::law::{Angle, Encoder, Law};
 use crate::nominal::{Fixed, Nominal};
 use crate::suggest::did_you_mean;
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Value of a parameter that is not given.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -611,7 +611,7 @@ impl Setting<'_> {
 
     fn tooth_pitch_arcsec(&self) -> Result<f64, String> {
         let fixed = self.nominal.teeth.map(|teeth| teeth.fixed);
-        Ok(crate::tables::ARCSEC_PER_TURN / self.teeth(if fixed == Some(Fixed::CircularSpline) { 0.0 } else { 1.0 })?)
+        Ok(crate::units::ARCSEC_PER_TURN / self.teeth(if fixed == Some(Fixed::CircularSpline) { 0.0 } else { 1.0 })?)
     }
 
     fn factor(&self, factor: Factor, effect: &Chosen) -> Result<f64, String> {

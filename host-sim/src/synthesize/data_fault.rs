@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::catalogue::Chosen;
 use crate::measurement::Session;
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Columns of a row.
 const HEADER: &str = "time_s,generator_rad,output_rad,torque_n_m,temperature_c,orientation_rad\n";

@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::law::{Angle, Encoder, Law, SECOND_OF_RECTIFIED, largest};
 use super::plant::Plant;
+use crate::units::ARCSEC_PER_TURN;
 
 /// Causes of the library that can be hidden.
 pub const CAUSES: [&str; 24] = [
@@ -136,7 +137,8 @@ impl Effect {
             "ratio_error" => Law::Ratio { relative: 3e-6 * size },
             "ratcheting" => Law::Jump {
                 row: (torque.len() as f64 * (0.2 + 0.6 * other)) as usize,
-                by: -1_296_000.0 / 190.0 * if phase > 4.0 { 2.0 } else { 1.0 },
+                by: -ARCSEC_PER_TURN / f64::from(plant.nominal.teeth_or_of_two_waves().of_output())
+                    * if phase > 4.0 { 2.0 } else { 1.0 },
             },
             name => Law::Strange { name: name.to_owned(), size, phase, other },
         }

@@ -5,11 +5,12 @@ use std::f64::consts::{PI, TAU};
 use super::excitation::Excitation;
 use super::plant::Plant;
 use crate::nominal::Nominal;
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Share of `e / (r cos a)` that the second order of the rectified sine has: `4 / 3 pi`.
 pub(super) const SECOND_OF_RECTIFIED: f64 = 0.424;
-/// Pressure angle where flanks meet, rad: the phase of a rectified sine on the flank that carries.
+/// Flank angle where teeth bear, rad: the phase of a rectified sine on the flank that carries. A guess of its own: the diagnosis, which
+/// must not share its laws, expects 0.39.
 const FLANK_ANGLE_RAD: f64 = 0.36;
 /// Steps to a row where a state is followed.
 const STEPS: u32 = 40;
@@ -231,7 +232,7 @@ impl Law {
             }),
             Law::CamForm { amplitude, phase_rad } => {
                 // Every tooth meets the same generator: nothing repeats less often than the teeth, and the clearance is another.
-                let teeth = now.nominal().teeth.map_or(188.0, |teeth| f64::from(teeth.flexspline));
+                let teeth = f64::from(now.nominal().teeth_or_of_two_waves().flexspline);
                 let (top, overtone, wider) =
                     (now.top(), if changed { 0.25 } else { 0.1 }, if changed { 0.4 } else { 0.0 });
                 (0..n).for_each(|k| {

@@ -28,7 +28,7 @@ use law::Law;
 
 use crate::measurement::Session;
 use crate::nominal::Nominal;
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 use plant::gauss;
 
 /// How noisy the sensors are.
@@ -183,7 +183,7 @@ pub fn synthesize(
     plant.add_laws(on, &torque, &laws, false, &mut error);
     add_noise(on, sensors, &mut error, random);
     // The encoder counts the output angle, not the error.
-    let step = crate::tables::ARCSEC_PER_TURN / 2f64.powi(encoder_bits as i32);
+    let step = crate::units::ARCSEC_PER_TURN / 2f64.powi(encoder_bits as i32);
     for (error, generator) in error.iter_mut().zip(&on.generator) {
         let nominal = generator / plant.nominal.ratio * ARCSEC_PER_RAD;
         *error = ((nominal + *error) / step).round() * step - nominal;

@@ -5,7 +5,7 @@ use flexspline::{GeneratorAngle, PlayState, Table};
 use super::excitation::Excitation;
 use super::law::{Law, Now};
 use crate::nominal::Nominal;
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// The nominal drive: a catalogue's model, or a table made by FEM and read by the core, whose wind-up and clearance then stand in
 /// the model.

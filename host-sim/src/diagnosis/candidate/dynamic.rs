@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::{Column, Excitation, Law, Lead, Shape, Tolerance, by_row, main};
 use crate::diagnosis::base::PlayLaw;
 use crate::diagnosis::linear::Prior;
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Moments, over the scale of the load, and directions that are tried on a drive without load; and how closely the best is followed.
 const MOMENTS: [f64; 5] = [0.2, 0.35, 0.6, 1.0, 1.6];

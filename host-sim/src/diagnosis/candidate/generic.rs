@@ -3,7 +3,7 @@
 
 use super::stiffness::follow;
 use super::{Excitation, Law, Shape, by_row, lagged, main};
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 fn law(name: &str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send + Sync + 'static) -> Law {
     let mut law = Law::new(name, move |on, _| {

@@ -121,7 +121,7 @@ impl Scales {
             duration_s: rows.time.last().copied().unwrap_or(0.0) - begin_s,
             travel: rows.travel.last().copied().unwrap_or(0.0),
             work,
-            arcsec_per_um: crate::tables::ARCSEC_PER_RAD * 1e-3 / pitch_radius_mm,
+            arcsec_per_um: crate::units::ARCSEC_PER_RAD * 1e-3 / pitch_radius_mm,
             jumps,
         }
     }

@@ -27,7 +27,7 @@ fn encoder(cause: &'static str, phase: fn(&Excitation<'_>, usize) -> f64, per_ra
 /// The output is read later than the generator.
 fn sensor_latency() -> Law {
     Law::new("sensor_latency", |on, _| {
-        let per_s = crate::tables::ARCSEC_PER_RAD / on.nominal.ratio;
+        let per_s = crate::units::ARCSEC_PER_RAD / on.nominal.ratio;
         let begun = on.scales.begin_s + 0.5 * on.scales.duration_s;
         let since = |k: usize| 2.0 * (on.rows.time[k] - begun) / on.scales.duration_s.max(1e-9);
         vec![
@@ -41,7 +41,7 @@ fn sensor_latency() -> Law {
 
 /// The error grows with the angle: the ratio is not what the nominal model says.
 fn ratio_error() -> Law {
-    Law::new("ratio_error", |on, _| vec![main(by_row(on, |k| on.rows.output[k] * crate::tables::ARCSEC_PER_RAD), 3e-4)])
+    Law::new("ratio_error", |on, _| vec![main(by_row(on, |k| on.rows.output[k] * crate::units::ARCSEC_PER_RAD), 3e-4)])
         .parameters(|_, _, c| vec![("ratio_relative_error", c[0])])
 }
 

@@ -6,7 +6,7 @@ use super::super::prepare::whole_pitches;
 use super::super::rows::rms;
 use super::geometry::{Angle, waves};
 use super::{Excitation, Law, Shape, by_row, history, main, nuisance};
-use crate::tables::ARCSEC_PER_TURN;
+use crate::units::ARCSEC_PER_TURN;
 
 /// Torque in units of the load scale.
 fn load_share(on: &Excitation<'_>, k: usize) -> f64 {

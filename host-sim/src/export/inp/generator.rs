@@ -170,7 +170,7 @@ fn rotate(p: Point, angle: f64) -> Point {
 mod tests {
     use super::*;
     use crate::drive::{Drive, GeneratorKind};
-    use crate::element::{edge_shape, gauss_points};
+    use crate::fem::element::{edge_shape, gauss_points};
     use crate::mesh::MeshLevel;
 
     fn body(kind: GeneratorKind) -> GeneratorBody {

@@ -24,7 +24,7 @@ use crate::diagnosis::{Extended, Series};
 use crate::measurement::{Gear, Recording, Session};
 use crate::nominal::Nominal;
 use crate::residual::Picture;
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 use thin::Clock;
 
 /// Rows of which a picture is made, at most: beyond, every so many are left out evenly.

@@ -47,7 +47,7 @@ fn of(cause: &Cause, nominal: &Nominal) -> Vec<(Turn, f64)> {
         "circular_spline_pitch_error" => all(Turn::CircularSpline, &harmonic()),
         "generator_eccentricity" => [all(Turn::Flexspline, &[1.0]), all(Turn::CircularSpline, &[1.0])].concat(),
         "cam_form_error" => {
-            let teeth = nominal.teeth.map_or(188.0, |teeth| f64::from(teeth.flexspline));
+            let teeth = f64::from(nominal.teeth_or_of_two_waves().flexspline);
             all(Turn::Generator, &[4.0, 6.0, teeth])
         }
         "damaged_tooth" => {

@@ -7,6 +7,7 @@ use crate::reference::ToothPath;
 use crate::reproduce::experiments::{LARGE_ARCMIN, curves};
 use crate::reproduce::{Reproduction, paper};
 use crate::simulate::Row;
+use crate::units::ARCMIN_PER_RAD;
 use std::f64::consts::TAU;
 
 fn series(name: impl Into<String>, mark: Mark, colour: usize, points: Vec<[f64; 2]>) -> Series {
@@ -78,8 +79,8 @@ pub(super) fn sources(r: &Reproduction, kind: GeneratorKind) -> Option<Lines> {
         }
     }
     if let Some(size) = paper::error_rad(kind) {
-        let arcsec = 60.0 * size * paper::ARCMIN;
-        let name = format!("the paper's {:.1}′", size * paper::ARCMIN);
+        let arcsec = 60.0 * size * ARCMIN_PER_RAD;
+        let name = format!("the paper's {:.1}′", size * ARCMIN_PER_RAD);
         lines.limits.extend([arcsec, -arcsec].map(|y| Limit { name: name.clone(), y }));
     }
     (!lines.series.is_empty()).then_some(lines)

@@ -15,6 +15,7 @@ use crate::reproduce::Reproduction;
 use crate::reproduce::claim::Verdict;
 use crate::reproduce::experiments::Experiment;
 use crate::reproduce::paper;
+use crate::units::ARCMIN_PER_RAD;
 
 /// What the page is made from.
 pub struct Sources<'a> {
@@ -157,8 +158,8 @@ fn span(experiment: &Experiment) -> Option<String> {
 fn headline(r: &Reproduction) -> Headline {
     let n = |verdict| r.count(verdict);
     let largest = largest_error(r);
-    let four = paper::ERROR_FOUR_ROLLER_RAD * paper::ARCMIN;
-    let cam = paper::ERROR_CAM_RAD * paper::ARCMIN;
+    let four = paper::ERROR_FOUR_ROLLER_RAD * ARCMIN_PER_RAD;
+    let cam = paper::ERROR_CAM_RAD * ARCMIN_PER_RAD;
     let mut answer = format!(
         "Of {} claims of the paper {} are reproduced, {} are not, {} contradict the paper itself and {} cannot be tested: unloaded, a sound drive is \
          off by half its clearance, {:.1}′, not by {cam:.0}′ to {four:.0}′",

@@ -7,6 +7,7 @@ use crate::reproduce::claim::{Check, Claim, Number, Of, Verdict};
 use crate::reproduce::metrics::ProtocolMetrics;
 use crate::reproduce::rank::Agreement;
 use crate::reproduce::runs::torques_of;
+use crate::units::ARCMIN_PER_RAD;
 
 fn header<const N: usize>(words: [&str; N]) -> Vec<String> {
     words.map(str::to_owned).into()
@@ -126,7 +127,7 @@ pub(super) fn experiments(r: &Reproduction, kind: GeneratorKind) -> Option<Table
             ])
         })
         .collect();
-    let paper = crate::reproduce::paper::error_rad(kind).map(|rad| rad * crate::reproduce::paper::ARCMIN);
+    let paper = crate::reproduce::paper::error_rad(kind).map(|rad| rad * ARCMIN_PER_RAD);
     (!rows.is_empty()).then(|| Table {
         caption: match paper {
             Some(arcmin) => {

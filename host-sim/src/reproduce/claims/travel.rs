@@ -1,10 +1,11 @@
 //! Figures 12 and 13: the output over the generator, and the kinematic error of the four generators.
 
 use super::super::claim::{Claim, Verdict, claim};
-use super::super::paper::{self, ARCMIN};
+use super::super::paper;
 use super::super::rank::{SPREADS, kendall_tau};
 use super::{Evidence, SHARE, least, most};
 use crate::drive::GeneratorKind::{self, Cam, DoubleDisc, FourRoller, TwoRoller};
+use crate::units::ARCMIN_PER_RAD;
 
 /// A remaining error counts as vanished below this share of the largest.
 const VANISHED: f64 = 0.1;
@@ -163,7 +164,7 @@ fn sizes(evidence: &Evidence<'_>) -> Vec<Claim> {
         Verdict::Reproduced => "Within a quarter.".into(),
         _ => format!(
             "Ours is {:.0} times smaller: {WHY_SMALL}.",
-            paper::error_rad(kind).unwrap_or(0.0) * ARCMIN / largest(kind)
+            paper::error_rad(kind).unwrap_or(0.0) * ARCMIN_PER_RAD / largest(kind)
         ),
     };
     let four = claim(
@@ -171,16 +172,16 @@ fn sizes(evidence: &Evidence<'_>) -> Vec<Claim> {
         "Fig. 13",
         "The largest error is that of the four-roller drive, 0.0062247 rad, 21′.",
     )
-    .paper("four-roller", paper::ERROR_FOUR_ROLLER_RAD * ARCMIN, "′")
+    .paper("four-roller", paper::ERROR_FOUR_ROLLER_RAD * ARCMIN_PER_RAD, "′")
     .metric(METRIC)
     .ours("four-roller", largest(FourRoller), "′")
     .paper_keeps(
         "0.0062247 rad less the 21′ it is converted to",
-        paper::ERROR_FOUR_ROLLER_RAD * ARCMIN - paper::ERROR_FOUR_ROLLER_ARCMIN,
+        paper::ERROR_FOUR_ROLLER_RAD * ARCMIN_PER_RAD - paper::ERROR_FOUR_ROLLER_ARCMIN,
         "′",
         [Some(-CONVERTED), Some(CONVERTED)],
     )
-    .within("largest error", largest(FourRoller), "′", paper::ERROR_FOUR_ROLLER_RAD * ARCMIN, SHARE)
+    .within("largest error", largest(FourRoller), "′", paper::ERROR_FOUR_ROLLER_RAD * ARCMIN_PER_RAD, SHARE)
     .because(|verdict| why(verdict, FourRoller));
 
     let similar = claim(
@@ -197,26 +198,28 @@ fn sizes(evidence: &Evidence<'_>) -> Vec<Claim> {
     });
 
     let disc = claim("error-double-disc", "Fig. 13", "The error of the double-disc drive is 0.0041344 rad.")
-        .paper("double disc", paper::ERROR_DOUBLE_DISC_RAD * ARCMIN, "′")
+        .paper("double disc", paper::ERROR_DOUBLE_DISC_RAD * ARCMIN_PER_RAD, "′")
         .metric(METRIC)
         .ours("double disc", largest(DoubleDisc), "′")
-        .within("largest error", largest(DoubleDisc), "′", paper::ERROR_DOUBLE_DISC_RAD * ARCMIN, SHARE)
+        .within("largest error", largest(DoubleDisc), "′", paper::ERROR_DOUBLE_DISC_RAD * ARCMIN_PER_RAD, SHARE)
         .because(|verdict| why(verdict, DoubleDisc));
 
     let cam = claim("error-cam", "Fig. 13", "The error of the cam drive is 0.003 rad.")
-        .paper("cam", paper::ERROR_CAM_RAD * ARCMIN, "′")
+        .paper("cam", paper::ERROR_CAM_RAD * ARCMIN_PER_RAD, "′")
         .metric(METRIC)
         .ours("cam", largest(Cam), "′")
-        .within("largest error", largest(Cam), "′", paper::ERROR_CAM_RAD * ARCMIN, SHARE)
+        .within("largest error", largest(Cam), "′", paper::ERROR_CAM_RAD * ARCMIN_PER_RAD, SHARE)
         .because(|verdict| why(verdict, Cam));
 
-    let cam_arcmin = paper::ERROR_CAM_RAD * ARCMIN;
+    let cam_arcmin = paper::ERROR_CAM_RAD * ARCMIN_PER_RAD;
     let converted = claim("error-cam-converted", "Below Fig. 13", "An error of 0.003 rad is about 4 arc-minutes.")
         .paper("as converted", paper::ERROR_CAM_ARCMIN, "′")
         .paper("0.003 rad", cam_arcmin, "′")
         .metric("0.003 rad in arc-minutes less the 4′ of the text")
         .paper_keeps("difference", cam_arcmin - paper::ERROR_CAM_ARCMIN, "′", [Some(-CONVERTED), Some(CONVERTED)])
-        .because(|_| format!("It is {cam_arcmin:.1}′; 4′ would be {:.5} rad.", paper::ERROR_CAM_ARCMIN / ARCMIN));
+        .because(|_| {
+            format!("It is {cam_arcmin:.1}′; 4′ would be {:.5} rad.", paper::ERROR_CAM_ARCMIN / ARCMIN_PER_RAD)
+        });
 
     let [low, high] = paper::RECOMMENDED_ARCMIN;
     let range = claim(
@@ -237,9 +240,9 @@ fn sizes(evidence: &Evidence<'_>) -> Vec<Claim> {
         "Roller drives still have high kinematic accuracy; disc and cam are classified above the standard.",
     )
     .paper("error of the four-roller drive over the travel of its output", 100.0 * share, "%")
-    .paper("error of the double-disc drive", paper::ERROR_DOUBLE_DISC_RAD * ARCMIN, "′")
+    .paper("error of the double-disc drive", paper::ERROR_DOUBLE_DISC_RAD * ARCMIN_PER_RAD, "′")
     .metric("Errors of Fig. 13 over all that the output turns in 1 rad of the generator, 1/95 rad; and against the range of 1′ to 9′")
-    .paper_keeps("error of the double-disc drive", paper::ERROR_DOUBLE_DISC_RAD * ARCMIN, "′", [None, Some(high)])
+    .paper_keeps("error of the double-disc drive", paper::ERROR_DOUBLE_DISC_RAD * ARCMIN_PER_RAD, "′", [None, Some(high)])
     .paper_keeps("error of the cam drive", cam_arcmin, "′", [None, Some(high)])
     .because(|_| {
         format!(

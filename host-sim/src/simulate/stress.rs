@@ -12,8 +12,8 @@
 
 use rayon::prelude::*;
 
-use crate::element::{cauchy_stress, extrapolate_to_nodes};
-use crate::material::PlaneStrain;
+use crate::fem::element::{cauchy_stress, extrapolate_to_nodes};
+use crate::fem::material::PlaneStrain;
 use crate::mesh::{WheelKind, WheelMesh};
 use crate::stepping::{Problem, State};
 

@@ -1,30 +1,24 @@
-//! From samples to the table image that firmware reads, and to the files that carry it.
+//! From samples to the table image that firmware reads.
 //!
 //! The projection itself is the core's ([`flexspline::make`]), the same code on the host and on board. Here its plan is
 //! laid: which nodes, which harmonics the samples can tell apart, and where the table came from.
 
-use std::fmt::Write as _;
-
 use flexspline::make::{Harmonics, MissingDirection, Plan, ProjectError, Sample, Workspace, make_image};
 use flexspline::{FixedMember, MAX_RIPPLE_NODES, Provenance, Table};
-use serde::Serialize;
 use thiserror::Error;
 
+use super::info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
+use super::sweep::{KnownNode, Sweep, SweepPlan, mirror};
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::SolverSettings;
-use crate::sweep::{KnownNode, Sweep, SweepPlan, mirror};
-
-/// Arc-seconds in a radian.
-pub const ARCSEC_PER_RAD: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
-/// Arc-seconds in a turn.
-pub const ARCSEC_PER_TURN: f64 = 360.0 * 3600.0;
+use crate::units::ARCSEC_PER_RAD;
 
 /// Full turns that separate 2 per generator turn from 2 per turn of the generator against the output, less a margin.
 const TURNS_FOR_HARMONICS: f64 = 47.5;
 /// Orders fitted where the samples cover enough turns: per generator turn, per turn against the output, per output turn.
-pub(crate) const GENERATOR_ORDERS: [u16; 4] = [1, 2, 3, 4];
-pub(crate) const MATERIAL_ORDERS: [u16; 4] = [1, 2, 3, 4];
-pub(crate) const OUTPUT_ORDERS: [u16; 2] = [1, 2];
+pub(super) const GENERATOR_ORDERS: [u16; 4] = [1, 2, 3, 4];
+pub(super) const MATERIAL_ORDERS: [u16; 4] = [1, 2, 3, 4];
+pub(super) const OUTPUT_ORDERS: [u16; 2] = [1, 2];
 /// Torques of a sample file closer than this share of the largest are one node.
 const SAME_TORQUE: f64 = 1e-6;
 /// Deviation (rad) that FEM samples may have from the table; they are exact but for rounding.
@@ -37,128 +31,6 @@ const HALF_WIDTH_NOISE_RAD: f64 = 5e-7;
 
 /// Places of a turn of the output over which a curve's mean is taken: no multiple of an order.
 const PLACES_OF_A_MEAN: u32 = 101;
-
-/// A finished table.
-#[derive(Debug, Clone)]
-pub struct MadeTable {
-    /// Which generator.
-    pub kind: GeneratorKind,
-    /// The `.fxt` image.
-    pub image: Vec<u8>,
-    /// What is said about it in JSON.
-    pub info: TableInfo,
-}
-
-/// What made a table, what is in it and how far it holds.
-#[derive(Debug, Clone, Serialize)]
-pub struct TableInfo {
-    /// Version of this object.
-    pub schema_version: u32,
-    /// "made": every check of the core passed.
-    pub status: &'static str,
-    /// First 16 hex digits of the BLAKE3 of the image's contents.
-    pub table_id: String,
-    /// Generator.
-    pub generator: String,
-    /// Name of the drive.
-    pub drive: String,
-    /// BLAKE3 of the drive, hex.
-    pub drive_blake3: String,
-    /// Program that made the table.
-    pub tool: String,
-    /// Where the samples come from.
-    pub source: Source,
-    /// Size of the image, bytes.
-    pub image_bytes: usize,
-    /// Torque nodes, N m.
-    pub torque_nodes_n_m: Vec<f32>,
-    /// Whether the FEM was met between all torque nodes when they were chosen; null where they were given.
-    pub torque_nodes_resolved: Option<bool>,
-    /// Temperature nodes, °C.
-    pub temperature_nodes_c: Vec<f32>,
-    /// Nodes over one tooth pitch.
-    pub ripple_nodes: usize,
-    /// Samples used, both directions.
-    pub samples: usize,
-    /// Largest deviation of the table from its samples, arcsec.
-    pub projection_worst_arcsec: f64,
-    /// Root mean square of that deviation, arcsec.
-    pub projection_rms_arcsec: f64,
-    /// Bound of |N de/dpsi| in steady motion; below 1 the inverse exists.
-    pub slope_bound: f32,
-    /// Iterations of the inverse and the error they leave, arcsec.
-    pub inverse_iterations: u8,
-    /// Error left by these iterations, arcsec.
-    pub inverse_error_arcsec: f64,
-    /// Largest backlash (both half-widths) of any node, arcsec.
-    pub backlash_arcsec: f64,
-    /// Error in the middle of the play at the ends of the torque axis, arcsec.
-    pub wind_up_arcsec: [f64; 2],
-    /// What is left over whole turns of a drive that does not repeat from tooth to tooth; null for one that does.
-    pub turns: Option<TurnsInfo>,
-    /// Command line, once known.
-    pub command: String,
-}
-
-/// A drive that does not repeat from tooth to tooth, and what its table has no room for: one curve for each of the angles, the
-/// same under every load, for either flank.
-#[derive(Debug, Clone, Serialize)]
-pub struct TurnsInfo {
-    /// Places over the turns of generator and output, for each sign of the load.
-    pub places: usize,
-    /// Torque by torque, in the order of the nodes.
-    pub by_torque: Vec<TurnsAtTorque>,
-    /// The same in words.
-    pub remark: String,
-}
-
-/// Whole turns under one torque: forward and backward motion, all temperatures.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct TurnsAtTorque {
-    /// Torque node, N m.
-    pub torque_n_m: f32,
-    /// Range of the drive's error over the places, the ripple within a pitch left out, arcsec. So few places see most, not all, of
-    /// its transmission accuracy.
-    pub drive_peak_to_peak_arcsec: f64,
-    /// What the table leaves of it, arcsec: root mean square.
-    pub left_rms_arcsec: f64,
-    /// Largest difference between table and samples, arcsec.
-    pub left_worst_arcsec: f64,
-}
-
-/// Where samples come from.
-#[derive(Debug, Clone, Serialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Source {
-    /// Contact FEM.
-    Fem {
-        /// Solver.
-        solver: String,
-        /// Mesh level.
-        mesh: String,
-        /// Unknowns.
-        degrees_of_freedom: usize,
-        /// Positions over one pitch at each torque and temperature.
-        positions: usize,
-        /// Which samples were computed and which mirrored.
-        sampled: String,
-        /// Increments solved.
-        increments: usize,
-        /// Newton iterations.
-        iterations: usize,
-        /// Largest residual, relative to the contact forces.
-        worst_residual: f64,
-        /// Wall seconds of the sweep, other sweeps running beside it.
-        wall_s: f64,
-    },
-    /// A file.
-    File {
-        /// Its name.
-        name: String,
-        /// BLAKE3 of its bytes, hex.
-        blake3: String,
-    },
-}
 
 /// Why no table was made.
 #[derive(Debug, Error)]
@@ -199,7 +71,7 @@ impl Default for SampleOptions {
 pub fn from_sweep(
     drive: &Drive,
     plan: &SweepPlan,
-    sweep: &Sweep,
+    sweep: Sweep,
     solver: SolverSettings,
     wall_s: f64,
 ) -> Result<MadeTable, TableError> {
@@ -219,24 +91,32 @@ pub fn from_sweep(
              places spread over the turns of generator and output, at reference temperature"
         }
         .to_owned(),
-        increments: sweep.increments,
-        iterations: sweep.iterations,
-        worst_residual: sweep.worst_residual,
+        increments: sweep.work.increments,
+        iterations: sweep.work.iterations,
+        worst_residual: sweep.work.worst_residual,
         wall_s,
     };
     let core_plan = fem_plan(drive, plan)?;
-    let mut made =
-        make((&drive.name, drive.hash()), sweep.kind, &core_plan, &sweep.samples, source, &mesh, sweep.worst_residual)?;
+    let mut made = make(
+        (&drive.name, drive.hash()),
+        sweep.kind,
+        &core_plan,
+        &sweep.samples,
+        source,
+        &mesh,
+        sweep.work.worst_residual,
+    )?;
     if sweep.places > 0 {
         let table = Table::check(&made.image).map_err(|e| TableError::Project(e.into()))?;
-        made.info.turns = Some(turns_info(drive, plan, sweep, &table));
+        made.info.turns = Some(turns_info(drive, plan, &sweep, &table));
     }
+    made.samples = Some(sweep.samples);
     Ok(made)
 }
 
 /// A table of forward samples at positive torque `nodes` alone, for choosing nodes: the other quadrants are filled by mirror
 /// images that neglect the drag. Only its image is wanted.
-pub(crate) fn trial_table(
+pub(super) fn trial_table(
     drive: &Drive,
     kind: GeneratorKind,
     plan: &SweepPlan,
@@ -428,7 +308,7 @@ fn make(
         turns: None,
         command: String::new(),
     };
-    Ok(MadeTable { kind, info, image })
+    Ok(MadeTable { kind, info, image, samples: None })
 }
 
 /// The finished table, read by the core, against the samples over whole turns.
@@ -531,68 +411,5 @@ fn ripple_nodes(drive: &Drive, samples: &[Sample]) -> usize {
     match poorest {
         0..4 => 0,
         4.. => poorest.min(16),
-    }
-}
-
-/// The image as a Rust source file: a constant to link.
-pub fn rust_source(table: &MadeTable) -> String {
-    let name = constant_name(table.kind);
-    let mut text = header_comment(table, "//!");
-    let _ =
-        writeln!(text, "\n/// Identity of the table.\npub const {name}_TABLE_ID: &str = \"{}\";", table.info.table_id);
-    let _ = writeln!(text, "/// The `.fxt` image, for `flexspline::Table::check`.");
-    let _ = writeln!(text, "pub static {name}_TABLE: [u8; {}] = [", table.image.len());
-    put_bytes(&mut text, &table.image);
-    text.push_str("];\n");
-    text
-}
-
-/// The image as a C header.
-pub fn c_header(table: &MadeTable) -> String {
-    let name = constant_name(table.kind);
-    let lower = name.to_lowercase();
-    let mut text = header_comment(table, "//");
-    let _ = writeln!(
-        text,
-        "\n#ifndef FLEXSPLINE_{name}_TABLE_H\n#define FLEXSPLINE_{name}_TABLE_H\n\n#include <stdint.h>\n"
-    );
-    let _ = writeln!(text, "#define FLEXSPLINE_{name}_TABLE_ID \"{}\"", table.info.table_id);
-    let _ = writeln!(text, "#define FLEXSPLINE_{name}_TABLE_BYTES {}u\n", table.image.len());
-    let _ = writeln!(text, "static const uint8_t flexspline_{lower}_table[FLEXSPLINE_{name}_TABLE_BYTES] = {{");
-    put_bytes(&mut text, &table.image);
-    text.push_str("};\n\n#endif\n");
-    text
-}
-
-fn constant_name(kind: GeneratorKind) -> String {
-    kind.to_string().replace('-', "_").to_uppercase()
-}
-
-fn header_comment(table: &MadeTable, mark: &str) -> String {
-    let info = &table.info;
-    let mut text = String::new();
-    let mut line = |words: String| {
-        let _ = writeln!(text, "{mark} {words}");
-    };
-    line(format!("Compensation table {} of drive {}, {} generator.", info.table_id, info.drive, info.generator));
-    line(format!("Made by {}; drive BLAKE3 {}.", info.tool, info.drive_blake3));
-    line(format!(
-        "Holds for {} to {} N.m, {} to {} degrees C; worst deviation from its samples {:.4} arcsec.",
-        info.torque_nodes_n_m[0],
-        info.torque_nodes_n_m[info.torque_nodes_n_m.len() - 1],
-        info.temperature_nodes_c[0],
-        info.temperature_nodes_c[info.temperature_nodes_c.len() - 1],
-        info.projection_worst_arcsec
-    ));
-    text
-}
-
-fn put_bytes(text: &mut String, bytes: &[u8]) {
-    for row in bytes.chunks(16) {
-        text.push_str("   ");
-        for byte in row {
-            let _ = write!(text, " 0x{byte:02x},");
-        }
-        text.push('\n');
     }
 }

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::measurement::{CsvRows, NotANumber, TableProblem};
 use crate::suggest::question;
-use crate::tables::ARCSEC_PER_RAD;
+use crate::units::ARCSEC_PER_RAD;
 
 /// A measured row.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,10 +7,12 @@
 
 use flexspline::{Direction, GeneratorAngle, Table};
 
+use super::project::trial_table;
+use super::sweep::{Chain, Computed, KnownNode, Observer, SweepError, SweepPlan, Work, symmetric_nodes};
 use crate::drive::{Drive, GeneratorKind};
-use crate::stepping::{Problem, Solver, SolverSettings, State};
-use crate::sweep::{Chain, Computed, KnownNode, Observer, SweepError, SweepPlan, symmetric_nodes};
-use crate::tables::trial_table;
+use crate::motion::Motion;
+use crate::stepping::{Problem, SolverSettings};
+use crate::units::ARCSEC_PER_RAD;
 
 /// How nodes are chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,8 +21,8 @@ pub struct NodeChoice {
     pub largest_n_m: f64,
     /// Nodes on each side of zero, beside the pair at the drag torque, at most.
     pub most: usize,
-    /// Difference between table and FEM, rad, above which a node is added.
-    pub tolerance_rad: f64,
+    /// Difference between table and FEM, arcsec, above which a node is added.
+    pub tolerance_arcsec: f64,
 }
 
 /// The nodes and what was computed to find them.
@@ -32,12 +34,8 @@ pub struct ChosenNodes {
     pub known: Vec<KnownNode>,
     /// Whether the table meets the tolerance at the middle of every interval; if not, the nodes ran out.
     pub resolved: bool,
-    /// Increments solved.
-    pub increments: usize,
-    /// Newton iterations.
-    pub iterations: usize,
-    /// Largest residual, relative to the contact forces.
-    pub worst_residual: f64,
+    /// What it took.
+    pub work: Work,
 }
 
 /// Nodes on each side that the choice starts with.
@@ -57,16 +55,15 @@ pub fn choose_torque_nodes(
     let temperature = plan.temperature_nodes_c[0];
     let temperature_c = f64::from(temperature);
     let problem = Problem::new(drive, kind, temperature_c, settings)?;
-    let mut solver = Solver::new(&problem);
-    let (unloaded, _) = solver.deform(0.0)?;
-    let mut chain = Chain::new(drive, plan, temperature_c, observe);
+    let mut motion = Motion::deformed(&problem, 0.0)?;
+    let unloaded = motion.state().clone();
+    let mut chain = Chain::new(plan, temperature_c, observe);
     let all = symmetric_nodes(drive.output.drag_torque_n_m, choice.largest_n_m, FIRST_NODES);
     let mut nodes: Vec<f32> = all.into_iter().filter(|t| f64::from(*t) > drive.output.drag_torque_n_m).collect();
 
     let mut known: Vec<KnownNode> = Vec::new();
-    let mut state: State = unloaded.clone();
     for torque in &nodes {
-        state = chain.sample(&mut solver, state, *torque)?;
+        chain.sample(&mut motion, *torque)?;
         known.push(KnownNode { torque: *torque, temperature, points: chain.take_points() });
     }
     // Intervals not yet looked into, by their lower node.
@@ -74,10 +71,10 @@ pub fn choose_torque_nodes(
     while !open.is_empty() && nodes.len() - 1 < choice.most {
         let mut missed: Vec<(f64, KnownNode)> = Vec::new();
         open.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut state = unloaded.clone();
+        motion.go_back(unloaded.clone());
         for (low, high) in &open {
             let middle = (0.5 * (f64::from(*low).sqrt() + f64::from(*high).sqrt())).powi(2) as f32;
-            state = chain.sample(&mut solver, state, middle)?;
+            chain.sample(&mut motion, middle)?;
             let points = chain.take_points();
             let image = trial_table(drive, kind, plan, &nodes, &known)?;
             missed.push((worst_miss(&image, &points), KnownNode { torque: middle, temperature, points }));
@@ -86,7 +83,7 @@ pub fn choose_torque_nodes(
         open.clear();
         for (miss, node) in missed {
             let middle = node.torque;
-            if miss > choice.tolerance_rad && nodes.len() - 1 < choice.most {
+            if miss > choice.tolerance_arcsec / ARCSEC_PER_RAD && nodes.len() - 1 < choice.most {
                 let place = nodes.partition_point(|t| *t < middle);
                 open.extend([(nodes[place - 1], middle), (middle, nodes[place])]);
                 nodes.insert(place, middle);
@@ -101,9 +98,7 @@ pub fn choose_torque_nodes(
         torque_nodes_n_m: positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).collect(),
         known,
         resolved: open.is_empty(),
-        increments: chain.increments,
-        iterations: chain.iterations,
-        worst_residual: chain.worst_residual,
+        work: chain.work,
     })
 }
 

@@ -19,7 +19,7 @@
 //! which needs no strain-displacement matrix (Belytschko, Liu, Moran, Nonlinear Finite Elements, 4.9, specialised).
 //! Everything is per unit width: forces N/mm, stiffness N/mm per mm.
 
-use crate::material::PlaneStrain;
+use crate::fem::material::PlaneStrain;
 
 /// Length of the packed lower triangle of a 16 x 16 element matrix: entry (i, j <= i) sits at `i (i+1)/2 + j`.
 pub const PACKED: usize = 136;

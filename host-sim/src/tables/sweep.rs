@@ -9,7 +9,6 @@
 //! is enough too: from a forward state under T the backward one follows by the compliance c of the output,
 //! `e_backward(psi, T) = e_forward(psi, T) + 2 d c`. The drag is small (0.02 N.m; the second order is below 0.05″).
 
-use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
 use flexspline::Direction;
@@ -18,7 +17,8 @@ use flexspline::make::Sample;
 use rayon::prelude::*;
 
 use crate::drive::{Drive, GeneratorKind};
-use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
+use crate::motion::{Motion, settling_pitches};
+use crate::stepping::{Increment, Problem, SolveError, SolverSettings};
 
 /// What to sample.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,8 +29,6 @@ pub struct SweepPlan {
     pub temperature_nodes_c: Vec<f32>,
     /// Samples over one tooth pitch.
     pub positions: usize,
-    /// Pitches of forward motion before the first sample after a change of torque or temperature, at least one increment.
-    pub settling_pitches: f64,
 }
 
 /// Share of the drag torque by which the nodes at either side of the jump lie away from it.
@@ -43,29 +41,10 @@ impl SweepPlan {
     pub fn for_generator(drive: &Drive, kind: GeneratorKind) -> SweepPlan {
         let temperature = &drive.temperature;
         SweepPlan {
-            torque_nodes_n_m: symmetric_nodes(drive.output.drag_torque_n_m, rated_torque_n_m(kind), 9),
+            torque_nodes_n_m: symmetric_nodes(drive.output.drag_torque_n_m, kind.rated_torque_n_m(), 9),
             temperature_nodes_c: [temperature.minimum_c, temperature.maximum_c].map(|t| t as f32).to_vec(),
             positions: 8,
-            settling_pitches: if drive.flanks.friction_coefficient > 0.0 { 2.0 } else { 0.0 },
         }
-    }
-
-    /// Converged increments that are sampled.
-    pub fn sampled_increments(&self) -> usize {
-        self.torque_nodes_n_m.len() * self.temperature_nodes_c.len() * self.positions
-    }
-
-    fn settling_increments(&self) -> usize {
-        ((self.settling_pitches * self.positions as f64).ceil() as usize).max(1)
-    }
-}
-
-/// Torque up to which the model of a generator holds with the rim of HHD-95: rollers leave the rim unsupported.
-pub fn rated_torque_n_m(kind: GeneratorKind) -> f64 {
-    match kind {
-        GeneratorKind::TwoRoller => 20.0,
-        GeneratorKind::FourRoller => 100.0,
-        GeneratorKind::DoubleDisc | GeneratorKind::Cam => 200.0,
     }
 }
 
@@ -85,9 +64,6 @@ pub fn symmetric_nodes(drag_n_m: f64, largest_n_m: f64, steps: usize) -> Vec<f32
     positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).map(|t| t as f32).collect()
 }
 
-/// Pitches within which the output must follow the generator.
-const MOST_SETTLING_PITCHES: usize = 10;
-
 /// Progress of a sweep.
 #[derive(Debug, Clone, Copy)]
 pub struct SweepProgress {
@@ -102,6 +78,31 @@ pub struct SweepProgress {
 /// Told of every increment, from any thread; may ask to stop.
 pub type Observer<'a> = dyn Fn(SweepProgress) -> ControlFlow<()> + Sync + 'a;
 
+/// What solving took.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Work {
+    /// Increments solved by FEM.
+    pub increments: usize,
+    /// Newton iterations.
+    pub iterations: usize,
+    /// Largest residual, relative to the contact forces.
+    pub worst_residual: f64,
+}
+
+impl Work {
+    /// One more increment.
+    pub(super) fn count(&mut self, increment: &Increment) {
+        self.add(Work { increments: 1, iterations: increment.iterations, worst_residual: increment.residual });
+    }
+
+    /// Other work beside this.
+    pub(super) fn add(&mut self, other: Work) {
+        self.increments += other.increments;
+        self.iterations += other.iterations;
+        self.worst_residual = self.worst_residual.max(other.worst_residual);
+    }
+}
+
 /// Samples of a sweep and how they came about.
 #[derive(Debug, Clone)]
 pub struct Sweep {
@@ -109,12 +110,8 @@ pub struct Sweep {
     pub kind: GeneratorKind,
     /// Forward samples, computed, then backward samples, mirrored.
     pub samples: Vec<Sample>,
-    /// Increments solved by FEM.
-    pub increments: usize,
-    /// Newton iterations.
-    pub iterations: usize,
-    /// Largest residual, relative to the contact forces.
-    pub worst_residual: f64,
+    /// What it took.
+    pub work: Work,
     /// Unknowns of the model.
     pub degrees_of_freedom: usize,
     /// Places over the turns of generator and output at which every torque of a sign was sampled; 0 for a drive that repeats from
@@ -125,20 +122,12 @@ pub struct Sweep {
 /// Why a sweep ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
-    /// The FEM failed.
+    /// The FEM failed, or the drive did not settle.
     #[error(transparent)]
     Solve(#[from] SolveError),
     /// The samples make no trial table.
     #[error(transparent)]
-    Table(#[from] crate::tables::TableError),
-    /// The output does not follow.
-    #[error("under {torque_n_m} N.m the output does not follow the generator within {pitches} tooth pitches")]
-    NeverMoves {
-        /// Load, N m.
-        torque_n_m: f64,
-        /// Travel of the generator.
-        pitches: usize,
-    },
+    Table(#[from] super::project::TableError),
     /// One tooth pitch in one direction does not say all of the drive.
     #[error(
         "{field}: one tooth pitch in one direction does not say all of this drive; allowed: an ideal drive, uniform wear \
@@ -177,25 +166,23 @@ pub fn sweep(
         .par_iter()
         .map(|&temperature| {
             let problem = Problem::new(drive, kind, f64::from(temperature), settings)?;
-            let mut solver = Solver::new(&problem);
-            let (unloaded, _) = solver.deform(0.0)?;
-            let mut chain = Chain::new(drive, plan, f64::from(temperature), observe);
+            let mut motion = Motion::deformed(&problem, 0.0)?;
+            let unloaded = motion.state().clone();
+            let mut chain = Chain::new(plan, f64::from(temperature), observe);
             for torques in half.chains(plan, drive.output.drag_torque_n_m) {
-                let mut state = unloaded.clone();
+                motion.go_back(unloaded.clone());
                 for torque in torques {
                     let reused = known.iter().find(|k| k.torque == torque && k.temperature == temperature);
                     match reused {
                         Some(known) => chain.points.extend(known.points.iter().copied()),
-                        None => state = chain.sample(&mut solver, state, torque)?,
+                        None => chain.sample(&mut motion, torque)?,
                     }
                 }
             }
             Ok(Sweep {
                 kind,
                 samples: half.complete(&chain.points, drive.output.drag_torque_n_m),
-                increments: chain.increments,
-                iterations: chain.iterations,
-                worst_residual: chain.worst_residual,
+                work: chain.work,
                 degrees_of_freedom: problem.degrees_of_freedom(),
                 places: 0,
             })
@@ -203,12 +190,23 @@ pub fn sweep(
         .collect::<Result<Vec<Sweep>, SweepError>>()?;
     let joined = parts.into_iter().reduce(|mut all, part| {
         all.samples.extend(part.samples);
-        all.increments += part.increments;
-        all.iterations += part.iterations;
-        all.worst_residual = all.worst_residual.max(part.worst_residual);
+        all.work.add(part.work);
         all
     });
     Ok(joined.expect("a plan has temperatures"))
+}
+
+/// Increments that a sweep over so many torque nodes on each side of zero takes, about, where so many are known at one temperature:
+/// at each of them the load comes on, the drive settles and is sampled.
+pub(super) fn planned_increments(drive: &Drive, plan: &SweepPlan, nodes: usize, known: usize) -> usize {
+    let sides = match Half::of(drive) {
+        Half::Forward => 2,
+        Half::ForwardLoaded => 1,
+    };
+    let settling =
+        (settling_pitches(drive.flanks.friction_coefficient) * plan.positions as f64).ceil().max(1.0) as usize;
+    let at_a_node = 1 + settling + plan.positions;
+    (sides * nodes * plan.temperature_nodes_c.len()).saturating_sub(known) * at_a_node
 }
 
 /// Which part of the plane of torque and direction is computed; the rest follows.
@@ -289,29 +287,17 @@ pub struct KnownNode {
 
 /// Samples at one torque after the other, the drive moving on forward.
 pub struct Chain<'a> {
-    drive: &'a Drive,
     plan: &'a SweepPlan,
     temperature_c: f64,
     observe: &'a Observer<'a>,
     points: Vec<Computed>,
-    pub(crate) increments: usize,
-    pub(crate) iterations: usize,
-    pub(crate) worst_residual: f64,
+    pub(super) work: Work,
 }
 
 impl<'a> Chain<'a> {
     /// A chain at one temperature.
-    pub fn new(drive: &'a Drive, plan: &'a SweepPlan, temperature_c: f64, observe: &'a Observer<'a>) -> Self {
-        Chain {
-            drive,
-            plan,
-            temperature_c,
-            observe,
-            points: Vec::new(),
-            increments: 0,
-            iterations: 0,
-            worst_residual: 0.0,
-        }
+    pub fn new(plan: &'a SweepPlan, temperature_c: f64, observe: &'a Observer<'a>) -> Self {
+        Chain { plan, temperature_c, observe, points: Vec::new(), work: Work::default() }
     }
 
     /// The points so far, which are then forgotten.
@@ -319,52 +305,37 @@ impl<'a> Chain<'a> {
         std::mem::take(&mut self.points)
     }
 
-    fn advance(
-        &mut self,
-        solver: &mut Solver<'_>,
-        state: &State,
-        turn: f64,
-        torque_n_m: f64,
-    ) -> Result<(State, f64), SweepError> {
-        let (next, increment) = solver.increment(state, state.generator_rad + turn, torque_n_m)?;
-        self.increments += 1;
-        self.iterations += increment.iterations;
-        self.worst_residual = self.worst_residual.max(increment.residual);
-        let progress =
-            SweepProgress { iterations: increment.iterations, torque_n_m, temperature_c: self.temperature_c };
-        match (self.observe)(progress) {
-            ControlFlow::Continue(()) => Ok((next, increment.compliance_rad_per_n_m)),
+    fn told(&mut self, motion: &Motion<'_>) -> Result<(), SweepError> {
+        let (iterations, torque_n_m) = (motion.last().iterations, motion.state().torque_n_m);
+        self.work.count(motion.last());
+        match (self.observe)(SweepProgress { iterations, torque_n_m, temperature_c: self.temperature_c }) {
+            ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(SweepError::Stopped),
         }
     }
 
-    /// Brings the load on, settles, and samples one pitch; the state at its end.
-    pub fn sample(&mut self, solver: &mut Solver<'_>, state: State, torque: f32) -> Result<State, SweepError> {
+    /// Brings the load on, settles, and samples one pitch.
+    pub fn sample(&mut self, motion: &mut Motion<'_>, torque: f32) -> Result<(), SweepError> {
         let torque_n_m = f64::from(torque);
-        let step = TAU / f64::from(self.drive.flexspline.teeth) / self.plan.positions as f64;
-        let (mut state, _) = self.advance(solver, &state, 0.0, torque_n_m)?;
-        // Under a load below the drag the output stands still until the clearance is crossed.
-        let mut settled = 0;
-        while settled < self.plan.settling_increments() || state.output_rate < 0.5 / self.drive.ratio() {
-            (state, _) = self.advance(solver, &state, step, torque_n_m)?;
-            settled += 1;
-            if settled > MOST_SETTLING_PITCHES * self.plan.positions {
-                return Err(SweepError::NeverMoves { torque_n_m, pitches: MOST_SETTLING_PITCHES });
-            }
+        let step = motion.pitch() / self.plan.positions as f64;
+        motion.load(torque_n_m)?;
+        self.told(motion)?;
+        while motion.settle_on(step)? {
+            self.told(motion)?;
         }
         for _ in 0..self.plan.positions {
-            let (next, compliance) = self.advance(solver, &state, step, torque_n_m)?;
-            state = next;
+            motion.turn(step)?;
+            self.told(motion)?;
             let sample = Sample {
-                generator_rad: state.generator_rad,
+                generator_rad: motion.state().generator_rad,
                 torque_n_m,
                 temperature_c: self.temperature_c,
                 direction: Direction::Forward,
-                output_rad: state.output_rad,
+                output_rad: motion.state().output_rad,
             };
-            self.points.push(Computed { sample, compliance });
+            self.points.push(Computed { sample, compliance: motion.last().compliance_rad_per_n_m });
         }
-        Ok(state)
+        Ok(())
     }
 }
 

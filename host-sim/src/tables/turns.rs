@@ -5,13 +5,13 @@
 //! geometry: friction has little part in it, and without friction contact converges several times faster. So two sweeps are put
 //! together:
 //!
-//! * the drive without the imperfections, over one tooth pitch at every node, as [`crate::sweep`] does it;
+//! * the drive without the imperfections, over one tooth pitch at every node, as [`crate::tables::sweep`] does it;
 //! * the *deviation*, the output with the imperfections less the output without, both frictionless, at a few loads of either
 //!   sign, from many places. The places cover the turn of the generator and the turn of the output as evenly as so few points
 //!   can (the additive recurrence of the plastic number), so that harmonics of ψ, δ and ψ − δ do not pass for one another.
 //!
 //! The places lie whole flexspline pitches apart. There the drive without imperfections is in one state, and the drive with them
-//! nearly so: under each load it jumps from place to place ([`Solver::jump`]).
+//! nearly so: under each load it jumps from place to place ([`Motion::jump`]).
 //!
 //! The samples are those of the first sweep, each at every place, with the deviation there added: between loads linear in the
 //! cube root of the load, within the pitch along the harmonics that the table will hold.
@@ -28,10 +28,11 @@ use faer::{Mat, Side};
 use flexspline::make::Sample;
 use rayon::prelude::*;
 
+use super::project::{GENERATOR_ORDERS, MATERIAL_ORDERS, OUTPUT_ORDERS};
+use super::sweep::{KnownNode, Observer, Sweep, SweepError, SweepPlan, SweepProgress, Work, sweep};
 use crate::drive::{Drive, GeneratorKind};
-use crate::stepping::{Increment, Problem, SolveError, Solver, SolverSettings, State};
-use crate::sweep::{KnownNode, Observer, Sweep, SweepError, SweepPlan, SweepProgress, sweep};
-use crate::tables::{GENERATOR_ORDERS, MATERIAL_ORDERS, OUTPUT_ORDERS};
+use crate::motion::Motion;
+use crate::stepping::{Problem, SolveError, SolverSettings};
 
 /// Places of generator and output for each sign of the load.
 const PLACES: usize = 32;
@@ -81,21 +82,17 @@ pub fn sweep_turns(
         .par_iter()
         .map(|&(level, sign)| {
             let torque_n_m = sign * levels[level];
-            let mut count = Count { observe, increments: 0, iterations: 0, worst_residual: 0.0 };
+            let mut count = Count { observe, work: Work::default() };
             let all_alike = count.errors(&without, &[0.0], torque_n_m)?[0];
             let places = places(drive, sign);
             let deviation: Vec<f64> =
                 count.errors(&with, &places, torque_n_m)?.into_iter().map(|error| error - all_alike).collect();
             let run = Run { level, sign, deviation };
-            Ok((run, count.increments, count.iterations, count.worst_residual))
+            Ok((run, count.work))
         })
         .collect::<Result<Vec<_>, SweepError>>()?;
-    for (_, increments, iterations, worst_residual) in &done {
-        whole.increments += increments;
-        whole.iterations += iterations;
-        whole.worst_residual = whole.worst_residual.max(*worst_residual);
-    }
-    let deviations = Deviations::new(drive, levels, done.into_iter().map(|(run, ..)| run).collect());
+    done.iter().for_each(|(_, work)| whole.work.add(*work));
+    let deviations = Deviations::new(drive, levels, done.into_iter().map(|(run, _)| run).collect());
     whole.samples = whole.samples.iter().flat_map(|sample| deviations.spread(drive, sample)).collect();
     whole.places = PLACES;
     Ok(whole)
@@ -116,7 +113,7 @@ pub fn errors_over_turns(
     smooth.flanks.friction_coefficient = 0.0;
     smooth.output.drag_torque_n_m = SMOOTH_DRAG_N_M;
     let problem = Problem::new(&smooth, kind, drive.temperature.reference_c, settings)?;
-    Count { observe, increments: 0, iterations: 0, worst_residual: 0.0 }.errors(&problem, generator_rad, torque_n_m)
+    Count { observe, work: Work::default() }.errors(&problem, generator_rad, torque_n_m)
 }
 
 /// Loads at which the deviation is looked at, light to heavy, evenly in their cube roots, N m.
@@ -144,63 +141,47 @@ fn places(drive: &Drive, sign: f64) -> Vec<f64> {
 /// Goes from place to place and counts.
 struct Count<'a> {
     observe: &'a Observer<'a>,
-    increments: usize,
-    iterations: usize,
-    worst_residual: f64,
+    work: Work,
 }
 
 impl Count<'_> {
-    fn counted(
-        &mut self,
-        problem: &Problem,
-        solved: Result<(State, Increment), SolveError>,
-    ) -> Result<State, SweepError> {
-        let (state, increment) = solved?;
-        self.increments += 1;
-        self.iterations += increment.iterations;
-        self.worst_residual = self.worst_residual.max(increment.residual);
-        let temperature_c = problem.drive.temperature.reference_c;
-        let progress = SweepProgress { iterations: increment.iterations, torque_n_m: state.torque_n_m, temperature_c };
+    fn told(&mut self, motion: &Motion<'_>) -> Result<(), SweepError> {
+        self.work.count(motion.last());
+        let progress = SweepProgress {
+            iterations: motion.last().iterations,
+            torque_n_m: motion.state().torque_n_m,
+            temperature_c: motion.problem().drive.temperature.reference_c,
+        };
         match (self.observe)(progress) {
-            ControlFlow::Continue(()) => Ok(state),
+            ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(SweepError::Stopped),
         }
     }
 
     /// The transmission error at places in ascending order, under one load.
     fn errors(&mut self, problem: &Problem, places: &[f64], torque_n_m: f64) -> Result<Vec<f64>, SweepError> {
-        let ratio = problem.drive.ratio();
-        let mut solver = Solver::new(problem);
         let Some(first) = places.first() else { return Ok(Vec::new()) };
-        let mut state = self.loaded_before(problem, &mut solver, *first, torque_n_m)?;
+        // Loaded one pitch before a place, so that the drive arrives there moving forward.
+        let pitch = problem.flexspline.pitch();
+        let mut motion = Motion::deformed(problem, first - pitch)?;
+        motion.load(torque_n_m)?;
+        self.told(&motion)?;
         let mut errors = Vec::with_capacity(places.len());
         for &place in places {
-            let solved = match solver.jump(&state, place) {
+            match motion.jump(place) {
                 // Too different from the last place: deformed and loaded afresh.
                 Err(SolveError::NotConverged { .. }) => {
-                    let before = self.loaded_before(problem, &mut solver, place, torque_n_m)?;
-                    solver.increment(&before, place, torque_n_m)
+                    motion.deform(place - pitch)?;
+                    motion.load(torque_n_m)?;
+                    self.told(&motion)?;
+                    motion.turn_to(place)?;
                 }
-                other => other,
-            };
-            state = self.counted(problem, solved)?;
-            errors.push(state.output_rad - place / ratio);
+                jumped => jumped?,
+            }
+            self.told(&motion)?;
+            errors.push(motion.error_rad());
         }
         Ok(errors)
-    }
-
-    /// The drive loaded one pitch before a place, so that it arrives there moving forward.
-    fn loaded_before(
-        &mut self,
-        problem: &Problem,
-        solver: &mut Solver<'_>,
-        place: f64,
-        torque_n_m: f64,
-    ) -> Result<State, SweepError> {
-        let before = place - TAU / f64::from(problem.drive.flexspline.teeth);
-        let deformed = solver.deform(before)?.0;
-        let solved = solver.increment(&deformed, before, torque_n_m);
-        self.counted(problem, solved)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Tables against fresh FEM at points that made none of them, through the core code that firmware links.
 //!
-//! Torques, temperatures, directions and positions are drawn between the nodes; each torque is settled and then followed over
+//! Torques, temperatures, directions and positions are drawn between the nodes; the drive is settled under each torque and then followed over
 //! a few positions. A run at zero torque is also reversed, so that the play operator is seen crossing the backlash.
 //!
 //! A drive that does not repeat from tooth to tooth is deformed anew for each torque, anywhere in the turns of generator and
@@ -14,9 +14,11 @@ use flexspline::{Direction, GeneratorAngle, PlayState, Quality, Table};
 use serde::Serialize;
 use thiserror::Error;
 
+use super::project::core_kind;
 use crate::drive::{Drive, GeneratorKind};
-use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
-use crate::tables::{ARCSEC_PER_RAD, core_kind};
+use crate::motion::Motion;
+use crate::stepping::{Problem, SolveError, SolverSettings};
+use crate::units::ARCSEC_PER_RAD;
 
 /// What a table may miss fresh FEM by, arcsec: root mean square and largest.
 pub const RMS_BOUND_ARCSEC: f64 = 0.5;
@@ -106,7 +108,7 @@ pub struct Validation {
 /// Why a table could not be validated.
 #[derive(Debug, Error)]
 pub enum ValidateError {
-    /// The FEM failed.
+    /// The FEM failed, or the drive did not settle.
     #[error(transparent)]
     Solve(#[from] SolveError),
     /// The table is of another drive.
@@ -172,22 +174,21 @@ pub fn validate(
     let mut fresh = Fresh { drive, table, observe, increments: 0, total, points: Vec::new() };
     for (k, (temperature_c, torques)) in draws.iter().enumerate() {
         let problem = Problem::new(drive, kind, *temperature_c, settings.solver)?;
-        let mut solver = Solver::new(&problem);
-        let (unloaded, _) = solver.deform(random.f64() * if repeats { 1.0 } else { whole_turns })?;
+        let mut motion = Motion::deformed(&problem, random.f64() * if repeats { 1.0 } else { whole_turns })?;
+        let unloaded = motion.state().clone();
         if k == 0 {
-            fresh.reversal(&mut solver, unloaded.clone(), *temperature_c)?;
+            fresh.reversal(&mut motion, *temperature_c)?;
         }
         // Either sign is a chain from light to heavy.
         for sign in [1.0, -1.0] {
-            let mut state = unloaded.clone();
+            motion.go_back(unloaded.clone());
             let mut chain: Vec<f64> = torques.iter().copied().filter(|t| t * sign > 0.0).collect();
             chain.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
             for torque_n_m in chain {
                 if !repeats {
-                    state = solver.deform(whole_turns * random.f64())?.0;
+                    motion.deform(whole_turns * random.f64())?;
                 }
-                state =
-                    fresh.steady(&mut solver, state, torque_n_m, *temperature_c, settings.positions, &mut random)?;
+                fresh.steady(&mut motion, torque_n_m, *temperature_c, settings.positions, &mut random)?;
             }
         }
     }
@@ -222,8 +223,8 @@ fn draw(
 
 /// Increments of the reversal.
 const REVERSAL_STEPS: usize = 16;
-/// Increments within which the output must follow the generator.
-const MOST_SETTLING: usize = 80;
+/// Increments to a flexspline pitch while the drive settles.
+const SETTLING_STEPS: f64 = 8.0;
 
 struct Fresh<'a> {
     drive: &'a Drive,
@@ -235,74 +236,53 @@ struct Fresh<'a> {
 }
 
 impl Fresh<'_> {
-    fn advance(
-        &mut self,
-        solver: &mut Solver<'_>,
-        state: &State,
-        turn: f64,
-        torque_n_m: f64,
-    ) -> Result<State, ValidateError> {
-        let (next, _) = solver.increment(state, state.generator_rad + turn, torque_n_m)?;
+    fn told(&mut self) -> Result<(), ValidateError> {
         self.increments += 1;
         match (self.observe)(self.increments, self.total.max(self.increments)) {
-            ControlFlow::Continue(()) => Ok(next),
+            ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(ValidateError::Stopped),
         }
     }
 
-    fn pitch(&self) -> f64 {
-        TAU / f64::from(self.drive.flexspline.teeth)
-    }
-
-    /// Moves until the output follows.
-    fn settle(
-        &mut self,
-        solver: &mut Solver<'_>,
-        mut state: State,
-        turn: f64,
-        torque_n_m: f64,
-    ) -> Result<State, ValidateError> {
-        let pitches = if self.drive.flanks.friction_coefficient > 0.0 { 2.0 } else { 0.0 };
-        let least = (pitches * self.pitch() / turn.abs()).ceil() as usize;
-        for k in 0..MOST_SETTLING {
-            state = self.advance(solver, &state, turn, torque_n_m)?;
-            if k >= least && state.output_rate > 0.5 / self.drive.ratio() {
-                return Ok(state);
-            }
+    /// Moves until the drive has settled.
+    fn settle(&mut self, motion: &mut Motion<'_>, sign: f64) -> Result<(), ValidateError> {
+        let step = sign * motion.pitch() / SETTLING_STEPS;
+        while motion.settle_on(step)? {
+            self.told()?;
         }
-        Ok(state)
+        Ok(())
     }
 
     fn steady(
         &mut self,
-        solver: &mut Solver<'_>,
-        state: State,
+        motion: &mut Motion<'_>,
         torque_n_m: f64,
         temperature_c: f64,
         positions: usize,
         random: &mut fastrand::Rng,
-    ) -> Result<State, ValidateError> {
+    ) -> Result<(), ValidateError> {
         let sign = if random.bool() { 1.0 } else { -1.0 };
-        let state = self.advance(solver, &state, 0.0, torque_n_m)?;
-        let mut state = self.settle(solver, state, sign * self.pitch() / 8.0, torque_n_m)?;
+        motion.load(torque_n_m)?;
+        self.told()?;
+        self.settle(motion, sign)?;
         for _ in 0..positions {
-            let turn = sign * self.pitch() * (0.1 + 0.2 * random.f64());
-            state = self.advance(solver, &state, turn, torque_n_m)?;
+            motion.turn(sign * motion.pitch() * (0.1 + 0.2 * random.f64()))?;
+            self.told()?;
             let mut play = PlayState::after_motion(if sign > 0.0 { Direction::Forward } else { Direction::Backward });
-            self.compare("steady", &state, temperature_c, sign, &mut play)?;
+            self.compare("steady", motion, temperature_c, sign, &mut play)?;
         }
-        Ok(state)
+        Ok(())
     }
 
     /// Unloaded, forward, then backward through the backlash and on.
-    fn reversal(&mut self, solver: &mut Solver<'_>, state: State, temperature_c: f64) -> Result<(), ValidateError> {
+    fn reversal(&mut self, motion: &mut Motion<'_>, temperature_c: f64) -> Result<(), ValidateError> {
         let [lowest, highest] = self.table.torque_range_n_m();
         if lowest > 0.0 || highest < 0.0 {
             return Ok(());
         }
-        let mut state = self.settle(solver, state, self.pitch() / 8.0, 0.0)?;
+        self.settle(motion, 1.0)?;
         let mut play = PlayState::after_motion(Direction::Forward);
-        self.compare("reversal", &state, temperature_c, 1.0, &mut play)?;
+        self.compare("reversal", motion, temperature_c, 1.0, &mut play)?;
         let steady = |direction| {
             self.table
                 .steady_error_rad(GeneratorAngle::ZERO, 0.0, temperature_c as f32, direction)
@@ -311,8 +291,9 @@ impl Fresh<'_> {
         let backlash = steady(Direction::Backward) - steady(Direction::Forward);
         let turn = -1.6 * backlash * self.drive.ratio() / REVERSAL_STEPS as f64;
         for _ in 0..REVERSAL_STEPS {
-            state = self.advance(solver, &state, turn, 0.0)?;
-            self.compare("reversal", &state, temperature_c, -1.0, &mut play)?;
+            motion.turn(turn)?;
+            self.told()?;
+            self.compare("reversal", motion, temperature_c, -1.0, &mut play)?;
         }
         Ok(())
     }
@@ -320,11 +301,12 @@ impl Fresh<'_> {
     fn compare(
         &mut self,
         kind: &'static str,
-        state: &State,
+        motion: &Motion<'_>,
         temperature_c: f64,
         sign: f64,
         play: &mut PlayState,
     ) -> Result<(), ValidateError> {
+        let state = motion.state();
         let disabled = ValidateError::Disabled { torque_n_m: state.torque_n_m, temperature_c };
         let Some(generator) = GeneratorAngle::from_rad(state.generator_rad) else { return Err(disabled) };
         let prediction = self.table.forward(play, generator, state.torque_n_m as f32, temperature_c as f32);
@@ -337,7 +319,7 @@ impl Fresh<'_> {
             torque_n_m: state.torque_n_m,
             temperature_c,
             direction: if sign > 0.0 { 1 } else { -1 },
-            fem_arcsec: (state.output_rad - state.generator_rad / self.drive.ratio()) * ARCSEC_PER_RAD,
+            fem_arcsec: motion.error_arcsec(),
             table_arcsec: f64::from(prediction.transmission_error_rad) * ARCSEC_PER_RAD,
         });
         Ok(())

@@ -1,0 +1,130 @@
+//! A finished table and what is said about it in JSON.
+
+use flexspline::make::Sample;
+use serde::Serialize;
+
+use crate::drive::GeneratorKind;
+
+/// A finished table.
+#[derive(Debug, Clone)]
+pub struct MadeTable {
+    /// Which generator.
+    pub kind: GeneratorKind,
+    /// The `.fxt` image.
+    pub image: Vec<u8>,
+    /// What is said about it in JSON.
+    pub info: TableInfo,
+    /// The samples of its sweep, if it was swept.
+    pub samples: Option<Vec<Sample>>,
+}
+
+/// What made a table, what is in it and how far it holds.
+#[derive(Debug, Clone, Serialize)]
+pub struct TableInfo {
+    /// Version of this object.
+    pub schema_version: u32,
+    /// "made": every check of the core passed.
+    pub status: &'static str,
+    /// First 16 hex digits of the BLAKE3 of the image's contents.
+    pub table_id: String,
+    /// Generator.
+    pub generator: String,
+    /// Name of the drive.
+    pub drive: String,
+    /// BLAKE3 of the drive, hex.
+    pub drive_blake3: String,
+    /// Program that made the table.
+    pub tool: String,
+    /// Where the samples come from.
+    pub source: Source,
+    /// Size of the image, bytes.
+    pub image_bytes: usize,
+    /// Torque nodes, N m.
+    pub torque_nodes_n_m: Vec<f32>,
+    /// Whether the FEM was met between all torque nodes when they were chosen; null where they were given.
+    pub torque_nodes_resolved: Option<bool>,
+    /// Temperature nodes, °C.
+    pub temperature_nodes_c: Vec<f32>,
+    /// Nodes over one tooth pitch.
+    pub ripple_nodes: usize,
+    /// Samples used, both directions.
+    pub samples: usize,
+    /// Largest deviation of the table from its samples, arcsec.
+    pub projection_worst_arcsec: f64,
+    /// Root mean square of that deviation, arcsec.
+    pub projection_rms_arcsec: f64,
+    /// Bound of |N de/dpsi| in steady motion; below 1 the inverse exists.
+    pub slope_bound: f32,
+    /// Iterations of the inverse and the error they leave, arcsec.
+    pub inverse_iterations: u8,
+    /// Error left by these iterations, arcsec.
+    pub inverse_error_arcsec: f64,
+    /// Largest backlash (both half-widths) of any node, arcsec.
+    pub backlash_arcsec: f64,
+    /// Error in the middle of the play at the ends of the torque axis, arcsec.
+    pub wind_up_arcsec: [f64; 2],
+    /// What is left over whole turns of a drive that does not repeat from tooth to tooth; null for one that does.
+    pub turns: Option<TurnsInfo>,
+    /// Command line, once known.
+    pub command: String,
+}
+
+/// A drive that does not repeat from tooth to tooth, and what its table has no room for: one curve for each of the angles, the
+/// same under every load, for either flank.
+#[derive(Debug, Clone, Serialize)]
+pub struct TurnsInfo {
+    /// Places over the turns of generator and output, for each sign of the load.
+    pub places: usize,
+    /// Torque by torque, in the order of the nodes.
+    pub by_torque: Vec<TurnsAtTorque>,
+    /// The same in words.
+    pub remark: String,
+}
+
+/// Whole turns under one torque: forward and backward motion, all temperatures.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct TurnsAtTorque {
+    /// Torque node, N m.
+    pub torque_n_m: f32,
+    /// Range of the drive's error over the places, the ripple within a pitch left out, arcsec. So few places see most, not all, of
+    /// its transmission accuracy.
+    pub drive_peak_to_peak_arcsec: f64,
+    /// What the table leaves of it, arcsec: root mean square.
+    pub left_rms_arcsec: f64,
+    /// Largest difference between table and samples, arcsec.
+    pub left_worst_arcsec: f64,
+}
+
+/// Where samples come from.
+#[derive(Debug, Clone, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Source {
+    /// Contact FEM.
+    Fem {
+        /// Solver.
+        solver: String,
+        /// Mesh level.
+        mesh: String,
+        /// Unknowns.
+        degrees_of_freedom: usize,
+        /// Positions over one pitch at each torque and temperature.
+        positions: usize,
+        /// Which samples were computed and which mirrored.
+        sampled: String,
+        /// Increments solved.
+        increments: usize,
+        /// Newton iterations.
+        iterations: usize,
+        /// Largest residual, relative to the contact forces.
+        worst_residual: f64,
+        /// Wall seconds of the sweep, other sweeps running beside it.
+        wall_s: f64,
+    },
+    /// A file.
+    File {
+        /// Its name.
+        name: String,
+        /// BLAKE3 of its bytes, hex.
+        blake3: String,
+    },
+}
