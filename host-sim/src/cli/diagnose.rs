@@ -11,12 +11,13 @@ use serde::Serialize;
 use super::context::{Context, quoted};
 use super::synthesize::{fresh_table, gear};
 use super::{Failure, names, report, say};
+use crate::causes::CauseName;
 use crate::diagnosis::report::{Compensation, Diagnosis};
 use crate::diagnosis::{Extended, Settings, diagnose_extended};
 use crate::drive::{Drive, GeneratorKind};
 use crate::extension::{
     Agreement, CauseEntry, Evaluation, EvaluationError, ExtendedTables, FoundGeometry, Model, Remake, TableSubject,
-    causes_to_toml, check_by_fem, evaluate, found_geometry, no_place_in_a_table,
+    causes_to_toml, check_by_fem, evaluate, found_geometry,
 };
 use crate::kernels::Kernels;
 use crate::measurement::{ColumnMap, Fault, Recording, Session, read};
@@ -98,7 +99,7 @@ struct Extension {
     #[serde(skip_serializing_if = "Option::is_none")]
     fem_agreement: Option<Agreement>,
     /// Causes that stand in `[extension]` of drive-extended.toml.
-    named_causes: Vec<String>,
+    named_causes: Vec<CauseName>,
     /// Compensation by session held out, and which causes are in the tables.
     #[serde(skip_serializing_if = "Option::is_none")]
     compensation: Option<Evaluation>,
@@ -152,7 +153,7 @@ impl Diagnose {
         let table_subject = TableSubject { kind: self.generator, drive: format!("{name}-extended"), hash };
         let tables = tables_of(&subject, &table_subject, &recording.sessions);
         let mut extension = Extension::default();
-        let causes: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.name.as_str()).collect();
+        let causes: Vec<CauseName> = diagnosis.causes.iter().map(|cause| cause.name).collect();
         let remake = |fitted: &Extended| -> Result<Option<Vec<u8>>, String> {
             let entries: Vec<CauseEntry> = fitted.causes().iter().map(CauseEntry::of_fitted).collect();
             let of = (&subject.nominal, subject.table.as_ref());
@@ -313,13 +314,13 @@ impl Diagnose {
             Some(known) => {
                 let mut model = Model::of_diagnosis(&subject.nominal, diagnosis);
                 model.causes.splice(0..0, known.causes.iter().cloned());
-                extension.named_causes = model.causes.iter().map(|cause| cause.name.clone()).collect();
+                extension.named_causes = model.causes.iter().map(|cause| cause.name).collect();
                 header(context) + &model.to_toml()
             }
             None => {
                 let found = self.geometry(context, subject, tables, diagnosis, extended, extension)?;
                 extension.drive_fields = found.mapped.iter().flat_map(|mapped| mapped.fields.clone()).collect();
-                extension.named_causes = found.rest.iter().map(|cause| cause.name.clone()).collect();
+                extension.named_causes = found.rest.iter().map(|cause| cause.name).collect();
                 if self.remake_tables && extension.tables_not_written.is_none() {
                     made = self.remade(context, &found, self.mesh(subject))?;
                     extension.tables_by_fem = made.is_some();
@@ -396,7 +397,7 @@ impl Diagnose {
     /// The table of the extended drive by FEM, if the drive holds all that a table can.
     fn remade(&self, context: &Context, found: &FoundGeometry, mesh: MeshLevel) -> Result<Option<MadeTable>, Failure> {
         // What is in no field of the drive would be missing in a table by FEM.
-        let in_tables = found.rest.iter().any(|cause| no_place_in_a_table(&cause.name).is_none());
+        let in_tables = found.rest.iter().any(|cause| cause.name.no_place_in_a_table().is_none());
         if in_tables {
             return Ok(None);
         }

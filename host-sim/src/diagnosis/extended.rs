@@ -15,11 +15,13 @@ use super::resolution::{Resolution, averages_hide, resolution};
 use super::rows::Rows;
 use super::select::{Selected, fit};
 use super::{DiagnosisError, Settings, prepare, uncertainty};
+use crate::causes::CauseName;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
 
 /// A cause as it was found.
 pub struct FittedCause {
+    name: CauseName,
     law: Law,
     places: Vec<f64>,
     coefficients: Vec<f64>,
@@ -28,10 +30,10 @@ pub struct FittedCause {
 }
 
 impl FittedCause {
-    /// Name, snake case.
+    /// Its name.
     #[must_use]
-    pub fn name(&self) -> &str {
-        &self.law.cause
+    pub fn name(&self) -> CauseName {
+        self.name
     }
 }
 
@@ -95,7 +97,7 @@ impl Extended {
         sessions: &[Session],
         nominal: &Nominal,
         table: Option<&Table<'_>>,
-        causes: &[&str],
+        causes: &[CauseName],
         settings: &Settings,
     ) -> Result<Extended, DiagnosisError> {
         Extended::fit_to(sessions, &vec![true; sessions.len()], nominal, table, causes, settings)
@@ -110,7 +112,7 @@ impl Extended {
         used: &[bool],
         nominal: &Nominal,
         table: Option<&Table<'_>>,
-        causes: &[&str],
+        causes: &[CauseName],
         settings: &Settings,
     ) -> Result<Extended, DiagnosisError> {
         let rows = Rows::new(sessions, nominal).learning_from(used);
@@ -232,9 +234,9 @@ impl Found {
             .terms
             .into_iter()
             .filter_map(|(k, places, coefficients, parameters)| {
-                Some(FittedCause { law: laws[k].take()?, places, coefficients, parameters })
+                let law = laws[k].take()?;
+                Some(FittedCause { name: law.cause()?, law, places, coefficients, parameters })
             })
-            .filter(|cause| cause.law.named)
             .collect();
         Extended { play: base.law, scales: scales.clone(), recalibrated: self.recalibrated, base: self.base, causes }
     }

@@ -49,7 +49,7 @@ pub fn proved<'l>(problem: &Problem<'_>, mut selected: Selected<'l>) -> (Selecte
         let Some((_, k)) = best else { break };
         let size_arcsec = select::standing(problem, &selected, k).size;
         let mut terms = selected.terms.clone();
-        let looks_like = terms.remove(k).law.cause.clone();
+        let looks_like = terms.remove(k).law.label.to_string();
         let Some(fit) = select::fit(problem, &terms) else { break };
         aside.push(Unexplained { looks_like, size_arcsec });
         selected = Selected { terms, fit };

@@ -36,7 +36,7 @@ use thiserror::Error;
 
 use crate::measurement::Session;
 use crate::nominal::Nominal;
-use candidate::{Excitation, Law, Scales, library, line, unnamed};
+use candidate::{Deviation, Excitation, Law, Scales, library, line, unnamed};
 use extended::Found;
 pub use extended::{Extended, FittedCause, Series};
 use model::{Problem, terms_at};
@@ -133,7 +133,7 @@ pub fn diagnose_extended(
     if settings.verbose {
         for (k, term) in selected.terms.iter().enumerate() {
             let [main, nuisance, beside] = select::parts(term, selected.fit.of(k));
-            tell(&format!("  {}: law {main:.2}, deviations {nuisance:.2}, beside {beside:.2}", term.law.cause));
+            tell(&format!("  {}: law {main:.2}, deviations {nuisance:.2}, beside {beside:.2}", term.law.label));
         }
         for something in &left {
             tell(&format!("  left: {} {:.2}", something.looks_like, something.size_arcsec));
@@ -208,7 +208,7 @@ impl<'a> Search<'a> {
             let (slow, found): (Vec<_>, Vec<_>) =
                 lines.into_iter().partition(|(line, _)| !remainder::averaged_away(&problem, line));
             for (line, size) in found {
-                let looks_like = format!("line of {:.4} per {}", line.order, line.unit);
+                let looks_like = Deviation::Line { per: line.per, order: line.order }.to_string();
                 if fast.iter().all(|f| f.looks_like != looks_like) {
                     say(format!("  {looks_like}: {size:.2} arcsec, too fast for averages"));
                     fast.push(Unexplained { looks_like, size_arcsec: size });
@@ -219,9 +219,9 @@ impl<'a> Search<'a> {
             drop(selected);
             let known = laws.len();
             for (found, size) in slow {
-                let law = line(found.unit, found.order);
-                if laws.iter().all(|l| l.cause != law.cause) {
-                    say(format!("  {}: {size:.2} arcsec", law.cause));
+                let law = line(found.per, found.order);
+                if laws.iter().all(|l| l.label != law.label) {
+                    say(format!("  {}: {size:.2} arcsec", law.label));
                     laws.push(law);
                 }
             }

@@ -5,12 +5,13 @@ use rayon::prelude::*;
 use super::candidate::Law;
 use super::model::{Fit, Problem, Scaffold, Term};
 use super::select::{Bests, Selected, Standing, begun, less, predicted, settle, size_of, sound};
+use crate::causes::CauseName;
 
 /// A rival in the place of a cause.
 #[derive(Clone, Debug)]
 pub struct Rival {
     /// Its name.
-    pub cause: String,
+    pub cause: CauseName,
     /// Rise of the misfit, in units in which 25 is five standard deviations.
     pub misfit: f64,
     /// Difference of the predictions, rms arcsec.
@@ -70,7 +71,7 @@ pub fn rivals(
     let scaffold = Scaffold::new(problem, others.clone());
     let now = selected.predicted(problem);
     let open: Vec<&Law> =
-        laws.iter().filter(|law| law.named && selected.terms.iter().all(|t| t.law.cause != law.cause)).collect();
+        laws.iter().filter(|law| law.named() && selected.terms.iter().all(|t| t.law.label != law.label)).collect();
     // Where more is left than noise, as much may hide in any rival: rises count against what is left.
     let left = selected.fit.solution.misfit / (problem.worth * problem.data_white.len().max(1) as f64);
     let lacking = scaffold.fit(None).map(|fit| predicted(problem, &others, &fit));
@@ -114,7 +115,7 @@ pub fn rivals(
             };
             let differs = |from: &[f64]| size_of(problem, &less(from, &then));
             Some(Rival {
-                cause: law.cause.clone(),
+                cause: law.cause()?,
                 misfit,
                 apart_arcsec: differs(&now),
                 mops_up: lacking.as_ref().is_some_and(|lacking| differs(lacking) < others_may_err(law)),
@@ -123,6 +124,6 @@ pub fn rivals(
         .collect();
     rivals.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
     let mut seen = std::collections::HashSet::new();
-    rivals.retain(|r| seen.insert(r.cause.clone()));
+    rivals.retain(|r| seen.insert(r.cause));
     rivals
 }

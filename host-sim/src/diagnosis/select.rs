@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::candidate::{Law, Tolerance};
 use super::linear::Gram;
 use super::model::{Fit, Problem, Scaffold, Term, among_each_other, white_columns};
+use crate::causes::CauseName;
 
 /// Evidence (natural logarithm of the ratio) below which nothing is named: "very strong" by Kass & Raftery (1995).
 const LEAST_EVIDENCE: f64 = 6.0;
@@ -122,7 +123,7 @@ fn follows(term: &Term<'_>) -> usize {
 
 /// Whether a term with a name follows much less than another.
 fn simpler(term: &Term<'_>, than: &Term<'_>) -> bool {
-    term.law.named && 3 * follows(term) <= 2 * follows(than)
+    term.law.named() && 3 * follows(term) <= 2 * follows(than)
 }
 
 /// Whether predictions this far apart are the same, as far as laws are known, for something of this size.
@@ -426,11 +427,11 @@ impl Limits {
     /// `misfit`: what the laws of the other terms may be wrong by, arcsec.
     /// `strongest`: the largest size, arcsec.
     fn passes(&self, law: &Law, standing: &Standing, misfit: f64, strongest: f64, in_tolerance: bool) -> bool {
-        let share = if law.named { LEAST_OF_MISFIT } else { LEAST_UNNAMED_OF_MISFIT };
+        let share = if law.named() { LEAST_OF_MISFIT } else { LEAST_UNNAMED_OF_MISFIT };
         let evidence = if law.tolerance_of.is_some() { 0.5 } else { LEAST_EVIDENCE };
         !in_tolerance
             && standing.evidence > evidence
-            && (standing.size > self.least || law.named && self.small_but_clear(standing, strongest))
+            && (standing.size > self.least || law.named() && self.small_but_clear(standing, strongest))
             && standing.alone > share * misfit
             && (standing.left_out > 0.0 || !law.foretells)
     }
@@ -494,7 +495,7 @@ pub fn select<'l>(
             selected = exchange(problem, laws, selected, &limits, compared, &mut given, bests, &mut log)?;
             selected = backward(problem, selected, &limits, &mut log)?;
         }
-        let mut causes: Vec<&str> = selected.terms.iter().map(|t| t.law.cause.as_str()).collect();
+        let mut causes: Vec<String> = selected.terms.iter().map(|t| t.law.label.to_string()).collect();
         causes.sort_unstable();
         if !seen.insert((causes.join("+"), given.len())) {
             break;
@@ -505,12 +506,15 @@ pub fn select<'l>(
 
 /// The given causes, each by the law of it that tells the data best beside the others.
 #[must_use]
-pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[&str]) -> Vec<Term<'l>> {
+pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[CauseName]) -> Vec<Term<'l>> {
     let mut terms: Vec<Term<'l>> = Vec::new();
     loop {
         let open: Vec<&Law> = laws
             .iter()
-            .filter(|law| causes.contains(&law.cause.as_str()) && terms.iter().all(|t| t.law.cause != law.cause))
+            .filter(|law| {
+                law.cause().is_some_and(|cause| causes.contains(&cause))
+                    && terms.iter().all(|t| t.law.label != law.label)
+            })
             .collect();
         let scaffold = Scaffold::new(problem, terms.iter().collect());
         let tried = tried(&scaffold, &open, |law| scaffold.begin(law));
@@ -542,12 +546,12 @@ fn forward<'l>(
     bests: &mut Bests,
     log: &mut impl FnMut(String),
 ) -> Option<Selected<'l>> {
-    let named = selected.terms.iter().filter(|t| t.law.named).count();
+    let named = selected.terms.iter().filter(|t| t.law.named()).count();
     let unnamed = selected.terms.len() - named;
     let open: Vec<&Law> = laws
         .iter()
-        .filter(|law| selected.terms.iter().all(|t| t.law.cause != law.cause))
-        .filter(|law| if law.named { named < MOST_CAUSES } else { unnamed < MOST_UNNAMED })
+        .filter(|law| selected.terms.iter().all(|t| t.law.label != law.label))
+        .filter(|law| if law.named() { named < MOST_CAUSES } else { unnamed < MOST_UNNAMED })
         .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &selected.fit, law))
         .collect();
     let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
@@ -576,10 +580,10 @@ fn forward<'l>(
         .collect();
     contenders_settled(problem, &mut grown, before);
     // Something with a name goes before something without unless that is clearly better: by more than the law may be wrong by.
-    let best_named = grown.iter().filter(|(_, next)| next.newest().law.named).max_by(|a, b| a.0.total_cmp(&b.0));
+    let best_named = grown.iter().filter(|(_, next)| next.newest().law.named()).max_by(|a, b| a.0.total_cmp(&b.0));
     let misfit = best_named.map_or(0.0, |(_, next)| next.newest().law.misfit);
     let ahead = |(gain, next): &(f64, Selected<'l>)| {
-        gain - if next.newest().law.named { 0.0 } else { UNNAMED_AHEAD.max(misfit * misfit * gain) }
+        gain - if next.newest().law.named() { 0.0 } else { UNNAMED_AHEAD.max(misfit * misfit * gain) }
     };
     grown.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
     let standing_now = standings(problem, selected);
@@ -597,11 +601,12 @@ fn forward<'l>(
         let standing = standing(problem, &next, next.terms.len() - 1);
         let strongest = strongest(&selected.terms, &standing_now);
         let passes = limits.passes(term.law, &standing, misfit_as(term.law), strongest, false)
-            && (!term.law.named || too_small.iter().all(|other| limits.clear_beside(problem, &next, &standing, other)));
+            && (!term.law.named()
+                || too_small.iter().all(|other| limits.clear_beside(problem, &next, &standing, other)));
         log(format!(
             "  {} {} {:?}: evidence {:.1}, size {:.2}, alone {:.2} of {:.2}, left out {:.1}",
             if passes { "+" } else { "?" },
-            term.law.cause,
+            term.law.label,
             term.law.values(&term.places),
             standing.evidence,
             standing.size,
@@ -623,7 +628,7 @@ fn forward<'l>(
 /// refined beside has taken some of what is there, which is not the same share of each. Gains are over `before`.
 fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [(f64, Selected<'l>)], before: f64) {
     let mut named: Vec<&mut (f64, Selected<'l>)> =
-        grown.iter_mut().filter(|(_, next)| next.newest().law.named).collect();
+        grown.iter_mut().filter(|(_, next)| next.newest().law.named()).collect();
     named.sort_by(|a, b| b.0.total_cmp(&a.0));
     let least = named.first().map_or(f64::INFINITY, |(best, _)| (CONTENDS * best).max(LEAST_EVIDENCE));
     named.truncate(CONTENDERS);
@@ -744,7 +749,7 @@ fn backward<'l>(
             .filter(|k| fails(problem, &selected, &standings, *k, limits))
             .min_by(|a, b| standings[*a].evidence.total_cmp(&standings[*b].evidence));
         let Some(k) = weakest else { break };
-        log(format!("  - {}: {:?}", selected.terms[k].law.cause, standings[k]));
+        log(format!("  - {}: {:?}", selected.terms[k].law.label, standings[k]));
         selected.terms.remove(k);
         selected.fit = fit(problem, &selected.terms)?;
         selected = settle_anew(problem, selected)?;
@@ -769,7 +774,7 @@ fn exchange<'l>(
         let without = fit(problem, &others)?;
         let open: Vec<&Law> = laws
             .iter()
-            .filter(|law| selected.terms.iter().all(|t| t.law.cause != law.cause))
+            .filter(|law| selected.terms.iter().all(|t| t.law.label != law.label))
             .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &without, law))
             .filter(|law| !given.contains(&(selected.terms[k].law.id(), law.id())))
             .collect();
@@ -793,7 +798,7 @@ fn exchange<'l>(
             .filter(|(term, fit)| {
                 let then = predicted(problem, &others.iter().chain([term]).collect::<Vec<_>>(), fit);
                 let apart = size_of(problem, &less(&then, &now));
-                let needed = if term.law.named { 3.0 } else { UNNAMED_AHEAD };
+                let needed = if term.law.named() { 3.0 } else { UNNAMED_AHEAD };
                 let better = fit.solution.evidence + term.occam > evidence + needed;
                 // What follows more does not take the place of what predicts the same.
                 let no_simpler = !(same(apart, size) && simpler(&selected.terms[k], term));
@@ -802,7 +807,7 @@ fn exchange<'l>(
             })
             .max_by(|a, b| (a.1.solution.evidence + a.0.occam).total_cmp(&(b.1.solution.evidence + b.0.occam)));
         if let Some((term, fit)) = best {
-            let line = format!("  ~ {} gives way to {}", selected.terms[k].law.cause, term.law.cause);
+            let line = format!("  ~ {} gives way to {}", selected.terms[k].law.label, term.law.label);
             let mut terms = others;
             terms.push(term);
             let exchanged = settle(problem, Selected { fit, terms })?;

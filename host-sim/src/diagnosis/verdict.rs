@@ -11,6 +11,7 @@ use super::report::{Cause, Compensation, Diagnosis, Parameter, Residual, Unexpla
 use super::select::{self, Selected, Standing, fit, predicted, standings};
 use super::uncertainty::{self, Known};
 use super::{Settings, experiment, held_out, rivals, tell};
+use crate::causes::CauseName;
 
 /// Sessions left out are predicted no worse up to this: the least that counts is a small part of what noise leaves.
 const NO_WORSE: f64 = 1.001;
@@ -54,7 +55,7 @@ pub(super) fn conclude(
     let known = uncertainty::known(problem, &selected);
     if settings.verbose {
         for (term, known) in selected.terms.iter().zip(&known) {
-            tell(&format!("  {}: {:.1} times its doubt", term.law.cause, known.times_its_doubt));
+            tell(&format!("  {}: {:.1} times its doubt", term.law.label, known.times_its_doubt));
         }
     }
     let named = understood(&selected, &standings, &known, &left_over, noise);
@@ -106,32 +107,33 @@ pub(super) fn conclude(
                 for rival in rivals.iter().take(4) {
                     tell(&format!(
                         "  rival of {}: {} misfit +{:.0}, apart {:.2}",
-                        selected.terms[k].law.cause, rival.cause, rival.misfit, rival.apart_arcsec
+                        selected.terms[k].law.label, rival.cause, rival.misfit, rival.apart_arcsec
                     ));
                 }
             }
+            let Some(name) = selected.terms[k].law.cause() else { continue };
             let size = standings[k].size;
             if rivals.iter().any(|r| r.tells_better(size)) {
                 // A rival that no other test lets through tells it better: neither is known.
                 told_better.push(k);
                 continue;
             }
-            let alike: Vec<String> = rivals
+            let alike: Vec<CauseName> = rivals
                 .iter()
                 .filter(|r| r.looks_alike(standings[k].size, selected.terms[k].law.tolerance_of.is_some()))
-                .map(|r| r.cause.clone())
+                .map(|r| r.cause)
                 .take(3)
                 .collect();
             let closest = rivals.first().map_or(50.0, |r| r.misfit);
             if !alike.is_empty() && next_experiment.is_none() {
-                let named: Vec<&Law> = alike.iter().filter_map(|a| laws.iter().find(|law| law.cause == *a)).collect();
+                let named: Vec<&Law> = alike.iter().filter_map(|a| laws.iter().find(|law| law.is(*a))).collect();
                 next_experiment = experiment::next(problem.on, &selected.terms[k], selected.fit.of(k), &named, noise)
                     .map(|(text, apart)| {
                         format!("{text}; expected to tell them apart by {apart:.0} standard deviations")
                     });
             }
             causes.push(Cause {
-                name: selected.terms[k].law.cause.clone(),
+                name,
                 confidence: confidence(closest, alike.len()),
                 parameters: known[k].parameters.clone(),
                 held_out_gain: held.gains.get(k).copied().unwrap_or(0.0),
@@ -153,7 +155,7 @@ pub(super) fn conclude(
     }
     let mut unexplained_list: Vec<Unexplained> = (0..selected.terms.len())
         .filter(|k| !named.contains(k) || told_better.contains(k) || verdict == Verdict::Unknown)
-        .map(|k| Unexplained { looks_like: selected.terms[k].law.cause.clone(), size_arcsec: standings[k].size })
+        .map(|k| Unexplained { looks_like: selected.terms[k].law.label.to_string(), size_arcsec: standings[k].size })
         .collect();
     unexplained_list.extend(left_over);
     Diagnosis {
@@ -184,7 +186,7 @@ fn understood(
     left_over: &[Unexplained],
     noise: Noise,
 ) -> Vec<usize> {
-    let is_named = |k: &usize| selected.terms[*k].law.named;
+    let is_named = |k: &usize| selected.terms[*k].law.named();
     let unnamed = (0..selected.terms.len()).filter(|k| !is_named(k)).map(|k| standings[k].size);
     let not_understood = unnamed.chain(left_over.iter().map(|l| l.size_arcsec)).fold(0.0, f64::max);
     let counts = |k: &usize| {

@@ -17,21 +17,20 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use crate::causes::{CauseName, ParameterName as Name, UnknownCause};
 use crate::diagnosis::FittedCause;
 use crate::diagnosis::report::{Cause, Diagnosis, Parameter};
 use crate::drive::{DriveError, Problem};
 use crate::measurement::Session;
 use crate::nominal::{Fixed, Nominal};
-use crate::synthesize::{Chosen, Excitation, Plant, Sizes, added_arcsec, effects, parse};
+use crate::synthesize::{Chosen, Excitation, Plant, Sizes, added_arcsec, parse};
 
 /// A cause with the values of its parameters.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CauseEntry {
-    /// Name, snake case.
-    pub name: String,
+    /// Its name.
+    pub name: CauseName,
     /// Parameters by name; the unit is the end of the name.
-    #[serde(default)]
     pub parameters: BTreeMap<String, f64>,
 }
 
@@ -53,7 +52,15 @@ struct FileForm {
 #[serde(deny_unknown_fields)]
 struct ExtensionForm {
     #[serde(default)]
-    cause: Vec<CauseEntry>,
+    cause: Vec<CauseForm>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CauseForm {
+    name: String,
+    #[serde(default)]
+    parameters: BTreeMap<String, f64>,
 }
 
 impl Model {
@@ -182,17 +189,16 @@ pub fn causes_in(file_name: &str, text: &str) -> Result<Vec<CauseEntry>, DriveEr
         let line = error.span().map_or(0, |span| text.get(..span.start).unwrap_or("").matches('\n').count() + 1);
         refuse(format!("{file_name}:{line}"), "extension".to_owned(), error.message().to_owned())
     })?;
-    let causes = form.extension.map_or_else(Vec::new, |extension| extension.cause);
-    let known: Vec<&str> = effects().iter().filter(|effect| !effect.fault).map(|effect| effect.name).collect();
-    for (k, cause) in causes.iter().enumerate() {
+    let mut causes = Vec::new();
+    for (k, form) in form.extension.map_or_else(Vec::new, |extension| extension.cause).into_iter().enumerate() {
         let field = format!("extension.cause[{k}]");
-        if !known.contains(&cause.name.as_str()) {
-            let what = format!("found \"{}\", allowed: {}", cause.name, known.join(", "));
-            return Err(refuse(file_name.to_owned(), format!("{field}.name"), what));
-        }
-        if let Err(what) = cause.checked_effect() {
-            return Err(refuse(file_name.to_owned(), field, what));
-        }
+        let name = form
+            .name
+            .parse()
+            .map_err(|error: UnknownCause| refuse(file_name.to_owned(), format!("{field}.name"), error.to_string()))?;
+        let cause = CauseEntry { name, parameters: form.parameters };
+        cause.checked_effect().map_err(|what| refuse(file_name.to_owned(), field, what))?;
+        causes.push(cause);
     }
     Ok(causes)
 }
@@ -228,7 +234,7 @@ impl CauseEntry {
     #[must_use]
     pub fn of(cause: &Cause) -> CauseEntry {
         CauseEntry {
-            name: cause.name.clone(),
+            name: cause.name,
             parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
         }
     }
@@ -237,7 +243,7 @@ impl CauseEntry {
     #[must_use]
     pub fn of_fitted(cause: &FittedCause) -> CauseEntry {
         CauseEntry {
-            name: cause.name().to_owned(),
+            name: cause.name(),
             parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
         }
     }
@@ -250,18 +256,17 @@ impl CauseEntry {
 
     fn checked_effect(&self) -> Result<Chosen, String> {
         let mut text = String::new();
-        let twice: &[&str] = &["amplitude_um", "depth_um", "tooth", "generator_amplitude_arcsec"];
-        let has = |name: &str| self.parameters.contains_key(name);
-        let definition = effects().into_iter().find(|effect| effect.name == self.name).ok_or("unknown cause")?;
-        for parameter in &definition.parameters {
-            let Some(&value) = self.parameters.get(parameter.name) else { continue };
+        let twice = [Name::AmplitudeUm, Name::DepthUm, Name::Tooth, Name::GeneratorAmplitudeArcsec];
+        let has = |name: Name| self.parameters.contains_key(name.as_str());
+        for parameter in self.name.parameters() {
+            let Some(&value) = self.parameters.get(parameter.name.as_str()) else { continue };
             // Of two forms of the same, the one in arc-seconds and radians.
-            if twice.contains(&parameter.name) && (has("amplitude_arcsec") || has("angle_rad")) {
+            if twice.contains(&parameter.name) && (has(Name::AmplitudeArcsec) || has(Name::AngleRad)) {
                 continue;
             }
             let value = match parameter.name {
-                "phase_rad" => value.rem_euclid(TAU),
-                "wheel" | "harmonic" => value.round(),
+                Name::PhaseRad => value.rem_euclid(TAU),
+                Name::Wheel | Name::Harmonic => value.round(),
                 _ => value,
             };
             let [low, high] = parameter.range;
@@ -277,16 +282,16 @@ mod tests {
     use crate::synthesize::catalogue_drive;
 
     fn model() -> Model {
-        let entry = |name: &str, parameters: &[(&str, f64)]| CauseEntry {
-            name: name.to_owned(),
+        let entry = |name: CauseName, parameters: &[(&str, f64)]| CauseEntry {
+            name,
             parameters: parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
         };
         Model {
             nominal: catalogue_drive(),
             causes: vec![
-                entry("sensor_latency", &[("delay_s", 0.0021)]),
+                entry(CauseName::SensorLatency, &[("delay_s", 0.0021)]),
                 entry(
-                    "flexspline_runout",
+                    CauseName::FlexsplineRunout,
                     &[("amplitude_arcsec", 31.0), ("amplitude_um", 7.0), ("phase_rad", 3.0), ("half_load_n_m", 9.0)],
                 ),
             ],
@@ -299,15 +304,15 @@ mod tests {
         assert_eq!(Model::from_toml("d.toml", &model.to_toml()).unwrap(), model);
         let effects = model.effects();
         assert_eq!(effects.len(), 2);
-        assert_eq!(effects[0].given("delay_s"), Some(0.0021));
-        assert_eq!((effects[1].given("amplitude_arcsec"), effects[1].given("amplitude_um")), (Some(31.0), None));
+        assert_eq!(effects[0].given(Name::DelayS), Some(0.0021));
+        assert_eq!((effects[1].given(Name::AmplitudeArcsec), effects[1].given(Name::AmplitudeUm)), (Some(31.0), None));
     }
 
     #[test]
     fn a_wrong_extension_is_refused_by_field_and_value() {
         let text = model().to_toml();
         for (from, to, message) in [
-            ("sensor_latency", "sensor_lag", "d.toml: extension.cause[0].name: found \"sensor_lag\", allowed: circ"),
+            ("sensor_latency", "sensor_lag", "d.toml: extension.cause[0].name: found \"sensor_lag\"; allowed: circ"),
             ("delay_s = 0.0021", "delay_s = \"old\"", "d.toml:"),
             ("[extension.cause.parameters]", "[extension.cause.numbers]", "d.toml:"),
         ] {

@@ -7,7 +7,8 @@
 //! So a law is evaluated on the excitation as the causes that act on it leave it. Of two that meet in the zones the later one is
 //! evaluated beside the earlier, and together they make what both do.
 
-use super::{Excitation, Kin, Law};
+use super::{Excitation, Law};
+use crate::causes::Kin;
 use crate::diagnosis::base::Base;
 use crate::diagnosis::rows::Rows;
 

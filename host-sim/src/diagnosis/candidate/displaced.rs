@@ -11,6 +11,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::geometry::{Angle, COS_PRESSURE_ANGLE, USUAL_ARCSEC, fading, half_load, kept, sense, waves};
 use super::{Column, Excitation, Law, Lead, Named, Shape, Tolerance, Zones, by_row, main, nuisance, polar};
+use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::linear::Prior;
 
 /// Relative uncertainty of an eccentricity: how much of it a wave shows depends on the teeth that give and on a rim that centres
@@ -93,7 +94,7 @@ impl Displacement {
 }
 
 /// An axis beside its place.
-pub(super) fn displaced(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
+pub(super) fn displaced(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law {
     let loaded = on.scales.load > 0.0;
     let by = FLANK_AHEAD * sense(on);
     let half_of = move |shape: &[f64]| if loaded { shape[2] } else { f64::INFINITY };
@@ -120,21 +121,24 @@ pub(super) fn displaced(cause: &'static str, of: Angle, on: &Excitation<'_>) -> 
         columns
     })
     .shapes(
-        [Shape::angle("phase_rad", 2.0 * PI, 1), Shape::by_factors("size_arcsec", RANGE_ARCSEC[0], RANGE_ARCSEC[1], 1)]
-            .into_iter()
-            .chain(loaded.then(|| half_load(on)))
-            .chain(loaded.then(|| Shape::by_factors("pressed_arcsec", PRESSED_ARCSEC[0], PRESSED_ARCSEC[1], 2))),
+        [
+            Shape::angle(Name::PhaseRad, 2.0 * PI, 1),
+            Shape::by_factors(Name::SizeArcsec, RANGE_ARCSEC[0], RANGE_ARCSEC[1], 1),
+        ]
+        .into_iter()
+        .chain(loaded.then(|| half_load(on)))
+        .chain(loaded.then(|| Shape::by_factors(Name::PressedArcsec, PRESSED_ARCSEC[0], PRESSED_ARCSEC[1], 2))),
     )
     .parameters(move |on, shape, c| {
         let amplitude = second_order_unloaded(c, shape, by) / SECOND_ORDER;
         let mut named: Vec<Named> = vec![
-            ("amplitude_um", amplitude * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", amplitude),
-            ("phase_rad", shape[0]),
+            (Name::AmplitudeUm, amplitude * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um),
+            (Name::AmplitudeArcsec, amplitude),
+            (Name::PhaseRad, shape[0]),
         ];
         if loaded {
-            named.push(("half_load_n_m", shape[2]));
-            named.push(("pressed_arcsec", shape[3]));
+            named.push((Name::HalfLoadNM, shape[2]));
+            named.push((Name::PressedArcsec, shape[3]));
         }
         named
     })

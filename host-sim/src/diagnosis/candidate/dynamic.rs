@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use super::{Column, Excitation, Law, Lead, Shape, Tolerance, by_row, main};
+use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::base::PlayLaw;
 use crate::diagnosis::linear::Prior;
 use crate::tables::ARCSEC_PER_RAD;
@@ -64,7 +65,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
     };
     // Where nothing else loads the drive, its moment decides which flank carries, and no linear law is near.
     let by_flank = on.unloaded().then(|| moment_that_turns_flanks(on, play, scale, load));
-    let mut law = Law::new("gravity_torque", move |on, shape| {
+    let mut law = Law::new(CauseName::GravityTorque, move |on, shape| {
         let rows = on.rows;
         let added = load(on, shape);
         let torque: Vec<f64> = (0..rows.len()).map(|k| rows.torque[k] + added[k]).collect();
@@ -78,8 +79,11 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
             Column { values: play, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 0.5 }) },
         ]
     })
-    .shapes([Shape::by_factors("torque_n_m", 0.003 * scale, 2.0 * scale, 1), Shape::angle("phase_rad", 2.0 * PI, 1)])
-    .parameters(|_, shape, c| vec![("torque_n_m", shape[0] * c[0]), ("phase_rad", shape[1])])
+    .shapes([
+        Shape::by_factors(Name::TorqueNM, 0.003 * scale, 2.0 * scale, 1),
+        Shape::angle(Name::PhaseRad, 2.0 * PI, 1),
+    ])
+    .parameters(|_, shape, c| vec![(Name::TorqueNM, shape[0] * c[0]), (Name::PhaseRad, shape[1])])
     // Without a moment the law is another play alone.
     .physical(move |shape, _| shape[0] > 0.004 * scale);
     law.load = Some(Box::new(load));
@@ -160,7 +164,7 @@ fn transition(omega: f64, damping: f64, dt: f64) -> [f64; 4] {
 /// where teeth skip.
 fn torsional_resonance(on: &Excitation<'_>) -> Law {
     let fastest = 0.45 / on.rows.period;
-    let mut law = Law::new("torsional_resonance", |on, shape| {
+    let mut law = Law::new(CauseName::TorsionalResonance, |on, shape| {
         let (frequency, damping) = (shape[0], shape[1]);
         let base = on.base;
         let kinematic = by_row(on, |k| base.prediction[k] - base.wind_up[k]);
@@ -181,12 +185,12 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
         columns
     })
     .shapes([
-        Shape::by_factors("frequency_hz", 1.0f64.min(0.3 * fastest), fastest.clamp(0.5, 80.0), 28),
-        Shape::by_factors("damping_ratio", 0.008, 0.5, 3),
+        Shape::by_factors(Name::FrequencyHz, 1.0f64.min(0.3 * fastest), fastest.clamp(0.5, 80.0), 28),
+        Shape::by_factors(Name::DampingRatio, 0.008, 0.5, 3),
     ])
     .parameters(|_, shape, c| {
         let gain = [c[0], c[1]].into_iter().fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
-        vec![("frequency_hz", shape[0]), ("damping_ratio", shape[1]), ("gain", gain)]
+        vec![(Name::FrequencyHz, shape[0]), (Name::DampingRatio, shape[1]), (Name::Gain, gain)]
     })
     .physical(|_, c| c[0] > 0.0 || c[1] > 0.0 || c[2] > 0.0);
     // It rings most when the load turns over.

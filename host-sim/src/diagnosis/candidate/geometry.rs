@@ -11,7 +11,8 @@ use crate::nominal::Fixed;
 
 use super::displaced::displaced;
 use super::lobes::generator_eccentricity;
-use super::{Column, Excitation, Kin, Law, Named, Shape, beside, by_row, main, nuisance, polar};
+use super::{Column, Excitation, Law, Named, Shape, beside, by_row, main, nuisance, polar};
+use crate::causes::{CauseName, ParameterName as Name};
 
 /// Share by which a law of shape may be wrong: signatures depend on generator and load.
 const SHAPE_MISFIT: f64 = 0.2;
@@ -72,7 +73,7 @@ pub(super) fn kept(on: &Excitation<'_>, of: Angle, order: f64) -> std::sync::Arc
 /// Half-load of the fading: from a thirtieth of the load scale to where nothing fades.
 pub(super) fn half_load(on: &Excitation<'_>) -> Shape {
     let load = on.scales.load.max(1e-3);
-    Shape::by_factors("half_load_n_m", load / 30.0, load * 30.0, 3)
+    Shape::by_factors(Name::HalfLoadNM, load / 30.0, load * 30.0, 3)
 }
 
 /// +1 where the circular spline is the output. Where the flexspline is, a load that turns it forward rests on the other flank of the
@@ -86,7 +87,7 @@ pub(super) fn sense(on: &Excitation<'_>) -> f64 {
 
 /// Errors of position along the pitch: nearly the same on both flanks and under any load. Of the teeth in mesh the foremost carries,
 /// which is another one on each flank: flanks differ somewhat, and a part of the clearance goes.
-fn pitch(cause: &'static str, of: Angle) -> Law {
+fn pitch(cause: CauseName, of: Angle) -> Law {
     let mut law = Law::new(cause, move |on, _| {
         let flank = |k: usize| on.base.flank[k];
         let light = |k: usize| if on.scales.load > 0.0 { fading(on, 0.3 * on.scales.load, k) } else { 1.0 };
@@ -124,7 +125,7 @@ fn pitch(cause: &'static str, of: Angle) -> Law {
 }
 
 /// The same of a wheel whose error is one smooth wave, as of a cutter or a clamping that is off: order 2 with a little of 1 and 4.
-fn smooth_pitch(cause: &'static str, of: Angle) -> Law {
+fn smooth_pitch(cause: CauseName, of: Angle) -> Law {
     Law::new(cause, move |on, _| {
         let flank = |k: usize| on.base.flank[k];
         let light = |k: usize| if on.scales.load > 0.0 { fading(on, 0.3 * on.scales.load, k) } else { 1.0 };
@@ -144,10 +145,10 @@ fn smooth_pitch(cause: &'static str, of: Angle) -> Law {
 fn pitch_parameters(on: &Excitation<'_>, _: &[f64], c: &[f64]) -> Vec<Named> {
     let (amplitude, phase) = polar(c[0], c[1]);
     vec![
-        ("amplitude_um", amplitude / on.scales.arcsec_per_um),
-        ("amplitude_arcsec", amplitude),
-        ("harmonic", 2.0),
-        ("phase_rad", 0.5 * phase),
+        (Name::AmplitudeUm, amplitude / on.scales.arcsec_per_um),
+        (Name::AmplitudeArcsec, amplitude),
+        (Name::Harmonic, 2.0),
+        (Name::PhaseRad, 0.5 * phase),
     ]
 }
 
@@ -156,7 +157,7 @@ fn pitch_parameters(on: &Excitation<'_>, _: &[f64], c: &[f64]) -> Vec<Named> {
 /// `e = d/r (1/2 sin 2x ± tan a cos 2x)`. 10 µm of radius are 0.67 of 10 µm on the pitch circle.
 fn ovality() -> Law {
     let of = Angle::CircularSpline;
-    Law::new("circular_spline_ovality", move |on, _| {
+    Law::new(CauseName::CircularSplineOvality, move |on, _| {
         let flank = |k: usize| on.base.flank[k];
         let [cos, sin] = waves(on, of, 2.0, |_| 1.0);
         let together = |a: &[f64], b: &[f64], sign: f64| -> Vec<f64> {
@@ -180,9 +181,9 @@ fn ovality() -> Law {
         // sin 2(x - c) = cos 2c sin 2x - sin 2c cos 2x.
         let (amplitude, phase) = polar(c[0], -c[1]);
         vec![
-            ("amplitude_um", amplitude / (0.67 * on.scales.arcsec_per_um)),
-            ("amplitude_arcsec", amplitude),
-            ("phase_rad", 0.5 * phase),
+            (Name::AmplitudeUm, amplitude / (0.67 * on.scales.arcsec_per_um)),
+            (Name::AmplitudeArcsec, amplitude),
+            (Name::PhaseRad, 0.5 * phase),
         ]
     })
     .well_known()
@@ -194,7 +195,7 @@ const RADIAL_OF_TANGENTIAL: f64 = 0.8;
 /// Form error of the generator: a constant shape repeats from tooth to tooth, so its order is the tooth mesh (z per turn), other on each
 /// flank, with a change of the clearance.
 fn cam_form_error() -> Law {
-    Law::new("cam_form_error", |on, _| {
+    Law::new(CauseName::CamFormError, |on, _| {
         let teeth = on.nominal.teeth.map_or(188.0, |t| f64::from(t.flexspline));
         let of = Angle::Flexspline;
         let flank = |k: usize| on.base.flank[k];
@@ -215,16 +216,16 @@ fn cam_form_error() -> Law {
     .parameters(|on, _, c| {
         let mesh = polar(c[0], c[1]).0.hypot(polar(c[2], c[3]).0);
         vec![
-            ("amplitude_um", mesh / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", mesh),
-            ("phase_rad", polar(c[0], c[1]).1),
+            (Name::AmplitudeUm, mesh / on.scales.arcsec_per_um),
+            (Name::AmplitudeArcsec, mesh),
+            (Name::PhaseRad, polar(c[0], c[1]).1),
         ]
     })
 }
 
 /// A tooth that lacks material: a pulse each time a lobe of the wave passes it, twice per turn, on the flank that carries, under load.
 fn damaged_tooth(of: Angle) -> Law {
-    Law::new("damaged_tooth", move |on, shape| {
+    Law::new(CauseName::DamagedTooth, move |on, shape| {
         let (place, width) = (shape[0], shape[1]);
         let period = PI;
         let pulse: Vec<f64> = by_row(on, |k| {
@@ -245,33 +246,33 @@ fn damaged_tooth(of: Angle) -> Law {
             nuisance(by_row(on, |k| pulse[k] * lobe(k)), 1.0),
         ]
     })
-    .shapes([Shape::angle("angle_rad", PI, 30), Shape::by_factors("width_rad", 0.03, 0.4, 2)])
+    .shapes([Shape::angle(Name::AngleRad, PI, 30), Shape::by_factors(Name::WidthRad, 0.03, 0.4, 2)])
     .parameters(move |on, shape, c| {
         let teeth =
             on.nominal.teeth.map_or((188.0, 190.0), |t| (f64::from(t.flexspline), f64::from(t.circular_spline)));
         let count = if of == Angle::Flexspline { teeth.0 } else { teeth.1 };
         let depth = c[0].hypot(c[1]).hypot(c[2]).hypot(c[3]);
         vec![
-            ("depth_um", depth / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", depth),
-            ("angle_rad", shape[0]),
-            ("width_rad", shape[1]),
-            ("tooth", (shape[0] / (2.0 * PI) * count).round()),
-            ("wheel", f64::from(u8::from(of == Angle::CircularSpline))),
+            (Name::DepthUm, depth / on.scales.arcsec_per_um),
+            (Name::AmplitudeArcsec, depth),
+            (Name::AngleRad, shape[0]),
+            (Name::WidthRad, shape[1]),
+            (Name::Tooth, (shape[0] / (2.0 * PI) * count).round()),
+            (Name::Wheel, f64::from(u8::from(of == Angle::CircularSpline))),
         ]
     })
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = vec![
-        displaced("circular_spline_eccentricity", Angle::CircularSpline, on),
-        displaced("flexspline_runout", Angle::Flexspline, on),
-        displaced("gravity_side_load", Angle::Gravity(1.0), on),
+        displaced(CauseName::CircularSplineEccentricity, Angle::CircularSpline, on),
+        displaced(CauseName::FlexsplineRunout, Angle::Flexspline, on),
+        displaced(CauseName::GravitySideLoad, Angle::Gravity(1.0), on),
         ovality(),
-        pitch("flexspline_pitch_error", Angle::Flexspline),
-        pitch("circular_spline_pitch_error", Angle::CircularSpline),
-        smooth_pitch("flexspline_pitch_error", Angle::Flexspline),
-        smooth_pitch("circular_spline_pitch_error", Angle::CircularSpline),
+        pitch(CauseName::FlexsplinePitchError, Angle::Flexspline),
+        pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline),
+        smooth_pitch(CauseName::FlexsplinePitchError, Angle::Flexspline),
+        smooth_pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline),
         generator_eccentricity(on),
         cam_form_error(),
     ];
@@ -280,14 +281,12 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         laws.extend([damaged_tooth(Angle::Flexspline), damaged_tooth(Angle::CircularSpline)]);
     }
     if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
-        laws.push(displaced("gravity_side_load", Angle::Gravity(-1.0), on));
+        laws.push(displaced(CauseName::GravitySideLoad, Angle::Gravity(-1.0), on));
     }
     for law in &mut laws {
         if law.zones.is_none() {
             law.misfit = SHAPE_MISFIT;
         }
-        // The tooth mesh is an order of its own.
-        law.kin = if law.cause == "cam_form_error" { Kin::Unlike } else { Kin::Shape };
     }
     laws
 }

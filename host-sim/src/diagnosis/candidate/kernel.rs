@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use super::geometry::{Angle, COS_PRESSURE_ANGLE, angle};
 use super::{Column, Excitation, Law, Shape, Tolerance, beside, by_row, nuisance, polar};
+use crate::causes::{CauseName, Kin, ParameterName as Name};
 use crate::diagnosis::linear::Prior;
 use crate::drive::Wheel;
 use crate::kernels::{Gain, Kernels};
@@ -70,7 +71,7 @@ fn left_open(on: &Excitation<'_>, of: Angle, order: f64) -> Vec<Column> {
 }
 
 /// An axis beside that of the generator: size and direction enter as the FEM of such drives has them.
-fn eccentric(cause: &'static str, of: Angle, kernels: Arc<Kernels>) -> Law {
+fn eccentric(cause: CauseName, of: Angle, kernels: Arc<Kernels>) -> Law {
     Law::new(cause, move |on, shape| {
         let (size, phase) = (shape[0], shape[1]);
         let field = kernels.eccentric_field(size);
@@ -85,22 +86,22 @@ fn eccentric(cause: &'static str, of: Angle, kernels: Arc<Kernels>) -> Law {
         columns
     })
     .shapes([
-        Shape::by_factors("size_um", ECCENTRICITY_UM[0], ECCENTRICITY_UM[1], 10),
-        Shape::angle("phase_rad", PI, 8),
+        Shape::by_factors(Name::SizeUm, ECCENTRICITY_UM[0], ECCENTRICITY_UM[1], 10),
+        Shape::angle(Name::PhaseRad, PI, 8),
     ])
     .parameters(|on, shape, c| {
         let size = shape[0] * c[0];
         vec![
-            ("amplitude_um", size),
-            ("amplitude_arcsec", size * on.scales.arcsec_per_um / COS_PRESSURE_ANGLE),
-            ("phase_rad", shape[1]),
+            (Name::AmplitudeUm, size),
+            (Name::AmplitudeArcsec, size * on.scales.arcsec_per_um / COS_PRESSURE_ANGLE),
+            (Name::PhaseRad, shape[1]),
         ]
     })
     .physical(|_, c| c[0] > 0.5)
 }
 
 /// Harmonics of the pitch of a wheel that both lobes see alike; the odd ones cancel.
-fn pitch(cause: &'static str, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
+fn pitch(cause: CauseName, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
     const ORDERS: [u32; 8] = [2, 4, 6, 8, 10, 12, 14, 16];
     let of = match wheel {
         Wheel::Flexspline => Angle::Flexspline,
@@ -124,10 +125,10 @@ fn pitch(cause: &'static str, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
     .parameters(|on, _, c| {
         let (amplitude, phase) = polar(c[0], c[1]);
         vec![
-            ("amplitude_um", amplitude),
-            ("amplitude_arcsec", amplitude * on.scales.arcsec_per_um),
-            ("harmonic", 2.0),
-            ("phase_rad", 0.5 * phase),
+            (Name::AmplitudeUm, amplitude),
+            (Name::AmplitudeArcsec, amplitude * on.scales.arcsec_per_um),
+            (Name::Harmonic, 2.0),
+            (Name::PhaseRad, 0.5 * phase),
         ]
     });
     law.free_form = true;
@@ -136,7 +137,7 @@ fn pitch(cause: &'static str, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
 
 fn ovality(kernels: Arc<Kernels>) -> Law {
     let of = Angle::CircularSpline;
-    Law::new("circular_spline_ovality", move |on, _| {
+    Law::new(CauseName::CircularSplineOvality, move |on, _| {
         let mut columns: Vec<Column> = responses(on, of, 2.0, |torque| kernels.ovality(torque)).map(main_um).into();
         columns.extend(left_open(on, of, 2.0));
         columns
@@ -144,9 +145,9 @@ fn ovality(kernels: Arc<Kernels>) -> Law {
     .parameters(|on, _, c| {
         let (amplitude, phase) = polar(c[0], c[1]);
         vec![
-            ("amplitude_um", amplitude),
-            ("amplitude_arcsec", amplitude * 0.67 * on.scales.arcsec_per_um),
-            ("phase_rad", 0.5 * phase),
+            (Name::AmplitudeUm, amplitude),
+            (Name::AmplitudeArcsec, amplitude * 0.67 * on.scales.arcsec_per_um),
+            (Name::PhaseRad, 0.5 * phase),
         ]
     })
 }
@@ -155,18 +156,19 @@ fn ovality(kernels: Arc<Kernels>) -> Law {
 pub(super) fn laws(on: &Excitation<'_>, kernels: &Arc<Kernels>) -> Vec<Law> {
     let of = |cause, angle| eccentric(cause, angle, Arc::clone(kernels));
     let mut laws = vec![
-        of("circular_spline_eccentricity", Angle::CircularSpline),
-        of("flexspline_runout", Angle::Flexspline),
-        of("gravity_side_load", Angle::Gravity(1.0)),
+        of(CauseName::CircularSplineEccentricity, Angle::CircularSpline),
+        of(CauseName::FlexsplineRunout, Angle::Flexspline),
+        of(CauseName::GravitySideLoad, Angle::Gravity(1.0)),
         ovality(Arc::clone(kernels)),
-        pitch("flexspline_pitch_error", Wheel::Flexspline, Arc::clone(kernels)),
-        pitch("circular_spline_pitch_error", Wheel::CircularSpline, Arc::clone(kernels)),
+        pitch(CauseName::FlexsplinePitchError, Wheel::Flexspline, Arc::clone(kernels)),
+        pitch(CauseName::CircularSplinePitchError, Wheel::CircularSpline, Arc::clone(kernels)),
     ];
     if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
-        laws.push(of("gravity_side_load", Angle::Gravity(-1.0)));
+        laws.push(of(CauseName::GravitySideLoad, Angle::Gravity(-1.0)));
     }
     for law in &mut laws {
         law.misfit = KERNEL_MISFIT;
+        law.kin = Kin::Unlike;
     }
     laws
 }

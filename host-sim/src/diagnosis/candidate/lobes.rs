@@ -7,6 +7,7 @@
 use super::displaced::{PRESSED_ARCSEC, ZONES_MISFIT, stopped};
 use super::geometry::{Angle, USUAL_ARCSEC, kept, waves};
 use super::{Column, Excitation, Law, Named, Shape, Tolerance, Zones, beside, by_row, main, nuisance, polar};
+use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::linear::Prior;
 
 /// Plausible differences between the lobes, arcsec at the output.
@@ -43,7 +44,7 @@ impl Lobe {
 /// The law.
 pub(super) fn generator_eccentricity(on: &Excitation<'_>) -> Law {
     let loaded = on.scales.load > 0.0;
-    let mut law = Law::new("generator_eccentricity", move |on, shape| {
+    let mut law = Law::new(CauseName::GeneratorEccentricity, move |on, shape| {
         let lobe = Lobe::new(on, shape);
         let flank = |k: usize| on.base.flank[k];
         let shows = |k: usize| lobe.shows[k];
@@ -69,8 +70,8 @@ pub(super) fn generator_eccentricity(on: &Excitation<'_>) -> Law {
     })
     .shapes(if loaded {
         vec![
-            Shape::by_factors("deeper_arcsec", DEEPER_ARCSEC[0], DEEPER_ARCSEC[1], 3),
-            Shape::by_factors("pressed_arcsec", PRESSED_ARCSEC[0], PRESSED_ARCSEC[1], 2),
+            Shape::by_factors(Name::DeeperArcsec, DEEPER_ARCSEC[0], DEEPER_ARCSEC[1], 3),
+            Shape::by_factors(Name::PressedArcsec, PRESSED_ARCSEC[0], PRESSED_ARCSEC[1], 2),
         ]
     } else {
         Vec::new()
@@ -80,12 +81,12 @@ pub(super) fn generator_eccentricity(on: &Excitation<'_>) -> Law {
         let on_ring = polar(c[2], c[3]).0;
         let strongest = on_flexspline.max(on_ring);
         let mut named: Vec<Named> = vec![
-            ("amplitude_um", strongest / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", strongest),
-            ("phase_rad", phase),
+            (Name::AmplitudeUm, strongest / on.scales.arcsec_per_um),
+            (Name::AmplitudeArcsec, strongest),
+            (Name::PhaseRad, phase),
         ];
         if let [deeper, pressed] = shape {
-            named.extend([("deeper_arcsec", *deeper), ("pressed_arcsec", *pressed)]);
+            named.extend([(Name::DeeperArcsec, *deeper), (Name::PressedArcsec, *pressed)]);
         }
         named
     });

@@ -11,6 +11,7 @@ mod dynamic;
 mod generic;
 mod geometry;
 mod kernel;
+mod label;
 mod lobes;
 mod sensor;
 mod stiffness;
@@ -22,10 +23,12 @@ use super::base::Base;
 use super::linear::Prior;
 use super::prepare::Jump;
 use super::rows::Rows;
+use crate::causes::{CauseName, Kin, ParameterName};
 use crate::nominal::Nominal;
 
 pub use among::{Acting, Among, Zones, left_by, together};
 pub use generic::{line, maps, unnamed};
+pub use label::{Deviation, Label, Per};
 
 /// What laws are evaluated on.
 #[derive(Clone, Copy)]
@@ -130,8 +133,8 @@ impl Scales {
 /// A shape parameter.
 #[derive(Clone, Debug)]
 pub struct Shape {
-    /// Name with unit.
-    pub name: &'static str,
+    /// Its name.
+    pub name: ParameterName,
     /// Least plausible value.
     pub low: f64,
     /// Largest plausible value.
@@ -145,13 +148,13 @@ pub struct Shape {
 }
 
 impl Shape {
-    fn by_factors(name: &'static str, low: f64, high: f64, tried: usize) -> Shape {
+    fn by_factors(name: ParameterName, low: f64, high: f64, tried: usize) -> Shape {
         Shape { name, low, high, tried, log: true, cyclic: false }
     }
-    fn evenly(name: &'static str, low: f64, high: f64, tried: usize) -> Shape {
+    fn evenly(name: ParameterName, low: f64, high: f64, tried: usize) -> Shape {
         Shape { name, low, high, tried, log: false, cyclic: false }
     }
-    fn angle(name: &'static str, period: f64, tried: usize) -> Shape {
+    fn angle(name: ParameterName, period: f64, tried: usize) -> Shape {
         Shape { name, low: 0.0, high: period, tried, log: false, cyclic: true }
     }
 
@@ -223,8 +226,8 @@ fn history(values: Vec<f64>, share: f64) -> Column {
     Column { values, tolerance: Tolerance::History(share) }
 }
 
-/// A parameter for the report: name with unit, value.
-pub type Named = (&'static str, f64);
+/// A parameter for the report: name and value.
+pub type Named = (ParameterName, f64);
 
 type Load = Box<dyn Fn(&Excitation<'_>, &[f64]) -> Vec<f64> + Send + Sync>;
 type Columns = Box<dyn Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync>;
@@ -249,10 +252,8 @@ static LAWS: AtomicU64 = AtomicU64::new(0);
 /// One law of one cause.
 pub struct Law {
     id: u64,
-    /// Cause in snake case, or what an unnamed deviation looks like.
-    pub cause: String,
-    /// False for a deviation that has no cause in the library.
-    pub named: bool,
+    /// What it tells of.
+    pub label: Label,
     /// Shape parameters.
     pub shapes: Vec<Shape>,
     /// Columns at given shape parameters.
@@ -289,39 +290,6 @@ pub struct Law {
     pub meets_zones: bool,
 }
 
-/// What the misfit of a law may be taken for: most of all another law of its kin.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kin {
-    /// Shape and place of wheels and generator: waves of the generator angle.
-    Shape,
-    /// Follows the torque: springs.
-    Torque,
-    /// Follows the motion: a reading that comes late.
-    Motion,
-    /// Follows both: friction inside.
-    Friction,
-    /// Drag that follows the speed.
-    Drag,
-    /// Width of the clearance.
-    Clearance,
-    /// Like nothing else.
-    Unlike,
-}
-
-impl Kin {
-    /// Whether what one is wrong by may look like the other.
-    fn like(self, other: Kin) -> bool {
-        match (self, other) {
-            (Kin::Unlike, _) | (_, Kin::Unlike) => false,
-            (Kin::Friction, Kin::Torque | Kin::Motion | Kin::Drag)
-            | (Kin::Torque | Kin::Motion | Kin::Drag, Kin::Friction)
-            | (Kin::Drag, Kin::Motion)
-            | (Kin::Motion, Kin::Drag) => true,
-            (a, b) => a == b,
-        }
-    }
-}
-
 /// Share of a law's misfit that may look like a law that is no kin.
 const NO_KIN: f64 = 0.25;
 
@@ -339,11 +307,14 @@ const USUAL_DOUBT: f64 = 0.03;
 const EXACT_DOUBT: f64 = 0.005;
 
 impl Law {
-    fn new(cause: &str, columns: impl Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync + 'static) -> Law {
+    fn new(
+        label: impl Into<Label>,
+        columns: impl Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync + 'static,
+    ) -> Law {
+        let label = label.into();
         Law {
             id: LAWS.fetch_add(1, Ordering::Relaxed),
-            cause: cause.to_owned(),
-            named: true,
+            label,
             shapes: Vec::new(),
             columns: Box::new(columns),
             parameters: Box::new(|_, _, _| Vec::new()),
@@ -351,7 +322,7 @@ impl Law {
             tolerance_of: None,
             misfit: USUAL_MISFIT,
             most_nuisance: MOST_NUISANCE,
-            kin: Kin::Unlike,
+            kin: label.kin(),
             doubt: USUAL_DOUBT,
             foretells: true,
             lead: None,
@@ -362,6 +333,21 @@ impl Law {
             zones: None,
             meets_zones: false,
         }
+    }
+    /// The cause it tells of; none for a deviation without one.
+    #[must_use]
+    pub const fn cause(&self) -> Option<CauseName> {
+        self.label.cause()
+    }
+    /// Whether it tells of a cause of the library.
+    #[must_use]
+    pub const fn named(&self) -> bool {
+        self.cause().is_some()
+    }
+    /// Whether it tells of this cause.
+    #[must_use]
+    pub fn is(&self, cause: CauseName) -> bool {
+        self.cause() == Some(cause)
     }
     /// A number that no other law has.
     #[must_use]
@@ -407,9 +393,7 @@ impl Law {
     /// How much of its size another law may be named for wrongly.
     #[must_use]
     pub fn misfit_as(&self, other: &Law) -> f64 {
-        // A pulse at a place is what any wrong shape leaves, in time or in angle.
-        let alike = self.kin.like(other.kin) || other.cause == "damaged_tooth";
-        self.misfit * if alike || !other.named { 1.0 } else { NO_KIN }
+        self.misfit * if self.kin.like(other.kin) || !other.named() { 1.0 } else { NO_KIN }
     }
 
     /// Values of the shape parameters at places between 0 and 1.
@@ -448,7 +432,7 @@ pub fn library(on: &Excitation<'_>) -> Vec<Law> {
         laws.extend(geometry::laws(on));
         if let Some(kernels) = &on.nominal.kernels {
             let known = kernel::laws(on, kernels);
-            laws.retain(|law| known.iter().all(|k| k.cause != law.cause));
+            laws.retain(|law| known.iter().all(|k| k.label != law.label));
             laws.extend(known);
         }
     }
@@ -456,16 +440,6 @@ pub fn library(on: &Excitation<'_>) -> Vec<Law> {
     laws.extend(thermal::laws(on));
     laws.extend(dynamic::laws(on));
     laws.extend(sensor::laws(on));
-    for law in &mut laws {
-        law.kin = match law.cause.as_str() {
-            "stiffness_hardening" | "stiffness_error" | "thermal_stiffness" | "gravity_torque" => Kin::Torque,
-            "sensor_latency" => Kin::Motion,
-            "torsional_hysteresis" => Kin::Friction,
-            "lubricant_viscosity" => Kin::Drag,
-            "backlash_growth" | "wear" | "thermal_clearance" => Kin::Clearance,
-            _ => law.kin,
-        };
-    }
     laws
 }
 

@@ -6,6 +6,7 @@ use super::super::prepare::whole_pitches;
 use super::super::rows::rms;
 use super::geometry::{Angle, waves};
 use super::{Excitation, Law, Shape, by_row, history, main, nuisance};
+use crate::causes::{CauseName, ParameterName as Name};
 use crate::tables::ARCSEC_PER_TURN;
 
 /// Torque in units of the load scale.
@@ -62,7 +63,7 @@ const MOST_BEGINNINGS: usize = 10;
 /// Springs that slip one after the other (Maxwell slip, Prandtl-Ishlinskii): the output lags the torque by what they hold.
 fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     let load = on.scales.load;
-    let mut law = Law::new("torsional_hysteresis", |on, shape| {
+    let mut law = Law::new(CauseName::TorsionalHysteresis, |on, shape| {
         let slip = shape[0];
         let usual = on.nominal.wind_up_arcsec(on.scales.load).mul_add(0.3, 30.0);
         let negative = |values: Vec<f64>| values.into_iter().map(|z| -z).collect::<Vec<f64>>();
@@ -78,13 +79,13 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
         columns
     })
     .whole()
-    .shapes([Shape::by_factors("slip_torque_n_m", 0.03 * load, 1.0 * load, 6)])
+    .shapes([Shape::by_factors(Name::SlipTorqueNM, 0.03 * load, 1.0 * load, 6)])
     .parameters(|on, shape, c| {
         // On the way back from the full load an element holds this share of what it can when the torque passes zero.
         let full = on.scales.load;
         let held = |slip: f64| ((full - slip) / slip).clamp(0.0, 1.0);
         let half_width: f64 = [1.0, 0.35, 2.5].iter().zip(c).map(|(factor, c)| c * held(factor * shape[0])).sum();
-        vec![("half_width_arcsec", half_width), ("slip_torque_n_m", shape[0])]
+        vec![(Name::HalfWidthArcsec, half_width), (Name::SlipTorqueNM, shape[0])]
     })
     .physical(|_, c| c[0] > 0.0);
     // Three elements stand for the many of a real drive: where the load passes zero they hold about, not exactly, as much (a fifth to a
@@ -97,20 +98,20 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
 
 /// Stiffer the higher the load: the wind-up lags behind the nominal line by a power of the torque.
 fn stiffness_hardening() -> Law {
-    Law::new("stiffness_hardening", |on, shape| {
+    Law::new(CauseName::StiffnessHardening, |on, shape| {
         let power = |n: f64| by_row(on, |k| -load_share(on, k).signum() * load_share(on, k).abs().powf(n));
         vec![main(power(shape[0]), 30.0), nuisance(power(1.0), 0.4), nuisance(power(shape[0] + 1.5), 0.3)]
     })
-    .shapes([Shape::evenly("exponent", 1.6, 4.4, 3)])
+    .shapes([Shape::evenly(Name::Exponent, 1.6, 4.4, 3)])
     .parameters(|on, shape, c| {
-        vec![("hardening_arcsec", c[0]), ("hardening_exponent", shape[0]), ("full_load_n_m", on.scales.load)]
+        vec![(Name::HardeningArcsec, c[0]), (Name::HardeningExponent, shape[0]), (Name::FullLoadNM, on.scales.load)]
     })
     .physical(|_, c| c[0] > 0.0)
 }
 
 fn stiffness_error() -> Law {
-    let mut law = Law::new("stiffness_error", |on, _| vec![main(on.base.wind_up.clone(), 0.5)])
-        .parameters(|_, _, c| vec![("stiffness_ratio", 1.0 / (1.0 + c[0]))]);
+    let mut law = Law::new(CauseName::StiffnessError, |on, _| vec![main(on.base.wind_up.clone(), 0.5)])
+        .parameters(|_, _, c| vec![(Name::StiffnessRatio, 1.0 / (1.0 + c[0]))]);
     law.tolerance_of = Some(super::among::STIFFNESS);
     law
 }
@@ -119,7 +120,7 @@ fn stiffness_error() -> Law {
 const UNEVEN_WEAR: f64 = 0.15;
 
 fn backlash_growth() -> Law {
-    let mut law = Law::new("backlash_growth", |on, _| {
+    let mut law = Law::new(CauseName::BacklashGrowth, |on, _| {
         let half = on.base.half_backlash.max(1.0);
         let mut columns = vec![main(by_row(on, |k| half * on.base.flank[k]), 1.0)];
         // Teeth that are used most wear most.
@@ -130,7 +131,7 @@ fn backlash_growth() -> Law {
         }
         columns
     })
-    .parameters(|on, _, c| vec![("growth_arcsec", 2.0 * c[0] * on.base.half_backlash.max(1.0))])
+    .parameters(|on, _, c| vec![(Name::GrowthArcsec, 2.0 * c[0] * on.base.half_backlash.max(1.0))])
     .physical(|_, c| c[0] > 0.0);
     law.tolerance_of = Some("backlash");
     law
@@ -146,7 +147,7 @@ enum Progress {
 
 /// A clearance that widens during the data, with time, travel, or travel under load (Archard).
 fn wear(by: Progress) -> Law {
-    Law::new("wear", move |on, shape| {
+    Law::new(CauseName::Wear, move |on, shape| {
         let rows = on.rows;
         let n = rows.len();
         let mut done = vec![0.0; n];
@@ -178,8 +179,8 @@ fn wear(by: Progress) -> Law {
             nuisance(by_row(on, |k| on.base.flank[k]), 0.25),
         ]
     })
-    .shapes([Shape::by_factors("exponent", 0.5, 2.0, 1)])
-    .parameters(|_, shape, c| vec![("growth_arcsec", 2.0 * (c[0] + c[1])), ("exponent", shape[0])])
+    .shapes([Shape::by_factors(Name::Exponent, 0.5, 2.0, 1)])
+    .parameters(|_, shape, c| vec![(Name::GrowthArcsec, 2.0 * (c[0] + c[1])), (Name::Exponent, shape[0])])
     .physical(|_, c| c[0] > 0.0)
     .well_known()
 }
@@ -192,12 +193,12 @@ fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
         return None;
     }
     let columns = jumps.clone();
-    let mut law = Law::new("ratcheting", move |on, _| {
+    let mut law = Law::new(CauseName::Ratcheting, move |on, _| {
         columns.iter().map(|jump| main(by_row(on, |k| jump.reached(on.rows.time[k]) / pitch), 2.0 * pitch)).collect()
     })
     .parameters(move |_, _, c| {
         let slipped: f64 = jumps.iter().zip(c).map(|(jump, c)| c * jump.height_arcsec / pitch).sum();
-        vec![("jump_arcsec", slipped), ("time_s", jumps[0].time_s[1]), ("events", jumps.len() as f64)]
+        vec![(Name::JumpArcsec, slipped), (Name::TimeS, jumps[0].time_s[1]), (Name::Events, jumps.len() as f64)]
     })
     .exact();
     // The jump is measured, not modelled: nothing of its height is left over.

@@ -1,6 +1,7 @@
 //! What the temperature does.
 
 use super::{Column, Excitation, Law, Lead, Named, Shape, Tolerance, by_row, lagged_through, main, nuisance};
+use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::linear::Prior;
 
 /// Temperature above nominal, felt with a lag of `lag_s`, K. Metal does not know when it is recorded: what was felt when a session ended
@@ -12,7 +13,7 @@ fn warmer_by(on: &Excitation<'_>, lag_s: f64) -> Vec<f64> {
 
 /// Warm parts close the clearance, cold ones open it (or the reverse): −2″/K of generator and flexspline against the circular spline.
 fn thermal_clearance(on: &Excitation<'_>) -> Law {
-    Law::new("thermal_clearance", |on, shape| {
+    Law::new(CauseName::ThermalClearance, |on, shape| {
         let warmer = warmer_by(on, shape.first().copied().unwrap_or(1e-3));
         let flank = |k: usize| on.base.flank[k];
         vec![
@@ -21,11 +22,11 @@ fn thermal_clearance(on: &Excitation<'_>) -> Law {
             nuisance(by_row(on, |k| flank(k) * warmer[k] * warmer[k] / 30.0), 0.3),
         ]
     })
-    .shapes(on.rows.recorded.time.then(|| Shape::by_factors("lag_s", 0.5, 600.0, 3)))
+    .shapes(on.rows.recorded.time.then(|| Shape::by_factors(Name::LagS, 0.5, 600.0, 3)))
     .parameters(|_, shape, c| {
-        let mut named = vec![("clearance_arcsec_per_k", 2.0 * c[0])];
+        let mut named = vec![(Name::ClearanceArcsecPerK, 2.0 * c[0])];
         if let Some(lag) = shape.first() {
-            named.push(("lag_s", *lag));
+            named.push((Name::LagS, *lag));
         }
         named
     })
@@ -35,7 +36,7 @@ fn thermal_clearance(on: &Excitation<'_>) -> Law {
 /// The same where it goes so far that the clearance is shut in the cold or in the heat: it cannot be less than nothing.
 fn thermal_clearance_shut(on: &Excitation<'_>) -> Law {
     let timed = on.rows.recorded.time;
-    Law::new("thermal_clearance", move |on, shape| {
+    Law::new(CauseName::ThermalClearance, move |on, shape| {
         let warmer = warmer_by(on, if timed { shape[1] } else { 1e-3 });
         let width = 2.0 * on.base.half_backlash;
         let changed = by_row(on, |k| 0.5 * on.base.flank[k] * ((width + shape[0] * warmer[k]).max(0.0) - width));
@@ -45,14 +46,14 @@ fn thermal_clearance_shut(on: &Excitation<'_>) -> Law {
         ]
     })
     .shapes(
-        [Shape::evenly("clearance_arcsec_per_k", -SHUT_ARCSEC_PER_K, SHUT_ARCSEC_PER_K, 8)]
+        [Shape::evenly(Name::ClearanceArcsecPerK, -SHUT_ARCSEC_PER_K, SHUT_ARCSEC_PER_K, 8)]
             .into_iter()
-            .chain(timed.then(|| Shape::by_factors("lag_s", 0.5, 600.0, 2))),
+            .chain(timed.then(|| Shape::by_factors(Name::LagS, 0.5, 600.0, 2))),
     )
     .parameters(move |_, shape, c| {
-        let mut named = vec![("clearance_arcsec_per_k", shape[0] * c[0])];
+        let mut named = vec![(Name::ClearanceArcsecPerK, shape[0] * c[0])];
         if timed {
-            named.push(("lag_s", shape[1]));
+            named.push((Name::LagS, shape[1]));
         }
         named
     })
@@ -65,14 +66,14 @@ const SHUT_ARCSEC_PER_K: f64 = 4.5;
 
 /// Wind-up that grows or falls with temperature.
 fn thermal_stiffness() -> Law {
-    Law::new("thermal_stiffness", |on, _| {
+    Law::new(CauseName::ThermalStiffness, |on, _| {
         let warmer = |k: usize| on.rows.temperature[k] - on.nominal.temperature_c;
         vec![
             main(by_row(on, |k| on.base.wind_up[k] * warmer(k) / 100.0), 0.5),
             nuisance(by_row(on, |k| on.base.wind_up[k] * warmer(k).powi(2) / 3000.0), 0.4),
         ]
     })
-    .parameters(|_, _, c| vec![("stiffness_relative_per_k", -0.01 * c[0])])
+    .parameters(|_, _, c| vec![(Name::StiffnessRelativePerK, -0.01 * c[0])])
     .well_known()
 }
 
@@ -115,10 +116,10 @@ fn drag(on: &Excitation<'_>, power: f64, per_k: f64, bend: f64) -> Vec<f64> {
 /// A drag by name: its size, and its power, slope and bend.
 fn named_drag(drag_n_m: f64, shape: &[f64]) -> Vec<Named> {
     vec![
-        ("drag_n_m", drag_n_m),
-        ("speed_exponent", shape[0]),
-        ("relative_drag_per_k", -shape[1]),
-        ("drag_bend_per_k", shape[2]),
+        (Name::DragNM, drag_n_m),
+        (Name::SpeedExponent, shape[0]),
+        (Name::RelativeDragPerK, -shape[1]),
+        (Name::DragBendPerK, shape[2]),
     ]
 }
 
@@ -130,7 +131,7 @@ fn drag_wind_up(on: &Excitation<'_>, power: f64, per_k: f64, bend: f64) -> Vec<f
 
 /// Drag of the lubricant, against the motion: a power of the speed, and thicker in the cold (Vogel, close to exponential).
 fn lubricant_viscosity() -> Law {
-    Law::new("lubricant_viscosity", |on, shape| {
+    Law::new(CauseName::LubricantViscosity, |on, shape| {
         let (power, per_k, bend) = (shape[0], shape[1], shape[2]);
         let drag = |power: f64, per_k: f64, bend: f64| drag_wind_up(on, power, per_k, bend);
         let size = super::super::rows::rms(&drag(power, per_k, bend)).max(1e-12);
@@ -141,9 +142,9 @@ fn lubricant_viscosity() -> Law {
         ]
     })
     .shapes([
-        Shape::evenly("speed_exponent", 0.25, 1.05, 3),
-        Shape::by_factors("per_k", 0.008, 0.12, 4),
-        Shape::evenly("bend_per_k", 0.0, MOST_BEND, 1),
+        Shape::evenly(Name::SpeedExponent, 0.25, 1.05, 3),
+        Shape::by_factors(Name::PerK, 0.008, 0.12, 4),
+        Shape::evenly(Name::BendPerK, 0.0, MOST_BEND, 1),
     ])
     .parameters(|_, shape, c| named_drag(c[0], &shape[..3]))
     .physical(|shape, c| c[0] > 0.0 && viscous(shape[0], shape[1]))
@@ -155,7 +156,7 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
     let load = |on: &Excitation<'_>, shape: &[f64]| -> Vec<f64> {
         drag(on, shape[1], shape[2], shape[3]).into_iter().map(|share| shape[0] * share).collect()
     };
-    let mut law = Law::new("lubricant_viscosity", move |on, shape| {
+    let mut law = Law::new(CauseName::LubricantViscosity, move |on, shape| {
         let rows = on.rows;
         let added = load(on, shape);
         let torque: Vec<f64> = (0..rows.len()).map(|k| rows.torque[k] + added[k]).collect();
@@ -168,10 +169,10 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
         ]
     })
     .shapes([
-        Shape::by_factors("drag_n_m", 0.001 * scale, 1.0 * scale, 1),
-        Shape::evenly("speed_exponent", 0.25, 1.05, 2),
-        Shape::by_factors("per_k", 0.008, 0.12, 3),
-        Shape::evenly("bend_per_k", 0.0, MOST_BEND, 1),
+        Shape::by_factors(Name::DragNM, 0.001 * scale, 1.0 * scale, 1),
+        Shape::evenly(Name::SpeedExponent, 0.25, 1.05, 2),
+        Shape::by_factors(Name::PerK, 0.008, 0.12, 3),
+        Shape::evenly(Name::BendPerK, 0.0, MOST_BEND, 1),
     ])
     .parameters(|_, shape, c| named_drag(shape[0] * c[0], &shape[1..]))
     .physical(|shape, c| c[0] > 0.0 && viscous(shape[1], shape[2]));
