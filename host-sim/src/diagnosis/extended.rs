@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use flexspline::Table;
 
 use super::base::{Base, PlayLaw};
-use super::candidate::{Acting, Column, Excitation, Law, Scales, Tolerance, library, together};
+use super::candidate::{Acting, Column, Excitation, Law, Role, Scales, Tolerance, library, together};
 use super::model::{Problem, Scaffold, terms_at};
 use super::noise::Whitener;
 use super::report::Parameter;
@@ -24,6 +24,8 @@ pub struct FittedCause {
     name: CauseName,
     law: Law,
     places: Vec<f64>,
+    /// What the columns are, and their coefficients.
+    roles: Vec<Role>,
     coefficients: Vec<f64>,
     /// Parameters with their uncertainty, as in [`super::report::Cause`].
     pub parameters: BTreeMap<&'static str, Parameter>,
@@ -181,7 +183,12 @@ impl Extended {
         let causes: Vec<Acting<'_>> = self
             .causes
             .iter()
-            .map(|c| Acting { law: &c.law, values: c.law.values(&c.places), coefficients: c.coefficients.clone() })
+            .map(|c| Acting {
+                law: &c.law,
+                values: c.law.values(&c.places),
+                roles: c.roles.clone(),
+                coefficients: c.coefficients.clone(),
+            })
             .collect();
         for (cause, columns) in self.causes.iter().zip(together(on, &causes)) {
             let mut part = vec![0.0; on.rows.len()];
@@ -196,8 +203,14 @@ impl Extended {
     }
 }
 
-/// Index of a law, places of its shape parameters, coefficients, parameters.
-type FoundTerm = (usize, Vec<f64>, Vec<f64>, BTreeMap<&'static str, Parameter>);
+/// A law (index) as it was fitted.
+struct FoundTerm {
+    law: usize,
+    places: Vec<f64>,
+    roles: Vec<Role>,
+    coefficients: Vec<f64>,
+    parameters: BTreeMap<&'static str, Parameter>,
+}
 
 /// What a fit leaves behind when its columns are gone.
 pub(super) struct Found {
@@ -221,7 +234,8 @@ impl Found {
                 .enumerate()
                 .zip(known)
                 .map(|((k, (law, places)), known)| {
-                    (*law, places.clone(), selected.fit.of(k).to_vec(), known.parameters)
+                    let Acting { roles, coefficients, .. } = selected.terms[k].acting(selected.fit.of(k));
+                    FoundTerm { law: *law, places: places.clone(), roles, coefficients, parameters: known.parameters }
                 })
                 .collect(),
         })
@@ -233,9 +247,9 @@ impl Found {
         let causes = self
             .terms
             .into_iter()
-            .filter_map(|(k, places, coefficients, parameters)| {
-                let law = laws[k].take()?;
-                Some(FittedCause { name: law.cause()?, law, places, coefficients, parameters })
+            .filter_map(|FoundTerm { law, places, roles, coefficients, parameters }| {
+                let law = laws[law].take()?;
+                Some(FittedCause { name: law.cause()?, law, places, roles, coefficients, parameters })
             })
             .collect();
         Extended { play: base.law, scales: scales.clone(), recalibrated: self.recalibrated, base: self.base, causes }

@@ -80,7 +80,7 @@ fn hidden(on: &Excitation<'_>, law: &Law, averages: &Whitener) -> Option<Vec<Vec
 }
 
 fn main_columns(on: &Excitation<'_>, law: &Law) -> Vec<Vec<f64>> {
-    let columns = (law.columns)(on, &[]);
+    let columns = law.columns(on, &[]);
     columns.into_iter().filter(|c| matches!(c.tolerance, Tolerance::Main(_))).map(|c| c.values).collect()
 }
 

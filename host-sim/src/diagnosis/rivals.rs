@@ -90,7 +90,7 @@ pub fn rivals(
                 .collect();
             let best = tried.iter().fold(f64::NEG_INFINITY, |best: f64, (worth, _)| best.max(*worth));
             // Far away already: no refinement brings it back; farther for what a lead only points at.
-            let far = if law.lead.is_none() { 1.0 } else { FARTHER };
+            let far = if law.search.lead.is_none() { 1.0 } else { FARTHER };
             if -best > far * (3.0 * selected.fit.solution.misfit + 3000.0) {
                 return None;
             }

@@ -6,7 +6,7 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::candidate::{Law, Tolerance};
+use super::candidate::{Coefficients, Law, Role, Tolerance};
 use super::linear::Gram;
 use super::model::{Fit, Problem, Scaffold, Term, among_each_other, white_columns};
 use crate::causes::CauseName;
@@ -134,7 +134,7 @@ fn same(apart: f64, size: f64) -> bool {
 /// Whether a fitted term makes sense.
 pub(super) fn sound(term: &Term<'_>, coefficients: &[f64]) -> bool {
     let [main, nuisance, _] = parts(term, coefficients);
-    term.law.sound(&term.law.values(&term.places), coefficients, main, nuisance)
+    term.law.sound(&term.law.values(&term.places), term.by_role(coefficients), main, nuisance)
 }
 
 /// Root mean squares of what a term adds by its main columns, by nuisance, and beside them, arcsec.
@@ -164,9 +164,10 @@ const ANOTHER_SIZE: f64 = 0.1;
 /// another size. Small ones leave clearance and large ones none, and no refinement goes from one to the other.
 pub(super) fn begun(law: &Law, mut tried: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
     tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let size = law.displacement_at().filter(|_| law.acts.meets_zones).map(|[_, size]| size);
     let mut begun: Vec<Vec<f64>> = Vec::new();
     for (_, places) in tried {
-        let other = |first: &Vec<f64>| law.meets_zones && (places[1] - first[1]).abs() > ANOTHER_SIZE;
+        let other = |first: &Vec<f64>| size.is_some_and(|size| (places[size] - first[size]).abs() > ANOTHER_SIZE);
         if begun.first().is_none_or(other) {
             begun.push(places);
         }
@@ -197,7 +198,7 @@ impl Bests {
     /// Places to begin with a law that takes the place of a term: where it was at its best beside all terms so far or before, and
     /// where its lead points now.
     pub fn begin(&self, scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law) -> Vec<Vec<f64>> {
-        match self.0.get(&law.id()).filter(|_| law.lead.is_none()) {
+        match self.0.get(&law.id()).filter(|_| law.search.lead.is_none()) {
             Some(known) => known.clone(),
             None => scaffold.begin(law),
         }
@@ -255,7 +256,7 @@ fn best_tried<'l>(
     for (_, law, places) in found {
         let term = scaffold.term(law, places);
         // Where a lead points is only near; what changes other terms may make sense where they have settled.
-        let open = law.lead.is_some() || scaffold.acted_on_by(law);
+        let open = law.search.lead.is_some() || scaffold.acted_on_by(law);
         if open || scaffold.fit(Some(&term)).is_some_and(|fit| sound(&term, fit.of(fit.starts.len() - 1))) {
             counted.insert(law.id());
         } else if law.shapes.is_empty() || !counted.is_empty() {
@@ -289,7 +290,7 @@ pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize)
     let alone = size_of(problem, &added);
     // At one load throughout, the zero of the encoder takes all of it.
     let own = about_mean(problem, selected.terms[k].contribution(selected.fit.of(k)));
-    if selected.terms[k].law.tolerance_of.is_some() {
+    if selected.terms[k].law.acts.tolerance_of.is_some() {
         // Without it the base goes to its limit: what is beyond that is alone, all of it counts.
         return Standing { evidence: gain, size: size_of(problem, &own), alone, left_out: 1.0 };
     }
@@ -301,7 +302,7 @@ pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize)
         left_out = left_out.max(left_out_gain(problem, &with_bare, &others));
     }
     let mut size = (TAKEN_OVER * alone).min(size_of(problem, &own)).max(alone);
-    if selected.terms[k].law.in_crossings {
+    if selected.terms[k].law.acts.in_crossings {
         size = size.max(super::rows::rms(&own).min(IN_CROSSINGS * size));
     }
     Standing { evidence: gain, size, alone, left_out }
@@ -389,7 +390,7 @@ fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]
 
 /// Whether a base parameter has left its tolerance far enough for `law` to be named.
 fn out_of_tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> bool {
-    let Some(name) = law.tolerance_of else { return false };
+    let Some(name) = law.acts.tolerance_of else { return false };
     let floating = &problem.on.base.floating;
     let Some(at) = floating.iter().position(|f| f.name == name) else {
         // Not floating at all: any change is one.
@@ -400,7 +401,7 @@ fn out_of_tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> bool {
         return false;
     }
     let z = change / floating[at].spread;
-    (law.physical)(&[], &[z]) && z.abs() > OUT_OF_TOLERANCE
+    law.physical(&[], Coefficients::new(&[Role::SIZE], &[z])) && z.abs() > OUT_OF_TOLERANCE
 }
 
 /// Least size of anything that counts, arcsec, at this white noise.
@@ -428,12 +429,12 @@ impl Limits {
     /// `strongest`: the largest size, arcsec.
     fn passes(&self, law: &Law, standing: &Standing, misfit: f64, strongest: f64, in_tolerance: bool) -> bool {
         let share = if law.named() { LEAST_OF_MISFIT } else { LEAST_UNNAMED_OF_MISFIT };
-        let evidence = if law.tolerance_of.is_some() { 0.5 } else { LEAST_EVIDENCE };
+        let evidence = if law.acts.tolerance_of.is_some() { 0.5 } else { LEAST_EVIDENCE };
         !in_tolerance
             && standing.evidence > evidence
             && (standing.size > self.least || law.named() && self.small_but_clear(standing, strongest))
             && standing.alone > share * misfit
-            && (standing.left_out > 0.0 || !law.foretells)
+            && (standing.left_out > 0.0 || !law.wrong.foretells)
     }
 
     /// Whether the last term is clear beside something without a name that tells the data better, and is too small to count.
@@ -462,7 +463,7 @@ impl Limits {
 
 /// The largest size of those that may be wrong at all: a jump of teeth is counted.
 fn strongest(terms: &[Term<'_>], standings: &[Standing]) -> f64 {
-    terms.iter().zip(standings).filter(|(t, _)| t.law.misfit > 0.0).map(|(_, s)| s.size).fold(0.0, f64::max)
+    terms.iter().zip(standings).filter(|(t, _)| t.law.wrong.misfit > 0.0).map(|(_, s)| s.size).fold(0.0, f64::max)
 }
 
 /// Chooses causes among `laws`.
@@ -552,7 +553,7 @@ fn forward<'l>(
         .iter()
         .filter(|law| selected.terms.iter().all(|t| t.law.label != law.label))
         .filter(|law| if law.named() { named < MOST_CAUSES } else { unnamed < MOST_UNNAMED })
-        .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &selected.fit, law))
+        .filter(|law| law.acts.tolerance_of.is_none() || out_of_tolerance(problem, &selected.fit, law))
         .collect();
     let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
     let tried = tried(&scaffold, &open, |law| scaffold.begin(law));
@@ -581,7 +582,7 @@ fn forward<'l>(
     contenders_settled(problem, &mut grown, before);
     // Something with a name goes before something without unless that is clearly better: by more than the law may be wrong by.
     let best_named = grown.iter().filter(|(_, next)| next.newest().law.named()).max_by(|a, b| a.0.total_cmp(&b.0));
-    let misfit = best_named.map_or(0.0, |(_, next)| next.newest().law.misfit);
+    let misfit = best_named.map_or(0.0, |(_, next)| next.newest().law.wrong.misfit);
     let ahead = |(gain, next): &(f64, Selected<'l>)| {
         gain - if next.newest().law.named() { 0.0 } else { UNNAMED_AHEAD.max(misfit * misfit * gain) }
     };
@@ -680,7 +681,7 @@ fn settle_all<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selec
 /// The same where a term has gone that the others were refined beside: those with a lead begin where it points now, too.
 fn settle_anew<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
     settle_from(problem, selected, |scaffold, term| {
-        let anew = if term.law.lead.is_some() { scaffold.begin(term.law) } else { Vec::new() };
+        let anew = if term.law.search.lead.is_some() { scaffold.begin(term.law) } else { Vec::new() };
         [term.clone()].into_iter().chain(anew.into_iter().map(|places| scaffold.term(term.law, places))).collect()
     })
 }
@@ -719,7 +720,7 @@ fn stood_in_for(others: &[&Term<'_>], without: Option<&Fit>) -> bool {
 fn fails(problem: &Problem<'_>, selected: &Selected<'_>, standings: &[Standing], k: usize, limits: &Limits) -> bool {
     let law = selected.terms[k].law;
     let physical = sound(&selected.terms[k], selected.fit.of(k));
-    let in_tolerance = law.tolerance_of.is_some() && {
+    let in_tolerance = law.acts.tolerance_of.is_some() && {
         let apart = selected.without(problem, k);
         let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
         let without = Scaffold::new(problem, others.clone()).fit(None);
@@ -775,7 +776,7 @@ fn exchange<'l>(
         let open: Vec<&Law> = laws
             .iter()
             .filter(|law| selected.terms.iter().all(|t| t.law.label != law.label))
-            .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &without, law))
+            .filter(|law| law.acts.tolerance_of.is_none() || out_of_tolerance(problem, &without, law))
             .filter(|law| !given.contains(&(selected.terms[k].law.id(), law.id())))
             .collect();
         let scaffold = Scaffold::new(problem, others.iter().collect());

@@ -500,10 +500,10 @@ fn a_recording_too_short_to_tell_a_wander_from_none_is_taken_to_have_one() {
 #[test]
 fn a_lubricant_thickens_by_vogels_law_and_as_an_exponential_where_it_does_not_bend() {
     excited(|on, laws| {
-        let law = laws.iter().find(|law| law.is(CauseName::LubricantViscosity) && law.load.is_none()).unwrap();
+        let law = laws.iter().find(|law| law.is(CauseName::LubricantViscosity) && !law.is_load()).unwrap();
         let (per_k, bend) = (0.02, 1.0 / 115.0);
-        let bent = &(law.columns)(on, &[1.0, per_k, bend])[0].values;
-        let straight = &(law.columns)(on, &[1.0, per_k, 0.0])[0].values;
+        let bent = &law.columns(on, &[1.0, per_k, bend])[0].values;
+        let straight = &law.columns(on, &[1.0, per_k, 0.0])[0].values;
         // ln ν = B / (T + C): C where it sets, B by the slope at the nominal temperature.
         let nominal = on.nominal.temperature_c;
         let c = 1.0 / bend - nominal;
@@ -538,7 +538,7 @@ fn a_clearance_shut_by_the_cold_is_never_less_than_nothing() {
         let mut reached = false;
         for per_k in [-4.0, 4.0] {
             let values = [per_k, 1.0];
-            let changed = &(law.columns)(on, &values)[0].values;
+            let changed = &law.columns(on, &values)[0].values;
             for (k, change) in changed.iter().enumerate() {
                 let left = on.base.half_backlash * on.base.flank[k] + change;
                 assert!(left * on.base.flank[k] >= -1e-9, "row {k}: {left}");
@@ -559,7 +559,7 @@ fn flanks_that_bind_leave_the_output_in_the_middle_and_a_load_presses_the_zone_a
         let eccentricity = law(laws, CauseName::CircularSplineEccentricity);
         // Phase, size, load that halves it, pressed in by the full load.
         let pattern = |size: f64, pressed: f64| -> Vec<f64> {
-            (eccentricity.columns)(on, &[0.3, size, 1e9, pressed])[0].values.clone()
+            eccentricity.columns(on, &[0.3, size, 1e9, pressed])[0].values.clone()
         };
         let half = on.base.half_backlash;
         let carried = |k: &usize| on.base.flank[*k].abs() == 1.0;
@@ -607,7 +607,7 @@ fn a_wheel_so_far_off_that_no_clearance_is_left_is_begun_with_its_own_size() {
     drive.harmonics.push(Harmonic { order_per_generator_turn: of_wheel(1.0), amplitude_arcsec: 5.0, phase_rad: 0.0 });
     excited(|on, laws| {
         let law = law(laws, CauseName::CircularSplineEccentricity);
-        let pattern = &(law.columns)(on, &[phase, size, 1e9, 3.0])[0].values;
+        let pattern = &law.columns(on, &[phase, size, 1e9, 3.0])[0].values;
         let errors = sessions.iter_mut().flat_map(|session| &mut session.error_rad);
         errors.zip(pattern).for_each(|(error, arcsec)| *error += arcsec / crate::tables::ARCSEC_PER_RAD);
     });
@@ -623,13 +623,12 @@ fn a_wheel_so_far_off_that_no_clearance_is_left_is_begun_with_its_own_size() {
 
 #[test]
 fn two_displacements_together_are_the_same_in_either_order_and_not_the_sum_of_both() {
-    use super::candidate::{Acting, together};
+    use super::candidate::{Acting, Role, together};
     excited(|on, laws| {
         let acting = |cause: CauseName, phase: f64, size: f64| {
             let law = law(laws, cause);
             let values = vec![phase, size, 50.0, 10.0];
-            let coefficients = std::iter::once(1.0).chain(std::iter::repeat_n(0.0, 40)).collect();
-            Acting { law, values, coefficients }
+            Acting { law, values, roles: vec![Role::SIZE], coefficients: vec![1.0] }
         };
         let pair = || {
             [acting(CauseName::CircularSplineEccentricity, 0.4, 18.0), acting(CauseName::FlexsplineRunout, 2.1, 12.0)]
@@ -652,15 +651,20 @@ fn two_displacements_together_are_the_same_in_either_order_and_not_the_sum_of_bo
 
 #[test]
 fn a_load_that_gravity_adds_passes_through_the_springs_that_slip() {
-    use super::candidate::{Acting, together};
+    use super::candidate::{Acting, Role, together};
     excited(|on, laws| {
         let gravity = || Acting {
             law: law(laws, CauseName::GravityTorque),
             values: vec![15.0, 0.7],
-            coefficients: vec![1.0, 0.0],
+            roles: vec![Role::SIZE],
+            coefficients: vec![1.0],
         };
-        let slipping =
-            || Acting { law: law(laws, CauseName::TorsionalHysteresis), values: vec![10.0], coefficients: vec![20.0] };
+        let slipping = || Acting {
+            law: law(laws, CauseName::TorsionalHysteresis),
+            values: vec![10.0],
+            roles: vec![Role::SIZE],
+            coefficients: vec![20.0],
+        };
         let beside = together(on, &[gravity(), slipping()]);
         let alone = together(on, &[slipping()]);
         let held: Vec<f64> = beside[1][0].values.iter().zip(&alone[0][0].values).map(|(a, b)| a - b).collect();
@@ -672,15 +676,20 @@ fn a_load_that_gravity_adds_passes_through_the_springs_that_slip() {
 
 #[test]
 fn a_softer_spring_gives_way_to_drag_and_gravity_as_well() {
-    use super::candidate::{Acting, together};
+    use super::candidate::{Acting, Role, together};
     excited(|on, laws| {
-        let spring = || Acting { law: law(laws, CauseName::StiffnessError), values: vec![], coefficients: vec![0.6] };
-        let drags = |law: &&super::Law| law.is(CauseName::LubricantViscosity) && law.load.is_some();
+        let spring = || Acting {
+            law: law(laws, CauseName::StiffnessError),
+            values: vec![],
+            roles: vec![Role::SIZE],
+            coefficients: vec![0.6],
+        };
+        let drags = |law: &&super::Law| law.is(CauseName::LubricantViscosity) && law.is_load();
         let drag = laws.iter().find(drags).unwrap();
         for (law, values) in
             [(drag, vec![3.0, 0.8, 0.03, 0.005]), (law(laws, CauseName::GravityTorque), vec![5.0, 0.7])]
         {
-            let load = || Acting { law, values: values.clone(), coefficients: vec![1.0, 0.0] };
+            let load = || Acting { law, values: values.clone(), roles: vec![Role::SIZE], coefficients: vec![1.0] };
             let (alone, beside) = (together(on, &[load()]), together(on, &[spring(), load()]));
             // Wind-up and play together, and play alone: what is left is wind-up.
             let [of_alone, of_beside] = [&alone[0], &beside[1]];

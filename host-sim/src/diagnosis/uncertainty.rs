@@ -155,7 +155,7 @@ fn parameters(
     coefficients: &[f64],
     spread: &Spread,
 ) -> BTreeMap<&'static str, Parameter> {
-    let value = |c: &[f64], places: &[f64]| (term.law.parameters)(problem.on, &term.law.values(places), c);
+    let value = |c: &[f64], places: &[f64]| term.law.parameters(problem.on, &term.law.values(places), term.by_role(c));
     let at = value(coefficients, &term.places);
     let dimension = coefficients.len() + term.places.len();
     let mut slopes = vec![vec![0.0; dimension]; at.len()];
@@ -185,7 +185,7 @@ fn parameters(
             Kind::Count => 0.0,
             Kind::Size => value.abs(),
         };
-        let std = spread.of(&outer(slope)).sqrt().hypot(term.law.doubt * scale);
+        let std = spread.of(&outer(slope)).sqrt().hypot(term.law.wrong.doubt * scale);
         (name.as_str(), Parameter { value, std })
     };
     at.into_iter().zip(&slopes).map(with_doubt).collect()

@@ -120,7 +120,7 @@ pub(super) fn conclude(
             }
             let alike: Vec<CauseName> = rivals
                 .iter()
-                .filter(|r| r.looks_alike(standings[k].size, selected.terms[k].law.tolerance_of.is_some()))
+                .filter(|r| r.looks_alike(standings[k].size, selected.terms[k].law.acts.tolerance_of.is_some()))
                 .map(|r| r.cause)
                 .take(3)
                 .collect();

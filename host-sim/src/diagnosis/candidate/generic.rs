@@ -2,7 +2,7 @@
 //! named for it.
 
 use super::stiffness::follow;
-use super::{Deviation, Excitation, Label, Law, Per, Shape, by_row, lagged, main};
+use super::{Deviation, Excitation, Label, Law, Per, Role, Shape, by_row, lagged, main};
 use crate::causes::ParameterName as Name;
 use crate::tables::ARCSEC_PER_RAD;
 
@@ -26,15 +26,15 @@ fn wave(label: Deviation, angle: fn(&Excitation<'_>, usize) -> f64, order: f64) 
 /// Lost motion before the generator, as of an Oldham coupling: whatever the load, the output lags by half of it either way.
 fn lash_before_the_generator() -> Law {
     Law::new("lost motion before the generator", |on, shape| {
-        let half_rad = shape[0] * on.nominal.ratio.abs() / ARCSEC_PER_RAD;
+        let half_rad = shape.of(Name::HalfLashArcsec) * on.nominal.ratio.abs() / ARCSEC_PER_RAD;
         let mut held = vec![0.0; on.rows.len()];
         for session in &on.rows.sessions {
             follow(&on.rows.generator, session.clone(), half_rad, 0.0, &mut held);
         }
-        vec![main(by_row(on, |k| -held[k] * on.nominal.ratio.signum()), 20.0)]
+        vec![main(by_row(on, |k| -held[k] * on.nominal.ratio.signum()), 20.0).called(Role::SIZE)]
     })
     .shapes([Shape::by_factors(Name::HalfLashArcsec, 0.5, 60.0, 5)])
-    .physical(|_, c| c[0] > 0.0)
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
 }
 
 /// Wind-up that comes late: what relaxes within about a second, ten, a hundred and a thousand, from rest under the first load.
@@ -54,7 +54,7 @@ fn zero_of_each_session() -> Law {
         let of = |session: &std::ops::Range<usize>| by_row(on, |k| f64::from(u8::from(session.contains(&k))));
         on.rows.sessions_used().skip(1).map(|session| main(of(&session), 20.0)).collect()
     });
-    law.foretells = false;
+    law.wrong.foretells = false;
     law
 }
 

@@ -7,9 +7,8 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::geometry::{Angle, COS_PRESSURE_ANGLE, angle};
-use super::{Column, Excitation, Law, Shape, Tolerance, beside, by_row, nuisance, polar};
+use super::{Column, Excitation, Law, Role, Shape, beside, by_row, main, main_about, nuisance, of_wave};
 use crate::causes::{CauseName, Kin, ParameterName as Name};
-use crate::diagnosis::linear::Prior;
 use crate::drive::Wheel;
 use crate::kernels::{Gain, Kernels};
 
@@ -30,8 +29,11 @@ fn by_flank(flank: f64, torque: f64, value: impl Fn(f64) -> f64) -> f64 {
     forward + backward
 }
 
+/// The wave that a law is.
+const WAVE: Role = Role("wave");
+
 fn main_um(values: Vec<f64>) -> Column {
-    Column { values, tolerance: Tolerance::Main(Prior { mean: 0.0, std: USUAL_UM }) }
+    main(values, USUAL_UM).called(WAVE)
 }
 
 /// Columns of the response to `cos(k α)` and to `sin(k α)` of an error on a wheel.
@@ -73,15 +75,14 @@ fn left_open(on: &Excitation<'_>, of: Angle, order: f64) -> Vec<Column> {
 /// An axis beside that of the generator: size and direction enter as the FEM of such drives has them.
 fn eccentric(cause: CauseName, of: Angle, kernels: Arc<Kernels>) -> Law {
     Law::new(cause, move |on, shape| {
-        let (size, phase) = (shape[0], shape[1]);
+        let (size, phase) = (shape.of(Name::SizeUm), shape.of(Name::PhaseRad));
         let field = kernels.eccentric_field(size);
         let pattern = by_row(on, |k| {
             let place = kernels.place_of_load(on.rows.torque[k]);
             let direction = phase - angle(on, of, k);
             by_flank(on.base.flank[k], on.rows.torque[k], |torque| field.at(direction, torque < 0.0, place))
         });
-        let mut columns =
-            vec![Column { values: pattern, tolerance: Tolerance::Main(Prior { mean: 1.0, std: SCALE_MISFIT }) }];
+        let mut columns = vec![main_about(1.0, pattern, SCALE_MISFIT).called(Role::SIZE)];
         columns.extend(left_open(on, of, 2.0));
         columns
     })
@@ -89,15 +90,15 @@ fn eccentric(cause: CauseName, of: Angle, kernels: Arc<Kernels>) -> Law {
         Shape::by_factors(Name::SizeUm, ECCENTRICITY_UM[0], ECCENTRICITY_UM[1], 10),
         Shape::angle(Name::PhaseRad, PI, 8),
     ])
-    .parameters(|on, shape, c| {
-        let size = shape[0] * c[0];
+    .parameters_by(|on, shape, c| {
+        let size = shape.of(Name::SizeUm) * c.of(Role::SIZE);
         vec![
             (Name::AmplitudeUm, size),
             (Name::AmplitudeArcsec, size * on.scales.arcsec_per_um / COS_PRESSURE_ANGLE),
-            (Name::PhaseRad, shape[1]),
+            (Name::PhaseRad, shape.of(Name::PhaseRad)),
         ]
     })
-    .physical(|_, c| c[0] > 0.5)
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.5)
 }
 
 /// Harmonics of the pitch of a wheel that both lobes see alike; the odd ones cancel.
@@ -122,8 +123,8 @@ fn pitch(cause: CauseName, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
         }
         columns
     })
-    .parameters(|on, _, c| {
-        let (amplitude, phase) = polar(c[0], c[1]);
+    .parameters_by(|on, _, c| {
+        let (amplitude, phase) = of_wave(c, WAVE);
         vec![
             (Name::AmplitudeUm, amplitude),
             (Name::AmplitudeArcsec, amplitude * on.scales.arcsec_per_um),
@@ -131,7 +132,7 @@ fn pitch(cause: CauseName, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
             (Name::PhaseRad, 0.5 * phase),
         ]
     });
-    law.free_form = true;
+    law.search.free_form = true;
     law
 }
 
@@ -142,8 +143,8 @@ fn ovality(kernels: Arc<Kernels>) -> Law {
         columns.extend(left_open(on, of, 2.0));
         columns
     })
-    .parameters(|on, _, c| {
-        let (amplitude, phase) = polar(c[0], c[1]);
+    .parameters_by(|on, _, c| {
+        let (amplitude, phase) = of_wave(c, WAVE);
         vec![
             (Name::AmplitudeUm, amplitude),
             (Name::AmplitudeArcsec, amplitude * 0.67 * on.scales.arcsec_per_um),
@@ -167,8 +168,8 @@ pub(super) fn laws(on: &Excitation<'_>, kernels: &Arc<Kernels>) -> Vec<Law> {
         laws.push(of(CauseName::GravitySideLoad, Angle::Gravity(-1.0)));
     }
     for law in &mut laws {
-        law.misfit = KERNEL_MISFIT;
-        law.kin = Kin::Unlike;
+        law.wrong.misfit = KERNEL_MISFIT;
+        law.wrong.kin = Kin::Unlike;
     }
     laws
 }

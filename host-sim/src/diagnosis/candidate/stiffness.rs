@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use super::super::prepare::whole_pitches;
+use super::super::prepare::{Jump, whole_pitches};
 use super::super::rows::rms;
 use super::geometry::{Angle, waves};
-use super::{Excitation, Law, Shape, by_row, history, main, nuisance};
+use super::{Excitation, Law, Role, Shape, by_row, history, main, nuisance};
 use crate::causes::{CauseName, ParameterName as Name};
 use crate::tables::ARCSEC_PER_TURN;
 
@@ -60,18 +60,29 @@ fn unknown_beginnings(on: &Excitation<'_>, slip: f64) -> Vec<Vec<f64>> {
 /// Sessions whose beginning is left open, at most.
 const MOST_BEGINNINGS: usize = 10;
 
+/// The spring that a hysteresis is stated by, and those that slip earlier and later: at these shares of its torque.
+const SPRING: Role = Role("spring");
+const EARLIER_SPRING: Role = Role("spring that slips earlier");
+const LATER_SPRING: Role = Role("spring that slips later");
+const EARLIER: f64 = 0.35;
+const LATER: f64 = 2.5;
+/// Wear that grows faster than the law says.
+const FASTER: Role = Role("faster");
+/// A jump by whole teeth.
+const JUMP: Role = Role("jump");
+
 /// Springs that slip one after the other (Maxwell slip, Prandtl-Ishlinskii): the output lags the torque by what they hold.
 fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     let load = on.scales.load;
     let mut law = Law::new(CauseName::TorsionalHysteresis, |on, shape| {
-        let slip = shape[0];
+        let slip = shape.of(Name::SlipTorqueNM);
         let usual = on.nominal.wind_up_arcsec(on.scales.load).mul_add(0.3, 30.0);
         let negative = |values: Vec<f64>| values.into_iter().map(|z| -z).collect::<Vec<f64>>();
         let mut columns = vec![
             // The opening is a share of the wind-up: a plastic gear's is wide, a steel drive's at rated load 0.5 to 2' of 3'.
-            main(negative(stop_operator(on, slip)), usual),
-            nuisance(negative(stop_operator(on, 0.35 * slip)), 0.35),
-            nuisance(negative(stop_operator(on, 2.5 * slip)), 0.5),
+            main(negative(stop_operator(on, slip)), usual).called(SPRING),
+            nuisance(negative(stop_operator(on, EARLIER * slip)), 0.35).called(EARLIER_SPRING),
+            nuisance(negative(stop_operator(on, LATER * slip)), 0.5).called(LATER_SPRING),
             nuisance(by_row(on, |k| load_share(on, k)), 0.25),
             nuisance(by_row(on, |k| load_share(on, k).powi(3)), 0.15),
         ];
@@ -80,19 +91,21 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     })
     .whole()
     .shapes([Shape::by_factors(Name::SlipTorqueNM, 0.03 * load, 1.0 * load, 6)])
-    .parameters(|on, shape, c| {
+    .parameters_by(|on, shape, c| {
+        let slips = shape.of(Name::SlipTorqueNM);
         // On the way back from the full load an element holds this share of what it can when the torque passes zero.
         let full = on.scales.load;
         let held = |slip: f64| ((full - slip) / slip).clamp(0.0, 1.0);
-        let half_width: f64 = [1.0, 0.35, 2.5].iter().zip(c).map(|(factor, c)| c * held(factor * shape[0])).sum();
-        vec![(Name::HalfWidthArcsec, half_width), (Name::SlipTorqueNM, shape[0])]
+        let springs = [(1.0, SPRING), (EARLIER, EARLIER_SPRING), (LATER, LATER_SPRING)];
+        let half_width: f64 = springs.iter().map(|(factor, role)| c.of(*role) * held(factor * slips)).sum();
+        vec![(Name::HalfWidthArcsec, half_width), (Name::SlipTorqueNM, slips)]
     })
-    .physical(|_, c| c[0] > 0.0);
+    .physical_if(|_, c| c.of(SPRING) > 0.0);
     // Three elements stand for the many of a real drive: where the load passes zero they hold about, not exactly, as much (a fifth to a
     // quarter less than springs that give way smoothly, hidden in made-up data).
-    law.doubt = 0.15;
+    law.wrong.doubt = 0.15;
     // What springs hold goes with the load; the wind-up beside them takes that back, and the beginnings are nobody's.
-    law.most_nuisance = 2.0;
+    law.wrong.most_nuisance = 2.0;
     law
 }
 
@@ -100,19 +113,29 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
 fn stiffness_hardening() -> Law {
     Law::new(CauseName::StiffnessHardening, |on, shape| {
         let power = |n: f64| by_row(on, |k| -load_share(on, k).signum() * load_share(on, k).abs().powf(n));
-        vec![main(power(shape[0]), 30.0), nuisance(power(1.0), 0.4), nuisance(power(shape[0] + 1.5), 0.3)]
+        let exponent = shape.of(Name::Exponent);
+        vec![
+            main(power(exponent), 30.0).called(Role::SIZE),
+            nuisance(power(1.0), 0.4),
+            nuisance(power(exponent + 1.5), 0.3),
+        ]
     })
     .shapes([Shape::evenly(Name::Exponent, 1.6, 4.4, 3)])
-    .parameters(|on, shape, c| {
-        vec![(Name::HardeningArcsec, c[0]), (Name::HardeningExponent, shape[0]), (Name::FullLoadNM, on.scales.load)]
+    .parameters_by(|on, shape, c| {
+        vec![
+            (Name::HardeningArcsec, c.of(Role::SIZE)),
+            (Name::HardeningExponent, shape.of(Name::Exponent)),
+            (Name::FullLoadNM, on.scales.load),
+        ]
     })
-    .physical(|_, c| c[0] > 0.0)
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
 }
 
 fn stiffness_error() -> Law {
-    let mut law = Law::new(CauseName::StiffnessError, |on, _| vec![main(on.base.wind_up.clone(), 0.5)])
-        .parameters(|_, _, c| vec![(Name::StiffnessRatio, 1.0 / (1.0 + c[0]))]);
-    law.tolerance_of = Some(super::among::STIFFNESS);
+    let mut law =
+        Law::new(CauseName::StiffnessError, |on, _| vec![main(on.base.wind_up.clone(), 0.5).called(Role::SIZE)])
+            .parameters_by(|_, _, c| vec![(Name::StiffnessRatio, 1.0 / (1.0 + c.of(Role::SIZE)))]);
+    law.acts.tolerance_of = Some(super::among::STIFFNESS);
     law
 }
 
@@ -122,7 +145,7 @@ const UNEVEN_WEAR: f64 = 0.15;
 fn backlash_growth() -> Law {
     let mut law = Law::new(CauseName::BacklashGrowth, |on, _| {
         let half = on.base.half_backlash.max(1.0);
-        let mut columns = vec![main(by_row(on, |k| half * on.base.flank[k]), 1.0)];
+        let mut columns = vec![main(by_row(on, |k| half * on.base.flank[k]), 1.0).called(Role::SIZE)];
         // Teeth that are used most wear most.
         if on.nominal.teeth.is_some() {
             for wheel in [Angle::Flexspline, Angle::CircularSpline] {
@@ -131,9 +154,9 @@ fn backlash_growth() -> Law {
         }
         columns
     })
-    .parameters(|on, _, c| vec![(Name::GrowthArcsec, 2.0 * c[0] * on.base.half_backlash.max(1.0))])
-    .physical(|_, c| c[0] > 0.0);
-    law.tolerance_of = Some("backlash");
+    .parameters_by(|on, _, c| vec![(Name::GrowthArcsec, 2.0 * c.of(Role::SIZE) * on.base.half_backlash.max(1.0))])
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0);
+    law.acts.tolerance_of = Some("backlash");
     law
 }
 
@@ -172,16 +195,20 @@ fn wear(by: Progress) -> Law {
             Progress::Work => on.scales.work,
         }
         .max(1e-12);
-        let widened = |k: usize| (done[k] / all).powf(shape[0]);
+        let exponent = shape.of(Name::Exponent);
+        let widened = |k: usize| (done[k] / all).powf(exponent);
         vec![
-            main(by_row(on, |k| on.base.flank[k] * widened(k)), 30.0),
-            nuisance(by_row(on, |k| on.base.flank[k] * widened(k).powi(2)), 0.25),
+            main(by_row(on, |k| on.base.flank[k] * widened(k)), 30.0).called(Role::SIZE),
+            nuisance(by_row(on, |k| on.base.flank[k] * widened(k).powi(2)), 0.25).called(FASTER),
             nuisance(by_row(on, |k| on.base.flank[k]), 0.25),
         ]
     })
     .shapes([Shape::by_factors(Name::Exponent, 0.5, 2.0, 1)])
-    .parameters(|_, shape, c| vec![(Name::GrowthArcsec, 2.0 * (c[0] + c[1])), (Name::Exponent, shape[0])])
-    .physical(|_, c| c[0] > 0.0)
+    .parameters_by(|_, shape, c| {
+        let growth_arcsec = 2.0 * (c.of(Role::SIZE) + c.of(FASTER));
+        vec![(Name::GrowthArcsec, growth_arcsec), (Name::Exponent, shape.of(Name::Exponent))]
+    })
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
     .well_known()
 }
 
@@ -194,16 +221,17 @@ fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
     }
     let columns = jumps.clone();
     let mut law = Law::new(CauseName::Ratcheting, move |on, _| {
-        columns.iter().map(|jump| main(by_row(on, |k| jump.reached(on.rows.time[k]) / pitch), 2.0 * pitch)).collect()
+        let reached = |jump: &Jump| by_row(on, |k| jump.reached(on.rows.time[k]) / pitch);
+        columns.iter().map(|jump| main(reached(jump), 2.0 * pitch).called(JUMP)).collect()
     })
-    .parameters(move |_, _, c| {
-        let slipped: f64 = jumps.iter().zip(c).map(|(jump, c)| c * jump.height_arcsec / pitch).sum();
+    .parameters_by(move |_, _, c| {
+        let slipped: f64 = jumps.iter().zip(c.all(JUMP)).map(|(jump, c)| c * jump.height_arcsec / pitch).sum();
         vec![(Name::JumpArcsec, slipped), (Name::TimeS, jumps[0].time_s[1]), (Name::Events, jumps.len() as f64)]
     })
     .exact();
     // The jump is measured, not modelled: nothing of its height is left over.
-    law.misfit = 0.0;
-    law.doubt = 1e-5;
+    law.wrong.misfit = 0.0;
+    law.wrong.doubt = 1e-5;
     Some(law)
 }
 
