@@ -549,6 +549,35 @@ fn a_clearance_shut_by_the_cold_is_never_less_than_nothing() {
     });
 }
 
+#[test]
+fn every_cause_has_a_law_that_knows_its_own_columns_and_shape_parameters() {
+    use super::candidate::{Coefficients, Role};
+    let sessions = data(&[effect(CauseName::Ratcheting, 1.0, 0.0, 0.5)], Richness::Rich, 0, 9);
+    excited_by(&sessions, &catalogue_drive(), |on| {
+        let laws = super::library(on);
+        for cause in CauseName::ALL {
+            assert_eq!(on.lacks(*cause), None, "{cause}");
+            assert!(laws.iter().any(|law| law.is(*cause)), "{cause} has no law");
+        }
+        for law in &laws {
+            let values = law.values(&vec![0.5; law.shapes.len()]);
+            let roles: Vec<Role> = law.columns(on, &values).iter().map(|column| column.role).collect();
+            let ones = vec![1.0; roles.len()];
+            let named = law.parameters(on, &values, Coefficients::new(&roles, &ones));
+            assert!(!named.is_empty() && named.iter().all(|(_, value)| value.is_finite()), "{}: {named:?}", law.label);
+            // What is told without coefficients is told by shape parameters alone, or not at all.
+            let none = law.parameters(on, &values, Coefficients::new(&[], &[]));
+            assert!(none != named, "{}: its coefficients say nothing", law.label);
+            let _ = law.physical(&values, Coefficients::new(&roles, &ones));
+            let _ = law.zones(on, &values, Coefficients::new(&roles, &ones));
+            let roles: Vec<Role> = law.lead_columns(on, &values).iter().map(|column| column.role).collect();
+            for begun in law.beginnings(&values, Coefficients::new(&roles, &vec![1.0; roles.len()])) {
+                assert_eq!(begun.len(), law.shapes.len(), "{}", law.label);
+            }
+        }
+    });
+}
+
 fn law<'l>(laws: &'l [super::Law], cause: CauseName) -> &'l super::Law {
     laws.iter().find(|law| law.is(cause)).unwrap()
 }

@@ -217,7 +217,7 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = Vec::new();
-    if on.nominal.wind_up_arcsec(1.0) > 0.0 {
+    if on.speaks_of(CauseName::GravityTorque) {
         // The load that gravity adds moves the torque at which the play turns over: which law it follows there shows only now.
         let mut plays = vec![PlayLaw::Held, PlayLaw::Pushed];
         if !plays.contains(&on.base.law) {
@@ -225,14 +225,11 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         }
         for play in plays {
             laws.push(gravity_torque(1.0, play, on));
-            if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
+            if on.is_turned_about() {
                 laws.push(gravity_torque(-1.0, play, on));
             }
         }
     }
-    if on.rows.recorded.time {
-        laws.push(torsional_resonance(on));
-    }
-    laws.retain(|law| !law.shapes.is_empty());
+    laws.push(torsional_resonance(on));
     laws
 }

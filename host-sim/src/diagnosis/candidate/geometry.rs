@@ -25,9 +25,6 @@ pub(super) const USUAL_ARCSEC: f64 = 20.0;
 /// Cosine of the pressure angle of a working flank, 20 to 25 degrees.
 pub(super) const COS_PRESSURE_ANGLE: f64 = 0.93;
 
-/// Generator turns below which a pulse in one place is not told from a wave; as in the picture of a residual.
-const FEWEST_TURNS_OF_PULSES: f64 = 6.0;
-
 /// Clearance that odd orders of a pitch error take on a flank, over its second order: a first order as large as the second takes 2/π of it,
 /// and a wheel that takes more and shows little is one beside its place.
 const MOST_CLEARANCE_TAKEN: f64 = 0.85;
@@ -292,12 +289,10 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         smooth_pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline),
         generator_eccentricity(on),
         cam_form_error(),
+        damaged_tooth(Angle::Flexspline),
+        damaged_tooth(Angle::CircularSpline),
     ];
-    // A pulse is told from what else is in a turn by coming again, turn after turn.
-    if on.rows.travel.last().is_some_and(|travel| *travel >= FEWEST_TURNS_OF_PULSES * 2.0 * PI) {
-        laws.extend([damaged_tooth(Angle::Flexspline), damaged_tooth(Angle::CircularSpline)]);
-    }
-    if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
+    if on.is_turned_about() {
         laws.push(displaced(CauseName::GravitySideLoad, Angle::Gravity(-1.0), on));
     }
     for law in &mut laws {

@@ -164,7 +164,7 @@ pub(super) fn laws(on: &Excitation<'_>, kernels: &Arc<Kernels>) -> Vec<Law> {
         pitch(CauseName::FlexsplinePitchError, Wheel::Flexspline, Arc::clone(kernels)),
         pitch(CauseName::CircularSplinePitchError, Wheel::CircularSpline, Arc::clone(kernels)),
     ];
-    if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
+    if on.is_turned_about() {
         laws.push(of(CauseName::GravitySideLoad, Angle::Gravity(-1.0)));
     }
     for law in &mut laws {

@@ -18,13 +18,14 @@ mod sensor;
 mod stiffness;
 mod thermal;
 
+use std::f64::consts::PI;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::base::Base;
 use super::linear::Prior;
-use super::prepare::Jump;
+use super::prepare::{Jump, whole_pitches};
 use super::rows::Rows;
-use crate::causes::{CauseName, Kin, ParameterName};
+use crate::causes::{CauseName, Kin, Need, ParameterName};
 use crate::nominal::Nominal;
 
 pub use among::{Acting, Among, Zones, left_by, together};
@@ -51,6 +52,13 @@ pub struct Excitation<'a> {
     pub softer: f64,
 }
 
+/// Generator turns below which a pulse in one place is not told from a wave; as in the picture of a residual.
+const FEWEST_TURNS_OF_PULSES: f64 = 6.0;
+/// At temperatures closer to each other than this, and this close to the nominal one, K, nothing thermal can be told from a changed
+/// constant.
+const LEAST_SPAN_K: f64 = 2.0;
+const LEAST_OFF_NOMINAL_K: f64 = 5.0;
+
 /// A load that nobody recorded on an unloaded drive may be so many times its friction, or wind it up by so much, arcsec.
 const UNLOADED_FRICTIONS: f64 = 4.0;
 const UNLOADED_ARCSEC: f64 = 20.0;
@@ -66,6 +74,47 @@ impl<'a> Excitation<'a> {
     #[must_use]
     pub fn unloaded(&self) -> bool {
         self.scales.load < self.nominal.friction_torque_n_m
+    }
+
+    /// What these data lack to speak of a cause: the first of its needs that they do not meet.
+    #[must_use]
+    pub fn lacks(&self, cause: CauseName) -> Option<Need> {
+        cause.needs().iter().copied().find(|need| !self.meets(*need))
+    }
+
+    /// Whether these data speak of a cause.
+    fn speaks_of(&self, cause: CauseName) -> bool {
+        self.lacks(cause).is_none()
+    }
+
+    fn meets(&self, need: Need) -> bool {
+        let rows = self.rows;
+        match need {
+            Need::Teeth => self.nominal.teeth.is_some(),
+            Need::Turns => rows.travel.last().is_some_and(|travel| *travel >= FEWEST_TURNS_OF_PULSES * 2.0 * PI),
+            Need::Load => self.scales.load > 0.0,
+            Need::Spring => self.nominal.wind_up_arcsec(1.0) > 0.0,
+            Need::Temperature => rows.recorded.temperature,
+            Need::TemperatureSpan => {
+                let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+                for t in &rows.temperature {
+                    (low, high) = (low.min(*t), high.max(*t));
+                }
+                high - low > LEAST_SPAN_K || (low - self.nominal.temperature_c).abs() > LEAST_OFF_NOMINAL_K
+            }
+            Need::Time => rows.recorded.time,
+            Need::Motion => rows.speed.iter().any(|w| *w != 0.0),
+            Need::Jump => {
+                let jumps = &self.scales.jumps;
+                !jumps.is_empty() && jumps.iter().all(|jump| whole_pitches(self.nominal, jump.height_arcsec).is_some())
+            }
+        }
+    }
+
+    /// Whether the drive is turned against gravity during the data.
+    fn is_turned_about(&self) -> bool {
+        let orientation = &self.rows.orientation;
+        orientation.iter().any(|o| (o - orientation[0]).abs() > 1e-3)
     }
 
     /// Nominal wind-up at rest, arcsec/N·m; none for a drive that does not give.
@@ -578,19 +627,17 @@ impl Law {
 /// Every law of every cause that the data can speak about.
 #[must_use]
 pub fn library(on: &Excitation<'_>) -> Vec<Law> {
-    let mut laws = Vec::new();
-    if on.nominal.teeth.is_some() {
-        laws.extend(geometry::laws(on));
-        if let Some(kernels) = &on.nominal.kernels {
-            let known = kernel::laws(on, kernels);
-            laws.retain(|law| known.iter().all(|k| k.label != law.label));
-            laws.extend(known);
-        }
+    let mut laws = geometry::laws(on);
+    if let Some(kernels) = on.nominal.kernels.as_ref().filter(|_| on.nominal.teeth.is_some()) {
+        let known = kernel::laws(on, kernels);
+        laws.retain(|law| known.iter().all(|k| k.label != law.label));
+        laws.extend(known);
     }
     laws.extend(stiffness::laws(on));
     laws.extend(thermal::laws(on));
     laws.extend(dynamic::laws(on));
-    laws.extend(sensor::laws(on));
+    laws.extend(sensor::laws());
+    laws.retain(|law| law.cause().is_none_or(|cause| on.speaks_of(cause)));
     laws
 }
 

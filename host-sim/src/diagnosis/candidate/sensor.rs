@@ -52,14 +52,12 @@ fn ratio_error() -> Law {
     .parameters_by(|_, _, c| vec![(Name::RatioRelativeError, c.of(Role::SIZE))])
 }
 
-pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
-    let mut laws = vec![
+pub(super) fn laws() -> Vec<Law> {
+    let laws = [
         encoder(CauseName::OutputEncoderEccentricity, |on, k| on.rows.output[k], false),
         encoder(CauseName::GeneratorEncoderEccentricity, |on, k| on.rows.generator[k], true),
         ratio_error(),
+        sensor_latency(),
     ];
-    if on.rows.recorded.time {
-        laws.push(sensor_latency());
-    }
     laws.into_iter().map(Law::exact).collect()
 }

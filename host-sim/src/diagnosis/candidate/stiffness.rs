@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::prepare::{Jump, whole_pitches};
+use super::super::prepare::Jump;
 use super::super::rows::rms;
 use super::geometry::{Angle, waves};
 use super::{Excitation, Law, Role, Shape, by_row, history, main, nuisance};
@@ -216,9 +216,7 @@ fn wear(by: Progress) -> Law {
 fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
     let pitch = ARCSEC_PER_TURN / f64::from(on.nominal.teeth?.circular_spline);
     let jumps = on.scales.jumps.clone();
-    if jumps.is_empty() || !jumps.iter().all(|jump| whole_pitches(on.nominal, jump.height_arcsec).is_some()) {
-        return None;
-    }
+    let first_s = jumps.first()?.time_s[1];
     let columns = jumps.clone();
     let mut law = Law::new(CauseName::Ratcheting, move |on, _| {
         let reached = |jump: &Jump| by_row(on, |k| jump.reached(on.rows.time[k]) / pitch);
@@ -226,7 +224,7 @@ fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
     })
     .parameters_by(move |_, _, c| {
         let slipped: f64 = jumps.iter().zip(c.all(JUMP)).map(|(jump, c)| c * jump.height_arcsec / pitch).sum();
-        vec![(Name::JumpArcsec, slipped), (Name::TimeS, jumps[0].time_s[1]), (Name::Events, jumps.len() as f64)]
+        vec![(Name::JumpArcsec, slipped), (Name::TimeS, first_s), (Name::Events, jumps.len() as f64)]
     })
     .exact();
     // The jump is measured, not modelled: nothing of its height is left over.
@@ -237,11 +235,10 @@ fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = Vec::new();
-    if on.scales.load > 0.0 {
-        laws.extend([torsional_hysteresis(on), stiffness_hardening(), stiffness_error()]);
+    if on.speaks_of(CauseName::TorsionalHysteresis) {
+        laws.push(torsional_hysteresis(on));
     }
-    laws.push(backlash_growth());
-    laws.push(wear(Progress::Travel));
+    laws.extend([stiffness_hardening(), stiffness_error(), backlash_growth(), wear(Progress::Travel)]);
     if on.rows.recorded.time {
         laws.push(wear(Progress::Time));
     }

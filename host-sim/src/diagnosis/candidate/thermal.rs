@@ -199,27 +199,13 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
-    let rows = on.rows;
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for t in &rows.temperature {
-        (low, high) = (low.min(*t), high.max(*t));
+    let mut laws = vec![thermal_clearance(on)];
+    if on.base.half_backlash > 0.0 {
+        laws.push(thermal_clearance_shut(on));
     }
-    let mut laws = Vec::new();
-    // At one temperature nothing thermal can be told from a changed constant.
-    if rows.recorded.temperature && (high - low > 2.0 || (low - on.nominal.temperature_c).abs() > 5.0) {
-        laws.push(thermal_clearance(on));
-        if on.base.half_backlash > 0.0 {
-            laws.push(thermal_clearance_shut(on));
-        }
-        if on.scales.load > 0.0 {
-            laws.push(thermal_stiffness());
-        }
-    }
-    if rows.recorded.time && rows.speed.iter().any(|w| *w != 0.0) {
-        laws.push(lubricant_viscosity());
-        if on.scales.load > 0.0 && on.nominal.wind_up_arcsec(1.0) > 0.0 {
-            laws.push(lubricant_load(on));
-        }
+    laws.extend([thermal_stiffness(), lubricant_viscosity()]);
+    if on.scales.load > 0.0 && on.nominal.wind_up_arcsec(1.0) > 0.0 {
+        laws.push(lubricant_load(on));
     }
     laws
 }
