@@ -12,6 +12,7 @@ use super::context::{Context, quoted};
 use super::synthesize::{fresh_table, gear};
 use super::{Failure, names, report, say};
 use crate::causes::CauseName;
+use crate::diagnosis::explain::Explanation;
 use crate::diagnosis::report::{Compensation, Diagnosis};
 use crate::diagnosis::{Extended, Settings, diagnose_extended};
 use crate::drive::{Drive, GeneratorKind};
@@ -39,6 +40,7 @@ use crate::tables::{ARCSEC_PER_RAD, MadeTable, c_header, rust_source};
 Examples:
   flexspline diagnose measured.csv --model nominal.toml
   flexspline diagnose measured.csv --tables out --generator cam
+  flexspline diagnose measured.csv --model nominal.toml --explain torsional_hysteresis
   flexspline diagnose measured.csv --tables out --generator cam --remake-tables --out diagnosed")]
 pub(super) struct Diagnose {
     /// Measured rows: CSV with a header; columns as --columns says
@@ -64,6 +66,9 @@ pub(super) struct Diagnose {
     /// arcsec, s, ms, N.m, C, K [default: these names]
     #[arg(long, value_name = "MAP", default_value = "", hide_default_value = true)]
     columns: String,
+    /// Say why this cause was named or not (snake case, for instance flexspline_runout); with --json the gates that it came to
+    #[arg(long, value_name = "CAUSE")]
+    explain: Option<String>,
     /// Do not write report.html
     #[arg(long)]
     no_report: bool,
@@ -120,6 +125,8 @@ impl Diagnose {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let map = if self.columns.is_empty() { Ok(ColumnMap::default()) } else { ColumnMap::parse(&self.columns) };
         let map = map.map_err(|error| Failure::BadInput(format!("--columns: {error}")))?;
+        let asked = self.explain.as_deref().map(str::parse::<CauseName>).transpose();
+        let asked = asked.map_err(|error| Failure::BadInput(format!("--explain: {error}")))?;
         let image = self.image()?;
         let subject = self.subject(context, image.as_deref())?;
         let mut recording =
@@ -130,6 +137,7 @@ impl Diagnose {
         context.out()?;
         let settings = Settings {
             verbose: context.verbose(),
+            asked,
             pitch_radius_mm: subject.drive.circular_spline.pitch_radius_mm(),
             ..Settings::default()
         };
@@ -200,6 +208,10 @@ impl Diagnose {
             report::write(&page, out, &mut outputs)?;
         }
         outputs.finish()?;
+        if let Some(cause) = asked {
+            let explanation = Explanation::of(&diagnosis, cause);
+            return context.print(&explanation, || explanation.text().trim_end().to_owned());
+        }
         context.print(&written, || {
             let next = say::next(&self.next(&diagnosis, &extension, out));
             text(&recording, &diagnosis, &extension, out, !self.no_report) + &next

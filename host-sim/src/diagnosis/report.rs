@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
+use super::trace::Trace;
 use crate::causes::CauseName;
 
 /// What was found.
@@ -114,6 +115,11 @@ pub struct Diagnosis {
     pub wander_correlation_s: f64,
     /// What to record to tell look-alikes apart.
     pub next_experiment: Option<String>,
+    /// Of the cause that was asked about, if it is not named: what to record to tell it from those that are.
+    #[serde(skip)]
+    pub experiment_for_asked: Option<String>,
+    /// Every decision: why these causes, and not others.
+    pub trace: Trace,
 }
 
 impl Diagnosis {

@@ -583,13 +583,6 @@ impl Law {
         self.shapes.iter().map(of).collect()
     }
 
-    /// Whether shape parameters and coefficients make sense: signs, and most of it from the main columns, whose `main` and `nuisance`
-    /// parts are this large.
-    #[must_use]
-    pub fn sound(&self, values: &[f64], coefficients: Coefficients<'_>, main: f64, nuisance: f64) -> bool {
-        self.physical(values, coefficients) && nuisance <= self.wrong.most_nuisance * main
-    }
-
     /// How much of its size another law may be named for wrongly.
     #[must_use]
     pub fn misfit_as(&self, other: &Law) -> f64 {

@@ -769,6 +769,7 @@ mod tests {
 
     use super::*;
     use crate::diagnosis::report::{Cause, Compensation, HeldOut, Residual, Unexplained};
+    use crate::diagnosis::trace::Trace;
     use crate::measurement::{Fault, FaultName, Treatment};
     use crate::report::page::Span;
     use crate::synthesize::catalogue_drive;
@@ -821,6 +822,8 @@ mod tests {
             noise_arcsec: [5.0, 0.0],
             wander_correlation_s: 1.0,
             next_experiment: None,
+            experiment_for_asked: None,
+            trace: Trace::default(),
         }
     }
 
