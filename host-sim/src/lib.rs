@@ -1,6 +1,7 @@
 //! Contact FEM of strain wave (harmonic) drives, and the compensation tables made from it.
 #![forbid(unsafe_code)]
 
+pub mod causes;
 pub mod cli;
 pub mod closed_loop;
 pub mod condense;

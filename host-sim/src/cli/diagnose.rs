@@ -12,12 +12,14 @@ use super::context::{Context, quoted};
 use super::synthesize::gear;
 use super::tables::fresh_table;
 use super::{Failure, names, report, say};
+use crate::causes::CauseName;
+use crate::diagnosis::explain::Explanation;
 use crate::diagnosis::report::{Compensation, Diagnosis};
 use crate::diagnosis::{Extended, Settings, diagnose_extended};
 use crate::drive::{Drive, GeneratorKind};
 use crate::extension::{
     Agreement, CauseEntry, Evaluation, EvaluationError, ExtendedTables, FoundGeometry, Model, Remake, TableSubject,
-    causes_to_toml, check_by_fem, evaluate, found_geometry, no_place_in_a_table,
+    causes_to_toml, check_by_fem, evaluate, found_geometry,
 };
 use crate::kernels::Kernels;
 use crate::measurement::{ColumnMap, Fault, Recording, Session, read};
@@ -40,6 +42,7 @@ use crate::units::ARCSEC_PER_RAD;
 Examples:
   flexspline diagnose measured.csv --model nominal.toml
   flexspline diagnose measured.csv --tables out --generator cam
+  flexspline diagnose measured.csv --model nominal.toml --explain torsional_hysteresis
   flexspline diagnose measured.csv --tables out --generator cam --remake-tables --out diagnosed")]
 pub(super) struct Diagnose {
     /// Measured rows: CSV with a header; columns as --columns says
@@ -65,6 +68,9 @@ pub(super) struct Diagnose {
     /// arcsec, s, ms, N.m, C, K [default: these names]
     #[arg(long, value_name = "MAP", default_value = "", hide_default_value = true)]
     columns: String,
+    /// Say why this cause was named or not (snake case, for instance flexspline_runout); with --json the gates that it came to
+    #[arg(long, value_name = "CAUSE")]
+    explain: Option<String>,
     /// Do not write report.html
     #[arg(long)]
     no_report: bool,
@@ -100,7 +106,7 @@ struct Extension {
     #[serde(skip_serializing_if = "Option::is_none")]
     fem_agreement: Option<Agreement>,
     /// Causes that stand in `[extension]` of drive-extended.toml.
-    named_causes: Vec<String>,
+    named_causes: Vec<CauseName>,
     /// Compensation by session held out, and which causes are in the tables.
     #[serde(skip_serializing_if = "Option::is_none")]
     compensation: Option<Evaluation>,
@@ -121,6 +127,8 @@ impl Diagnose {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let map = if self.columns.is_empty() { Ok(ColumnMap::default()) } else { ColumnMap::parse(&self.columns) };
         let map = map.map_err(|error| Failure::BadInput(format!("--columns: {error}")))?;
+        let asked = self.explain.as_deref().map(str::parse::<CauseName>).transpose();
+        let asked = asked.map_err(|error| Failure::BadInput(format!("--explain: {error}")))?;
         let image = self.image()?;
         let subject = self.subject(context, image.as_deref())?;
         let mut recording =
@@ -131,6 +139,7 @@ impl Diagnose {
         context.out()?;
         let settings = Settings {
             verbose: context.verbose(),
+            asked,
             pitch_radius_mm: subject.drive.circular_spline.pitch_radius_mm(),
             ..Settings::default()
         };
@@ -154,7 +163,7 @@ impl Diagnose {
         let table_subject = TableSubject { kind: self.generator, drive: format!("{name}-extended"), hash };
         let tables = tables_of(&subject, &table_subject, &recording.sessions);
         let mut extension = Extension::default();
-        let causes: Vec<&str> = diagnosis.causes.iter().map(|cause| cause.name.as_str()).collect();
+        let causes: Vec<CauseName> = diagnosis.causes.iter().map(|cause| cause.name).collect();
         let remake = |fitted: &Extended| -> Result<Option<Vec<u8>>, String> {
             let entries: Vec<CauseEntry> = fitted.causes().iter().map(CauseEntry::of_fitted).collect();
             let of = (&subject.nominal, subject.table.as_ref());
@@ -201,6 +210,10 @@ impl Diagnose {
             report::write(&page, out, &mut outputs)?;
         }
         outputs.finish()?;
+        if let Some(cause) = asked {
+            let explanation = Explanation::of(&diagnosis, cause);
+            return context.print(&explanation, || explanation.text().trim_end().to_owned());
+        }
         context.print(&written, || {
             let next = say::next(&self.next(&diagnosis, &extension, out));
             text(&recording, &diagnosis, &extension, out, !self.no_report) + &next
@@ -315,13 +328,13 @@ impl Diagnose {
             Some(known) => {
                 let mut model = Model::of_diagnosis(&subject.nominal, diagnosis);
                 model.causes.splice(0..0, known.causes.iter().cloned());
-                extension.named_causes = model.causes.iter().map(|cause| cause.name.clone()).collect();
+                extension.named_causes = model.causes.iter().map(|cause| cause.name).collect();
                 header(context) + &model.to_toml()
             }
             None => {
                 let found = self.geometry(context, subject, tables, diagnosis, extended, extension)?;
                 extension.drive_fields = found.mapped.iter().flat_map(|mapped| mapped.fields.clone()).collect();
-                extension.named_causes = found.rest.iter().map(|cause| cause.name.clone()).collect();
+                extension.named_causes = found.rest.iter().map(|cause| cause.name).collect();
                 if self.remake_tables && extension.tables_not_written.is_none() {
                     made = self.remade(context, &found, self.mesh(subject))?;
                     extension.tables_by_fem = made.is_some();
@@ -398,7 +411,7 @@ impl Diagnose {
     /// The table of the extended drive by FEM, if the drive holds all that a table can.
     fn remade(&self, context: &Context, found: &FoundGeometry, mesh: MeshLevel) -> Result<Option<MadeTable>, Failure> {
         // What is in no field of the drive would be missing in a table by FEM.
-        let in_tables = found.rest.iter().any(|cause| no_place_in_a_table(&cause.name).is_none());
+        let in_tables = found.rest.iter().any(|cause| cause.name.no_place_in_a_table().is_none());
         if in_tables {
             return Ok(None);
         }

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::context::{Context, quoted};
 use super::tables::fresh_table;
 use super::{Failure, names, say};
+use crate::causes::{Parameter, Usual};
 use crate::drive::{Drive, GeneratorKind};
 use crate::extension::{self, CauseEntry};
 use crate::measurement::{ColumnMap, Gear, read};
@@ -17,8 +18,7 @@ use crate::mesh::MeshLevel;
 use crate::nominal::{Fixed, Nominal};
 use crate::output::Outputs;
 use crate::synthesize::{
-    Chosen, Definition, Excitation, Parameter, Plan, Plant, Richness, Sensors, Sizes, Unit, Usual, effects, parse,
-    synthesize, to_csv,
+    Chosen, Definition, Excitation, Plan, Plant, Richness, Sensors, Sizes, Unit, effects, parse, synthesize, to_csv,
 };
 
 /// Make data that look measured: the drive of the simulation, with effects, noise and sensors of your choice
@@ -203,7 +203,7 @@ impl Synthesize {
         let made = synthesize(&plant, sizes, &chosen, &on, (&sensors, self.encoder_bits), unit, &mut random)
             .map_err(|what| Failure::BadInput(format!("--effect: {what}")))?;
         let csv = to_csv(&made.sessions, nominal.ratio, &made.effects, &mut random);
-        let (data_faults, effects) = made.effects.into_iter().partition(|effect| effect.definition.fault);
+        let (data_faults, effects) = made.effects.into_iter().partition(|effect| effect.definition.is_fault());
         let truth = Truth {
             schema_version: 1,
             command: context.command.clone(),
@@ -357,7 +357,7 @@ fn text(truth: &Truth, out: &std::path::Path) -> String {
         let _ = writeln!(text, "drive {}, table {id}", truth.nominal.drive);
     }
     for effect in truth.effects.iter().chain(&truth.data_faults) {
-        let _ = writeln!(text, "  {}", effect.definition.name);
+        let _ = writeln!(text, "  {}", effect.definition.name());
         for (parameter, value) in effect.definition.parameters.iter().zip(&effect.values) {
             let _ = writeln!(text, "    {:<32} {:>14.6}", parameter.name, value.unwrap_or(f64::NAN));
         }
@@ -398,16 +398,16 @@ struct ListedParameter {
 impl Listed {
     fn of(effect: &Definition) -> Listed {
         let parameters = effect.parameters.iter().map(|parameter| ListedParameter {
-            name: parameter.name,
+            name: parameter.name.as_str(),
             meaning: parameter.meaning,
             range: parameter.range,
             allowed: parameter.allowed(),
             usual: usual(parameter),
         });
         Listed {
-            name: effect.name,
+            name: effect.name(),
             meaning: effect.meaning,
-            data_fault: effect.fault,
+            data_fault: effect.is_fault(),
             parameters: parameters.collect(),
         }
     }
@@ -432,13 +432,13 @@ fn usual(parameter: &Parameter) -> String {
 fn list() -> String {
     let mut text = String::from("Causes:\n");
     let all = effects();
-    let faults_from = all.iter().position(|effect| effect.fault);
+    let faults_from = all.iter().position(Definition::is_fault);
     for (k, effect) in all.iter().enumerate() {
         if Some(k) == faults_from {
             text.push_str("\nFaults of the data:\n");
         }
-        let _ = writeln!(text, "  {}: {}", effect.name, effect.meaning);
-        for parameter in &effect.parameters {
+        let _ = writeln!(text, "  {}: {}", effect.name(), effect.meaning);
+        for parameter in effect.parameters {
             let _ = writeln!(
                 text,
                 "    {:<28} {}; {}, allowed {}",

@@ -9,7 +9,7 @@ use flexspline::Table;
 
 use super::averaged::Averaged;
 use super::base::{Base, PlayLaw};
-use super::candidate::{Acting, Column, Excitation, Law, Scales, Tolerance, library, together};
+use super::candidate::{Acting, Column, Excitation, Law, Role, Scales, Tolerance, library, together};
 use super::model::{Problem, Scaffold, terms_at};
 use super::noise::Whitener;
 use super::report::Parameter;
@@ -17,23 +17,27 @@ use super::resolution::{Resolution, averages_hide, resolution};
 use super::rows::Rows;
 use super::select::{Selected, fit};
 use super::{DiagnosisError, Settings, prepare, uncertainty};
+use crate::causes::CauseName;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
 
 /// A cause as it was found.
 pub struct FittedCause {
+    name: CauseName,
     law: Law,
     places: Vec<f64>,
+    /// What the columns are, and their coefficients.
+    roles: Vec<Role>,
     coefficients: Vec<f64>,
     /// Parameters with their uncertainty, as in [`super::report::Cause`].
     pub parameters: BTreeMap<&'static str, Parameter>,
 }
 
 impl FittedCause {
-    /// Name, snake case.
+    /// Its name.
     #[must_use]
-    pub fn name(&self) -> &str {
-        &self.law.cause
+    pub fn name(&self) -> CauseName {
+        self.name
     }
 }
 
@@ -97,7 +101,7 @@ impl Extended {
         sessions: &[Session],
         nominal: &Nominal,
         table: Option<&Table<'_>>,
-        causes: &[&str],
+        causes: &[CauseName],
         settings: &Settings,
     ) -> Result<Extended, DiagnosisError> {
         Extended::fit_to(sessions, &vec![true; sessions.len()], nominal, table, causes, settings)
@@ -112,7 +116,7 @@ impl Extended {
         used: &[bool],
         nominal: &Nominal,
         table: Option<&Table<'_>>,
-        causes: &[&str],
+        causes: &[CauseName],
         settings: &Settings,
     ) -> Result<Extended, DiagnosisError> {
         let rows = Rows::new(sessions, nominal).learning_from(used);
@@ -183,7 +187,12 @@ impl Extended {
         let causes: Vec<Acting<'_>> = self
             .causes
             .iter()
-            .map(|c| Acting { law: &c.law, values: c.law.values(&c.places), coefficients: c.coefficients.clone() })
+            .map(|c| Acting {
+                law: &c.law,
+                values: c.law.values(&c.places),
+                roles: c.roles.clone(),
+                coefficients: c.coefficients.clone(),
+            })
             .collect();
         for (cause, columns) in self.causes.iter().zip(together(on, &causes)) {
             let mut part = vec![0.0; on.rows.len()];
@@ -198,8 +207,14 @@ impl Extended {
     }
 }
 
-/// Index of a law, places of its shape parameters, coefficients, parameters.
-type FoundTerm = (usize, Vec<f64>, Vec<f64>, BTreeMap<&'static str, Parameter>);
+/// A law (index) as it was fitted.
+struct FoundTerm {
+    law: usize,
+    places: Vec<f64>,
+    roles: Vec<Role>,
+    coefficients: Vec<f64>,
+    parameters: BTreeMap<&'static str, Parameter>,
+}
 
 /// What a fit leaves behind when its columns are gone.
 pub(super) struct Found {
@@ -223,7 +238,8 @@ impl Found {
                 .enumerate()
                 .zip(known)
                 .map(|((k, (law, places)), known)| {
-                    (*law, places.clone(), selected.fit.of(k).to_vec(), known.parameters)
+                    let Acting { roles, coefficients, .. } = selected.terms[k].acting(selected.fit.of(k));
+                    FoundTerm { law: *law, places: places.clone(), roles, coefficients, parameters: known.parameters }
                 })
                 .collect(),
         })
@@ -235,10 +251,10 @@ impl Found {
         let causes = self
             .terms
             .into_iter()
-            .filter_map(|(k, places, coefficients, parameters)| {
-                Some(FittedCause { law: laws[k].take()?, places, coefficients, parameters })
+            .filter_map(|FoundTerm { law, places, roles, coefficients, parameters }| {
+                let law = laws[law].take()?;
+                Some(FittedCause { name: law.cause()?, law, places, roles, coefficients, parameters })
             })
-            .filter(|cause| cause.law.named)
             .collect();
         Extended { play: base.law, scales: scales.clone(), recalibrated: self.recalibrated, base: self.base, causes }
     }

@@ -5,6 +5,7 @@ use super::linear::Gram;
 use super::model::{Problem, Scaffold, Term, white_columns};
 use super::report::{HeldOut, Unexplained};
 use super::select::{self, Selected, blocks};
+use super::trace::{Gate, Judged, Stage, Trace};
 
 /// Errors of prediction in blocks left out.
 pub struct Evaluated {
@@ -33,7 +34,11 @@ pub fn evaluate(problem: &Problem<'_>, terms: &[&Term<'_>]) -> Evaluated {
 /// The terms that predict sessions they were not fitted to: while all together predict them worse than none, the one that harms most is
 /// set aside, as long as that helps and another is left. Also what was set aside.
 #[must_use]
-pub fn proved<'l>(problem: &Problem<'_>, mut selected: Selected<'l>) -> (Selected<'l>, Vec<Unexplained>) {
+pub fn proved<'l>(
+    problem: &Problem<'_>,
+    mut selected: Selected<'l>,
+    trace: &mut Trace,
+) -> (Selected<'l>, Vec<Unexplained>) {
     let square = |terms: &[&Term<'l>]| left_out(problem, terms, true).unwrap_or(f64::INFINITY);
     let none = square(&[]);
     let mut aside = Vec::new();
@@ -49,8 +54,11 @@ pub fn proved<'l>(problem: &Problem<'_>, mut selected: Selected<'l>) -> (Selecte
         let Some((_, k)) = best else { break };
         let size_arcsec = select::standing(problem, &selected, k).size;
         let mut terms = selected.terms.clone();
-        let looks_like = terms.remove(k).law.cause.clone();
+        let gone = terms.remove(k);
+        let looks_like = gone.law.label.to_string();
         let Some(fit) = select::fit(problem, &terms) else { break };
+        let predicts = Judged::number(Gate::Predicts, all.sqrt(), none.sqrt(), false);
+        trace.judged(Stage::HeldOut, gone.law, &gone.law.values(&gone.places), vec![predicts]);
         aside.push(Unexplained { looks_like, size_arcsec });
         selected = Selected { terms, fit };
     }

@@ -8,11 +8,14 @@
 //! 5. [`rivals`]: every rival refitted; look-alikes.
 //! 6. [`remainder`]: lines and steps left; abstention.
 //! 7. `verdict`: which causes may be named, with parameters, uncertainty, and the gain on sessions left out ([`report`]).
+//!
+//! Every decision on the way is in the [`trace`]; [`explain`] says from it why a cause was named or not.
 
 mod averaged;
 pub mod base;
 pub mod candidate;
 mod experiment;
+pub mod explain;
 mod extended;
 mod held_out;
 pub mod linear;
@@ -27,19 +30,20 @@ pub mod rows;
 pub mod select;
 #[cfg(test)]
 mod tests;
+pub mod trace;
 mod uncertainty;
 mod verdict;
 
-use std::io::Write as _;
 use std::sync::Arc;
 
 use flexspline::Table;
 use thiserror::Error;
 
+use crate::causes::CauseName;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
 use averaged::Averaged;
-use candidate::{Excitation, Law, Scales, library, line, unnamed};
+use candidate::{Deviation, Excitation, Label, Law, Scales, library, line, unnamed};
 use extended::Found;
 pub use extended::{Extended, FittedCause, Series};
 use model::{Problem, terms_at};
@@ -49,6 +53,7 @@ use report::{Diagnosis, Unexplained};
 use resolution::{Resolution, resolution};
 use rows::Rows;
 use select::{Bests, Selected, fit, select};
+use trace::{Gate, Judged, Stage, Trace};
 
 /// Why data cannot be diagnosed.
 #[derive(Debug, Error, PartialEq, Eq)]
@@ -75,11 +80,13 @@ pub struct Settings {
     pub averages: usize,
     /// Says on stderr what is tried.
     pub verbose: bool,
+    /// A cause that is asked about: if it is not named, what to record to tell it from those that are is looked for.
+    pub asked: Option<CauseName>,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false }
+        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false, asked: None }
     }
 }
 
@@ -125,34 +132,26 @@ pub fn diagnose_extended(
     progress(1, 4, "causes");
     let search = Search::new(&on, settings)?;
     progress(2, 4, "rivals");
-    let Search { laws, problem, noise, start, bests, fast } = search;
+    let Search { laws, problem, noise, start, bests, fast, mut trace } = search;
     let terms = terms_at(&problem, &laws, &start);
     let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
-    let (selected, mut unproved) = held_out::proved(&problem, selected);
+    let (selected, mut unproved) = held_out::proved(&problem, selected, &mut trace);
     let start = remembered(&laws, &selected);
     let maps = candidate::maps(&on);
     let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);
     left.extend(fast.into_iter().filter(|f| f.size_arcsec > select::least_size(noise.white)));
     left.extend(remainder::beyond_noise(&problem, &selected, noise));
-    if settings.verbose {
-        for (k, term) in selected.terms.iter().enumerate() {
-            let [main, nuisance, beside] = select::parts(term, selected.fit.of(k));
-            tell(&format!("  {}: law {main:.2}, deviations {nuisance:.2}, beside {beside:.2}", term.law.cause));
-        }
-        for something in &left {
-            tell(&format!("  left: {} {:.2}", something.looks_like, something.size_arcsec));
-        }
+    for (k, term) in selected.terms.iter().enumerate() {
+        trace.say(&trace::Found::Parts(term.law.label, select::parts(term, selected.fit.of(k))));
+    }
+    for something in &left {
+        trace.say(&trace::Found::Left(&something.looks_like, something.size_arcsec));
     }
     left.append(&mut unproved);
-    let diagnosis = verdict::conclude(&problem, &laws, selected, &bests, left, noise, settings);
+    let diagnosis = verdict::conclude(&problem, &laws, selected, &bests, left, noise, settings, trace);
     let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
     drop(problem);
     Ok((diagnosis, found.extended(laws, &base, &scales)))
-}
-
-/// Says on stderr what is tried; a reader that has gone is no reason to fail.
-fn tell(text: &str) {
-    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 /// Whether rows can be diagnosed at all.
@@ -178,24 +177,27 @@ struct Search<'a> {
     bests: Bests,
     /// Lines too fast for averages.
     fast: Vec<Unexplained>,
+    /// Every decision on the way.
+    trace: Trace,
 }
 
 impl<'a> Search<'a> {
     fn new(on: &'a Excitation<'a>, settings: &Settings) -> Result<Search<'a>, DiagnosisError> {
         let mut laws = library(on);
         laws.extend(unnamed(on));
-        let say = |text: String| {
-            if settings.verbose {
-                tell(&text);
+        let mut trace = Trace::new(settings.verbose);
+        for cause in CauseName::ALL {
+            if let Some(need) = on.lacks(*cause) {
+                trace.decided(Stage::Data, (*cause).into(), None, vec![Judged::plain(Gate::Needs(need), false)]);
             }
-        };
+        }
         let mut uncertain = prepare::uncertain(on, &[]);
         let Resolution { mut stride, fast: at_first } = resolution(on, &laws, &uncertain, settings.averages, &[]);
         let whiten = |noise, uncertain: &[bool], stride| Whitener::new(on.rows, uncertain, stride, noise);
         let mut averaged = Averaged::of(on, stride).map(Arc::new);
         let mut free = FreeColumns::of(on, &laws, averaged.clone());
         let (mut noise, mut worth) = prepare::noise(on, &free, &at_first, &uncertain);
-        say(format!("play {:?}, {noise:?}, worth {worth:.2}, {} rows", on.base.law, on.rows.count_used()));
+        trace.say(&trace::Found::Noise(noise, worth));
         let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
         let mut fast: Vec<Unexplained> = Vec::new();
         let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
@@ -205,7 +207,7 @@ impl<'a> Search<'a> {
             fast.clear();
             let terms = terms_at(&problem, &laws, &start);
             let selected =
-                select(&problem, &laws, noise.white, terms, &mut bests, say).ok_or(DiagnosisError::NotFinite)?;
+                select(&problem, &laws, noise.white, terms, &mut bests, &mut trace).ok_or(DiagnosisError::NotFinite)?;
             start = remembered(&laws, &selected);
             if round == MOST_ROUNDS {
                 break;
@@ -214,9 +216,10 @@ impl<'a> Search<'a> {
             let (slow, found): (Vec<_>, Vec<_>) =
                 lines.into_iter().partition(|(line, _)| !remainder::averaged_away(&problem, line));
             for (line, size) in found {
-                let looks_like = format!("line of {:.4} per {}", line.order, line.unit);
+                let label = Label::Deviation(Deviation::Line { per: line.per, order: line.order });
+                let looks_like = label.to_string();
                 if fast.iter().all(|f| f.looks_like != looks_like) {
-                    say(format!("  {looks_like}: {size:.2} arcsec, too fast for averages"));
+                    trace.say(&trace::Found::FastLine(label, size));
                     fast.push(Unexplained { looks_like, size_arcsec: size });
                 }
             }
@@ -225,9 +228,9 @@ impl<'a> Search<'a> {
             drop(selected);
             let known = laws.len();
             for (found, size) in slow {
-                let law = line(found.unit, found.order);
-                if laws.iter().all(|l| l.cause != law.cause) {
-                    say(format!("  {}: {size:.2} arcsec", law.cause));
+                let law = line(found.per, found.order);
+                if laws.iter().all(|l| l.label != law.label) {
+                    trace.say(&trace::Found::Line(law.label, size));
                     laws.push(law);
                 }
             }
@@ -255,10 +258,10 @@ impl<'a> Search<'a> {
                 start.clear();
             }
             (noise, worth) = (again, worth_again);
-            say(format!("once more: {noise:?}, worth {worth:.2}"));
+            trace.say(&trace::Found::Noise(noise, worth));
             problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
         }
-        Ok(Search { laws, problem, noise, start, bests, fast })
+        Ok(Search { laws, problem, noise, start, bests, fast, trace })
     }
 }
 

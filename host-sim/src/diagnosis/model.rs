@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::averaged::{Averaged, Grain};
-use super::candidate::{Acting, Among, Column, Excitation, Law, Tolerance, left_by};
+use super::candidate::{Acting, Among, Coefficients, Column, Excitation, Law, Role, Tolerance, left_by};
 use super::linear::{Gram, Prior, Solution, products, solve};
 use super::noise::Whitener;
 use super::rows::rms;
@@ -100,7 +100,7 @@ impl<'a> Problem<'a> {
 
     /// What a law is evaluated on, with nothing that other causes change.
     fn excitation(&self, law: &Law) -> Excitation<'_> {
-        self.grain.excitation(law.smooth, self.on)
+        self.grain.excitation(law.smooth(), self.on)
     }
 
     fn base_priors(&self) -> Vec<Prior> {
@@ -117,11 +117,11 @@ impl<'a> Problem<'a> {
 
 /// Columns of a law as rows give them.
 fn columns(law: &Law, extent: Extent, on: &Excitation<'_>, places: &[f64]) -> Vec<Column> {
-    let made = match (&law.lead, extent) {
-        (Some(lead), Extent::Lead) => &lead.columns,
-        _ => &law.columns,
+    let values = law.values(places);
+    let mut columns = match extent {
+        Extent::Lead => law.lead_columns(on, &values),
+        Extent::Whole | Extent::Bare => law.columns(on, &values),
     };
-    let mut columns = made(on, &law.values(places));
     columns.retain(|c| extent == Extent::Whole || matches!(c.tolerance, Tolerance::Main(_)));
     columns
 }
@@ -133,6 +133,8 @@ pub struct White {
     pub columns: Vec<Vec<f64>>,
     /// What coefficients may be.
     pub tolerances: Vec<Tolerance>,
+    /// What the columns are.
+    roles: Vec<Role>,
     /// Root mean square of each averaged column.
     size: Vec<f64>,
     /// Products of the columns with base, data, and themselves.
@@ -142,12 +144,13 @@ pub struct White {
 impl White {
     /// Averages columns and makes them white; returns the averages as well.
     fn of(problem: &Problem<'_>, law: &Law, columns: Vec<Column>) -> (Vec<Vec<f64>>, White) {
-        let average = |c: &Column| problem.grain.average(law.smooth, &problem.whitener, &c.values);
+        let average = |c: &Column| problem.grain.average(law.smooth(), &problem.whitener, &c.values);
         let averaged: Vec<Vec<f64>> = columns.iter().map(average).collect();
         let white = problem.whitener.whiten_each(&averaged);
         let size = averaged.iter().map(|c| rms(c)).collect();
         let tolerances = columns.iter().map(|c| c.tolerance).collect();
-        (averaged, White { columns: white, tolerances, size, products: OnceLock::new() })
+        let roles = columns.iter().map(|c| c.role).collect();
+        (averaged, White { columns: white, tolerances, roles, size, products: OnceLock::new() })
     }
 
     /// Columns.
@@ -172,6 +175,11 @@ impl White {
         })
     }
 
+    /// Coefficients of these columns by what the columns are.
+    fn by_role<'c>(&'c self, coefficients: &'c [f64]) -> Coefficients<'c> {
+        Coefficients::new(&self.roles, coefficients)
+    }
+
     /// Only the main columns.
     fn main_only(mut self) -> White {
         let main: Vec<bool> = self.tolerances.iter().map(|t| matches!(t, Tolerance::Main(_))).collect();
@@ -179,6 +187,8 @@ impl White {
         self.columns.retain(|_| *at.next().unwrap_or(&true));
         let mut at = main.iter();
         self.size.retain(|_| *at.next().unwrap_or(&true));
+        let mut at = main.iter();
+        self.roles.retain(|_| *at.next().unwrap_or(&true));
         self.tolerances.retain(|t| matches!(t, Tolerance::Main(_)));
         White { products: OnceLock::new(), ..self }
     }
@@ -251,7 +261,18 @@ impl<'l> Term<'l> {
 
     /// As a cause that acts on others.
     pub(super) fn acting(&self, coefficients: &[f64]) -> Acting<'l> {
-        Acting { law: self.law, values: self.law.values(&self.places), coefficients: coefficients.to_vec() }
+        Acting {
+            law: self.law,
+            values: self.law.values(&self.places),
+            roles: self.white.roles.clone(),
+            coefficients: coefficients.to_vec(),
+        }
+    }
+
+    /// Coefficients of its columns by what the columns are.
+    #[must_use]
+    pub fn by_role<'c>(&'c self, coefficients: &'c [f64]) -> Coefficients<'c> {
+        self.white.by_role(coefficients)
     }
 
     /// Only its main columns.
@@ -471,7 +492,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// The solution with a law tried at some places: with its main columns alone, or where they mean nothing by themselves all of them.
     #[must_use]
     pub fn trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
-        let extent = if law.whole { Extent::Whole } else { Extent::Bare };
+        let extent = if law.search.whole { Extent::Whole } else { Extent::Bare };
         Some(self.fit_with(Some(&self.white(law, extent, places)), &[])?.0.solution)
     }
 
@@ -489,7 +510,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
 
     /// What the terms leave to a law.
     fn left_to(&self, law: &Law) -> Option<Arc<Among>> {
-        let kind = usize::from(law.load.is_some()) + 2 * usize::from(law.meets_zones) + 4 * usize::from(law.smooth);
+        let kind = usize::from(law.is_load()) + 2 * usize::from(law.acts.meets_zones) + 4 * usize::from(law.smooth());
         let acts = |k: usize| self.terms[k].law.acts_on(law) && (k < self.ahead || !self.terms[k].law.meets(law));
         if !(0..self.terms.len()).any(acts) {
             return None;
@@ -576,27 +597,27 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     pub fn begin(&self, law: &Law) -> Vec<Vec<f64>> {
         let mut places = self.begin_alone(law);
         // Beside one that is there, another displacement may stand in any direction: together they are not what either is alone.
-        if let Some(met) = self.terms.iter().find(|t| t.law.meets(law)) {
+        let met = self.terms.iter().find(|t| t.law.meets(law));
+        if let (Some(met), Some([phase, size])) = (met, law.displacement_at()) {
             for k in 0..DIRECTIONS {
                 for smaller in SMALLER {
-                    let mut beside = met.places.clone();
-                    beside[0] = k as f64 / DIRECTIONS as f64;
-                    beside[1] = (beside[1] - smaller).max(0.0);
+                    let mut beside = law.places_like(met.law, &met.places);
+                    beside[phase] = k as f64 / DIRECTIONS as f64;
+                    beside[size] = (beside[size] - smaller).max(0.0);
                     places.push(beside);
                 }
             }
         }
         // Under a generator beside its axis it shows as another order than alone: no lead points there.
-        let under = |t: &&&Term<'_>| t.law.zones.is_some() && t.law.acts_on(law) && !t.law.meets(law);
-        if let Some(lobes) = self.terms.iter().find(under) {
+        let under = |t: &&&Term<'_>| t.law.is_in_zones() && t.law.acts_on(law) && !t.law.meets(law);
+        let lobes = self.terms.iter().find(under);
+        if let (Some(lobes), Some([phase, size])) = (lobes, law.displacement_at()) {
             for k in 0..DIRECTIONS {
                 for arcsec in BESIDE_ARCSEC {
-                    let mut beside = vec![0.5; law.shapes.len()];
-                    beside[0] = k as f64 / DIRECTIONS as f64;
-                    beside[1] = law.shapes[1].place(arcsec);
-                    if let ([_, _, _, pressed], Some(known)) = (&mut beside[..], lobes.places.get(1)) {
-                        *pressed = *known;
-                    }
+                    // Both are pressed in alike.
+                    let mut beside = law.places_like(lobes.law, &lobes.places);
+                    beside[phase] = k as f64 / DIRECTIONS as f64;
+                    beside[size] = law.shapes[size].place(arcsec);
                     places.push(beside);
                 }
             }
@@ -606,7 +627,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
 
     fn begin_alone(&self, law: &Law) -> Vec<Vec<f64>> {
         let tried = law.tried();
-        let Some(lead) = &law.lead else { return tried };
+        let Some(lead) = &law.search.lead else { return tried };
         let problem = self.problem;
         let least = LOADED * problem.on.scales.load;
         let mask: Vec<bool> = problem
@@ -636,7 +657,9 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 let meeting: Vec<Vec<f64>> =
                     products(&new, &with, 0..mask.len(), false).chunks_exact(with.len()).map(<[f64]>::to_vec).collect();
                 let solution = solve(&gram.with(&meeting), &all, problem.worth);
-                let found = solution.map(|s| (lead.shape)(&law.values(&places), &s.coefficients[priors.len()..]));
+                let found = solution.map(|s| {
+                    law.beginnings(&law.values(&places), lead_columns.by_role(&s.coefficients[priors.len()..]))
+                });
                 found.unwrap_or_default().into_iter().map(|values| law.places(&values)).collect::<Vec<_>>()
             })
             .collect()

@@ -166,8 +166,7 @@ pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>]) -> Vec<bool> {
     }
     let without = uncertain.clone();
     for term in terms {
-        let Some(load) = &term.law.load else { continue };
-        let added = load(on, &term.law.values(&term.places));
+        let Some(added) = term.law.load(on, &term.law.values(&term.places)) else { continue };
         for (k, doubtful) in uncertain.iter_mut().enumerate() {
             let near = NEAR_FRICTION * on.nominal.friction_torque_n_m + LOAD_UNKNOWN * added[k].abs();
             *doubtful |= (on.rows.torque[k] + added[k]).abs() < near;
@@ -290,13 +289,12 @@ fn free_columns(on: &Excitation<'_>, laws: &[Law], plain: &Whitener, grain: &Gra
     let of_law = |law: &Law| -> Vec<(Vec<f64>, Prior)> {
         let tried = law.tried();
         let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
-        let made = law.lead.as_ref().map_or(&law.columns, |lead| &lead.columns);
-        let on = grain.excitation(law.smooth, on);
-        let all = tried.iter().step_by(spread).flat_map(|places| made(&on, &law.values(places)));
-        let counts = |column: &Column| law.free_form || matches!(column.tolerance, Tolerance::Main(_));
+        let on = grain.excitation(law.smooth(), on);
+        let all = tried.iter().step_by(spread).flat_map(|places| law.lead_columns(&on, &law.values(places)));
+        let counts = |column: &Column| law.search.free_form || matches!(column.tolerance, Tolerance::Main(_));
         all.filter(counts)
             .map(|column| {
-                let averaged = grain.average(law.smooth, plain, &column.values);
+                let averaged = grain.average(law.smooth(), plain, &column.values);
                 let std = 20.0 / rms(&averaged).max(1e-9);
                 (averaged, Prior { mean: 0.0, std })
             })

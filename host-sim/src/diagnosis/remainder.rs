@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use realfft::RealFftPlanner;
 
-use super::candidate::{Acting, Law, together};
+use super::candidate::{Acting, Law, Per, together};
 use super::model::{Problem, Scaffold, Term};
 use super::noise::{Noise, Whitener};
 use super::report::Unexplained;
@@ -16,8 +16,8 @@ const SLOWEST_LINE_HZ: f64 = 0.15;
 /// A line found in what is left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
-    /// What it is counted against: `generator turn` or `second`.
-    pub unit: &'static str,
+    /// What it is counted against.
+    pub per: Per,
     /// Periods per unit.
     pub order: f64,
     /// Power in units of what white noise has on average.
@@ -71,7 +71,7 @@ pub fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> 
     let mut found = Vec::new();
     found.extend(
         strongest(&rows.generator, innovations, 0.0, highest_order / (2.0 * PI), None).map(|(f, power)| Line {
-            unit: "generator turn",
+            per: Per::GeneratorTurn,
             order: f * 2.0 * PI,
             power,
         }),
@@ -89,7 +89,7 @@ pub fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> 
         }
         let cell = Some(0.5 * rows.period);
         found.extend(strongest(&time, innovations, SLOWEST_LINE_HZ, 0.5 / rows.period, cell).map(|(f, power)| Line {
-            unit: "second",
+            per: Per::Second,
             order: f,
             power,
         }));
@@ -101,9 +101,10 @@ pub fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> 
 #[must_use]
 pub fn averaged_away(problem: &Problem<'_>, line: &Line) -> bool {
     let rows = problem.on.rows;
-    let angle: Vec<f64> = match line.unit {
-        "second" => rows.time.iter().map(|t| 2.0 * PI * line.order * t).collect(),
-        _ => rows.generator.iter().map(|psi| line.order * psi).collect(),
+    let angle: Vec<f64> = match line.per {
+        Per::Second => rows.time.iter().map(|t| 2.0 * PI * line.order * t).collect(),
+        Per::GeneratorTurn => rows.generator.iter().map(|psi| line.order * psi).collect(),
+        Per::OutputTurn => rows.output.iter().map(|turned| line.order * turned).collect(),
     };
     let wave: Vec<f64> = angle.iter().map(|a| a.cos()).collect();
     problem.whitener.hides(&wave)
@@ -125,7 +126,7 @@ pub fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[Law], whi
             let there = standing.evidence > LEAST_EVIDENCE
                 && standing.left_out > LEAST_EVIDENCE
                 && standing.size > super::select::least_size(white);
-            there.then(|| Unexplained { looks_like: law.cause.clone(), size_arcsec: standing.size })
+            there.then(|| Unexplained { looks_like: law.label.to_string(), size_arcsec: standing.size })
         })
         .collect();
     found.sort_by(|a, b| b.size_arcsec.total_cmp(&a.size_arcsec));

@@ -5,6 +5,9 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
+use super::trace::Trace;
+use crate::causes::CauseName;
+
 /// What was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -31,8 +34,8 @@ pub struct Parameter {
 /// A cause.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cause {
-    /// Name, snake case.
-    pub name: String,
+    /// Its name.
+    pub name: CauseName,
     /// Probability that it is this one and not the best rival, given that it is one of the library.
     pub confidence: f64,
     /// Parameters; the unit is the end of the name.
@@ -42,7 +45,7 @@ pub struct Cause {
     /// Root mean square of what it explains, arcsec.
     pub size_arcsec: f64,
     /// Causes that these data cannot tell from it, at most three.
-    pub look_alikes: Vec<String>,
+    pub look_alikes: Vec<CauseName>,
 }
 
 /// Residual over all data used.
@@ -112,6 +115,11 @@ pub struct Diagnosis {
     pub wander_correlation_s: f64,
     /// What to record to tell look-alikes apart.
     pub next_experiment: Option<String>,
+    /// Of the cause that was asked about, if it is not named: what to record to tell it from those that are.
+    #[serde(skip)]
+    pub experiment_for_asked: Option<String>,
+    /// Every decision: why these causes, and not others.
+    pub trace: Trace,
 }
 
 impl Diagnosis {
@@ -138,7 +146,11 @@ impl Diagnosis {
                 let _ = writeln!(text, "    {name:<32} {:>12.4} +- {:.4}", p.value, p.std);
             }
             if !cause.look_alikes.is_empty() {
-                let _ = writeln!(text, "    cannot be told from: {}", cause.look_alikes.join(", "));
+                let _ = writeln!(
+                    text,
+                    "    cannot be told from: {}",
+                    cause.look_alikes.iter().map(|alike| alike.as_str()).collect::<Vec<_>>().join(", ")
+                );
             }
         }
         for left in &self.unexplained {

@@ -6,6 +6,7 @@ use super::candidate::{Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
 use super::noise::{Noise, Whitener};
 use super::rows::{Rows, rms, robust_std};
+use crate::causes::CauseName;
 
 /// Rows whose mean is taken from each of them, to see what is fast.
 const TOGETHER: usize = 5;
@@ -44,7 +45,7 @@ pub fn resolution(
     let averages = averages_of(on, uncertain, stride);
     let shown = laws
         .iter()
-        .filter(|law| law.named && law.shapes.is_empty())
+        .filter(|law| law.named() && law.shapes.is_empty())
         .filter_map(|law| hidden(on, law, &averages))
         .find_map(|main| explained_in_detail(on.rows, &main, &left, uncertain));
     match shown {
@@ -55,9 +56,16 @@ pub fn resolution(
 
 /// Whether averages of `stride` rows hide any of these causes.
 #[must_use]
-pub fn averages_hide(on: &Excitation<'_>, laws: &[Law], causes: &[&str], uncertain: &[bool], stride: usize) -> bool {
+pub fn averages_hide(
+    on: &Excitation<'_>,
+    laws: &[Law],
+    causes: &[CauseName],
+    uncertain: &[bool],
+    stride: usize,
+) -> bool {
     let averages = averages_of(on, uncertain, stride);
-    let asked = laws.iter().filter(|law| law.shapes.is_empty() && causes.contains(&law.cause.as_str()));
+    let asked =
+        laws.iter().filter(|law| law.shapes.is_empty() && law.cause().is_some_and(|cause| causes.contains(&cause)));
     asked.into_iter().any(|law| hidden(on, law, &averages).is_some())
 }
 
@@ -72,7 +80,7 @@ fn hidden(on: &Excitation<'_>, law: &Law, averages: &Whitener) -> Option<Vec<Vec
 }
 
 fn main_columns(on: &Excitation<'_>, law: &Law) -> Vec<Vec<f64>> {
-    let columns = (law.columns)(on, &[]);
+    let columns = law.columns(on, &[]);
     columns.into_iter().filter(|c| matches!(c.tolerance, Tolerance::Main(_))).map(|c| c.values).collect()
 }
 

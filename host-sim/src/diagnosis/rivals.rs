@@ -5,12 +5,14 @@ use rayon::prelude::*;
 use super::candidate::Law;
 use super::model::{Fit, Problem, Scaffold, Term};
 use super::select::{Bests, Selected, Standing, begun, less, predicted, settle, size_of, sound};
+use super::trace::{Gate, Judged};
+use crate::causes::CauseName;
 
 /// A rival in the place of a cause.
 #[derive(Clone, Debug)]
 pub struct Rival {
     /// Its name.
-    pub cause: String,
+    pub cause: CauseName,
     /// Rise of the misfit, in units in which 25 is five standard deviations.
     pub misfit: f64,
     /// Difference of the predictions, rms arcsec.
@@ -21,6 +23,8 @@ pub struct Rival {
 
 /// Rise of the misfit up to which two causes are not told apart: five standard deviations.
 const TOLD_APART: f64 = 25.0;
+/// The same of a base parameter out of its tolerance, for which the nominal model may stand in.
+const OUT_OF_TOLERANCE_APART: f64 = 5.0;
 /// Up to this rise the other causes are refined anew beside a rival.
 const SETTLED_BELOW: f64 = 400.0;
 /// How much farther away a law may begin that a lead leads to.
@@ -37,6 +41,22 @@ const TOLD_BETTER: f64 = -100.0;
 const IN_ITS_PLACE: f64 = 0.9;
 
 impl Rival {
+    /// Whether a cause of this size holds against it: it is not told better by it, and is told apart from it.
+    #[must_use]
+    pub fn judge(&self, size_arcsec: f64, out_of_tolerance: bool) -> Vec<Judged> {
+        let least = if out_of_tolerance { OUT_OF_TOLERANCE_APART } else { TOLD_APART };
+        vec![
+            Judged::number(Gate::ToldBetter, self.misfit, TOLD_BETTER, !self.tells_better(size_arcsec)),
+            Judged::number(Gate::ToldApart, self.misfit, least, !self.looks_alike(size_arcsec, out_of_tolerance)),
+        ]
+    }
+
+    /// What it comes to in the place of a cause of this size.
+    #[must_use]
+    pub fn in_its_place(&self, size_arcsec: f64) -> Vec<Judged> {
+        vec![Judged::number(Gate::AsRival, self.misfit, TOLD_BETTER, self.tells_better(size_arcsec))]
+    }
+
     /// Whether it tells the data better than a cause of this size, and otherwise: not by telling what the laws of the other causes leave.
     #[must_use]
     pub fn tells_better(&self, size_arcsec: f64) -> bool {
@@ -51,7 +71,7 @@ impl Rival {
     #[must_use]
     pub fn looks_alike(&self, size_arcsec: f64, out_of_tolerance: bool) -> bool {
         let same = self.apart_arcsec < SAME_ARCSEC.max(SAME_SHARE * size_arcsec);
-        self.misfit < if out_of_tolerance { 5.0 } else { TOLD_APART } || (same && !out_of_tolerance)
+        self.misfit < if out_of_tolerance { OUT_OF_TOLERANCE_APART } else { TOLD_APART } || (same && !out_of_tolerance)
     }
 }
 
@@ -70,7 +90,7 @@ pub fn rivals(
     let scaffold = Scaffold::new(problem, others.clone());
     let now = selected.predicted(problem);
     let open: Vec<&Law> =
-        laws.iter().filter(|law| law.named && selected.terms.iter().all(|t| t.law.cause != law.cause)).collect();
+        laws.iter().filter(|law| law.named() && selected.terms.iter().all(|t| t.law.label != law.label)).collect();
     // Where more is left than noise, as much may hide in any rival: rises count against what is left.
     let left = selected.fit.solution.misfit / (problem.worth * problem.data_white.len().max(1) as f64);
     let lacking = scaffold.fit(None).map(|fit| predicted(problem, &others, &fit));
@@ -89,7 +109,7 @@ pub fn rivals(
                 .collect();
             let best = tried.iter().fold(f64::NEG_INFINITY, |best: f64, (worth, _)| best.max(*worth));
             // Far away already: no refinement brings it back; farther for what a lead only points at.
-            let far = if law.lead.is_none() { 1.0 } else { FARTHER };
+            let far = if law.search.lead.is_none() { 1.0 } else { FARTHER };
             if -best > far * (3.0 * selected.fit.solution.misfit + 3000.0) {
                 return None;
             }
@@ -114,7 +134,7 @@ pub fn rivals(
             };
             let differs = |from: &[f64]| size_of(problem, &less(from, &then));
             Some(Rival {
-                cause: law.cause.clone(),
+                cause: law.cause()?,
                 misfit,
                 apart_arcsec: differs(&now),
                 mops_up: lacking.as_ref().is_some_and(|lacking| differs(lacking) < others_may_err(law)),
@@ -123,6 +143,6 @@ pub fn rivals(
         .collect();
     rivals.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
     let mut seen = std::collections::HashSet::new();
-    rivals.retain(|r| seen.insert(r.cause.clone()));
+    rivals.retain(|r| seen.insert(r.cause));
     rivals
 }

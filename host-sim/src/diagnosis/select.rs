@@ -6,9 +6,11 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::candidate::{Law, Tolerance};
+use super::candidate::{Coefficients, Law, Role, Tolerance};
 use super::linear::Gram;
 use super::model::{Fit, Problem, Scaffold, Term, among_each_other, white_columns};
+use super::trace::{Gate, Judged, Stage, Trace, passed};
+use crate::causes::CauseName;
 
 /// Evidence (natural logarithm of the ratio) below which nothing is named: "very strong" by Kass & Raftery (1995).
 const LEAST_EVIDENCE: f64 = 6.0;
@@ -55,6 +57,10 @@ const REFINED: usize = 9;
 const NOTED: usize = 2;
 /// Laws that are refined for the place of another.
 const EXCHANGED: usize = 4;
+/// Evidence that a law has to gain at all, refined; and a base parameter to be named.
+const LEAST_GAIN: f64 = 0.5;
+/// Evidence by which a cause has to be ahead of another to take its place.
+const AHEAD: f64 = 3.0;
 /// Evidence by which something unnamed has to be ahead of the best cause to be taken before it.
 const UNNAMED_AHEAD: f64 = 5.0;
 
@@ -122,7 +128,7 @@ fn follows(term: &Term<'_>) -> usize {
 
 /// Whether a term with a name follows much less than another.
 fn simpler(term: &Term<'_>, than: &Term<'_>) -> bool {
-    term.law.named && 3 * follows(term) <= 2 * follows(than)
+    term.law.named() && 3 * follows(term) <= 2 * follows(than)
 }
 
 /// Whether predictions this far apart are the same, as far as laws are known, for something of this size.
@@ -132,8 +138,23 @@ fn same(apart: f64, size: f64) -> bool {
 
 /// Whether a fitted term makes sense.
 pub(super) fn sound(term: &Term<'_>, coefficients: &[f64]) -> bool {
+    passed(&sense(term, coefficients))
+}
+
+/// Whether a fitted term makes sense: its signs, and the size of its deviations.
+fn sense(term: &Term<'_>, coefficients: &[f64]) -> [Judged; 2] {
     let [main, nuisance, _] = parts(term, coefficients);
-    term.law.sound(&term.law.values(&term.places), coefficients, main, nuisance)
+    let most = term.law.wrong.most_nuisance;
+    let physical = term.law.physical(&term.law.values(&term.places), term.by_role(coefficients));
+    [
+        Judged::plain(Gate::Sense, physical),
+        Judged::number(Gate::Deviations, nuisance / main, most, nuisance <= most * main),
+    ]
+}
+
+/// Whether the last term of a fit makes sense.
+fn sense_of_last(term: &Term<'_>, fit: &Fit) -> [Judged; 2] {
+    sense(term, fit.of(fit.starts.len() - 1))
 }
 
 /// Root mean squares of what a term adds by its main columns, by nuisance, and beside them, arcsec.
@@ -163,9 +184,10 @@ const ANOTHER_SIZE: f64 = 0.1;
 /// another size. Small ones leave clearance and large ones none, and no refinement goes from one to the other.
 pub(super) fn begun(law: &Law, mut tried: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
     tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let size = law.displacement_at().filter(|_| law.acts.meets_zones).map(|[_, size]| size);
     let mut begun: Vec<Vec<f64>> = Vec::new();
     for (_, places) in tried {
-        let other = |first: &Vec<f64>| law.meets_zones && (places[1] - first[1]).abs() > ANOTHER_SIZE;
+        let other = |first: &Vec<f64>| size.is_some_and(|size| (places[size] - first[size]).abs() > ANOTHER_SIZE);
         if begun.first().is_none_or(other) {
             begun.push(places);
         }
@@ -196,7 +218,7 @@ impl Bests {
     /// Places to begin with a law that takes the place of a term: where it was at its best beside all terms so far or before, and
     /// where its lead points now.
     pub fn begin(&self, scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law) -> Vec<Vec<f64>> {
-        match self.0.get(&law.id()).filter(|_| law.lead.is_none()) {
+        match self.0.get(&law.id()).filter(|_| law.search.lead.is_none()) {
             Some(known) => known.clone(),
             None => scaffold.begin(law),
         }
@@ -228,13 +250,20 @@ fn tried(
     by_law
 }
 
-/// The strongest laws (`most` of them) at the best of the places tried, law by law; not refined. Best evidence first.
+/// Laws at the best of the places tried: those that are refined, best evidence first, and those that are not, with the gates that they
+/// came to.
+struct Screened<'l> {
+    terms: Vec<Term<'l>>,
+    refused: Vec<(&'l Law, Vec<f64>, Vec<Judged>)>,
+}
+
+/// The strongest laws (`most` of them) at the best of the places tried, law by law; not refined.
 fn best_tried<'l>(
     scaffold: &Scaffold<'_, '_, '_, 'l>,
     laws: &[&'l Law],
     tried: Vec<Vec<(f64, Vec<f64>)>>,
     most: usize,
-) -> Vec<Term<'l>> {
+) -> Screened<'l> {
     let begun: Vec<(&'l Law, Vec<f64>)> = laws
         .iter()
         .zip(tried)
@@ -249,24 +278,41 @@ fn best_tried<'l>(
         })
         .collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut terms = Vec::new();
+    let (mut terms, mut refused) = (Vec::new(), Vec::new());
+    for law in laws.iter().filter(|law| found.iter().all(|(_, other, _)| other.id() != law.id())) {
+        refused.push((*law, Vec::new(), vec![Judged::plain(Gate::Refined, false)]));
+    }
     let mut counted = HashSet::new();
-    for (_, law, places) in found {
-        let term = scaffold.term(law, places);
+    let mut least = f64::INFINITY;
+    for (evidence, law, places) in found {
+        let too_late = || vec![Judged::number(Gate::Refined, evidence, least, false)];
+        if counted.len() > most {
+            refused.push((law, places, too_late()));
+            continue;
+        }
+        let term = scaffold.term(law, places.clone());
         // Where a lead points is only near; what changes other terms may make sense where they have settled.
-        let open = law.lead.is_some() || scaffold.acted_on_by(law);
-        if open || scaffold.fit(Some(&term)).is_some_and(|fit| sound(&term, fit.of(fit.starts.len() - 1))) {
+        let open = law.search.lead.is_some() || scaffold.acted_on_by(law);
+        let fit = if open { None } else { Some(scaffold.fit(Some(&term))) };
+        let refused_for = fit.map_or_else(Vec::new, |fit| match fit {
+            Some(fit) => sense_of_last(&term, &fit).to_vec(),
+            None => vec![Judged::plain(Gate::Refined, false)],
+        });
+        if passed(&refused_for) {
             counted.insert(law.id());
         } else if law.shapes.is_empty() || !counted.is_empty() {
             // What tells the data better than all these may make sense at places nearby; others do not.
+            refused.push((law, places, refused_for));
             continue;
         }
         if counted.len() > most {
-            break;
+            refused.push((law, places, too_late()));
+            continue;
         }
+        least = evidence;
         terms.push(term);
     }
-    terms
+    Screened { terms, refused }
 }
 
 /// What each term adds that the others cannot, and what it is worth on sessions left out.
@@ -288,7 +334,7 @@ pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize)
     let alone = size_of(problem, &added);
     // At one load throughout, the zero of the encoder takes all of it.
     let own = about_mean(problem, selected.terms[k].contribution(selected.fit.of(k)));
-    if selected.terms[k].law.tolerance_of.is_some() {
+    if selected.terms[k].law.acts.tolerance_of.is_some() {
         // Without it the base goes to its limit: what is beyond that is alone, all of it counts.
         return Standing { evidence: gain, size: size_of(problem, &own), alone, left_out: 1.0 };
     }
@@ -300,7 +346,7 @@ pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize)
         left_out = left_out.max(left_out_gain(problem, &with_bare, &others));
     }
     let mut size = (TAKEN_OVER * alone).min(size_of(problem, &own)).max(alone);
-    if selected.terms[k].law.in_crossings {
+    if selected.terms[k].law.acts.in_crossings {
         size = size.max(super::rows::rms(&own).min(IN_CROSSINGS * size));
     }
     Standing { evidence: gain, size, alone, left_out }
@@ -386,20 +432,25 @@ fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]
     }
 }
 
-/// Whether a base parameter has left its tolerance far enough for `law` to be named.
-fn out_of_tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> bool {
-    let Some(name) = law.tolerance_of else { return false };
+/// Whether a base parameter has left its tolerance far enough for `law` to be named; none for a law that is no base parameter.
+fn tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> Option<Judged> {
+    let name = law.acts.tolerance_of?;
     let floating = &problem.on.base.floating;
     let Some(at) = floating.iter().position(|f| f.name == name) else {
         // Not floating at all: any change is one.
-        return true;
+        return Some(Judged::plain(Gate::Tolerance, true));
     };
     let change = fit.solution.coefficients[at];
-    if change < -LARGEST_SHARE_LOST {
-        return false;
-    }
     let z = change / floating[at].spread;
-    (law.physical)(&[], &[z]) && z.abs() > OUT_OF_TOLERANCE
+    let physical = change >= -LARGEST_SHARE_LOST && law.physical(&[], Coefficients::new(&[Role::SIZE], &[z]));
+    let out = physical && z.abs() > OUT_OF_TOLERANCE;
+    // On the wrong side it counts as far below as it has gone there.
+    Some(Judged::number(Gate::Tolerance, if physical { z.abs() } else { -z.abs() }, OUT_OF_TOLERANCE, out))
+}
+
+/// Whether a law may be tried beside this fit: it is no base parameter, or one that has left its tolerance.
+fn may_be_tried(problem: &Problem<'_>, fit: &Fit, law: &Law) -> bool {
+    tolerance(problem, fit, law).is_none_or(|judged| judged.passed)
 }
 
 /// Least size of anything that counts, arcsec, at this white noise.
@@ -414,25 +465,34 @@ pub fn least_named(white: f64) -> f64 {
     LEAST_IF_CLEAR * least_size(white)
 }
 
-struct Limits {
+/// Limits of what counts at this noise.
+pub(super) struct Limits {
     least: f64,
 }
 
 impl Limits {
-    fn of(white: f64) -> Limits {
+    pub(super) fn of(white: f64) -> Limits {
         Limits { least: least_size(white) }
     }
 
-    /// `misfit`: what the laws of the other terms may be wrong by, arcsec.
-    /// `strongest`: the largest size, arcsec.
-    fn passes(&self, law: &Law, standing: &Standing, misfit: f64, strongest: f64, in_tolerance: bool) -> bool {
-        let share = if law.named { LEAST_OF_MISFIT } else { LEAST_UNNAMED_OF_MISFIT };
-        let evidence = if law.tolerance_of.is_some() { 0.5 } else { LEAST_EVIDENCE };
-        !in_tolerance
-            && standing.evidence > evidence
-            && (standing.size > self.least || law.named && self.small_but_clear(standing, strongest))
-            && standing.alone > share * misfit
-            && (standing.left_out > 0.0 || !law.foretells)
+    /// The gates that a law comes to, whatever the ones before say. `misfit` is what the laws of the other terms may be wrong by, arcsec,
+    /// `strongest` the largest size, arcsec.
+    fn gates(&self, law: &Law, standing: &Standing, misfit: f64, strongest: f64) -> Vec<Judged> {
+        let share = if law.named() { LEAST_OF_MISFIT } else { LEAST_UNNAMED_OF_MISFIT };
+        let evidence = if law.acts.tolerance_of.is_some() { LEAST_GAIN } else { LEAST_EVIDENCE };
+        let mut gates = vec![Judged::above(Gate::Evidence, standing.evidence, evidence)];
+        let size = Judged::above(Gate::Size, standing.size, self.least);
+        if size.passed || !law.named() {
+            gates.push(size);
+        } else {
+            let least = (LEAST_IF_CLEAR * self.least).max(LEAST_OF_STRONGEST * strongest);
+            gates.push(Judged::above(Gate::EvidenceIfSmall, standing.evidence, CLEAR_EVIDENCE));
+            gates.push(Judged::above(Gate::SizeIfClear, standing.size, least));
+        }
+        gates.push(Judged::above(Gate::Alone, standing.alone, share * misfit));
+        let left_out = standing.left_out > 0.0 || !law.wrong.foretells;
+        gates.push(Judged::number(Gate::LeftOut, standing.left_out, 0.0, left_out));
+        gates
     }
 
     /// Whether the last term is clear beside something without a name that tells the data better, and is too small to count.
@@ -442,26 +502,21 @@ impl Limits {
         selected: &Selected<'_>,
         standing: &Standing,
         other: &Term<'_>,
-    ) -> bool {
-        let Some((last, before)) = selected.terms.split_last() else { return true };
+    ) -> Judged {
+        let Some((last, before)) = selected.terms.split_last() else { return Judged::plain(Gate::ClearBeside, true) };
         let scaffold = Scaffold::new(problem, before.iter().chain([other]).collect());
         let evidence = |term: Option<&Term<'_>>| scaffold.fit(term).map(|fit| fit.solution.evidence);
         let needed = if standing.size > self.least { LEAST_EVIDENCE } else { CLEAR_EVIDENCE };
         match (evidence(Some(last)), evidence(None)) {
-            (Some(with), Some(without)) => with + last.occam - without > needed,
-            _ => false,
+            (Some(with), Some(without)) => Judged::above(Gate::ClearBeside, with + last.occam - without, needed),
+            _ => Judged::plain(Gate::ClearBeside, false),
         }
-    }
-
-    fn small_but_clear(&self, standing: &Standing, strongest: f64) -> bool {
-        standing.evidence > CLEAR_EVIDENCE
-            && standing.size > (LEAST_IF_CLEAR * self.least).max(LEAST_OF_STRONGEST * strongest)
     }
 }
 
 /// The largest size of those that may be wrong at all: a jump of teeth is counted.
 fn strongest(terms: &[Term<'_>], standings: &[Standing]) -> f64 {
-    terms.iter().zip(standings).filter(|(t, _)| t.law.misfit > 0.0).map(|(_, s)| s.size).fold(0.0, f64::max)
+    terms.iter().zip(standings).filter(|(t, _)| t.law.wrong.misfit > 0.0).map(|(_, s)| s.size).fold(0.0, f64::max)
 }
 
 /// Chooses causes among `laws`.
@@ -472,29 +527,29 @@ pub fn select<'l>(
     white: f64,
     start: Vec<Term<'l>>,
     bests: &mut Bests,
-    mut log: impl FnMut(String),
+    trace: &mut Trace,
 ) -> Option<Selected<'l>> {
     let limits = Limits::of(white);
     let mut selected = Selected { fit: fit(problem, &start)?, terms: start };
     if !selected.terms.is_empty() {
         // They were found in other noise, and in rows that some of them have put in doubt since.
         selected = settle_all(problem, selected)?;
-        selected = backward(problem, selected, &limits, &mut log)?;
+        selected = backward(problem, selected, &limits, trace)?;
     }
     // What has given way once and come back does not give way to the same again: so rounds end.
     let (mut seen, mut given) = (HashSet::new(), HashSet::new());
     for round in 0..MOST_ROUNDS {
-        let Some(next) = forward(problem, laws, &selected, &limits, bests, &mut log) else { break };
+        let Some(next) = forward(problem, laws, &selected, &limits, bests, trace) else { break };
         let taken = next.terms.len();
         selected = settle(problem, next)?;
-        selected = backward(problem, selected, &limits, &mut log)?;
+        selected = backward(problem, selected, &limits, trace)?;
         if round > 0 || selected.terms.len() > 1 {
             // What was taken just now was held against all others beside the same terms, unless one of them has gone since.
             let compared = if selected.terms.len() == taken { taken - 1 } else { usize::MAX };
-            selected = exchange(problem, laws, selected, &limits, compared, &mut given, bests, &mut log)?;
-            selected = backward(problem, selected, &limits, &mut log)?;
+            selected = exchange(problem, laws, selected, &limits, compared, &mut given, bests, trace)?;
+            selected = backward(problem, selected, &limits, trace)?;
         }
-        let mut causes: Vec<&str> = selected.terms.iter().map(|t| t.law.cause.as_str()).collect();
+        let mut causes: Vec<String> = selected.terms.iter().map(|t| t.law.label.to_string()).collect();
         causes.sort_unstable();
         if !seen.insert((causes.join("+"), given.len())) {
             break;
@@ -505,16 +560,19 @@ pub fn select<'l>(
 
 /// The given causes, each by the law of it that tells the data best beside the others.
 #[must_use]
-pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[&str]) -> Vec<Term<'l>> {
+pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[CauseName]) -> Vec<Term<'l>> {
     let mut terms: Vec<Term<'l>> = Vec::new();
     loop {
         let open: Vec<&Law> = laws
             .iter()
-            .filter(|law| causes.contains(&law.cause.as_str()) && terms.iter().all(|t| t.law.cause != law.cause))
+            .filter(|law| {
+                law.cause().is_some_and(|cause| causes.contains(&cause))
+                    && terms.iter().all(|t| t.law.label != law.label)
+            })
             .collect();
         let scaffold = Scaffold::new(problem, terms.iter().collect());
         let tried = tried(&scaffold, &open, |law| scaffold.begin(law));
-        let found = best_tried(&scaffold, &open, tried, usize::MAX);
+        let found = best_tried(&scaffold, &open, tried, usize::MAX).terms;
         let best = found
             .into_par_iter()
             .with_max_len(1)
@@ -534,52 +592,72 @@ pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[&str]) -> Vec
     terms
 }
 
+/// A law that was dropped before it was compared: its places, and what it was asked.
+type Dropped<'l> = (&'l Law, Vec<f64>, Vec<Judged>);
+
 fn forward<'l>(
     problem: &Problem<'_>,
     laws: &'l [Law],
     selected: &Selected<'l>,
     limits: &Limits,
     bests: &mut Bests,
-    log: &mut impl FnMut(String),
+    trace: &mut Trace,
 ) -> Option<Selected<'l>> {
-    let named = selected.terms.iter().filter(|t| t.law.named).count();
+    trace.next_round();
+    let named = selected.terms.iter().filter(|t| t.law.named()).count();
     let unnamed = selected.terms.len() - named;
-    let open: Vec<&Law> = laws
-        .iter()
-        .filter(|law| selected.terms.iter().all(|t| t.law.cause != law.cause))
-        .filter(|law| if law.named { named < MOST_CAUSES } else { unnamed < MOST_UNNAMED })
-        .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &selected.fit, law))
-        .collect();
+    let mut open: Vec<&Law> = Vec::new();
+    for law in laws.iter().filter(|law| selected.terms.iter().all(|t| t.law.label != law.label)) {
+        let (chosen, most) = if law.named() { (named, MOST_CAUSES) } else { (unnamed, MOST_UNNAMED) };
+        let room = Judged::number(Gate::Room, chosen as f64, most as f64, chosen < most);
+        let gates: Vec<Judged> = [room].into_iter().chain(tolerance(problem, &selected.fit, law)).collect();
+        if passed(&gates) {
+            open.push(law);
+        } else {
+            trace.judged(Stage::Tried, law, &[], gates);
+        }
+    }
     let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
     let tried = tried(&scaffold, &open, |law| scaffold.begin(law));
     for (law, tried) in open.iter().zip(&tried) {
         bests.note(law, tried);
     }
-    let found = best_tried(&scaffold, &open, tried, REFINED);
+    let Screened { terms: found, refused } = best_tried(&scaffold, &open, tried, REFINED);
+    for (law, places, gates) in refused {
+        trace.judged(Stage::Tried, law, &law.values(&places), gates);
+    }
     let before = selected.fit.solution.evidence;
-    let mut grown: Vec<(f64, Selected<'l>)> = found
-        .into_par_iter()
-        .with_max_len(1)
-        .filter_map(|term| {
-            let (term, fit) = scaffold.refine_towards(term, before)?;
-            let makes_sense = sound(&term, fit.of(fit.starts.len() - 1));
-            if !makes_sense && !scaffold.acted_on_by(term.law) {
-                return None;
-            }
-            let mut next = Selected { terms: [&selected.terms[..], &[term]].concat(), fit };
-            if !makes_sense {
-                // What changes others was refined beside what they do without it.
-                next = settle(problem, next).filter(Selected::is_sound)?;
-            }
-            Some((next.fit.solution.evidence + next.newest().occam - before, next))
-        })
-        .collect();
+    let refine = |term: Term<'l>| -> Result<(f64, Selected<'l>), Dropped<'l>> {
+        let (law, places) = (term.law, term.places.clone());
+        let Some((refined, fit)) = scaffold.refine_towards(term, before) else {
+            return Err((law, places, vec![Judged::plain(Gate::Gain, false)]));
+        };
+        let (sense, places) = (sense_of_last(&refined, &fit), refined.places.clone());
+        if !passed(&sense) && !scaffold.acted_on_by(law) {
+            return Err((law, places, sense.to_vec()));
+        }
+        let mut next = Selected { terms: [&selected.terms[..], &[refined]].concat(), fit };
+        if !passed(&sense) {
+            // What changes others was refined beside what they do without it.
+            let settled = settle(problem, next).filter(Selected::is_sound);
+            next = settled.ok_or_else(|| (law, places, sense.to_vec()))?;
+        }
+        Ok((next.fit.solution.evidence + next.newest().occam - before, next))
+    };
+    let refined: Vec<_> = found.into_par_iter().with_max_len(1).map(refine).collect();
+    let mut grown: Vec<(f64, Selected<'l>)> = Vec::new();
+    for outcome in refined {
+        match outcome {
+            Ok(next) => grown.push(next),
+            Err((law, places, gates)) => trace.judged(Stage::Forward, law, &law.values(&places), gates),
+        }
+    }
     contenders_settled(problem, &mut grown, before);
     // Something with a name goes before something without unless that is clearly better: by more than the law may be wrong by.
-    let best_named = grown.iter().filter(|(_, next)| next.newest().law.named).max_by(|a, b| a.0.total_cmp(&b.0));
-    let misfit = best_named.map_or(0.0, |(_, next)| next.newest().law.misfit);
+    let best_named = grown.iter().filter(|(_, next)| next.newest().law.named()).max_by(|a, b| a.0.total_cmp(&b.0));
+    let misfit = best_named.map_or(0.0, |(_, next)| next.newest().law.wrong.misfit);
     let ahead = |(gain, next): &(f64, Selected<'l>)| {
-        gain - if next.newest().law.named { 0.0 } else { UNNAMED_AHEAD.max(misfit * misfit * gain) }
+        gain - if next.newest().law.named() { 0.0 } else { UNNAMED_AHEAD.max(misfit * misfit * gain) }
     };
     grown.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
     let standing_now = standings(problem, selected);
@@ -589,32 +667,45 @@ fn forward<'l>(
     simplest_first(problem, selected, &mut grown);
     // What tells the data better, only that it is too small.
     let mut too_small: Vec<Term<'l>> = Vec::new();
-    for (gain, next) in grown {
-        if gain < 0.5 {
+    let mut grown = grown.into_iter();
+    while let Some((gain, next)) = grown.next() {
+        let term = next.newest();
+        let values = term.law.values(&term.places);
+        if gain < LEAST_GAIN {
+            trace.judged(Stage::Forward, term.law, &values, vec![Judged::number(Gate::Gain, gain, LEAST_GAIN, false)]);
             break;
         }
-        let term = next.newest();
         let standing = standing(problem, &next, next.terms.len() - 1);
         let strongest = strongest(&selected.terms, &standing_now);
-        let passes = limits.passes(term.law, &standing, misfit_as(term.law), strongest, false)
-            && (!term.law.named || too_small.iter().all(|other| limits.clear_beside(problem, &next, &standing, other)));
-        log(format!(
-            "  {} {} {:?}: evidence {:.1}, size {:.2}, alone {:.2} of {:.2}, left out {:.1}",
-            if passes { "+" } else { "?" },
-            term.law.cause,
-            term.law.values(&term.places),
-            standing.evidence,
-            standing.size,
-            standing.alone,
-            misfit_as(term.law),
-            standing.left_out
-        ));
+        let mut gates = limits.gates(term.law, &standing, misfit_as(term.law), strongest);
+        if passed(&gates) && term.law.named() {
+            for other in &too_small {
+                let clear = limits.clear_beside(problem, &next, &standing, other);
+                gates.push(clear);
+                if !clear.passed {
+                    break;
+                }
+            }
+        }
+        let passes = passed(&gates);
+        trace.judged(Stage::Forward, term.law, &values, gates);
         if passes {
+            let taken = Some(term.law.label);
+            for (less, other) in grown {
+                let (law, values) = (other.newest().law, other.newest().law.values(&other.newest().places));
+                let gates = vec![Judged::number(Gate::First, less, gain, false)];
+                trace.judged_against(Stage::Forward, law, &values, taken, gates);
+            }
             return Some(next);
         }
         if standing.evidence > LEAST_EVIDENCE && standing.left_out > 0.0 && standing.size <= limits.least {
             too_small.push(term.clone());
         }
+    }
+    for (gain, next) in grown {
+        let (law, values) = (next.newest().law, next.newest().law.values(&next.newest().places));
+        let gates = vec![Judged::number(Gate::Gain, gain, LEAST_GAIN, gain >= LEAST_GAIN)];
+        trace.judged(Stage::Forward, law, &values, gates);
     }
     None
 }
@@ -623,7 +714,7 @@ fn forward<'l>(
 /// refined beside has taken some of what is there, which is not the same share of each. Gains are over `before`.
 fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [(f64, Selected<'l>)], before: f64) {
     let mut named: Vec<&mut (f64, Selected<'l>)> =
-        grown.iter_mut().filter(|(_, next)| next.newest().law.named).collect();
+        grown.iter_mut().filter(|(_, next)| next.newest().law.named()).collect();
     named.sort_by(|a, b| b.0.total_cmp(&a.0));
     let least = named.first().map_or(f64::INFINITY, |(best, _)| (CONTENDS * best).max(LEAST_EVIDENCE));
     named.truncate(CONTENDERS);
@@ -675,7 +766,7 @@ fn settle_all<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selec
 /// The same where a term has gone that the others were refined beside: those with a lead begin where it points now, too.
 fn settle_anew<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
     settle_from(problem, selected, |scaffold, term| {
-        let anew = if term.law.lead.is_some() { scaffold.begin(term.law) } else { Vec::new() };
+        let anew = if term.law.search.lead.is_some() { scaffold.begin(term.law) } else { Vec::new() };
         [term.clone()].into_iter().chain(anew.into_iter().map(|places| scaffold.term(term.law, places))).collect()
     })
 }
@@ -710,25 +801,33 @@ fn stood_in_for(others: &[&Term<'_>], without: Option<&Fit>) -> bool {
     without.is_some_and(|fit| others.iter().enumerate().any(|(j, other)| !sound(other, fit.of(j))))
 }
 
-/// Whether a term does not earn its place.
-fn fails(problem: &Problem<'_>, selected: &Selected<'_>, standings: &[Standing], k: usize, limits: &Limits) -> bool {
+/// The gates that a term has to pass to keep its place.
+pub(super) fn earns(
+    problem: &Problem<'_>,
+    selected: &Selected<'_>,
+    standings: &[Standing],
+    k: usize,
+    limits: &Limits,
+) -> Vec<Judged> {
     let law = selected.terms[k].law;
-    let physical = sound(&selected.terms[k], selected.fit.of(k));
-    let in_tolerance = law.tolerance_of.is_some() && {
+    let mut gates = sense(&selected.terms[k], selected.fit.of(k)).to_vec();
+    if law.acts.tolerance_of.is_some() {
         let apart = selected.without(problem, k);
         let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
         let without = Scaffold::new(problem, others.clone()).fit(None);
-        if physical && stood_in_for(&others, without.as_ref()) {
-            return false;
+        if passed(&gates) && stood_in_for(&others, without.as_ref()) {
+            // Without it others would have to make up for it, and make no sense then.
+            return gates;
         }
-        without.is_none_or(|fit| !out_of_tolerance(problem, &fit, law))
-    };
+        let out = without.and_then(|fit| tolerance(problem, &fit, law));
+        gates.push(out.unwrap_or(Judged::plain(Gate::Tolerance, false)));
+    }
     let misfit = (0..selected.terms.len())
         .filter(|j| *j != k)
         .map(|j| standings[j].size * selected.terms[j].law.misfit_as(law))
         .fold(0.0, f64::max);
-    let strongest = strongest(&selected.terms, standings);
-    !physical || !limits.passes(law, &standings[k], misfit, strongest, in_tolerance)
+    gates.extend(limits.gates(law, &standings[k], misfit, strongest(&selected.terms, standings)));
+    gates
 }
 
 /// Drops what no longer earns its place, weakest first.
@@ -736,16 +835,17 @@ fn backward<'l>(
     problem: &Problem<'_>,
     mut selected: Selected<'l>,
     limits: &Limits,
-    log: &mut impl FnMut(String),
+    trace: &mut Trace,
 ) -> Option<Selected<'l>> {
     while !selected.terms.is_empty() {
         let standings = standings(problem, &selected);
         let weakest = (0..selected.terms.len())
-            .filter(|k| fails(problem, &selected, &standings, *k, limits))
-            .min_by(|a, b| standings[*a].evidence.total_cmp(&standings[*b].evidence));
-        let Some(k) = weakest else { break };
-        log(format!("  - {}: {:?}", selected.terms[k].law.cause, standings[k]));
-        selected.terms.remove(k);
+            .map(|k| (k, earns(problem, &selected, &standings, k, limits)))
+            .filter(|(_, gates)| !passed(gates))
+            .min_by(|(a, _), (b, _)| standings[*a].evidence.total_cmp(&standings[*b].evidence));
+        let Some((k, gates)) = weakest else { break };
+        let gone = selected.terms.remove(k);
+        trace.judged(Stage::Backward, gone.law, &gone.law.values(&gone.places), gates);
         selected.fit = fit(problem, &selected.terms)?;
         selected = settle_anew(problem, selected)?;
     }
@@ -762,20 +862,20 @@ fn exchange<'l>(
     compared: usize,
     given: &mut HashSet<(u64, u64)>,
     bests: &Bests,
-    log: &mut impl FnMut(String),
+    trace: &mut Trace,
 ) -> Option<Selected<'l>> {
     for k in (0..selected.terms.len()).filter(|k| *k != compared) {
         let others: Vec<Term<'l>> = selected.without(problem, k).into_iter().map(Cow::into_owned).collect();
         let without = fit(problem, &others)?;
         let open: Vec<&Law> = laws
             .iter()
-            .filter(|law| selected.terms.iter().all(|t| t.law.cause != law.cause))
-            .filter(|law| law.tolerance_of.is_none() || out_of_tolerance(problem, &without, law))
+            .filter(|law| selected.terms.iter().all(|t| t.law.label != law.label))
+            .filter(|law| may_be_tried(problem, &without, law))
             .filter(|law| !given.contains(&(selected.terms[k].law.id(), law.id())))
             .collect();
         let scaffold = Scaffold::new(problem, others.iter().collect());
         let tried = tried(&scaffold, &open, |law| bests.begin(&scaffold, law));
-        let rivals = best_tried(&scaffold, &open, tried, EXCHANGED);
+        let rivals = best_tried(&scaffold, &open, tried, EXCHANGED).terms;
         let refined: Vec<(Term<'l>, Fit)> = rivals
             .into_par_iter()
             .with_max_len(1)
@@ -788,28 +888,49 @@ fn exchange<'l>(
         let now = selected.predicted(problem);
         let size = size_of(problem, &less(&now, &predicted(problem, &others.iter().collect::<Vec<_>>(), &without)));
         let evidence = selected.fit.solution.evidence + selected.terms[k].occam;
-        let best = refined
+        let held_by = selected.terms[k].law;
+        let judge = |term: &Term<'l>, fit: &Fit| -> Vec<Judged> {
+            let then = predicted(problem, &others.iter().chain([term]).collect::<Vec<_>>(), fit);
+            let apart = size_of(problem, &less(&then, &now));
+            let needed = if term.law.named() { AHEAD } else { UNNAMED_AHEAD };
+            let better = fit.solution.evidence + term.occam > evidence + needed;
+            // What follows more does not take the place of what predicts the same.
+            let no_simpler = !(same(apart, size) && simpler(&selected.terms[k], term));
+            let ahead = better && no_simpler || same(apart, size) && simpler(term, &selected.terms[k]);
+            vec![
+                Judged::number(Gate::SamePlace, apart / size, IN_PLACE, apart < IN_PLACE * size),
+                Judged::number(Gate::Ahead, fit.solution.evidence + term.occam - evidence, needed, ahead),
+            ]
+        };
+        let mut contenders = Vec::new();
+        for (term, fit) in refined {
+            let gates = judge(&term, &fit);
+            if passed(&gates) {
+                contenders.push((term, fit, gates));
+            } else {
+                let values = term.law.values(&term.places);
+                trace.judged_against(Stage::Exchange, term.law, &values, Some(held_by.label), gates);
+            }
+        }
+        let best = contenders
             .into_iter()
-            .filter(|(term, fit)| {
-                let then = predicted(problem, &others.iter().chain([term]).collect::<Vec<_>>(), fit);
-                let apart = size_of(problem, &less(&then, &now));
-                let needed = if term.law.named { 3.0 } else { UNNAMED_AHEAD };
-                let better = fit.solution.evidence + term.occam > evidence + needed;
-                // What follows more does not take the place of what predicts the same.
-                let no_simpler = !(same(apart, size) && simpler(&selected.terms[k], term));
-                apart < IN_PLACE * size
-                    && (better && no_simpler || same(apart, size) && simpler(term, &selected.terms[k]))
-            })
             .max_by(|a, b| (a.1.solution.evidence + a.0.occam).total_cmp(&(b.1.solution.evidence + b.0.occam)));
-        if let Some((term, fit)) = best {
-            let line = format!("  ~ {} gives way to {}", selected.terms[k].law.cause, term.law.cause);
+        if let Some((term, fit, mut gates)) = best {
+            let (law, values) = (term.law, term.law.values(&term.places));
+            let ahead_by = fit.solution.evidence + term.occam - evidence;
             let mut terms = others;
             terms.push(term);
             let exchanged = settle(problem, Selected { fit, terms })?;
             // It has to earn the place that it takes.
-            if !fails(problem, &exchanged, &standings(problem, &exchanged), exchanged.terms.len() - 1, limits) {
-                log(line);
-                given.extend(exchanged.terms.last().map(|term| (selected.terms[k].law.id(), term.law.id())));
+            let last = exchanged.terms.len() - 1;
+            gates.extend(earns(problem, &exchanged, &standings(problem, &exchanged), last, limits));
+            let taken = passed(&gates);
+            trace.judged_against(Stage::Exchange, law, &values, Some(held_by.label), gates);
+            if taken {
+                let values = held_by.values(&selected.terms[k].places);
+                let gates = vec![Judged::number(Gate::First, 0.0, ahead_by, false)];
+                trace.judged_against(Stage::Exchange, held_by, &values, Some(law.label), gates);
+                given.insert((held_by.id(), law.id()));
                 return Some(exchanged);
             }
         }

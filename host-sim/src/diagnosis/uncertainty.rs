@@ -3,10 +3,12 @@
 
 use std::collections::BTreeMap;
 
+use super::candidate::Named;
 use super::linear::Gram;
 use super::model::{Fit, Problem, Scaffold, Term, white_columns};
 use super::report::Parameter;
 use super::select::{Selected, blocks};
+use crate::causes::Kind;
 
 /// Step of numerical derivatives, standard deviations.
 const STEP: f64 = 0.1;
@@ -153,7 +155,7 @@ fn parameters(
     coefficients: &[f64],
     spread: &Spread,
 ) -> BTreeMap<&'static str, Parameter> {
-    let value = |c: &[f64], places: &[f64]| (term.law.parameters)(problem.on, &term.law.values(places), c);
+    let value = |c: &[f64], places: &[f64]| term.law.parameters(problem.on, &term.law.values(places), term.by_role(c));
     let at = value(coefficients, &term.places);
     let dimension = coefficients.len() + term.places.len();
     let mut slopes = vec![vec![0.0; dimension]; at.len()];
@@ -170,23 +172,21 @@ fn parameters(
         let sign = if j >= c.len() && p[j - c.len()] < term.places[j - c.len()] { -1.0 } else { 1.0 };
         for (slope, (new, old)) in slopes.iter_mut().zip(value(&c, &p).iter().zip(&at)) {
             let mut change = new.1 - old.1;
-            if old.0 == "phase_rad" || old.0 == "angle_rad" {
+            if old.0.kind() == Kind::Angle {
                 change = (change + std::f64::consts::FRAC_PI_2).rem_euclid(std::f64::consts::PI)
                     - std::f64::consts::FRAC_PI_2;
             }
             slope[j] = sign * change / step;
         }
     }
-    let with_doubt = |((name, value), slope): ((&'static str, f64), &Vec<f64>)| {
-        let counted = ["harmonic", "tooth", "wheel", "events"].contains(&name);
-        let scale = if name.ends_with("phase_rad") || name == "angle_rad" {
-            1.0
-        } else if counted {
-            0.0
-        } else {
-            value.abs()
+    let with_doubt = |((name, value), slope): (Named, &Vec<f64>)| {
+        let scale = match name.kind() {
+            Kind::Angle => 1.0,
+            Kind::Count => 0.0,
+            Kind::Size => value.abs(),
         };
-        (name, Parameter { value, std: spread.of(&outer(slope)).sqrt().hypot(term.law.doubt * scale) })
+        let std = spread.of(&outer(slope)).sqrt().hypot(term.law.wrong.doubt * scale);
+        (name.as_str(), Parameter { value, std })
     };
     at.into_iter().zip(&slopes).map(with_doubt).collect()
 }

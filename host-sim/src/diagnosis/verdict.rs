@@ -7,10 +7,12 @@ use rayon::prelude::*;
 use super::candidate::Law;
 use super::model::{Fit, Problem, Term};
 use super::noise::Noise;
-use super::report::{Cause, Compensation, Diagnosis, Parameter, Residual, Unexplained, Verdict};
+use super::report::{Cause, Compensation, Diagnosis, HeldOut, Parameter, Residual, Unexplained, Verdict};
 use super::select::{self, Selected, Standing, fit, predicted, standings};
+use super::trace::{Gate, Judged, Stage, Trace, passed};
 use super::uncertainty::{self, Known};
-use super::{Settings, experiment, held_out, rivals, tell};
+use super::{Settings, experiment, held_out, rivals};
+use crate::causes::CauseName;
 
 /// Sessions left out are predicted no worse up to this: the least that counts is a small part of what noise leaves.
 const NO_WORSE: f64 = 1.001;
@@ -28,6 +30,7 @@ const LARGE_BESIDE: f64 = 0.7;
 const KNOWN_BESIDE: f64 = 5.0;
 
 /// The verdict, with its causes and what is left.
+#[allow(clippy::too_many_arguments, reason = "all that a search has found")]
 pub(super) fn conclude(
     problem: &Problem<'_>,
     laws: &[Law],
@@ -36,8 +39,14 @@ pub(super) fn conclude(
     mut left_over: Vec<Unexplained>,
     noise: Noise,
     settings: &Settings,
+    mut trace: Trace,
 ) -> Diagnosis {
     let standings = standings(problem, &selected);
+    let limits = select::Limits::of(noise.white);
+    for (k, term) in selected.terms.iter().enumerate() {
+        let gates = select::earns(problem, &selected, &standings, k, &limits);
+        trace.judged(Stage::Settled, term.law, &term.law.values(&term.places), gates);
+    }
     let all: Vec<&Term<'_>> = selected.terms.iter().collect();
     let none = fit(problem, &[]);
     let left = |terms: &[&Term<'_>], fit: &Fit| -> Vec<f64> {
@@ -52,12 +61,7 @@ pub(super) fn conclude(
     let unexplained = (rms_after * rms_after - floor * floor).max(0.0);
 
     let known = uncertainty::known(problem, &selected);
-    if settings.verbose {
-        for (term, known) in selected.terms.iter().zip(&known) {
-            tell(&format!("  {}: {:.1} times its doubt", term.law.cause, known.times_its_doubt));
-        }
-    }
-    let named = understood(&selected, &standings, &known, &left_over, noise);
+    let named = understood(&selected, &standings, &known, &left_over, noise, &mut trace);
     let size = |k: &usize| standings[*k].size.powi(2);
     let (by_name, without_name) = (
         named.iter().map(size).sum::<f64>(),
@@ -68,30 +72,19 @@ pub(super) fn conclude(
     let described = without_name;
     let without_name = without_name + left_over.iter().map(|l| l.size_arcsec.powi(2)).fold(0.0, f64::max);
     let significant_left = without_name > 0.0;
+    let held = held_out::evaluate(problem, &all);
+    let abstained = Abstention { by_name, without_name, described, unexplained, explainable };
+    let gates = if named.is_empty() { Vec::new() } else { abstained.gates(significant_left, held.total, noise.white) };
     let verdict = match (named.is_empty(), significant_left) {
         (true, false) => Verdict::None,
         (true, true) => Verdict::Unknown,
+        (false, _) if !passed(&gates) => Verdict::Unknown,
         (false, false) => Verdict::Explained,
-        // What is left without even a description may be what the cause was named for.
-        (false, true)
-            if by_name < LEAST_NAMED_SHARE * (by_name + without_name - described)
-                || by_name < LEAST_BESIDE_DESCRIBED * (by_name + described) =>
-        {
-            Verdict::Unknown
-        }
         (false, true) => Verdict::PartlyExplained,
     };
-    // Names for a small part of what is there, with the rest in the dark, are no understanding.
-    let in_the_dark =
-        unexplained.sqrt() > select::least_size(noise.white) && unexplained > MOST_UNEXPLAINED * explainable;
-    let verdict = if named.is_empty() || !in_the_dark { verdict } else { Verdict::Unknown };
-    let held = held_out::evaluate(problem, &all);
-    // What does not predict sessions it was not fitted to is no explanation.
-    let verdict = if !named.is_empty() && held.total.rms_after_arcsec > NO_WORSE * held.total.rms_before_arcsec {
-        Verdict::Unknown
-    } else {
-        verdict
-    };
+    for k in &named {
+        trace.decided(Stage::Verdict, selected.terms[*k].law.label, None, gates.clone());
+    }
     let mut causes = Vec::new();
     let mut next_experiment = None;
     let mut told_better = Vec::new();
@@ -102,36 +95,31 @@ pub(super) fn conclude(
             .map(|k| rivals::rivals(problem, laws, &selected, &standings, bests, *k))
             .collect();
         for (k, rivals) in named.iter().copied().zip(of_all) {
-            if settings.verbose {
-                for rival in rivals.iter().take(4) {
-                    tell(&format!(
-                        "  rival of {}: {} misfit +{:.0}, apart {:.2}",
-                        selected.terms[k].law.cause, rival.cause, rival.misfit, rival.apart_arcsec
-                    ));
-                }
-            }
+            let Some(name) = selected.terms[k].law.cause() else { continue };
             let size = standings[k].size;
+            let base = selected.terms[k].law.acts.tolerance_of.is_some();
+            for rival in &rivals {
+                let against = |label: CauseName| Some(label.into());
+                trace.decided(Stage::Rival, name.into(), against(rival.cause), rival.judge(size, base));
+                trace.decided(Stage::Rival, rival.cause.into(), against(name), rival.in_its_place(size));
+            }
             if rivals.iter().any(|r| r.tells_better(size)) {
                 // A rival that no other test lets through tells it better: neither is known.
                 told_better.push(k);
                 continue;
             }
-            let alike: Vec<String> = rivals
-                .iter()
-                .filter(|r| r.looks_alike(standings[k].size, selected.terms[k].law.tolerance_of.is_some()))
-                .map(|r| r.cause.clone())
-                .take(3)
-                .collect();
+            let alike: Vec<CauseName> =
+                rivals.iter().filter(|r| r.looks_alike(size, base)).map(|r| r.cause).take(3).collect();
             let closest = rivals.first().map_or(50.0, |r| r.misfit);
             if !alike.is_empty() && next_experiment.is_none() {
-                let named: Vec<&Law> = alike.iter().filter_map(|a| laws.iter().find(|law| law.cause == *a)).collect();
+                let named: Vec<&Law> = alike.iter().filter_map(|a| laws.iter().find(|law| law.is(*a))).collect();
                 next_experiment = experiment::next(problem.on, &selected.terms[k], selected.fit.of(k), &named, noise)
                     .map(|(text, apart)| {
                         format!("{text}; expected to tell them apart by {apart:.0} standard deviations")
                     });
             }
             causes.push(Cause {
-                name: selected.terms[k].law.cause.clone(),
+                name,
                 confidence: confidence(closest, alike.len()),
                 parameters: known[k].parameters.clone(),
                 held_out_gain: held.gains.get(k).copied().unwrap_or(0.0),
@@ -141,6 +129,22 @@ pub(super) fn conclude(
         }
         causes.sort_by(|a, b| b.size_arcsec.total_cmp(&a.size_arcsec));
     }
+    // Of a cause that was asked about and not named: what would tell it from the strongest that is.
+    let strongest_named = causes.first().and_then(|first: &Cause| {
+        selected
+            .terms
+            .iter()
+            .position(|term| term.law.is(first.name))
+            .filter(|_| causes.iter().all(|c| Some(c.name) != settings.asked))
+    });
+    let experiment_for_asked = settings.asked.zip(strongest_named).and_then(|(asked, k)| {
+        let laws: Vec<&Law> = laws.iter().filter(|law| law.is(asked)).take(1).collect();
+        if laws.is_empty() {
+            return None;
+        }
+        let (text, _) = experiment::next(problem.on, &selected.terms[k], selected.fit.of(k), &laws, noise)?;
+        Some(text)
+    });
     let verdict = match verdict {
         Verdict::Explained | Verdict::PartlyExplained if causes.is_empty() => Verdict::Unknown,
         Verdict::Explained if !told_better.is_empty() => Verdict::PartlyExplained,
@@ -153,7 +157,7 @@ pub(super) fn conclude(
     }
     let mut unexplained_list: Vec<Unexplained> = (0..selected.terms.len())
         .filter(|k| !named.contains(k) || told_better.contains(k) || verdict == Verdict::Unknown)
-        .map(|k| Unexplained { looks_like: selected.terms[k].law.cause.clone(), size_arcsec: standings[k].size })
+        .map(|k| Unexplained { looks_like: selected.terms[k].law.label.to_string(), size_arcsec: standings[k].size })
         .collect();
     unexplained_list.extend(left_over);
     Diagnosis {
@@ -173,6 +177,48 @@ pub(super) fn conclude(
         noise_arcsec: [noise.white, noise.wander],
         wander_correlation_s: noise.correlation_s,
         next_experiment,
+        experiment_for_asked,
+        trace,
+    }
+}
+
+/// What there is with a name and without, arcsec².
+struct Abstention {
+    /// Squares of the causes that may be named.
+    by_name: f64,
+    /// Squares of what has no name, described or not.
+    without_name: f64,
+    /// Those of it that are described by a law without a name.
+    described: f64,
+    /// Left unexplained beyond noise.
+    unexplained: f64,
+    /// Beyond noise at all.
+    explainable: f64,
+}
+
+impl Abstention {
+    /// What the causes have to pass together, or none of them is named.
+    fn gates(&self, significant_left: bool, held_out: HeldOut, white: f64) -> Vec<Judged> {
+        let mut gates = Vec::new();
+        let share = |gate: Gate, all: f64, least: f64| {
+            Judged::number(gate, self.by_name / all, least, self.by_name >= least * all)
+        };
+        if significant_left {
+            // What is left without even a description may be what the cause was named for.
+            let not_described = self.by_name + self.without_name - self.described;
+            gates.push(share(Gate::ShareNamed, not_described, LEAST_NAMED_SHARE));
+            gates.push(share(Gate::ShareDescribed, self.by_name + self.described, LEAST_BESIDE_DESCRIBED));
+        }
+        // Names for a small part of what is there, with the rest in the dark, are no understanding.
+        let dark = self.unexplained.sqrt() > select::least_size(white)
+            && self.unexplained > MOST_UNEXPLAINED * self.explainable;
+        let in_the_dark = if self.explainable > 0.0 { self.unexplained / self.explainable } else { 0.0 };
+        gates.push(Judged::number(Gate::InTheDark, in_the_dark, MOST_UNEXPLAINED, !dark));
+        // What does not predict sessions it was not fitted to is no explanation.
+        let (after, most) = (held_out.rms_after_arcsec, NO_WORSE * held_out.rms_before_arcsec);
+        let worse = after > most;
+        gates.push(Judged::number(Gate::NoWorse, after, most, !worse));
+        gates
     }
 }
 
@@ -183,16 +229,29 @@ fn understood(
     known: &[Known],
     left_over: &[Unexplained],
     noise: Noise,
+    trace: &mut Trace,
 ) -> Vec<usize> {
-    let is_named = |k: &usize| selected.terms[*k].law.named;
+    let is_named = |k: &usize| selected.terms[*k].law.named();
     let unnamed = (0..selected.terms.len()).filter(|k| !is_named(k)).map(|k| standings[k].size);
     let not_understood = unnamed.chain(left_over.iter().map(|l| l.size_arcsec)).fold(0.0, f64::max);
-    let counts = |k: &usize| {
-        let size = standings[*k].size;
-        let clear = not_understood <= LARGE_BESIDE * size || known[*k].times_its_doubt > KNOWN_BESIDE;
-        is_named(k) && size > select::least_named(noise.white) && clear
-    };
-    (0..selected.terms.len()).filter(counts).collect()
+    let mut named = Vec::new();
+    for k in (0..selected.terms.len()).filter(is_named) {
+        let size = standings[k].size;
+        let hidden = Judged::number(
+            Gate::BesideUnknown,
+            not_understood / size,
+            LARGE_BESIDE,
+            not_understood <= LARGE_BESIDE * size,
+        );
+        let well_known = Judged::above(Gate::KnownWell, known[k].times_its_doubt, KNOWN_BESIDE);
+        let beside = if hidden.passed { hidden } else { well_known };
+        let gates = vec![Judged::above(Gate::Named, size, select::least_named(noise.white)), beside];
+        if passed(&gates) {
+            named.push(k);
+        }
+        trace.decided(Stage::Understood, selected.terms[k].law.label, None, gates);
+    }
+    named
 }
 
 /// Probability of a cause against its closest rival, whose misfit is higher by this; halved by each look-alike.

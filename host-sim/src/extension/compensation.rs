@@ -8,6 +8,7 @@ use flexspline::{GeneratorAngle, PlayState, Table};
 use serde::Serialize;
 
 use super::sampled::ExtendedTables;
+use crate::causes::CauseName;
 use crate::diagnosis::{DiagnosisError, Extended, Settings};
 use crate::measurement::Session;
 use crate::tables::TableError;
@@ -37,7 +38,7 @@ pub struct Compensated {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct NotApplied {
     /// The cause.
-    pub cause: String,
+    pub cause: CauseName,
     /// Why.
     pub reason: &'static str,
 }
@@ -56,7 +57,7 @@ pub struct Evaluation {
     /// In how many of them the extended tables are better than the nominal ones.
     pub improved: usize,
     /// Causes that are in the extended tables.
-    pub applied: Vec<String>,
+    pub applied: Vec<CauseName>,
     /// Causes that are not, and why.
     pub not_applied: Vec<NotApplied>,
 }
@@ -148,7 +149,7 @@ pub type Remake<'a> = dyn Fn(&Extended) -> Result<Option<Vec<u8>>, String> + 'a;
 /// Too few rows to learn from; a model that makes no table.
 pub fn evaluate(
     sessions: &[Session],
-    causes: &[&str],
+    causes: &[CauseName],
     tables: &ExtendedTables<'_>,
     settings: &Settings,
     remake: Option<&Remake<'_>>,
@@ -163,12 +164,12 @@ pub fn evaluate(
     let mut applied = Vec::new();
     let mut not_applied = Vec::new();
     for cause in causes {
-        match tables.left_out(cause) {
-            Some(reason) => not_applied.push(NotApplied { cause: (*cause).to_owned(), reason }),
-            None if fitted.causes().iter().any(|found| found.name() == *cause) => applied.push((*cause).to_owned()),
+        match tables.left_out(*cause) {
+            Some(reason) => not_applied.push(NotApplied { cause: *cause, reason }),
+            None if fitted.causes().iter().any(|found| found.name() == *cause) => applied.push(*cause),
             None => {
                 let reason = "the sessions learnt from do not show it";
-                not_applied.push(NotApplied { cause: (*cause).to_owned(), reason });
+                not_applied.push(NotApplied { cause: *cause, reason });
             }
         }
     }
@@ -266,16 +267,16 @@ mod tests {
             rms_nominal_tables_arcsec: 2.0,
             rms_extended_tables_arcsec: if better { 1.0 } else { 2.5 },
         };
-        let with = |better: &[bool], applied: &[&str]| Evaluation {
+        let with = |better: &[bool], applied: &[CauseName]| Evaluation {
             rms_uncompensated_arcsec: 0.0,
             rms_nominal_tables_arcsec: 0.0,
             rms_extended_tables_arcsec: 0.0,
             sessions: better.iter().map(|b| one(*b)).collect(),
             improved: better.iter().filter(|b| **b).count(),
-            applied: applied.iter().map(|a| (*a).to_owned()).collect(),
+            applied: applied.to_vec(),
             not_applied: Vec::new(),
         };
-        let cause = ["backlash_growth"];
+        let cause = [CauseName::BacklashGrowth];
         assert!(with(&[true, true, false], &cause).worth_writing().is_ok());
         assert!(with(&[true, false], &cause).worth_writing().unwrap_err().contains("better in 1 of 2"));
         assert!(with(&[true, true], &[]).worth_writing().unwrap_err().contains("no cause"));

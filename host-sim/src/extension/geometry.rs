@@ -18,6 +18,7 @@ use std::f64::consts::{PI, TAU};
 use flexspline::Table;
 
 use super::model::CauseEntry;
+use crate::causes::{CauseName, DriveField, ParameterName as Name};
 use crate::diagnosis::Extended;
 use crate::drive::{DamagedFlank, DamagedTooth, Drive, DriveError, GeneratorKind, Harmonic, Wheel};
 use crate::measurement::Session;
@@ -37,7 +38,7 @@ const LARGEST_UM: f64 = 100.0;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mapped {
     /// The cause.
-    pub cause: String,
+    pub cause: CauseName,
     /// The fields it set, `path = value`.
     pub fields: Vec<String>,
     /// Whether it depends on where the drive stands in its turns.
@@ -167,7 +168,7 @@ pub fn found_geometry(
     let mut found = drive.clone();
     let (mut mapped, mut rest) = (Vec::new(), Vec::new());
     for cause in causes {
-        let value = |name: &str| cause.parameters.get(name).copied();
+        let value = |name: Name| cause.parameters.get(name.as_str()).copied();
         let mut fields: Vec<String> = Vec::new();
         let mut by_angle = true;
         let built = &mut found.as_built;
@@ -177,8 +178,8 @@ pub fn found_geometry(
             fields.push(format!("{field} = {slot}"));
         };
         let middle = |root: f64, tip: f64| 0.5 * (root + tip);
-        match (cause.name.as_str(), place) {
-            ("circular_spline_eccentricity", Some(k)) => {
+        match (cause.name.drive_field(), place) {
+            (Some(DriveField::CircularSplineEccentricity), Some(k)) => {
                 let wave = displaced(probe.wave(k, true, 2.0), flank_angle_rad);
                 set(
                     "as_built.circular_spline_eccentricity_um",
@@ -191,7 +192,7 @@ pub fn found_geometry(
                     degrees(0.5 * wave.phase()),
                 );
             }
-            ("flexspline_runout", Some(k)) => {
+            (Some(DriveField::FlexsplineRunout), Some(k)) => {
                 let wave = displaced(probe.wave(k, false, 2.0), flank_angle_rad);
                 set("as_built.flexspline_runout_um", &mut built.flexspline_runout_um, um(wave.size(), base_mm));
                 set(
@@ -200,7 +201,7 @@ pub fn found_geometry(
                     degrees(0.5 * wave.phase()),
                 );
             }
-            ("gravity_side_load", Some(k)) if orientation_rad.is_some() => {
+            (Some(DriveField::CircularSplineOffset), Some(k)) if orientation_rad.is_some() => {
                 let wave = displaced(probe.wave(k, false, 2.0), flank_angle_rad);
                 set(
                     "as_built.circular_spline_offset_um",
@@ -213,7 +214,7 @@ pub fn found_geometry(
                     degrees(0.5 * wave.phase()),
                 );
             }
-            ("circular_spline_ovality", Some(k)) => {
+            (Some(DriveField::CircularSplineOvality), Some(k)) => {
                 let wave = oval(probe.wave(k, true, 2.0), flank_angle_rad);
                 let radius = drive.circular_spline.pitch_radius_mm();
                 set(
@@ -227,8 +228,8 @@ pub fn found_geometry(
                     degrees(0.5 * wave.phase()),
                 );
             }
-            ("flexspline_pitch_error" | "circular_spline_pitch_error", Some(k)) => {
-                let on_circular_spline = cause.name.starts_with("circular");
+            (Some(DriveField::PitchHarmonics(wheel)), Some(k)) => {
+                let on_circular_spline = wheel == Wheel::CircularSpline;
                 let (f, c) = (&drive.flexspline, &drive.circular_spline);
                 let (field, list, radius, sign) = if on_circular_spline {
                     let radius = middle(c.root_radius_mm, c.tip_radius_mm);
@@ -251,8 +252,10 @@ pub fn found_geometry(
                     }
                 }
             }
-            ("damaged_tooth", Some(k)) => {
-                if let (Some(tooth), Some(wheel), Some(depth)) = (value("tooth"), value("wheel"), value("depth_um")) {
+            (Some(DriveField::DamagedTooth), Some(k)) => {
+                if let (Some(tooth), Some(wheel), Some(depth)) =
+                    (value(Name::Tooth), value(Name::Wheel), value(Name::DepthUm))
+                {
                     let wheel = if wheel < 0.5 { Wheel::Flexspline } else { Wheel::CircularSpline };
                     let teeth =
                         if wheel == Wheel::Flexspline { drive.flexspline.teeth } else { drive.circular_spline.teeth };
@@ -281,9 +284,9 @@ pub fn found_geometry(
                     built.damaged_teeth.push(damaged);
                 }
             }
-            ("backlash_growth" | "wear", _) => {
+            (Some(DriveField::FlankWear), _) => {
                 by_angle = false;
-                if let Some(growth) = value("growth_arcsec").filter(|growth| *growth > 0.0) {
+                if let Some(growth) = value(Name::GrowthArcsec).filter(|growth| *growth > 0.0) {
                     // Half of it from the flanks of either wheel.
                     let depth = 0.25 * um(growth, base_mm);
                     let (f, c) = (built.flexspline_wear_um + depth, built.circular_spline_wear_um + depth);
@@ -291,9 +294,9 @@ pub fn found_geometry(
                     set("as_built.circular_spline_wear_um", &mut built.circular_spline_wear_um, c);
                 }
             }
-            ("thermal_clearance", _) => {
+            (Some(DriveField::Expansion), _) => {
                 by_angle = false;
-                if let Some(per_k) = value("clearance_arcsec_per_k") {
+                if let Some(per_k) = value(Name::ClearanceArcsecPerK) {
                     // A ring that grows by dr opens its spaces by 2 dr tan a / r.
                     let more = per_k / ARCSEC_PER_RAD / (2.0 * flank_angle_rad.tan());
                     let t = &mut found.temperature;
@@ -306,9 +309,9 @@ pub fn found_geometry(
                     }
                 }
             }
-            ("stiffness_error", _) => {
+            (Some(DriveField::Stiffness), _) => {
                 by_angle = false;
-                if let Some(ratio) = value("stiffness_ratio").filter(|ratio| *ratio > 0.0) {
+                if let Some(ratio) = value(Name::StiffnessRatio).filter(|ratio| *ratio > 0.0) {
                     if ratio < 1.0 {
                         // What gives more is put in series: the sleeve.
                         let nominal_k = nominal.stiffness.last().map_or(f64::INFINITY, |[_, k]| *k);
@@ -322,9 +325,9 @@ pub fn found_geometry(
                     }
                 }
             }
-            ("thermal_stiffness", _) => {
+            (Some(DriveField::StiffnessPerKelvin), _) => {
                 by_angle = false;
-                if let Some(per_k) = value("stiffness_relative_per_k") {
+                if let Some(per_k) = value(Name::StiffnessRelativePerK) {
                     let all = found.temperature.youngs_modulus_per_k + per_k;
                     if all.abs() <= 1e-3 {
                         found.temperature.youngs_modulus_per_k = all;
@@ -332,7 +335,19 @@ pub fn found_geometry(
                     }
                 }
             }
-            _ => {}
+            // No field holds it, the data do not show it, or it is no fixed direction.
+            (None, _)
+            | (
+                Some(
+                    DriveField::CircularSplineEccentricity
+                    | DriveField::FlexsplineRunout
+                    | DriveField::CircularSplineOffset
+                    | DriveField::CircularSplineOvality
+                    | DriveField::PitchHarmonics(_)
+                    | DriveField::DamagedTooth,
+                ),
+                _,
+            ) => {}
         }
         let b = &found.as_built;
         let largest = [
@@ -346,7 +361,7 @@ pub fn found_geometry(
         if fields.is_empty() || largest > LARGEST_UM {
             rest.push(cause.clone());
         } else {
-            mapped.push(Mapped { cause: cause.name.clone(), fields, by_angle });
+            mapped.push(Mapped { cause: cause.name, fields, by_angle });
         }
     }
     if !mapped.is_empty() {

@@ -16,4 +16,4 @@ pub use compensation::{
 };
 pub use geometry::{Agreement, FoundGeometry, Mapped, check_by_fem, found_geometry};
 pub use model::{CauseEntry, Model, causes_in, causes_to_toml};
-pub use sampled::{ExtendedTables, TableSubject, no_place_in_a_table};
+pub use sampled::{ExtendedTables, TableSubject};

@@ -17,19 +17,20 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
+use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::FittedCause;
 use crate::diagnosis::report::{Cause, Diagnosis, Parameter};
 use crate::drive::{DriveError, Problem};
 use crate::measurement::Session;
 use crate::nominal::{Fixed, Nominal};
-use crate::synthesize::{Chosen, Excitation, Plant, Sizes, added_arcsec, effects, parse};
+use crate::synthesize::{Chosen, Excitation, Plant, Sizes, added_arcsec, parse};
 use crate::toml_file::{Entries, Refused, TomlFile, any, entries_of, one_of};
 
 /// A cause with the values of its parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CauseEntry {
-    /// Name, snake case.
-    pub name: String,
+    /// Its name.
+    pub name: CauseName,
     /// Parameters by name; the unit is the end of the name.
     pub parameters: BTreeMap<String, f64>,
 }
@@ -176,11 +177,10 @@ fn causes_of(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Vec<CauseEntry> {
         let field = extension.path(key.get_ref());
         file.refuse(key.span(), &field, "unknown key; allowed: cause".to_owned());
     }
-    let known: Vec<(&'static str, &'static str)> =
-        effects().iter().filter(|effect| !effect.fault).map(|effect| (effect.name, effect.name)).collect();
+    let known: Vec<(&'static str, CauseName)> = CauseName::ALL.iter().map(|cause| (cause.as_str(), *cause)).collect();
     let causes = extension.each(file, "cause", |entry| {
         let cause = Entries::of(entry, &["name", "parameters"])?;
-        let name = cause.needed("name", |v| one_of(&known, v))?.to_owned();
+        let name = cause.needed("name", |v| one_of(&known, v))?;
         let parameters = cause.given("parameters", |v| entries_of(v, any))?.unwrap_or_default();
         let cause = CauseEntry { name, parameters };
         cause.checked_effect().map_err(|what| Refused::because(entry, what))?;
@@ -220,7 +220,7 @@ impl CauseEntry {
     #[must_use]
     pub fn of(cause: &Cause) -> CauseEntry {
         CauseEntry {
-            name: cause.name.clone(),
+            name: cause.name,
             parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
         }
     }
@@ -229,7 +229,7 @@ impl CauseEntry {
     #[must_use]
     pub fn of_fitted(cause: &FittedCause) -> CauseEntry {
         CauseEntry {
-            name: cause.name().to_owned(),
+            name: cause.name(),
             parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
         }
     }
@@ -242,18 +242,17 @@ impl CauseEntry {
 
     fn checked_effect(&self) -> Result<Chosen, String> {
         let mut text = String::new();
-        let twice: &[&str] = &["amplitude_um", "depth_um", "tooth", "generator_amplitude_arcsec"];
-        let has = |name: &str| self.parameters.contains_key(name);
-        let definition = effects().into_iter().find(|effect| effect.name == self.name).ok_or("unknown cause")?;
-        for parameter in &definition.parameters {
-            let Some(&value) = self.parameters.get(parameter.name) else { continue };
+        let twice = [Name::AmplitudeUm, Name::DepthUm, Name::Tooth, Name::GeneratorAmplitudeArcsec];
+        let has = |name: Name| self.parameters.contains_key(name.as_str());
+        for parameter in self.name.parameters() {
+            let Some(&value) = self.parameters.get(parameter.name.as_str()) else { continue };
             // Of two forms of the same, the one in arc-seconds and radians.
-            if twice.contains(&parameter.name) && (has("amplitude_arcsec") || has("angle_rad")) {
+            if twice.contains(&parameter.name) && (has(Name::AmplitudeArcsec) || has(Name::AngleRad)) {
                 continue;
             }
             let value = match parameter.name {
-                "phase_rad" => value.rem_euclid(TAU),
-                "wheel" | "harmonic" => value.round(),
+                Name::PhaseRad => value.rem_euclid(TAU),
+                Name::Wheel | Name::Harmonic => value.round(),
                 _ => value,
             };
             let [low, high] = parameter.range;
@@ -269,16 +268,16 @@ mod tests {
     use crate::synthesize::catalogue_drive;
 
     fn model() -> Model {
-        let entry = |name: &str, parameters: &[(&str, f64)]| CauseEntry {
-            name: name.to_owned(),
+        let entry = |name: CauseName, parameters: &[(&str, f64)]| CauseEntry {
+            name,
             parameters: parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
         };
         Model {
             nominal: catalogue_drive(),
             causes: vec![
-                entry("sensor_latency", &[("delay_s", 0.0021)]),
+                entry(CauseName::SensorLatency, &[("delay_s", 0.0021)]),
                 entry(
-                    "flexspline_runout",
+                    CauseName::FlexsplineRunout,
                     &[("amplitude_arcsec", 31.0), ("amplitude_um", 7.0), ("phase_rad", 3.0), ("half_load_n_m", 9.0)],
                 ),
             ],
@@ -291,8 +290,8 @@ mod tests {
         assert_eq!(Model::from_toml("d.toml", &model.to_toml()).unwrap(), model);
         let effects = model.effects();
         assert_eq!(effects.len(), 2);
-        assert_eq!(effects[0].given("delay_s"), Some(0.0021));
-        assert_eq!((effects[1].given("amplitude_arcsec"), effects[1].given("amplitude_um")), (Some(31.0), None));
+        assert_eq!(effects[0].given(Name::DelayS), Some(0.0021));
+        assert_eq!((effects[1].given(Name::AmplitudeArcsec), effects[1].given(Name::AmplitudeUm)), (Some(31.0), None));
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use flexspline::make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
 use flexspline::{Direction, FixedMember, Table};
 
+use crate::causes::{CauseName, InTable};
 use crate::diagnosis::Extended;
 use crate::drive::GeneratorKind;
 use crate::measurement::Session;
@@ -34,21 +35,6 @@ const LEAST_FRICTION: f64 = 1e-3;
 const NEGATIVE_HALF_WIDTH_RAD: f64 = 1e-4;
 /// Temperatures closer than this, K, are one.
 const ONE_TEMPERATURE_K: f64 = 2.0;
-
-/// Why a cause cannot live in a table, if it cannot.
-#[must_use]
-pub fn no_place_in_a_table(cause: &str) -> Option<&'static str> {
-    match cause {
-        "sensor_latency" => Some("it follows the speed, and a table knows none"),
-        "torsional_resonance" => Some("it follows the motion in time, and a table knows steady motion alone"),
-        "torsional_hysteresis" => Some("it depends on the torques before, and a table knows the present one alone"),
-        "lubricant_viscosity" => Some("it follows the speed, and a table knows none"),
-        "ratcheting" => Some("it happens at an instant"),
-        "ratio_error" => Some("it grows from turn to turn, and a table repeats"),
-        "wear" => Some("it grows with use, and a table stays"),
-        _ => None,
-    }
-}
 
 /// Nodes symmetric about zero: a pair at either side of the friction, where the flank changes, and further ones up to the largest
 /// torque.
@@ -93,9 +79,14 @@ pub struct ExtendedTables<'a> {
 impl ExtendedTables<'_> {
     /// Why a cause is not in a table of this drive, if it is not.
     #[must_use]
-    pub fn left_out(&self, cause: &str) -> Option<&'static str> {
-        let gravity = cause.starts_with("gravity_") && self.orientation_rad.is_none();
-        no_place_in_a_table(cause).or_else(|| gravity.then_some("the drive is turned against gravity"))
+    pub fn left_out(&self, cause: CauseName) -> Option<&'static str> {
+        match cause.in_table() {
+            InTable::Yes => None,
+            InTable::AtOneOrientation => {
+                self.orientation_rad.is_none().then_some("the drive is turned against gravity")
+            }
+            InTable::No(why) => Some(why),
+        }
     }
 
     /// The nominal model as a table; the one given, if one is given.
@@ -263,15 +254,5 @@ mod tests {
         let mut all: Vec<i64> = orders.chain([1, 2]).chain((1..=4).map(|k| 17860 * k)).map(folded).chain([0]).collect();
         all.sort_unstable();
         assert!(all.windows(2).all(|pair| pair[0] < pair[1]), "{all:?}");
-    }
-
-    #[test]
-    fn what_follows_speed_time_or_the_past_has_no_place_in_a_table() {
-        for cause in ["sensor_latency", "torsional_resonance", "torsional_hysteresis", "ratcheting", "ratio_error"] {
-            assert!(no_place_in_a_table(cause).is_some(), "{cause}");
-        }
-        for cause in ["circular_spline_eccentricity", "backlash_growth", "output_encoder_eccentricity"] {
-            assert!(no_place_in_a_table(cause).is_none(), "{cause}");
-        }
     }
 }

@@ -26,6 +26,23 @@ pub enum FaultName {
     Drift,
 }
 
+impl FaultName {
+    /// Its name in files, snake case.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            FaultName::EncoderIndexJump => "encoder_index_jump",
+            FaultName::FrozenChannel => "frozen_channel",
+            FaultName::MissingSamples => "missing_samples",
+            FaultName::ClockError => "clock_error",
+            FaultName::Outliers => "outliers",
+            FaultName::UnitMismatch => "unit_mismatch",
+            FaultName::Quantisation => "quantisation",
+            FaultName::Drift => "drift",
+        }
+    }
+}
+
 /// What was done about a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]

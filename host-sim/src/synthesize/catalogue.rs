@@ -10,338 +10,130 @@ use serde::ser::{SerializeMap, Serializer};
 
 use super::Sizes;
 use super::excitation::Excitation;
-use super::law::{Angle, Encoder, Law};
+use super::law::OVAL_FLANK_RAD;
+use crate::causes::{CauseName, Factor, Parameter, ParameterName, TIME, Usual, number};
+use crate::measurement::FaultName;
 use crate::nominal::{Fixed, Nominal};
 use crate::suggest::did_you_mean;
 use crate::units::ARCSEC_PER_RAD;
 
-/// Value of a parameter that is not given.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Usual {
-    /// Always this.
-    Value(f64),
-    /// This share of the largest torque of the data.
-    OfLoad(f64),
-    /// Drawn evenly between two numbers.
-    Drawn(f64, f64),
-    /// A time drawn between two shares of the data.
-    Instant(f64, f64),
-    /// One tooth pitch of the wheel that turns.
-    ToothPitch,
-    /// Follows from the other form in which the same may be given.
-    Follows,
-}
-
-/// A parameter of an effect.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parameter {
-    /// Name; the unit is its end.
-    pub name: &'static str,
-    /// What it is.
-    pub meaning: &'static str,
-    /// Allowed values, both ends with them.
-    pub range: [f64; 2],
-    /// Value if it is not given.
-    pub usual: Usual,
-    /// Words that may stand for 0, 1, 2, ...; none for a number.
-    pub words: &'static [&'static str],
-}
-
-/// How one form of a parameter follows from another.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Factor {
-    /// Arcsec for a micrometre along the normal of the flanks.
-    AlongNormal,
-    /// Arcsec for a micrometre along the pitch circle.
-    AlongPitch,
-    /// Arcsec for a micrometre of a ring that is pressed to an oval and keeps its length.
-    Oval,
-    /// Radians for a tooth of the wheel.
-    Tooth,
-    /// Arcsec at the generator for one at the output.
-    Ratio,
+/// What may be hidden in data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hidden {
+    /// A cause of the library.
+    Cause(CauseName),
+    /// A fault of the data, not of the drive or its sensors.
+    Fault(FaultName),
 }
 
 /// An effect that can be asked for.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Definition {
-    /// Name, snake case.
-    pub name: &'static str,
     /// What it is.
+    pub what: Hidden,
+    /// In words.
     pub meaning: &'static str,
-    /// A fault of the data, not of the drive or its sensors.
-    pub fault: bool,
     /// Its parameters.
-    pub parameters: Vec<Parameter>,
+    pub parameters: &'static [Parameter],
     /// Two forms of the same, and the factor from the first to the second.
-    twins: Vec<(&'static str, &'static str, Factor)>,
+    twins: &'static [(ParameterName, ParameterName, Factor)],
 }
 
-const fn number(name: &'static str, meaning: &'static str, low: f64, high: f64, usual: Usual) -> Parameter {
-    Parameter { name, meaning, range: [low, high], usual, words: &[] }
+impl Definition {
+    /// Its name, snake case.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self.what {
+            Hidden::Cause(cause) => cause.as_str(),
+            Hidden::Fault(fault) => fault.as_str(),
+        }
+    }
+
+    /// Whether it is a fault of the data.
+    #[must_use]
+    pub const fn is_fault(&self) -> bool {
+        matches!(self.what, Hidden::Fault(_))
+    }
+
+    const fn of_cause(cause: CauseName) -> Definition {
+        Definition {
+            what: Hidden::Cause(cause),
+            meaning: cause.meaning(),
+            parameters: cause.parameters(),
+            twins: cause.twins(),
+        }
+    }
+
+    const fn of_fault(fault: FaultName) -> Definition {
+        let (meaning, parameters) = fault_parameters(fault);
+        Definition { what: Hidden::Fault(fault), meaning, parameters, twins: &[] }
+    }
 }
 
-const fn phase(meaning: &'static str) -> Parameter {
-    number("phase_rad", meaning, -TAU, TAU, Usual::Drawn(0.0, TAU))
-}
-
-const fn microns(meaning: &'static str, usual: f64) -> Parameter {
-    number("amplitude_um", meaning, 0.0, 100.0, Usual::Value(usual))
-}
-
-const ARCSECONDS: Parameter = number("amplitude_arcsec", "the same at the output", 0.0, 1000.0, Usual::Follows);
-const HALF_LOAD: Parameter =
-    number("half_load_n_m", "load at which more teeth have halved it", 0.01, 1e6, Usual::OfLoad(0.35));
-const TIME: Parameter = number("time_s", "when", -1e9, 1e12, Usual::Instant(0.3, 0.7));
-/// Flank angle by which the radius of an oval opens its spaces, rad: where teeth of HHD-95 bear.
-const OVAL_FLANK_RAD: f64 = 0.4;
-const WHEELS: &[&str] = &["flexspline", "circular_spline"];
 const CHANNELS: &[&str] = &["generator", "output", "torque", "temperature"];
 
-/// Everything that can be asked for: the 24 causes of the library, then data faults.
+/// What a data fault is, and its parameters.
+const fn fault_parameters(fault: FaultName) -> (&'static str, &'static [Parameter]) {
+    use ParameterName as Name;
+    use Usual::Value;
+    match fault {
+        FaultName::EncoderIndexJump => (
+            "the count of the output encoder is off from an instant on",
+            const { &[number(Name::SizeArcsec, "of the jump", -1e5, 1e5, Value(60.0)), TIME] },
+        ),
+        FaultName::FrozenChannel => (
+            "a channel repeats one value",
+            const {
+                &[
+                    Parameter { words: CHANNELS, ..number(Name::Channel, "which one", 0.0, 3.0, Value(1.0)) },
+                    TIME,
+                    number(Name::DurationS, "how long", 0.0, 1e6, Value(3.0)),
+                ]
+            },
+        ),
+        FaultName::MissingSamples => {
+            ("rows without an output angle", const { &[number(Name::Share, "of the rows", 0.0, 0.5, Value(0.02))] })
+        }
+        FaultName::ClockError => {
+            ("time runs back", const { &[number(Name::StepS, "by which", 1e-4, 1e4, Value(0.5)), TIME] })
+        }
+        FaultName::Outliers => (
+            "single rows far off",
+            const {
+                &[
+                    number(Name::Share, "of the rows", 0.0, 0.1, Value(0.002)),
+                    number(Name::SizeArcsec, "of the largest", 0.0, 1e6, Value(600.0)),
+                ]
+            },
+        ),
+        FaultName::UnitMismatch => ("the output angle is in degrees and says radians", &[]),
+        FaultName::Quantisation => {
+            ("a coarse output encoder", const { &[number(Name::StepArcsec, "its step", 0.0, 1e5, Value(30.0))] })
+        }
+        FaultName::Drift => (
+            "a zero that moves with time",
+            const { &[number(Name::ArcsecPerHour, "how fast", -1e6, 1e6, Value(300.0))] },
+        ),
+    }
+}
+
+/// Data faults in the order of lists.
+const FAULTS: [FaultName; 8] = [
+    FaultName::EncoderIndexJump,
+    FaultName::FrozenChannel,
+    FaultName::MissingSamples,
+    FaultName::ClockError,
+    FaultName::Outliers,
+    FaultName::UnitMismatch,
+    FaultName::Quantisation,
+    FaultName::Drift,
+];
+
+/// Everything that can be asked for: the causes of the library, then data faults.
 #[must_use]
 pub fn effects() -> Vec<Definition> {
-    use Factor::{AlongNormal, AlongPitch, Oval, Ratio, Tooth};
-    use Usual::{Follows, OfLoad, ToothPitch, Value};
-    type Twins = &'static [(&'static str, &'static str, Factor)];
-    let cause = |name, meaning, parameters: &[Parameter], twins: Twins| Definition {
-        name,
-        meaning,
-        fault: false,
-        parameters: parameters.to_vec(),
-        twins: twins.to_vec(),
-    };
-    let fault = |name, meaning, parameters: &[Parameter]| Definition {
-        name,
-        meaning,
-        fault: true,
-        parameters: parameters.to_vec(),
-        twins: Vec::new(),
-    };
-    let displaced: Twins = &[("amplitude_um", "amplitude_arcsec", AlongNormal)];
-    let pitch: Twins = &[("amplitude_um", "amplitude_arcsec", AlongPitch)];
-    let harmonic = number("harmonic", "waves around the wheel", 1.0, 12.0, Value(2.0));
-    vec![
-        cause(
-            "circular_spline_eccentricity",
-            "toothing of the circular spline beside the axis it turns about",
-            &[microns("how far", 10.0), ARCSECONDS, phase("whereto, on the circular spline"), HALF_LOAD],
-            displaced,
-        ),
-        cause(
-            "flexspline_runout",
-            "toothing of the flexspline beside the axis of its bore",
-            &[microns("how far", 10.0), ARCSECONDS, phase("whereto, on the flexspline"), HALF_LOAD],
-            displaced,
-        ),
-        cause(
-            "circular_spline_ovality",
-            "circular spline pressed to an oval that keeps its length",
-            &[microns("of the radius", 8.0), ARCSECONDS, phase("angle of a crest of what both flanks have alike")],
-            &[("amplitude_um", "amplitude_arcsec", Oval)],
-        ),
-        cause(
-            "flexspline_pitch_error",
-            "cumulative pitch error of the flexspline",
-            &[microns("along the pitch", 5.0), ARCSECONDS, harmonic, phase("angle of a crest of the error")],
-            pitch,
-        ),
-        cause(
-            "circular_spline_pitch_error",
-            "cumulative pitch error of the circular spline",
-            &[microns("along the pitch", 5.0), ARCSECONDS, harmonic, phase("angle of a crest of the error")],
-            pitch,
-        ),
-        cause(
-            "generator_eccentricity",
-            "generator beside its axis: one lobe carries more",
-            &[microns("how far", 5.0), ARCSECONDS, phase("whereto, on the generator"), HALF_LOAD],
-            pitch,
-        ),
-        cause(
-            "cam_form_error",
-            "form error of the generator",
-            &[microns("of the error it makes", 3.0), ARCSECONDS, phase("of the form")],
-            pitch,
-        ),
-        cause(
-            "damaged_tooth",
-            "a tooth that lacks material",
-            &[
-                number("depth_um", "depth that lacks, along the normal", 0.0, 500.0, Value(10.0)),
-                number("amplitude_arcsec", "the same at the output, under the largest load", 0.0, 3000.0, Follows),
-                Parameter { words: WHEELS, ..number("wheel", "0 flexspline, 1 circular spline", 0.0, 1.0, Value(0.0)) },
-                number("tooth", "which one, from 0", 0.0, 2000.0, Value(40.0)),
-                number("angle_rad", "the same as an angle on the wheel", -TAU, TAU, Follows),
-                number("width_rad", "half the arc over which it is felt", 0.02, 0.6, Value(0.15)),
-            ],
-            &[("depth_um", "amplitude_arcsec", AlongNormal), ("tooth", "angle_rad", Tooth)],
-        ),
-        cause(
-            "backlash_growth",
-            "a wider clearance throughout",
-            &[number("growth_arcsec", "whole width over nominal", 0.0, 10_000.0, Value(40.0))],
-            &[],
-        ),
-        cause(
-            "wear",
-            "a clearance that widens with travel",
-            &[number("growth_arcsec", "whole width, first row to last", 0.0, 10_000.0, Value(40.0))],
-            &[],
-        ),
-        cause(
-            "stiffness_hardening",
-            "stiffer the higher the load",
-            &[
-                number(
-                    "hardening_arcsec",
-                    "by which the wind-up falls short at the full load",
-                    0.0,
-                    1000.0,
-                    Value(20.0),
-                ),
-                number("hardening_exponent", "of the torque", 1.2, 8.0, Value(3.0)),
-                number("full_load_n_m", "the torque at which it is stated", 1e-3, 1e6, OfLoad(1.0)),
-            ],
-            &[],
-        ),
-        cause(
-            "stiffness_error",
-            "another stiffness than nominal",
-            &[number("stiffness_ratio", "true over nominal", 0.05, 20.0, Value(0.8))],
-            &[],
-        ),
-        cause(
-            "torsional_hysteresis",
-            "springs that slip: the output lags the torque",
-            &[
-                number(
-                    "half_width_arcsec",
-                    "half the opening of the large loop at zero torque",
-                    0.0,
-                    1000.0,
-                    Value(15.0),
-                ),
-                number("slip_torque_n_m", "at which the middle spring slips", 1e-3, 1e6, OfLoad(0.2)),
-            ],
-            &[],
-        ),
-        cause(
-            "thermal_clearance",
-            "a clearance that follows the temperature",
-            &[
-                number("clearance_arcsec_per_k", "whole width, wider when warm", -50.0, 50.0, Value(-1.0)),
-                number("lag_s", "with which it follows", 0.0, 1e5, Value(0.0)),
-            ],
-            &[],
-        ),
-        cause(
-            "thermal_stiffness",
-            "a stiffness that follows the temperature",
-            &[number("stiffness_relative_per_k", "of the stiffness", -0.02, 0.02, Value(-0.004))],
-            &[],
-        ),
-        cause(
-            "lubricant_viscosity",
-            "drag of the lubricant on the output, that the torque column does not hold",
-            &[
-                number("drag_n_m", "at the mean speed and the nominal temperature", 0.0, 1e5, OfLoad(0.1)),
-                number("speed_exponent", "of the speed", 0.2, 1.2, Value(2.0 / 3.0)),
-                number("relative_drag_per_k", "of the drag", -0.15, 0.0, Value(-0.035)),
-            ],
-            &[],
-        ),
-        cause(
-            "gravity_torque",
-            "an unbalanced load that the torque column does not hold",
-            &[number("torque_n_m", "m g l", 0.0, 1e5, OfLoad(0.2)), phase("of sin(output + orientation + phase)")],
-            &[],
-        ),
-        cause(
-            "gravity_side_load",
-            "weight that pushes the circular spline aside",
-            &[microns("how far", 10.0), ARCSECONDS, phase("whereto, against gravity"), HALF_LOAD],
-            displaced,
-        ),
-        cause(
-            "torsional_resonance",
-            "the load's inertia on the drive's spring",
-            &[
-                number("frequency_hz", "of the free oscillation", 0.1, 1000.0, Value(8.0)),
-                number("damping_ratio", "of critical damping", 0.001, 0.9, Value(0.03)),
-            ],
-            &[],
-        ),
-        cause(
-            "output_encoder_eccentricity",
-            "disc of the output encoder off its axis",
-            &[number("amplitude_arcsec", "at the output", 0.0, 10_000.0, Value(20.0)), phase("of sin(output + phase)")],
-            &[],
-        ),
-        cause(
-            "generator_encoder_eccentricity",
-            "disc of the generator's encoder off its axis",
-            &[
-                number("amplitude_arcsec", "at the output", 0.0, 1000.0, Value(10.0)),
-                number("generator_amplitude_arcsec", "the same at the generator", 0.0, 1e5, Follows),
-                phase("of sin(generator + phase)"),
-            ],
-            &[("amplitude_arcsec", "generator_amplitude_arcsec", Ratio)],
-        ),
-        cause(
-            "sensor_latency",
-            "the output's reading is older than the generator's",
-            &[number("delay_s", "positive: the output's is older", -0.1, 0.1, Value(0.002))],
-            &[],
-        ),
-        cause(
-            "ratio_error",
-            "an error in proportion to the output angle",
-            &[number("ratio_relative_error", "of the output angle", -0.01, 0.01, Value(1e-4))],
-            &[],
-        ),
-        cause(
-            "ratcheting",
-            "teeth that skip",
-            &[number("jump_arcsec", "of the output, whole teeth", -1e5, 1e5, ToothPitch), TIME],
-            &[],
-        ),
-        fault(
-            "encoder_index_jump",
-            "the count of the output encoder is off from an instant on",
-            &[number("size_arcsec", "of the jump", -1e5, 1e5, Value(60.0)), TIME],
-        ),
-        fault(
-            "frozen_channel",
-            "a channel repeats one value",
-            &[
-                Parameter { words: CHANNELS, ..number("channel", "which one", 0.0, 3.0, Value(1.0)) },
-                TIME,
-                number("duration_s", "how long", 0.0, 1e6, Value(3.0)),
-            ],
-        ),
-        fault(
-            "missing_samples",
-            "rows without an output angle",
-            &[number("share", "of the rows", 0.0, 0.5, Value(0.02))],
-        ),
-        fault("clock_error", "time runs back", &[number("step_s", "by which", 1e-4, 1e4, Value(0.5)), TIME]),
-        fault(
-            "outliers",
-            "single rows far off",
-            &[
-                number("share", "of the rows", 0.0, 0.1, Value(0.002)),
-                number("size_arcsec", "of the largest", 0.0, 1e6, Value(600.0)),
-            ],
-        ),
-        fault("unit_mismatch", "the output angle is in degrees and says radians", &[]),
-        fault("quantisation", "a coarse output encoder", &[number("step_arcsec", "its step", 0.0, 1e5, Value(30.0))]),
-        fault(
-            "drift",
-            "a zero that moves with time",
-            &[number("arcsec_per_hour", "how fast", -1e6, 1e6, Value(300.0))],
-        ),
-    ]
+    let causes = CauseName::ALL.iter().map(|cause| Definition::of_cause(*cause));
+    causes.chain(FAULTS.map(Definition::of_fault)).collect()
 }
 
 /// An effect with the values of its parameters: those given, and once completed all.
@@ -369,7 +161,7 @@ impl Serialize for Chosen {
             }
         }
         let mut map = serializer.serialize_map(Some(2))?;
-        map.serialize_entry("name", self.definition.name)?;
+        map.serialize_entry("name", self.definition.name())?;
         map.serialize_entry("parameters", &Values(self))?;
         map.end()
     }
@@ -382,22 +174,22 @@ impl Serialize for Chosen {
 pub fn parse(text: &str) -> Result<Chosen, String> {
     let (name, rest) = text.split_once(':').unwrap_or((text, ""));
     let all = effects();
-    let Some(definition) = all.iter().find(|effect| effect.name == name) else {
-        let names: Vec<&str> = all.iter().map(|effect| effect.name).collect();
+    let Some(definition) = all.iter().find(|effect| effect.name() == name) else {
+        let names: Vec<&str> = all.iter().map(Definition::name).collect();
         return Err(format!(
             "found \"{name}\"{}; allowed: {}",
             did_you_mean("; ", name, names.iter().copied()),
             names.join(", ")
         ));
     };
-    let mut chosen = Chosen { definition: definition.clone(), values: vec![None; definition.parameters.len()] };
+    let mut chosen = Chosen { definition: *definition, values: vec![None; definition.parameters.len()] };
     for part in rest.split(',').filter(|part| !part.trim().is_empty()) {
         let (key, value) =
             part.split_once('=').ok_or_else(|| format!("{name}: found \"{part}\"; allowed: parameter=value"))?;
         chosen.set(key.trim(), value.trim())?;
     }
-    for (a, b, _) in &definition.twins {
-        if chosen.given(a).is_some() && chosen.given(b).is_some() {
+    for (a, b, _) in definition.twins {
+        if chosen.given(*a).is_some() && chosen.given(*b).is_some() {
             return Err(format!("{name}: {a} and {b} say the same; give one of them"));
         }
     }
@@ -406,9 +198,9 @@ pub fn parse(text: &str) -> Result<Chosen, String> {
 
 impl Chosen {
     fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
-        let name = self.definition.name;
-        let Some(place) = self.definition.parameters.iter().position(|parameter| parameter.name == key) else {
-            let names: Vec<&str> = self.definition.parameters.iter().map(|parameter| parameter.name).collect();
+        let name = self.definition.name();
+        let Some(place) = self.definition.parameters.iter().position(|parameter| parameter.name.as_str() == key) else {
+            let names: Vec<&str> = self.definition.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
             let allowed = if names.is_empty() { "no parameter".to_owned() } else { names.join(", ") };
             let hint = did_you_mean("; ", key, names);
             return Err(format!("{name}: found parameter \"{key}\"{hint}; allowed: {allowed}"));
@@ -420,7 +212,8 @@ impl Chosen {
         let word = parameter.words.iter().position(|word| *word == text).map(|k| k as f64);
         let value = word.or_else(|| text.parse().ok());
         let [low, high] = parameter.range;
-        let whole = !parameter.words.is_empty() || ["harmonic", "tooth"].contains(&parameter.name);
+        let whole =
+            !parameter.words.is_empty() || [ParameterName::Harmonic, ParameterName::Tooth].contains(&parameter.name);
         match value {
             Some(value) if value >= low && value <= high && (!whole || value.fract() == 0.0) => {
                 self.values[place] = Some(value);
@@ -432,22 +225,23 @@ impl Chosen {
 
     /// The value of a parameter, if it has one.
     #[must_use]
-    pub fn given(&self, name: &str) -> Option<f64> {
+    pub fn given(&self, name: ParameterName) -> Option<f64> {
         let place = self.definition.parameters.iter().position(|parameter| parameter.name == name)?;
         self.values[place]
     }
 
     /// The value of a parameter of a completed effect.
-    pub(super) fn value(&self, name: &str) -> f64 {
+    pub(super) fn value(&self, name: ParameterName) -> f64 {
         self.given(name).expect("a completed effect has all its parameters")
     }
 
     /// The effect with every parameter.
     pub(super) fn completed(&self, setting: &Setting<'_>, random: &mut fastrand::Rng) -> Result<Chosen, String> {
         let mut complete = self.clone();
-        let definition = &self.definition;
-        let place =
-            |name: &str| definition.parameters.iter().position(|p| p.name == name).expect("twins are parameters");
+        let definition = self.definition;
+        let place = |name: ParameterName| {
+            definition.parameters.iter().position(|p| p.name == name).expect("twins are parameters")
+        };
         for (k, parameter) in definition.parameters.iter().enumerate() {
             let drawn = random.f64();
             if complete.values[k].is_some() {
@@ -455,7 +249,7 @@ impl Chosen {
             }
             // Which of two forms was given decides; the other follows below.
             let is_first_of_given =
-                definition.twins.iter().any(|(a, b, _)| *a == parameter.name && self.given(b).is_some());
+                definition.twins.iter().any(|(a, b, _)| *a == parameter.name && self.given(*b).is_some());
             if is_first_of_given {
                 continue;
             }
@@ -468,113 +262,29 @@ impl Chosen {
                 Usual::Follows => None,
             };
         }
-        for (a, b, factor) in &definition.twins {
+        for (a, b, factor) in definition.twins {
             let factor = setting.factor(*factor, &complete)?;
-            let (a, b) = (place(a), place(b));
+            let (a, b) = (place(*a), place(*b));
             match (complete.values[a], complete.values[b]) {
                 (Some(first), None) => complete.values[b] = Some(first * factor),
                 (None, Some(second)) => complete.values[a] = Some(second / factor),
                 _ => {}
             }
         }
-        if let Some(time) = complete.given("time_s") {
+        if let Some(time) = complete.given(ParameterName::TimeS) {
             let (first, last) = setting.span();
             if !(time > first && time < last) {
-                let name = definition.name;
+                let name = definition.name();
                 return Err(format!("{name}: time_s: found {time}, allowed: within the data, {first:.2} to {last:.2}"));
             }
         }
-        if let (Some(tooth), Some(wheel)) = (self.given("tooth"), complete.given("wheel")) {
+        if let (Some(tooth), Some(wheel)) = (self.given(ParameterName::Tooth), complete.given(ParameterName::Wheel)) {
             let teeth = setting.teeth(wheel)?;
             if tooth >= teeth {
                 return Err(format!("damaged_tooth: tooth: found {tooth}, allowed: 0 to {}", teeth - 1.0));
             }
         }
         Ok(complete)
-    }
-
-    /// The law of a completed effect; a fault of the data has none.
-    pub(super) fn law(&self, setting: &Setting<'_>) -> Option<Law> {
-        let v = |name: &str| self.value(name);
-        let phase = || self.value("phase_rad");
-        let displaced = |angle| Law::Displaced {
-            angle,
-            amplitude: v("amplitude_arcsec"),
-            direction_rad: phase(),
-            half_load_n_m: v("half_load_n_m"),
-        };
-        let pitch =
-            |angle| Law::Pitch { angle, lines: vec![(v("harmonic"), v("amplitude_arcsec"), -v("harmonic") * phase())] };
-        Some(match self.definition.name {
-            "circular_spline_eccentricity" => displaced(Angle::CircularSpline),
-            "flexspline_runout" => displaced(Angle::Flexspline),
-            "gravity_side_load" => displaced(Angle::Gravity),
-            "circular_spline_ovality" => Law::Oval {
-                amplitude: v("amplitude_arcsec"),
-                phase_rad: -2.0 * phase(),
-                radial: 2.0 * OVAL_FLANK_RAD.tan(),
-            },
-            "flexspline_pitch_error" => pitch(Angle::Flexspline),
-            "circular_spline_pitch_error" => pitch(Angle::CircularSpline),
-            "generator_eccentricity" => {
-                Law::Lobes { amplitude: v("amplitude_arcsec"), phase_rad: -phase(), half_load_n_m: v("half_load_n_m") }
-            }
-            "cam_form_error" => Law::CamForm { amplitude: v("amplitude_arcsec"), phase_rad: phase() },
-            "damaged_tooth" => Law::Damage {
-                angle: if v("wheel") == 0.0 { Angle::Flexspline } else { Angle::CircularSpline },
-                amplitude: v("amplitude_arcsec"),
-                place_rad: v("angle_rad"),
-                half_width_rad: v("width_rad"),
-                both_flanks: false,
-            },
-            "backlash_growth" => Law::Wider { growth: v("growth_arcsec") },
-            "wear" => Law::Wear { growth: v("growth_arcsec") },
-            "stiffness_hardening" => Law::Hardening {
-                at_full_load: v("hardening_arcsec"),
-                exponent: v("hardening_exponent"),
-                full_load_n_m: v("full_load_n_m"),
-            },
-            "stiffness_error" => Law::Softer { relative: 1.0 / v("stiffness_ratio") - 1.0 },
-            "torsional_hysteresis" => Law::Slip {
-                half_width: v("half_width_arcsec"),
-                // Four springs slip at 0.4, 0.9, 1.4 and 1.9 of this.
-                slip_n_m: v("slip_torque_n_m") / 1.15,
-            },
-            "thermal_clearance" => Law::Breathing { per_k: v("clearance_arcsec_per_k"), lag_s: v("lag_s") },
-            "thermal_stiffness" => Law::SofterWarm { relative_per_k: -v("stiffness_relative_per_k") },
-            "lubricant_viscosity" => Law::Drag {
-                drag_n_m: v("drag_n_m"),
-                speed_rad_s: setting.mean_speed_rad_s(),
-                speed_exponent: v("speed_exponent"),
-                per_k: -v("relative_drag_per_k"),
-            },
-            "gravity_torque" => Law::Unbalance { torque_n_m: v("torque_n_m"), phase_rad: phase() },
-            "torsional_resonance" => {
-                Law::Resonance { frequency_hz: v("frequency_hz"), damping_ratio: v("damping_ratio") }
-            }
-            "output_encoder_eccentricity" => {
-                Law::Disc { encoder: Encoder::Output, amplitude: v("amplitude_arcsec"), phase_rad: phase() }
-            }
-            "generator_encoder_eccentricity" => {
-                Law::Disc { encoder: Encoder::Generator, amplitude: v("amplitude_arcsec"), phase_rad: phase() }
-            }
-            "sensor_latency" => Law::Latency { delay_s: v("delay_s") },
-            "ratio_error" => Law::Ratio { relative: v("ratio_relative_error") },
-            "ratcheting" => {
-                Law::Jump { row: setting.on.time.partition_point(|t| *t < v("time_s")), by: v("jump_arcsec") }
-            }
-            _ => return None,
-        })
-    }
-}
-
-impl Parameter {
-    /// Allowed values, in words.
-    #[must_use]
-    pub fn allowed(&self) -> String {
-        let [low, high] = self.range;
-        let words = self.words.join(", ");
-        if words.is_empty() { format!("{low} to {high}") } else { format!("{words} (or {low} to {high})") }
     }
 }
 
@@ -599,7 +309,7 @@ impl Setting<'_> {
         time.get((share * time.len() as f64) as usize).copied().unwrap_or(0.0)
     }
 
-    fn mean_speed_rad_s(&self) -> f64 {
+    pub fn mean_speed_rad_s(&self) -> f64 {
         let speeds = self.on.speeds();
         (speeds.iter().map(|w| w.abs()).sum::<f64>() / speeds.len().max(1) as f64).max(1e-9)
     }
@@ -621,7 +331,7 @@ impl Setting<'_> {
             Factor::AlongPitch => along(self.sizes.pitch_radius_mm),
             // Half of it moves the teeth along the ring, and its radius opens them by the tangent of the flank angle.
             Factor::Oval => 0.5f64.hypot(OVAL_FLANK_RAD.tan()) * along(self.sizes.pitch_radius_mm),
-            Factor::Tooth => TAU / self.teeth(effect.given("wheel").unwrap_or(0.0))?,
+            Factor::Tooth => TAU / self.teeth(effect.given(ParameterName::Wheel).unwrap_or(0.0))?,
             Factor::Ratio => self.nominal.ratio.abs(),
         })
     }
@@ -629,24 +339,12 @@ impl Setting<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::CAUSES;
     use super::*;
 
     #[test]
-    fn every_cause_of_the_library_can_be_asked_for() {
-        let all = effects();
-        let mut causes: Vec<&str> = all.iter().filter(|effect| !effect.fault).map(|effect| effect.name).collect();
-        let mut known = CAUSES.to_vec();
-        causes.sort_unstable();
-        known.sort_unstable();
-        assert_eq!(causes, known);
-        for effect in &all {
-            for parameter in &effect.parameters {
-                let [low, high] = parameter.range;
-                if let Usual::Value(value) = parameter.usual {
-                    assert!((low..=high).contains(&value), "{} {}", effect.name, parameter.name);
-                }
-            }
+    fn every_cause_and_every_fault_can_be_asked_for_by_its_name() {
+        for effect in effects() {
+            assert_eq!(parse(effect.name()).unwrap().definition, effect);
         }
     }
 
@@ -675,6 +373,6 @@ mod tests {
             let error = parse(text).unwrap_err();
             assert!(error.contains(message), "{text}: {error}");
         }
-        assert_eq!(parse("damaged_tooth:wheel=circular_spline").unwrap().given("wheel"), Some(1.0));
+        assert_eq!(parse("damaged_tooth:wheel=circular_spline").unwrap().given(ParameterName::Wheel), Some(1.0));
     }
 }

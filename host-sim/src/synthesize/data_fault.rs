@@ -2,8 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::catalogue::Chosen;
-use crate::measurement::Session;
+use super::catalogue::{Chosen, Hidden};
+use crate::causes::ParameterName;
+use crate::measurement::{FaultName, Session};
 use crate::units::ARCSEC_PER_RAD;
 
 /// Columns of a row.
@@ -30,8 +31,10 @@ pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Chosen], random: &mut
             ]
         }));
     }
-    for effect in effects.iter().filter(|effect| effect.definition.fault) {
-        spoil(&mut rows, effect, random);
+    for effect in effects {
+        if let Hidden::Fault(fault) = effect.definition.what {
+            spoil(&mut rows, fault, effect, random);
+        }
     }
     let mut text = String::with_capacity(80 * rows.len());
     text.push_str(HEADER);
@@ -51,48 +54,48 @@ pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Chosen], random: &mut
     text
 }
 
-fn spoil(rows: &mut [[f64; 6]], effect: &Chosen, random: &mut fastrand::Rng) {
-    let v = |name: &str| effect.value(name);
+fn spoil(rows: &mut [[f64; 6]], fault: FaultName, effect: &Chosen, random: &mut fastrand::Rng) {
+    use ParameterName as Name;
+    let v = |name: Name| effect.value(name);
     let first = rows.first().map_or(0.0, |row| row[TIME]);
-    match effect.definition.name {
-        "encoder_index_jump" => {
-            let (time, size) = (v("time_s"), v("size_arcsec") / ARCSEC_PER_RAD);
+    match fault {
+        FaultName::EncoderIndexJump => {
+            let (time, size) = (v(Name::TimeS), v(Name::SizeArcsec) / ARCSEC_PER_RAD);
             rows.iter_mut().filter(|row| row[TIME] >= time).for_each(|row| row[OUTPUT] += size);
         }
-        "frozen_channel" => {
-            let (from, until) = (v("time_s"), v("time_s") + v("duration_s"));
-            let channel = 1 + v("channel") as usize;
+        FaultName::FrozenChannel => {
+            let (from, until) = (v(Name::TimeS), v(Name::TimeS) + v(Name::DurationS));
+            let channel = 1 + v(Name::Channel) as usize;
             let mut held = None;
             for row in rows.iter_mut().filter(|row| (from..until).contains(&row[TIME])) {
                 row[channel] = *held.get_or_insert(row[channel]);
             }
         }
-        "missing_samples" => {
-            let share = v("share");
+        FaultName::MissingSamples => {
+            let share = v(Name::Share);
             rows.iter_mut().filter(|_| random.f64() < share).for_each(|row| row[OUTPUT] = f64::NAN);
         }
-        "clock_error" => {
-            let (time, step) = (v("time_s"), v("step_s"));
+        FaultName::ClockError => {
+            let (time, step) = (v(Name::TimeS), v(Name::StepS));
             rows.iter_mut().filter(|row| row[TIME] >= time).for_each(|row| row[TIME] -= step);
         }
-        "outliers" => {
-            let (share, size) = (v("share"), v("size_arcsec") / ARCSEC_PER_RAD);
+        FaultName::Outliers => {
+            let (share, size) = (v(Name::Share), v(Name::SizeArcsec) / ARCSEC_PER_RAD);
             for row in rows.iter_mut() {
                 if random.f64() < share {
                     row[OUTPUT] += size * (0.5 + 0.5 * random.f64()) * if random.bool() { 1.0 } else { -1.0 };
                 }
             }
         }
-        "unit_mismatch" => rows.iter_mut().for_each(|row| row[OUTPUT] = row[OUTPUT].to_degrees()),
-        "quantisation" => {
-            let step = (v("step_arcsec") / ARCSEC_PER_RAD).max(1e-12);
+        FaultName::UnitMismatch => rows.iter_mut().for_each(|row| row[OUTPUT] = row[OUTPUT].to_degrees()),
+        FaultName::Quantisation => {
+            let step = (v(Name::StepArcsec) / ARCSEC_PER_RAD).max(1e-12);
             rows.iter_mut().for_each(|row| row[OUTPUT] = (row[OUTPUT] / step).round() * step);
         }
-        "drift" => {
-            let rate = v("arcsec_per_hour") / 3600.0 / ARCSEC_PER_RAD;
+        FaultName::Drift => {
+            let rate = v(Name::ArcsecPerHour) / 3600.0 / ARCSEC_PER_RAD;
             rows.iter_mut().for_each(|row| row[OUTPUT] += rate * (row[TIME] - first));
         }
-        other => unreachable!("{other} is no fault of the data"),
     }
 }
 
@@ -100,7 +103,7 @@ fn spoil(rows: &mut [[f64; 6]], effect: &Chosen, random: &mut fastrand::Rng) {
 mod tests {
     use super::super::{Excitation, Plan, Plant, Richness, Sensors, Sizes, Unit, catalogue_drive, parse, synthesize};
     use super::*;
-    use crate::measurement::{ColumnMap, FaultName, Gear, parse as read};
+    use crate::measurement::{ColumnMap, Gear, parse as read};
 
     fn recording(effect: &str) -> crate::measurement::Recording {
         let nominal = catalogue_drive();

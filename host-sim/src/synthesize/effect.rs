@@ -1,56 +1,77 @@
-//! Effects drawn at random, for tests of the diagnosis.
+//! Effects of a chosen size hidden in sessions, in two forms of each law: for the tests of the diagnosis.
 
 use std::f64::consts::{PI, TAU};
 
-use super::law::{Angle, Encoder, Law, SECOND_OF_RECTIFIED, largest};
-use super::plant::Plant;
+use super::law::{Angle, Encoder, Law, Now, SECOND_OF_RECTIFIED, largest};
+use super::plant::{Plant, Unit};
+use super::{Plan, Sensors, add_noise, into_sessions};
+use crate::causes::CauseName;
+use crate::measurement::Session;
+use crate::nominal::Nominal;
 use crate::units::ARCSEC_PER_TURN;
 
-/// Causes of the library that can be hidden.
-pub const CAUSES: [&str; 24] = [
-    "circular_spline_eccentricity",
-    "flexspline_runout",
-    "circular_spline_ovality",
-    "flexspline_pitch_error",
-    "circular_spline_pitch_error",
-    "generator_eccentricity",
-    "cam_form_error",
-    "damaged_tooth",
-    "backlash_growth",
-    "wear",
-    "stiffness_hardening",
-    "stiffness_error",
-    "torsional_hysteresis",
-    "thermal_clearance",
-    "thermal_stiffness",
-    "lubricant_viscosity",
-    "gravity_torque",
-    "gravity_side_load",
-    "torsional_resonance",
-    "output_encoder_eccentricity",
-    "generator_encoder_eccentricity",
-    "sensor_latency",
-    "ratio_error",
-    "ratcheting",
-];
+/// Resolution of the output encoder, arcsec.
+const STEP_ARCSEC: f64 = 0.3;
 
 /// Effects that are in no library.
-pub const STRANGE: [&str; 8] = [
-    "sensor_offset_with_temperature",
-    "line_of_order_7",
-    "line_of_order_10.37",
-    "line_in_time",
-    "creep",
-    "oldham_lash",
-    "torque_cross_talk",
-    "settling",
-];
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Strange {
+    /// The zero of the output encoder follows the temperature.
+    SensorOffsetWithTemperature,
+    /// A line at an order that no part of the drive makes.
+    LineOfOrder10_37,
+    /// The error creeps with the logarithm of time.
+    Creep,
+    /// The encoder feels the square of the torque.
+    TorqueCrossTalk,
+}
+
+impl Strange {
+    /// Adds it to the error, arcsec.
+    pub(super) fn add_error(self, now: &Now<'_>, [size, phase]: [f64; 2], error: &mut [f64]) {
+        let on = now.on;
+        let since = |k: usize| {
+            let session = on.sessions.iter().find(|s| s.contains(&k)).expect("every row has a session");
+            on.time[k] - on.time[session.start]
+        };
+        let top = largest(now.torque);
+        for (k, error) in error.iter_mut().enumerate() {
+            *error += match self {
+                Strange::SensorOffsetWithTemperature => size / 25.0 * (on.temperature[k] - 20.0),
+                Strange::LineOfOrder10_37 => size * (10.37 * on.generator[k] + phase).sin(),
+                Strange::Creep => size * (1.0 + since(k)).ln() / 2.0,
+                Strange::TorqueCrossTalk => size * (now.torque[k] / top).powi(2),
+            };
+        }
+    }
+}
+
+/// What is hidden.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum What {
+    /// A cause of the library.
+    Cause(CauseName),
+    /// Something else.
+    Strange(Strange),
+}
+
+impl From<CauseName> for What {
+    fn from(cause: CauseName) -> What {
+        What::Cause(cause)
+    }
+}
+
+impl From<Strange> for What {
+    fn from(strange: Strange) -> What {
+        What::Strange(strange)
+    }
+}
 
 /// An effect with its size and phase.
 #[derive(Clone, Debug)]
 pub struct Effect {
-    /// Name.
-    pub name: String,
+    /// What it is.
+    pub what: What,
     /// Amplitude at the output, arcsec; for the rest what the name says.
     pub size: f64,
     /// Phase, rad, or a second number between 0 and 2π.
@@ -60,26 +81,6 @@ pub struct Effect {
 }
 
 impl Effect {
-    /// Draws an effect of a visible size.
-    #[must_use]
-    pub fn draw(name: &str, random: &mut fastrand::Rng) -> Effect {
-        let mut between = |low: f64, high: f64| low * (high / low).powf(random.f64());
-        let size = match name {
-            "thermal_clearance" => between(0.5, 2.0),
-            "thermal_stiffness" => between(0.002, 0.008),
-            "stiffness_error" => between(0.15, 0.4),
-            "backlash_growth" => between(0.25, 1.2),
-            "gravity_torque" => between(3.0, 25.0),
-            "torsional_resonance" => between(3.0, 25.0),
-            "sensor_latency" => between(0.6, 8.0),
-            "ratio_error" => between(3.0, 100.0),
-            "ratcheting" => 1.0,
-            "wear" | "damaged_tooth" => between(15.0, 60.0),
-            _ => between(5.0, 40.0),
-        };
-        Effect { name: name.to_owned(), size, phase: TAU * random.f64(), other: random.f64() }
-    }
-
     /// The law with its numbers, under a torque on the flanks that is known but for this effect.
     pub(super) fn law(&self, plant: &Plant<'_>, torque: &[f64], changed: bool, random: &mut fastrand::Rng) -> Law {
         let (size, phase, other) = (self.size, self.phase, self.other);
@@ -91,12 +92,16 @@ impl Effect {
             direction_rad: phase,
             half_load_n_m,
         };
-        match self.name.as_str() {
-            "circular_spline_eccentricity" => displaced(Angle::CircularSpline),
-            "flexspline_runout" => displaced(Angle::Flexspline),
-            "gravity_side_load" => displaced(Angle::Gravity),
-            "circular_spline_ovality" => Law::Oval { amplitude: size, phase_rad: phase, radial: 0.0 },
-            "flexspline_pitch_error" | "circular_spline_pitch_error" => {
+        let cause = match self.what {
+            What::Cause(cause) => cause,
+            What::Strange(name) => return Law::Strange { name, size, phase },
+        };
+        match cause {
+            CauseName::CircularSplineEccentricity => displaced(Angle::CircularSpline),
+            CauseName::FlexsplineRunout => displaced(Angle::Flexspline),
+            CauseName::GravitySideLoad => displaced(Angle::Gravity),
+            CauseName::CircularSplineOvality => Law::Oval { amplitude: size, phase_rad: phase, radial: 0.0 },
+            CauseName::FlexsplinePitchError | CauseName::CircularSplinePitchError => {
                 let lines = [2.0, 1.0, 3.0, 4.0]
                     .into_iter()
                     .enumerate()
@@ -105,42 +110,72 @@ impl Effect {
                         (o, size * a, TAU * random.f64())
                     })
                     .collect();
-                let angle = if self.name.starts_with("flex") { Angle::Flexspline } else { Angle::CircularSpline };
+                let angle =
+                    if cause == CauseName::FlexsplinePitchError { Angle::Flexspline } else { Angle::CircularSpline };
                 Law::Pitch { angle, lines }
             }
-            "generator_eccentricity" => Law::Lobes { amplitude: size, phase_rad: phase, half_load_n_m },
-            "cam_form_error" => Law::CamForm { amplitude: size, phase_rad: phase },
-            "damaged_tooth" => Law::Damage {
+            CauseName::GeneratorEccentricity => Law::Lobes { amplitude: size, phase_rad: phase, half_load_n_m },
+            CauseName::CamFormError => Law::CamForm { amplitude: size, phase_rad: phase },
+            CauseName::DamagedTooth => Law::Damage {
                 angle: if phase > PI { Angle::Flexspline } else { Angle::CircularSpline },
                 amplitude: size,
                 place_rad: phase,
                 half_width_rad: 0.06 + 0.2 * other,
                 both_flanks: other > 0.7,
             },
-            "wear" => Law::Wear { growth: size },
-            "backlash_growth" => Law::Wider { growth: size * plant.nominal.backlash_arcsec },
-            "thermal_clearance" => Law::Breathing { per_k: -size, lag_s: if changed { 20.0 } else { 0.01 } },
-            "gravity_torque" => Law::Unbalance { torque_n_m: size, phase_rad: phase },
-            "stiffness_hardening" => Law::Hardening { at_full_load: size, exponent: 3.0, full_load_n_m: top },
-            "stiffness_error" => Law::Softer { relative: size },
-            "thermal_stiffness" => Law::SofterWarm { relative_per_k: size },
-            "torsional_hysteresis" => Law::Slip { half_width: size, slip_n_m: top * (0.08 + 0.3 * other) },
-            "lubricant_viscosity" => Law::DragLag { largest: 0.5 * size },
-            "torsional_resonance" => {
+            CauseName::Wear => Law::Wear { growth: size },
+            CauseName::BacklashGrowth => Law::Wider { growth: size * plant.nominal.backlash_arcsec },
+            CauseName::ThermalClearance => Law::Breathing { per_k: -size, lag_s: if changed { 20.0 } else { 0.01 } },
+            CauseName::GravityTorque => Law::Unbalance { torque_n_m: size, phase_rad: phase },
+            CauseName::StiffnessHardening => Law::Hardening { at_full_load: size, exponent: 3.0, full_load_n_m: top },
+            CauseName::StiffnessError => Law::Softer { relative: size },
+            CauseName::ThermalStiffness => Law::SofterWarm { relative_per_k: size },
+            CauseName::TorsionalHysteresis => Law::Slip { half_width: size, slip_n_m: top * (0.08 + 0.3 * other) },
+            CauseName::LubricantViscosity => Law::DragLag { largest: 0.5 * size },
+            CauseName::TorsionalResonance => {
                 Law::Resonance { frequency_hz: size, damping_ratio: if changed { 0.15 } else { 0.02 + 0.06 * other } }
             }
-            "output_encoder_eccentricity" => Law::Disc { encoder: Encoder::Output, amplitude: size, phase_rad: phase },
-            "generator_encoder_eccentricity" => {
+            CauseName::OutputEncoderEccentricity => {
+                Law::Disc { encoder: Encoder::Output, amplitude: size, phase_rad: phase }
+            }
+            CauseName::GeneratorEncoderEccentricity => {
                 Law::Disc { encoder: Encoder::Generator, amplitude: 0.4 * size, phase_rad: phase }
             }
-            "sensor_latency" => Law::Latency { delay_s: size * 1e-3 },
-            "ratio_error" => Law::Ratio { relative: 3e-6 * size },
-            "ratcheting" => Law::Jump {
+            CauseName::SensorLatency => Law::Latency { delay_s: size * 1e-3 },
+            CauseName::RatioError => Law::Ratio { relative: 3e-6 * size },
+            CauseName::Ratcheting => Law::Jump {
                 row: (torque.len() as f64 * (0.2 + 0.6 * other)) as usize,
                 by: -ARCSEC_PER_TURN / f64::from(plant.nominal.teeth_or_of_two_waves().of_output())
                     * if phase > 4.0 { 2.0 } else { 1.0 },
             },
-            name => Law::Strange { name: name.to_owned(), size, phase, other },
         }
     }
+}
+
+/// Sessions of a drive with `effects`; `law` 0 or 1 picks the form of each law.
+#[must_use]
+pub fn measure(
+    nominal: &Nominal,
+    effects: &[Effect],
+    plan: &Plan,
+    sensors: &Sensors,
+    law: u8,
+    random: &mut fastrand::Rng,
+) -> Vec<Session> {
+    let changed = law == 1;
+    let plant = Plant { nominal, table: None };
+    let on = plan.excite(random);
+    let unit = Unit::draw(nominal, random);
+    let unbalanced: Vec<Law> = effects
+        .iter()
+        .filter(|effect| effect.what == What::Cause(CauseName::GravityTorque))
+        .map(|effect| effect.law(&plant, &on.torque, changed, random))
+        .collect();
+    let torque = plant.flank_torque(&on, &unbalanced);
+    let laws: Vec<Law> = effects.iter().map(|effect| effect.law(&plant, &torque, changed, random)).collect();
+    let mut error = plant.error(&on, &torque, &laws, &unit, (changed, changed));
+    plant.add_laws(&on, &torque, &laws, changed, &mut error);
+    add_noise(&on, sensors, &mut error, random);
+    error.iter_mut().for_each(|e| *e = (*e / STEP_ARCSEC).round() * STEP_ARCSEC);
+    into_sessions(&on, &error)
 }

@@ -2,8 +2,12 @@
 
 use std::f64::consts::{PI, TAU};
 
+use super::catalogue::{Chosen, Setting};
+#[cfg(test)]
+use super::effect::Strange;
 use super::excitation::Excitation;
 use super::plant::Plant;
+use crate::causes::{CauseName, ParameterName};
 use crate::nominal::Nominal;
 use crate::units::ARCSEC_PER_RAD;
 
@@ -67,6 +71,7 @@ pub(super) enum Law {
     /// Springs that slip one after the other.
     Slip { half_width: f64, slip_n_m: f64 },
     /// Drag that is seen as a lag.
+    #[cfg(test)]
     DragLag { largest: f64 },
     /// Drag as a load: at `speed_rad_s` of the generator and the nominal temperature.
     Drag { drag_n_m: f64, speed_rad_s: f64, speed_exponent: f64, per_k: f64 },
@@ -82,8 +87,9 @@ pub(super) enum Law {
     Ratio { relative: f64 },
     /// From a row on the output is elsewhere.
     Jump { row: usize, by: f64 },
-    /// No cause of the library: named by [`super::STRANGE`].
-    Strange { name: String, size: f64, phase: f64, other: f64 },
+    /// No cause of the library.
+    #[cfg(test)]
+    Strange { name: Strange, size: f64, phase: f64 },
 }
 
 /// When a law acts: loads wind the drive up, the load's inertia follows all that the drive does, sensors read what comes of it.
@@ -142,7 +148,88 @@ pub(super) fn largest(torque: &[f64]) -> f64 {
     torque.iter().fold(1e-9, |m: f64, t| m.max(t.abs()))
 }
 
+/// Flank angle by which the radius of an oval opens its spaces, rad: where teeth of HHD-95 bear.
+pub(super) const OVAL_FLANK_RAD: f64 = 0.4;
+
 impl Law {
+    /// The law of a cause, with the parameters of a completed effect.
+    pub fn of(cause: CauseName, effect: &Chosen, setting: &Setting<'_>) -> Law {
+        use ParameterName as Name;
+        let v = |name: Name| effect.value(name);
+        let phase = || v(Name::PhaseRad);
+        let displaced = |angle| Law::Displaced {
+            angle,
+            amplitude: v(Name::AmplitudeArcsec),
+            direction_rad: phase(),
+            half_load_n_m: v(Name::HalfLoadNM),
+        };
+        let pitch = |angle| Law::Pitch {
+            angle,
+            lines: vec![(v(Name::Harmonic), v(Name::AmplitudeArcsec), -v(Name::Harmonic) * phase())],
+        };
+        match cause {
+            CauseName::CircularSplineEccentricity => displaced(Angle::CircularSpline),
+            CauseName::FlexsplineRunout => displaced(Angle::Flexspline),
+            CauseName::GravitySideLoad => displaced(Angle::Gravity),
+            CauseName::CircularSplineOvality => Law::Oval {
+                amplitude: v(Name::AmplitudeArcsec),
+                phase_rad: -2.0 * phase(),
+                radial: 2.0 * OVAL_FLANK_RAD.tan(),
+            },
+            CauseName::FlexsplinePitchError => pitch(Angle::Flexspline),
+            CauseName::CircularSplinePitchError => pitch(Angle::CircularSpline),
+            CauseName::GeneratorEccentricity => Law::Lobes {
+                amplitude: v(Name::AmplitudeArcsec),
+                phase_rad: -phase(),
+                half_load_n_m: v(Name::HalfLoadNM),
+            },
+            CauseName::CamFormError => Law::CamForm { amplitude: v(Name::AmplitudeArcsec), phase_rad: phase() },
+            CauseName::DamagedTooth => Law::Damage {
+                angle: if v(Name::Wheel) == 0.0 { Angle::Flexspline } else { Angle::CircularSpline },
+                amplitude: v(Name::AmplitudeArcsec),
+                place_rad: v(Name::AngleRad),
+                half_width_rad: v(Name::WidthRad),
+                both_flanks: false,
+            },
+            CauseName::BacklashGrowth => Law::Wider { growth: v(Name::GrowthArcsec) },
+            CauseName::Wear => Law::Wear { growth: v(Name::GrowthArcsec) },
+            CauseName::StiffnessHardening => Law::Hardening {
+                at_full_load: v(Name::HardeningArcsec),
+                exponent: v(Name::HardeningExponent),
+                full_load_n_m: v(Name::FullLoadNM),
+            },
+            CauseName::StiffnessError => Law::Softer { relative: 1.0 / v(Name::StiffnessRatio) - 1.0 },
+            CauseName::TorsionalHysteresis => Law::Slip {
+                half_width: v(Name::HalfWidthArcsec),
+                // Four springs slip at 0.4, 0.9, 1.4 and 1.9 of this.
+                slip_n_m: v(Name::SlipTorqueNM) / 1.15,
+            },
+            CauseName::ThermalClearance => Law::Breathing { per_k: v(Name::ClearanceArcsecPerK), lag_s: v(Name::LagS) },
+            CauseName::ThermalStiffness => Law::SofterWarm { relative_per_k: -v(Name::StiffnessRelativePerK) },
+            CauseName::LubricantViscosity => Law::Drag {
+                drag_n_m: v(Name::DragNM),
+                speed_rad_s: setting.mean_speed_rad_s(),
+                speed_exponent: v(Name::SpeedExponent),
+                per_k: -v(Name::RelativeDragPerK),
+            },
+            CauseName::GravityTorque => Law::Unbalance { torque_n_m: v(Name::TorqueNM), phase_rad: phase() },
+            CauseName::TorsionalResonance => {
+                Law::Resonance { frequency_hz: v(Name::FrequencyHz), damping_ratio: v(Name::DampingRatio) }
+            }
+            CauseName::OutputEncoderEccentricity => {
+                Law::Disc { encoder: Encoder::Output, amplitude: v(Name::AmplitudeArcsec), phase_rad: phase() }
+            }
+            CauseName::GeneratorEncoderEccentricity => {
+                Law::Disc { encoder: Encoder::Generator, amplitude: v(Name::AmplitudeArcsec), phase_rad: phase() }
+            }
+            CauseName::SensorLatency => Law::Latency { delay_s: v(Name::DelayS) },
+            CauseName::RatioError => Law::Ratio { relative: v(Name::RatioRelativeError) },
+            CauseName::Ratcheting => {
+                Law::Jump { row: setting.on.time.partition_point(|t| *t < v(Name::TimeS)), by: v(Name::JumpArcsec) }
+            }
+        }
+    }
+
     /// When it acts.
     pub fn stage(&self) -> Stage {
         match self {
@@ -274,6 +361,7 @@ impl Law {
                 error[k] += factor * now.nominal().wind_up_arcsec(torque[k]);
             }),
             Law::Slip { half_width, slip_n_m } => slip(now, *half_width, *slip_n_m, error),
+            #[cfg(test)]
             Law::DragLag { largest } => {
                 let speeds = on.speeds();
                 let fastest = speeds.iter().fold(1e-9, |m: f64, w| m.max(w.abs()));
@@ -301,7 +389,8 @@ impl Law {
             }
             Law::Ratio { relative } => (0..n).for_each(|k| error[k] += relative * now.output(k) * ARCSEC_PER_RAD),
             Law::Jump { row, by } => error.iter_mut().skip(*row).for_each(|e| *e += by),
-            Law::Strange { name, size, phase, other } => strange(name, now, [*size, *phase, *other], error),
+            #[cfg(test)]
+            Law::Strange { name, size, phase } => name.add_error(now, [*size, *phase], error),
         }
     }
 }
@@ -352,29 +441,5 @@ fn resonance(now: &Now<'_>, frequency_hz: f64, damping_ratio: f64, error: &mut [
             }
             error[k] = x;
         }
-    }
-}
-
-fn strange(name: &str, now: &Now<'_>, [size, phase, other]: [f64; 3], error: &mut [f64]) {
-    let (on, n) = (now.on, error.len());
-    let since = |k: usize| {
-        let session = on.sessions.iter().find(|s| s.contains(&k)).expect("every row has a session");
-        on.time[k] - on.time[session.start]
-    };
-    let wave = |order: f64, k: usize| size * (order * on.generator[k] + phase).sin();
-    let speeds = on.speeds();
-    let top = now.top();
-    for k in 0..n {
-        error[k] += match name {
-            "sensor_offset_with_temperature" => size / 25.0 * (on.temperature[k] - 20.0),
-            "line_of_order_7" => wave(7.0, k),
-            "line_of_order_10.37" => wave(10.37, k),
-            "line_in_time" => size * (TAU * (0.3 + 3.0 * other) * on.time[k]).sin(),
-            "creep" => size * (1.0 + since(k)).ln() / 2.0,
-            "oldham_lash" => size * speeds[k].signum(),
-            "torque_cross_talk" => size * (now.torque[k] / top).powi(2),
-            "settling" => 2.0 * size * (-since(k) / (8.0 + 20.0 * other)).exp(),
-            other => unreachable!("no effect {other}"),
-        };
     }
 }

@@ -12,14 +12,16 @@
 
 mod catalogue;
 mod data_fault;
+#[cfg(test)]
 mod effect;
 mod excitation;
 mod law;
 mod plant;
 
-pub use catalogue::{Chosen, Definition, Parameter, Usual, effects, parse};
+pub use catalogue::{Chosen, Definition, Hidden, effects, parse};
 pub use data_fault::to_csv;
-pub use effect::{CAUSES, Effect, STRANGE};
+#[cfg(test)]
+pub use effect::{Effect, Strange, What, measure};
 pub use excitation::{Excitation, Plan, Richness};
 pub use plant::{Plant, Unit};
 
@@ -42,9 +44,6 @@ pub struct Sensors {
     pub wander_s: f64,
 }
 
-/// Resolution of the output encoder where [`measure`] makes data, arcsec.
-const STEP_ARCSEC: f64 = 0.3;
-
 /// White noise of the torque sensor, of the largest torque, and of the thermometer, K.
 const TORQUE_NOISE: f64 = 5e-4;
 const TEMPERATURE_NOISE_K: f64 = 0.02;
@@ -60,34 +59,6 @@ pub fn catalogue_drive() -> Nominal {
          amplitude_arcsec = 3.0\nphase_rad = 1.1\n",
     )
     .expect("the built-in text is valid")
-}
-
-/// Sessions of a drive with `effects`; `law` 0 or 1 picks the form of each law.
-#[must_use]
-pub fn measure(
-    nominal: &Nominal,
-    effects: &[Effect],
-    plan: &Plan,
-    sensors: &Sensors,
-    law: u8,
-    random: &mut fastrand::Rng,
-) -> Vec<Session> {
-    let changed = law == 1;
-    let plant = Plant { nominal, table: None };
-    let on = plan.excite(random);
-    let unit = Unit::draw(nominal, random);
-    let unbalanced: Vec<Law> = effects
-        .iter()
-        .filter(|effect| effect.name == "gravity_torque")
-        .map(|effect| effect.law(&plant, &on.torque, changed, random))
-        .collect();
-    let torque = plant.flank_torque(&on, &unbalanced);
-    let laws: Vec<Law> = effects.iter().map(|effect| effect.law(&plant, &torque, changed, random)).collect();
-    let mut error = plant.error(&on, &torque, &laws, &unit, (changed, changed));
-    plant.add_laws(&on, &torque, &laws, changed, &mut error);
-    add_noise(&on, sensors, &mut error, random);
-    error.iter_mut().for_each(|e| *e = (*e / STEP_ARCSEC).round() * STEP_ARCSEC);
-    into_sessions(&on, &error)
 }
 
 /// Adds white noise and wander: slow sines of random phase.
@@ -139,6 +110,14 @@ pub struct Synthesized {
     pub effects: Vec<Chosen>,
 }
 
+/// The law of a completed effect; a fault of the data has none.
+fn law_of(effect: &Chosen, setting: &Setting<'_>) -> Option<Law> {
+    match effect.definition.what {
+        Hidden::Cause(cause) => Some(Law::of(cause, effect, setting)),
+        Hidden::Fault(_) => None,
+    }
+}
+
 /// What `chosen` effects add to the error of a nominal drive under an excitation, without sensors, row by row, arcsec. Parameters
 /// that are not given take their default; nothing is drawn.
 ///
@@ -148,7 +127,7 @@ pub fn added_arcsec(plant: &Plant<'_>, sizes: Sizes, chosen: &[Chosen], on: &Exc
     let setting = Setting { nominal: plant.nominal, sizes, on, load_n_m: law::largest(&on.torque) };
     let mut same = fastrand::Rng::with_seed(0);
     let effects = chosen.iter().map(|effect| effect.completed(&setting, &mut same)).collect::<Result<Vec<_>, _>>()?;
-    let mut laws: Vec<Law> = effects.iter().filter_map(|effect| effect.law(&setting)).collect();
+    let mut laws: Vec<Law> = effects.iter().filter_map(|effect| law_of(effect, &setting)).collect();
     laws.sort_by_key(Law::stage);
     let unit = Unit::nominal(plant.nominal);
     let error = |laws: &[Law]| {
@@ -176,7 +155,7 @@ pub fn synthesize(
 ) -> Result<Synthesized, String> {
     let setting = Setting { nominal: plant.nominal, sizes, on, load_n_m: law::largest(&on.torque) };
     let effects = chosen.iter().map(|effect| effect.completed(&setting, random)).collect::<Result<Vec<_>, _>>()?;
-    let mut laws: Vec<Law> = effects.iter().filter_map(|effect| effect.law(&setting)).collect();
+    let mut laws: Vec<Law> = effects.iter().filter_map(|effect| law_of(effect, &setting)).collect();
     laws.sort_by_key(Law::stage);
     let torque = plant.flank_torque(on, &laws);
     let mut error = plant.error(on, &torque, &laws, &unit, (false, true));

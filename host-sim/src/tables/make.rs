@@ -108,7 +108,6 @@ impl TableSettings {
             },
             temperature_nodes_c: self.temperature_nodes_c.clone(),
             positions: self.positions,
-            ..SweepPlan::for_generator(drive, kind)
         }
     }
 }

@@ -7,7 +7,8 @@
 //! So a law is evaluated on the excitation as the causes that act on it leave it. Of two that meet in the zones the later one is
 //! evaluated beside the earlier, and together they make what both do.
 
-use super::{Excitation, Kin, Law};
+use super::{Coefficients, Excitation, Law, Role};
+use crate::causes::Kin;
 use crate::diagnosis::base::Base;
 use crate::diagnosis::rows::Rows;
 
@@ -21,13 +22,23 @@ pub struct Zones {
 }
 
 /// A cause as it was fitted.
+#[derive(Clone)]
 pub struct Acting<'l> {
     /// Its law.
     pub law: &'l Law,
     /// Shape parameters.
     pub values: Vec<f64>,
+    /// What its columns are.
+    pub roles: Vec<Role>,
     /// Coefficients of its columns.
     pub coefficients: Vec<f64>,
+}
+
+impl Acting<'_> {
+    /// Coefficients by what their columns are.
+    fn by_role(&self) -> Coefficients<'_> {
+        Coefficients::new(&self.roles, &self.coefficients)
+    }
 }
 
 /// What causes leave to another one.
@@ -48,20 +59,20 @@ impl Law {
     #[must_use]
     pub fn acts_on(&self, other: &Law) -> bool {
         // What a load winds up in a softer spring is in the load's law.
-        self.load.is_some() && other.load.is_none() && !other.is_spring()
-            || self.is_spring() && other.load.is_some()
-            || other.meets_zones && (self.zones.is_some() || self.kin == Kin::Clearance)
+        self.is_load() && !other.is_load() && !other.is_spring()
+            || self.is_spring() && other.is_load()
+            || other.acts.meets_zones && (self.is_in_zones() || self.wrong.kin == Kin::Clearance)
     }
 
     /// Whether it is the spring of the nominal model that is softer or stiffer.
     fn is_spring(&self) -> bool {
-        self.tolerance_of == Some(STIFFNESS)
+        self.acts.tolerance_of == Some(STIFFNESS)
     }
 
     /// Whether two act on each other.
     #[must_use]
     pub fn meets(&self, other: &Law) -> bool {
-        self.meets_zones && other.meets_zones
+        self.acts.meets_zones && other.acts.meets_zones
     }
 }
 
@@ -72,11 +83,11 @@ impl Among {
         let mut among = Among { loaded: None, widened: None, zones: None, softer: 1.0 };
         for cause in acting {
             if cause.law.is_spring() {
-                among.softer += cause.coefficients.first().unwrap_or(&0.0);
+                among.softer += cause.by_role().of(Role::SIZE);
             }
-            if let Some(load) = &cause.law.load {
+            if let Some(load) = cause.law.load(on, &cause.values) {
                 let (rows, _) = among.loaded.get_or_insert_with(|| (on.rows.clone(), on.base.without_floating()));
-                for (torque, added) in rows.torque.iter_mut().zip(load(on, &cause.values)) {
+                for (torque, added) in rows.torque.iter_mut().zip(load) {
                     *torque += added;
                 }
             }
@@ -88,12 +99,11 @@ impl Among {
         {
             let on = among.excitation(on);
             for cause in acting {
-                if cause.law.kin == Kin::Clearance {
+                if cause.law.wrong.kin == Kin::Clearance {
                     let sum = widened.get_or_insert_with(|| vec![0.0; on.rows.len()]);
                     add(sum, &half_width(&on, cause));
                 }
-                if let Some(apart) = &cause.law.zones {
-                    let more = apart(&on, &cause.values, &cause.coefficients);
+                if let Some(more) = cause.law.zones(&on, &cause.values, cause.by_role()) {
                     let sum = zones.get_or_insert_with(|| Zones {
                         upper: vec![0.0; on.rows.len()],
                         lower: vec![0.0; on.rows.len()],
@@ -141,7 +151,7 @@ fn half_width(on: &Excitation<'_>, cause: &Acting<'_>) -> Vec<f64> {
     forward.flank.fill(1.0);
     let on = Excitation { base: &forward, ..*on };
     let mut sum = vec![0.0; on.rows.len()];
-    for (column, c) in (cause.law.columns)(&on, &cause.values).iter().zip(&cause.coefficients) {
+    for (column, c) in cause.law.columns(&on, &cause.values).iter().zip(&cause.coefficients) {
         for (s, v) in sum.iter_mut().zip(&column.values) {
             *s += c * v;
         }
@@ -157,11 +167,9 @@ pub fn together(on: &Excitation<'_>, causes: &[Acting<'_>]) -> Vec<Vec<super::Co
             let others = causes.iter().enumerate().filter(|(j, other)| {
                 *j != k && other.law.acts_on(causes[k].law) && (*j < k || !other.law.meets(causes[k].law))
             });
-            let acting: Vec<Acting<'_>> = others
-                .map(|(_, a)| Acting { law: a.law, values: a.values.clone(), coefficients: a.coefficients.clone() })
-                .collect();
+            let acting: Vec<Acting<'_>> = others.map(|(_, acting)| acting.clone()).collect();
             let among = Among::of(on, &acting);
-            (causes[k].law.columns)(&left_by(among.as_ref(), on), &causes[k].values)
+            causes[k].law.columns(&left_by(among.as_ref(), on), &causes[k].values)
         })
         .collect()
 }

@@ -10,8 +10,10 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::geometry::{Angle, COS_PRESSURE_ANGLE, USUAL_ARCSEC, fading, half_load, kept, sense, waves};
-use super::{Column, Excitation, Law, Lead, Named, Shape, Tolerance, Zones, by_row, main, nuisance, polar};
-use crate::diagnosis::linear::Prior;
+use super::{
+    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, Zones, by_row, main, main_about, nuisance, polar,
+};
+use crate::causes::{CauseName, ParameterName as Name};
 
 /// Relative uncertainty of an eccentricity: how much of it a wave shows depends on the teeth that give and on a rim that centres
 /// itself, which differ between generators (FEM: from 5 % to a factor).
@@ -56,10 +58,15 @@ struct Displacement {
 }
 
 impl Displacement {
-    fn of(of: Angle, loaded: bool, on: &Excitation<'_>, shape: &[f64]) -> Displacement {
-        let [half_load, pressed_per_n_m] =
-            if loaded { [shape[2], shape[3] / on.scales.load] } else { [f64::INFINITY, 0.0] };
-        Displacement { of, phase: shape[0], size: shape[1], half_load, pressed_per_n_m, flank_ahead: FLANK_AHEAD }
+    fn of(of: Angle, on: &Excitation<'_>, shape: Shaped<'_>) -> Displacement {
+        Displacement {
+            of,
+            phase: shape.of(Name::PhaseRad),
+            size: shape.of(Name::SizeArcsec),
+            half_load: half_of(shape),
+            pressed_per_n_m: shape.get(Name::PressedArcsec).map_or(0.0, |pressed| pressed / on.scales.load),
+            flank_ahead: FLANK_AHEAD,
+        }
     }
 
     /// How far it brings one zone ahead of the other.
@@ -92,63 +99,75 @@ impl Displacement {
     }
 }
 
+/// Second orders that fade with the load, and those that do not: as waves of both flanks alike, and of opposite sign on each.
+const FADING: Role = Role("second order that fades");
+const FADING_BY_FLANK: Role = Role("second order that fades, by flank");
+const STEADY: Role = Role("second order");
+const STEADY_BY_FLANK: Role = Role("second order, by flank");
+/// What changes where a flank is farther ahead.
+const FARTHER_AHEAD: Role = Role("flank farther ahead");
+/// In the lead: the second order along the cosine and the sine of twice the angle by which a flank is ahead.
+const ALONG: Role = Role("second order along the flanks");
+
+/// Load that halves a displacement, N·m; without a load nothing does.
+fn half_of(shape: Shaped<'_>) -> f64 {
+    shape.get(Name::HalfLoadNM).unwrap_or(f64::INFINITY)
+}
+
 /// An axis beside its place.
-pub(super) fn displaced(cause: &'static str, of: Angle, on: &Excitation<'_>) -> Law {
+pub(super) fn displaced(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law {
     let loaded = on.scales.load > 0.0;
     let by = FLANK_AHEAD * sense(on);
-    let half_of = move |shape: &[f64]| if loaded { shape[2] } else { f64::INFINITY };
     let mut law = Law::new(cause, move |on, shape| {
         let half = half_of(shape);
         let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
-        let displacement = Displacement::of(of, loaded, on, shape);
+        let displacement = Displacement::of(of, on, shape);
         let pattern = displacement.pattern(on);
         let steeper = Displacement { flank_ahead: FLANK_AHEAD + AHEAD_SPREAD, ..displacement }.pattern(on);
         let change = by_row(on, |k| steeper[k] - pattern[k]);
-        let scale = Tolerance::Main(Prior { mean: 1.0, std: SCALE_MISFIT });
-        let mut columns: Vec<Column> = vec![Column { values: pattern, tolerance: scale }];
+        let mut columns: Vec<Column> = vec![main_about(1.0, pattern, SCALE_MISFIT).called(Role::SIZE)];
         columns.push(nuisance(by_row(on, |k| fade(k) * flank(k)), 0.08));
-        columns.extend(waves(on, of, 2.0, fade).map(|v| nuisance(v, 0.12)));
-        columns.extend(waves(on, of, 2.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.12)));
+        columns.extend(waves(on, of, 2.0, fade).map(|v| nuisance(v, 0.12).called(FADING)));
+        columns.extend(waves(on, of, 2.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.12).called(FADING_BY_FLANK)));
         columns.extend(waves(on, of, 4.0, fade).map(|v| nuisance(v, 0.08)));
         columns.extend(waves(on, of, 4.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.08)));
         columns.extend(waves(on, of, 6.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.04)));
         if loaded {
-            columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| nuisance(v, 0.12)));
-            columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.12)));
+            columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| nuisance(v, 0.12).called(STEADY)));
+            columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.12).called(STEADY_BY_FLANK)));
         }
-        columns.push(Column { values: change, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 1.0 }) });
+        columns.push(main(change, 1.0).called(FARTHER_AHEAD));
         columns
     })
     .shapes(
-        [Shape::angle("phase_rad", 2.0 * PI, 1), Shape::by_factors("size_arcsec", RANGE_ARCSEC[0], RANGE_ARCSEC[1], 1)]
-            .into_iter()
-            .chain(loaded.then(|| half_load(on)))
-            .chain(loaded.then(|| Shape::by_factors("pressed_arcsec", PRESSED_ARCSEC[0], PRESSED_ARCSEC[1], 2))),
+        [
+            Shape::angle(Name::PhaseRad, 2.0 * PI, 1),
+            Shape::by_factors(Name::SizeArcsec, RANGE_ARCSEC[0], RANGE_ARCSEC[1], 1),
+        ]
+        .into_iter()
+        .chain(loaded.then(|| half_load(on)))
+        .chain(loaded.then(|| Shape::by_factors(Name::PressedArcsec, PRESSED_ARCSEC[0], PRESSED_ARCSEC[1], 2))),
     )
-    .parameters(move |on, shape, c| {
+    .parameters_by(move |on, shape, c| {
         let amplitude = second_order_unloaded(c, shape, by) / SECOND_ORDER;
         let mut named: Vec<Named> = vec![
-            ("amplitude_um", amplitude * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", amplitude),
-            ("phase_rad", shape[0]),
+            (Name::AmplitudeUm, amplitude * COS_PRESSURE_ANGLE / on.scales.arcsec_per_um),
+            (Name::AmplitudeArcsec, amplitude),
+            (Name::PhaseRad, shape.of(Name::PhaseRad)),
         ];
-        if loaded {
-            named.push(("half_load_n_m", shape[2]));
-            named.push(("pressed_arcsec", shape[3]));
-        }
+        named.extend([Name::HalfLoadNM, Name::PressedArcsec].into_iter().filter_map(|n| Some((n, shape.get(n)?))));
         named
     })
     // Where its deviations take back what the law says, it is another error of order 2.
-    .physical(move |shape, c| {
-        c[0] > 0.5 && second_order_unloaded(c, shape, by) > LEAST_OF_PATTERN * SECOND_ORDER * shape[1] * c[0]
-    });
-    law.smooth = true;
-    law.doubt = ECCENTRICITY_DOUBT;
-    law.meets_zones = true;
-    law.misfit = ZONES_MISFIT;
-    law.zones = Some(Box::new(move |on, shape, _| Displacement::of(of, loaded, on, shape).zones(on)));
-    law.lead = Some(Lead {
-        columns: Box::new(move |on, shape| {
+    .physical_if(move |shape, c| {
+        let scale = c.of(Role::SIZE);
+        let least = LEAST_OF_PATTERN * SECOND_ORDER * shape.of(Name::SizeArcsec) * scale;
+        scale > 0.5 && second_order_unloaded(c, shape, by) > least
+    })
+    .parts_zones(move |on, shape, _| Displacement::of(of, on, shape).zones(on))
+    .evaluated_on_averages()
+    .led_by(
+        move |on, shape| {
             let half = half_of(shape);
             let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
             let second = kept(on, of, 2.0);
@@ -159,42 +178,45 @@ pub(super) fn displaced(cause: &'static str, of: Angle, on: &Excitation<'_>) -> 
                     let (sin, cos) = (2.0 * by * flank(k) - shift).sin_cos();
                     second[0][k] * cos - second[1][k] * sin
                 };
-                columns.push(main(by_row(on, |k| fade(k) * flank(k) * along(k)), USUAL_ARCSEC));
+                columns.push(main(by_row(on, |k| fade(k) * flank(k) * along(k)), USUAL_ARCSEC).called(ALONG));
             }
-            columns.extend(waves(on, of, 2.0, fade).map(|v| main(v, USUAL_ARCSEC)));
+            columns.extend(waves(on, of, 2.0, fade).map(|v| main(v, USUAL_ARCSEC).called(FADING)));
             columns.push(main(by_row(on, |k| fade(k) * flank(k)), USUAL_ARCSEC));
             // What no load takes would go to the nominal wave of the same order, far from its tolerance.
-            columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC)));
+            columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC).called(STEADY)));
             columns
-        }),
-        shape: Box::new(move |shape, c| {
+        },
+        move |shape, c| {
             let beginning = |size: f64, twice: f64| {
-                let mut shape = shape.to_vec();
-                (shape[0], shape[1]) = ((0.5 * twice).rem_euclid(PI), size);
-                shape
+                shape.with(&[(Name::PhaseRad, (0.5 * twice).rem_euclid(PI)), (Name::SizeArcsec, size)])
             };
-            let (free, twice) = polar(c[0], c[1]);
+            let [cos, sin] = c.wave(ALONG);
+            let (free, twice) = polar(cos, sin);
             // Both flanks bind: -0.424 A sin 2a sin 2x, whichever carries.
             let both = (2.0 * by).sin();
-            let (bound, twice_bound) = polar(-(c[3] + c[6]) / both, (c[2] + c[5]) / both);
+            let (fading, steady) = (c.wave(FADING), c.wave(STEADY));
+            let (bound, twice_bound) = polar(-(fading[1] + steady[1]) / both, (fading[0] + steady[0]) / both);
             vec![beginning(free / SECOND_ORDER, twice), beginning(bound / SECOND_ORDER, twice_bound)]
-        }),
-        loaded_only: false,
-    });
+        },
+    );
+    law.wrong.doubt = ECCENTRICITY_DOUBT;
+    law.wrong.misfit = ZONES_MISFIT;
+    law.acts.meets_zones = true;
     law
 }
 
 /// Second order of a rectified eccentricity without load, all columns together: what fades and what does not share it
 /// in proportions that loads of a narrow range cannot tell. Each column of order 2 is projected on the pattern, flank by flank.
-fn second_order_unloaded(c: &[f64], shape: &[f64], ahead_by: f64) -> f64 {
-    let at = |j: usize| c.get(j).copied().unwrap_or(0.0);
-    let wave = |j: usize| [at(j), at(j + 1)];
-    let both = [wave(2), wave(12)];
-    let by_flank = [wave(4), wave(14)];
+fn second_order_unloaded(c: Coefficients<'_>, shape: Shaped<'_>, ahead_by: f64) -> f64 {
+    let loaded = shape.get(Name::HalfLoadNM).is_some();
+    // Without a load the place of the steady wave is that of what a flank farther ahead changes.
+    let steady = if loaded { c.wave(STEADY) } else { [c.of(FARTHER_AHEAD), 0.0] };
+    let both = [c.wave(FADING), steady];
+    let by_flank = [c.wave(FADING_BY_FLANK), c.wave(STEADY_BY_FLANK)];
     let on_pattern = |flank: f64| {
-        let (sin, cos) = (2.0 * shape[0] - 2.0 * ahead_by * flank).sin_cos();
+        let (sin, cos) = (2.0 * shape.of(Name::PhaseRad) - 2.0 * ahead_by * flank).sin_cos();
         let along = |w: &[f64; 2]| w[0] * cos + w[1] * sin;
         both.iter().map(|w| flank * along(w)).chain(by_flank.iter().map(along)).sum::<f64>()
     };
-    SECOND_ORDER * shape[1] * c[0] + 0.5 * (on_pattern(1.0) + on_pattern(-1.0))
+    SECOND_ORDER * shape.of(Name::SizeArcsec) * c.of(Role::SIZE) + 0.5 * (on_pattern(1.0) + on_pattern(-1.0))
 }

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::{Column, Excitation, Law, Lead, Shape, Tolerance, by_row, main};
+use super::{Excitation, Law, Role, Shape, Shaped, by_row, main, main_about};
+use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::base::PlayLaw;
-use crate::diagnosis::linear::Prior;
 use crate::units::ARCSEC_PER_RAD;
 
 /// Moments, over the scale of the load, and directions that are tried on a drive without load; and how closely the best is followed.
@@ -18,13 +18,13 @@ fn moment_that_turns_flanks(
     on: &Excitation<'_>,
     play: PlayLaw,
     scale: f64,
-    load: impl Fn(&Excitation<'_>, &[f64]) -> Vec<f64> + Sync,
-) -> Vec<f64> {
+    load: impl Fn(&Excitation<'_>, [f64; 2]) -> Vec<f64> + Sync,
+) -> [f64; 2] {
     use rayon::prelude::*;
     let (rows, base) = (on.rows, on.base);
     let used: Vec<usize> = rows.sessions_used().flatten().collect();
     let spread = |shape: &[f64; 2]| -> f64 {
-        let torque: Vec<f64> = rows.torque.iter().zip(load(on, shape)).map(|(t, added)| t + added).collect();
+        let torque: Vec<f64> = rows.torque.iter().zip(load(on, *shape)).map(|(t, added)| t + added).collect();
         let flank = play.flanks(rows, &torque, on.nominal);
         let left = |k: &usize| {
             let turned_over = base.half_backlash * (flank[*k] - base.flank[*k]);
@@ -52,41 +52,44 @@ fn moment_that_turns_flanks(
             (best, spread_of_best) = (better, spread);
         }
     }
-    vec![best[0], best[1].rem_euclid(2.0 * PI)]
+    [best[0], best[1].rem_euclid(2.0 * PI)]
 }
 
 /// An unbalanced load, m g l sin of the output angle against gravity: adds to the torque, so it winds the drive up and moves the play.
 fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
     let scale = on.plausible_load();
-    let load = move |on: &Excitation<'_>, shape: &[f64]| -> Vec<f64> {
+    let load = move |on: &Excitation<'_>, [moment, phase]: [f64; 2]| -> Vec<f64> {
         let rows = on.rows;
-        by_row(on, |k| shape[0] * (rows.output[k] + sign * rows.orientation[k] + shape[1]).sin())
+        by_row(on, |k| moment * (rows.output[k] + sign * rows.orientation[k] + phase).sin())
     };
+    let of = |shape: Shaped<'_>| [shape.of(Name::TorqueNM), shape.of(Name::PhaseRad)];
     // Where nothing else loads the drive, its moment decides which flank carries, and no linear law is near.
     let by_flank = on.unloaded().then(|| moment_that_turns_flanks(on, play, scale, load));
-    let mut law = Law::new("gravity_torque", move |on, shape| {
+    let mut law = Law::new(CauseName::GravityTorque, move |on, shape| {
         let rows = on.rows;
-        let added = load(on, shape);
+        let added = load(on, of(shape));
         let torque: Vec<f64> = (0..rows.len()).map(|k| rows.torque[k] + added[k]).collect();
         let flank = play.flanks(rows, &torque, on.nominal);
         let half = on.base.half_backlash;
         let wind = by_row(on, |k| on.wound_up(k, torque[k]));
         let play = by_row(on, |k| half * (flank[k] - on.base.flank[k]));
         let together = by_row(on, |k| wind[k] + play[k]);
-        vec![
-            Column { values: together, tolerance: Tolerance::Main(Prior { mean: 1.0, std: 0.02 }) },
-            Column { values: play, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 0.5 }) },
-        ]
+        vec![main_about(1.0, together, 0.02).called(Role::SIZE), main(play, 0.5)]
     })
-    .shapes([Shape::by_factors("torque_n_m", 0.003 * scale, 2.0 * scale, 1), Shape::angle("phase_rad", 2.0 * PI, 1)])
-    .parameters(|_, shape, c| vec![("torque_n_m", shape[0] * c[0]), ("phase_rad", shape[1])])
+    .shapes([
+        Shape::by_factors(Name::TorqueNM, 0.003 * scale, 2.0 * scale, 1),
+        Shape::angle(Name::PhaseRad, 2.0 * PI, 1),
+    ])
+    .parameters_by(|_, shape, c| {
+        let torque_n_m = shape.of(Name::TorqueNM) * c.of(Role::SIZE);
+        vec![(Name::TorqueNM, torque_n_m), (Name::PhaseRad, shape.of(Name::PhaseRad))]
+    })
     // Without a moment the law is another play alone.
-    .physical(move |shape, _| shape[0] > 0.004 * scale);
-    law.smooth = true;
-    law.load = Some(Box::new(load));
-    law.in_crossings = true;
-    law.lead = Some(Lead {
-        columns: Box::new(move |on, _| {
+    .physical_if(move |shape, _| shape.of(Name::TorqueNM) > 0.004 * scale)
+    .evaluated_on_averages()
+    .adds_load(move |on, shape| load(on, of(shape)))
+    .led_by(
+        move |on, _| {
             let rows = on.rows;
             // Wind-up for 1 N·m more, at the load that is there.
             let slope = |k: usize| {
@@ -95,19 +98,33 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
             };
             let at = |k: usize| rows.output[k] + sign * rows.orientation[k];
             vec![
-                main(by_row(on, |k| slope(k) * at(k).sin()), 0.3 * scale),
-                main(by_row(on, |k| slope(k) * at(k).cos()), 0.3 * scale),
+                main(by_row(on, |k| slope(k) * at(k).sin()), 0.3 * scale).called(SINE),
+                main(by_row(on, |k| slope(k) * at(k).cos()), 0.3 * scale).called(COSINE),
             ]
-        }),
-        shape: Box::new(move |_, c| {
+        },
+        move |shape, c| {
             // a sin(x) + b cos(x) = m sin(x + phase).
-            let by_wind_up = vec![c[0].hypot(c[1]), c[1].atan2(c[0]).rem_euclid(2.0 * PI)];
-            [by_wind_up].into_iter().chain(by_flank.iter().cloned()).collect()
-        }),
-        loaded_only: true,
-    });
+            let (sin, cos) = (c.of(SINE), c.of(COSINE));
+            let by_wind_up = [sin.hypot(cos), cos.atan2(sin).rem_euclid(2.0 * PI)];
+            [by_wind_up]
+                .into_iter()
+                .chain(by_flank)
+                .map(|[moment, phase]| shape.with(&[(Name::TorqueNM, moment), (Name::PhaseRad, phase)]))
+                .collect()
+        },
+    )
+    .led_under_load_alone();
+    law.acts.in_crossings = true;
     law
 }
+
+/// In the lead: parts of the moment.
+const SINE: Role = Role("sine");
+const COSINE: Role = Role("cosine");
+/// What the load swings about: wind-up, kinematic error, the turning itself.
+const WIND_UP: Role = Role("wind-up");
+const KINEMATIC: Role = Role("kinematic error");
+const TURNING: Role = Role("turning");
 
 /// Spread of the share of a jump that makes the load ring, beside that of a step of the torque.
 const SLIDING: f64 = 0.3;
@@ -161,8 +178,8 @@ fn transition(omega: f64, damping: f64, dt: f64) -> [f64; 4] {
 /// where teeth skip.
 fn torsional_resonance(on: &Excitation<'_>) -> Law {
     let fastest = 0.45 / on.rows.period;
-    let mut law = Law::new("torsional_resonance", |on, shape| {
-        let (frequency, damping) = (shape[0], shape[1]);
+    let mut law = Law::new(CauseName::TorsionalResonance, |on, shape| {
+        let (frequency, damping) = (shape.of(Name::FrequencyHz), shape.of(Name::DampingRatio));
         let base = on.base;
         let kinematic = by_row(on, |k| base.prediction[k] - base.wind_up[k]);
         let turning: Vec<f64> = on.rows.output.iter().map(|out| out * ARCSEC_PER_RAD).collect();
@@ -173,33 +190,35 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
         let skipped = skipped(on);
         let moved_to = by_row(on, |k| base.wind_up[k] + skipped.as_ref().map_or(0.0, |skipped| skipped[k]));
         let mut columns = vec![
-            main(ringing(on, &moved_to, frequency, damping), 1.0),
-            main(ringing(on, &kinematic, frequency, damping), 1.0),
-            main(moved, 0.5),
+            main(ringing(on, &moved_to, frequency, damping), 1.0).called(WIND_UP),
+            main(ringing(on, &kinematic, frequency, damping), 1.0).called(KINEMATIC),
+            main(moved, 0.5).called(TURNING),
         ];
         // Teeth that slide into the next space do so less suddenly.
         columns.extend(skipped.map(|skipped| main(ringing(on, &skipped, frequency, damping), SLIDING)));
         columns
     })
     .shapes([
-        Shape::by_factors("frequency_hz", 1.0f64.min(0.3 * fastest), fastest.clamp(0.5, 80.0), 28),
-        Shape::by_factors("damping_ratio", 0.008, 0.5, 3),
+        Shape::by_factors(Name::FrequencyHz, 1.0f64.min(0.3 * fastest), fastest.clamp(0.5, 80.0), 28),
+        Shape::by_factors(Name::DampingRatio, 0.008, 0.5, 3),
     ])
-    .parameters(|_, shape, c| {
-        let gain = [c[0], c[1]].into_iter().fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
-        vec![("frequency_hz", shape[0]), ("damping_ratio", shape[1]), ("gain", gain)]
+    .parameters_by(|_, shape, c| {
+        let gains = [WIND_UP, KINEMATIC].map(|role| c.of(role));
+        let gain = gains.into_iter().fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
+        let shape = |name| (name, shape.of(name));
+        vec![shape(Name::FrequencyHz), shape(Name::DampingRatio), (Name::Gain, gain)]
     })
-    .physical(|_, c| c[0] > 0.0 || c[1] > 0.0 || c[2] > 0.0);
+    .physical_if(|_, c| [WIND_UP, KINEMATIC, TURNING].into_iter().any(|role| c.of(role) > 0.0));
     // It rings most when the load turns over.
-    law.in_crossings = true;
+    law.acts.in_crossings = true;
     // Rows are joined by straight lines.
-    law.doubt = 0.006;
+    law.wrong.doubt = 0.006;
     law
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = Vec::new();
-    if on.nominal.wind_up_arcsec(1.0) > 0.0 {
+    if on.speaks_of(CauseName::GravityTorque) {
         // The load that gravity adds moves the torque at which the play turns over: which law it follows there shows only now.
         let mut plays = vec![PlayLaw::Held, PlayLaw::Pushed];
         if !plays.contains(&on.base.law) {
@@ -207,14 +226,11 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         }
         for play in plays {
             laws.push(gravity_torque(1.0, play, on));
-            if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
+            if on.is_turned_about() {
                 laws.push(gravity_torque(-1.0, play, on));
             }
         }
     }
-    if on.rows.recorded.time {
-        laws.push(torsional_resonance(on));
-    }
-    laws.retain(|law| !law.shapes.is_empty());
+    laws.push(torsional_resonance(on));
     laws
 }

@@ -2,57 +2,50 @@
 //! named for it.
 
 use super::stiffness::follow;
-use super::{Excitation, Law, Shape, by_row, lagged, main};
+use super::{Deviation, Excitation, Label, Law, Per, Role, Shape, by_row, lagged, main};
+use crate::causes::ParameterName as Name;
 use crate::units::ARCSEC_PER_RAD;
 
-fn law(name: &str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send + Sync + 'static) -> Law {
-    let mut law = Law::new(name, move |on, _| {
+fn law(name: &'static str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send + Sync + 'static) -> Law {
+    Law::new(name, move |on, _| {
         let column = by_row(on, |k| values(on, k));
         let size = super::super::rows::rms(&column).max(1e-12);
         vec![main(column.into_iter().map(|v| v / size).collect(), 20.0)]
-    });
-    law.named = false;
-    law
+    })
 }
 
-fn wave(name: String, angle: fn(&Excitation<'_>, usize) -> f64, order: f64) -> Law {
-    let mut law = Law::new(&name, move |on, _| {
+fn wave(label: Deviation, angle: fn(&Excitation<'_>, usize) -> f64, order: f64) -> Law {
+    Law::new(Label::Deviation(label), move |on, _| {
         vec![
             main(by_row(on, |k| (order * angle(on, k)).cos()), 15.0),
             main(by_row(on, |k| (order * angle(on, k)).sin()), 15.0),
         ]
-    });
-    law.named = false;
-    law
+    })
 }
 
 /// Lost motion before the generator, as of an Oldham coupling: whatever the load, the output lags by half of it either way.
 fn lash_before_the_generator() -> Law {
-    let mut law = Law::new("lost motion before the generator", |on, shape| {
-        let half_rad = shape[0] * on.nominal.ratio.abs() / ARCSEC_PER_RAD;
+    Law::new("lost motion before the generator", |on, shape| {
+        let half_rad = shape.of(Name::HalfLashArcsec) * on.nominal.ratio.abs() / ARCSEC_PER_RAD;
         let mut held = vec![0.0; on.rows.len()];
         for session in &on.rows.sessions {
             follow(&on.rows.generator, session.clone(), half_rad, 0.0, &mut held);
         }
-        vec![main(by_row(on, |k| -held[k] * on.nominal.ratio.signum()), 20.0)]
+        vec![main(by_row(on, |k| -held[k] * on.nominal.ratio.signum()), 20.0).called(Role::SIZE)]
     })
-    .shapes([Shape::by_factors("half_lash_arcsec", 0.5, 60.0, 5)])
-    .physical(|_, c| c[0] > 0.0);
-    law.named = false;
-    law
+    .shapes([Shape::by_factors(Name::HalfLashArcsec, 0.5, 60.0, 5)])
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
 }
 
 /// Wind-up that comes late: what relaxes within about a second, ten, a hundred and a thousand, from rest under the first load.
 fn creep_under_load() -> Law {
-    let mut law = Law::new("creep under load", |on, _| {
+    Law::new("creep under load", |on, _| {
         let late = |lasts_s: f64| {
             let reached = lagged(on, &on.base.wind_up, lasts_s);
             main(by_row(on, |k| reached[k] - on.base.wind_up[k]), 0.3)
         };
         [1.0, 10.0, 100.0, 1000.0].into_iter().map(late).collect()
-    });
-    law.named = false;
-    law
+    })
 }
 
 /// Another zero in each session: a sensor that was taken off and put back. No session tells the next one's.
@@ -61,34 +54,30 @@ fn zero_of_each_session() -> Law {
         let of = |session: &std::ops::Range<usize>| by_row(on, |k| f64::from(u8::from(session.contains(&k))));
         on.rows.sessions_used().skip(1).map(|session| main(of(&session), 20.0)).collect()
     });
-    law.named = false;
-    law.foretells = false;
+    law.wrong.foretells = false;
     law
 }
 
-/// A line at any order of an angle or of time: `unit` is what it is counted against.
+/// A line at any order of an angle or of time: `per` is what it is counted against.
 #[must_use]
-pub fn line(unit: &str, order: f64) -> Law {
-    let angle: fn(&Excitation<'_>, usize) -> f64 = match unit {
-        "generator turn" => |on, k| on.rows.generator[k],
-        "turn on the circular spline" => |on, k| on.rows.on_circular_spline[k],
-        "output turn" => |on, k| on.rows.output[k],
-        _ => |on, k| 2.0 * std::f64::consts::PI * on.rows.time[k],
+pub fn line(per: Per, order: f64) -> Law {
+    let angle: fn(&Excitation<'_>, usize) -> f64 = match per {
+        Per::GeneratorTurn => |on, k| on.rows.generator[k],
+        Per::OutputTurn => |on, k| on.rows.output[k],
+        Per::Second => |on, k| 2.0 * std::f64::consts::PI * on.rows.time[k],
     };
-    let name = format!("line of {order:.4} per {unit}");
-    if unit != "second" {
-        return wave(name, angle, order);
+    let label = Deviation::Line { per, order };
+    if per != Per::Second {
+        return wave(label, angle, order);
     }
     // Nothing says that a line in time keeps its phase while nobody records.
-    let mut law = Law::new(&name, move |on, _| {
+    Law::new(Label::Deviation(label), move |on, _| {
         let of = |session: &std::ops::Range<usize>, shift: f64| {
             let inside = |k: usize| if session.contains(&k) { (order * angle(on, k) - shift).cos() } else { 0.0 };
             main(by_row(on, inside), 15.0)
         };
         on.rows.sessions.iter().flat_map(|s| [of(s, 0.0), of(s, std::f64::consts::FRAC_PI_2)]).collect()
-    });
-    law.named = false;
-    law
+    })
 }
 
 /// Everything without a name that is always tried.
@@ -138,17 +127,17 @@ pub fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
         }
     }
     for order in [3.0, 5.0, 7.0, 8.0, 10.0, 12.0] {
-        laws.push(line("generator turn", order));
+        laws.push(line(Per::GeneratorTurn, order));
     }
     for order in [2.0, 3.0] {
-        laws.push(line("output turn", order));
+        laws.push(line(Per::OutputTurn, order));
     }
     laws
 }
 
 /// A function of one or two quantities, free but for its smoothness: hats on a grid.
-fn map(name: &str, grids: Vec<(Vec<f64>, usize)>) -> Law {
-    let mut law = Law::new(name, move |on, _| {
+fn map(name: &'static str, grids: Vec<(Vec<f64>, usize)>) -> Law {
+    Law::new(name, move |on, _| {
         let n = on.rows.len();
         let mut columns: Vec<Vec<f64>> = vec![vec![1.0; n]];
         for (values, nodes) in &grids {
@@ -174,9 +163,7 @@ fn map(name: &str, grids: Vec<(Vec<f64>, usize)>) -> Law {
                 .collect();
         }
         columns.into_iter().map(|values| main(values, 10.0)).collect()
-    });
-    law.named = false;
-    law
+    })
 }
 
 /// What is left as a free function of what was measured: tried only when the causes are in, to see whether anything is left.

@@ -11,7 +11,10 @@ use crate::nominal::Fixed;
 
 use super::displaced::displaced;
 use super::lobes::generator_eccentricity;
-use super::{Column, Excitation, Kin, Law, Named, Shape, beside, by_row, main, nuisance, polar};
+use super::{
+    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, beside, by_row, main, nuisance, of_wave, polar,
+};
+use crate::causes::{CauseName, ParameterName as Name};
 
 /// Share by which a law of shape may be wrong: signatures depend on generator and load.
 const SHAPE_MISFIT: f64 = 0.2;
@@ -22,12 +25,18 @@ pub(super) const USUAL_ARCSEC: f64 = 20.0;
 /// Cosine of the pressure angle of a working flank, 20 to 25 degrees.
 pub(super) const COS_PRESSURE_ANGLE: f64 = 0.93;
 
-/// Generator turns below which a pulse in one place is not told from a wave; as in the picture of a residual.
-const FEWEST_TURNS_OF_PULSES: f64 = 6.0;
-
 /// Clearance that odd orders of a pitch error take on a flank, over its second order: a first order as large as the second takes 2/π of it,
 /// and a wheel that takes more and shows little is one beside its place.
 const MOST_CLEARANCE_TAKEN: f64 = 0.85;
+
+/// The wave that a law is, in waves of both flanks alike and of opposite sign on each.
+const WAVE: Role = Role("wave");
+const WAVE_BY_FLANK: Role = Role("wave by flank");
+/// Clearance that goes with a pitch error, under any load and under light ones.
+const TAKEN: Role = Role("clearance taken");
+const TAKEN_UNDER_LIGHT_LOAD: Role = Role("clearance taken under light load");
+/// Pulses of a damaged tooth, by flank and load.
+const PULSE: Role = Role("pulse");
 
 /// Which angle an error is locked to.
 #[derive(Clone, Copy, PartialEq)]
@@ -72,7 +81,7 @@ pub(super) fn kept(on: &Excitation<'_>, of: Angle, order: f64) -> std::sync::Arc
 /// Half-load of the fading: from a thirtieth of the load scale to where nothing fades.
 pub(super) fn half_load(on: &Excitation<'_>) -> Shape {
     let load = on.scales.load.max(1e-3);
-    Shape::by_factors("half_load_n_m", load / 30.0, load * 30.0, 3)
+    Shape::by_factors(Name::HalfLoadNM, load / 30.0, load * 30.0, 3)
 }
 
 /// +1 where the circular spline is the output. Where the flexspline is, a load that turns it forward rests on the other flank of the
@@ -86,15 +95,15 @@ pub(super) fn sense(on: &Excitation<'_>) -> f64 {
 
 /// Errors of position along the pitch: nearly the same on both flanks and under any load. Of the teeth in mesh the foremost carries,
 /// which is another one on each flank: flanks differ somewhat, and a part of the clearance goes.
-fn pitch(cause: &'static str, of: Angle) -> Law {
+fn pitch(cause: CauseName, of: Angle) -> Law {
     let mut law = Law::new(cause, move |on, _| {
         let flank = |k: usize| on.base.flank[k];
         let light = |k: usize| if on.scales.load > 0.0 { fading(on, 0.3 * on.scales.load, k) } else { 1.0 };
         let mut columns: Vec<Column> = Vec::new();
-        columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC)));
+        columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC).called(WAVE)));
         // What odd orders take of the clearance, which nothing in the even ones tells.
-        columns.push(beside(by_row(on, flank), 0.6));
-        columns.push(beside(by_row(on, |k| flank(k) * light(k)), 0.4));
+        columns.push(beside(by_row(on, flank), 0.6).called(TAKEN));
+        columns.push(beside(by_row(on, |k| flank(k) * light(k)), 0.4).called(TAKEN_UNDER_LIGHT_LOAD));
         columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
         columns.extend(waves(on, of, 4.0, |_| 1.0).map(|v| nuisance(v, 0.35)));
         columns.extend(waves(on, of, 4.0, flank).map(|v| nuisance(v, 0.12)));
@@ -117,19 +126,22 @@ fn pitch(cause: &'static str, of: Angle) -> Law {
         }
         columns
     })
-    .parameters(pitch_parameters)
-    .physical(|_, c| c[2].abs().max((c[2] + c[3]).abs()) < MOST_CLEARANCE_TAKEN * c[0].hypot(c[1]));
-    law.free_form = true;
+    .parameters_by(pitch_parameters)
+    .physical_if(|_, c| {
+        let (taken, light) = (c.of(TAKEN), c.of(TAKEN_UNDER_LIGHT_LOAD));
+        taken.abs().max((taken + light).abs()) < MOST_CLEARANCE_TAKEN * of_wave(c, WAVE).0
+    });
+    law.search.free_form = true;
     law
 }
 
 /// The same of a wheel whose error is one smooth wave, as of a cutter or a clamping that is off: order 2 with a little of 1 and 4.
-fn smooth_pitch(cause: &'static str, of: Angle) -> Law {
+fn smooth_pitch(cause: CauseName, of: Angle) -> Law {
     Law::new(cause, move |on, _| {
         let flank = |k: usize| on.base.flank[k];
         let light = |k: usize| if on.scales.load > 0.0 { fading(on, 0.3 * on.scales.load, k) } else { 1.0 };
         let mut columns: Vec<Column> = Vec::new();
-        columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC)));
+        columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC).called(WAVE)));
         columns.extend(waves(on, of, 4.0, |_| 1.0).map(|v| nuisance(v, 0.25)));
         columns.extend(waves(on, of, 1.0, light).map(|v| nuisance(v, 0.2)));
         // The clearance makes even orders of the first one, of other phase on each flank.
@@ -138,16 +150,16 @@ fn smooth_pitch(cause: &'static str, of: Angle) -> Law {
         columns.push(nuisance(by_row(on, |k| flank(k) * light(k)), 0.3));
         columns
     })
-    .parameters(pitch_parameters)
+    .parameters_by(pitch_parameters)
 }
 
-fn pitch_parameters(on: &Excitation<'_>, _: &[f64], c: &[f64]) -> Vec<Named> {
-    let (amplitude, phase) = polar(c[0], c[1]);
+fn pitch_parameters(on: &Excitation<'_>, _: Shaped<'_>, c: Coefficients<'_>) -> Vec<Named> {
+    let (amplitude, phase) = of_wave(c, WAVE);
     vec![
-        ("amplitude_um", amplitude / on.scales.arcsec_per_um),
-        ("amplitude_arcsec", amplitude),
-        ("harmonic", 2.0),
-        ("phase_rad", 0.5 * phase),
+        (Name::AmplitudeUm, amplitude / on.scales.arcsec_per_um),
+        (Name::AmplitudeArcsec, amplitude),
+        (Name::Harmonic, 2.0),
+        (Name::PhaseRad, 0.5 * phase),
     ]
 }
 
@@ -156,7 +168,7 @@ fn pitch_parameters(on: &Excitation<'_>, _: &[f64], c: &[f64]) -> Vec<Named> {
 /// `e = d/r (1/2 sin 2x ± tan a cos 2x)`. 10 µm of radius are 0.67 of 10 µm on the pitch circle.
 fn ovality() -> Law {
     let of = Angle::CircularSpline;
-    Law::new("circular_spline_ovality", move |on, _| {
+    Law::new(CauseName::CircularSplineOvality, move |on, _| {
         let flank = |k: usize| on.base.flank[k];
         let [cos, sin] = waves(on, of, 2.0, |_| 1.0);
         let together = |a: &[f64], b: &[f64], sign: f64| -> Vec<f64> {
@@ -164,7 +176,7 @@ fn ovality() -> Law {
             by_row(on, |k| (a[k] + radial * flank(k) * b[k]) / root)
         };
         let mut columns: Vec<Column> =
-            vec![main(together(&sin, &cos, 1.0), USUAL_ARCSEC), main(together(&cos, &sin, -1.0), USUAL_ARCSEC)];
+            [together(&sin, &cos, 1.0), together(&cos, &sin, -1.0)].map(|v| main(v, USUAL_ARCSEC).called(WAVE)).into();
         columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
         // Screws and seats leave further waves on the ring: of n per turn, 1/n of the radial part is tangential.
         for order in [3.0, 4.0, 6.0] {
@@ -176,13 +188,14 @@ fn ovality() -> Law {
         }
         columns
     })
-    .parameters(|on, _, c| {
+    .parameters_by(|on, _, c| {
         // sin 2(x - c) = cos 2c sin 2x - sin 2c cos 2x.
-        let (amplitude, phase) = polar(c[0], -c[1]);
+        let [of_sine, of_cosine] = c.wave(WAVE);
+        let (amplitude, phase) = polar(of_sine, -of_cosine);
         vec![
-            ("amplitude_um", amplitude / (0.67 * on.scales.arcsec_per_um)),
-            ("amplitude_arcsec", amplitude),
-            ("phase_rad", 0.5 * phase),
+            (Name::AmplitudeUm, amplitude / (0.67 * on.scales.arcsec_per_um)),
+            (Name::AmplitudeArcsec, amplitude),
+            (Name::PhaseRad, 0.5 * phase),
         ]
     })
     .well_known()
@@ -194,13 +207,13 @@ const RADIAL_OF_TANGENTIAL: f64 = 0.8;
 /// Form error of the generator: a constant shape repeats from tooth to tooth, so its order is the tooth mesh (z per turn), other on each
 /// flank, with a change of the clearance.
 fn cam_form_error() -> Law {
-    Law::new("cam_form_error", |on, _| {
+    Law::new(CauseName::CamFormError, |on, _| {
         let teeth = on.nominal.teeth.map_or(188.0, |t| f64::from(t.flexspline));
         let of = Angle::Flexspline;
         let flank = |k: usize| on.base.flank[k];
         let mut columns: Vec<Column> = Vec::new();
-        columns.extend(waves(on, of, teeth, |_| 1.0).map(|v| main(v, 8.0)));
-        columns.extend(waves(on, of, teeth, flank).map(|v| main(v, 8.0)));
+        columns.extend(waves(on, of, teeth, |_| 1.0).map(|v| main(v, 8.0).called(WAVE)));
+        columns.extend(waves(on, of, teeth, flank).map(|v| main(v, 8.0).called(WAVE_BY_FLANK)));
         if on.scales.load > 0.0 {
             // More teeth carry, or other ones.
             let load = |k: usize| (on.rows.torque[k] / on.scales.load).abs();
@@ -212,20 +225,21 @@ fn cam_form_error() -> Law {
         columns.push(beside(by_row(on, flank), 1.0));
         columns
     })
-    .parameters(|on, _, c| {
-        let mesh = polar(c[0], c[1]).0.hypot(polar(c[2], c[3]).0);
+    .parameters_by(|on, _, c| {
+        let (both, phase) = of_wave(c, WAVE);
+        let mesh = both.hypot(of_wave(c, WAVE_BY_FLANK).0);
         vec![
-            ("amplitude_um", mesh / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", mesh),
-            ("phase_rad", polar(c[0], c[1]).1),
+            (Name::AmplitudeUm, mesh / on.scales.arcsec_per_um),
+            (Name::AmplitudeArcsec, mesh),
+            (Name::PhaseRad, phase),
         ]
     })
 }
 
 /// A tooth that lacks material: a pulse each time a lobe of the wave passes it, twice per turn, on the flank that carries, under load.
 fn damaged_tooth(of: Angle) -> Law {
-    Law::new("damaged_tooth", move |on, shape| {
-        let (place, width) = (shape[0], shape[1]);
+    Law::new(CauseName::DamagedTooth, move |on, shape| {
+        let (place, width) = (shape.of(Name::AngleRad), shape.of(Name::WidthRad));
         let period = PI;
         let pulse: Vec<f64> = by_row(on, |k| {
             let away = (angle(on, of, k) - place + 0.5 * period).rem_euclid(period) - 0.5 * period;
@@ -236,58 +250,55 @@ fn damaged_tooth(of: Angle) -> Law {
         let flank = |k: usize| on.base.flank[k];
         let load = if on.scales.load > 0.0 { on.scales.load } else { 1.0 };
         vec![
-            main(by_row(on, |k| pulse[k] * flank(k)), 30.0),
-            main(by_row(on, |k| pulse[k] * on.rows.torque[k] / load), 30.0),
-            main(pulse.clone(), 20.0),
-            main(by_row(on, |k| pulse[k] * (on.rows.torque[k] / load).abs()), 20.0),
+            main(by_row(on, |k| pulse[k] * flank(k)), 30.0).called(PULSE),
+            main(by_row(on, |k| pulse[k] * on.rows.torque[k] / load), 30.0).called(PULSE),
+            main(pulse.clone(), 20.0).called(PULSE),
+            main(by_row(on, |k| pulse[k] * (on.rows.torque[k] / load).abs()), 20.0).called(PULSE),
             nuisance(by_row(on, |k| pulse[k] * flank(k) * lobe(k)), 1.0),
             nuisance(by_row(on, |k| pulse[k] * on.rows.torque[k] / load * lobe(k)), 1.0),
             nuisance(by_row(on, |k| pulse[k] * lobe(k)), 1.0),
         ]
     })
-    .shapes([Shape::angle("angle_rad", PI, 30), Shape::by_factors("width_rad", 0.03, 0.4, 2)])
-    .parameters(move |on, shape, c| {
+    .shapes([Shape::angle(Name::AngleRad, PI, 30), Shape::by_factors(Name::WidthRad, 0.03, 0.4, 2)])
+    .parameters_by(move |on, shape, c| {
+        let place = shape.of(Name::AngleRad);
         let teeth =
             on.nominal.teeth.map_or((188.0, 190.0), |t| (f64::from(t.flexspline), f64::from(t.circular_spline)));
         let count = if of == Angle::Flexspline { teeth.0 } else { teeth.1 };
-        let depth = c[0].hypot(c[1]).hypot(c[2]).hypot(c[3]);
+        let depth = c.all(PULSE).reduce(f64::hypot).unwrap_or(0.0);
         vec![
-            ("depth_um", depth / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", depth),
-            ("angle_rad", shape[0]),
-            ("width_rad", shape[1]),
-            ("tooth", (shape[0] / (2.0 * PI) * count).round()),
-            ("wheel", f64::from(u8::from(of == Angle::CircularSpline))),
+            (Name::DepthUm, depth / on.scales.arcsec_per_um),
+            (Name::AmplitudeArcsec, depth),
+            (Name::AngleRad, place),
+            (Name::WidthRad, shape.of(Name::WidthRad)),
+            (Name::Tooth, (place / (2.0 * PI) * count).round()),
+            (Name::Wheel, f64::from(u8::from(of == Angle::CircularSpline))),
         ]
     })
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = vec![
-        displaced("circular_spline_eccentricity", Angle::CircularSpline, on),
-        displaced("flexspline_runout", Angle::Flexspline, on),
-        displaced("gravity_side_load", Angle::Gravity(1.0), on),
+        displaced(CauseName::CircularSplineEccentricity, Angle::CircularSpline, on),
+        displaced(CauseName::FlexsplineRunout, Angle::Flexspline, on),
+        displaced(CauseName::GravitySideLoad, Angle::Gravity(1.0), on),
         ovality(),
-        pitch("flexspline_pitch_error", Angle::Flexspline),
-        pitch("circular_spline_pitch_error", Angle::CircularSpline),
-        smooth_pitch("flexspline_pitch_error", Angle::Flexspline),
-        smooth_pitch("circular_spline_pitch_error", Angle::CircularSpline),
+        pitch(CauseName::FlexsplinePitchError, Angle::Flexspline),
+        pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline),
+        smooth_pitch(CauseName::FlexsplinePitchError, Angle::Flexspline),
+        smooth_pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline),
         generator_eccentricity(on),
         cam_form_error(),
+        damaged_tooth(Angle::Flexspline),
+        damaged_tooth(Angle::CircularSpline),
     ];
-    // A pulse is told from what else is in a turn by coming again, turn after turn.
-    if on.rows.travel.last().is_some_and(|travel| *travel >= FEWEST_TURNS_OF_PULSES * 2.0 * PI) {
-        laws.extend([damaged_tooth(Angle::Flexspline), damaged_tooth(Angle::CircularSpline)]);
-    }
-    if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
-        laws.push(displaced("gravity_side_load", Angle::Gravity(-1.0), on));
+    if on.is_turned_about() {
+        laws.push(displaced(CauseName::GravitySideLoad, Angle::Gravity(-1.0), on));
     }
     for law in &mut laws {
-        if law.zones.is_none() {
-            law.misfit = SHAPE_MISFIT;
+        if !law.is_in_zones() {
+            law.wrong.misfit = SHAPE_MISFIT;
         }
-        // The tooth mesh is an order of its own.
-        law.kin = if law.cause == "cam_form_error" { Kin::Unlike } else { Kin::Shape };
     }
     laws
 }

@@ -7,8 +7,8 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::geometry::{Angle, COS_PRESSURE_ANGLE, angle};
-use super::{Column, Excitation, Law, Shape, Tolerance, beside, by_row, nuisance, polar};
-use crate::diagnosis::linear::Prior;
+use super::{Column, Excitation, Law, Role, Shape, beside, by_row, main, main_about, nuisance, of_wave};
+use crate::causes::{CauseName, Kin, ParameterName as Name};
 use crate::drive::Wheel;
 use crate::kernels::{Gain, Kernels};
 
@@ -29,8 +29,11 @@ fn by_flank(flank: f64, torque: f64, value: impl Fn(f64) -> f64) -> f64 {
     forward + backward
 }
 
+/// The wave that a law is.
+const WAVE: Role = Role("wave");
+
 fn main_um(values: Vec<f64>) -> Column {
-    Column { values, tolerance: Tolerance::Main(Prior { mean: 0.0, std: USUAL_UM }) }
+    main(values, USUAL_UM).called(WAVE)
 }
 
 /// Columns of the response to `cos(k α)` and to `sin(k α)` of an error on a wheel.
@@ -70,37 +73,36 @@ fn left_open(on: &Excitation<'_>, of: Angle, order: f64) -> Vec<Column> {
 }
 
 /// An axis beside that of the generator: size and direction enter as the FEM of such drives has them.
-fn eccentric(cause: &'static str, of: Angle, kernels: Arc<Kernels>) -> Law {
+fn eccentric(cause: CauseName, of: Angle, kernels: Arc<Kernels>) -> Law {
     Law::new(cause, move |on, shape| {
-        let (size, phase) = (shape[0], shape[1]);
+        let (size, phase) = (shape.of(Name::SizeUm), shape.of(Name::PhaseRad));
         let field = kernels.eccentric_field(size);
         let pattern = by_row(on, |k| {
             let place = kernels.place_of_load(on.rows.torque[k]);
             let direction = phase - angle(on, of, k);
             by_flank(on.base.flank[k], on.rows.torque[k], |torque| field.at(direction, torque < 0.0, place))
         });
-        let mut columns =
-            vec![Column { values: pattern, tolerance: Tolerance::Main(Prior { mean: 1.0, std: SCALE_MISFIT }) }];
+        let mut columns = vec![main_about(1.0, pattern, SCALE_MISFIT).called(Role::SIZE)];
         columns.extend(left_open(on, of, 2.0));
         columns
     })
     .shapes([
-        Shape::by_factors("size_um", ECCENTRICITY_UM[0], ECCENTRICITY_UM[1], 10),
-        Shape::angle("phase_rad", PI, 8),
+        Shape::by_factors(Name::SizeUm, ECCENTRICITY_UM[0], ECCENTRICITY_UM[1], 10),
+        Shape::angle(Name::PhaseRad, PI, 8),
     ])
-    .parameters(|on, shape, c| {
-        let size = shape[0] * c[0];
+    .parameters_by(|on, shape, c| {
+        let size = shape.of(Name::SizeUm) * c.of(Role::SIZE);
         vec![
-            ("amplitude_um", size),
-            ("amplitude_arcsec", size * on.scales.arcsec_per_um / COS_PRESSURE_ANGLE),
-            ("phase_rad", shape[1]),
+            (Name::AmplitudeUm, size),
+            (Name::AmplitudeArcsec, size * on.scales.arcsec_per_um / COS_PRESSURE_ANGLE),
+            (Name::PhaseRad, shape.of(Name::PhaseRad)),
         ]
     })
-    .physical(|_, c| c[0] > 0.5)
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.5)
 }
 
 /// Harmonics of the pitch of a wheel that both lobes see alike; the odd ones cancel.
-fn pitch(cause: &'static str, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
+fn pitch(cause: CauseName, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
     const ORDERS: [u32; 8] = [2, 4, 6, 8, 10, 12, 14, 16];
     let of = match wheel {
         Wheel::Flexspline => Angle::Flexspline,
@@ -121,32 +123,32 @@ fn pitch(cause: &'static str, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
         }
         columns
     })
-    .parameters(|on, _, c| {
-        let (amplitude, phase) = polar(c[0], c[1]);
+    .parameters_by(|on, _, c| {
+        let (amplitude, phase) = of_wave(c, WAVE);
         vec![
-            ("amplitude_um", amplitude),
-            ("amplitude_arcsec", amplitude * on.scales.arcsec_per_um),
-            ("harmonic", 2.0),
-            ("phase_rad", 0.5 * phase),
+            (Name::AmplitudeUm, amplitude),
+            (Name::AmplitudeArcsec, amplitude * on.scales.arcsec_per_um),
+            (Name::Harmonic, 2.0),
+            (Name::PhaseRad, 0.5 * phase),
         ]
     });
-    law.free_form = true;
+    law.search.free_form = true;
     law
 }
 
 fn ovality(kernels: Arc<Kernels>) -> Law {
     let of = Angle::CircularSpline;
-    Law::new("circular_spline_ovality", move |on, _| {
+    Law::new(CauseName::CircularSplineOvality, move |on, _| {
         let mut columns: Vec<Column> = responses(on, of, 2.0, |torque| kernels.ovality(torque)).map(main_um).into();
         columns.extend(left_open(on, of, 2.0));
         columns
     })
-    .parameters(|on, _, c| {
-        let (amplitude, phase) = polar(c[0], c[1]);
+    .parameters_by(|on, _, c| {
+        let (amplitude, phase) = of_wave(c, WAVE);
         vec![
-            ("amplitude_um", amplitude),
-            ("amplitude_arcsec", amplitude * 0.67 * on.scales.arcsec_per_um),
-            ("phase_rad", 0.5 * phase),
+            (Name::AmplitudeUm, amplitude),
+            (Name::AmplitudeArcsec, amplitude * 0.67 * on.scales.arcsec_per_um),
+            (Name::PhaseRad, 0.5 * phase),
         ]
     })
 }
@@ -155,18 +157,19 @@ fn ovality(kernels: Arc<Kernels>) -> Law {
 pub(super) fn laws(on: &Excitation<'_>, kernels: &Arc<Kernels>) -> Vec<Law> {
     let of = |cause, angle| eccentric(cause, angle, Arc::clone(kernels));
     let mut laws = vec![
-        of("circular_spline_eccentricity", Angle::CircularSpline),
-        of("flexspline_runout", Angle::Flexspline),
-        of("gravity_side_load", Angle::Gravity(1.0)),
+        of(CauseName::CircularSplineEccentricity, Angle::CircularSpline),
+        of(CauseName::FlexsplineRunout, Angle::Flexspline),
+        of(CauseName::GravitySideLoad, Angle::Gravity(1.0)),
         ovality(Arc::clone(kernels)),
-        pitch("flexspline_pitch_error", Wheel::Flexspline, Arc::clone(kernels)),
-        pitch("circular_spline_pitch_error", Wheel::CircularSpline, Arc::clone(kernels)),
+        pitch(CauseName::FlexsplinePitchError, Wheel::Flexspline, Arc::clone(kernels)),
+        pitch(CauseName::CircularSplinePitchError, Wheel::CircularSpline, Arc::clone(kernels)),
     ];
-    if on.rows.orientation.iter().any(|o| (o - on.rows.orientation[0]).abs() > 1e-3) {
-        laws.push(of("gravity_side_load", Angle::Gravity(-1.0)));
+    if on.is_turned_about() {
+        laws.push(of(CauseName::GravitySideLoad, Angle::Gravity(-1.0)));
     }
     for law in &mut laws {
-        law.misfit = KERNEL_MISFIT;
+        law.wrong.misfit = KERNEL_MISFIT;
+        law.wrong.kin = Kin::Unlike;
     }
     laws
 }

@@ -6,15 +6,23 @@
 
 use super::displaced::{PRESSED_ARCSEC, ZONES_MISFIT, stopped};
 use super::geometry::{Angle, USUAL_ARCSEC, kept, waves};
-use super::{Column, Excitation, Law, Named, Shape, Tolerance, Zones, beside, by_row, main, nuisance, polar};
-use crate::diagnosis::linear::Prior;
+use super::{
+    Column, Excitation, Law, Named, Role, Shape, Shaped, Zones, beside, by_row, main, main_about, nuisance, of_wave,
+};
+use crate::causes::{CauseName, ParameterName as Name};
 
 /// Plausible differences between the lobes, arcsec at the output.
 const DEEPER_ARCSEC: [f64; 2] = [2.0, 200.0];
 /// Errors of the teeth over the difference of the lobes, at most.
 const MOST_TEETH: f64 = 1.3;
-/// Where the column of what the deeper lobe takes of the clearance stands.
-const TAKEN: usize = 4;
+/// What the deeper lobe takes of the clearance, under a load and without one.
+const TAKEN: Role = Role("clearance taken");
+const TAKEN_UNLOADED: Role = Role("clearance taken without a load");
+/// First orders of the teeth that the deeper lobe shows.
+const TEETH: [(Angle, Role); 2] = [
+    (Angle::Flexspline, Role("first order of the flexspline")),
+    (Angle::CircularSpline, Role("first order of the circular spline")),
+];
 
 /// What a load does to a lobe that is this much deeper, row by row.
 struct Lobe {
@@ -25,9 +33,9 @@ struct Lobe {
 }
 
 impl Lobe {
-    fn new(on: &Excitation<'_>, shape: &[f64]) -> Lobe {
-        let (deeper, per_n_m) = match shape {
-            [deeper, pressed] => (*deeper, pressed / on.scales.load),
+    fn new(on: &Excitation<'_>, shape: Shaped<'_>) -> Lobe {
+        let (deeper, per_n_m) = match (shape.get(Name::DeeperArcsec), shape.get(Name::PressedArcsec)) {
+            (Some(deeper), Some(pressed)) => (deeper, pressed / on.scales.load),
             _ => (0.0, 0.0),
         };
         let pressed = |k: usize| per_n_m * on.rows.torque[k].abs();
@@ -43,18 +51,18 @@ impl Lobe {
 /// The law.
 pub(super) fn generator_eccentricity(on: &Excitation<'_>) -> Law {
     let loaded = on.scales.load > 0.0;
-    let mut law = Law::new("generator_eccentricity", move |on, shape| {
+    let mut law = Law::new(CauseName::GeneratorEccentricity, move |on, shape| {
         let lobe = Lobe::new(on, shape);
         let flank = |k: usize| on.base.flank[k];
         let shows = |k: usize| lobe.shows[k];
         let mut columns: Vec<Column> = Vec::new();
-        for of in [Angle::Flexspline, Angle::CircularSpline] {
-            columns.extend(waves(on, of, 1.0, shows).map(|v| main(v, USUAL_ARCSEC)));
+        for (of, role) in TEETH {
+            columns.extend(waves(on, of, 1.0, shows).map(|v| main(v, USUAL_ARCSEC).called(role)));
         }
         if loaded {
             // No more than the clearance.
             let taken = by_row(on, |k| -flank(k) * lobe.stops[k].min(on.base.half_backlash));
-            columns.push(Column { values: taken, tolerance: Tolerance::Main(Prior { mean: 1.0, std: 0.15 }) });
+            columns.push(main_about(1.0, taken, 0.15).called(TAKEN));
         }
         for of in [Angle::Flexspline, Angle::CircularSpline] {
             columns.extend(waves(on, of, 1.0, |k| shows(k) * flank(k)).map(|v| nuisance(v, 0.12)));
@@ -64,44 +72,46 @@ pub(super) fn generator_eccentricity(on: &Excitation<'_>) -> Law {
                 columns.extend(waves(on, of, 1.0, |_| 1.0).map(|v| nuisance(v, 0.03)));
             }
         }
-        columns.push(if loaded { nuisance(by_row(on, flank), 0.05) } else { beside(by_row(on, flank), 2.0) });
+        columns.push(if loaded {
+            nuisance(by_row(on, flank), 0.05)
+        } else {
+            beside(by_row(on, flank), 2.0).called(TAKEN_UNLOADED)
+        });
         columns
     })
+    .evaluated_on_averages()
     .shapes(if loaded {
         vec![
-            Shape::by_factors("deeper_arcsec", DEEPER_ARCSEC[0], DEEPER_ARCSEC[1], 3),
-            Shape::by_factors("pressed_arcsec", PRESSED_ARCSEC[0], PRESSED_ARCSEC[1], 2),
+            Shape::by_factors(Name::DeeperArcsec, DEEPER_ARCSEC[0], DEEPER_ARCSEC[1], 3),
+            Shape::by_factors(Name::PressedArcsec, PRESSED_ARCSEC[0], PRESSED_ARCSEC[1], 2),
         ]
     } else {
         Vec::new()
     })
-    .parameters(|on, shape, c| {
-        let (on_flexspline, phase) = polar(c[0], c[1]);
-        let on_ring = polar(c[2], c[3]).0;
+    .parameters_by(|on, shape, c| {
+        let [(on_flexspline, phase), (on_ring, _)] = TEETH.map(|(_, role)| of_wave(c, role));
         let strongest = on_flexspline.max(on_ring);
         let mut named: Vec<Named> = vec![
-            ("amplitude_um", strongest / on.scales.arcsec_per_um),
-            ("amplitude_arcsec", strongest),
-            ("phase_rad", phase),
+            (Name::AmplitudeUm, strongest / on.scales.arcsec_per_um),
+            (Name::AmplitudeArcsec, strongest),
+            (Name::PhaseRad, phase),
         ];
-        if let [deeper, pressed] = shape {
-            named.extend([("deeper_arcsec", *deeper), ("pressed_arcsec", *pressed)]);
-        }
+        let deeper = [Name::DeeperArcsec, Name::PressedArcsec];
+        named.extend(deeper.into_iter().filter_map(|name| Some((name, shape.get(name)?))));
         named
-    });
-    law.smooth = true;
-    law.misfit = ZONES_MISFIT;
-    law.physical = Box::new(|shape, c| {
+    })
+    .physical_if(|shape, c| {
         // Teeth farther out than the lobe is deep would make the other lobe the deeper one, once a turn.
-        let teeth = polar(c[0], c[1]).0 + polar(c[2], c[3]).0;
-        shape.first().is_none_or(|deeper| teeth < MOST_TEETH * deeper * c.get(TAKEN).copied().unwrap_or(1.0))
-    });
-    law.zones = Some(Box::new(|on, shape, c| {
-        let waves: Vec<_> = [Angle::Flexspline, Angle::CircularSpline].map(|of| kept(on, of, 1.0)).into();
-        let teeth =
-            by_row(on, |k| (0..2).map(|w| c[2 * w] * waves[w][0][k] + c[2 * w + 1] * waves[w][1][k]).sum::<f64>());
-        let deeper = shape.first().map_or_else(|| -c.last().unwrap_or(&0.0), |deeper| deeper * c[TAKEN]);
+        let [on_flexspline, on_ring] = TEETH.map(|(_, role)| of_wave(c, role).0);
+        let lobe = shape.get(Name::DeeperArcsec);
+        lobe.is_none_or(|deeper| on_flexspline + on_ring < MOST_TEETH * deeper * c.get(TAKEN).unwrap_or(1.0))
+    })
+    .parts_zones(|on, shape, c| {
+        let waves = TEETH.map(|(of, role)| (kept(on, of, 1.0), c.wave(role)));
+        let teeth = by_row(on, |k| waves.iter().map(|(wave, c)| c[0] * wave[0][k] + c[1] * wave[1][k]).sum::<f64>());
+        let deeper = shape.get(Name::DeeperArcsec).map_or_else(|| -c.of(TAKEN_UNLOADED), |deeper| deeper * c.of(TAKEN));
         Zones { upper: by_row(on, |k| teeth[k] - deeper), lower: by_row(on, |k| teeth[k] + deeper) }
-    }));
+    });
+    law.wrong.misfit = ZONES_MISFIT;
     law
 }

@@ -11,21 +11,27 @@ mod dynamic;
 mod generic;
 mod geometry;
 mod kernel;
+mod label;
 mod lobes;
+mod named;
 mod sensor;
 mod stiffness;
 mod thermal;
 
+use std::f64::consts::PI;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::base::Base;
 use super::linear::Prior;
-use super::prepare::Jump;
+use super::prepare::{Jump, whole_pitches};
 use super::rows::Rows;
+use crate::causes::{CauseName, Kin, Need, ParameterName};
 use crate::nominal::Nominal;
 
 pub use among::{Acting, Among, Zones, left_by, together};
 pub use generic::{line, maps, unnamed};
+pub use label::{Deviation, Label, Per};
+pub use named::{Coefficients, Role, Shaped};
 
 /// What laws are evaluated on.
 #[derive(Clone, Copy)]
@@ -46,6 +52,13 @@ pub struct Excitation<'a> {
     pub softer: f64,
 }
 
+/// Generator turns below which a pulse in one place is not told from a wave; as in the picture of a residual.
+const FEWEST_TURNS_OF_PULSES: f64 = 6.0;
+/// At temperatures closer to each other than this, and this close to the nominal one, K, nothing thermal can be told from a changed
+/// constant.
+const LEAST_SPAN_K: f64 = 2.0;
+const LEAST_OFF_NOMINAL_K: f64 = 5.0;
+
 /// A load that nobody recorded on an unloaded drive may be so many times its friction, or wind it up by so much, arcsec.
 const UNLOADED_FRICTIONS: f64 = 4.0;
 const UNLOADED_ARCSEC: f64 = 20.0;
@@ -61,6 +74,47 @@ impl<'a> Excitation<'a> {
     #[must_use]
     pub fn unloaded(&self) -> bool {
         self.scales.load < self.nominal.friction_torque_n_m
+    }
+
+    /// What these data lack to speak of a cause: the first of its needs that they do not meet.
+    #[must_use]
+    pub fn lacks(&self, cause: CauseName) -> Option<Need> {
+        cause.needs().iter().copied().find(|need| !self.meets(*need))
+    }
+
+    /// Whether these data speak of a cause.
+    fn speaks_of(&self, cause: CauseName) -> bool {
+        self.lacks(cause).is_none()
+    }
+
+    fn meets(&self, need: Need) -> bool {
+        let rows = self.rows;
+        match need {
+            Need::Teeth => self.nominal.teeth.is_some(),
+            Need::Turns => rows.travel.last().is_some_and(|travel| *travel >= FEWEST_TURNS_OF_PULSES * 2.0 * PI),
+            Need::Load => self.scales.load > 0.0,
+            Need::Spring => self.nominal.wind_up_arcsec(1.0) > 0.0,
+            Need::Temperature => rows.recorded.temperature,
+            Need::TemperatureSpan => {
+                let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+                for t in &rows.temperature {
+                    (low, high) = (low.min(*t), high.max(*t));
+                }
+                high - low > LEAST_SPAN_K || (low - self.nominal.temperature_c).abs() > LEAST_OFF_NOMINAL_K
+            }
+            Need::Time => rows.recorded.time,
+            Need::Motion => rows.speed.iter().any(|w| *w != 0.0),
+            Need::Jump => {
+                let jumps = &self.scales.jumps;
+                !jumps.is_empty() && jumps.iter().all(|jump| whole_pitches(self.nominal, jump.height_arcsec).is_some())
+            }
+        }
+    }
+
+    /// Whether the drive is turned against gravity during the data.
+    fn is_turned_about(&self) -> bool {
+        let orientation = &self.rows.orientation;
+        orientation.iter().any(|o| (o - orientation[0]).abs() > 1e-3)
     }
 
     /// Nominal wind-up at rest, arcsec/N·m; none for a drive that does not give.
@@ -130,8 +184,8 @@ impl Scales {
 /// A shape parameter.
 #[derive(Clone, Debug)]
 pub struct Shape {
-    /// Name with unit.
-    pub name: &'static str,
+    /// Its name.
+    pub name: ParameterName,
     /// Least plausible value.
     pub low: f64,
     /// Largest plausible value.
@@ -145,13 +199,13 @@ pub struct Shape {
 }
 
 impl Shape {
-    fn by_factors(name: &'static str, low: f64, high: f64, tried: usize) -> Shape {
+    fn by_factors(name: ParameterName, low: f64, high: f64, tried: usize) -> Shape {
         Shape { name, low, high, tried, log: true, cyclic: false }
     }
-    fn evenly(name: &'static str, low: f64, high: f64, tried: usize) -> Shape {
+    fn evenly(name: ParameterName, low: f64, high: f64, tried: usize) -> Shape {
         Shape { name, low, high, tried, log: false, cyclic: false }
     }
-    fn angle(name: &'static str, period: f64, tried: usize) -> Shape {
+    fn angle(name: ParameterName, period: f64, tried: usize) -> Shape {
         Shape { name, low: 0.0, high: period, tried, log: false, cyclic: true }
     }
 
@@ -197,48 +251,65 @@ pub enum Tolerance {
 /// A column of a law.
 #[derive(Clone, Debug)]
 pub struct Column {
+    /// What it is, for what asks for its coefficient.
+    pub role: Role,
     /// Arcsec per unit of the coefficient, row by row.
     pub values: Vec<f64>,
     /// What the coefficient may be.
     pub tolerance: Tolerance,
 }
 
+impl Column {
+    fn new(values: Vec<f64>, tolerance: Tolerance) -> Column {
+        Column { role: Role::PLAIN, values, tolerance }
+    }
+
+    /// The column with a role.
+    #[must_use]
+    fn called(self, role: Role) -> Column {
+        Column { role, ..self }
+    }
+}
+
 /// A main column with a coefficient around zero.
 fn main(values: Vec<f64>, std: f64) -> Column {
-    Column { values, tolerance: Tolerance::Main(Prior { mean: 0.0, std }) }
+    main_about(0.0, values, std)
+}
+
+/// A main column with a coefficient around `mean`.
+fn main_about(mean: f64, values: Vec<f64>, std: f64) -> Column {
+    Column::new(values, Tolerance::Main(Prior { mean, std }))
 }
 
 /// A nuisance column.
 fn nuisance(values: Vec<f64>, share: f64) -> Column {
-    Column { values, tolerance: Tolerance::Nuisance(share) }
+    Column::new(values, Tolerance::Nuisance(share))
 }
 
 /// A column of what comes with a cause.
 fn beside(values: Vec<f64>, share: f64) -> Column {
-    Column { values, tolerance: Tolerance::Beside(share) }
+    Column::new(values, Tolerance::Beside(share))
 }
 
 /// A column of what was before the first row of a session.
 fn history(values: Vec<f64>, share: f64) -> Column {
-    Column { values, tolerance: Tolerance::History(share) }
+    Column::new(values, Tolerance::History(share))
 }
 
-/// A parameter for the report: name with unit, value.
-pub type Named = (&'static str, f64);
+/// A parameter for the report: name and value.
+pub type Named = (ParameterName, f64);
 
-type Load = Box<dyn Fn(&Excitation<'_>, &[f64]) -> Vec<f64> + Send + Sync>;
-type Columns = Box<dyn Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync>;
-type Parameters = Box<dyn Fn(&Excitation<'_>, &[f64], &[f64]) -> Vec<Named> + Send + Sync>;
-type ShapeFound = Box<dyn Fn(&[f64], &[f64]) -> Vec<Vec<f64>> + Send + Sync>;
-type Apart = Box<dyn Fn(&Excitation<'_>, &[f64], &[f64]) -> Zones + Send + Sync>;
-type Physical = Box<dyn Fn(&[f64], &[f64]) -> bool + Send + Sync>;
+type MakeColumns = Box<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Column> + Send + Sync>;
+type MakeParameters = Box<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Vec<Named> + Send + Sync>;
+type IsPhysical = Box<dyn Fn(Shaped<'_>, Coefficients<'_>) -> bool + Send + Sync>;
+type AddedLoad = Box<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<f64> + Send + Sync>;
+type Apart = Box<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Zones + Send + Sync>;
+type Beginnings = Box<dyn Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Send + Sync>;
 
 /// A linear law close to a law that is none: its coefficients say where to begin with the shape parameters.
 pub struct Lead {
-    /// Columns at the values of the shape parameters tried first; what the lead finds is not looked at.
-    pub columns: Columns,
-    /// Values of the shape parameters to begin at, from those tried and the coefficients found.
-    pub shape: ShapeFound,
+    columns: MakeColumns,
+    beginnings: Beginnings,
     /// Only where the load leaves no doubt about the flank.
     pub loaded_only: bool,
 }
@@ -246,82 +317,73 @@ pub struct Lead {
 /// Laws made so far: each has a number of its own.
 static LAWS: AtomicU64 = AtomicU64::new(0);
 
-/// One law of one cause.
+/// One law of one cause: what it tells of, how it is evaluated, how it may be wrong, how it is looked for, and how it acts on others.
 pub struct Law {
     id: u64,
-    /// Cause in snake case, or what an unnamed deviation looks like.
-    pub cause: String,
-    /// False for a deviation that has no cause in the library.
-    pub named: bool,
+    /// What it tells of.
+    pub label: Label,
     /// Shape parameters.
     pub shapes: Vec<Shape>,
+    evaluated: Evaluated,
+    /// How it may be wrong.
+    pub wrong: Wrong,
+    /// How it is looked for.
+    pub search: Search,
+    /// What it does to other causes, and they to it.
+    pub acts: Acts,
+}
+
+/// How a law is evaluated.
+struct Evaluated {
     /// Columns at given shape parameters.
-    pub columns: Columns,
+    columns: MakeColumns,
     /// Parameters for the report from shape parameters and coefficients.
-    pub parameters: Parameters,
+    parameters: MakeParameters,
     /// Whether shape parameters and coefficients make sense, signs above all.
-    pub physical: Physical,
-    /// If set, the law is a base parameter out of tolerance: index of the name in [`Base::floating`].
-    pub tolerance_of: Option<&'static str>,
-    /// How wrong the law may be, as a share of its size: what is smaller than that beside it may be its own misfit.
+    physical: IsPhysical,
+    /// It changes little from one row to the next.
+    smooth: bool,
+}
+
+/// How a law may be wrong.
+#[derive(Clone, Copy, Debug)]
+pub struct Wrong {
+    /// Share of its size by which it may be wrong: what is smaller than that beside it may be its own misfit.
     pub misfit: f64,
+    /// What that misfit may be taken for.
+    pub kin: Kin,
     /// Largest size of all nuisance over that of the main columns.
     pub most_nuisance: f64,
-    /// What it may be taken for.
-    pub kin: Kin,
     /// Relative uncertainty of its parameters beside that of the data: what the law itself is not sure of.
     pub doubt: f64,
-    /// Says something about sessions that it was not fitted to.
+    /// It says something about sessions that it was not fitted to.
     pub foretells: bool,
+}
+
+/// How a law is looked for.
+#[derive(Default)]
+pub struct Search {
     /// Where to begin.
     pub lead: Option<Lead>,
-    /// The law is a free profile: what it may hold has to be taken out before the noise is measured, the finest detail too.
-    pub free_form: bool,
-    /// Looked for with its nuisance columns, as its main ones mean nothing without them.
+    /// With its nuisance columns, as its main ones mean nothing without them.
     pub whole: bool,
+    /// It is a free profile: what it may hold has to be taken out before the noise is measured, the finest detail too.
+    pub free_form: bool,
+}
+
+/// What a law does to other causes, and they to it.
+#[derive(Default)]
+pub struct Acts {
     /// Load (N·m, row by row) that the cause adds beside the torque that was recorded.
-    pub load: Option<Load>,
-    /// Much of it shows while the play is crossed, in rows that do not count for the sizes of others.
-    pub in_crossings: bool,
-    /// How far it brings one zone of teeth ahead of the other, from shape parameters and coefficients.
-    pub zones: Option<Apart>,
+    load: Option<AddedLoad>,
+    /// How far it brings one zone of teeth ahead of the other.
+    zones: Option<Apart>,
     /// What other causes do to the zones of teeth and to the clearance enters the law.
     pub meets_zones: bool,
-    /// It changes little from one row to the next: averages of rows tell what it says of their average.
-    pub smooth: bool,
-}
-
-/// What the misfit of a law may be taken for: most of all another law of its kin.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kin {
-    /// Shape and place of wheels and generator: waves of the generator angle.
-    Shape,
-    /// Follows the torque: springs.
-    Torque,
-    /// Follows the motion: a reading that comes late.
-    Motion,
-    /// Follows both: friction inside.
-    Friction,
-    /// Drag that follows the speed.
-    Drag,
-    /// Width of the clearance.
-    Clearance,
-    /// Like nothing else.
-    Unlike,
-}
-
-impl Kin {
-    /// Whether what one is wrong by may look like the other.
-    fn like(self, other: Kin) -> bool {
-        match (self, other) {
-            (Kin::Unlike, _) | (_, Kin::Unlike) => false,
-            (Kin::Friction, Kin::Torque | Kin::Motion | Kin::Drag)
-            | (Kin::Torque | Kin::Motion | Kin::Drag, Kin::Friction)
-            | (Kin::Drag, Kin::Motion)
-            | (Kin::Motion, Kin::Drag) => true,
-            (a, b) => a == b,
-        }
-    }
+    /// Much of it shows while the play is crossed, in rows that do not count for the sizes of others.
+    pub in_crossings: bool,
+    /// If set, the law is a base parameter out of tolerance: its name in [`Base::floating`].
+    pub tolerance_of: Option<&'static str>,
 }
 
 /// Share of a law's misfit that may look like a law that is no kin.
@@ -341,30 +403,46 @@ const USUAL_DOUBT: f64 = 0.03;
 const EXACT_DOUBT: f64 = 0.005;
 
 impl Law {
-    fn new(cause: &str, columns: impl Fn(&Excitation<'_>, &[f64]) -> Vec<Column> + Send + Sync + 'static) -> Law {
+    fn new(
+        label: impl Into<Label>,
+        columns: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Column> + Send + Sync + 'static,
+    ) -> Law {
+        let label = label.into();
         Law {
             id: LAWS.fetch_add(1, Ordering::Relaxed),
-            cause: cause.to_owned(),
-            named: true,
+            label,
             shapes: Vec::new(),
-            columns: Box::new(columns),
-            parameters: Box::new(|_, _, _| Vec::new()),
-            physical: Box::new(|_, _| true),
-            tolerance_of: None,
-            misfit: USUAL_MISFIT,
-            most_nuisance: MOST_NUISANCE,
-            kin: Kin::Unlike,
-            doubt: USUAL_DOUBT,
-            foretells: true,
-            lead: None,
-            free_form: false,
-            whole: false,
-            load: None,
-            in_crossings: false,
-            zones: None,
-            meets_zones: false,
-            smooth: false,
+            evaluated: Evaluated {
+                columns: Box::new(columns),
+                parameters: Box::new(|_, _, _| Vec::new()),
+                physical: Box::new(|_, _| true),
+                smooth: false,
+            },
+            wrong: Wrong {
+                misfit: USUAL_MISFIT,
+                kin: label.kin(),
+                most_nuisance: MOST_NUISANCE,
+                doubt: USUAL_DOUBT,
+                foretells: true,
+            },
+            search: Search::default(),
+            acts: Acts::default(),
         }
+    }
+    /// The cause it tells of; none for a deviation without one.
+    #[must_use]
+    pub const fn cause(&self) -> Option<CauseName> {
+        self.label.cause()
+    }
+    /// Whether it tells of a cause of the library.
+    #[must_use]
+    pub const fn named(&self) -> bool {
+        self.cause().is_some()
+    }
+    /// Whether it tells of this cause.
+    #[must_use]
+    pub fn is(&self, cause: CauseName) -> bool {
+        self.cause() == Some(cause)
     }
     /// A number that no other law has.
     #[must_use]
@@ -372,51 +450,155 @@ impl Law {
         self.id
     }
     fn exact(mut self) -> Law {
-        self.misfit = EXACT_MISFIT;
-        self.doubt = EXACT_DOUBT;
+        self.wrong.misfit = EXACT_MISFIT;
+        self.wrong.doubt = EXACT_DOUBT;
         self
     }
     fn well_known(mut self) -> Law {
-        self.most_nuisance = MOST_NUISANCE_OF_KNOWN;
+        self.wrong.most_nuisance = MOST_NUISANCE_OF_KNOWN;
         self
     }
-    fn smooth(mut self) -> Law {
-        self.smooth = true;
+    fn evaluated_on_averages(mut self) -> Law {
+        self.evaluated.smooth = true;
         self
+    }
+    /// Whether it changes little from one row to the next, so that averages of rows tell what it says of their average.
+    #[must_use]
+    pub fn smooth(&self) -> bool {
+        self.evaluated.smooth
     }
     fn whole(mut self) -> Law {
-        self.whole = true;
+        self.search.whole = true;
         self
     }
     fn shapes(mut self, shapes: impl IntoIterator<Item = Shape>) -> Law {
         self.shapes = shapes.into_iter().collect();
         self
     }
-    fn parameters(
+    fn parameters_by(
         mut self,
-        parameters: impl Fn(&Excitation<'_>, &[f64], &[f64]) -> Vec<Named> + Send + Sync + 'static,
+        parameters: impl Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Vec<Named> + Send + Sync + 'static,
     ) -> Law {
-        self.parameters = Box::new(parameters);
+        self.evaluated.parameters = Box::new(parameters);
         self
     }
-    fn physical(mut self, physical: impl Fn(&[f64], &[f64]) -> bool + Send + Sync + 'static) -> Law {
-        self.physical = Box::new(physical);
+    fn physical_if(mut self, physical: impl Fn(Shaped<'_>, Coefficients<'_>) -> bool + Send + Sync + 'static) -> Law {
+        self.evaluated.physical = Box::new(physical);
+        self
+    }
+    fn adds_load(mut self, load: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<f64> + Send + Sync + 'static) -> Law {
+        self.acts.load = Some(Box::new(load));
+        self
+    }
+    fn parts_zones(
+        mut self,
+        apart: impl Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Zones + Send + Sync + 'static,
+    ) -> Law {
+        self.acts.zones = Some(Box::new(apart));
+        self
+    }
+    fn led_by(
+        mut self,
+        columns: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Column> + Send + Sync + 'static,
+        beginnings: impl Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Send + Sync + 'static,
+    ) -> Law {
+        let (columns, beginnings) = (Box::new(columns), Box::new(beginnings));
+        self.search.lead = Some(Lead { columns, beginnings, loaded_only: false });
+        self
+    }
+    fn led_under_load_alone(mut self) -> Law {
+        if let Some(lead) = &mut self.search.lead {
+            lead.loaded_only = true;
+        }
         self
     }
 
-    /// Whether shape parameters and coefficients make sense: signs, and most of it from the main columns, whose `main` and `nuisance`
-    /// parts are this large.
+    fn shaped<'s>(&'s self, values: &'s [f64]) -> Shaped<'s> {
+        Shaped::new(&self.shapes, values)
+    }
+
+    /// Columns at values of the shape parameters.
     #[must_use]
-    pub fn sound(&self, values: &[f64], coefficients: &[f64], main: f64, nuisance: f64) -> bool {
-        (self.physical)(values, coefficients) && nuisance <= self.most_nuisance * main
+    pub fn columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Column> {
+        (self.evaluated.columns)(on, self.shaped(values))
+    }
+
+    /// Columns of the lead at values of the shape parameters; those of the law where it has no lead.
+    #[must_use]
+    pub fn lead_columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Column> {
+        match &self.search.lead {
+            Some(lead) => (lead.columns)(on, self.shaped(values)),
+            None => self.columns(on, values),
+        }
+    }
+
+    /// Values of the shape parameters to begin with, from those tried and the coefficients of the columns of the lead; nothing without
+    /// a lead.
+    #[must_use]
+    pub fn beginnings(&self, values: &[f64], coefficients: Coefficients<'_>) -> Vec<Vec<f64>> {
+        let lead = self.search.lead.as_ref();
+        lead.map_or_else(Vec::new, |lead| (lead.beginnings)(self.shaped(values), coefficients))
+    }
+
+    /// Parameters for the report.
+    #[must_use]
+    pub fn parameters(&self, on: &Excitation<'_>, values: &[f64], coefficients: Coefficients<'_>) -> Vec<Named> {
+        (self.evaluated.parameters)(on, self.shaped(values), coefficients)
+    }
+
+    /// Whether shape parameters and coefficients make sense, signs above all.
+    #[must_use]
+    pub fn physical(&self, values: &[f64], coefficients: Coefficients<'_>) -> bool {
+        (self.evaluated.physical)(self.shaped(values), coefficients)
+    }
+
+    /// Load (N·m, row by row) that the cause adds beside the torque that was recorded, if it adds any.
+    #[must_use]
+    pub fn load(&self, on: &Excitation<'_>, values: &[f64]) -> Option<Vec<f64>> {
+        self.acts.load.as_ref().map(|load| load(on, self.shaped(values)))
+    }
+
+    /// Whether it adds a load.
+    #[must_use]
+    pub fn is_load(&self) -> bool {
+        self.acts.load.is_some()
+    }
+
+    /// How far it brings one zone of teeth ahead of the other, if it does.
+    #[must_use]
+    pub fn zones(&self, on: &Excitation<'_>, values: &[f64], coefficients: Coefficients<'_>) -> Option<Zones> {
+        self.acts.zones.as_ref().map(|apart| apart(on, self.shaped(values), coefficients))
+    }
+
+    /// Whether it brings one zone of teeth ahead of the other.
+    #[must_use]
+    pub fn is_in_zones(&self) -> bool {
+        self.acts.zones.is_some()
+    }
+
+    /// Which of the shape parameters has this name.
+    #[must_use]
+    pub fn shape_at(&self, name: ParameterName) -> Option<usize> {
+        self.shapes.iter().position(|shape| shape.name == name)
+    }
+
+    /// Which of the shape parameters are the direction and the size of a displacement, if it is one.
+    #[must_use]
+    pub fn displacement_at(&self) -> Option<[usize; 2]> {
+        Some([self.shape_at(ParameterName::PhaseRad)?, self.shape_at(ParameterName::SizeArcsec)?])
+    }
+
+    /// Places of the shape parameters as another law has those of the same name; in the middle where it has none.
+    #[must_use]
+    pub fn places_like(&self, other: &Law, places: &[f64]) -> Vec<f64> {
+        let of = |shape: &Shape| other.shape_at(shape.name).and_then(|at| places.get(at)).copied().unwrap_or(0.5);
+        self.shapes.iter().map(of).collect()
     }
 
     /// How much of its size another law may be named for wrongly.
     #[must_use]
     pub fn misfit_as(&self, other: &Law) -> f64 {
-        // A pulse at a place is what any wrong shape leaves, in time or in angle.
-        let alike = self.kin.like(other.kin) || other.cause == "damaged_tooth";
-        self.misfit * if alike || !other.named { 1.0 } else { NO_KIN }
+        self.wrong.misfit * if self.wrong.kin.like(other.wrong.kin) || !other.named() { 1.0 } else { NO_KIN }
     }
 
     /// Values of the shape parameters at places between 0 and 1.
@@ -450,29 +632,17 @@ impl Law {
 /// Every law of every cause that the data can speak about.
 #[must_use]
 pub fn library(on: &Excitation<'_>) -> Vec<Law> {
-    let mut laws = Vec::new();
-    if on.nominal.teeth.is_some() {
-        laws.extend(geometry::laws(on));
-        if let Some(kernels) = &on.nominal.kernels {
-            let known = kernel::laws(on, kernels);
-            laws.retain(|law| known.iter().all(|k| k.cause != law.cause));
-            laws.extend(known);
-        }
+    let mut laws = geometry::laws(on);
+    if let Some(kernels) = on.nominal.kernels.as_ref().filter(|_| on.nominal.teeth.is_some()) {
+        let known = kernel::laws(on, kernels);
+        laws.retain(|law| known.iter().all(|k| k.label != law.label));
+        laws.extend(known);
     }
     laws.extend(stiffness::laws(on));
     laws.extend(thermal::laws(on));
     laws.extend(dynamic::laws(on));
-    laws.extend(sensor::laws(on));
-    for law in &mut laws {
-        law.kin = match law.cause.as_str() {
-            "stiffness_hardening" | "stiffness_error" | "thermal_stiffness" | "gravity_torque" => Kin::Torque,
-            "sensor_latency" => Kin::Motion,
-            "torsional_hysteresis" => Kin::Friction,
-            "lubricant_viscosity" => Kin::Drag,
-            "backlash_growth" | "wear" | "thermal_clearance" => Kin::Clearance,
-            _ => law.kin,
-        };
-    }
+    laws.extend(sensor::laws());
+    laws.retain(|law| law.cause().is_none_or(|cause| on.speaks_of(cause)));
     laws
 }
 
@@ -524,4 +694,10 @@ fn by_row(on: &Excitation<'_>, value: impl Fn(usize) -> f64) -> Vec<f64> {
 /// Amplitude and phase of `c cos(x) + s sin(x) = amplitude cos(x − phase)`.
 fn polar(c: f64, s: f64) -> (f64, f64) {
     (c.hypot(s), s.atan2(c))
+}
+
+/// Amplitude and phase of a wave by its coefficients.
+fn of_wave(c: Coefficients<'_>, role: Role) -> (f64, f64) {
+    let [cos, sin] = c.wave(role);
+    polar(cos, sin)
 }

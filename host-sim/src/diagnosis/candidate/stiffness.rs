@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use super::super::prepare::whole_pitches;
+use super::super::prepare::Jump;
 use super::super::rows::rms;
 use super::geometry::{Angle, waves};
-use super::{Excitation, Law, Shape, by_row, history, main, nuisance};
+use super::{Excitation, Law, Role, Shape, by_row, history, main, nuisance};
+use crate::causes::{CauseName, ParameterName as Name};
 use crate::units::ARCSEC_PER_TURN;
 
 /// Torque in units of the load scale.
@@ -59,18 +60,29 @@ fn unknown_beginnings(on: &Excitation<'_>, slip: f64) -> Vec<Vec<f64>> {
 /// Sessions whose beginning is left open, at most.
 const MOST_BEGINNINGS: usize = 10;
 
+/// The spring that a hysteresis is stated by, and those that slip earlier and later: at these shares of its torque.
+const SPRING: Role = Role("spring");
+const EARLIER_SPRING: Role = Role("spring that slips earlier");
+const LATER_SPRING: Role = Role("spring that slips later");
+const EARLIER: f64 = 0.35;
+const LATER: f64 = 2.5;
+/// Wear that grows faster than the law says.
+const FASTER: Role = Role("faster");
+/// A jump by whole teeth.
+const JUMP: Role = Role("jump");
+
 /// Springs that slip one after the other (Maxwell slip, Prandtl-Ishlinskii): the output lags the torque by what they hold.
 fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     let load = on.scales.load;
-    let mut law = Law::new("torsional_hysteresis", |on, shape| {
-        let slip = shape[0];
+    let mut law = Law::new(CauseName::TorsionalHysteresis, |on, shape| {
+        let slip = shape.of(Name::SlipTorqueNM);
         let usual = on.nominal.wind_up_arcsec(on.scales.load).mul_add(0.3, 30.0);
         let negative = |values: Vec<f64>| values.into_iter().map(|z| -z).collect::<Vec<f64>>();
         let mut columns = vec![
             // The opening is a share of the wind-up: a plastic gear's is wide, a steel drive's at rated load 0.5 to 2' of 3'.
-            main(negative(stop_operator(on, slip)), usual),
-            nuisance(negative(stop_operator(on, 0.35 * slip)), 0.35),
-            nuisance(negative(stop_operator(on, 2.5 * slip)), 0.5),
+            main(negative(stop_operator(on, slip)), usual).called(SPRING),
+            nuisance(negative(stop_operator(on, EARLIER * slip)), 0.35).called(EARLIER_SPRING),
+            nuisance(negative(stop_operator(on, LATER * slip)), 0.5).called(LATER_SPRING),
             nuisance(by_row(on, |k| load_share(on, k)), 0.25),
             nuisance(by_row(on, |k| load_share(on, k).powi(3)), 0.15),
         ];
@@ -78,42 +90,54 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
         columns
     })
     .whole()
-    .smooth()
-    .shapes([Shape::by_factors("slip_torque_n_m", 0.03 * load, 1.0 * load, 6)])
-    .parameters(|on, shape, c| {
+    .evaluated_on_averages()
+    .shapes([Shape::by_factors(Name::SlipTorqueNM, 0.03 * load, 1.0 * load, 6)])
+    .parameters_by(|on, shape, c| {
+        let slips = shape.of(Name::SlipTorqueNM);
         // On the way back from the full load an element holds this share of what it can when the torque passes zero.
         let full = on.scales.load;
         let held = |slip: f64| ((full - slip) / slip).clamp(0.0, 1.0);
-        let half_width: f64 = [1.0, 0.35, 2.5].iter().zip(c).map(|(factor, c)| c * held(factor * shape[0])).sum();
-        vec![("half_width_arcsec", half_width), ("slip_torque_n_m", shape[0])]
+        let springs = [(1.0, SPRING), (EARLIER, EARLIER_SPRING), (LATER, LATER_SPRING)];
+        let half_width: f64 = springs.iter().map(|(factor, role)| c.of(*role) * held(factor * slips)).sum();
+        vec![(Name::HalfWidthArcsec, half_width), (Name::SlipTorqueNM, slips)]
     })
-    .physical(|_, c| c[0] > 0.0);
+    .physical_if(|_, c| c.of(SPRING) > 0.0);
     // Three elements stand for the many of a real drive: where the load passes zero they hold about, not exactly, as much (a fifth to a
     // quarter less than springs that give way smoothly, hidden in made-up data).
-    law.doubt = 0.15;
+    law.wrong.doubt = 0.15;
     // What springs hold goes with the load; the wind-up beside them takes that back, and the beginnings are nobody's.
-    law.most_nuisance = 2.0;
+    law.wrong.most_nuisance = 2.0;
     law
 }
 
 /// Stiffer the higher the load: the wind-up lags behind the nominal line by a power of the torque.
 fn stiffness_hardening() -> Law {
-    Law::new("stiffness_hardening", |on, shape| {
+    Law::new(CauseName::StiffnessHardening, |on, shape| {
         let power = |n: f64| by_row(on, |k| -load_share(on, k).signum() * load_share(on, k).abs().powf(n));
-        vec![main(power(shape[0]), 30.0), nuisance(power(1.0), 0.4), nuisance(power(shape[0] + 1.5), 0.3)]
+        let exponent = shape.of(Name::Exponent);
+        vec![
+            main(power(exponent), 30.0).called(Role::SIZE),
+            nuisance(power(1.0), 0.4),
+            nuisance(power(exponent + 1.5), 0.3),
+        ]
     })
-    .smooth()
-    .shapes([Shape::evenly("exponent", 1.6, 4.4, 3)])
-    .parameters(|on, shape, c| {
-        vec![("hardening_arcsec", c[0]), ("hardening_exponent", shape[0]), ("full_load_n_m", on.scales.load)]
+    .evaluated_on_averages()
+    .shapes([Shape::evenly(Name::Exponent, 1.6, 4.4, 3)])
+    .parameters_by(|on, shape, c| {
+        vec![
+            (Name::HardeningArcsec, c.of(Role::SIZE)),
+            (Name::HardeningExponent, shape.of(Name::Exponent)),
+            (Name::FullLoadNM, on.scales.load),
+        ]
     })
-    .physical(|_, c| c[0] > 0.0)
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
 }
 
 fn stiffness_error() -> Law {
-    let mut law = Law::new("stiffness_error", |on, _| vec![main(on.base.wind_up.clone(), 0.5)])
-        .parameters(|_, _, c| vec![("stiffness_ratio", 1.0 / (1.0 + c[0]))]);
-    law.tolerance_of = Some(super::among::STIFFNESS);
+    let mut law =
+        Law::new(CauseName::StiffnessError, |on, _| vec![main(on.base.wind_up.clone(), 0.5).called(Role::SIZE)])
+            .parameters_by(|_, _, c| vec![(Name::StiffnessRatio, 1.0 / (1.0 + c.of(Role::SIZE)))]);
+    law.acts.tolerance_of = Some(super::among::STIFFNESS);
     law
 }
 
@@ -121,9 +145,9 @@ fn stiffness_error() -> Law {
 const UNEVEN_WEAR: f64 = 0.15;
 
 fn backlash_growth() -> Law {
-    let mut law = Law::new("backlash_growth", |on, _| {
+    let mut law = Law::new(CauseName::BacklashGrowth, |on, _| {
         let half = on.base.half_backlash.max(1.0);
-        let mut columns = vec![main(by_row(on, |k| half * on.base.flank[k]), 1.0)];
+        let mut columns = vec![main(by_row(on, |k| half * on.base.flank[k]), 1.0).called(Role::SIZE)];
         // Teeth that are used most wear most.
         if on.nominal.teeth.is_some() {
             for wheel in [Angle::Flexspline, Angle::CircularSpline] {
@@ -132,9 +156,9 @@ fn backlash_growth() -> Law {
         }
         columns
     })
-    .parameters(|on, _, c| vec![("growth_arcsec", 2.0 * c[0] * on.base.half_backlash.max(1.0))])
-    .physical(|_, c| c[0] > 0.0);
-    law.tolerance_of = Some("backlash");
+    .parameters_by(|on, _, c| vec![(Name::GrowthArcsec, 2.0 * c.of(Role::SIZE) * on.base.half_backlash.max(1.0))])
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0);
+    law.acts.tolerance_of = Some("backlash");
     law
 }
 
@@ -148,7 +172,7 @@ enum Progress {
 
 /// A clearance that widens during the data, with time, travel, or travel under load (Archard).
 fn wear(by: Progress) -> Law {
-    Law::new("wear", move |on, shape| {
+    Law::new(CauseName::Wear, move |on, shape| {
         let rows = on.rows;
         let n = rows.len();
         let mut done = vec![0.0; n];
@@ -173,49 +197,51 @@ fn wear(by: Progress) -> Law {
             Progress::Work => on.scales.work,
         }
         .max(1e-12);
-        let widened = |k: usize| (done[k] / all).powf(shape[0]);
+        let exponent = shape.of(Name::Exponent);
+        let widened = |k: usize| (done[k] / all).powf(exponent);
         vec![
-            main(by_row(on, |k| on.base.flank[k] * widened(k)), 30.0),
-            nuisance(by_row(on, |k| on.base.flank[k] * widened(k).powi(2)), 0.25),
+            main(by_row(on, |k| on.base.flank[k] * widened(k)), 30.0).called(Role::SIZE),
+            nuisance(by_row(on, |k| on.base.flank[k] * widened(k).powi(2)), 0.25).called(FASTER),
             nuisance(by_row(on, |k| on.base.flank[k]), 0.25),
         ]
     })
-    .smooth()
-    .shapes([Shape::by_factors("exponent", 0.5, 2.0, 1)])
-    .parameters(|_, shape, c| vec![("growth_arcsec", 2.0 * (c[0] + c[1])), ("exponent", shape[0])])
-    .physical(|_, c| c[0] > 0.0)
+    .shapes([Shape::by_factors(Name::Exponent, 0.5, 2.0, 1)])
+    .parameters_by(|_, shape, c| {
+        let growth_arcsec = 2.0 * (c.of(Role::SIZE) + c.of(FASTER));
+        vec![(Name::GrowthArcsec, growth_arcsec), (Name::Exponent, shape.of(Name::Exponent))]
+    })
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
     .well_known()
+    .evaluated_on_averages()
 }
 
 /// Teeth that skipped: the output is off by whole teeth from then on.
 fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
     let pitch = ARCSEC_PER_TURN / f64::from(on.nominal.teeth?.circular_spline);
     let jumps = on.scales.jumps.clone();
-    if jumps.is_empty() || !jumps.iter().all(|jump| whole_pitches(on.nominal, jump.height_arcsec).is_some()) {
-        return None;
-    }
+    let first_s = jumps.first()?.time_s[1];
     let columns = jumps.clone();
-    let mut law = Law::new("ratcheting", move |on, _| {
-        columns.iter().map(|jump| main(by_row(on, |k| jump.reached(on.rows.time[k]) / pitch), 2.0 * pitch)).collect()
+    let mut law = Law::new(CauseName::Ratcheting, move |on, _| {
+        let reached = |jump: &Jump| by_row(on, |k| jump.reached(on.rows.time[k]) / pitch);
+        columns.iter().map(|jump| main(reached(jump), 2.0 * pitch).called(JUMP)).collect()
     })
-    .parameters(move |_, _, c| {
-        let slipped: f64 = jumps.iter().zip(c).map(|(jump, c)| c * jump.height_arcsec / pitch).sum();
-        vec![("jump_arcsec", slipped), ("time_s", jumps[0].time_s[1]), ("events", jumps.len() as f64)]
+    .parameters_by(move |_, _, c| {
+        let slipped: f64 = jumps.iter().zip(c.all(JUMP)).map(|(jump, c)| c * jump.height_arcsec / pitch).sum();
+        vec![(Name::JumpArcsec, slipped), (Name::TimeS, first_s), (Name::Events, jumps.len() as f64)]
     })
     .exact();
     // The jump is measured, not modelled: nothing of its height is left over.
-    law.misfit = 0.0;
-    law.doubt = 1e-5;
+    law.wrong.misfit = 0.0;
+    law.wrong.doubt = 1e-5;
     Some(law)
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = Vec::new();
-    if on.scales.load > 0.0 {
-        laws.extend([torsional_hysteresis(on), stiffness_hardening(), stiffness_error()]);
+    if on.speaks_of(CauseName::TorsionalHysteresis) {
+        laws.push(torsional_hysteresis(on));
     }
-    laws.push(backlash_growth());
-    laws.push(wear(Progress::Travel));
+    laws.extend([stiffness_hardening(), stiffness_error(), backlash_growth(), wear(Progress::Travel)]);
     if on.rows.recorded.time {
         laws.push(wear(Progress::Time));
     }

@@ -1,7 +1,7 @@
 //! What the temperature does.
 
-use super::{Column, Excitation, Law, Lead, Named, Shape, Tolerance, by_row, lagged_through, main, nuisance};
-use crate::diagnosis::linear::Prior;
+use super::{Excitation, Law, Named, Role, Shape, Shaped, by_row, lagged_through, main, main_about, nuisance};
+use crate::causes::{CauseName, ParameterName as Name};
 
 /// Temperature above nominal, felt with a lag of `lag_s`, K. Metal does not know when it is recorded: what was felt when a session ended
 /// nears the temperature at which the next one begins.
@@ -12,54 +12,52 @@ fn warmer_by(on: &Excitation<'_>, lag_s: f64) -> Vec<f64> {
 
 /// Warm parts close the clearance, cold ones open it (or the reverse): −2″/K of generator and flexspline against the circular spline.
 fn thermal_clearance(on: &Excitation<'_>) -> Law {
-    Law::new("thermal_clearance", |on, shape| {
-        let warmer = warmer_by(on, shape.first().copied().unwrap_or(1e-3));
+    Law::new(CauseName::ThermalClearance, |on, shape| {
+        let warmer = warmer_by(on, lag_of(shape));
         let flank = |k: usize| on.base.flank[k];
         vec![
-            main(by_row(on, |k| flank(k) * warmer[k]), 1.0),
+            main(by_row(on, |k| flank(k) * warmer[k]), 1.0).called(Role::SIZE),
             nuisance(by_row(on, |k| flank(k) * warmer[k] * warmer[k].abs() / 30.0), 0.3),
             nuisance(by_row(on, |k| flank(k) * warmer[k] * warmer[k] / 30.0), 0.3),
         ]
     })
-    .shapes(on.rows.recorded.time.then(|| Shape::by_factors("lag_s", 0.5, 600.0, 3)))
-    .parameters(|_, shape, c| {
-        let mut named = vec![("clearance_arcsec_per_k", 2.0 * c[0])];
-        if let Some(lag) = shape.first() {
-            named.push(("lag_s", *lag));
-        }
-        named
-    })
+    .shapes(on.rows.recorded.time.then(|| Shape::by_factors(Name::LagS, 0.5, 600.0, 3)))
+    .parameters_by(|_, shape, c| named_clearance(2.0 * c.of(Role::SIZE), shape))
     .well_known()
-    .smooth()
+    .evaluated_on_averages()
 }
 
-/// The same where it goes so far that the clearance is shut in the cold or in the heat: it cannot be less than nothing.
+/// Lag with which the clearance follows the sensor, s; next to nothing where no time was recorded.
+fn lag_of(shape: Shaped<'_>) -> f64 {
+    shape.get(Name::LagS).unwrap_or(1e-3)
+}
+
+/// A clearance by name: its change, and its lag where there is a time.
+fn named_clearance(arcsec_per_k: f64, shape: Shaped<'_>) -> Vec<Named> {
+    let lag = shape.get(Name::LagS).map(|lag| (Name::LagS, lag));
+    [(Name::ClearanceArcsecPerK, arcsec_per_k)].into_iter().chain(lag).collect()
+}
+
+/// The clearance where it changes so far that the clearance is shut in the cold or in the heat: it cannot be less than nothing.
 fn thermal_clearance_shut(on: &Excitation<'_>) -> Law {
-    let timed = on.rows.recorded.time;
-    Law::new("thermal_clearance", move |on, shape| {
-        let warmer = warmer_by(on, if timed { shape[1] } else { 1e-3 });
+    Law::new(CauseName::ThermalClearance, |on, shape| {
+        let (warmer, per_k) = (warmer_by(on, lag_of(shape)), shape.of(Name::ClearanceArcsecPerK));
         let width = 2.0 * on.base.half_backlash;
-        let changed = by_row(on, |k| 0.5 * on.base.flank[k] * ((width + shape[0] * warmer[k]).max(0.0) - width));
+        let changed = by_row(on, |k| 0.5 * on.base.flank[k] * ((width + per_k * warmer[k]).max(0.0) - width));
         vec![
-            Column { values: changed, tolerance: Tolerance::Main(Prior { mean: 1.0, std: 0.1 }) },
+            main_about(1.0, changed, 0.1).called(Role::SIZE),
             nuisance(by_row(on, |k| on.base.flank[k] * warmer[k]), 0.15),
         ]
     })
     .shapes(
-        [Shape::evenly("clearance_arcsec_per_k", -SHUT_ARCSEC_PER_K, SHUT_ARCSEC_PER_K, 8)]
+        [Shape::evenly(Name::ClearanceArcsecPerK, -SHUT_ARCSEC_PER_K, SHUT_ARCSEC_PER_K, 8)]
             .into_iter()
-            .chain(timed.then(|| Shape::by_factors("lag_s", 0.5, 600.0, 2))),
+            .chain(on.rows.recorded.time.then(|| Shape::by_factors(Name::LagS, 0.5, 600.0, 2))),
     )
-    .parameters(move |_, shape, c| {
-        let mut named = vec![("clearance_arcsec_per_k", shape[0] * c[0])];
-        if timed {
-            named.push(("lag_s", shape[1]));
-        }
-        named
-    })
-    .physical(|_, c| c[0] > 0.5)
+    .parameters_by(|_, shape, c| named_clearance(shape.of(Name::ClearanceArcsecPerK) * c.of(Role::SIZE), shape))
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.5)
     .well_known()
-    .smooth()
+    .evaluated_on_averages()
 }
 
 /// Largest change of the clearance with temperature, arcsec/K: twice that of a hot generator in a cold ring (2″/K).
@@ -67,21 +65,64 @@ const SHUT_ARCSEC_PER_K: f64 = 4.5;
 
 /// Wind-up that grows or falls with temperature.
 fn thermal_stiffness() -> Law {
-    Law::new("thermal_stiffness", |on, _| {
+    Law::new(CauseName::ThermalStiffness, |on, _| {
         let warmer = |k: usize| on.rows.temperature[k] - on.nominal.temperature_c;
         vec![
-            main(by_row(on, |k| on.base.wind_up[k] * warmer(k) / 100.0), 0.5),
+            main(by_row(on, |k| on.base.wind_up[k] * warmer(k) / 100.0), 0.5).called(Role::SIZE),
             nuisance(by_row(on, |k| on.base.wind_up[k] * warmer(k).powi(2) / 3000.0), 0.4),
         ]
     })
-    .parameters(|_, _, c| vec![("stiffness_relative_per_k", -0.01 * c[0])])
+    .parameters_by(|_, _, c| vec![(Name::StiffnessRelativePerK, -0.01 * c.of(Role::SIZE))])
     .well_known()
-    .smooth()
+    .evaluated_on_averages()
 }
 
-/// Whether a drag is one of a lubricant: at the edge of the range it is dry friction or lash, which knows neither speed nor cold.
-fn viscous(power: f64, per_k: f64) -> bool {
-    power > 0.27 && per_k > 0.009
+/// How a drag depends on speed and temperature.
+#[derive(Clone, Copy)]
+struct Drag {
+    /// Power of the speed.
+    power: f64,
+    /// How much thicker the lubricant gets, of itself, for 1 K colder.
+    per_k: f64,
+    /// How much that slope bends, see [`thicker`].
+    bend: f64,
+}
+
+impl Drag {
+    fn of(shape: Shaped<'_>) -> Drag {
+        Drag { power: shape.of(Name::SpeedExponent), per_k: shape.of(Name::PerK), bend: shape.of(Name::BendPerK) }
+    }
+
+    /// Whether it is one of a lubricant: at the edge of the range it is dry friction or lash, which knows neither speed nor cold.
+    fn is_viscous(self) -> bool {
+        self.power > 0.27 && self.per_k > 0.009
+    }
+
+    /// Share of a drag of 1 at the mean speed and the nominal temperature, against the motion.
+    fn share(self, on: &Excitation<'_>) -> Vec<f64> {
+        let (rows, usual) = (on.rows, usual_speed(on));
+        by_row(on, |k| {
+            let share = (rows.speed[k] / usual).abs().powf(self.power);
+            let thicker = thicker(on.nominal.temperature_c - rows.temperature[k], self.per_k, self.bend);
+            -rows.direction[k] * on.nominal.ratio.signum() * share * thicker
+        })
+    }
+
+    /// Arcsec for 1 N·m of it at the mean speed and the nominal temperature.
+    fn wind_up(self, on: &Excitation<'_>) -> Vec<f64> {
+        let slope = wind_up_arcsec_per_n_m(on);
+        self.share(on).into_iter().map(|share| share * slope).collect()
+    }
+
+    /// It by name, of this size.
+    fn named(self, drag_n_m: f64) -> Vec<Named> {
+        vec![
+            (Name::DragNM, drag_n_m),
+            (Name::SpeedExponent, self.power),
+            (Name::RelativeDragPerK, -self.per_k),
+            (Name::DragBendPerK, self.bend),
+        ]
+    }
 }
 
 /// Speed at which a drag is stated, rad/s.
@@ -105,113 +146,71 @@ const LEAST_ABOVE_SETTING: f64 = 0.2;
 /// Largest [`thicker`] bend, 1/K.
 const MOST_BEND: f64 = 0.01;
 
-/// Share of a drag of 1 at the mean speed and the nominal temperature, against the motion.
-fn drag(on: &Excitation<'_>, power: f64, per_k: f64, bend: f64) -> Vec<f64> {
-    let (rows, usual) = (on.rows, usual_speed(on));
-    by_row(on, |k| {
-        let share = (rows.speed[k] / usual).abs().powf(power);
-        let thicker = thicker(on.nominal.temperature_c - rows.temperature[k], per_k, bend);
-        -rows.direction[k] * on.nominal.ratio.signum() * share * thicker
-    })
-}
-
-/// A drag by name: its size, and its power, slope and bend.
-fn named_drag(drag_n_m: f64, shape: &[f64]) -> Vec<Named> {
-    vec![
-        ("drag_n_m", drag_n_m),
-        ("speed_exponent", shape[0]),
-        ("relative_drag_per_k", -shape[1]),
-        ("drag_bend_per_k", shape[2]),
-    ]
-}
-
-/// Arcsec for 1 N·m of drag at the mean speed and the nominal temperature.
-fn drag_wind_up(on: &Excitation<'_>, power: f64, per_k: f64, bend: f64) -> Vec<f64> {
-    let slope = wind_up_arcsec_per_n_m(on);
-    drag(on, power, per_k, bend).into_iter().map(|share| share * slope).collect()
-}
-
 /// Drag of the lubricant, against the motion: a power of the speed, and thicker in the cold (Vogel, close to exponential).
 fn lubricant_viscosity() -> Law {
-    Law::new("lubricant_viscosity", |on, shape| {
-        let (power, per_k, bend) = (shape[0], shape[1], shape[2]);
-        let drag = |power: f64, per_k: f64, bend: f64| drag_wind_up(on, power, per_k, bend);
-        let size = super::super::rows::rms(&drag(power, per_k, bend)).max(1e-12);
+    Law::new(CauseName::LubricantViscosity, |on, shape| {
+        let drag = Drag::of(shape);
+        let wind_up = drag.wind_up(on);
+        let size = super::super::rows::rms(&wind_up).max(1e-12);
         vec![
-            main(drag(power, per_k, bend), 15.0 / size),
-            nuisance(drag(0.5 * power, per_k, bend), 0.15),
-            nuisance(drag(power, 0.5 * per_k, bend), 0.15),
+            main(wind_up, 15.0 / size).called(Role::SIZE),
+            nuisance(Drag { power: 0.5 * drag.power, ..drag }.wind_up(on), 0.15),
+            nuisance(Drag { per_k: 0.5 * drag.per_k, ..drag }.wind_up(on), 0.15),
         ]
     })
     .shapes([
-        Shape::evenly("speed_exponent", 0.25, 1.05, 3),
-        Shape::by_factors("per_k", 0.008, 0.12, 4),
-        Shape::evenly("bend_per_k", 0.0, MOST_BEND, 1),
+        Shape::evenly(Name::SpeedExponent, 0.25, 1.05, 3),
+        Shape::by_factors(Name::PerK, 0.008, 0.12, 4),
+        Shape::evenly(Name::BendPerK, 0.0, MOST_BEND, 1),
     ])
-    .parameters(|_, shape, c| named_drag(c[0], &shape[..3]))
-    .physical(|shape, c| c[0] > 0.0 && viscous(shape[0], shape[1]))
-    .smooth()
+    .parameters_by(|_, shape, c| Drag::of(shape).named(c.of(Role::SIZE)))
+    .physical_if(|shape, c| c.of(Role::SIZE) > 0.0 && Drag::of(shape).is_viscous())
+    .evaluated_on_averages()
 }
 
-/// The same drag as a load: it winds the drive up and, where it exceeds the torque, moves the play to the other flank.
+/// Drag of the lubricant as a load: it winds the drive up and, where it exceeds the torque, moves the play to the other flank.
 fn lubricant_load(on: &Excitation<'_>) -> Law {
     let scale = on.plausible_load();
-    let load = |on: &Excitation<'_>, shape: &[f64]| -> Vec<f64> {
-        drag(on, shape[1], shape[2], shape[3]).into_iter().map(|share| shape[0] * share).collect()
+    let load = |on: &Excitation<'_>, shape: Shaped<'_>| -> Vec<f64> {
+        let drag_n_m = shape.of(Name::DragNM);
+        Drag::of(shape).share(on).into_iter().map(|share| drag_n_m * share).collect()
     };
-    let mut law = Law::new("lubricant_viscosity", move |on, shape| {
+    let mut law = Law::new(CauseName::LubricantViscosity, move |on, shape| {
         let rows = on.rows;
         let added = load(on, shape);
         let torque: Vec<f64> = (0..rows.len()).map(|k| rows.torque[k] + added[k]).collect();
         let flank = on.base.law.flanks(rows, &torque, on.nominal);
         let play = by_row(on, |k| on.base.half_backlash * (flank[k] - on.base.flank[k]));
         let together = by_row(on, |k| on.wound_up(k, torque[k]) + play[k]);
-        vec![
-            Column { values: together, tolerance: Tolerance::Main(Prior { mean: 1.0, std: 0.02 }) },
-            Column { values: play, tolerance: Tolerance::Main(Prior { mean: 0.0, std: 0.5 }) },
-        ]
+        vec![main_about(1.0, together, 0.02).called(Role::SIZE), main(play, 0.5)]
     })
     .shapes([
-        Shape::by_factors("drag_n_m", 0.001 * scale, 1.0 * scale, 1),
-        Shape::evenly("speed_exponent", 0.25, 1.05, 2),
-        Shape::by_factors("per_k", 0.008, 0.12, 3),
-        Shape::evenly("bend_per_k", 0.0, MOST_BEND, 1),
+        Shape::by_factors(Name::DragNM, 0.001 * scale, 1.0 * scale, 1),
+        Shape::evenly(Name::SpeedExponent, 0.25, 1.05, 2),
+        Shape::by_factors(Name::PerK, 0.008, 0.12, 3),
+        Shape::evenly(Name::BendPerK, 0.0, MOST_BEND, 1),
     ])
-    .parameters(|_, shape, c| named_drag(shape[0] * c[0], &shape[1..]))
-    .physical(|shape, c| c[0] > 0.0 && viscous(shape[1], shape[2]));
-    law.smooth = true;
-    law.load = Some(Box::new(load));
-    law.in_crossings = true;
-    law.lead = Some(Lead {
-        columns: Box::new(|on, shape| vec![main(drag_wind_up(on, shape[1], shape[2], shape[3]), 10.0)]),
-        shape: Box::new(|shape, c| vec![vec![c[0].max(0.0), shape[1], shape[2], shape[3]]]),
-        loaded_only: true,
-    });
+    .parameters_by(|_, shape, c| Drag::of(shape).named(shape.of(Name::DragNM) * c.of(Role::SIZE)))
+    .physical_if(|shape, c| c.of(Role::SIZE) > 0.0 && Drag::of(shape).is_viscous())
+    .evaluated_on_averages()
+    .adds_load(load)
+    .led_by(
+        |on, shape| vec![main(Drag::of(shape).wind_up(on), 10.0).called(Role::SIZE)],
+        |shape, c| vec![shape.with(&[(Name::DragNM, c.of(Role::SIZE).max(0.0))])],
+    )
+    .led_under_load_alone();
+    law.acts.in_crossings = true;
     law
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
-    let rows = on.rows;
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for t in &rows.temperature {
-        (low, high) = (low.min(*t), high.max(*t));
+    let mut laws = vec![thermal_clearance(on)];
+    if on.base.half_backlash > 0.0 {
+        laws.push(thermal_clearance_shut(on));
     }
-    let mut laws = Vec::new();
-    // At one temperature nothing thermal can be told from a changed constant.
-    if rows.recorded.temperature && (high - low > 2.0 || (low - on.nominal.temperature_c).abs() > 5.0) {
-        laws.push(thermal_clearance(on));
-        if on.base.half_backlash > 0.0 {
-            laws.push(thermal_clearance_shut(on));
-        }
-        if on.scales.load > 0.0 {
-            laws.push(thermal_stiffness());
-        }
-    }
-    if rows.recorded.time && rows.speed.iter().any(|w| *w != 0.0) {
-        laws.push(lubricant_viscosity());
-        if on.scales.load > 0.0 && on.nominal.wind_up_arcsec(1.0) > 0.0 {
-            laws.push(lubricant_load(on));
-        }
+    laws.extend([thermal_stiffness(), lubricant_viscosity()]);
+    if on.scales.load > 0.0 && on.nominal.wind_up_arcsec(1.0) > 0.0 {
+        laws.push(lubricant_load(on));
     }
     laws
 }

@@ -18,6 +18,7 @@ use super::page::{
     Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Mark, Page, Quantity, Section,
     Status, Table as PageTable, Text, significant,
 };
+use crate::causes::CauseName;
 use crate::diagnosis::report::{Diagnosis, Verdict};
 use crate::diagnosis::rows::Rows;
 use crate::diagnosis::{Extended, Series};
@@ -46,8 +47,8 @@ pub struct Level {
 /// What one cause adds.
 #[derive(Debug, Clone)]
 pub struct Part {
-    /// Its name, snake case.
-    pub cause: String,
+    /// Its name.
+    pub cause: CauseName,
     /// What it adds to the prediction, arcsec, a value for each row of all sessions.
     pub adds_arcsec: Vec<f64>,
 }
@@ -70,7 +71,7 @@ pub fn levels_and_parts(series: &[Series], extended: &Extended, diagnosis: &Diag
         .iter()
         .enumerate()
         .map(|(k, cause)| Part {
-            cause: cause.name().to_owned(),
+            cause: cause.name(),
             adds_arcsec: joined(&|s| s.cause_arcsec.get(k).cloned().unwrap_or_default()),
         })
         .collect();
@@ -314,10 +315,10 @@ impl Known<'_> {
             ));
         }
         for cause in diagnosis.causes.iter().filter(|cause| !cause.look_alikes.is_empty()) {
-            let alike: Vec<String> = cause.look_alikes.iter().map(|name| words::cause(name)).collect();
+            let alike: Vec<String> = cause.look_alikes.iter().map(|name| name.words().to_owned()).collect();
             blocks.push(Block::paragraph(
                 Text::new("These data do not tell ")
-                    .strong(words::cause(&cause.name))
+                    .strong(cause.name.words())
                     .plain(format!(" from {}.", words::listed(&alike))),
             ));
         }
@@ -404,8 +405,8 @@ impl Known<'_> {
                 .iter()
                 .enumerate()
                 .map(|(k, part)| {
-                    let name = words::cause(&part.cause);
-                    thin::envelope(&self.rows, &self.clock, &part.adds_arcsec, &name, k)
+                    let name = part.cause.words();
+                    thin::envelope(&self.rows, &self.clock, &part.adds_arcsec, name, k)
                 })
                 .collect(),
             uprights: self.clock.borders(),
@@ -473,9 +474,9 @@ impl Known<'_> {
                 .causes
                 .iter()
                 .map(|cause| {
-                    let alike: Vec<String> = cause.look_alikes.iter().map(|name| words::cause(name)).collect();
+                    let alike: Vec<String> = cause.look_alikes.iter().map(|name| name.words().to_owned()).collect();
                     vec![
-                        Text::new(words::begun(&words::cause(&cause.name))),
+                        Text::new(words::begun(cause.name.words())),
                         Text::new(words::percent(cause.confidence)),
                         Text::default().error(cause.size_arcsec, 3),
                         Text::new(words::percent(cause.held_out_gain)),
@@ -502,11 +503,9 @@ impl Known<'_> {
                  cannot tell from it. Parameters are of the law that was fitted; µm are displacements on the pitch circle.",
                 self.left_out()
             )));
-            for cause in diagnosis.causes.iter().filter(|cause| !words::effect(&cause.name).is_empty()) {
+            for cause in &diagnosis.causes {
                 blocks.push(Block::paragraph(
-                    Text::default()
-                        .strong(words::begun(&words::cause(&cause.name)))
-                        .plain(format!(": {}.", words::effect(&cause.name))),
+                    Text::default().strong(words::begun(cause.name.words())).plain(format!(": {}.", cause.name.does())),
                 ));
             }
         }
@@ -770,6 +769,7 @@ mod tests {
 
     use super::*;
     use crate::diagnosis::report::{Cause, Compensation, HeldOut, Residual, Unexplained};
+    use crate::diagnosis::trace::Trace;
     use crate::measurement::{Fault, FaultName, Treatment};
     use crate::report::page::Span;
     use crate::synthesize::catalogue_drive;
@@ -796,14 +796,14 @@ mod tests {
         }
     }
 
-    fn diagnosis(verdict: Verdict, causes: &[&str]) -> Diagnosis {
-        let cause = |name: &&str| Cause {
-            name: (*name).to_owned(),
+    fn diagnosis(verdict: Verdict, causes: &[CauseName]) -> Diagnosis {
+        let cause = |name: &CauseName| Cause {
+            name: *name,
             confidence: 0.97,
             parameters: BTreeMap::new(),
             held_out_gain: 0.8,
             size_arcsec: 12.0,
-            look_alikes: vec!["sensor_latency".into()],
+            look_alikes: vec![CauseName::SensorLatency],
         };
         Diagnosis {
             schema_version: 1,
@@ -822,6 +822,8 @@ mod tests {
             noise_arcsec: [5.0, 0.0],
             wander_correlation_s: 1.0,
             next_experiment: None,
+            experiment_for_asked: None,
+            trace: Trace::default(),
         }
     }
 
@@ -863,10 +865,10 @@ mod tests {
             what: "the output jumps".into(),
         };
         for (verdict, causes, status, begins, number) in [
-            (Verdict::Explained, &["wear"][..], Status::Good, "Explained by wear (97 %, 12″ rms).", "75 %"),
+            (Verdict::Explained, &[CauseName::Wear][..], Status::Good, "Explained by wear (97 %, 12″ rms).", "75 %"),
             (
                 Verdict::PartlyExplained,
-                &["wear", "ratcheting"],
+                &[CauseName::Wear, CauseName::Ratcheting],
                 Status::PartlyExplained,
                 "Partly explained by wear (97 %, 12″ rms) and ratcheting",
                 "75 %",
@@ -890,7 +892,7 @@ mod tests {
 
     #[test]
     fn a_long_record_is_thinned_and_its_page_is_small() {
-        let page = page_of(&diagnosis(Verdict::Explained, &["wear"]), Vec::new());
+        let page = page_of(&diagnosis(Verdict::Explained, &[CauseName::Wear]), Vec::new());
         let html = page.html().unwrap();
         assert!(html.len() < 600_000, "{} bytes", html.len());
         assert!(

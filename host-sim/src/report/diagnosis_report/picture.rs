@@ -299,7 +299,7 @@ impl Known<'_> {
                         let places =
                             orders::along(cause, angle, nominal).into_iter().filter(|x| (low..=high).contains(x));
                         for x in places {
-                            let name = format!("{}: {}", words::cause(&cause.name), words::order(x));
+                            let name = format!("{}: {}", cause.name.words(), words::order(x));
                             lines.uprights.push(Upright { name, x });
                         }
                     }

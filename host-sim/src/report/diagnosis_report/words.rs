@@ -4,84 +4,6 @@ use crate::diagnosis::report::{Cause, Parameter, Verdict};
 use crate::measurement::{FaultName, Treatment};
 use crate::report::page::{Text, significant};
 
-/// What each cause is called in a sentence, and what it does.
-const CAUSES: [(&str, &str, &str); 24] = [
-    (
-        "circular_spline_eccentricity",
-        "eccentricity of the circular spline",
-        "its axis beside the axis of the generator: two waves in a turn of the generator against the circular spline",
-    ),
-    (
-        "flexspline_runout",
-        "runout of the flexspline",
-        "its axis beside the axis of the generator: two waves in a generator turn",
-    ),
-    (
-        "circular_spline_ovality",
-        "oval circular spline",
-        "pressed out of round: two waves in a turn against the circular spline",
-    ),
-    (
-        "flexspline_pitch_error",
-        "pitch error of the flexspline",
-        "teeth out of place: whole orders of the generator turn",
-    ),
-    (
-        "circular_spline_pitch_error",
-        "pitch error of the circular spline",
-        "teeth out of place: whole orders of a turn against the circular spline",
-    ),
-    (
-        "generator_eccentricity",
-        "eccentricity of the generator",
-        "one lobe carries more: odd orders, once in a turn above all",
-    ),
-    (
-        "cam_form_error",
-        "form error of the generator",
-        "a shape that is not the drawn one: tooth mesh and even orders of the generator turn",
-    ),
-    ("damaged_tooth", "damaged tooth", "a pulse each time a lobe passes one place"),
-    ("backlash_growth", "wider backlash", "more clearance than nominal throughout the data"),
-    ("wear", "wear", "a clearance that widens from the first row to the last"),
-    ("stiffness_hardening", "hardening stiffness", "stiffer the higher the load"),
-    ("stiffness_error", "other stiffness", "wind-up in proportion to nominal, of another size"),
-    ("torsional_hysteresis", "torsional hysteresis", "the output lags the torque by what slipping contacts hold"),
-    ("thermal_clearance", "clearance with temperature", "backlash that follows the temperature"),
-    ("thermal_stiffness", "stiffness with temperature", "wind-up that follows the temperature"),
-    ("lubricant_viscosity", "drag of the lubricant", "a load against the motion that grows with speed and cold"),
-    ("gravity_torque", "unbalanced load", "gravity on the load, which the torque column does not hold"),
-    ("gravity_side_load", "side load by gravity", "a weight that pushes the wheels out of centre"),
-    ("torsional_resonance", "torsional resonance", "the inertia of the load on the spring of the drive"),
-    (
-        "output_encoder_eccentricity",
-        "eccentricity of the output encoder",
-        "one wave in an output turn, whatever the load",
-    ),
-    (
-        "generator_encoder_eccentricity",
-        "eccentricity of the generator encoder",
-        "one wave in a generator turn, whatever the load",
-    ),
-    (
-        "sensor_latency",
-        "time between the sensors",
-        "output and generator are read at different instants: an error in proportion to speed",
-    ),
-    ("ratio_error", "another ratio", "the error grows with the angle"),
-    ("ratcheting", "ratcheting", "teeth that skipped"),
-];
-
-/// A cause in a sentence.
-pub(super) fn cause(name: &str) -> String {
-    CAUSES.iter().find(|c| c.0 == name).map_or_else(|| name.replace('_', " "), |c| c.1.to_owned())
-}
-
-/// What a cause does, in a few words.
-pub(super) fn effect(name: &str) -> &'static str {
-    CAUSES.iter().find(|c| c.0 == name).map_or("", |c| c.2)
-}
-
 /// The first letter made large.
 pub(super) fn begun(text: &str) -> String {
     let mut letters = text.chars();
@@ -166,7 +88,7 @@ pub(super) fn parameters(cause: &Cause) -> String {
 
 /// A cause with what a reader has to know of it at once: `eccentricity of the circular spline (97 %, 12″ rms)`.
 pub(super) fn named(text: Text, cause: &Cause) -> Text {
-    text.plain(format!("{} ({}, ", self::cause(&cause.name), percent(cause.confidence)))
+    text.plain(format!("{} ({}, ", cause.name.words(), percent(cause.confidence)))
         .error(cause.size_arcsec, 2)
         .plain(" rms)")
 }
@@ -208,14 +130,6 @@ pub(super) fn seconds(time_s: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_cause_of_the_contract_has_words() {
-        for name in crate::synthesize::CAUSES {
-            assert!(!effect(name).is_empty() && !cause(name).contains('_'), "{name}");
-        }
-        assert_eq!(cause("something_new"), "something new");
-    }
 
     #[test]
     fn parameters_have_the_digits_of_their_uncertainty_and_a_unit() {

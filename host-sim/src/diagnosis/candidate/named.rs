@@ -1,0 +1,117 @@
+//! Columns and shape parameters by name: what a law says of its own coefficients stays true when a column is put in between.
+
+use super::Shape;
+use crate::causes::ParameterName;
+
+/// What a column of a law is, to find its coefficient again. A wave is two columns of one role, cosine and sine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Role(pub &'static str);
+
+impl Role {
+    /// A column whose coefficient nobody asks for.
+    pub const PLAIN: Role = Role("");
+    /// The law at its size: the only column that it has, or the one that all others are deviations of.
+    pub const SIZE: Role = Role("size");
+}
+
+/// Coefficients with what their columns are.
+#[derive(Clone, Copy, Debug)]
+pub struct Coefficients<'c> {
+    roles: &'c [Role],
+    values: &'c [f64],
+}
+
+impl<'c> Coefficients<'c> {
+    /// Coefficients of columns of these roles.
+    #[must_use]
+    pub fn new(roles: &'c [Role], values: &'c [f64]) -> Coefficients<'c> {
+        Coefficients { roles, values }
+    }
+
+    /// Those of all columns of a role, in their order.
+    pub fn all(self, role: Role) -> impl Iterator<Item = f64> {
+        self.roles.iter().zip(self.values).filter(move |(r, _)| **r == role).map(|(_, c)| *c)
+    }
+
+    /// That of the first column of a role; none where the law has no such column here.
+    #[must_use]
+    pub fn get(self, role: Role) -> Option<f64> {
+        self.all(role).next()
+    }
+
+    /// That of the first column of a role. What has no column adds nothing: 0.
+    #[must_use]
+    pub fn of(self, role: Role) -> f64 {
+        self.get(role).unwrap_or(0.0)
+    }
+
+    /// Those of the cosine and the sine of a wave; 0 where the law has no such wave here.
+    #[must_use]
+    pub fn wave(self, role: Role) -> [f64; 2] {
+        let mut both = self.all(role);
+        [0, 1].map(|_| both.next().unwrap_or(0.0))
+    }
+}
+
+/// Values of the shape parameters of a law.
+#[derive(Clone, Copy, Debug)]
+pub struct Shaped<'s> {
+    shapes: &'s [Shape],
+    values: &'s [f64],
+}
+
+impl<'s> Shaped<'s> {
+    /// Values of these shape parameters.
+    #[must_use]
+    pub fn new(shapes: &'s [Shape], values: &'s [f64]) -> Shaped<'s> {
+        Shaped { shapes, values }
+    }
+
+    /// The value of a shape parameter, if the law has it here.
+    #[must_use]
+    pub fn get(self, name: ParameterName) -> Option<f64> {
+        self.shapes.iter().zip(self.values).find(|(shape, _)| shape.name == name).map(|(_, value)| *value)
+    }
+
+    /// The value of a shape parameter that the law always has.
+    ///
+    /// # Panics
+    /// The law has none of this name.
+    #[must_use]
+    pub fn of(self, name: ParameterName) -> f64 {
+        self.get(name).unwrap_or_else(|| panic!("a law asks for {name}, which is none of its shape parameters"))
+    }
+
+    /// All values, with some of them changed.
+    #[must_use]
+    pub fn with(self, changed: &[(ParameterName, f64)]) -> Vec<f64> {
+        let new = |name: ParameterName| changed.iter().find(|(n, _)| *n == name).map(|(_, value)| *value);
+        self.shapes.iter().zip(self.values).map(|(shape, value)| new(shape.name).unwrap_or(*value)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ParameterName as Name;
+
+    #[test]
+    fn a_coefficient_is_found_wherever_its_column_stands() {
+        let wave = Role("wave");
+        let values = [7.0, 1.0, 2.0, 3.0];
+        for roles in [[Role::PLAIN, wave, wave, Role::SIZE], [Role::SIZE, wave, wave, Role::PLAIN]] {
+            let c = Coefficients::new(&roles, &values);
+            assert_eq!(c.wave(wave), [1.0, 2.0]);
+            assert_eq!(c.of(Role::SIZE), if roles[0] == Role::SIZE { 7.0 } else { 3.0 });
+            assert_eq!((c.get(Role("none")), c.of(Role("none")), c.wave(Role("none"))), (None, 0.0, [0.0; 2]));
+        }
+    }
+
+    #[test]
+    fn a_shape_parameter_is_found_and_changed_by_its_name() {
+        let shapes = [Shape::evenly(Name::LagS, 0.0, 9.0, 1), Shape::angle(Name::PhaseRad, 6.0, 1)];
+        let shape = Shaped::new(&shapes, &[4.0, 2.0]);
+        assert_eq!((shape.of(Name::PhaseRad), shape.get(Name::Exponent)), (2.0, None));
+        assert_eq!(shape.with(&[(Name::LagS, 5.0)]), [5.0, 2.0]);
+    }
+}

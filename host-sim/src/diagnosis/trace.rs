@@ -1,0 +1,529 @@
+//! Every decision of a diagnosis: which law was judged, at which stage, by which gates, with which values and limits.
+//!
+//! The verdict alone does not say why a cause was *not* named. The trace does: of each cause it knows how far it came, and the gate that
+//! stopped it. What `-v` prints, what `diagnosis.json` has under `trace`, what the report shows and what `--explain` says are all
+//! made from it. Collecting costs nothing that can be measured: a few numbers that the search has in hand anyway, some hundred times.
+
+use std::fmt;
+use std::io::Write as _;
+
+use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
+
+use super::candidate::{Label, Law};
+use super::noise::Noise;
+use crate::causes::{CauseName, Need, ParameterName};
+
+/// Where in the search a decision fell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// Before the search: can these data speak of the cause at all?
+    Data,
+    /// A law is tried at many places, none of them refined.
+    Tried,
+    /// Laws are refined, and compared beside those chosen before.
+    Forward,
+    /// A law that was chosen has to earn its place again beside a later one.
+    Backward,
+    /// A law is tried in the place of one that was chosen.
+    Exchange,
+    /// How a law that was chosen stands when the search is over.
+    Settled,
+    /// Laws have to predict sessions that they were not fitted to.
+    HeldOut,
+    /// What has no name beside a cause must not be too large.
+    Understood,
+    /// Every rival is refitted in the place of a cause.
+    Rival,
+    /// The verdict over all causes together.
+    Verdict,
+}
+
+impl Stage {
+    /// As it stands in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Stage::Data => "data",
+            Stage::Tried => "tried",
+            Stage::Forward => "forward",
+            Stage::Backward => "backward",
+            Stage::Exchange => "exchange",
+            Stage::Settled => "settled",
+            Stage::HeldOut => "held_out",
+            Stage::Understood => "understood",
+            Stage::Rival => "rival",
+            Stage::Verdict => "verdict",
+        }
+    }
+
+    /// For a reader.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Stage::Data => "the data",
+            Stage::Tried => "tried at many places",
+            Stage::Forward => "refined beside the causes chosen before",
+            Stage::Backward => "held against what was chosen after it",
+            Stage::Exchange => "tried in the place of another cause",
+            Stage::Settled => "at the end of the search",
+            Stage::HeldOut => "in sessions left out of the fit",
+            Stage::Understood => "beside what has no name",
+            Stage::Rival => "against its rivals",
+            Stage::Verdict => "the verdict",
+        }
+    }
+}
+
+/// A gate that a law has to pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gate {
+    /// The data hold what it needs.
+    Needs(Need),
+    /// A parameter of the nominal model has left its tolerance, in standard deviations between units.
+    Tolerance,
+    /// There is room: so many causes, or deviations, are chosen at most.
+    Room,
+    /// Tried at many places it gains as much evidence as the last law that was refined.
+    Refined,
+    /// Its signs and sizes make sense.
+    Sense,
+    /// Its deviations are no larger than this share of the law itself.
+    Deviations,
+    /// Refined it gains any evidence.
+    Gain,
+    /// No other law gains more.
+    First,
+    /// It gains evidence over the model without it.
+    Evidence,
+    /// It is large enough, arcsec.
+    Size,
+    /// It gains so much evidence that it may be small.
+    EvidenceIfSmall,
+    /// It is large enough for a cause that is clear, arcsec.
+    SizeIfClear,
+    /// What nothing else explains of it is larger than what the laws of the other causes may be wrong by, arcsec.
+    Alone,
+    /// It predicts sessions that it was not fitted to.
+    LeftOut,
+    /// It stays clear beside something too small to name that tells the data better.
+    ClearBeside,
+    /// In the place of another it gains evidence over that.
+    Ahead,
+    /// It tells the same as what it takes the place of: they differ by less than this share of that.
+    SamePlace,
+    /// In the place of another it earns that place.
+    Earns,
+    /// With it sessions left out are predicted no worse than with no cause at all, arcsec rms.
+    Predicts,
+    /// It is large enough to be named, arcsec.
+    Named,
+    /// What has no name is no larger than this against it.
+    BesideUnknown,
+    /// It is so many times its own uncertainty.
+    KnownWell,
+    /// No rival lowers the misfit by this much.
+    ToldBetter,
+    /// Rivals raise the misfit by this much.
+    ToldApart,
+    /// As a rival it would lower the misfit against the cause that was named.
+    AsRival,
+    /// The causes named are at least this share of what is there and not described.
+    ShareNamed,
+    /// The causes named are at least this share of what is there and described without a name.
+    ShareDescribed,
+    /// At most this share of what noise does not explain stays in the dark.
+    InTheDark,
+    /// All causes together predict sessions left out no worse than the nominal model, arcsec rms.
+    NoWorse,
+}
+
+impl Gate {
+    /// As it stands in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Gate::Needs(Need::Teeth) => "needs_teeth",
+            Gate::Needs(Need::Turns) => "needs_turns",
+            Gate::Needs(Need::Load) => "needs_torque",
+            Gate::Needs(Need::Spring) => "needs_stiffness",
+            Gate::Needs(Need::Temperature) => "needs_temperature",
+            Gate::Needs(Need::TemperatureSpan) => "needs_temperatures",
+            Gate::Needs(Need::Time) => "needs_time",
+            Gate::Needs(Need::Motion) => "needs_motion",
+            Gate::Needs(Need::Jump) => "needs_jump",
+            Gate::Tolerance => "tolerance",
+            Gate::Room => "room",
+            Gate::Refined => "refined",
+            Gate::Sense => "sense",
+            Gate::Deviations => "deviations",
+            Gate::Gain => "gain",
+            Gate::First => "first",
+            Gate::Evidence => "evidence",
+            Gate::Size => "size",
+            Gate::EvidenceIfSmall => "evidence_if_small",
+            Gate::SizeIfClear => "size_if_clear",
+            Gate::Alone => "alone",
+            Gate::LeftOut => "left_out",
+            Gate::ClearBeside => "clear_beside",
+            Gate::Ahead => "ahead",
+            Gate::SamePlace => "same_place",
+            Gate::Earns => "earns",
+            Gate::Predicts => "predicts",
+            Gate::Named => "named",
+            Gate::BesideUnknown => "beside_unknown",
+            Gate::KnownWell => "known_well",
+            Gate::ToldBetter => "told_better",
+            Gate::ToldApart => "told_apart",
+            Gate::AsRival => "as_rival",
+            Gate::ShareNamed => "share_named",
+            Gate::ShareDescribed => "share_described",
+            Gate::InTheDark => "in_the_dark",
+            Gate::NoWorse => "no_worse",
+        }
+    }
+
+    /// What it asks, as a sentence of which the law is the subject.
+    #[must_use]
+    pub const fn asks(self) -> &'static str {
+        match self {
+            Gate::Needs(need) => need.missing(),
+            Gate::Tolerance => {
+                "takes a parameter of the nominal model out of its tolerance (standard deviations between units)"
+            }
+            Gate::Room => "finds room beside the laws chosen already",
+            Gate::Refined => "gains as much evidence, not yet refined, as the laws that are refined",
+            Gate::Sense => "has signs and sizes that make sense",
+            Gate::Deviations => "is larger than its own deviations (their share of it)",
+            Gate::Gain => "gains evidence when it is refined",
+            Gate::First => "gains more evidence than any other law",
+            Gate::Evidence => "gains evidence over the model without it (natural logarithm)",
+            Gate::Size => "is large enough (arcsec rms)",
+            Gate::EvidenceIfSmall => "is so clear that it may be small (evidence)",
+            Gate::SizeIfClear => "is large enough for a cause that is clear (arcsec rms)",
+            Gate::Alone => "is larger than what the laws of the other causes may be wrong by (arcsec rms)",
+            Gate::LeftOut => "predicts sessions that it was not fitted to (gain)",
+            Gate::ClearBeside => "stays clear beside something smaller that tells the data better (evidence)",
+            Gate::Ahead => "tells the data better than the cause in whose place it is tried (evidence)",
+            Gate::SamePlace => "tells the same as the cause in whose place it is tried (difference as a share of that)",
+            Gate::Earns => "earns the place that it would take",
+            Gate::Predicts => "keeps the causes together better than none in sessions left out (arcsec rms)",
+            Gate::Named => "is large enough to be named (arcsec rms)",
+            Gate::BesideUnknown => "is not hidden by what has no name (its size as a share of the cause)",
+            Gate::KnownWell => "is known well beside what has no name (times its own uncertainty)",
+            Gate::ToldBetter => "is not told better by a rival (rise of the misfit with the rival in its place)",
+            Gate::ToldApart => "is told apart from a rival (rise of the misfit with the rival in its place)",
+            Gate::AsRival => "tells the data better in the place of a cause that was named (rise of the misfit)",
+            Gate::ShareNamed => "is, with the others named, most of what is there (share of the square)",
+            Gate::ShareDescribed => {
+                "is, with the others named, no small part beside what is described without a name (share of the square)"
+            }
+            Gate::InTheDark => "leaves little in the dark, with the others named (share of the square beyond noise)",
+            Gate::NoWorse => "predicts sessions left out, with the others named (arcsec rms)",
+        }
+    }
+
+    /// Whether a value passes below its limit, not above.
+    #[must_use]
+    pub const fn is_below(self) -> bool {
+        match self {
+            Gate::Deviations
+            | Gate::Room
+            | Gate::SamePlace
+            | Gate::Predicts
+            | Gate::BesideUnknown
+            | Gate::InTheDark
+            | Gate::NoWorse
+            | Gate::AsRival => true,
+            Gate::Needs(_)
+            | Gate::Tolerance
+            | Gate::Refined
+            | Gate::Sense
+            | Gate::Gain
+            | Gate::First
+            | Gate::Evidence
+            | Gate::Size
+            | Gate::EvidenceIfSmall
+            | Gate::SizeIfClear
+            | Gate::Alone
+            | Gate::LeftOut
+            | Gate::ClearBeside
+            | Gate::Ahead
+            | Gate::Earns
+            | Gate::Named
+            | Gate::KnownWell
+            | Gate::ToldBetter
+            | Gate::ToldApart
+            | Gate::ShareNamed
+            | Gate::ShareDescribed => false,
+        }
+    }
+}
+
+/// A gate with what came to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Judged {
+    /// The gate.
+    pub gate: Gate,
+    /// What came to it, if it is a number.
+    pub value: Option<f64>,
+    /// What it asks for.
+    pub limit: Option<f64>,
+    /// Whether it let it through.
+    pub passed: bool,
+}
+
+impl Judged {
+    /// A number against a limit.
+    #[must_use]
+    pub fn number(gate: Gate, value: f64, limit: f64, passed: bool) -> Judged {
+        Judged { gate, value: Some(value), limit: Some(limit), passed }
+    }
+
+    /// The value has to be above the limit.
+    #[must_use]
+    pub fn above(gate: Gate, value: f64, limit: f64) -> Judged {
+        Judged::number(gate, value, limit, value > limit)
+    }
+
+    /// What is no number.
+    #[must_use]
+    pub fn plain(gate: Gate, passed: bool) -> Judged {
+        Judged { gate, value: None, limit: None, passed }
+    }
+}
+
+/// Whether all gates let it through.
+#[must_use]
+pub fn passed(gates: &[Judged]) -> bool {
+    gates.iter().all(|judged| judged.passed)
+}
+
+/// One judgement of one law.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// What was judged.
+    pub label: Label,
+    /// Its shape parameters.
+    pub shape: Vec<(ParameterName, f64)>,
+    /// Where.
+    pub stage: Stage,
+    /// In which round of the search, from 1; 0 before it.
+    pub round: usize,
+    /// What it was held against, if that was another law.
+    pub against: Option<Label>,
+    /// The gates that it came to, in their order.
+    pub gates: Vec<Judged>,
+}
+
+impl Step {
+    /// Whether all gates let it through.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        passed(&self.gates)
+    }
+
+    /// The gate that decided: the first that did not let it through, or the last of those that did.
+    #[must_use]
+    pub fn deciding(&self) -> Option<&Judged> {
+        self.gates.iter().find(|judged| !judged.passed).or(self.gates.last())
+    }
+
+    fn value_at(&self, gate: Gate) -> Option<f64> {
+        self.gates.iter().find(|judged| judged.gate == gate).and_then(|judged| judged.value)
+    }
+}
+
+impl fmt::Display for Step {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {} {} {}", self.round, self.stage.as_str(), if self.passed() { '+' } else { '-' }, self.label)?;
+        for (k, (name, value)) in self.shape.iter().enumerate() {
+            write!(f, "{}{name} {value:.4}", if k == 0 { " at " } else { ", " })?;
+        }
+        if let Some(against) = self.against {
+            write!(f, ", against {against}")?;
+        }
+        for (k, judged) in self.gates.iter().enumerate() {
+            write!(f, "{} {}", if k == 0 { ':' } else { ',' }, judged.gate.as_str())?;
+            if let (Some(value), Some(limit)) = (judged.value, judged.limit) {
+                write!(f, " {value:.2} of {limit:.2}")?;
+            }
+            f.write_str(if judged.passed { "" } else { " (no)" })?;
+        }
+        Ok(())
+    }
+}
+
+/// What else a search comes upon, for who listens.
+#[derive(Clone, Debug)]
+pub enum Found<'a> {
+    /// Noise, and the information weight of the rows under it.
+    Noise(Noise, f64),
+    /// A line that no law had yet, of this size, arcsec.
+    Line(Label, f64),
+    /// A line too fast for averages.
+    FastLine(Label, f64),
+    /// A law chosen in the end: sizes of its main columns, its deviations, and what is beside it, arcsec.
+    Parts(Label, [f64; 3]),
+    /// Something left over.
+    Left(&'a str, f64),
+}
+
+impl fmt::Display for Found<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Found::Noise(noise, weight) => write!(
+                f,
+                "noise: white {:.3}, drift {:.3} arcsec over {:.1} s; information weight {weight:.2}",
+                noise.white, noise.wander, noise.correlation_s
+            ),
+            Found::Line(label, size) => write!(f, "{label}: {size:.2} arcsec"),
+            Found::FastLine(label, size) => write!(f, "{label}: {size:.2} arcsec, too fast for averages"),
+            Found::Parts(label, [main, nuisance, beside]) => {
+                write!(f, "{label}: law {main:.2}, deviations {nuisance:.2}, beside {beside:.2} arcsec")
+            }
+            Found::Left(looks_like, size) => write!(f, "left: {looks_like}, {size:.2} arcsec"),
+        }
+    }
+}
+
+/// All decisions in their order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trace {
+    steps: Vec<Step>,
+    round: usize,
+    /// Says on stderr what comes.
+    aloud: bool,
+}
+
+impl Trace {
+    /// An empty one; `aloud` if it is said on stderr as it comes.
+    #[must_use]
+    pub fn new(aloud: bool) -> Trace {
+        Trace { aloud, ..Trace::default() }
+    }
+
+    /// All decisions in their order.
+    #[must_use]
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// Another round of the search begins.
+    pub(super) fn next_round(&mut self) {
+        self.round += 1;
+    }
+
+    /// A decision on a law at values of its shape parameters.
+    pub(super) fn judged(&mut self, stage: Stage, law: &Law, values: &[f64], gates: Vec<Judged>) {
+        self.judged_against(stage, law, values, None, gates);
+    }
+
+    /// A decision on a law that was held against another.
+    pub(super) fn judged_against(
+        &mut self,
+        stage: Stage,
+        law: &Law,
+        values: &[f64],
+        against: Option<Label>,
+        gates: Vec<Judged>,
+    ) {
+        let shape = law.shapes.iter().map(|shape| shape.name).zip(values.iter().copied()).collect();
+        self.push(Step { label: law.label, shape, stage, round: self.round, against, gates });
+    }
+
+    /// A decision on a cause that has no law here, or on what is named.
+    pub(super) fn decided(&mut self, stage: Stage, label: Label, against: Option<Label>, gates: Vec<Judged>) {
+        self.push(Step { label, shape: Vec::new(), stage, round: self.round, against, gates });
+    }
+
+    fn push(&mut self, step: Step) {
+        self.say(&step);
+        self.steps.push(step);
+    }
+
+    /// Says what was found to who listens; a reader that has gone is no reason to fail.
+    pub(super) fn say(&self, what: &impl fmt::Display) {
+        if self.aloud {
+            let _ = writeln!(std::io::stderr(), "{what}");
+        }
+    }
+
+    /// Decisions on a cause, in their order.
+    pub fn of(&self, cause: CauseName) -> impl DoubleEndedIterator<Item = &Step> {
+        self.steps.iter().filter(move |step| step.label == Label::Cause(cause))
+    }
+
+    /// The decision that says why a cause was not named: of the last stage that it came to, the one of the law that came farthest.
+    /// None if all gates let it through to the end.
+    #[must_use]
+    pub fn stopped(&self, cause: CauseName) -> Option<&Step> {
+        let search = |step: &&Step| !matches!(step.stage, Stage::Exchange | Stage::Rival);
+        let last = self.of(cause).rev().find(search)?;
+        if last.passed() {
+            // It was let through by all but a rival that tells the data better.
+            return self.of(cause).find(|step| {
+                step.stage == Stage::Rival && step.gates.iter().any(|j| j.gate == Gate::ToldBetter && !j.passed)
+            });
+        }
+        let gained = |step: &Step| {
+            [Gate::Evidence, Gate::Gain, Gate::First, Gate::Refined]
+                .into_iter()
+                .find_map(|gate| step.value_at(gate))
+                .unwrap_or(f64::NEG_INFINITY)
+        };
+        let beside = self.of(cause).filter(|step| step.round == last.round && !step.passed() && search(step));
+        beside.max_by(|a, b| a.stage.cmp(&b.stage).then(gained(a).total_cmp(&gained(b))))
+    }
+
+    /// The decisions that say what became of a cause: those of the last round that it was judged in, and from any round those where it
+    /// was chosen, given up, or held against a rival.
+    pub fn telling(&self, cause: CauseName) -> Vec<&Step> {
+        let last = self.of(cause).map(|step| step.round).max().unwrap_or(0);
+        let tells =
+            |step: &&Step| step.round == last || !matches!(step.stage, Stage::Tried | Stage::Forward) || step.passed();
+        self.of(cause).filter(tells).collect()
+    }
+}
+
+/// One gate of a step, as it stands in `diagnosis.json`.
+struct Entry<'a>(&'a Step, &'a Judged);
+
+impl Serialize for Entry<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Entry(step, judged) = self;
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("cause", &step.label.to_string())?;
+        map.serialize_entry("stage", step.stage.as_str())?;
+        map.serialize_entry("round", &step.round)?;
+        map.serialize_entry("gate", judged.gate.as_str())?;
+        map.serialize_entry("value", &judged.value.filter(|value| value.is_finite()))?;
+        map.serialize_entry("limit", &judged.limit.filter(|limit| limit.is_finite()))?;
+        map.serialize_entry("passed", &judged.passed)?;
+        if let Some(against) = step.against {
+            map.serialize_entry("against", &against.to_string())?;
+        }
+        map.end()
+    }
+}
+
+/// Decisions as they stand in files: gate by gate.
+pub struct Entries<'a>(pub Vec<&'a Step>);
+
+impl Serialize for Entries<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut seq = serializer.serialize_seq(None)?;
+        for step in &self.0 {
+            for judged in &step.gates {
+                seq.serialize_element(&Entry(step, judged))?;
+            }
+        }
+        seq.end()
+    }
+}
+
+impl Serialize for Trace {
+    /// What tells of each cause, cause after cause.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Entries(CauseName::ALL.iter().flat_map(|cause| self.telling(*cause)).collect()).serialize(serializer)
+    }
+}
