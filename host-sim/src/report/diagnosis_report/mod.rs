@@ -7,6 +7,7 @@
 mod orders;
 mod picture;
 mod thin;
+mod why;
 mod words;
 
 use std::borrow::Cow;
@@ -175,6 +176,8 @@ impl Known<'_> {
         sections.extend(self.picture_sections());
         sections.push(self.before_and_after());
         sections.extend(self.causes());
+        sections.push(why::in_short(self.sources.diagnosis));
+        sections.push(why::gate_by_gate(self.sources.diagnosis));
         sections.push(self.gain());
         sections.push(self.next());
         sections.push(self.data());
