@@ -464,7 +464,15 @@ fn noise_of(sessions: &[Session]) -> super::Noise {
     let mut found = None;
     excited_by(sessions, &catalogue_drive(), |on| {
         let laws = super::library(on);
-        found = Some(super::prepare::noise(on, &super::FreeColumns::of(on, &laws, None), &[], &super::prepare::uncertain(on, &[])).0);
+        found = Some(
+            super::prepare::noise(
+                on,
+                &super::FreeColumns::of(on, &laws, None),
+                &[],
+                &super::prepare::uncertain(on, &[]),
+            )
+            .0,
+        );
     });
     found.unwrap()
 }
@@ -578,7 +586,7 @@ fn every_cause_has_a_law_that_knows_its_own_columns_and_shape_parameters() {
     });
 }
 
-fn law<'l>(laws: &'l [super::Law], cause: CauseName) -> &'l super::Law {
+fn law(laws: &[super::Law], cause: CauseName) -> &super::Law {
     laws.iter().find(|law| law.is(cause)).unwrap()
 }
 

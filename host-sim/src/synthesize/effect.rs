@@ -2,13 +2,16 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::law::{Angle, Encoder, Law, Now, SECOND_OF_RECTIFIED, largest};
+use super::law::{Angle, Encoder, Law, Now, largest};
 use super::plant::{Plant, Unit};
 use super::{Plan, Sensors, add_noise, into_sessions};
 use crate::causes::CauseName;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
 use crate::units::ARCSEC_PER_TURN;
+
+/// Share of `e / (r cos a)` that the second order of the rectified sine has: `4 / 3 pi`.
+const SECOND_OF_RECTIFIED: f64 = 0.424;
 
 /// Resolution of the output encoder, arcsec.
 const STEP_ARCSEC: f64 = 0.3;

@@ -11,8 +11,6 @@ use crate::causes::{CauseName, ParameterName};
 use crate::nominal::Nominal;
 use crate::units::ARCSEC_PER_RAD;
 
-/// Share of `e / (r cos a)` that the second order of the rectified sine has: `4 / 3 pi`.
-pub(super) const SECOND_OF_RECTIFIED: f64 = 0.424;
 /// Flank angle where teeth bear, rad: the phase of a rectified sine on the flank that carries. A guess of its own: the diagnosis, which
 /// must not share its laws, expects 0.39.
 const FLANK_ANGLE_RAD: f64 = 0.36;

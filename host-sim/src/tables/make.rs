@@ -100,7 +100,7 @@ impl TableSettings {
     }
 
     /// The sweep at the torque nodes that were given; at none where they are still to be chosen.
-    fn plan(&self, drive: &Drive, kind: GeneratorKind) -> SweepPlan {
+    fn plan(&self) -> SweepPlan {
         SweepPlan {
             torque_nodes_n_m: match &self.torque_nodes {
                 TorqueNodes::Chosen(_) => Vec::new(),
@@ -174,7 +174,7 @@ pub fn make(
 ) -> Result<MadeTable, MakeError> {
     settings.check(drive)?;
     let clock = Instant::now();
-    let mut plan = settings.plan(drive, kind);
+    let mut plan = settings.plan();
     let over_turns = if repeats(drive) { 0 } else { deviation_increments() };
     let done = AtomicUsize::new(0);
     let expected = AtomicUsize::new(match &settings.torque_nodes {
