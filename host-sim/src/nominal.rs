@@ -11,6 +11,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::drive::DriveError;
 use crate::kernels::Kernels;
+use crate::measurement::Gear;
 use crate::toml_file::{Allowed, Refused, Section, TomlFile, from, number, one_of, real, whole};
 use crate::units::ARCSEC_PER_RAD;
 
@@ -106,6 +107,15 @@ pub struct Nominal {
 }
 
 impl Nominal {
+    /// The gear, for the reader of data.
+    #[must_use]
+    pub fn gear(&self) -> Gear {
+        match self.teeth {
+            Some(teeth) => Gear::of_teeth(teeth.flexspline, teeth.circular_spline, teeth.fixed == Fixed::Flexspline),
+            None => Gear::of_ratio(self.ratio),
+        }
+    }
+
     /// Wind-up under a torque, arcsec, of the sign of the torque.
     #[must_use]
     pub fn wind_up_arcsec(&self, torque_n_m: f64) -> f64 {

@@ -13,9 +13,9 @@ use super::{Failure, names, say};
 use crate::causes::{Parameter, Usual};
 use crate::drive::{Drive, GeneratorKind};
 use crate::extension::{self, CauseEntry};
-use crate::measurement::{ColumnMap, Gear, read};
+use crate::measurement::{ColumnMap, read};
 use crate::mesh::MeshLevel;
-use crate::nominal::{Fixed, Nominal};
+use crate::nominal::Nominal;
 use crate::output::Outputs;
 use crate::synthesize::{
     Chosen, Definition, Excitation, Plan, Plant, Richness, Sensors, Sizes, Unit, effects, parse, synthesize, to_csv,
@@ -280,7 +280,7 @@ impl Synthesize {
         };
         let map = if self.columns.is_empty() { Ok(ColumnMap::default()) } else { ColumnMap::parse(&self.columns) };
         let map = map.map_err(|error| Failure::BadInput(format!("--columns: {error}")))?;
-        let gear = gear(nominal);
+        let gear = nominal.gear();
         let recording = read(path, &map, &gear).map_err(|error| Failure::BadInput(error.to_string()))?;
         Ok(Excitation::of_sessions(&recording.sessions, self.rate_hz, nominal.temperature_c))
     }
@@ -340,14 +340,6 @@ impl Synthesize {
             drive: drive.name.clone(),
         };
         Ok((Some(image), nominal, Vec::new(), source))
-    }
-}
-
-/// The gear of a nominal model, for the reader of data.
-pub(super) fn gear(nominal: &Nominal) -> Gear {
-    match nominal.teeth {
-        Some(teeth) => Gear::of_teeth(teeth.flexspline, teeth.circular_spline, teeth.fixed == Fixed::Flexspline),
-        None => Gear::of_ratio(nominal.ratio),
     }
 }
 

@@ -21,6 +21,7 @@ mod held_out;
 pub mod linear;
 pub mod model;
 pub mod noise;
+pub mod pipeline;
 pub mod prepare;
 pub mod remainder;
 pub mod report;
