@@ -15,6 +15,8 @@ fn main() {
     println!("cargo:rerun-if-changed={}", memory.display());
     println!("cargo:rustc-link-search={}", out.display());
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
+    // Functions of one alignment stand together: the padding between them does not depend on the order of modules.
+    println!("cargo:rustc-link-arg-bins=--sort-section=alignment");
     println!("cargo:rerun-if-changed=build.rs");
     write_full_table(&out.join("full.fxt"));
     write_predictor(&out.join("predictor.rs"), Some(1e-6));

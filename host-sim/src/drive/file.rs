@@ -659,7 +659,7 @@ mod tests {
             ),
             (
                 "[[as_built.damaged_teeth]]\nwheel = \"flexspline\"\ntooth = 1\ndepth_um = 501",
-                "wrong.toml:2: as_built.damaged_teeth[0].depth_um: found 501, allowed: 0 to 500",
+                "wrong.toml:5: as_built.damaged_teeth[0].depth_um: found 501, allowed: 0 to 500",
             ),
             ("as_built = 3", "wrong.toml:2: as_built: found 3, allowed: a table [as_built]"),
             ("[flexpline]\nteeth = 188", "wrong.toml:2: flexpline: unknown key; did you mean `flexspline`?"),

@@ -301,17 +301,17 @@ mod tests {
             (
                 "sensor_latency",
                 "sensor_lag",
-                "d.toml:24: extension.cause[0].name: found \"sensor_lag\", allowed: \"circ",
+                "d.toml:28: extension.cause[0].name: found \"sensor_lag\", allowed: \"circ",
             ),
             (
                 "delay_s = 0.0021",
                 "delay_s = \"old\"",
-                "d.toml:26: extension.cause[0].parameters.delay_s: found \"old\", allowed: a number",
+                "d.toml:30: extension.cause[0].parameters.delay_s: found \"old\", allowed: a number",
             ),
             (
                 "[extension.cause.parameters]",
                 "[extension.cause.numbers]",
-                "d.toml:25: extension.cause[0].numbers: unknown key; allowed: name, parameters",
+                "d.toml:29: extension.cause[0].numbers: unknown key; allowed: name, parameters",
             ),
         ] {
             let error = Model::from_toml("d.toml", &text.replacen(from, to, 1)).unwrap_err().to_string();

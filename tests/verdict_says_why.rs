@@ -1,0 +1,84 @@
+//! A verdict says why: of each cause of the library, the gate that let it through or dropped it, with value and limit.
+//!
+//! Wrong if this fails: a cause that is dropped without a trace; a trace that names a gate which did not decide; an explanation that
+//! blames the drive where the data lack what the cause needs.
+
+use flexspline_tests::command::Desk;
+use serde_json::Value;
+
+/// A drive known from its catalogue.
+const NOMINAL: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\n\
+    [nominal]\nstiffness_n_m_per_rad = 30000.0\nbacklash_arcsec = 60.0\nfriction_torque_n_m = 1.5\n\
+    [[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 10.0\nphase_rad = 0.4\n";
+const HIDDEN: &str = "circular_spline_eccentricity";
+/// Causes of the library.
+const CAUSES: usize = 24;
+
+fn steps<'d>(diagnosis: &'d Value, cause: &str) -> Vec<&'d Value> {
+    diagnosis["trace"].as_array().unwrap().iter().filter(|step| step["cause"] == cause).collect()
+}
+
+/// Measurements that hide [`HIDDEN`].
+fn measured(desk: &Desk) {
+    desk.write("nominal.toml", NOMINAL);
+    desk.line(&format!("synthesize --model nominal.toml --effect {HIDDEN}:amplitude_um=10 --seed 42 --out made"))
+        .done();
+}
+
+#[test]
+fn the_trace_names_the_gate_that_dropped_a_rival() {
+    let desk = Desk::new();
+    measured(&desk);
+    let diagnosis = desk.line("diagnose made/data.csv --model nominal.toml --no-report --json").done().json();
+    assert_eq!(diagnosis["causes"][0]["name"], HIDDEN, "{}", diagnosis["causes"]);
+
+    let mut judged: Vec<&str> =
+        diagnosis["trace"].as_array().unwrap().iter().filter_map(|step| step["cause"].as_str()).collect();
+    judged.sort_unstable();
+    judged.dedup();
+    let named = judged.iter().filter(|cause| !cause.contains(' ')).count();
+    assert!(named >= CAUSES, "{named} causes leave a trace: {judged:?}");
+
+    // What was named passed every gate of the verdict, against limits that it is told beside.
+    let verdict: Vec<_> = steps(&diagnosis, HIDDEN).into_iter().filter(|step| step["stage"] == "verdict").collect();
+    assert!(!verdict.is_empty());
+    assert!(verdict.iter().all(|step| step["passed"] == true), "{verdict:?}");
+
+    // A wheel pushed aside by gravity turns with another angle: refitted in the place of the cause, it tells the data far worse.
+    let rival = steps(&diagnosis, "gravity_side_load").into_iter().find(|step| step["stage"] == "rival").unwrap();
+    assert_eq!((&rival["gate"], &rival["against"]), (&Value::from("as_rival"), &Value::from(HIDDEN)), "{rival}");
+    assert_eq!(rival["passed"], false, "{rival}");
+    assert!(rival["value"].as_f64().unwrap() > 1000.0 && rival["limit"].as_f64().unwrap() < 0.0, "{rival}");
+}
+
+#[test]
+fn a_cause_is_explained_on_one_screen() {
+    let desk = Desk::new();
+    measured(&desk);
+    let explained = |cause: &str| {
+        let line = format!("diagnose made/data.csv --model nominal.toml --no-report --explain {cause}");
+        desk.line(&line).done().stdout
+    };
+    let named = explained(HIDDEN);
+    assert!(named.contains("It is named") && named.lines().count() <= 40, "{named}");
+    let dropped = explained("gravity_side_load");
+    assert!(dropped.contains("It is not named") && dropped.contains("asked for"), "{dropped}");
+
+    // Without the torque nobody can speak of springs, and that is the reason given.
+    let data = desk.read("made/data.csv");
+    let mut lines = data.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let torque = header.iter().position(|name| *name == "torque_n_m").unwrap();
+    let without = |line: &str| -> String {
+        let cells: Vec<&str> =
+            line.split(',').enumerate().filter(|(k, _)| *k != torque).map(|(_, cell)| cell).collect();
+        cells.join(",") + "\n"
+    };
+    desk.write("made/data.csv", &(without(&header.join(",")) + &lines.map(without).collect::<String>()));
+    let blind = explained("stiffness_hardening");
+    assert!(blind.contains("torque") && !blind.contains("asked for"), "{blind}");
+
+    let refused = desk.line("diagnose made/data.csv --model nominal.toml --explain weer");
+    assert_eq!(refused.code, 2);
+    assert!(refused.stderr.contains("did you mean `wear`"), "{}", refused.stderr);
+}
