@@ -304,8 +304,17 @@ mod tests {
                 let stated = !arg.get_default_values().is_empty() || help.contains("default");
                 let needs_none = arg.is_required_set() || !arg.get_action().takes_values() || arg.is_positional();
                 // Without these there is no file, no limit, nothing to change.
-                let absent =
-                    ["sets", "effects", "model", "tables", "like", "from_samples", "half_width_arcsec", "seed"];
+                let absent = [
+                    "sets",
+                    "effects",
+                    "model",
+                    "tables",
+                    "like",
+                    "from_samples",
+                    "half_width_arcsec",
+                    "seed",
+                    "explain",
+                ];
                 assert!(stated || needs_none || absent.contains(&id.as_str()), "{name} {id} states no default: {help}");
             }
         }

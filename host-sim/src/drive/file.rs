@@ -599,7 +599,7 @@ mod tests {
             ),
             (
                 "[as_built]\ncircular_spline_pitch_error_um = [1.0,\n nan]",
-                "wrong.toml:3: as_built.circular_spline_pitch_error_um[1]: found NaN, allowed: -100 to 100",
+                "wrong.toml:4: as_built.circular_spline_pitch_error_um[1]: found NaN, allowed: -100 to 100",
             ),
             (
                 "[as_built]\ncircular_spline_pitch_error_um = [1.0, \"2\"]",
