@@ -484,7 +484,7 @@ fn every_field_of_the_nominal_model_is_checked() {
         (
             "ratio NaN",
             with("flexspline_teeth = 188\ncircular_spline_teeth = 190\nfixed = \"flexspline\"", "ratio = nan"),
-            &["drive.ratio", "NaN"],
+            &["drive.ratio", "nan"],
         ),
         ("stiffness zero", with("30000.0", "0.0"), &["wrong.toml:6", "stiffness_n_m_per_rad", "0.0"]),
         ("stiffness negative", with("30000.0", "-1.0"), &["wrong.toml:6", "-1.0"]),
