@@ -1,7 +1,7 @@
 //! Reading TOML files: every mistake of a file named at once, each by line, field, value found and what is allowed.
 //!
-//! Drives, nominal models and what a diagnosis adds to either are read by these parts: [`TomlFile`] keeps what is wrong with a file,
-//! [`Section`] is a table of it, and `real`, `whole`, `one_of`, `each_of` and `Entries` read values.
+//! Drives, nominal models and what a diagnosis adds to either are read by these parts: `TomlFile` keeps what is wrong with a file,
+//! `Section` is a table of it, and `real`, `whole`, `one_of`, `each_of` and `Entries` read values.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
