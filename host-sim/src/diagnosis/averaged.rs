@@ -2,11 +2,12 @@
 //! the average of what it says of the rows, and is evaluated on a third or a tenth of them.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::base::Base;
 use super::candidate::Excitation;
 use super::noise::Whitener;
-use super::rows::{Rows, quantile};
+use super::rows::{Rows, mean, parts, quantile};
 
 /// Highest order per generator turn of a column that smooth laws have.
 const HIGHEST_ORDER: f64 = 6.0;
@@ -31,21 +32,22 @@ impl Averaged {
     /// Averages of `stride` rows, none across sessions; nothing where rows are taken one by one, or move too far within an average.
     #[must_use]
     pub fn of(on: &Excitation<'_>, stride: usize) -> Option<Averaged> {
-        let from = on.rows;
-        let groups: Vec<Vec<Range<usize>>> = from.sessions.iter().map(|s| chunks(s, stride)).collect();
-        let turned = groups.iter().flatten().map(|g| (from.generator[g.end - 1] - from.generator[g.start]).abs());
-        if stride < 2 || HIGHEST_ORDER * quantile(turned, SLOW_SHARE) > MOST_TURNED_RAD {
+        if stride < 2 {
             return None;
         }
-        let mean = |column: &[f64]| -> Vec<f64> {
-            groups.iter().flatten().map(|g| column[g.clone()].iter().sum::<f64>() / g.len() as f64).collect()
-        };
-        let (mut sessions, mut firsts, mut count) = (Vec::new(), Vec::new(), 0);
-        for (session, groups) in from.sessions.iter().zip(&groups) {
-            firsts.push((session.start, count));
-            sessions.push(count..count + groups.len());
-            count += groups.len();
+        let from = on.rows;
+        let (mut groups, mut sessions, mut firsts) = (Vec::new(), Vec::new(), Vec::new());
+        for session in &from.sessions {
+            let first = groups.len();
+            groups.extend(parts(session, stride));
+            firsts.push((session.start, first));
+            sessions.push(first..groups.len());
         }
+        let turned = groups.iter().map(|g| (from.generator[g.end - 1] - from.generator[g.start]).abs());
+        if HIGHEST_ORDER * quantile(turned, SLOW_SHARE) > MOST_TURNED_RAD {
+            return None;
+        }
+        let mean = |column: &[f64]| -> Vec<f64> { groups.iter().map(|group| mean(column, group)).collect() };
         let rows = Rows {
             sessions,
             used: from.used.clone(),
@@ -65,7 +67,7 @@ impl Averaged {
             period: from.period * stride as f64,
         };
         let base = on.base.each(mean);
-        let counts = groups.iter().flatten().map(|g| g.len() as f64).collect();
+        let counts = groups.iter().map(|group| group.len() as f64).collect();
         Some(Averaged { rows, base, stride, counts, firsts })
     }
 
@@ -106,21 +108,17 @@ impl Averaged {
     }
 }
 
-/// A session in parts of `stride` rows; the last may be shorter.
-fn chunks(session: &Range<usize>, stride: usize) -> Vec<Range<usize>> {
-    session.clone().step_by(stride.max(1)).map(|from| from..(from + stride.max(1)).min(session.end)).collect()
-}
-
-/// Groups of a whitener as columns of rows, or of averages of them, are laid on them.
+/// What laws are evaluated on: smooth ones on averages, if there are any, all others on rows.
 #[derive(Clone, Debug, Default)]
 pub struct Grain {
-    averaged: Option<(std::sync::Arc<Averaged>, Vec<Range<usize>>)>,
+    /// The averages, and those that each group of the whitener consists of.
+    averaged: Option<(Arc<Averaged>, Vec<Range<usize>>)>,
 }
 
 impl Grain {
     /// Smooth laws are evaluated on `averaged`, if there is any.
     #[must_use]
-    pub fn new(averaged: Option<std::sync::Arc<Averaged>>, whitener: &Whitener) -> Grain {
+    pub fn new(averaged: Option<Arc<Averaged>>, whitener: &Whitener) -> Grain {
         Grain { averaged: averaged.map(|averaged| (averaged.clone(), averaged.in_groups(whitener.groups()))) }
     }
 

@@ -205,19 +205,10 @@ impl Base {
 impl Base {
     /// A copy to be changed, without what floats.
     pub(super) fn without_floating(&self) -> Base {
-        Base {
-            prediction: self.prediction.clone(),
-            flank: self.flank.clone(),
-            wind_up: self.wind_up.clone(),
-            half_backlash: self.half_backlash,
-            law: self.law,
-            floating: Vec::new(),
-            waves: self.waves.clone(),
-            uncertain: Vec::new(),
-        }
+        Base { waves: self.waves.clone(), ..self.each(<[f64]>::to_vec) }
     }
 
-    /// With each column changed by `of`, without what floats.
+    /// With each column changed by `of`, without what floats, and without the waves of its rows.
     pub(super) fn each(&self, of: impl Fn(&[f64]) -> Vec<f64>) -> Base {
         Base {
             prediction: of(&self.prediction),

@@ -144,7 +144,7 @@ fn least_apart(
     let mut truth = base.prediction.clone();
     {
         let imagined = Excitation { rows: &rows, base: &base, ..*on };
-        for (column, c) in term.law.columns(&imagined, &term.law.values(&term.places)).iter().zip(coefficients) {
+        for (column, c) in term.law.columns(&imagined, &term.values()).iter().zip(coefficients) {
             for (t, v) in truth.iter_mut().zip(&column.values) {
                 *t += c * v;
             }

@@ -58,7 +58,7 @@ pub fn proved<'l>(
         let looks_like = gone.law.label.to_string();
         let Some(fit) = select::fit(problem, &terms) else { break };
         let predicts = Judged::number(Gate::Predicts, all.sqrt(), none.sqrt(), false);
-        trace.judged(Stage::HeldOut, gone.law, &gone.law.values(&gone.places), vec![predicts]);
+        trace.judged(Stage::HeldOut, gone.law, &gone.values(), vec![predicts]);
         aside.push(Unexplained { looks_like, size_arcsec });
         selected = Selected { terms, fit };
     }

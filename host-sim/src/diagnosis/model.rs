@@ -180,16 +180,18 @@ impl White {
         Coefficients::new(&self.roles, coefficients)
     }
 
+    /// Which columns are main ones.
+    fn main(&self) -> Vec<bool> {
+        self.tolerances.iter().map(|t| matches!(t, Tolerance::Main(_))).collect()
+    }
+
     /// Only the main columns.
     fn main_only(mut self) -> White {
-        let main: Vec<bool> = self.tolerances.iter().map(|t| matches!(t, Tolerance::Main(_))).collect();
-        let mut at = main.iter();
-        self.columns.retain(|_| *at.next().unwrap_or(&true));
-        let mut at = main.iter();
-        self.size.retain(|_| *at.next().unwrap_or(&true));
-        let mut at = main.iter();
-        self.roles.retain(|_| *at.next().unwrap_or(&true));
-        self.tolerances.retain(|t| matches!(t, Tolerance::Main(_)));
+        let main = self.main();
+        keep(&mut self.columns, &main);
+        keep(&mut self.size, &main);
+        keep(&mut self.roles, &main);
+        keep(&mut self.tolerances, &main);
         White { products: OnceLock::new(), ..self }
     }
 
@@ -215,6 +217,12 @@ impl White {
             })
             .collect()
     }
+}
+
+/// Keeps those values that are told to be kept.
+fn keep<T>(values: &mut Vec<T>, kept: &[bool]) {
+    let mut kept = kept.iter();
+    values.retain(|_| *kept.next().unwrap_or(&true));
 }
 
 /// A law at given places of its shape parameters, with its columns.
@@ -259,11 +267,17 @@ impl<'l> Term<'l> {
         Term::among(problem, self.law, places.collect(), self.among.clone())
     }
 
+    /// Values of the shape parameters.
+    #[must_use]
+    pub fn values(&self) -> Vec<f64> {
+        self.law.values(&self.places)
+    }
+
     /// As a cause that acts on others.
     pub(super) fn acting(&self, coefficients: &[f64]) -> Acting<'l> {
         Acting {
             law: self.law,
-            values: self.law.values(&self.places),
+            values: self.values(),
             roles: self.white.roles.clone(),
             coefficients: coefficients.to_vec(),
         }
@@ -278,9 +292,7 @@ impl<'l> Term<'l> {
     /// Only its main columns.
     #[must_use]
     pub fn main_only(mut self) -> Term<'l> {
-        let mut main = self.white.tolerances.iter().map(|t| matches!(t, Tolerance::Main(_)));
-        self.averaged.retain(|_| main.next().unwrap_or(true));
-        drop(main);
+        keep(&mut self.averaged, &self.white.main());
         self.white = self.white.main_only();
         self
     }

@@ -4,7 +4,7 @@
 //! alike, into innovations of unit variance; least squares on those is generalised least squares on the rows, and forty
 //! thousand correlated rows weigh what they are worth (n_eff).
 
-use super::rows::{Rows, quantile, rms, robust_std};
+use super::rows::{Rows, mean, parts, quantile, rms, robust_std};
 
 /// White noise and wander.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,16 +62,10 @@ impl Whitener {
     /// Averages of `stride` rows under `noise`; rows marked uncertain count next to nothing.
     #[must_use]
     pub fn new(rows: &Rows, uncertain: &[bool], stride: usize, noise: Noise) -> Whitener {
-        let stride = stride.max(1);
         let (mut groups, mut sessions) = (Vec::new(), Vec::new());
         for session in rows.sessions_used() {
             let from = groups.len();
-            let mut k = session.start;
-            while k < session.end {
-                let end = (k + stride).min(session.end);
-                groups.push(k..end);
-                k = end;
-            }
+            groups.extend(parts(&session, stride));
             sessions.push(from..groups.len());
         }
         let count = groups.len();
@@ -102,6 +96,12 @@ impl Whitener {
         Whitener { groups, sessions, gain, scale, decay, filter }
     }
 
+    /// Averages of `stride` rows under noise that is white alone, `white` arcsec in a row.
+    #[must_use]
+    pub fn plain(rows: &Rows, uncertain: &[bool], stride: usize, white: f64) -> Whitener {
+        Whitener::new(rows, uncertain, stride, Noise { white, wander: 0.0, correlation_s: 1.0 })
+    }
+
     /// Rows of each average.
     #[must_use]
     pub fn groups(&self) -> &[std::ops::Range<usize>] {
@@ -123,7 +123,7 @@ impl Whitener {
     /// Averages of a column.
     #[must_use]
     pub fn average(&self, column: &[f64]) -> Vec<f64> {
-        self.groups.iter().map(|g| column[g.clone()].iter().sum::<f64>() / g.len() as f64).collect()
+        self.groups.iter().map(|group| mean(column, group)).collect()
     }
 
     /// Whether averages take most of a column away.

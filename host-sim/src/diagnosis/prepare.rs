@@ -166,7 +166,7 @@ pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>]) -> Vec<bool> {
     }
     let without = uncertain.clone();
     for term in terms {
-        let Some(added) = term.law.load(on, &term.law.values(&term.places)) else { continue };
+        let Some(added) = term.law.load(on, &term.values()) else { continue };
         for (k, doubtful) in uncertain.iter_mut().enumerate() {
             let near = NEAR_FRICTION * on.nominal.friction_torque_n_m + LOAD_UNKNOWN * added[k].abs();
             *doubtful |= (on.rows.torque[k] + added[k]).abs() < near;
@@ -215,7 +215,7 @@ impl FreeColumns {
     pub fn of(on: &Excitation<'_>, laws: &[Law], averaged: Option<Arc<Averaged>>) -> FreeColumns {
         let finest = averaged.as_ref().map_or(1, |averaged| averaged.stride());
         let stride = finest * on.rows.count_used().div_ceil(WANDER_AVERAGES * finest).max(1);
-        let plain = plain(on.rows, stride, 1.0);
+        let plain = Whitener::plain(on.rows, &vec![false; on.rows.len()], stride, 1.0);
         let grain = Grain::new(averaged, &plain);
         let (columns, priors) = free_columns(on, laws, &plain, &grain).into_iter().unzip();
         FreeColumns { stride, laws: laws.len(), columns, priors }
@@ -228,11 +228,6 @@ impl FreeColumns {
     }
 }
 
-/// Averages under white noise alone.
-fn plain(rows: &Rows, stride: usize, white: f64) -> Whitener {
-    Whitener::new(rows, &vec![false; rows.len()], stride, Noise { white, wander: 0.0, correlation_s: 1.0 })
-}
-
 /// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by its evidence
 /// with the main columns of all laws as free columns. Returns also the worth of the information: below 1 where innovations are
 /// not white. `explained` is what is explained already, row by row.
@@ -243,7 +238,7 @@ pub fn noise(on: &Excitation<'_>, columns: &FreeColumns, explained: &[f64], unce
         (0..rows.len()).map(|k| rows.error[k] - on.base.prediction[k] - explained.get(k).unwrap_or(&0.0)).collect();
     let white = white_level(rows, &left);
     let stride = columns.stride;
-    let plain = Whitener::new(rows, uncertain, stride, Noise { white, wander: 0.0, correlation_s: 1.0 });
+    let plain = Whitener::plain(rows, uncertain, stride, white);
     let free = Free { columns: &columns.columns, priors: &columns.priors, data: plain.average(&left) };
     let unit = if rows.recorded.time { 1.0 } else { 100.0 * rows.period };
     let hypotheses = hypotheses(white, unit);

@@ -4,7 +4,7 @@
 
 use super::candidate::{Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
-use super::noise::{Noise, Whitener};
+use super::noise::Whitener;
 use super::rows::{Rows, rms, robust_std};
 use crate::causes::CauseName;
 
@@ -70,7 +70,7 @@ pub fn averages_hide(
 }
 
 fn averages_of(on: &Excitation<'_>, uncertain: &[bool], stride: usize) -> Whitener {
-    Whitener::new(on.rows, uncertain, stride, Noise { white: 1.0, wander: 0.0, correlation_s: 1.0 })
+    Whitener::plain(on.rows, uncertain, stride, 1.0)
 }
 
 /// The main columns of a law, if averages hide all of them.

@@ -163,6 +163,17 @@ impl Rows {
     }
 }
 
+/// A session in parts of `stride` rows (at least one); the last may be shorter.
+pub(super) fn parts(session: &Range<usize>, stride: usize) -> impl Iterator<Item = Range<usize>> + use<> {
+    let (stride, end) = (stride.max(1), session.end);
+    session.clone().step_by(stride).map(move |from| from..(from + stride).min(end))
+}
+
+/// Mean of a column over some of its rows.
+pub(super) fn mean(column: &[f64], rows: &Range<usize>) -> f64 {
+    column[rows.clone()].iter().sum::<f64>() / rows.len() as f64
+}
+
 /// Quantile of those numbers that are finite; 0 of none.
 pub(crate) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();

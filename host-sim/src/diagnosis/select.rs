@@ -145,7 +145,7 @@ pub(super) fn sound(term: &Term<'_>, coefficients: &[f64]) -> bool {
 fn sense(term: &Term<'_>, coefficients: &[f64]) -> [Judged; 2] {
     let [main, nuisance, _] = parts(term, coefficients);
     let most = term.law.wrong.most_nuisance;
-    let physical = term.law.physical(&term.law.values(&term.places), term.by_role(coefficients));
+    let physical = term.law.physical(&term.values(), term.by_role(coefficients));
     [
         Judged::plain(Gate::Sense, physical),
         Judged::number(Gate::Deviations, nuisance / main, most, nuisance <= most * main),
@@ -670,7 +670,7 @@ fn forward<'l>(
     let mut grown = grown.into_iter();
     while let Some((gain, next)) = grown.next() {
         let term = next.newest();
-        let values = term.law.values(&term.places);
+        let values = term.values();
         if gain < LEAST_GAIN {
             trace.judged(Stage::Forward, term.law, &values, vec![Judged::number(Gate::Gain, gain, LEAST_GAIN, false)]);
             break;
@@ -692,7 +692,7 @@ fn forward<'l>(
         if passes {
             let taken = Some(term.law.label);
             for (less, other) in grown {
-                let (law, values) = (other.newest().law, other.newest().law.values(&other.newest().places));
+                let (law, values) = (other.newest().law, other.newest().values());
                 let gates = vec![Judged::number(Gate::First, less, gain, false)];
                 trace.judged_against(Stage::Forward, law, &values, taken, gates);
             }
@@ -703,7 +703,7 @@ fn forward<'l>(
         }
     }
     for (gain, next) in grown {
-        let (law, values) = (next.newest().law, next.newest().law.values(&next.newest().places));
+        let (law, values) = (next.newest().law, next.newest().values());
         let gates = vec![Judged::number(Gate::Gain, gain, LEAST_GAIN, gain >= LEAST_GAIN)];
         trace.judged(Stage::Forward, law, &values, gates);
     }
@@ -845,7 +845,7 @@ fn backward<'l>(
             .min_by(|(a, _), (b, _)| standings[*a].evidence.total_cmp(&standings[*b].evidence));
         let Some((k, gates)) = weakest else { break };
         let gone = selected.terms.remove(k);
-        trace.judged(Stage::Backward, gone.law, &gone.law.values(&gone.places), gates);
+        trace.judged(Stage::Backward, gone.law, &gone.values(), gates);
         selected.fit = fit(problem, &selected.terms)?;
         selected = settle_anew(problem, selected)?;
     }
@@ -908,7 +908,7 @@ fn exchange<'l>(
             if passed(&gates) {
                 contenders.push((term, fit, gates));
             } else {
-                let values = term.law.values(&term.places);
+                let values = term.values();
                 trace.judged_against(Stage::Exchange, term.law, &values, Some(held_by.label), gates);
             }
         }
@@ -916,7 +916,7 @@ fn exchange<'l>(
             .into_iter()
             .max_by(|a, b| (a.1.solution.evidence + a.0.occam).total_cmp(&(b.1.solution.evidence + b.0.occam)));
         if let Some((term, fit, mut gates)) = best {
-            let (law, values) = (term.law, term.law.values(&term.places));
+            let (law, values) = (term.law, term.values());
             let ahead_by = fit.solution.evidence + term.occam - evidence;
             let mut terms = others;
             terms.push(term);

@@ -2,7 +2,7 @@
 //!
 //! The verdict alone does not say why a cause was *not* named. The trace does: of each cause it knows how far it came, and the gate that
 //! stopped it. What `-v` prints, what `diagnosis.json` has under `trace`, what the report shows and what `--explain` says are all
-//! made from it. Collecting costs nothing that can be measured: a few numbers that the search has in hand anyway, some hundred times.
+//! made from it. What is collected are numbers that the search has in hand anyway, some hundred of them.
 
 use std::fmt;
 use std::io::Write as _;

@@ -45,7 +45,7 @@ pub(super) fn conclude(
     let limits = select::Limits::of(noise.white);
     for (k, term) in selected.terms.iter().enumerate() {
         let gates = select::earns(problem, &selected, &standings, k, &limits);
-        trace.judged(Stage::Settled, term.law, &term.law.values(&term.places), gates);
+        trace.judged(Stage::Settled, term.law, &term.values(), gates);
     }
     let all: Vec<&Term<'_>> = selected.terms.iter().collect();
     let none = fit(problem, &[]);
