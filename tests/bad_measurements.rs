@@ -3,16 +3,13 @@
 //!
 //! The drive is healthy throughout: it does what its nominal model says, within noise. Whatever is named is the fault of the file.
 
-#[path = "bench_data.rs"]
-mod bench_data;
-
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
-use bench_data::{ARCSEC, Bench, RATIO, normal};
+use crate::bench_data::{ARCSEC, Bench, RATIO, normal};
 use flexspline_tests::command::Desk;
 use serde_json::Value;
 

@@ -8,13 +8,14 @@ use std::sync::OnceLock;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// The command `flexspline`, built in the profile that the tests were built in.
+/// The command `flexspline`, built in the profile that the tests were built in, and like them with the features that the whole
+/// workspace asks for: so nothing is built twice.
 pub fn flexspline() -> &'static Path {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     BINARY.get_or_init(|| {
         let mut build = Command::new(env!("CARGO"));
         build
-            .args(["build", "--package", "flexspline-sim", "--bin", "flexspline"])
+            .args(["build", "--workspace", "--bin", "flexspline"])
             .arg("--message-format=json-render-diagnostics")
             .current_dir(env!("CARGO_MANIFEST_DIR"));
         if !cfg!(debug_assertions) {

@@ -1,10 +1,7 @@
 //! Measured data, damaged in every way that is known: each file ends in a clear error or in a fault with its name, and what is physics
 //! is not taken for a fault.
 
-#[path = "bench_data.rs"]
-mod bench_data;
-
-use bench_data::{ARCSEC, Bench, RATIO, normal};
+use crate::bench_data::{ARCSEC, Bench, RATIO, normal};
 use flexspline_sim::measurement::{ColumnMap, FaultName, Gear, MeasuredError, Recording, Treatment, parse};
 
 fn gear() -> Gear {
@@ -774,7 +771,7 @@ fn columns_are_mapped_and_wrong_mappings_say_so() {
     assert!(error.contains("ratio: found 0"), "{error}");
 }
 
-/// Ten million rows, written as they are read: `cargo test --release -p flexspline-tests --test measured_data -- --ignored --nocapture`.
+/// Ten million rows, written as they are read: `cargo test --release --test claims ten_million -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes a minute and a gigabyte and a half"]
 fn ten_million_rows() {

@@ -1,10 +1,7 @@
 //! `report.html`: what the page says is what the other files and the exit code say. How it looks and moves is for
 //! `tests/run browser`.
 
-#[path = "bench_data.rs"]
-mod bench_data;
-
-use bench_data::{ARCSEC, Bench};
+use crate::bench_data::{ARCSEC, Bench};
 use flexspline_tests::command::{Desk, names};
 use serde_json::Value;
 

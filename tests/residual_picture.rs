@@ -1,12 +1,9 @@
 //! The picture of a residual: signals that are known come back with amplitude, phase and position, and noise shows nothing.
 
-#[path = "bench_data.rs"]
-mod bench_data;
-
 use std::f64::consts::TAU;
 use std::time::Instant;
 
-use bench_data::{ARCSEC, Bench, RATIO, normal};
+use crate::bench_data::{ARCSEC, Bench, RATIO, normal};
 use flexspline_sim::measurement::{Gear, Session};
 use flexspline_sim::residual::{Axis, OrderSpectrum, Picture, SpectrumSettings, Wheel, harmonics, order_spectrum};
 

@@ -1,0 +1,35 @@
+//! Claims that cross the crates, one file for each.
+//!
+//! `cargo test --release --test claims as_built` runs one of them.
+
+mod bench_data;
+
+mod as_built;
+mod backlash_and_dwell;
+mod bad_input;
+mod bad_measurements;
+mod cli;
+mod cli_files;
+mod cli_terminal;
+mod closed_loop;
+mod contact_patch;
+mod docs_commands;
+mod element_patch_and_rates;
+mod fast_equals_reference;
+mod fem_causes;
+mod friction;
+mod fxt_format;
+mod independence;
+mod measured_data;
+mod mirror_symmetry;
+mod one_pitch_periodicity;
+mod real_data;
+mod report;
+mod reproduce;
+mod residual_picture;
+mod ring_under_each_generator;
+mod synthesize_and_extend;
+mod tables_against_fresh_fem;
+mod temperature;
+mod verdict_says_why;
+mod wind_up_ranking;
