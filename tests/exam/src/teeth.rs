@@ -97,12 +97,13 @@ fn entering(half: f64, press: f64) -> f64 {
     deflection - equal
 }
 
-/// Position of the teeth of a wheel around its circumference, as a sum of harmonics; forward positive, arcsec.
+/// Position of the teeth of a wheel around its circumference, as a sum of harmonics; forward positive, arcsec. Held is the factor
+/// of `exp(i k angle)`, real and imaginary part, for each order `k` from zero.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Profile(Vec<(f64, f64, f64)>);
+pub struct Profile(Vec<(f64, f64)>);
 
 impl Profile {
-    /// From order, amplitude and phase, each averaged over the engaged arc (`half_arc_rad` to both sides).
+    /// From order (a whole number), amplitude and phase, each averaged over the engaged arc (`half_arc_rad` to both sides).
     pub fn new(lines: impl IntoIterator<Item = (f64, f64, f64)>, half_arc_rad: f64) -> Self {
         Self::averaged(lines, |k| (k * half_arc_rad).sin() / (k * half_arc_rad))
     }
@@ -116,12 +117,26 @@ impl Profile {
     }
 
     fn averaged(lines: impl IntoIterator<Item = (f64, f64, f64)>, left: impl Fn(f64) -> f64) -> Self {
-        Self(lines.into_iter().map(|(k, amplitude, phase)| (k, amplitude * left(k), phase)).collect())
+        let mut coefficients = Vec::new();
+        for (k, amplitude, phase) in lines {
+            let order = k as usize;
+            if coefficients.len() <= order {
+                coefficients.resize(order + 1, (0.0, 0.0));
+            }
+            let (sin, cos) = phase.sin_cos();
+            let of_order: &mut (f64, f64) = &mut coefficients[order];
+            of_order.0 += amplitude * left(k) * cos;
+            of_order.1 += amplitude * left(k) * sin;
+        }
+        Self(coefficients)
     }
 
     /// At an angle on the wheel.
     pub fn at(&self, angle_rad: f64) -> f64 {
-        self.0.iter().map(|(k, amplitude, phase)| amplitude * (k * angle_rad + phase).cos()).sum()
+        // The polynomial at exp(i angle) by Horner: a plant asks a hundred million times.
+        let (sin, cos) = angle_rad.sin_cos();
+        let highest_first = self.0.iter().rev();
+        highest_first.fold((0.0, 0.0), |(re, im), (a, b)| (re * cos - im * sin + a, re * sin + im * cos + b)).0
     }
 }
 
