@@ -114,7 +114,7 @@ impl Case {
         let plan = Plan::new(seed, index, draw);
         let mut chance = Chance::new(seed, "case", index);
         let family = draw.family.unwrap_or(*chance.of(&Family::ALL));
-        let name = format!("{:012x}", Chance::new(seed, "name", index).number() >> 16);
+        let name = Self::name(seed, index);
         let drive = Drive::draw(&mut chance);
         let unit = Unit::draw(&drive, family, &mut chance);
         let motion = Motion::draw(&drive, &plan.poor, &mut chance);
@@ -135,6 +135,11 @@ impl Case {
         }
         let (kind, poor, fault) = (plan.kind, plan.poor, plan.fault);
         Self { seed, index, name, kind, family, poor, drive, unit, motion, sensors, effects, fault }
+    }
+
+    /// Directory of the data of a case.
+    pub fn name(seed: u64, index: u64) -> String {
+        format!("{:012x}", Chance::new(seed, "name", index).number() >> 16)
     }
 
     /// Readings without noise.

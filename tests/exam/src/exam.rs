@@ -37,6 +37,8 @@ pub struct Settings {
     pub keep: bool,
     /// Write the truth before the answers are there: for testing the examiner, never for examining.
     pub reveal: Option<PathBuf>,
+    /// What the oracle said of these cases before, as `reveal` wrote it: for testing the examiner, never for examining.
+    pub revealed: Option<PathBuf>,
 }
 
 /// What came of it.
@@ -59,14 +61,18 @@ pub struct Examination {
 /// # Errors
 /// If files cannot be written.
 pub fn run(settings: &Settings) -> io::Result<Examination> {
-    let truths = in_parallel(settings.jobs, (0..settings.cases).collect(), |index| {
-        Truth::of(&Case::draw(settings.seed, index, &settings.draw))
+    let truths = in_parallel(settings.jobs, (0..settings.cases).collect(), |index| match &settings.revealed {
+        Some(dir) => Truth::read(&dir.join(format!("{}.json", Case::name(settings.seed, index)))),
+        None => Ok(Truth::of(&Case::draw(settings.seed, index, &settings.draw))),
     });
+    let truths = truths.into_iter().collect::<io::Result<Vec<Truth>>>()?;
     let commitment = commitment(&truths);
     println!("seed {}{}", settings.seed, settings.draw.options());
     println!("truth of {} cases, BLAKE3 {commitment}", truths.len());
-    if let Some(dir) = &settings.reveal {
+    if let Some(dir) = settings.reveal.as_ref().or(settings.revealed.as_ref()) {
         println!("NOT AN EXAMINATION: the truth lies open in {}", dir.display());
+    }
+    if let Some(dir) = &settings.reveal {
         write_truths(dir, &truths)?;
     }
     // In the order of their names, which is no order.

@@ -58,6 +58,9 @@ struct Run {
     /// Write the truth here before asking: for testing the examiner alone
     #[arg(long, value_name = "DIR")]
     reveal: Option<PathBuf>,
+    /// Take the truth of these cases from here: for testing the examiner alone
+    #[arg(long, value_name = "DIR", conflicts_with = "reveal")]
+    revealed: Option<PathBuf>,
     #[command(flatten)]
     draw: Draw,
     #[command(flatten)]
@@ -155,6 +158,7 @@ fn run(options: Run) -> io::Result<bool> {
         out: options.out,
         keep: options.keep,
         reveal: options.reveal,
+        revealed: options.revealed,
     };
     let examination = exam::run(&settings)?;
     println!("\n{}", examination.scores.table());

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::path::Path;
+use std::{fs, io};
 
 use crate::bench::Bench;
 use crate::case::{Case, Kind};
@@ -205,6 +207,14 @@ pub fn commitment(truths: &[Truth]) -> String {
 }
 
 impl Truth {
+    /// What was written.
+    ///
+    /// # Errors
+    /// If there is no such file.
+    pub fn read(path: &Path) -> io::Result<Self> {
+        Ok(serde_json::from_str(&fs::read_to_string(path)?)?)
+    }
+
     /// As it is written and hashed.
     pub fn json(&self) -> String {
         serde_json::to_string_pretty(self).expect("numbers and names") + "\n"
