@@ -329,7 +329,7 @@ mod tests {
     use crate::drive::{DamagedFlank, DamagedTooth, Harmonic, Wheel};
     use crate::mesh::MeshLevel;
     use crate::stepping::Method;
-    use std::sync::OnceLock;
+    use std::sync::{LazyLock, OnceLock};
 
     fn coarse() -> SolverSettings {
         SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
@@ -349,18 +349,21 @@ mod tests {
         })
     }
 
+    fn problem(change: impl Fn(&mut AsBuilt)) -> Problem {
+        let mut drive = Drive::hhd_95();
+        change(&mut drive.as_built);
+        drive.output.drag_torque_n_m = DRAG_N_M;
+        Problem::new(&drive, GeneratorKind::Cam, drive.temperature.reference_c, coarse()).unwrap()
+    }
+
     /// What FEM says of a drive with a deviation, beyond the ideal one, at whole pitches under a load.
     fn beyond_ideal(change: impl Fn(&mut AsBuilt), pitches: &[f64], torque_n_m: f64) -> Vec<f64> {
-        let at = |drive: &Drive, psi: f64| {
-            let mut drive = drive.clone();
-            drive.output.drag_torque_n_m = DRAG_N_M;
-            let problem = Problem::new(&drive, GeneratorKind::Cam, drive.temperature.reference_c, coarse()).unwrap();
-            loaded(&problem, psi, &[torque_n_m]).unwrap()[0]
-        };
-        let mut built = Drive::hhd_95();
-        change(&mut built.as_built);
-        let psi = |k: &f64| k * TAU / 188.0;
-        pitches.iter().map(|k| at(&built, psi(k)) - at(&Drive::hhd_95(), psi(k))).collect()
+        static IDEAL: LazyLock<Problem> = LazyLock::new(|| problem(|_| {}));
+        let at = |problem: &Problem, k: f64| loaded(problem, k * TAU / 188.0, &[torque_n_m]).unwrap()[0];
+        // All whole pitches are one to it.
+        let ideal = at(&IDEAL, 0.0);
+        let built = problem(change);
+        pitches.iter().map(|k| at(&built, *k) - ideal).collect()
     }
 
     #[test]
