@@ -1,8 +1,6 @@
 //! Both wheels of a drive, condensed.
 
-use faer::Side as Triangle;
-use faer::linalg::solvers::Solve;
-use faer::{Mat, MatRef};
+use flexspline_algebra::{MatRef, cholesky, product};
 use rayon::prelude::*;
 
 use crate::fem::material::PlaneStrain;
@@ -39,11 +37,11 @@ impl Cell {
         let (n, [f, b, _]) = (element.kept(), element.unknowns);
         let r = n - f;
         let k = element.stiffness.as_ref();
-        let factor = k.submatrix(0, 0, f, f).llt(Triangle::Lower).expect("a tooth held at its foot is stiff");
-        let flexibility = factor.solve(Mat::<f64>::identity(f, f));
+        let factor = cholesky(k.submatrix(0, 0, f, f)).expect("a tooth held at its foot is stiff");
+        let flexibility = factor.inverse();
         let coupling = factor.solve(k.submatrix(0, f, f, r));
-        let body = k.submatrix(f, f, r, r) - k.submatrix(f, 0, r, f) * &coupling;
-        let columns = |m: MatRef<'_, f64>| -> Vec<f64> { m.col_iter().flat_map(|c| c.iter().copied()).collect() };
+        let body = k.submatrix(f, f, r, r) - product(k.submatrix(f, 0, r, f), coupling.as_ref());
+        let columns = |m: MatRef<'_>| -> Vec<f64> { m.col_iter().flat_map(|c| c.iter().copied()).collect() };
         let body = columns(body.as_ref());
         let mut free_body = body.clone();
         assert!(Kernels::default().eliminate(&mut free_body, r, b, 1.0), "a cell held at its faces is stiff");

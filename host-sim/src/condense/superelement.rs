@@ -9,8 +9,7 @@
 //!
 //! Nodes that the housing holds are displaced by what they are told; they push on the kept ones with a constant force.
 
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side as Triangle};
+use flexspline_algebra::{Mat, cholesky, product};
 
 use crate::fem::element::{linear_stiffness, packed_index};
 use crate::fem::material::PlaneStrain;
@@ -43,16 +42,16 @@ pub struct Superelement {
     /// Unknowns on flanks, bore, and one face.
     pub unknowns: [usize; 3],
     /// Stiffness of the kept nodes.
-    pub stiffness: Mat<f64>,
+    pub stiffness: Mat,
     /// Force of the kept nodes on the cell that holds them at rest while the held nodes are displaced by 1 mm outwards.
-    pub seat: Mat<f64>,
+    pub seat: Mat,
     /// Nodes that go, by number in the mesh.
     interior: Vec<u32>,
     /// Their positions, as those of the kept nodes.
     interior_position: Vec<[f64; 2]>,
     /// Their displacements for displacements of the kept nodes, and for the held nodes displaced outwards.
-    recovery: Mat<f64>,
-    seat_recovery: Mat<f64>,
+    recovery: Mat,
+    seat_recovery: Mat,
 }
 
 impl Superelement {
@@ -68,7 +67,7 @@ impl Superelement {
             place[n as usize] = k;
         }
         let (ni, nh, nr) = (2 * interior.len(), 2 * cell.held.len(), 2 * cell.kept.len());
-        let mut k = Mat::<f64>::zeros(ni + nh + nr, ni + nh + nr);
+        let mut k = Mat::zeros(ni + nh + nr, ni + nh + nr);
         let to_cell = (-cell.angle).sin_cos();
         for &e in &cell.elements {
             // The tangent at rest is isotropic: rotate it block by block into the frame of the cell.
@@ -89,7 +88,7 @@ impl Superelement {
         }
         let in_frame = |n: &u32| rotate(mesh.nodes[*n as usize], to_cell);
         // Held nodes displaced by 1 mm outwards.
-        let mut outward = Mat::<f64>::zeros(nh, 1);
+        let mut outward = Mat::zeros(nh, 1);
         for (h, n) in cell.held.iter().enumerate() {
             let x = in_frame(n);
             let r = x[0].hypot(x[1]);
@@ -97,11 +96,12 @@ impl Superelement {
             outward[(2 * h + 1, 0)] = x[1] / r;
         }
         let block = |r: usize, rows: usize, c: usize, columns: usize| k.as_ref().submatrix(r, c, rows, columns);
-        let factor = block(0, ni, 0, ni).llt(Triangle::Lower).expect("a cell held at its kept nodes is stiff");
-        let recovery = factor.solve(-block(0, ni, ni + nh, nr));
-        let seat_recovery = factor.solve(-(block(0, ni, ni, nh) * &outward));
-        let stiffness = block(ni + nh, nr, ni + nh, nr) + block(ni + nh, nr, 0, ni) * &recovery;
-        let seat = block(ni + nh, nr, ni, nh) * &outward + block(ni + nh, nr, 0, ni) * &seat_recovery;
+        let factor = cholesky(block(0, ni, 0, ni)).expect("a cell held at its kept nodes is stiff");
+        let recovery = factor.solve((-block(0, ni, ni + nh, nr)).as_ref());
+        let seat_recovery = factor.solve((-product(block(0, ni, ni, nh), outward.as_ref())).as_ref());
+        let stiffness = block(ni + nh, nr, ni + nh, nr) + product(block(ni + nh, nr, 0, ni), recovery.as_ref());
+        let seat = product(block(ni + nh, nr, ni, nh), outward.as_ref())
+            + product(block(ni + nh, nr, 0, ni), seat_recovery.as_ref());
         // Exactly symmetric, or factors and forces part company at round-off.
         let stiffness = Mat::from_fn(nr, nr, |i, j| 0.5 * (stiffness[(i, j)] + stiffness[(j, i)]));
 

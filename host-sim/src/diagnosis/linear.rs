@@ -6,8 +6,7 @@
 use std::ops::Range;
 use std::sync::LazyLock;
 
-use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::{Accum, Mat, Par};
+use flexspline_algebra::{Mat, lower_of_product};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Symmetric products of columns, the data last.
@@ -39,13 +38,11 @@ impl Gram {
     /// As [`Gram::of`], the columns side by side in one matrix: many of them do not fit the cache.
     fn of_many(columns: &[&[f64]], range: Range<usize>) -> Gram {
         let size = columns.len();
-        let mut all = Mat::<f64>::zeros(range.len(), size);
+        let mut all = Mat::zeros(range.len(), size);
         for (j, column) in columns.iter().enumerate() {
             all.col_as_slice_mut(j).copy_from_slice(&column[range.clone()]);
         }
-        let mut lower = Mat::<f64>::zeros(size, size);
-        let (half, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-        matmul(&mut lower, half, Accum::Replace, all.transpose(), whole, &all, whole, 1.0, Par::Seq);
+        let lower = lower_of_product(all.transpose(), all.as_ref());
         let products =
             (0..size).flat_map(|i| (0..size).map(move |j| (i.max(j), i.min(j)))).map(|at| lower[at]).collect();
         Gram { size, products }

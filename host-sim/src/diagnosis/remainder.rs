@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use realfft::RealFftPlanner;
+use flexspline_algebra::spectrum;
 
 use super::candidate::{Acting, Law, Per, together};
 use super::model::{Problem, Scaffold, Term};
@@ -174,14 +174,12 @@ fn strongest(places: &[f64], values: &[f64], lowest: f64, highest: f64, cell: Op
     let even = cell.filter(|cell| span / cell < 0.5 * MOST_CELLS as f64);
     let size = even.map_or(size, |cell| (2.0 * span / cell) as usize).next_power_of_two();
     let step = even.unwrap_or(span / (size as f64 * 0.5));
-    let transform = RealFftPlanner::new().plan_fft_forward(size);
-    let mut on_grid: Vec<f64> = transform.make_input_vec();
-    let mut spectrum = transform.make_output_vec();
+    let mut on_grid = vec![0.0; size];
     for (x, v) in places.iter().zip(values) {
         let at = ((x - low) / step + 1e-6) as usize;
         on_grid[at.min(size - 1)] += v;
     }
-    transform.process(&mut on_grid, &mut spectrum).ok()?;
+    let spectrum = spectrum(&mut on_grid);
     let total: f64 = values.iter().map(|v| v * v).sum();
     let upto = ((highest * step * size as f64) as usize).min(size / 2);
     let from = ((lowest * step * size as f64).ceil() as usize).max(1);

@@ -8,5 +8,5 @@ pub mod material;
 mod pattern;
 
 pub use border::{Border, BorderedSystem, Factor};
-pub use cholesky::{Cholesky, NotPositiveDefinite};
+pub use cholesky::Cholesky;
 pub use pattern::{BlockPosition, ElementPositions, Pattern};

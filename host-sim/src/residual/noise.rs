@@ -1,6 +1,6 @@
 //! The noise under a residual: its white part, the part that remembers, and how many independent rows there are.
 
-use realfft::RealFftPlanner;
+use flexspline_algebra::{spectrum, values_of};
 use serde::Serialize;
 
 use super::orders::Line;
@@ -57,14 +57,10 @@ fn correlation_length(values: &[f64]) -> f64 {
     let length = (2 * n).next_power_of_two();
     let mut padded = vec![0.0; length];
     padded.iter_mut().zip(values).for_each(|(padded, value)| *padded = value - mean);
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, inverse) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
-    let mut sums = forward.make_output_vec();
-    if forward.process(&mut padded, &mut sums).is_err() {
-        return 1.0;
-    }
+    let mut sums = spectrum(&mut padded);
     sums.iter_mut().for_each(|sum| *sum = (sum.re * sum.re + sum.im * sum.im).into());
-    if inverse.process(&mut sums, &mut padded).is_err() || padded[0] <= 0.0 {
+    let padded = values_of(&mut sums, length);
+    if padded[0] <= 0.0 {
         return 1.0;
     }
     let mut length = 1.0;

@@ -1,7 +1,6 @@
 //! Sines of given orders by least squares, and the orders that a strain wave gear has by its teeth.
 
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
+use flexspline_algebra::{Mat, cholesky};
 use serde::Serialize;
 
 /// What an order is tied to.
@@ -89,7 +88,7 @@ pub(super) fn confusion(angle: &[f64], weight: Option<&[f64]>, orders: &[f64]) -
 
 /// Normal equations of a constant and sines.
 struct Normal {
-    inverse: Mat<f64>,
+    inverse: Mat,
     right: Vec<f64>,
     yy: f64,
 }
@@ -122,7 +121,7 @@ impl Normal {
             total += w;
         }
         let matrix = Mat::from_fn(width, width, |a, b| normal[a.max(b) * width + a.min(b)]);
-        let inverse = matrix.llt(Side::Lower).ok()?.solve(Mat::<f64>::identity(width, width));
+        let inverse = cholesky(matrix.as_ref()).ok()?.inverse();
         // A variance grown a million times by the other columns is no answer.
         let sound = |a: usize| inverse[(a, a)].is_finite() && inverse[(a, a)] * total < 1e6;
         (0..width).all(sound).then_some(Normal { inverse, right, yy })

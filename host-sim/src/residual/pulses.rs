@@ -2,8 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
+use flexspline_algebra::{Mat, cholesky};
 use serde::Serialize;
 
 use super::rows::{Axis, Rows};
@@ -138,7 +137,7 @@ fn fit(bins: &[(f64, f64)], at: f64, width: f64, per_turn: u32) -> Option<(f64, 
         return None;
     }
     let matrix = Mat::from_fn(COLUMNS, COLUMNS, |a, b| normal[a][b]);
-    let inverse = matrix.llt(Side::Lower).ok()?.solve(Mat::<f64>::identity(COLUMNS, COLUMNS));
+    let inverse = cholesky(matrix.as_ref()).ok()?.inverse();
     let value: Vec<f64> = (0..COLUMNS).map(|a| (0..COLUMNS).map(|b| inverse[(a, b)] * right[b]).sum()).collect();
     let said: f64 = value.iter().zip(&right).map(|(value, right)| value * right).sum();
     // Neighbouring bins share what is left over; a bell covers several of them.

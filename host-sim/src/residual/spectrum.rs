@@ -7,8 +7,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex;
+use flexspline_algebra::{Complex, spectrum};
 use serde::Serialize;
 
 use super::orders::{Line, NamedOrder, confusion, harmonics, named_orders};
@@ -310,13 +309,7 @@ impl<'a> Grid<'a> {
             cells[cell] += w * (1.0 - part);
             cells[cell + 1] += w * part;
         }
-        let mut planner = RealFftPlanner::<f64>::new();
-        let fft = planner.plan_fft_forward(self.length);
-        let mut sums = fft.make_output_vec();
-        // The lengths are those of the plan, the only thing that can be wrong.
-        if fft.process(&mut cells, &mut sums).is_err() {
-            return vec![Complex::default(); self.length / 2 + 1];
-        }
+        let mut sums = spectrum(&mut cells);
         for (place, sum) in sums.iter_mut().enumerate() {
             let x = PI * place as f64 / self.length as f64;
             let sinc = if place == 0 { 1.0 } else { x.sin() / x };

@@ -23,9 +23,8 @@
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
-use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
 use flexspline::make::Sample;
+use flexspline_algebra::{Mat, cholesky, product};
 use rayon::prelude::*;
 
 use super::project::{GENERATOR_ORDERS, MATERIAL_ORDERS, OUTPUT_ORDERS};
@@ -252,18 +251,18 @@ fn harmonics(drive: &Drive, generator_rad: f64) -> Vec<f64> {
 /// The harmonics that all loads of both signs have in common, by least squares; each sign and load has a mean of its own.
 fn common_harmonics(drive: &Drive, signs: &[(Vec<f64>, Vec<[f64; LEVELS]>); 2]) -> Vec<f64> {
     // The means are taken out of columns and data alike. The columns of a sign are the same under every load.
-    let mut normal: Option<(Mat<f64>, Mat<f64>)> = None;
+    let mut normal: Option<(Mat, Mat)> = None;
     for (places, deviations) in signs {
         let rows: Vec<Vec<f64>> = places.iter().map(|place| harmonics(drive, *place)).collect();
         let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / places.len() as f64;
         let columns = Mat::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j] - mean(&mut rows.iter().map(|r| r[j])));
         let data = Mat::from_fn(rows.len(), 1, |i, _| deviations[i].iter().sum::<f64>() / LEVELS as f64);
-        let part = (columns.transpose() * &columns, columns.transpose() * &data);
+        let part = (product(columns.transpose(), columns.as_ref()), product(columns.transpose(), data.as_ref()));
         normal = Some(normal.map_or(part.clone(), |(matrix, right)| (matrix + &part.0, right + &part.1)));
     }
     let Some((matrix, right)) = normal else { return Vec::new() };
-    let factor = matrix.llt(Side::Lower).expect("the places tell the harmonics apart");
-    let solution = factor.solve(&right);
+    let factor = cholesky(matrix.as_ref()).expect("the places tell the harmonics apart");
+    let solution = factor.solve(right.as_ref());
     (0..solution.nrows()).map(|k| solution[(k, 0)]).collect()
 }
 

@@ -5,9 +5,7 @@
 
 use std::sync::OnceLock;
 
-use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::linalg::solvers::Solve;
-use faer::{Accum, ColRef, Mat, Par, Side};
+use flexspline_algebra::{Mat, cholesky, lower_of_product, product};
 
 use crate::measurement::Session;
 use crate::measurement::gear::Gear;
@@ -193,7 +191,7 @@ impl<'a> State<'a> {
         if n < 2 * width {
             return None;
         }
-        let mut table = Mat::<f64>::zeros(n, width);
+        let mut table = Mat::zeros(n, width);
         for (c, column) in columns.iter().enumerate() {
             table.col_as_slice_mut(c).copy_from_slice(column);
         }
@@ -210,6 +208,7 @@ impl<'a> State<'a> {
                 size
             })
             .collect();
+        let errors = Mat::from_fn(n, 1, |i, _| error[i]);
         let mut weight = vec![1.0; n];
         let (mut value, mut inverse, mut left, mut sigma) = (vec![0.0; width], Mat::zeros(0, 0), error.clone(), 0.0);
         for _ in 0..4 {
@@ -217,17 +216,15 @@ impl<'a> State<'a> {
             for c in 0..width {
                 weighted.col_as_slice_mut(c).iter_mut().zip(&weight).for_each(|(x, w)| *x *= w);
             }
-            let mut normal = Mat::<f64>::zeros(width, width);
-            let (lower, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-            matmul(&mut normal, lower, Accum::Replace, weighted.transpose(), whole, &table, whole, 1.0, Par::Seq);
+            let mut normal = lower_of_product(weighted.transpose(), table.as_ref());
             (0..width).for_each(|c| normal[(c, c)] += 1e-9 * n as f64);
-            let right = weighted.transpose() * ColRef::from_slice(error);
-            let factor = normal.llt(Side::Lower).ok()?;
-            let solution = factor.solve(&right);
-            value = solution.iter().copied().collect();
-            inverse = factor.solve(Mat::<f64>::identity(width, width));
-            let said = &table * &solution;
-            left = error.iter().zip(said.iter()).map(|(y, said)| y - said).collect();
+            let right = product(weighted.transpose(), errors.as_ref());
+            let factor = cholesky(normal.as_ref()).ok()?;
+            let solution = factor.solve(right.as_ref());
+            value = solution.col_as_slice(0).to_vec();
+            inverse = factor.inverse();
+            let said = product(table.as_ref(), solution.as_ref());
+            left = error.iter().zip(said.col_as_slice(0)).map(|(y, said)| y - said).collect();
             sigma = median_and_std(&mut left.clone()).1;
             if sigma <= 0.0 {
                 break;
