@@ -8,6 +8,7 @@ mod as_built;
 mod backlash_and_dwell;
 mod bad_input;
 mod bad_measurements;
+mod c_header;
 mod cli;
 mod cli_files;
 mod cli_terminal;
