@@ -1,4 +1,38 @@
 //! Contact FEM of strain wave (harmonic) drives, and the compensation tables made from it.
+//!
+//! ```text
+//! drive.toml -> drive -> mesh -> fem, contact -> stepping -> motion -> tables -> image (.fxt), read by the crate `flexspline`
+//!                                                              |
+//!                                   simulate, kernels, reproduce, closed_loop
+//! measured.csv -> measurement -> residual -> diagnosis (beside a table, or nominal.toml) -> extension -> drive, tables
+//! ```
+//!
+//! [`drive::Drive`] says what the drive is, [`stepping::Problem`] makes meshes and contact of it with one wave generator at one
+//! temperature, [`motion::Motion`] deforms, loads and turns it. [`tables::make()`] samples steady motion at the torques and
+//! temperatures that it finds to be needed, and projects the samples onto the table that firmware reads; [`tables::validate`]
+//! compares the table with fresh FEM. [`diagnosis`] says what measured data have beyond all that. The command is [`cli`].
+//!
+//! A drive, a solver, one error:
+//!
+//! ```
+//! use flexspline_sim::drive::{Drive, GeneratorKind};
+//! use flexspline_sim::mesh::MeshLevel;
+//! use flexspline_sim::motion::Motion;
+//! use flexspline_sim::stepping::{Method, Problem, SolverSettings};
+//!
+//! let drive = Drive::hhd_95();
+//! let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
+//! let problem = Problem::new(&drive, GeneratorKind::Cam, drive.temperature.reference_c, settings)?;
+//! let mut motion = Motion::deformed(&problem, 0.0)?;
+//! motion.settle(motion.pitch() / 8.0)?;
+//! // Driven forward without load, the output lags by half the clearance of 0.987'.
+//! assert!((motion.error_arcsec() + 0.5 * 0.987 * 60.0).abs() < 1.0);
+//! # Ok::<(), flexspline_sim::stepping::SolveError>(())
+//! ```
+//!
+//! `examples/contact.rs` goes on to loads and a whole tooth pitch. Lengths are mm, forces N, torques N m, angles rad, temperatures °C,
+//! and a name carries any other unit. A positive load turns the output forward; the error is output angle minus generator angle over
+//! the ratio, positive when the output leads.
 #![forbid(unsafe_code)]
 
 pub mod causes;
