@@ -1,7 +1,7 @@
 //! A whole contact problem: a drive, its generator, loads, and the kinematic error over one tooth pitch under each.
 //!
 //! ```sh
-//! cargo run --release -p flexspline-sim --example contact
+//! cargo run --release --example contact
 //! ```
 
 use flexspline_sim::drive::{Drive, GeneratorKind};
