@@ -1,7 +1,7 @@
 //! How the cost of a steady increment of the fast solver grows with teeth and with elements.
 //!
 //! ```text
-//! cargo bench -p flexspline-sim --bench growth
+//! cargo bench --bench growth
 //! ```
 //!
 //! Prints a line for each drive and each mesh level: CPU milliseconds of an increment (median of several rounds, the machine

@@ -1,7 +1,7 @@
 //! Cost of an increment of 0.01 rad of the whole drive in steady motion, standard mesh, by both solvers side by side.
 //!
 //! ```text
-//! cargo bench -p flexspline-sim --bench increment
+//! cargo bench --bench increment
 //! ```
 //!
 //! Criterion's figures `increment/<generator> <torque> N.m/<solver>` are CPU time of one increment: predictor, contact, Newton

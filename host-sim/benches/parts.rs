@@ -1,7 +1,7 @@
 //! Cost of the parts that both solvers are made of: cam, 50 N.m, standard mesh, one pass each, CPU time.
 //!
 //! ```text
-//! cargo bench -p flexspline-sim --bench parts
+//! cargo bench --bench parts
 //! ```
 //!
 //! * `reference/assembly`: element tangents and forces of the flexspline, added into the sparse matrix;

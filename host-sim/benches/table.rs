@@ -1,7 +1,7 @@
 //! Cost of one small table, through the library: torque nodes chosen, swept, projected.
 //!
 //! ```text
-//! cargo bench -p flexspline-sim --bench table
+//! cargo bench --bench table
 //! ```
 //!
 //! Criterion's figure is CPU time of all threads for a table of the cam up to 50 N.m, at both ends of the operating

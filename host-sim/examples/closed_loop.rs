@@ -1,10 +1,10 @@
 //! The closed loop by hand.
 //!
 //! ```sh
-//! cargo run --release -p flexspline-sim --example closed_loop -- map tests/firmware/plant [GENERATOR...]    # contact FEM, minutes
-//! cargo run --release -p flexspline-sim --example closed_loop -- fly antenna|brief TABLES [OUT]
-//! cargo run --release -p flexspline-sim --example closed_loop -- inert antenna|brief TABLES [OUT]
-//! cargo run --release -p flexspline-sim --example closed_loop -- rover TABLES
+//! cargo run --release --example closed_loop -- map tests/firmware/plant [GENERATOR...]    # contact FEM, minutes
+//! cargo run --release --example closed_loop -- fly antenna|brief TABLES [OUT]
+//! cargo run --release --example closed_loop -- inert antenna|brief TABLES [OUT]
+//! cargo run --release --example closed_loop -- rover TABLES
 //! ```
 //! `TABLES` is a folder of `<generator>.fxt`. With `OUT` every tick of the flights is written there as CSV. `fly brief` prints,
 //! line by line, what the program `antenna` prints on the target, and `rover` what `rover` does; `inert` gives the load inertia.

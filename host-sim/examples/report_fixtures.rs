@@ -1,6 +1,6 @@
 //! What the browser tests read beside real reports: packed arrays with what they hold, and a page whose every text is hostile.
 //!
-//! `cargo run --release -p flexspline-sim --example report_fixtures -- DIR`
+//! `cargo run --release --example report_fixtures -- DIR`
 
 use std::path::PathBuf;
 
