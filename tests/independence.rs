@@ -6,7 +6,7 @@
 //!   e with more increments     - e  |
 //! ```
 //!
-//! Loads: none but the drag, 0.7 and 1.3 pitches after the start, and 50 N.m; all generators (two of them with `--ignored`). The bound is 0.1", for the
+//! Loads: none but the drag, 0.7 and 1.3 pitches after the start, and 50 N.m; all generators. The bound is 0.1", for the
 //! loaded two-roller, which winds up by 15', 0.3".
 //! Reference: the same drive with the next finer choice. Physics wrong if this fails: something that sets the answer is
 //! not in drive.toml.
@@ -67,13 +67,11 @@ fn cam() {
 }
 
 #[test]
-#[ignore = "a minute; the cam and the two-roller are the stiffest and the softest"]
 fn double_disc() {
     independent(GeneratorKind::DoubleDisc);
 }
 
 #[test]
-#[ignore = "a minute; the cam and the two-roller are the stiffest and the softest"]
 fn four_roller() {
     independent(GeneratorKind::FourRoller);
 }
