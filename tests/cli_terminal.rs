@@ -47,14 +47,12 @@ fn stopped(desk: &Desk, line: &str, working: Duration, signals: &[&str]) {
     assert_eq!(output.code, 1, "{line}: {}", output.stderr);
     assert!(output.stdout.is_empty(), "{line}: {}", output.stdout);
     assert!(output.stderr.ends_with("error: stopped; nothing was written\n"), "{line}: {}", output.stderr);
-    assert!(took < AT_ONCE, "{line}: {took:?}");
+    assert!(took < Duration::from_secs(1), "{line}: {took:?}");
     let after = contents(&desk.path("."));
     assert!(before == after, "{line}: {:?} became {:?}", before.keys(), after.keys());
 }
 
 const WORKING: Duration = Duration::from_millis(600);
-/// Some tenths of a second alone, more beside tests that keep every core busy; the work itself would take far longer.
-const AT_ONCE: Duration = Duration::from_secs(5);
 
 #[test]
 fn a_stopped_simulation_leaves_the_folder_as_it_was() {
@@ -185,7 +183,7 @@ fn a_folder_that_cannot_be_written_is_found_out_before_the_work() {
         let run = desk.line(&format!("{line} --out /proc/flexspline"));
         assert_eq!(run.code, 2, "{line}: {}", run.stderr);
         assert!(run.stderr.starts_with("error: --out: cannot write /proc/flexspline: "), "{line}: {}", run.stderr);
-        assert!(clock.elapsed() < AT_ONCE, "{line} worked {:?} before it said so", clock.elapsed());
+        assert!(clock.elapsed() < Duration::from_secs(2), "{line} worked {:?} before it said so", clock.elapsed());
     }
     assert!(before == contents(&desk.path(".")));
 }
@@ -248,11 +246,15 @@ fn a_terminal_sees_colour_and_how_long_it_will_take() {
         ("kernels --generator cam", " left"),
         ("diagnose data/data.csv --model nominal.toml", " so far"),
     ] {
+        let mut shown = String::new();
         // A busy machine needs longer before it can say.
-        let stopped_after =
-            |seconds: &&str| on_a_terminal(&desk, &format!("timeout -s INT {seconds} {program} {line}"), &[]).unwrap();
-        let shown = ["2.2", "8", "30"].iter().map(stopped_after).find(|shown| shown.contains(time));
-        let shown = shown.unwrap_or_else(|| panic!("{line} shows no time"));
+        for seconds in ["2.2", "8", "30"] {
+            shown = on_a_terminal(&desk, &format!("timeout -s INT {seconds} {program} {line}"), &[]).unwrap();
+            if shown.contains(time) {
+                break;
+            }
+        }
+        assert!(shown.contains(time), "{line} shows no time: {shown:?}");
         // The bar goes before the last word.
         let (_, end) = shown.rsplit_once("\u{1b}[2K").unwrap();
         assert!(end.contains("stopped; nothing was written") && !end.contains(" left"), "{line}: {end:?}");
