@@ -48,24 +48,7 @@ impl Averaged {
             return None;
         }
         let mean = |column: &[f64]| -> Vec<f64> { groups.iter().map(|group| mean(column, group)).collect() };
-        let rows = Rows {
-            sessions,
-            used: from.used.clone(),
-            recorded: from.recorded,
-            time: mean(&from.time),
-            generator: mean(&from.generator),
-            error: mean(&from.error),
-            torque: mean(&from.torque),
-            temperature: mean(&from.temperature),
-            orientation: mean(&from.orientation),
-            speed: mean(&from.speed),
-            direction: mean(&from.direction),
-            travel: mean(&from.travel),
-            output: mean(&from.output),
-            on_flexspline: mean(&from.on_flexspline),
-            on_circular_spline: mean(&from.on_circular_spline),
-            period: from.period * stride as f64,
-        };
+        let rows = Rows { period: from.period * stride as f64, ..from.each(sessions, mean) };
         let base = on.base.each(mean);
         let counts = groups.iter().map(|group| group.len() as f64).collect();
         Some(Averaged { rows, base, stride, counts, firsts })

@@ -679,21 +679,24 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
 
     /// Columns (white) by which the prediction of `term` changes with each of its places, and how far the place may move.
     fn derivatives(&self, term: &Term<'_>, coefficients: &[f64]) -> Vec<(Vec<f64>, Prior)> {
+        let problem = self.problem;
+        let here = term.contribution(coefficients);
+        let recorded = problem.excitation(term.law);
+        let on = left_by(term.among.as_deref(), &recorded);
         (0..term.places.len())
             .map(|i| {
                 let mut places = term.places.clone();
                 let cyclic = term.law.shapes[i].cyclic;
                 let step = if cyclic || places[i] + STEP <= 1.0 { STEP } else { -STEP };
                 places[i] += step;
-                let moved = Term::among(self.problem, term.law, places, term.among.clone());
-                let mut change = vec![0.0; self.problem.data_white.len()];
-                for ((there, here), c) in moved.white.columns.iter().zip(&term.white.columns).zip(coefficients) {
-                    let factor = c / step;
-                    for (d, (a, b)) in change.iter_mut().zip(there.iter().zip(here)) {
-                        *d += factor * (a - b);
-                    }
+                // Sums, averages and the whitening are linear: one column for all.
+                let mut there = vec![0.0; on.rows.len()];
+                for (column, c) in columns(term.law, Extent::Whole, &on, &places).iter().zip(coefficients) {
+                    there.iter_mut().zip(&column.values).for_each(|(sum, v)| *sum += c * v);
                 }
-                (change, Prior { mean: 0.0, std: PLACE_SPREAD })
+                let mut change = problem.grain.average(term.law.smooth(), &problem.whitener, &there);
+                change.iter_mut().zip(&here).for_each(|(there, here)| *there = (*there - here) / step);
+                (problem.whitener.whiten_averaged(&change), Prior { mean: 0.0, std: PLACE_SPREAD })
             })
             .collect()
     }

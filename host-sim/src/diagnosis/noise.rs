@@ -4,7 +4,7 @@
 //! alike, into innovations of unit variance; least squares on those is generalised least squares on the rows, and forty
 //! thousand correlated rows weigh what they are worth (n_eff).
 
-use super::rows::{Rows, mean, parts, quantile, rms, robust_std};
+use super::rows::{Rows, parts, quantile, rms, robust_std};
 
 /// White noise and wander.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +30,8 @@ impl Noise {
 pub struct Whitener {
     /// Averages: rows of each, none across sessions.
     groups: Vec<std::ops::Range<usize>>,
+    /// Rows to an average; fewer at the end of a session.
+    stride: usize,
     /// Averages of each session.
     pub sessions: Vec<std::ops::Range<usize>>,
     /// Filter gain at each average.
@@ -93,7 +95,7 @@ impl Whitener {
         let filter = (0..count)
             .map(|g| Step { keep: decay[g] * (1.0 - gain[g]), take: decay[g] * gain[g], worth: 1.0 / scale[g] })
             .collect();
-        Whitener { groups, sessions, gain, scale, decay, filter }
+        Whitener { groups, stride: stride.max(1), sessions, gain, scale, decay, filter }
     }
 
     /// Averages of `stride` rows under noise that is white alone, `white` arcsec in a row.
@@ -123,7 +125,19 @@ impl Whitener {
     /// Averages of a column.
     #[must_use]
     pub fn average(&self, column: &[f64]) -> Vec<f64> {
-        self.groups.iter().map(|group| mean(column, group)).collect()
+        let mut means = Vec::with_capacity(self.groups.len());
+        for session in self.sessions.iter().filter(|session| !session.is_empty()) {
+            let rows = &column[self.groups[session.start].start..self.groups[session.end - 1].end];
+            // The usual strides with a length that the compiler knows.
+            match self.stride {
+                1 => means.extend_from_slice(rows),
+                2 => means_of::<2>(rows, &mut means),
+                3 => means_of::<3>(rows, &mut means),
+                4 => means_of::<4>(rows, &mut means),
+                stride => means.extend(rows.chunks(stride).map(mean_of)),
+            }
+        }
+        means
     }
 
     /// Whether averages take most of a column away.
@@ -211,6 +225,19 @@ impl Whitener {
     #[must_use]
     pub fn log_scale(&self) -> f64 {
         self.scale.iter().map(|s| s.ln()).sum()
+    }
+}
+
+fn mean_of(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Means of `N` values each; the last ones may be fewer.
+fn means_of<const N: usize>(values: &[f64], means: &mut Vec<f64>) {
+    let (whole, rest) = values.as_chunks::<N>();
+    means.extend(whole.iter().map(|part| mean_of(part)));
+    if !rest.is_empty() {
+        means.push(mean_of(rest));
     }
 }
 

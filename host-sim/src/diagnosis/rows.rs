@@ -30,6 +30,8 @@ pub struct Rows {
     pub recorded: Recorded,
     /// Time, s; row numbers where it was not recorded.
     pub time: Vec<f64>,
+    /// Time since the session began, s.
+    pub since: Vec<f64>,
     /// Generator angle, rad.
     pub generator: Vec<f64>,
     /// Output error, arcsec.
@@ -83,6 +85,8 @@ impl Rows {
                 Some(time) if rows.recorded.time => rows.time.extend(time),
                 _ => rows.time.extend((from..from + len).map(|k| k as f64)),
             }
+            let begin = rows.time.get(from).copied().unwrap_or(0.0);
+            rows.since.extend(rows.time[from..].iter().map(|time| time - begin).collect::<Vec<f64>>());
             rows.sessions.push(from..from + len);
             rows.used.push(len > 3);
         }
@@ -97,6 +101,30 @@ impl Rows {
             *session &= used.get(k).copied().unwrap_or(false);
         }
         self
+    }
+
+    /// With each column changed by `of`; the sessions are these then.
+    #[must_use]
+    pub fn each(&self, sessions: Vec<Range<usize>>, of: impl Fn(&[f64]) -> Vec<f64>) -> Rows {
+        Rows {
+            sessions,
+            used: self.used.clone(),
+            recorded: self.recorded,
+            time: of(&self.time),
+            since: of(&self.since),
+            generator: of(&self.generator),
+            error: of(&self.error),
+            torque: of(&self.torque),
+            temperature: of(&self.temperature),
+            orientation: of(&self.orientation),
+            speed: of(&self.speed),
+            direction: of(&self.direction),
+            travel: of(&self.travel),
+            output: of(&self.output),
+            on_flexspline: of(&self.on_flexspline),
+            on_circular_spline: of(&self.on_circular_spline),
+            period: self.period,
+        }
     }
 
     /// Sessions that are learnt from.

@@ -9,9 +9,12 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::geometry::{Angle, COS_PRESSURE_ANGLE, USUAL_ARCSEC, fading, half_load, kept, sense, waves};
+use super::geometry::{
+    Angle, COS_PRESSURE_ANGLE, USUAL_ARCSEC, faded, half_load, kept, sense, waves, weighted_waves,
+};
 use super::{
-    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, Zones, by_row, main, main_about, nuisance, polar,
+    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, Zones, by_row, main, main_about, nuisance, of_both, polar,
+    times,
 };
 use crate::causes::{CauseName, ParameterName as Name};
 
@@ -49,8 +52,6 @@ struct Displacement {
     of: Angle,
     phase: f64,
     size: f64,
-    /// Load that halves the displacement, N·m.
-    half_load: f64,
     /// Pressing in per load, arcsec/N·m.
     pressed_per_n_m: f64,
     /// Angle by which a flank is ahead, rad.
@@ -63,39 +64,50 @@ impl Displacement {
             of,
             phase: shape.of(Name::PhaseRad),
             size: shape.of(Name::SizeArcsec),
-            half_load: half_of(shape),
             pressed_per_n_m: shape.get(Name::PressedArcsec).map_or(0.0, |pressed| pressed / on.scales.load),
             flank_ahead: FLANK_AHEAD,
         }
     }
 
-    /// How far it brings one zone ahead of the other.
-    fn zones(&self, on: &Excitation<'_>) -> Zones {
+    /// How far it brings one zone ahead of the other, where it fades like this.
+    fn zones(&self, on: &Excitation<'_>, fade: &[f64]) -> Zones {
         let first = kept(on, self.of, 1.0);
         let by = self.flank_ahead * sense(on);
         let ahead = |flank: f64| {
             let (sin, cos) = (flank * by - self.phase).sin_cos();
-            let size = |k: usize| self.size * fading(on, self.half_load, k);
-            by_row(on, |k| size(k) * (first[1][k] * cos + first[0][k] * sin))
+            let (along, across) = (self.size * cos, self.size * sin);
+            let waves = first[1].iter().zip(&first[0]);
+            waves.zip(fade).map(|((s, c), fade)| fade * (along * s + across * c)).collect::<Vec<f64>>()
         };
         Zones { upper: ahead(1.0), lower: ahead(-1.0) }
     }
 
     /// What it adds to what causes besides do in the zones.
-    fn pattern(&self, on: &Excitation<'_>) -> Vec<f64> {
-        let own = self.zones(on);
-        by_row(on, |k| {
-            let half = (on.base.half_backlash + on.widened.map_or(0.0, |w| w[k])).max(0.0);
-            let flank = on.base.flank[k];
-            let pressed = self.pressed_per_n_m * on.rows.torque[k];
-            let rests = |upper: f64, lower: f64| {
-                let high = half - stopped(upper, pressed.max(0.0));
-                let low = -half + stopped(lower, (-pressed).max(0.0));
-                0.5 * (high + low) + flank * 0.5 * (high - low).max(0.0)
-            };
-            let (upper, lower) = on.zones.map_or((0.0, 0.0), |z| (z.upper[k], z.lower[k]));
-            rests(upper + own.upper[k], lower + own.lower[k]) - rests(upper, lower)
-        })
+    fn pattern(&self, on: &Excitation<'_>, fade: &[f64]) -> Vec<f64> {
+        let own = self.zones(on, fade);
+        let half_backlash = on.base.half_backlash;
+        // Where the output rests with zones this far ahead, half the clearance being `half`.
+        let rests = |upper: f64, lower: f64, half: f64, flank: f64, pressed: f64| {
+            let high = half - stopped(upper, pressed.max(0.0));
+            let low = -half + stopped(lower, (-pressed).max(0.0));
+            0.5 * (high + low) + flank * 0.5 * (high - low).max(0.0)
+        };
+        let rows = on.base.flank.iter().zip(&on.rows.torque).zip(own.upper.iter().zip(&own.lower));
+        let alone = |((flank, torque), (upper, lower)): ((&f64, &f64), (&f64, &f64))| {
+            let pressed = self.pressed_per_n_m * torque;
+            let half = half_backlash.max(0.0);
+            rests(*upper, *lower, half, *flank, pressed) - rests(0.0, 0.0, half, *flank, pressed)
+        };
+        if on.widened.is_none() && on.zones.is_none() {
+            return rows.map(alone).collect();
+        }
+        let beside = |(k, ((flank, torque), (upper, lower))): (usize, ((&f64, &f64), (&f64, &f64)))| {
+            let pressed = self.pressed_per_n_m * torque;
+            let half = (half_backlash + on.widened.map_or(0.0, |w| w[k])).max(0.0);
+            let (high, low) = on.zones.map_or((0.0, 0.0), |z| (z.upper[k], z.lower[k]));
+            rests(high + upper, low + lower, half, *flank, pressed) - rests(high, low, half, *flank, pressed)
+        };
+        rows.enumerate().map(beside).collect()
     }
 }
 
@@ -120,21 +132,22 @@ pub(super) fn displaced(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law
     let by = FLANK_AHEAD * sense(on);
     let mut law = Law::new(cause, move |on, shape| {
         let half = half_of(shape);
-        let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
+        let (flank, fade) = (&on.base.flank, faded(on, half));
+        let fade_by_flank = times(&fade, flank);
         let displacement = Displacement::of(of, on, shape);
-        let pattern = displacement.pattern(on);
-        let steeper = Displacement { flank_ahead: FLANK_AHEAD + AHEAD_SPREAD, ..displacement }.pattern(on);
-        let change = by_row(on, |k| steeper[k] - pattern[k]);
+        let pattern = displacement.pattern(on, &fade);
+        let steeper = Displacement { flank_ahead: FLANK_AHEAD + AHEAD_SPREAD, ..displacement }.pattern(on, &fade);
+        let change = of_both(&steeper, &pattern, |steeper, pattern| steeper - pattern);
         let mut columns: Vec<Column> = vec![main_about(1.0, pattern, SCALE_MISFIT).called(Role::SIZE)];
-        columns.push(nuisance(by_row(on, |k| fade(k) * flank(k)), 0.08));
-        columns.extend(waves(on, of, 2.0, fade).map(|v| nuisance(v, 0.12).called(FADING)));
-        columns.extend(waves(on, of, 2.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.12).called(FADING_BY_FLANK)));
-        columns.extend(waves(on, of, 4.0, fade).map(|v| nuisance(v, 0.08)));
-        columns.extend(waves(on, of, 4.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.08)));
-        columns.extend(waves(on, of, 6.0, |k| fade(k) * flank(k)).map(|v| nuisance(v, 0.04)));
+        columns.push(nuisance(fade_by_flank.clone(), 0.08));
+        columns.extend(weighted_waves(on, of, 2.0, &fade).map(|v| nuisance(v, 0.12).called(FADING)));
+        columns.extend(weighted_waves(on, of, 2.0, &fade_by_flank).map(|v| nuisance(v, 0.12).called(FADING_BY_FLANK)));
+        columns.extend(weighted_waves(on, of, 4.0, &fade).map(|v| nuisance(v, 0.08)));
+        columns.extend(weighted_waves(on, of, 4.0, &fade_by_flank).map(|v| nuisance(v, 0.08)));
+        columns.extend(weighted_waves(on, of, 6.0, &fade_by_flank).map(|v| nuisance(v, 0.04)));
         if loaded {
-            columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| nuisance(v, 0.12).called(STEADY)));
-            columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.12).called(STEADY_BY_FLANK)));
+            columns.extend(waves(on, of, 2.0).map(|v| nuisance(v, 0.12).called(STEADY)));
+            columns.extend(weighted_waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.12).called(STEADY_BY_FLANK)));
         }
         columns.push(main(change, 1.0).called(FARTHER_AHEAD));
         columns
@@ -164,26 +177,27 @@ pub(super) fn displaced(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law
         let least = LEAST_OF_PATTERN * SECOND_ORDER * shape.of(Name::SizeArcsec) * scale;
         scale > 0.5 && second_order_unloaded(c, shape, by) > least
     })
-    .parts_zones(move |on, shape, _| Displacement::of(of, on, shape).zones(on))
+    .parts_zones(move |on, shape, _| Displacement::of(of, on, shape).zones(on, &faded(on, half_of(shape))))
     .evaluated_on_averages()
     .led_by(
         move |on, shape| {
             let half = half_of(shape);
-            let (flank, fade) = (|k: usize| on.base.flank[k], |k: usize| fading(on, half, k));
+            let (flank, fade) = (&on.base.flank, faded(on, half));
+            let fade_by_flank = times(&fade, flank);
             let second = kept(on, of, 2.0);
             let mut columns: Vec<Column> = Vec::new();
             // Second order along cos 2 eps and sin 2 eps.
             for shift in [0.0, FRAC_PI_2] {
                 let along = |k: usize| {
-                    let (sin, cos) = (2.0 * by * flank(k) - shift).sin_cos();
+                    let (sin, cos) = (2.0 * by * flank[k] - shift).sin_cos();
                     second[0][k] * cos - second[1][k] * sin
                 };
-                columns.push(main(by_row(on, |k| fade(k) * flank(k) * along(k)), USUAL_ARCSEC).called(ALONG));
+                columns.push(main(by_row(on, |k| fade_by_flank[k] * along(k)), USUAL_ARCSEC).called(ALONG));
             }
-            columns.extend(waves(on, of, 2.0, fade).map(|v| main(v, USUAL_ARCSEC).called(FADING)));
-            columns.push(main(by_row(on, |k| fade(k) * flank(k)), USUAL_ARCSEC));
+            columns.extend(weighted_waves(on, of, 2.0, &fade).map(|v| main(v, USUAL_ARCSEC).called(FADING)));
+            columns.push(main(fade_by_flank, USUAL_ARCSEC));
             // What no load takes would go to the nominal wave of the same order, far from its tolerance.
-            columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC).called(STEADY)));
+            columns.extend(waves(on, of, 2.0).map(|v| main(v, USUAL_ARCSEC).called(STEADY)));
             columns
         },
         move |shape, c| {

@@ -93,19 +93,8 @@ pub fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
     }
     if rows.recorded.time {
         laws.push(law("offset with time", |on, k| on.rows.time[k] - on.rows.time[0]));
-        let since = |rows: &super::super::rows::Rows| {
-            let mut since = vec![0.0; rows.len()];
-            for session in &rows.sessions {
-                for k in session.clone() {
-                    since[k] = rows.time[k] - rows.time[session.start];
-                }
-            }
-            since
-        };
-        let since = since(rows);
-        let again = since.clone();
-        laws.push(law("creep since the session began (logarithm)", move |_, k| (1.0 + since[k]).ln()));
-        laws.push(law("settling since the session began (exponential, 20 s)", move |_, k| (-again[k] / 20.0).exp()));
+        laws.push(law("creep since the session began (logarithm)", |on, k| (1.0 + on.rows.since[k]).ln()));
+        laws.push(law("settling since the session began (exponential, 20 s)", |on, k| (-on.rows.since[k] / 20.0).exp()));
         laws.push(law("offset with the magnitude of speed", |on, k| on.rows.speed[k].abs()));
         laws.push(law("offset with speed squared", |on, k| on.rows.speed[k].powi(2)));
         laws.push(law("offset with speed squared, by direction", |on, k| {

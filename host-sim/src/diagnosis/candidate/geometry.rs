@@ -12,7 +12,8 @@ use crate::nominal::Fixed;
 use super::displaced::displaced;
 use super::lobes::generator_eccentricity;
 use super::{
-    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, beside, by_row, main, nuisance, of_wave, polar,
+    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, beside, by_row, main, nuisance, of_both, of_wave,
+    polar, times,
 };
 use crate::causes::{CauseName, ParameterName as Name};
 
@@ -55,14 +56,20 @@ pub(super) fn angle(on: &Excitation<'_>, of: Angle, k: usize) -> f64 {
     }
 }
 
-/// How an error fades as the load brings more teeth to bear.
-pub(super) fn fading(on: &Excitation<'_>, half_load: f64, k: usize) -> f64 {
-    1.0 / (1.0 + (on.rows.torque[k] / half_load).abs())
+/// How an error fades as the load brings more teeth to bear, row by row.
+pub(super) fn faded(on: &Excitation<'_>, half_load: f64) -> Vec<f64> {
+    on.rows.torque.iter().map(|torque| 1.0 / (1.0 + (torque / half_load).abs())).collect()
 }
 
-pub(super) fn waves(on: &Excitation<'_>, of: Angle, order: f64, weight: impl Fn(usize) -> f64) -> [Vec<f64>; 2] {
+/// Cosine and sine of a multiple of an angle.
+pub(super) fn waves(on: &Excitation<'_>, of: Angle, order: f64) -> [Vec<f64>; 2] {
+    <[Vec<f64>; 2]>::clone(&kept(on, of, order))
+}
+
+/// Cosine and sine of a multiple of an angle, each row with its weight.
+pub(super) fn weighted_waves(on: &Excitation<'_>, of: Angle, order: f64, weight: &[f64]) -> [Vec<f64>; 2] {
     let kept = kept(on, of, order);
-    [by_row(on, |k| weight(k) * kept[0][k]), by_row(on, |k| weight(k) * kept[1][k])]
+    [times(weight, &kept[0]), times(weight, &kept[1])]
 }
 
 /// Cosine and sine of a multiple of an angle, made once.
@@ -84,6 +91,16 @@ pub(super) fn half_load(on: &Excitation<'_>) -> Shape {
     Shape::by_factors(Name::HalfLoadNM, load / 30.0, load * 30.0, 3)
 }
 
+/// How much errors show that a load hides, row by row; all of it where there is none.
+fn light(on: &Excitation<'_>) -> Vec<f64> {
+    if on.scales.load > 0.0 { faded(on, 0.3 * on.scales.load) } else { vec![1.0; on.rows.len()] }
+}
+
+/// Magnitude of the torque in units of the load scale, row by row.
+fn load_shares(on: &Excitation<'_>) -> Vec<f64> {
+    on.rows.torque.iter().map(|torque| (torque / on.scales.load).abs()).collect()
+}
+
 /// +1 where the circular spline is the output. Where the flexspline is, a load that turns it forward rests on the other flank of the
 /// circular spline, and what a flank is ahead by changes its sign.
 pub(super) fn sense(on: &Excitation<'_>) -> f64 {
@@ -97,32 +114,32 @@ pub(super) fn sense(on: &Excitation<'_>) -> f64 {
 /// which is another one on each flank: flanks differ somewhat, and a part of the clearance goes.
 fn pitch(cause: CauseName, of: Angle) -> Law {
     let mut law = Law::new(cause, move |on, _| {
-        let flank = |k: usize| on.base.flank[k];
-        let light = |k: usize| if on.scales.load > 0.0 { fading(on, 0.3 * on.scales.load, k) } else { 1.0 };
+        let (flank, light) = (&on.base.flank, light(on));
+        let light_by_flank = times(flank, &light);
         let mut columns: Vec<Column> = Vec::new();
-        columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC).called(WAVE)));
+        columns.extend(waves(on, of, 2.0).map(|v| main(v, USUAL_ARCSEC).called(WAVE)));
         // What odd orders take of the clearance, which nothing in the even ones tells.
-        columns.push(beside(by_row(on, flank), 0.6).called(TAKEN));
-        columns.push(beside(by_row(on, |k| flank(k) * light(k)), 0.4).called(TAKEN_UNDER_LIGHT_LOAD));
-        columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
-        columns.extend(waves(on, of, 4.0, |_| 1.0).map(|v| nuisance(v, 0.35)));
-        columns.extend(waves(on, of, 4.0, flank).map(|v| nuisance(v, 0.12)));
-        columns.extend(waves(on, of, 6.0, |_| 1.0).map(|v| nuisance(v, 0.12)));
-        columns.extend(waves(on, of, 6.0, flank).map(|v| nuisance(v, 0.06)));
+        columns.push(beside(flank.clone(), 0.6).called(TAKEN));
+        columns.push(beside(light_by_flank.clone(), 0.4).called(TAKEN_UNDER_LIGHT_LOAD));
+        columns.extend(weighted_waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
+        columns.extend(waves(on, of, 4.0).map(|v| nuisance(v, 0.35)));
+        columns.extend(weighted_waves(on, of, 4.0, flank).map(|v| nuisance(v, 0.12)));
+        columns.extend(waves(on, of, 6.0).map(|v| nuisance(v, 0.12)));
+        columns.extend(weighted_waves(on, of, 6.0, flank).map(|v| nuisance(v, 0.06)));
         // Equal lobes cancel odd harmonics; under light load they are not quite equal.
-        columns.extend(waves(on, of, 1.0, |_| 1.0).map(|v| nuisance(v, 0.03)));
-        columns.extend(waves(on, of, 1.0, light).map(|v| nuisance(v, 0.2)));
-        columns.extend(waves(on, of, 3.0, |_| 1.0).map(|v| nuisance(v, 0.05)));
+        columns.extend(waves(on, of, 1.0).map(|v| nuisance(v, 0.03)));
+        columns.extend(weighted_waves(on, of, 1.0, &light).map(|v| nuisance(v, 0.2)));
+        columns.extend(waves(on, of, 3.0).map(|v| nuisance(v, 0.05)));
         for order in [8.0, 10.0, 12.0, 14.0, 16.0] {
-            columns.extend(waves(on, of, order, |_| 1.0).map(|v| nuisance(v, 0.6 / order)));
+            columns.extend(waves(on, of, order).map(|v| nuisance(v, 0.6 / order)));
         }
         for order in [8.0, 10.0] {
-            columns.extend(waves(on, of, order, flank).map(|v| nuisance(v, 0.3 / order)));
+            columns.extend(weighted_waves(on, of, order, flank).map(|v| nuisance(v, 0.3 / order)));
         }
         // The first order of the wheel, which most cutting leaves, is rectified by the clearance like an eccentricity.
-        columns.extend(waves(on, of, 2.0, |k| flank(k) * light(k)).map(|v| nuisance(v, 0.4)));
+        columns.extend(weighted_waves(on, of, 2.0, &light_by_flank).map(|v| nuisance(v, 0.4)));
         if on.scales.load > 0.0 {
-            columns.extend(waves(on, of, 2.0, |k| on.rows.torque[k].abs() / on.scales.load).map(|v| nuisance(v, 0.1)));
+            columns.extend(weighted_waves(on, of, 2.0, &load_shares(on)).map(|v| nuisance(v, 0.1)));
         }
         columns
     })
@@ -138,16 +155,16 @@ fn pitch(cause: CauseName, of: Angle) -> Law {
 /// The same of a wheel whose error is one smooth wave, as of a cutter or a clamping that is off: order 2 with a little of 1 and 4.
 fn smooth_pitch(cause: CauseName, of: Angle) -> Law {
     Law::new(cause, move |on, _| {
-        let flank = |k: usize| on.base.flank[k];
-        let light = |k: usize| if on.scales.load > 0.0 { fading(on, 0.3 * on.scales.load, k) } else { 1.0 };
+        let (flank, light) = (&on.base.flank, light(on));
+        let light_by_flank = times(flank, &light);
         let mut columns: Vec<Column> = Vec::new();
-        columns.extend(waves(on, of, 2.0, |_| 1.0).map(|v| main(v, USUAL_ARCSEC).called(WAVE)));
-        columns.extend(waves(on, of, 4.0, |_| 1.0).map(|v| nuisance(v, 0.25)));
-        columns.extend(waves(on, of, 1.0, light).map(|v| nuisance(v, 0.2)));
+        columns.extend(waves(on, of, 2.0).map(|v| main(v, USUAL_ARCSEC).called(WAVE)));
+        columns.extend(waves(on, of, 4.0).map(|v| nuisance(v, 0.25)));
+        columns.extend(weighted_waves(on, of, 1.0, &light).map(|v| nuisance(v, 0.2)));
         // The clearance makes even orders of the first one, of other phase on each flank.
-        columns.extend(waves(on, of, 2.0, |k| flank(k) * light(k)).map(|v| nuisance(v, 0.4)));
-        columns.extend(waves(on, of, 2.0, light).map(|v| nuisance(v, 0.1)));
-        columns.push(nuisance(by_row(on, |k| flank(k) * light(k)), 0.3));
+        columns.extend(weighted_waves(on, of, 2.0, &light_by_flank).map(|v| nuisance(v, 0.4)));
+        columns.extend(weighted_waves(on, of, 2.0, &light).map(|v| nuisance(v, 0.1)));
+        columns.push(nuisance(light_by_flank.clone(), 0.3));
         columns
     })
     .parameters_by(pitch_parameters)
@@ -169,22 +186,22 @@ fn pitch_parameters(on: &Excitation<'_>, _: Shaped<'_>, c: Coefficients<'_>) -> 
 fn ovality() -> Law {
     let of = Angle::CircularSpline;
     Law::new(CauseName::CircularSplineOvality, move |on, _| {
-        let flank = |k: usize| on.base.flank[k];
-        let [cos, sin] = waves(on, of, 2.0, |_| 1.0);
+        let flank = &on.base.flank;
+        let [cos, sin] = waves(on, of, 2.0);
         let together = |a: &[f64], b: &[f64], sign: f64| -> Vec<f64> {
             let (root, radial) = (1.0f64.hypot(RADIAL_OF_TANGENTIAL), sign * sense(on) * RADIAL_OF_TANGENTIAL);
-            by_row(on, |k| (a[k] + radial * flank(k) * b[k]) / root)
+            by_row(on, |k| (a[k] + radial * flank[k] * b[k]) / root)
         };
         let mut columns: Vec<Column> =
             [together(&sin, &cos, 1.0), together(&cos, &sin, -1.0)].map(|v| main(v, USUAL_ARCSEC).called(WAVE)).into();
-        columns.extend(waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
+        columns.extend(weighted_waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
         // Screws and seats leave further waves on the ring: of n per turn, 1/n of the radial part is tangential.
         for order in [3.0, 4.0, 6.0] {
-            columns.extend(waves(on, of, order, |_| 1.0).map(|v| nuisance(v, 0.12)));
-            columns.extend(waves(on, of, order, flank).map(|v| nuisance(v, 0.12)));
+            columns.extend(waves(on, of, order).map(|v| nuisance(v, 0.12)));
+            columns.extend(weighted_waves(on, of, order, flank).map(|v| nuisance(v, 0.12)));
         }
         if on.scales.load > 0.0 {
-            columns.extend(waves(on, of, 2.0, |k| on.rows.torque[k].abs() / on.scales.load).map(|v| nuisance(v, 0.1)));
+            columns.extend(weighted_waves(on, of, 2.0, &load_shares(on)).map(|v| nuisance(v, 0.1)));
         }
         columns
     })
@@ -210,19 +227,19 @@ fn cam_form_error() -> Law {
     Law::new(CauseName::CamFormError, |on, _| {
         let teeth = on.nominal.teeth.map_or(188.0, |t| f64::from(t.flexspline));
         let of = Angle::Flexspline;
-        let flank = |k: usize| on.base.flank[k];
+        let flank = &on.base.flank;
         let mut columns: Vec<Column> = Vec::new();
-        columns.extend(waves(on, of, teeth, |_| 1.0).map(|v| main(v, 8.0).called(WAVE)));
-        columns.extend(waves(on, of, teeth, flank).map(|v| main(v, 8.0).called(WAVE_BY_FLANK)));
+        columns.extend(waves(on, of, teeth).map(|v| main(v, 8.0).called(WAVE)));
+        columns.extend(weighted_waves(on, of, teeth, flank).map(|v| main(v, 8.0).called(WAVE_BY_FLANK)));
         if on.scales.load > 0.0 {
             // More teeth carry, or other ones.
-            let load = |k: usize| (on.rows.torque[k] / on.scales.load).abs();
-            columns.extend(waves(on, of, teeth, load).map(|v| nuisance(v, 0.6)));
-            columns.extend(waves(on, of, teeth, |k| load(k) * flank(k)).map(|v| nuisance(v, 0.6)));
+            let load = load_shares(on);
+            columns.extend(weighted_waves(on, of, teeth, &load).map(|v| nuisance(v, 0.6)));
+            columns.extend(weighted_waves(on, of, teeth, &times(&load, flank)).map(|v| nuisance(v, 0.6)));
         }
-        columns.extend(waves(on, of, 2.0 * teeth, flank).map(|v| nuisance(v, 0.4)));
-        columns.extend(waves(on, of, 2.0 * teeth, |_| 1.0).map(|v| nuisance(v, 0.4)));
-        columns.push(beside(by_row(on, flank), 1.0));
+        columns.extend(weighted_waves(on, of, 2.0 * teeth, flank).map(|v| nuisance(v, 0.4)));
+        columns.extend(waves(on, of, 2.0 * teeth).map(|v| nuisance(v, 0.4)));
+        columns.push(beside(flank.clone(), 1.0));
         columns
     })
     .parameters_by(|on, _, c| {
@@ -236,28 +253,34 @@ fn cam_form_error() -> Law {
     })
 }
 
+/// A pulse is nothing beyond so many of its widths.
+const PULSE_ENDS: f64 = 8.0;
+
 /// A tooth that lacks material: a pulse each time a lobe of the wave passes it, twice per turn, on the flank that carries, under load.
 fn damaged_tooth(of: Angle) -> Law {
     Law::new(CauseName::DamagedTooth, move |on, shape| {
         let (place, width) = (shape.of(Name::AngleRad), shape.of(Name::WidthRad));
-        let period = PI;
-        let pulse: Vec<f64> = by_row(on, |k| {
-            let away = (angle(on, of, k) - place + 0.5 * period).rem_euclid(period) - 0.5 * period;
-            (-0.5 * (away / width).powi(2)).exp()
+        let load = if on.scales.load > 0.0 { on.scales.load } else { 1.0 };
+        let pulse = by_row(on, |k| {
+            let turns = (angle(on, of, k) - place) / PI;
+            let away = PI * (turns - turns.round()) / width;
+            if away.abs() < PULSE_ENDS { (-0.5 * away * away).exp() } else { 0.0 }
         });
         // The two lobes meet the tooth half a turn apart and may share the load unequally.
-        let lobe = |k: usize| (angle(on, of, k) - place).cos().signum();
-        let flank = |k: usize| on.base.flank[k];
-        let load = if on.scales.load > 0.0 { on.scales.load } else { 1.0 };
-        vec![
-            main(by_row(on, |k| pulse[k] * flank(k)), 30.0).called(PULSE),
-            main(by_row(on, |k| pulse[k] * on.rows.torque[k] / load), 30.0).called(PULSE),
-            main(pulse.clone(), 20.0).called(PULSE),
-            main(by_row(on, |k| pulse[k] * (on.rows.torque[k] / load).abs()), 20.0).called(PULSE),
-            nuisance(by_row(on, |k| pulse[k] * flank(k) * lobe(k)), 1.0),
-            nuisance(by_row(on, |k| pulse[k] * on.rows.torque[k] / load * lobe(k)), 1.0),
-            nuisance(by_row(on, |k| pulse[k] * lobe(k)), 1.0),
-        ]
+        let (first, (sin, cos)) = (kept(on, of, 1.0), place.sin_cos());
+        let lobe = of_both(&first[0], &first[1], |c, s| (c * cos + s * sin).signum());
+        let by_load = of_both(&pulse, &on.rows.torque, |pulse, torque| pulse * torque / load);
+        let by_flank = times(&pulse, &on.base.flank);
+        let of_lobe = [&by_flank, &by_load, &pulse].map(|column| nuisance(times(column, &lobe), 1.0));
+        let of_load = by_load.iter().map(|v| v.abs()).collect();
+        let mut columns = vec![
+            main(by_flank, 30.0).called(PULSE),
+            main(by_load, 30.0).called(PULSE),
+            main(pulse, 20.0).called(PULSE),
+            main(of_load, 20.0).called(PULSE),
+        ];
+        columns.extend(of_lobe);
+        columns
     })
     .shapes([Shape::angle(Name::AngleRad, PI, 30), Shape::by_factors(Name::WidthRad, 0.03, 0.4, 2)])
     .parameters_by(move |on, shape, c| {

@@ -5,9 +5,10 @@
 //! other one carries as well: from there on both share, and the odd harmonics vanish.
 
 use super::displaced::{PRESSED_ARCSEC, ZONES_MISFIT, stopped};
-use super::geometry::{Angle, USUAL_ARCSEC, kept, waves};
+use super::geometry::{Angle, USUAL_ARCSEC, kept, waves, weighted_waves};
 use super::{
     Column, Excitation, Law, Named, Role, Shape, Shaped, Zones, beside, by_row, main, main_about, nuisance, of_wave,
+    times,
 };
 use crate::causes::{CauseName, ParameterName as Name};
 
@@ -53,29 +54,29 @@ pub(super) fn generator_eccentricity(on: &Excitation<'_>) -> Law {
     let loaded = on.scales.load > 0.0;
     let mut law = Law::new(CauseName::GeneratorEccentricity, move |on, shape| {
         let lobe = Lobe::new(on, shape);
-        let flank = |k: usize| on.base.flank[k];
-        let shows = |k: usize| lobe.shows[k];
+        let (flank, shows) = (&on.base.flank, &lobe.shows);
+        let shows_by_flank = times(shows, flank);
         let mut columns: Vec<Column> = Vec::new();
         for (of, role) in TEETH {
-            columns.extend(waves(on, of, 1.0, shows).map(|v| main(v, USUAL_ARCSEC).called(role)));
+            columns.extend(weighted_waves(on, of, 1.0, shows).map(|v| main(v, USUAL_ARCSEC).called(role)));
         }
         if loaded {
             // No more than the clearance.
-            let taken = by_row(on, |k| -flank(k) * lobe.stops[k].min(on.base.half_backlash));
+            let taken = by_row(on, |k| -flank[k] * lobe.stops[k].min(on.base.half_backlash));
             columns.push(main_about(1.0, taken, 0.15).called(TAKEN));
         }
         for of in [Angle::Flexspline, Angle::CircularSpline] {
-            columns.extend(waves(on, of, 1.0, |k| shows(k) * flank(k)).map(|v| nuisance(v, 0.12)));
-            columns.extend(waves(on, of, 2.0, shows).map(|v| nuisance(v, 0.05)));
-            columns.extend(waves(on, of, 3.0, shows).map(|v| nuisance(v, 0.1)));
+            columns.extend(weighted_waves(on, of, 1.0, &shows_by_flank).map(|v| nuisance(v, 0.12)));
+            columns.extend(weighted_waves(on, of, 2.0, shows).map(|v| nuisance(v, 0.05)));
+            columns.extend(weighted_waves(on, of, 3.0, shows).map(|v| nuisance(v, 0.1)));
             if loaded {
-                columns.extend(waves(on, of, 1.0, |_| 1.0).map(|v| nuisance(v, 0.03)));
+                columns.extend(waves(on, of, 1.0).map(|v| nuisance(v, 0.03)));
             }
         }
         columns.push(if loaded {
-            nuisance(by_row(on, flank), 0.05)
+            nuisance(flank.clone(), 0.05)
         } else {
-            beside(by_row(on, flank), 2.0).called(TAKEN_UNLOADED)
+            beside(flank.clone(), 2.0).called(TAKEN_UNLOADED)
         });
         columns
     })

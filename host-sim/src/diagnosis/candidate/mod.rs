@@ -691,6 +691,16 @@ fn by_row(on: &Excitation<'_>, value: impl Fn(usize) -> f64) -> Vec<f64> {
     (0..on.rows.len()).map(value).collect()
 }
 
+/// A column made of two others, row by row.
+fn of_both(a: &[f64], b: &[f64], value: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| value(*a, *b)).collect()
+}
+
+/// Products of two columns, row by row.
+fn times(a: &[f64], b: &[f64]) -> Vec<f64> {
+    of_both(a, b, |a, b| a * b)
+}
+
 /// Amplitude and phase of `c cos(x) + s sin(x) = amplitude cos(x − phase)`.
 fn polar(c: f64, s: f64) -> (f64, f64) {
     (c.hypot(s), s.atan2(c))

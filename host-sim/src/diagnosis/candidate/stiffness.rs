@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::super::prepare::Jump;
 use super::super::rows::rms;
-use super::geometry::{Angle, waves};
+use super::geometry::{Angle, weighted_waves};
 use super::{Excitation, Law, Role, Shape, by_row, history, main, nuisance};
 use crate::causes::{CauseName, ParameterName as Name};
 use crate::units::ARCSEC_PER_TURN;
@@ -151,7 +151,7 @@ fn backlash_growth() -> Law {
         // Teeth that are used most wear most.
         if on.nominal.teeth.is_some() {
             for wheel in [Angle::Flexspline, Angle::CircularSpline] {
-                columns.extend(waves(on, wheel, 2.0, |k| on.base.flank[k]).map(|v| nuisance(v, UNEVEN_WEAR)));
+                columns.extend(weighted_waves(on, wheel, 2.0, &on.base.flank).map(|v| nuisance(v, UNEVEN_WEAR)));
             }
         }
         columns
