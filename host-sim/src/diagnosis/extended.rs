@@ -15,8 +15,9 @@ use super::noise::Whitener;
 use super::report::Parameter;
 use super::resolution::{Resolution, averages_hide, resolution};
 use super::rows::Rows;
-use super::select::{Selected, fit};
-use super::{DiagnosisError, Settings, prepare, uncertainty};
+use super::select::{Selected, fit, fixed, settle_all};
+use super::thinned::{Sample, Thinned};
+use super::{DiagnosisError, Fineness, Settings, prepare, uncertainty};
 use crate::causes::CauseName;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
@@ -48,6 +49,8 @@ pub struct Extended {
     recalibrated: Vec<f64>,
     base: Vec<f64>,
     causes: Vec<FittedCause>,
+    /// How finely rows were looked at, and their noise.
+    pub fineness: Fineness,
 }
 
 /// Predictions for the rows of one session, arcsec at the output, with what was measured.
@@ -91,6 +94,14 @@ fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
+/// How finely rows are to be looked at, and the noise in them.
+fn fineness(on: &Excitation<'_>, laws: &[Law], uncertain: &[bool], averages: usize) -> Fineness {
+    let Resolution { stride, fast } = resolution(on, laws, uncertain, averages, &[]);
+    let free = prepare::FreeColumns::of(on, laws, Averaged::of(on, stride).map(Arc::new));
+    let (noise, worth) = prepare::noise(on, &free, &fast, uncertain, None);
+    Fineness { stride, noise, worth }
+}
+
 impl Extended {
     /// Fits the nominal model and the named causes to sessions. A name that these data cannot speak about (a load without
     /// torque, a law of teeth without teeth) is left out.
@@ -126,20 +137,25 @@ impl Extended {
         let on = Excitation::new(&rows, nominal, &base, &scales);
         let laws = library(&on);
         let uncertain = prepare::uncertain(&on, &[]);
-        let Resolution { mut stride, fast } = resolution(&on, &laws, &uncertain, settings.averages, &[]);
+        let Fineness { mut stride, noise, worth } =
+            settings.fineness.unwrap_or_else(|| fineness(&on, &laws, &uncertain, settings.averages));
         if averages_hide(&on, &laws, causes, &uncertain, stride) {
             stride = 1;
         }
         let averaged = Averaged::of(&on, stride).map(Arc::new);
-        let free = prepare::FreeColumns::of(&on, &laws, averaged.clone());
-        let (noise, worth) = prepare::noise(&on, &free, &fast, &uncertain);
         let problem = Problem::new(&on, &uncertain, Whitener::new(&rows, &uncertain, stride, noise), worth, averaged);
-        let start: Vec<(usize, Vec<f64>)> = super::select::fixed(&problem, &laws, causes)
-            .iter()
-            .filter_map(|t| Some((laws.iter().position(|law| std::ptr::eq(law, t.law))?, t.places.clone())))
-            .collect();
+        let start = match Thinned::of(&on, stride) {
+            Some(thinned) => {
+                let sample = Sample::new(&on, &thinned, &uncertain, stride);
+                let terms = super::remembered(&laws, &fixed(&sample.problem(noise, worth), &laws, causes));
+                let terms = terms_at(&problem, &laws, &terms);
+                let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
+                super::remembered(&laws, &settle_all(&problem, selected).ok_or(DiagnosisError::NotFinite)?.terms)
+            }
+            None => super::remembered(&laws, &fixed(&problem, &laws, causes)),
+        };
         let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
-        Ok(found.extended(laws, &base, &scales))
+        Ok(found.extended(laws, &base, &scales, Fineness { stride, noise, worth }))
     }
 
     /// Causes of the model.
@@ -246,7 +262,7 @@ impl Found {
     }
 
     /// Keeps the laws that were fitted.
-    pub(super) fn extended(self, laws: Vec<Law>, base: &Base, scales: &Scales) -> Extended {
+    pub(super) fn extended(self, laws: Vec<Law>, base: &Base, scales: &Scales, fineness: Fineness) -> Extended {
         let mut laws: Vec<Option<Law>> = laws.into_iter().map(Some).collect();
         let causes = self
             .terms
@@ -256,6 +272,13 @@ impl Found {
                 Some(FittedCause { name: law.cause()?, law, places, roles, coefficients, parameters })
             })
             .collect();
-        Extended { play: base.law, scales: scales.clone(), recalibrated: self.recalibrated, base: self.base, causes }
+        Extended {
+            play: base.law,
+            scales: scales.clone(),
+            recalibrated: self.recalibrated,
+            base: self.base,
+            causes,
+            fineness,
+        }
     }
 }

@@ -33,6 +33,7 @@ pub mod select;
 mod tests;
 pub mod trace;
 mod uncertainty;
+mod thinned;
 mod verdict;
 
 use std::sync::Arc;
@@ -47,13 +48,14 @@ use averaged::Averaged;
 use candidate::{Deviation, Excitation, Label, Law, Scales, library, line, unnamed};
 use extended::Found;
 pub use extended::{Extended, FittedCause, Series};
-use model::{Problem, terms_at};
+use model::{Problem, Term, terms_at};
 use noise::{Noise, Whitener};
 use prepare::FreeColumns;
 use report::{Diagnosis, Unexplained};
 use resolution::{Resolution, resolution};
 use rows::Rows;
-use select::{Bests, Selected, fit, select};
+use select::{Bests, Scope, Selected, fit, select};
+use thinned::{Sample, Thinned};
 use trace::{Gate, Judged, Stage, Trace};
 
 /// Why data cannot be diagnosed.
@@ -83,11 +85,24 @@ pub struct Settings {
     pub verbose: bool,
     /// A cause that is asked about: if it is not named, what to record to tell it from those that are is looked for.
     pub asked: Option<CauseName>,
+    /// How finely rows are looked at, and their noise, where that is known from before.
+    pub fineness: Option<Fineness>,
+}
+
+/// How finely rows are looked at, and the noise in them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fineness {
+    /// Rows to an average.
+    pub stride: usize,
+    /// Noise of a row.
+    pub noise: Noise,
+    /// Worth of the information, at most 1.
+    pub worth: f64,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false, asked: None }
+        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false, asked: None, fineness: None }
     }
 }
 
@@ -133,11 +148,11 @@ pub fn diagnose_extended(
     progress(1, 4, "causes");
     let search = Search::new(&on, settings)?;
     progress(2, 4, "rivals");
-    let Search { laws, problem, noise, start, bests, fast, mut trace } = search;
+    let Search { laws, problem, noise, stride, thinned, start, bests, fast, mut trace } = search;
     let terms = terms_at(&problem, &laws, &start);
     let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
     let (selected, mut unproved) = held_out::proved(&problem, selected, &mut trace);
-    let start = remembered(&laws, &selected);
+    let start = remembered(&laws, &selected.terms);
     let maps = candidate::maps(&on);
     let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);
     left.extend(fast.into_iter().filter(|f| f.size_arcsec > select::least_size(noise.white)));
@@ -149,10 +164,14 @@ pub fn diagnose_extended(
         trace.say(&trace::Found::Left(&something.looks_like, something.size_arcsec));
     }
     left.append(&mut unproved);
-    let diagnosis = verdict::conclude(&problem, &laws, selected, &bests, left, noise, settings, trace);
+    let fineness = Fineness { stride, noise, worth: problem.worth };
+    let sample = thinned.as_ref().map(|thinned| Sample::new(&on, thinned, &problem.uncertain, stride));
+    let on_sample = sample.as_ref().map(|sample| sample.problem(noise, problem.worth));
+    let on_sample = on_sample.as_ref().zip(thinned.as_ref().map(|thinned| thinned.share));
+    let diagnosis = verdict::conclude(&problem, on_sample, &laws, selected, &bests, left, noise, settings, trace);
     let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
-    drop(problem);
-    Ok((diagnosis, found.extended(laws, &base, &scales)))
+    drop((problem, sample));
+    Ok((diagnosis, found.extended(laws, &base, &scales, fineness)))
 }
 
 /// Whether rows can be diagnosed at all.
@@ -172,6 +191,10 @@ struct Search<'a> {
     laws: Vec<Law>,
     problem: Problem<'a>,
     noise: Noise,
+    /// Rows to an average.
+    stride: usize,
+    /// A sample of the rows, where they are many.
+    thinned: Option<Thinned>,
     /// Index and places of each law chosen.
     start: Vec<(usize, Vec<f64>)>,
     /// Where each law was at its best.
@@ -197,19 +220,29 @@ impl<'a> Search<'a> {
         let whiten = |noise, uncertain: &[bool], stride| Whitener::new(on.rows, uncertain, stride, noise);
         let mut averaged = Averaged::of(on, stride).map(Arc::new);
         let mut free = FreeColumns::of(on, &laws, averaged.clone());
-        let (mut noise, mut worth) = prepare::noise(on, &free, &at_first, &uncertain);
+        let (mut noise, mut worth) = prepare::noise(on, &free, &at_first, &uncertain, None);
         trace.say(&trace::Found::Noise(noise, worth));
         let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
         let mut fast: Vec<Unexplained> = Vec::new();
         let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
         let mut bests = Bests::default();
         // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
+        let mut thinned = Thinned::of(on, stride);
         for round in 0.. {
             fast.clear();
+            let mut scope = Scope::Everything;
+            if let Some(thinned) = &thinned {
+                let sample = Sample::new(on, thinned, &uncertain, stride);
+                let problem = sample.problem(noise, worth);
+                let terms = terms_at(&problem, &laws, &start);
+                let selected = select(&problem, &laws, noise.white, terms, &mut bests, scope, &mut trace);
+                start = remembered(&laws, &selected.ok_or(DiagnosisError::NotFinite)?.terms);
+                scope = Scope::CameClose;
+            }
             let terms = terms_at(&problem, &laws, &start);
-            let selected =
-                select(&problem, &laws, noise.white, terms, &mut bests, &mut trace).ok_or(DiagnosisError::NotFinite)?;
-            start = remembered(&laws, &selected);
+            let selected = select(&problem, &laws, noise.white, terms, &mut bests, scope, &mut trace)
+                .ok_or(DiagnosisError::NotFinite)?;
+            start = remembered(&laws, &selected.terms);
             if round == MOST_ROUNDS {
                 break;
             }
@@ -245,12 +278,16 @@ impl<'a> Search<'a> {
             stride = stride.min(finer.stride);
             if closer_look {
                 averaged = Averaged::of(on, stride).map(Arc::new);
+                thinned = Thinned::of(on, stride);
             }
             if closer_look || !free.are_of(&laws) {
                 free = FreeColumns::of(on, &laws, averaged.clone());
             }
             explained.iter_mut().zip(&finer.fast).for_each(|(sum, fast)| *sum += fast);
-            let (again, worth_again) = prepare::noise(on, &free, if new_line { &[] } else { &explained }, &uncertain);
+            let (again, worth_again) = {
+                let explained: &[f64] = if new_line { &[] } else { &explained };
+                prepare::noise(on, &free, explained, &uncertain, Some(noise))
+            };
             let change = again.floor() / noise.floor();
             if !new_line && !other_rows && !closer_look && (0.85..1.18).contains(&change) {
                 break;
@@ -262,14 +299,13 @@ impl<'a> Search<'a> {
             trace.say(&trace::Found::Noise(noise, worth));
             problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
         }
-        Ok(Search { laws, problem, noise, start, bests, fast, trace })
+        Ok(Search { laws, problem, noise, stride, thinned, start, bests, fast, trace })
     }
 }
 
 /// Which laws were selected, and where.
-fn remembered(laws: &[Law], selected: &Selected<'_>) -> Vec<(usize, Vec<f64>)> {
-    selected
-        .terms
+fn remembered(laws: &[Law], terms: &[Term<'_>]) -> Vec<(usize, Vec<f64>)> {
+    terms
         .iter()
         .filter_map(|t| Some((laws.iter().position(|law| std::ptr::eq(law, t.law))?, t.places.clone())))
         .collect()

@@ -385,6 +385,9 @@ const BESIDE_ARCSEC: [f64; 2] = [5.0, 20.0];
 /// All steps together gain no more than so many times what the linear model of the first one promises, and this much evidence.
 const FARTHER_THAN_LINEAR: f64 = 3.0;
 const BEYOND_LINEAR: f64 = 10.0;
+/// A step that promises less evidence than this is not tried; one that gains less than this is the last.
+const LEAST_PROMISED: f64 = 0.1;
+const LEAST_STEP: f64 = 0.3;
 /// Gauss-Newton steps at most.
 const STEPS: usize = 6;
 
@@ -718,9 +721,15 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             let coefficients = fit.of(fit.starts.len() - 1).to_vec();
             let (free, moves) = self.fit_with(Some(&term.white), &self.derivatives(&term, &coefficients))?;
             let now = fit.solution.evidence;
+            let promised = 0.5 * (fit.solution.misfit - free.solution.misfit);
+            term.occam = (free.solution.evidence - now - promised).min(0.0);
             let in_reach = now + FARTHER_THAN_LINEAR * (free.solution.evidence - now).max(0.0) + BEYOND_LINEAR;
             if step == 0 && in_reach < least_evidence {
                 return None;
+            }
+            // The linear model of a step says what it can gain.
+            if promised < LEAST_PROMISED {
+                break;
             }
             let mut better = None;
             for shorter in [1.0, 0.4, 0.1] {
@@ -733,14 +742,12 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             }
             let Some((trial, trial_fit)) = better else { break };
             let gain = trial_fit.solution.evidence - fit.solution.evidence;
-            (term, fit) = (trial, trial_fit);
-            if gain < 0.3 {
+            // The last step is a short one, and changes next to nothing of what freedom costs.
+            (term, fit) = (Term { occam: term.occam, ..trial }, trial_fit);
+            if gain < LEAST_STEP {
                 break;
             }
         }
-        let coefficients = fit.of(fit.starts.len() - 1).to_vec();
-        let (free, _) = self.fit_with(Some(&term.white), &self.derivatives(&term, &coefficients))?;
-        term.occam = (free.solution.evidence - fit.solution.evidence).min(0.0);
         Some((term, fit))
     }
 

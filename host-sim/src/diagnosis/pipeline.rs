@@ -269,6 +269,7 @@ pub fn diagnose_rows(
         Ok(remade(make, subject, &found, options.mesh)?.map(|made| made.image))
     };
     let remake: Option<&Remake<'_>> = if options.remake.is_some() { Some(&remake) } else { None };
+    let settings = Settings { fineness: Some(extended.fineness), ..settings };
     let evaluation = match evaluate(&recording.sessions, &causes, &tables, &settings, remake) {
         // The FEM failed, or was stopped.
         Err(EvaluationError::Remake(what)) => return Err(PipelineError::Remake(what)),

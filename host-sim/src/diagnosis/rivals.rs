@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::candidate::Law;
-use super::model::{Fit, Problem, Scaffold, Term};
-use super::select::{Bests, Selected, Standing, begun, less, predicted, settle, size_of, sound};
+use super::model::{Fit, Problem, Scaffold, Term, among_each_other};
+use super::select::{Bests, Selected, Standing, begun, fit, less, predicted, settle, size_of, sound};
 use super::trace::{Gate, Judged};
 use crate::causes::CauseName;
 
@@ -27,6 +27,8 @@ const TOLD_APART: f64 = 25.0;
 const OUT_OF_TOLERANCE_APART: f64 = 5.0;
 /// Up to this rise the other causes are refined anew beside a rival.
 const SETTLED_BELOW: f64 = 400.0;
+/// A rival whose rise on a sample says less than this of all rows is refitted to all of them: twice what others are settled below.
+const NEAR: f64 = 2.0 * SETTLED_BELOW;
 /// How much farther away a law may begin that a lead leads to.
 const FARTHER: f64 = 10.0;
 /// Predictions closer than this (arcsec rms, or this share of the cause's size) are not told apart by any law known this well.
@@ -75,22 +77,72 @@ impl Rival {
     }
 }
 
-/// Rivals of term `k`, closest first.
+/// A sample of the rows on which rivals are looked at first, and its share of all rows.
+pub type OnSample<'p, 'a> = Option<(&'p Problem<'a>, f64)>;
+
+/// Rivals of term `k`, closest first. With a sample only those that are near there are refitted to all rows.
 #[must_use]
 pub fn rivals(
     problem: &Problem<'_>,
+    sample: OnSample<'_, '_>,
     laws: &[Law],
     selected: &Selected<'_>,
     standings: &[Standing],
     bests: &Bests,
     k: usize,
 ) -> Vec<Rival> {
+    let open: Vec<&Law> =
+        laws.iter().filter(|law| law.named() && selected.terms.iter().all(|t| t.law.label != law.label)).collect();
+    let of_sample = sample.and_then(|(sample, share)| {
+        let terms = selected.terms.iter().map(|t| Term::new(sample, t.law, t.places.clone())).collect();
+        let terms = among_each_other(sample, terms);
+        let there = Selected { fit: fit(sample, &terms)?, terms };
+        let begin = |scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law| bests.begin(scaffold, law);
+        Some((refitted(sample, &open, &there, standings, begin, k), share))
+    });
+    let mut rivals: Vec<Rival> = match of_sample {
+        None => {
+            let begin = |scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law| bests.begin(scaffold, law);
+            refitted(problem, &open, selected, standings, begin, k).into_iter().map(|found| found.rival).collect()
+        }
+        Some((mut found, share)) => {
+            found.iter_mut().for_each(|found| found.rival.misfit /= share);
+            let (near, far): (Vec<Refitted<'_>>, Vec<Refitted<'_>>) =
+                found.into_iter().partition(|found| found.rival.misfit < NEAR);
+            let near_laws: Vec<&Law> = near.iter().map(|found| found.law).collect();
+            let begin = |_: &Scaffold<'_, '_, '_, '_>, law: &Law| -> Vec<Vec<f64>> {
+                near.iter().filter(|found| found.law.id() == law.id()).map(|found| found.places.clone()).collect()
+            };
+            let near = refitted(problem, &near_laws, selected, standings, begin, k);
+            near.into_iter().chain(far).map(|found| found.rival).collect()
+        }
+    };
+    rivals.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
+    let mut seen = std::collections::HashSet::new();
+    rivals.retain(|r| seen.insert(r.cause));
+    rivals
+}
+
+/// A rival with the law that it is, and where.
+struct Refitted<'l> {
+    rival: Rival,
+    law: &'l Law,
+    places: Vec<f64>,
+}
+
+/// Laws refitted in the place of term `k`, from where `begin` says.
+fn refitted<'l>(
+    problem: &Problem<'_>,
+    open: &[&'l Law],
+    selected: &Selected<'_>,
+    standings: &[Standing],
+    begin: impl Fn(&Scaffold<'_, '_, '_, '_>, &Law) -> Vec<Vec<f64>> + Sync,
+    k: usize,
+) -> Vec<Refitted<'l>> {
     let apart = selected.without(problem, k);
     let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
     let scaffold = Scaffold::new(problem, others.clone());
     let now = selected.predicted(problem);
-    let open: Vec<&Law> =
-        laws.iter().filter(|law| law.named() && selected.terms.iter().all(|t| t.law.label != law.label)).collect();
     // Where more is left than noise, as much may hide in any rival: rises count against what is left.
     let left = selected.fit.solution.misfit / (problem.worth * problem.data_white.len().max(1) as f64);
     let lacking = scaffold.fit(None).map(|fit| predicted(problem, &others, &fit));
@@ -98,12 +150,10 @@ pub fn rivals(
         let of = |j: usize| standings[j].size * selected.terms[j].law.misfit_as(law);
         (0..selected.terms.len()).filter(|j| *j != k).map(of).fold(0.0, f64::max)
     };
-    let mut rivals: Vec<Rival> = open
-        .into_par_iter()
+    open.par_iter()
         .with_max_len(1)
         .filter_map(|law| {
-            let tried: Vec<(f64, Vec<f64>)> = bests
-                .begin(&scaffold, law)
+            let tried: Vec<(f64, Vec<f64>)> = begin(&scaffold, law)
                 .into_iter()
                 .filter_map(|places| Some((-scaffold.trial(law, &places)?.misfit, places)))
                 .collect();
@@ -133,16 +183,13 @@ pub fn rivals(
                 None => (rise(&fit), predicted(problem, &with, &fit)),
             };
             let differs = |from: &[f64]| size_of(problem, &less(from, &then));
-            Some(Rival {
+            let rival = Rival {
                 cause: law.cause()?,
                 misfit,
                 apart_arcsec: differs(&now),
                 mops_up: lacking.as_ref().is_some_and(|lacking| differs(lacking) < others_may_err(law)),
-            })
+            };
+            Some(Refitted { rival, law, places: term.places.clone() })
         })
-        .collect();
-    rivals.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
-    let mut seen = std::collections::HashSet::new();
-    rivals.retain(|r| seen.insert(r.cause));
-    rivals
+        .collect()
 }

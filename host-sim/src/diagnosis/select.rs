@@ -57,6 +57,13 @@ const REFINED: usize = 9;
 const NOTED: usize = 2;
 /// Laws that are refined for the place of another.
 const EXCHANGED: usize = 4;
+/// Laws that are refined in each round of those that came close on a sample of the rows.
+const REFINED_AGAIN: usize = 4;
+/// A law comes close that gains no less than this, refined, on a sample: what all rows would tell just so (evidence 6) tells a quarter of
+/// them next to nothing.
+const CLOSE_GAIN: f64 = -3.0;
+/// And to one that was chosen, if it is behind by no more than this.
+const CLOSE_BEHIND: f64 = 8.0;
 /// Evidence that a law has to gain at all, refined; and a base parameter to be named.
 const LEAST_GAIN: f64 = 0.5;
 /// Evidence by which a cause has to be ahead of another to take its place.
@@ -198,16 +205,32 @@ pub(super) fn begun(law: &Law, mut tried: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>>
     begun
 }
 
-/// Where laws were at their best, each time that they were tried at all places.
+/// Which laws a search tries, and where.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scope {
+    /// All of them, wherever they may begin.
+    Everything,
+    /// Those that came close on a sample of the rows, from where they were there.
+    CameClose,
+}
+
+/// What a search has found out about laws, whether it chose them or not.
 #[derive(Default)]
-pub struct Bests(HashMap<u64, Vec<Vec<f64>>>);
+pub struct Bests {
+    /// Where they were at their best, each time that they were tried at all places.
+    tried: HashMap<u64, Vec<Vec<f64>>>,
+    /// Where those came to that were refined and came close, the latest first.
+    close: HashMap<u64, Vec<Vec<f64>>>,
+    /// Those that came close to one that was chosen: that one first.
+    close_to: HashSet<(u64, u64)>,
+}
 
 impl Bests {
     /// Notes the best of those tried, with what each is worth.
     fn note(&mut self, law: &Law, tried: &[(f64, Vec<f64>)]) {
         let mut best: Vec<&(f64, Vec<f64>)> = tried.iter().collect();
         best.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let known = self.0.entry(law.id()).or_default();
+        let known = self.tried.entry(law.id()).or_default();
         for (_, places) in best.into_iter().take(NOTED) {
             if !known.contains(places) {
                 known.push(places.clone());
@@ -215,13 +238,37 @@ impl Bests {
         }
     }
 
+    /// Notes a refined term that came close.
+    fn came_close(&mut self, term: &Term<'_>) {
+        let known = self.close.entry(term.law.id()).or_default();
+        known.retain(|places| *places != term.places);
+        known.insert(0, term.places.clone());
+        known.truncate(NOTED);
+    }
+
+    /// Notes a refined term that came close to one that was chosen.
+    fn came_close_to(&mut self, chosen: &Law, term: &Term<'_>) {
+        self.came_close(term);
+        self.close_to.insert((chosen.id(), term.law.id()));
+    }
+
+    /// Whether a law came close.
+    fn is_close(&self, law: &Law) -> bool {
+        self.close.contains_key(&law.id())
+    }
+
     /// Places to begin with a law that takes the place of a term: where it was at its best beside all terms so far or before, and
     /// where its lead points now.
     pub fn begin(&self, scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law) -> Vec<Vec<f64>> {
-        match self.0.get(&law.id()).filter(|_| law.search.lead.is_none()) {
+        match self.tried.get(&law.id()).filter(|_| law.search.lead.is_none()) {
             Some(known) => known.clone(),
             None => scaffold.begin(law),
         }
+    }
+
+    /// Places to begin with a law that came close.
+    fn begin_close(&self, law: &Law) -> Vec<Vec<f64>> {
+        self.close.get(&law.id()).cloned().unwrap_or_default()
     }
 }
 
@@ -521,12 +568,14 @@ fn strongest(terms: &[Term<'_>], standings: &[Standing]) -> f64 {
 
 /// Chooses causes among `laws`.
 #[must_use]
+#[allow(clippy::too_many_arguments, reason = "all that a search remembers")]
 pub fn select<'l>(
     problem: &Problem<'_>,
     laws: &'l [Law],
     white: f64,
     start: Vec<Term<'l>>,
     bests: &mut Bests,
+    scope: Scope,
     trace: &mut Trace,
 ) -> Option<Selected<'l>> {
     let limits = Limits::of(white);
@@ -538,15 +587,20 @@ pub fn select<'l>(
     }
     // What has given way once and come back does not give way to the same again: so rounds end.
     let (mut seen, mut given) = (HashSet::new(), HashSet::new());
+    if scope == Scope::CameClose {
+        // A sample may have chosen the wrong one of two that are close.
+        selected = exchange(problem, laws, selected, &limits, usize::MAX, &mut given, bests, scope, trace)?;
+        selected = backward(problem, selected, &limits, trace)?;
+    }
     for round in 0..MOST_ROUNDS {
-        let Some(next) = forward(problem, laws, &selected, &limits, bests, trace) else { break };
+        let Some(next) = forward(problem, laws, &selected, &limits, bests, scope, trace) else { break };
         let taken = next.terms.len();
         selected = settle(problem, next)?;
         selected = backward(problem, selected, &limits, trace)?;
         if round > 0 || selected.terms.len() > 1 {
             // What was taken just now was held against all others beside the same terms, unless one of them has gone since.
             let compared = if selected.terms.len() == taken { taken - 1 } else { usize::MAX };
-            selected = exchange(problem, laws, selected, &limits, compared, &mut given, bests, trace)?;
+            selected = exchange(problem, laws, selected, &limits, compared, &mut given, bests, scope, trace)?;
             selected = backward(problem, selected, &limits, trace)?;
         }
         let mut causes: Vec<String> = selected.terms.iter().map(|t| t.law.label.to_string()).collect();
@@ -601,13 +655,15 @@ fn forward<'l>(
     selected: &Selected<'l>,
     limits: &Limits,
     bests: &mut Bests,
+    scope: Scope,
     trace: &mut Trace,
 ) -> Option<Selected<'l>> {
     trace.next_round();
     let named = selected.terms.iter().filter(|t| t.law.named()).count();
     let unnamed = selected.terms.len() - named;
     let mut open: Vec<&Law> = Vec::new();
-    for law in laws.iter().filter(|law| selected.terms.iter().all(|t| t.law.label != law.label)) {
+    let in_scope = |law: &&Law| scope == Scope::Everything || bests.is_close(law);
+    for law in laws.iter().filter(in_scope).filter(|law| selected.terms.iter().all(|t| t.law.label != law.label)) {
         let (chosen, most) = if law.named() { (named, MOST_CAUSES) } else { (unnamed, MOST_UNNAMED) };
         let room = Judged::number(Gate::Room, chosen as f64, most as f64, chosen < most);
         let gates: Vec<Judged> = [room].into_iter().chain(tolerance(problem, &selected.fit, law)).collect();
@@ -618,11 +674,16 @@ fn forward<'l>(
         }
     }
     let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
-    let tried = tried(&scaffold, &open, |law| scaffold.begin(law));
-    for (law, tried) in open.iter().zip(&tried) {
-        bests.note(law, tried);
+    let (tried, most) = match scope {
+        Scope::Everything => (tried(&scaffold, &open, |law| scaffold.begin(law)), REFINED),
+        Scope::CameClose => (tried(&scaffold, &open, |law| bests.begin_close(law)), REFINED_AGAIN),
+    };
+    if scope == Scope::Everything {
+        for (law, tried) in open.iter().zip(&tried) {
+            bests.note(law, tried);
+        }
     }
-    let Screened { terms: found, refused } = best_tried(&scaffold, &open, tried, REFINED);
+    let Screened { terms: found, refused } = best_tried(&scaffold, &open, tried, most);
     for (law, places, gates) in refused {
         trace.judged(Stage::Tried, law, &law.values(&places), gates);
     }
@@ -650,6 +711,11 @@ fn forward<'l>(
         match outcome {
             Ok(next) => grown.push(next),
             Err((law, places, gates)) => trace.judged(Stage::Forward, law, &law.values(&places), gates),
+        }
+    }
+    if scope == Scope::Everything {
+        for (_, next) in grown.iter().filter(|(gain, _)| *gain > CLOSE_GAIN) {
+            bests.came_close(next.newest());
         }
     }
     contenders_settled(problem, &mut grown, before);
@@ -692,6 +758,9 @@ fn forward<'l>(
         if passes {
             let taken = Some(term.law.label);
             for (less, other) in grown {
+                if scope == Scope::Everything && less > gain - CLOSE_BEHIND {
+                    bests.came_close_to(term.law, other.newest());
+                }
                 let (law, values) = (other.newest().law, other.newest().values());
                 let gates = vec![Judged::number(Gate::First, less, gain, false)];
                 trace.judged_against(Stage::Forward, law, &values, taken, gates);
@@ -759,7 +828,7 @@ pub(super) fn settle<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Optio
 }
 
 /// The same for one alone, too.
-fn settle_all<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
+pub(super) fn settle_all<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
     settle_from(problem, selected, |_, term| vec![term.clone()])
 }
 
@@ -861,20 +930,30 @@ fn exchange<'l>(
     limits: &Limits,
     compared: usize,
     given: &mut HashSet<(u64, u64)>,
-    bests: &Bests,
+    bests: &mut Bests,
+    scope: Scope,
     trace: &mut Trace,
 ) -> Option<Selected<'l>> {
     for k in (0..selected.terms.len()).filter(|k| *k != compared) {
+        let held = selected.terms[k].law;
+        let in_scope = |law: &&Law| scope == Scope::Everything || bests.close_to.contains(&(held.id(), law.id()));
+        if !laws.iter().any(|law| in_scope(&law)) {
+            continue;
+        }
         let others: Vec<Term<'l>> = selected.without(problem, k).into_iter().map(Cow::into_owned).collect();
         let without = fit(problem, &others)?;
         let open: Vec<&Law> = laws
             .iter()
+            .filter(in_scope)
             .filter(|law| selected.terms.iter().all(|t| t.law.label != law.label))
             .filter(|law| may_be_tried(problem, &without, law))
-            .filter(|law| !given.contains(&(selected.terms[k].law.id(), law.id())))
+            .filter(|law| !given.contains(&(held.id(), law.id())))
             .collect();
         let scaffold = Scaffold::new(problem, others.iter().collect());
-        let tried = tried(&scaffold, &open, |law| bests.begin(&scaffold, law));
+        let tried = match scope {
+            Scope::Everything => tried(&scaffold, &open, |law| bests.begin(&scaffold, law)),
+            Scope::CameClose => tried(&scaffold, &open, |law| bests.begin_close(law)),
+        };
         let rivals = best_tried(&scaffold, &open, tried, EXCHANGED).terms;
         let refined: Vec<(Term<'l>, Fit)> = rivals
             .into_par_iter()
@@ -888,7 +967,10 @@ fn exchange<'l>(
         let now = selected.predicted(problem);
         let size = size_of(problem, &less(&now, &predicted(problem, &others.iter().collect::<Vec<_>>(), &without)));
         let evidence = selected.fit.solution.evidence + selected.terms[k].occam;
-        let held_by = selected.terms[k].law;
+        if scope == Scope::Everything {
+            let close = |(term, fit): &&(Term<'l>, Fit)| fit.solution.evidence + term.occam > evidence - CLOSE_BEHIND;
+            refined.iter().filter(close).for_each(|(term, _)| bests.came_close_to(held, term));
+        }
         let judge = |term: &Term<'l>, fit: &Fit| -> Vec<Judged> {
             let then = predicted(problem, &others.iter().chain([term]).collect::<Vec<_>>(), fit);
             let apart = size_of(problem, &less(&then, &now));
@@ -909,7 +991,7 @@ fn exchange<'l>(
                 contenders.push((term, fit, gates));
             } else {
                 let values = term.values();
-                trace.judged_against(Stage::Exchange, term.law, &values, Some(held_by.label), gates);
+                trace.judged_against(Stage::Exchange, term.law, &values, Some(held.label), gates);
             }
         }
         let best = contenders
@@ -925,12 +1007,12 @@ fn exchange<'l>(
             let last = exchanged.terms.len() - 1;
             gates.extend(earns(problem, &exchanged, &standings(problem, &exchanged), last, limits));
             let taken = passed(&gates);
-            trace.judged_against(Stage::Exchange, law, &values, Some(held_by.label), gates);
+            trace.judged_against(Stage::Exchange, law, &values, Some(held.label), gates);
             if taken {
-                let values = held_by.values(&selected.terms[k].places);
+                let values = held.values(&selected.terms[k].places);
                 let gates = vec![Judged::number(Gate::First, 0.0, ahead_by, false)];
-                trace.judged_against(Stage::Exchange, held_by, &values, Some(law.label), gates);
-                given.insert((held_by.id(), law.id()));
+                trace.judged_against(Stage::Exchange, held, &values, Some(law.label), gates);
+                given.insert((held.id(), law.id()));
                 return Some(exchanged);
             }
         }

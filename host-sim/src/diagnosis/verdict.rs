@@ -33,6 +33,7 @@ const KNOWN_BESIDE: f64 = 5.0;
 #[allow(clippy::too_many_arguments, reason = "all that a search has found")]
 pub(super) fn conclude(
     problem: &Problem<'_>,
+    sample: rivals::OnSample<'_, '_>,
     laws: &[Law],
     selected: Selected<'_>,
     bests: &select::Bests,
@@ -92,7 +93,7 @@ pub(super) fn conclude(
         let of_all: Vec<Vec<rivals::Rival>> = named
             .par_iter()
             .with_max_len(1)
-            .map(|k| rivals::rivals(problem, laws, &selected, &standings, bests, *k))
+            .map(|k| rivals::rivals(problem, sample, laws, &selected, &standings, bests, *k))
             .collect();
         for (k, rivals) in named.iter().copied().zip(of_all) {
             let Some(name) = selected.terms[k].law.cause() else { continue };
