@@ -23,6 +23,12 @@ pub fn cholesky(matrix: MatRef<'_>) -> Result<Factor, NotPositiveDefinite> {
 }
 
 impl Factor {
+    /// The factor itself, lower triangular.
+    #[must_use]
+    pub fn lower(&self) -> MatRef<'_> {
+        self.0.L()
+    }
+
     /// `A⁻¹ B`.
     #[must_use]
     pub fn solve(&self, right_hand_sides: MatRef<'_>) -> Mat {

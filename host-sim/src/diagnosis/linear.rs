@@ -6,7 +6,7 @@
 use std::ops::Range;
 use std::sync::LazyLock;
 
-use flexspline_algebra::{Mat, lower_of_product};
+use flexspline_algebra::{Mat, cholesky, lower_of_product};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Symmetric products of columns, the data last.
@@ -237,6 +237,33 @@ fn backward(l: &[f64], x: &mut [f64]) {
     }
 }
 
+/// From so many columns on a factor is that of a library for large matrices.
+const LARGE: usize = 96;
+
+/// Cholesky factor, row by row; none if the matrix is not positive definite or not finite.
+fn factor(mut a: Vec<f64>, n: usize) -> Option<Vec<f64>> {
+    if n >= LARGE {
+        let factor = cholesky(Mat::from_fn(n, n, |i, j| a[i * n + j]).as_ref()).ok()?;
+        let lower = factor.lower();
+        let finite = (0..n).all(|i| lower[(i, i)].is_finite());
+        return finite
+            .then(|| (0..n * n).map(|at| if at % n <= at / n { lower[(at / n, at % n)] } else { 0.0 }).collect());
+    }
+    for i in 0..n {
+        let (above, row) = a.split_at_mut(i * n);
+        for j in 0..i {
+            let known = &above[j * n..=j * n + j];
+            row[j] = (row[j] - dot(&known[..j], &row[..j])) / known[j];
+        }
+        let pivot = row[i] - dot(&row[..i], &row[..i]);
+        if pivot <= 0.0 || !pivot.is_finite() {
+            return None;
+        }
+        row[i] = pivot.sqrt();
+    }
+    Some(a)
+}
+
 /// Solves with priors. `worth` scales all information in the data: below 1 where the noise is not as white as it was taken for.
 ///
 /// `None` if the products are not finite.
@@ -259,21 +286,8 @@ pub fn solve(gram: &Gram, priors: &[Prior], worth: f64) -> Option<Solution> {
         }
         a[i * n + i] += 1.0;
     }
-    let mut l = a;
-    let mut log_det = 0.0;
-    for i in 0..n {
-        let (above, row) = l.split_at_mut(i * n);
-        for j in 0..i {
-            let known = &above[j * n..=j * n + j];
-            row[j] = (row[j] - dot(&known[..j], &row[..j])) / known[j];
-        }
-        let pivot = row[i] - dot(&row[..i], &row[..i]);
-        if pivot <= 0.0 || !pivot.is_finite() {
-            return None;
-        }
-        row[i] = pivot.sqrt();
-        log_det += pivot.ln();
-    }
+    let l = factor(a, n)?;
+    let log_det = 2.0 * (0..n).map(|i| l[i * n + i].ln()).sum::<f64>();
     let mut z = b;
     forward(&l, &mut z);
     let explained: f64 = z.iter().map(|v| v * v).sum();

@@ -31,9 +31,9 @@ pub mod rows;
 pub mod select;
 #[cfg(test)]
 mod tests;
+mod thinned;
 pub mod trace;
 mod uncertainty;
-mod thinned;
 mod verdict;
 
 use std::sync::Arc;

@@ -298,11 +298,8 @@ const CORRELATIONS_S: [f64; 4] = [FASTEST_S, 8.0, 25.0, 80.0];
 
 /// White noise alone, and with each wander that is tried, wander by wander.
 fn hypotheses(white: f64, unit: f64) -> Vec<Noise> {
-    let with = |wander: f64, correlation: f64| Noise {
-        white,
-        wander: wander * white,
-        correlation_s: correlation * unit,
-    };
+    let with =
+        |wander: f64, correlation: f64| Noise { white, wander: wander * white, correlation_s: correlation * unit };
     let all = WANDERS.iter().flat_map(|wander| CORRELATIONS_S.map(|correlation| with(*wander, correlation)));
     [Noise { white, wander: 0.0, correlation_s: 1.0 }].into_iter().chain(all).collect()
 }
@@ -316,8 +313,8 @@ fn beside(hypothesis: usize) -> Vec<usize> {
     let Some(at) = hypothesis.checked_sub(1) else { return (0..=width).collect() };
     let (row, column) = (at / width, at % width);
     let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
-    let grid = around(row, WANDERS.len())
-        .flat_map(|row| around(column, width).map(move |column| 1 + row * width + column));
+    let grid =
+        around(row, WANDERS.len()).flat_map(|row| around(column, width).map(move |column| 1 + row * width + column));
     if row == 0 { [0].into_iter().chain(grid).collect() } else { grid.collect() }
 }
 

@@ -120,6 +120,9 @@ pub fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[Law], whi
         .filter_map(|law| {
             let term = Term::new(problem, law, Vec::new());
             let fit = scaffold.fit(Some(&term))?;
+            if fit.solution.evidence - selected.fit.solution.evidence <= LEAST_EVIDENCE {
+                return None;
+            }
             let mut terms = selected.terms.clone();
             terms.push(term);
             let standing = super::select::standing(problem, &Selected { terms, fit }, selected.terms.len());

@@ -66,10 +66,10 @@ impl Thinned {
     }
 
     /// The excitation of the sample, with nothing that other causes change.
-    fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
+    #[must_use]
+    pub fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
         Excitation { rows: &self.rows, base: &self.base, ..*on }
     }
-
 }
 
 /// The sample as models are fitted to it.

@@ -14,9 +14,15 @@ use crate::nominal::{Fixed, Nominal};
 use crate::tables::{MadeTable, Source, TableError, from_plan};
 use crate::units::ARCSEC_PER_RAD;
 
-/// Positions over a whole turn of the output. A prime, on which no order of the teeth (17860 times 1 to 4), of the generator (95), of the
-/// generator against the output (94) or of the output folds onto another.
-const POSITIONS: usize = 509;
+/// Positions over a whole turn of the output, at least and at most. Fitted are a few dozen numbers at each load.
+const LEAST_POSITIONS: usize = 151;
+const MOST_POSITIONS: usize = 1009;
+/// Orders that a model may have beside those fitted: of what is rectified by the clearance.
+const FURTHER_ORDERS: [u16; 3] = [8, 10, 12];
+/// Orders that are to be told apart stay apart by so much where the positions fold them.
+const APART: f64 = 0.9;
+/// Tooth meshes of higher order than this are none in the model.
+const MESHES: u16 = 4;
 /// Positions that a session runs through before those that are sampled: the play comes to rest.
 const BEFORE: usize = 40;
 /// Positions of the tooth pitch in a table.
@@ -46,6 +52,26 @@ fn torque_nodes(friction: f64, largest: f64) -> Vec<f32> {
     });
     let positive: Vec<f64> = [friction - half, friction + half].into_iter().chain(further).collect();
     positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).map(|t| t as f32).collect()
+}
+
+/// Positions over a whole turn of the output on which no order of the tooth mesh, of the generator, of the generator against the output,
+/// or of the output folds onto another: a prime.
+fn positions(ratio: f64, teeth: f64) -> usize {
+    let ratio = ratio.abs();
+    let turns = [ratio, ratio - 1.0, ratio + 1.0];
+    let of_generator =
+        ORDERS.iter().chain(&FURTHER_ORDERS).flat_map(|k| turns.map(|per_turn| f64::from(*k) * per_turn));
+    let of_output = OUTPUT_ORDERS.iter().map(|k| f64::from(*k));
+    let of_mesh = (1..=MESHES).map(|k| f64::from(k) * teeth * ratio);
+    let orders: Vec<f64> = of_generator.chain(of_output).chain(of_mesh).chain([0.0]).collect();
+    let tells_apart = |count: &usize| {
+        let of = |order: &f64| (order - (order / *count as f64).round() * *count as f64).abs();
+        let mut folded: Vec<f64> = orders.iter().map(of).collect();
+        folded.sort_by(f64::total_cmp);
+        folded.windows(2).all(|pair| pair[1] - pair[0] > APART)
+    };
+    let is_prime = |count: &usize| (2..).take_while(|k| k * k <= *count).all(|k| !count.is_multiple_of(k));
+    (LEAST_POSITIONS..=MOST_POSITIONS).filter(is_prime).find(tells_apart).unwrap_or(MOST_POSITIONS)
 }
 
 /// What a table is made for.
@@ -167,14 +193,21 @@ impl ExtendedTables<'_> {
     /// Steady motion both ways through a whole turn of the output at every node.
     fn sample(&self, extended: &Extended, with_causes: bool, torques: &[f32], temperatures: &[f32]) -> Vec<Sample> {
         let ratio = self.nominal.ratio;
-        let step = TAU * ratio.abs() / POSITIONS as f64;
+        // Without teeth there is no mesh.
+        let positions = positions(ratio, self.nominal.teeth.map_or(0.5, |teeth| f64::from(teeth.flexspline)));
         let mut nodes = Vec::new();
         let mut sessions = Vec::new();
         for &temperature in temperatures {
             for &torque in torques {
                 for turn in [1.0, -1.0] {
                     nodes.push((torque, temperature, turn * ratio.signum()));
-                    sessions.push(self.steady(step * turn, f64::from(torque), f64::from(temperature), sessions.len()));
+                    sessions.push(self.steady(
+                        turn,
+                        positions,
+                        f64::from(torque),
+                        f64::from(temperature),
+                        sessions.len(),
+                    ));
                 }
             }
         }
@@ -213,8 +246,9 @@ impl ExtendedTables<'_> {
         samples
     }
 
-    fn steady(&self, step: f64, torque: f64, temperature: f64, number: usize) -> Session {
-        let rows = BEFORE + POSITIONS;
+    fn steady(&self, turn: f64, positions: usize, torque: f64, temperature: f64, number: usize) -> Session {
+        let step = turn * TAU * self.nominal.ratio.abs() / positions as f64;
+        let rows = BEFORE + positions;
         Session {
             line: (0..rows as u64).collect(),
             // So slow that nothing of it depends on speed.
@@ -246,13 +280,21 @@ mod tests {
 
     #[test]
     fn no_order_folds_onto_another() {
-        let folded = |per_output_turn: i64| {
-            let rest = per_output_turn.rem_euclid(POSITIONS as i64);
-            rest.min(POSITIONS as i64 - rest)
-        };
-        let orders = ORDERS.iter().flat_map(|k| [95 * i64::from(*k), 94 * i64::from(*k)]);
-        let mut all: Vec<i64> = orders.chain([1, 2]).chain((1..=4).map(|k| 17860 * k)).map(folded).chain([0]).collect();
-        all.sort_unstable();
-        assert!(all.windows(2).all(|pair| pair[0] < pair[1]), "{all:?}");
+        for (ratio, teeth, fixed) in
+            [(95.0, 188i64, 1i64), (-94.0, 188, -1), (50.0, 100, 1), (121.0, 240, 1), (160.0, 318, 1)]
+        {
+            let count = positions(ratio, teeth as f64) as i64;
+            assert!(count < 400, "{count} positions for {ratio}");
+            let folded = |per_output_turn: i64| {
+                let rest = per_output_turn.rem_euclid(count);
+                rest.min(count - rest)
+            };
+            let generator = ratio.abs() as i64;
+            let orders = ORDERS.iter().flat_map(|k| [generator, generator - fixed].map(|of| of * i64::from(*k)));
+            let mesh = (1..=4).map(|k| teeth * generator * k);
+            let mut all: Vec<i64> = orders.chain([1, 2]).chain(mesh).map(folded).chain([0]).collect();
+            all.sort_unstable();
+            assert!(all.windows(2).all(|pair| pair[0] < pair[1]), "{ratio}: {all:?}");
+        }
     }
 }

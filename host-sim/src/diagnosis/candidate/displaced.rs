@@ -9,12 +9,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::geometry::{
-    Angle, COS_PRESSURE_ANGLE, USUAL_ARCSEC, faded, half_load, kept, sense, waves, weighted_waves,
-};
+use super::geometry::{Angle, COS_PRESSURE_ANGLE, USUAL_ARCSEC, faded, half_load, kept, sense, waves, weighted_waves};
 use super::{
-    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, Zones, by_row, main, main_about, nuisance, of_both, polar,
-    times,
+    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, Zones, by_row, main, main_about, nuisance,
+    of_both, polar, times,
 };
 use crate::causes::{CauseName, ParameterName as Name};
 

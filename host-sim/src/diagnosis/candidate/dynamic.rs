@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use super::{Excitation, Law, Role, Shape, Shaped, by_row, main, main_about};
 use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::base::PlayLaw;
+use crate::diagnosis::thinned::Thinned;
 use crate::units::ARCSEC_PER_RAD;
 
 /// Moments, over the scale of the load, and directions that are tried on a drive without load; and how closely the best is followed.
@@ -64,7 +65,12 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
     };
     let of = |shape: Shaped<'_>| [shape.of(Name::TorqueNM), shape.of(Name::PhaseRad)];
     // Where nothing else loads the drive, its moment decides which flank carries, and no linear law is near.
-    let by_flank = on.unloaded().then(|| moment_that_turns_flanks(on, play, scale, load));
+    let by_flank = on.unloaded().then(|| {
+        // A sample tells where to begin.
+        let thinned = Thinned::of(on, 1);
+        let on = thinned.as_ref().map_or(*on, |thinned| thinned.excitation(on));
+        moment_that_turns_flanks(&on, play, scale, load)
+    });
     let mut law = Law::new(CauseName::GravityTorque, move |on, shape| {
         let rows = on.rows;
         let added = load(on, of(shape));

@@ -94,7 +94,9 @@ pub fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
     if rows.recorded.time {
         laws.push(law("offset with time", |on, k| on.rows.time[k] - on.rows.time[0]));
         laws.push(law("creep since the session began (logarithm)", |on, k| (1.0 + on.rows.since[k]).ln()));
-        laws.push(law("settling since the session began (exponential, 20 s)", |on, k| (-on.rows.since[k] / 20.0).exp()));
+        laws.push(law("settling since the session began (exponential, 20 s)", |on, k| {
+            (-on.rows.since[k] / 20.0).exp()
+        }));
         laws.push(law("offset with the magnitude of speed", |on, k| on.rows.speed[k].abs()));
         laws.push(law("offset with speed squared", |on, k| on.rows.speed[k].powi(2)));
         laws.push(law("offset with speed squared, by direction", |on, k| {

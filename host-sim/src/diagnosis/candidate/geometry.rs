@@ -12,8 +12,8 @@ use crate::nominal::Fixed;
 use super::displaced::displaced;
 use super::lobes::generator_eccentricity;
 use super::{
-    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, beside, by_row, main, nuisance, of_both, of_wave,
-    polar, times,
+    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, beside, by_row, main, nuisance, of_both,
+    of_wave, polar, times,
 };
 use crate::causes::{CauseName, ParameterName as Name};
 
