@@ -104,6 +104,38 @@ fn two_effects_at_once_are_both_named_or_said_to_look_alike() {
 }
 
 #[test]
+fn a_search_on_a_sample_comes_to_what_one_on_all_rows_comes_to() {
+    let effects = [
+        effect(CauseName::FlexsplineRunout, 15.0, 0.7, 0.5),
+        effect(CauseName::OutputEncoderEccentricity, 8.0, 2.0, 0.0),
+        effect(CauseName::SensorLatency, 2.0, 1.0, 0.3),
+    ];
+    let sessions = recorded(&effects, 5, 6000, 100.0, 2.0, 31);
+    excited_by(&sessions, &catalogue_drive(), |on| {
+        let search = super::Search::new(on, &Settings::default()).unwrap();
+        assert!(search.thinned.as_ref().unwrap().share < 0.4);
+        let (problem, noise) = (&search.problem, search.noise);
+        let (mut bests, mut trace) = (super::Bests::default(), super::Trace::new(false));
+        let everything = super::Scope::Everything;
+        let on_all =
+            super::select(problem, &search.laws, noise.white, Vec::new(), &mut bests, everything, &mut trace).unwrap();
+        let on_sample = super::terms_at(problem, &search.laws, &search.start);
+        let on_sample = super::Selected { fit: super::fit(problem, &on_sample).unwrap(), terms: on_sample };
+        let (all, sample) = (on_all.terms.len(), on_sample.terms.len());
+        assert_eq!((all, sample), (3, 3));
+        for (k, term) in on_all.terms.iter().enumerate() {
+            let j = on_sample.terms.iter().position(|t| t.law.label == term.law.label).unwrap();
+            let [a, b] = [(&on_all, k), (&on_sample, j)].map(|(of, k)| of.terms[k].contribution(of.fit.of(k)));
+            let apart: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
+            let (apart, size) = (super::rows::rms(&apart), super::rows::rms(&a));
+            assert!(apart < 0.03 * size, "{}: {apart} apart, of {size}", term.law.label);
+        }
+        let behind = on_all.fit.solution.evidence - on_sample.fit.solution.evidence;
+        assert!(behind.abs() < 3.0, "{behind}");
+    });
+}
+
+#[test]
 fn what_no_cause_explains_is_not_named() {
     for (k, name) in
         [Strange::SensorOffsetWithTemperature, Strange::LineOfOrder10_37, Strange::Creep, Strange::TorqueCrossTalk]
@@ -470,6 +502,7 @@ fn noise_of(sessions: &[Session]) -> super::Noise {
                 &super::FreeColumns::of(on, &laws, None),
                 &[],
                 &super::prepare::uncertain(on, &[]),
+                None,
             )
             .0,
         );

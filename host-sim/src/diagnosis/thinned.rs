@@ -96,3 +96,63 @@ impl<'a> Sample<'a> {
         Problem::new(&self.on, &self.uncertain, whitener, worth, self.averaged.clone())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::Scales;
+    use crate::measurement::Session;
+    use crate::synthesize::catalogue_drive;
+
+    fn turning(rows: usize) -> Session {
+        Session {
+            line: (0..rows as u64).collect(),
+            time_s: Some((0..rows).map(|k| 0.01 * k as f64).collect()),
+            generator_rad: (0..rows).map(|k| 0.07 * k as f64).collect(),
+            error_rad: (0..rows).map(|k| 1e-6 * (k % 17) as f64).collect(),
+            ..Session::default()
+        }
+    }
+
+    fn sampled(sessions: &[Session], stride: usize, look: impl FnOnce(&Rows, Option<Thinned>)) {
+        let nominal = catalogue_drive();
+        let rows = Rows::new(sessions, &nominal);
+        let base = Base::new(&rows, &nominal, None);
+        let scales = Scales::new(&rows, 48.7, Vec::new());
+        let on = Excitation::new(&rows, &nominal, &base, &scales);
+        look(&rows, Thinned::of(&on, stride));
+    }
+
+    #[test]
+    fn a_sample_is_whole_averages_of_neighbouring_rows_from_all_over_every_session() {
+        let stride = 5;
+        sampled(&[turning(30_000), turning(900), turning(12_345)], stride, |rows, thinned| {
+            let thinned = thinned.unwrap();
+            assert!((0.2..0.3).contains(&thinned.share), "{}", thinned.share);
+            for (session, of) in thinned.rows.sessions.iter().zip(&rows.sessions) {
+                let share = session.len() as f64 / of.len() as f64;
+                assert!((0.15..0.35).contains(&share), "{share} of {of:?}");
+                for part in parts(session, stride) {
+                    let kept = &thinned.kept[part];
+                    assert!(kept.windows(2).all(|pair| pair[1] == pair[0] + 1) && of.contains(&kept[0]), "{kept:?}");
+                }
+            }
+            for (k, row) in thinned.kept.iter().enumerate() {
+                assert_eq!(thinned.rows.generator[k], rows.generator[*row]);
+                assert_eq!(thinned.rows.travel[k], rows.travel[*row]);
+            }
+            // No phase of the generator is left out: 16 parts of a turn have about as many rows.
+            let mut of_part = [0usize; 16];
+            for psi in &thinned.rows.generator {
+                of_part[(psi.rem_euclid(std::f64::consts::TAU) / std::f64::consts::TAU * 16.0) as usize % 16] += 1;
+            }
+            let usual = thinned.kept.len() / 16;
+            assert!(of_part.iter().all(|n| (usual / 2..2 * usual).contains(n)), "{of_part:?}");
+        });
+    }
+
+    #[test]
+    fn few_rows_are_all_searched() {
+        sampled(&[turning(9_000)], 1, |_, thinned| assert!(thinned.is_none()));
+    }
+}
