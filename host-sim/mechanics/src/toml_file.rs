@@ -44,19 +44,21 @@ impl fmt::Display for Problem {
 
 /// Allowed values; the lower end belongs to it unless `above`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Allowed {
+pub struct Allowed {
+    /// Least.
     pub low: f64,
+    /// Largest.
     pub high: f64,
     above: bool,
 }
 
 /// From `low` to `high`, both allowed.
-pub(crate) const fn from(low: f64, high: f64) -> Allowed {
+pub const fn from(low: f64, high: f64) -> Allowed {
     Allowed { low, high, above: false }
 }
 
 /// Above `low`, to `high`.
-pub(crate) const fn above(low: f64, high: f64) -> Allowed {
+pub const fn above(low: f64, high: f64) -> Allowed {
     Allowed { low, high, above: true }
 }
 
@@ -82,7 +84,7 @@ impl fmt::Display for Allowed {
 }
 
 /// A file that is being read, with what is wrong so far.
-pub(crate) struct TomlFile<'a> {
+pub struct TomlFile<'a> {
     name: &'a str,
     text: &'a str,
     /// With the byte they start at, for the order.
@@ -90,6 +92,7 @@ pub(crate) struct TomlFile<'a> {
 }
 
 impl<'a> TomlFile<'a> {
+    /// The text of a file, with the name that problems are told with.
     pub fn new(name: &'a str, text: &'a str) -> Self {
         TomlFile { name, text, problems: Vec::new() }
     }
@@ -209,7 +212,7 @@ fn unknown_key(path: &str, known: &[&str]) -> String {
 }
 
 /// A table of a file, whose keys are known already.
-pub(crate) struct Section<'t, 'i> {
+pub struct Section<'t, 'i> {
     path: String,
     entries: Entries<'t, 'i>,
 }
@@ -290,7 +293,7 @@ impl<'t, 'i> Section<'t, 'i> {
 
 /// Why a value is refused.
 #[derive(Debug)]
-pub(crate) struct Refused {
+pub struct Refused {
     /// Where it stands in its file.
     pub span: Range<usize>,
     /// Where within the value, `[1].order`; empty for the value itself.
@@ -326,29 +329,29 @@ fn in_range(allowed: &Allowed, value: &Spanned<DeValue>, number: f64) -> Result<
 }
 
 /// A number.
-pub(crate) fn real(allowed: &Allowed, value: &Spanned<DeValue>) -> Result<f64, Refused> {
+pub fn real(allowed: &Allowed, value: &Spanned<DeValue>) -> Result<f64, Refused> {
     in_range(allowed, value, number(value.get_ref()).ok_or_else(|| Refused::found(value, allowed))?)
 }
 
 /// Any number.
-pub(crate) fn any(value: &Spanned<DeValue>) -> Result<f64, Refused> {
+pub fn any(value: &Spanned<DeValue>) -> Result<f64, Refused> {
     number(value.get_ref()).ok_or_else(|| Refused::found(value, "a number"))
 }
 
 /// A number without a fraction.
-pub(crate) fn whole(allowed: &Allowed, value: &Spanned<DeValue>) -> Result<u32, Refused> {
+pub fn whole(allowed: &Allowed, value: &Spanned<DeValue>) -> Result<u32, Refused> {
     let whole = number(value.get_ref()).filter(|_| value.get_ref().is_integer());
     let whole = whole.ok_or_else(|| Refused::found(value, format!("a whole number, {allowed}")))?;
     Ok(in_range(allowed, value, whole)? as u32)
 }
 
 /// A word.
-pub(crate) fn text(value: &Spanned<DeValue>) -> Result<String, Refused> {
+pub fn text(value: &Spanned<DeValue>) -> Result<String, Refused> {
     value.get_ref().as_str().map(str::to_owned).ok_or_else(|| Refused::found(value, "a string"))
 }
 
 /// One of several names, for what it means.
-pub(crate) fn one_of<T: Copy>(known: &[(&'static str, T)], value: &Spanned<DeValue>) -> Result<T, Refused> {
+pub fn one_of<T: Copy>(known: &[(&'static str, T)], value: &Spanned<DeValue>) -> Result<T, Refused> {
     let word = value.get_ref().as_str();
     let found = known.iter().find(|(name, _)| word == Some(name));
     found.map(|(_, meant)| *meant).ok_or_else(|| {
@@ -359,7 +362,7 @@ pub(crate) fn one_of<T: Copy>(known: &[(&'static str, T)], value: &Spanned<DeVal
 }
 
 /// The elements of an array, each read by `read`.
-pub(crate) fn each_of<'i, T>(
+pub fn each_of<'i, T>(
     value: &Spanned<DeValue<'i>>,
     allowed: &str,
     mut read: impl FnMut(&Spanned<DeValue<'i>>) -> Result<T, Refused>,
@@ -373,7 +376,8 @@ pub(crate) fn each_of<'i, T>(
 }
 
 /// The entries of a table.
-pub(crate) struct Entries<'t, 'i> {
+pub struct Entries<'t, 'i> {
+    /// The table.
     pub table: &'t DeTable<'i>,
     span: Range<usize>,
 }
@@ -421,7 +425,7 @@ impl<'t, 'i> Entries<'t, 'i> {
 }
 
 /// The entries of a table of any keys, each read by `read`.
-pub(crate) fn entries_of<'i, T>(
+pub fn entries_of<'i, T>(
     value: &Spanned<DeValue<'i>>,
     read: impl Fn(&Spanned<DeValue<'i>>) -> Result<T, Refused>,
 ) -> Result<BTreeMap<String, T>, Refused> {
@@ -435,7 +439,7 @@ pub(crate) fn entries_of<'i, T>(
 }
 
 /// The number of a TOML value, if it is one.
-pub(crate) fn number(value: &DeValue) -> Option<f64> {
+pub fn number(value: &DeValue) -> Option<f64> {
     match value {
         DeValue::Integer(integer) => {
             i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix()).ok().map(|n| n as f64)
@@ -446,7 +450,7 @@ pub(crate) fn number(value: &DeValue) -> Option<f64> {
 }
 
 /// A value as a message shows it.
-pub(crate) fn shown(value: &DeValue) -> String {
+pub fn shown(value: &DeValue) -> String {
     match value {
         DeValue::String(text) => format!("{text:?}"),
         DeValue::Integer(integer) => integer.to_string(),

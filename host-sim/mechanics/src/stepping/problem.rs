@@ -343,7 +343,7 @@ impl Problem {
     }
 
     /// Displaces the circular-spline nodes that the housing holds, where a [`State`] has them.
-    pub(crate) fn seat_state(&self, v: &mut [f64]) {
+    pub fn seat_state(&self, v: &mut [f64]) {
         if self.condensed.is_none() {
             self.seat(v);
         }

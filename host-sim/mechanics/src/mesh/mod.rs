@@ -10,6 +10,6 @@ pub use wheel::{Edge, FlankMesh, WheelKind, WheelMesh};
 
 /// Rotates a vector by the angle of this sine and cosine.
 #[inline]
-pub(crate) fn rotate(p: Point, (sin, cos): (f64, f64)) -> Point {
+pub fn rotate(p: Point, (sin, cos): (f64, f64)) -> Point {
     [cos * p[0] - sin * p[1], sin * p[0] + cos * p[1]]
 }

@@ -56,7 +56,7 @@ pub fn did_you_mean<'k>(before: &str, found: &str, known: impl IntoIterator<Item
 }
 
 /// What a suggestion in a message begins and ends with.
-pub(crate) const MARKS: [&str; 2] = ["did you mean `", "`?"];
+pub const MARKS: [&str; 2] = ["did you mean `", "`?"];
 
 /// `` did you mean `name`? ``
 #[must_use]

@@ -53,7 +53,7 @@ pub struct Place {
 
 /// Motion since it last began: since a reversal, a standstill or a change of load.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Travel {
+pub struct Travel {
     /// +1 forward, −1 backward, 0 at rest.
     sense: f64,
     travelled_rad: f64,
@@ -269,7 +269,7 @@ impl<'p> Motion<'p> {
 
 impl Travel {
     /// The motion after an increment that turned generator and output by so much.
-    pub(crate) fn on(self, [turn_rad, output_turn_rad]: [f64; 2], same_load: bool, ratio: f64) -> Travel {
+    pub fn on(self, [turn_rad, output_turn_rad]: [f64; 2], same_load: bool, ratio: f64) -> Travel {
         if turn_rad == 0.0 {
             return Travel::default();
         }
@@ -285,7 +285,7 @@ impl Travel {
     }
 
     /// Whether the drive has settled, which must at least have moved on by so much.
-    pub(crate) fn settled(&self, least_rad: f64) -> bool {
+    pub fn settled(&self, least_rad: f64) -> bool {
         self.followed && self.travelled_rad >= least_rad * (1.0 - 1e-9)
     }
 }
