@@ -35,7 +35,9 @@
 //! the ratio, positive when the output leads.
 #![forbid(unsafe_code)]
 
-pub use flexspline_mechanics::{condense, contact, drive, fem, mesh, motion, reference, stepping, suggest, toml_file, units};
+pub use flexspline_mechanics::{
+    condense, contact, drive, fem, mesh, motion, reference, stepping, suggest, toml_file, units,
+};
 
 pub mod causes;
 pub mod cli;

@@ -32,6 +32,7 @@ pub mod select;
 #[cfg(test)]
 mod tests;
 mod thinned;
+pub mod thresholds;
 pub mod trace;
 mod uncertainty;
 mod verdict;

@@ -9,9 +9,7 @@ use super::model::{Problem, Scaffold, Term};
 use super::noise::{Noise, Whitener};
 use super::report::Unexplained;
 use super::select::Selected;
-
-/// Below this a line in time is no different from wander, Hz.
-const SLOWEST_LINE_HZ: f64 = 0.15;
+use super::thresholds::remainder::*;
 
 /// A line found in what is left.
 #[derive(Clone, Debug, PartialEq)]
@@ -136,15 +134,6 @@ pub fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[Law], whi
     found.truncate(1);
     found
 }
-
-/// Evidence for a free function in what is left.
-const LEAST_EVIDENCE: f64 = 15.0;
-/// A wander beyond this, arcsec and in units of the white noise, is no noise of a sensor.
-const MOST_WANDER_ARCSEC: f64 = 7.0;
-const MOST_WANDER_OF_WHITE: f64 = 2.5;
-
-/// Innovations that are worth less than this are no noise: something moves in them that the wander cannot follow.
-const LEAST_WORTH: f64 = 0.35;
 
 /// Slow motion that is too large for noise, or too orderly.
 #[must_use]

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::candidate::Law;
 use super::model::{Fit, Problem, Scaffold, Term, among_each_other};
 use super::select::{Bests, Selected, Standing, begun, fit, less, predicted, settle, size_of, sound};
+use super::thresholds::rivals::*;
 use super::trace::{Gate, Judged};
 use crate::causes::CauseName;
 
@@ -20,27 +21,6 @@ pub struct Rival {
     /// What it adds to the others is no more than what their laws may be wrong by.
     pub mops_up: bool,
 }
-
-/// Rise of the misfit up to which two causes are not told apart: five standard deviations.
-const TOLD_APART: f64 = 25.0;
-/// The same of a base parameter out of its tolerance, for which the nominal model may stand in.
-const OUT_OF_TOLERANCE_APART: f64 = 5.0;
-/// Up to this rise the other causes are refined anew beside a rival.
-const SETTLED_BELOW: f64 = 400.0;
-/// A rival whose rise on a sample says less than this of all rows is refitted to all of them: twice what others are settled below.
-const NEAR: f64 = 2.0 * SETTLED_BELOW;
-/// How much farther away a law may begin that a lead leads to.
-const FARTHER: f64 = 10.0;
-/// Predictions closer than this (arcsec rms, or this share of the cause's size) are not told apart by any law known this well.
-const SAME_ARCSEC: f64 = 0.5;
-const SAME_SHARE: f64 = 0.12;
-
-/// A rival tells the data better that lowers the misfit by this: five standard deviations, and a share of what was there for one that has
-/// more columns to do it with.
-const TOLD_BETTER: f64 = -100.0;
-
-/// A rival whose prediction differs by more than this share of a cause's size tells something else.
-const IN_ITS_PLACE: f64 = 0.9;
 
 impl Rival {
     /// Whether a cause of this size holds against it: it is not told better by it, and is told apart from it.

@@ -9,43 +9,10 @@ use rayon::prelude::*;
 use super::candidate::{Coefficients, Law, Role, Tolerance};
 use super::linear::Gram;
 use super::model::{Fit, Problem, Scaffold, Term, among_each_other, white_columns};
+use super::thresholds::selection::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
 use crate::causes::CauseName;
 
-/// Evidence (natural logarithm of the ratio) below which nothing is named: "very strong" by Kass & Raftery (1995).
-const LEAST_EVIDENCE: f64 = 6.0;
-/// A base parameter is out of tolerance when it is held at its limit.
-const OUT_OF_TOLERANCE: f64 = super::model::TOLERANCE - 0.05;
-/// What a term adds counts up to this many times what the nominal model, within its tolerance, cannot take over from it.
-const TAKEN_OVER: f64 = 2.5;
-/// A wind-up or a clearance cannot lose more of itself than this: beyond, something else stands in for it.
-const LARGEST_SHARE_LOST: f64 = 0.95;
-/// Least size of a contribution, arcsec.
-const LEAST_ARCSEC: f64 = 1.5;
-/// Least size in units of the white noise.
-const LEAST_OF_NOISE: f64 = 0.3;
-/// Evidence beyond which a cause may be smaller than that, and how much smaller.
-const CLEAR_EVIDENCE: f64 = 15.0;
-const LEAST_IF_CLEAR: f64 = 0.55;
-/// And at least this share of the strongest.
-const LEAST_OF_STRONGEST: f64 = 0.1;
-/// Where much of a cause shows while the play is crossed, those rows count up to this many times what it adds elsewhere.
-const IN_CROSSINGS: f64 = 3.0;
-/// Least size against what the laws of the other terms may be wrong by.
-const LEAST_OF_MISFIT: f64 = 1.0;
-/// The same for a deviation without a name.
-const LEAST_UNNAMED_OF_MISFIT: f64 = 1.5;
-/// Predictions are the same if they are closer than this, arcsec rms, and than this share of what they explain.
-const SAME_ARCSEC: f64 = 0.75;
-const SAME_SHARE: f64 = 0.04;
-/// Evidence within which what is simpler is taken: "not worth more than a bare mention" and "positive" by Kass & Raftery (1995).
-const AS_LIKELY: f64 = 3.0;
-/// A law takes the place of another only where what it explains differs from it by less than this share.
-const IN_PLACE: f64 = 0.7;
-/// Causes at most.
-const MOST_CAUSES: usize = 3;
-/// Unnamed deviations at most.
-const MOST_UNNAMED: usize = 3;
 /// Rounds at most.
 const MOST_ROUNDS: usize = 10;
 /// Of the laws refined, so many of the best settle with all other terms where they gain this share of what the best gains.
@@ -59,17 +26,6 @@ const NOTED: usize = 2;
 const EXCHANGED: usize = 4;
 /// Laws that are refined in each round of those that came close on a sample of the rows.
 const REFINED_AGAIN: usize = 4;
-/// A law comes close that gains no less than this, refined, on a sample: what all rows would tell just so (evidence 6) tells a quarter of
-/// them next to nothing.
-const CLOSE_GAIN: f64 = -3.0;
-/// And to one that was chosen, if it is behind by no more than this.
-const CLOSE_BEHIND: f64 = 8.0;
-/// Evidence that a law has to gain at all, refined; and a base parameter to be named.
-const LEAST_GAIN: f64 = 0.5;
-/// Evidence by which a cause has to be ahead of another to take its place.
-const AHEAD: f64 = 3.0;
-/// Evidence by which something unnamed has to be ahead of the best cause to be taken before it.
-const UNNAMED_AHEAD: f64 = 5.0;
 
 /// A selection and its fit.
 #[derive(Clone)]

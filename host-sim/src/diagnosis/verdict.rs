@@ -9,25 +9,11 @@ use super::model::{Fit, Problem, Term};
 use super::noise::Noise;
 use super::report::{Cause, Compensation, Diagnosis, HeldOut, Parameter, Residual, Unexplained, Verdict};
 use super::select::{self, Selected, Standing, fit, predicted, standings};
+use super::thresholds::verdict::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
 use super::uncertainty::{self, Known};
 use super::{Settings, experiment, held_out, rivals};
 use crate::causes::CauseName;
-
-/// Sessions left out are predicted no worse up to this: the least that counts is a small part of what noise leaves.
-const NO_WORSE: f64 = 1.001;
-/// What is left as a free function counts if it is larger than this against the strongest cause.
-const LEAST_LEFT_OF_STRONGEST: f64 = 0.25;
-/// Named causes that explain less than this share of what is explained at all are not named.
-const LEAST_NAMED_SHARE: f64 = 0.6;
-/// The same beside a deviation that is described well though it has no name.
-const LEAST_BESIDE_DESCRIBED: f64 = 0.05;
-/// Share of the square of what is beyond noise that may stay without any description where causes are named.
-const MOST_UNEXPLAINED: f64 = 0.5;
-/// Beside something without a name that is larger than this against a cause, what the cause adds has to be so many times the
-/// uncertainty of that: what is not understood may reach into it.
-const LARGE_BESIDE: f64 = 0.7;
-const KNOWN_BESIDE: f64 = 5.0;
 
 /// The verdict, with its causes and what is left.
 #[allow(clippy::too_many_arguments, reason = "all that a search has found")]
