@@ -23,11 +23,16 @@ pub struct Bench<'a> {
     /// Every `thin`th.
     thinned: Motion,
     thin: usize,
-    whitening: Whitening,
     /// Effects that are there besides.
     rest: Vec<Effect>,
     rest_arcsec: Vec<f64>,
     rest_fast_arcsec: Option<Vec<f64>>,
+    scales: Scales,
+}
+
+/// What contributions are weighed on: the noise, and what may float beside them.
+pub struct Scales {
+    whitening: Whitening,
     nuisance: Vec<Vec<f64>>,
     whitened: DMatrix<f64>,
     /// Weight of the prior of each nuisance column.
@@ -35,7 +40,9 @@ pub struct Bench<'a> {
 }
 
 /// Weight of the prior of a base parameter in units of its spread.
-const SPREAD: f64 = 1.0;
+pub const SPREAD: f64 = 1.0;
+/// Weight of the prior of what is free.
+pub const FREE: f64 = 1e-9;
 
 /// How an effect stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,18 +83,14 @@ impl<'a> Bench<'a> {
             rows,
             thinned,
             thin,
-            whitening,
             rest: rest.to_vec(),
             rest_arcsec: Vec::new(),
             rest_fast_arcsec: None,
-            nuisance: Vec::new(),
-            whitened: DMatrix::zeros(0, 0),
-            prior: Vec::new(),
+            scales: Scales::new(whitening, Vec::new()),
         };
         bench.rest_arcsec = bench.errors(unit, rest, false);
-        bench.float_base();
-        bench.float_rest();
-        bench.whitened = columns(&bench.nuisance.iter().map(|c| bench.whitening.apply(c)).collect::<Vec<_>>());
+        let floating = bench.floating_base().into_iter().chain(bench.floating_rest()).collect();
+        bench.scales = Scales::new(bench.scales.whitening, floating);
         bench
     }
 
@@ -101,9 +104,8 @@ impl<'a> Bench<'a> {
     }
 
     /// Base parameters, each by one standard deviation of its spread.
-    fn float_base(&mut self) {
-        self.nuisance.push(vec![1.0; self.rest_arcsec.len()]);
-        self.prior.push(1e-9);
+    fn floating_base(&self) -> Vec<(Vec<f64>, f64)> {
+        let mut floating = vec![(vec![1.0; self.rest_arcsec.len()], FREE)];
         let mut units = vec![
             Unit { stiffness: self.unit.stiffness + STIFFNESS_SPREAD, ..self.unit.clone() },
             Unit { backlash: self.unit.backlash + BACKLASH_SPREAD, ..self.unit.clone() },
@@ -118,13 +120,14 @@ impl<'a> Bench<'a> {
         }
         for unit in units {
             let moved = self.errors(&unit, &self.rest, false);
-            self.nuisance.push(difference(&moved, &self.rest_arcsec));
-            self.prior.push(SPREAD);
+            floating.push((difference(&moved, &self.rest_arcsec), SPREAD));
         }
+        floating
     }
 
     /// Numbers of the effects that are there besides: free.
-    fn float_rest(&mut self) {
+    fn floating_rest(&self) -> Vec<(Vec<f64>, f64)> {
+        let mut floating = Vec::new();
         for at in 0..self.rest.len() {
             for moved in tangents(&self.rest[at], self.drive) {
                 let mut effects = self.rest.clone();
@@ -132,11 +135,11 @@ impl<'a> Bench<'a> {
                 let moved = self.errors(self.unit, &effects, false);
                 let column = difference(&moved, &self.rest_arcsec);
                 if column.iter().any(|x| x.abs() > 1e-9) {
-                    self.nuisance.push(column);
-                    self.prior.push(1e-6);
+                    floating.push((column, 1e-6));
                 }
             }
         }
+        floating
     }
 
     /// Angles between the axes of the housing and those of gravity, either way: none, and those of the run.
@@ -169,6 +172,25 @@ impl<'a> Bench<'a> {
             &with,
             if fast { self.rest_fast_arcsec.as_ref().unwrap_or(&self.rest_arcsec) } else { &self.rest_arcsec },
         )
+    }
+
+    /// Weighs a contribution against the base parameters.
+    pub fn weigh(&self, contribution: &[f64]) -> Weight {
+        self.scales.weigh(contribution)
+    }
+
+    /// The same with further columns that may take it up freely; also their coefficients.
+    pub fn weigh_beside(&self, contribution: &[f64], beside: &[(Vec<f64>, f64)]) -> (Weight, Vec<f64>) {
+        self.scales.weigh_beside(contribution, beside)
+    }
+}
+
+impl Scales {
+    /// Scales for noise of this kind, with columns that float and the weight of the prior of each.
+    pub fn new(whitening: Whitening, floating: Vec<(Vec<f64>, f64)>) -> Self {
+        let (nuisance, prior): (Vec<_>, Vec<_>) = floating.into_iter().unzip();
+        let whitened = columns(&nuisance.iter().map(|c| whitening.apply(c)).collect::<Vec<_>>());
+        Self { whitening, nuisance, whitened, prior }
     }
 
     /// Weighs a contribution against the base parameters.

@@ -8,6 +8,7 @@ use crate::chance::Chance;
 use crate::drive::{Drive, Unit};
 use crate::effect::{Effect, Family, What};
 use crate::fault::Fault;
+use crate::fresh::logger::LoggerFault;
 use crate::motion::{Motion, Poor};
 use crate::noise::{Sensors, csv};
 use crate::outside::Outside;
@@ -27,20 +28,67 @@ pub enum Kind {
     Outside,
     /// A fault of the data: drawn only when asked for.
     Fault,
+    /// A perfect drive under a fault of the logger: drawn only when asked for.
+    Logger,
+}
+
+impl Kind {
+    /// In truth files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Null => "null",
+            Self::Single => "single",
+            Self::Compound => "compound",
+            Self::Outside => "outside",
+            Self::Fault => "fault",
+            Self::Logger => "logger",
+        }
+    }
+}
+
+/// Whose plant: three sets of laws for one plant, and two plants of their own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, clap::ValueEnum)]
+pub enum Plant {
+    /// The plainer textbook laws.
+    A,
+    /// Other laws for the same physics.
+    B,
+    /// A third set.
+    C,
+    /// A joint in motion: inertia, servo, polled encoders.
+    D,
+    /// A slow bench for metrology: stops, weights, sessions set to zero anew.
+    E,
+}
+
+impl Plant {
+    /// Laws of the first plant.
+    fn laws(self) -> Option<Family> {
+        match self {
+            Self::A => Some(Family::A),
+            Self::B => Some(Family::B),
+            Self::C => Some(Family::C),
+            Self::D | Self::E => None,
+        }
+    }
 }
 
 /// Which cases are drawn.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct Draw {
-    /// Laws of one family alone [default: all three, case by case]
+    /// One family alone [default: A, B and C, case by case]
     #[arg(long, value_enum, ignore_case = true)]
-    pub family: Option<Family>,
-    /// Cases of one kind alone [default: in 25 cases 5 nulls, 10 singles, 6 compounds, 4 outside the library]
+    pub family: Option<Plant>,
+    /// Cases of one kind alone [default: in 25 cases 5 nulls, 10 singles, 6 compounds, 4 outside the library; of families D and
+    /// E in 10 cases 2, 5, 1 and 2]
     #[arg(long, value_enum)]
     pub kind: Option<Kind>,
     /// Singles of one cause alone
     #[arg(long, value_name = "NAME")]
     pub cause: Option<Cause>,
+    /// With `--kind logger`: this fault alone [default: each in turn]
+    #[arg(long, value_enum, value_name = "NAME")]
+    pub fault: Option<LoggerFault>,
     /// Poor excitation: of this kind in every case, or `--rich` for none [default: in 6 of 25 cases]
     #[arg(long, value_enum)]
     pub poor: Option<Poor>,
@@ -53,6 +101,11 @@ pub struct Draw {
 }
 
 impl Draw {
+    /// Whether the cases come from the plants of [`crate::fresh`].
+    pub fn is_fresh(&self) -> bool {
+        self.kind == Some(Kind::Logger) || self.family.is_some_and(|family| family.laws().is_none())
+    }
+
     /// As it would be typed.
     pub fn options(&self) -> String {
         let mut text = String::new();
@@ -66,6 +119,7 @@ impl Draw {
         add("family", self.family.and_then(|f| name(f.to_possible_value())));
         add("kind", self.kind.and_then(|k| name(k.to_possible_value())));
         add("cause", self.cause.map(|c| c.name().to_owned()));
+        add("fault", self.fault.map(|f| f.name().to_owned()));
         add("poor", self.poor.and_then(|p| name(p.to_possible_value())));
         if self.rich {
             text.push_str(" --rich");
@@ -113,7 +167,8 @@ impl Case {
     pub fn draw(seed: u64, index: u64, draw: &Draw) -> Self {
         let plan = Plan::new(seed, index, draw);
         let mut chance = Chance::new(seed, "case", index);
-        let family = draw.family.unwrap_or(*chance.of(&Family::ALL));
+        let drawn = *chance.of(&Family::ALL);
+        let family = draw.family.and_then(Plant::laws).unwrap_or(drawn);
         let name = Self::name(seed, index);
         let drive = Drive::draw(&mut chance);
         let unit = Unit::draw(&drive, family, &mut chance);
@@ -221,7 +276,7 @@ impl Plan {
         }
         let mut chance = Chance::new(seed, "plan", index);
         let hidden = match kind {
-            Kind::Null | Kind::Fault => Vec::new(),
+            Kind::Null | Kind::Fault | Kind::Logger => Vec::new(),
             Kind::Single => vec![What::Cause(
                 draw.cause.unwrap_or_else(|| Cause::ALL[in_turn(number, Cause::ALL.len(), "singles")]),
             )],
@@ -285,7 +340,7 @@ mod tests {
             .into_iter()
             .enumerate()
         {
-            for family in Family::ALL {
+            for family in [Plant::A, Plant::B, Plant::C] {
                 let draw =
                     Draw { family: Some(family), cause: Some(cause), clear: true, rich: true, ..Draw::default() };
                 for index in 0..3 {

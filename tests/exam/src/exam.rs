@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use crate::answer::Answer;
 use crate::case::{Case, Draw};
+use crate::question;
 use crate::score::{Judged, Scores, judge};
 use crate::truth::{Truth, commitment};
 
@@ -63,7 +64,7 @@ pub struct Examination {
 pub fn run(settings: &Settings) -> io::Result<Examination> {
     let truths = in_parallel(settings.jobs, (0..settings.cases).collect(), |index| match &settings.revealed {
         Some(dir) => Truth::read(&dir.join(format!("{}.json", Case::name(settings.seed, index)))),
-        None => Ok(Truth::of(&Case::draw(settings.seed, index, &settings.draw))),
+        None => Ok(question::truth(settings.seed, index, &settings.draw)),
     });
     let truths = truths.into_iter().collect::<io::Result<Vec<Truth>>>()?;
     let commitment = commitment(&truths);
@@ -112,9 +113,9 @@ fn ask(settings: &Settings, index: u64, name: &str) -> io::Result<(Result<Answer
     fs::create_dir_all(&given)?;
     fs::create_dir_all(&answered)?;
     {
-        let case = Case::draw(settings.seed, index, &settings.draw);
-        fs::write(given.join("data.csv"), case.data())?;
-        fs::write(given.join("nominal.toml"), case.drive.nominal_toml())?;
+        let files = question::files(settings.seed, index, &settings.draw);
+        fs::write(given.join("data.csv"), files.data)?;
+        fs::write(given.join("nominal.toml"), files.nominal)?;
     }
     let mut command = Command::new(&settings.program[0]);
     command

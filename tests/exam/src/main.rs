@@ -10,9 +10,10 @@ use std::process::ExitCode;
 use flexspline_exam::case::{Case, Draw};
 use flexspline_exam::chance::Chance;
 use flexspline_exam::exam::{self, Settings};
+use flexspline_exam::fresh::Fresh;
 use flexspline_exam::plant;
+use flexspline_exam::question;
 use flexspline_exam::score::Scores;
-use flexspline_exam::truth::Truth;
 
 /// Examines `flexspline diagnose` on data from a plant of its own.
 #[derive(Parser)]
@@ -172,7 +173,7 @@ fn run(options: Run) -> io::Result<bool> {
         for case in wrong {
             let hidden: Vec<_> = case.hidden.iter().map(|(name, over)| format!("{name} ×{over:.1}")).collect();
             println!(
-                "  index {:<4} {} {} {:<9} {:<60} said {} [{}] {}",
+                "  index {:<4} {} {} {:<9} {:<60} said {} [{}] faults [{}] {} {}",
                 case.index,
                 case.name,
                 case.family,
@@ -180,7 +181,9 @@ fn run(options: Run) -> io::Result<bool> {
                 hidden.join(" + "),
                 case.verdict,
                 case.named.join(", "),
+                case.faults.join(", "),
                 case.poor.join(" "),
+                case.bench.join(" "),
             );
         }
     }
@@ -193,13 +196,16 @@ fn run(options: Run) -> io::Result<bool> {
 }
 
 fn one(options: &One) -> io::Result<()> {
-    let case = Case::draw(options.seed, options.index, &options.draw);
+    let (seed, index, draw) = (options.seed, options.index, &options.draw);
     fs::create_dir_all(&options.out)?;
     let write = |name: &str, text: String| fs::write(options.out.join(name), text);
-    write("data.csv", case.data())?;
-    write("nominal.toml", case.drive.nominal_toml())?;
-    write("truth.json", Truth::of(&case).json())?;
-    write("parts.csv", parts(&case))?;
+    let files = question::files(seed, index, draw);
+    write("data.csv", files.data)?;
+    write("nominal.toml", files.nominal)?;
+    write("truth.json", question::truth(seed, index, draw).json())?;
+    let of_parts =
+        if draw.is_fresh() { Fresh::draw(seed, index, draw).parts() } else { parts(&Case::draw(seed, index, draw)) };
+    write("parts.csv", of_parts)?;
     print!("{}", fs::read_to_string(Path::new(&options.out).join("truth.json"))?);
     Ok(())
 }

@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn truthful(dir: &Path, data: &Path) -> Result<Value, Box<dyn Error>> {
     let case = data.parent().and_then(Path::file_name).ok_or("data without a directory")?;
     let truth: Truth = serde_json::from_str(&fs::read_to_string(dir.join(case).with_extension("json"))?)?;
-    let (outside, fault) = (truth.kind == "outside", truth.kind == "fault");
+    let (outside, fault) = (truth.kind == "outside", truth.kind == "fault" || truth.kind == "logger");
     let counted: Vec<_> = truth.hidden.iter().filter(|hidden| hidden.counts()).collect();
     let causes: Vec<Value> = counted
         .iter()

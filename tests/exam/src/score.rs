@@ -21,6 +21,10 @@ pub struct Judged {
     pub family: String,
     /// What the excitation lacks.
     pub poor: Vec<String>,
+    /// What the bench does beside the drive.
+    pub bench: Vec<String>,
+    /// Faults of the data that were named.
+    pub faults: Vec<String>,
     /// What is hidden, with the times over the limit.
     pub hidden: Vec<(String, f64)>,
     /// What was named.
@@ -49,6 +53,12 @@ pub struct Judged {
     pub fault_blamed: Option<bool>,
     /// A fault was named in data that have none.
     pub fault_invented: Option<bool>,
+    /// A cause was named for a fault of the logger.
+    pub logger_named: Option<bool>,
+    /// A cause was named for a fault of the logger that is not the same thing by another name.
+    pub logger_misled: Option<bool>,
+    /// A fault of the logger that can be told was told.
+    pub logger_told: Option<bool>,
     /// A wrong name on what cannot be detected.
     pub below_limit_misnamed: Option<bool>,
     /// A cause that is not there was named beside or instead.
@@ -77,6 +87,8 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
         kind: truth.kind.clone(),
         family: truth.family.clone(),
         poor: truth.poor.clone(),
+        bench: truth.bench.clone(),
+        faults: Vec::new(),
         hidden: truth.hidden.iter().map(|hidden| (hidden.name.clone(), hidden.over_limit)).collect(),
         named: Vec::new(),
         verdict: String::new(),
@@ -91,6 +103,9 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
         fault_named: None,
         fault_blamed: None,
         fault_invented: None,
+        logger_named: None,
+        logger_misled: None,
+        logger_told: None,
         below_limit_misnamed: None,
         false_name: None,
         removed: None,
@@ -113,12 +128,15 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
         judged.verdict.clone_from(&answer.verdict);
     }
     judged.named = answer.causes.iter().map(|cause| cause.name.clone()).collect();
+    judged.faults = answer.data_faults.iter().map(|fault| fault.name.clone()).collect();
     let is_hidden = |name: &str| truth.hidden.iter().any(|hidden| hidden.is_called(name));
     let any_named = !answer.causes.is_empty();
     match truth.kind.as_str() {
         "null" => {
             judged.null_named = Some(any_named);
-            judged.null_not_none = Some(answer.verdict != "none");
+            // A bench that was set to zero anew, or whose counter started again, is a discrepancy of its own.
+            let quiet = truth.bench.iter().all(|what| what == "chamber");
+            judged.null_not_none = quiet.then(|| answer.verdict != "none");
         }
         "outside" if !truth.outside_looks_named() => {
             judged.outside_named = Some(any_named);
@@ -129,6 +147,14 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
         "fault" => {
             judged.fault_named = Some(answer.data_faults.iter().any(|fault| is_hidden(&fault.name)));
             judged.fault_blamed = Some(any_named);
+        }
+        "logger" => {
+            judged.logger_named = Some(any_named);
+            judged.logger_misled = Some(judged.named.iter().any(|name| !is_hidden(name)));
+            if truth.hidden.iter().any(|hidden| hidden.counts()) {
+                let told = judged.faults.iter().chain(&judged.named).any(|name| is_hidden(name));
+                judged.logger_told = Some(told);
+            }
         }
         "single" | "compound" => {
             let counted: Vec<_> = truth.hidden.iter().filter(|hidden| hidden.counts()).collect();
@@ -178,7 +204,7 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
         }
         _ => {}
     }
-    if truth.kind == "null" {
+    if truth.kind == "null" && truth.bench.iter().all(|what| what == "chamber") {
         judged.fault_invented = Some(!answer.data_faults.is_empty());
     }
     judged.confidence = answer
@@ -200,6 +226,36 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
     judged
 }
 
+/// Of the causes named with a confidence, how many are right.
+#[derive(Debug, Clone, Serialize)]
+pub struct Reliability {
+    /// Least and largest confidence of each bin, mean confidence of its names, and how many are right.
+    pub bins: Vec<(f64, f64, f64, Rate)>,
+}
+
+/// Bounds of the bins. The last holds what is stated as 99 % and more.
+const CONFIDENCE: [f64; 7] = [0.0, 0.5, 0.7, 0.9, 0.97, 0.99, 1.0];
+
+impl Reliability {
+    /// From (confidence, right) of each name.
+    pub fn of(names: &[(f64, bool)]) -> Self {
+        let bins = CONFIDENCE.windows(2).map(|b| {
+            let last = b[1] == 1.0;
+            let within = names.iter().filter(|(p, _)| *p >= b[0] && (last || *p < b[1]));
+            let within: Vec<_> = within.collect();
+            let mean = within.iter().map(|(p, _)| p).sum::<f64>() / within.len().max(1) as f64;
+            (b[0], b[1], mean, Rate::over(within.iter().map(|(_, right)| Some(*right))))
+        });
+        Self { bins: bins.collect() }
+    }
+
+    fn write(&self, text: &mut String) {
+        for (from, to, mean, rate) in self.bins.iter().filter(|(.., rate)| rate.of > 0) {
+            let _ = writeln!(text, "  {from:.2} .. {to:.2} (mean {mean:.3}) {rate}");
+        }
+    }
+}
+
 /// All cases together.
 #[derive(Debug, Clone, Serialize)]
 pub struct Scores {
@@ -211,8 +267,12 @@ pub struct Scores {
     pub removed_median: f64,
     /// Mean square of confidence less right.
     pub brier: f64,
-    /// By stated confidence: lower bound, names, share right.
-    pub reliability: Vec<(f64, usize, f64)>,
+    /// Share right by stated confidence.
+    pub reliability: Reliability,
+    /// The same of each family.
+    pub reliability_by_family: Vec<(String, Reliability)>,
+    /// Rates of each family.
+    pub families: Vec<(String, Vec<(&'static str, Rate)>)>,
     /// Found against times over the limit of detection: bounds, rate.
     pub by_size: Vec<(f64, f64, Rate)>,
     /// By hidden cause (singles that count): what came first, how often.
@@ -238,6 +298,8 @@ impl Scores {
             ("first_name_family_a", rate(&|j| when(single(j) && j.family == "A", j.first))),
             ("first_name_family_b", rate(&|j| when(single(j) && j.family == "B", j.first))),
             ("first_name_family_c", rate(&|j| when(single(j) && j.family == "C", j.first))),
+            ("first_name_family_d", rate(&|j| when(single(j) && j.family == "D", j.first))),
+            ("first_name_family_e", rate(&|j| when(single(j) && j.family == "E", j.first))),
             ("first_name_strict", rate(&|j| when(single(j), j.first_strict))),
             ("first_name_or_listed", rate(&|j| when(single(j), j.first_or_listed))),
             ("exact", rate(&|j| when(single(j), j.exact))),
@@ -252,6 +314,9 @@ impl Scores {
             ("fault_named", rate(&|j| j.fault_named)),
             ("fault_blamed_on_a_cause", rate(&|j| j.fault_blamed)),
             ("fault_invented", rate(&|j| j.fault_invented)),
+            ("logger_named", rate(&|j| j.logger_named)),
+            ("logger_misled", rate(&|j| j.logger_misled)),
+            ("logger_told", rate(&|j| j.logger_told)),
             ("worse_than_recalibrated", rate(&|j| j.worse)),
             ("failed", rate(&|j| Some(j.failed))),
         ];
@@ -274,17 +339,43 @@ impl Scores {
         let spread = (removed.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count / count).sqrt();
 
         let names: Vec<(f64, bool)> = all.iter().flat_map(|j| j.confidence.iter().copied()).collect();
-        let brier = names.iter().map(|(p, right)| (p - f64::from(u8::from(*right))).powi(2)).sum::<f64>()
-            / names.len().max(1) as f64;
-        let bounds = [0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.01];
-        let reliability = bounds
-            .windows(2)
-            .map(|b| {
-                let within: Vec<_> = names.iter().filter(|(p, _)| (b[0]..b[1]).contains(p)).collect();
-                let right = within.iter().filter(|(_, right)| *right).count();
-                (b[0], within.len(), right as f64 / within.len().max(1) as f64)
+        let mut families: Vec<String> = all.iter().map(|j| j.family.clone()).collect();
+        families.sort();
+        families.dedup();
+        let reliability_by_family = families
+            .iter()
+            .map(|family| {
+                let of: Vec<_> =
+                    all.iter().filter(|j| j.family == *family).flat_map(|j| j.confidence.clone()).collect();
+                (family.clone(), Reliability::of(&of))
             })
             .collect();
+        let families = families
+            .into_iter()
+            .map(|family| {
+                let of: Vec<_> = all.iter().filter(|j| j.family == family).collect();
+                let rate = |ask: &dyn Fn(&Judged) -> Option<bool>| Rate::over(of.iter().map(|j| ask(j)));
+                let rates = vec![
+                    ("first_name", rate(&|j| when(single(j), j.first))),
+                    ("first_name_or_listed", rate(&|j| when(single(j), j.first_or_listed))),
+                    ("exact", rate(&|j| when(single(j), j.exact))),
+                    ("compound_exact", rate(&|j| when(j.kind == "compound", j.exact))),
+                    ("false_name", rate(&|j| j.false_name)),
+                    ("null_named", rate(&|j| j.null_named)),
+                    ("null_not_none", rate(&|j| j.null_not_none)),
+                    ("fault_invented", rate(&|j| j.fault_invented)),
+                    ("outside_named", rate(&|j| j.outside_named)),
+                    ("outside_unknown", rate(&|j| j.outside_unknown)),
+                    ("logger_named", rate(&|j| j.logger_named)),
+                    ("logger_told", rate(&|j| j.logger_told)),
+                    ("failed", rate(&|j| Some(j.failed))),
+                ];
+                (family, rates)
+            })
+            .collect();
+        let brier = names.iter().map(|(p, right)| (p - f64::from(u8::from(*right))).powi(2)).sum::<f64>()
+            / names.len().max(1) as f64;
+        let reliability = Reliability::of(&names);
 
         let sizes = [0.0, 0.3, 0.6, 1.0, 1.5, 2.5, 5.0, 10.0, 1e9];
         let singles: Vec<_> = all.iter().filter(|j| single(j)).collect();
@@ -313,6 +404,8 @@ impl Scores {
             removed_median: middle(&removed),
             brier,
             reliability,
+            reliability_by_family,
+            families,
             by_size,
             confusion,
             coverage,
@@ -342,9 +435,21 @@ impl Scores {
             "  Brier {:.4}; run time median {:.1} s, largest {:.1} s",
             self.brier, self.seconds.0, self.seconds.1
         );
-        text.push_str("\nstated confidence from: names, share right\n");
-        for (from, count, right) in self.reliability.iter().filter(|(_, count, _)| *count > 0) {
-            let _ = writeln!(text, "  {from:.2}: {count}, {right:.2}");
+        if self.families.len() > 1 {
+            for (family, rates) in &self.families {
+                let _ = writeln!(text, "\nfamily {family}");
+                for (name, rate) in rates.iter().filter(|(_, rate)| rate.of > 0) {
+                    let _ = writeln!(text, "  {name:<26}{rate}");
+                }
+            }
+        }
+        text.push_str("\nnamed with a confidence: of these right\n");
+        self.reliability.write(&mut text);
+        if self.reliability_by_family.len() > 1 {
+            for (family, reliability) in &self.reliability_by_family {
+                let _ = writeln!(text, "  family {family}");
+                reliability.write(&mut text);
+            }
         }
         text.push_str("\nsingles by size (times the limit of detection): first name right\n");
         for (from, to, rate) in self.by_size.iter().filter(|(_, _, rate)| rate.of > 0) {
@@ -374,7 +479,8 @@ impl Judged {
             || self.exact == Some(false)
             || [self.null_named, self.outside_named, self.below_limit_misnamed, self.worse].contains(&Some(true))
             || [self.outside_unknown, self.fault_named].contains(&Some(false))
-            || [self.fault_blamed, self.fault_invented].contains(&Some(true))
+            || [self.fault_blamed, self.fault_invented, self.logger_named].contains(&Some(true))
+            || self.logger_told == Some(false)
             || self.null_not_none == Some(true)
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::{fs, io};
 
 use crate::bench::Bench;
-use crate::case::{Case, Kind};
+use crate::case::Case;
 use crate::cause::Cause;
 use crate::chance::Chance;
 use crate::drive::{Drive, Unit};
@@ -55,12 +55,15 @@ pub struct Truth {
     pub seed: u64,
     /// Of the case.
     pub index: u64,
-    /// null, single, compound, outside, fault.
+    /// null, single, compound, outside, fault, logger.
     pub kind: String,
-    /// A, B or C.
+    /// A to E, or logger.
     pub family: String,
     /// What the excitation lacks.
     pub poor: Vec<String>,
+    /// What the bench of family E does beside the drive.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub bench: Vec<String>,
     /// Hidden effects.
     pub hidden: Vec<Hidden>,
     /// All hidden effects together beyond what base parameters take up, rms.
@@ -120,16 +123,10 @@ impl Truth {
             name: case.name.clone(),
             seed: case.seed,
             index: case.index,
-            kind: match case.kind {
-                Kind::Null => "null",
-                Kind::Single => "single",
-                Kind::Compound => "compound",
-                Kind::Outside => "outside",
-                Kind::Fault => "fault",
-            }
-            .to_owned(),
+            kind: case.kind.name().to_owned(),
             family: format!("{:?}", case.family),
             poor: case.poor.iter().map(|poor| format!("{poor:?}")).collect(),
+            bench: Vec::new(),
             hidden,
             removable_rms_arcsec: rounded(removable_rms_arcsec),
             floor_arcsec: rounded(case.sensors.all_arcsec(&case.drive)),
@@ -144,7 +141,8 @@ impl Truth {
     }
 }
 
-fn rounded(value: f64) -> f64 {
+/// To four digits, as truth files hold it.
+pub fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }
 
