@@ -273,6 +273,8 @@ pub struct Scores {
     pub reliability_by_family: Vec<(String, Reliability)>,
     /// Rates of each family.
     pub families: Vec<(String, Vec<(&'static str, Rate)>)>,
+    /// First name right where the bench does this beside the drive, or nothing (singles that count).
+    pub by_bench: Vec<(String, Rate)>,
     /// Found against times over the limit of detection: bounds, rate.
     pub by_size: Vec<(f64, f64, Rate)>,
     /// By hidden cause (singles that count): what came first, how often.
@@ -377,6 +379,16 @@ impl Scores {
             / names.len().max(1) as f64;
         let reliability = Reliability::of(&names);
 
+        let mut benches: Vec<&String> = all.iter().flat_map(|j| &j.bench).collect();
+        benches.sort();
+        benches.dedup();
+        let with = |what: &String| rate(&|j| when(single(j) && j.bench.contains(what), j.first));
+        let mut by_bench: Vec<(String, Rate)> = benches.into_iter().map(|what| (what.clone(), with(what))).collect();
+        if !by_bench.is_empty() {
+            let plain = rate(&|j| when(single(j) && j.bench.iter().all(|what| what == "chamber"), j.first));
+            by_bench.push(("one zero, one count".to_owned(), plain));
+        }
+
         let sizes = [0.0, 0.3, 0.6, 1.0, 1.5, 2.5, 5.0, 10.0, 1e9];
         let singles: Vec<_> = all.iter().filter(|j| single(j)).collect();
         let by_size = sizes
@@ -406,6 +418,7 @@ impl Scores {
             reliability,
             reliability_by_family,
             families,
+            by_bench,
             by_size,
             confusion,
             coverage,
@@ -451,6 +464,12 @@ impl Scores {
                 reliability.write(&mut text);
             }
         }
+        if !self.by_bench.is_empty() {
+            text.push_str("\nsingles by what the bench does: first name right\n");
+            for (what, rate) in &self.by_bench {
+                let _ = writeln!(text, "  {what:<26}{rate}");
+            }
+        }
         text.push_str("\nsingles by size (times the limit of detection): first name right\n");
         for (from, to, rate) in self.by_size.iter().filter(|(_, _, rate)| rate.of > 0) {
             let to = if *to > 1e6 { "".to_owned() } else { format!("{to}") };
@@ -482,5 +501,18 @@ impl Judged {
             || [self.fault_blamed, self.fault_invented, self.logger_named].contains(&Some(true))
             || self.logger_told == Some(false)
             || self.null_not_none == Some(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_confidence_falls_into_one_bin() {
+        let names =
+            [(0.5, true), (0.69, false), (0.7, true), (0.97, true), (0.9899, false), (0.99, true), (1.0, false)];
+        let counts: Vec<_> = Reliability::of(&names).bins.iter().map(|(.., rate)| (rate.right, rate.of)).collect();
+        assert_eq!(counts, [(0, 0), (1, 2), (1, 1), (0, 0), (1, 2), (1, 2)]);
     }
 }

@@ -91,6 +91,52 @@ fn faults_of_the_data_are_drawn_and_counted_when_asked_for() {
 }
 
 #[test]
+fn a_plant_of_its_own_is_scored_by_the_same_rules() {
+    let dir = tempfile::tempdir().unwrap();
+    let open = dir.path().join("open").display().to_string();
+    let bench = ["--cases", "20", "--family", "e"];
+    let knows = ["--manner", "truth", "--truth", &open];
+    let (exam, _) = examine(dir.path(), &knows, &[&bench[..], &["--reveal", &open]].concat());
+    for name in ["first_name", "first_name_family_e", "first_name_strict", "exact", "compound_exact", "outside_unknown"]
+    {
+        all(&exam, name);
+    }
+    for name in ["false_name", "null_named", "outside_named", "failed"] {
+        none(&exam, name);
+    }
+    // Its names are stated as certain and are right, so the last bin holds all of them.
+    let bins = exam["scores"]["reliability"]["bins"].as_array().unwrap();
+    let (last, others) = bins.split_last().unwrap();
+    assert!(last[3]["of"].as_u64().unwrap() >= 12 && last[3]["of"] == last[3]["right"], "{last}");
+    assert!(others.iter().all(|bin| bin[3]["of"] == 0));
+    assert_eq!(exam["scores"]["families"][0][0], "E");
+    let (exam, _) = examine(dir.path(), &["--manner", "always"], &bench);
+    all(&exam, "null_named");
+    all(&exam, "outside_named");
+    assert!(exam["scores"]["reliability"]["bins"][5][3]["right"].as_u64().unwrap() < 5);
+}
+
+#[test]
+fn faults_of_loggers_are_told_or_blamed_on_a_cause() {
+    let dir = tempfile::tempdir().unwrap();
+    let open = dir.path().join("open").display().to_string();
+    let faults = ["--cases", "3", "--kind", "logger"];
+    let knows = ["--manner", "truth", "--truth", &open];
+    let (exam, _) = examine(dir.path(), &knows, &[&faults[..], &["--reveal", &open]].concat());
+    all(&exam, "logger_told");
+    none(&exam, "logger_named");
+    // A skew of the reads is a delay by another name: naming that misleads nobody.
+    let skew = ["--manner", "always", "--cause", "sensor_latency"];
+    let (exam, _) = examine(dir.path(), &skew, &["--cases", "1", "--kind", "logger", "--fault", "read_skew"]);
+    all(&exam, "logger_named");
+    all(&exam, "logger_told");
+    none(&exam, "logger_misled");
+    let (exam, _) = examine(dir.path(), &["--manner", "always"], &["--cases", "1", "--kind", "logger"]);
+    all(&exam, "logger_misled");
+    none(&exam, "logger_told");
+}
+
+#[test]
 fn one_that_never_names_anything_finds_and_misnames_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let (exam, passed) = examine_again(dir.path(), &["--manner", "none"], &["--at-least", "first_name=0.9"]);

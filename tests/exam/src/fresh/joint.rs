@@ -175,7 +175,8 @@ impl Joint {
             poll: Poll {
                 row_s: 1.0 / rate_hz,
                 late_s: chance.log_uniform(2e-5, 4e-4),
-                skew_s: chance.uniform(0.0, 1.5e-5),
+                // Less than any of these logs can show.
+                skew_s: chance.uniform(0.0, 1e-6),
                 jitter_s: chance.log_uniform(3e-6, 2e-5),
                 late_reads: 0.0,
                 stalls_s: (0.0, 0.0),
@@ -285,13 +286,15 @@ impl Joint {
         let hub = free.clamp(teeth + low, teeth + high);
         // Spring and what slips beside it.
         let x = state.output_arcsec() - hub;
-        let rate = (x - state.deflection_arcsec) / STEP_S;
+        // Between the flanks the hub has neither mass nor speed of its own, so nothing for the damper to hold on to.
+        let pushed = hub != free;
+        let rate = if pushed && state.pushed { (x - state.deflection_arcsec) / STEP_S } else { 0.0 };
+        state.pushed = pushed;
         state.slip(gear, x);
         state.deflection_arcsec = x;
         let elastic = gear.torque(x, place) + state.slipping_n_m;
         let spring = elastic + self.damping * rate / ARCSEC;
         let hub_speed = (hub - state.hub_arcsec) / STEP_S / ARCSEC;
-        let pushed = hub != free;
         let hub_friction = friction * (hub_speed / 1e-5).tanh();
         let push = if pushed { hub_friction - spring } else { 0.0 };
         let slope = 1.0 / ratio + gear.lines(state.generator_rad).1 / ARCSEC;
@@ -421,6 +424,8 @@ struct State {
     integral: f64,
     /// Hub, arcsec.
     hub_arcsec: f64,
+    /// A flank pushes it.
+    pushed: bool,
     output_rad: f64,
     output_speed: f64,
     /// Torque in the spring, N m.
@@ -441,6 +446,7 @@ impl State {
             motor_speed: 0.0,
             integral: 0.0,
             hub_arcsec: middle,
+            pushed: false,
             output_rad: middle / ARCSEC,
             output_speed: 0.0,
             spring_n_m: 0.0,
