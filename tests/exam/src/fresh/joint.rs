@@ -199,6 +199,18 @@ impl Joint {
         Self { poll, ..self.clone() }
     }
 
+    /// Two sessions of a third of the time: for tests that look at many effects.
+    #[cfg(test)]
+    pub fn short(&self) -> Self {
+        let mut short = self.clone();
+        short.sessions.truncate(2);
+        for session in &mut short.sessions {
+            session.seconds /= 3.0;
+            session.moves.iter_mut().for_each(|(lasts, _)| *lasts /= 3.0);
+        }
+        short
+    }
+
     /// What the encoders read, without noise, and what the torque sensor and the thermometer tell.
     pub fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> (Motion, Readings) {
         let (motion, readings, _) = self.run_with_energy(drive, unit, hidden);

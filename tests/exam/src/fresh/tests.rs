@@ -25,7 +25,7 @@ fn quantiles(residual: &[f64]) -> [f64; 3] {
 /// the rows in which the load is on its way through it.
 #[test]
 fn a_perfect_joint_returns_the_error_of_the_catalogue() {
-    for index in 0..6 {
+    for index in 0..4 {
         let (drive, mut chance) = drive(index);
         let joint = Joint::draw(&drive, &mut chance);
         let joint = joint.polled(EXACT(joint.poll));
@@ -73,7 +73,7 @@ fn a_joint_keeps_its_energy() {
 #[test]
 fn hysteresis_loses_energy() {
     let (drive, mut chance) = drive(1);
-    let joint = Joint::draw(&drive, &mut chance);
+    let joint = Joint::draw(&drive, &mut chance).short();
     let unit = Unit::nominal(&drive);
     let one = Hides { thing: Thing::Cause(Cause::TorsionalHysteresis), size: 20.0, shape: [0.5; 4] };
     let energy = joint.run_with_energy(&drive, &unit, &[one]).2;
@@ -87,7 +87,7 @@ fn hysteresis_loses_energy() {
 fn every_effect_shows_and_vanishes_with_its_size() {
     let (drive, mut chance) = drive(2);
     let unit = Unit::nominal(&drive);
-    let joint = Joint::draw(&drive, &mut chance);
+    let joint = Joint::draw(&drive, &mut chance).short();
     let things = |causes: &[Cause], strangers: &[Stranger]| -> Vec<Thing> {
         let causes = causes.iter().map(|cause| Thing::Cause(*cause));
         causes.chain(strangers.iter().map(|stranger| Thing::Stranger(*stranger))).collect()
@@ -140,7 +140,7 @@ fn a_seed_repeats_a_case_and_the_data_hold_no_truth() {
     for options in [["--family", "d"], ["--family", "e"], ["--kind", "logger"]] {
         let draw = Options::parse_from(["exam"].into_iter().chain(options)).draw;
         assert!(draw.is_fresh());
-        for index in [0, 3] {
+        for index in [3] {
             let files = question::files(4, index, &draw);
             assert!(files == question::files(4, index, &draw));
             assert!(files != question::files(5, index, &draw));
