@@ -90,22 +90,23 @@ impl Displacement {
             let low = -half + stopped(lower, (-pressed).max(0.0));
             0.5 * (high + low) + flank * 0.5 * (high - low).max(0.0)
         };
-        let rows = on.base.flank.iter().zip(&on.rows.torque).zip(own.upper.iter().zip(&own.lower));
-        let alone = |((flank, torque), (upper, lower)): ((&f64, &f64), (&f64, &f64))| {
-            let pressed = self.pressed_per_n_m * torque;
-            let half = half_backlash.max(0.0);
-            rests(*upper, *lower, half, *flank, pressed) - rests(0.0, 0.0, half, *flank, pressed)
-        };
         if on.widened.is_none() && on.zones.is_none() {
-            return rows.map(alone).collect();
+            let half = half_backlash.max(0.0);
+            let rows = on.base.flank.iter().zip(&on.rows.torque).zip(own.upper.iter().zip(&own.lower));
+            return rows
+                .map(|((flank, torque), (upper, lower))| {
+                    let pressed = self.pressed_per_n_m * torque;
+                    rests(*upper, *lower, half, *flank, pressed) - rests(0.0, 0.0, half, *flank, pressed)
+                })
+                .collect();
         }
-        let beside = |(k, ((flank, torque), (upper, lower))): (usize, ((&f64, &f64), (&f64, &f64)))| {
-            let pressed = self.pressed_per_n_m * torque;
+        by_row(on, |k| {
+            let (flank, pressed) = (on.base.flank[k], self.pressed_per_n_m * on.rows.torque[k]);
             let half = (half_backlash + on.widened.map_or(0.0, |w| w[k])).max(0.0);
             let (high, low) = on.zones.map_or((0.0, 0.0), |z| (z.upper[k], z.lower[k]));
-            rests(high + upper, low + lower, half, *flank, pressed) - rests(high, low, half, *flank, pressed)
-        };
-        rows.enumerate().map(beside).collect()
+            rests(high + own.upper[k], low + own.lower[k], half, flank, pressed)
+                - rests(high, low, half, flank, pressed)
+        })
     }
 }
 
