@@ -1,7 +1,7 @@
 //! Family D: a joint in motion. Motor and load have inertia, the gear between them gives way, a servo turns the motor, the load
 //! is an arm under gravity and a brake, and a logger polls both encoders one after the other.
 //!
-//! Equations, with the parts of [`Gear`](super::gear::Gear) between them (ψ generator, p hub, θ output, T torque of the spring):
+//! Equations, with the parts of [`Gear`] between them (ψ generator, p hub, θ output, T torque of the spring):
 //! `J_m ψ'' = τ - friction(ψ') - N dp/dψ`, `N = f(p') - T` where a flank pushes the hub and 0 elsewhere, `J_l θ'' = -(T - unseen) + load -
 //! friction(θ')`. In the clearance the hub, which has no mass, gives way until its friction holds the spring. Semi-implicit Euler; dry
 //! friction takes at most the momentum that is there.
