@@ -254,6 +254,8 @@ pub fn noise(
         None => uncertain.to_vec(),
     };
     let mut judged: Vec<Option<Judged>> = hypotheses.iter().map(|_| None).collect();
+    // Some cannot be judged: each is asked once.
+    let mut asked = vec![false; hypotheses.len()];
     let mut best = 0;
     let mut next = match near {
         Some(near) => beside(nearest(&hypotheses, near)),
@@ -264,6 +266,7 @@ pub fn noise(
         let judge = |k: &usize| (*k, free.judge(Whitener::new(rows, &uncertain, stride, hypotheses[*k])));
         for (k, of) in next.par_iter().map(judge).collect::<Vec<_>>() {
             judged[k] = of;
+            asked[k] = true;
         }
         let evidence = |k: usize| judged[k].as_ref().map_or(f64::NEG_INFINITY, |judged| judged.evidence);
         let likeliest = (0..judged.len()).max_by(|a, b| evidence(*a).total_cmp(&evidence(*b))).unwrap_or(0);
@@ -276,7 +279,7 @@ pub fn noise(
         next = [beside(likeliest), beside(best)].concat();
         next.sort_unstable();
         next.dedup();
-        next.retain(|k| judged[*k].is_none());
+        next.retain(|k| !asked[*k]);
     }
     // As restless as this no sensor is: what is left is a cause. On a drive without load it is one that turns flanks over, which a wander
     // that follows everything would hide.

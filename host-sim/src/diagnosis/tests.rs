@@ -173,6 +173,13 @@ fn data_that_say_nothing_are_refused() {
     sessions[2].error_rad[77] = f64::NAN;
     let refused = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap_err();
     assert_eq!(refused, DiagnosisError::NotFinite);
+    // Finite, but their squares are not: no hypothesis of the noise can be judged.
+    let mut sessions = data(&[], Richness::Rich, 0, 1);
+    for (k, error) in sessions.iter_mut().flat_map(|s| &mut s.error_rad).enumerate() {
+        *error = if k % 2 == 0 { 1e200 } else { -1e200 };
+    }
+    let refused = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap_err();
+    assert_eq!(refused, DiagnosisError::NotFinite);
 }
 
 #[test]
