@@ -47,7 +47,7 @@ impl Averaged {
         if HIGHEST_ORDER * quantile(turned, SLOW_SHARE) > MOST_TURNED_RAD {
             return None;
         }
-        let mean = |column: &[f64]| -> Vec<f64> { groups.iter().map(|group| mean(column, group)).collect() };
+        let mean = |column: &[f64]| -> Vec<f64> { groups.iter().map(|group| mean(&column[group.clone()])).collect() };
         let rows = Rows { period: from.period * stride as f64, ..from.each(sessions, mean) };
         let base = on.base.each(mean);
         let counts = groups.iter().map(|group| group.len() as f64).collect();

@@ -227,8 +227,8 @@ impl<'a> Search<'a> {
         let mut fast: Vec<Unexplained> = Vec::new();
         let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
         let mut bests = Bests::default();
-        // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
         let mut thinned = Thinned::of(on, stride);
+        // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
         for round in 0.. {
             fast.clear();
             let mut scope = Scope::Everything;

@@ -10,7 +10,7 @@ use super::averaged::{Averaged, Grain};
 use super::candidate::{Acting, Among, Coefficients, Column, Excitation, Law, Role, Tolerance, left_by};
 use super::linear::{Gram, Prior, Solution, products, solve};
 use super::noise::Whitener;
-use super::rows::rms;
+use super::rows::{combined, rms};
 
 /// Data and nominal model, averaged and white.
 pub struct Problem<'a> {
@@ -312,13 +312,8 @@ impl<'l> Term<'l> {
     /// What the term adds to the error, averaged.
     #[must_use]
     pub fn contribution(&self, coefficients: &[f64]) -> Vec<f64> {
-        let mut sum = vec![0.0; self.averaged.first().map_or(0, Vec::len)];
-        for (column, c) in self.averaged.iter().zip(coefficients) {
-            for (s, v) in sum.iter_mut().zip(column) {
-                *s += c * v;
-            }
-        }
-        sum
+        let len = self.averaged.first().map_or(0, Vec::len);
+        combined(len, self.averaged.iter().map(Vec::as_slice), coefficients)
     }
 }
 
@@ -693,10 +688,8 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 let step = if cyclic || places[i] + STEP <= 1.0 { STEP } else { -STEP };
                 places[i] += step;
                 // Sums, averages and the whitening are linear: one column for all.
-                let mut there = vec![0.0; on.rows.len()];
-                for (column, c) in columns(term.law, Extent::Whole, &on, &places).iter().zip(coefficients) {
-                    there.iter_mut().zip(&column.values).for_each(|(sum, v)| *sum += c * v);
-                }
+                let moved = columns(term.law, Extent::Whole, &on, &places);
+                let there = combined(on.rows.len(), moved.iter().map(|column| column.values.as_slice()), coefficients);
                 let mut change = problem.grain.average(term.law.smooth(), &problem.whitener, &there);
                 change.iter_mut().zip(&here).for_each(|(there, here)| *there = (*there - here) / step);
                 (problem.whitener.whiten_averaged(&change), Prior { mean: 0.0, std: PLACE_SPREAD })

@@ -4,7 +4,7 @@
 //! alike, into innovations of unit variance; least squares on those is generalised least squares on the rows, and forty
 //! thousand correlated rows weigh what they are worth (n_eff).
 
-use super::rows::{Rows, parts, quantile, rms, robust_std};
+use super::rows::{Rows, mean, parts, quantile, rms, robust_std};
 
 /// White noise and wander.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,7 +134,7 @@ impl Whitener {
                 2 => means_of::<2>(rows, &mut means),
                 3 => means_of::<3>(rows, &mut means),
                 4 => means_of::<4>(rows, &mut means),
-                stride => means.extend(rows.chunks(stride).map(mean_of)),
+                stride => means.extend(rows.chunks(stride).map(mean)),
             }
         }
         means
@@ -228,16 +228,12 @@ impl Whitener {
     }
 }
 
-fn mean_of(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
 /// Means of `N` values each; the last ones may be fewer.
 fn means_of<const N: usize>(values: &[f64], means: &mut Vec<f64>) {
     let (whole, rest) = values.as_chunks::<N>();
-    means.extend(whole.iter().map(|part| mean_of(part)));
+    means.extend(whole.iter().map(|part| mean(part)));
     if !rest.is_empty() {
-        means.push(mean_of(rest));
+        means.push(mean(rest));
     }
 }
 

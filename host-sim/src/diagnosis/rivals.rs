@@ -73,27 +73,24 @@ pub fn rivals(
 ) -> Vec<Rival> {
     let open: Vec<&Law> =
         laws.iter().filter(|law| law.named() && selected.terms.iter().all(|t| t.law.label != law.label)).collect();
+    let begin = |scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law| bests.begin(scaffold, law);
     let of_sample = sample.and_then(|(sample, share)| {
         let terms = selected.terms.iter().map(|t| Term::new(sample, t.law, t.places.clone())).collect();
         let terms = among_each_other(sample, terms);
         let there = Selected { fit: fit(sample, &terms)?, terms };
-        let begin = |scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law| bests.begin(scaffold, law);
         Some((refitted(sample, &open, &there, standings, begin, k), share))
     });
     let mut rivals: Vec<Rival> = match of_sample {
-        None => {
-            let begin = |scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law| bests.begin(scaffold, law);
-            refitted(problem, &open, selected, standings, begin, k).into_iter().map(|found| found.rival).collect()
-        }
+        None => refitted(problem, &open, selected, standings, begin, k).into_iter().map(|found| found.rival).collect(),
         Some((mut found, share)) => {
             found.iter_mut().for_each(|found| found.rival.misfit /= share);
             let (near, far): (Vec<Refitted<'_>>, Vec<Refitted<'_>>) =
                 found.into_iter().partition(|found| found.rival.misfit < NEAR);
             let near_laws: Vec<&Law> = near.iter().map(|found| found.law).collect();
-            let begin = |_: &Scaffold<'_, '_, '_, '_>, law: &Law| -> Vec<Vec<f64>> {
+            let from_there = |_: &Scaffold<'_, '_, '_, '_>, law: &Law| -> Vec<Vec<f64>> {
                 near.iter().filter(|found| found.law.id() == law.id()).map(|found| found.places.clone()).collect()
             };
-            let near = refitted(problem, &near_laws, selected, standings, begin, k);
+            let near = refitted(problem, &near_laws, selected, standings, from_there, k);
             near.into_iter().chain(far).map(|found| found.rival).collect()
         }
     };

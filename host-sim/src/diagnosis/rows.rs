@@ -197,9 +197,18 @@ pub(super) fn parts(session: &Range<usize>, stride: usize) -> impl Iterator<Item
     session.clone().step_by(stride).map(move |from| from..(from + stride).min(end))
 }
 
-/// Mean of a column over some of its rows.
-pub(super) fn mean(column: &[f64], rows: &Range<usize>) -> f64 {
-    column[rows.clone()].iter().sum::<f64>() / rows.len() as f64
+/// Mean.
+pub(super) fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Sum of columns of this length, each times its coefficient.
+pub(super) fn combined<'c>(len: usize, columns: impl IntoIterator<Item = &'c [f64]>, coefficients: &[f64]) -> Vec<f64> {
+    let mut sum = vec![0.0; len];
+    for (column, c) in columns.into_iter().zip(coefficients) {
+        sum.iter_mut().zip(column).for_each(|(s, v)| *s += c * v);
+    }
+    sum
 }
 
 /// Quantile of those numbers that are finite; 0 of none.

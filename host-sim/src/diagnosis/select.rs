@@ -379,14 +379,8 @@ pub(super) fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
 /// Prediction beside the nominal one, averaged.
 #[must_use]
 pub fn predicted(problem: &Problem<'_>, terms: &[&Term<'_>], fit: &Fit) -> Vec<f64> {
-    let mut sum = vec![0.0; problem.data.len()];
-    let columns = problem.base.iter().chain(terms.iter().flat_map(|t| &t.averaged));
-    for (column, c) in columns.zip(&fit.solution.coefficients) {
-        for (s, v) in sum.iter_mut().zip(column) {
-            *s += c * v;
-        }
-    }
-    sum
+    let columns = problem.base.iter().chain(terms.iter().flat_map(|t| &t.averaged)).map(Vec::as_slice);
+    super::rows::combined(problem.data.len(), columns, &fit.solution.coefficients)
 }
 
 /// Blocks that are left out one at a time: sessions, or quarters of the data where there are fewer than three.
@@ -631,14 +625,13 @@ fn forward<'l>(
     }
     let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
     let (tried, most) = match scope {
-        Scope::Everything => (tried(&scaffold, &open, |law| scaffold.begin(law)), REFINED),
+        Scope::Everything => {
+            let tried = tried(&scaffold, &open, |law| scaffold.begin(law));
+            open.iter().zip(&tried).for_each(|(law, tried)| bests.note(law, tried));
+            (tried, REFINED)
+        }
         Scope::CameClose => (tried(&scaffold, &open, |law| bests.begin_close(law)), REFINED_AGAIN),
     };
-    if scope == Scope::Everything {
-        for (law, tried) in open.iter().zip(&tried) {
-            bests.note(law, tried);
-        }
-    }
     let Screened { terms: found, refused } = best_tried(&scaffold, &open, tried, most);
     for (law, places, gates) in refused {
         trace.judged(Stage::Tried, law, &law.values(&places), gates);

@@ -10,7 +10,7 @@
 use super::{Coefficients, Excitation, Law, Role};
 use crate::causes::Kin;
 use crate::diagnosis::base::Base;
-use crate::diagnosis::rows::Rows;
+use crate::diagnosis::rows::{Rows, combined};
 
 /// How far causes bring one zone of teeth ahead of the other, row by row, arcsec.
 #[derive(Clone, Debug, Default)]
@@ -150,13 +150,8 @@ fn half_width(on: &Excitation<'_>, cause: &Acting<'_>) -> Vec<f64> {
     let mut forward = on.base.without_floating();
     forward.flank.fill(1.0);
     let on = Excitation { base: &forward, ..*on };
-    let mut sum = vec![0.0; on.rows.len()];
-    for (column, c) in cause.law.columns(&on, &cause.values).iter().zip(&cause.coefficients) {
-        for (s, v) in sum.iter_mut().zip(&column.values) {
-            *s += c * v;
-        }
-    }
-    sum
+    let columns = cause.law.columns(&on, &cause.values);
+    combined(on.rows.len(), columns.iter().map(|column| column.values.as_slice()), &cause.coefficients)
 }
 
 /// Columns of causes that are there together, in their order.

@@ -57,7 +57,8 @@ fn moment_that_turns_flanks(
 }
 
 /// An unbalanced load, m g l sin of the output angle against gravity: adds to the torque, so it winds the drive up and moves the play.
-fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
+/// On a drive without load, `on_sample` tells where to begin.
+fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>, on_sample: &Excitation<'_>) -> Law {
     let scale = on.plausible_load();
     let load = move |on: &Excitation<'_>, [moment, phase]: [f64; 2]| -> Vec<f64> {
         let rows = on.rows;
@@ -65,12 +66,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>) -> Law {
     };
     let of = |shape: Shaped<'_>| [shape.of(Name::TorqueNM), shape.of(Name::PhaseRad)];
     // Where nothing else loads the drive, its moment decides which flank carries, and no linear law is near.
-    let by_flank = on.unloaded().then(|| {
-        // A sample tells where to begin.
-        let thinned = Thinned::of(on, 1);
-        let on = thinned.as_ref().map_or(*on, |thinned| thinned.excitation(on));
-        moment_that_turns_flanks(&on, play, scale, load)
-    });
+    let by_flank = on.unloaded().then(|| moment_that_turns_flanks(on_sample, play, scale, load));
     let mut law = Law::new(CauseName::GravityTorque, move |on, shape| {
         let rows = on.rows;
         let added = load(on, of(shape));
@@ -230,10 +226,12 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         if !plays.contains(&on.base.law) {
             plays.push(on.base.law);
         }
+        let thinned = if on.unloaded() { Thinned::of(on, 1) } else { None };
+        let on_sample = thinned.as_ref().map_or(*on, |thinned| thinned.excitation(on));
         for play in plays {
-            laws.push(gravity_torque(1.0, play, on));
+            laws.push(gravity_torque(1.0, play, on, &on_sample));
             if on.is_turned_about() {
-                laws.push(gravity_torque(-1.0, play, on));
+                laws.push(gravity_torque(-1.0, play, on, &on_sample));
             }
         }
     }
