@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use crate::answer::Answer;
 use crate::case::{Case, Draw};
-use crate::question;
+use crate::question::Question;
 use crate::score::{Judged, Scores, judge};
 use crate::truth::{Truth, commitment};
 
@@ -64,7 +64,7 @@ pub struct Examination {
 pub fn run(settings: &Settings) -> io::Result<Examination> {
     let truths = in_parallel(settings.jobs, (0..settings.cases).collect(), |index| match &settings.revealed {
         Some(dir) => Truth::read(&dir.join(format!("{}.json", Case::name(settings.seed, index)))),
-        None => Ok(question::truth(settings.seed, index, &settings.draw)),
+        None => Ok(Question::draw(settings.seed, index, &settings.draw).truth()),
     });
     let truths = truths.into_iter().collect::<io::Result<Vec<Truth>>>()?;
     let commitment = commitment(&truths);
@@ -113,9 +113,9 @@ fn ask(settings: &Settings, index: u64, name: &str) -> io::Result<(Result<Answer
     fs::create_dir_all(&given)?;
     fs::create_dir_all(&answered)?;
     {
-        let files = question::files(settings.seed, index, &settings.draw);
-        fs::write(given.join("data.csv"), files.data)?;
-        fs::write(given.join("nominal.toml"), files.nominal)?;
+        let question = Question::draw(settings.seed, index, &settings.draw);
+        fs::write(given.join("data.csv"), question.data())?;
+        fs::write(given.join("nominal.toml"), question.nominal_toml())?;
     }
     let mut command = Command::new(&settings.program[0]);
     command

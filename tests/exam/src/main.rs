@@ -10,9 +10,8 @@ use std::process::ExitCode;
 use flexspline_exam::case::{Case, Draw};
 use flexspline_exam::chance::Chance;
 use flexspline_exam::exam::{self, Settings};
-use flexspline_exam::fresh::Fresh;
 use flexspline_exam::plant;
-use flexspline_exam::question;
+use flexspline_exam::question::Question;
 use flexspline_exam::score::Scores;
 
 /// Examines `flexspline diagnose` on data from a plant of its own.
@@ -196,15 +195,16 @@ fn run(options: Run) -> io::Result<bool> {
 }
 
 fn one(options: &One) -> io::Result<()> {
-    let (seed, index, draw) = (options.seed, options.index, &options.draw);
     fs::create_dir_all(&options.out)?;
     let write = |name: &str, text: String| fs::write(options.out.join(name), text);
-    let files = question::files(seed, index, draw);
-    write("data.csv", files.data)?;
-    write("nominal.toml", files.nominal)?;
-    write("truth.json", question::truth(seed, index, draw).json())?;
-    let of_parts =
-        if draw.is_fresh() { Fresh::draw(seed, index, draw).parts() } else { parts(&Case::draw(seed, index, draw)) };
+    let question = Question::draw(options.seed, options.index, &options.draw);
+    write("data.csv", question.data())?;
+    write("nominal.toml", question.nominal_toml())?;
+    write("truth.json", question.truth().json())?;
+    let of_parts = match &question {
+        Question::Case(case) => parts(case),
+        Question::Fresh(case, _) => case.parts(),
+    };
     write("parts.csv", of_parts)?;
     print!("{}", fs::read_to_string(Path::new(&options.out).join("truth.json"))?);
     Ok(())

@@ -1,34 +1,49 @@
-//! One question of an examination, whichever plant it comes from: the truth, and the files that the diagnosis is given.
+//! One question of an examination, whichever plant it comes from.
 
 use crate::case::{Case, Draw};
 use crate::fresh::Fresh;
 use crate::truth::Truth;
 
-/// What the diagnosis is given.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Files {
-    /// `data.csv`.
-    pub data: String,
-    /// `nominal.toml`.
-    pub nominal: String,
+/// A case of one of the plants. Few are held at a time.
+#[allow(clippy::large_enum_variant, reason = "few are held at a time")]
+pub enum Question {
+    /// Families A, B, C.
+    Case(Case),
+    /// Families D and E, and faults of loggers, under the name that says nothing.
+    Fresh(Fresh, String),
 }
 
-/// The truth of the case of this seed and index.
-pub fn truth(seed: u64, index: u64, draw: &Draw) -> Truth {
-    if draw.is_fresh() {
-        Fresh::draw(seed, index, draw).truth(Case::name(seed, index))
-    } else {
-        Truth::of(&Case::draw(seed, index, draw))
+impl Question {
+    /// The question of this seed and index.
+    pub fn draw(seed: u64, index: u64, draw: &Draw) -> Self {
+        if draw.is_fresh() {
+            Self::Fresh(Fresh::draw(seed, index, draw), Case::name(seed, index))
+        } else {
+            Self::Case(Case::draw(seed, index, draw))
+        }
     }
-}
 
-/// Its files.
-pub fn files(seed: u64, index: u64, draw: &Draw) -> Files {
-    if draw.is_fresh() {
-        let case = Fresh::draw(seed, index, draw);
-        Files { data: case.data(), nominal: case.nominal_toml() }
-    } else {
-        let case = Case::draw(seed, index, draw);
-        Files { data: case.data(), nominal: case.drive.nominal_toml() }
+    /// The truth.
+    pub fn truth(&self) -> Truth {
+        match self {
+            Self::Case(case) => Truth::of(case),
+            Self::Fresh(case, name) => case.truth(name.clone()),
+        }
+    }
+
+    /// `data.csv` that the diagnosis is given.
+    pub fn data(&self) -> String {
+        match self {
+            Self::Case(case) => case.data(),
+            Self::Fresh(case, _) => case.data(),
+        }
+    }
+
+    /// `nominal.toml` that the diagnosis is given.
+    pub fn nominal_toml(&self) -> String {
+        match self {
+            Self::Case(case) => case.drive.nominal_toml(),
+            Self::Fresh(case, _) => case.nominal_toml(),
+        }
     }
 }

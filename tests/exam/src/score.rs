@@ -134,9 +134,7 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
     match truth.kind.as_str() {
         "null" => {
             judged.null_named = Some(any_named);
-            // A bench that was set to zero anew, or whose counter started again, is a discrepancy of its own.
-            let quiet = truth.bench.iter().all(|what| what == "chamber");
-            judged.null_not_none = quiet.then(|| answer.verdict != "none");
+            judged.null_not_none = is_quiet(&truth.bench).then(|| answer.verdict != "none");
         }
         "outside" if !truth.outside_looks_named() => {
             judged.outside_named = Some(any_named);
@@ -204,7 +202,7 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
         }
         _ => {}
     }
-    if truth.kind == "null" && truth.bench.iter().all(|what| what == "chamber") {
+    if truth.kind == "null" && is_quiet(&truth.bench) {
         judged.fault_invented = Some(!answer.data_faults.is_empty());
     }
     judged.confidence = answer
@@ -224,6 +222,12 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
         judged.removed = Some(0.0);
     }
     judged
+}
+
+/// Whether a bench adds nothing that a log shows. One that was set to zero anew, or whose counter started again, is a discrepancy of its
+/// own.
+fn is_quiet(bench: &[String]) -> bool {
+    bench.iter().all(|what| what == "chamber")
 }
 
 /// Of the causes named with a confidence, how many are right.
@@ -254,6 +258,66 @@ impl Reliability {
             let _ = writeln!(text, "  {from:.2} .. {to:.2} (mean {mean:.3}) {rate}");
         }
     }
+}
+
+/// What is told of each family.
+const OF_A_FAMILY: [&str; 13] = [
+    "first_name",
+    "first_name_or_listed",
+    "exact",
+    "compound_exact",
+    "false_name",
+    "null_named",
+    "null_not_none",
+    "fault_invented",
+    "outside_named",
+    "outside_unknown",
+    "logger_named",
+    "logger_told",
+    "failed",
+];
+
+/// A value that counts on a condition.
+fn when(condition: bool, value: Option<bool>) -> Option<bool> {
+    if condition { value } else { None }
+}
+
+fn single(judged: &Judged) -> bool {
+    judged.kind == "single"
+}
+
+/// Rates over some cases, by name.
+fn rates_of(cases: &[&Judged]) -> Vec<(&'static str, Rate)> {
+    let rate = |ask: &dyn Fn(&Judged) -> Option<bool>| Rate::over(cases.iter().map(|j| ask(j)));
+    vec![
+        ("first_name", rate(&|j| when(single(j), j.first))),
+        ("first_name_rich", rate(&|j| when(single(j) && j.poor.is_empty(), j.first))),
+        ("first_name_poor", rate(&|j| when(!j.poor.is_empty(), j.first))),
+        ("first_name_family_a", rate(&|j| when(single(j) && j.family == "A", j.first))),
+        ("first_name_family_b", rate(&|j| when(single(j) && j.family == "B", j.first))),
+        ("first_name_family_c", rate(&|j| when(single(j) && j.family == "C", j.first))),
+        ("first_name_family_d", rate(&|j| when(single(j) && j.family == "D", j.first))),
+        ("first_name_family_e", rate(&|j| when(single(j) && j.family == "E", j.first))),
+        ("first_name_strict", rate(&|j| when(single(j), j.first_strict))),
+        ("first_name_or_listed", rate(&|j| when(single(j), j.first_or_listed))),
+        ("exact", rate(&|j| when(single(j), j.exact))),
+        ("compound_first", rate(&|j| when(j.kind == "compound", j.first))),
+        ("compound_exact", rate(&|j| when(j.kind == "compound", j.exact))),
+        ("false_name", rate(&|j| j.false_name)),
+        ("null_named", rate(&|j| j.null_named)),
+        ("null_not_none", rate(&|j| j.null_not_none)),
+        ("outside_named", rate(&|j| j.outside_named)),
+        ("outside_unknown", rate(&|j| j.outside_unknown)),
+        ("below_limit_misnamed", rate(&|j| j.below_limit_misnamed)),
+        ("fault_named", rate(&|j| j.fault_named)),
+        ("fault_blamed_on_a_cause", rate(&|j| j.fault_blamed)),
+        ("fault_invented", rate(&|j| j.fault_invented)),
+        ("logger_named", rate(&|j| j.logger_named)),
+        ("logger_misled", rate(&|j| j.logger_misled)),
+        ("logger_told", rate(&|j| j.logger_told)),
+        ("worse_than_recalibrated", rate(&|j| j.worse)),
+        ("failed", rate(&|j| Some(j.failed))),
+    ]
 }
 
 /// All cases together.
@@ -291,37 +355,7 @@ impl Scores {
     /// Gathers.
     pub fn of(all: &[Judged]) -> Self {
         let rate = |ask: &dyn Fn(&Judged) -> Option<bool>| Rate::over(all.iter().map(ask));
-        let when = |condition: bool, value: Option<bool>| if condition { value } else { None };
-        let single = |j: &Judged| j.kind == "single";
-        let mut rates: Vec<(&'static str, Rate)> = vec![
-            ("first_name", rate(&|j| when(single(j), j.first))),
-            ("first_name_rich", rate(&|j| when(single(j) && j.poor.is_empty(), j.first))),
-            ("first_name_poor", rate(&|j| when(!j.poor.is_empty(), j.first))),
-            ("first_name_family_a", rate(&|j| when(single(j) && j.family == "A", j.first))),
-            ("first_name_family_b", rate(&|j| when(single(j) && j.family == "B", j.first))),
-            ("first_name_family_c", rate(&|j| when(single(j) && j.family == "C", j.first))),
-            ("first_name_family_d", rate(&|j| when(single(j) && j.family == "D", j.first))),
-            ("first_name_family_e", rate(&|j| when(single(j) && j.family == "E", j.first))),
-            ("first_name_strict", rate(&|j| when(single(j), j.first_strict))),
-            ("first_name_or_listed", rate(&|j| when(single(j), j.first_or_listed))),
-            ("exact", rate(&|j| when(single(j), j.exact))),
-            ("compound_first", rate(&|j| when(j.kind == "compound", j.first))),
-            ("compound_exact", rate(&|j| when(j.kind == "compound", j.exact))),
-            ("false_name", rate(&|j| j.false_name)),
-            ("null_named", rate(&|j| j.null_named)),
-            ("null_not_none", rate(&|j| j.null_not_none)),
-            ("outside_named", rate(&|j| j.outside_named)),
-            ("outside_unknown", rate(&|j| j.outside_unknown)),
-            ("below_limit_misnamed", rate(&|j| j.below_limit_misnamed)),
-            ("fault_named", rate(&|j| j.fault_named)),
-            ("fault_blamed_on_a_cause", rate(&|j| j.fault_blamed)),
-            ("fault_invented", rate(&|j| j.fault_invented)),
-            ("logger_named", rate(&|j| j.logger_named)),
-            ("logger_misled", rate(&|j| j.logger_misled)),
-            ("logger_told", rate(&|j| j.logger_told)),
-            ("worse_than_recalibrated", rate(&|j| j.worse)),
-            ("failed", rate(&|j| Some(j.failed))),
-        ];
+        let mut rates = rates_of(&all.iter().collect::<Vec<_>>());
         let compound = all.iter().filter(|j| j.kind == "compound");
         rates.push(("compound_recall", Rate::over(compound.flat_map(|j| j.found.iter().map(|(_, yes)| Some(*yes))))));
         let intervals = all.iter().flat_map(|j| &j.intervals);
@@ -356,22 +390,9 @@ impl Scores {
             .into_iter()
             .map(|family| {
                 let of: Vec<_> = all.iter().filter(|j| j.family == family).collect();
-                let rate = |ask: &dyn Fn(&Judged) -> Option<bool>| Rate::over(of.iter().map(|j| ask(j)));
-                let rates = vec![
-                    ("first_name", rate(&|j| when(single(j), j.first))),
-                    ("first_name_or_listed", rate(&|j| when(single(j), j.first_or_listed))),
-                    ("exact", rate(&|j| when(single(j), j.exact))),
-                    ("compound_exact", rate(&|j| when(j.kind == "compound", j.exact))),
-                    ("false_name", rate(&|j| j.false_name)),
-                    ("null_named", rate(&|j| j.null_named)),
-                    ("null_not_none", rate(&|j| j.null_not_none)),
-                    ("fault_invented", rate(&|j| j.fault_invented)),
-                    ("outside_named", rate(&|j| j.outside_named)),
-                    ("outside_unknown", rate(&|j| j.outside_unknown)),
-                    ("logger_named", rate(&|j| j.logger_named)),
-                    ("logger_told", rate(&|j| j.logger_told)),
-                    ("failed", rate(&|j| Some(j.failed))),
-                ];
+                let of_all = rates_of(&of);
+                let of_name = |name: &&str| of_all.iter().find(|(other, _)| other == name).cloned();
+                let rates = OF_A_FAMILY.iter().filter_map(of_name).collect();
                 (family, rates)
             })
             .collect();
@@ -385,7 +406,7 @@ impl Scores {
         let with = |what: &String| rate(&|j| when(single(j) && j.bench.contains(what), j.first));
         let mut by_bench: Vec<(String, Rate)> = benches.into_iter().map(|what| (what.clone(), with(what))).collect();
         if !by_bench.is_empty() {
-            let plain = rate(&|j| when(single(j) && j.bench.iter().all(|what| what == "chamber"), j.first));
+            let plain = rate(&|j| when(single(j) && is_quiet(&j.bench), j.first));
             by_bench.push(("one zero, one count".to_owned(), plain));
         }
 

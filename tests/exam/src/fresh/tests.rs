@@ -5,7 +5,7 @@ use super::hides::range;
 use super::joint::Poll;
 use super::*;
 use crate::bench::rms;
-use crate::question;
+use crate::question::Question;
 
 const EXACT: fn(Poll) -> Poll = |poll| Poll { skew_s: 0.0, jitter_s: 0.0, ..poll };
 
@@ -141,19 +141,21 @@ fn a_seed_repeats_a_case_and_the_data_hold_no_truth() {
         let draw = Options::parse_from(["exam"].into_iter().chain(options)).draw;
         assert!(draw.is_fresh());
         for index in [3] {
-            let files = question::files(4, index, &draw);
-            assert!(files == question::files(4, index, &draw));
-            assert!(files != question::files(5, index, &draw));
-            let truth = question::truth(4, index, &draw);
+            let files_of = |question: &Question| [question.data(), question.nominal_toml()];
+            let question = Question::draw(4, index, &draw);
+            let files = files_of(&question);
+            assert!(files == files_of(&Question::draw(4, index, &draw)));
+            assert!(files != files_of(&Question::draw(5, index, &draw)));
+            let truth = question.truth();
             assert_eq!(truth.seed, 4);
             for hidden in &truth.hidden {
-                for text in [&files.data, &files.nominal] {
+                for text in &files {
                     assert!(!text.contains(&hidden.name), "{}", hidden.name);
                 }
             }
-            let header = files.data.lines().next().unwrap();
+            let header = files[0].lines().next().unwrap();
             assert!(header.starts_with("time_s,generator_rad,output_rad,torque_n_m,temperature_c"), "{header}");
-            let rows = files.data.lines().count() - 1;
+            let rows = files[0].lines().count() - 1;
             assert!((18_000..42_000).contains(&rows), "{rows} rows");
             assert!(!truth.name.contains(&index.to_string()) || truth.name.len() == 12);
         }
