@@ -11,6 +11,7 @@ fn the_header_is_up_to_date() {
     cbindgen::Builder::new()
         .with_config(config)
         .with_src(core.join("src/c_api.rs"))
+        .with_src(core.join("src/c_api/beside.rs"))
         .generate()
         .expect("cbindgen reads the C interface")
         .write(&mut made);

@@ -11,8 +11,9 @@ mod trajectory;
 fn main() -> std::io::Result<()> {
     for path in std::env::args().skip(1) {
         let image = std::fs::read(&path)?;
+        let twin = image.clone();
         let name = std::path::Path::new(&path).file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        println!("{name} {:016x}", trajectory::run(&image, &mut flexspline::Store::new(), 100_000));
+        println!("{name} {:016x}", trajectory::run([&image, &twin], &mut flexspline::Store::new(), 100_000));
     }
     Ok(())
 }

@@ -5,14 +5,27 @@
 //! checked: null, alignment, whether the object was initialised, overlap of what is written, lengths and enumerations. A call that
 //! returns anything but [`FlexsplineStatus::Ok`] has changed nothing unless its documentation says so.
 //!
+//! # Threads and interrupts
+//! A call works on the objects that it is given and on nothing else: there is no state of its own, no lock, no memory from a heap. So
+//! calls for different joints may interrupt each other. One store, one state and one joint belong to one context at a time: a call in
+//! an interrupt must not be given an object that the code it interrupted is working on. A slow group in the background therefore
+//! runs with the interrupt of the tick held off, or in the same one. What is only read (`const`) may be shared while nobody writes.
+//!
 //! Not to be called from Rust, and private for that reason. The only `unsafe` of the crate. What it relies on, and what C cannot be kept from breaking: a pointer that is not null and
 //! is aligned points to an object of its type, and images have the length given.
 #![allow(unsafe_code)]
 
+mod beside;
+
+#[cfg(feature = "fuzzing")]
+pub use beside::*;
+use beside::{health_code, quality_code};
+
 use crate::{
-    ActivateError, Adjustment, Drive, FixedMember, Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits,
-    Mode, OutputAngle, Overrun, Quality, SAVED_JOINT_BYTES, Store,
+    ActivateError, Adjustment, Counters, Drive, FORMAT_VERSION, FixedMember, Flags, GeneratorAngle, ImageError, Images,
+    Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun, RestoreError, SAVED_JOINT_BYTES, Store, mend_page,
 };
+use core::ffi::c_char;
 use core::mem::{MaybeUninit, align_of, size_of};
 
 #[cfg(all(target_os = "none", not(test)))]
@@ -44,16 +57,50 @@ pub enum FlexsplineStatus {
     Saved = 9,
     /// Each image is a table, and they differ.
     TwoTables = 10,
+    /// The state was saved with another table.
+    OtherTable = 11,
+    /// The state was saved by a joint with other settings.
+    OtherJoint = 12,
+    /// Both images are the same place in memory.
+    SameImage = 13,
+    /// A chunk of an upload is not the next one.
+    Order = 14,
+    /// Not all bytes of an upload came.
+    Incomplete = 15,
+    /// The image is whole and its wind-up is none that a drive has: a flank falls while the load grows (the sign of the torque?),
+    /// or rises too fast.
+    Implausible = 16,
 }
 
+/// There was no sample.
+pub const FLEXSPLINE_FLAG_SAMPLE_LOST: u16 = 1;
+/// The sample was not believed.
+pub const FLEXSPLINE_FLAG_GLITCH: u16 = 2;
+/// The tick came late.
+pub const FLEXSPLINE_FLAG_OVERRUN: u16 = 4;
+/// The limiter held the correction back.
+pub const FLEXSPLINE_FLAG_HELD_BACK: u16 = 8;
+/// No correction could be made; the last one is kept or fades out.
+pub const FLEXSPLINE_FLAG_NOT_CORRECTED: u16 = 16;
+/// What was read of the table was not whole. It was mended and the tick done again, unless not corrected is set too.
+pub const FLEXSPLINE_FLAG_TABLE_DOUBT: u16 = 32;
+/// The state was not whole, and was taken from its other copy; where neither was, the joint is safe.
+pub const FLEXSPLINE_FLAG_STATE_TORN: u16 = 64;
+/// The settings are not whole: `flexspline_joint_mend`, or make the joint anew.
+pub const FLEXSPLINE_FLAG_JOINT_TORN: u16 = 128;
+/// The joint is in mode safe.
+pub const FLEXSPLINE_FLAG_SAFE: u16 = 256;
+/// An image is not the one that was activated, or both are the same one.
+pub const FLEXSPLINE_FLAG_OTHER_IMAGES: u16 = 512;
+
 /// Eight-byte words of a [`FlexsplineStore`].
-pub const FLEXSPLINE_STORE_WORDS: usize = 1056;
+pub const FLEXSPLINE_STORE_WORDS: usize = 1072;
 /// Eight-byte words of a [`FlexsplineJoint`].
-pub const FLEXSPLINE_JOINT_WORDS: usize = 16;
+pub const FLEXSPLINE_JOINT_WORDS: usize = 32;
 /// Eight-byte words of a [`FlexsplineState`].
-pub const FLEXSPLINE_STATE_WORDS: usize = 16;
+pub const FLEXSPLINE_STATE_WORDS: usize = 24;
 /// Bytes of a saved state.
-pub const FLEXSPLINE_SAVED_BYTES: usize = 40;
+pub const FLEXSPLINE_SAVED_BYTES: usize = 72;
 
 /// The copies of a table.
 #[repr(C)]
@@ -100,6 +147,9 @@ pub struct FlexsplineSettings {
     pub acceleration_rad_s2: f32,
     /// Fastest generator, rad/s.
     pub generator_rate_rad_s: f32,
+    /// A target no further from the output than this is reached on the flank that bears already, rad; 0 for none. Three times the peak
+    /// of the encoder's noise at the output keeps the flank from changing to and fro; it costs up to this much after a reversal.
+    pub hold_rad: f32,
 }
 
 /// Two images of one table.
@@ -110,7 +160,7 @@ pub struct FlexsplineImages {
     pub first: *const u8,
     /// Its bytes.
     pub first_bytes: usize,
-    /// Second image; the same one is allowed.
+    /// Second image, at another place.
     pub second: *const u8,
     /// Its bytes.
     pub second_bytes: usize,
@@ -130,6 +180,10 @@ pub struct FlexsplineInput {
     pub missed_ticks: u16,
     /// 0 if there is no sample of the generator, else 1.
     pub has_generator: u8,
+    /// Added to the mean error of the table in this tick, counts at the output; 0 for none.
+    pub mean_counts: i32,
+    /// Added to the half-width of the play, counts; 0 for none.
+    pub half_width_counts: i32,
 }
 
 /// One tick's results. Angles are counts of 2^-32 turn.
@@ -150,8 +204,44 @@ pub struct FlexsplineOutput {
     pub held_back_rad: f32,
     /// 0 in range, 1 uncertain, 2 extrapolated, 3 disabled.
     pub quality: u8,
-    /// Bits: 1 sample lost, 2 glitch, 4 overrun, 8 held back, 16 not corrected, 32 table in doubt, 64 state torn.
+    /// `FLEXSPLINE_FLAG_...`.
     pub flags: u16,
+}
+
+/// What is known of a store.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineStoreReport {
+    /// Id of the table in use; zeros if there is none.
+    pub table_id: [u8; 8],
+    /// Ticks that were done again because something was not whole; wraps, as all counters.
+    pub doubtful_ticks: u32,
+    /// Words of the copies that were found to differ and made anew.
+    pub words_mended: u32,
+    /// Words that could not be made anew.
+    pub words_skipped: u32,
+    /// Pages of an image found damaged.
+    pub pages_damaged: u32,
+    /// Passes over both copies.
+    pub passes: u32,
+    /// 0 sound, 1 a page of one image is damaged, 2 of both: lost, 3 no table, 4 torn: activate again.
+    pub health: u8,
+    /// Image with a page that can be written again from the other: 0 or 1; 255 if there is none.
+    pub damaged_image: u8,
+    /// That page.
+    pub damaged_page: u8,
+}
+
+/// What is known of a state.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineStateReport {
+    /// Ticks missed since the start; wraps.
+    pub missed_ticks: u32,
+    /// 0 off, 1 tracking, 2 hold, 3 safe.
+    pub mode: u8,
+    /// 1 if the side of the play is known, else 0.
+    pub side_known: u8,
 }
 
 /// A value with a mark that tells that it was initialised.
@@ -257,14 +347,34 @@ fn status(result: Result<(), FlexsplineStatus>) -> FlexsplineStatus {
     result.err().unwrap_or(FlexsplineStatus::Ok)
 }
 
+/// Why an image is refused, as far as a caller can act on it.
+fn image_status(error: ImageError) -> FlexsplineStatus {
+    match error {
+        ImageError::Falls { .. } | ImageError::Steep { .. } => FlexsplineStatus::Implausible,
+        _ => FlexsplineStatus::Image,
+    }
+}
+
 fn span<T>(pointer: *const T) -> (usize, usize) {
     (pointer as usize, size_of::<T>())
 }
 
-/// Makes an empty store.
+/// Makes an empty store, where it lies: nothing of its size is on the stack.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_store_init(store: *mut FlexsplineStore) -> FlexsplineStatus {
-    status(put(store, STORE_MARK, Store::new()))
+    let init = || {
+        usable(store)?;
+        let marked = store.cast::<Marked<Store>>();
+        // SAFETY: not null, aligned, large enough (asserted above), and the caller's. A store is made of numbers, and one without a table of
+        // zeros (a test holds that), so the reference is to a store.
+        let marked = unsafe {
+            marked.write_bytes(0, 1);
+            &mut *marked
+        };
+        marked.mark = STORE_MARK;
+        Ok(())
+    };
+    status(init())
 }
 
 /// Makes a joint of its settings.
@@ -292,6 +402,7 @@ pub extern "C" fn flexspline_joint_init(
             acceleration_rad_s2: s.acceleration_rad_s2,
             generator_rate_rad_s: s.generator_rate_rad_s,
             patience: s.patience,
+            hold_rad: s.hold_rad,
         };
         let argument = FlexsplineStatus::Argument;
         let drive = Drive::new(s.flexspline_teeth, s.circular_spline_teeth, fixed).map_err(|_| argument)?;
@@ -320,10 +431,12 @@ pub extern "C" fn flexspline_store_activate(
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
         store.activate(&images, joint.drive(), temperature_c).map(|_| ()).map_err(|error| match error {
-            ActivateError::Image(_) => FlexsplineStatus::Image,
+            ActivateError::Image(error) => image_status(error),
             ActivateError::TooLarge { .. } | ActivateError::TooManyPages { .. } => FlexsplineStatus::TooLarge,
             ActivateError::TwoTables => FlexsplineStatus::TwoTables,
             ActivateError::OtherDrive => FlexsplineStatus::OtherDrive,
+            ActivateError::SameImage => FlexsplineStatus::SameImage,
+            ActivateError::Temperature { .. } => FlexsplineStatus::Argument,
         })
     };
     status(activate())
@@ -360,52 +473,224 @@ pub extern "C" fn flexspline_store_check_images(
     status(check())
 }
 
+/// Tells what is known of a store.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_store_report(
+    store: *const FlexsplineStore,
+    report: *mut FlexsplineStoreReport,
+) -> FlexsplineStatus {
+    let tell = || {
+        apart([span(store), span(report)])?;
+        usable(report)?;
+        let store: &Store = get(store, STORE_MARK)?;
+        let Counters { doubtful_ticks, words_mended, words_skipped, pages_damaged, passes } = store.counters();
+        let (image, page) = store.damaged_page().unwrap_or((255, 0));
+        let told = FlexsplineStoreReport {
+            table_id: store.id().0,
+            doubtful_ticks,
+            words_mended,
+            words_skipped,
+            pages_damaged,
+            passes,
+            health: health_code(store.health()),
+            damaged_image: image as u8,
+            damaged_page: page as u8,
+        };
+        // SAFETY: not null, aligned, apart from the store; the caller's.
+        unsafe { report.write(told) };
+        Ok(())
+    };
+    status(tell())
+}
+
+/// Writes a damaged page of an image in memory again from the other image, both whole images of `bytes` bytes, and tells the store.
+/// What `flexspline_store_report` named is `image` and `page`.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_store_mend_page(
+    store: *mut FlexsplineStore,
+    damaged: *mut u8,
+    good: *const u8,
+    length: usize,
+    image: u8,
+    page: u8,
+) -> FlexsplineStatus {
+    let mend = || {
+        usable(damaged)?;
+        let good_bytes = bytes(good, length)?;
+        apart([span(store), (damaged as usize, length), (good as usize, length)])?;
+        let store: &mut Store = get_mut(store, STORE_MARK)?;
+        // SAFETY: not null, apart from the other image and the store; the caller says that so many bytes are there, and they are its own.
+        let damaged = unsafe { core::slice::from_raw_parts_mut(damaged, length) };
+        if image > 1 || !mend_page(damaged, good_bytes, page as usize) {
+            return Err(FlexsplineStatus::Argument);
+        }
+        store.mended(image as usize, page as usize);
+        Ok(())
+    };
+    status(mend())
+}
+
+/// Makes a copy of a joint's settings that is not whole anew from the other; `FLEXSPLINE_STATUS_ARGUMENT` if neither is. In a slow
+/// rate group.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_joint_mend(joint: *mut FlexsplineJoint) -> FlexsplineStatus {
+    let mend = || {
+        let joint: &mut Joint = get_mut(joint, JOINT_MARK)?;
+        if joint.mend() { Ok(()) } else { Err(FlexsplineStatus::Argument) }
+    };
+    status(mend())
+}
+
 /// Changes the mode: 0 off, 1 tracking, 2 hold, 3 safe.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_request(state: *mut FlexsplineState, mode: u8) -> FlexsplineStatus {
     let request = || {
         let state: &mut JointState = get_mut(state, STATE_MARK)?;
-        let mode = match mode {
-            0 => Mode::Off,
-            1 => Mode::Tracking,
-            2 => Mode::Hold,
-            3 => Mode::Safe,
-            _ => return Err(FlexsplineStatus::Argument),
-        };
-        state.request(mode).map_err(|_| FlexsplineStatus::Mode)
+        if mode > 3 {
+            return Err(FlexsplineStatus::Argument);
+        }
+        state.request(Mode::from_code(mode as u32)).map_err(|_| FlexsplineStatus::Mode)
     };
     status(request())
 }
 
-/// Writes what must survive a reset: `FLEXSPLINE_SAVED_BYTES` bytes.
+/// On command: which side of the play the drive rests on is not known any more, as after work on it.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_state_forget_side(state: *mut FlexsplineState) -> FlexsplineStatus {
+    let forget = || {
+        let state: &mut JointState = get_mut(state, STATE_MARK)?;
+        state.forget_side();
+        Ok(())
+    };
+    status(forget())
+}
+
+/// Tells what is known of a state, as the last tick left it.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_state_report(
+    state: *const FlexsplineState,
+    report: *mut FlexsplineStateReport,
+) -> FlexsplineStatus {
+    let tell = || {
+        apart([span(state), span(report)])?;
+        usable(report)?;
+        let state: &JointState = get(state, STATE_MARK)?;
+        let told = FlexsplineStateReport {
+            missed_ticks: state.missed_ticks(),
+            mode: state.mode().code() as u8,
+            side_known: state.play().is_known() as u8,
+        };
+        // SAFETY: not null, aligned, apart from the state; the caller's.
+        unsafe { report.write(told) };
+        Ok(())
+    };
+    status(tell())
+}
+
+/// Writes what must survive a reset: `FLEXSPLINE_SAVED_BYTES` bytes, with version, table and joint.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_save(
     state: *const FlexsplineState,
+    joint: *const FlexsplineJoint,
+    store: *const FlexsplineStore,
     saved: *mut [u8; FLEXSPLINE_SAVED_BYTES],
 ) -> FlexsplineStatus {
     let save = || {
-        apart([span(state), span(saved)])?;
+        for object in [span(state), span(joint), span(store)] {
+            apart([object, span(saved)])?;
+        }
         let state: &JointState = get(state, STATE_MARK)?;
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let store: &Store = get(store, STORE_MARK)?;
         usable(saved)?;
         // SAFETY: not null, apart from the state; the caller owns so many bytes.
-        unsafe { saved.write(state.save()) };
+        unsafe { saved.write(state.save(joint, store)) };
         Ok(())
     };
     status(save())
 }
 
-/// Makes a state of saved bytes, in mode off; only if the joint cannot have moved meanwhile.
+/// Makes a state of bytes that the same joint saved with the same table, in mode off; only if the joint cannot have moved meanwhile.
+/// The first sample is held against the one that was saved.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_restore(
     state: *mut FlexsplineState,
+    joint: *const FlexsplineJoint,
+    store: *const FlexsplineStore,
     saved: *const [u8; FLEXSPLINE_SAVED_BYTES],
 ) -> FlexsplineStatus {
     let restore = || {
-        apart([span(state), span(saved)])?;
-        let restored = JointState::restore(&copied(saved)?).ok_or(FlexsplineStatus::Saved)?;
+        for object in [span(joint), span(store), span(saved)] {
+            apart([span(state), object])?;
+        }
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let store: &Store = get(store, STORE_MARK)?;
+        let restored = JointState::restore(&copied(saved)?, joint, store).map_err(|error| match error {
+            RestoreError::OtherTable => FlexsplineStatus::OtherTable,
+            RestoreError::OtherJoint => FlexsplineStatus::OtherJoint,
+            RestoreError::Version { .. } | RestoreError::Crc | RestoreError::Impossible => FlexsplineStatus::Saved,
+        })?;
         put(state, STATE_MARK, restored)
     };
     status(restore())
+}
+
+/// Version of this library, as text.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_version() -> *const c_char {
+    concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
+}
+
+/// Version of the table format that is read.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_format_version() -> u16 {
+    FORMAT_VERSION
+}
+
+/// Name of a mode.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_mode_name(mode: u8) -> *const c_char {
+    let name = match mode {
+        0 => c"off",
+        1 => c"tracking",
+        2 => c"hold",
+        3 => c"safe",
+        _ => c"?",
+    };
+    name.as_ptr()
+}
+
+/// Name of a health, as in `FlexsplineStoreReport`.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_health_name(health: u8) -> *const c_char {
+    let name = match health {
+        0 => c"sound",
+        1 => c"one image",
+        2 => c"lost",
+        3 => c"empty",
+        4 => c"torn",
+        _ => c"?",
+    };
+    name.as_ptr()
+}
+
+/// Name of one flag.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_flag_name(flag: u16) -> *const c_char {
+    let name = match flag {
+        FLEXSPLINE_FLAG_SAMPLE_LOST => c"sample lost",
+        FLEXSPLINE_FLAG_GLITCH => c"glitch",
+        FLEXSPLINE_FLAG_OVERRUN => c"overrun",
+        FLEXSPLINE_FLAG_HELD_BACK => c"held back",
+        FLEXSPLINE_FLAG_NOT_CORRECTED => c"not corrected",
+        FLEXSPLINE_FLAG_TABLE_DOUBT => c"table doubt",
+        FLEXSPLINE_FLAG_STATE_TORN => c"state torn",
+        FLEXSPLINE_FLAG_JOINT_TORN => c"joint torn",
+        FLEXSPLINE_FLAG_SAFE => c"safe",
+        FLEXSPLINE_FLAG_OTHER_IMAGES => c"other images",
+        _ => c"?",
+    };
+    name.as_ptr()
 }
 
 /// One tick.
@@ -432,7 +717,7 @@ pub extern "C" fn flexspline_tick(
             target: OutputAngle::from_counts(input.target_counts),
             torque_n_m: input.torque_n_m,
             missed_ticks: input.missed_ticks,
-            adjustment: Adjustment::default(),
+            adjustment: Adjustment { mean_counts: input.mean_counts, half_width_counts: input.half_width_counts },
         };
         let found = joint.tick(&images, store, state, &input);
         let given = FlexsplineOutput {
@@ -442,12 +727,7 @@ pub extern "C" fn flexspline_tick(
             uncertainty_rad: found.uncertainty_rad,
             correction_rad: found.correction_rad,
             held_back_rad: found.held_back_rad,
-            quality: match found.quality {
-                Quality::InRange => 0,
-                Quality::Uncertain => 1,
-                Quality::Extrapolated => 2,
-                Quality::Disabled => 3,
-            },
+            quality: quality_code(found.quality),
             flags: Flags::bits(found.flags),
         };
         // SAFETY: checked above: not null, aligned, apart from what is borrowed here.
@@ -463,6 +743,7 @@ mod tests {
     use crate::fixture;
     use core::ptr::{null, null_mut};
     use std::boxed::Box;
+    use std::vec::Vec;
 
     const SETTINGS: FlexsplineSettings = FlexsplineSettings {
         flexspline_teeth: 188,
@@ -475,12 +756,13 @@ mod tests {
         rate_rad_s: 0.05,
         acceleration_rad_s2: 5.0,
         generator_rate_rad_s: 600.0,
+        hold_rad: 0.0,
     };
 
-    struct Objects {
-        store: Box<FlexsplineStore>,
-        joint: FlexsplineJoint,
-        state: FlexsplineState,
+    pub(super) struct Objects {
+        pub store: Box<FlexsplineStore>,
+        pub joint: FlexsplineJoint,
+        pub state: FlexsplineState,
     }
 
     fn blank() -> Objects {
@@ -491,7 +773,7 @@ mod tests {
         }
     }
 
-    fn made() -> Objects {
+    pub(super) fn made() -> Objects {
         let mut o = blank();
         assert_eq!(flexspline_store_init(&mut *o.store), FlexsplineStatus::Ok);
         assert_eq!(flexspline_joint_init(&mut o.joint, &SETTINGS), FlexsplineStatus::Ok);
@@ -499,21 +781,25 @@ mod tests {
         o
     }
 
-    fn pair(image: &[u8]) -> FlexsplineImages {
+    /// Two images at two places.
+    pub(super) fn pair(image: &[u8]) -> FlexsplineImages {
+        let twin = Box::leak(image.to_vec().into_boxed_slice());
         FlexsplineImages {
             first: image.as_ptr(),
             first_bytes: image.len(),
-            second: image.as_ptr(),
-            second_bytes: image.len(),
+            second: twin.as_ptr(),
+            second_bytes: twin.len(),
         }
     }
 
-    const INPUT: FlexsplineInput = FlexsplineInput {
+    pub(super) const INPUT: FlexsplineInput = FlexsplineInput {
         generator_counts: 1 << 30,
         target_counts: 11_000_000,
         torque_n_m: 5.0,
         missed_ticks: 0,
         has_generator: 1,
+        mean_counts: 0,
+        half_width_counts: 0,
     };
 
     #[test]
@@ -528,13 +814,15 @@ mod tests {
             FlexsplineStatus::Ok
         );
 
-        let images = Images::new(&image, &image);
+        let twin = image.clone();
+        let images = Images::new(&image, &twin);
         let limits = Limits {
             tick_s: 1e-3,
             rate_rad_s: 0.05,
             acceleration_rad_s2: 5.0,
             generator_rate_rad_s: 600.0,
             patience: 5,
+            hold_rad: 0.0,
         };
         let joint = Joint::new(fixture::drive(), limits, Overrun::FadeOut { ticks: 50 }).unwrap();
         let (mut store, mut state) = (Store::new(), JointState::new());
@@ -552,14 +840,75 @@ mod tests {
         assert_eq!((out.correction_rad, out.flags), (expected.correction_rad, expected.flags.bits()));
 
         let mut saved = [0; FLEXSPLINE_SAVED_BYTES];
-        assert_eq!(flexspline_state_save(&o.state, &mut saved), FlexsplineStatus::Ok);
-        assert_eq!(saved, state.save());
-        assert_eq!(flexspline_state_restore(&mut o.state, &saved), FlexsplineStatus::Ok);
-        saved[3] ^= 1;
-        assert_eq!(flexspline_state_restore(&mut o.state, &saved), FlexsplineStatus::Saved);
+        assert_eq!(flexspline_state_save(&o.state, &o.joint, &*o.store, &mut saved), FlexsplineStatus::Ok);
+        assert_eq!(saved, state.save(&joint, &store));
+        assert_eq!(flexspline_state_restore(&mut o.state, &o.joint, &*o.store, &saved), FlexsplineStatus::Ok);
+        saved[30] ^= 1;
+        assert_eq!(flexspline_state_restore(&mut o.state, &o.joint, &*o.store, &saved), FlexsplineStatus::Saved);
+        saved[30] ^= 1;
+        let mut other = blank();
+        let settings = FlexsplineSettings { patience: 6, ..SETTINGS };
+        assert_eq!(flexspline_joint_init(&mut other.joint, &settings), FlexsplineStatus::Ok);
+        let found = flexspline_state_restore(&mut o.state, &other.joint, &*o.store, &saved);
+        assert_eq!(found, FlexsplineStatus::OtherJoint);
+        assert_eq!(flexspline_store_init(&mut *other.store), FlexsplineStatus::Ok);
+        let found = flexspline_state_restore(&mut o.state, &o.joint, &*other.store, &saved);
+        assert_eq!(found, FlexsplineStatus::OtherTable);
         assert_eq!(flexspline_store_set_temperature(&mut *o.store, &table, 30.0), FlexsplineStatus::Ok);
         assert_eq!(flexspline_store_set_temperature(&mut *o.store, &table, f32::NAN), FlexsplineStatus::Argument);
         assert_eq!(flexspline_store_check_images(&mut *o.store, &table, 100), FlexsplineStatus::Ok);
+    }
+
+    #[test]
+    fn what_is_known_can_be_read_and_mended() {
+        let mut images = [fixture::image(false), fixture::image(false)];
+        images[1][700] ^= 4;
+        let table = |images: &[Vec<u8>; 2]| FlexsplineImages {
+            first: images[0].as_ptr(),
+            first_bytes: images[0].len(),
+            second: images[1].as_ptr(),
+            second_bytes: images[1].len(),
+        };
+        let mut o = made();
+        let mut seen = FlexsplineStoreReport::default();
+        let mut report = |store: &FlexsplineStore| {
+            assert_eq!(flexspline_store_report(store, &mut seen), FlexsplineStatus::Ok);
+            seen
+        };
+        assert_eq!(report(&o.store).health, 3);
+        // An empty store is the one of Rust.
+        let empty: &Store = get(&*o.store, STORE_MARK).unwrap();
+        assert_eq!(std::format!("{empty:?}"), std::format!("{:?}", Store::new()));
+        let bad = flexspline_store_activate(&mut *o.store, &o.joint, &table(&images), f32::NAN);
+        assert_eq!((bad, report(&o.store).health), (FlexsplineStatus::Argument, 3));
+        let once = FlexsplineImages { second: images[0].as_ptr(), ..table(&images) };
+        let found = flexspline_store_activate(&mut *o.store, &o.joint, &once, 20.0);
+        assert_eq!(found, FlexsplineStatus::SameImage);
+        assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table(&images), 20.0), FlexsplineStatus::Ok);
+        assert_eq!(flexspline_store_check_images(&mut *o.store, &table(&images), 20_000), FlexsplineStatus::Ok);
+        let damaged = report(&o.store);
+        assert_eq!((damaged.health, damaged.damaged_image, damaged.damaged_page), (1, 1, 2));
+        let [good, bad] = &mut images;
+        let mend = flexspline_store_mend_page(&mut *o.store, bad.as_mut_ptr(), good.as_ptr(), good.len(), 1, 2);
+        assert_eq!((mend, good == bad), (FlexsplineStatus::Ok, true));
+        let whole = report(&o.store);
+        assert_eq!((whole.health, whole.damaged_image), (0, 255));
+        assert_eq!(whole.table_id, crate::Table::check(&images[0]).unwrap().id().0);
+
+        let mut state = FlexsplineStateReport::default();
+        assert_eq!(flexspline_state_request(&mut o.state, 1), FlexsplineStatus::Ok);
+        assert_eq!(flexspline_state_report(&o.state, &mut state), FlexsplineStatus::Ok);
+        assert_eq!((state.mode, state.side_known), (1, 0));
+        assert_eq!(flexspline_state_forget_side(&mut o.state), FlexsplineStatus::Ok);
+        assert_eq!(flexspline_joint_mend(&mut o.joint), FlexsplineStatus::Ok);
+        // SAFETY: texts of the library.
+        let text = |name: *const c_char| unsafe { core::ffi::CStr::from_ptr(name) }.to_str().unwrap();
+        assert_eq!(text(flexspline_version()), env!("CARGO_PKG_VERSION"));
+        assert_eq!([text(flexspline_mode_name(3)), text(flexspline_health_name(4))], ["safe", "torn"]);
+        assert_eq!((flexspline_format_version(), text(flexspline_mode_name(9))), (FORMAT_VERSION, "?"));
+        let flags = [Flags::SAMPLE_LOST, Flags::TABLE_DOUBT, Flags::JOINT_TORN, Flags::SAFE, Flags::OTHER_IMAGES];
+        let names = ["sample lost", "table doubt", "joint torn", "safe", "other images"];
+        assert!(flags.iter().zip(names).all(|(flag, name)| text(flexspline_flag_name(flag.bits())) == name));
     }
 
     #[test]
@@ -639,6 +988,7 @@ mod tests {
             acceleration_rad_s2: SETTINGS.acceleration_rad_s2,
             generator_rate_rad_s: SETTINGS.generator_rate_rad_s,
             patience: SETTINGS.patience,
+            hold_rad: SETTINGS.hold_rad,
         };
         let members = [FixedMember::Flexspline, FixedMember::CircularSpline];
         let policies = [Overrun::SkipAndCount, Overrun::HoldLast, Overrun::FadeOut { ticks: 50 }];

@@ -241,6 +241,26 @@ pub enum ImageError {
         /// Bound of the slope found; below 1 is allowed.
         found: f32,
     },
+    /// The error on one flank falls while the load grows. No drive gives way against its load; the torque may have the wrong sign.
+    Falls {
+        /// Temperature node.
+        temperature: usize,
+        /// Torque node above.
+        torque: usize,
+        /// The change of the error, or a part of it that the slopes at the nodes make, rad.
+        found_rad: f32,
+    },
+    /// The error on one flank grows faster with the load than that of any drive, or a jump is higher than half a tooth pitch.
+    Steep {
+        /// Temperature node.
+        temperature: usize,
+        /// Torque node above.
+        torque: usize,
+        /// The change of the error, or a part of it that the slopes at the nodes make, rad.
+        found_rad: f32,
+        /// The most that is allowed, rad.
+        allowed_rad: f32,
+    },
     /// The inverse does not come close enough in the iterations that a step may take.
     Inverse {
         /// Error left, rad at the output; at most [`MAX_INVERSE_ERROR_RAD`](crate::MAX_INVERSE_ERROR_RAD) is allowed.
@@ -296,6 +316,17 @@ impl fmt::Display for ImageError {
             Self::ErrorBound { found_rad, allowed_rad } => {
                 write!(f, "the table can give an error of {found_rad} rad, its limit is {allowed_rad}")
             }
+            Self::Falls { temperature, torque, found_rad } => write!(
+                f,
+                "the error of a flank falls by {} rad up to torque node {torque} at temperature node {temperature}: it must \
+                 grow with the load, which is positive where it turns the output forward",
+                -found_rad
+            ),
+            Self::Steep { temperature, torque, found_rad, allowed_rad } => write!(
+                f,
+                "the error of a flank grows by {found_rad} rad up to torque node {torque} at temperature node {temperature}, \
+                 allowed are {allowed_rad}"
+            ),
             Self::Inverse { left_rad } => write!(f, "the inverse is left with an error of {left_rad} rad"),
             Self::Slope { found } => write!(f, "slope bound |ratio*de/dpsi| = {found}, allowed is below 1"),
         }

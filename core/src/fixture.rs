@@ -13,8 +13,14 @@ use std::vec::Vec;
 pub const ARCSEC: f64 = TAU / 360.0 / 3600.0;
 
 /// Limits of a joint at a thousand ticks a second.
-pub const LIMITS: Limits =
-    Limits { tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 2.0, generator_rate_rad_s: 700.0, patience: 5 };
+pub const LIMITS: Limits = Limits {
+    tick_s: 1e-3,
+    rate_rad_s: 0.05,
+    acceleration_rad_s2: 2.0,
+    generator_rate_rad_s: 700.0,
+    patience: 5,
+    hold_rad: 0.0,
+};
 pub const PITCH: f64 = TAU / 188.0;
 
 /// Jumps at ±the drag torque of 1.5 N·m.

@@ -2,7 +2,7 @@
 
 use crate::drive::Drive;
 use crate::play::PlayState;
-use crate::store::{Images, Store};
+use crate::store::Store;
 use crate::table::{Doubt, Model};
 use crate::{GeneratorAngle, Joint, OperatingPoint, OutputAngle};
 
@@ -34,9 +34,4 @@ pub fn play(play: &mut PlayState, nominal: OutputAngle) -> i32 {
 /// The error on one side of the play where it brings the output to `target`, counts.
 pub fn inverse(joint: &Joint, store: &Store, point: &OperatingPoint, target: OutputAngle, backward: bool) -> i32 {
     model(joint.drive(), store).solve(point, target, backward, &mut Doubt::default()).0
-}
-
-/// Makes a word of both copies anew.
-pub fn slice(store: &mut Store, images: &Images<'_>) {
-    store.tend(images, Doubt::default(), true);
 }

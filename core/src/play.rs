@@ -146,21 +146,19 @@ impl PlayState {
         self.error
     }
 
-    /// Whether the bounds are ones that an update leaves.
+    /// Nominal output; error, bounds and half-width: all of it.
     #[inline(always)]
-    pub(crate) const fn is_ordered(&self) -> bool {
-        self.lower <= self.upper
+    pub(crate) const fn parts(&self) -> (i64, [i32; 4]) {
+        (self.nominal.counts(), [self.error, self.lower, self.upper, self.half])
     }
 
-    /// Flips a bit of a bound (0, 1) or of the error (2), as radiation does.
-    #[cfg(test)]
-    pub(crate) fn flip(&mut self, bound: usize, bit: u32) {
-        let bound = match bound {
-            0 => &mut self.lower,
-            1 => &mut self.upper,
-            _ => &mut self.error,
-        };
-        *bound ^= 1 << bit;
+    /// From its parts, if an update can have left them.
+    pub(crate) fn of(nominal: i64, [error, lower, upper, half]: [i32; 4]) -> Option<Self> {
+        let started = (0..=MAX_PLAY_COUNTS).contains(&half) && lower >= half.wrapping_neg() && upper <= half;
+        let fresh = half == -1 && (lower == i32::MIN || lower == i32::MAX);
+        let possible = lower <= upper && error.unsigned_abs() <= MOST_KEPT_COUNTS;
+        let state = Self { nominal: OutputAngle::from_counts(nominal), error, lower, upper, half };
+        (possible && (started || fresh)).then_some(state)
     }
 
     /// Whether there was an update.
@@ -225,20 +223,9 @@ impl PlayState {
         let (upper, rest) = rest.split_first_chunk::<4>()?;
         let (half, rest) = rest.split_first_chunk::<4>()?;
         let crc = rest.first_chunk::<4>()?;
-        let state = Self {
-            nominal: OutputAngle::from_counts(i64::from_le_bytes(*counts)),
-            error: i32::from_le_bytes(*error),
-            lower: i32::from_le_bytes(*lower),
-            upper: i32::from_le_bytes(*upper),
-            half: i32::from_le_bytes(*half),
-        };
         let intact = u32::from_le_bytes(*crc) == crc32(bytes.first_chunk::<SAVED_BEFORE_CRC>()?);
-        let started = (0..=MAX_PLAY_COUNTS).contains(&state.half)
-            && state.lower >= state.half.wrapping_neg()
-            && state.upper <= state.half;
-        let fresh = state.half == -1 && (state.lower == i32::MIN || state.lower == i32::MAX);
-        let possible = state.lower <= state.upper && state.error.unsigned_abs() <= MOST_KEPT_COUNTS;
-        (intact && possible && (started || fresh)).then_some(state)
+        let parts = [error, lower, upper, half].map(|part| i32::from_le_bytes(*part));
+        Self::of(i64::from_le_bytes(*counts), parts).filter(|_| intact)
     }
 }
 
@@ -248,6 +235,9 @@ const fn clamped(offset: i32, half: i32) -> i32 {
     let above = if offset < least { least } else { offset };
     if above > half { half } else { above }
 }
+
+#[cfg(test)]
+crate::upset::upsets!(PlayState { nominal, error, lower, upper, half });
 
 #[cfg(test)]
 mod tests {

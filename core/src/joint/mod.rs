@@ -29,4 +29,4 @@ pub use slip::{
     FittedSlip, LoadTorque, NominalOutput, Slip, SlipBank, SlipElement, SlipState, SlipVariable, TorqueSlipElement,
     saved_slip_bytes,
 };
-pub use state::{JointState, SAVED_JOINT_BYTES};
+pub use state::{JointState, RestoreError, SAVED_JOINT_BYTES};

@@ -33,6 +33,26 @@ impl fmt::Display for ModeError {
 impl core::error::Error for ModeError {}
 
 impl Mode {
+    /// As a number: of telemetry, of the C interface, of what is kept.
+    pub(crate) const fn code(self) -> u32 {
+        match self {
+            Self::Off => 0,
+            Self::Tracking => 1,
+            Self::Hold => 2,
+            Self::Safe => 3,
+        }
+    }
+
+    /// From its number; safe for any that is none.
+    pub(crate) const fn from_code(code: u32) -> Self {
+        match code {
+            0 => Self::Off,
+            1 => Self::Tracking,
+            2 => Self::Hold,
+            _ => Self::Safe,
+        }
+    }
+
     /// Whether `self` may be followed by `to`: everything may stop, tracking starts from off or hold, hold only from tracking,
     /// and safe is left to off alone.
     #[must_use]

@@ -713,7 +713,8 @@ mod tests {
     #[test]
     fn the_output_is_where_it_was_predicted() {
         let image = fixture::image(true);
-        let images = Images::new(&image, &image);
+        let twin = image.clone();
+        let images = Images::new(&image, &twin);
         let missed = Table::check(&image).unwrap().projection_worst_rad() as f64;
         let joint = Joint::new(fixture::drive(), fixture::LIMITS, Overrun::SkipAndCount).unwrap();
         let mut store = Store::new();

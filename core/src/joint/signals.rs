@@ -34,10 +34,21 @@ impl Flags {
     pub const HELD_BACK: Self = Self(8);
     /// No correction could be made; the last one is kept or fades out.
     pub const NOT_CORRECTED: Self = Self(16);
-    /// The copies of the table disagree in what was read.
+    /// What was read of the table was not the same in both copies, or what the store knows of it was not whole. It was made anew and
+    /// the tick done again, so the answer is sound, unless [`Self::NOT_CORRECTED`] is set too: then it could not be mended, and
+    /// was not used. Also set, with that one, where the table is for another drive than the joint.
     pub const TABLE_DOUBT: Self = Self(32);
-    /// The state was not whole.
+    /// The state was not whole, and was taken from its other copy; where neither was whole the joint is in [`Mode::Safe`](crate::Mode::Safe).
     pub const STATE_TORN: Self = Self(64);
+    /// Settings of the joint in memory are not whole. Those of the other copy are used until the joint is made anew
+    /// ([`Joint::mend`](crate::Joint::mend)); if neither is whole the command is where the generator is, and nothing is corrected.
+    pub const JOINT_TORN: Self = Self(128);
+    /// The joint is in [`Mode::Safe`](crate::Mode::Safe): no correction is made.
+    pub const SAFE: Self = Self(256);
+    /// An image is not the one that was activated, or both are the same one: copies are made anew from the other, or not at all.
+    pub const OTHER_IMAGES: Self = Self(512);
+    /// Within a tick: it has to be done again.
+    pub(super) const AGAIN: Self = Self(1 << 15);
 
     /// Whether all of `other` are set.
     #[must_use]
@@ -51,8 +62,14 @@ impl Flags {
         self.0
     }
 
+    /// From bits, those of no flag left out.
+    #[cfg(feature = "c-api")]
+    pub(crate) const fn of_bits(bits: u16) -> Self {
+        Self(bits & !Self::AGAIN.0)
+    }
+
     #[inline(always)]
-    pub(super) const fn with(self, other: Self, set: bool) -> Self {
+    pub(crate) const fn with(self, other: Self, set: bool) -> Self {
         Self(self.0 | if set { other.0 } else { 0 })
     }
 }

@@ -1,41 +1,179 @@
 //! What changes while a joint runs, and what of it survives a reset.
 
 use super::mode::{Mode, ModeError};
-use crate::angle::{GeneratorAngle, OutputAngle};
+use super::runtime::Joint;
+use crate::angle::GeneratorAngle;
 use crate::crc::crc32;
-use crate::play::{MOST_ERROR_COUNTS, PlayState, SAVED_STATE_BYTES};
+use crate::play::{MOST_ERROR_COUNTS, PlayState};
+use crate::store::Store;
+use crate::whole::{SUMS_START, high, low, pair, same, sums};
+use core::fmt;
 
 /// Parts of a count that the correction is kept in: the difference of any two corrections fits 32 bits.
 pub(super) const FINE: i32 = 8;
 /// No table with its adjustment gives a larger correction, and no joint a faster one, fine counts.
 pub(super) const MOST_FINE: u32 = MOST_ERROR_COUNTS * FINE as u32;
 
-/// What changes while a joint runs.
+/// What changes while a joint runs: two copies with sums over each, so that an upset of one is noticed and mended in the next tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointState {
-    pub(super) play: PlayState,
+    copies: [Sealed; 2],
+    /// Told only.
+    missed_ticks: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Sealed {
+    kept: Kept,
+    sums: [u32; 2],
+}
+
+/// What a tick changes: 64 bytes, the most that is copied without a call.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Kept {
+    pub play: PlayState,
     /// Mean of the last adjustment, counts.
-    pub(super) adjusted: i32,
-    /// Output of the play and the last adjustment, added up: once more.
-    pub(super) output: OutputAngle,
-    pub(super) generator: GeneratorAngle,
-    /// The correction in fine counts, twice.
-    pub(super) correction: [i32; 2],
+    pub adjusted: i32,
+    /// The last sample that was believed.
+    pub generator: GeneratorAngle,
+    /// The correction, fine counts.
+    pub correction: i32,
     /// What is wanted, and what of it was asked of the limiter.
-    pub(super) goal: i32,
-    pub(super) aimed: i32,
-    pub(super) speed: i32,
+    pub goal: i32,
+    pub aimed: i32,
+    pub speed: i32,
     /// Ticks in a row with a glitch, and without a correction.
-    pub(super) glitches: u32,
-    pub(super) uncorrected: u32,
-    pub(super) fading: u32,
-    pub(super) missed_ticks: u32,
-    pub(super) mode: Mode,
-    pub(super) started: bool,
+    pub glitches: u16,
+    pub uncorrected: u16,
+    pub fading: u32,
+    /// Mode, what samples there were, and towards which flank the last motion went; a whole word, of which every bit means something
+    /// or is zero.
+    pub marks: u32,
+}
+
+/// Bits of the marks: mode.
+pub(super) const MODE: u32 = 3;
+/// No sample yet after a reset; one that is saved, to hold the first against; a sample.
+pub(super) const SEEN: u32 = 3 << 2;
+const SAVED: u32 = 1 << 2;
+pub(super) const SAMPLED: u32 = 2 << 2;
+/// The flank that the last motion went to: none yet, that of forward, that of backward motion.
+pub(super) const FLANK: u32 = 3 << 4;
+pub(super) const FLANK_FORWARD: u32 = 1 << 4;
+pub(super) const FLANK_BACKWARD: u32 = 2 << 4;
+/// The state was mended since the last tick, which the next has to tell.
+pub(super) const MENDED: u32 = 1 << 6;
+
+impl Kept {
+    /// After a reset: no correction, the side of the play unknown, off.
+    const NEW: Self = Self {
+        play: PlayState::unknown(),
+        adjusted: 0,
+        generator: GeneratorAngle::ZERO,
+        correction: 0,
+        goal: 0,
+        aimed: 0,
+        speed: 0,
+        glitches: 0,
+        uncorrected: 0,
+        fading: 0,
+        marks: Mode::Off.code(),
+    };
+
+    #[inline(never)]
+    const fn sums(&self) -> u64 {
+        let (nominal, [error, lower, upper, half]) = self.play.parts();
+        sums!(
+            SUMS_START;
+            low(nominal),
+            high(nominal),
+            error as u32,
+            lower as u32,
+            upper as u32,
+            half as u32,
+            self.adjusted as u32,
+            low(self.generator.counts()),
+            high(self.generator.counts()),
+            self.correction as u32,
+            self.goal as u32,
+            self.aimed as u32,
+            self.speed as u32,
+            self.glitches as u32 | (self.uncorrected as u32) << 16,
+            self.fading,
+            self.marks,
+        )
+    }
+
+    #[inline(always)]
+    const fn sealed(self) -> Sealed {
+        Sealed { kept: self, sums: pair(self.sums()) }
+    }
+
+    #[inline(always)]
+    pub(super) const fn mode(&self) -> Mode {
+        Mode::from_code(self.marks & MODE)
+    }
+
+    /// The mark of what samples there were.
+    #[inline(always)]
+    pub(super) const fn seen(&self) -> u32 {
+        self.marks & SEEN
+    }
+}
+
+impl Sealed {
+    #[inline(always)]
+    const fn is_whole(&self) -> bool {
+        same(pair(self.kept.sums()), self.sums)
+    }
 }
 
 /// Size of a saved joint state.
-pub const SAVED_JOINT_BYTES: usize = SAVED_STATE_BYTES + 12;
+pub const SAVED_JOINT_BYTES: usize = 72;
+/// What it begins with; the last byte is the version.
+const SAVED_MARK: [u8; 4] = *b"FXJ\x01";
+
+/// Why saved bytes are no state of this joint with this table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RestoreError {
+    /// Not of this version.
+    Version {
+        /// The first bytes; `FXJ` and 1 are read.
+        found: [u8; 4],
+    },
+    /// The CRC-32 does not match: damaged, or not written to the end.
+    Crc,
+    /// Saved with another table.
+    OtherTable,
+    /// Saved by a joint of another drive or with other settings.
+    OtherJoint,
+    /// Numbers that no joint can have saved.
+    Impossible,
+}
+
+impl fmt::Display for RestoreError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Version { found } => write!(f, "saved state begins with {found:02x?}, {SAVED_MARK:02x?} is read"),
+            Self::Crc => f.write_str("the saved state is damaged"),
+            Self::OtherTable => f.write_str("the state was saved with another table"),
+            Self::OtherJoint => f.write_str("the state was saved by another joint"),
+            Self::Impossible => f.write_str("no joint can have saved this state"),
+        }
+    }
+}
+
+impl core::error::Error for RestoreError {}
+
+/// How a state was found.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Found {
+    Whole,
+    /// One copy was not whole; the other was taken.
+    Mended,
+    /// Neither was whole: all but the correction is what it is after a reset, and the mode is safe.
+    Lost,
+}
 
 impl Default for JointState {
     fn default() -> Self {
@@ -44,55 +182,94 @@ impl Default for JointState {
 }
 
 impl JointState {
+    const NEW: [Sealed; 2] = [Kept::NEW.sealed(); 2];
+
     /// After a reset: no correction, the side of the play unknown, off.
     #[must_use]
     pub const fn new() -> Self {
-        Self {
-            play: PlayState::unknown(),
-            adjusted: 0,
-            output: OutputAngle::ZERO,
-            generator: GeneratorAngle::ZERO,
-            correction: [0; 2],
-            goal: 0,
-            aimed: 0,
-            speed: 0,
-            glitches: 0,
-            uncorrected: 0,
-            fading: 0,
-            missed_ticks: 0,
-            mode: Mode::Off,
-            started: false,
+        Self { copies: Self::NEW, missed_ticks: 0 }
+    }
+
+    /// What is kept, of the copy that is whole.
+    #[inline(always)]
+    pub(super) fn open(&self) -> (Kept, Found) {
+        let [first, _] = &self.copies;
+        // Copied once.
+        let (mut kept, mut found) = (first.kept, Found::Whole);
+        if !first.is_whole() {
+            found = self.open_other(&mut kept);
         }
+        (kept, found)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn open_other(&self, kept: &mut Kept) -> Found {
+        let [first, second] = &self.copies;
+        if second.is_whole() {
+            *kept = second.kept;
+            return Found::Mended;
+        }
+        let (one, other) = (first.kept.correction, second.kept.correction);
+        // What both have is likely to be what is commanded, and taken back within the limits.
+        let correction = if one == other && one.unsigned_abs() <= MOST_FINE { one } else { 0 };
+        let marks = Mode::Safe.code();
+        *kept = Kept { correction, goal: correction, aimed: correction, marks, ..Kept::NEW };
+        Found::Lost
+    }
+
+    /// Keeps what a tick leaves.
+    #[inline(always)]
+    pub(super) const fn close(&mut self, kept: &Kept) {
+        let sums = pair(kept.sums());
+        let [first, second] = &mut self.copies;
+        first.kept = *kept;
+        first.sums = sums;
+        second.kept = *kept;
+        second.sums = sums;
+    }
+
+    /// The first copy, for a look: as the last tick left it.
+    const fn kept(&self) -> &Kept {
+        let [first, _] = &self.copies;
+        &first.kept
     }
 
     /// The mode.
     #[must_use]
     pub const fn mode(&self) -> Mode {
-        self.mode
+        self.kept().mode()
     }
 
     /// Changes the mode from the next tick on.
     ///
     /// # Errors
     /// [`ModeError`] if [`Mode::may_become`] says no; the mode stays.
-    pub const fn request(&mut self, to: Mode) -> Result<(), ModeError> {
-        if !self.mode.may_become(to) {
-            return Err(ModeError { from: self.mode, to });
+    pub fn request(&mut self, to: Mode) -> Result<(), ModeError> {
+        let (mut kept, found) = self.open();
+        let from = kept.mode();
+        if !from.may_become(to) {
+            return Err(ModeError { from, to });
         }
-        self.mode = to;
+        let mended = if found == Found::Whole { 0 } else { MENDED };
+        kept.marks = kept.marks & !MODE | to.code() | mended;
+        self.close(&kept);
         Ok(())
     }
 
-    /// What [`Self::output`] must be.
-    #[inline(always)]
-    pub(super) const fn told_twice(&self) -> OutputAngle {
-        self.play.output_or_zero().offset_counts(self.adjusted as i64)
+    /// On command: which side of the play the drive rests on is not known any more, as after work on it.
+    pub fn forget_side(&mut self) {
+        let (mut kept, found) = self.open();
+        kept.play = PlayState::unknown();
+        let mended = if found == Found::Whole { 0 } else { MENDED };
+        kept.marks = kept.marks & !FLANK | mended;
+        self.close(&kept);
     }
 
     /// The play.
     #[must_use]
     pub const fn play(&self) -> &PlayState {
-        &self.play
+        &self.kept().play
     }
 
     /// Ticks missed since the start; wraps.
@@ -101,44 +278,135 @@ impl JointState {
         self.missed_ticks
     }
 
-    /// What must survive a reset: the play and the correction, with checksums.
+    /// Counts ticks that were missed.
+    #[inline(always)]
+    pub(super) const fn missed(&mut self, ticks: u16) {
+        self.missed_ticks = self.missed_ticks.wrapping_add(ticks as u32);
+    }
+
+    /// What must survive a reset: play, correction and the last sample, with version, table and joint, and a CRC-32 over all of it.
+    ///
+    /// | offset | type | what |
+    /// |---|---|---|
+    /// | 0 | 4 bytes | `FXJ`, version 1 |
+    /// | 4 | 8 bytes | id of the table |
+    /// | 12 | 2 × `u32` | sums of the joint's settings |
+    /// | 20 | `i64` | nominal output, counts of 2⁻³² turn, as all that follows |
+    /// | 28 | 4 × `i32` | error; bounds of the offset in the play; half-width |
+    /// | 44 | `i32` | mean of the last adjustment |
+    /// | 48 | `i64` | generator |
+    /// | 56 | 2 × `i32` | correction and its change in a tick, eighths of a count |
+    /// | 64 | `u32` | flank: 0 none, 16 forward, 32 backward |
+    /// | 68 | `u32` | CRC-32 of the 68 bytes before |
     #[must_use]
-    pub fn save(&self) -> [u8; SAVED_JOINT_BYTES] {
+    pub fn save(&self, joint: &Joint, store: &Store) -> [u8; SAVED_JOINT_BYTES] {
+        let (kept, found) = self.open();
+        let (nominal, [error, lower, upper, half]) = kept.play.parts();
+        let generator = kept.generator.counts();
+        let [[a, b, c, d], [e, f, g, h]] = {
+            let [a, b, c, d, e, f, g, h] = store.id().0;
+            [[a, b, c, d], [e, f, g, h]]
+        };
+        let [turned, added] = joint.sums();
+        let words = [
+            u32::from_le_bytes(SAVED_MARK),
+            u32::from_le_bytes([a, b, c, d]),
+            u32::from_le_bytes([e, f, g, h]),
+            turned,
+            added,
+            low(nominal),
+            high(nominal),
+            error as u32,
+            lower as u32,
+            upper as u32,
+            half as u32,
+            kept.adjusted as u32,
+            low(generator),
+            high(generator),
+            kept.correction as u32,
+            kept.speed as u32,
+            kept.marks & FLANK,
+        ];
         let mut bytes = [0; SAVED_JOINT_BYTES];
-        let [correction, _] = self.correction;
-        let parts = self.play.save().into_iter().chain(correction.to_le_bytes()).chain(self.speed.to_le_bytes());
-        for (to, from) in bytes.iter_mut().zip(parts) {
-            *to = from;
+        for (to, from) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(words) {
+            *to = from.to_le_bytes();
         }
         if let Some((before, sum)) = bytes.split_last_chunk_mut::<4>() {
-            *sum = crc32(before).to_le_bytes();
+            // A state that is lost is not to come back as one that was saved.
+            let spoilt = if found == Found::Lost { u32::MAX } else { 0 };
+            *sum = (crc32(before) ^ spoilt).to_le_bytes();
         }
         bytes
     }
 
-    /// A state from [`Self::save`], in [`Mode::Off`] with the correction still there; `None` if the bytes are damaged.
+    /// A state from [`Self::save`], in [`Mode::Off`] with the correction still there, for the same joint with the same table.
     ///
+    /// The first sample is held against the one that was saved: if the generator is further away than a tick allows, it is a glitch,
+    /// and if it stays there the side of the play is unknown. Until there is a sample nothing is corrected anew.
     /// Restore only if the joint cannot have moved meanwhile, else start from [`Self::new`]. Ask for [`Mode::Tracking`] before
     /// the first tick to keep the correction.
-    #[must_use]
-    pub fn restore(bytes: &[u8; SAVED_JOINT_BYTES]) -> Option<Self> {
-        let (before, sum) = bytes.split_last_chunk::<4>()?;
-        let (play, rest) = before.split_first_chunk::<SAVED_STATE_BYTES>()?;
-        let (correction, speed) = rest.split_first_chunk::<4>()?;
-        let correction = i32::from_le_bytes(*correction);
-        let speed = i32::from_le_bytes(*speed.first_chunk::<4>()?);
-        let play = PlayState::restore(play)?;
-        let possible = correction.unsigned_abs() <= MOST_FINE && speed.unsigned_abs() <= MOST_FINE;
-        let intact = crc32(before) == u32::from_le_bytes(*sum) && possible;
-        let state = Self {
+    ///
+    /// # Errors
+    /// [`RestoreError`]; then [`Self::new`] is left.
+    pub fn restore(bytes: &[u8; SAVED_JOINT_BYTES], joint: &Joint, store: &Store) -> Result<Self, RestoreError> {
+        let words = bytes.as_chunks::<4>().0;
+        let word = |i: usize| words.get(i).copied().unwrap_or_default();
+        let number = |i: usize| u32::from_le_bytes(word(i));
+        let signed = |i: usize| number(i) as i32;
+        let long = |i: usize| (signed(i.wrapping_add(1)) as i64) << 32 | number(i) as i64;
+        if word(0) != SAVED_MARK {
+            return Err(RestoreError::Version { found: word(0) });
+        }
+        let (before, sum) = bytes.split_last_chunk::<4>().ok_or(RestoreError::Crc)?;
+        if crc32(before) != u32::from_le_bytes(*sum) {
+            return Err(RestoreError::Crc);
+        }
+        if !store.id().0.iter().eq([word(1), word(2)].as_flattened()) {
+            return Err(RestoreError::OtherTable);
+        }
+        if !same([number(3), number(4)], joint.sums()) {
+            return Err(RestoreError::OtherJoint);
+        }
+        let play = PlayState::of(long(5), [7, 8, 9, 10].map(signed)).ok_or(RestoreError::Impossible)?;
+        let (adjusted, correction, speed, flank) = (signed(11), signed(14), signed(15), number(16));
+        let small = [correction, speed].iter().all(|fine| fine.unsigned_abs() <= MOST_FINE);
+        if !small || flank & !FLANK != 0 || flank == FLANK || adjusted.unsigned_abs() > MOST_ERROR_COUNTS {
+            return Err(RestoreError::Impossible);
+        }
+        let kept = Kept {
             play,
-            output: play.output_or_zero(),
-            correction: [correction; 2],
+            adjusted,
+            generator: GeneratorAngle::from_counts(long(12)),
+            correction,
             goal: correction,
             aimed: correction,
             speed,
-            ..Self::new()
+            marks: Mode::Off.code() | SAVED | flank,
+            ..Kept::NEW
         };
-        intact.then_some(state)
+        // Before any sample there is none to hold the first against.
+        let kept = if play.is_started() { kept } else { Kept { marks: Mode::Off.code(), ..kept } };
+        Ok(Self { copies: [kept.sealed(); 2], missed_ticks: 0 })
     }
 }
+
+const _: () = assert!(size_of::<Kept>() == 64);
+
+#[cfg(test)]
+crate::upset::upsets!(JointState { copies, missed_ticks });
+#[cfg(test)]
+crate::upset::upsets!(Sealed { kept, sums });
+#[cfg(test)]
+crate::upset::upsets!(Kept {
+    play,
+    adjusted,
+    generator,
+    correction,
+    goal,
+    aimed,
+    speed,
+    glitches,
+    uncorrected,
+    fading,
+    marks,
+});

@@ -5,7 +5,7 @@ use crate::table::{Doubt, words_from};
 /// Largest copy that fits into a [`Store`](crate::Store), words: 72 for the axes, curves, and for each torque node 3 and its ripple.
 pub const STORE_WORDS: usize = 1024;
 /// Words that a read may take from the last place on.
-const SLACK: usize = 8;
+pub(super) const SLACK: usize = 8;
 
 /// One copy: words, lowest byte first.
 #[repr(align(8))]
@@ -43,4 +43,15 @@ pub(super) fn agreed<const N: usize>(first: [u32; N], second: [u32; N], doubt: &
         doubt.0 |= a ^ b;
     }
     first
+}
+
+#[cfg(test)]
+impl crate::upset::Upset for Copied {
+    fn bits(&self) -> usize {
+        32 * self.0.len()
+    }
+
+    fn flip(&mut self, bit: usize, _: &mut std::string::String) {
+        self.0[bit / 32][bit / 8 % 4] ^= 1 << (bit % 8);
+    }
 }

@@ -10,7 +10,7 @@ pub const STORE_PAGES: usize = 32;
 /// What the store has seen since it was made; counters wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// Ticks in which a step read words that differ between the copies.
+    /// Ticks that were done again, as a step read words that differ between the copies or something else was not whole.
     pub doubtful_ticks: u32,
     /// Words of the copies that were found to differ when they were made anew.
     pub words_mended: u32,
@@ -33,6 +33,8 @@ pub enum Health {
     Lost,
     /// No table was activated.
     Empty,
+    /// What the store knew of the table was hit in both its copies: nothing is corrected until the table is activated again.
+    Torn,
 }
 
 /// Why a table was not activated.
@@ -54,6 +56,13 @@ pub enum ActivateError {
     TwoTables,
     /// The table is for other tooth counts or another fixed member.
     OtherDrive,
+    /// The temperature is not finite.
+    Temperature {
+        /// °C.
+        found_c: f32,
+    },
+    /// Both images lie at the same place, or overlap.
+    SameImage,
 }
 
 impl fmt::Display for ActivateError {
@@ -64,8 +73,13 @@ impl fmt::Display for ActivateError {
             Self::TooManyPages { found } => write!(f, "the image has {found} pages, a store takes {STORE_PAGES}"),
             Self::TwoTables => f.write_str("the images are two different tables"),
             Self::OtherDrive => f.write_str("the table is for another drive"),
+            Self::Temperature { found_c } => write!(f, "temperature {found_c} C: must be finite"),
+            Self::SameImage => f.write_str("both images are the same place in memory: two are needed"),
         }
     }
 }
 
 impl core::error::Error for ActivateError {}
+
+#[cfg(test)]
+crate::upset::upsets!(Counters { doubtful_ticks, words_mended, words_skipped, pages_damaged, passes });

@@ -1,5 +1,6 @@
 //! Two images of one table, and how a page of one is written again from the other.
 
+use crate::crc::crc32;
 use crate::table::{PAGE_BYTES, Words, page_intact, word, word_at};
 
 /// Two images of one table, read where they lie. Made anew for every call: it holds nothing but where they are.
@@ -9,10 +10,23 @@ pub struct Images<'a> {
 }
 
 impl<'a> Images<'a> {
-    /// Two images. The same one twice is allowed, and protects only the copies.
+    /// Two images, at two places: the same one twice is not activated, and a tick that is given it does not make the copies anew.
     #[must_use]
     pub const fn new(first: &'a [u8], second: &'a [u8]) -> Self {
         Self { words: [first.as_chunks::<4>().0, second.as_chunks::<4>().0] }
+    }
+
+    /// Whether both begin at the same place.
+    #[inline(always)]
+    pub(super) fn is_one(&self) -> bool {
+        let [first, second] = self.words;
+        core::ptr::eq(first.as_ptr(), second.as_ptr())
+    }
+
+    /// Whether they share memory.
+    pub(super) fn overlap(&self) -> bool {
+        let [first, second] = self.words.map(<[_]>::as_ptr_range);
+        first.start < second.end && second.start < first.end
     }
 
     #[inline(always)]
@@ -23,11 +37,14 @@ impl<'a> Images<'a> {
 }
 
 /// Writes a page of `good` over the same page of `damaged`, and its checksum, and tells whether it did: not if the page of `good` is
-/// damaged too. Both are whole images of the same table. Then tell the store: [`Store::mended`](crate::Store::mended).
+/// damaged too. Both are whole images of the same table. The page after the last is the CRC-32 of the whole image, by which a store
+/// knows it ([`Flags::OTHER_IMAGES`](crate::Flags::OTHER_IMAGES)). Then tell the store: [`Store::mended`](crate::Store::mended).
 #[must_use]
 pub fn mend_page(damaged: &mut [u8], good: &[u8], page: usize) -> bool {
     let body_bytes = (word_at(good.as_chunks::<4>().0, word::BODY) as usize).saturating_mul(4);
-    if damaged.len() != good.len() || !page_intact(good, body_bytes, page) {
+    let last = body_bytes.div_ceil(PAGE_BYTES);
+    let intact = if page == last { whole_intact(good) } else { page_intact(good, body_bytes, page) };
+    if damaged.len() != good.len() || !intact {
         return false;
     }
     let sum = body_bytes.saturating_add(page.saturating_mul(4));
@@ -39,4 +56,9 @@ pub fn mend_page(damaged: &mut [u8], good: &[u8], page: usize) -> bool {
         }
     }
     true
+}
+
+/// Whether the CRC-32 of all before is at the end.
+fn whole_intact(image: &[u8]) -> bool {
+    image.split_last_chunk::<4>().is_some_and(|(before, sum)| crc32(before) == u32::from_le_bytes(*sum))
 }

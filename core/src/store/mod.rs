@@ -1,13 +1,11 @@
 //! The table that a joint flies with: two images, and from them two copies at the temperature of the drive.
 //!
 //! The images lie where the firmware has them, in flash or in memory, and are read in place. Of what a step needs, the store
-//! holds two copies in memory, blended to one temperature. Each tick
+//! holds two copies in memory, blended to one temperature. What a step reads it reads in both copies; if they differ, they are made
+//! anew in that tick.
 //!
-//! * what the step reads it reads in both copies; if they differ, the step makes no use of it and says so;
-//! * one word of both copies is made anew from both images, so that nothing stays wrong for longer than a pass, and the copies
-//!   follow the temperature.
-//!
-//! In a slower rate group [`Store::check_images`] goes over the CRC-32 of the pages of both images. A word that differs between the images is taken from the one whose page is intact, or not at all. A page that is damaged in
+//! In a slower rate group [`Store::check_images`] makes word by word of both copies anew from both images, so that nothing stays wrong
+//! for longer than a pass, and the copies follow the temperature; and it goes over the CRC-32 of the pages of both images. A word that differs between the images is taken from the one whose page is intact, or not at all. A page that is damaged in
 //! one image is named, so that the firmware writes it again from the other ([`Store::damaged_page`], [`mend_page`]); one that is
 //! damaged in both is lost, the copies stay as they were, and the health says so. The work is the same in every tick, whatever is
 //! found.
@@ -32,37 +30,76 @@ use crate::crc::{CRC_START, crc_word};
 use crate::drive::Drive;
 use crate::num;
 use crate::table::{
-    Doubt, Memory, NODE_WORDS, OperatingPoint, PAGE_BYTES, Plan, Table, TableId, TorquePlace, Words, f32_at, grid,
-    halves, word, word_at,
+    Doubt, Memory, NODE_WORDS, OperatingPoint, PAGE_BYTES, Plan, Table, TableId, TorquePlace, Words, grid, word_at,
 };
-use copies::{Copied, agreed};
-use source::{FIRST, Source};
+use copies::{Copied, SLACK, agreed};
+use source::{ACTIVE, FIRST, IN_RANGE, Sealed, Source, TORN};
 
 const PAGE_WORDS: usize = PAGE_BYTES / 4;
 
-/// What became of a word that was to be made anew.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Word {
-    /// The copies agreed.
-    Kept,
-    Mended,
-    /// There is nothing to make it of.
-    Skipped,
+/// A word of the copies, made anew.
+#[derive(Clone, Copy)]
+struct Fresh {
+    place: usize,
+    value: u32,
+    /// There is something to make it of.
+    usable: bool,
 }
 
-/// Where the checking of the images is.
+/// Whether any of two images, or both, are not those that were activated; one that is given twice is not.
+#[derive(Clone, Copy)]
+struct Strangers {
+    any: bool,
+    all: bool,
+}
+
+/// What a tick has to say of the table.
+#[derive(Clone, Copy)]
+pub(crate) struct Told {
+    /// What is known of it is whole.
+    pub whole: bool,
+    /// An image is not the one that was activated.
+    pub other_images: bool,
+}
+
+/// Where the checking of the images is. An upset of it makes a page look damaged until it is checked again.
 #[derive(Clone, Copy, Debug)]
 struct Scrub {
-    second: bool,
+    second: u32,
     page: u32,
     word: u32,
+    /// Exclusive or with what a CRC-32 begins with.
     crc: u32,
-    /// Pages found damaged, one bit each.
-    damaged: [u32; 2],
 }
 
 impl Scrub {
-    const START: Self = Self { second: false, page: 0, word: 0, crc: CRC_START, damaged: [0; 2] };
+    const START: Self = Self { second: 0, page: 0, word: 0, crc: 0 };
+}
+
+/// Pages found damaged, one bit each, of both images; once more, turned, so that an upset of it is noticed. All zeros for none.
+#[derive(Clone, Copy, Debug)]
+struct Damaged {
+    pages: [u32; 2],
+    again: [u32; 2],
+}
+
+impl Damaged {
+    const NONE: Self = Self::of([0; 2]);
+
+    #[inline(always)]
+    const fn of(pages: [u32; 2]) -> Self {
+        let [first, second] = pages;
+        Self { pages, again: [first.rotate_left(16), second.rotate_left(16)] }
+    }
+
+    /// The pages; none where they are not whole, so that words that differ are left as they are.
+    #[inline(always)]
+    const fn pages(&self) -> [u32; 2] {
+        let ([a, b], [c, d]) = (self.pages, self.again);
+        let whole = (a.rotate_left(16) ^ c) | (b.rotate_left(16) ^ d) == 0;
+        let mask = (whole as u32).wrapping_neg();
+        [a & mask, b & mask]
+    }
 }
 
 /// Whether an image passes; on a stack of its own.
@@ -71,20 +108,18 @@ fn is_table(words: Words<'_>) -> bool {
     Table::check(words.as_flattened()).is_ok()
 }
 
-/// Two copies of a table at the temperature of the drive: 8.1 KiB, and 0.2 KiB beside.
+/// Two copies of a table at the temperature of the drive: 8.1 KiB, and 0.3 KiB beside.
 #[derive(Clone, Debug)]
 pub struct Store {
     first: Copied,
     second: Copied,
-    source: Source,
-    sum: u32,
-    /// The word that is made anew next.
+    source: [Sealed; 2],
+    /// The word that is made anew next; any that is in use is as good.
     next: u32,
     scrub: Scrub,
-    /// Words of the body of an image.
-    body: u32,
+    damaged: Damaged,
     counters: Counters,
-    active: bool,
+    id: [TableId; 2],
 }
 
 impl Default for Store {
@@ -98,7 +133,7 @@ impl Memory for Store {
 
     #[inline(always)]
     fn plan(&self) -> &Plan {
-        &self.source.plan
+        &self.source().plan
     }
 
     #[inline(always)]
@@ -113,53 +148,42 @@ impl Memory for Store {
 }
 
 impl Store {
-    /// A store without a table: every step goes without correction.
+    /// A store without a table, all zeros: every step goes without correction.
+    ///
+    /// In a static it takes no room in flash and none of the stack.
     #[must_use]
+    #[inline(always)]
     pub const fn new() -> Self {
-        let plan = Plan {
-            ripple_nodes: 0,
-            ripple_unit: 0,
-            ripple_cells: 0,
-            curves: [0; 3],
-            limit: 0,
-            iterations: 0,
-            hold: 0,
-            cell_width: 1.0,
-            play_ripple: 0,
-        };
-        let source = Source {
-            plan,
-            torque_range: [0.0; 2],
-            last_torque: 0,
-            used: 0,
-            nodes_from: 0,
-            records_from: 0,
-            record: 0,
-            nodes_ahead: 0,
-            node_plane: 0,
-            records_ahead: 0,
-            record_plane: 0,
-            warm: 0.0,
-            temperature_in_range: 0,
-        };
         Self {
             first: Copied::EMPTY,
             second: Copied::EMPTY,
-            source,
-            sum: 0,
+            source: [Sealed::EMPTY; 2],
             next: 0,
             scrub: Scrub::START,
-            body: 0,
+            damaged: Damaged::NONE,
             counters: Counters { doubtful_ticks: 0, words_mended: 0, words_skipped: 0, pages_damaged: 0, passes: 0 },
-            active: false,
+            id: [TableId([0; 8]); 2],
         }
+    }
+
+    #[inline(always)]
+    const fn source(&self) -> &Source {
+        let [first, _] = &self.source;
+        &first.source
+    }
+
+    /// The id of the table in use; zeros if there is none, or if its two copies disagree.
+    #[must_use]
+    pub fn id(&self) -> TableId {
+        let [first, second] = self.id;
+        if first == second { first } else { TableId::default() }
     }
 
     /// Checks the images and fills the copies from them, at this temperature; used from the next tick on.
     ///
     /// At least one image must pass [`Table::check`]; if the other does not, it is damaged and will be named; if it is another
-    /// table, neither is taken. Takes as long as the
-    /// check and some 80 instructions for each word: between two ticks only if there is time for that.
+    /// table, neither is taken. They must lie at two places: one image given twice would be believed against the copies wherever it is
+    /// hit. Takes as long as the check and some 80 instructions for each word: between two ticks only if there is time for that.
     ///
     /// # Errors
     /// [`ActivateError`]; the table in use stays, and goes on only if its images stay too.
@@ -170,6 +194,9 @@ impl Store {
         temperature_c: f32,
     ) -> Result<TableId, ActivateError> {
         let [first, second] = images.words;
+        if !temperature_c.is_finite() {
+            return Err(ActivateError::Temperature { found_c: temperature_c });
+        }
         // Only where the images differ is the second a question.
         if first != second && is_table(first) && is_table(second) {
             return Err(ActivateError::TwoTables);
@@ -177,74 +204,106 @@ impl Store {
         let table = Table::check(first.as_flattened())
             .or_else(|error| Table::check(second.as_flattened()).map_err(|_| error))
             .map_err(ActivateError::Image)?;
+        if images.overlap() {
+            return Err(ActivateError::SameImage);
+        }
         if table.drive() != drive {
             return Err(ActivateError::OtherDrive);
         }
         let source = Source::new(&table);
-        let body = word_at(table.words, word::BODY);
         if source.used as usize > STORE_WORDS {
             return Err(ActivateError::TooLarge { needed: source.used as usize });
         }
         if table.page_count() > STORE_PAGES {
             return Err(ActivateError::TooManyPages { found: table.page_count() });
         }
-        let counters = self.counters;
         // Field by field: a whole store would be made on the stack first.
         for copy in [&mut self.first, &mut self.second] {
             copy.0.fill([0; 4]);
         }
-        self.source = source;
-        self.sum = source.sum();
+        self.source = [source.at_temperature(table.words, temperature_c).sealed(); 2];
         self.next = 0;
         self.scrub = Scrub::START;
-        self.body = body;
-        self.active = true;
-        let images = Images { words: [table.words; 2] };
-        self.set_temperature(&images, temperature_c);
-        for _ in 0..self.source.used {
-            self.tend(&images, Doubt::default(), true);
+        self.damaged = Damaged::NONE;
+        self.id = [table.id(); 2];
+        for place in 0..source.used as u32 {
+            let fresh = self.fresh(&[table.words; 2], place, Strangers { any: false, all: false });
+            self.first.set(fresh.place, fresh.value);
+            self.second.set(fresh.place, fresh.value);
         }
-        self.counters = counters;
         Ok(table.id())
     }
 
     /// The temperature that the copies follow, °C, within one pass. Call it in a slow rate group; false, and nothing changes, if it
-    /// is not finite, the images disagree about where what is, or the store is not whole.
+    /// is not finite, the images disagree about where what is or are not those that were activated, or there is no table.
     pub fn set_temperature(&mut self, images: &Images<'_>, temperature_c: f32) -> bool {
+        self.mend_source();
+        let source = *self.source();
         let [first, second] = images.words;
-        let range_at = word::TEMPERATURE_RANGE;
-        let axis = word::TEMPERATURE_NODES..word::CURVES;
-        // Last intervals, nodes, records.
-        let [last_at, nodes_at, records_at] = [1, 2, 3].map(|i: usize| word::CELL_WIDTH.wrapping_add(i));
-        let read = [range_at, range_at.wrapping_add(1), last_at, nodes_at, records_at].into_iter().chain(axis);
-        let same = read.into_iter().all(|i| word_at(first, i) == word_at(second, i));
-        if !same || !temperature_c.is_finite() || self.source.sum() != self.sum {
+        let known = images.at(source.seal_at as usize) == [source.seal; 2];
+        let active = source.marks & ACTIVE != 0;
+        if !temperature_c.is_finite() || !active || !known || !source::agree_on_temperature(first, second) {
             return false;
         }
-        let number = |i: usize| f32_at(first, i);
-        let range = [number(range_at), number(range_at.wrapping_add(1))];
-        let temperature = num::within(temperature_c, range);
-        let [last_temperature, _] = halves(word_at(first, last_at));
-        let node = |i: usize| number(word::TEMPERATURE_NODES.wrapping_add(i));
-        let plane = grid::search_8(node, temperature).min(last_temperature);
-        let (cold, hot) = (node(plane), node(plane.wrapping_add(1)));
-        let [node_plane, nodes] = halves(word_at(first, nodes_at));
-        let [record_plane, records] = halves(word_at(first, records_at));
-        let ahead = |start: usize, step: usize, from: u16| {
-            (start.wrapping_add(plane.wrapping_mul(step)) as u16).wrapping_sub(from)
-        };
-        let source = Source {
-            nodes_ahead: ahead(nodes, node_plane, self.source.nodes_from),
-            node_plane: node_plane as u16,
-            records_ahead: ahead(records, record_plane, self.source.records_from),
-            record_plane: record_plane as u16,
-            warm: (temperature - cold) / (hot - cold),
-            temperature_in_range: (temperature == temperature_c) as u16,
-            ..self.source
-        };
-        self.source = source;
-        self.sum = source.sum();
+        self.source = [source.at_temperature(first, temperature_c).sealed(); 2];
         true
+    }
+
+    /// Takes what is known of the table from the copy that is whole; if neither is, there is no table any more.
+    /// Whether anything was to be done.
+    fn mend_source(&mut self) -> bool {
+        let [first, second] = self.source.map(|sealed| sealed.is_whole());
+        let [one, other] = self.source;
+        self.source = match (first, second) {
+            (true, true) if one.sums == other.sums => return false,
+            (true, _) => [one; 2],
+            (false, true) => [other; 2],
+            (false, false) => [Source { marks: TORN, ..Source::EMPTY }.sealed(); 2],
+        };
+        true
+    }
+
+    /// Mends what a tick at this torque reads: what is known of the table, and words that differ between the copies. Whether anything was to be done.
+    pub(crate) fn mend(&mut self, images: &Images<'_>, torque_n_m: f32) -> bool {
+        let mut found = self.mend_source();
+        let Source { nodes_from, records_from, record, last_torque, torque_range, .. } = *self.source();
+        found |= self.mend_words(images, 0, nodes_from as usize);
+        // The axis is whole now.
+        let interval = self.interval(num::within(torque_n_m, torque_range), last_torque as usize);
+        let nodes = (nodes_from as usize).wrapping_add(interval.wrapping_mul(NODE_WORDS));
+        found |= self.mend_words(images, nodes, 2 * NODE_WORDS);
+        let record = record as usize;
+        let records = (records_from as usize).wrapping_add(interval.wrapping_mul(record));
+        // A record alone is read with what follows it.
+        found |= self.mend_words(images, records, record.wrapping_mul(2).wrapping_add(SLACK));
+        self.counters.doubtful_ticks = self.counters.doubtful_ticks.wrapping_add(1);
+        found
+    }
+
+    /// Makes those of these words anew that differ between the copies.
+    fn mend_words(&mut self, images: &Images<'_>, from: usize, words: usize) -> bool {
+        let mut found = false;
+        let used = self.source().used as usize;
+        // What is read beyond the last record is zero.
+        let end = used.wrapping_add(SLACK);
+        let (from, to) = (from.min(end), from.wrapping_add(words).min(end));
+        let strangers = self.strangers(images);
+        for place in from..to {
+            let ([a], [b]) = (self.first.words::<1>(place), self.second.words::<1>(place));
+            if a == b {
+                continue;
+            }
+            found = true;
+            let fresh = self.fresh(&images.words, place as u32, strangers);
+            let fresh = if place < used { fresh } else { Fresh { place, value: 0, usable: true } };
+            let counter = if fresh.usable { &mut self.counters.words_mended } else { &mut self.counters.words_skipped };
+            *counter = counter.wrapping_add(1);
+            if fresh.usable {
+                self.first.set(place, fresh.value);
+                self.second.set(place, fresh.value);
+            }
+        }
+        found
     }
 
     /// What was seen so far.
@@ -256,8 +315,10 @@ impl Store {
     /// How the table is.
     #[must_use]
     pub const fn health(&self) -> Health {
-        let [first, second] = self.scrub.damaged;
-        match (self.active, first & second, first | second) {
+        let [first, second] = self.damaged.pages();
+        let marks = self.source().marks;
+        match (marks & ACTIVE != 0, first & second, first | second) {
+            (false, ..) if marks & TORN != 0 => Health::Torn,
             (false, ..) => Health::Empty,
             (true, 0, 0) => Health::Sound,
             (true, 0, _) => Health::OneImage,
@@ -268,7 +329,7 @@ impl Store {
     /// A page that is damaged in one image and not known to be so in the other: image (0 or 1) and page, to be written again.
     #[must_use]
     pub fn damaged_page(&self) -> Option<(usize, usize)> {
-        let [first, second] = self.scrub.damaged;
+        let [first, second] = self.damaged.pages();
         [first & !second, second & !first]
             .into_iter()
             .enumerate()
@@ -278,9 +339,13 @@ impl Store {
     /// To be told when [`mend_page`], or what writes flash in its place, has written this page of image 0 or 1 again from an intact
     /// one. Without it the other image would be believed alone until the page is checked anew, also when it is hit itself.
     pub const fn mended(&mut self, image: usize, page: usize) {
-        let [first, second] = self.scrub.damaged;
+        let [first, second] = self.damaged.pages();
         let sound = !1u32.wrapping_shl(page as u32);
-        self.scrub.damaged = if image == 0 { [first & sound, second] } else { [first, second & sound] };
+        self.damaged = Damaged::of(if image == 0 { [first & sound, second] } else { [first, second & sound] });
+        // A check under way has words of before in it, and would find the page damaged.
+        if self.scrub.page as usize == page && self.scrub.second & 1 == image as u32 {
+            self.scrub = Scrub { word: 0, crc: 0, ..self.scrub };
+        }
     }
 
     /// Flips bits of one word of one copy, as radiation does: for campaigns. Copies are 0 and 1.
@@ -294,7 +359,24 @@ impl Store {
     /// Words of a copy that are in use.
     #[must_use]
     pub const fn used_words(&self) -> usize {
-        self.source.used as usize
+        self.source().used as usize
+    }
+
+    /// Whether the table is for this drive.
+    #[inline(always)]
+    pub(crate) const fn is_for(&self, drive: &Drive) -> bool {
+        self.source().drive == drive.word()
+    }
+
+    /// Whether there is a table, and it is for another drive.
+    #[inline(always)]
+    pub(crate) const fn is_for_another(&self, drive: &Drive) -> bool {
+        self.is_active() & !self.is_for(drive)
+    }
+
+    #[inline(always)]
+    const fn is_active(&self) -> bool {
+        self.source().marks & ACTIVE != 0
     }
 
     /// Locates a torque, with this added to D and H, counts ([`OperatingPoint::adjusted`]). The same work for all values.
@@ -305,16 +387,29 @@ impl Store {
         self.locate_here(torque_n_m, mean, half_width)
     }
 
-    /// The same, where nothing else is done.
+    /// Locates a torque where nobody else asks whether what is known of the table is whole.
     #[inline(always)]
-    pub(crate) fn locate_here(&self, torque_n_m: f32, mean: i32, half_width: i32) -> OperatingPoint {
-        let source = &self.source;
-        let changed = source.sum() ^ self.sum;
-        let torque = num::within(torque_n_m, source.torque_range);
+    pub(crate) fn locate_whole(&self, torque_n_m: f32) -> OperatingPoint {
+        let mut point = self.locate_here(torque_n_m, 0, 0);
+        let [first, _] = &self.source;
+        point.doubt.0 |= !first.is_whole() as u32;
+        point
+    }
+
+    /// The interval of the torque axis that holds a torque.
+    #[inline(always)]
+    fn interval(&self, torque: f32, last: usize) -> usize {
         let start = |i: usize| f32::from_bits(u32::from_le_bytes(self.first.0.get(i).copied().unwrap_or([0; 4])));
-        let interval = grid::search_64(start, torque).min(source.last_torque as usize);
+        grid::search_64(start, torque).min(last)
+    }
+
+    #[inline(always)]
+    fn locate_here(&self, torque_n_m: f32, mean: i32, half_width: i32) -> OperatingPoint {
+        let source = self.source();
+        let torque = num::within(torque_n_m, source.torque_range);
+        let interval = self.interval(torque, source.last_torque as usize);
         let at = (source.nodes_from as usize).wrapping_add(interval.wrapping_mul(NODE_WORDS));
-        let mut doubt = Doubt(changed);
+        let mut doubt = Doubt(0);
         let [low, high] = self.words(interval, &mut doubt).map(f32::from_bits);
         let [below @ .., a, b, c] = self.words::<6>(at, &mut doubt).map(f32::from_bits);
         let width = high - low;
@@ -323,45 +418,82 @@ impl Store {
         let around = [below, [a, b, c]];
         let first = (source.records_from as usize).wrapping_add(interval.wrapping_mul(source.record as usize));
         let rows = [first, source.record as usize, 0].map(|words: usize| words.wrapping_mul(2));
-        let marks =
-            (num::finite(torque_n_m) & self.active, (torque == torque_n_m) & (source.temperature_in_range != 0));
-        let mut point = OperatingPoint::new(place, around, 0.0, rows, marks, doubt);
-        point.whole = changed == 0;
-        point.adjusted(&source.plan, mean, half_width)
+        let (active, in_range) = (source.marks & ACTIVE != 0, source.marks & IN_RANGE != 0);
+        let marks = (num::finite(torque_n_m) & active, (torque == torque_n_m) & in_range);
+        OperatingPoint::new(place, around, 0.0, rows, marks, doubt).adjusted(&source.plan, mean, half_width)
     }
 
-    /// One tick of making anew; `whole` if what is known of the table is.
-    #[inline(never)]
-    pub(crate) fn tend(&mut self, images: &Images<'_>, doubt: Doubt, whole: bool) {
-        let seldom = self.renew(images, whole);
-        if !doubt.none() | (seldom != Word::Kept) {
-            self.count(doubt, seldom);
+    /// Images that are not to be used: not those that were activated, or both the same.
+    #[inline(always)]
+    fn strangers(&self, images: &Images<'_>) -> Strangers {
+        let Source { seal, seal_at, .. } = *self.source();
+        let [first, second] = images.at(seal_at as usize).map(|found| found != seal);
+        let once = images.is_one();
+        Strangers { any: first | second | once, all: first & second | once }
+    }
+
+    /// What a tick was told, to be asked after everything that it read.
+    #[inline(always)]
+    pub(crate) fn told(&self, images: &Images<'_>) -> Told {
+        let strangers = self.strangers(images);
+        let [sealed, _] = &self.source;
+        Told { whole: sealed.is_whole(), other_images: self.is_active() & strangers.any }
+    }
+
+    /// Makes a word of both copies anew from both images.
+    fn renew(&mut self, images: &Images<'_>, strangers: Strangers) {
+        let used = self.source().used as u32;
+        let at = if self.next < used { self.next } else { 0 };
+        let fresh = self.fresh(&images.words, at, strangers);
+        let ([a], [b]) = (self.first.words::<1>(fresh.place), self.second.words::<1>(fresh.place));
+        if fresh.usable {
+            self.first.set(fresh.place, fresh.value);
+            self.second.set(fresh.place, fresh.value);
+        }
+        self.next = at.wrapping_add(1);
+        self.counters.passes = self.counters.passes.wrapping_add((at.wrapping_add(1) >= used) as u32);
+        if (a != b) | !fresh.usable {
+            self.count(fresh.usable);
         }
     }
 
     /// Counts what seldom happens.
     #[cold]
     #[inline(never)]
-    fn count(&mut self, doubt: Doubt, word: Word) {
-        let counters = &mut self.counters;
-        counters.doubtful_ticks = counters.doubtful_ticks.wrapping_add(!doubt.none() as u32);
-        counters.words_mended = counters.words_mended.wrapping_add((word == Word::Mended) as u32);
-        counters.words_skipped = counters.words_skipped.wrapping_add((word == Word::Skipped) as u32);
+    fn count(&mut self, mended: bool) {
+        let counter = if mended { &mut self.counters.words_mended } else { &mut self.counters.words_skipped };
+        *counter = counter.wrapping_add(1);
     }
 
     /// Takes `words` words of the images into the CRC-32 of their pages: tells which of two images is damaged, and finds what both
-    /// have. Call it in a slow rate group, the same number each time.
+    /// have. Makes as many words of the copies anew. Call it in a slow rate group, the same number each time: a word takes at
+    /// most 723 instructions, and with 16 words every 100 ms the copies follow the temperature within 6 s.
     pub fn check_images(&mut self, images: &Images<'_>, words: usize) {
+        self.mend_source();
+        let strangers = self.strangers(images);
         for _ in 0..words {
             self.check(images);
+            self.renew(images, strangers);
         }
     }
 
-    /// Makes one word of both copies anew.
+    /// A word of the images, and whether it can be used: both have it, or one has it in a page that is not known to be damaged.
+    ///
+    /// By its own page: beside a damaged page of one image another page of the other may be damaged, and not found yet. Beside a
+    /// stranger no image is believed alone.
+    #[inline(never)]
+    fn believed(&self, images: &[Words<'_>; 2], at: usize, strangers: Strangers) -> (u32, bool) {
+        let [a, b] = images.map(|words| word_at(words, at));
+        let page = 1u32.wrapping_shl((at / PAGE_WORDS) as u32);
+        let [bad_a, bad_b] = self.damaged.pages().map(|pages| pages & page != 0);
+        let usable = ((a == b) & !strangers.all) | ((bad_a ^ bad_b) & !strangers.any);
+        (if bad_a { b } else { a }, usable)
+    }
+
+    /// Makes one word of the copies anew.
     #[inline(always)]
-    fn renew(&mut self, images: &Images<'_>, whole: bool) -> Word {
-        let source = &self.source;
-        let at = self.next;
+    fn fresh(&self, images: &[Words<'_>; 2], at: u32, strangers: Strangers) -> Fresh {
+        let source = self.source();
         let (ahead, step, is_number) = (FIRST as u16, 0, false);
         let is_node = at >= source.nodes_from as u32;
         let (ahead, step, is_number) =
@@ -371,15 +503,9 @@ impl Store {
             if is_record { (source.records_ahead, source.record_plane, false) } else { (ahead, step, is_number) };
         let cold = at.wrapping_add(ahead as u32) as usize;
         let hot = cold.wrapping_add(step as usize);
-        let [cold_a, cold_b] = images.at(cold);
-        let [hot_a, hot_b] = images.at(hot);
-
-        let [damaged_a, damaged_b] = self.scrub.damaged;
-        let pages = 1u32.wrapping_shl((cold / PAGE_WORDS) as u32) | 1u32.wrapping_shl((hot / PAGE_WORDS) as u32);
-        let (bad_a, bad_b) = (damaged_a & pages != 0, damaged_b & pages != 0);
-        let differ = (cold_a ^ cold_b) | (hot_a ^ hot_b) != 0;
-        let (cold, hot) = if bad_a { (cold_b, hot_b) } else { (cold_a, hot_a) };
-        let usable = (!differ | (bad_a != bad_b)) & whole;
+        let (cold, cold_usable) = self.believed(images, cold, strangers);
+        let (hot, hot_usable) = self.believed(images, hot, strangers);
+        let usable = cold_usable & hot_usable;
 
         // Both are made every time: a branch would save one of them now and then.
         let (f, g) = (f32::from_bits(cold), f32::from_bits(hot));
@@ -397,31 +523,21 @@ impl Store {
         let mask = (is_number as u32).wrapping_neg();
         let value = pair ^ (pair ^ number) & mask;
 
-        let place = at as usize;
-        let ([a], [b]) = (self.first.words(place), self.second.words(place));
-        let (new_a, new_b) = if usable { (value, value) } else { (a, b) };
-        self.first.set(place, new_a);
-        self.second.set(place, new_b);
-        let next = at.wrapping_add(1);
-        let ended = next >= source.used as u32;
-        self.next = if ended { 0 } else { next };
-        self.counters.passes = self.counters.passes.wrapping_add(ended as u32);
-        let mended = if a == b { Word::Kept } else { Word::Mended };
-        if usable { mended } else { Word::Skipped }
+        Fresh { place: at as usize, value, usable }
     }
 
     /// Takes one word of an image into the CRC-32 of its page.
     #[inline(always)]
     fn check(&mut self, images: &Images<'_>) {
-        let Scrub { second, page, word, crc, damaged: [damaged_a, damaged_b] } = self.scrub;
-        let body = self.body;
+        let Scrub { second, page, word, crc } = self.scrub;
+        let (body, of_second) = (self.source().body as u32, second & 1 != 0);
         let start = page.wrapping_mul(PAGE_WORDS as u32);
         let left = body.wrapping_sub(start);
         let length = if left < PAGE_WORDS as u32 { left } else { PAGE_WORDS as u32 };
         let [a, b] = images.at(start.wrapping_add(word) as usize);
-        let crc = crc_word(crc, if second { b } else { a });
+        let crc = crc_word(crc ^ CRC_START, if of_second { b } else { a });
         let [sum_a, sum_b] = images.at(body.wrapping_add(page) as usize);
-        let intact = !crc == if second { sum_b } else { sum_a };
+        let intact = !crc == if of_second { sum_b } else { sum_a };
 
         let ended = word.wrapping_add(1) >= length;
         let last = ended & (start.wrapping_add(PAGE_WORDS as u32) >= body);
@@ -429,12 +545,66 @@ impl Store {
         let found = if intact { 0 } else { bit };
         let next_page = if ended { page.wrapping_add(1) } else { page };
         self.scrub = Scrub {
-            second: second ^ last,
+            second: second ^ last as u32,
             page: if last { 0 } else { next_page },
             word: if ended { 0 } else { word.wrapping_add(1) },
-            crc: if ended { CRC_START } else { crc },
-            damaged: if second { [damaged_a, damaged_b & !bit | found] } else { [damaged_a & !bit | found, damaged_b] },
+            crc: if ended { 0 } else { crc ^ CRC_START },
         };
+        let [damaged_a, damaged_b] = self.damaged.pages();
+        let pages =
+            if of_second { [damaged_a, damaged_b & !bit | found] } else { [damaged_a & !bit | found, damaged_b] };
+        self.damaged = Damaged::of(pages);
+        if found != 0 {
+            self.check_other(images, page, !of_second);
+        }
         self.counters.pages_damaged = self.counters.pages_damaged.wrapping_add((found != 0) as u32);
     }
 }
+
+impl Store {
+    /// A page was found damaged: before the other image is believed alone, the same page of it is checked at once.
+    #[cold]
+    #[inline(never)]
+    fn check_other(&mut self, images: &Images<'_>, page: u32, second: bool) {
+        let body = self.source().body as usize;
+        let start = (page as usize).wrapping_mul(PAGE_WORDS);
+        let end = start.wrapping_add(PAGE_WORDS).min(body);
+        let [a, b] = images.words;
+        let words = if second { b } else { a };
+        let crc = (start..end).fold(CRC_START, |crc, at| crc_word(crc, word_at(words, at)));
+        if !crc != word_at(words, body.wrapping_add(page as usize)) {
+            let [a, b] = self.damaged.pages();
+            let bit = 1u32.wrapping_shl(page);
+            self.damaged = Damaged::of(if second { [a, b | bit] } else { [a | bit, b] });
+        }
+    }
+}
+
+#[cfg(test)]
+impl Store {
+    /// Bits of what is known of the table, both copies.
+    pub(crate) fn source_bits(&self) -> usize {
+        crate::upset::Upset::bits(&self.source)
+    }
+
+    /// Whether everything but the counters is the same.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let rest = |store: &Self| (store.next, store.scrub.second, store.scrub.page, store.scrub.word, store.scrub.crc);
+        let (same_source, same_id) = (self.source == other.source, self.id == other.id);
+        let damaged = |store: &Self| (store.damaged.pages, store.damaged.again);
+        let same_rest = rest(self) == rest(other) && damaged(self) == damaged(other);
+        same_source && same_id && same_rest && self.first == other.first && self.second == other.second
+    }
+
+    /// Flips one of them.
+    pub(crate) fn flip_source(&mut self, bit: usize) {
+        crate::upset::Upset::flip(&mut self.source, bit, &mut std::string::String::new());
+    }
+}
+
+#[cfg(test)]
+crate::upset::upsets!(Store { first, second, source, next, scrub, damaged, counters, id });
+#[cfg(test)]
+crate::upset::upsets!(Scrub { second, page, word, crc });
+#[cfg(test)]
+crate::upset::upsets!(Damaged { pages, again });

@@ -95,6 +95,23 @@ impl<'b> Upload<'b> {
         self.received
     }
 
+    /// Goes on with an upload of which so much has come: for C, where no pointer is kept between calls.
+    #[cfg(feature = "c-api")]
+    pub(crate) fn resume(buffer: &'b mut [u8], announced: usize, received: usize) -> Result<Self, UploadError> {
+        Self::begin(buffer, announced).map(|begun| Self { received, ..begun })
+    }
+
+    /// [`Self::finish`] of an upload of which so much has come.
+    #[cfg(feature = "c-api")]
+    pub(crate) fn check(buffer: &'b [u8], announced: usize, received: usize) -> Result<Table<'b>, UploadError> {
+        let found = buffer.len();
+        let image = buffer.get(..announced).ok_or(UploadError::Buffer { announced, found })?;
+        if received != announced {
+            return Err(UploadError::Incomplete { announced, found: received });
+        }
+        Table::check(image).map_err(UploadError::Image)
+    }
+
     /// The table, if all bytes came and pass every check.
     ///
     /// # Errors

@@ -86,3 +86,16 @@ impl Plan {
         (a | b | c) >> 16 != 0
     }
 }
+
+#[cfg(test)]
+crate::upset::upsets!(Plan {
+    ripple_nodes,
+    ripple_unit,
+    ripple_cells,
+    curves,
+    limit,
+    iterations,
+    hold,
+    cell_width,
+    play_ripple
+});

@@ -74,7 +74,9 @@ pub enum Approach<'s> {
 pub(crate) struct Departure {
     /// Backward motion.
     pub backward: bool,
-    pub uncertainty: i32,
+    /// What is not known of where the output is, and of the side of the play on which the target will be reached, counts.
+    pub unknown: i32,
+    pub guess: i32,
     /// The target is where the output is.
     pub hold: bool,
     /// Target less output, counts.
@@ -147,7 +149,7 @@ impl<M: Memory> Model<'_, M> {
                 let nominal = minus(target, error);
                 let held = (state.nominal_or_zero(), state.error_counts());
                 let (nominal, error) = if from.hold { held } else { (nominal, error) };
-                (nominal, error, from.uncertainty, sane)
+                (nominal, error, if from.hold { from.unknown } else { from.guess }, sane)
             }
             Approach::From(_) => {
                 let (forward, sane) = self.solve(point, target, false, &mut doubt);
@@ -258,8 +260,8 @@ pub(crate) fn departure(
     let hold = away <= plan.hold;
     let unknown = state.uncertainty_counts();
     // A target inside the interval may lie on the other side of the output: then the whole play is in doubt.
-    let guess = if away <= unknown { point.half_width.wrapping_mul(2) } else { 0 };
-    Departure { backward: ahead <= 0, uncertainty: if hold { unknown } else { guess }, hold, ahead }
+    let guess = if (away <= unknown) & (unknown > 0) { point.half_width.wrapping_mul(2) } else { 0 };
+    Departure { backward: ahead <= 0, unknown, guess, hold, ahead }
 }
 
 impl<'a> Table<'a> {

@@ -36,8 +36,6 @@ pub struct OperatingPoint {
     pub(crate) jump: i32,
     /// All inputs are finite.
     pub(crate) finite: bool,
-    /// What the store knows of its table is what it was told.
-    pub(crate) whole: bool,
     in_range: bool,
     /// What two copies of the table disagreed in while it was read.
     pub(crate) doubt: Doubt,
@@ -84,6 +82,13 @@ impl OperatingPoint {
         let mask = (backward as i32).wrapping_neg();
         let added = (half_width ^ !mask).wrapping_sub(!mask).wrapping_add(mean);
         error.wrapping_sub(added).wrapping_add(plan.limit) as u32 <= plan.limit.wrapping_mul(2) as u32
+    }
+
+    /// The largest error that the table may give with what was added to it, counts.
+    #[inline(always)]
+    pub(crate) const fn most(&self, plan: &Plan) -> i32 {
+        let [mean, half_width] = self.added;
+        plan.limit.wrapping_add(mean.saturating_abs()).wrapping_add(half_width.saturating_abs())
     }
 
     /// D, rad.
@@ -138,7 +143,6 @@ impl OperatingPoint {
             added: [0; 2],
             jump: height,
             finite,
-            whole: true,
             in_range,
             doubt,
         }

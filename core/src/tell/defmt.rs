@@ -24,7 +24,7 @@ macro_rules! by_name {
 by_name! {
     Quality { InRange "in range", Uncertain "uncertain", Extrapolated "extrapolated", Disabled "disabled" }
     Mode { Off "off", Tracking "tracking", Hold "hold", Safe "safe" }
-    Health { Sound "sound", OneImage "one image", Lost "lost", Empty "empty" }
+    Health { Sound "sound", OneImage "one image", Lost "lost", Empty "empty", Torn "torn" }
     Direction { Forward "forward", Backward "backward" }
     FixedMember { Flexspline "flexspline", CircularSpline "circular spline" }
     GeneratorKind { Other "other", TwoRoller "two roller", FourRoller "four roller", DoubleDisc "double disc", Cam "cam" }
@@ -147,6 +147,8 @@ impl Format for ActivateError {
             Self::TooManyPages { found } => write!(f, "the image has {=usize} pages", found),
             Self::TwoTables => write!(f, "the images are two different tables"),
             Self::OtherDrive => write!(f, "the table is for another drive"),
+            Self::Temperature { .. } => write!(f, "the temperature is not a number within the range of numbers"),
+            Self::SameImage => write!(f, "one image is given twice"),
         }
     }
 }
@@ -198,6 +200,18 @@ impl Format for ImageError {
                 write!(f, "error up to {=f32}, {=f32} rad allowed", found_rad, allowed_rad);
             }
             Self::Slope { found } => write!(f, "slope {=f32}", found),
+            Self::Falls { temperature, torque, found_rad } => {
+                write!(
+                    f,
+                    "falls by {=f32} rad to torque node {=usize} at temperature {=usize}",
+                    found_rad, torque, temperature
+                )
+            }
+            Self::Steep { temperature, torque, found_rad, allowed_rad } => write!(
+                f,
+                "rises by {=f32} rad of {=f32} allowed to torque node {=usize} at temperature {=usize}",
+                found_rad, allowed_rad, torque, temperature
+            ),
             Self::Inverse { left_rad } => write!(f, "inverse leaves {=f32} rad", left_rad),
         }
     }

@@ -156,7 +156,7 @@ mod tests {
             let output = joint.tick(&images, store, state, &input);
             watch.see(state, store, &output).iter().collect::<Vec<_>>()
         };
-        assert_eq!(tick(&mut store, &mut state, 5.0, 0), [Event::TableDoubt, Event::Fallback]);
+        assert_eq!(tick(&mut store, &mut state, 5.0, 0), [Event::Fallback]);
         assert_eq!(tick(&mut store, &mut state, 5.0, 0), []);
         store.activate(&images, &fixture::drive(), 20.0).unwrap();
         state.request(Mode::Tracking).unwrap();
@@ -173,6 +173,6 @@ mod tests {
         // Every word in use, so that one that is read is among them.
         (0..store.used_words()).for_each(|word| store.upset(0, word, 1 << 20));
         let doubt = tick(&mut store, &mut state, 5.0, 0);
-        assert_eq!(doubt, [Event::TableDoubt, Event::Fallback]);
+        assert_eq!(doubt, [Event::TableDoubt]);
     }
 }

@@ -17,8 +17,8 @@
 //! | offset | type | what |
 //! |---|---|---|
 //! | 0 | 2 bytes | `FX` |
-//! | 2 | `u8` | version: 1 |
-//! | 3 | `u8` | bits 0–1 quality (in range, uncertain, extrapolated, disabled), 2–3 mode (off, tracking, hold, safe), 4–5 health of the table (sound, one image, lost, empty), 6–7 zero |
+//! | 2 | `u8` | version: 2 |
+//! | 3 | `u8` | bits 0–1 quality (in range, uncertain, extrapolated, disabled), 2–3 mode (off, tracking, hold, safe), 4–6 health of the table (sound, one image, lost, empty, torn), 7 zero |
 //! | 4 | `u16` | number of the record; wraps |
 //! | 6 | `u16` | records lost since the start; wraps |
 //! | 8 | `u32` | number of the tick |
@@ -45,7 +45,7 @@ use core::fmt;
 /// Size of a record as bytes.
 pub const RECORD_BYTES: usize = 52;
 const MARK: [u8; 2] = *b"FX";
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 
 /// One tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,7 +95,7 @@ pub enum RecordError {
     Mark,
     /// Another version.
     Version {
-        /// Version found; 1 is read.
+        /// Version found; 2 is read.
         found: u8,
     },
     /// The CRC-32 does not match.
@@ -180,6 +180,7 @@ impl Record {
             Health::OneImage => 1 << 4,
             Health::Lost => 2 << 4,
             Health::Empty => 3 << 4,
+            Health::Torn => 4 << 4,
         };
         let pair = |low: u16, high: u16| low as u32 | (high as u32) << 16;
         let [mark, x] = MARK;
@@ -229,9 +230,14 @@ impl Record {
         if stated != computed {
             return Err(RecordError::Crc { stated, computed });
         }
-        if states >> 6 != 0 {
-            return Err(RecordError::Reserved);
-        }
+        let health = match states >> 4 {
+            0 => Health::Sound,
+            1 => Health::OneImage,
+            2 => Health::Lost,
+            3 => Health::Empty,
+            4 => Health::Torn,
+            _ => return Err(RecordError::Reserved),
+        };
         Ok(Self {
             number: low(1),
             lost: high(1),
@@ -248,12 +254,7 @@ impl Record {
                 2 => Mode::Hold,
                 _ => Mode::Safe,
             },
-            health: match states >> 4 {
-                0 => Health::Sound,
-                1 => Health::OneImage,
-                2 => Health::Lost,
-                _ => Health::Empty,
-            },
+            health,
             flags: low(3),
             missed_ticks: high(3),
             output_counts: (word(5) as i64) << 32 | word(4) as i64,
@@ -493,7 +494,7 @@ mod tests {
             ..Record::of(0x0a0b_0c0d, &JointState::new(), &Store::new(), &output(1.0))
         };
         let bytes = record.encode();
-        assert_eq!(bytes[..4], [b'F', b'X', 1, 1 | 3 << 4]);
+        assert_eq!(bytes[..4], [b'F', b'X', 2, 1 | 3 << 4]);
         assert_eq!(bytes[4..12], [2, 1, 3, 0, 0x0d, 0x0c, 0x0b, 0x0a]);
         assert_eq!(bytes[12..16], [2, 0, 0, 0]);
         assert_eq!(bytes[16..24], (-5i64).to_le_bytes());

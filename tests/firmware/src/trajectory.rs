@@ -8,8 +8,14 @@ use flexspline::{
 /// The joint of all programs: HHD-95, a thousand ticks a second.
 pub const JOINT: Joint = {
     let Ok(drive) = Drive::new(188, 190, FixedMember::Flexspline) else { panic!() };
-    let limits =
-        Limits { tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, patience: 5 };
+    let limits = Limits {
+        tick_s: 1e-3,
+        rate_rad_s: 0.05,
+        acceleration_rad_s2: 5.0,
+        generator_rate_rad_s: 600.0,
+        patience: 5,
+        hold_rad: 0.0,
+    };
     let Ok(joint) = Joint::new(drive, limits, Overrun::FadeOut { ticks: 50 }) else { panic!() };
     joint
 };
@@ -89,9 +95,9 @@ pub fn hash(hash: u64, out: &Output) -> u64 {
     words.iter().fold(hash, |hash, word| (hash ^ word).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// The hash after so many ticks with a table; 0 if the table is refused.
-pub fn run(image: &[u8], store: &mut Store, ticks: u32) -> u64 {
-    let images = Images::new(image, image);
+/// The hash after so many ticks with a table, given twice; 0 if the table is refused.
+pub fn run([first, second]: [&[u8]; 2], store: &mut Store, ticks: u32) -> u64 {
+    let images = Images::new(first, second);
     if store.activate(&images, JOINT.drive(), 21.0).is_err() {
         return 0;
     }

@@ -20,6 +20,7 @@ pub fn any_joint(drive: Drive, choices: &mut Choices<'_>) -> Result<(Joint, Watc
             acceleration_rad_s2: choices.wild(),
             generator_rate_rad_s: choices.wild(),
             patience: choices.any(),
+            hold_rad: choices.wild(),
         }
     } else {
         let decade = |choices: &mut Choices<'_>, least: i32, most: i32| {
@@ -31,6 +32,7 @@ pub fn any_joint(drive: Drive, choices: &mut Choices<'_>) -> Result<(Joint, Watc
             acceleration_rad_s2: decade(choices, -4, 5),
             generator_rate_rad_s: decade(choices, 0, 3).min(100.0),
             patience: choices.below(8) as u16,
+            hold_rad: if choices.any() { 1e-6 } else { 0.0 },
         }
     };
     let overrun = match choices.below(4) {
@@ -123,7 +125,8 @@ pub fn run(data: &[u8]) {
     let torques: Vec<f32> = table.torque_nodes_n_m().collect();
     let drive = *table.drive();
     let Ok((joint, mut watch)) = any_joint(drive, &mut choices) else { return };
-    let images = Images::new(image, image);
+    let twin = image.clone();
+    let images = Images::new(image, &twin);
     let (mut store, mut state) = (Store::new(), JointState::new());
     if choices.below(8) > 0 {
         store.activate(&images, &drive, 20.0).expect("a base");
@@ -136,7 +139,7 @@ pub fn run(data: &[u8]) {
         }
         match choices.below(24) {
             0 => drop(state.request([Mode::Off, Mode::Tracking, Mode::Hold, Mode::Safe][choices.below(4)])),
-            1 => state = JointState::restore(&state.save()).expect("just saved"),
+            1 => state = JointState::restore(&state.save(&joint, &store), &joint, &store).expect("just saved"),
             2 => drop(store.set_temperature(&images, choices.wild())),
             3 => store.check_images(&images, choices.below(300)),
             4 | 5 => drop(state.request(Mode::Tracking)),

@@ -8,6 +8,9 @@ use flexspline::{
     GeneratorAngle, Images, JointState, Mode, PlayState, SAVED_JOINT_BYTES, SAVED_STATE_BYTES, Store, Table,
 };
 
+/// Where a saved joint has its correction.
+const CORRECTION: usize = 56;
+
 fn seal<const N: usize>(bytes: &mut [u8; N]) {
     let (before, sum) = bytes.split_last_chunk_mut::<4>().expect("longer than a checksum");
     *sum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(before).to_le_bytes();
@@ -20,7 +23,13 @@ pub fn run(data: &[u8]) {
     let table = Table::check(image).expect("a base");
     let drive = *table.drive();
     let torques: Vec<f32> = table.torque_nodes_n_m().collect();
-    let mut bytes = JointState::new().save();
+    let twin = image.clone();
+    let images = Images::new(image, &twin);
+    let mut store = Store::new();
+    store.activate(&images, &drive, 20.0).expect("a base");
+    let Ok((joint, mut watch)) = any_joint(drive, &mut choices) else { return };
+    let mut bytes = JointState::new().save(&joint, &store);
+    let mut play_bytes = PlayState::unknown().save();
     let sealed = choices.any();
     for _ in 0..choices.below(12) {
         let at = choices.below(SAVED_JOINT_BYTES);
@@ -30,14 +39,15 @@ pub fn run(data: &[u8]) {
             _ => bytes[at / 4 * 4..][..4].copy_from_slice(&choices.any::<u32>().to_le_bytes()),
         }
     }
+    for _ in 0..choices.below(8) {
+        play_bytes[choices.below(SAVED_STATE_BYTES)] = choices.any();
+    }
     if sealed {
-        let (play, _) = bytes.split_first_chunk_mut::<SAVED_STATE_BYTES>().expect("a joint has a play");
-        seal(play);
+        seal(&mut play_bytes);
         seal(&mut bytes);
     }
-    let play: &[u8; SAVED_STATE_BYTES] = bytes.first_chunk().expect("a joint has a play");
-    if let Some(play) = PlayState::restore(play) {
-        assert_eq!(play.save(), bytes[..SAVED_STATE_BYTES], "a state that is read is the one that was saved");
+    if let Some(play) = PlayState::restore(&play_bytes) {
+        assert_eq!(play.save(), play_bytes, "a state that is read is the one that was saved");
         assert!(play.uncertainty_rad() >= 0.0);
         let error = play.output().map_or(0.0, |output| output.minus_rad(play.nominal().expect("it has an output")));
         assert!(
@@ -45,21 +55,17 @@ pub fn run(data: &[u8]) {
             "{play:?}"
         );
     }
-    let Some(mut state) = JointState::restore(&bytes) else { return };
-    assert_eq!(state.save(), bytes);
+    let Ok(mut state) = JointState::restore(&bytes, &joint, &store) else { return };
+    assert_eq!(state.save(&joint, &store), bytes);
     assert_eq!(state.mode(), Mode::Off);
-    let Ok((joint, mut watch)) = any_joint(drive, &mut choices) else { return };
-    let kept = i32::from_le_bytes(*bytes[SAVED_STATE_BYTES..].first_chunk().expect("the correction"));
-    let speed = i32::from_le_bytes(*bytes[SAVED_STATE_BYTES + 4..].first_chunk().expect("its speed"));
+    let kept = i32::from_le_bytes(*bytes[CORRECTION..].first_chunk().expect("the correction"));
+    let speed = i32::from_le_bytes(*bytes[CORRECTION + 4..].first_chunk().expect("its speed"));
     let fine = |parts: f64| parts * f64::from(COUNT_RAD) / 8.0;
     if !watch.stops_in_time(fine(kept.into()), fine(speed.into())) {
         // No joint with these limits saves that.
         return;
     }
     watch.restart(f64::from(kept) * f64::from(COUNT_RAD) / 8.0);
-    let images = Images::new(image, image);
-    let mut store = Store::new();
-    store.activate(&images, &drive, 20.0).expect("a base");
     if choices.any() {
         state.request(Mode::Tracking).expect("from off");
     }

@@ -122,7 +122,9 @@ impl Numbers {
             let scale = 0.06 * 10f64.powi(-(choices.below(9) as i32));
             (0..count).map(|_| (scale * choices.part().max(least)) as f32).collect()
         };
-        let (mean, half) = (values(records, -1.0), values(records, 0.0));
+        let (mut mean, half) = (values(records, -1.0), values(records, 0.0));
+        // Rising with the load, or most would be refused.
+        mean.chunks_mut(torque.len()).for_each(|mean| mean.sort_by(f32::total_cmp));
         let (mean_ripple, half_ripple) = (values(records * ripple_nodes, -1.0), values(records * ripple_nodes, -1.0));
         let counts = [0, 0, 4, 5, 9, 16, 64, 128];
         let (a, b, c) = (choices.below(8), choices.below(8), choices.below(8));

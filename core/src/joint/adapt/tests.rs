@@ -395,7 +395,8 @@ fn a_joint_that_learns_comes_where_it_is_wanted() {
     use crate::fixture;
     use crate::{Images, Joint, JointState, Limits, Mode, Overrun, Store};
     let image = fixture::image(true);
-    let images = Images::new(&image, &image);
+    let twin = image.clone();
+    let images = Images::new(&image, &twin);
     let limits = Limits { rate_rad_s: 0.5, acceleration_rad_s2: 100.0, ..fixture::LIMITS };
     let joint = Joint::new(fixture::drive(), limits, Overrun::SkipAndCount).unwrap();
     let mut worst = [0.0f64; 2];
@@ -484,7 +485,8 @@ proptest! {
         let mut hidden = parts;
         hidden.iter_mut().zip(SETTINGS.coefficients).for_each(|(h, of)| *h *= of.limit as f64);
         let mut run = Loop::new(&SETTINGS, hidden, seed);
-        prop_assert!(run.swing(30_000, mixed) < 1.5e-6);
+        // Of 1500 drawn the worst missed 2.4e-7, which is what noise and memory leave.
+        prop_assert!(run.swing(30_000, mixed) < 5e-7);
     }
 }
 
@@ -503,4 +505,17 @@ fn fewer_coefficients_take_fewer_numbers() {
     assert!(run.swing(10_000, |_| 3.0) < 1e-6);
     let sizes: Vec<usize> = [1, 2, 3, 7].map(saved_adapt_bytes).into();
     assert_eq!(sizes, [16, 28, 44, 148]);
+}
+
+/// Found by chance: early on, coefficients that are not yet told apart swing beyond their limits and are held there. What was taken
+/// off them must widen what is thought of them, or every later measurement is an outlier.
+#[test]
+fn what_is_held_at_a_limit_is_found_later() {
+    let parts = [0.0, -0.210_628_3, 0.194_511_7, 0.0, 0.0, 0.073_871_1, 0.203_876_1];
+    let mut hidden = parts;
+    hidden.iter_mut().zip(SETTINGS.coefficients).for_each(|(h, of)| *h *= of.limit as f64);
+    let mut run = Loop::new(&SETTINGS, hidden, 6_962_953_151_420_026_695);
+    assert!(run.swing(30_000, mixed) < 5e-7);
+    let counters = run.state.counters();
+    assert!(counters.limited > 100 && counters.outliers == 0 && counters.used > 25_000, "{counters:?}");
 }

@@ -17,6 +17,12 @@ use core::f64::consts::TAU;
 
 /// Half-widths may miss zero by this, counts, and the ripple unit: rounding.
 const HALF_WIDTH_ROUNDING_COUNTS: f64 = 3.0;
+/// The error of a flank may lie so far below what it was at a smaller torque, rad, 10″: noise of a table that was measured, and cubics
+/// that swing. Chosen; the tables of the four generators never fall at their nodes, and swing by 5e-6 between them.
+const FALL_RAD: f32 = 5.0e-5;
+/// The softest drive that is believed, rad/N·m. Chosen: a hundred times the compliance of size 5 in catalogues (some 1e-2), five hundred
+/// times the steepest place in a table of contact FEM (two-roller at no load, 5e-4; with friction learnt 1.9e-3).
+const MAX_COMPLIANCE_RAD_PER_N_M: f32 = 1.0;
 /// Largest ripple unit for each count of a cell: a ripple of 15.9 cells.
 const MAX_UNITS_PER_CELL: f32 = 255.0;
 /// How far B-spline weights of 15 bits can be off, times the largest step between coefficients: one unit for the place in the
@@ -116,7 +122,7 @@ impl<'a> Table<'a> {
     ///
     /// Verified: length, magic, version, byte order, CRC-32 of the whole and of every page, texts, tooth counts, node
     /// counts; every number finite; axes strictly increasing; half-width of the play ≥ 0 everywhere; torque intervals that
-    /// meet at their nodes; the largest error the table can give within its stated limit and [`MAX_ERROR_RAD`];
+    /// meet at their nodes; wind-up that grows with the load on both flanks, and no faster than a drive can; the largest error the table can give within its stated limit and [`MAX_ERROR_RAD`];
     /// `|ratio·de/dψ| < 1` everywhere, so that the inverse exists, and how it converges; periodic parts closed at the wrap;
     /// every offset, unit and bound that follows from other numbers.
     ///
@@ -194,6 +200,7 @@ impl<'a> Table<'a> {
             plan: Table::plan_in(words),
         };
         table.bounds = table.check_bounds(&layout, curve_nodes)?;
+        table.check_rise(&layout)?;
         let cell_rad = rad(cell_width(&drive, ripple_nodes).abs());
         table.inverse = table.bounds.inverse(if ripple_nodes == 0 { f32::INFINITY } else { cell_rad });
         let left_rad = table.inverse.error_rad;
@@ -299,6 +306,57 @@ impl<'a> Table<'a> {
                 bounds.error_rad = larger(bounds.error_rad, rad(inner + larger(half, half_below)));
             }
             before = Some([torque, mean, slope, half]);
+        }
+        Ok(())
+    }
+
+    /// Whether the error of both flanks, D − H and D + H, grows with the load, and no faster than a drive can.
+    ///
+    /// From node to node, and where there is no jump from each control point of the cubic to the next: a cubic with rising control points rises.
+    fn check_rise(&self, layout: &Layout) -> Result<(), ImageError> {
+        let jumps = self.torque_jumps();
+        let pitch_rad = TAU as f32 / self.drive.circular_spline_teeth() as f32;
+        // Between two jumps the load is within the drag and the flanks let go: a table that was sampled one way falls there by its play.
+        let [first, last] = [jumps.trailing_zeros() as usize, 63_usize.saturating_sub(jumps.leading_zeros() as usize)];
+        for temperature in 0..self.temperature_nodes {
+            // Of D − H and D + H.
+            let mut highest = [f32::NEG_INFINITY; 2];
+            for torque in 1..self.torque_nodes {
+                let below = torque.saturating_sub(1);
+                let [low, high] = [below, torque].map(|node| {
+                    let index = temperature.saturating_mul(self.torque_nodes).saturating_add(node);
+                    let at = self.node_at(layout, index);
+                    [0, 1, 2].map(|i: usize| rad(f32_at(self.words, at.saturating_add(i))))
+                });
+                let [from, to] =
+                    [below, torque].map(|node| f32_at(self.words, word::TORQUE_NODES.saturating_add(node)));
+                let (width, jump) = (to - from, grid::is_jump(jumps, below));
+                let ([mean_low, slope_low, half_low], [mean_high, slope_high, half_high]) = (low, high);
+                let (rise, widening) = (mean_high - mean_low, half_high - half_low);
+                let third = width / 3.0;
+                let (parts, widening) = if jump {
+                    ([rise; 3], widening)
+                } else {
+                    ([slope_low * third, rise - (slope_low + slope_high) * third, slope_high * third], widening / 3.0)
+                };
+                let allowed_rad = if jump { 0.5 * pitch_rad } else { MAX_COMPLIANCE_RAD_PER_N_M * third };
+                let [a, b, c] = parts;
+                let most = larger(larger(a, b), c) + widening.abs();
+                let mut least = -larger(larger(-a, -b), -c) - widening.abs();
+                for (highest, side) in highest.iter_mut().zip([-1.0, 1.0]) {
+                    *highest = larger(*highest, mean_low + side * half_low);
+                    let below = mean_high + side * half_high - *highest;
+                    least = if below < least { below } else { least };
+                }
+                let lets_go = first < below && below < last && !jump;
+                let fall_rad = if lets_go { 0.5 * pitch_rad } else { FALL_RAD };
+                if least < -fall_rad {
+                    return Err(ImageError::Falls { temperature, torque, found_rad: least });
+                }
+                if most > allowed_rad + FALL_RAD {
+                    return Err(ImageError::Steep { temperature, torque, found_rad: most, allowed_rad });
+                }
+            }
         }
         Ok(())
     }

@@ -59,6 +59,17 @@ impl<'a> Table<'a> {
         TableId(self.header().bytes(ID_OFFSET))
     }
 
+    /// What the [id](Self::id) is a hash of, one part after another: the body with zeros where the id is.
+    ///
+    /// The core does not hash: a firmware that wants to know that a table is the one of its id has BLAKE3 take these parts, and compares the
+    /// first eight bytes. Checksums tell damage from chance; this also tells an image that was changed and sealed again.
+    #[must_use]
+    pub fn hashed(&self) -> [&'a [u8]; 3] {
+        let body = self.image.get(..self.body_bytes).unwrap_or_default();
+        let (before, rest) = body.split_at_checked(ID_OFFSET).unwrap_or_default();
+        [before, &[0; 8], rest.get(8..).unwrap_or_default()]
+    }
+
     /// BLAKE3 of the drive description the table was made from.
     #[must_use]
     pub fn drive_hash(&self) -> [u8; 32] {

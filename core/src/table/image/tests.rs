@@ -113,6 +113,7 @@ fn the_id_is_that_of_the_body_with_the_id_zero() {
     let mut image = write(&data(), &provenance()).unwrap();
     let table = Table::check(&image).unwrap();
     let (id, body_bytes) = (table.id(), table.body_bytes);
+    assert_eq!(id, TableId(fixture::id(&table.hashed().concat())));
     image[ID_OFFSET..ID_OFFSET + 8].fill(0);
     assert_eq!(id, TableId(fixture::id(&image[..body_bytes])));
     assert_eq!(std::format!("{}", TableId([0, 1, 2, 0xab, 4, 5, 6, 0xff])), "000102ab040506ff");
@@ -323,6 +324,66 @@ fn each_damage_of_the_numbers_has_its_own_error() {
         }
     });
     assert!(matches!(error, ImageError::Slope { found } if found > 1.0 && found < 20.0), "{error}");
+}
+
+/// With every checksum right and every bound of the format kept: what no drive does is refused, by a rule that has a name.
+#[test]
+fn a_wind_up_that_no_drive_has_is_refused() {
+    let refused = |change: &dyn Fn(&mut TableData<'_>) -> WindUp| {
+        let mut plain = data();
+        let WindUp { torque, mean, half } = change(&mut plain);
+        let made = TableData {
+            torque_nodes_n_m: &torque,
+            temperature_nodes_c: &[20.0],
+            ripple_nodes: 0,
+            mean_rad: &mean,
+            half_width_rad: &half,
+            mean_ripple_rad: &[],
+            half_width_ripple_rad: &[],
+            generator_curve_rad: &[],
+            output_curve_rad: &[],
+            ..plain
+        };
+        let ends = [torque[0], torque[torque.len() - 1]];
+        let limits = Provenance { torque_range_n_m: ends, error_limit_rad: 0.05, ..provenance() };
+        write(&made, &limits).map(|_| ())
+    };
+    let case = |torque: &[f32], mean: &[f32], half: &[f32]| {
+        let (torque, mean, half) = (torque.to_vec(), mean.to_vec(), half.to_vec());
+        refused(&move |_| WindUp { torque: torque.clone(), mean: mean.clone(), half: half.clone() })
+    };
+    let falls = |found: Result<(), WriteError>, node| {
+        let named = matches!(found, Err(WriteError::Refused(ImageError::Falls { torque, temperature: 0, .. })) if torque == node);
+        assert!(named, "{found:?}");
+    };
+    let steep = |found: Result<(), WriteError>, node| {
+        let named = matches!(found, Err(WriteError::Refused(ImageError::Steep { torque, temperature: 0, .. })) if torque == node);
+        assert!(named, "{found:?}");
+    };
+    let axis = [-20.0, -5.0, 0.0, 5.0, 20.0];
+    let sound = [-6e-4, -2e-4, 0.0, 2e-4, 6e-4];
+    assert_eq!(case(&axis, &sound, &[1e-4; 5]), Ok(()));
+    // A thousandth of a newton metre, and two hundredths of a radian: up and down, and only up.
+    steep(case(&[-1e-3, 0.0, 1e-3], &[-0.02, 0.02, -0.02], &[0.0; 3]), 1);
+    steep(case(&[0.0, 1e-3], &[-0.02, 0.02], &[0.0; 2]), 1);
+    // The sign of the torque turned.
+    falls(case(&axis, &sound.map(|d| -d), &[1e-4; 5]), 1);
+    // Gives way at 5 N m; noise of measurement passes.
+    falls(case(&axis, &[-6e-4, -2e-4, 0.0, -1e-4, 6e-4], &[1e-4; 5]), 3);
+    assert_eq!(case(&axis, &[0.0, 5e-6, 0.0, 5e-6, 0.0], &[1e-4; 5]), Ok(()));
+    // The mean rises, one flank falls.
+    falls(case(&axis, &sound, &[1e-4, 1e-4, 1e-4, 5e-4, 5e-4]), 3);
+    // A jump of a clearance, and one beyond half a tooth pitch of 190.
+    let jump = [-20.0, -0.01, 0.01, 20.0];
+    assert_eq!(case(&jump, &[-6e-4, -3e-4, 3e-4, 6e-4], &[0.0; 4]), Ok(()));
+    steep(case(&jump, &[-0.0181, -0.018, 0.018, 0.0181], &[0.0; 4]), 2);
+}
+
+/// Nodes and numbers of a table.
+struct WindUp {
+    torque: Vec<f32>,
+    mean: Vec<f32>,
+    half: Vec<f32>,
 }
 
 #[test]

@@ -37,13 +37,13 @@ fn main() -> ! {
 
 /// One generator; `None` if something is missing.
 fn fly(generator: usize, room: &mut Room) -> Option<bool> {
-    let (_, image) = *TABLES.get(generator)?;
+    let (_, images) = *TABLES.get(generator)?;
     let (name, largest_n_m, map) = read(generator, room)?;
     let [first_c, _] = BRIEF.temperature_c;
     let mean_n_m = BRIEF.mean_torque_n_m(largest_n_m);
     let gear = Gear::new(map, first_c);
     let plants = core::array::from_fn(|_| gear.clone());
-    let mut antenna = Antenna::new(image, plants, largest_n_m, mean_n_m, first_c)?;
+    let mut antenna = Antenna::new(images, plants, largest_n_m, mean_n_m, first_c)?;
     let mut observer = Observer::new(Predictor::from_parts(&MOTOR_PREDICTOR).ok()?);
     let (mut last, mut missed_squares) = (Moment::default(), 0.0);
     for moment in BRIEF.moments(largest_n_m) {

@@ -13,10 +13,10 @@ use flexspline::{
 };
 use flexspline_firmware::count::{Counter, Range};
 use flexspline_firmware::trajectory::{JOINT, Mixed, Trajectory};
-use flexspline_firmware::{PREDICTOR, TABLES, finish};
+use flexspline_firmware::{PREDICTOR, TABLES, finish, twice};
 
 /// 25 torques, 3 temperatures, and harmonics of all three angles, which no table of FEM has.
-static FULL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/full.fxt"));
+static FULL: [&[u8]; 2] = twice!(concat!(env!("OUT_DIR"), "/full.fxt"));
 
 const INPUTS: u32 = 10_000;
 
@@ -42,7 +42,7 @@ fn locate(store: &Store, torque: f32) -> OperatingPoint {
 
 #[inline(never)]
 fn slice(store: &mut Store, images: &Images<'_>) {
-    parts::slice(store, images);
+    store.check_images(images, 1);
 }
 
 #[inline(never)]
@@ -90,10 +90,11 @@ type Ranges = [(&'static str, Range); 8];
 /// Counts with one table; the tick's is given back.
 ///
 /// `tick`, and `forward` and `inverse` as they are called alone, from locating the torque to angles. Then the parts of a tick, each
-/// called alone: `locate` the torque, `output` (nominal, ripple and play) and, of that, the `play`, `solve` for the command, the
-/// `slice` that makes a word of the copies anew. The `rest` is what is left of the tick: judging the sample, goal, limiter, flags.
-fn measure(counter: &Counter, name: &str, image: &[u8]) -> Option<Range> {
-    let images = Images::new(image, image);
+/// called alone: `locate` the torque, `output` (nominal, ripple and play) and, of that, the `play`, `solve` for the command; the
+/// rest is what is left of the tick: judging the sample, goal, limiter, flags, sums. A `slice` of the slow group checks a word of the images
+/// and makes one of the copies anew.
+fn measure(counter: &Counter, name: &str, [first, second]: [&[u8]; 2]) -> Option<Range> {
+    let images = Images::new(first, second);
     let mut store = Store::new();
     store.activate(&images, JOINT.drive(), 21.0).ok()?;
     let (mut state, mut play, mut other) = (JointState::new(), PlayState::unknown(), PlayState::unknown());
@@ -122,8 +123,8 @@ fn measure(counter: &Counter, name: &str, image: &[u8]) -> Option<Range> {
     for (part, range) in ranges {
         hprintln!("{} {}: {} instructions (min {}, max {})", name, part, range.max, range.min, range.max);
     }
-    let [.., (_, locate), (_, output), _, (_, solve), (_, slice), (_, tick)] = ranges;
-    let rest = |end: fn(&Range) -> u32| end(&tick) - [locate, output, solve, slice].iter().map(end).sum::<u32>();
+    let [.., (_, locate), (_, output), _, (_, solve), _, (_, tick)] = ranges;
+    let rest = |end: fn(&Range) -> u32| end(&tick) - [locate, output, solve].iter().map(end).sum::<u32>();
     let (min, max) = (rest(|range| range.min), rest(|range| range.max));
     hprintln!("{} rest: {} instructions (min {}, max {}), by difference", name, max, min, max);
     Some(tick)
@@ -134,8 +135,8 @@ fn main() -> ! {
     let Some(peripherals) = cortex_m::Peripherals::take() else { finish(false) };
     let counter = Counter::new(peripherals.SYST);
     let mut costliest = Range { min: 0, max: 0 };
-    for (name, image) in TABLES {
-        let Some(ticks) = measure(&counter, name, image) else { finish(false) };
+    for (name, images) in TABLES {
+        let Some(ticks) = measure(&counter, name, images) else { finish(false) };
         if ticks.max > costliest.max {
             costliest = ticks;
         }

@@ -10,8 +10,8 @@ use flexspline_firmware::{TABLES, finish, trajectory};
 
 #[entry]
 fn main() -> ! {
-    for (name, image) in TABLES {
-        hprintln!("{} {:016x}", name, trajectory::run(image, &mut Store::new(), 100_000));
+    for (name, images) in TABLES {
+        hprintln!("{} {:016x}", name, trajectory::run(images, &mut Store::new(), 100_000));
     }
     finish(true)
 }

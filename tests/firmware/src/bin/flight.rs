@@ -22,15 +22,22 @@ fn predictor() -> Option<Predictor> {
     Predictor::from_parts(&PREDICTOR).ok()
 }
 
+/// A call of its own: what it makes is on the stack only until it lies in its place.
+#[inline(never)]
+fn store() -> Option<&'static mut Store> {
+    cortex_m::singleton!(: Store = Store::new())
+}
+
 #[entry]
 fn main() -> ! {
-    let Some(store) = cortex_m::singleton!(: Store = Store::new()) else { finish(false) };
-    let [.., (_, image)] = TABLES;
-    let images = Images::new(image, image);
+    let Some(store) = store() else { finish(false) };
+    let [.., (_, [first, second])] = TABLES;
+    let images = Images::new(first, second);
     if store.activate(&images, JOINT.drive(), 21.0).is_err() {
         finish(false);
     }
-    let mut state = JointState::restore(&black_box(JointState::new()).save()).unwrap_or_default();
+    let saved = black_box(JointState::new()).save(&JOINT, store);
+    let mut state = JointState::restore(&saved, &JOINT, store).unwrap_or_default();
     let _ = state.request(Mode::Tracking);
     let Some(predictor) = predictor() else { finish(false) };
     let mut inertias = PredictorState::new();

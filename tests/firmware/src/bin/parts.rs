@@ -62,8 +62,8 @@ fn push<S: Sink>(recorder: &mut Recorder<S>, tick: u32, state: &JointState, stor
 }
 
 fn run(counter: &Counter) -> Option<[Range; 5]> {
-    let [(_, image), ..] = TABLES;
-    let images = Images::new(image, image);
+    let [(_, [first, second]), ..] = TABLES;
+    let images = Images::new(first, second);
     let mut store = Store::new();
     store.activate(&images, JOINT.drive(), 21.0).ok()?;
     let adapter = Adapter::new(&SETTINGS).ok()?;

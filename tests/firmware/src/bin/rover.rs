@@ -24,8 +24,8 @@ fn drive(rooms: &mut [Room; 4]) -> Option<bool> {
     let maps = [read(0, one)?, read(1, two)?, read(2, three)?, read(3, four)?];
     let joint = |number: usize| {
         let (name, largest_n_m, map) = *maps.get(number)?;
-        let (_, image) = *TABLES.get(number)?;
-        RoverJoint::new(number as u32, name, image, Gear::new(map, first_c), largest_n_m, first_c)
+        let (_, images) = *TABLES.get(number)?;
+        RoverJoint::new(number as u32, name, images, Gear::new(map, first_c), largest_n_m, first_c)
     };
     let mut joints = [joint(0)?, joint(1)?, joint(2)?, joint(3)?];
     let mut moments = maps.map(|(_, largest_n_m, _)| profile.moments(largest_n_m));

@@ -1,0 +1,486 @@
+//! What goes on beside a tick: a table received in chunks, events, records for the ground, an observer and what lies ahead.
+
+use super::{
+    FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, JOINT_MARK, Marked,
+    STATE_MARK, STORE_MARK, apart, bytes, copied, get, get_mut, image_status, put, span, status, usable,
+};
+use crate::{
+    Disturbance, Event, Flags, GeneratorAngle, Health, Joint, JointState, Measured, Mode, Now, Output, OutputAngle,
+    PREDICTOR_PARTS, Predictor, PredictorState, Quality, RECORD_BYTES, Record, Store, Upload, UploadError, Watch,
+};
+use core::mem::{MaybeUninit, align_of, size_of};
+
+/// Bytes of a record of telemetry.
+pub const FLEXSPLINE_RECORD_BYTES: usize = 52;
+/// Numbers of a predictor.
+pub const FLEXSPLINE_PREDICTOR_PARTS: usize = 34;
+/// Eight-byte words of a [`FlexsplineUpload`].
+pub const FLEXSPLINE_UPLOAD_WORDS: usize = 3;
+/// Eight-byte words of a [`FlexsplineWatch`].
+pub const FLEXSPLINE_WATCH_WORDS: usize = 6;
+/// Eight-byte words of a [`FlexsplinePredictor`].
+pub const FLEXSPLINE_PREDICTOR_WORDS: usize = 18;
+/// Eight-byte words of a [`FlexsplineObserver`].
+pub const FLEXSPLINE_OBSERVER_WORDS: usize = 3;
+
+/// The mode changed: `mode_before`, `mode`.
+pub const FLEXSPLINE_EVENT_MODE: u16 = 1;
+/// The health of the table changed: `health_before`, `health`.
+pub const FLEXSPLINE_EVENT_HEALTH: u16 = 2;
+/// A page of one image is damaged and can be written again from the other: `damaged_image`, `damaged_page`.
+pub const FLEXSPLINE_EVENT_PAGE_DAMAGED: u16 = 4;
+/// The copies of the table disagreed in what was read.
+pub const FLEXSPLINE_EVENT_TABLE_DOUBT: u16 = 8;
+/// No correction can be made from now on.
+pub const FLEXSPLINE_EVENT_FALLBACK: u16 = 16;
+/// Corrections are made again.
+pub const FLEXSPLINE_EVENT_RECOVERED: u16 = 32;
+/// A tick came late: `missed_ticks`.
+pub const FLEXSPLINE_EVENT_OVERRUN: u16 = 64;
+/// The state was not whole.
+pub const FLEXSPLINE_EVENT_STATE_TORN: u16 = 128;
+
+/// How far a table on its way in has come.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplineUpload {
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_UPLOAD_WORDS],
+}
+
+/// Knows how the last tick was.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplineWatch {
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_WATCH_WORDS],
+}
+
+/// Two inertias and an observer of them: all that does not change while they run.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplinePredictor {
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_PREDICTOR_WORDS],
+}
+
+/// What an observer estimates.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplineObserver {
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_OBSERVER_WORDS],
+}
+
+/// What changed in a tick.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineEvents {
+    /// Ticks missed since the start.
+    pub missed_ticks: u32,
+    /// `FLEXSPLINE_EVENT_...`; what follows is only told with its event.
+    pub events: u16,
+    /// 0 off, 1 tracking, 2 hold, 3 safe.
+    pub mode_before: u8,
+    /// The mode now.
+    pub mode: u8,
+    /// As in `FlexsplineStoreReport`.
+    pub health_before: u8,
+    /// The health now.
+    pub health: u8,
+    /// 0 or 1.
+    pub damaged_image: u8,
+    /// That page.
+    pub damaged_page: u8,
+}
+
+/// What was measured in a tick, for the observer.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct FlexsplineMeasured {
+    /// Motor torque times the ratio in the tick before, N m.
+    pub torque_n_m: f32,
+    /// Motor speed over the ratio, rad/s.
+    pub speed_rad_s: f32,
+    /// Twist, rad: only used if the predictor was made with a noise for it.
+    pub twist_rad: f32,
+}
+
+/// What an observer estimates, to read.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineObserverReport {
+    /// Twist of the drive, rad.
+    pub twist_rad: f32,
+    /// Speed of the load, rad/s.
+    pub load_speed_rad_s: f32,
+    /// Torque on the load, N m.
+    pub load_torque_n_m: f32,
+}
+
+/// Where a prediction starts.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct FlexsplineNow {
+    /// Generator angle, counts of 2^-32 turn.
+    pub generator_counts: i64,
+    /// Output angle as measured.
+    pub measured_counts: i64,
+    /// It lies within +- this, rad.
+    pub measured_bound_rad: f32,
+    /// Motor torque times the ratio from now on, N m; it can be off by +- `torque_off_n_m`.
+    pub torque_n_m: f32,
+    /// See `torque_n_m`.
+    pub torque_off_n_m: f32,
+    /// Change of the torque on the load in a tick, +- N m.
+    pub load_change_n_m: f32,
+    /// How far off the observer can be, +-: twist rad, speeds of motor and load rad/s, torque on the load N m.
+    pub state_bound: [f32; 4],
+    /// Ticks ahead.
+    pub ticks: u16,
+    /// 0 if there is no encoder at the output, else 1.
+    pub has_measured: u8,
+}
+
+/// Where the output is expected.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineAhead {
+    /// The output angle then, counts of 2^-32 turn.
+    pub output_counts: i64,
+    /// It lies within +- this, rad.
+    pub bound_rad: f32,
+    /// What the load turns until then, rad.
+    pub load_rad: f32,
+    /// What the motor turns until then, over the ratio, rad.
+    pub motor_rad: f32,
+    /// Twist then, rad.
+    pub twist_rad: f32,
+    /// 0 in range, 1 uncertain, 2 extrapolated, 3 disabled: the worse of now and then.
+    pub quality: u8,
+}
+
+/// Announced and received bytes.
+#[derive(Clone, Copy)]
+struct Progress {
+    announced: usize,
+    received: usize,
+}
+
+const UPLOAD_MARK: u32 = 0x7855_5446;
+const WATCH_MARK: u32 = 0x7857_5446;
+const PREDICTOR_MARK: u32 = 0x7850_5446;
+const OBSERVER_MARK: u32 = 0x784f_5446;
+
+const _: () = {
+    assert!(size_of::<Marked<Progress>>() <= size_of::<FlexsplineUpload>() && align_of::<Marked<Progress>>() <= 8);
+    assert!(size_of::<Marked<Watch>>() <= size_of::<FlexsplineWatch>() && align_of::<Marked<Watch>>() <= 8);
+    assert!(size_of::<Marked<Predictor>>() <= size_of::<FlexsplinePredictor>() && align_of::<Marked<Predictor>>() <= 8);
+    assert!(
+        size_of::<Marked<PredictorState>>() <= size_of::<FlexsplineObserver>()
+            && align_of::<Marked<PredictorState>>() <= 8
+    );
+    assert!(FLEXSPLINE_RECORD_BYTES == RECORD_BYTES && FLEXSPLINE_PREDICTOR_PARTS == PREDICTOR_PARTS);
+};
+
+pub(super) const fn quality_code(quality: Quality) -> u8 {
+    match quality {
+        Quality::InRange => 0,
+        Quality::Uncertain => 1,
+        Quality::Extrapolated => 2,
+        Quality::Disabled => 3,
+    }
+}
+
+pub(super) const fn health_code(health: Health) -> u8 {
+    match health {
+        Health::Sound => 0,
+        Health::OneImage => 1,
+        Health::Lost => 2,
+        Health::Empty => 3,
+        Health::Torn => 4,
+    }
+}
+
+/// What a tick gave, back from C.
+fn given(output: *const FlexsplineOutput) -> Result<Output, FlexsplineStatus> {
+    let found = copied(output)?;
+    Ok(Output {
+        command: GeneratorAngle::from_counts(found.command_counts),
+        output: OutputAngle::from_counts(found.output_counts),
+        transmission_error_rad: found.transmission_error_rad,
+        uncertainty_rad: found.uncertainty_rad,
+        correction_rad: found.correction_rad,
+        held_back_rad: found.held_back_rad,
+        quality: match found.quality {
+            0 => Quality::InRange,
+            1 => Quality::Uncertain,
+            2 => Quality::Extrapolated,
+            3 => Quality::Disabled,
+            _ => return Err(FlexsplineStatus::Argument),
+        },
+        flags: Flags::of_bits(found.flags),
+    })
+}
+
+fn upload_status(error: UploadError) -> FlexsplineStatus {
+    match error {
+        UploadError::Buffer { .. } | UploadError::TooLong { .. } => FlexsplineStatus::TooLarge,
+        UploadError::Order { .. } => FlexsplineStatus::Order,
+        UploadError::Incomplete { .. } => FlexsplineStatus::Incomplete,
+        UploadError::Image(error) => image_status(error),
+    }
+}
+
+/// Begins to receive a table of so many bytes. The buffer is the caller's and is given with every call; it is no image in use.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_upload_begin(upload: *mut FlexsplineUpload, announced: usize) -> FlexsplineStatus {
+    status(put(upload, UPLOAD_MARK, Progress { announced, received: 0 }))
+}
+
+/// Takes the bytes from `offset` on: `FLEXSPLINE_STATUS_ORDER` if they are not the next ones, which can still come.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_upload_chunk(
+    upload: *mut FlexsplineUpload,
+    buffer: *mut u8,
+    buffer_bytes: usize,
+    offset: usize,
+    chunk: *const u8,
+    chunk_bytes: usize,
+) -> FlexsplineStatus {
+    let take = || {
+        usable(buffer)?;
+        let chunk_read = bytes(chunk, chunk_bytes)?;
+        let (upload_span, buffer_span) = (span(upload), (buffer as usize, buffer_bytes));
+        apart([upload_span, buffer_span, (chunk as usize, chunk_bytes)])?;
+        let progress: &mut Progress = get_mut(upload, UPLOAD_MARK)?;
+        if buffer_bytes > isize::MAX as usize {
+            return Err(FlexsplineStatus::Argument);
+        }
+        // SAFETY: not null, apart from the other objects; the caller says that so many bytes are there, and they are its own.
+        let buffer = unsafe { core::slice::from_raw_parts_mut(buffer, buffer_bytes) };
+        let mut resumed = Upload::resume(buffer, progress.announced, progress.received).map_err(upload_status)?;
+        resumed.chunk(offset, chunk_read).map_err(upload_status)?;
+        progress.received = resumed.received();
+        Ok(())
+    };
+    status(take())
+}
+
+/// Checks a table of which all bytes came, in full, and tells its id; it can then be activated.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_upload_finish(
+    upload: *const FlexsplineUpload,
+    buffer: *const u8,
+    buffer_bytes: usize,
+    table_id: *mut [u8; 8],
+) -> FlexsplineStatus {
+    let finish = || {
+        let image = bytes(buffer, buffer_bytes)?;
+        apart([span(upload), (buffer as usize, buffer_bytes), span(table_id)])?;
+        usable(table_id)?;
+        let &Progress { announced, received } = get(upload, UPLOAD_MARK)?;
+        let id = Upload::check(image, announced, received).map_err(upload_status)?.id();
+        // SAFETY: not null, apart from what is borrowed; the caller's.
+        unsafe { table_id.write(id.0) };
+        Ok(())
+    };
+    status(finish())
+}
+
+/// Begins to watch for events: off, without a table.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_watch_init(watch: *mut FlexsplineWatch) -> FlexsplineStatus {
+    status(put(watch, WATCH_MARK, Watch::new()))
+}
+
+/// Tells what changed, after `flexspline_tick`; `output` is what it gave.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_watch_see(
+    watch: *mut FlexsplineWatch,
+    state: *const FlexsplineState,
+    store: *const FlexsplineStore,
+    output: *const FlexsplineOutput,
+    events: *mut FlexsplineEvents,
+) -> FlexsplineStatus {
+    let see = || {
+        for written in [span(watch), span(events)] {
+            for read in [span(state), span(store), span(output)] {
+                apart([written, read])?;
+            }
+        }
+        apart([span(watch), span(events)])?;
+        usable(events)?;
+        let given = given(output)?;
+        let state: &JointState = get(state, STATE_MARK)?;
+        let store: &Store = get(store, STORE_MARK)?;
+        let watch: &mut Watch = get_mut(watch, WATCH_MARK)?;
+        let mut told = FlexsplineEvents::default();
+        for event in watch.see(state, store, &given).iter() {
+            told.events |= match event {
+                Event::Mode { from, to } => {
+                    (told.mode_before, told.mode) = (Mode::code(from) as u8, Mode::code(to) as u8);
+                    FLEXSPLINE_EVENT_MODE
+                }
+                Event::Health { from, to } => {
+                    (told.health_before, told.health) = (health_code(from), health_code(to));
+                    FLEXSPLINE_EVENT_HEALTH
+                }
+                Event::PageDamaged { image, page } => {
+                    (told.damaged_image, told.damaged_page) = (image as u8, page as u8);
+                    FLEXSPLINE_EVENT_PAGE_DAMAGED
+                }
+                Event::TableDoubt => FLEXSPLINE_EVENT_TABLE_DOUBT,
+                Event::Fallback => FLEXSPLINE_EVENT_FALLBACK,
+                Event::Recovered => FLEXSPLINE_EVENT_RECOVERED,
+                Event::Overrun { missed_ticks } => {
+                    told.missed_ticks = missed_ticks;
+                    FLEXSPLINE_EVENT_OVERRUN
+                }
+                Event::StateTorn => FLEXSPLINE_EVENT_STATE_TORN,
+            };
+        }
+        // SAFETY: not null, aligned, apart from what is borrowed; the caller's.
+        unsafe { events.write(told) };
+        Ok(())
+    };
+    status(see())
+}
+
+/// Writes a record of telemetry of a tick: `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32. `number` and `lost` are the caller's: of the
+/// record, and of those that it could not keep.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_record(
+    tick: u32,
+    number: u16,
+    lost: u16,
+    state: *const FlexsplineState,
+    store: *const FlexsplineStore,
+    output: *const FlexsplineOutput,
+    record: *mut [u8; FLEXSPLINE_RECORD_BYTES],
+) -> FlexsplineStatus {
+    let write = || {
+        for read in [span(state), span(store), span(output)] {
+            apart([span(record), read])?;
+        }
+        usable(record)?;
+        let given = given(output)?;
+        let state: &JointState = get(state, STATE_MARK)?;
+        let store: &Store = get(store, STORE_MARK)?;
+        let made = Record { number, lost, ..Record::of(tick, state, store, &given) };
+        // SAFETY: not null, apart from what is borrowed; the caller owns so many bytes.
+        unsafe { record.write(made.encode()) };
+        Ok(())
+    };
+    status(write())
+}
+
+/// Makes a predictor of its numbers, which the host discretised; `FLEXSPLINE_STATUS_ARGUMENT` if its observer does not contract.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_predictor_init(
+    predictor: *mut FlexsplinePredictor,
+    parts: *const [f32; FLEXSPLINE_PREDICTOR_PARTS],
+) -> FlexsplineStatus {
+    let make = || {
+        apart([span(predictor), span(parts)])?;
+        let made = Predictor::from_parts(&copied(parts)?).map_err(|_| FlexsplineStatus::Argument)?;
+        put(predictor, PREDICTOR_MARK, made)
+    };
+    status(make())
+}
+
+/// Makes an observer at rest, without load.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_observer_init(observer: *mut FlexsplineObserver) -> FlexsplineStatus {
+    status(put(observer, OBSERVER_MARK, PredictorState::new()))
+}
+
+/// One tick of the observer.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_observer_step(
+    observer: *mut FlexsplineObserver,
+    predictor: *const FlexsplinePredictor,
+    measured: *const FlexsplineMeasured,
+) -> FlexsplineStatus {
+    let step = || {
+        apart([span(observer), span(predictor)])?;
+        let FlexsplineMeasured { torque_n_m, speed_rad_s, twist_rad } = copied(measured)?;
+        let predictor: &Predictor = get(predictor, PREDICTOR_MARK)?;
+        let observer: &mut PredictorState = get_mut(observer, OBSERVER_MARK)?;
+        predictor.step(observer, &Measured { torque_n_m, speed_rad_s, twist_rad });
+        Ok(())
+    };
+    status(step())
+}
+
+/// Tells what an observer estimates.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_observer_report(
+    observer: *const FlexsplineObserver,
+    report: *mut FlexsplineObserverReport,
+) -> FlexsplineStatus {
+    let tell = || {
+        apart([span(observer), span(report)])?;
+        usable(report)?;
+        let observer: &PredictorState = get(observer, OBSERVER_MARK)?;
+        let told = FlexsplineObserverReport {
+            twist_rad: observer.twist_rad(),
+            load_speed_rad_s: observer.load_speed_rad_s(),
+            load_torque_n_m: observer.load_torque_n_m(),
+        };
+        // SAFETY: not null, aligned, apart from the observer; the caller's.
+        unsafe { report.write(told) };
+        Ok(())
+    };
+    status(tell())
+}
+
+/// Tells where the output will be some ticks from now, with the table as the output map of the two inertias. The work grows with the
+/// ticks; call it in a slow rate group.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_predict(
+    predictor: *const FlexsplinePredictor,
+    observer: *const FlexsplineObserver,
+    joint: *const FlexsplineJoint,
+    store: *const FlexsplineStore,
+    state: *const FlexsplineState,
+    now: *const FlexsplineNow,
+    ahead: *mut FlexsplineAhead,
+) -> FlexsplineStatus {
+    let predict = || {
+        for read in [span(predictor), span(observer), span(joint), span(store), span(state), span(now)] {
+            apart([span(ahead), read])?;
+        }
+        usable(ahead)?;
+        let from = copied(now)?;
+        let predictor: &Predictor = get(predictor, PREDICTOR_MARK)?;
+        let observer: &PredictorState = get(observer, OBSERVER_MARK)?;
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let store: &Store = get(store, STORE_MARK)?;
+        let state: &JointState = get(state, STATE_MARK)?;
+        let off = Disturbance {
+            torque_n_m: from.torque_off_n_m,
+            load_change_n_m: from.load_change_n_m,
+            ..Disturbance::default()
+        };
+        let turned = predictor.ahead(observer, from.torque_n_m, from.ticks, from.state_bound, &off);
+        let now = Now {
+            generator: GeneratorAngle::from_counts(from.generator_counts),
+            play: state.play(),
+            measured: (from.has_measured != 0).then_some(OutputAngle::from_counts(from.measured_counts)),
+            measured_bound_rad: from.measured_bound_rad,
+        };
+        let found = predictor.output_ahead(joint, store, observer, &turned, &now);
+        let told = FlexsplineAhead {
+            output_counts: found.output.counts(),
+            bound_rad: found.bound_rad,
+            load_rad: turned.load_rad,
+            motor_rad: turned.motor_rad,
+            twist_rad: turned.twist_rad,
+            quality: quality_code(found.quality),
+        };
+        // SAFETY: not null, aligned, apart from what is borrowed; the caller's.
+        unsafe { ahead.write(told) };
+        Ok(())
+    };
+    status(predict())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,104 @@
+//! Single bits of everything that lives from tick to tick, by the name of the field they are in: for campaigns of upsets.
+//!
+//! [`upsets!`] takes a structure apart without `..`, so a new field that is not listed does not compile.
+
+use crate::angle::{GeneratorAngle, OutputAngle};
+use std::string::String;
+
+/// Something whose bits can flip.
+pub(crate) trait Upset {
+    /// How many bits it has.
+    fn bits(&self) -> usize;
+    /// Flips one of them; adds the names on the way to it to the path.
+    fn flip(&mut self, bit: usize, path: &mut String);
+}
+
+macro_rules! numbers {
+    ($($number:ty),*) => {$(
+        impl Upset for $number {
+            fn bits(&self) -> usize {
+                <$number>::BITS as usize
+            }
+
+            fn flip(&mut self, bit: usize, _: &mut String) {
+                *self ^= 1 << bit;
+            }
+        }
+    )*};
+}
+numbers!(u8, u16, u32, u64, i32, i64);
+
+impl Upset for f32 {
+    fn bits(&self) -> usize {
+        32
+    }
+
+    fn flip(&mut self, bit: usize, _: &mut String) {
+        *self = f32::from_bits(self.to_bits() ^ 1 << bit);
+    }
+}
+
+macro_rules! angles {
+    ($($angle:ty),*) => {$(
+        impl Upset for $angle {
+            fn bits(&self) -> usize {
+                64
+            }
+
+            fn flip(&mut self, bit: usize, _: &mut String) {
+                *self = Self::from_counts(self.counts() ^ 1 << bit);
+            }
+        }
+    )*};
+}
+angles!(GeneratorAngle, OutputAngle);
+
+impl Upset for crate::TableId {
+    fn bits(&self) -> usize {
+        64
+    }
+
+    fn flip(&mut self, bit: usize, _: &mut String) {
+        self.0[bit / 8] ^= 1 << (bit % 8);
+    }
+}
+
+impl<T: Upset, const N: usize> Upset for [T; N] {
+    fn bits(&self) -> usize {
+        self.iter().map(Upset::bits).sum()
+    }
+
+    fn flip(&mut self, mut bit: usize, path: &mut String) {
+        for part in self {
+            if bit < part.bits() {
+                return part.flip(bit, path);
+            }
+            bit -= part.bits();
+        }
+    }
+}
+
+macro_rules! upsets {
+    ($type:ty { $($field:ident),* $(,)? }) => {
+        impl $crate::upset::Upset for $type {
+            fn bits(&self) -> usize {
+                let Self { $($field),* } = self;
+                [$($crate::upset::Upset::bits($field)),*].into_iter().sum()
+            }
+
+            fn flip(&mut self, mut bit: usize, path: &mut std::string::String) {
+                let Self { $($field),* } = self;
+                $(
+                    if bit < $crate::upset::Upset::bits($field) {
+                        path.push('.');
+                        path.push_str(stringify!($field));
+                        return $crate::upset::Upset::flip($field, bit, path);
+                    }
+                    bit -= $crate::upset::Upset::bits($field);
+                )*
+                let _ = bit;
+            }
+        }
+    };
+}
+pub(crate) use upsets;

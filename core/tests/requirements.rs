@@ -1,0 +1,96 @@
+//! The page of requirements: every one has an id of its own and a test, and every test that is named exists.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn top() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn rust_files(folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path()) {
+        if entry.is_dir() {
+            rust_files(&entry, files);
+        } else if entry.extension().is_some_and(|extension| extension == "rs") {
+            files.push(entry);
+        }
+    }
+}
+
+/// Names of functions under `#[test]`.
+fn tests() -> BTreeSet<String> {
+    let mut files = Vec::new();
+    ["core/src", "core/tests"].iter().for_each(|folder| rust_files(&top().join(folder), &mut files));
+    let mut names = BTreeSet::new();
+    for file in files {
+        let text = fs::read_to_string(file).expect("source");
+        for after in text.split("#[test]").skip(1) {
+            let name = after.split("fn ").nth(1).and_then(|rest| rest.split('(').next());
+            names.insert(name.expect("a function").to_owned());
+        }
+    }
+    names
+}
+
+/// What is wrong with a page, given the tests and the checks that there are.
+fn faults(page: &str, tests: &BTreeSet<String>, run: &str) -> Vec<String> {
+    let (mut ids, mut faults) = (BTreeSet::new(), Vec::new());
+    for row in page.lines().filter(|line| line.starts_with("| C-")) {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        let &[_, id, _, named, _] = &cells[..] else {
+            faults.push(format!("three columns: {row}"));
+            continue;
+        };
+        if !ids.insert(id) {
+            faults.push(format!("{id} is there twice"));
+        }
+        let names: Vec<&str> = named.split(", ").filter(|name| !name.is_empty()).collect();
+        if names.is_empty() {
+            faults.push(format!("{id} has no test"));
+        }
+        for name in names {
+            let test = name.trim_matches('`');
+            let check = name.strip_prefix('"').map(|rest| rest.trim_end_matches('"'));
+            let exists = check.map_or(tests.contains(test), |check| run.contains(&format!("\"{check}")));
+            if !exists {
+                faults.push(format!("{id}: {name} does not exist"));
+            }
+        }
+    }
+    let told = page.lines().filter(|line| line.starts_with("| ") && line.matches('|').count() == 6);
+    for row in told.skip(1) {
+        let requirement = row.split('|').nth(4).expect("a column").trim();
+        for id in requirement.split(", ").filter(|id| id.starts_with("C-")) {
+            if !ids.contains(id) {
+                faults.push(format!("no requirement {id}: {row}"));
+            }
+        }
+    }
+    if ids.is_empty() {
+        faults.push("no requirement".to_owned());
+    }
+    faults
+}
+
+#[test]
+fn every_requirement_has_tests_that_exist() {
+    let read = |path: &str| fs::read_to_string(top().join(path)).expect("a file of the project");
+    let page = read("docs/requirements.md");
+    assert_eq!(faults(&page, &tests(), &read("tests/run")), Vec::<String>::new());
+    assert!(page.lines().filter(|line| line.starts_with("| C-")).count() > 40);
+}
+
+#[test]
+fn a_page_with_faults_is_refused() {
+    let tests = BTreeSet::from(["one".to_owned()]);
+    let refused = |page: &str| faults(page, &tests, "check \"bits and ticks\" x");
+    assert_eq!(refused("| C-1 | does | `one`, \"bits\" |"), Vec::<String>::new());
+    assert_eq!(refused("| C-1 | does | `two` |"), ["C-1: `two` does not exist"]);
+    assert_eq!(refused("| C-1 | does | \"bytes\" |"), ["C-1: \"bytes\" does not exist"]);
+    assert_eq!(refused("| C-1 | does |  |"), ["C-1 has no test"]);
+    assert_eq!(refused("| C-1 | does | `one` |\n| C-1 | too | `one` |"), ["C-1 is there twice"]);
+    let effects = "| C-1 | does | `one` |\n| a | b | c | d | e |\n| f | g | h | C-2 | i |";
+    assert_eq!(refused(effects), ["no requirement C-2: | f | g | h | C-2 | i |"]);
+    assert_eq!(refused(""), ["no requirement"]);
+}
