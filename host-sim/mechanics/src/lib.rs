@@ -11,6 +11,7 @@ pub mod fem;
 pub mod mesh;
 pub mod motion;
 pub mod reference;
+pub mod sleeve;
 pub mod stepping;
 pub mod suggest;
 pub mod toml_file;

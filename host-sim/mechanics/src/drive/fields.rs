@@ -2,6 +2,7 @@
 //! overriding, checking and hashing all walk this list.
 
 use super::as_built::{DamagedTooth, Harmonic};
+use super::sleeve::{Choice, SleeveKind};
 use super::spec::Drive;
 use crate::toml_file::{Allowed, above, from};
 
@@ -21,6 +22,8 @@ pub(super) enum Slot<'a> {
     /// `"rigid"` in a file is `None`.
     RealOrRigid(&'a mut Option<f64>),
     Count(&'a mut u32),
+    /// One of several names.
+    Word(&'a mut dyn Choice),
     /// One number for each tooth, or none.
     List(&'a mut Vec<f64>),
     Harmonics(&'a mut Vec<Harmonic>),
@@ -32,6 +35,7 @@ pub(super) enum Slot<'a> {
 pub(super) enum Value {
     Number(f64),
     Rigid,
+    Word { chosen: &'static str, names: Vec<&'static str> },
     List(Vec<f64>),
     Harmonics(Vec<Harmonic>),
     Damage(Vec<DamagedTooth>),
@@ -42,7 +46,7 @@ impl Value {
     pub fn is_zero(&self) -> bool {
         match self {
             Value::Number(number) => *number == 0.0,
-            Value::Rigid => false,
+            Value::Rigid | Value::Word { .. } => false,
             Value::List(list) => list.is_empty(),
             Value::Harmonics(list) => list.is_empty(),
             Value::Damage(list) => list.is_empty(),
@@ -58,6 +62,9 @@ pub(super) const ORDER: Allowed = from(1.0, 1000.0);
 pub(super) const DEPTH: Allowed = from(0.0, 500.0);
 /// Allowed numbers of a damaged tooth; the drive narrows them.
 pub(super) const TOOTH: Allowed = from(0.0, 2001.0);
+
+/// The range of a field that is no number.
+const NO_NUMBER: Allowed = from(0.0, 0.0);
 
 macro_rules! fields {
     ($($section:ident . $key:ident : $slot:ident, $range:expr, $meaning:literal;)*) => {
@@ -77,7 +84,10 @@ pub(super) const SECTIONS: &[(&str, &str)] = &[
     ("material", "of both wheels"),
     ("generator", "of all four wave generators; each takes what it has"),
     ("output", "what brakes the output beside its load"),
-    ("sleeve", "what holds the rim of the flexspline"),
+    (
+        "sleeve",
+        "what holds the rim of the flexspline: shells (hermetic: rim between two tubes; cup; hat: tube and flange), springs or nothing",
+    ),
     ("flanks", "where the teeth touch"),
     ("temperature", "what warmth changes"),
     (
@@ -116,8 +126,18 @@ pub(super) const ALL: &[Field] = fields! {
     generator.disc_half_angle_deg: Real, from(5.0, 50.0), "half the contact angle of a disc, degrees";
     generator.bearing_stiffness_n_per_mm3: RealOrRigid, above(0.0, 1.0e7), "pressure per approach of the generator bearing, N/mm^3";
     output.drag_torque_n_m: Real, from(0.0, 1.0e4), "Coulomb drag on the circular spline, against its motion, N.m";
-    sleeve.torsion_stiffness_n_m_per_rad: RealOrRigid, above(0.0, 1.0e12), "torsional stiffness, rim to flange, N.m/rad";
-    sleeve.lateral_stiffness_n_per_mm: Real, from(0.0, 1.0e9), "lateral stiffness, rim to flange, N/mm";
+    sleeve.kind: Word, NO_NUMBER, "what holds the rim, and in how many dimensions it is computed";
+    sleeve.wall_mm: Real, above(0.0, 100.0), "wall of the tubes, mm";
+    sleeve.flange_side_mm: Real, above(0.0, 10_000.0), "tube from rim to flange, mm (hermetic, hat)";
+    sleeve.bottom_side_mm: Real, above(0.0, 10_000.0), "tube from rim to the outer face of the bottom, mm (hermetic, cup)";
+    sleeve.flange: Word, NO_NUMBER, "how the tube stands on its flange: clamped, or on a thin plate clamped to it further out";
+    sleeve.bottom: Word, NO_NUMBER, "what closes the tube: held in its plane and free axially, a plate, or a massive body";
+    sleeve.bottom_thickness_mm: Real, above(0.0, 100.0), "thickness of bottom = \"plate\", mm";
+    sleeve.diaphragm_thickness_mm: Real, above(0.0, 100.0), "thickness of flange = \"diaphragm\", mm";
+    sleeve.diaphragm_width_mm: Real, above(0.0, 1000.0), "from the tube to where a diaphragm is clamped, mm";
+    sleeve.hub_radius_mm: Real, above(0.0, 1000.0), "hub on which the plate of a cup is clamped, radius, mm";
+    sleeve.torsion_stiffness_n_m_per_rad: RealOrRigid, above(0.0, 1.0e12), "torsional stiffness of springs, or of what holds shells, N.m/rad";
+    sleeve.lateral_stiffness_n_per_mm: Real, from(0.0, 1.0e9), "lateral stiffness of springs, rim to flange, N/mm";
     flanks.friction_coefficient: Real, from(0.0, 0.5), "Coulomb friction between the flanks";
     temperature.reference_c: Real, from(-200.0, 300.0), "temperature at which the sizes hold, degrees C";
     temperature.minimum_c: Real, from(-200.0, 300.0), "lowest operating temperature, degrees C";
@@ -164,6 +184,7 @@ impl Field {
             Slot::Real(_) => range.to_string(),
             Slot::RealOrRigid(_) => format!("{range} or \"rigid\""),
             Slot::Count(_) => format!("a whole number, {range}"),
+            Slot::Word(word) => word.names().iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", "),
             Slot::List(_) => format!("{range} each"),
             Slot::Harmonics(_) => format!("order {ORDER}, amplitude {range} µm, phase {PHASE}"),
             Slot::Damage(_) => format!("tooth from 0, depth {range} µm"),
@@ -171,9 +192,23 @@ impl Field {
         format!("{}; {allowed}", self.meaning)
     }
 
-    /// True if a file may leave it out: a stiffness that is not there is rigid, an imperfection that is not there is none.
-    pub fn is_optional(&self) -> bool {
-        self.is_imperfection() || matches!(self.slot(&mut Drive::hhd_95()), Slot::RealOrRigid(_))
+    /// True if the file of this drive may leave it out: a stiffness that is not there is rigid, an imperfection that is not there
+    /// is none, and of a sleeve only the sizes that it has are needed.
+    pub fn is_optional(&self, drive: &Drive) -> bool {
+        let sleeve = &drive.sleeve;
+        match self.path {
+            "sleeve.wall_mm" => !sleeve.is_shell(),
+            "sleeve.flange_side_mm" => !sleeve.has_flange(),
+            "sleeve.bottom_side_mm" => !sleeve.has_bottom(),
+            "sleeve.lateral_stiffness_n_per_mm" => sleeve.kind != SleeveKind::Springs,
+            _ if self.is_of_shells() => true,
+            _ => self.is_imperfection() || matches!(self.slot(&mut Drive::hhd_95()), Slot::RealOrRigid(_)),
+        }
+    }
+
+    /// True for what only a sleeve of shells has.
+    pub fn is_of_shells(&self) -> bool {
+        self.split().0 == "sleeve" && !self.path.contains("stiffness")
     }
 
     /// True for what an ideal drive has not.
@@ -194,6 +229,7 @@ pub(super) fn for_each(drive: &Drive, mut visit: impl FnMut(&Field, &Value)) {
             Slot::Real(number) => Value::Number(*number),
             Slot::RealOrRigid(number) => number.map_or(Value::Rigid, Value::Number),
             Slot::Count(number) => Value::Number(f64::from(*number)),
+            Slot::Word(word) => Value::Word { chosen: word.chosen(), names: word.names() },
             Slot::List(list) => Value::List(list.clone()),
             Slot::Harmonics(list) => Value::Harmonics(list.clone()),
             Slot::Damage(list) => Value::Damage(list.clone()),
@@ -206,7 +242,7 @@ pub(super) fn for_each(drive: &Drive, mut visit: impl FnMut(&Field, &Value)) {
 pub(super) fn ranged<'f>(field: &'f Field, value: &Value) -> Vec<(String, f64, &'f Allowed)> {
     match value {
         Value::Number(number) => vec![(String::new(), *number, &field.range)],
-        Value::Rigid => Vec::new(),
+        Value::Rigid | Value::Word { .. } => Vec::new(),
         Value::List(list) => list.iter().enumerate().map(|(k, x)| (format!("[{k}]"), *x, &field.range)).collect(),
         Value::Harmonics(list) => list
             .iter()
@@ -237,7 +273,8 @@ mod tests {
             let (section, key) = field.split();
             assert!(SECTIONS.iter().any(|(name, _)| *name == section), "{section} is not described");
             let comment = field.comment();
-            assert!(comment.contains(" to ") && comment.len() > 20, "{comment}");
+            let allowed = if field.range == NO_NUMBER { ", \"" } else { " to " };
+            assert!(comment.contains(allowed) && comment.len() > 20, "{comment}");
             let units = [
                 ("_mm", "mm"),
                 ("_um", "µm"),

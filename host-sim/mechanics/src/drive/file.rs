@@ -49,11 +49,11 @@ impl Drive {
         self.with_sets([assignment])
     }
 
-    /// This drive with several fields changed, checked once all of them are.
+    /// This drive with several fields changed, checked once all of them are; one text may hold several, with commas between them.
     pub fn with_sets<'a>(&self, assignments: impl IntoIterator<Item = &'a str>) -> Result<Drive, DriveError> {
         let mut drive = self.clone();
         let mut problems = Vec::new();
-        for assignment in assignments {
+        for assignment in assignments.into_iter().flat_map(apart) {
             if let Err(problem) = drive.set(assignment) {
                 problems.push(Problem { place: format!("--set {assignment}"), ..problem });
             }
@@ -115,6 +115,7 @@ impl Drive {
             }
             let value = match value {
                 Value::Rigid => "\"rigid\"".to_owned(),
+                Value::Word { chosen, .. } => format!("{chosen:?}"),
                 Value::Number(number) if field.is_count() => format!("{number}"),
                 Value::Number(number) => format!("{number:?}"),
                 Value::List(list) => {
@@ -159,6 +160,10 @@ impl Field {
             }
             Slot::Real(slot) => *slot = real(&self.range, value)?,
             Slot::Count(slot) => *slot = whole(&self.range, value)?,
+            Slot::Word(slot) => {
+                let known: Vec<(&str, &str)> = slot.names().into_iter().map(|name| (name, name)).collect();
+                slot.choose(one_of(&known, value)?);
+            }
             Slot::List(slot) => {
                 let each = format!("an array of numbers, {} each", self.range);
                 *slot = each_of(value, &each, |entry| real(&self.range, entry))?;
@@ -257,7 +262,7 @@ impl Reader<'_> {
             }
         }
         if !has_base {
-            self.refuse_missing();
+            self.refuse_missing(&drive);
         }
         if !self.file.is_sound() {
             return Err(self.finish());
@@ -295,14 +300,39 @@ impl Reader<'_> {
         self.file.take(key, text(value)).map(|text| (value.span(), text))
     }
 
-    fn refuse_missing(&mut self) {
+    fn refuse_missing(&mut self, drive: &Drive) {
         for field in fields::ALL {
-            if !field.is_optional() && !self.lines.contains_key(field.path) {
+            if !field.is_optional(drive) && !self.lines.contains_key(field.path) {
                 let what = format!("missing ({}); give it, or a base = \"HHD-95\" to start from", field.meaning);
                 self.file.refuse_whole(field.path, what);
             }
         }
     }
+}
+
+/// The assignments of one text: a comma outside brackets and quotes ends one where another, `section.key=`, begins.
+fn apart(text: &str) -> Vec<&str> {
+    let begins_another = |rest: &str| {
+        let path = rest.split('=').next().unwrap_or_default().trim();
+        rest.contains('=')
+            && path.contains('.')
+            && path.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_' || c == '.')
+    };
+    let (mut parts, mut start, mut depth, mut quoted) = (Vec::new(), 0, 0_i32, false);
+    for (at, c) in text.char_indices() {
+        match c {
+            '"' => quoted = !quoted,
+            '[' | '{' if !quoted => depth += 1,
+            ']' | '}' if !quoted => depth -= 1,
+            ',' if !quoted && depth == 0 && begins_another(&text[at + 1..]) => {
+                parts.push(&text[start..at]);
+                start = at + 1;
+            }
+            _ => {}
+        }
+    }
+    parts.push(&text[start..]);
+    parts
 }
 
 fn sections() -> impl Iterator<Item = &'static str> {
@@ -330,6 +360,7 @@ fn unknown_path(path: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::sleeve::SleeveKind;
     use super::*;
 
     /// A file on top of the default drive.
@@ -668,6 +699,48 @@ mod tests {
                 "friction_coefficient = 0.1",
                 "wrong.toml:2: friction_coefficient: unknown key; did you mean `flanks.friction_coefficient`?",
             ),
+            (
+                "[sleeve]\nkind = \"bellows\"",
+                "wrong.toml:3: sleeve.kind: found \"bellows\", allowed: \"hermetic\", \"cup\", \"hat\", \"springs\", \"none\"",
+            ),
+            (
+                "[sleeve]\nkind = \"hermetc\"",
+                "wrong.toml:3: sleeve.kind: found \"hermetc\", allowed: \"hermetic\", \"cup\", \"hat\", \"springs\", \"none\"; did you mean `hermetic`?",
+            ),
+            ("[sleeve]\nflange = 2", "wrong.toml:3: sleeve.flange: found 2, allowed: \"rigid\", \"diaphragm\""),
+            ("[sleeve]\nwall_mm = 0", "wrong.toml:3: sleeve.wall_mm: found 0, allowed: above 0 to 100"),
+            (
+                "[sleeve]\nkind = \"cup\"\nwall_mm = 5",
+                "wrong.toml:4: sleeve.wall_mm: found 5, allowed: up to 4.7275 (a tenth of the neutral radius: a thin shell)",
+            ),
+            (
+                "[sleeve]\nkind = \"hermetic\"\nflange_side_mm = 0.9",
+                "wrong.toml:4: sleeve.flange_side_mm: found 0.9, allowed: at least 1 (two walls: a tube)",
+            ),
+            (
+                "[sleeve]\nkind = \"cup\"\nlateral_stiffness_n_per_mm = 500",
+                "wrong.toml:4: sleeve.lateral_stiffness_n_per_mm: found 500, allowed with kind = \"cup\": 0",
+            ),
+            (
+                "[sleeve]\nkind = \"none\"\nlateral_stiffness_n_per_mm = 500",
+                "wrong.toml:4: sleeve.lateral_stiffness_n_per_mm: found 500, allowed with kind = \"none\": 0",
+            ),
+            (
+                "[sleeve]\nkind = \"none\"\ntorsion_stiffness_n_m_per_rad = 4.6e5",
+                "wrong.toml:4: sleeve.torsion_stiffness_n_m_per_rad: found 460000, allowed with kind = \"none\": \"rigid\"",
+            ),
+            (
+                "[sleeve]\nkind = \"cup\"\nbottom = \"plate\"\nbottom_thickness_mm = 20",
+                "wrong.toml:5: sleeve.bottom_thickness_mm: found 20, allowed: up to 9.4550",
+            ),
+            (
+                "[sleeve]\nkind = \"cup\"\nbottom = \"plate\"\nhub_radius_mm = 47",
+                "wrong.toml:5: sleeve.hub_radius_mm: found 47, allowed: up to 44.9112 (inside the tube)",
+            ),
+            (
+                "[sleeve]\nkind = \"hat\"\nflange = \"diaphragm\"\ndiaphragm_thickness_mm = 10",
+                "wrong.toml:5: sleeve.diaphragm_thickness_mm: found 10, allowed: up to 9.4550 (a thin plate)",
+            ),
             ("sleeve = 4.6e5", "wrong.toml:2: sleeve: found 4.6e5, allowed: a table [sleeve]"),
             ("name = 95", "wrong.toml:2: name: found 95, allowed: a string"),
             ("[flexspline]\nteeth = 188\nteeth = 188", "wrong.toml:4: not TOML: duplicate key"),
@@ -688,7 +761,10 @@ mod tests {
     #[test]
     fn a_wrong_base_is_named() {
         let message = Drive::from_toml("d.toml", "base = \"HHD95\"").unwrap_err().to_string();
-        assert_eq!(message, "d.toml:1: base: found \"HHD95\", allowed: HHD-95, HHD-95-typical; did you mean `HHD-95`?");
+        assert_eq!(
+            message,
+            "d.toml:1: base: found \"HHD95\", allowed: HHD-95, HHD-95-typical, CUP-95, HHD-95-plane; did you mean `HHD-95`?"
+        );
         let message = Drive::from_toml("d.toml", "base = 95").unwrap_err().to_string();
         assert_eq!(message, "d.toml:1: base: found 95, allowed: a string");
     }
@@ -705,8 +781,10 @@ mod tests {
              outward, mm); give it, or a base = \"HHD-95\" to start from"
         );
         let empty = Drive::from_toml("f.toml", "").unwrap_err();
-        let optional = fields::ALL.iter().filter(|field| field.is_optional()).count();
-        assert_eq!(optional, 2 + fields::ALL.iter().filter(|field| field.is_imperfection()).count());
+        let count = |of: &dyn Fn(&Field) -> bool| fields::ALL.iter().filter(|field| of(field)).count();
+        let optional = count(&|field| field.is_optional(&Drive::hhd_95()));
+        // Two stiffnesses that may be rigid, and what springs have not.
+        assert_eq!(optional, 2 + count(&Field::is_imperfection) + count(&Field::is_of_shells));
         assert_eq!(empty.problems.len(), fields::ALL.len() - optional);
         // a stiffness that is not there is rigid
         let text = text.replace("bearing_stiffness_n_per_mm3", "# ").replace("torsion_stiffness_n_m_per_rad", "# ");
@@ -740,6 +818,43 @@ mod tests {
         let both = ["flexspline.teeth=186", "circular_spline.teeth=190"];
         assert!(Drive::hhd_95().with_sets(both).unwrap_err().to_string().contains("found 190, allowed: 188"));
         assert_eq!(Drive::hhd_95().with_set("name=mine").unwrap().name, "mine");
+    }
+
+    #[test]
+    fn one_text_may_set_several_fields() {
+        let drive = Drive::hhd_95()
+            .with_set("sleeve.kind=hermetic,sleeve.wall_mm=0.7, as_built.cam_form_harmonics=[{order=2,amplitude_um=1}]")
+            .unwrap();
+        assert_eq!((drive.sleeve.kind, drive.sleeve.wall_mm), (SleeveKind::Hermetic, 0.7));
+        assert_eq!(drive.as_built.cam_form_harmonics.len(), 1);
+        assert_eq!(Drive::hhd_95().with_set("name=mine, not yours").unwrap().name, "mine, not yours");
+        let wrong = Drive::hhd_95().with_set("sleeve.wall_mm=0.7,sleeve.wal_mm=1").unwrap_err().to_string();
+        assert!(wrong.starts_with("--set sleeve.wal_mm=1: sleeve.wal_mm: unknown key"), "{wrong}");
+    }
+
+    /// Without a base a drive needs the sizes of the sleeve that it has, and no others.
+    #[test]
+    fn a_sleeve_needs_its_own_sizes() {
+        let without = |name: &str, kind: &str, keys: &[&str]| {
+            let mut text = Drive::hhd_95().to_toml().replace("kind = \"springs\"", &format!("kind = \"{kind}\""));
+            for key in keys {
+                text = text.replace(&format!("\n{key} ="), "\n# ");
+            }
+            Drive::from_toml(name, &text).map_err(|error| error.to_string())
+        };
+        let sizes = ["wall_mm", "flange_side_mm", "bottom_side_mm", "lateral_stiffness_n_per_mm"];
+        let missing = |kind: &str| {
+            let said = without("a.toml", kind, &sizes).err().unwrap_or_default();
+            let keys = sizes.into_iter().filter(move |key| said.contains(&format!("sleeve.{key}: missing")));
+            keys.collect::<Vec<_>>()
+        };
+        assert_eq!(missing("hermetic"), sizes[..3]);
+        assert_eq!(missing("cup"), ["wall_mm", "bottom_side_mm"]);
+        assert_eq!(missing("hat"), ["wall_mm", "flange_side_mm"]);
+        assert_eq!(missing("springs"), ["lateral_stiffness_n_per_mm"]);
+        assert!(without("b.toml", "none", &sizes).is_ok());
+        let optional = ["flange", "bottom", "bottom_thickness_mm", "diaphragm_thickness_mm", "hub_radius_mm"];
+        assert!(without("c.toml", "hermetic", &optional).is_ok());
     }
 
     #[test]

@@ -21,6 +21,7 @@ mod involute;
 mod neutral;
 mod placement;
 mod ring;
+mod sleeve;
 mod spec;
 mod tooth;
 
@@ -32,8 +33,9 @@ pub use involute::{Foot, InvoluteFlank};
 pub use neutral::NeutralCurve;
 pub use placement::{FlankDeviations, Placement};
 pub use ring::{GeneratorKind, RingShape, UnknownGenerator};
+pub use sleeve::{Bottom, Flange, Sleeve, SleeveKind};
 pub use spec::{
-    CircularSpline, Drive, Flanks, Flexspline, Generators, Material, OutputLoadPath, Sleeve, Temperature, ThermalState,
+    CircularSpline, Drive, Flanks, Flexspline, Generators, Material, OutputLoadPath, Temperature, ThermalState,
 };
 pub use tooth::{OutlinePiece, PieceKind, ToothFlank};
 

@@ -5,6 +5,7 @@ use super::error::DriveError;
 use super::fields::{self, Value};
 use super::generator::GeneratorOutline;
 use super::ring::GeneratorKind;
+use super::sleeve::{Bottom, Sleeve, SleeveKind};
 use super::tooth::ToothFlank;
 use crate::toml_file::Problem;
 use serde::Serialize;
@@ -119,15 +120,6 @@ pub struct Generators {
 pub struct OutputLoadPath {
     /// Coulomb drag on the circular spline, N·m, against its motion.
     pub drag_torque_n_m: f64,
-}
-
-/// The sleeve of the flexspline, as springs on its rim.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Sleeve {
-    /// Torsional stiffness from rim to flange, N·m/rad; `None` is rigid.
-    pub torsion_stiffness_n_m_per_rad: Option<f64>,
-    /// Lateral stiffness from rim to flange, N/mm; 0 leaves the rim to the generator.
-    pub lateral_stiffness_n_per_mm: f64,
 }
 
 /// Contact between the flanks.
@@ -249,7 +241,7 @@ impl Material {
 
 impl Drive {
     /// Names of the built-in drives.
-    pub const BUILT_IN: [&'static str; 2] = ["HHD-95", "HHD-95-typical"];
+    pub const BUILT_IN: [&'static str; 4] = ["HHD-95", "HHD-95-typical", "CUP-95", "HHD-95-plane"];
 
     /// The default drive: ratio 95, module 0.5 mm, ideal geometry, no friction, rigid sleeve and generator bearing.
     ///
@@ -291,7 +283,7 @@ impl Drive {
                 bearing_stiffness_n_per_mm3: None,
             },
             output: OutputLoadPath { drag_torque_n_m: 0.02 },
-            sleeve: Sleeve { torsion_stiffness_n_m_per_rad: None, lateral_stiffness_n_per_mm: 0.0 },
+            sleeve: Sleeve::default(),
             flanks: Flanks { friction_coefficient: 0.0 },
             temperature: Temperature {
                 reference_c: 20.0,
@@ -371,11 +363,31 @@ impl Drive {
         drive
     }
 
+    /// [`Drive::hhd_95`] with its rim at the open end of a cup, as most drives have it: wall 0.7 mm, 80 mm long, a thin bottom.
+    pub fn cup_95() -> Drive {
+        let sleeve = Sleeve {
+            kind: SleeveKind::Cup,
+            wall_mm: 0.7,
+            bottom_side_mm: 80.0,
+            bottom: Bottom::Disc,
+            ..Sleeve::default()
+        };
+        Drive { name: "CUP-95".to_owned(), sleeve, ..Drive::hhd_95() }
+    }
+
+    /// The plane drive: no third dimension, nothing beside the rim but that it does not turn.
+    pub fn hhd_95_plane() -> Drive {
+        let sleeve = Sleeve { kind: SleeveKind::None, ..Sleeve::default() };
+        Drive { name: "HHD-95-plane".to_owned(), sleeve, ..Drive::hhd_95() }
+    }
+
     /// The built-in drive of that name, if there is one.
     pub fn built_in(name: &str) -> Option<Drive> {
         match name {
             "HHD-95" => Some(Drive::hhd_95()),
             "HHD-95-typical" => Some(Drive::hhd_95_typical()),
+            "CUP-95" => Some(Drive::cup_95()),
+            "HHD-95-plane" => Some(Drive::hhd_95_plane()),
             _ => None,
         }
     }
@@ -424,6 +436,9 @@ impl Drive {
         ] {
             *length *= new.flexspline_scale / old.flexspline_scale;
         }
+        for length in drive.sleeve.lengths() {
+            *length *= new.flexspline_scale / old.flexspline_scale;
+        }
         let c = &mut drive.circular_spline;
         for length in [
             &mut c.module_mm,
@@ -451,6 +466,10 @@ impl Drive {
             if field.is_imperfection() && value.is_zero() {
                 return;
             }
+            // and so do the sizes of a sleeve that springs stand for
+            if field.is_of_shells() && !self.sleeve.is_shell() {
+                return;
+            }
             hasher.update(field.path.as_bytes());
             // zero has one sign
             let number = |hasher: &mut blake3::Hasher, number: f64| {
@@ -461,6 +480,9 @@ impl Drive {
             match value {
                 Value::Number(x) => number(&mut hasher, *x),
                 Value::Rigid => {}
+                Value::Word { chosen, .. } => {
+                    hasher.update(chosen.as_bytes());
+                }
                 Value::List(list) => list.iter().for_each(|x| number(&mut hasher, *x)),
                 Value::Harmonics(list) => {
                     for harmonic in list {
@@ -572,6 +594,7 @@ impl Drive {
         if !radii {
             return;
         }
+        self.sleeve.fit(f.neutral_radius_mm(), problems);
         let mut require = |holds: bool, field: &str, what: String| {
             if !holds {
                 problems.push(Problem::of(field, what));

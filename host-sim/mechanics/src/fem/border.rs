@@ -1,12 +1,15 @@
 //! Solution of a sparse symmetric system with a few dense rows and columns.
 //!
 //! ```text
-//!   [ A    B ] [ x ]   [ f ]        A n x n sparse, factorised; B n x m; D m x m; m at most seven
+//!   [ A    B ] [ x ]   [ f ]        A n x n sparse, factorised; B n x m; D m x m; m some tens at most
 //!   [ B^T  D ] [ z ] = [ g ]
 //! ```
 //!
 //! by block elimination: `(D - B^T A^-1 B) z = g - B^T A^-1 f`, then `x = A^-1 f - A^-1 B z`. The output angle, the mean
 //! rotation of the bore and other quantities that couple with many nodes at once enter as borders and leave A sparse.
+
+/// Right-hand sides that a factor takes at once.
+const MOST_COLUMNS: usize = 8;
 
 /// A factorised matrix that solves.
 pub trait Factor {
@@ -58,7 +61,9 @@ impl BorderedSystem {
         let m = border.width;
         let n = border.columns.len() / m;
         let mut solved = border.columns.clone();
-        factor.solve(&mut solved, m);
+        for columns in solved.chunks_mut(MOST_COLUMNS * n) {
+            factor.solve(columns, columns.len() / n);
+        }
         let mut schur = border.corner.clone();
         for i in 0..m {
             for j in 0..m {

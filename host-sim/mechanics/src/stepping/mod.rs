@@ -11,6 +11,7 @@ mod reference;
 mod slip;
 mod state;
 mod step;
+mod waves;
 mod wheels;
 
 pub use error::SolveError;

@@ -1,7 +1,7 @@
 //! Newton's method on the whole drive, the same for both solvers; only the wheels differ (see [`Wheels`]).
 //!
 //! Unknowns are the displacements of both wheels and, as a dense border, the output angle, the moment of the sleeve (a
-//! Lagrange multiplier when the sleeve is rigid) and its lateral force. One increment:
+//! Lagrange multiplier when the sleeve is rigid), its lateral force, and those of its shells on waves of the bore. One increment:
 //!
 //! predict, lay out the contact; repeat { assemble; done? factorise; solve; update } until done.
 
@@ -78,6 +78,8 @@ pub struct Increment {
     pub drag_torque_n_m: f64,
     /// How far the output turns for one more N m of load, the generator held: rad/(N m).
     pub compliance_rad_per_n_m: f64,
+    /// Force of the generator along its major axis on the half of the rim at 0°, outward, N.
+    pub lobe_force_n: f64,
     /// Largest contact pressure on a flank and on the bore, MPa.
     pub peak_pressure_mpa: [f64; 2],
 }
@@ -461,6 +463,8 @@ impl<'p> Solver<'p> {
     fn assemble_contact(&mut self, state: &State, near: &mut NearPairs, residual: &mut Residual) {
         let problem = self.problem;
         let (bore_law, flank_law) = (self.bore_law(), self.flank_law());
+        let bore_nodes = &problem.wheels().0.nodes;
+        let major = [state.generator_rad.cos(), state.generator_rad.sin()];
         let wheels = self.wheels.as_mut();
         problem.bore.evaluate_near(
             bore_law,
@@ -474,6 +478,10 @@ impl<'p> Solver<'p> {
                         let f = contact.force[2 * a + k];
                         residual.force[2 * n as usize + k] += f;
                         residual.scale = residual.scale.max(f.abs());
+                    }
+                    let [x, y] = bore_nodes[n as usize];
+                    if major[0] * x + major[1] * y > 0.0 {
+                        residual.lobe_force += major[0] * contact.force[2 * a] + major[1] * contact.force[2 * a + 1];
                     }
                 }
                 wheels.add_bore(contact);
@@ -535,7 +543,7 @@ impl<'p> Solver<'p> {
         corner[SLEEVE * width + SLEEVE] = -problem.sleeve_compliance;
         corner[ANCHORED * width + ANCHORED] = 1.0 / ANCHOR;
 
-        if width == BORDERS {
+        if problem.lateral_stiffness > 0.0 {
             for axis in 0..2 {
                 let force = state.lateral_force[axis];
                 let mut mean = 0.0;
@@ -548,6 +556,10 @@ impl<'p> Solver<'p> {
                 residual.border[row] = -(mean - compliance * force);
                 corner[row * width + row] = -compliance;
             }
+        }
+        for (row, wave) in (problem.first_wave()..).zip(&problem.waves) {
+            wave.add_force(-wave.stiffness * wave.amplitude(&state.u), &mut residual.force);
+            corner[row * width + row] = -1.0 / wave.stiffness;
         }
     }
 
@@ -679,6 +691,7 @@ impl<'p> Solver<'p> {
             drag_torque_n_m: residual.drag_torque * to_n_m,
             // Per width: rad per (N mm/mm); a torque in N m is 1 / to_n_m of that.
             compliance_rad_per_n_m: compliance / to_n_m,
+            lobe_force_n: residual.lobe_force * self.problem.drive.flexspline.width_mm,
             peak_pressure_mpa: residual.peak,
         }
     }
@@ -686,13 +699,16 @@ impl<'p> Solver<'p> {
 
 /// The border of this drive; the column of the output angle and the corner change with the contact.
 fn fixed_border(problem: &Problem, wheels: &dyn Wheels) -> Border {
-    let width = if problem.lateral_stiffness > 0.0 { BORDERS } else { LATERAL };
+    let width = problem.first_wave() + problem.waves.len();
     let mut border = Border::zeros(wheels.unknowns(), width);
     border.column_mut(SLEEVE)[..problem.rotation_weights.len()].copy_from_slice(&problem.rotation_weights);
     for (unknown, weight) in wheels.anchor() {
         border.column_mut(ANCHORED)[unknown] = weight;
     }
-    if width == BORDERS {
+    for (row, wave) in (problem.first_wave()..).zip(&problem.waves) {
+        wave.add_force(1.0, border.column_mut(row));
+    }
+    if problem.lateral_stiffness > 0.0 {
         for (i, w) in problem.mean_weights.iter().enumerate().step_by(2) {
             border.column_mut(LATERAL)[i] = *w;
             border.column_mut(LATERAL + 1)[i + 1] = *w;

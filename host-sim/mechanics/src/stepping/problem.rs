@@ -14,6 +14,8 @@ use crate::suggest::did_you_mean;
 use super::error::SolveError;
 use super::fast::CondensedDrive;
 use super::state::State;
+use super::step::LATERAL;
+use super::waves::{Third, Wave};
 
 /// Which solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -165,6 +167,10 @@ pub struct Problem {
     pub(super) sleeve_compliance: f64,
     /// Lateral stiffness of the sleeve per mm of width (N/mm²).
     pub(super) lateral_stiffness: f64,
+    /// What shells in the third dimension add to the slice.
+    third: Third,
+    /// The same on the bore of the meshes of this problem.
+    pub(super) waves: Vec<Wave>,
     /// Coulomb drag of the output per mm of width (N mm/mm).
     pub(super) drag: f64,
     pub(super) drag_stiffness: f64,
@@ -208,6 +214,8 @@ impl Problem {
         }
         let bore = BoreContact::new(fs, settings.bore_points(kind));
         let (rotation_weights, mean_weights) = bore_averages(fs, &bore, settings.holding);
+        let third = Third::of(&drive)?;
+        let waves = third.waves(&drive, fs, &bore);
         let thermal = &drive.thermal_state;
         Ok(Problem {
             bore_law: BoreLaw::new(settings.bore_penalty(kind), drive.generator.bearing_stiffness_n_per_mm3),
@@ -216,14 +224,16 @@ impl Problem {
                 stick_stiffness: 0.1 * settings.flank_penalty,
                 friction: drive.flanks.friction_coefficient,
             },
-            sleeve_compliance: drive.sleeve.torsion_stiffness_n_m_per_rad.map_or(0.0, |k| width / (1e3 * k)),
-            lateral_stiffness: drive.sleeve.lateral_stiffness_n_per_mm / width,
+            sleeve_compliance: third.torsion_n_m_per_rad.map_or(0.0, |k| width / (1e3 * k)),
+            lateral_stiffness: third.lateral_n_per_mm / width,
             drag: drive.output.drag_torque_n_m * 1e3 / width,
             drag_stiffness: DRAG_STICK_STIFFNESS,
             seat_displacement: outer * (thermal.housing_scale / thermal.circular_spline_scale - 1.0),
             degrees_of_freedom,
             rotation_weights,
             mean_weights,
+            third,
+            waves,
             held,
             condensed,
             bore,
@@ -257,6 +267,7 @@ impl Problem {
         problem.bore = BoreContact::new(&problem.flexspline, settings.bore_points(kind));
         (problem.rotation_weights, problem.mean_weights) =
             bore_averages(&problem.flexspline, &problem.bore, settings.holding);
+        problem.waves = problem.third.waves(&problem.drive, &problem.flexspline, &problem.bore);
         Ok(problem)
     }
 
@@ -269,6 +280,11 @@ impl Problem {
     /// Contact between the flanks as other meshes carry them, of the same sectors and flanks.
     pub fn flanks_on<'a>(&'a self, flexspline: &'a WheelMesh, circular_spline: &'a WheelMesh) -> FlankContact<'a> {
         FlankContact::new(flexspline, circular_spline, self.tooth.clone(), self.space.clone(), &self.deviations)
+    }
+
+    /// Row of the border where the waves begin.
+    pub(super) fn first_wave(&self) -> usize {
+        if self.lateral_stiffness > 0.0 { LATERAL + 2 } else { LATERAL }
     }
 
     /// Drag torque on the output (N mm/mm) at a displacement from its anchor, and the stiffness with which it holds.

@@ -1,19 +1,20 @@
 //! Out-of-balance forces, and the step that takes them away.
 
 use super::state::State;
+use super::waves::MOST_WAVES;
 
-/// Rows of the border: output angle, mean rotation of the bore, anchor, lateral x and y.
+/// Rows of the border: output angle, mean rotation of the bore, anchor, then lateral x and y and waves of the bore, where there are.
 pub(super) const OUTPUT: usize = 0;
 pub(super) const SLEEVE: usize = 1;
 pub(super) const ANCHORED: usize = 2;
 pub(super) const LATERAL: usize = 3;
-pub(super) const BORDERS: usize = 5;
+pub(super) const BORDERS: usize = LATERAL + 2 + MOST_WAVES;
 
 /// Out-of-balance forces at a configuration.
 pub(super) struct Residual {
     /// On the free nodes.
     pub force: Vec<f64>,
-    /// On output angle, sleeve rotation, anchor, lateral x, lateral y.
+    /// On the rows of the border; those of the waves are always in balance.
     pub border: [f64; BORDERS],
     /// Largest contact force on a node.
     pub scale: f64,
@@ -21,6 +22,8 @@ pub(super) struct Residual {
     pub flank_contacts: usize,
     pub generator_contacts: usize,
     pub generator_moment: f64,
+    /// Along the major axis, on the half of the bore at 0°.
+    pub lobe_force: f64,
     pub flank_torque: f64,
     pub drag_torque: f64,
     /// What rounding of the output angle leaves of the torque at worst.
@@ -40,6 +43,7 @@ impl Residual {
             flank_contacts: 0,
             generator_contacts: 0,
             generator_moment: 0.0,
+            lobe_force: 0.0,
             flank_torque: 0.0,
             drag_torque: 0.0,
             torque_round_off: 0.0,

@@ -1,0 +1,274 @@
+//! What holds the rim of the flexspline: its sleeve or cup, or springs in its place.
+
+use serde::{Serialize, Serializer};
+
+use crate::toml_file::Problem;
+
+/// A choice among names in a drive file.
+pub(super) trait Choice {
+    /// All names.
+    fn names(&self) -> Vec<&'static str>;
+    /// The name chosen.
+    fn chosen(&self) -> &'static str;
+    /// Chooses by name; false, and nothing changed, for a name that is none.
+    fn choose(&mut self, name: &str) -> bool;
+}
+
+macro_rules! choice {
+    ($(#[$about:meta])* $type:ident { $($(#[$doc:meta])* $variant:ident = $name:literal),* $(,)? }) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum $type {
+            $($(#[$doc])* $variant),*
+        }
+
+        impl $type {
+            /// All of them.
+            pub const ALL: &[$type] = &[$($type::$variant),*];
+
+            /// Its name in a drive file.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $($type::$variant => $name),*
+                }
+            }
+        }
+
+        impl Choice for $type {
+            fn names(&self) -> Vec<&'static str> {
+                Self::ALL.iter().map(|one| one.name()).collect()
+            }
+
+            fn chosen(&self) -> &'static str {
+                self.name()
+            }
+
+            fn choose(&mut self, name: &str) -> bool {
+                Self::ALL.iter().find(|one| one.name() == name).map(|one| *self = *one).is_some()
+            }
+        }
+
+        impl Serialize for $type {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.serialize_str(self.name())
+            }
+        }
+    };
+}
+
+choice! {
+    /// What holds the rim.
+    SleeveKind {
+        /// The rim in the middle of a closed sleeve: a tube to the flange on one side, a tube with a bottom on the other.
+        Hermetic = "hermetic",
+        /// The rim at the open end of a cup, whose bottom is on the shaft.
+        Cup = "cup",
+        /// The rim at the open end of a tube with a flange (a silk hat).
+        Hat = "hat",
+        /// Two springs on the rim, in torsion and sideways; a plane model.
+        Springs = "springs",
+        /// Nothing but that it does not turn; a plane model.
+        None = "none",
+    }
+}
+
+choice! {
+    /// How the tube stands on its flange.
+    Flange {
+        /// Clamped.
+        Rigid = "rigid",
+        /// On a thin ring-shaped plate that is clamped further out.
+        Diaphragm = "diaphragm",
+    }
+}
+
+choice! {
+    /// What closes the other tube.
+    Bottom {
+        /// Held in its plane, free along the axis: a bottom that is stiff as a membrane and bends without force.
+        Disc = "disc",
+        /// A plate of finite thickness.
+        Plate = "plate",
+        /// Clamped: a massive bottom.
+        Clamped = "clamped",
+    }
+}
+
+/// The sleeve of the flexspline.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sleeve {
+    /// What holds the rim.
+    pub kind: SleeveKind,
+    /// Wall of the tubes, mm.
+    pub wall_mm: f64,
+    /// From the rim to the flange, mm (hermetic sleeve, hat).
+    pub flange_side_mm: f64,
+    /// From the rim to the outer face of the bottom, mm (hermetic sleeve, cup).
+    pub bottom_side_mm: f64,
+    /// How the tube stands on its flange.
+    pub flange: Flange,
+    /// What closes the other tube.
+    pub bottom: Bottom,
+    /// Thickness of a bottom that is a plate, mm.
+    pub bottom_thickness_mm: f64,
+    /// Thickness of a flange that is a diaphragm, mm.
+    pub diaphragm_thickness_mm: f64,
+    /// How far outside the tube a diaphragm is clamped, mm.
+    pub diaphragm_width_mm: f64,
+    /// Radius of the hub on which the bottom of a cup is clamped, mm.
+    pub hub_radius_mm: f64,
+    /// Torsional stiffness, N·m/rad, of springs in place of the sleeve, or of what holds a sleeve of shells; `None` is rigid.
+    pub torsion_stiffness_n_m_per_rad: Option<f64>,
+    /// Lateral stiffness of springs in place of the sleeve, N/mm; 0 leaves the rim to the generator.
+    pub lateral_stiffness_n_per_mm: f64,
+}
+
+impl Default for Sleeve {
+    /// No third dimension, and the sizes of the sleeve that HHD-95 would have: 0.5 mm, 140 mm on both sides, a rigid flange. The
+    /// plate of a bottom, the diaphragm and the hub are of usual proportions.
+    fn default() -> Sleeve {
+        Sleeve {
+            kind: SleeveKind::Springs,
+            wall_mm: 0.5,
+            flange_side_mm: 140.0,
+            bottom_side_mm: 140.0,
+            flange: Flange::Rigid,
+            bottom: Bottom::Disc,
+            bottom_thickness_mm: 2.0,
+            diaphragm_thickness_mm: 0.5,
+            diaphragm_width_mm: 15.0,
+            hub_radius_mm: 20.0,
+            torsion_stiffness_n_m_per_rad: None,
+            lateral_stiffness_n_per_mm: 0.0,
+        }
+    }
+}
+
+impl Sleeve {
+    /// Whether it is shells, in three dimensions.
+    pub fn is_shell(&self) -> bool {
+        matches!(self.kind, SleeveKind::Hermetic | SleeveKind::Cup | SleeveKind::Hat)
+    }
+
+    /// Whether it has a tube to a flange.
+    pub fn has_flange(&self) -> bool {
+        matches!(self.kind, SleeveKind::Hermetic | SleeveKind::Hat)
+    }
+
+    /// Whether it has a tube to a bottom.
+    pub fn has_bottom(&self) -> bool {
+        matches!(self.kind, SleeveKind::Hermetic | SleeveKind::Cup)
+    }
+
+    /// Whether its sizes go together, on a rim of this neutral radius.
+    pub(super) fn fit(&self, radius_mm: f64, problems: &mut Vec<Problem>) {
+        let mut require = |holds: bool, key: &str, what: String| {
+            if !holds {
+                problems.push(Problem::of(&format!("sleeve.{key}"), what));
+            }
+        };
+        let kind = self.kind.name();
+        if !self.is_shell() {
+            if self.kind == SleeveKind::None {
+                let found = self.torsion_stiffness_n_m_per_rad.map_or(String::new(), |k| k.to_string());
+                let allowed = "allowed with kind = \"none\": \"rigid\" (springs need kind = \"springs\")";
+                require(found.is_empty(), "torsion_stiffness_n_m_per_rad", format!("found {found}, {allowed}"));
+                let lateral = self.lateral_stiffness_n_per_mm;
+                let allowed = "allowed with kind = \"none\": 0 (springs need kind = \"springs\")";
+                require(lateral == 0.0, "lateral_stiffness_n_per_mm", format!("found {lateral}, {allowed}"));
+            }
+            return;
+        }
+        let thin = 0.1 * radius_mm;
+        require(
+            self.wall_mm <= thin,
+            "wall_mm",
+            format!("found {}, allowed: up to {thin:.4} (a tenth of the neutral radius: a thin shell)", self.wall_mm),
+        );
+        let shortest = 2.0 * self.wall_mm;
+        for (key, length, there) in [
+            ("flange_side_mm", self.flange_side_mm, self.has_flange()),
+            ("bottom_side_mm", self.bottom_side_mm, self.has_bottom()),
+        ] {
+            let allowed = format!("found {length}, allowed: at least {shortest} (two walls: a tube)");
+            require(!there || length >= shortest, key, allowed);
+        }
+        let lateral = self.lateral_stiffness_n_per_mm;
+        require(
+            lateral == 0.0,
+            "lateral_stiffness_n_per_mm",
+            format!("found {lateral}, allowed with kind = \"{kind}\": 0 (the shells hold the rim sideways)"),
+        );
+        if self.has_bottom() && self.bottom == Bottom::Plate {
+            let thickest = (self.bottom_side_mm - shortest).min(0.2 * radius_mm);
+            let thickness = self.bottom_thickness_mm;
+            require(
+                thickness <= thickest,
+                "bottom_thickness_mm",
+                format!("found {thickness}, allowed: up to {thickest:.4} (a plate inside the end of the tube)"),
+            );
+            let (hub, widest) = (self.hub_radius_mm, 0.95 * radius_mm);
+            require(
+                self.kind != SleeveKind::Cup || hub <= widest,
+                "hub_radius_mm",
+                format!("found {hub}, allowed: up to {widest:.4} (inside the tube)"),
+            );
+        }
+        if self.has_flange() && self.flange == Flange::Diaphragm {
+            let (thickness, thickest) = (self.diaphragm_thickness_mm, 0.2 * radius_mm);
+            require(
+                thickness <= thickest,
+                "diaphragm_thickness_mm",
+                format!("found {thickness}, allowed: up to {thickest:.4} (a thin plate)"),
+            );
+        }
+    }
+
+    /// Its lengths, for whoever scales them.
+    pub(super) fn lengths(&mut self) -> [&mut f64; 7] {
+        [
+            &mut self.wall_mm,
+            &mut self.flange_side_mm,
+            &mut self.bottom_side_mm,
+            &mut self.bottom_thickness_mm,
+            &mut self.diaphragm_thickness_mm,
+            &mut self.diaphragm_width_mm,
+            &mut self.hub_radius_mm,
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::spec::Drive;
+    use super::*;
+
+    #[test]
+    fn names_lead_to_what_they_name() {
+        for kind in SleeveKind::ALL {
+            let mut found = SleeveKind::None;
+            assert!(found.choose(kind.name()) && found == *kind);
+            assert!(!found.choose("bellows") && found == *kind);
+        }
+    }
+
+    /// Tables and results of drives without shells stand under the hash they had before there were any.
+    #[test]
+    fn sizes_of_shells_count_only_where_there_are_shells() {
+        let drive = Drive::hhd_95();
+        let thicker = drive.with_set("sleeve.wall_mm=0.7").unwrap();
+        assert_eq!(thicker.hash(), drive.hash());
+        assert_eq!(drive.hash(), Drive::hhd_95_plane().hash());
+        let hermetic = drive.with_set("sleeve.kind=hermetic").unwrap();
+        assert_ne!(hermetic.hash(), drive.hash());
+        assert_ne!(hermetic.hash(), thicker.with_set("sleeve.kind=hermetic").unwrap().hash());
+        assert_ne!(hermetic.hash(), hermetic.with_set("sleeve.flange=diaphragm").unwrap().hash());
+    }
+
+    #[test]
+    fn a_warm_sleeve_is_larger() {
+        let warm = Drive::cup_95().at_temperature(70.0);
+        let scale = warm.thermal_state.flexspline_scale;
+        assert!((warm.sleeve.wall_mm / 0.7 - scale).abs() < 1e-12 && scale > 1.0);
+    }
+}
