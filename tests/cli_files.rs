@@ -50,13 +50,13 @@ fn a_new_drive_file_is_the_drive_it_was_made_from_and_is_not_lost() {
         let told = hash(&format!("{made} --json"));
         assert_eq!(hash(&format!("drive --drive {file} --json")), told, "{made}");
         assert_eq!(hash(&format!("drive {same} --json")), told, "{made}");
-        // It says of each number what it is and what is allowed.
+        // It says of each field what it is and what is allowed: a range, or words.
         let text = desk.read(file);
         assert_eq!(text, desk.line(&format!("drive --drive {file}")).done().stdout);
         let numbers = text.lines().filter(|line| line.contains(" = ") && !line.starts_with(['#', ' ']));
         // The comment of a list stands behind its last line.
         for line in numbers.filter(|line| !line.starts_with("name") && !line.ends_with('[')) {
-            assert!(line.contains(" # ") && line.contains(" to "), "{line}");
+            assert!(line.contains(" # ") && (line.contains(" to ") || line.contains("\", \"")), "{line}");
         }
     }
     desk.write("mine.toml", "my own work");
@@ -215,6 +215,9 @@ fn every_command_prints_one_json_object_and_nothing_else() {
         "synthesize --list",
         "synthesize --model nominal.toml --rows 300 --sessions 4 --seed 1",
         "diagnose out/data.csv --model nominal.toml --no-report",
+        "sleeve --drive CUP-95",
+        "look out/data.csv",
+        "calibrate out/data.csv --model nominal.toml",
     ];
     for line in lines {
         let run = desk.line(&format!("{line} --json"));

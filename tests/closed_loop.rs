@@ -44,7 +44,8 @@ static CAM: LazyLock<(Vec<u8>, DenseMap)> = LazyLock::new(|| (image(GeneratorKin
 /// Errors of all controllers over a flight, and the lines that say so.
 fn flown<P: Plant + Clone>(kind: GeneratorKind, image: &[u8], plant: P, profile: &Profile) -> ([Scores; 5], String) {
     let plants = std::array::from_fn(|_| plant.clone());
-    let antenna = fly(image, plants, SERVO, profile, kind.rated_torque_n_m(), &mut |_| ()).unwrap();
+    let twin = image.to_vec();
+    let antenna = fly([image, &twin], plants, SERVO, profile, kind.rated_torque_n_m(), &mut |_| ()).unwrap();
     let mut text = String::new();
     antenna.write(&kind.to_string(), &mut text).unwrap();
     (*antenna.scores(), text)
@@ -141,15 +142,16 @@ fn the_plant_is_what_contact_fem_says() {
 fn contact_fem_in_the_loop_gives_the_same_errors() {
     let kind = GeneratorKind::Cam;
     let (image, map) = &*CAM;
+    let twin = image.clone();
     let temperature_c = 23.0;
     let profile = Profile { temperature_c: [temperature_c; 2], ..BRIEF };
     let problem = Problem::new(&Drive::hhd_95(), kind, temperature_c, FAST()).unwrap();
     let fem = FemPlant::new(&problem, map.view(), temperature_c, Windows::default()).unwrap();
     let drive = tables::core_drive(&Drive::hhd_95()).unwrap();
     let largest = kind.rated_torque_n_m();
-    let mut by_fem = Single::new(image, drive, fem, largest, temperature_c, Overrun::SkipAndCount).unwrap();
+    let mut by_fem = Single::new([image, &twin], drive, fem, largest, temperature_c, Overrun::SkipAndCount).unwrap();
     let gear = Gear::new(map.view(), temperature_c);
-    let mut by_map = Single::new(image, drive, gear, largest, temperature_c, Overrun::SkipAndCount).unwrap();
+    let mut by_map = Single::new([image, &twin], drive, gear, largest, temperature_c, Overrun::SkipAndCount).unwrap();
     let begun = std::time::Instant::now();
     for moment in profile.moments(largest) {
         let undisturbed = |_: &mut Told, _: &mut Compensated<'_>| true;
@@ -185,10 +187,11 @@ fn disturbed(
     mut disturb: impl FnMut(u32, &mut Told, &mut Compensated<'_>) -> bool,
 ) -> Vec<(Moment, Step, JointState)> {
     let (image, map) = &*CAM;
+    let twin = image.clone();
     let drive = tables::core_drive(&Drive::hhd_95()).unwrap();
     let gear = Gear::new(map.view(), profile.temperature_c[0]);
     let first_c = profile.temperature_c[0];
-    let mut joint = Single::new(image, drive, gear, 200.0, first_c, overrun).unwrap();
+    let mut joint = Single::new([image, &twin], drive, gear, 200.0, first_c, overrun).unwrap();
     let [mut last, mut before] = [0.0_f64; 2];
     let mut steps = Vec::new();
     for (tick, moment) in profile.moments(200.0).enumerate() {
@@ -348,7 +351,7 @@ fn a_reset_in_the_middle_of_a_reversal_goes_on_or_starts_anew() {
     let at = reset_at(&plain);
     let restored = disturbed(Overrun::SkipAndCount, &BRIEF, |tick, _, core| {
         if tick as usize == at {
-            core.state = JointState::restore(&core.state.save()).unwrap();
+            assert!(core.reset_to_saved());
             core.request(Mode::Tracking);
         }
         true

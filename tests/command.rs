@@ -8,20 +8,22 @@ use std::sync::OnceLock;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// The command `flexspline`, built in the profile that the tests were built in, and like them with the features that the whole
-/// workspace asks for: so nothing is built twice.
+/// The command `flexspline`, built in the profile that the tests were built in (their folder `PROFILE/deps` has its name), and
+/// like them with the features that the whole workspace asks for: so nothing is built twice.
 pub fn flexspline() -> &'static Path {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     BINARY.get_or_init(|| {
-        let mut build = Command::new(env!("CARGO"));
-        build
-            .args(["build", "--workspace", "--bin", "flexspline"])
+        let tests = std::env::current_exe().expect("the tests have a path");
+        let profile = match tests.ancestors().nth(2).and_then(|folder| folder.file_name()?.to_str()) {
+            Some("debug") | None => "dev",
+            Some(profile) => profile,
+        };
+        let built = Command::new(env!("CARGO"))
+            .args(["build", "--workspace", "--bin", "flexspline", "--profile", profile])
             .arg("--message-format=json-render-diagnostics")
-            .current_dir(env!("CARGO_MANIFEST_DIR"));
-        if !cfg!(debug_assertions) {
-            build.arg("--release");
-        }
-        let built = build.output().expect("cargo can be run");
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .output()
+            .expect("cargo can be run");
         let log = String::from_utf8_lossy(&built.stderr);
         assert!(built.status.success(), "the command does not build:\n{log}");
         let messages = serde_json::Deserializer::from_slice(&built.stdout);

@@ -16,7 +16,7 @@ use flexspline_sim::contact::{BoreContact, BoreLaw, Configuration, FlankLaw, Fla
 use flexspline_sim::drive::{Drive, GeneratorKind, GeneratorOutline};
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::stepping::{Problem, Solver};
-use flexspline_tests::motion::{imperfect, loaded, mean, on, problem};
+use flexspline_tests::motion::{imperfect, loaded, mean, problem, reference};
 
 /// Numbers in [-1, 1] that look random and are always the same.
 struct Noise(u64);
@@ -80,7 +80,7 @@ fn bore(contact: &BoreContact, law: BoreLaw, outline: &GeneratorOutline, psi: f6
 }
 
 fn bore_derivatives(drive: &Drive, kind: GeneratorKind) {
-    let problem = problem(drive, kind, on(MeshLevel::Coarse));
+    let problem = problem(drive, kind, reference(MeshLevel::Coarse));
     let contact = BoreContact::new(&problem.flexspline, 16);
     let law = BoreLaw::new(1e6, None);
     let psi = 0.0123;
@@ -157,7 +157,8 @@ fn a_ring_shrunk_on_a_round_generator_feels_lames_pressure() {
     drive.temperature.flexspline_expansion_per_k = 0.0;
     drive.temperature.generator_expansion_per_k = 1e-6;
     let penalty = 1e4;
-    let settings = flexspline_sim::stepping::SolverSettings { bore_penalty: Some(penalty), ..on(MeshLevel::Coarse) };
+    let settings =
+        flexspline_sim::stepping::SolverSettings { bore_penalty: Some(penalty), ..reference(MeshLevel::Coarse) };
     let mut problem = Problem::smooth_ring(&drive, GeneratorKind::Cam, settings, 188, 2).unwrap();
     problem.outline = GeneratorOutline::new(&drive.at_temperature(26.0), GeneratorKind::Cam).unwrap();
     let mut solver = Solver::new(&problem);
@@ -204,7 +205,7 @@ fn as_built_flank_forces_are_derivatives_of_the_energy_and_balance() {
 }
 
 fn flank_derivatives(drive: &Drive, moment_bound: f64) {
-    let problem = problem(drive, GeneratorKind::TwoRoller, on(MeshLevel::Standard));
+    let problem = problem(drive, GeneratorKind::TwoRoller, reference(MeshLevel::Standard));
     let run = loaded(&problem, 20.0);
     let flanks = problem.flanks();
     let mut noise = Noise(7);

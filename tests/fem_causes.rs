@@ -49,8 +49,8 @@ fn known() -> &'static (Vec<u8>, Arc<Kernels>) {
         let desk = Desk::new();
         desk.line("tables --generator cam --mesh coarse --temperatures-c 20 --positions 8 --most-nodes 14 --no-report --out made").done();
         let plan = KernelPlan {
-            torques_n_m: vec![2.0, 4.5, 10.0, 24.0, 60.0],
-            sizes_um: vec![4.0, 5.5, 7.0, 9.0, 12.0],
+            torques_n_m: vec![2.0, 10.0, 60.0],
+            sizes_um: vec![5.5, 8.0, 12.0],
             ..KernelPlan::for_generator(GeneratorKind::Cam)
         };
         let kernels = make(&Drive::hhd_95(), GeneratorKind::Cam, &plan, coarse(), &|_| ControlFlow::Continue(()));

@@ -349,7 +349,10 @@ fn tables_of_every_shape() {
         let mut numbers = |count: usize, from: f32, to: f32| -> Vec<f32> {
             (0..count).map(|_| from + (to - from) * random.f32()).collect()
         };
-        let (mean, half) = (numbers(records, -1e-3, 1e-3), numbers(records, 1e-4, 3e-4));
+        // A rough rise: what falls with the load is refused.
+        let rise = torques.iter().cycle().map(|torque| 2e-5 * torque);
+        let mean: Vec<f32> = rise.zip(numbers(records, -2e-6, 2e-6)).map(|(rise, rough)| rise + rough).collect();
+        let half = numbers(records, 1.8e-4, 1.85e-4);
         let (ripples, half_ripples) = (numbers(records * ripple, -3e-6, 3e-6), numbers(records * ripple, -2e-6, 2e-6));
         // The slope of a curve counts as often as it comes in an output turn.
         let [a, b, c] = [(curves[0], 4e-5), (curves[1], 4e-5), (curves[2], 1e-3)]

@@ -13,7 +13,7 @@
 
 use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::stepping::{Method, SolverSettings};
+use flexspline_sim::stepping::SolverSettings;
 use flexspline_tests::motion::{deformed, loaded, on, problem};
 
 const TORQUE_N_M: f64 = 50.0;
@@ -43,8 +43,7 @@ fn apart(kind: GeneratorKind, standard: &([f64; 2], f64), finer: &([f64; 2], f64
 }
 
 fn independent(kind: GeneratorKind) {
-    // `fast_equals_reference` holds this solver against the other on the standard mesh.
-    let settings = SolverSettings { method: Method::Fast, ..on(MeshLevel::Standard) };
+    let settings = on(MeshLevel::Standard);
     let standard = errors(kind, settings);
     let bore_penalty = settings.bore_penalty(kind);
     let loaded_bound = if kind == GeneratorKind::TwoRoller { ALLOWED_LOADED_TWO_ROLLER_ARCSEC } else { ALLOWED_ARCSEC };

@@ -185,17 +185,17 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
         (
             "prose",
             b"Measured on Tuesday.\nAll went well.\n".to_vec(),
-            Error(&["column generator_rad is missing", "separated by spaces"]),
+            Error(&["column generator_rad is missing", "no rows of numbers"]),
         ),
         // Columns.
-        ("semicolons", good.replace(',', ";").into(), Error(&["semicolons", "allowed: commas"])),
-        ("decimal commas", good.replace(',', ";").replace('.', ",").into(), Error(&["semicolons"])),
+        ("semicolons", good.replace(',', ";").into(), Faults(&[])),
+        ("decimal commas", good.replace(',', ";").replace('.', ",").into(), Faults(&[])),
         (
             "decimal commas between commas",
             good.replace('.', ",").into(),
             Error(&["m.csv:2: ", "fields, but the header has 5", "with a point"]),
         ),
-        ("tabs", good.replace(',', "\t").into(), Error(&["tabs"])),
+        ("tabs", good.replace(',', "\t").into(), Faults(&[])),
         (
             "no generator",
             good.replacen("generator_rad", "motor", 1).into(),
@@ -385,9 +385,10 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
             Faults(&[MissingSamples]),
         ),
         (
-            "torque missing in most rows",
+            // Every third row would be a channel that is recorded more slowly.
+            "torque missing in most rows, without order",
             edited(|k, f| {
-                if k % 3 > 0 {
+                if k * k % 7 > 1 {
                     f[TORQUE] = String::new()
                 }
             })

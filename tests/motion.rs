@@ -3,11 +3,16 @@
 use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::motion::{Motion, Place};
-use flexspline_sim::stepping::{Problem, SolverSettings};
+use flexspline_sim::stepping::{Method, Problem, SolverSettings};
 
-/// Default settings on a mesh.
-pub fn on(mesh: MeshLevel) -> SolverSettings {
+/// Default settings on a mesh, with the solver that has every node of it.
+pub fn reference(mesh: MeshLevel) -> SolverSettings {
     SolverSettings { mesh, ..SolverSettings::default() }
+}
+
+/// Default settings on a mesh, with the fast solver: `fast_equals_reference` holds it against the other.
+pub fn on(mesh: MeshLevel) -> SolverSettings {
+    SolverSettings { mesh, method: Method::Fast, ..SolverSettings::default() }
 }
 
 /// HHD-95 with a generator at its reference temperature.

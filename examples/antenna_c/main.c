@@ -19,14 +19,17 @@ static const FlexsplineSettings settings = {
     .rate_rad_s = 0.05f,
     .acceleration_rad_s2 = 5.0f,
     .generator_rate_rad_s = 600.0f,
+    .hold_rad = 0.0f,
 };
 
-// The table in flash. Two copies at two places are what survives an upset; for an example one serves as both.
+// The second image: in flight at another place of the flash, here copied into memory.
+static uint8_t second[sizeof flexspline_cam_table];
+
 static const FlexsplineImages table = {
     .first = flexspline_cam_table,
     .first_bytes = sizeof flexspline_cam_table,
-    .second = flexspline_cam_table,
-    .second_bytes = sizeof flexspline_cam_table,
+    .second = second,
+    .second_bytes = sizeof second,
 };
 
 enum { TICKS = 4000, SLEW_COUNTS = 6836 }; // 0.01 rad/s in counts of 2^-32 output turn
@@ -60,6 +63,8 @@ static int32_t mas(float rad)
 // 0 if all is as it should be, else the number of what is not. Called by startup.c.
 int run(void)
 {
+    for (size_t i = 0; i < sizeof second; i++)
+        second[i] = flexspline_cam_table[i];
     if (flexspline_store_init(&store) || flexspline_joint_init(&joint, &settings) || flexspline_state_init(&state))
         return 1;
     if (flexspline_store_activate(&store, &joint, &table, 20.0f) || flexspline_state_request(&state, 1))

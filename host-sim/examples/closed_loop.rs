@@ -83,7 +83,8 @@ fn run<P: Plant + Clone>(
 ) -> Result<(), Box<dyn Error>> {
     let mut rows = Vec::new();
     let plants = std::array::from_fn(|_| plant.clone());
-    let antenna = fly(image, plants, servo, profile, kind.rated_torque_n_m(), &mut |row| rows.push(row))
+    let twin = image.to_vec();
+    let antenna = fly([image, &twin], plants, servo, profile, kind.rated_torque_n_m(), &mut |row| rows.push(row))
         .ok_or_else(|| format!("{kind}: the table cannot be flown"))?;
     let mut text = String::new();
     antenna.write(&kind.to_string(), &mut text)?;
@@ -101,9 +102,10 @@ fn rover(tables: &Path) -> Result<(), Box<dyn Error>> {
         let plant = format!("tests/firmware/plant/{kind}.csv");
         let map = DenseMap::parse(kind, &plant, &std::fs::read_to_string(&plant)?)?;
         let image = std::fs::read(tables.join(format!("{kind}.fxt")))?;
+        let twin = image.clone();
         let (name, largest) = (kind.to_string(), kind.rated_torque_n_m());
         let gear = Gear::new(map.view(), first_c);
-        let mut joint = RoverJoint::new(number as u32, &name, &image, gear, largest, first_c)
+        let mut joint = RoverJoint::new(number as u32, &name, [&image, &twin], gear, largest, first_c)
             .ok_or_else(|| format!("{kind}: the table cannot be flown"))?;
         for (tick, moment) in BRIEF.moments(largest).enumerate() {
             joint.tick(tick as u32, &moment);

@@ -36,9 +36,10 @@
 #![forbid(unsafe_code)]
 
 pub use flexspline_mechanics::{
-    condense, contact, drive, fem, mesh, motion, reference, stepping, suggest, toml_file, units,
+    condense, contact, drive, fem, mesh, motion, reference, sleeve, stepping, suggest, toml_file, units,
 };
 
+pub mod calibrate;
 pub mod causes;
 pub mod cli;
 pub mod closed_loop;
@@ -46,6 +47,7 @@ pub mod diagnosis;
 pub mod export;
 pub mod extension;
 pub mod kernels;
+pub mod look;
 pub mod measurement;
 pub mod nominal;
 pub mod output;

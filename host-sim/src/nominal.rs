@@ -49,6 +49,19 @@ pub struct Teeth {
 }
 
 impl Teeth {
+    /// The drive as the core knows it.
+    ///
+    /// # Errors
+    /// No pair of wheels has these teeth.
+    pub fn core_drive(self) -> Result<flexspline::Drive, flexspline::DriveError> {
+        let fixed = match self.fixed {
+            Fixed::Flexspline => FixedMember::Flexspline,
+            Fixed::CircularSpline => FixedMember::CircularSpline,
+        };
+        let narrow = |count: u32| u16::try_from(count).unwrap_or(u16::MAX);
+        flexspline::Drive::new(narrow(self.flexspline), narrow(self.circular_spline), fixed)
+    }
+
     /// Of the wheel that is the output.
     #[must_use]
     pub const fn of_output(self) -> u32 {

@@ -16,14 +16,22 @@ use flexspline::{
 };
 use panic_halt as _;
 
-/// The table in flash. Two copies at two places are what survives an upset; for an example one serves as both.
-static TABLE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/cam.fxt"));
+/// The table at two places of the flash: what an upset leaves of one is mended from the other.
+static FIRST: [u8; BYTES] = *include_bytes!(concat!(env!("OUT_DIR"), "/cam.fxt"));
+static SECOND: [u8; BYTES] = *include_bytes!(concat!(env!("OUT_DIR"), "/cam.fxt"));
+const BYTES: usize = include_bytes!(concat!(env!("OUT_DIR"), "/cam.fxt")).len();
 
 /// What never changes, checked by the compiler.
 const JOINT: Joint = {
     let Ok(drive) = Drive::new(188, 190, FixedMember::Flexspline) else { panic!() };
-    let limits =
-        Limits { tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, patience: 5 };
+    let limits = Limits {
+        tick_s: 1e-3,
+        rate_rad_s: 0.05,
+        acceleration_rad_s2: 5.0,
+        generator_rate_rad_s: 600.0,
+        patience: 5,
+        hold_rad: 0.0,
+    };
     let Ok(joint) = Joint::new(drive, limits, Overrun::FadeOut { ticks: 50 }) else { panic!() };
     joint
 };
@@ -41,7 +49,7 @@ fn main() -> ! {
 }
 
 fn fly() -> bool {
-    let images = Images::new(TABLE, TABLE);
+    let images = Images::new(&FIRST, &SECOND);
     let (mut store, mut state) = (Store::new(), JointState::new());
     if store.activate(&images, JOINT.drive(), 20.0).is_err() || state.request(Mode::Tracking).is_err() {
         return false;

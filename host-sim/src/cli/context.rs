@@ -1,12 +1,12 @@
 //! What every command works with: the drive, the output folder, how to talk, when to stop.
 
 use std::ffi::OsString;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use super::{Common, Failure, say};
-use crate::drive::Drive;
+use crate::drive::{Drive, GeneratorKind};
 use crate::output::prepare_folder;
 use crate::progress::Progress;
 use crate::suggest::{likeliest, question};
@@ -133,6 +133,15 @@ impl Context {
         } else {
             Ok(())
         }
+    }
+}
+
+/// The table of a generator in a folder that `flexspline tables` wrote: its file and its bytes, not looked at yet.
+pub(super) fn table_image(folder: &Path, generator: GeneratorKind) -> Result<(PathBuf, Vec<u8>), Failure> {
+    let path = folder.join(format!("{generator}.fxt"));
+    match std::fs::read(&path) {
+        Ok(bytes) => Ok((path, bytes)),
+        Err(error) => Err(Failure::BadInput(format!("{}: {error}", path.display()))),
     }
 }
 

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueHint};
 use serde::Serialize;
 
-use super::context::{Context, quoted};
+use super::context::{Context, quoted, table_image};
+use super::logs::LogOptions;
 use super::tables::fresh_table;
 use super::{Failure, names, report, say};
 use crate::causes::CauseName;
@@ -18,7 +19,7 @@ use crate::diagnosis::report::Diagnosis;
 use crate::drive::{Drive, GeneratorKind};
 use crate::extension::Model;
 use crate::kernels::Kernels;
-use crate::measurement::{ColumnMap, Fault, Recording};
+use crate::measurement::{Fault, Recording};
 use crate::mesh::MeshLevel;
 use crate::output::Outputs;
 use crate::tables::{c_header, rust_source};
@@ -55,11 +56,8 @@ pub(super) struct Diagnose {
     /// Mesh of FEM runs: coarse, standard or fine [default: that of the table]
     #[arg(long, value_name = "LEVEL", requires = "tables", value_parser = names::mesh(), hide_possible_values = true)]
     mesh: Option<MeshLevel>,
-    /// Names and units of columns that are not called time_s, generator_rad, output_rad, error_arcsec, torque_n_m, temperature_c,
-    /// orientation_rad, for instance generator=wave_gen_turns:turn,error=error_arcsec:arcsec; units are rad, deg, turn, arcmin,
-    /// arcsec, s, ms, N.m, C, K [default: these names]
-    #[arg(long, value_name = "MAP", default_value = "", hide_default_value = true)]
-    columns: String,
+    #[command(flatten)]
+    logs: LogOptions,
     /// Say why this cause was named or not (snake case, for instance flexspline_runout); with --json the gates that it came to
     #[arg(long, value_name = "CAUSE")]
     explain: Option<String>,
@@ -81,8 +79,7 @@ struct Written<'a> {
 
 impl Diagnose {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
-        let map = if self.columns.is_empty() { Ok(ColumnMap::default()) } else { ColumnMap::parse(&self.columns) };
-        let map = map.map_err(|error| Failure::BadInput(format!("--columns: {error}")))?;
+        let map = self.logs.map()?;
         let asked = self.explain.as_deref().map(str::parse::<CauseName>).transpose();
         let asked = asked.map_err(|error| Failure::BadInput(format!("--explain: {error}")))?;
         let image = self.image()?;
@@ -165,8 +162,7 @@ impl Diagnose {
     /// The bytes of the table that was asked for.
     fn image(&self) -> Result<Option<Vec<u8>>, Failure> {
         let Some(folder) = &self.tables else { return Ok(None) };
-        let path = folder.join(format!("{}.fxt", self.generator));
-        std::fs::read(&path).map(Some).map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))
+        table_image(folder, self.generator).map(|(_, bytes)| Some(bytes))
     }
 
     fn subject<'i>(&self, context: &Context, image: Option<&'i [u8]>) -> Result<Subject<'i>, Failure> {

@@ -3,12 +3,15 @@
 //! What a command computes is a library function that knows nothing of the command line. Here options are read and
 //! checked, the function is called, and its result is written and shown. Data goes to stdout, talk to stderr.
 
+mod calibrate;
 mod completions;
 mod context;
 mod diagnose;
 mod drive;
 mod export;
 mod kernels;
+mod logs;
+mod look;
 mod man;
 mod names;
 mod new;
@@ -17,6 +20,7 @@ mod report;
 mod reproduce;
 mod say;
 mod simulate;
+mod sleeve;
 mod stop;
 mod synthesize;
 mod tables;
@@ -86,6 +90,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
         "Simulate",
         &[
             ("simulate", "run the drive along a path: kinematic error, backlash, wind-up, stress"),
+            ("sleeve", "the sleeve or cup in three dimensions: stiffness by harmonic, tilt, torsion"),
             ("export", "the mesh, the outlines or a CalculiX deck, for other programs"),
             ("reproduce", "the paper's protocol for all four generators, beside its figures"),
         ],
@@ -101,7 +106,9 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
     (
         "Measured data",
         &[
+            ("look", "what is in log files, and how to read them"),
             ("diagnose", "what measured data say that the simulation does not, and why"),
+            ("calibrate", "logs of one unit to its table, whatever the cause of its error"),
             ("replay", "what a table leaves of a measured error"),
             ("synthesize", "measured-looking data with effects of your choice, to try diagnose on"),
         ],
@@ -157,13 +164,16 @@ fn parse(args: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> Result<
 #[derive(Debug, Subcommand)]
 enum Command {
     Simulate(simulate::Simulate),
+    Sleeve(sleeve::SleeveCommand),
     Drive(drive::DriveCommand),
     Export(export::Export),
     Tables(tables::Tables),
     Kernels(kernels::KernelsCommand),
     Validate(validate::Validate),
+    Calibrate(calibrate::Calibrate),
     Replay(replay::Replay),
     Synthesize(synthesize::Synthesize),
+    Look(look::Look),
     Diagnose(diagnose::Diagnose),
     Reproduce(reproduce::Reproduce),
     New(new::New),
@@ -174,10 +184,11 @@ enum Command {
 /// Options of every command.
 #[derive(Debug, Args)]
 struct Common {
-    /// Drive file, or the name of a built-in drive: HHD-95 (ideal) or HHD-95-typical (friction, compliances, tolerances)
+    /// Drive file, or the name of a built-in drive: HHD-95 (ideal), HHD-95-typical (friction, compliances,
+    /// tolerances), CUP-95 (a cup), HHD-95-plane (no third dimension)
     #[arg(long, global = true, value_name = "FILE|NAME", default_value = USUAL_DRIVE, value_hint = ValueHint::FilePath, help_heading = "Common options")]
     drive: String,
-    /// Override one field of the drive, for instance flanks.friction_coefficient=0.08; may be repeated
+    /// Override fields of the drive, for instance flanks.friction_coefficient=0.08; several with commas, or repeated
     #[arg(long = "set", global = true, value_name = "PATH=VALUE", help_heading = "Common options")]
     sets: Vec<String>,
     /// Folder for output files, made if it does not exist [default: out]
@@ -234,13 +245,16 @@ impl Command {
     fn run(&self, context: &Context) -> Result<(), Failure> {
         match self {
             Command::Simulate(command) => command.run(context),
+            Command::Sleeve(command) => command.run(context),
             Command::Drive(command) => command.run(context),
             Command::Export(command) => command.run(context),
             Command::Tables(command) => command.run(context),
             Command::Kernels(command) => command.run(context),
             Command::Validate(command) => command.run(context),
+            Command::Calibrate(command) => command.run(context),
             Command::Replay(command) => command.run(context),
             Command::Synthesize(command) => command.run(context),
+            Command::Look(command) => command.run(context),
             Command::Diagnose(command) => command.run(context),
             Command::Reproduce(command) => command.run(context),
             Command::New(command) => command.run(context),
@@ -314,6 +328,7 @@ mod tests {
                     "half_width_arcsec",
                     "seed",
                     "explain",
+                    "ratio",
                 ];
                 assert!(stated || needs_none || absent.contains(&id.as_str()), "{name} {id} states no default: {help}");
             }

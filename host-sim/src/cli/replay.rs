@@ -1,24 +1,29 @@
 //! `flexspline replay`: the core over measured rows.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueHint};
 use flexspline::Table;
 
 use super::context::{Context, quoted};
+use super::logs::LogOptions;
 use super::{Failure, say};
 use crate::drive::GeneratorKind;
+use crate::measurement::{self, ColumnMap};
+use crate::nominal::Nominal;
 use crate::output::Outputs;
-use crate::tables::replay::{ReplaySummary, parse, replay};
+use crate::tables::replay::{MeasuredRow, ReplaySummary, parse, replay};
+use crate::units::ARCSEC_PER_RAD;
 
 /// Run the core over measured rows, open loop, and show what it leaves
 ///
 /// Reads a table image and a CSV with generator_rad and output_rad (or error_arcsec), optionally torque_n_m and
-/// temperature_c; writes replay.csv, one row for each with the prediction, the residual and its quality, and summary.json.
+/// temperature_c, or a log with columns of its own (--columns); writes replay.csv, one row for each with the prediction, the residual and its quality, and summary.json.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Example:
-  flexspline replay --tables out/cam.fxt measured.csv")]
+Examples:
+  flexspline replay --tables out/cam.fxt measured.csv
+  flexspline replay --tables out/calibrated.fxt bench.log --columns generator=#2:turn,output=#3:deg")]
 pub(super) struct Replay {
     /// Table image, as `flexspline tables` writes it
     #[arg(long, value_name = "FILE.fxt", value_hint = ValueHint::FilePath)]
@@ -26,6 +31,8 @@ pub(super) struct Replay {
     /// Measured rows: CSV with generator_rad (rad), output_rad (rad) or error_arcsec, and if wanted torque_n_m, temperature_c
     #[arg(value_name = "DATA.csv", value_hint = ValueHint::FilePath)]
     data: PathBuf,
+    #[command(flatten)]
+    logs: LogOptions,
     /// Temperature where the data has none, degrees C
     #[arg(long, value_name = "T", default_value_t = 20.0, allow_negative_numbers = true)]
     temperature_c: f64,
@@ -39,12 +46,15 @@ impl Replay {
         let image = read(&self.tables)?;
         let table =
             Table::check(&image).map_err(|error| Failure::BadInput(format!("{}: {error}", self.tables.display())))?;
-        let bytes = read(&self.data)?;
         let ratio = table.drive().exact_ratio();
         // Found out before the rows are read.
         context.out()?;
-        let rows = parse(&self.data.display().to_string(), &bytes, ratio, self.temperature_c)
-            .map_err(|error| Failure::BadInput(error.to_string()))?;
+        let rows = if self.logs.said() {
+            of_log(&self.data, &self.logs.map()?, &table, self.temperature_c)?
+        } else {
+            parse(&self.data.display().to_string(), &read(&self.data)?, ratio, self.temperature_c)
+                .map_err(|error| Failure::BadInput(error.to_string()))?
+        };
         let (replayed, mut summary) = replay(&table, &rows);
         summary.command.clone_from(&context.command);
         let out = context.out()?;
@@ -67,6 +77,22 @@ impl Replay {
         let data = quoted(&self.data.display().to_string());
         vec![context.next(&format!("diagnose {data} --tables {} --generator {kind}", quoted(&folder)))]
     }
+}
+
+/// The rows of a log with columns of its own, checked as those of a diagnosis.
+fn of_log(data: &Path, map: &ColumnMap, table: &Table<'_>, temperature_c: f64) -> Result<Vec<MeasuredRow>, Failure> {
+    let recording = measurement::read(data, map, &Nominal::of_table(table).gear())
+        .map_err(|error| Failure::BadInput(error.to_string()))?;
+    let at = |column: &Option<Vec<f64>>, k: usize, usual: f64| column.as_ref().map_or(usual, |values| values[k]);
+    let rows = recording.sessions.iter().flat_map(|session| {
+        (0..session.len()).map(move |k| MeasuredRow {
+            generator_rad: session.generator_rad[k],
+            error_arcsec: session.error_rad[k] * ARCSEC_PER_RAD,
+            torque_n_m: at(&session.torque_n_m, k, 0.0),
+            temperature_c: at(&session.temperature_c, k, temperature_c),
+        })
+    });
+    Ok(rows.collect())
 }
 
 fn text(summary: &ReplaySummary, out: &std::path::Path) -> String {

@@ -7,7 +7,7 @@ use clap::{Args, ValueHint};
 use flexspline::Table;
 use serde::Serialize;
 
-use super::context::{Context, quoted};
+use super::context::{Context, quoted, table_image};
 use super::tables::fresh_table;
 use super::{Failure, names, say};
 use crate::causes::{Parameter, Usual};
@@ -322,9 +322,7 @@ impl Synthesize {
         }
         let (image, file) = match &self.tables {
             Some(folder) => {
-                let path = folder.join(format!("{}.fxt", self.generator));
-                let image =
-                    std::fs::read(&path).map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
+                let (path, image) = table_image(folder, self.generator)?;
                 Table::check(&image).map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
                 (image, Some(path.display().to_string()))
             }

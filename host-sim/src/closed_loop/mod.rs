@@ -55,7 +55,7 @@ pub struct FlightRow {
 
 /// Flies a profile to its end with every controller. `None` if the table cannot be flown; `observe` sees every tick.
 pub fn fly<'a, P: Plant>(
-    image: &'a [u8],
+    images: [&'a [u8]; 2],
     plants: [P; 5],
     servo: ServoSettings,
     profile: &Profile,
@@ -64,7 +64,7 @@ pub fn fly<'a, P: Plant>(
 ) -> Option<Antenna<'a, P>> {
     let [first_c, _] = profile.temperature_c;
     let mut antenna =
-        Antenna::new(image, plants, largest_n_m, profile.mean_torque_n_m(largest_n_m), first_c)?.with_servo(servo);
+        Antenna::new(images, plants, largest_n_m, profile.mean_torque_n_m(largest_n_m), first_c)?.with_servo(servo);
     for moment in profile.moments(largest_n_m) {
         let pointing = antenna.tick(&moment);
         observe(row(&moment, &pointing, &antenna));

@@ -40,7 +40,7 @@ impl<'a, P: Plant> Single<'a, P> {
     /// # Errors
     /// [`StartError`].
     pub fn new(
-        image: &'a [u8],
+        images: [&'a [u8]; 2],
         drive: Drive,
         plant: P,
         largest_n_m: f64,
@@ -48,7 +48,7 @@ impl<'a, P: Plant> Single<'a, P> {
         overrun: Overrun,
     ) -> Result<Self, StartError> {
         let sensors = Sensors::for_range(largest_n_m);
-        let mut core = Compensated::new(image, drive, sensors.temperature(first_c), overrun)?;
+        let mut core = Compensated::new(images, drive, sensors.temperature(first_c), overrun)?;
         core.request(Mode::Tracking);
         let groups = SlowGroups::staggered(0).unwrap_or_else(|| unreachable!("number 0 is below 20"));
         let lane = Lane::new(plant, Servo::new(SERVO));

@@ -94,6 +94,11 @@ pub enum DeckError {
          (--set output.drag_torque_n_m=0)"
     )]
     Drag(f64),
+    /// A sleeve in three dimensions.
+    #[error(
+        "sleeve.kind: found \"{0}\", and a deck is plane; allowed: \"springs\", \"none\" (--set sleeve.kind=springs)"
+    )]
+    Shells(&'static str),
     /// No backlash to take up.
     #[error("the teeth of the drive have no clearance: rigid backlash {0:.3e} rad; a deck needs some to start from")]
     NoClearance(f64),
@@ -171,6 +176,9 @@ impl Deck {
         let drive = &problem.drive;
         if drive.output.drag_torque_n_m != 0.0 {
             return Err(DeckError::Drag(drive.output.drag_torque_n_m));
+        }
+        if drive.sleeve.is_shell() {
+            return Err(DeckError::Shells(drive.sleeve.kind.name()));
         }
         let backlash_rad = RigidMesh::new(drive, problem.kind)?.report(problem.kind).map_or(0.0, |r| r.backlash_rad);
         if backlash_rad <= 0.0 {
@@ -727,6 +735,16 @@ mod tests {
     fn drag_is_refused_by_name() {
         let error = Deck::new(&problem(&Drive::hhd_95(), GeneratorKind::Cam), SETTINGS).unwrap_err();
         assert!(error.to_string().starts_with("output.drag_torque_n_m: found 0.02"), "{error}");
+    }
+
+    #[test]
+    fn a_sleeve_of_shells_is_refused_by_name() {
+        let error = Deck::new(
+            &problem(&Drive::cup_95().with_set("output.drag_torque_n_m=0").unwrap(), GeneratorKind::Cam),
+            SETTINGS,
+        );
+        let error = error.unwrap_err().to_string();
+        assert!(error.starts_with("sleeve.kind: found \"cup\", and a deck is plane"), "{error}");
     }
 
     #[test]

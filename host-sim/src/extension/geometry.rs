@@ -20,7 +20,7 @@ use flexspline::Table;
 use super::model::CauseEntry;
 use crate::causes::{CauseName, DriveField, ParameterName as Name};
 use crate::diagnosis::Extended;
-use crate::drive::{DamagedFlank, DamagedTooth, Drive, DriveError, GeneratorKind, Harmonic, Wheel};
+use crate::drive::{DamagedFlank, DamagedTooth, Drive, DriveError, GeneratorKind, Harmonic, SleeveKind, Wheel};
 use crate::measurement::Session;
 use crate::motion::Motion;
 use crate::nominal::Nominal;
@@ -318,6 +318,10 @@ pub fn found_geometry(
                         let before = drive.sleeve.torsion_stiffness_n_m_per_rad.map_or(0.0, |k| 1.0 / k);
                         let k = 1.0 / (before + (1.0 / ratio - 1.0) / nominal_k);
                         found.sleeve.torsion_stiffness_n_m_per_rad = Some(k.round());
+                        if found.sleeve.kind == SleeveKind::None {
+                            found.sleeve.kind = SleeveKind::Springs;
+                            fields.push("sleeve.kind = \"springs\"".to_owned());
+                        }
                         fields.push(format!("sleeve.torsion_stiffness_n_m_per_rad = {}", k.round()));
                     } else {
                         let e = found.material.youngs_modulus_mpa * ratio;

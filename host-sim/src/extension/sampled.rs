@@ -4,14 +4,14 @@
 use std::f64::consts::TAU;
 
 use flexspline::make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
-use flexspline::{Direction, FixedMember, Table};
+use flexspline::{Direction, Table};
 
 use crate::causes::{CauseName, InTable};
 use crate::diagnosis::Extended;
 use crate::drive::GeneratorKind;
 use crate::measurement::Session;
-use crate::nominal::{Fixed, Nominal};
-use crate::tables::{MadeTable, Source, TableError, from_plan};
+use crate::nominal::Nominal;
+use crate::tables::{MadeTable, Source, TableError, from_plan, places_that_tell_apart};
 use crate::units::ARCSEC_PER_RAD;
 
 /// Positions over a whole turn of the output, at least and at most. Fitted are a few dozen numbers at each load.
@@ -64,14 +64,7 @@ fn positions(ratio: f64, teeth: f64) -> usize {
     let of_output = OUTPUT_ORDERS.iter().map(|k| f64::from(*k));
     let of_mesh = (1..=MESHES).map(|k| f64::from(k) * teeth * ratio);
     let orders: Vec<f64> = of_generator.chain(of_output).chain(of_mesh).chain([0.0]).collect();
-    let tells_apart = |count: &usize| {
-        let of = |order: &f64| (order - (order / *count as f64).round() * *count as f64).abs();
-        let mut folded: Vec<f64> = orders.iter().map(of).collect();
-        folded.sort_by(f64::total_cmp);
-        folded.windows(2).all(|pair| pair[1] - pair[0] > APART)
-    };
-    let is_prime = |count: &usize| (2..).take_while(|k| k * k <= *count).all(|k| !count.is_multiple_of(k));
-    (LEAST_POSITIONS..=MOST_POSITIONS).filter(is_prime).find(tells_apart).unwrap_or(MOST_POSITIONS)
+    places_that_tell_apart(&orders, [LEAST_POSITIONS, MOST_POSITIONS], APART)
 }
 
 /// What a table is made for.
@@ -184,10 +177,7 @@ impl ExtendedTables<'_> {
             reason,
         };
         let teeth = self.nominal.teeth.ok_or_else(|| refuse(0, 0, "a ratio without teeth".to_owned()))?;
-        let fixed =
-            if teeth.fixed == Fixed::Flexspline { FixedMember::Flexspline } else { FixedMember::CircularSpline };
-        let (f, c) = (teeth.flexspline, teeth.circular_spline);
-        flexspline::Drive::new(f as u16, c as u16, fixed).map_err(|error| refuse(f, c, error.to_string()))
+        teeth.core_drive().map_err(|error| refuse(teeth.flexspline, teeth.circular_spline, error.to_string()))
     }
 
     /// Steady motion both ways through a whole turn of the output at every node.

@@ -1,9 +1,12 @@
 //! Rows of a CSV file with a header: the one reader of this project.
 //!
 //! Commas between fields, a point in numbers, fields quoted where needed, `#` lines comments, blank lines nothing, lines ended by
-//! LF or CRLF, a byte order mark passed over. What a field must hold is for the caller to say; here stands where it was found.
+//! LF or CRLF, a byte order mark passed over; or as a [`Layout`] says. What a field must hold is for the caller to say; here stands
+//! where it was found.
 
 use std::io::{BufRead, BufReader, Read};
+
+use super::layout::{Layout, Separator, with_comma};
 
 use crate::suggest::{likeliest, question};
 
@@ -27,9 +30,12 @@ pub enum NotANumber {
 
 /// Rows of a CSV file, one at a time.
 pub struct CsvRows<R: Read> {
-    reader: csv::Reader<Ended<BufReader<R>>>,
+    reader: csv::Reader<Prepared<BufReader<R>>>,
     header: Vec<String>,
     header_line: u64,
+    /// Lines before the first that the parser sees.
+    passed: u64,
+    decimal_comma: bool,
     record: csv::ByteRecord,
 }
 
@@ -39,27 +45,74 @@ pub struct Row<'a> {
     record: &'a csv::ByteRecord,
     /// Line, from 1; the last one of a row that a quoted field spreads over several.
     pub line: u64,
+    decimal_comma: bool,
 }
 
-/// A source whose last line is ended.
-struct Ended<R> {
+/// A source whose last line is ended, and in which any number of blanks are one tab if they separate fields.
+struct Prepared<R> {
     source: R,
+    blanks: bool,
+    /// The last byte handed on.
     last: u8,
+    /// Whether blanks were seen that are not yet handed on.
+    pending: bool,
 }
 
-impl<R: Read> Read for Ended<R> {
-    fn read(&mut self, to: &mut [u8]) -> std::io::Result<usize> {
-        let n = self.source.read(to)?;
-        if n > 0 {
-            self.last = to[n - 1];
-        } else if self.last != b'\n'
-            && let Some(first) = to.first_mut()
-        {
-            *first = b'\n';
-            self.last = b'\n';
-            return Ok(1);
+impl<R: Read> Prepared<R> {
+    /// Makes blanks between fields one tab and drops those at the ends of a line; gives the bytes left. A tab takes the place of the
+    /// blanks before it, so there are never more bytes than before, but for one blank that an earlier piece ended with.
+    fn squeezed(&mut self, bytes: &[u8], to: &mut [u8]) -> usize {
+        let mut end = 0;
+        let mut put = |byte: u8, last: &mut u8| {
+            to[end] = byte;
+            end += 1;
+            *last = byte;
+        };
+        for byte in bytes {
+            match byte {
+                b' ' | b'\t' => self.pending = self.last != b'\n',
+                b'\r' | b'\n' => {
+                    self.pending = false;
+                    put(*byte, &mut self.last);
+                }
+                _ => {
+                    if std::mem::take(&mut self.pending) {
+                        put(b'\t', &mut self.last);
+                    }
+                    put(*byte, &mut self.last);
+                }
+            }
         }
-        Ok(n)
+        end
+    }
+}
+
+impl<R: Read> Read for Prepared<R> {
+    fn read(&mut self, to: &mut [u8]) -> std::io::Result<usize> {
+        if to.len() < 2 {
+            return Err(std::io::Error::other("a buffer of one byte"));
+        }
+        loop {
+            let n = if self.blanks {
+                let mut bytes = vec![0; to.len() - 1];
+                let n = self.source.read(&mut bytes)?;
+                let left = self.squeezed(&bytes[..n], to);
+                if n > 0 && left == 0 {
+                    continue;
+                }
+                left
+            } else {
+                self.source.read(to)?
+            };
+            if n > 0 {
+                self.last = to[n - 1];
+            } else if self.last != b'\n' {
+                to[0] = b'\n';
+                self.last = b'\n';
+                return Ok(1);
+            }
+            return Ok(n);
+        }
     }
 }
 
@@ -75,14 +128,9 @@ impl<R: Read> CsvRows<R> {
         if start.starts_with(b"\xEF\xBB\xBF") {
             source.consume(3);
         }
-        // Lines are ended here by LF, and CR is trimmed: the line of a row is then the lines counted so far.
-        let reader = csv::ReaderBuilder::new()
-            .comment(Some(b'#'))
-            .flexible(true)
-            .has_headers(false)
-            .terminator(csv::Terminator::Any(b'\n'))
-            .from_reader(Ended { source, last: b'\n' });
-        let mut rows = CsvRows { reader, header: Vec::new(), header_line: 1, record: csv::ByteRecord::new() };
+        let reader = parser(source, Separator::Comma);
+        let record = csv::ByteRecord::new();
+        let mut rows = CsvRows { reader, header: Vec::new(), header_line: 1, passed: 0, decimal_comma: false, record };
         let mut header = Vec::new();
         let mut header_line = 1;
         if let Some(row) = rows.next_row()? {
@@ -98,6 +146,25 @@ impl<R: Read> CsvRows<R> {
         }
         (rows.header, rows.header_line) = (header, header_line);
         Ok(rows)
+    }
+
+    /// Reads a file that is laid out otherwise, up to its first row.
+    pub(super) fn by_layout(source: R, layout: &Layout) -> Result<Self, TableProblem> {
+        let mut source = BufReader::with_capacity(1 << 16, source);
+        let mut line = Vec::new();
+        for number in 1..layout.first_row_line {
+            let unreadable = |error: std::io::Error| TableProblem { line: number, what: error.to_string() };
+            line.clear();
+            source.read_until(b'\n', &mut line).map_err(unreadable)?;
+        }
+        Ok(CsvRows {
+            reader: parser(source, layout.separator),
+            header: layout.names.clone(),
+            header_line: layout.header_line,
+            passed: layout.first_row_line - 1,
+            decimal_comma: layout.decimal_comma,
+            record: csv::ByteRecord::new(),
+        })
     }
 
     /// Names of the columns.
@@ -141,14 +208,15 @@ impl<R: Read> CsvRows<R> {
     /// The next row that is not blank.
     pub fn next_row(&mut self) -> Result<Option<Row<'_>>, TableProblem> {
         loop {
-            let line = |reader: &csv::Reader<_>| reader.position().line().saturating_sub(1).max(1);
+            let passed = self.passed;
+            let line = |reader: &csv::Reader<_>| passed + reader.position().line().saturating_sub(1).max(1);
             match self.reader.read_byte_record(&mut self.record) {
                 Ok(false) => return Ok(None),
                 Ok(true) => {
                     let blank = self.record.len() == 1 && self.record[0].trim_ascii().is_empty();
                     if !blank {
                         let line = line(&self.reader);
-                        return Ok(Some(Row { record: &self.record, line }));
+                        return Ok(Some(Row { record: &self.record, line, decimal_comma: self.decimal_comma }));
                     }
                 }
                 Err(error) => return Err(TableProblem { line: line(&self.reader), what: error.to_string() }),
@@ -177,11 +245,25 @@ impl Row<'_> {
     /// A field as a number, which may be infinite or NaN if the text says so.
     pub fn number(&self, place: usize) -> Result<f64, NotANumber> {
         let field = self.record.get(place).ok_or(NotANumber::Absent(self.record.len()))?.trim_ascii();
+        let number =
+            |text: &str| text.parse().ok().or_else(|| if self.decimal_comma { with_comma(text) } else { None });
         std::str::from_utf8(field)
             .ok()
-            .and_then(|text| text.parse().ok())
+            .and_then(number)
             .ok_or_else(|| NotANumber::Text(String::from_utf8_lossy(field).into_owned()))
     }
+}
+
+/// Lines are ended here by LF, and CR is trimmed: the line of a row is then the lines counted so far.
+fn parser<R: Read>(source: BufReader<R>, separator: Separator) -> csv::Reader<Prepared<BufReader<R>>> {
+    let blanks = separator == Separator::Blanks;
+    csv::ReaderBuilder::new()
+        .delimiter(separator.byte())
+        .comment(Some(b'#'))
+        .flexible(true)
+        .has_headers(false)
+        .terminator(csv::Terminator::Any(b'\n'))
+        .from_reader(Prepared { source, blanks, last: b'\n', pending: false })
 }
 
 /// What a file is that begins so, if it is no CSV text.

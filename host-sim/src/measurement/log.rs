@@ -1,11 +1,14 @@
 //! A file as it stands: its columns in rad, s, N·m and °C, what is missing as NaN.
 
-use std::io::Read;
+use std::io::{Cursor, Read};
 
 use thiserror::Error;
 
+use super::clock_text;
 use super::columns::{Column, ColumnMap, Quantity};
 use super::csv_rows::{CsvRows, NotANumber, Row, TableProblem};
+use super::layout::{HEAD, Layout, missing};
+use super::{rollover, slower};
 
 /// Fewest rows that say anything about noise or an order.
 pub const FEWEST_ROWS: usize = 16;
@@ -29,6 +32,8 @@ pub(super) struct Log {
     pub line: Vec<u64>,
     /// Session of each row; empty as long as there is one.
     pub session: Vec<u32>,
+    /// Whether time is a time of day.
+    pub time_of_day: bool,
     columns: [Option<Vec<f64>>; 7],
 }
 
@@ -99,17 +104,26 @@ pub(super) struct Found {
     pub columns: Vec<Column>,
     /// The last line, if it broke off.
     pub broken_off: Option<u64>,
-    /// Columns that are not used though their name is nearly that of one that is missing.
-    pub misspelt: Vec<String>,
+    /// What was read otherwise than it stands, or not at all though it may have been meant.
+    pub notes: Vec<String>,
 }
 
 /// Reads a file called `file`.
-pub(super) fn read(file: &str, source: impl Read, map: &ColumnMap) -> Result<(Log, Found), MeasuredError> {
+pub(super) fn read(file: &str, mut source: impl Read, map: &ColumnMap) -> Result<(Log, Found), MeasuredError> {
     let refuse =
         |problem: TableProblem| MeasuredError { file: file.to_owned(), line: Some(problem.line), what: problem.what };
-    let mut rows = CsvRows::new(source).map_err(refuse)?;
-    let columns = map.resolve(rows.header(), rows.header_line()).map_err(refuse)?;
-    let misspelt = map.misspelt(rows.header(), &columns);
+    let mut head = Vec::new();
+    let begun = source.by_ref().take(HEAD).read_to_end(&mut head);
+    begun.map_err(|error| refuse(TableProblem { line: 1, what: error.to_string() }))?;
+    let layout = Layout::of(&head, &map.known());
+    let source = Cursor::new(head).chain(source);
+    let mut rows = match &layout {
+        None => CsvRows::new(source),
+        Some(layout) => CsvRows::by_layout(source, layout),
+    }
+    .map_err(refuse)?;
+    let columns = map.resolve(rows.header(), rows.header_line(), layout.as_ref()).map_err(refuse)?;
+    let mut notes = map.misspelt(rows.header(), &columns);
     let width = rows.header().len();
     let header_line = rows.header_line();
     let mut values: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
@@ -130,7 +144,7 @@ pub(super) fn read(file: &str, source: impl Read, map: &ColumnMap) -> Result<(Lo
             continue;
         }
         for (column, values) in columns.iter().zip(&mut values) {
-            values.push(number(&row, column).map_err(at)?);
+            values.push(number(&row, column, &mut log.time_of_day).map_err(at)?);
         }
         log.line.push(row.line);
     }
@@ -148,15 +162,57 @@ pub(super) fn read(file: &str, source: impl Read, map: &ColumnMap) -> Result<(Lo
         values.shrink_to_fit();
         log.put(column.quantity, values);
     }
-    Ok((log, Found { columns, broken_off, misspelt }))
+    past_midnight(&mut log, &mut notes);
+    count_time(&mut log, map, &mut notes).map_err(|what| refuse(TableProblem { line: header_line, what }))?;
+    rollover::undo(&mut log, &columns, &mut notes);
+    slower::fill(&mut log, &mut notes);
+    Ok((log, Found { columns, broken_off, notes }))
 }
 
-/// The value of a column, NaN if it is missing or not finite.
-fn number(row: &Row<'_>, column: &Column) -> Result<f64, String> {
+/// The time of rows that were recorded at a rate, where the file has none.
+fn count_time(log: &mut Log, map: &ColumnMap, notes: &mut Vec<String>) -> Result<(), String> {
+    let Some(rate_hz) = map.rate_hz() else { return Ok(()) };
+    if log.get(Quantity::Time).is_some() {
+        return Err("the file has a column of time; allowed with it: no --rate".to_owned());
+    }
+    log.put(Quantity::Time, (0..log.len()).map(|row| row as f64 / rate_hz).collect());
+    notes.push(format!("time is counted, {rate_hz} rows in a second: rows that are lost cannot be seen"));
+    Ok(())
+}
+
+/// A time of day goes on where a day ends.
+fn past_midnight(log: &mut Log, notes: &mut Vec<String>) {
+    if !log.time_of_day {
+        return;
+    }
+    let Some(time) = log.get_mut(Quantity::Time) else { return };
+    let (mut days, mut last) = (0.0, f64::NEG_INFINITY);
+    for t in time.iter_mut().filter(|t| t.is_finite()) {
+        // A clock that is set back by half a day or more has passed midnight.
+        if *t < last - 0.5 * clock_text::DAY_S {
+            days += 1.0;
+        }
+        last = *t;
+        *t += days * clock_text::DAY_S;
+    }
+    if days > 0.0 {
+        notes.push(format!("the time of day passes midnight {days} times: days are counted"));
+    }
+}
+
+/// The value of a column, NaN if it is missing or not finite; notes a time of day.
+fn number(row: &Row<'_>, column: &Column, time_of_day: &mut bool) -> Result<f64, String> {
     let value = match row.number(column.place) {
-        Ok(value) if value.is_finite() => value * column.unit.factor() + column.unit.zero(),
+        Ok(value) if value.is_finite() => column.reading.value(value),
         Ok(_) => return Ok(f64::NAN),
         Err(NotANumber::Text(text)) if missing(&text) => return Ok(f64::NAN),
+        Err(NotANumber::Text(text))
+            if column.quantity == Quantity::Time
+                && let Some(seconds) = clock_text::seconds(&text) =>
+        {
+            *time_of_day |= clock_text::has_no_date(&text);
+            seconds
+        }
         Err(NotANumber::Text(text)) => {
             return Err(format!(
                 "{}: found \"{text}\", allowed: a number, or nothing where none was recorded",
@@ -173,12 +229,6 @@ fn number(row: &Row<'_>, column: &Column) -> Result<f64, String> {
         return Err(format!("{}: found \"{text}\", allowed: at most {limit:e} {unit}", column.name));
     }
     Ok(value)
-}
-
-/// Whether a field says that nothing was recorded.
-fn missing(text: &str) -> bool {
-    const WORDS: [&str; 8] = ["", "na", "n/a", "null", "none", "nil", "-", "?"];
-    WORDS.iter().any(|word| text.eq_ignore_ascii_case(word))
 }
 
 fn too_wide(row: &Row<'_>, width: usize) -> String {

@@ -8,25 +8,32 @@
 //! drive.
 
 mod averages;
+mod clock_text;
 mod columns;
 mod csv_rows;
 mod fault;
 mod faults;
 mod gear;
+mod layout;
 mod log;
+pub mod raw;
 mod robust;
+mod rollover;
+mod slower;
+mod unit;
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-pub use columns::{ColumnMap, MappingError, Quantity, Unit};
+pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
 pub use csv_rows::{CsvRows, NotANumber, Row, TableProblem};
 pub use fault::{Fault, FaultName, ToothStep, Treatment};
 pub use faults::clock::SESSION_GAP_PERIODS;
 pub use gear::Gear;
+pub use layout::{Layout, Separator};
 pub use log::{FEWEST_ROWS, MeasuredError};
-pub use robust::{MAD_TO_STD, median_and_std, median_of, quantile_of, sampled, white_noise};
+pub use robust::{MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, sampled, white_noise};
 
 use faults::Findings;
 use log::Log;
@@ -150,7 +157,7 @@ pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) ->
     }
     let (mut log, found) = log::read(file, source, columns)?;
     let rows = log.len();
-    let mut findings = Findings { notes: found.misspelt, ..Findings::default() };
+    let mut findings = Findings { notes: found.notes, ..Findings::default() };
     if let Some(line) = found.broken_off {
         findings.faults.push(Fault {
             name: FaultName::MissingSamples,

@@ -6,6 +6,11 @@ pub const MAD_TO_STD: f64 = 1.482_602_218_505_602;
 /// Rows that a statistic of a long series is taken from at most.
 const ENOUGH: usize = 200_000;
 
+/// Least and largest of some values; plus and minus infinity of none.
+pub fn least_and_most(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| (a.min(value), b.max(value)))
+}
+
 /// The quantile `q` (0 to 1) of `values`, which are reordered; 0 of none.
 pub fn quantile_of(values: &mut [f64], q: f64) -> f64 {
     if values.is_empty() {

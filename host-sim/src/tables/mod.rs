@@ -8,6 +8,7 @@
 
 mod info;
 pub mod make;
+mod positions;
 mod project;
 pub mod replay;
 pub mod samples;
@@ -19,6 +20,7 @@ pub mod validate;
 
 pub use info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
 pub use make::{MakeError, TableProgress, TableSettings, TorqueNodes, make};
+pub(crate) use positions::places_that_tell_apart;
 pub(crate) use project::from_plan;
 pub use project::{SampleOptions, TableError, core_drive, core_kind, from_samples, from_sweep};
 pub use source_files::{c_header, rust_source};

@@ -85,7 +85,14 @@ pub struct Pointing {
 impl<'a, P: Plant> Antenna<'a, P> {
     /// At rest with a table and a plant for each controller; `None` if the table cannot be flown. `mean_torque_n_m` is the mean
     /// of the load to come.
-    pub fn new(image: &'a [u8], plants: [P; 5], largest_n_m: f64, mean_torque_n_m: f64, first_c: f64) -> Option<Self> {
+    pub fn new(
+        images: [&'a [u8]; 2],
+        plants: [P; 5],
+        largest_n_m: f64,
+        mean_torque_n_m: f64,
+        first_c: f64,
+    ) -> Option<Self> {
+        let [image, _] = images;
         let table = Table::check(image).ok()?;
         let drive: Drive = *table.drive();
         let sensors = Sensors::for_range(largest_n_m);
@@ -96,7 +103,7 @@ impl<'a, P: Plant> Antenna<'a, P> {
             uncompensated: Uncompensated::new(drive),
             by_sign: [sign(0.0)?, sign(mean_torque_n_m)?],
             by_torque: ByTorque::new(table),
-            core: Compensated::new(image, drive, sensors.temperature(first_c), overrun).ok()?,
+            core: Compensated::new(images, drive, sensors.temperature(first_c), overrun).ok()?,
             groups: SlowGroups::staggered(0)?,
             sensors,
             noise: Noise::new(5),

@@ -24,6 +24,8 @@ pub const LIMITS: Limits = Limits {
     acceleration_rad_s2: 5.0,
     generator_rate_rad_s: 600.0,
     patience: 5,
+    // The target is guarded outside of the core.
+    hold_rad: 0.0,
 };
 
 /// What a controller is told in a tick.
@@ -206,13 +208,14 @@ pub enum StartError {
 }
 
 impl<'a> Compensated<'a> {
-    /// With a table at its temperature, off.
+    /// With a table, twice, at its temperature, off.
     ///
     /// # Errors
     /// [`StartError`].
-    pub fn new(image: &'a [u8], drive: Drive, temperature_c: f32, overrun: Overrun) -> Result<Self, StartError> {
+    pub fn new(images: [&'a [u8]; 2], drive: Drive, temperature_c: f32, overrun: Overrun) -> Result<Self, StartError> {
         let joint = Joint::new(drive, LIMITS, overrun).map_err(StartError::Limits)?;
-        let images = Images::new(image, image);
+        let [first, second] = images;
+        let images = Images::new(first, second);
         let mut store = Store::new();
         store.activate(&images, &drive, temperature_c).map_err(StartError::Table)?;
         Ok(Self {
@@ -225,6 +228,14 @@ impl<'a> Compensated<'a> {
             state: JointState::new(),
             out: None,
         })
+    }
+
+    /// Saves the state and restores it, as over a reset; false, and nothing changes, if it is refused.
+    pub fn reset_to_saved(&mut self) -> bool {
+        let saved = self.state.save(&self.joint, &self.store);
+        let Ok(restored) = JointState::restore(&saved, &self.joint, &self.store) else { return false };
+        self.state = restored;
+        true
     }
 
     /// From the next tick on.

@@ -31,10 +31,18 @@ pub struct RoverJoint<'a, P> {
 
 impl<'a, P: Plant + Clone> RoverJoint<'a, P> {
     /// Joint `number` at rest; `None` if its table cannot be flown.
-    pub fn new(number: u32, name: &'a str, image: &'a [u8], plant: P, largest_n_m: f64, first_c: f64) -> Option<Self> {
+    pub fn new(
+        number: u32,
+        name: &'a str,
+        images: [&'a [u8]; 2],
+        plant: P,
+        largest_n_m: f64,
+        first_c: f64,
+    ) -> Option<Self> {
+        let [image, _] = images;
         let drive = *Table::check(image).ok()?.drive();
         let sensors = Sensors::for_range(largest_n_m);
-        let mut core = Compensated::new(image, drive, sensors.temperature(first_c), Overrun::SkipAndCount).ok()?;
+        let mut core = Compensated::new(images, drive, sensors.temperature(first_c), Overrun::SkipAndCount).ok()?;
         core.request(Mode::Tracking);
         let lane = Lane::new(plant, Servo::new(SERVO));
         Some(Self {

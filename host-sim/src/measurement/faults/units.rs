@@ -5,7 +5,7 @@ use crate::measurement::columns::{Column, Quantity, Unit};
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
-use crate::measurement::robust::{median_of, quantile_of, sampled};
+use crate::measurement::robust::{least_and_most, median_of, quantile_of, sampled};
 
 /// The output must have turned by so much, by the generator or by itself, before the ratio is judged: twenty times two
 /// arc-minutes of clearance, so that clearance moves the ratio by less than 5 %.
@@ -119,7 +119,7 @@ fn slope(log: &Log) -> Option<(f64, f64, f64)> {
     }
     let median = typical_slope(pieces);
     let slope = if (delta / psi - median).abs() <= 0.1 * median.abs() { delta / psi } else { median };
-    let travel = output.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), d| (a.min(*d), b.max(*d)));
+    let travel = least_and_most(output.iter().copied());
     Some((slope, psi, travel.1 - travel.0))
 }
 

@@ -6,7 +6,7 @@ use super::{Findings, span};
 use crate::measurement::columns::{Column, Quantity, Unit};
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::log::Log;
-use crate::measurement::robust::quantile_of;
+use crate::measurement::robust::{least_and_most, quantile_of};
 
 /// A column that stays within one turn, and begins anew, covers at least this share of the turn.
 const COVERED: f64 = 0.75;
@@ -57,7 +57,7 @@ pub(in crate::measurement) fn unwrap(log: &mut Log, columns: &[Column], ratio: f
 
 /// From the least to the largest of some values.
 fn span_of(values: &[f64]) -> f64 {
-    let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let (least, most) = least_and_most(values.iter().copied());
     most - least
 }
 

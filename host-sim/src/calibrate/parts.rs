@@ -1,0 +1,203 @@
+//! The parts that a unit may have beside its nominal model: smooth, periodic where the drive is, each linear in its coefficients.
+//!
+//! Every column is of the order of one, so that a penalty means the same in all parts. The weight of a column within its part rises with
+//! its order: smooth curves cost little, wrinkles much.
+
+use std::f64::consts::TAU;
+
+use serde::Serialize;
+
+/// Which part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PartName {
+    /// Wind-up by torque.
+    WindUp,
+    /// Play: by direction of motion, and by the flank that the load bears on.
+    Play,
+    /// Periodic in the generator angle.
+    GeneratorAngle,
+    /// Periodic in the generator angle against the output.
+    MaterialAngle,
+    /// Periodic in a tooth pitch.
+    ToothPitch,
+    /// Periodic in the output angle.
+    OutputAngle,
+    /// What temperature changes: zero, wind-up and play.
+    Temperature,
+}
+
+impl PartName {
+    /// All of them, in the order in which they are shown.
+    pub const ALL: [PartName; 7] = [
+        PartName::WindUp,
+        PartName::Play,
+        PartName::GeneratorAngle,
+        PartName::MaterialAngle,
+        PartName::ToothPitch,
+        PartName::OutputAngle,
+        PartName::Temperature,
+    ];
+
+    /// Its name in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            PartName::WindUp => "wind_up",
+            PartName::Play => "play",
+            PartName::GeneratorAngle => "generator_angle",
+            PartName::MaterialAngle => "material_angle",
+            PartName::ToothPitch => "tooth_pitch",
+            PartName::OutputAngle => "output_angle",
+            PartName::Temperature => "temperature",
+        }
+    }
+}
+
+/// Waves of a curve over the generator's turn, or over that against the output: what a table holds.
+pub(super) const GENERATOR_ORDERS: u16 = 8;
+/// Waves of the curve over the output's turn: an encoder's two, the weight of an arm that swings through angles and winds up a spring that
+/// hardens (up to three times its order), and some more. Chosen on the two records of `examples/`.
+pub(super) const OUTPUT_ORDERS: u16 = 6;
+/// Waves of the curve over a tooth pitch: eight nodes of a table hold them.
+pub(super) const TOOTH_ORDERS: u16 = 3;
+/// Degree of the wind-up over the torques recorded.
+const WIND_UP_DEGREE: usize = 6;
+/// How the weight of a wave rises with its order: between the energies of a slope (second power) and of a curvature (fourth). Chosen on
+/// halves of the record of `examples/csf17_100`.
+const WAVE_POWER: i32 = 3;
+/// The same for the degrees of the wind-up, a guess.
+const DEGREE_POWER: i32 = 4;
+
+/// Where the drive is, as the parts see it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State {
+    /// Generator angle, rad.
+    pub generator_rad: f64,
+    /// Nominal output angle, rad.
+    pub output_rad: f64,
+    /// Load torque, N·m.
+    pub torque_n_m: f64,
+    /// Temperature, °C.
+    pub temperature_c: f64,
+    /// Direction of the output: 1, −1; 0 if not known.
+    pub way: f64,
+}
+
+/// What the columns are made with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scales {
+    /// Least and largest torque recorded, N·m.
+    pub torque_n_m: [f64; 2],
+    /// Load beyond which it decides the flank, N·m.
+    pub friction_n_m: f64,
+    /// Least and highest temperature recorded, °C.
+    pub temperature_c: [f64; 2],
+    /// Tooth pitches in a turn of the generator.
+    pub teeth: f64,
+}
+
+impl Scales {
+    fn most_torque(&self) -> f64 {
+        self.torque_n_m[0].abs().max(self.torque_n_m[1].abs()).max(1e-9)
+    }
+
+    /// −1 to 1 over the torques recorded.
+    fn torque_share(&self, torque: f64) -> f64 {
+        let [low, high] = self.torque_n_m;
+        (2.0 * (torque.clamp(low, high) - low) / (high - low).max(1e-9) - 1.0).clamp(-1.0, 1.0)
+    }
+
+    /// −1 to 1 over the temperatures recorded.
+    fn temperature_share(&self, temperature: f64) -> f64 {
+        let [low, high] = self.temperature_c;
+        2.0 * (temperature.clamp(low, high) - low) / (high - low).max(1e-9) - 1.0
+    }
+}
+
+/// Puts the columns of a part in a state at the end of `to`.
+pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<f64>) {
+    let load = at.torque_n_m / scales.most_torque();
+    let lag = -at.way;
+    match part {
+        PartName::WindUp => {
+            let ends = chebyshev(scales.torque_share(at.torque_n_m));
+            // No wind-up without a load, where that was recorded.
+            let zero = chebyshev(scales.torque_share(0.0));
+            to.extend(ends.iter().zip(zero).map(|(value, zero)| value - zero));
+        }
+        PartName::Play => {
+            let flank = if at.torque_n_m.abs() > scales.friction_n_m { at.torque_n_m.signum() } else { lag };
+            to.extend([lag, lag * load.abs(), flank]);
+        }
+        PartName::GeneratorAngle => waves(at.generator_rad, GENERATOR_ORDERS, to),
+        PartName::MaterialAngle => waves(at.generator_rad - at.output_rad, GENERATOR_ORDERS, to),
+        PartName::ToothPitch => waves(scales.teeth * at.generator_rad, TOOTH_ORDERS, to),
+        PartName::OutputAngle => waves(at.output_rad, OUTPUT_ORDERS, to),
+        PartName::Temperature => {
+            let warm = scales.temperature_share(at.temperature_c);
+            to.extend([warm, warm * load, warm * lag]);
+        }
+    }
+}
+
+/// The weights of a part's columns in its penalty.
+pub(super) fn weights(part: PartName) -> Vec<f64> {
+    let of_waves = |orders: u16| (1..=orders).flat_map(|k| [f64::from(k).powi(WAVE_POWER); 2]).collect();
+    match part {
+        PartName::WindUp => (1..=WIND_UP_DEGREE).map(|k| (k as f64).powi(DEGREE_POWER)).collect(),
+        PartName::Play | PartName::Temperature => vec![1.0; 3],
+        PartName::GeneratorAngle | PartName::MaterialAngle => of_waves(GENERATOR_ORDERS),
+        PartName::ToothPitch => of_waves(TOOTH_ORDERS),
+        PartName::OutputAngle => of_waves(OUTPUT_ORDERS),
+    }
+}
+
+/// Sine and cosine of each order.
+fn waves(angle: f64, orders: u16, to: &mut Vec<f64>) {
+    let angle = angle.rem_euclid(TAU);
+    for order in 1..=orders {
+        let (sine, cosine) = (f64::from(order) * angle).sin_cos();
+        to.extend([sine, cosine]);
+    }
+}
+
+/// Chebyshev's polynomials from the first degree on.
+fn chebyshev(x: f64) -> [f64; WIND_UP_DEGREE] {
+    let (mut before, mut now) = (1.0, x);
+    std::array::from_fn(|_| {
+        let value = now;
+        (before, now) = (now, 2.0 * x * now - before);
+        value
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_repeat_where_the_drive_does_and_have_a_weight_for_each_column() {
+        let scales = Scales { torque_n_m: [-10.0, 30.0], friction_n_m: 1.0, temperature_c: [10.0, 30.0], teeth: 200.0 };
+        let at = State { generator_rad: 1.3, output_rad: 0.4, torque_n_m: 5.0, temperature_c: 20.0, way: 1.0 };
+        let of = |part, at: &State| {
+            let mut to = Vec::new();
+            columns(part, at, &scales, &mut to);
+            to
+        };
+        for part in PartName::ALL {
+            assert_eq!(of(part, &at).len(), weights(part).len(), "{}", part.as_str());
+        }
+        let same = |part, other: &State| of(part, &at).iter().zip(of(part, other)).all(|(a, b)| (a - b).abs() < 1e-9);
+        let turned = State { generator_rad: 1.3 + TAU, ..at };
+        assert!(same(PartName::GeneratorAngle, &turned) && same(PartName::ToothPitch, &turned));
+        assert!(same(PartName::ToothPitch, &State { generator_rad: 1.3 + TAU / 200.0, ..at }));
+        assert!(!same(PartName::MaterialAngle, &State { output_rad: 1.4, ..at }));
+        assert!(same(PartName::OutputAngle, &State { output_rad: 0.4 - TAU, ..at }));
+        // No wind-up without load; Chebyshev's polynomials are the cosines of multiples.
+        assert!(of(PartName::WindUp, &State { torque_n_m: 0.0, ..at }).iter().all(|value| *value == 0.0));
+        for (k, value) in chebyshev(0.3).iter().enumerate() {
+            assert!((value - ((k + 1) as f64 * 0.3_f64.acos()).cos()).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! `flexspline look`: what is in log files, and the mapping to read them with.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueHint};
+
+use super::context::{Context, quoted};
+use super::{Failure, say};
+use crate::look::{Looked, look, text};
+use crate::measurement::raw;
+
+/// Look at log files of a bench: columns, units, ratio, torque, time, coverage; proposes the mapping to read them with
+///
+/// Reads text files with a row for each instant, separated by commas, semicolons, tabs, bars or blanks, decimals behind a point or
+/// a comma, with or without names; several files are sessions of one bench. Nothing is written.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  flexspline look bench.log
+  flexspline look monday.csv tuesday.csv --json")]
+pub(super) struct Look {
+    /// Log files
+    #[arg(value_name = "FILE", value_hint = ValueHint::FilePath, required = true)]
+    files: Vec<PathBuf>,
+}
+
+impl Look {
+    pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
+        let files = self.files.iter().map(|file| raw::read(file)).collect::<Result<Vec<_>, _>>();
+        let files = files.map_err(|error| Failure::BadInput(error.to_string()))?;
+        let looked = look(&files).map_err(Failure::BadInput)?;
+        context.print(&looked, || text(&looked) + &say::next(&self.next(&looked)))
+    }
+
+    /// What to go on with.
+    fn next(&self, looked: &Looked) -> Vec<String> {
+        let Some(columns) = &looked.columns_option else { return Vec::new() };
+        let files: Vec<String> = self.files.iter().map(|file| quoted(&file.display().to_string())).collect();
+        let ratio = looked.ratio_proposed.map_or("RATIO".to_owned(), |ratio| ratio.to_string());
+        vec![format!("flexspline calibrate {} --ratio {ratio} --columns {}", files.join(" "), quoted(columns))]
+    }
+}

@@ -1,0 +1,690 @@
+//! What is in log files of a gear on a bench: separators, columns with role and unit, ratio, counts of a turn, sign of a torque, time,
+//! coverage; and the mapping to read them with.
+//!
+//! Names, units and numbers are asked in this order. Whatever is guessed says why, and how sure it is; nothing is used silently: the mapping is
+//! proposed, and the reader takes it only when it is given.
+
+mod column;
+mod coverage;
+mod picture;
+mod relation;
+mod words;
+
+use std::f64::consts::TAU;
+
+use serde::Serialize;
+
+use crate::measurement::raw::RawFile;
+use crate::measurement::{SESSION_GAP_PERIODS, Unit, median_of, sampled};
+use column::{Facts, unwrapped};
+pub use coverage::Coverage;
+pub use picture::text;
+use relation::{RATIOS, counts_of_a_turn, slope, torque_says};
+
+/// What a column may hold, for all that can be told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Time.
+    Time,
+    /// Generator angle.
+    Generator,
+    /// Output angle.
+    Output,
+    /// Output angle less generator over ratio.
+    Error,
+    /// Load torque.
+    Torque,
+    /// A motor current, which may stand for the torque.
+    Current,
+    /// Temperature.
+    Temperature,
+    /// Angle against gravity.
+    Orientation,
+    /// A speed: not needed.
+    Speed,
+    /// What was wanted, not measured.
+    Command,
+    /// Not known.
+    Unknown,
+}
+
+impl Role {
+    /// Its name in a mapping, if it has a place there.
+    fn in_mapping(self) -> Option<&'static str> {
+        match self {
+            Role::Time => Some("time"),
+            Role::Generator => Some("generator"),
+            Role::Output => Some("output"),
+            Role::Error => Some("error"),
+            Role::Torque | Role::Current => Some("torque"),
+            Role::Temperature => Some("temperature"),
+            Role::Orientation => Some("orientation"),
+            Role::Speed | Role::Command | Role::Unknown => None,
+        }
+    }
+
+    fn is_angle(self) -> bool {
+        matches!(self, Role::Generator | Role::Output | Role::Orientation)
+    }
+}
+
+/// A column.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Column {
+    /// Its name, `#1` and so on where the file has none.
+    pub name: String,
+    /// What it holds.
+    pub role: Role,
+    /// Its unit, with sign and gain as a mapping takes it; `None` if it cannot be told.
+    pub unit: Option<String>,
+    /// How sure role and unit are, 0 to 1: a judgement, not a probability.
+    pub confidence: f64,
+    /// Why.
+    pub why: Vec<String>,
+    /// Least number.
+    pub least: f64,
+    /// Largest.
+    pub most: f64,
+    /// Smallest change from row to row.
+    pub step: f64,
+    /// Rows without a number.
+    pub missing: usize,
+    /// Counts of a turn, where they are counts and that can be told.
+    pub counts_per_turn: Option<f64>,
+    /// Whether the proposed mapping uses it.
+    pub used: bool,
+}
+
+/// What kind of time a log has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TimeKind {
+    /// Stamps of a clock, which jitter.
+    Measured,
+    /// Rows times a period.
+    Counted,
+    /// No time.
+    None,
+}
+
+/// What is in the files.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Looked {
+    /// The files.
+    pub files: Vec<String>,
+    /// Rows of all.
+    pub rows: usize,
+    /// Rows of another width than the header.
+    pub odd_rows: usize,
+    /// Between fields.
+    pub separator: &'static str,
+    /// Whether decimals follow a comma.
+    pub decimal_comma: bool,
+    /// Line of the names of the first file; `None` if it names none.
+    pub header_line: Option<u64>,
+    /// The columns.
+    pub columns: Vec<Column>,
+    /// Turns of the generator for one of the output as the rows have it, signed.
+    pub ratio_found: Option<f64>,
+    /// The whole number next to it.
+    pub ratio_proposed: Option<f64>,
+    /// Sessions: files, and their parts between gaps in time.
+    pub sessions: usize,
+    /// What kind of time there is.
+    pub time: TimeKind,
+    /// Median of the time from row to row, s, if a time was found.
+    pub period_s: Option<f64>,
+    /// What the rows go through.
+    pub coverage: Option<Coverage>,
+    /// What to pass on with `--columns`; `None` if generator and output, or an error, cannot be told.
+    pub columns_option: Option<String>,
+    /// What has to be decided by whoever knows the bench.
+    pub notes: Vec<String>,
+}
+
+/// A column at work.
+struct Guess {
+    facts: Facts,
+    role: Role,
+    unit: Option<Unit>,
+    /// Counts of a turn of counts.
+    counts: Option<f64>,
+    negative: bool,
+    confidence: f64,
+    why: Vec<String>,
+    used: bool,
+    /// Numbers made continuous.
+    values: Vec<f64>,
+}
+
+impl Guess {
+    fn because(&mut self, why: impl Into<String>, confidence: f64) {
+        self.why.push(why.into());
+        self.confidence = confidence;
+    }
+
+    /// One of its numbers, rad, if that can be told.
+    fn rad(&self) -> Option<f64> {
+        match self.unit? {
+            Unit::Count => self.counts.map(|counts| TAU / counts),
+            unit => Some(unit.factor()),
+        }
+    }
+
+    fn moves(&self) -> bool {
+        self.facts.finite >= 16 && !self.facts.constant()
+    }
+
+    /// The unit as a mapping takes it.
+    fn written(&self) -> Option<String> {
+        let unit = self.unit?;
+        let sign = if self.negative { "-" } else { "" };
+        match unit {
+            Unit::Count => self.counts.map(|counts| format!("{sign}count/{counts}")),
+            Unit::Ampere | Unit::Milliampere | Unit::Volt => Some(format!("{sign}{unit}*GAIN")),
+            _ => Some(format!("{sign}{unit}")),
+        }
+    }
+}
+
+/// Looks at files of one bench, read as they stand.
+///
+/// # Errors
+/// The files do not have the same columns.
+pub fn look(files: &[RawFile]) -> Result<Looked, String> {
+    let Some(first) = files.first() else { return Err("no file".to_owned()) };
+    let names: Vec<&str> = first.columns.iter().map(|column| column.name.as_str()).collect();
+    for other in &files[1..] {
+        let theirs: Vec<&str> = other.columns.iter().map(|column| column.name.as_str()).collect();
+        if theirs != names {
+            return Err(format!(
+                "{} has the columns {}, but {} has {}; allowed: logs of one form together",
+                other.file,
+                theirs.join(", "),
+                first.file,
+                names.join(", ")
+            ));
+        }
+    }
+    let mut notes = Vec::new();
+    let mut guesses: Vec<Guess> = first.columns.iter().enumerate().map(|(place, _)| guess(files, place)).collect();
+    time(&mut guesses, files);
+    units_of_counts(&mut guesses);
+    let ratio = pair(&mut guesses, &mut notes);
+    settle(&mut guesses, &mut notes);
+    let error = error_rad(&guesses, ratio.map(f64::round));
+    torque(&mut guesses, error.as_deref(), &mut notes);
+    let (kind, period_s, starts) = clock(&guesses, files);
+    let columns_option = option(&guesses, first, &mut notes);
+    let coverage = coverage::of(&guesses, ratio, &starts);
+    let columns = guesses
+        .into_iter()
+        .zip(&first.columns)
+        .map(|(guess, raw)| Column {
+            name: raw.name.clone(),
+            role: guess.role,
+            unit: guess.written(),
+            confidence: guess.confidence,
+            least: guess.facts.least,
+            most: guess.facts.most,
+            step: guess.facts.step,
+            missing: guess.values.len() - guess.facts.finite,
+            counts_per_turn: guess.counts,
+            used: guess.used,
+            why: guess.why,
+        })
+        .collect();
+    Ok(Looked {
+        files: files.iter().map(|file| file.file.clone()).collect(),
+        rows: files.iter().map(|file| file.rows).sum(),
+        odd_rows: files.iter().map(|file| file.odd_rows).sum(),
+        separator: first.separator.name(),
+        decimal_comma: first.decimal_comma,
+        header_line: first.has_names.then_some(first.header_line),
+        columns,
+        ratio_found: ratio,
+        ratio_proposed: ratio.map(f64::round),
+        sessions: starts.len(),
+        time: kind,
+        period_s,
+        coverage,
+        columns_option,
+        notes,
+    })
+}
+
+/// What a column says by its name and by its numbers alone.
+fn guess(files: &[RawFile], place: usize) -> Guess {
+    let mut raw = files[0].columns[place].clone();
+    files[1..].iter().for_each(|file| raw.values.extend_from_slice(&file.columns[place].values));
+    let facts = Facts::of(&raw);
+    let said = words::said(&raw.name);
+    let values = unwrapped(&raw.values, facts.wraps_at);
+    let mut guess = Guess {
+        facts,
+        role: Role::Unknown,
+        unit: None,
+        counts: None,
+        negative: false,
+        confidence: 0.0,
+        why: Vec::new(),
+        used: false,
+        values,
+    };
+    if raw.times > 0 && raw.times + raw.empty + raw.words >= raw.values.len() {
+        (guess.role, guess.unit) = (Role::Time, Some(Unit::Iso));
+        guess.because("times written as text", 0.95);
+        return guess;
+    }
+    if guess.facts.finite == 0 {
+        guess.because(if raw.words > 0 { "words" } else { "empty" }, 0.9);
+        return guess;
+    }
+    if let Some(role) = said.role {
+        guess.role = if said.commanded && role != Role::Torque { Role::Command } else { role };
+        guess.because("its name", if said.commanded { 0.6 } else { 0.8 });
+    }
+    if guess.facts.constant() {
+        guess.because(format!("keeps the value {}", guess.facts.least), 0.3);
+    }
+    if guess.facts.every > 1 {
+        guess.why.push(format!("a value in one of {} rows: slower than the file", guess.facts.every));
+    } else if guess.facts.repeats > 0.6 && !guess.facts.constant() {
+        guess.why.push(format!(
+            "repeats its value in {:.0} % of the rows: slower than the file",
+            100.0 * guess.facts.repeats
+        ));
+    }
+    if let Some(turn) = guess.facts.wraps_at {
+        guess.why.push(format!("begins anew after {turn:.6}"));
+    }
+    let said = raw.unit.as_deref().and_then(Unit::in_brackets).or_else(|| Unit::in_name(&raw.name));
+    if let Some(unit) = said.filter(|unit| fits(guess.role, *unit)) {
+        guess.unit = Some(unit);
+        guess.why.push(format!("{unit} by its {}", if raw.unit.is_some() { "line of units" } else { "name" }));
+    } else if guess.role.is_angle() || matches!(guess.role, Role::Unknown | Role::Command) {
+        unit_of_numbers(&mut guess, &raw.name);
+    } else if guess.role == Role::Torque {
+        guess.unit = Some(Unit::NewtonMetre);
+        guess.because("N.m, for want of a unit", 0.5);
+    } else if guess.role == Role::Temperature {
+        guess.unit = Some(if guess.facts.least > 200.0 { Unit::Kelvin } else { Unit::Celsius });
+        guess.why.push("its size".to_owned());
+    } else if guess.role == Role::Error {
+        guess.unit = Some(Unit::Arcsecond);
+        guess.because("arcsec, for want of a unit", 0.5);
+    }
+    guess
+}
+
+/// Whether a unit is one of the role.
+fn fits(role: Role, unit: Unit) -> bool {
+    match role {
+        Role::Time => unit.is_of_time(),
+        Role::Torque => unit.is_of_torque(),
+        Role::Current => matches!(unit, Unit::Ampere | Unit::Milliampere),
+        Role::Temperature => unit.is_of_temperature(),
+        Role::Generator | Role::Output | Role::Orientation | Role::Error => unit.is_of_angles(),
+        Role::Speed => false,
+        Role::Command | Role::Unknown => true,
+    }
+}
+
+/// The unit of an angle by the turn after which it begins anew, or by whole numbers.
+fn unit_of_numbers(guess: &mut Guess, name: &str) {
+    let by_turn = guess
+        .facts
+        .wraps_at
+        .and_then(|turn| Unit::ANGLES.into_iter().find(|unit| (turn * unit.factor() / TAU - 1.0).abs() < 1e-9));
+    let counted = ["inc", "count", "tick", "cnt"].iter().any(|word| name.to_lowercase().contains(word));
+    if let Some(unit) = by_turn {
+        guess.unit = Some(unit);
+        guess.why.push(format!("{unit} by the turn"));
+    } else if guess.facts.whole && (counted || guess.facts.most - guess.facts.least > 1000.0) {
+        guess.unit = Some(Unit::Count);
+        guess.counts = guess.facts.wraps_at;
+        guess.why.push("whole numbers: counts".to_owned());
+    }
+}
+
+/// The column of time: by name, or the one that rises evenly.
+fn time(guesses: &mut [Guess], files: &[RawFile]) {
+    let first_file = files[0].rows;
+    if guesses.iter().all(|guess| guess.role != Role::Time) {
+        let evenly = |guess: &Guess| {
+            let steps: Vec<f64> = guess.values[..first_file].windows(2).map(|pair| pair[1] - pair[0]).collect();
+            let mut some = sampled(&steps);
+            let usual = median_of(&mut some);
+            // One step in ten may be of another length.
+            let odd = steps.iter().filter(|step| (*step - usual).abs() > 0.5 * usual).count();
+            guess.facts.rises && usual > 0.0 && 10 * odd < steps.len()
+        };
+        // Where more than one does, the first: loggers begin with the time.
+        let found = guesses.iter_mut().find(|guess| guess.role == Role::Unknown && guess.moves() && evenly(guess));
+        if let Some(guess) = found {
+            guess.role = Role::Time;
+            guess.unit = None;
+            guess.counts = None;
+            guess.because("rises evenly from row to row", 0.5);
+        }
+    }
+    // Of several that are called so, one that moves.
+    let best = guesses.iter().position(|guess| guess.role == Role::Time && guess.moves());
+    for (place, guess) in guesses.iter_mut().enumerate().filter(|(_, guess)| guess.role == Role::Time) {
+        guess.used = Some(place) == best;
+        if guess.unit.is_none() {
+            // Seconds since 1970 have ten digits, their thousandths thirteen.
+            let size = guess.facts.most;
+            let (unit, why) = match size {
+                s if s > 1e17 => (Unit::Nanosecond, "nanoseconds since 1970"),
+                s if s > 1e14 => (Unit::Microsecond, "microseconds since 1970"),
+                s if s > 1e11 => (Unit::Millisecond, "milliseconds since 1970"),
+                s if s > 1e9 => (Unit::Second, "seconds since 1970"),
+                _ => (Unit::Second, "s, for want of a unit"),
+            };
+            guess.unit = Some(unit);
+            let sure = if size > 1e9 { guess.confidence } else { guess.confidence.min(0.6) };
+            guess.because(why, sure);
+        }
+    }
+}
+
+/// Counts of a turn, where another column shows the same shaft in a unit of angle.
+fn units_of_counts(guesses: &mut [Guess]) {
+    let counts: Vec<usize> = (0..guesses.len())
+        .filter(|k| guesses[*k].unit == Some(Unit::Count) && guesses[*k].counts.is_none() && guesses[*k].moves())
+        .collect();
+    for k in counts {
+        let others: Vec<usize> = (0..guesses.len())
+            .filter(|j| {
+                *j != k && guesses[*j].moves() && guesses[*j].unit != Some(Unit::Count) && !guesses[*j].facts.whole
+            })
+            .filter(|j| !matches!(guesses[*j].role, Role::Time | Role::Speed | Role::Torque | Role::Current))
+            .collect();
+        let mut best: Option<(bool, f64, usize, Unit, f64)> = None;
+        for j in others {
+            let together = slope(&guesses[k].values, &guesses[j].values).filter(|line| line.left < 1e-4);
+            let Some(line) = together else { continue };
+            let units = guesses[j].unit.map_or(vec![Unit::Radian, Unit::Degree, Unit::Turn], |unit| vec![unit]);
+            for (unit, round) in units.into_iter().flat_map(|unit| [(unit, false), (unit, true)]) {
+                let Some((counts, off)) = counts_of_a_turn(line.slope / unit.factor(), round) else { continue };
+                // A power of two before a round number, then what fits better.
+                if best.is_none_or(|(other, before, ..)| (round, off) < (other, before)) {
+                    best = Some((round, off, j, unit, counts));
+                }
+            }
+        }
+        if let Some((_, _, j, unit, counts)) = best {
+            guesses[k].counts = Some(counts);
+            guesses[k]
+                .why
+                .push(format!("{counts} counts a turn by column {}, which shows the same shaft in {unit}", j + 1));
+            guesses[j].unit = Some(unit);
+            guesses[j].why.push(format!("{unit} by column {}: then a turn has {counts} counts", k + 1));
+        }
+    }
+}
+
+/// Generator and output: by name, else the two that turn together; and the ratio between them.
+fn pair(guesses: &mut [Guess], notes: &mut Vec<String>) -> Option<f64> {
+    let angles: Vec<usize> = (0..guesses.len())
+        .filter(|k| guesses[*k].moves() && guesses[*k].facts.every <= 1)
+        .filter(|k| matches!(guesses[*k].role, Role::Generator | Role::Output | Role::Unknown))
+        .collect();
+    let mut best: Option<(f64, usize, usize, f64)> = None;
+    for &g in &angles {
+        for &o in &angles {
+            let named = |k: usize, role: Role| guesses[k].role == role;
+            let against = named(g, Role::Output) || named(o, Role::Generator);
+            let Some(line) = (g != o && !against)
+                .then(|| slope(&guesses[o].values, &guesses[g].values))
+                .flatten()
+                .filter(relation::Slope::holds)
+            else {
+                continue;
+            };
+            let Some(ratio) = in_range(&guesses[g], &guesses[o], 1.0 / line.slope) else { continue };
+            // Names count most, then how well the two turn together; counts are what an encoder gives.
+            let score = 2.0 * f64::from(named(g, Role::Generator))
+                + 2.0 * f64::from(named(o, Role::Output))
+                + 0.5 * f64::from(guesses[g].unit == guesses[o].unit)
+                - line.left;
+            if best.is_none_or(|(before, ..)| score > before) {
+                best = Some((score, g, o, ratio));
+            }
+        }
+    }
+    let (_, g, o, _) = best?;
+    // What follows the generator by the ratio in the units that were found.
+    let slope = slope(&guesses[o].values, &guesses[g].values)?.slope;
+    let units = units_of_pair(guesses, g, o, 1.0 / slope, notes)?;
+    for (k, role) in [(g, Role::Generator), (o, Role::Output)] {
+        let by_name = guesses[k].role == role;
+        guesses[k].role = role;
+        guesses[k].used = true;
+        let sure = if by_name { 0.9 } else { 0.6 };
+        guesses[k].because(format!("turns with column {}, {units:.3} to 1", if k == g { o } else { g } + 1), sure);
+    }
+    Some(units)
+}
+
+/// The ratio in the units known so far, if it is one of a strain wave gear or may be.
+fn in_range(generator: &Guess, output: &Guess, ratio: f64) -> Option<f64> {
+    let within = |ratio: f64| (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs());
+    match (generator.rad(), output.rad()) {
+        (Some(g), Some(o)) => Some(ratio * g / o).filter(|ratio| within(*ratio)),
+        // One of the units is open.
+        (Some(_), None) | (None, Some(_)) => Some(ratio),
+        (None, None) => Some(ratio).filter(|ratio| within(*ratio)),
+    }
+}
+
+/// Settles the units of generator and output that are open so that the ratio is one of a strain wave gear; gives it.
+fn units_of_pair(guesses: &mut [Guess], g: usize, o: usize, raw: f64, notes: &mut Vec<String>) -> Option<f64> {
+    let within = |ratio: f64| (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs());
+    match (guesses[g].rad(), guesses[o].rad()) {
+        (Some(a), Some(b)) => Some(raw * a / b),
+        (None, None) => {
+            // The same unit, as far as can be told.
+            for k in [g, o] {
+                if guesses[k].unit.is_none() {
+                    guesses[k].unit = Some(Unit::Radian);
+                    guesses[k].why.push("rad, for want of a unit".to_owned());
+                } else {
+                    notes.push(format!("how many counts make a turn of column {} is not in the file", k + 1));
+                }
+            }
+            Some(raw)
+        }
+        (known, _) => {
+            let open = if known.is_some() { o } else { g };
+            let both = (guesses[g].rad(), guesses[o].rad());
+            let of = |unit_rad: f64| match both {
+                (Some(a), _) => raw * a / unit_rad,
+                (_, Some(b)) => raw * unit_rad / b,
+                _ => raw,
+            };
+            if guesses[open].unit == Some(Unit::Count) {
+                // The other encoder's counts, or the power of two that gives a ratio near a whole number.
+                let other = if open == g { guesses[o].counts } else { guesses[g].counts };
+                let powers = (6..=28).map(|bits| 2f64.powi(bits));
+                let near = |counts: &f64| {
+                    let ratio = of(TAU / counts);
+                    within(ratio) && (ratio - ratio.round()).abs() < 0.005 * ratio.abs()
+                };
+                let counts = other.into_iter().chain(powers).find(near)?;
+                guesses[open].counts = Some(counts);
+                let why = if other == Some(counts) {
+                    "as the other encoder has"
+                } else {
+                    "which makes the ratio nearly whole"
+                };
+                guesses[open].why.push(format!("{counts} counts a turn, {why}"));
+                notes.push(format!("column {}: {counts} counts a turn, {why}: check it", open + 1));
+                return Some(of(TAU / counts));
+            }
+            let unit = Unit::ANGLES.into_iter().find(|unit| within(of(unit.factor())))?;
+            guesses[open].unit = Some(unit);
+            guesses[open].why.push(format!("{unit} makes the ratio {:.2}", of(unit.factor())));
+            Some(of(unit.factor()))
+        }
+    }
+}
+
+/// Roles that only one column may have: the first that moves, and what is left is none.
+fn settle(guesses: &mut [Guess], notes: &mut Vec<String>) {
+    let paired = guesses.iter().any(|guess| guess.used && guess.role == Role::Output);
+    for role in [Role::Generator, Role::Output, Role::Error, Role::Temperature, Role::Orientation] {
+        let used = guesses.iter().any(|guess| guess.used && guess.role == role);
+        let may = |guess: &Guess| guess.role == role && guess.moves();
+        let place = guesses.iter().position(may).filter(|_| !used);
+        // An output that does not follow a generator is none, and an error is not needed beside an output.
+        let wanted = match role {
+            Role::Output => false,
+            Role::Error => !paired,
+            _ => true,
+        };
+        if let Some(place) = place.filter(|_| wanted) {
+            guesses[place].used = true;
+            if guesses[place].unit.is_none() && role.is_angle() {
+                guesses[place].unit = Some(Unit::Radian);
+                guesses[place].because("rad, for want of a unit", 0.4);
+            }
+        }
+        let many = guesses.iter().filter(|guess| guess.role == role && guess.moves()).count();
+        if many > 1 && role == Role::Temperature {
+            notes.push(format!("{many} columns of temperature: the first is proposed"));
+        }
+    }
+}
+
+/// The error (rad) as far as it can be computed.
+fn error_rad(guesses: &[Guess], ratio: Option<f64>) -> Option<Vec<f64>> {
+    let used = |role: Role| guesses.iter().find(|guess| guess.used && guess.role == role);
+    if let (Some(g), Some(o), Some(ratio)) = (used(Role::Generator), used(Role::Output), ratio) {
+        let (a, b) = (g.rad()?, o.rad()?);
+        return Some(g.values.iter().zip(&o.values).map(|(g, o)| b * o - a * g / ratio).collect());
+    }
+    let error = used(Role::Error)?;
+    let rad = error.rad()?;
+    Some(error.values.iter().map(|value| rad * value).collect())
+}
+
+/// Which column may be the torque, and which way it counts.
+fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>) {
+    let output: Option<Vec<f64>> =
+        guesses.iter().find(|guess| guess.used && guess.role == Role::Output).and_then(|guess| {
+            let rad = guess.rad()?;
+            Some(guess.values.iter().map(|value| rad * value).collect())
+        });
+    let candidates: Vec<usize> = (0..guesses.len())
+        .filter(|k| matches!(guesses[*k].role, Role::Torque | Role::Current) && guesses[*k].moves())
+        .collect();
+    let says: Vec<_> = candidates
+        .iter()
+        .map(|k| error.zip(output.as_ref()).and_then(|(error, output)| torque_says(error, output, &guesses[*k].values)))
+        .collect();
+    for (k, says) in candidates.iter().zip(&says) {
+        match says {
+            Some(says) if says.tells() => {
+                guesses[*k].negative = says.slope < 0.0;
+                let way = if says.slope < 0.0 { "against" } else { "with" };
+                let sure = if guesses[*k].role == Role::Torque { 0.8 } else { 0.5 };
+                guesses[*k].because(
+                    format!(
+                        "the error moves {way} it: it explains {:.0} % beside the turn of the output",
+                        100.0 * says.share
+                    ),
+                    sure,
+                );
+            }
+            _ => guesses[*k].because("its sign cannot be told here", 0.4),
+        }
+    }
+    // A torque before a current, then what explains more.
+    let share = |says: &Option<relation::TorqueSays>| says.map_or(0.0, |says| says.share);
+    let best = candidates.iter().zip(&says).max_by(|(a, x), (b, y)| {
+        let key = |k: &usize| guesses[*k].role == Role::Torque;
+        key(a).cmp(&key(b)).then(share(x).total_cmp(&share(y)))
+    });
+    let Some((&best, _)) = best else { return };
+    guesses[best].used = guesses[best].written().is_some_and(|unit| !unit.contains("GAIN"));
+    if !guesses[best].used {
+        let unit = guesses[best].unit.map_or("current", Unit::name);
+        notes.push(format!(
+            "column {} is in {unit}: give the torque for one of it in place of GAIN, torque=#{}:{}",
+            best + 1,
+            best + 1,
+            guesses[best].written().unwrap_or_else(|| "A*GAIN".to_owned())
+        ));
+    }
+    if candidates.len() > 1 {
+        let all: Vec<String> = candidates.iter().map(|k| (k + 1).to_string()).collect();
+        notes.push(format!("columns {} may be the torque: column {} is proposed", all.join(", "), best + 1));
+    }
+    if guesses[best].negative {
+        notes.push(format!("column {} counts the torque the other way round: it is proposed with a minus", best + 1));
+    }
+}
+
+/// Kind of time, median step (s), and the first row of each session.
+fn clock(guesses: &[Guess], files: &[RawFile]) -> (TimeKind, Option<f64>, Vec<usize>) {
+    let mut starts: Vec<usize> = files
+        .iter()
+        .scan(0, |row, file| {
+            let start = *row;
+            *row += file.rows;
+            Some(start)
+        })
+        .collect();
+    let Some(time) = guesses.iter().find(|guess| guess.used && guess.role == Role::Time) else {
+        return (TimeKind::None, None, starts);
+    };
+    let factor = time.unit.map_or(1.0, Unit::factor);
+    let steps: Vec<f64> = time.values.windows(2).map(|pair| factor * (pair[1] - pair[0])).collect();
+    let forward: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
+    if forward.is_empty() {
+        return (TimeKind::None, None, starts);
+    }
+    let period = median_of(&mut sampled(&forward));
+    for (row, step) in steps.iter().enumerate() {
+        if *step > SESSION_GAP_PERIODS * period || *step < -SESSION_GAP_PERIODS * period {
+            starts.push(row + 1);
+        }
+    }
+    starts.sort_unstable();
+    starts.dedup();
+    // Stamps of a clock differ by more than they are rounded to.
+    let rounded = 1.01 * (factor * time.facts.step).min(period) * 1e-3 + 1e-9 * factor * time.facts.most.abs();
+    let even = forward.iter().filter(|step| (*step - period).abs() <= rounded.max(1e-4 * period)).count();
+    let kind = if even as f64 > 0.98 * forward.len() as f64 { TimeKind::Counted } else { TimeKind::Measured };
+    (kind, Some(period), starts)
+}
+
+/// The mapping, if generator and output or an error are told.
+fn option(guesses: &[Guess], file: &RawFile, notes: &mut Vec<String>) -> Option<String> {
+    let used = |role: Role| guesses.iter().any(|guess| guess.used && guess.role == role && guess.written().is_some());
+    if !(used(Role::Generator) && (used(Role::Output) || used(Role::Error))) {
+        let what = match (used(Role::Generator), used(Role::Output) || used(Role::Error)) {
+            (true, false) => "which column is the output (or the error)",
+            (false, true) => "which column is the generator",
+            _ => "which columns are generator and output",
+        };
+        notes.push(format!("{what} cannot be told: name them, --columns generator=#1:UNIT,output=#2:UNIT"));
+        return None;
+    }
+    let entries = guesses.iter().enumerate().filter(|(_, guess)| guess.used).filter_map(|(place, guess)| {
+        let (role, unit) = (guess.role.in_mapping()?, guess.written()?);
+        let name = &file.columns[place].name;
+        // Names with signs of the mapping in them, and names that are there twice, go by number.
+        let twice = file.columns.iter().filter(|column| column.name == *name).count() > 1;
+        let plain = !twice && !name.is_empty() && !name.contains([',', ':', '=', '"', '\'']);
+        let column = if plain { name.clone() } else { format!("#{}", place + 1) };
+        Some(format!("{role}={column}:{unit}"))
+    });
+    Some(entries.collect::<Vec<_>>().join(","))
+}
+
+#[cfg(test)]
+mod tests;

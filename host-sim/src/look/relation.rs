@@ -1,0 +1,181 @@
+//! What columns show of each other: a ratio, the counts of a turn, which way a torque counts.
+
+use std::f64::consts::TAU;
+
+use flexspline_algebra::{Mat, cholesky};
+
+use crate::measurement::least_and_most;
+
+/// Rows that a relation is found on, at most.
+const LOOKED_AT: usize = 4000;
+/// Two columns turn together if what a straight line leaves is below this share of the range of the second.
+const TOGETHER: f64 = 5e-3;
+/// Counts of a turn are a power of two or a round number to this: one encoder against another on the same shaft, eccentric by an arc-minute.
+const SAME_COUNT: f64 = 1e-4;
+/// Incremental encoders have round numbers of counts, up to this; of larger numbers nearly each is near a round one.
+const MOST_ROUND: f64 = 1e6;
+/// Ratios of strain wave gears, and a little more.
+pub(super) const RATIOS: [f64; 2] = [20.0, 400.0];
+/// A torque is believed to turn the error one way if it explains this share of what the turn of the output leaves.
+const TELLS: f64 = 0.05;
+
+/// Rows in which all columns have a number, thinned.
+fn rows(columns: &[&[f64]]) -> Vec<Vec<f64>> {
+    let count = columns.iter().map(|column| column.len()).min().unwrap_or(0);
+    let all = (0..count).filter(|k| columns.iter().all(|column| column[*k].is_finite()));
+    let all: Vec<usize> = all.collect();
+    let every = all.len().div_ceil(LOOKED_AT).max(1);
+    all.iter().step_by(every).map(|k| columns.iter().map(|column| column[*k]).collect()).collect()
+}
+
+/// A straight line between two columns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Slope {
+    /// Change of the first for one of the second.
+    pub slope: f64,
+    /// What the line leaves of the first, over its range.
+    pub left: f64,
+}
+
+/// How the first column follows the second, if it does.
+pub(super) fn slope(first: &[f64], second: &[f64]) -> Option<Slope> {
+    let rows = rows(&[first, second]);
+    let n = rows.len() as f64;
+    if rows.len() < 16 {
+        return None;
+    }
+    let mean = |at: usize| rows.iter().map(|row| row[at]).sum::<f64>() / n;
+    let (a, b) = (mean(0), mean(1));
+    let sum = |of: &dyn Fn(f64, f64) -> f64| rows.iter().map(|row| of(row[0] - a, row[1] - b)).sum::<f64>();
+    let (xx, xy, yy) = (sum(&|y, _| y * y), sum(&|y, x| x * y), sum(&|_, x| x * x));
+    if !(xx > 0.0 && yy > 0.0) {
+        return None;
+    }
+    let slope = xy / yy;
+    let left = ((xx - slope * xy).max(0.0) / n).sqrt();
+    let range = least_and_most(rows.iter().map(|row| row[0]));
+    Some(Slope { slope, left: left / (range.1 - range.0) })
+}
+
+impl Slope {
+    /// Whether the two turn together.
+    pub fn holds(&self) -> bool {
+        self.left < TOGETHER
+    }
+}
+
+/// Counts of a turn, from counts over an angle in rad: the power of two that they nearly are, or the round number of an incremental
+/// encoder; and how far off, as a share.
+pub(super) fn counts_of_a_turn(per_rad: f64, round: bool) -> Option<(f64, f64)> {
+    let counts = (per_rad * TAU).abs();
+    let near = if round {
+        let power = 10f64.powf(counts.log10().floor() - 1.0);
+        (counts / power).round() * power
+    } else {
+        2f64.powf(counts.log2().round())
+    };
+    let off = (counts / near - 1.0).abs();
+    let most = if round { MOST_ROUND } else { 2f64.powi(32) };
+    ((64.0..=most).contains(&near) && off < SAME_COUNT).then_some((near, off))
+}
+
+/// Which way a torque turns the error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct TorqueSays {
+    /// Positive where more of it turns the output forward, rad for one of its unit.
+    pub slope: f64,
+    /// Share of what the turns of the output leave of the error that it explains.
+    pub share: f64,
+}
+
+impl TorqueSays {
+    /// Whether the sign can be told.
+    pub fn tells(&self) -> bool {
+        self.share > TELLS
+    }
+}
+
+/// How an error (rad) follows a torque beside what turns with the output (rad): an eccentric encoder and the weight of an arm look alike, so
+/// both may explain what one of them does.
+pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64]) -> Option<TorqueSays> {
+    let rows = rows(&[error, output, torque]);
+    let travel = least_and_most(rows.iter().map(|row| row[1]));
+    let turns = (travel.1 - travel.0) / TAU;
+    let scale = rows.iter().map(|row| row[2].abs()).fold(0.0, f64::max);
+    if !(rows.len() > 40 && scale > 0.0) {
+        return None;
+    }
+    let columns = |with: bool| -> Vec<Vec<f64>> {
+        rows.iter()
+            .map(|row| {
+                let mut columns = vec![1.0];
+                // Less than a third of a turn does not tell a sine from a straight line.
+                if turns > 0.33 {
+                    columns.extend([row[1].sin(), row[1].cos()]);
+                } else {
+                    columns.push(row[1]);
+                }
+                if with {
+                    columns.push(row[2] / scale);
+                }
+                columns
+            })
+            .collect()
+    };
+    let values: Vec<f64> = rows.iter().map(|row| row[0]).collect();
+    let (_, without) = least_squares(&columns(false), &values)?;
+    let (fitted, with) = least_squares(&columns(true), &values)?;
+    let slope = fitted.last()? / scale;
+    Some(TorqueSays { slope, share: 1.0 - with / without.max(f64::MIN_POSITIVE) })
+}
+
+/// Coefficients, and the sum of squares that they leave.
+fn least_squares(columns: &[Vec<f64>], values: &[f64]) -> Option<(Vec<f64>, f64)> {
+    let n = columns.first()?.len();
+    let mut gram = Mat::zeros(n, n);
+    let mut right = Mat::zeros(n, 1);
+    for (row, value) in columns.iter().zip(values) {
+        for (i, a) in row.iter().enumerate() {
+            right[(i, 0)] += a * value;
+            for (j, b) in row.iter().enumerate() {
+                gram[(i, j)] += a * b;
+            }
+        }
+    }
+    let solved = cholesky(gram.as_ref()).ok()?.solve(right.as_ref());
+    let fitted: Vec<f64> = (0..n).map(|i| solved[(i, 0)]).collect();
+    let left = columns
+        .iter()
+        .zip(values)
+        .map(|(row, value)| (value - row.iter().zip(&fitted).map(|(a, b)| a * b).sum::<f64>()).powi(2))
+        .sum();
+    Some((fitted, left))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ratio_and_counts_come_out() {
+        let motor: Vec<f64> = (0..3000).map(|k| 0.05 * f64::from(k)).collect();
+        let out: Vec<f64> = motor.iter().map(|m| 65_536.0 / TAU * (m / 101.0 + 1e-3 * (m / 101.0).sin())).collect();
+        let found = slope(&out, &motor).unwrap();
+        assert!(found.holds());
+        let counts = |of: f64, round: bool| counts_of_a_turn(of / TAU, round).map(|(counts, _)| counts);
+        assert_eq!(counts(-65_536.0, false), Some(65_536.0));
+        assert_eq!((counts(20_000.1, false), counts(20_000.1, true)), (None, Some(20_000.0)));
+        assert_eq!((counts(20_777.0, true), counts(2.7e8, true)), (None, None));
+        let noise: Vec<f64> = (0..3000).map(|k| f64::from((k * 7919) % 3001)).collect();
+        assert!(!slope(&noise, &motor).unwrap().holds());
+    }
+
+    #[test]
+    fn the_sign_of_a_torque_is_told() {
+        let out: Vec<f64> = (0..2000).map(|k| 2e-3 * f64::from(k)).collect();
+        let torque: Vec<f64> = (0..2000).map(|k| 20.0 * (0.013 * f64::from(k)).sin()).collect();
+        let error: Vec<f64> = out.iter().zip(&torque).map(|(o, t)| 1e-3 * o.sin() - t / 3e4).collect();
+        let says = torque_says(&error, &out, &torque).unwrap();
+        assert!(says.tells() && (says.slope * -3e4 - 1.0).abs() < 1e-6, "{says:?}");
+    }
+}

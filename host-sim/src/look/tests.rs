@@ -1,0 +1,430 @@
+//! Odd files, as loggers, robots and spreadsheets write them: each is read right by the mapping proposed (or one that a user who knows
+//! the bench would give), or ends in one clear error.
+
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+
+use super::{Looked, Role, TimeKind, look, text};
+use crate::measurement::raw;
+use crate::measurement::{ColumnMap, Gear, Recording, parse};
+
+const RATIO: f64 = 101.0;
+const ROWS: usize = 1500;
+const ARCSEC: f64 = TAU / 1_296_000.0;
+
+/// What the bench did.
+struct Truth {
+    time_s: Vec<f64>,
+    generator_rad: Vec<f64>,
+    output_rad: Vec<f64>,
+    torque_n_m: Vec<f64>,
+    temperature_c: Vec<f64>,
+}
+
+/// Two thirds of the rows forward, the rest back, under a load that swings.
+fn truth() -> Truth {
+    let mut random = fastrand::Rng::with_seed(7);
+    let mut t = Truth {
+        time_s: Vec::new(),
+        generator_rad: Vec::new(),
+        output_rad: Vec::new(),
+        torque_n_m: Vec::new(),
+        temperature_c: Vec::new(),
+    };
+    let mut psi = 0.4;
+    for k in 0..ROWS {
+        let x = k as f64;
+        psi += if 3 * k < 2 * ROWS { 0.62 } else { -0.55 };
+        let torque = 25.0 * (x / 97.0).sin();
+        let error = 300.0 * (psi / RATIO).sin() + 20.0 * (2.0 * psi).sin() + torque / 3e4 / ARCSEC;
+        t.time_s.push(0.004 * x + 2e-4 * (random.f64() - 0.5));
+        t.generator_rad.push(psi);
+        t.output_rad.push(psi / RATIO + error * ARCSEC);
+        t.torque_n_m.push(torque);
+        t.temperature_c.push(21.0 + 3.0 * (x / 400.0).sin());
+    }
+    t
+}
+
+/// A file: a first line, and a row for each instant, with fields by their texts.
+fn file(header: &str, separator: &str, fields: impl Fn(&Truth, usize) -> Vec<String>) -> String {
+    let truth = truth();
+    let mut text = header.to_owned();
+    for k in 0..ROWS {
+        let _ = writeln!(text, "{}", fields(&truth, k).join(separator));
+    }
+    text
+}
+
+/// Time, generator and output in radians, torque.
+fn plain(t: &Truth, k: usize) -> Vec<String> {
+    vec![
+        format!("{:.5}", t.time_s[k]),
+        format!("{:.7}", t.generator_rad[k]),
+        format!("{:.9}", t.output_rad[k]),
+        format!("{:.4}", t.torque_n_m[k]),
+    ]
+}
+
+fn degrees(t: &Truth, k: usize) -> Vec<String> {
+    let mut fields = plain(t, k);
+    fields[1] = format!("{:.5}", t.generator_rad[k].to_degrees());
+    fields[2] = format!("{:.7}", t.output_rad[k].to_degrees());
+    fields
+}
+
+fn counts(angle: f64, of_a_turn: f64) -> String {
+    format!("{:.0}", angle / TAU * of_a_turn)
+}
+
+fn encoder_counts(t: &Truth, k: usize) -> Vec<String> {
+    let mut fields = plain(t, k);
+    fields[1] = counts(t.generator_rad[k] + 100.0, 16_777_216.0);
+    fields[2] = counts(t.output_rad[k] + 2.5, 16_777_216.0);
+    fields
+}
+
+fn commas(fields: Vec<String>) -> Vec<String> {
+    fields.into_iter().map(|field| field.replace('.', ",")).collect()
+}
+
+fn with(mut fields: Vec<String>, place: usize, field: String) -> Vec<String> {
+    fields[place] = field;
+    fields
+}
+
+/// What a file must end in.
+enum Ends {
+    /// Read by the mapping that `look` proposes.
+    Proposed,
+    /// Read by this mapping.
+    By(&'static str),
+    /// As [`Ends::By`], without a torque.
+    NoTorque(&'static str),
+    /// Refused by this mapping (or the names of this project), with an error that says all this.
+    Refused(&'static str, &'static [&'static str]),
+    /// Not even looked at.
+    NoTable(&'static [&'static str]),
+}
+use Ends::{By, NoTable, NoTorque, Proposed, Refused};
+
+fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
+    let gear = |text: String| text.into_bytes();
+    let day = |t: &Truth, k: usize, from: f64| {
+        let s = t.time_s[k] + from;
+        format!("{:02.0}:{:02.0}:{:07.4}", (s / 3600.0).floor() % 24.0, (s / 60.0).floor() % 60.0, s % 60.0)
+    };
+    vec![
+        ("this project's", gear(file("time_s,generator_rad,output_rad,torque_n_m\n", ",", plain)), Proposed),
+        ("semicolons", gear(file("time;motor;load;torque\n", ";", plain)), Proposed),
+        ("decimal commas", gear(file("Zeit;Motor;Abtrieb;Drehmoment\n", ";", |t, k| commas(plain(t, k)))), Proposed),
+        ("tabs", gear(file("time\tmotor\tload\ttorque\n", "\t", plain)), Proposed),
+        ("tabs, decimal commas", gear(file("t\tmotor\tload\tNm\n", "\t", |t, k| commas(plain(t, k)))), Proposed),
+        ("bars", gear(file("time|motor|load|torque\n", "|", plain)), Proposed),
+        ("blanks", gear(file("  time    motor  load torque\n", "    ", plain)), Proposed),
+        (
+            "quotes",
+            gear(file("\"time\";\"motor\";\"load\";\"torque\"\n", ";", |t, k| {
+                commas(plain(t, k)).into_iter().map(|f| format!("\"{f}\"")).collect()
+            })),
+            Proposed,
+        ),
+        (
+            "a preamble and units",
+            gear(file("Logger 7\nBench;4\n\nZeit;Motor;Abtrieb;Moment\n[s];[°];[°];[Nm]\n", ";", |t, k| {
+                commas(degrees(t, k))
+            })),
+            Proposed,
+        ),
+        ("units in brackets", gear(file("t [s],motor [deg],link [deg],torque [Nm]\n", ",", degrees)), Proposed),
+        (
+            "Latin-1",
+            file("Zeit [s];Motor [°];Abtrieb [°];Moment [Nm]\n", ";", degrees)
+                .chars()
+                .map(|c| u8::try_from(u32::from(c)).unwrap())
+                .collect(),
+            Proposed,
+        ),
+        ("a byte order mark", gear(format!("\u{feff}{}", file("time;motor;load;torque\n", ";", plain))), Proposed),
+        ("CRLF", gear(file("time;motor;load;torque\n", ";", plain).replace('\n', "\r\n")), Proposed),
+        ("names as a comment", gear(file("# bench 4\n# time motor load torque\n", " ", plain)), Proposed),
+        ("no names", gear(file("", ",", plain)), By("time=#1:s,generator=#2:rad,output=#3:rad,torque=#4:N.m")),
+        ("no names, blanks", gear(file("", " ", plain)), NoTorque("generator=2,output=3")),
+        (
+            "counts",
+            gear(file("time,motor_inc,load_inc,torque\n", ",", encoder_counts)),
+            By("time=time:s,generator=motor_inc:count/2^24,output=load_inc:count/16777216,torque=torque:Nm"),
+        ),
+        (
+            "counts beside an angle",
+            gear(file("time,motor_inc,load_inc,torque,joint_angle\n", ",", |t, k| {
+                let mut fields = encoder_counts(t, k);
+                fields.push(format!("{:.8}", t.output_rad[k]));
+                fields
+            })),
+            Proposed,
+        ),
+        (
+            "a counter of 16 bits",
+            gear(file("time,motor,load,torque\n", ",", |t, k| {
+                let count = (t.generator_rad[k] / TAU * 4096.0).round() as i64;
+                with(plain(t, k), 1, (count.rem_euclid(65_536) - 32_768).to_string())
+            })),
+            By("time=time:s,generator=motor:count/4096,output=load:rad,torque=torque:N.m"),
+        ),
+        (
+            "angles within one turn",
+            gear(file("time,motor_deg,load_deg,torque\n", ",", |t, k| {
+                let wrapped = |angle: f64| format!("{:.7}", angle.to_degrees().rem_euclid(360.0));
+                let fields = with(plain(t, k), 1, wrapped(t.generator_rad[k]));
+                with(fields, 2, wrapped(t.output_rad[k] + 1.0))
+            })),
+            Proposed,
+        ),
+        (
+            "torque the other way round",
+            gear(file("time,motor,load,torque\n", ",", |t, k| {
+                with(plain(t, k), 3, format!("{:.4}", -t.torque_n_m[k]))
+            })),
+            Proposed,
+        ),
+        (
+            "a current",
+            gear(file("time,motor,load,current_mA\n", ",", |t, k| {
+                with(plain(t, k), 3, format!("{:.2}", 1000.0 * t.torque_n_m[k] / 3.5))
+            })),
+            By("time=time:s,generator=motor:rad,output=load:rad,torque=current_mA:mA*0.0035"),
+        ),
+        (
+            "newton centimetres, milliseconds, milliradians",
+            gear(file("ms,motor,load,torque\n", ",", |t, k| {
+                vec![
+                    format!("{:.2}", 1e3 * t.time_s[k]),
+                    format!("{:.5}", 1e3 * t.generator_rad[k]),
+                    format!("{:.6}", 1e3 * t.output_rad[k]),
+                    format!("{:.2}", 100.0 * t.torque_n_m[k]),
+                ]
+            })),
+            By("time=ms:ms,generator=motor:mrad,output=load:mrad,torque=torque:N.cm"),
+        ),
+        (
+            "dates",
+            gear(file("Timestamp;motor;load;torque\n", ";", |t, k| {
+                with(plain(t, k), 0, format!("2026-11-22 {}", day(t, k, 50_000.0)))
+            })),
+            Proposed,
+        ),
+        (
+            "time of day across midnight",
+            gear(file("time,motor,load,torque\n", ",", |t, k| with(plain(t, k), 0, day(t, k, 86_397.0)))),
+            Proposed,
+        ),
+        (
+            "milliseconds since 1970",
+            gear(file("timestamp,motor,load,torque\n", ",", |t, k| {
+                with(plain(t, k), 0, format!("{:.1}", 1e3 * (1.795e9 + t.time_s[k])))
+            })),
+            Proposed,
+        ),
+        (
+            "a slower torque",
+            gear(file("time,motor,load,torque\n", ",", |t, k| {
+                let fields = plain(t, k);
+                if k % 10 == 0 { fields } else { with(fields, 3, String::new()) }
+            })),
+            Proposed,
+        ),
+        (
+            "an error instead of the output",
+            gear(file("t_s,wave_gen_turns,error_arcsec\n", ",", |t, k| {
+                let error = (t.output_rad[k] - t.generator_rad[k] / RATIO) / ARCSEC;
+                vec![format!("{:.5}", t.time_s[k]), format!("{:.7}", t.generator_rad[k] / TAU), format!("{error:.4}")]
+            })),
+            NoTorque("time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec"),
+        ),
+        (
+            "words and empty columns",
+            gear(file("time;motor;load;torque;state;\n", ";", |t, k| {
+                let mut fields = plain(t, k);
+                fields.extend(["run".to_owned(), String::new()]);
+                fields
+            })),
+            Proposed,
+        ),
+        (
+            "names that the mapping cannot hold",
+            gear(file("t,motor: enc,load: enc,torque\n", ",", degrees)),
+            By("time=#1:s,generator=#2:deg,output=#3:deg,torque=#4:N.m"),
+        ),
+        // Damaged, or not said enough.
+        ("nothing", Vec::new(), NoTable(&["log.txt:1: ", "no rows of numbers"])),
+        ("prose", b"Measured on Tuesday.\nAll went well.\n".to_vec(), NoTable(&["no rows of numbers"])),
+        ("a workbook", b"PK\x03\x04\x14\0".to_vec(), NoTable(&["workbook", "save it as CSV"])),
+        ("UTF-16", vec![0xFF, 0xFE, b'a', 0], NoTable(&["UTF-16"])),
+        ("binary", (0..=255_u8).cycle().take(5000).collect(), NoTable(&["binary"])),
+        (
+            "ten rows",
+            gear(file("a;b\n", ";", plain).lines().take(11).collect::<Vec<_>>().join("\n")),
+            NoTable(&["10 rows", "16"]),
+        ),
+        (
+            "names of others",
+            gear(file("t;m;l;x\n", ";", plain)),
+            Refused("", &["column generator_rad is missing", "flexspline look"]),
+        ),
+        ("no names, no mapping", gear(file("", ";", plain)), Refused("", &["first line has numbers", "generator=#1"])),
+        (
+            "a separator that changes",
+            gear({
+                let text = file("time;motor;load;torque\n", ";", plain);
+                let (a, b) = text.split_at(text.find("\n5.8").unwrap() + 1);
+                a.to_owned() + &b.replace(';', ",")
+            }),
+            Refused("generator=motor:rad,output=load:rad", &["log.txt:14", "1 fields, but motor is field 2"]),
+        ),
+        (
+            "a word for a number",
+            gear(file("time;motor;load;torque\n", ";", |t, k| {
+                if k == 700 { with(plain(t, k), 2, "ERR".to_owned()) } else { plain(t, k) }
+            })),
+            Refused("generator=motor:rad,output=load:rad", &["log.txt:702: load: found \"ERR\""]),
+        ),
+        (
+            "another gear",
+            gear(file("time;motor;load;torque\n", ";", |t, k| {
+                with(plain(t, k), 2, format!("{:.7}", 1.9 * t.output_rad[k]))
+            })),
+            Refused("generator=motor:rad,output=load:rad", &["ratio", "--columns"]),
+        ),
+        (
+            "a column number that is not there",
+            gear(file("", ";", plain)),
+            Refused("generator=#2:rad,output=#9:rad", &["column #9 is missing", "the 4 columns"]),
+        ),
+    ]
+}
+
+fn looked_at(bytes: &[u8]) -> Result<Looked, String> {
+    let raw = raw::parse("log.txt", bytes).map_err(|error| error.to_string())?;
+    look(&[raw])
+}
+
+fn read(bytes: &[u8], columns: &str) -> Result<Recording, String> {
+    let map =
+        if columns.is_empty() { ColumnMap::default() } else { ColumnMap::parse(columns).map_err(|e| e.to_string())? };
+    parse("log.txt", bytes, &map, &Gear::of_ratio(RATIO)).map_err(|error| error.to_string())
+}
+
+/// Largest difference from the truth, each freed of its mean.
+fn off(read: &[f64], truth: &[f64]) -> f64 {
+    assert_eq!(read.len(), truth.len());
+    let n = read.len() as f64;
+    let mean = read.iter().zip(truth).map(|(a, b)| a - b).sum::<f64>() / n;
+    read.iter().zip(truth).map(|(a, b)| (a - b - mean).abs()).fold(0.0, f64::max)
+}
+
+/// Whether what was read is what the bench did.
+fn right(recording: &Recording, with_torque: bool) -> Result<(), String> {
+    let truth = truth();
+    if recording.sessions.len() != 1 || recording.sessions[0].len() != ROWS {
+        let rows: Vec<usize> = recording.sessions.iter().map(super::super::measurement::Session::len).collect();
+        return Err(format!("sessions of {rows:?} rows; {:?}", recording.faults));
+    }
+    let session = &recording.sessions[0];
+    let generator = off(&session.generator_rad, &truth.generator_rad);
+    let output = off(&session.output_rad(RATIO), &truth.output_rad);
+    // 4096 counts resolve 1.5e-3 rad.
+    if generator > 1.6e-3 || output > 2e-5 {
+        return Err(format!("generator off by {generator:e}, output by {output:e} rad"));
+    }
+    if let Some(time) = &session.time_s
+        && off(time, &truth.time_s) > 3e-4
+    {
+        return Err(format!("time off by {} s", off(time, &truth.time_s)));
+    }
+    match &session.torque_n_m {
+        Some(torque) if with_torque => {
+            // A straight line between values ten rows apart, held behind the last of them.
+            let off = torque.iter().zip(&truth.torque_n_m).take(ROWS - 10);
+            let off = off.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            if off > 0.1 { Err(format!("torque off by {off} N.m")) } else { Ok(()) }
+        }
+        None if !with_torque => Ok(()),
+        found => Err(format!("torque {}", if found.is_some() { "read" } else { "missing" })),
+    }
+}
+
+#[test]
+fn odd_files_are_read_right_or_end_in_one_clear_error() {
+    let cases = cases();
+    assert!(cases.len() >= 40, "{}", cases.len());
+    let mut wrong = Vec::new();
+    let mut messages = std::collections::BTreeSet::new();
+    let mut refused = 0;
+    for (name, bytes, ends) in &cases {
+        let outcome = match ends {
+            Proposed => looked_at(bytes).and_then(|looked| {
+                let columns = looked.columns_option.clone().ok_or_else(|| text(&looked))?;
+                read(bytes, &columns)
+                    .and_then(|recording| right(&recording, true))
+                    .map_err(|what| format!("by {columns}: {what}\n{}", text(&looked)))
+            }),
+            By(map) => looked_at(bytes).and_then(|_| read(bytes, map)).and_then(|recording| right(&recording, true)),
+            NoTorque(map) => {
+                looked_at(bytes).and_then(|_| read(bytes, map)).and_then(|recording| right(&recording, false))
+            }
+            Refused(_, said) | NoTable(said) => {
+                refused += 1;
+                let outcome = match ends {
+                    Refused(map, _) => read(bytes, map).map(|_| ()),
+                    _ => looked_at(bytes).map(|_| ()),
+                };
+                match outcome {
+                    Ok(()) => Err("was read".to_owned()),
+                    Err(message) => {
+                        messages.insert(message.clone());
+                        let missing = said.iter().find(|said| !message.contains(**said));
+                        missing.map_or(Ok(()), |missing| Err(format!("said {message:?}, without {missing:?}")))
+                    }
+                }
+            }
+        };
+        if let Err(what) = outcome {
+            wrong.push(format!("{name}: {what}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
+    // "nothing" and "prose" say the same of different lines.
+    assert!(messages.len() + 1 >= refused, "two mistakes got the same message: {messages:#?}");
+}
+
+#[test]
+fn what_is_found_is_said() {
+    let bytes = file("time,motor_inc,load_inc,torque,joint_angle,temp\n", ",", |t, k| {
+        let mut fields = encoder_counts(t, k);
+        fields[3] = format!("{:.4}", -t.torque_n_m[k]);
+        fields.push(format!("{:.8}", t.output_rad[k]));
+        fields.push(format!("{:.2}", t.temperature_c[k]));
+        fields
+    });
+    let looked = looked_at(bytes.as_bytes()).unwrap();
+    let by_role = |role: Role| looked.columns.iter().find(|column| column.used && column.role == role).unwrap();
+    assert_eq!(by_role(Role::Generator).counts_per_turn, Some(16_777_216.0));
+    assert_eq!(by_role(Role::Output).name, "load_inc");
+    assert_eq!(by_role(Role::Torque).unit.as_deref(), Some("-N.m"));
+    assert_eq!(looked.ratio_proposed, Some(101.0));
+    assert!((looked.ratio_found.unwrap() - 101.0).abs() < 0.5);
+    assert_eq!(looked.time, TimeKind::Measured);
+    let coverage = looked.coverage.as_ref().unwrap();
+    assert!(coverage.directions[0] > 0.6 && coverage.directions[1] > 0.3 && coverage.temperature_c.is_some());
+    assert!((coverage.generator_turns - 0.62 * 1000.0 / TAU).abs() < 0.2, "{}", coverage.generator_turns);
+    assert!(text(&looked).contains("ratio: ") && text(&looked).contains("output turn, forward"));
+    // Time that is counted; files of one form are sessions.
+    let counted =
+        file("time,motor,load,torque\n", ",", |t, k| with(plain(t, k), 0, format!("{:.3}", 0.004 * k as f64)));
+    let raw = raw::parse("a.csv", counted.as_bytes()).unwrap();
+    let two = look(&[raw.clone(), raw::RawFile { file: "b.csv".to_owned(), ..raw.clone() }]).unwrap();
+    assert_eq!((two.sessions, two.time, two.rows), (2, TimeKind::Counted, 2 * ROWS));
+    let other = raw::parse("c.csv", file("time,motor,load,x\n", ",", plain).as_bytes()).unwrap();
+    assert!(look(&[raw, other]).unwrap_err().contains("logs of one form"));
+}

@@ -1,0 +1,467 @@
+//! Units of columns, and how a written value becomes one: `deg`, `-N.m`, `count/16777216`, `A*3.5`, `V*20-0.4`.
+
+use std::fmt;
+
+/// Unit of a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// rad
+    Radian,
+    /// deg
+    Degree,
+    /// turn
+    Turn,
+    /// arcmin
+    Arcminute,
+    /// arcsec
+    Arcsecond,
+    /// mrad
+    Milliradian,
+    /// Counts of an encoder; how many make a turn has to be said.
+    Count,
+    /// s
+    Second,
+    /// ms
+    Millisecond,
+    /// us
+    Microsecond,
+    /// ns
+    Nanosecond,
+    /// min
+    Minute,
+    /// h
+    Hour,
+    /// Date and time, or time of day, as text.
+    Iso,
+    /// N.m
+    NewtonMetre,
+    /// N.cm
+    NewtonCentimetre,
+    /// mN.m
+    MillinewtonMetre,
+    /// kN.m
+    KilonewtonMetre,
+    /// lbf.in
+    PoundInch,
+    /// lbf.ft
+    PoundFoot,
+    /// A: a current; its torque for an ampere has to be said.
+    Ampere,
+    /// mA, likewise.
+    Milliampere,
+    /// V of a transducer, likewise.
+    Volt,
+    /// C
+    Celsius,
+    /// K
+    Kelvin,
+    /// F
+    Fahrenheit,
+}
+
+/// The pound-force, N: 0.453 592 37 kg (1959) times the standard acceleration 9.806 65 m/s².
+const POUND_FORCE_N: f64 = 4.448_221_615_260_5;
+
+impl Unit {
+    fn all() -> impl Iterator<Item = Unit> {
+        let rest = Self::OF_TIME.into_iter().chain(Self::OF_TORQUE).chain(Self::OF_TEMPERATURE);
+        Self::OF_ANGLES.into_iter().chain(rest)
+    }
+
+    /// Units of angle that one may take for another, the largest name first that a slip of the pen takes for another.
+    pub const ANGLES: [Unit; 5] = [Unit::Radian, Unit::Degree, Unit::Turn, Unit::Arcminute, Unit::Arcsecond];
+
+    /// Units of angle of a column.
+    pub(super) const OF_ANGLES: [Unit; 7] =
+        [Unit::Radian, Unit::Degree, Unit::Turn, Unit::Arcminute, Unit::Arcsecond, Unit::Milliradian, Unit::Count];
+    /// Units of time.
+    pub(super) const OF_TIME: [Unit; 7] =
+        [Unit::Second, Unit::Millisecond, Unit::Microsecond, Unit::Nanosecond, Unit::Minute, Unit::Hour, Unit::Iso];
+    /// Units of torque, and of what is proportional to it.
+    pub(super) const OF_TORQUE: [Unit; 9] = [
+        Unit::NewtonMetre,
+        Unit::NewtonCentimetre,
+        Unit::MillinewtonMetre,
+        Unit::KilonewtonMetre,
+        Unit::PoundInch,
+        Unit::PoundFoot,
+        Unit::Ampere,
+        Unit::Milliampere,
+        Unit::Volt,
+    ];
+    /// Units of temperature.
+    pub(super) const OF_TEMPERATURE: [Unit; 3] = [Unit::Celsius, Unit::Kelvin, Unit::Fahrenheit];
+
+    /// Its name in a mapping.
+    pub fn name(self) -> &'static str {
+        match self {
+            Unit::Radian => "rad",
+            Unit::Degree => "deg",
+            Unit::Turn => "turn",
+            Unit::Arcminute => "arcmin",
+            Unit::Arcsecond => "arcsec",
+            Unit::Milliradian => "mrad",
+            Unit::Count => "count",
+            Unit::Second => "s",
+            Unit::Millisecond => "ms",
+            Unit::Microsecond => "us",
+            Unit::Nanosecond => "ns",
+            Unit::Minute => "min",
+            Unit::Hour => "h",
+            Unit::Iso => "iso",
+            Unit::NewtonMetre => "N.m",
+            Unit::NewtonCentimetre => "N.cm",
+            Unit::MillinewtonMetre => "mN.m",
+            Unit::KilonewtonMetre => "kN.m",
+            Unit::PoundInch => "lbf.in",
+            Unit::PoundFoot => "lbf.ft",
+            Unit::Ampere => "A",
+            Unit::Milliampere => "mA",
+            Unit::Volt => "V",
+            Unit::Celsius => "C",
+            Unit::Kelvin => "K",
+            Unit::Fahrenheit => "F",
+        }
+    }
+
+    /// One of it in the unit used inside: rad, s, N·m, °C. Of a count, an ampere and a volt what the gain makes of it: turns, N·m.
+    pub fn factor(self) -> f64 {
+        use std::f64::consts::TAU;
+        match self {
+            Unit::Degree => TAU / 360.0,
+            Unit::Turn | Unit::Count => TAU,
+            Unit::Arcminute => TAU / 21_600.0,
+            Unit::Arcsecond => TAU / 1_296_000.0,
+            Unit::Milliradian | Unit::Millisecond | Unit::MillinewtonMetre => 1e-3,
+            Unit::Microsecond => 1e-6,
+            Unit::Nanosecond => 1e-9,
+            Unit::Minute => 60.0,
+            Unit::Hour => 3600.0,
+            Unit::NewtonCentimetre => 1e-2,
+            Unit::KilonewtonMetre => 1e3,
+            Unit::PoundInch => POUND_FORCE_N * 0.0254,
+            Unit::PoundFoot => POUND_FORCE_N * 0.3048,
+            Unit::Fahrenheit => 5.0 / 9.0,
+            Unit::Radian
+            | Unit::Second
+            | Unit::Iso
+            | Unit::NewtonMetre
+            | Unit::Ampere
+            | Unit::Milliampere
+            | Unit::Volt
+            | Unit::Celsius
+            | Unit::Kelvin => 1.0,
+        }
+    }
+
+    /// Its zero in the unit used inside.
+    pub fn zero(self) -> f64 {
+        match self {
+            Unit::Kelvin => -273.15,
+            Unit::Fahrenheit => -160.0 / 9.0,
+            _ => 0.0,
+        }
+    }
+
+    /// A unit as it stands in a line of units, with or without brackets.
+    #[must_use]
+    pub fn in_brackets(field: &str) -> Option<Unit> {
+        Unit::written(super::layout::unit_word(field))
+    }
+
+    /// Whether it is one of angle.
+    #[must_use]
+    pub fn is_of_angles(self) -> bool {
+        Unit::OF_ANGLES.contains(&self)
+    }
+
+    /// Whether it is one of time.
+    #[must_use]
+    pub fn is_of_time(self) -> bool {
+        Unit::OF_TIME.contains(&self)
+    }
+
+    /// Whether it is one of torque, or of what is proportional to it.
+    #[must_use]
+    pub fn is_of_torque(self) -> bool {
+        Unit::OF_TORQUE.contains(&self)
+    }
+
+    /// Whether it is one of temperature.
+    #[must_use]
+    pub fn is_of_temperature(self) -> bool {
+        Unit::OF_TEMPERATURE.contains(&self)
+    }
+
+    /// What has to be said beside a unit that is none by itself.
+    fn needs_gain(self) -> Option<&'static str> {
+        match self {
+            Unit::Count => Some("how many counts make a turn, for instance count/16777216"),
+            Unit::Ampere => Some("the torque at the output for an ampere, for instance A*3.5, or --torque-constant"),
+            Unit::Milliampere => {
+                Some("the torque at the output for a milliampere, for instance mA*0.0035, or --torque-constant")
+            }
+            Unit::Volt => Some("the torque for a volt, for instance V*20"),
+            _ => None,
+        }
+    }
+
+    /// The unit that people write so, if it is one.
+    pub(super) fn written(text: &str) -> Option<Unit> {
+        if let Some(unit) = Unit::all().find(|unit| unit.name() == text) {
+            return Some(unit);
+        }
+        Some(match text {
+            "°" => Unit::Degree,
+            "turns" | "rev" | "revs" => Unit::Turn,
+            "counts" | "cnt" | "inc" | "incs" | "tick" | "ticks" => Unit::Count,
+            "sec" => Unit::Second,
+            "µs" | "μs" => Unit::Microsecond,
+            "Nm" | "N·m" | "N*m" | "N-m" | "N m" => Unit::NewtonMetre,
+            "Ncm" | "N·cm" => Unit::NewtonCentimetre,
+            "mNm" | "mN·m" => Unit::MillinewtonMetre,
+            "kNm" | "kN·m" => Unit::KilonewtonMetre,
+            "in.lbf" | "in-lb" | "lb-in" | "lbf-in" => Unit::PoundInch,
+            "ft.lbf" | "ft-lb" | "lb-ft" | "lbf-ft" => Unit::PoundFoot,
+            "°C" | "degC" => Unit::Celsius,
+            "°F" | "degF" => Unit::Fahrenheit,
+            _ => return None,
+        })
+    }
+
+    /// The unit that a column is in if its name says it: `wave_gen_turn`, `error_arcsec`, `Winkel [deg]`, `load (Nm)`.
+    #[must_use]
+    pub fn in_name(column: &str) -> Option<Unit> {
+        for (open, close) in [('[', ']'), ('(', ')')] {
+            if let Some(inside) = column.trim_end().strip_suffix(close).and_then(|rest| rest.rsplit_once(open)) {
+                return Unit::written(inside.1.trim());
+            }
+        }
+        let endings = [
+            ("_rad", Unit::Radian),
+            ("_mrad", Unit::Milliradian),
+            ("_deg", Unit::Degree),
+            ("_turn", Unit::Turn),
+            ("_turns", Unit::Turn),
+            ("_rev", Unit::Turn),
+            ("_arcmin", Unit::Arcminute),
+            ("_arcsec", Unit::Arcsecond),
+            ("_counts", Unit::Count),
+            ("_count", Unit::Count),
+            ("_s", Unit::Second),
+            ("_ms", Unit::Millisecond),
+            ("_us", Unit::Microsecond),
+            ("_ns", Unit::Nanosecond),
+            ("_n_m", Unit::NewtonMetre),
+            ("_Nm", Unit::NewtonMetre),
+            ("_nm", Unit::NewtonMetre),
+            ("_mNm", Unit::MillinewtonMetre),
+            ("_Ncm", Unit::NewtonCentimetre),
+            ("_mA", Unit::Milliampere),
+            ("_A", Unit::Ampere),
+            ("_V", Unit::Volt),
+            ("_c", Unit::Celsius),
+            ("_C", Unit::Celsius),
+            ("_degC", Unit::Celsius),
+            ("_k", Unit::Kelvin),
+            ("_K", Unit::Kelvin),
+        ];
+        endings.iter().find(|(end, _)| column.ends_with(end)).map(|(_, unit)| *unit)
+    }
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// How a number of a column is read: `gain · number + offset` in a unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// Unit of the result; a count is then a turn.
+    pub unit: Unit,
+    /// What a number is multiplied with first.
+    pub gain: f64,
+    /// What is added then, in the unit.
+    pub offset: f64,
+}
+
+impl Reading {
+    /// A number as it stands, in a unit.
+    pub fn of(unit: Unit) -> Reading {
+        Reading { unit, gain: 1.0, offset: 0.0 }
+    }
+
+    /// A number in the unit used inside: rad, s, N·m, °C.
+    pub fn value(&self, number: f64) -> f64 {
+        // Exactly as it was before there were gains.
+        let scaled = if self.gain == 1.0 && self.offset == 0.0 { number } else { self.gain * number + self.offset };
+        scaled * self.unit.factor() + self.unit.zero()
+    }
+
+    /// The unit in which faults are looked for: a count divided is a turn.
+    pub(super) fn plain_unit(&self) -> Unit {
+        if self.unit == Unit::Count { Unit::Turn } else { self.unit }
+    }
+
+    /// Reads `[-]unit` and any number of `*g`, `/g`, `+o`, `-o`, done from left to right; numbers may be `2^24`. `torque_per_ampere` stands
+    /// in where a current has no gain.
+    ///
+    /// # Errors
+    /// What was found and what is allowed; the unit itself if it is not known or not one of `allowed`.
+    pub(super) fn parse(text: &str, allowed: &[Unit], torque_per_ampere: Option<f64>) -> Result<Reading, Wrong> {
+        let text = text.trim();
+        if let Some(unit) = Unit::written(text).filter(|unit| allowed.contains(unit)) {
+            return Reading::of(unit).complete(false, torque_per_ampere);
+        }
+        let (sign, rest) = text.strip_prefix('-').map_or((1.0, text), |rest| (-1.0, rest.trim_start()));
+        let end = rest.find(['*', '/', '+', '-']).unwrap_or(rest.len());
+        let word = rest[..end].trim();
+        let unit =
+            Unit::written(word).filter(|unit| allowed.contains(unit)).ok_or_else(|| Wrong::Unit(word.to_owned()))?;
+        let (mut gain, mut offset, mut scaled) = (sign, 0.0, false);
+        let mut rest = rest[end..].trim_start();
+        while let Some(operator) = rest.chars().next() {
+            let (number, after) = leading_number(rest[1..].trim_start()).ok_or_else(|| Wrong::Text(format!(
+                "found \"{rest}\" after the unit, allowed: *, /, + or - and a number, for instance count/16777216 or V*20-0.4"
+            )))?;
+            match operator {
+                '*' => (gain, offset, scaled) = (gain * number, offset * number, true),
+                '/' => (gain, offset, scaled) = (gain / number, offset / number, true),
+                '+' => offset += number,
+                _ => offset -= number,
+            }
+            rest = after.trim_start();
+        }
+        if !(gain.is_finite() && offset.is_finite() && gain != 0.0) {
+            return Err(Wrong::Text(format!("found \"{text}\", allowed: a gain that is finite and not zero")));
+        }
+        Reading { unit, gain, offset }.complete(scaled, torque_per_ampere)
+    }
+
+    /// With the gain that a current has without being told, or the error that one is missing.
+    fn complete(mut self, scaled: bool, torque_per_ampere: Option<f64>) -> Result<Reading, Wrong> {
+        let Some(needs) = self.unit.needs_gain().filter(|_| !scaled) else { return Ok(self) };
+        let ampere = match self.unit {
+            Unit::Ampere => torque_per_ampere,
+            Unit::Milliampere => torque_per_ampere.map(|torque| 1e-3 * torque),
+            _ => None,
+        };
+        self.gain *= ampere.ok_or_else(|| Wrong::Text(format!("{} needs a number: {needs}", self.unit)))?;
+        Ok(self)
+    }
+}
+
+/// Why a reading is none.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Wrong {
+    /// This is no unit, or none of the column's.
+    Unit(String),
+    /// What was found and what is allowed.
+    Text(String),
+}
+
+/// A number at the beginning of a text, such as `1e-3` or `2^24`, and what follows it.
+fn leading_number(text: &str) -> Option<(f64, &str)> {
+    let plain = |text: &str| {
+        let mut end = 0;
+        let mut exponent = false;
+        let bytes = text.as_bytes();
+        while let Some(byte) = bytes.get(end) {
+            let digit = byte.is_ascii_digit() || *byte == b'.';
+            let begins = !exponent && end > 0 && matches!(byte, b'e' | b'E');
+            let sign = matches!(byte, b'+' | b'-') && (end == 0 || matches!(bytes[end - 1], b'e' | b'E'));
+            if !(digit || begins || sign) {
+                break;
+            }
+            exponent |= begins;
+            end += 1;
+        }
+        text[..end].parse::<f64>().ok().map(|number| (number, end))
+    };
+    let (base, end) = plain(text)?;
+    let rest = &text[end..];
+    match rest.strip_prefix('^') {
+        None => Some((base, rest)),
+        Some(power) => plain(power).map(|(exponent, end)| (base.powf(exponent), &power[end..])),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_convert() {
+        for (unit, angle) in Unit::ANGLES.into_iter().zip([std::f64::consts::TAU, 360.0, 1.0, 21_600.0, 1_296_000.0]) {
+            assert!((unit.factor() * angle - std::f64::consts::TAU).abs() < 1e-12, "{unit}");
+        }
+        let read =
+            |text: &str, allowed: &[Unit], number: f64| Reading::parse(text, allowed, None).unwrap().value(number);
+        assert_eq!(read("K", &Unit::OF_TEMPERATURE, 300.0), 300.0 - 273.15);
+        assert!((read("F", &Unit::OF_TEMPERATURE, 212.0) - 100.0).abs() < 1e-12);
+        assert!((read("lbf.ft", &Unit::OF_TORQUE, 1.0) - 1.355_817_948_331_400_4).abs() < 1e-12);
+        assert!((read("min", &Unit::OF_TIME, 2.0) - 120.0).abs() < 1e-12);
+        for unit in Unit::all() {
+            assert_eq!(Unit::written(unit.name()), Some(unit));
+        }
+    }
+
+    #[test]
+    fn a_reading_has_a_sign_a_gain_and_an_offset() {
+        use std::f64::consts::TAU;
+        for (text, allowed, number, due) in [
+            ("count/16777216", &Unit::OF_ANGLES[..], 4_194_304.0, TAU / 4.0),
+            ("-count/2^24", &Unit::OF_ANGLES, 4_194_304.0, -TAU / 4.0),
+            ("turn/100", &Unit::OF_ANGLES, 50.0, TAU / 2.0),
+            ("-deg", &Unit::OF_ANGLES, 90.0, -TAU / 4.0),
+            ("deg*2+10", &Unit::OF_ANGLES, 40.0, TAU / 4.0),
+            (" - mrad * 1e1 ", &Unit::OF_ANGLES, 100.0, -1.0),
+            ("Nm", &Unit::OF_TORQUE, 2.0, 2.0),
+            ("N.cm", &Unit::OF_TORQUE, 200.0, 2.0),
+            ("V*20-0.5", &Unit::OF_TORQUE, 0.1, 1.5),
+            ("mA*0.0035", &Unit::OF_TORQUE, 1000.0, 3.5),
+            ("N-m", &Unit::OF_TORQUE, 2.0, 2.0),
+            ("us", &Unit::OF_TIME, 2e6, 2.0),
+        ] {
+            let reading = Reading::parse(text, allowed, None).unwrap_or_else(|wrong| panic!("{text}: {wrong:?}"));
+            assert!((reading.value(number) - due).abs() < 1e-9, "{text}: {}", reading.value(number));
+        }
+        let amperes = Reading::parse("-mA", &Unit::OF_TORQUE, Some(3.5)).unwrap();
+        assert!((amperes.value(2000.0) + 7.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_wrong_reading_says_what_is_missing() {
+        for (text, allowed, said) in [
+            ("count", &Unit::OF_ANGLES[..], "counts make a turn"),
+            ("A", &Unit::OF_TORQUE, "--torque-constant"),
+            ("deg*", &Unit::OF_ANGLES, "found \"*\""),
+            ("deg*0", &Unit::OF_ANGLES, "not zero"),
+            ("deg/0", &Unit::OF_ANGLES, "finite"),
+            ("deg*2x", &Unit::OF_ANGLES, "after the unit"),
+        ] {
+            match Reading::parse(text, allowed, None) {
+                Err(Wrong::Text(what)) => assert!(what.contains(said), "{text}: {what}"),
+                other => panic!("{text}: {other:?}"),
+            }
+        }
+        assert_eq!(Reading::parse("grad", &Unit::OF_ANGLES, None), Err(Wrong::Unit("grad".to_owned())));
+        assert_eq!(Reading::parse("deg", &Unit::OF_TIME, None), Err(Wrong::Unit("deg".to_owned())));
+    }
+
+    #[test]
+    fn a_name_says_its_unit() {
+        for (name, unit) in [
+            ("wave_gen_turns", Unit::Turn),
+            ("Winkel [°]", Unit::Degree),
+            ("load (Nm)", Unit::NewtonMetre),
+            ("torque_Nm", Unit::NewtonMetre),
+            ("t_ms", Unit::Millisecond),
+        ] {
+            assert_eq!(Unit::in_name(name), Some(unit), "{name}");
+        }
+        assert_eq!(Unit::in_name("psi"), None);
+    }
+}
