@@ -159,12 +159,6 @@ impl White {
         self.columns.len()
     }
 
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.columns.is_empty()
-    }
-
     /// Products of the columns with base, data, and themselves, column by column.
     fn bare_products(&self, problem: &Problem<'_>) -> &[f64] {
         self.products.get_or_init(|| {
@@ -301,12 +295,6 @@ impl<'l> Term<'l> {
     #[must_use]
     pub fn len(&self) -> usize {
         self.white.len()
-    }
-
-    /// Whether the law gave no column.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.white.is_empty()
     }
 
     /// What the term adds to the error, averaged.

@@ -110,18 +110,6 @@ impl Whitener {
         &self.groups
     }
 
-    /// Averages.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.groups.len()
-    }
-
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.groups.is_empty()
-    }
-
     /// Averages of a column.
     #[must_use]
     pub fn average(&self, column: &[f64]) -> Vec<f64> {
