@@ -131,7 +131,7 @@ pub fn diagnose(
     diagnose_extended(sessions, nominal, table, settings, progress).map(|(diagnosis, _)| diagnosis)
 }
 
-/// The same, with the model that was found, to predict other rows with.
+/// Diagnoses, and gives the model that was found, to predict other rows with.
 ///
 /// # Errors
 /// As [`diagnose`].

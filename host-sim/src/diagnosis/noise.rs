@@ -40,7 +40,7 @@ pub struct Whitener {
     scale: Vec<f64>,
     /// Decay of the wander to the next average.
     decay: Vec<f64>,
-    /// The same, ready for use.
+    /// Gain, scale and decay, ready for use.
     filter: Vec<Step>,
 }
 

@@ -93,7 +93,7 @@ pub struct Validation {
     pub rms_arcsec: f64,
     /// Largest difference, arcsec.
     pub max_arcsec: f64,
-    /// The same in the reversal alone.
+    /// Root mean square of the difference between table and FEM in the reversal alone, arcsec.
     pub reversal_rms_arcsec: f64,
     /// Largest difference in the reversal, arcsec.
     pub reversal_max_arcsec: f64,
