@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::context::quoted;
 use super::{Context, Failure, names, say};
-use crate::drive::{DriveError, FewNumbers, GeneratorKind, MadeDrive};
+use crate::drive::{Drive, DriveError, FewNumbers, GeneratorKind, MadeDrive};
 use crate::nominal::Nominal;
 use crate::output::write_whole;
 
@@ -87,32 +87,33 @@ struct Written {
 impl New {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let few = self.few()?;
-        if few.is_some() && context.has_drive() {
-            let what = "--drive: found it beside --teeth, --module or --like; give one of them";
-            return Err(Failure::BadInput(what.to_owned()));
-        }
-        let drive = match &self.from {
-            Some(name) if context.has_drive() => {
+        let made = match few {
+            Some(_) if context.has_drive() => {
+                let what = "--drive: found it beside --teeth, --module or --like; give one of them";
+                return Err(Failure::BadInput(what.to_owned()));
+            }
+            Some((name, few)) => Some(few.drive(&name).map_err(|error| refused(&error, self.like.is_some()))?),
+            None => None,
+        };
+        let drive = match (&made, &self.from) {
+            (Some(made), _) => context.with_sets(made.drive.clone())?,
+            (None, Some(name)) if context.has_drive() => {
                 let what = format!("--from: found {name:?} beside --drive, which says the same; give one of the two");
                 return Err(Failure::BadInput(what));
             }
-            Some(name) => context.drive_called("--from", name)?,
-            None => context.drive()?,
+            (None, Some(name)) => context.drive_called("--from", name)?,
+            (None, None) => context.drive()?,
         };
         self.check()?;
         let shown = self.file.display().to_string();
         let file = quoted(&shown);
         let kind = self.kind.unwrap_or_else(|| self.kind_by_name());
-        let made = few
-            .map(|(name, few)| few.drive(&name).map_err(|error| refused(&error, self.like.is_some())))
-            .transpose()?;
-        let drive = made.as_ref().map_or(drive, |made| made.drive.clone());
         let (text, drive_hash, next) = match kind {
             Kind::Drive => {
                 let hash = blake3::Hash::from_bytes(drive.hash()).to_hex().to_string();
                 let next =
                     [format!("flexspline drive --check --drive {file}"), format!("flexspline tables --drive {file}")];
-                (made.as_ref().map_or_else(|| drive.to_toml(), with_formulas), Some(hash), next)
+                (made.as_ref().map_or_else(|| drive.to_toml(), |made| with_formulas(made, &drive)), Some(hash), next)
             }
             Kind::Nominal => {
                 let next = [
@@ -232,16 +233,17 @@ fn refused(error: &DriveError, like: bool) -> Failure {
     Failure::BadInput(says.collect::<Vec<_>>().join("\n"))
 }
 
-/// The drive's file with a formula above every field that was derived.
-fn with_formulas(made: &MadeDrive) -> String {
+/// The drive's file with a formula above every field that was derived and not set to something else.
+fn with_formulas(made: &MadeDrive, drive: &Drive) -> String {
     let mut section = String::new();
     let mut text = String::new();
-    for line in made.drive.to_toml().lines() {
+    for (derived, line) in made.drive.to_toml().lines().zip(drive.to_toml().lines()) {
         if let Some((name, _)) = line.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
             section = name.to_owned();
         }
         let path = line.split_once(" = ").map(|(key, _)| format!("{section}.{key}"));
-        if let Some((_, formula)) = made.formulas.iter().find(|(of, _)| path.as_deref() == Some(of)) {
+        let formula = made.formulas.iter().find(|(of, _)| path.as_deref() == Some(of));
+        if let Some((_, formula)) = formula.filter(|_| line == derived) {
             text += &format!("# {formula}\n");
         }
         text += line;
