@@ -436,7 +436,7 @@ pub extern "C" fn flexspline_store_activate(
             ActivateError::TwoTables => FlexsplineStatus::TwoTables,
             ActivateError::OtherDrive => FlexsplineStatus::OtherDrive,
             ActivateError::SameImage => FlexsplineStatus::SameImage,
-            ActivateError::Temperature { .. } => FlexsplineStatus::Argument,
+            ActivateError::Temperature { .. } | ActivateError::Torn => FlexsplineStatus::Argument,
         })
     };
     status(activate())

@@ -52,6 +52,12 @@ pub struct Phases {
 }
 
 impl Drive {
+    /// That of one tooth and one wave, where there is none yet.
+    pub(crate) const SMALLEST: Self = match Self::new(1, 2, FixedMember::Flexspline) {
+        Ok(drive) => drive,
+        Err(_) => loop {},
+    };
+
     /// A drive from its tooth counts.
     ///
     /// # Errors

@@ -223,7 +223,8 @@ pub use joint::{
 };
 pub use play::{Direction, PlayState, SAVED_STATE_BYTES};
 pub use store::{
-    ActivateError, Counters, Health, Images, STORE_PAGES, STORE_WORDS, Store, Upload, UploadError, mend_page,
+    ActivateError, Activation, Counters, Health, Images, Progress, STORE_PAGES, STORE_WORDS, Store, Upload,
+    UploadError, mend_page,
 };
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]

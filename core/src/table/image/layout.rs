@@ -84,6 +84,8 @@ pub(super) struct Layout {
 }
 
 impl Layout {
+    pub const NONE: Self = Self { curves: [0; 3], nodes: 0, node_plane: 0, records: 0, record: 0, end: 0 };
+
     pub const fn new(torque: usize, temperature: usize, ripple: usize, [a, b, c]: [usize; 3]) -> Self {
         let curve_b = word::CURVES.saturating_add(stored(a));
         let curve_c = curve_b.saturating_add(stored(b));

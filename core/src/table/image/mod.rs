@@ -62,6 +62,7 @@ mod sums;
 mod tests;
 mod write;
 
+pub(crate) use check::Check;
 pub use layout::{
     FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, TEXT_BYTES, image_bytes,
 };

@@ -8,8 +8,8 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use flexspline::{
-    Approach, Command, GeneratorAngle, Images, Input, Joint, JointState, Measured, Mode, OperatingPoint, Output,
-    OutputAngle, PlayState, Prediction, Predictor, PredictorState, Store, parts,
+    Activation, Approach, Command, GeneratorAngle, Images, Input, Joint, JointState, Measured, Mode, OperatingPoint,
+    Output, OutputAngle, PlayState, Prediction, Predictor, PredictorState, Progress, Store, parts,
 };
 use flexspline_firmware::count::{Counter, Range};
 use flexspline_firmware::trajectory::{JOINT, Mixed, Trajectory};
@@ -84,6 +84,29 @@ fn measure_observer(counter: &Counter) -> Option<Range> {
     Some(range)
 }
 
+#[inline(never)]
+fn step(activation: &mut Activation, store: &mut Store, images: &Images<'_>) -> Option<Progress> {
+    activation.step(store, images).ok()
+}
+
+/// The costliest step of an activation, and how many there are.
+fn measure_activation(counter: &Counter, name: &str, [first, second]: [&[u8]; 2]) -> Option<()> {
+    let images = Images::new(first, second);
+    let (mut store, mut range, mut all) = (Store::new(), Range::default(), [0; 2]);
+    let mut activation = Store::begin(JOINT.drive(), 21.0).ok()?;
+    loop {
+        let (count, progress) = counter.of(|| black_box(step(&mut activation, &mut store, &images)));
+        range.add(count);
+        all = [all[0] + 1, all[1] + count];
+        if matches!(progress?, Progress::Done(_)) {
+            break;
+        }
+    }
+    let [steps, sum] = all;
+    hprintln!("{} activation: {} instructions (min {}), {} steps, {} in all", name, range.max, range.min, steps, sum);
+    Some(())
+}
+
 /// Ranges of one table, by name.
 type Ranges = [(&'static str, Range); 8];
 
@@ -143,6 +166,11 @@ fn main() -> ! {
     }
     if measure(&counter, "all-curves", FULL).is_none() {
         finish(false);
+    }
+    for (name, images) in TABLES.into_iter().chain([("full", FULL)]) {
+        if measure_activation(&counter, name, images).is_none() {
+            finish(false);
+        }
     }
     let Some(observer) = measure_observer(&counter) else { finish(false) };
     // The observer is part of a step.
