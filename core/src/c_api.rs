@@ -22,8 +22,9 @@ pub use beside::*;
 use beside::{health_code, quality_code};
 
 use crate::{
-    ActivateError, Adjustment, Counters, Drive, FORMAT_VERSION, FixedMember, Flags, GeneratorAngle, ImageError, Images,
-    Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun, RestoreError, SAVED_JOINT_BYTES, Store, mend_page,
+    ActivateError, Activation, Adjustment, Counters, Drive, FORMAT_VERSION, FixedMember, Flags, GeneratorAngle,
+    ImageError, Images, Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun, Progress, RestoreError,
+    SAVED_JOINT_BYTES, Store, mend_page,
 };
 use core::ffi::c_char;
 use core::mem::{MaybeUninit, align_of, size_of};
@@ -70,6 +71,8 @@ pub enum FlexsplineStatus {
     /// The image is whole and its wind-up is none that a drive has: a flank falls while the load grows (the sign of the torque?),
     /// or rises too fast.
     Implausible = 16,
+    /// What was kept of an activation is not whole: begin again.
+    Torn = 17,
 }
 
 /// There was no sample.
@@ -99,6 +102,8 @@ pub const FLEXSPLINE_STORE_WORDS: usize = 1072;
 pub const FLEXSPLINE_JOINT_WORDS: usize = 32;
 /// Eight-byte words of a [`FlexsplineState`].
 pub const FLEXSPLINE_STATE_WORDS: usize = 24;
+/// Eight-byte words of a [`FlexsplineActivation`].
+pub const FLEXSPLINE_ACTIVATION_WORDS: usize = 88;
 /// Bytes of a saved state.
 pub const FLEXSPLINE_SAVED_BYTES: usize = 72;
 
@@ -107,6 +112,13 @@ pub const FLEXSPLINE_SAVED_BYTES: usize = 72;
 #[derive(Debug)]
 pub struct FlexsplineStore {
     opaque: [MaybeUninit<u64>; FLEXSPLINE_STORE_WORDS],
+}
+
+/// A table on its way into a store.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplineActivation {
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_ACTIVATION_WORDS],
 }
 
 /// The settings of a joint.
@@ -254,6 +266,7 @@ struct Marked<T> {
 const STORE_MARK: u32 = 0x7853_5446;
 const JOINT_MARK: u32 = 0x784a_5446;
 const STATE_MARK: u32 = 0x7841_5446;
+const ACTIVATION_MARK: u32 = 0x7856_5446;
 
 const _: () = {
     assert!(size_of::<Marked<Store>>() <= size_of::<FlexsplineStore>());
@@ -262,6 +275,8 @@ const _: () = {
     assert!(
         align_of::<Marked<Store>>() <= 8 && align_of::<Marked<Joint>>() <= 8 && align_of::<Marked<JointState>>() <= 8
     );
+    assert!(size_of::<Marked<Activation>>() <= size_of::<FlexsplineActivation>());
+    assert!(align_of::<Marked<Activation>>() <= 8);
     assert!(FLEXSPLINE_SAVED_BYTES == SAVED_JOINT_BYTES);
 };
 
@@ -430,16 +445,65 @@ pub extern "C" fn flexspline_store_activate(
         let images = images(table, [span(store)])?;
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
-        store.activate(&images, joint.drive(), temperature_c).map(|_| ()).map_err(|error| match error {
-            ActivateError::Image(error) => image_status(error),
-            ActivateError::TooLarge { .. } | ActivateError::TooManyPages { .. } => FlexsplineStatus::TooLarge,
-            ActivateError::TwoTables => FlexsplineStatus::TwoTables,
-            ActivateError::OtherDrive => FlexsplineStatus::OtherDrive,
-            ActivateError::SameImage => FlexsplineStatus::SameImage,
-            ActivateError::Temperature { .. } | ActivateError::Torn => FlexsplineStatus::Argument,
-        })
+        store.activate(&images, joint.drive(), temperature_c).map(|_| ()).map_err(activate_status)
     };
     status(activate())
+}
+
+/// Why a table is not activated.
+fn activate_status(error: ActivateError) -> FlexsplineStatus {
+    match error {
+        ActivateError::Image(error) => image_status(error),
+        ActivateError::TooLarge { .. } | ActivateError::TooManyPages { .. } => FlexsplineStatus::TooLarge,
+        ActivateError::TwoTables => FlexsplineStatus::TwoTables,
+        ActivateError::OtherDrive => FlexsplineStatus::OtherDrive,
+        ActivateError::SameImage => FlexsplineStatus::SameImage,
+        ActivateError::Temperature { .. } => FlexsplineStatus::Argument,
+        ActivateError::Torn => FlexsplineStatus::Torn,
+    }
+}
+
+/// Begins to bring a table into a store in short steps, between ticks.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_activation_begin(
+    activation: *mut FlexsplineActivation,
+    joint: *const FlexsplineJoint,
+    temperature_c: f32,
+) -> FlexsplineStatus {
+    let begin = || {
+        apart([span(activation), span(joint)])?;
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let begun = Store::begin(joint.drive(), temperature_c).map_err(activate_status)?;
+        put(activation, ACTIVATION_MARK, begun)
+    };
+    status(begin())
+}
+
+/// A step: the same store and images with each, until `progress` is 2. 0: the images are checked, the store is as it was; 1: the store is
+/// filled, and has no table meanwhile; 2: the table is in use. If a step fails the activation is over; begin again.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_activation_step(
+    activation: *mut FlexsplineActivation,
+    store: *mut FlexsplineStore,
+    table: *const FlexsplineImages,
+    progress: *mut u8,
+) -> FlexsplineStatus {
+    let step = || {
+        apart([span(activation), span(store), span(progress)])?;
+        usable(progress)?;
+        let images = images(table, [span(activation), span(store), span(progress)])?;
+        let activation: &mut Activation = get_mut(activation, ACTIVATION_MARK)?;
+        let store: &mut Store = get_mut(store, STORE_MARK)?;
+        let code = match activation.step(store, &images).map_err(activate_status)? {
+            Progress::Checking => 0,
+            Progress::Filling => 1,
+            Progress::Done(_) => 2,
+        };
+        // SAFETY: not null; the caller's, apart from everything else.
+        unsafe { progress.write(code) };
+        Ok(())
+    };
+    status(step())
 }
 
 /// Tells the temperature, degrees C: in a slow rate group.
@@ -857,6 +921,41 @@ mod tests {
         assert_eq!(flexspline_store_set_temperature(&mut *o.store, &table, 30.0), FlexsplineStatus::Ok);
         assert_eq!(flexspline_store_set_temperature(&mut *o.store, &table, f32::NAN), FlexsplineStatus::Argument);
         assert_eq!(flexspline_store_check_images(&mut *o.store, &table, 100), FlexsplineStatus::Ok);
+    }
+
+    #[test]
+    fn a_table_is_activated_in_steps() {
+        let image = fixture::image(false);
+        let (mut o, table) = (made(), pair(&image));
+        let mut activation = Box::new(FlexsplineActivation { opaque: [MaybeUninit::new(7); _] });
+        let mut progress = 9;
+        let step = |o: &mut Objects, activation: &mut FlexsplineActivation, progress: &mut u8| {
+            flexspline_activation_step(activation, &mut *o.store, &table, progress)
+        };
+        assert_eq!(step(&mut o, &mut activation, &mut progress), FlexsplineStatus::NotInitialised);
+        let begun = flexspline_activation_begin(&mut *activation, &o.joint, f32::NAN);
+        assert_eq!(begun, FlexsplineStatus::Argument);
+        assert_eq!(flexspline_activation_begin(&mut *activation, &o.joint, 20.0), FlexsplineStatus::Ok);
+        let inside = (&raw mut *activation).cast::<u8>();
+        let found = flexspline_activation_step(&mut *activation, &mut *o.store, &table, inside);
+        assert_eq!((found, progress), (FlexsplineStatus::Overlap, 9));
+        let null = core::ptr::null_mut();
+        let found = flexspline_activation_step(&mut *activation, &mut *o.store, &table, null);
+        assert_eq!(found, FlexsplineStatus::Pointer);
+        let mut seen = [0; 3];
+        while progress != 2 {
+            assert_eq!(step(&mut o, &mut activation, &mut progress), FlexsplineStatus::Ok);
+            seen[usize::from(progress)] += 1;
+        }
+        assert!(seen[0] > 200 && seen[1] > 100 && seen[2] == 1, "{seen:?}");
+        let mut at_once = made();
+        assert_eq!(flexspline_store_activate(&mut *at_once.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
+        let mut reports = [FlexsplineStoreReport::default(); 2];
+        let [one, other] = &mut reports;
+        assert_eq!(flexspline_store_report(&*o.store, one), FlexsplineStatus::Ok);
+        assert_eq!(flexspline_store_report(&*at_once.store, other), FlexsplineStatus::Ok);
+        assert_eq!((one.table_id, one.health), (other.table_id, 0));
+        assert!(one.table_id != [0; 8]);
     }
 
     #[test]

@@ -230,8 +230,9 @@ pub use store::{
 #[doc(hidden)]
 pub use table::reseal;
 pub use table::{
-    Approach, Bounds, Command, FORMAT_VERSION, GeneratorKind, INVERSE_TOLERANCE_RAD, MAX_ERROR_RAD,
-    MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, OperatingPoint, PAGE_BYTES,
-    Prediction, Provenance, Quality, TEXT_BYTES, Table, TableData, TableId, WriteError, grid, image_bytes, write_image,
+    Approach, Bounds, Command, FORMAT_VERSION, GeneratorKind, INVERSE_TOLERANCE_RAD, Identity, IdentityCheck,
+    MAX_ERROR_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES,
+    OperatingPoint, PAGE_BYTES, Prediction, Provenance, Quality, TEXT_BYTES, Table, TableData, TableId, WriteError,
+    grid, image_bytes, write_image,
 };
 pub use tell::{Event, Events, Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Watch, Writer};

@@ -25,6 +25,7 @@
 
 mod bounds;
 pub mod grid;
+mod identity;
 mod image;
 mod memory;
 mod model;
@@ -34,6 +35,7 @@ pub(crate) mod windup;
 mod words;
 
 pub use bounds::{Bounds, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS};
+pub use identity::{Identity, IdentityCheck};
 #[cfg(any(test, feature = "fuzzing"))]
 pub use image::reseal;
 pub(crate) use image::{Check, MAX_AXIS_VALUE, NODE_WORDS, counted, page_intact, ripple_row, word};

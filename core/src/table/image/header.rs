@@ -59,8 +59,7 @@ impl<'a> Table<'a> {
 
     /// What the [id](Self::id) is a hash of, one part after another: the body with zeros where the id is.
     ///
-    /// The core does not hash: a firmware that wants to know that a table is the one of its id has BLAKE3 take these parts, and compares the
-    /// first eight bytes. Checksums tell damage from chance; this also tells an image that was changed and sealed again.
+    /// [`IdentityCheck`](crate::IdentityCheck) hashes it on board; on the host any BLAKE3 takes these parts, and the first eight bytes are compared.
     #[must_use]
     pub fn hashed(&self) -> [&'a [u8]; 3] {
         let body = self.image.get(..self.body_bytes).unwrap_or_default();
@@ -132,6 +131,21 @@ impl<'a> Table<'a> {
     #[must_use]
     pub fn is_page_intact(&self, page: usize) -> bool {
         page_intact(self.image, self.body_bytes, page)
+    }
+}
+
+/// The body and the id of an image that need not have passed any check.
+pub(crate) struct Laid<'a> {
+    pub body: &'a [u8],
+    pub id: TableId,
+}
+
+impl<'a> Laid<'a> {
+    /// `None` if there is no header, or not the body that it states.
+    pub fn of(image: &'a [u8]) -> Option<Self> {
+        let header = Header(image.first_chunk()?);
+        let body = image.get(..(header.u32(196) as usize).checked_mul(4)?)?;
+        (body.len() >= HEADER_BYTES).then(|| Self { body, id: TableId(header.bytes(ID_OFFSET)) })
     }
 }
 

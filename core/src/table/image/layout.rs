@@ -28,7 +28,7 @@ pub(super) const AXIS_SLOTS: [usize; 2] = [MAX_CLAMPED_NODES, MAX_TEMPERATURE_NO
 pub(super) const UNITS_PER_COUNT: f64 = 524_288.0;
 
 pub(super) const CRC_BYTES: usize = 4;
-pub(super) const ID_OFFSET: usize = 48;
+pub(crate) const ID_OFFSET: usize = 48;
 pub(super) const RESERVED: core::ops::Range<usize> = 200..HEADER_BYTES;
 /// |torque| N·m and |temperature| °C of any node or range: keeps differences of nodes finite.
 pub(crate) const MAX_AXIS_VALUE: f32 = 1e6;
