@@ -46,6 +46,9 @@
 // Eight-byte words of a [`FlexsplineState`].
 #define FLEXSPLINE_STATE_WORDS 24
 
+// Eight-byte words of a [`FlexsplineActivation`].
+#define FLEXSPLINE_ACTIVATION_WORDS 88
+
 // Bytes of a saved state.
 #define FLEXSPLINE_SAVED_BYTES 72
 
@@ -128,6 +131,8 @@ typedef enum FlexsplineStatus {
   // The image is whole and its wind-up is none that a drive has: a flank falls while the load grows (the sign of the torque?),
   // or rises too fast.
   FLEXSPLINE_STATUS_IMPLAUSIBLE = 16,
+  // What was kept of an activation is not whole: begin again.
+  FLEXSPLINE_STATUS_TORN = 17,
 } FlexsplineStatus;
 
 // The copies of a table.
@@ -183,6 +188,11 @@ typedef struct FlexsplineImages {
   // Its bytes.
   size_t second_bytes;
 } FlexsplineImages;
+
+// A table on its way into a store.
+typedef struct FlexsplineActivation {
+  uint64_t opaque[FLEXSPLINE_ACTIVATION_WORDS];
+} FlexsplineActivation;
 
 // What is known of a store.
 typedef struct FlexsplineStoreReport {
@@ -371,6 +381,18 @@ enum FlexsplineStatus flexspline_store_activate(struct FlexsplineStore *store,
                                                 const struct FlexsplineJoint *joint,
                                                 const struct FlexsplineImages *table,
                                                 float temperature_c);
+
+// Begins to bring a table into a store in short steps, between ticks.
+enum FlexsplineStatus flexspline_activation_begin(struct FlexsplineActivation *activation,
+                                                  const struct FlexsplineJoint *joint,
+                                                  float temperature_c);
+
+// A step: the same store and images with each, until `progress` is 2. 0: the images are checked, the store is as it was; 1: the store is
+// filled, and has no table meanwhile; 2: the table is in use. If a step fails the activation is over; begin again.
+enum FlexsplineStatus flexspline_activation_step(struct FlexsplineActivation *activation,
+                                                 struct FlexsplineStore *store,
+                                                 const struct FlexsplineImages *table,
+                                                 uint8_t *progress);
 
 // Tells the temperature, degrees C: in a slow rate group.
 enum FlexsplineStatus flexspline_store_set_temperature(struct FlexsplineStore *store,

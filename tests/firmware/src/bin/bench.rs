@@ -8,8 +8,9 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use flexspline::{
-    Activation, Approach, Command, GeneratorAngle, Images, Input, Joint, JointState, Measured, Mode, OperatingPoint,
-    Output, OutputAngle, PlayState, Prediction, Predictor, PredictorState, Progress, Store, parts,
+    Activation, Approach, Command, GeneratorAngle, Identity, IdentityCheck, Images, Input, Joint, JointState, Measured,
+    Mode, OperatingPoint, Output, OutputAngle, PlayState, Prediction, Predictor, PredictorState, Progress, Store,
+    parts,
 };
 use flexspline_firmware::count::{Counter, Range};
 use flexspline_firmware::trajectory::{JOINT, Mixed, Trajectory};
@@ -107,6 +108,29 @@ fn measure_activation(counter: &Counter, name: &str, [first, second]: [&[u8]; 2]
     Some(())
 }
 
+#[inline(never)]
+fn hash(check: &mut IdentityCheck, image: &[u8]) -> Identity {
+    check.step(image)
+}
+
+/// The costliest step of finding out whether an image is the one of its id.
+fn measure_identity(counter: &Counter, name: &str, image: &[u8]) -> Option<()> {
+    let (mut check, mut range, mut all) = (IdentityCheck::new(), Range::default(), [0; 2]);
+    loop {
+        let (count, found) = counter.of(|| black_box(hash(&mut check, image)));
+        range.add(count);
+        all = [all[0] + 1, all[1] + count];
+        match found {
+            Identity::Hashing => {}
+            Identity::Same(_) => break,
+            Identity::Other(_) => return None,
+        }
+    }
+    let [steps, sum] = all;
+    hprintln!("{} identity: {} instructions (min {}), {} steps, {} in all", name, range.max, range.min, steps, sum);
+    Some(())
+}
+
 /// Ranges of one table, by name.
 type Ranges = [(&'static str, Range); 8];
 
@@ -169,6 +193,11 @@ fn main() -> ! {
     }
     for (name, images) in TABLES.into_iter().chain([("full", FULL)]) {
         if measure_activation(&counter, name, images).is_none() {
+            finish(false);
+        }
+    }
+    for (name, [image, _]) in TABLES {
+        if measure_identity(&counter, name, image).is_none() {
             finish(false);
         }
     }
