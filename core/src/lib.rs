@@ -144,6 +144,9 @@
 //! * The two copies of what a tick reads are compared as they are read; settings, state and what is known of the table are kept twice
 //!   with sums. A tick that finds something not whole mends it, says so, and is done again; what cannot be mended is not used
 //!   ([`Flags`], [`store`](Store)).
+//! * A table is checked and filled in, in steps of at most 2000 instructions between ticks ([`Activation`]); so is found out whether
+//!   it is the one of its id ([`IdentityCheck`]).
+//! * A torque or temperature that is too old is not used ([`Aged`]).
 //! * A damaged image gives an [`ImageError`]. What a table can give at most is bounded from its coefficients when it is accepted, for
 //!   every input and not only at nodes: a hostile image can give no more either.
 //! * NaN or infinity in torque or temperature gives [`Quality::Disabled`] and no correction; such a temperature activates nothing.
@@ -215,7 +218,7 @@ pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};
 pub use error::{DriveError, Field, ImageError};
 pub use joint::{
-    AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Ahead, Coefficient,
+    AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Aged, Ahead, Coefficient,
     Disturbance, FittedSlip, Flags, Inertias, Input, Joint, JointState, Learning, Limits, LoadTorque, Measured, Mode,
     ModeError, Noise, NominalOutput, Now, Output, OutputAhead, Overrun, PREDICTOR_PARTS, Predictor, PredictorError,
     PredictorState, RateGroup, RestoreError, SAVED_JOINT_BYTES, Seen, SettingError, Slip, SlipBank, SlipElement,
