@@ -49,6 +49,9 @@
 // Eight-byte words of a [`FlexsplineActivation`].
 #define FLEXSPLINE_ACTIVATION_WORDS 88
 
+// Eight-byte words of a [`FlexsplineIdentity`].
+#define FLEXSPLINE_IDENTITY_WORDS 40
+
 // Bytes of a saved state.
 #define FLEXSPLINE_SAVED_BYTES 72
 
@@ -133,6 +136,8 @@ typedef enum FlexsplineStatus {
   FLEXSPLINE_STATUS_IMPLAUSIBLE = 16,
   // What was kept of an activation is not whole: begin again.
   FLEXSPLINE_STATUS_TORN = 17,
+  // The self-test gave another answer than it must: processor or program are not what they were.
+  FLEXSPLINE_STATUS_SELF_TEST = 18,
 } FlexsplineStatus;
 
 // The copies of a table.
@@ -193,6 +198,11 @@ typedef struct FlexsplineImages {
 typedef struct FlexsplineActivation {
   uint64_t opaque[FLEXSPLINE_ACTIVATION_WORDS];
 } FlexsplineActivation;
+
+// Whether an image is the one of its id, as far as it was found out.
+typedef struct FlexsplineIdentity {
+  uint64_t opaque[FLEXSPLINE_IDENTITY_WORDS];
+} FlexsplineIdentity;
 
 // What is known of a store.
 typedef struct FlexsplineStoreReport {
@@ -393,6 +403,19 @@ enum FlexsplineStatus flexspline_activation_step(struct FlexsplineActivation *ac
                                                  struct FlexsplineStore *store,
                                                  const struct FlexsplineImages *table,
                                                  uint8_t *progress);
+
+// Begins to find out whether an image is the one of its id.
+enum FlexsplineStatus flexspline_identity_begin(struct FlexsplineIdentity *identity);
+
+// Takes in a block of 64 bytes of the image, the same one with each step. `found` is 0 while there is more, then 1 if the image is the one of its id,
+// or 2 if it is not; with the next step it begins anew.
+enum FlexsplineStatus flexspline_identity_step(struct FlexsplineIdentity *identity,
+                                               const uint8_t *image,
+                                               size_t image_bytes,
+                                               uint8_t *found);
+
+// Known answers of what a tick is made of, for a slow rate group: `FLEXSPLINE_STATUS_SELF_TEST` if one is another.
+enum FlexsplineStatus flexspline_self_test(void);
 
 // Tells the temperature, degrees C: in a slow rate group.
 enum FlexsplineStatus flexspline_store_set_temperature(struct FlexsplineStore *store,

@@ -23,8 +23,8 @@ use beside::{health_code, quality_code};
 
 use crate::{
     ActivateError, Activation, Adjustment, Counters, Drive, FORMAT_VERSION, FixedMember, Flags, GeneratorAngle,
-    ImageError, Images, Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun, Progress, RestoreError,
-    SAVED_JOINT_BYTES, Store, mend_page,
+    Identity, IdentityCheck, ImageError, Images, Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun,
+    Progress, RestoreError, SAVED_JOINT_BYTES, Store, mend_page, self_test,
 };
 use core::ffi::c_char;
 use core::mem::{MaybeUninit, align_of, size_of};
@@ -73,6 +73,8 @@ pub enum FlexsplineStatus {
     Implausible = 16,
     /// What was kept of an activation is not whole: begin again.
     Torn = 17,
+    /// The self-test gave another answer than it must: processor or program are not what they were.
+    SelfTest = 18,
 }
 
 /// There was no sample.
@@ -104,6 +106,8 @@ pub const FLEXSPLINE_JOINT_WORDS: usize = 32;
 pub const FLEXSPLINE_STATE_WORDS: usize = 24;
 /// Eight-byte words of a [`FlexsplineActivation`].
 pub const FLEXSPLINE_ACTIVATION_WORDS: usize = 88;
+/// Eight-byte words of a [`FlexsplineIdentity`].
+pub const FLEXSPLINE_IDENTITY_WORDS: usize = 40;
 /// Bytes of a saved state.
 pub const FLEXSPLINE_SAVED_BYTES: usize = 72;
 
@@ -119,6 +123,13 @@ pub struct FlexsplineStore {
 #[derive(Debug)]
 pub struct FlexsplineActivation {
     opaque: [MaybeUninit<u64>; FLEXSPLINE_ACTIVATION_WORDS],
+}
+
+/// Whether an image is the one of its id, as far as it was found out.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplineIdentity {
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_IDENTITY_WORDS],
 }
 
 /// The settings of a joint.
@@ -267,6 +278,7 @@ const STORE_MARK: u32 = 0x7853_5446;
 const JOINT_MARK: u32 = 0x784a_5446;
 const STATE_MARK: u32 = 0x7841_5446;
 const ACTIVATION_MARK: u32 = 0x7856_5446;
+const IDENTITY_MARK: u32 = 0x7849_5446;
 
 const _: () = {
     assert!(size_of::<Marked<Store>>() <= size_of::<FlexsplineStore>());
@@ -277,6 +289,8 @@ const _: () = {
     );
     assert!(size_of::<Marked<Activation>>() <= size_of::<FlexsplineActivation>());
     assert!(align_of::<Marked<Activation>>() <= 8);
+    assert!(size_of::<Marked<IdentityCheck>>() <= size_of::<FlexsplineIdentity>());
+    assert!(align_of::<Marked<IdentityCheck>>() <= 8);
     assert!(FLEXSPLINE_SAVED_BYTES == SAVED_JOINT_BYTES);
 };
 
@@ -504,6 +518,44 @@ pub extern "C" fn flexspline_activation_step(
         Ok(())
     };
     status(step())
+}
+
+/// Begins to find out whether an image is the one of its id.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_identity_begin(identity: *mut FlexsplineIdentity) -> FlexsplineStatus {
+    status(put(identity, IDENTITY_MARK, IdentityCheck::new()))
+}
+
+/// Takes in a block of 64 bytes of the image, the same one with each step. `found` is 0 while there is more, then 1 if the image is the one of its id,
+/// or 2 if it is not; with the next step it begins anew.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_identity_step(
+    identity: *mut FlexsplineIdentity,
+    image: *const u8,
+    image_bytes: usize,
+    found: *mut u8,
+) -> FlexsplineStatus {
+    let step = || {
+        apart([span(identity), span(found), (image as usize, image_bytes)])?;
+        usable(found)?;
+        let image = bytes(image, image_bytes)?;
+        let identity: &mut IdentityCheck = get_mut(identity, IDENTITY_MARK)?;
+        let code = match identity.step(image) {
+            Identity::Hashing => 0,
+            Identity::Same(_) => 1,
+            Identity::Other(_) => 2,
+        };
+        // SAFETY: not null; the caller's, apart from everything else.
+        unsafe { found.write(code) };
+        Ok(())
+    };
+    status(step())
+}
+
+/// Known answers of what a tick is made of, for a slow rate group: `FLEXSPLINE_STATUS_SELF_TEST` if one is another.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_self_test() -> FlexsplineStatus {
+    status(self_test().map_err(|_| FlexsplineStatus::SelfTest))
 }
 
 /// Tells the temperature, degrees C: in a slow rate group.
@@ -956,6 +1008,40 @@ mod tests {
         assert_eq!(flexspline_store_report(&*at_once.store, other), FlexsplineStatus::Ok);
         assert_eq!((one.table_id, one.health), (other.table_id, 0));
         assert!(one.table_id != [0; 8]);
+    }
+
+    #[test]
+    fn an_image_is_verified_and_the_program_tested_from_c() {
+        assert_eq!(flexspline_self_test(), FlexsplineStatus::Ok);
+        let mut image = fixture::image(false);
+        let mut identity = Box::new(FlexsplineIdentity { opaque: [MaybeUninit::new(7); _] });
+        let mut found = 9;
+        let step = flexspline_identity_step;
+        assert_eq!(step(&mut *identity, image.as_ptr(), image.len(), &mut found), FlexsplineStatus::NotInitialised);
+        assert_eq!(flexspline_identity_begin(&mut *identity), FlexsplineStatus::Ok);
+        let null = core::ptr::null();
+        assert_eq!(step(&mut *identity, null, image.len(), &mut found), FlexsplineStatus::Pointer);
+        let inside = image.as_mut_ptr();
+        assert_eq!(step(&mut *identity, inside, image.len(), inside), FlexsplineStatus::Overlap);
+        let mut run = |image: &[u8]| {
+            for _ in 0..5000 {
+                let told = step(&mut *identity, image.as_ptr(), image.len(), &mut found);
+                assert_eq!(told, FlexsplineStatus::Ok);
+                if found != 0 {
+                    break;
+                }
+            }
+            found
+        };
+        // The fixture's id is no BLAKE3.
+        assert_eq!(run(&image), 2);
+        let mut hash = crate::IdentityCheck::new();
+        let real = (0..5000).map(|_| hash.step(&image)).find(|found| *found != crate::Identity::Hashing);
+        let Some(crate::Identity::Other(id)) = real else { panic!("{real:?}") };
+        image[48..56].copy_from_slice(&id.0);
+        assert_eq!(run(&image), 1);
+        image[1000] ^= 1;
+        assert_eq!(run(&image), 2);
     }
 
     #[test]

@@ -207,6 +207,7 @@ mod num;
 #[doc(hidden)]
 pub mod parts;
 mod play;
+mod self_test;
 mod store;
 mod table;
 mod tell;
@@ -225,6 +226,7 @@ pub use joint::{
     SlipState, SlipVariable, Term, TorqueSlipElement, Verdict, saved_adapt_bytes, saved_slip_bytes,
 };
 pub use play::{Direction, PlayState, SAVED_STATE_BYTES};
+pub use self_test::{SelfTestError, self_test};
 pub use store::{
     ActivateError, Activation, Counters, Health, Images, Progress, STORE_PAGES, STORE_WORDS, Store, Upload,
     UploadError, mend_page,

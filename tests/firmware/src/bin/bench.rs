@@ -181,6 +181,11 @@ fn measure(counter: &Counter, name: &str, [first, second]: [&[u8]; 2]) -> Option
 fn main() -> ! {
     let Some(peripherals) = cortex_m::Peripherals::take() else { finish(false) };
     let counter = Counter::new(peripherals.SYST);
+    let (count, answer) = counter.of(|| black_box(self_test()));
+    hprintln!("self-test: {} instructions", count);
+    if answer.is_err() {
+        finish(false);
+    }
     let mut costliest = Range { min: 0, max: 0 };
     for (name, images) in TABLES {
         let Some(ticks) = measure(&counter, name, images) else { finish(false) };
