@@ -612,6 +612,7 @@ fn steps(
 
 /// While the images are checked the store flies on with its table, to the bit; then it is as if it had been activated at once.
 #[test]
+#[cfg_attr(miri, ignore = "takes too long")]
 fn an_activation_in_steps_leaves_the_table_in_use_until_the_new_one_has_passed() {
     let other = fixture::image(false);
     let other_twin = other.clone();
@@ -669,6 +670,7 @@ fn an_activation_that_fails_has_not_touched_the_store() {
 
 /// Every bit of what an activation keeps while it fills, and the two words of the temperature before: refused, or harmless.
 #[test]
+#[cfg_attr(miri, ignore = "takes too long")]
 fn no_single_bit_of_an_activation_makes_another_table() {
     let images = Images::new(&IMAGE, &TWIN);
     let expected = active(25.0);
