@@ -357,7 +357,8 @@ fn bytes<'a>(first: *const u8, length: usize) -> Result<&'a [u8], FlexsplineStat
     Ok(unsafe { core::slice::from_raw_parts(first, length) })
 }
 
-/// The images, apart from what is written: to be asked for before that is borrowed.
+/// The images, apart from what is written: to be asked for before that is borrowed. Inlined: a tick would pay for a call.
+#[inline(always)]
 fn images<'a, const N: usize>(
     images: *const FlexsplineImages,
     written: [(usize, usize); N],

@@ -10,7 +10,7 @@ use cortex_m_semihosting::hprintln;
 use flexspline::{
     Activation, Approach, Command, GeneratorAngle, Identity, IdentityCheck, Images, Input, Joint, JointState, Measured,
     Mode, OperatingPoint, Output, OutputAngle, PlayState, Prediction, Predictor, PredictorState, Progress, Store,
-    parts,
+    parts, self_test,
 };
 use flexspline_firmware::count::{Counter, Range};
 use flexspline_firmware::trajectory::{JOINT, Mixed, Trajectory};
