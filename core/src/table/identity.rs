@@ -215,7 +215,7 @@ mod tests {
 
     /// An image whose body says it is so many words long.
     fn sized(words: u32) -> Vec<u8> {
-        let mut image: Vec<u8> = (0..4 * words + 100).map(|i| (i * i / 7) as u8).collect();
+        let mut image: Vec<u8> = (0..4 * words + 100).map(|i| (i.wrapping_mul(i) / 7) as u8).collect();
         image[196..200].copy_from_slice(&words.to_le_bytes());
         image
     }
