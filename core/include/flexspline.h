@@ -46,6 +46,12 @@
 // Eight-byte words of a [`FlexsplineState`].
 #define FLEXSPLINE_STATE_WORDS 24
 
+// Eight-byte words of a [`FlexsplineActivation`].
+#define FLEXSPLINE_ACTIVATION_WORDS 88
+
+// Eight-byte words of a [`FlexsplineIdentity`].
+#define FLEXSPLINE_IDENTITY_WORDS 40
+
 // Bytes of a saved state.
 #define FLEXSPLINE_SAVED_BYTES 72
 
@@ -128,6 +134,10 @@ typedef enum FlexsplineStatus {
   // The image is whole and its wind-up is none that a drive has: a flank falls while the load grows (the sign of the torque?),
   // or rises too fast.
   FLEXSPLINE_STATUS_IMPLAUSIBLE = 16,
+  // What was kept of an activation is not whole: begin again.
+  FLEXSPLINE_STATUS_TORN = 17,
+  // The self-test gave another answer than it must: processor or program are not what they were.
+  FLEXSPLINE_STATUS_SELF_TEST = 18,
 } FlexsplineStatus;
 
 // The copies of a table.
@@ -183,6 +193,16 @@ typedef struct FlexsplineImages {
   // Its bytes.
   size_t second_bytes;
 } FlexsplineImages;
+
+// A table on its way into a store.
+typedef struct FlexsplineActivation {
+  uint64_t opaque[FLEXSPLINE_ACTIVATION_WORDS];
+} FlexsplineActivation;
+
+// Whether an image is the one of its id, as far as it was found out.
+typedef struct FlexsplineIdentity {
+  uint64_t opaque[FLEXSPLINE_IDENTITY_WORDS];
+} FlexsplineIdentity;
 
 // What is known of a store.
 typedef struct FlexsplineStoreReport {
@@ -371,6 +391,31 @@ enum FlexsplineStatus flexspline_store_activate(struct FlexsplineStore *store,
                                                 const struct FlexsplineJoint *joint,
                                                 const struct FlexsplineImages *table,
                                                 float temperature_c);
+
+// Begins to bring a table into a store in short steps, between ticks.
+enum FlexsplineStatus flexspline_activation_begin(struct FlexsplineActivation *activation,
+                                                  const struct FlexsplineJoint *joint,
+                                                  float temperature_c);
+
+// A step: the same store and images with each, until `progress` is 2. 0: the images are checked, the store is as it was; 1: the store is
+// filled, and has no table meanwhile; 2: the table is in use. If a step fails the activation is over; begin again.
+enum FlexsplineStatus flexspline_activation_step(struct FlexsplineActivation *activation,
+                                                 struct FlexsplineStore *store,
+                                                 const struct FlexsplineImages *table,
+                                                 uint8_t *progress);
+
+// Begins to find out whether an image is the one of its id.
+enum FlexsplineStatus flexspline_identity_begin(struct FlexsplineIdentity *identity);
+
+// Takes in a block of 64 bytes of the image, the same one with each step. `found` is 0 while there is more, then 1 if the image is the one of its id,
+// or 2 if it is not; with the next step it begins anew.
+enum FlexsplineStatus flexspline_identity_step(struct FlexsplineIdentity *identity,
+                                               const uint8_t *image,
+                                               size_t image_bytes,
+                                               uint8_t *found);
+
+// Known answers of what a tick is made of, for a slow rate group: `FLEXSPLINE_STATUS_SELF_TEST` if one is another.
+enum FlexsplineStatus flexspline_self_test(void);
 
 // Tells the temperature, degrees C: in a slow rate group.
 enum FlexsplineStatus flexspline_store_set_temperature(struct FlexsplineStore *store,

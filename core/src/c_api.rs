@@ -22,8 +22,9 @@ pub use beside::*;
 use beside::{health_code, quality_code};
 
 use crate::{
-    ActivateError, Adjustment, Counters, Drive, FORMAT_VERSION, FixedMember, Flags, GeneratorAngle, ImageError, Images,
-    Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun, RestoreError, SAVED_JOINT_BYTES, Store, mend_page,
+    ActivateError, Activation, Adjustment, Counters, Drive, FORMAT_VERSION, FixedMember, Flags, GeneratorAngle,
+    Identity, IdentityCheck, ImageError, Images, Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun,
+    Progress, RestoreError, SAVED_JOINT_BYTES, Store, mend_page, self_test,
 };
 use core::ffi::c_char;
 use core::mem::{MaybeUninit, align_of, size_of};
@@ -70,6 +71,10 @@ pub enum FlexsplineStatus {
     /// The image is whole and its wind-up is none that a drive has: a flank falls while the load grows (the sign of the torque?),
     /// or rises too fast.
     Implausible = 16,
+    /// What was kept of an activation is not whole: begin again.
+    Torn = 17,
+    /// The self-test gave another answer than it must: processor or program are not what they were.
+    SelfTest = 18,
 }
 
 /// There was no sample.
@@ -99,6 +104,10 @@ pub const FLEXSPLINE_STORE_WORDS: usize = 1072;
 pub const FLEXSPLINE_JOINT_WORDS: usize = 32;
 /// Eight-byte words of a [`FlexsplineState`].
 pub const FLEXSPLINE_STATE_WORDS: usize = 24;
+/// Eight-byte words of a [`FlexsplineActivation`].
+pub const FLEXSPLINE_ACTIVATION_WORDS: usize = 88;
+/// Eight-byte words of a [`FlexsplineIdentity`].
+pub const FLEXSPLINE_IDENTITY_WORDS: usize = 40;
 /// Bytes of a saved state.
 pub const FLEXSPLINE_SAVED_BYTES: usize = 72;
 
@@ -107,6 +116,20 @@ pub const FLEXSPLINE_SAVED_BYTES: usize = 72;
 #[derive(Debug)]
 pub struct FlexsplineStore {
     opaque: [MaybeUninit<u64>; FLEXSPLINE_STORE_WORDS],
+}
+
+/// A table on its way into a store.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplineActivation {
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_ACTIVATION_WORDS],
+}
+
+/// Whether an image is the one of its id, as far as it was found out.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplineIdentity {
+    opaque: [MaybeUninit<u64>; FLEXSPLINE_IDENTITY_WORDS],
 }
 
 /// The settings of a joint.
@@ -254,6 +277,8 @@ struct Marked<T> {
 const STORE_MARK: u32 = 0x7853_5446;
 const JOINT_MARK: u32 = 0x784a_5446;
 const STATE_MARK: u32 = 0x7841_5446;
+const ACTIVATION_MARK: u32 = 0x7856_5446;
+const IDENTITY_MARK: u32 = 0x7849_5446;
 
 const _: () = {
     assert!(size_of::<Marked<Store>>() <= size_of::<FlexsplineStore>());
@@ -262,6 +287,10 @@ const _: () = {
     assert!(
         align_of::<Marked<Store>>() <= 8 && align_of::<Marked<Joint>>() <= 8 && align_of::<Marked<JointState>>() <= 8
     );
+    assert!(size_of::<Marked<Activation>>() <= size_of::<FlexsplineActivation>());
+    assert!(align_of::<Marked<Activation>>() <= 8);
+    assert!(size_of::<Marked<IdentityCheck>>() <= size_of::<FlexsplineIdentity>());
+    assert!(align_of::<Marked<IdentityCheck>>() <= 8);
     assert!(FLEXSPLINE_SAVED_BYTES == SAVED_JOINT_BYTES);
 };
 
@@ -328,7 +357,8 @@ fn bytes<'a>(first: *const u8, length: usize) -> Result<&'a [u8], FlexsplineStat
     Ok(unsafe { core::slice::from_raw_parts(first, length) })
 }
 
-/// The images, apart from what is written: to be asked for before that is borrowed.
+/// The images, apart from what is written: to be asked for before that is borrowed. Inlined: a tick would pay for a call.
+#[inline(always)]
 fn images<'a, const N: usize>(
     images: *const FlexsplineImages,
     written: [(usize, usize); N],
@@ -430,16 +460,103 @@ pub extern "C" fn flexspline_store_activate(
         let images = images(table, [span(store)])?;
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
-        store.activate(&images, joint.drive(), temperature_c).map(|_| ()).map_err(|error| match error {
-            ActivateError::Image(error) => image_status(error),
-            ActivateError::TooLarge { .. } | ActivateError::TooManyPages { .. } => FlexsplineStatus::TooLarge,
-            ActivateError::TwoTables => FlexsplineStatus::TwoTables,
-            ActivateError::OtherDrive => FlexsplineStatus::OtherDrive,
-            ActivateError::SameImage => FlexsplineStatus::SameImage,
-            ActivateError::Temperature { .. } => FlexsplineStatus::Argument,
-        })
+        store.activate(&images, joint.drive(), temperature_c).map(|_| ()).map_err(activate_status)
     };
     status(activate())
+}
+
+/// Why a table is not activated.
+fn activate_status(error: ActivateError) -> FlexsplineStatus {
+    match error {
+        ActivateError::Image(error) => image_status(error),
+        ActivateError::TooLarge { .. } | ActivateError::TooManyPages { .. } => FlexsplineStatus::TooLarge,
+        ActivateError::TwoTables => FlexsplineStatus::TwoTables,
+        ActivateError::OtherDrive => FlexsplineStatus::OtherDrive,
+        ActivateError::SameImage => FlexsplineStatus::SameImage,
+        ActivateError::Temperature { .. } => FlexsplineStatus::Argument,
+        ActivateError::Torn => FlexsplineStatus::Torn,
+    }
+}
+
+/// Begins to bring a table into a store in short steps, between ticks.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_activation_begin(
+    activation: *mut FlexsplineActivation,
+    joint: *const FlexsplineJoint,
+    temperature_c: f32,
+) -> FlexsplineStatus {
+    let begin = || {
+        apart([span(activation), span(joint)])?;
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let begun = Store::begin(joint.drive(), temperature_c).map_err(activate_status)?;
+        put(activation, ACTIVATION_MARK, begun)
+    };
+    status(begin())
+}
+
+/// A step: the same store and images with each, until `progress` is 2. 0: the images are checked, the store is as it was; 1: the store is
+/// filled, and has no table meanwhile; 2: the table is in use. If a step fails the activation is over; begin again.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_activation_step(
+    activation: *mut FlexsplineActivation,
+    store: *mut FlexsplineStore,
+    table: *const FlexsplineImages,
+    progress: *mut u8,
+) -> FlexsplineStatus {
+    let step = || {
+        apart([span(activation), span(store), span(progress)])?;
+        usable(progress)?;
+        let images = images(table, [span(activation), span(store), span(progress)])?;
+        let activation: &mut Activation = get_mut(activation, ACTIVATION_MARK)?;
+        let store: &mut Store = get_mut(store, STORE_MARK)?;
+        let code = match activation.step(store, &images).map_err(activate_status)? {
+            Progress::Checking => 0,
+            Progress::Filling => 1,
+            Progress::Done(_) => 2,
+        };
+        // SAFETY: not null; the caller's, apart from everything else.
+        unsafe { progress.write(code) };
+        Ok(())
+    };
+    status(step())
+}
+
+/// Begins to find out whether an image is the one of its id.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_identity_begin(identity: *mut FlexsplineIdentity) -> FlexsplineStatus {
+    status(put(identity, IDENTITY_MARK, IdentityCheck::new()))
+}
+
+/// Takes in a block of 64 bytes of the image, the same one with each step. `found` is 0 while there is more, then 1 if the image is the one of its id,
+/// or 2 if it is not; with the next step it begins anew.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_identity_step(
+    identity: *mut FlexsplineIdentity,
+    image: *const u8,
+    image_bytes: usize,
+    found: *mut u8,
+) -> FlexsplineStatus {
+    let step = || {
+        apart([span(identity), span(found), (image as usize, image_bytes)])?;
+        usable(found)?;
+        let image = bytes(image, image_bytes)?;
+        let identity: &mut IdentityCheck = get_mut(identity, IDENTITY_MARK)?;
+        let code = match identity.step(image) {
+            Identity::Hashing => 0,
+            Identity::Same(_) => 1,
+            Identity::Other(_) => 2,
+        };
+        // SAFETY: not null; the caller's, apart from everything else.
+        unsafe { found.write(code) };
+        Ok(())
+    };
+    status(step())
+}
+
+/// Known answers of what a tick is made of, for a slow rate group: `FLEXSPLINE_STATUS_SELF_TEST` if one is another.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_self_test() -> FlexsplineStatus {
+    status(self_test().map_err(|_| FlexsplineStatus::SelfTest))
 }
 
 /// Tells the temperature, degrees C: in a slow rate group.
@@ -857,6 +974,75 @@ mod tests {
         assert_eq!(flexspline_store_set_temperature(&mut *o.store, &table, 30.0), FlexsplineStatus::Ok);
         assert_eq!(flexspline_store_set_temperature(&mut *o.store, &table, f32::NAN), FlexsplineStatus::Argument);
         assert_eq!(flexspline_store_check_images(&mut *o.store, &table, 100), FlexsplineStatus::Ok);
+    }
+
+    #[test]
+    fn a_table_is_activated_in_steps() {
+        let image = fixture::image(false);
+        let (mut o, table) = (made(), pair(&image));
+        let mut activation = Box::new(FlexsplineActivation { opaque: [MaybeUninit::new(7); _] });
+        let mut progress = 9;
+        let step = |o: &mut Objects, activation: &mut FlexsplineActivation, progress: &mut u8| {
+            flexspline_activation_step(activation, &mut *o.store, &table, progress)
+        };
+        assert_eq!(step(&mut o, &mut activation, &mut progress), FlexsplineStatus::NotInitialised);
+        let begun = flexspline_activation_begin(&mut *activation, &o.joint, f32::NAN);
+        assert_eq!(begun, FlexsplineStatus::Argument);
+        assert_eq!(flexspline_activation_begin(&mut *activation, &o.joint, 20.0), FlexsplineStatus::Ok);
+        let inside = (&raw mut *activation).cast::<u8>();
+        let found = flexspline_activation_step(&mut *activation, &mut *o.store, &table, inside);
+        assert_eq!((found, progress), (FlexsplineStatus::Overlap, 9));
+        let null = core::ptr::null_mut();
+        let found = flexspline_activation_step(&mut *activation, &mut *o.store, &table, null);
+        assert_eq!(found, FlexsplineStatus::Pointer);
+        let mut seen = [0; 3];
+        while progress != 2 {
+            assert_eq!(step(&mut o, &mut activation, &mut progress), FlexsplineStatus::Ok);
+            seen[usize::from(progress)] += 1;
+        }
+        assert!(seen[0] > 200 && seen[1] > 100 && seen[2] == 1, "{seen:?}");
+        let mut at_once = made();
+        assert_eq!(flexspline_store_activate(&mut *at_once.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
+        let mut reports = [FlexsplineStoreReport::default(); 2];
+        let [one, other] = &mut reports;
+        assert_eq!(flexspline_store_report(&*o.store, one), FlexsplineStatus::Ok);
+        assert_eq!(flexspline_store_report(&*at_once.store, other), FlexsplineStatus::Ok);
+        assert_eq!((one.table_id, one.health), (other.table_id, 0));
+        assert!(one.table_id != [0; 8]);
+    }
+
+    #[test]
+    fn an_image_is_verified_and_the_program_tested_from_c() {
+        assert_eq!(flexspline_self_test(), FlexsplineStatus::Ok);
+        let mut image = fixture::image(false);
+        let mut identity = Box::new(FlexsplineIdentity { opaque: [MaybeUninit::new(7); _] });
+        let mut found = 9;
+        let step = flexspline_identity_step;
+        assert_eq!(step(&mut *identity, image.as_ptr(), image.len(), &mut found), FlexsplineStatus::NotInitialised);
+        assert_eq!(flexspline_identity_begin(&mut *identity), FlexsplineStatus::Ok);
+        let null = core::ptr::null();
+        assert_eq!(step(&mut *identity, null, image.len(), &mut found), FlexsplineStatus::Pointer);
+        let inside = image.as_mut_ptr();
+        assert_eq!(step(&mut *identity, inside, image.len(), inside), FlexsplineStatus::Overlap);
+        let mut run = |image: &[u8]| {
+            for _ in 0..5000 {
+                let told = step(&mut *identity, image.as_ptr(), image.len(), &mut found);
+                assert_eq!(told, FlexsplineStatus::Ok);
+                if found != 0 {
+                    break;
+                }
+            }
+            found
+        };
+        // The fixture's id is no BLAKE3.
+        assert_eq!(run(&image), 2);
+        let mut hash = crate::IdentityCheck::new();
+        let real = (0..5000).map(|_| hash.step(&image)).find(|found| *found != crate::Identity::Hashing);
+        let Some(crate::Identity::Other(id)) = real else { panic!("{real:?}") };
+        image[48..56].copy_from_slice(&id.0);
+        assert_eq!(run(&image), 1);
+        image[1000] ^= 1;
+        assert_eq!(run(&image), 2);
     }
 
     #[test]

@@ -52,6 +52,16 @@ pub struct Phases {
 }
 
 impl Drive {
+    /// That of one tooth and one wave, where there is none yet.
+    pub(crate) const SMALLEST: Self = Self {
+        flexspline_teeth: 1,
+        circular_spline_teeth: 2,
+        reversed: 0,
+        to_output: Factor::new(1, 2),
+        to_generator: Factor::new(2, 1),
+        tooth_rate: Rate::new(Factor::new(2, 1), 1, false),
+    };
+
     /// A drive from its tooth counts.
     ///
     /// # Errors

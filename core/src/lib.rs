@@ -144,6 +144,9 @@
 //! * The two copies of what a tick reads are compared as they are read; settings, state and what is known of the table are kept twice
 //!   with sums. A tick that finds something not whole mends it, says so, and is done again; what cannot be mended is not used
 //!   ([`Flags`], [`store`](Store)).
+//! * A table is checked and filled in, in steps of at most 2000 instructions between ticks ([`Activation`]); so is found out whether
+//!   it is the one of its id ([`IdentityCheck`]).
+//! * A torque or temperature that is too old is not used ([`Aged`]).
 //! * A damaged image gives an [`ImageError`]. What a table can give at most is bounded from its coefficients when it is accepted, for
 //!   every input and not only at nodes: a hostile image can give no more either.
 //! * NaN or infinity in torque or temperature gives [`Quality::Disabled`] and no correction; such a temperature activates nothing.
@@ -204,6 +207,7 @@ mod num;
 #[doc(hidden)]
 pub mod parts;
 mod play;
+mod self_test;
 mod store;
 mod table;
 mod tell;
@@ -215,22 +219,25 @@ pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};
 pub use error::{DriveError, Field, ImageError};
 pub use joint::{
-    AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Ahead, Coefficient,
+    AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Aged, Ahead, Coefficient,
     Disturbance, FittedSlip, Flags, Inertias, Input, Joint, JointState, Learning, Limits, LoadTorque, Measured, Mode,
     ModeError, Noise, NominalOutput, Now, Output, OutputAhead, Overrun, PREDICTOR_PARTS, Predictor, PredictorError,
     PredictorState, RateGroup, RestoreError, SAVED_JOINT_BYTES, Seen, SettingError, Slip, SlipBank, SlipElement,
     SlipState, SlipVariable, Term, TorqueSlipElement, Verdict, saved_adapt_bytes, saved_slip_bytes,
 };
 pub use play::{Direction, PlayState, SAVED_STATE_BYTES};
+pub use self_test::{SelfTestError, self_test};
 pub use store::{
-    ActivateError, Counters, Health, Images, STORE_PAGES, STORE_WORDS, Store, Upload, UploadError, mend_page,
+    ActivateError, Activation, Counters, Health, Images, Progress, STORE_PAGES, STORE_WORDS, Store, Upload,
+    UploadError, mend_page,
 };
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub use table::reseal;
 pub use table::{
-    Approach, Bounds, Command, FORMAT_VERSION, GeneratorKind, INVERSE_TOLERANCE_RAD, MAX_ERROR_RAD,
-    MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, OperatingPoint, PAGE_BYTES,
-    Prediction, Provenance, Quality, TEXT_BYTES, Table, TableData, TableId, WriteError, grid, image_bytes, write_image,
+    Approach, Bounds, Command, FORMAT_VERSION, GeneratorKind, INVERSE_TOLERANCE_RAD, Identity, IdentityCheck,
+    MAX_ERROR_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES,
+    OperatingPoint, PAGE_BYTES, Prediction, Provenance, Quality, TEXT_BYTES, Table, TableData, TableId, WriteError,
+    grid, image_bytes, write_image,
 };
 pub use tell::{Event, Events, Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Watch, Writer};

@@ -2,6 +2,7 @@
 
 mod adapt;
 mod adjustment;
+mod aged;
 mod limits;
 mod mode;
 mod predictor;
@@ -16,6 +17,7 @@ pub use adapt::{
     saved_adapt_bytes,
 };
 pub use adjustment::Adjustment;
+pub use aged::Aged;
 pub use limits::{Limits, SettingError};
 pub use mode::{Mode, ModeError, Overrun};
 pub use predictor::{

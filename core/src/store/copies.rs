@@ -28,6 +28,13 @@ impl Copied {
         words_from(self.0.as_flattened(), (at & (2 * STORE_WORDS - 1)).wrapping_mul(2))
     }
 
+    /// As [`Self::set`], also behind the last place.
+    pub fn put(&mut self, at: usize, value: u32) {
+        if let Some(word) = self.0.get_mut(at) {
+            *word = value.to_le_bytes();
+        }
+    }
+
     #[inline(always)]
     pub fn set(&mut self, at: usize, value: u32) {
         if let Some(word) = self.0.get_mut(at & (STORE_WORDS - 1)) {

@@ -63,6 +63,8 @@ pub enum ActivateError {
     },
     /// Both images lie at the same place, or overlap.
     SameImage,
+    /// What an [`Activation`](crate::Activation) keeps from step to step was hit: begin again.
+    Torn,
 }
 
 impl fmt::Display for ActivateError {
@@ -74,6 +76,7 @@ impl fmt::Display for ActivateError {
             Self::TwoTables => f.write_str("the images are two different tables"),
             Self::OtherDrive => f.write_str("the table is for another drive"),
             Self::Temperature { found_c } => write!(f, "temperature {found_c} C: must be finite"),
+            Self::Torn => f.write_str("what was kept of an activation is not whole: begin again"),
             Self::SameImage => f.write_str("both images are the same place in memory: two are needed"),
         }
     }

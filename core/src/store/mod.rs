@@ -10,9 +10,10 @@
 //! damaged in both is lost, the copies stay as they were, and the health says so. The work is the same in every tick, whatever is
 //! found.
 //!
-//! A new table comes in chunks ([`crate::Upload`]) and is checked in full; the one in use stays until [`Store::activate`] is
-//! called between two ticks.
+//! A new table comes in chunks ([`crate::Upload`]). It is checked in full, and filled in, in short steps between ticks
+//! ([`Store::begin`], [`Activation`]), or at once where nothing waits ([`Store::activate`]).
 
+mod activation;
 mod copies;
 mod health;
 mod images;
@@ -21,6 +22,7 @@ mod source;
 mod tests;
 mod upload;
 
+pub use activation::{Activation, Progress};
 pub use copies::STORE_WORDS;
 pub use health::{ActivateError, Counters, Health, STORE_PAGES};
 pub use images::{Images, mend_page};
@@ -30,28 +32,14 @@ use crate::crc::{CRC_START, crc_word};
 use crate::drive::Drive;
 use crate::num;
 use crate::table::{
-    Doubt, Memory, NODE_WORDS, OperatingPoint, PAGE_BYTES, Plan, Table, TableId, TorquePlace, Words, grid, word_at,
+    Doubt, Memory, NODE_WORDS, OperatingPoint, PAGE_BYTES, Plan, TableId, TorquePlace, Words, grid, word_at,
 };
+use crate::whole::pair;
 use copies::{Copied, SLACK, agreed};
-use source::{ACTIVE, FIRST, IN_RANGE, Sealed, Source, TORN};
+use source::{ACTIVE, Fresh, IN_RANGE, Sealed, Source, Strangers, TORN};
 
+/// Words of a page.
 const PAGE_WORDS: usize = PAGE_BYTES / 4;
-
-/// A word of the copies, made anew.
-#[derive(Clone, Copy)]
-struct Fresh {
-    place: usize,
-    value: u32,
-    /// There is something to make it of.
-    usable: bool,
-}
-
-/// Whether any of two images, or both, are not those that were activated; one that is given twice is not.
-#[derive(Clone, Copy)]
-struct Strangers {
-    any: bool,
-    all: bool,
-}
 
 /// What a tick has to say of the table.
 #[derive(Clone, Copy)]
@@ -100,12 +88,6 @@ impl Damaged {
         let mask = (whole as u32).wrapping_neg();
         [a & mask, b & mask]
     }
-}
-
-/// Whether an image passes; on a stack of its own.
-#[inline(never)]
-fn is_table(words: Words<'_>) -> bool {
-    Table::check(words.as_flattened()).is_ok()
 }
 
 /// Two copies of a table at the temperature of the drive: 8.1 KiB, and 0.3 KiB beside.
@@ -179,59 +161,47 @@ impl Store {
         if first == second { first } else { TableId::default() }
     }
 
-    /// Checks the images and fills the copies from them, at this temperature; used from the next tick on.
+    /// Begins to check the images and to fill the copies from them, at this temperature: step by step, between ticks.
     ///
-    /// At least one image must pass [`Table::check`]; if the other does not, it is damaged and will be named; if it is another
+    /// At least one image must pass [`Table::check`](crate::Table::check); if the other does not, it is damaged and will be named; if it is another
     /// table, neither is taken. They must lie at two places: one image given twice would be believed against the copies wherever it is
-    /// hit. Takes as long as the check and some 80 instructions for each word: between two ticks only if there is time for that.
+    /// hit.
+    ///
+    /// # Errors
+    /// [`ActivateError::Temperature`]; every other with the step that finds it.
+    pub fn begin(drive: &Drive, temperature_c: f32) -> Result<Activation, ActivateError> {
+        if !temperature_c.is_finite() {
+            return Err(ActivateError::Temperature { found_c: temperature_c });
+        }
+        Ok(Activation::new(*drive, temperature_c))
+    }
+
+    /// All of [`Self::begin`] and its steps in one call, some hundred thousand instructions; the table is used from the next tick on.
     ///
     /// # Errors
     /// [`ActivateError`]; the table in use stays, and goes on only if its images stay too.
+    #[inline(never)]
     pub fn activate(
         &mut self,
         images: &Images<'_>,
         drive: &Drive,
         temperature_c: f32,
     ) -> Result<TableId, ActivateError> {
-        let [first, second] = images.words;
-        if !temperature_c.is_finite() {
-            return Err(ActivateError::Temperature { found_c: temperature_c });
+        let mut activation = Self::begin(drive, temperature_c)?;
+        loop {
+            if let Progress::Done(id) = activation.step(self, images)? {
+                return Ok(id);
+            }
         }
-        // Only where the images differ is the second a question.
-        if first != second && is_table(first) && is_table(second) {
-            return Err(ActivateError::TwoTables);
+    }
+
+    /// Keeps both copies of what is known of a table.
+    fn know(&mut self, source: &Source) {
+        let sums = pair(source.sums());
+        for sealed in &mut self.source {
+            sealed.source = *source;
+            sealed.sums = sums;
         }
-        let table = Table::check(first.as_flattened())
-            .or_else(|error| Table::check(second.as_flattened()).map_err(|_| error))
-            .map_err(ActivateError::Image)?;
-        if images.overlap() {
-            return Err(ActivateError::SameImage);
-        }
-        if table.drive() != drive {
-            return Err(ActivateError::OtherDrive);
-        }
-        let source = Source::new(&table);
-        if source.used as usize > STORE_WORDS {
-            return Err(ActivateError::TooLarge { needed: source.used as usize });
-        }
-        if table.page_count() > STORE_PAGES {
-            return Err(ActivateError::TooManyPages { found: table.page_count() });
-        }
-        // Field by field: a whole store would be made on the stack first.
-        for copy in [&mut self.first, &mut self.second] {
-            copy.0.fill([0; 4]);
-        }
-        self.source = [source.at_temperature(table.words, temperature_c).sealed(); 2];
-        self.next = 0;
-        self.scrub = Scrub::START;
-        self.damaged = Damaged::NONE;
-        self.id = [table.id(); 2];
-        for place in 0..source.used as u32 {
-            let fresh = self.fresh(&[table.words; 2], place, Strangers { any: false, all: false });
-            self.first.set(fresh.place, fresh.value);
-            self.second.set(fresh.place, fresh.value);
-        }
-        Ok(table.id())
     }
 
     /// The temperature that the copies follow, °C, within one pass. Call it in a slow rate group; false, and nothing changes, if it
@@ -477,53 +447,10 @@ impl Store {
         }
     }
 
-    /// A word of the images, and whether it can be used: both have it, or one has it in a page that is not known to be damaged.
-    ///
-    /// By its own page: beside a damaged page of one image another page of the other may be damaged, and not found yet. Beside a
-    /// stranger no image is believed alone.
-    #[inline(never)]
-    fn believed(&self, images: &[Words<'_>; 2], at: usize, strangers: Strangers) -> (u32, bool) {
-        let [a, b] = images.map(|words| word_at(words, at));
-        let page = 1u32.wrapping_shl((at / PAGE_WORDS) as u32);
-        let [bad_a, bad_b] = self.damaged.pages().map(|pages| pages & page != 0);
-        let usable = ((a == b) & !strangers.all) | ((bad_a ^ bad_b) & !strangers.any);
-        (if bad_a { b } else { a }, usable)
-    }
-
     /// Makes one word of the copies anew.
     #[inline(always)]
     fn fresh(&self, images: &[Words<'_>; 2], at: u32, strangers: Strangers) -> Fresh {
-        let source = self.source();
-        let (ahead, step, is_number) = (FIRST as u16, 0, false);
-        let is_node = at >= source.nodes_from as u32;
-        let (ahead, step, is_number) =
-            if is_node { (source.nodes_ahead, source.node_plane, true) } else { (ahead, step, is_number) };
-        let is_record = at >= source.records_from as u32;
-        let (ahead, step, is_number) =
-            if is_record { (source.records_ahead, source.record_plane, false) } else { (ahead, step, is_number) };
-        let cold = at.wrapping_add(ahead as u32) as usize;
-        let hot = cold.wrapping_add(step as usize);
-        let (cold, cold_usable) = self.believed(images, cold, strangers);
-        let (hot, hot_usable) = self.believed(images, hot, strangers);
-        let usable = cold_usable & hot_usable;
-
-        // Both are made every time: a branch would save one of them now and then.
-        let (f, g) = (f32::from_bits(cold), f32::from_bits(hot));
-        // The last bit of H is a mark, and of the others too small to matter.
-        let number = (f + source.warm * (g - f)).to_bits() & !1 | cold & 1;
-        let hotter = (source.warm * 16_384.0) as i32;
-        let colder = 16_384i32.wrapping_sub(hotter);
-        let blend = |cold: i32, hot: i32| {
-            let cold = (cold as i16 as i32).wrapping_mul(colder as i16 as i32);
-            let hot = (hot as i16 as i32).wrapping_mul(hotter as i16 as i32);
-            cold.wrapping_add(hot).wrapping_add(8192) >> 14
-        };
-        let low = blend(cold as i32, hot as i32) as u32 & 0xffff;
-        let pair = (blend(cold as i32 >> 16, hot as i32 >> 16) as u32) << 16 | low;
-        let mask = (is_number as u32).wrapping_neg();
-        let value = pair ^ (pair ^ number) & mask;
-
-        Fresh { place: at as usize, value, usable }
+        self.source().fresh(images, at, strangers, self.damaged.pages())
     }
 
     /// Takes one word of an image into the CRC-32 of its page.

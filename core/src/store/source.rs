@@ -1,11 +1,12 @@
 //! What a step needs of a table besides the copies, and where the words of the copies come from.
 
+use super::PAGE_WORDS;
 use crate::num;
 use crate::table::{NODE_WORDS, Plan, Table, Words, f32_at, grid, halves, ripple_row, word, word_at};
 use crate::whole::{pair, same, sums};
 
 /// A copy starts with the torque axis; what comes before it in an image is in the store otherwise.
-pub(super) const FIRST: usize = word::TORQUE_NODES;
+const FIRST: usize = word::TORQUE_NODES;
 
 /// What a step needs besides the copies, and where the words of the copies come from: kept twice, with sums over each.
 ///
@@ -169,7 +170,7 @@ impl Source {
         let seal_at = body.wrapping_add(table.page_count());
         let mut plan = table.plan;
         plan.curves = plan.curves.map(|curve| if curve >> 16 == 0 { 0 } else { curve.wrapping_sub(FIRST as u32) });
-        plan.play_ripple = table.play_ripple_counts();
+        plan.play_ripple = table.play_ripple;
         Self {
             plan,
             torque_range: [number(word::TORQUE_RANGE), number(word::TORQUE_RANGE.wrapping_add(1))],
@@ -185,6 +186,76 @@ impl Source {
             drive: table.drive().word(),
             ..Self::EMPTY
         }
+    }
+}
+
+/// A word of the copies, made anew.
+#[derive(Clone, Copy)]
+pub(super) struct Fresh {
+    pub place: usize,
+    pub value: u32,
+    /// There is something to make it of.
+    pub usable: bool,
+}
+
+/// Whether any of two images, or both, are not those that were activated; one that is given twice is not.
+#[derive(Clone, Copy)]
+pub(super) struct Strangers {
+    pub any: bool,
+    pub all: bool,
+}
+
+impl Strangers {
+    pub const NONE: Self = Self { any: false, all: false };
+}
+
+impl Source {
+    /// A word of the images, and whether it can be used: both have it, or one has it in a page that is not known to be damaged.
+    ///
+    /// By its own page: beside a damaged page of one image another page of the other may be damaged, and not found yet. Beside a
+    /// stranger no image is believed alone.
+    #[inline(never)]
+    fn believed(images: &[Words<'_>; 2], at: usize, strangers: Strangers, damaged: [u32; 2]) -> (u32, bool) {
+        let [a, b] = images.map(|words| word_at(words, at));
+        let page = 1u32.wrapping_shl((at / PAGE_WORDS) as u32);
+        let [bad_a, bad_b] = damaged.map(|pages| pages & page != 0);
+        let usable = ((a == b) & !strangers.all) | ((bad_a ^ bad_b) & !strangers.any);
+        (if bad_a { b } else { a }, usable)
+    }
+
+    /// A word of the copies, made anew of the images; `damaged` are their pages that are known to be, a bit each.
+    #[inline(always)]
+    pub fn fresh(&self, images: &[Words<'_>; 2], at: u32, strangers: Strangers, damaged: [u32; 2]) -> Fresh {
+        let (ahead, step, is_number) = (FIRST as u16, 0, false);
+        let is_node = at >= self.nodes_from as u32;
+        let (ahead, step, is_number) =
+            if is_node { (self.nodes_ahead, self.node_plane, true) } else { (ahead, step, is_number) };
+        let is_record = at >= self.records_from as u32;
+        let (ahead, step, is_number) =
+            if is_record { (self.records_ahead, self.record_plane, false) } else { (ahead, step, is_number) };
+        let cold = at.wrapping_add(ahead as u32) as usize;
+        let hot = cold.wrapping_add(step as usize);
+        let (cold, cold_usable) = Self::believed(images, cold, strangers, damaged);
+        let (hot, hot_usable) = Self::believed(images, hot, strangers, damaged);
+        let usable = cold_usable & hot_usable;
+
+        // Both are made every time: a branch would save one of them now and then.
+        let (f, g) = (f32::from_bits(cold), f32::from_bits(hot));
+        // The last bit of H is a mark, and of the others too small to matter.
+        let number = (f + self.warm * (g - f)).to_bits() & !1 | cold & 1;
+        let hotter = (self.warm * 16_384.0) as i32;
+        let colder = 16_384i32.wrapping_sub(hotter);
+        let blend = |cold: i32, hot: i32| {
+            let cold = (cold as i16 as i32).wrapping_mul(colder as i16 as i32);
+            let hot = (hot as i16 as i32).wrapping_mul(hotter as i16 as i32);
+            cold.wrapping_add(hot).wrapping_add(8192) >> 14
+        };
+        let low = blend(cold as i32, hot as i32) as u32 & 0xffff;
+        let pair = (blend(cold as i32 >> 16, hot as i32 >> 16) as u32) << 16 | low;
+        let mask = (is_number as u32).wrapping_neg();
+        let value = pair ^ (pair ^ number) & mask;
+
+        Fresh { place: at as usize, value, usable }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::fixture::{self, ARCSEC};
 use crate::upset::Upset;
 use crate::{
     Adjustment, FixedMember, Flags, GeneratorAngle, Input, Joint, JointState, Limits, Mode, Output, OutputAngle,
-    Overrun, PlayState, Quality,
+    Overrun, PlayState, Quality, Table,
 };
 use std::sync::LazyLock;
 use std::vec::Vec;
@@ -592,4 +592,125 @@ fn an_empty_store_is_all_zeros() {
     assert!(!numbers.iter().any(|number| number.parse() == Ok(0u32)), "a zero in {told:.400}");
     let whole = Store::new();
     assert!(whole.source[0].is_whole() && whole.source[1].is_whole() && whole.damaged.pages() == [0; 2]);
+}
+
+/// Steps of an activation into a store until it is done or fails.
+fn steps(
+    activation: &mut Activation,
+    store: &mut Store,
+    images: &Images<'_>,
+    mut between: impl FnMut(usize, Progress, &mut Activation, &mut Store),
+) -> Result<TableId, ActivateError> {
+    for step in 0..10_000 {
+        match activation.step(store, images)? {
+            Progress::Done(id) => return Ok(id),
+            progress => between(step, progress, activation, store),
+        }
+    }
+    panic!("it does not end")
+}
+
+/// While the images are checked the store flies on with its table, to the bit; then it is as if it had been activated at once.
+#[test]
+#[cfg_attr(miri, ignore = "takes too long")]
+fn an_activation_in_steps_leaves_the_table_in_use_until_the_new_one_has_passed() {
+    let other = fixture::image(false);
+    let other_twin = other.clone();
+    let (old, new) = (Images::new(&IMAGE, &TWIN), Images::new(&other, &other_twin));
+    let (mut store, mut twin) = (active(20.0), active(20.0));
+    let mut states = [JointState::new(); 2];
+    states.iter_mut().for_each(|state| state.request(Mode::Tracking).unwrap());
+    let mut motion = Motion::new(5);
+    let (mut checked, mut filled) = (0, 0);
+    let mut activation = Store::begin(&fixture::drive(), 20.0).unwrap();
+    let found = steps(&mut activation, &mut store, &new, |_, progress, _, store| {
+        let input = motion.next();
+        let [first, second] = &mut states;
+        let out = joint().tick(&old, store, first, &input);
+        let expected = joint().tick(&old, &mut twin, second, &input);
+        if progress == Progress::Checking {
+            assert_eq!(out, expected);
+            checked += 1;
+        } else {
+            assert!(out.flags.contains(Flags::NOT_CORRECTED) && store.health() == Health::Empty);
+            filled += 1;
+        }
+    });
+    assert!(checked > 300 && filled > 100, "{checked} {filled}");
+    assert_eq!(found, Ok(Table::check(&other).unwrap().id()));
+    let mut at_once = Store::new();
+    at_once.activate(&new, &fixture::drive(), 20.0).unwrap();
+    assert!(store.is_like(&at_once) && store.health() == Health::Sound);
+    // It says so again, and changes nothing.
+    assert_eq!(activation.step(&mut store, &new), found.map(Progress::Done));
+    assert!(store.is_like(&at_once));
+}
+
+/// What is refused is refused in every later step too, and the store is as it was.
+#[test]
+fn an_activation_that_fails_has_not_touched_the_store() {
+    let other = fixture::image(false);
+    let mut damaged = IMAGE.clone();
+    damaged[3000] ^= 1;
+    let refused = [
+        (Images::new(&damaged, &damaged[..]), "a damaged one"),
+        (Images::new(&IMAGE, &other), "two tables"),
+        (Images::new(&IMAGE, &IMAGE), "one image"),
+    ];
+    for (images, name) in refused {
+        let mut store = active(20.0);
+        let mut activation = Store::begin(&fixture::drive(), 20.0).unwrap();
+        let found = steps(&mut activation, &mut store, &images, |_, progress, _, _| {
+            assert_eq!(progress, Progress::Checking, "{name}");
+        });
+        assert!(found.is_err() && activation.step(&mut store, &images).is_err(), "{name}: {found:?}");
+        assert!(store.is_like(&active(20.0)), "{name}");
+    }
+}
+
+/// Every bit of what an activation keeps while it fills, and the two words of the temperature before: refused, or harmless.
+#[test]
+#[cfg_attr(miri, ignore = "takes too long")]
+fn no_single_bit_of_an_activation_makes_another_table() {
+    let images = Images::new(&IMAGE, &TWIN);
+    let expected = active(25.0);
+    let (mut checking, mut filling) = (None, None);
+    let mut activation = Store::begin(&fixture::drive(), 25.0).unwrap();
+    steps(&mut activation, &mut Store::new(), &images, |step, progress, now, store| {
+        if step == 100 {
+            checking = Some((*now, store.clone()));
+        }
+        if progress == Progress::Filling && now.found.unwrap().filled == 160 {
+            filling = Some((*now, store.clone()));
+        }
+    })
+    .unwrap();
+    let told = core::cell::Cell::new(0);
+    let judge = |(mut hit, mut store): (Activation, Store)| match steps(&mut hit, &mut store, &images, |_, _, _, _| {})
+    {
+        Ok(_) => assert!(store.is_like(&expected)),
+        Err(error) => {
+            assert!(error == ActivateError::Torn && store.health() != Health::Sound, "{error:?}");
+            told.set(told.get() + 1);
+        }
+    };
+    let (checking, filling) = (checking.unwrap(), filling.unwrap());
+    for bit in 0..checking.0.temperature.bits() {
+        let mut hit = checking.clone();
+        hit.0.temperature.flip(bit, &mut std::string::String::new());
+        judge(hit);
+    }
+    let bits = filling.0.found.unwrap().bits();
+    for bit in 0..bits {
+        let mut hit = filling.clone();
+        hit.0.found.as_mut().unwrap().flip(bit, &mut std::string::String::new());
+        judge(hit);
+    }
+    assert_eq!(told.get(), 64 + bits);
+    // What the store knows while it is filled is not used for it.
+    for bit in 0..filling.1.source_bits() {
+        let mut hit = filling.clone();
+        hit.1.flip_source(bit);
+        judge(hit);
+    }
 }

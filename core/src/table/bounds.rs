@@ -38,7 +38,15 @@ pub(crate) struct InverseBound {
     pub error_rad: f32,
 }
 
+impl InverseBound {
+    pub const NONE: Self = Self { iterations: 0, error_rad: 0.0 };
+}
+
 impl Bounds {
+    /// Of a table that gives nothing.
+    pub(crate) const NONE: Self =
+        Self { error_rad: 0.0, periodic_rad: 0.0, slope: 0.0, curve_slope: 0.0, ripple_cells: 0.0, rounding_rad: 0.0 };
+
     /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], 1 to 8, and what they and rounding leave; `cell_rad` is a cell of the
     /// ripple at the output.
     pub(crate) fn inverse(self, cell_rad: f32) -> InverseBound {

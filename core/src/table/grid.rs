@@ -72,6 +72,9 @@ pub struct PeriodicAxis {
 }
 
 impl PeriodicAxis {
+    /// An axis that is absent.
+    pub(crate) const NONE: Self = Self { nodes: 0 };
+
     /// An axis of `nodes` nodes; `None` unless 0 (absent) or 4 to 128.
     #[must_use]
     pub fn new(nodes: usize) -> Option<Self> {
@@ -187,18 +190,18 @@ pub const JUMP_RATIO: f32 = 8.0;
 ///
 /// Decided once, when a table is accepted.
 pub fn jump_intervals(len: usize, node: impl Fn(usize) -> f32) -> u64 {
+    let intervals = len.saturating_sub(1).min(MAX_CLAMPED_NODES);
+    (0..intervals).fold(0, |jumps, i| jumps | (jump_at(i, len, &node) as u64).checked_shl(i as u32).unwrap_or(0))
+}
+
+/// Whether the interval above node `i` of so many is one of them.
+pub(crate) fn jump_at(i: usize, len: usize, node: impl Fn(usize) -> f32) -> bool {
     let width = |i: usize| node(i.saturating_add(1)) - node(i);
     let intervals = len.saturating_sub(1).min(MAX_CLAMPED_NODES);
-    let mut jumps = 0u64;
-    for i in 0..intervals {
-        let own = width(i) * JUMP_RATIO;
-        let left_wide = i == 0 || width(i.saturating_sub(1)) >= own;
-        let right_wide = i.saturating_add(1) == intervals || width(i.saturating_add(1)) >= own;
-        if intervals > 1 && left_wide && right_wide {
-            jumps |= 1u64.checked_shl(i as u32).unwrap_or(0);
-        }
-    }
-    jumps
+    let own = width(i) * JUMP_RATIO;
+    let left_wide = i == 0 || width(i.saturating_sub(1)) >= own;
+    let right_wide = i.saturating_add(1) == intervals || width(i.saturating_add(1)) >= own;
+    i < intervals && intervals > 1 && left_wide && right_wide
 }
 
 /// Whether bit `node` of [`jump_intervals`] is set.

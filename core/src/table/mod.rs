@@ -25,6 +25,7 @@
 
 mod bounds;
 pub mod grid;
+mod identity;
 mod image;
 mod memory;
 mod model;
@@ -34,13 +35,14 @@ pub(crate) mod windup;
 mod words;
 
 pub use bounds::{Bounds, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVERSE_ITERATIONS};
+pub use identity::{Identity, IdentityCheck};
 #[cfg(any(test, feature = "fuzzing"))]
 pub use image::reseal;
+pub(crate) use image::{Check, MAX_AXIS_VALUE, NODE_WORDS, counted, page_intact, ripple_row, word};
 pub use image::{
     FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance, TEXT_BYTES,
     TableData, WriteError, image_bytes, write_image,
 };
-pub(crate) use image::{MAX_AXIS_VALUE, NODE_WORDS, counted, page_intact, ripple_row, word};
 pub(crate) use memory::{Doubt, Memory, Plan};
 pub use model::{Approach, Command, Prediction};
 pub(crate) use model::{Estimate, Model, departure};
@@ -121,6 +123,8 @@ pub struct Table<'a> {
     pub(crate) plan: Plan,
     pub(crate) bounds: Bounds,
     pub(crate) inverse: InverseBound,
+    /// How far the ripple takes the half-width of the play below H at most, counts, rounded up.
+    pub(crate) play_ripple: i32,
 }
 
 impl Memory for Table<'_> {

@@ -149,6 +149,7 @@ impl Format for ActivateError {
             Self::OtherDrive => write!(f, "the table is for another drive"),
             Self::Temperature { .. } => write!(f, "the temperature is not a number within the range of numbers"),
             Self::SameImage => write!(f, "one image is given twice"),
+            Self::Torn => write!(f, "what was kept of an activation is not whole: begin again"),
         }
     }
 }

@@ -111,7 +111,25 @@ int run(void)
         return 10;
     if (flexspline_store_activate(&store, &joint, &table, 0.0f / 0.0f) != FLEXSPLINE_STATUS_ARGUMENT)
         return 11;
-    if (flexspline_store_activate(&store, &joint, &table, 20.0f) || flexspline_state_request(&state, 1))
+    if (flexspline_self_test())
+        return 22;
+    static FlexsplineIdentity identity;
+    uint8_t found = 0;
+    if (flexspline_identity_begin(&identity))
+        return 23;
+    while (found == 0)
+        if (flexspline_identity_step(&identity, second, sizeof second, &found))
+            return 24;
+    if (found != 1)
+        return 25;
+    static FlexsplineActivation activation;
+    uint8_t progress = 0;
+    if (flexspline_activation_begin(&activation, &joint, 20.0f))
+        return 26;
+    while (progress != 2)
+        if (flexspline_activation_step(&activation, &store, &table, &progress))
+            return 27;
+    if (flexspline_state_request(&state, 1))
         return 4;
 
     FlexsplineOutput out = {0};

@@ -2,16 +2,18 @@
 
 use super::header::{check_envelope, check_identity};
 use super::layout::{
-    DERIVED_WORDS, Layout, MAX_AXIS_VALUE, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, NODE_WORDS,
-    PAGE_BYTES, UNITS_PER_COUNT, cell_width, counted, image_bytes, limit_counts, word,
+    CRC_BYTES, DERIVED_WORDS, Layout, MAX_AXIS_VALUE, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES,
+    NODE_WORDS, PAGE_BYTES, UNITS_PER_COUNT, cell_width, counted, image_bytes, limit_counts, word,
 };
 use super::sums::page_intact;
 use crate::angle::RAD_PER_COUNT;
+use crate::crc::{CRC_START, crc_bytes};
+use crate::drive::Drive;
 use crate::error::{Field, ImageError};
 use crate::num::{self, larger};
 use crate::table::bounds::{Bounds, HOLD_COUNTS, InverseBound, MAX_INVERSE_ERROR_RAD};
 use crate::table::grid::{self, MAX_CLAMPED_NODES, MAX_PERIODIC_NODES, MIN_PERIODIC_NODES, PeriodicAxis};
-use crate::table::words::{Words, f32_at, halves, word_at};
+use crate::table::words::{Words, f32_at, word_at};
 use crate::table::{GeneratorKind, Table};
 use core::f64::consts::TAU;
 
@@ -29,39 +31,25 @@ const MAX_UNITS_PER_CELL: f32 = 255.0;
 /// cell and one for each of the two weights that are rounded.
 const WEIGHT_ROUNDING: f32 = 3.0 / 32_768.0;
 
+#[inline(never)]
 fn finite(field: Field, index: usize, value: f32) -> Result<f32, ImageError> {
     if value.is_finite() { Ok(value) } else { Err(ImageError::NotFinite { field, index }) }
 }
 
+#[inline(never)]
 fn in_range(field: Field, index: usize, found: f32, least: f32, most: f32) -> Result<f32, ImageError> {
     finite(field, index, found)?;
     if found >= least && found <= most { Ok(found) } else { Err(ImageError::OutOfRange { field, found, least, most }) }
 }
 
-/// The nodes increase and what follows is padding.
-fn check_axis(field: Field, words: Words<'_>, first: usize, nodes: usize, slots: usize) -> Result<(), ImageError> {
-    let mut before = f32::NEG_INFINITY;
-    for index in 0..slots {
-        let at = first.saturating_add(index);
-        if index >= nodes {
-            derived_is(words, at, f32::MAX.to_bits())?;
-            continue;
-        }
-        let node = in_range(field, index, f32_at(words, at), -MAX_AXIS_VALUE, MAX_AXIS_VALUE)?;
-        if node <= before {
-            return Err(ImageError::NotIncreasing { field, index });
-        }
-        before = node;
-    }
-    Ok(())
-}
-
 /// Whether a word is what it must be.
+#[inline(never)]
 fn derived_is(words: Words<'_>, at: usize, value: u32) -> Result<(), ImageError> {
     if word_at(words, at) == value { Ok(()) } else { Err(ImageError::Derived { offset: at.saturating_mul(4) }) }
 }
 
 /// A range must lie inside the axis; an axis of one node holds wherever its maker says.
+#[inline(never)]
 fn check_range(field: Field, words: Words<'_>, at: usize, first: usize, nodes: usize) -> Result<(), ImageError> {
     let [least, most] = [0, 1].map(|end: usize| f32_at(words, at.saturating_add(end)));
     let (mut from, mut to) = (-MAX_AXIS_VALUE, MAX_AXIS_VALUE);
@@ -73,26 +61,6 @@ fn check_range(field: Field, words: Words<'_>, at: usize, first: usize, nodes: u
     Ok(())
 }
 
-/// What a closed B-spline has at most: coefficient, slope per node spacing, value. Coefficients bound values too, and are simpler
-/// to blend; values tell how far the curve really goes.
-fn extremes(stored: usize, value: impl Fn(usize) -> f32) -> [f32; 3] {
-    let mut most = [0.0; 3];
-    for i in 0..stored.saturating_sub(2) {
-        let [largest, steepest, reached] = most;
-        let (a, b, c) = (value(i), value(i.saturating_add(1)), value(i.saturating_add(2)));
-        // A parabola from (a + b)/2 to (b + c)/2; its top, if inside, where the slope b − a + t·(a − 2b + c) vanishes.
-        let turn = (a - b) / (a - 2.0 * b + c);
-        let top = 0.5 * (a + b) + 0.5 * turn * (b - a);
-        let top = if turn > 0.0 && turn < 1.0 { top.abs() } else { 0.0 };
-        most = [
-            larger(largest, a.abs()),
-            larger(steepest, (b - a).abs()),
-            larger(reached, larger(top, 0.5 * (a + b).abs())),
-        ];
-    }
-    most
-}
-
 /// Half word `index` of a record.
 #[inline(never)]
 fn half_at(record: Words<'_>, index: usize) -> i16 {
@@ -100,49 +68,532 @@ fn half_at(record: Words<'_>, index: usize) -> i16 {
     (if index.is_multiple_of(2) { word } else { word >> 16 }) as i16
 }
 
-/// Whether the three repeated words of a stored curve equal the nodes they repeat.
-fn check_closed(field: Field, axis: PeriodicAxis, words: Words<'_>) -> Result<(), ImageError> {
-    let word = |position: usize| words.get(position);
-    for index in 0..axis.stored_len() {
-        // Node i is stored at position i + 1.
-        if word(index) != word(axis.stored_node(index).saturating_add(1)) {
-            return Err(ImageError::NotClosed { field, index });
-        }
-    }
-    Ok(())
-}
-
 /// Counts in radians.
 fn rad(counts: f32) -> f32 {
     counts * RAD_PER_COUNT
 }
 
-impl<'a> Table<'a> {
-    /// Checks an image and gives the table in it. Nothing of an image can be used before.
-    ///
-    /// Verified: length, magic, version, byte order, CRC-32 of the whole and of every page, texts, tooth counts, node
-    /// counts; every number finite; axes strictly increasing; half-width of the play ≥ 0 everywhere; torque intervals that
-    /// meet at their nodes; wind-up that grows with the load on both flanks, and no faster than a drive can; the largest error the table can give within its stated limit and [`MAX_ERROR_RAD`];
-    /// `|ratio·de/dψ| < 1` everywhere, so that the inverse exists, and how it converges; periodic parts closed at the wrap;
-    /// every offset, unit and bound that follows from other numbers.
-    ///
-    /// Bounds hold for every input, not only at nodes: a B-spline stays within its coefficients, and what the cubic of the
-    /// wind-up departs from the straight line between two nodes counts in full.
-    ///
-    /// Two passes over the image and its CRC-32 twice, once per upload, not in the step.
+/// How much of an image a step of a check goes over: bytes of a checksum, numbers of a curve or a record, nodes.
+const STEP_BYTES: usize = PAGE_BYTES;
+const STEP_NUMBERS: usize = 12;
+const STEP_NODES: usize = 4;
+
+/// What a check finds next, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Envelope,
+    Crc,
+    Identity,
+    Pages,
+    Places,
+    TorqueAxis,
+    TemperatureAxis,
+    Unit,
+    Jumps,
+    Nodes,
+    /// Of a record: closed, and how far it narrows the play; then how far each of its two ripples goes.
+    Closed,
+    Narrowest,
+    Forward,
+    Backward,
+    Curves,
+    CurvesClosed,
+    Bounds,
+    Rise,
+    Inverse,
+    /// Words that follow from the bounds.
+    Derived,
+    Done,
+}
+
+/// What is known of an image once its sizes are.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Facts {
+    body_bytes: usize,
+    drive: Drive,
+    generator_kind: GeneratorKind,
+    torque_nodes: usize,
+    temperature_nodes: usize,
+    ripple: PeriodicAxis,
+    /// Width of a cell of the ripple at the output, counts.
+    cell_width: f32,
+    curve_nodes: [usize; 3],
+    layout: Layout,
+    /// Intervals of the torque axis that are jumps.
+    jumps: u64,
+    bounds: Bounds,
+    inverse: InverseBound,
+    /// What the ripple narrows the play by at most, twice, ripple units.
+    narrowest: i32,
+}
+
+/// A check of an image, step by step: holds nothing of the image, which is given with every step.
+///
+/// A step takes at most 2000 instructions on a Cortex-M4F, held by `tests/run firmware`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Check {
+    stage: Stage,
+    /// Where in the stage, and where in the part that is looked at there.
+    at: usize,
+    within: usize,
+    crc: u32,
+    facts: Facts,
+    /// Torque, D, slope of D and H of the node before.
+    before: Option<[f32; 4]>,
+    /// The largest D − H and D + H below the node.
+    highest: [f32; 2],
+    /// Coefficient, step and value of a closed curve, as far as it was looked at.
+    most: [f32; 3],
+    /// The narrowest play of a record.
+    least: f32,
+}
+
+impl Check {
+    pub const NEW: Self = Self {
+        stage: Stage::Envelope,
+        at: 0,
+        within: 0,
+        crc: CRC_START,
+        facts: Facts::NONE,
+        before: None,
+        highest: [f32::NEG_INFINITY; 2],
+        most: [0.0; 3],
+        least: 0.0,
+    };
+
+    /// A step; true after the last. The first check that fails ends it.
     ///
     /// # Errors
     /// The first check that fails, in the order of [`ImageError`].
-    pub fn check(image: &'a [u8]) -> Result<Self, ImageError> {
-        let table = Self::parse(image)?;
-        for (at, value) in DERIVED_WORDS.into_iter().zip(table.derived()) {
-            derived_is(table.words, at, value)?;
+    #[inline(never)]
+    pub fn step(&mut self, image: &[u8]) -> Result<bool, ImageError> {
+        if self.stage == Stage::Done {
+            return Ok(true);
         }
-        Ok(table)
+        let next = match self.stage {
+            Stage::Envelope => {
+                check_envelope(image)?;
+                Some(Stage::Crc)
+            }
+            Stage::Crc => self.crc(image)?.then_some(Stage::Identity),
+            Stage::Identity => {
+                self.facts = Facts::of(image)?;
+                Some(Stage::Pages)
+            }
+            Stage::Pages => self.page(image)?.then_some(Stage::Places),
+            _ => self.numbers(image)?,
+        };
+        if let Some(next) = next {
+            self.stage = next;
+            (self.at, self.within) = (0, 0);
+        }
+        Ok(self.stage == Stage::Done)
     }
 
-    /// [`Self::check`] but for the words that follow from the bounds.
-    pub(super) fn parse(image: &'a [u8]) -> Result<Self, ImageError> {
+    /// A step among the numbers; the next stage if this one has ended.
+    fn numbers(&mut self, image: &[u8]) -> Result<Option<Stage>, ImageError> {
+        let words = image.get(..self.facts.body_bytes).unwrap_or_default().as_chunks::<4>().0;
+        let records = self.facts.torque_nodes.saturating_mul(self.facts.temperature_nodes);
+        Ok(match self.stage {
+            Stage::Places => {
+                self.facts.check_places(image, words)?;
+                Some(Stage::TorqueAxis)
+            }
+            Stage::TorqueAxis => {
+                let nodes = self.facts.torque_nodes;
+                self.axis(Field::TorqueNodes, words, word::TORQUE_NODES, nodes, MAX_CLAMPED_NODES)?
+                    .then_some(Stage::TemperatureAxis)
+            }
+            Stage::TemperatureAxis => {
+                let (nodes, slots) = (self.facts.temperature_nodes, MAX_TEMPERATURE_NODES);
+                let ended = self.axis(Field::TemperatureNodes, words, word::TEMPERATURE_NODES, nodes, slots)?;
+                if ended {
+                    self.facts.check_ranges(image, words)?;
+                }
+                ended.then_some(Stage::Unit)
+            }
+            Stage::Unit => {
+                // So that the ripple in cells, and in counts, fits the integers of a step.
+                let most = self.facts.cell_width.abs() * MAX_UNITS_PER_CELL;
+                let most = if self.facts.ripple.is_empty() || most > i32::MAX as f32 { i32::MAX as f32 } else { most };
+                in_range(Field::MeanRipple, 0, word_at(words, word::RIPPLE_UNIT) as f32, 0.0, most)?;
+                Some(Stage::Jumps)
+            }
+            Stage::Jumps => {
+                let node = |i: usize| f32_at(words, word::TORQUE_NODES.saturating_add(i));
+                let part = STEP_NUMBERS;
+                let (from, to) = (self.at, self.at.saturating_add(part).min(self.facts.torque_nodes));
+                for i in from..to {
+                    let jump = grid::jump_at(i, self.facts.torque_nodes, node);
+                    self.facts.jumps |= (jump as u64).wrapping_shl(i as u32);
+                }
+                self.at = to;
+                (to >= self.facts.torque_nodes).then_some(Stage::Nodes)
+            }
+            Stage::Nodes => {
+                for _ in 0..STEP_NODES {
+                    if self.at < records {
+                        self.node(words)?;
+                        self.at = self.at.saturating_add(1);
+                    }
+                }
+                (self.at >= records).then_some(if self.facts.ripple.is_empty() { Stage::Curves } else { Stage::Closed })
+            }
+            Stage::Closed => {
+                if self.closed(words)? {
+                    self.next_part(Stage::Narrowest);
+                }
+                None
+            }
+            Stage::Narrowest => {
+                if self.narrowest(words)? {
+                    self.next_part(Stage::Forward);
+                }
+                None
+            }
+            Stage::Forward => {
+                if self.ripple(words) {
+                    self.next_part(Stage::Backward);
+                }
+                None
+            }
+            Stage::Backward => {
+                let ended = self.ripple(words);
+                if ended {
+                    self.next_part(Stage::Closed);
+                    self.at = self.at.saturating_add(1);
+                }
+                (ended && self.at >= records).then_some(Stage::Curves)
+            }
+            Stage::Curves => self.curve(words)?,
+            Stage::CurvesClosed => self.curve_closed(words)?,
+            Stage::Bounds => {
+                self.facts.check_bounds(image)?;
+                Some(Stage::Rise)
+            }
+            Stage::Rise => {
+                for _ in 0..STEP_NODES {
+                    if self.at < records {
+                        self.rise(words)?;
+                        self.at = self.at.saturating_add(1);
+                    }
+                }
+                (self.at >= records).then_some(Stage::Inverse)
+            }
+            Stage::Inverse => {
+                self.facts.check_inverse()?;
+                Some(Stage::Derived)
+            }
+            _ => {
+                for (at, value) in DERIVED_WORDS.into_iter().zip(self.facts.derived()) {
+                    derived_is(words, at, value)?;
+                }
+                Some(Stage::Done)
+            }
+        })
+    }
+
+    /// Goes on with another part of the same record.
+    fn next_part(&mut self, stage: Stage) {
+        self.stage = stage;
+        self.within = 0;
+    }
+
+    /// Takes some bytes into the CRC-32 of all, and compares it after the last.
+    fn crc(&mut self, image: &[u8]) -> Result<bool, ImageError> {
+        let too_short = ImageError::TooShort { found: image.len(), needed: CRC_BYTES };
+        let (before, sum) = image.split_last_chunk::<CRC_BYTES>().ok_or(too_short)?;
+        let end = self.at.saturating_add(STEP_BYTES).min(before.len());
+        self.crc = crc_bytes(self.crc, before.get(self.at..end).unwrap_or_default());
+        self.at = end;
+        let (stated, computed) = (u32::from_le_bytes(*sum), !self.crc);
+        let ended = end >= before.len();
+        if ended && stated != computed {
+            return Err(ImageError::Crc { stated, computed });
+        }
+        Ok(ended)
+    }
+
+    /// Checks one page; true after the last.
+    fn page(&mut self, image: &[u8]) -> Result<bool, ImageError> {
+        let body_bytes = self.facts.body_bytes;
+        if !page_intact(image, body_bytes, self.at) {
+            return Err(ImageError::PageCrc { page: self.at });
+        }
+        self.at = self.at.saturating_add(1);
+        Ok(self.at >= body_bytes.div_ceil(PAGE_BYTES))
+    }
+
+    /// Some nodes of an axis: they increase, and what follows is padding.
+    fn axis(
+        &mut self,
+        field: Field,
+        words: Words<'_>,
+        first: usize,
+        nodes: usize,
+        slots: usize,
+    ) -> Result<bool, ImageError> {
+        let end = self.at.saturating_add(STEP_NUMBERS).min(slots);
+        for index in self.at..end {
+            let at = first.saturating_add(index);
+            if index >= nodes {
+                derived_is(words, at, f32::MAX.to_bits())?;
+                continue;
+            }
+            let node = in_range(field, index, f32_at(words, at), -MAX_AXIS_VALUE, MAX_AXIS_VALUE)?;
+            if index > 0 && node <= f32_at(words, at.saturating_sub(1)) {
+                return Err(ImageError::NotIncreasing { field, index });
+            }
+        }
+        self.at = end;
+        Ok(end >= slots)
+    }
+
+    /// What D and H can give at a node, and between it and the one before: linear interpolation between temperatures stays within them,
+    /// a cubic within its Bernstein coefficients.
+    #[inline(never)]
+    fn node(&mut self, words: Words<'_>) -> Result<(), ImageError> {
+        let most = num::counts(MAX_ERROR_RAD as f64) as f32;
+        let index = self.at;
+        let node = index.checked_rem(self.facts.torque_nodes).unwrap_or(0);
+        let at = self.facts.node_at(index);
+        let number = |i: usize| f32_at(words, at.saturating_add(i));
+        let mean = in_range(Field::Mean, index, number(0), -most, most)?;
+        let slope = finite(Field::MeanSlope, index, number(1))?;
+        let half = in_range(Field::HalfWidth, index, number(2), 0.0, most)?;
+        if number(2).to_bits() & 1 != grid::is_jump(self.facts.jumps, node) as u32 {
+            return Err(ImageError::Derived { offset: at.saturating_add(2).saturating_mul(4) });
+        }
+        if self.facts.torque_nodes == 1 {
+            for word in 0..NODE_WORDS {
+                derived_is(words, at.saturating_add(NODE_WORDS).saturating_add(word), number(word).to_bits())?;
+            }
+            // Nowhere to go with it.
+            in_range(Field::MeanSlope, index, slope, 0.0, 0.0)?;
+        }
+        let torque = f32_at(words, word::TORQUE_NODES.saturating_add(node));
+        let bounds = &mut self.facts.bounds;
+        bounds.error_rad = larger(bounds.error_rad, rad(mean.abs() + half));
+        let below = self.before.filter(|_| node > 0 && !grid::is_jump(self.facts.jumps, node.saturating_sub(1)));
+        if let Some([torque_below, mean_below, slope_below, half_below]) = below {
+            let third = (torque - torque_below) / 3.0;
+            let inner = larger((mean_below + slope_below * third).abs(), (mean - slope * third).abs());
+            let inner = if inner.is_finite() { inner } else { f32::INFINITY };
+            bounds.error_rad = larger(bounds.error_rad, rad(inner + larger(half, half_below)));
+        }
+        self.before = Some([torque, mean, slope, half]);
+        Ok(())
+    }
+
+    /// Whether the error of both flanks, D − H and D + H, grows with the load up to this node, and no faster than a drive can.
+    ///
+    /// From node to node, and where there is no jump from each control point of the cubic to the next: a cubic with rising control points rises.
+    #[inline(never)]
+    fn rise(&mut self, words: Words<'_>) -> Result<(), ImageError> {
+        let torque = self.at.checked_rem(self.facts.torque_nodes).unwrap_or(0);
+        let temperature = self.at.checked_div(self.facts.torque_nodes).unwrap_or(0);
+        if torque == 0 {
+            self.highest = [f32::NEG_INFINITY; 2];
+            return Ok(());
+        }
+        let jumps = self.facts.jumps;
+        let pitch_rad = TAU as f32 / self.facts.drive.circular_spline_teeth() as f32;
+        // Between two jumps the load is within the drag and the flanks let go: a table that was sampled one way falls there by its play.
+        let [first, last] = [jumps.trailing_zeros() as usize, 63_usize.saturating_sub(jumps.leading_zeros() as usize)];
+        let below = torque.saturating_sub(1);
+        let [low, high] = [self.at.saturating_sub(1), self.at].map(|index| {
+            let at = self.facts.node_at(index);
+            [0, 1, 2].map(|i: usize| rad(f32_at(words, at.saturating_add(i))))
+        });
+        let [from, to] = [below, torque].map(|node| f32_at(words, word::TORQUE_NODES.saturating_add(node)));
+        let (width, jump) = (to - from, grid::is_jump(jumps, below));
+        let ([mean_low, slope_low, half_low], [mean_high, slope_high, half_high]) = (low, high);
+        let (rise, widening) = (mean_high - mean_low, half_high - half_low);
+        let third = width / 3.0;
+        let (parts, widening) = if jump {
+            ([rise; 3], widening)
+        } else {
+            ([slope_low * third, rise - (slope_low + slope_high) * third, slope_high * third], widening / 3.0)
+        };
+        let allowed_rad = if jump { 0.5 * pitch_rad } else { MAX_COMPLIANCE_RAD_PER_N_M * third };
+        let [a, b, c] = parts;
+        let most = larger(larger(a, b), c) + widening.abs();
+        let mut least = -larger(larger(-a, -b), -c) - widening.abs();
+        for (highest, side) in self.highest.iter_mut().zip([-1.0, 1.0]) {
+            *highest = larger(*highest, mean_low + side * half_low);
+            let below = mean_high + side * half_high - *highest;
+            least = if below < least { below } else { least };
+        }
+        let lets_go = first < below && below < last && !jump;
+        let fall_rad = if lets_go { 0.5 * pitch_rad } else { FALL_RAD };
+        if least < -fall_rad {
+            return Err(ImageError::Falls { temperature, torque, found_rad: least });
+        }
+        if most > allowed_rad + FALL_RAD {
+            return Err(ImageError::Steep { temperature, torque, found_rad: most, allowed_rad });
+        }
+        Ok(())
+    }
+
+    /// Whether some of a record, of both directions, repeat the nodes they must; true after the last.
+    fn closed(&mut self, words: Words<'_>) -> Result<bool, ImageError> {
+        let record = self.facts.record(words, self.at);
+        let length = self.facts.layout.record;
+        let end = self.within.saturating_add(STEP_NUMBERS).min(length.saturating_mul(2));
+        for index in self.within..end {
+            let first = if index < length { 0 } else { length };
+            let node = self.facts.ripple.stored_node(index.saturating_sub(first)).saturating_add(1);
+            if half_at(record, index) != half_at(record, first.saturating_add(node)) {
+                return Err(ImageError::NotClosed { field: Field::MeanRipple, index });
+            }
+        }
+        self.within = end;
+        self.least = f32_at(words, self.facts.node_at(self.at).saturating_add(2));
+        Ok(end >= length.saturating_mul(2))
+    }
+
+    /// Whether a record leaves no negative half-width; true after the last of its numbers.
+    fn narrowest(&mut self, words: Words<'_>) -> Result<bool, ImageError> {
+        let record = self.facts.record(words, self.at);
+        let unit = self.facts.unit(words);
+        let half = f32_at(words, self.facts.node_at(self.at).saturating_add(2));
+        let stored = self.facts.ripple.stored_len();
+        let end = self.within.saturating_add(STEP_NUMBERS).min(stored);
+        for i in self.within..end {
+            let [forward, backward] =
+                [i, i.saturating_add(self.facts.layout.record)].map(|i| half_at(record, i) as i32);
+            let narrower = forward.wrapping_sub(backward);
+            self.facts.narrowest = if narrower > self.facts.narrowest { narrower } else { self.facts.narrowest };
+            let wider = 0.5 * (backward as f32 * unit - forward as f32 * unit);
+            let play = half + wider;
+            self.least = if play < self.least { play } else { self.least };
+        }
+        self.within = end;
+        if end >= stored && self.least < -(HALF_WIDTH_ROUNDING_COUNTS as f32 + unit) {
+            let torque = self.at.checked_rem(self.facts.torque_nodes).unwrap_or(0);
+            let temperature = self.at.checked_div(self.facts.torque_nodes).unwrap_or(0);
+            return Err(ImageError::NegativeHalfWidth { temperature, torque, found_rad: rad(self.least) });
+        }
+        Ok(end >= stored)
+    }
+
+    /// Adds what some of the ripple of one direction can give: steady motion follows forward or backward. True after the last.
+    fn ripple(&mut self, words: Words<'_>) -> bool {
+        let ended = self.extremes(words, self.facts.ripple.stored_len());
+        if ended {
+            let [largest, steepest, reached] = self.most;
+            self.most = [0.0; 3];
+            let cells_per_rad = self.facts.ripple.len() as f32 * self.facts.drive.tooth_periods().abs() / TAU as f32;
+            let bounds = &mut self.facts.bounds;
+            bounds.periodic_rad = larger(bounds.periodic_rad, largest);
+            bounds.slope = larger(bounds.slope, steepest * cells_per_rad);
+            bounds.ripple_cells = larger(bounds.ripple_cells, reached * cells_per_rad);
+            bounds.rounding_rad = larger(bounds.rounding_rad, WEIGHT_ROUNDING * steepest);
+        }
+        ended
+    }
+
+    /// Coefficient `i` of the closed curve that is looked at, rad.
+    #[inline(never)]
+    fn number(&self, words: Words<'_>, i: usize) -> f32 {
+        let first = match self.stage {
+            Stage::Forward => 0,
+            Stage::Backward => self.facts.layout.record,
+            _ => {
+                let at = self.facts.layout.curves.get(self.at).copied().unwrap_or(0);
+                return curve_rad(words, at.saturating_add(i));
+            }
+        };
+        rad(half_at(self.facts.record(words, self.at), first.saturating_add(i)) as f32 * self.facts.unit(words))
+    }
+
+    /// What a closed B-spline has at most: coefficient, slope per node spacing, value. Coefficients bound values too, and are simpler
+    /// to blend; values tell how far the curve really goes. Some of it; true after the last.
+    #[inline(never)]
+    fn extremes(&mut self, words: Words<'_>, stored: usize) -> bool {
+        let last = stored.saturating_sub(2);
+        let end = self.within.saturating_add(STEP_NUMBERS).min(last);
+        let [mut a, mut b] = [0, 1].map(|next: usize| self.number(words, self.within.saturating_add(next)));
+        for i in self.within..end {
+            let [largest, steepest, reached] = self.most;
+            let c = self.number(words, i.saturating_add(2));
+            // A parabola from (a + b)/2 to (b + c)/2; its top, if inside, where the slope b − a + t·(a − 2b + c) vanishes.
+            let turn = (a - b) / (a - 2.0 * b + c);
+            let top = 0.5 * (a + b) + 0.5 * turn * (b - a);
+            let top = if turn > 0.0 && turn < 1.0 { top.abs() } else { 0.0 };
+            self.most = [
+                larger(largest, a.abs()),
+                larger(steepest, (b - a).abs()),
+                larger(reached, larger(top, 0.5 * (a + b).abs())),
+            ];
+            (a, b) = (b, c);
+        }
+        self.within = end;
+        end >= last
+    }
+
+    /// Some numbers of one of A, B, C: in range; after the last its closing.
+    fn curve(&mut self, words: Words<'_>) -> Result<Option<Stage>, ImageError> {
+        let Some((field, at, stored)) = self.facts.curve(self.at) else { return Ok(Some(Stage::Bounds)) };
+        let end = self.within.saturating_add(STEP_NUMBERS).min(stored);
+        for index in self.within..end {
+            in_range(field, index, curve_rad(words, at.saturating_add(index)), -MAX_ERROR_RAD, MAX_ERROR_RAD)?;
+        }
+        self.within = end;
+        if end >= stored {
+            self.next_part(Stage::CurvesClosed);
+        }
+        Ok(None)
+    }
+
+    /// Whether it is closed, and, some at a time, what it can give.
+    fn curve_closed(&mut self, words: Words<'_>) -> Result<Option<Stage>, ImageError> {
+        let Some((field, at, stored)) = self.facts.curve(self.at) else { return Ok(Some(Stage::Bounds)) };
+        let nodes = stored.saturating_sub(3);
+        if self.within == 0 && stored > 0 {
+            let curve = words.get(at..).unwrap_or_default();
+            // Node i is stored at position i + 1: only the first and the last two repeat another.
+            for (index, node) in [(0, nodes), (nodes.saturating_add(1), 1), (nodes.saturating_add(2), 2)] {
+                if curve.get(index) != curve.get(node) {
+                    return Err(ImageError::NotClosed { field, index });
+                }
+            }
+        }
+        if self.extremes(words, stored) {
+            self.facts.add_curve(self.at, self.most);
+            self.most = [0.0; 3];
+            self.next_part(Stage::Curves);
+            self.at = self.at.saturating_add(1);
+        }
+        Ok(None)
+    }
+}
+
+/// A coefficient of A, B, C.
+fn curve_rad(words: Words<'_>, at: usize) -> f32 {
+    rad(word_at(words, at) as i32 as f32 * 0.5)
+}
+
+impl Facts {
+    /// Nothing known yet.
+    const NONE: Self = Self {
+        body_bytes: 0,
+        drive: Drive::SMALLEST,
+        generator_kind: GeneratorKind::Other,
+        torque_nodes: 0,
+        temperature_nodes: 0,
+        ripple: PeriodicAxis::NONE,
+        cell_width: 1.0,
+        curve_nodes: [0; 3],
+        layout: Layout::NONE,
+        jumps: 0,
+        bounds: Bounds::NONE,
+        inverse: InverseBound::NONE,
+        narrowest: 0,
+    };
+
+    /// What an image is for, and its sizes.
+    fn of(image: &[u8]) -> Result<Self, ImageError> {
         let header = check_envelope(image)?;
         let drive = check_identity(header)?;
         let generator_kind =
@@ -164,50 +615,109 @@ impl<'a> Table<'a> {
             return Err(size);
         }
         let layout = Layout::new(torque_nodes, temperature_nodes, ripple_nodes, curve_nodes);
-        let body_bytes = layout.end.saturating_mul(4);
-        if let Some(page) = (0..body_bytes.div_ceil(PAGE_BYTES)).find(|&page| !page_intact(image, body_bytes, page)) {
-            return Err(ImageError::PageCrc { page });
-        }
-        let (words, _) = image.get(..body_bytes).ok_or(size)?.as_chunks::<4>();
-        let plan = layout.plan(torque_nodes, temperature_nodes, ripple_nodes, curve_nodes);
-        derived_is(words, word::BODY, layout.end as u32)?;
-        derived_is(words, word::CELL_WIDTH, cell_width(&drive, ripple_nodes).to_bits())?;
-        for (at, value) in (word::CELL_WIDTH.saturating_add(1)..).zip(plan) {
-            derived_is(words, at, value)?;
-        }
-        let limit = in_range(Field::ErrorLimit, 0, header.f32(152), f32::MIN_POSITIVE, MAX_ERROR_RAD)?;
-        derived_is(words, word::RIPPLE_UNIT.saturating_add(1), limit_counts(limit))?;
-        check_axis(Field::TorqueNodes, words, word::TORQUE_NODES, torque_nodes, MAX_CLAMPED_NODES)?;
-        let slots = MAX_TEMPERATURE_NODES;
-        check_axis(Field::TemperatureNodes, words, word::TEMPERATURE_NODES, temperature_nodes, slots)?;
-        check_range(Field::TorqueRange, words, word::TORQUE_RANGE, word::TORQUE_NODES, torque_nodes)?;
-        let (range, nodes) = (word::TEMPERATURE_RANGE, word::TEMPERATURE_NODES);
-        check_range(Field::TemperatureRange, words, range, nodes, temperature_nodes)?;
-        in_range(Field::SolverResidual, 0, header.f32(124), 0.0, f32::MAX)?;
-        in_range(Field::ProjectionWorst, 0, header.f32(128), 0.0, MAX_ERROR_RAD)?;
-        in_range(Field::ProjectionRms, 0, header.f32(132), 0.0, header.f32(128))?;
-        let mut table = Self {
-            image,
-            words,
-            body_bytes,
+        Ok(Self {
+            body_bytes: layout.end.saturating_mul(4),
             drive,
             generator_kind,
             torque_nodes,
             temperature_nodes,
             ripple: PeriodicAxis::new(ripple_nodes).ok_or(size)?,
-            bounds: Bounds::default(),
-            inverse: InverseBound::default(),
-            plan: Table::plan_in(words),
-        };
-        table.bounds = table.check_bounds(&layout, curve_nodes)?;
-        table.check_rise(&layout)?;
-        let cell_rad = rad(cell_width(&drive, ripple_nodes).abs());
-        table.inverse = table.bounds.inverse(if ripple_nodes == 0 { f32::INFINITY } else { cell_rad });
-        let left_rad = table.inverse.error_rad;
+            cell_width: cell_width(&drive, ripple_nodes),
+            curve_nodes,
+            layout,
+            ..Self::NONE
+        })
+    }
+
+    /// Where everything is, the error limit, and what follows from it.
+    fn check_places(&self, image: &[u8], words: Words<'_>) -> Result<(), ImageError> {
+        let plan = self.layout.plan(self.torque_nodes, self.temperature_nodes, self.ripple.len(), self.curve_nodes);
+        derived_is(words, word::BODY, self.layout.end as u32)?;
+        derived_is(words, word::CELL_WIDTH, self.cell_width.to_bits())?;
+        for (at, value) in (word::CELL_WIDTH.saturating_add(1)..).zip(plan) {
+            derived_is(words, at, value)?;
+        }
+        let stated = check_envelope(image)?.f32(152);
+        let limit = in_range(Field::ErrorLimit, 0, stated, f32::MIN_POSITIVE, MAX_ERROR_RAD)?;
+        derived_is(words, word::RIPPLE_UNIT.saturating_add(1), limit_counts(limit))
+    }
+
+    /// The ranges of both axes, and how well the table was made.
+    fn check_ranges(&self, image: &[u8], words: Words<'_>) -> Result<(), ImageError> {
+        let header = check_envelope(image)?;
+        check_range(Field::TorqueRange, words, word::TORQUE_RANGE, word::TORQUE_NODES, self.torque_nodes)?;
+        let (range, nodes) = (word::TEMPERATURE_RANGE, word::TEMPERATURE_NODES);
+        check_range(Field::TemperatureRange, words, range, nodes, self.temperature_nodes)?;
+        in_range(Field::SolverResidual, 0, header.f32(124), 0.0, f32::MAX)?;
+        in_range(Field::ProjectionWorst, 0, header.f32(128), 0.0, MAX_ERROR_RAD)?;
+        in_range(Field::ProjectionRms, 0, header.f32(132), 0.0, header.f32(128))?;
+        Ok(())
+    }
+
+    /// Where node `index`, over all temperatures, starts.
+    fn node_at(&self, index: usize) -> usize {
+        let step = if self.torque_nodes > 1 { NODE_WORDS } else { NODE_WORDS.saturating_mul(2) };
+        self.layout.nodes.saturating_add(index.saturating_mul(step))
+    }
+
+    /// A record, over all temperatures.
+    fn record<'w>(&self, words: Words<'w>, index: usize) -> Words<'w> {
+        let first = self.layout.records.saturating_add(index.saturating_mul(self.layout.record));
+        words.get(first..first.saturating_add(self.layout.record)).unwrap_or_default()
+    }
+
+    /// The ripple unit, counts.
+    fn unit(&self, words: Words<'_>) -> f32 {
+        word_at(words, word::RIPPLE_UNIT) as f32 * (1.0 / UNITS_PER_COUNT as f32)
+    }
+
+    /// Field, place and stored numbers of one of A, B, C.
+    fn curve(&self, index: usize) -> Option<(Field, usize, usize)> {
+        let fields = [Field::GeneratorCurve, Field::MaterialCurve, Field::OutputCurve];
+        let axis = PeriodicAxis::new(*self.curve_nodes.get(index)?).unwrap_or_default();
+        Some((*fields.get(index)?, *self.layout.curves.get(index)?, axis.stored_len()))
+    }
+
+    /// Adds what one of A, B, C can give to what the nodes and records can.
+    fn add_curve(&mut self, index: usize, [largest, steepest, _]: [f32; 3]) {
+        let ratio = self.drive.ratio();
+        // Periods in an output turn.
+        let periods = [ratio, ratio - 1.0, 1.0].get(index).copied().unwrap_or(0.0);
+        let nodes = self.curve_nodes.get(index).copied().unwrap_or(0);
+        let bounds = &mut self.bounds;
+        if index == 0 {
+            bounds.error_rad += bounds.periodic_rad;
+        }
+        let slope = steepest * nodes as f32 * periods.abs() / TAU as f32;
+        // Two readings, which may lie on both sides of a step.
+        bounds.rounding_rad += 2.0 * WEIGHT_ROUNDING * steepest;
+        bounds.error_rad += largest;
+        bounds.periodic_rad += largest;
+        bounds.slope += slope;
+        bounds.curve_slope += slope;
+    }
+
+    /// Whether the table gives no more than it states, and has an inverse.
+    fn check_bounds(&self, image: &[u8]) -> Result<(), ImageError> {
+        let (found_rad, allowed_rad) = (self.bounds.error_rad, check_envelope(image)?.f32(152));
+        if found_rad.is_nan() || found_rad > allowed_rad {
+            return Err(ImageError::ErrorBound { found_rad, allowed_rad });
+        }
+        let found = self.bounds.slope;
+        if found.is_nan() || found >= 1.0 {
+            return Err(ImageError::Slope { found });
+        }
+        Ok(())
+    }
+
+    fn check_inverse(&mut self) -> Result<(), ImageError> {
+        let cell_rad = rad(self.cell_width.abs());
+        self.inverse = self.bounds.inverse(if self.ripple.is_empty() { f32::INFINITY } else { cell_rad });
+        let left_rad = self.inverse.error_rad;
         if left_rad.is_nan() || left_rad > MAX_INVERSE_ERROR_RAD {
             return Err(ImageError::Inverse { left_rad });
         }
-        Ok(table)
+        Ok(())
     }
 
     /// Values of [`DERIVED_WORDS`].
@@ -216,208 +726,65 @@ impl<'a> Table<'a> {
         [self.inverse.iterations as u32, hold.saturating_add(HOLD_COUNTS) as u32]
     }
 
-    fn check_bounds(&self, layout: &Layout, curve_nodes: [usize; 3]) -> Result<Bounds, ImageError> {
-        let mut bounds = Bounds::default();
-        // So that the ripple in cells, and in counts, fits the integers of a step.
-        let most = cell_width(&self.drive, self.ripple.len()).abs() * MAX_UNITS_PER_CELL;
-        let most = if self.ripple.is_empty() || most > i32::MAX as f32 { i32::MAX as f32 } else { most };
-        in_range(Field::MeanRipple, 0, word_at(self.words, word::RIPPLE_UNIT) as f32, 0.0, most)?;
-        self.check_nodes(layout, &mut bounds)?;
-        self.check_records(layout, &mut bounds)?;
-        bounds.error_rad += bounds.periodic_rad;
-        let ratio = self.drive.ratio();
-        let curves = [(Field::GeneratorCurve, ratio), (Field::MaterialCurve, ratio - 1.0), (Field::OutputCurve, 1.0)];
-        for (((field, periods), at), nodes) in curves.into_iter().zip(layout.curves).zip(curve_nodes) {
-            self.add_curve(&mut bounds, field, at, nodes, periods)?;
-        }
-        let limit = self.error_limit_rad();
-        if bounds.error_rad.is_nan() || bounds.error_rad > limit {
-            return Err(ImageError::ErrorBound { found_rad: bounds.error_rad, allowed_rad: limit });
-        }
-        if bounds.slope.is_nan() || bounds.slope >= 1.0 {
-            return Err(ImageError::Slope { found: bounds.slope });
-        }
-        Ok(bounds)
-    }
-
-    /// Adds what a curve of A, B, C can give; `periods` of it in one output turn.
-    fn add_curve(
-        &self,
-        bounds: &mut Bounds,
-        field: Field,
-        at: usize,
-        nodes: usize,
-        periods: f32,
-    ) -> Result<(), ImageError> {
-        let axis = PeriodicAxis::new(nodes).unwrap_or_default();
-        let value = |i: usize| rad(word_at(self.words, at.saturating_add(i)) as i32 as f32 * 0.5);
-        for index in 0..axis.stored_len() {
-            in_range(field, index, value(index), -MAX_ERROR_RAD, MAX_ERROR_RAD)?;
-        }
-        check_closed(field, axis, self.words.get(at..).unwrap_or_default())?;
-        let [largest, steepest, _] = extremes(axis.stored_len(), value);
-        let slope = steepest * nodes as f32 * periods.abs() / TAU as f32;
-        // Two readings, which may lie on both sides of a step.
-        bounds.rounding_rad += 2.0 * WEIGHT_ROUNDING * steepest;
-        bounds.error_rad += largest;
-        bounds.periodic_rad += largest;
-        bounds.slope += slope;
-        bounds.curve_slope += slope;
-        Ok(())
-    }
-
-    /// Where node `index`, over all temperatures, starts.
-    fn node_at(&self, layout: &Layout, index: usize) -> usize {
-        let step = if self.torque_nodes > 1 { NODE_WORDS } else { NODE_WORDS.saturating_mul(2) };
-        layout.nodes.saturating_add(index.saturating_mul(step))
-    }
-
-    /// What D and H can give: linear interpolation between temperatures stays within them, a cubic within its Bernstein
-    /// coefficients.
-    fn check_nodes(&self, layout: &Layout, bounds: &mut Bounds) -> Result<(), ImageError> {
-        let jumps = self.torque_jumps();
-        let most = num::counts(MAX_ERROR_RAD as f64) as f32;
-        // Torque, D, slope of D and H of the node before.
-        let mut before: Option<[f32; 4]> = None;
-        for index in 0..self.torque_nodes.saturating_mul(self.temperature_nodes) {
-            let node = index.checked_rem(self.torque_nodes).unwrap_or(0);
-            let at = self.node_at(layout, index);
-            let number = |i: usize| f32_at(self.words, at.saturating_add(i));
-            let mean = in_range(Field::Mean, index, number(0), -most, most)?;
-            let slope = finite(Field::MeanSlope, index, number(1))?;
-            let half = in_range(Field::HalfWidth, index, number(2), 0.0, most)?;
-            if number(2).to_bits() & 1 != grid::is_jump(jumps, node) as u32 {
-                return Err(ImageError::Derived { offset: at.saturating_add(2).saturating_mul(4) });
-            }
-            if self.torque_nodes == 1 {
-                for word in 0..NODE_WORDS {
-                    derived_is(self.words, at.saturating_add(NODE_WORDS).saturating_add(word), number(word).to_bits())?;
-                }
-                // Nowhere to go with it.
-                in_range(Field::MeanSlope, index, slope, 0.0, 0.0)?;
-            }
-            let torque = f32_at(self.words, word::TORQUE_NODES.saturating_add(node));
-            bounds.error_rad = larger(bounds.error_rad, rad(mean.abs() + half));
-            let below = before.filter(|_| node > 0 && !grid::is_jump(jumps, node.saturating_sub(1)));
-            if let Some([torque_below, mean_below, slope_below, half_below]) = below {
-                let third = (torque - torque_below) / 3.0;
-                let inner = larger((mean_below + slope_below * third).abs(), (mean - slope * third).abs());
-                let inner = if inner.is_finite() { inner } else { f32::INFINITY };
-                bounds.error_rad = larger(bounds.error_rad, rad(inner + larger(half, half_below)));
-            }
-            before = Some([torque, mean, slope, half]);
-        }
-        Ok(())
-    }
-
-    /// Whether the error of both flanks, D − H and D + H, grows with the load, and no faster than a drive can.
-    ///
-    /// From node to node, and where there is no jump from each control point of the cubic to the next: a cubic with rising control points rises.
-    fn check_rise(&self, layout: &Layout) -> Result<(), ImageError> {
-        let jumps = self.torque_jumps();
-        let pitch_rad = TAU as f32 / self.drive.circular_spline_teeth() as f32;
-        // Between two jumps the load is within the drag and the flanks let go: a table that was sampled one way falls there by its play.
-        let [first, last] = [jumps.trailing_zeros() as usize, 63_usize.saturating_sub(jumps.leading_zeros() as usize)];
-        for temperature in 0..self.temperature_nodes {
-            // Of D − H and D + H.
-            let mut highest = [f32::NEG_INFINITY; 2];
-            for torque in 1..self.torque_nodes {
-                let below = torque.saturating_sub(1);
-                let [low, high] = [below, torque].map(|node| {
-                    let index = temperature.saturating_mul(self.torque_nodes).saturating_add(node);
-                    let at = self.node_at(layout, index);
-                    [0, 1, 2].map(|i: usize| rad(f32_at(self.words, at.saturating_add(i))))
-                });
-                let [from, to] =
-                    [below, torque].map(|node| f32_at(self.words, word::TORQUE_NODES.saturating_add(node)));
-                let (width, jump) = (to - from, grid::is_jump(jumps, below));
-                let ([mean_low, slope_low, half_low], [mean_high, slope_high, half_high]) = (low, high);
-                let (rise, widening) = (mean_high - mean_low, half_high - half_low);
-                let third = width / 3.0;
-                let (parts, widening) = if jump {
-                    ([rise; 3], widening)
-                } else {
-                    ([slope_low * third, rise - (slope_low + slope_high) * third, slope_high * third], widening / 3.0)
-                };
-                let allowed_rad = if jump { 0.5 * pitch_rad } else { MAX_COMPLIANCE_RAD_PER_N_M * third };
-                let [a, b, c] = parts;
-                let most = larger(larger(a, b), c) + widening.abs();
-                let mut least = -larger(larger(-a, -b), -c) - widening.abs();
-                for (highest, side) in highest.iter_mut().zip([-1.0, 1.0]) {
-                    *highest = larger(*highest, mean_low + side * half_low);
-                    let below = mean_high + side * half_high - *highest;
-                    least = if below < least { below } else { least };
-                }
-                let lets_go = first < below && below < last && !jump;
-                let fall_rad = if lets_go { 0.5 * pitch_rad } else { FALL_RAD };
-                if least < -fall_rad {
-                    return Err(ImageError::Falls { temperature, torque, found_rad: least });
-                }
-                if most > allowed_rad + FALL_RAD {
-                    return Err(ImageError::Steep { temperature, torque, found_rad: most, allowed_rad });
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// What R and h can give, and that they leave no negative half-width.
-    fn check_records(&self, layout: &Layout, bounds: &mut Bounds) -> Result<(), ImageError> {
-        let nodes = self.ripple.len();
-        let unit = (word_at(self.words, word::RIPPLE_UNIT) as f64 / UNITS_PER_COUNT) as f32;
-        let cells_per_rad = nodes as f32 * self.drive.tooth_periods().abs() / TAU as f32;
-        for index in 0..self.torque_nodes.saturating_mul(self.temperature_nodes) {
-            let first = layout.records.saturating_add(index.saturating_mul(layout.record));
-            let record = self.words.get(first..first.saturating_add(layout.record)).unwrap_or_default();
-            let value = |i: usize| half_at(record, i);
-            for index in 0..layout.record.saturating_mul(2) {
-                let node = self.ripple.stored_node(index.checked_rem(layout.record).unwrap_or(0)).saturating_add(1);
-                let first = if index < layout.record { 0 } else { layout.record };
-                if value(index) != value(first.saturating_add(node)) {
-                    return Err(ImageError::NotClosed { field: Field::MeanRipple, index });
-                }
-            }
-            let ripple = |i: usize| [i, i.saturating_add(layout.record)].map(|i| value(i) as f32 * unit);
-            let torque = index.checked_rem(self.torque_nodes).unwrap_or(0);
-            let temperature = index.checked_div(self.torque_nodes).unwrap_or(0);
-            let half = f32_at(self.words, self.node_at(layout, index).saturating_add(2));
-            let least = (0..self.ripple.stored_len()).fold(half, |least, i| {
-                let [forward, backward] = ripple(i);
-                least.min(half + 0.5 * (backward - forward))
-            });
-            if least < -(HALF_WIDTH_ROUNDING_COUNTS as f32 + unit) {
-                return Err(ImageError::NegativeHalfWidth { temperature, torque, found_rad: rad(least) });
-            }
-            // Steady motion follows forward or backward.
-            for first in [0, layout.record] {
-                let way = |i: usize| rad(value(first.saturating_add(i)) as f32 * unit);
-                let [largest, steepest, reached] = extremes(self.ripple.stored_len(), way);
-                bounds.periodic_rad = larger(bounds.periodic_rad, largest);
-                bounds.slope = larger(bounds.slope, steepest * cells_per_rad);
-                bounds.ripple_cells = larger(bounds.ripple_cells, reached * cells_per_rad);
-                bounds.rounding_rad = larger(bounds.rounding_rad, WEIGHT_ROUNDING * steepest);
-            }
-        }
-        Ok(())
-    }
-
-    /// How far the ripple takes the half-width of the play below H at most, counts, rounded up.
-    pub(crate) fn play_ripple_counts(&self) -> i32 {
-        let layout = Layout::new(self.torque_nodes, self.temperature_nodes, self.ripple.len(), [0; 3]);
-        let [_, first] = halves(word_at(self.words, word::CELL_WIDTH.saturating_add(3)));
-        let words = layout.record.saturating_mul(self.torque_nodes).saturating_mul(self.temperature_nodes);
-        let records = self.words.get(first..first.saturating_add(words)).unwrap_or_default();
-        let mut narrowest = 0;
-        for record in records.chunks_exact(layout.record.max(1)) {
-            for i in 0..record.len() {
-                let [forward, backward] = [i, i.saturating_add(record.len())].map(|i| half_at(record, i) as i32);
-                let narrower = forward.wrapping_sub(backward);
-                narrowest = if narrower > narrowest { narrower } else { narrowest };
-            }
-        }
-        let narrowest = narrowest.unsigned_abs() as u64;
+    /// The table of an image that passed.
+    fn table<'a>(&self, image: &'a [u8]) -> Table<'a> {
+        let words = image.get(..self.body_bytes).unwrap_or_default().as_chunks::<4>().0;
         // Half of it in counts of 2¹⁹ units, rounded up, and two for the rounding of the ripple.
-        let counts = narrowest.wrapping_mul(word_at(self.words, word::RIPPLE_UNIT) as u64) >> 20;
-        if self.ripple.is_empty() { 0 } else { (counts as i32).saturating_add(3) }
+        let narrowest = (self.narrowest.unsigned_abs() as u64).wrapping_mul(word_at(words, word::RIPPLE_UNIT) as u64);
+        let counts = ((narrowest >> 20) as i32).saturating_add(3);
+        Table {
+            image,
+            words,
+            body_bytes: self.body_bytes,
+            drive: self.drive,
+            generator_kind: self.generator_kind,
+            torque_nodes: self.torque_nodes,
+            temperature_nodes: self.temperature_nodes,
+            ripple: self.ripple,
+            bounds: self.bounds,
+            inverse: self.inverse,
+            plan: Table::plan_in(words),
+            play_ripple: if self.ripple.is_empty() { 0 } else { counts },
+        }
+    }
+}
+
+impl Check {
+    /// The table of the image that was given with every step, once the last is done.
+    pub fn table<'a>(&self, image: &'a [u8]) -> Option<Table<'a>> {
+        (self.stage == Stage::Done).then(|| self.facts.table(image))
+    }
+}
+
+impl<'a> Table<'a> {
+    /// Checks an image and gives the table in it. Nothing of an image can be used before.
+    ///
+    /// Verified: length, magic, version, byte order, CRC-32 of the whole and of every page, texts, tooth counts, node
+    /// counts; every number finite; axes strictly increasing; half-width of the play ≥ 0 everywhere; torque intervals that
+    /// meet at their nodes; wind-up that grows with the load on both flanks, and no faster than a drive can; the largest error the table can give within its stated limit and [`MAX_ERROR_RAD`];
+    /// `|ratio·de/dψ| < 1` everywhere, so that the inverse exists, and how it converges; periodic parts closed at the wrap;
+    /// every offset, unit and bound that follows from other numbers.
+    ///
+    /// Bounds hold for every input, not only at nodes: a B-spline stays within its coefficients, and what the cubic of the
+    /// wind-up departs from the straight line between two nodes counts in full.
+    ///
+    /// All at once; [`Store::begin`](crate::Store::begin) does the same step by step.
+    ///
+    /// # Errors
+    /// The first check that fails, in the order of [`ImageError`].
+    pub fn check(image: &'a [u8]) -> Result<Self, ImageError> {
+        let mut check = Check::NEW;
+        while !check.step(image)? {}
+        // What is done has found everything.
+        check.table(image).ok_or(ImageError::Magic)
+    }
+
+    /// [`Self::check`] but for the words that follow from the bounds.
+    pub(super) fn found(image: &'a [u8]) -> Result<Facts, ImageError> {
+        let mut check = Check::NEW;
+        while check.stage != Stage::Derived {
+            check.step(image)?;
+        }
+        Ok(check.facts)
     }
 }

@@ -1,11 +1,9 @@
 //! The header of an image: what it is, what made it, and for which drive.
 
 use super::layout::{
-    BYTE_ORDER_MARK, CRC_BYTES, FORMAT_VERSION, HEADER_BYTES, ID_OFFSET, MAGIC, PAGE_BYTES, RESERVED, TEXT_BYTES,
-    image_bytes,
+    BYTE_ORDER_MARK, FORMAT_VERSION, HEADER_BYTES, ID_OFFSET, MAGIC, PAGE_BYTES, RESERVED, TEXT_BYTES, image_bytes,
 };
 use super::sums::{page_intact, page_of};
-use crate::crc::crc32;
 use crate::drive::{Drive, FixedMember};
 use crate::error::{Field, ImageError};
 use crate::table::{Table, TableId};
@@ -61,8 +59,7 @@ impl<'a> Table<'a> {
 
     /// What the [id](Self::id) is a hash of, one part after another: the body with zeros where the id is.
     ///
-    /// The core does not hash: a firmware that wants to know that a table is the one of its id has BLAKE3 take these parts, and compares the
-    /// first eight bytes. Checksums tell damage from chance; this also tells an image that was changed and sealed again.
+    /// [`IdentityCheck`](crate::IdentityCheck) hashes it on board; on the host any BLAKE3 takes these parts, and the first eight bytes are compared.
     #[must_use]
     pub fn hashed(&self) -> [&'a [u8]; 3] {
         let body = self.image.get(..self.body_bytes).unwrap_or_default();
@@ -137,7 +134,22 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Everything about an image that needs no knowledge of tables.
+/// The body and the id of an image that need not have passed any check.
+pub(crate) struct Laid<'a> {
+    pub body: &'a [u8],
+    pub id: TableId,
+}
+
+impl<'a> Laid<'a> {
+    /// `None` if there is no header, or not the body that it states.
+    pub fn of(image: &'a [u8]) -> Option<Self> {
+        let header = Header(image.first_chunk()?);
+        let body = image.get(..(header.u32(196) as usize).checked_mul(4)?)?;
+        (body.len() >= HEADER_BYTES).then(|| Self { body, id: TableId(header.bytes(ID_OFFSET)) })
+    }
+}
+
+/// Everything about an image that needs no knowledge of tables, but its checksum.
 pub(super) fn check_envelope(image: &[u8]) -> Result<Header<'_>, ImageError> {
     let needed = image_bytes(1, 1, 0, [0; 3]);
     let found = image.len();
@@ -159,11 +171,6 @@ pub(super) fn check_envelope(image: &[u8]) -> Result<Header<'_>, ImageError> {
     let stated = header.u32(12) as usize;
     if stated != found {
         return Err(ImageError::Length { stated, found });
-    }
-    let (before, sum) = image.split_last_chunk::<CRC_BYTES>().ok_or(too_short)?;
-    let (stated, computed) = (u32::from_le_bytes(*sum), crc32(before));
-    if stated != computed {
-        return Err(ImageError::Crc { stated, computed });
     }
     Ok(header)
 }

@@ -28,7 +28,7 @@ pub(super) const AXIS_SLOTS: [usize; 2] = [MAX_CLAMPED_NODES, MAX_TEMPERATURE_NO
 pub(super) const UNITS_PER_COUNT: f64 = 524_288.0;
 
 pub(super) const CRC_BYTES: usize = 4;
-pub(super) const ID_OFFSET: usize = 48;
+pub(crate) const ID_OFFSET: usize = 48;
 pub(super) const RESERVED: core::ops::Range<usize> = 200..HEADER_BYTES;
 /// |torque| N·m and |temperature| °C of any node or range: keeps differences of nodes finite.
 pub(crate) const MAX_AXIS_VALUE: f32 = 1e6;
@@ -84,6 +84,8 @@ pub(super) struct Layout {
 }
 
 impl Layout {
+    pub const NONE: Self = Self { curves: [0; 3], nodes: 0, node_plane: 0, records: 0, record: 0, end: 0 };
+
     pub const fn new(torque: usize, temperature: usize, ripple: usize, [a, b, c]: [usize; 3]) -> Self {
         let curve_b = word::CURVES.saturating_add(stored(a));
         let curve_c = curve_b.saturating_add(stored(b));

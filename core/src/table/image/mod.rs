@@ -62,6 +62,9 @@ mod sums;
 mod tests;
 mod write;
 
+pub(crate) use check::Check;
+pub(crate) use header::Laid;
+pub(crate) use layout::ID_OFFSET;
 pub use layout::{
     FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, TEXT_BYTES, image_bytes,
 };

@@ -325,7 +325,7 @@ pub fn write_image(
 /// Stores what follows from the bounds of the numbers.
 pub(super) fn complete(image: &mut [u8], body_bytes: usize) -> Result<(), ImageError> {
     seal(image, body_bytes);
-    let derived = Table::parse(image)?.derived();
+    let derived = Table::found(image)?.derived();
     for (word, value) in DERIVED_WORDS.into_iter().zip(derived) {
         let place = image.as_chunks_mut::<4>().0.get_mut(word);
         place.into_iter().for_each(|bytes| *bytes = value.to_le_bytes());

@@ -8,8 +8,9 @@ use core::hint::black_box;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use flexspline::{
-    Approach, Command, GeneratorAngle, Images, Input, Joint, JointState, Measured, Mode, OperatingPoint, Output,
-    OutputAngle, PlayState, Prediction, Predictor, PredictorState, Store, parts,
+    Activation, Approach, Command, GeneratorAngle, Identity, IdentityCheck, Images, Input, Joint, JointState, Measured,
+    Mode, OperatingPoint, Output, OutputAngle, PlayState, Prediction, Predictor, PredictorState, Progress, Store,
+    parts, self_test,
 };
 use flexspline_firmware::count::{Counter, Range};
 use flexspline_firmware::trajectory::{JOINT, Mixed, Trajectory};
@@ -84,6 +85,52 @@ fn measure_observer(counter: &Counter) -> Option<Range> {
     Some(range)
 }
 
+#[inline(never)]
+fn step(activation: &mut Activation, store: &mut Store, images: &Images<'_>) -> Option<Progress> {
+    activation.step(store, images).ok()
+}
+
+/// The costliest step of an activation, and how many there are.
+fn measure_activation(counter: &Counter, name: &str, [first, second]: [&[u8]; 2]) -> Option<()> {
+    let images = Images::new(first, second);
+    let (mut store, mut range, mut all) = (Store::new(), Range::default(), [0; 2]);
+    let mut activation = Store::begin(JOINT.drive(), 21.0).ok()?;
+    loop {
+        let (count, progress) = counter.of(|| black_box(step(&mut activation, &mut store, &images)));
+        range.add(count);
+        all = [all[0] + 1, all[1] + count];
+        if matches!(progress?, Progress::Done(_)) {
+            break;
+        }
+    }
+    let [steps, sum] = all;
+    hprintln!("{} activation: {} instructions (min {}), {} steps, {} in all", name, range.max, range.min, steps, sum);
+    Some(())
+}
+
+#[inline(never)]
+fn hash(check: &mut IdentityCheck, image: &[u8]) -> Identity {
+    check.step(image)
+}
+
+/// The costliest step of finding out whether an image is the one of its id.
+fn measure_identity(counter: &Counter, name: &str, image: &[u8]) -> Option<()> {
+    let (mut check, mut range, mut all) = (IdentityCheck::new(), Range::default(), [0; 2]);
+    loop {
+        let (count, found) = counter.of(|| black_box(hash(&mut check, image)));
+        range.add(count);
+        all = [all[0] + 1, all[1] + count];
+        match found {
+            Identity::Hashing => {}
+            Identity::Same(_) => break,
+            Identity::Other(_) => return None,
+        }
+    }
+    let [steps, sum] = all;
+    hprintln!("{} identity: {} instructions (min {}), {} steps, {} in all", name, range.max, range.min, steps, sum);
+    Some(())
+}
+
 /// Ranges of one table, by name.
 type Ranges = [(&'static str, Range); 8];
 
@@ -134,6 +181,11 @@ fn measure(counter: &Counter, name: &str, [first, second]: [&[u8]; 2]) -> Option
 fn main() -> ! {
     let Some(peripherals) = cortex_m::Peripherals::take() else { finish(false) };
     let counter = Counter::new(peripherals.SYST);
+    let (count, answer) = counter.of(|| black_box(self_test()));
+    hprintln!("self-test: {} instructions", count);
+    if answer.is_err() {
+        finish(false);
+    }
     let mut costliest = Range { min: 0, max: 0 };
     for (name, images) in TABLES {
         let Some(ticks) = measure(&counter, name, images) else { finish(false) };
@@ -143,6 +195,16 @@ fn main() -> ! {
     }
     if measure(&counter, "all-curves", FULL).is_none() {
         finish(false);
+    }
+    for (name, images) in TABLES.into_iter().chain([("full", FULL)]) {
+        if measure_activation(&counter, name, images).is_none() {
+            finish(false);
+        }
+    }
+    for (name, [image, _]) in TABLES {
+        if measure_identity(&counter, name, image).is_none() {
+            finish(false);
+        }
     }
     let Some(observer) = measure_observer(&counter) else { finish(false) };
     // The observer is part of a step.
