@@ -14,6 +14,7 @@
 mod averaged;
 pub mod base;
 pub mod candidate;
+pub mod channels;
 mod experiment;
 pub mod explain;
 mod extended;

@@ -54,6 +54,14 @@ pub struct Rows {
     pub on_flexspline: Vec<f64>,
     /// Angle of the wave on the circular spline's material, rad.
     pub on_circular_spline: Vec<f64>,
+    /// Noise of each row against that of a row of mean worth; 1 where all rows are alike.
+    pub loudness: Vec<f64>,
+    /// Whether angles are not read at one instant, so that rows differ in noise.
+    pub jitters: bool,
+    /// Time by which one angle may be read before the other on the mean, for all that is known of how they are read, s.
+    pub unsure_s: f64,
+    /// Sessions from which on the zero of the error is another one.
+    pub zeros: Vec<usize>,
     /// Median sample period, s.
     pub period: f64,
 }
@@ -87,6 +95,17 @@ impl Rows {
             }
             let begin = rows.time.get(from).copied().unwrap_or(0.0);
             rows.since.extend(rows.time[from..].iter().map(|time| time - begin).collect::<Vec<f64>>());
+            match &session.loudness {
+                Some(loudness) => {
+                    rows.jitters = true;
+                    rows.loudness.extend(loudness);
+                }
+                None => rows.loudness.resize(from + len, 1.0),
+            }
+            rows.unsure_s = rows.unsure_s.max(session.unsure_s);
+            if session.own_zero {
+                rows.zeros.push(rows.sessions.len());
+            }
             rows.sessions.push(from..from + len);
             rows.used.push(len > 3);
         }
@@ -123,6 +142,10 @@ impl Rows {
             output: of(&self.output),
             on_flexspline: of(&self.on_flexspline),
             on_circular_spline: of(&self.on_circular_spline),
+            loudness: of(&self.loudness),
+            jitters: self.jitters,
+            zeros: self.zeros.clone(),
+            unsure_s: self.unsure_s,
             period: self.period,
         }
     }
@@ -182,6 +205,12 @@ impl Rows {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.generator.is_empty()
+    }
+
+    /// Noise of all rows together, root mean square, against that of a row of mean worth.
+    #[must_use]
+    pub fn loudness_rms(&self) -> f64 {
+        if self.jitters { rms(&self.loudness) } else { 1.0 }
     }
 
     /// A high percentile of the torque's magnitude, N·m: the scale of the load.

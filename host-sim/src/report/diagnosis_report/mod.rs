@@ -160,6 +160,9 @@ fn thinned(session: &Session, every: usize) -> Session {
         torque_n_m: column(&session.torque_n_m),
         temperature_c: column(&session.temperature_c),
         orientation_rad: column(&session.orientation_rad),
+        loudness: column(&session.loudness),
+        own_zero: session.own_zero,
+        unsure_s: session.unsure_s,
     }
 }
 
@@ -672,12 +675,13 @@ impl Known<'_> {
                         fault.size_arcsec.map_or_else(|| Text::new("–"), |size| Text::default().error(size, 3)),
                         Text::new(words::treatment(fault.treatment)),
                         Text::new(fault.what.clone()),
+                        Text::new(fault.advice),
                     ]
                 })
                 .collect();
             blocks.push(table(
                 "Faults of the data",
-                &["Fault", "When", "Lines of the file", "Rows", "Size", "Done", "What it is"],
+                &["Fault", "When", "Lines of the file", "Rows", "Size", "Done", "What it is", "What to change"],
                 rows,
             ));
             if recording.faults.len() > MOST {
@@ -771,9 +775,9 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::diagnosis::report::{Cause, Compensation, HeldOut, Residual, Unexplained};
+    use crate::diagnosis::report::{Cause, Compensation, Finding, HeldOut, Residual, Unexplained};
     use crate::diagnosis::trace::Trace;
-    use crate::measurement::{Fault, FaultName, Treatment};
+    use crate::measurement::{Fault, FaultName, Measures, Treatment};
     use crate::report::page::Span;
     use crate::synthesize::catalogue_drive;
 
@@ -796,6 +800,7 @@ mod tests {
             faults,
             tooth_steps: Vec::new(),
             notes: Vec::new(),
+            unusable: None,
         }
     }
 
@@ -811,6 +816,7 @@ mod tests {
         Diagnosis {
             schema_version: 1,
             verdict,
+            finding: Finding::of(verdict),
             causes: causes.iter().map(cause).collect(),
             residual: Residual {
                 rms_before_arcsec: 13.0,
@@ -825,6 +831,7 @@ mod tests {
             noise_arcsec: [5.0, 0.0],
             wander_correlation_s: 1.0,
             next_experiment: None,
+            ratio_proposed: None,
             experiment_for_asked: None,
             trace: Trace::default(),
         }
@@ -866,6 +873,8 @@ mod tests {
             size_arcsec: Some(53.0),
             treatment: Treatment::Repaired,
             what: "the output jumps".into(),
+            advice: FaultName::EncoderIndexJump.advice(),
+            measures: Measures::default(),
         };
         for (verdict, causes, status, begins, number) in [
             (Verdict::Explained, &[CauseName::Wear][..], Status::Good, "Explained by wear (97 %, 12″ rms).", "75 %"),
