@@ -6,6 +6,9 @@ use crate::measurement::{Session, quantile_of};
 use crate::nominal::{Fixed, Nominal};
 use crate::units::ARCSEC_PER_RAD;
 
+/// Four rows around one say where it was as long as they span no more than so many times what the inner two do.
+const FAR_APART: f64 = 4.0;
+
 /// Which columns were recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Recorded {
@@ -109,8 +112,33 @@ impl Rows {
             rows.sessions.push(from..from + len);
             rows.used.push(len > 3);
         }
+        if rows.jitters {
+            rows.generator = rows.by_neighbours();
+        }
         rows.derive(nominal);
         rows
+    }
+
+    /// The generator angle of each row as those beside it have it: a cubic in time through the two before and the two after. The instant
+    /// at which a row was read is in its error, and whatever follows the angle itself would follow that.
+    fn by_neighbours(&self) -> Vec<f64> {
+        let mut angle = self.generator.clone();
+        for session in &self.sessions {
+            for k in session.start + 2..session.end.saturating_sub(2) {
+                let beside = [k - 2, k - 1, k + 1, k + 2];
+                let t = beside.map(|j| self.time[j] - self.time[k]);
+                if t[3] - t[0] > FAR_APART * (t[2] - t[1]).max(0.0) || t.windows(2).any(|t| t[1] <= t[0]) {
+                    continue;
+                }
+                angle[k] = (0..4)
+                    .map(|j| {
+                        let weight = (0..4).filter(|i| *i != j).map(|i| -t[i] / (t[j] - t[i])).product::<f64>();
+                        weight * self.generator[beside[j]]
+                    })
+                    .sum();
+            }
+        }
+        angle
     }
 
     /// Learns from these sessions alone, as far as they have rows enough.

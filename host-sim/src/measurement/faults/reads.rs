@@ -7,7 +7,10 @@
 //! The scatter of a row is what the rows beside it leave of it when a cubic goes through them. Rows then weigh what noise and scatter
 //! together leave of them; rows that were read late are left out.
 
+use std::borrow::Cow;
+
 use super::outliers::repeat_with_position;
+use super::state::State;
 use super::{ARCSEC, Findings, of_rows};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
@@ -19,6 +22,9 @@ use crate::measurement::robust::{MAD_TO_STD, median_of, quantile_of};
 const CLASSES: usize = 14;
 /// Fewest rows of a class.
 const CLASS_ROWS: usize = 80;
+/// Largest speed of a class against its least one, and the share of the largest of all that comes to it.
+const WIDEST: f64 = 1.3;
+const NARROWEST: f64 = 0.05;
 /// Scatter that grows with the speed is told from this on, rad at the output, at the speed that a twentieth of the rows exceed: below, encoders of
 /// common loops scatter by themselves. *Chosen* so that loops polled within 20 µs are not named.
 const LEAST_RAD: f64 = 1.0 * ARCSEC;
@@ -48,7 +54,7 @@ const MOST_LATE: f64 = 0.35;
 /// Rows that are late and not told from others are up to so many times those that are. *Guess*.
 const UNTOLD: f64 = 2.0;
 /// Rows that are late one after another, at most.
-const LONGEST_RUN: usize = 3;
+const LONGEST_RUN: usize = 2;
 /// Quantile of absolute numbers that a third of them, being far off, move little; and what it is of normal ones.
 const LOW: (f64, f64) = (0.25, 0.3186);
 
@@ -62,7 +68,7 @@ struct Class {
 
 /// The rows of a session that are not late, and how fast each row is.
 struct Reads<'a> {
-    error: &'a [f64],
+    error: Cow<'a, [f64]>,
     /// Change of the output from row to row, rad.
     speed: Vec<f64>,
     /// Rows, in order.
@@ -79,7 +85,7 @@ impl<'a> Reads<'a> {
                 (psi[b] - psi[a]) / ((b - a).max(1) as f64 * gear.ratio)
             })
             .collect();
-        Reads { error: &session.error_rad, speed, good: (0..rows).collect() }
+        Reads { error: Cow::Borrowed(&session.error_rad), speed, good: (0..rows).collect() }
     }
 
     /// By how much some good rows (a run from place `from` among them) are off the cubic through the two good rows before and after,
@@ -125,15 +131,25 @@ fn classes(reads: &[Reads<'_>], spread: impl Fn(&mut [f64]) -> f64) -> Vec<Class
         reads.iter().flat_map(|of| of.scatter().map(|(row, off)| (of.speed[row].abs(), off))).collect();
     rows.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let size = rows.len().div_ceil(CLASSES).max(CLASS_ROWS);
-    rows.chunks(size)
-        .filter(|class| class.len() >= CLASS_ROWS / 2)
-        .map(|class| {
-            let mut off: Vec<f64> = class.iter().map(|(_, off)| off.abs()).collect();
-            let square = class.iter().map(|(speed, _)| speed * speed).sum::<f64>() / class.len() as f64;
-            let variance = spread(&mut off).powi(2) / SCATTER_GAIN;
-            Class { speed: square.sqrt(), variance, rows: class.len() as f64 }
-        })
-        .collect()
+    let fastest = rows.last().map_or(0.0, |(speed, _)| *speed);
+    // A bench that turns at one pace passes the others on its ramps alone: few rows, and they tell.
+    let mut begun = (0, 0.0);
+    rows.chunk_by(|_, (speed, _)| {
+        begun.0 += 1;
+        let full = begun.0 >= size || begun.0 >= CLASS_ROWS && *speed > WIDEST * begun.1 + NARROWEST * fastest;
+        if full {
+            begun = (0, *speed);
+        }
+        !full
+    })
+    .filter(|class| class.len() >= CLASS_ROWS / 2)
+    .map(|class| {
+        let mut off: Vec<f64> = class.iter().map(|(_, off)| off.abs()).collect();
+        let square = class.iter().map(|(speed, _)| speed * speed).sum::<f64>() / class.len() as f64;
+        let variance = spread(&mut off).powi(2) / SCATTER_GAIN;
+        Class { speed: square.sqrt(), variance, rows: class.len() as f64 }
+    })
+    .collect()
 }
 
 /// Noise at rest, rad, and scatter of the time between the readings, in rows: what `classes` show of both; and the fall of χ² by the latter.
@@ -196,6 +212,44 @@ fn fit(classes: &[Class], tooth_speed: f64) -> (f64, f64, f64) {
     (values[0].max(0.0).sqrt(), values[1].max(0.0).sqrt() / least_speed, without - misfit)
 }
 
+/// What rows show of how they are read.
+struct Found {
+    /// Rows that are off by far, with how far, session by session.
+    late: Vec<Vec<(usize, f64)>>,
+    /// Whether these were read late.
+    told_late: bool,
+    /// Whether the time between the readings scatters.
+    told_jitter: bool,
+    /// Noise at rest, rad.
+    noise: f64,
+    /// Scatter of the time between the readings, rows.
+    jitter_rows: f64,
+}
+
+impl Found {
+    fn of(reads: &mut [Reads<'_>], fast: f64, tooth_speed: f64, sessions: &[Session], gear: &Gear) -> Found {
+        let mut late: Vec<Vec<(usize, f64)>> = vec![Vec::new(); reads.len()];
+        for run in [1, 1, LONGEST_RUN, 1] {
+            let known = classes(reads, |off| quantile_of(off, LOW.0) / LOW.1);
+            for (of, late) in reads.iter_mut().zip(&mut late) {
+                late.extend(read_late(of, &known, run));
+            }
+        }
+        for late in &mut late {
+            late.sort_unstable_by_key(|(row, _)| *row);
+        }
+        let told_late = is_told(reads, &late, fast, sessions, gear);
+        let robust = |off: &mut [f64]| MAD_TO_STD * median_of(off);
+        if !told_late {
+            reads.iter_mut().for_each(|of| of.good = (0..of.error.len()).collect());
+        }
+        let (noise, jitter_rows, certain) = fit(&classes(reads, robust), tooth_speed);
+        let scatter = jitter_rows * fast;
+        let told_jitter = certain > CERTAIN && scatter > LEAST_RAD.max(LEAST_OF_NOISE * noise);
+        Found { late, told_late, told_jitter, noise, jitter_rows }
+    }
+}
+
 /// Finds angles that are not read at one instant: rows weigh what their speed leaves of them, and rows that were read late are left out.
 pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
     let rows: usize = sessions.iter().map(Session::len).sum();
@@ -212,24 +266,22 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     let pitch = gear.tooth_pitch_rad.unwrap_or(std::f64::consts::PI / gear.ratio.abs());
     // A tooth of either wheel passes in a turn of the generator over its number: in a pitch of the output over the ratio.
     let tooth_speed = pitch / gear.ratio.abs() / TOOTH_ROWS;
-    let mut late: Vec<Vec<(usize, f64)>> = vec![Vec::new(); reads.len()];
-    for run in [1, 1, 2, 1, LONGEST_RUN, 1] {
-        let known = classes(&reads, |off| quantile_of(off, LOW.0) / LOW.1);
-        for (of, late) in reads.iter_mut().zip(&mut late) {
-            late.extend(read_late(of, &known, run));
+    let mut found = Found::of(&mut reads, fast, tooth_speed, sessions, gear);
+    if !found.told_late && !found.told_jitter {
+        return;
+    }
+    // Waves of the drive that fast rows are too far apart to follow scatter as well: once more without what its state explains.
+    let state = State::new(sessions, gear);
+    if let Some(fit) = state.fit(&[]) {
+        let long = (0..sessions.len()).filter(|k| sessions[*k].len() > 8);
+        for (of, session) in reads.iter_mut().zip(long) {
+            of.error = Cow::Owned(state.left(&fit, session, &[]));
+            of.good = (0..of.speed.len()).collect();
         }
+        found = Found::of(&mut reads, fast, tooth_speed, sessions, gear);
     }
-    for late in &mut late {
-        late.sort_unstable_by_key(|(row, _)| *row);
-    }
-    let told_late = is_told(&reads, &late, fast, sessions, gear);
-    let robust = |off: &mut [f64]| MAD_TO_STD * median_of(off);
-    if !told_late {
-        reads.iter_mut().for_each(|of| of.good = (0..of.error.len()).collect());
-    }
-    let (noise, jitter_rows, certain) = fit(&classes(&reads, robust), tooth_speed);
+    let Found { late, told_late, told_jitter, noise, jitter_rows } = found;
     let scatter = jitter_rows * fast;
-    let told_jitter = certain > CERTAIN && scatter > LEAST_RAD.max(LEAST_OF_NOISE * noise);
     if !told_late && !told_jitter {
         return;
     }
@@ -340,7 +392,8 @@ fn is_told(reads: &[Reads<'_>], late: &[Vec<(usize, f64)>], fast: f64, sessions:
     // Share of the rows of such a speed that are late.
     let share = |such: &dyn Fn(f64) -> bool| -> f64 {
         let all: usize = reads.iter().map(|of| of.speed.iter().filter(|speed| such(**speed)).count()).sum();
-        let of = |(of, late): (&Reads<'_>, &Vec<(usize, f64)>)| late.iter().filter(|(row, _)| such(of.speed[*row])).count();
+        let of =
+            |(of, late): (&Reads<'_>, &Vec<(usize, f64)>)| late.iter().filter(|(row, _)| such(of.speed[*row])).count();
         reads.iter().zip(late).map(of).sum::<usize>() as f64 / all.max(1) as f64
     };
     let (moving, at_rest) = (share(&moves), share(&rests));
@@ -350,11 +403,8 @@ fn is_told(reads: &[Reads<'_>], late: &[Vec<(usize, f64)>], fast: f64, sessions:
     let ahead = |(of, late): (&Reads<'_>, &Vec<(usize, f64)>)| {
         late.iter().filter(|(row, off)| moves(of.speed[*row]) && off * of.speed[*row] > 0.0).count()
     };
-    let in_motion: usize = reads
-        .iter()
-        .zip(late)
-        .map(|(of, late)| late.iter().filter(|(row, _)| moves(of.speed[*row])).count())
-        .sum();
+    let in_motion: usize =
+        reads.iter().zip(late).map(|(of, late)| late.iter().filter(|(row, _)| moves(of.speed[*row])).count()).sum();
     let ahead = reads.iter().zip(late).map(ahead).sum::<usize>() as f64 / in_motion.max(1) as f64;
     if ahead.max(1.0 - ahead) < ONE_SIDED {
         return false;
