@@ -128,6 +128,8 @@ pub struct Base {
     pub uncertain: Vec<bool>,
 }
 
+/// What floats where angles are read at other instants than is known, s.
+pub(crate) const BETWEEN_READINGS: &str = "time between the readings";
 /// Standard deviation of what no drawing fixes, arcsec: the zero of the output encoder.
 pub(super) const FREE: f64 = 1e4;
 /// Least spread of a phase, over that of the amplitude.
@@ -192,7 +194,7 @@ impl Base {
         };
         // Where angles are read at other instants than is known, their mean may be off, too: that is the logger's.
         let late = rows.speed.iter().map(|speed| -speed * ARCSEC_PER_RAD / nominal.ratio);
-        add("seconds between the readings", late.collect(), rows.unsure_s);
+        add(BETWEEN_READINGS, late.collect(), rows.unsure_s);
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
         add("backlash", flank.iter().map(|p| half_backlash * p).collect(), nominal.spread.backlash);
         for harmonic in &nominal.harmonics {

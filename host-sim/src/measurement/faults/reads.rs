@@ -37,7 +37,7 @@ const CLASS_DOUBT: f64 = 0.05;
 /// Ripple of the teeth is smooth in slow rows and scatter in fast ones: half of it where a tooth passes in so many rows. *Guess*.
 const TOOTH_ROWS: f64 = 6.0;
 /// A row is read late if it is off by so many times what its speed lets expect.
-const LATE: f64 = 5.0;
+const LATE: f64 = 4.0;
 /// Late rows are told from this share of the rows that move on…
 const LATE_SHARE: f64 = 0.004;
 /// …and from so many on.
@@ -56,7 +56,7 @@ const UNTOLD: f64 = 2.0;
 /// Rows that are late one after another, at most.
 const LONGEST_RUN: usize = 2;
 /// Quantile of absolute numbers that a third of them, being far off, move little; and what it is of normal ones.
-const LOW: (f64, f64) = (0.25, 0.3186);
+const LOW: (f64, f64) = (0.15, 0.1891);
 
 /// Speeds (rad of the output in a row), and the scatter that they come with.
 struct Class {
@@ -229,7 +229,7 @@ struct Found {
 impl Found {
     fn of(reads: &mut [Reads<'_>], fast: f64, tooth_speed: f64, sessions: &[Session], gear: &Gear) -> Found {
         let mut late: Vec<Vec<(usize, f64)>> = vec![Vec::new(); reads.len()];
-        for run in [1, 1, LONGEST_RUN, 1] {
+        for run in [1, 1, 1, LONGEST_RUN, 1] {
             let known = classes(reads, |off| quantile_of(off, LOW.0) / LOW.1);
             for (of, late) in reads.iter_mut().zip(&mut late) {
                 late.extend(read_late(of, &known, run));
@@ -495,7 +495,8 @@ mod tests {
             let worth = loud.iter().map(|loud| loud.powi(-2)).sum::<f64>() / loud.len() as f64;
             assert!((worth - 1.0).abs() < 1e-9, "{worth}");
             // Row 393 is at full speed, row 785 at rest.
-            assert!(loud[393] > 2.0 * loud[785] * jitter_s / 1e-4, "{} {}", loud[393], loud[785]);
+            let louder = f64::hypot(1.0, jitter_s * 0.12 / (2.0 * ARCSEC));
+            assert!((loud[393] / loud[785] / louder - 1.0).abs() < 0.1, "{} of {louder}", loud[393] / loud[785]);
         }
     }
 
@@ -503,7 +504,8 @@ mod tests {
     fn late_rows_are_left_out_and_a_good_logger_is_left_alone() {
         let (session, measures) = checked(0.0, 0.12);
         let late = measures.unwrap().late_rows.unwrap();
-        assert!((1200..2600).contains(&late), "{late} of about 2400");
+        // A third of the time the drive is too slow for a row that is late by 0.7 ms to be seen.
+        assert!((800..2600).contains(&late), "{late} of about 2400");
         assert_eq!(session.len(), 20_000 - late as usize);
         for jitter_s in [0.0, 1e-5] {
             let (session, measures) = checked(jitter_s, 0.0);

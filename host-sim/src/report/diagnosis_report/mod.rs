@@ -20,6 +20,7 @@ use super::page::{
     Status, Table as PageTable, Text, significant,
 };
 use crate::causes::CauseName;
+use crate::diagnosis::base::BETWEEN_READINGS;
 use crate::diagnosis::report::{Diagnosis, Verdict};
 use crate::diagnosis::rows::Rows;
 use crate::diagnosis::{Extended, Series};
@@ -611,8 +612,11 @@ impl Known<'_> {
         let mut rows: Vec<(usize, Vec<Text>)> = recalibrated
             .iter()
             .map(|(name, p)| {
-                let value = if name == "zero" {
+                let value = if name.starts_with("zero") {
                     Text::default().error(p.value, 3).plain("\u{a0}±\u{a0}").error(p.std, 2)
+                } else if name == BETWEEN_READINGS {
+                    let ms = |seconds: f64| significant(1e3 * seconds, 2);
+                    Text::new(format!("{}\u{a0}±\u{a0}{}\u{a0}ms", ms(p.value), ms(p.std)).replace('-', "−"))
                 } else {
                     Text::new(
                         format!("{:+.1}\u{a0}±\u{a0}{:.1}\u{a0}%", 100.0 * p.value, 100.0 * p.std).replace('-', "−"),
