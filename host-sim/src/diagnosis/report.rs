@@ -187,6 +187,7 @@ impl Diagnosis {
             Verdict::None => "nothing beyond noise and unit-to-unit spread",
             Verdict::Explained => "explained",
             Verdict::PartlyExplained => "partly explained",
+            Verdict::Unknown if self.finding == Finding::DataUnusable => "none that these data bear",
             Verdict::Unknown => "a discrepancy that no known cause explains",
         };
         let _ = writeln!(text, "finding: {}", self.finding.words());

@@ -229,10 +229,18 @@ struct Found {
 impl Found {
     fn of(reads: &mut [Reads<'_>], fast: f64, tooth_speed: f64, sessions: &[Session], gear: &Gear) -> Found {
         let mut late: Vec<Vec<(usize, f64)>> = vec![Vec::new(); reads.len()];
-        for run in [1, 1, 1, LONGEST_RUN, 1] {
-            let known = classes(reads, |off| quantile_of(off, LOW.0) / LOW.1);
-            for (of, late) in reads.iter_mut().zip(&mut late) {
-                late.extend(read_late(of, &known, run));
+        // Few rows that stand out at all are no late rows: most logs end here.
+        let low = |off: &mut [f64]| quantile_of(off, LOW.0) / LOW.1;
+        let mut known = classes(reads, low);
+        let stand_out =
+            |of: &Reads<'_>| of.scatter().filter(|(row, off)| off.abs() > LATE * expected(&known, of, *row)).count();
+        let (standing_out, rows) = reads.iter().fold((0, 0), |sum, of| (sum.0 + stand_out(of), sum.1 + of.error.len()));
+        if standing_out >= LATE_ROWS && standing_out as f64 > LATE_SHARE * rows as f64 {
+            for run in [1, 1, 1, LONGEST_RUN, 1] {
+                for (of, late) in reads.iter_mut().zip(&mut late) {
+                    late.extend(read_late(of, &known, run));
+                }
+                known = classes(reads, low);
             }
         }
         for late in &mut late {
@@ -343,14 +351,16 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     }
 }
 
+/// Scatter of a row of this speed, rad.
+fn expected(known: &[Class], of: &Reads<'_>, row: usize) -> f64 {
+    let speed = of.speed[row].abs();
+    let class = known.iter().min_by(|a, b| (a.speed - speed).abs().total_cmp(&(b.speed - speed).abs()));
+    class.map_or(f64::INFINITY, |class| (class.variance * SCATTER_GAIN).sqrt())
+}
+
 /// Rows off by far more than their speed lets expect while those beside agree, `run` of them one after another: taken out of the good
 /// ones, and given with how far they are off.
 fn read_late(of: &mut Reads<'_>, known: &[Class], run: usize) -> Vec<(usize, f64)> {
-    let expected = |row: usize| {
-        let speed = of.speed[row].abs();
-        let class = known.iter().min_by(|a, b| (a.speed - speed).abs().total_cmp(&(b.speed - speed).abs()));
-        class.map_or(f64::INFINITY, |class| (class.variance * SCATTER_GAIN).sqrt())
-    };
     let places = of.good.len().saturating_sub(run + 1);
     let off: Vec<Option<(Vec<f64>, f64)>> = (0..places).map(|from| of.off(from, run)).collect();
     let least = |from: usize| -> f64 {
@@ -365,7 +375,7 @@ fn read_late(of: &mut Reads<'_>, known: &[Class], run: usize) -> Vec<(usize, f64
     for from in 2..places {
         let beside = from.saturating_sub(2)..(from + 3).min(places);
         let largest = beside.map(|other| sizes[other]).fold(0.0, f64::max);
-        if sizes[from] > 0.0 && sizes[from] >= largest && sizes[from] > LATE * expected(of.good[from]) {
+        if sizes[from] > 0.0 && sizes[from] >= largest && sizes[from] > LATE * expected(known, of, of.good[from]) {
             if let Some((off, _)) = &off[from] {
                 for (k, off) in off.iter().enumerate() {
                     if !gone[from + k] {

@@ -21,7 +21,7 @@ use super::page::{
 };
 use crate::causes::CauseName;
 use crate::diagnosis::base::BETWEEN_READINGS;
-use crate::diagnosis::report::{Diagnosis, Verdict};
+use crate::diagnosis::report::{Diagnosis, Finding, Verdict};
 use crate::diagnosis::rows::Rows;
 use crate::diagnosis::{Extended, Series};
 use crate::measurement::{Gear, Recording, Session};
@@ -225,6 +225,9 @@ impl Known<'_> {
 
     fn status(&self) -> (Status, Vec<Status>) {
         let faults = !self.sources.recording.faults.is_empty();
+        if self.sources.diagnosis.finding == Finding::DataUnusable {
+            return (Status::DataFaults, Vec::new());
+        }
         let status = match self.sources.diagnosis.verdict {
             Verdict::PartlyExplained => Status::PartlyExplained,
             Verdict::Unknown => Status::Unknown,
@@ -279,6 +282,14 @@ impl Known<'_> {
         let (answer, number, number_is) = match diagnosis.verdict {
             Verdict::Explained => (listed(Text::new("Explained by ")), share, share_is),
             Verdict::PartlyExplained => (listed(Text::new("Partly explained by ")), share, share_is),
+            Verdict::Unknown if diagnosis.finding == Finding::DataUnusable => (
+                Text::new(format!(
+                    "Data not usable: {}.",
+                    self.sources.recording.unusable.as_deref().unwrap_or("their faults hide what the drive does")
+                )),
+                Text::default().error(self.departure_arcsec(), 2),
+                "rms beyond noise, of which nothing can be said".to_owned(),
+            ),
             Verdict::Unknown => (
                 Text::new(
                     "Unknown: the drive departs from the nominal model, and no cause in the library explains how.",
@@ -779,7 +790,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::diagnosis::report::{Cause, Compensation, Finding, HeldOut, Residual, Unexplained};
+    use crate::diagnosis::report::{Cause, Compensation, HeldOut, Residual, Unexplained};
     use crate::diagnosis::trace::Trace;
     use crate::measurement::{Fault, FaultName, Measures, Treatment};
     use crate::report::page::Span;
