@@ -404,7 +404,7 @@ fn every_damaged_file_is_refused_clearly_or_its_fault_is_named_and_no_physics_bl
             plain(),
             changed(|b| {
                 b.time_s[2500..].iter_mut().for_each(|t| *t += 600.0);
-                b.output_rad[2500..].iter_mut().for_each(|a| *a += 0.0345);
+                b.output_rad[2500..].iter_mut().for_each(|a| *a += 0.0123);
             }),
             Faults(&["position_jump"]),
         ),
@@ -423,19 +423,6 @@ fn every_damaged_file_is_refused_clearly_or_its_fault_is_named_and_no_physics_bl
             Faults(&[]),
         ),
         // Reading.
-        (
-            "an output that is read now and then",
-            plain(),
-            changed(|b| {
-                let mut random = fastrand::Rng::with_seed(5);
-                let psi = b.generator_rad.clone();
-                for k in 1..psi.len() {
-                    // 0.5 ms rms off, 10 ms from row to row.
-                    b.output_rad[k] += 0.05 * normal(&mut random) * (psi[k] - psi[k - 1]) / RATIO;
-                }
-            }),
-            Faults(&["read_jitter"]),
-        ),
         (
             "a logger that stands still after every 50 rows and counts on",
             plain(),

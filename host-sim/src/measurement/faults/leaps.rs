@@ -16,6 +16,9 @@ use crate::measurement::robust::median_of;
 const BESIDE_TURNS: f64 = 0.2;
 /// The column that leaps does so this many times more than the other.
 const LEAPS_MORE: f64 = 3.0;
+/// Before a leap the generator and the ratio times the output move alike, within this (rad in a row) and this share.
+const TOGETHER_RAD: f64 = 0.02;
+const TOGETHER: f64 = 0.3;
 /// Rows before and after, for what is usual there.
 const AROUND: usize = 3;
 /// More leaps than this share of the rows are no leaps: something else is wrong with the column.
@@ -53,6 +56,15 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
             }
             let by_generator = (moved(generator, row) - usual(log, generator, row)).abs();
             let by_output = ((moved(output, row) - usual(log, output, row)) * gear.ratio).abs();
+            // A generator that was frozen leaps to where it is: before a leap both go on together.
+            let before = |values: &[f64]| {
+                let rows = row.saturating_sub(AROUND).max(1)..row;
+                median_of(&mut rows.map(|k| moved(values, k)).collect::<Vec<f64>>())
+            };
+            let (psi, delta) = (before(generator), before(output) * gear.ratio);
+            if (psi - delta).abs() > TOGETHER_RAD + TOGETHER * psi.abs().max(delta.abs()) {
+                return None;
+            }
             let whole = (by_generator / TAU - turns.round().abs()).abs() < 2.0 * BESIDE_TURNS;
             (whole && by_generator > LEAPS_MORE * by_output).then_some((row, turns.round()))
         })
@@ -119,6 +131,16 @@ pub(in crate::measurement) fn between_sessions(log: &mut Log, gear: &Gear, findi
             restarts.push((start, turns.round()));
         } else if slope == 0.0 && jump_beside_slope.abs() > OTHER_ZERO_RAD && !whole_pitches(jump, gear) {
             others.push((session + 1, start, jump));
+        }
+    }
+    // One turn of the motor is two tooth pitches: alone it may be teeth that have skipped, and is left to the diagnosis.
+    if gear.tooth_pitch_rad.is_some() && restarts.iter().all(|(_, turns)| turns.abs() < 2.0) {
+        for (start, _) in restarts.drain(..) {
+            findings.notes.push(format!(
+                "line {}: the error changes by one turn of the motor between two sessions: a counter that began anew, or teeth that have \
+                 skipped, which these data do not tell",
+                log.line[start]
+            ));
         }
     }
     if let (Some(&(first, size)), Some(&(last, _))) = (restarts.first(), restarts.last()) {

@@ -53,6 +53,10 @@ const AT_REST: f64 = 0.03;
 const MOST_LATE: f64 = 0.35;
 /// Rows that are late and not told from others are up to so many times those that are. *Guess*.
 const UNTOLD: f64 = 2.0;
+/// Rows in which the generator turns by more do not follow the waves of a drive, rad. *Guess*.
+const FOLLOWED_RAD: f64 = 0.25;
+/// Scatter of readings is white: of the scatter of a row and of the next, -56/70 is common, within this. What swings has more or less.
+const WHITE: f64 = 0.08;
 /// Rows that are late one after another, at most.
 const LONGEST_RUN: usize = 2;
 /// Quantile of absolute numbers that a third of them, being far off, move little; and what it is of normal ones.
@@ -71,6 +75,8 @@ struct Reads<'a> {
     error: Cow<'a, [f64]>,
     /// Change of the output from row to row, rad.
     speed: Vec<f64>,
+    /// Faster rows are too far apart to tell their scatter from waves of the drive.
+    fastest: f64,
     /// Rows, in order.
     good: Vec<usize>,
 }
@@ -85,7 +91,8 @@ impl<'a> Reads<'a> {
                 (psi[b] - psi[a]) / ((b - a).max(1) as f64 * gear.ratio)
             })
             .collect();
-        Reads { error: Cow::Borrowed(&session.error_rad), speed, good: (0..rows).collect() }
+        let fastest = FOLLOWED_RAD / gear.ratio.abs();
+        Reads { error: Cow::Borrowed(&session.error_rad), speed, fastest, good: (0..rows).collect() }
     }
 
     /// By how much some good rows (a run from place `from` among them) are off the cubic through the two good rows before and after,
@@ -115,7 +122,8 @@ impl<'a> Reads<'a> {
 
     /// Row and scatter of each good row whose four neighbours are good: (-1, 4, -6, 4, -1) / 6 of the errors.
     fn scatter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.good.windows(5).filter(|rows| rows[4] - rows[0] == 4).map(|rows| {
+        let slow = |row: usize| self.speed[row].abs() <= self.fastest;
+        self.good.windows(5).filter(move |rows| rows[4] - rows[0] == 4 && slow(rows[2])).map(|rows| {
             let e = |k: usize| self.error[rows[k]];
             (rows[2], (6.0 * e(2) - 4.0 * (e(1) + e(3)) + e(0) + e(4)) / 6.0)
         })
@@ -253,7 +261,7 @@ impl Found {
         }
         let (noise, jitter_rows, certain) = fit(&classes(reads, robust), tooth_speed);
         let scatter = jitter_rows * fast;
-        let told_jitter = certain > CERTAIN && scatter > LEAST_RAD.max(LEAST_OF_NOISE * noise);
+        let told_jitter = certain > CERTAIN && scatter > LEAST_RAD.max(LEAST_OF_NOISE * noise) && is_white(reads, fast);
         Found { late, told_late, told_jitter, noise, jitter_rows }
     }
 }
@@ -267,7 +275,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     let mut reads: Vec<Reads<'_>> =
         sessions.iter().filter(|session| session.len() > 8).map(|session| Reads::new(session, gear)).collect();
     let mut speeds: Vec<f64> = reads.iter().flat_map(|of| of.speed.iter().map(|speed| speed.abs())).collect();
-    let fast = quantile_of(&mut speeds, 0.95);
+    let fast = quantile_of(&mut speeds, 0.95).min(FOLLOWED_RAD / gear.ratio.abs());
     if fast == 0.0 {
         return;
     }
@@ -349,6 +357,22 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             sessions[*session].leave_out(&drop);
         }
     }
+}
+
+/// Whether the scatter of rows in motion is that of readings which know nothing of each other.
+fn is_white(reads: &[Reads<'_>], fast: f64) -> bool {
+    let pairs = || {
+        reads.iter().flat_map(|of| {
+            let off: Vec<(usize, f64)> = of.scatter().filter(|(row, _)| of.speed[*row].abs() > 0.5 * fast).collect();
+            let next = |pair: &[(usize, f64)]| (pair[1].0 == pair[0].0 + 1).then(|| [pair[0].1, pair[1].1]);
+            off.windows(2).filter_map(next).collect::<Vec<[f64; 2]>>()
+        })
+    };
+    let spread = MAD_TO_STD * median_of(&mut pairs().map(|[off, _]| off.abs()).collect::<Vec<f64>>());
+    let cut = |off: f64| off.clamp(-4.0 * spread, 4.0 * spread);
+    let (own, common) = pairs()
+        .fold((0.0, 0.0), |sum, [a, b]| (sum.0 + 0.5 * (cut(a).powi(2) + cut(b).powi(2)), sum.1 + cut(a) * cut(b)));
+    (common / f64::max(own, 1e-300) + 56.0 / 70.0).abs() < WHITE
 }
 
 /// Scatter of a row of this speed, rad.

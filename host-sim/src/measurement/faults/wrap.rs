@@ -17,6 +17,8 @@ const UNAMBIGUOUS: f64 = 0.4;
 /// A step that differs from the one before by less than this share of a turn goes on as it did; where files are joined without a time
 /// between them, it does not.
 const GOES_ON: f64 = 0.25;
+/// Teeth do not skip by more than so many turns of the motor in a row: two pitches are one.
+const MOST_SKIPPED: f64 = 3.5;
 
 /// Finds wrapped angles (also in a unit other than the one given, which is a fault) and unwraps them.
 pub(in crate::measurement) fn unwrap(log: &mut Log, columns: &[Column], ratio: f64, findings: &mut Findings) {
@@ -102,10 +104,11 @@ fn along(values: &mut [f64], log: &Log, ratio: f64, output: Option<&[f64]>) -> b
     let mut last = 0.0;
     for row in 1..values.len() {
         let plain = nearest(values[row] - values[row - 1]);
+        let expected = output.map_or(plain, |output| (output[row] - output[row - 1]) * ratio);
+        let far = (expected - plain).abs() > MOST_SKIPPED * TAU;
         let step = match output {
-            // What goes on as it did needs no help: there it is the output that may skip.
-            Some(output) if fast || !log.continues(row) || (plain - last).abs() > GOES_ON * TAU => {
-                let expected = (output[row] - output[row - 1]) * ratio;
+            // What goes on as it did needs no help: there it is the output that may skip, by some teeth.
+            Some(_) if fast || far || !log.continues(row) || (plain - last).abs() > GOES_ON * TAU => {
                 expected + nearest(values[row] - values[row - 1] - expected)
             }
             _ => plain,
