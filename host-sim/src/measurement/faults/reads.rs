@@ -13,7 +13,6 @@ use super::outliers::repeat_with_position;
 use super::state::State;
 use super::{ARCSEC, Findings, of_rows};
 use crate::measurement::Session;
-use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Measures, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::robust::{MAD_TO_STD, median_of, quantile_of};
@@ -342,7 +341,6 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             largest.abs() / ARCSEC
         ));
     }
-    fault.channel = None::<Quantity>;
     fault.what = format!("the two angles are not read at one instant: {}", said.join("; "));
     findings.faults.push(fault);
     let late_share = late_rows as f64 / rows as f64;
@@ -399,14 +397,14 @@ fn read_late(of: &mut Reads<'_>, known: &[Class], run: usize) -> Vec<(usize, f64
     for from in 2..places {
         let beside = from.saturating_sub(2)..(from + 3).min(places);
         let largest = beside.map(|other| sizes[other]).fold(0.0, f64::max);
-        if sizes[from] > 0.0 && sizes[from] >= largest && sizes[from] > LATE * expected(known, of, of.good[from]) {
-            if let Some((off, _)) = &off[from] {
-                for (k, off) in off.iter().enumerate() {
-                    if !gone[from + k] {
-                        taken.push((of.good[from + k], *off));
-                        gone[from + k] = true;
-                    }
-                }
+        let stands_out = sizes[from] > 0.0 && sizes[from] >= largest;
+        if stands_out
+            && sizes[from] > LATE * expected(known, of, of.good[from])
+            && let Some((off, _)) = &off[from]
+        {
+            for (k, off) in off.iter().enumerate().filter(|(k, _)| !gone[from + k]).collect::<Vec<_>>() {
+                taken.push((of.good[from + k], *off));
+                gone[from + k] = true;
             }
         }
     }
