@@ -115,7 +115,8 @@ pub(in crate::measurement) fn between_sessions(log: &mut Log, gear: &Gear, findi
     let error: Vec<f64> = output.iter().zip(generator).map(|(output, psi)| output - psi / gear.ratio).collect();
     let bounds: Vec<usize> = [0].into_iter().chain(starts.iter().copied()).chain([log.len()]).collect();
     let slope = slope(generator, &error, &bounds);
-    let (mut restarts, mut others): (Vec<(usize, f64)>, Vec<(usize, usize, f64)>) = (Vec::new(), Vec::new());
+    let mut restarts: Vec<(usize, f64)> = Vec::new();
+    let mut others: Vec<(usize, usize, f64)> = Vec::new();
     for (session, at) in bounds.windows(3).enumerate() {
         let (from, start, end) = (at[0], at[1], at[2]);
         let level = |rows: std::ops::Range<usize>, of: &[f64]| median_of(&mut of[rows].to_vec());

@@ -25,6 +25,9 @@ const MOST_SHARE: f64 = 0.2;
 /// They come every so many rows if this share of them does.
 const REGULAR: f64 = 0.7;
 
+/// A row, and the time that is missing before it, s.
+type Leap = (usize, f64);
+
 /// Finds stalls that the time does not show, and makes time anew where they are.
 pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) {
     let Some((leaps, telling, period_s)) = leaps(log, gear) else { return };
@@ -62,7 +65,7 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
 }
 
 /// Rows into which both angles leap, with the time that is missing there (s); how many rows would tell; and the period, s.
-fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<(usize, f64)>, usize, f64)> {
+fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
     let (time, generator, output) =
         (log.get(Quantity::Time)?, log.get(Quantity::Generator)?, log.get(Quantity::Output)?);
     let steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).filter(|dt| *dt > 0.0).collect();
