@@ -79,8 +79,10 @@ enum Ends {
     Faults(&'static [&'static str]),
     /// No fault can be told from the data alone: a discrepancy without a name.
     Abstains,
+    /// This fault, and nothing can be said of the unit.
+    Unusable(&'static str),
 }
-use Ends::{Abstains, Faults, Refused};
+use Ends::{Abstains, Faults, Refused, Unusable};
 
 /// What is wrong with how a run ended, if anything.
 fn judged(desk: &Desk, options: &str, ends: &Ends, messages: &mut BTreeSet<String>) -> Result<(), String> {
@@ -104,10 +106,11 @@ fn judged(desk: &Desk, options: &str, ends: &Ends, messages: &mut BTreeSet<Strin
             }
             messages.insert(message.to_owned());
         }
-        Faults(_) | Abstains => {
-            let (due, verdict) = match ends {
-                Faults(due) => (*due, "none"),
-                _ => (&[][..], "unknown"),
+        Faults(_) | Abstains | Unusable(_) => {
+            let (due, verdict, finding) = match ends {
+                Faults(due) => (due.to_vec(), "none", "nothing_found"),
+                Unusable(due) => (vec![*due], "unknown", "data_unusable"),
+                _ => (Vec::new(), "unknown", "not_understood"),
             };
             if run.code != 0 {
                 return Err(format!("exit code {}: {}", run.code, run.stderr));
@@ -119,7 +122,10 @@ fn judged(desk: &Desk, options: &str, ends: &Ends, messages: &mut BTreeSet<Strin
                 return Err(format!("faults {faults:?}, notes {}", json["notes"]));
             }
             let causes: Vec<&Value> = json["causes"].as_array().unwrap().iter().map(|cause| &cause["name"]).collect();
-            if !causes.is_empty() || json["verdict"] != verdict {
+            if faults.iter().any(|fault| fault["advice"].as_str().is_none_or(str::is_empty)) {
+                return Err(format!("no advice: {faults:?}"));
+            }
+            if !causes.is_empty() || json["verdict"] != verdict || json["finding"] != finding {
                 return Err(format!("verdict {}, causes {causes:?}, {}", json["verdict"], json["unexplained"]));
             }
             if !Path::new(&desk.path("out/report.html")).exists() {
@@ -351,7 +357,84 @@ fn every_damaged_file_is_refused_clearly_or_its_fault_is_named_and_no_physics_bl
                 scaled(&mut b.generator_rad, deg);
                 scaled(&mut b.output_rad, deg);
             }),
-            Abstains,
+            Faults(&["unit_mismatch"]),
+        ),
+        (
+            "torque turned round",
+            plain(),
+            changed(|b| scaled(b.torque_n_m.as_mut().unwrap(), -1.0)),
+            Faults(&["torque_sign"]),
+        ),
+        (
+            "torque of the motor",
+            plain(),
+            changed(|b| scaled(b.torque_n_m.as_mut().unwrap(), 1.0 / RATIO)),
+            Faults(&["torque_scale"]),
+        ),
+        (
+            "torque of another drive",
+            plain(),
+            changed(|b| {
+                let time = b.time_s.clone();
+                let other = |t: f64| 24.0 * (TAU * t / 3.7).sin();
+                b.torque_n_m.as_mut().unwrap().iter_mut().zip(time).for_each(|(torque, t)| *torque = other(t));
+            }),
+            Unusable("torque_scale"),
+        ),
+        // Counts.
+        (
+            "a counter that begins anew after a break",
+            plain(),
+            changed(|b| {
+                b.time_s[2500..].iter_mut().for_each(|t| *t += 600.0);
+                b.generator_rad[2500..].iter_mut().for_each(|a| *a += 7.0 * TAU);
+            }),
+            Faults(&["counter_restart"]),
+        ),
+        (
+            "a register of 16 bit that wraps",
+            plain(),
+            changed(|b| {
+                b.generator_rad.iter_mut().for_each(|a| *a = (*a + 8.0 * TAU).rem_euclid(16.0 * TAU) - 8.0 * TAU);
+            }),
+            Faults(&["position_jump"]),
+        ),
+        (
+            "another zero after a break",
+            plain(),
+            changed(|b| {
+                b.time_s[2500..].iter_mut().for_each(|t| *t += 600.0);
+                b.output_rad[2500..].iter_mut().for_each(|a| *a += 0.0123);
+            }),
+            Faults(&["position_jump"]),
+        ),
+        (
+            "two files joined without a time, the generator within one turn",
+            plain(),
+            {
+                let mut bench = healthy(ROWS);
+                let on = 0.4 * TAU * RATIO;
+                bench.generator_rad[3000..].iter_mut().for_each(|a| *a += on);
+                bench.output_rad[3000..].iter_mut().for_each(|a| *a += on / RATIO);
+                bench.generator_rad.iter_mut().for_each(|a| *a = a.rem_euclid(TAU));
+                let without = |line: &str| line.split_once(',').unwrap().1.to_owned() + "\n";
+                bench.csv().lines().map(without).collect::<String>().into()
+            },
+            Faults(&[]),
+        ),
+        // Reading.
+        (
+            "a logger that stands still after every 50 rows and counts on",
+            plain(),
+            edited(|k, line| {
+                let (block, row) = (k / 54, k % 54);
+                if k > 0 && row >= 50 {
+                    return String::new();
+                }
+                let counted = format!("{:.6}", 0.01 * (50 * block + row) as f64);
+                if k == 0 { format!("{line}\n") } else { format!("{counted},{}\n", line.split_once(',').unwrap().1) }
+            }),
+            Faults(&["stalls"]),
         ),
         // Time.
         (

@@ -97,7 +97,7 @@ fn measured(change: impl Fn(&mut AsBuilt), seed: u64) -> Vec<Session> {
                 error_rad: places.clone().flat_map(|p| errors[p].clone()).map(|e| e + noise()).collect(),
                 torque_n_m: Some(places.clone().flat_map(|_| torque.clone()).collect()),
                 temperature_c: Some(vec![20.0; rows]),
-                orientation_rad: None,
+                ..Session::default()
             }
         })
         .collect()

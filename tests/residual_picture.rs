@@ -182,7 +182,7 @@ fn the_whole_picture_of_a_long_recording_takes_about_a_second() {
                 error_rad: error,
                 torque_n_m: Some(bench.torque_n_m.as_ref().unwrap()[rows.clone()].to_vec()),
                 temperature_c: Some(bench.temperature_c.as_ref().unwrap()[rows].to_vec()),
-                orientation_rad: None,
+                ..Session::default()
             }
         })
         .collect();

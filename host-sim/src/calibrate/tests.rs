@@ -40,6 +40,7 @@ fn recording(seed: u64, law: impl Fn(f64, f64, f64, f64) -> f64) -> Recording {
         faults: Vec::new(),
         tooth_steps: Vec::new(),
         notes: Vec::new(),
+        unusable: None,
     }
 }
 

@@ -42,7 +42,9 @@ names! {
     DragNM = "drag_n_m",
     DurationS = "duration_s",
     Events = "events",
+    EveryRows = "every_rows",
     Exponent = "exponent",
+    Factor = "factor",
     FrequencyHz = "frequency_hz",
     FullLoadNM = "full_load_n_m",
     Gain = "gain",
@@ -54,6 +56,7 @@ names! {
     HardeningArcsec = "hardening_arcsec",
     HardeningExponent = "hardening_exponent",
     Harmonic = "harmonic",
+    JitterMs = "jitter_ms",
     JumpArcsec = "jump_arcsec",
     LagS = "lag_s",
     PerK = "per_k",
@@ -73,6 +76,7 @@ names! {
     TimeS = "time_s",
     Tooth = "tooth",
     TorqueNM = "torque_n_m",
+    Turns = "turns",
     Wheel = "wheel",
     WidthRad = "width_rad",
 }
@@ -98,6 +102,8 @@ impl ParameterName {
             | ParameterName::Tooth
             | ParameterName::Wheel
             | ParameterName::Events
+            | ParameterName::EveryRows
+            | ParameterName::Turns
             | ParameterName::Channel => Kind::Count,
             ParameterName::AmplitudeArcsec
             | ParameterName::AmplitudeUm
@@ -112,6 +118,7 @@ impl ParameterName {
             | ParameterName::DragNM
             | ParameterName::DurationS
             | ParameterName::Exponent
+            | ParameterName::Factor
             | ParameterName::FrequencyHz
             | ParameterName::FullLoadNM
             | ParameterName::Gain
@@ -123,6 +130,7 @@ impl ParameterName {
             | ParameterName::HardeningArcsec
             | ParameterName::HardeningExponent
             | ParameterName::JumpArcsec
+            | ParameterName::JitterMs
             | ParameterName::LagS
             | ParameterName::PerK
             | ParameterName::PressedArcsec

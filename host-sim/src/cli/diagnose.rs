@@ -228,7 +228,7 @@ fn header(context: &Context) -> String {
 fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out: &Path, with_page: bool) -> String {
     let mut text = format!("{}: {} rows, {} sessions\n", recording.file, recording.rows, recording.sessions.len());
     for fault in &recording.faults {
-        text += &format!("data fault: {}\n", fault.what);
+        text += &format!("data fault: {}\n  to change: {}\n", fault.what, fault.advice);
     }
     for note in &recording.notes {
         text += &format!("note: {note}\n");

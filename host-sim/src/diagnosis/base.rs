@@ -128,6 +128,8 @@ pub struct Base {
     pub uncertain: Vec<bool>,
 }
 
+/// What floats where angles are read at other instants than is known, s.
+pub(crate) const BETWEEN_READINGS: &str = "time between the readings";
 /// Standard deviation of what no drawing fixes, arcsec: the zero of the output encoder.
 pub(super) const FREE: f64 = 1e4;
 /// Least spread of a phase, over that of the amplitude.
@@ -180,11 +182,19 @@ impl Base {
             None => (0..rows.len()).map(|k| harmonics[k] + wind_up[k] + half_backlash * flank[k]).collect(),
         };
         let mut floating = vec![Floating { name: "zero".into(), values: vec![1.0; rows.len()], spread: FREE }];
+        for session in &rows.zeros {
+            let from = rows.sessions[*session].start;
+            let values = (0..rows.len()).map(|k| f64::from(u8::from(k >= from))).collect();
+            floating.push(Floating { name: "zero".into(), values, spread: FREE });
+        }
         let mut add = |name: &str, values: Vec<f64>, spread: f64| {
             if spread > 0.0 && values.iter().any(|v| *v != 0.0) {
                 floating.push(Floating { name: name.into(), values, spread });
             }
         };
+        // Where angles are read at other instants than is known, their mean may be off, too: that is the logger's.
+        let late = rows.speed.iter().map(|speed| -speed * ARCSEC_PER_RAD / nominal.ratio);
+        add(BETWEEN_READINGS, late.collect(), rows.unsure_s);
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
         add("backlash", flank.iter().map(|p| half_backlash * p).collect(), nominal.spread.backlash);
         for harmonic in &nominal.harmonics {

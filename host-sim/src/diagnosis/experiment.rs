@@ -136,6 +136,7 @@ fn least_apart(
                 torque_n_m: Some(states.iter().map(|s| s.torque * on.scales.load).collect()),
                 temperature_c: Some(states.iter().map(|s| on.nominal.temperature_c + s.warmer).collect()),
                 orientation_rad: Some(states.iter().map(|s| s.orientation).collect()),
+                ..Session::default()
             }
         })
         .collect();

@@ -14,6 +14,7 @@
 mod averaged;
 pub(crate) mod base;
 pub(crate) mod candidate;
+pub(crate) mod channels;
 mod experiment;
 pub(crate) mod explain;
 mod extended;

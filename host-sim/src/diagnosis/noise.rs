@@ -79,7 +79,8 @@ impl Whitener {
                 let rows_in = &groups[g];
                 let doubtful = uncertain[rows_in.clone()].iter().any(|u| *u);
                 let white = noise.white.max(1e-9) * if doubtful { UNCERTAIN_NOISE } else { 1.0 };
-                let white = white * white / rows_in.len() as f64;
+                let loud = if rows.jitters { rms(&rows.loudness[rows_in.clone()]) } else { 1.0 };
+                let white = (white * loud).powi(2) / rows_in.len() as f64;
                 let innovation = variance + white;
                 gain[g] = variance / innovation;
                 scale[g] = innovation.sqrt();
@@ -231,7 +232,9 @@ pub fn white_level(rows: &Rows, left: &[f64]) -> f64 {
     let mut differences = Vec::with_capacity(left.len());
     for session in rows.sessions_used() {
         for k in session.start + 2..session.end {
-            differences.push((left[k] - 2.0 * left[k - 1] + left[k - 2]).abs());
+            let loud = |k: usize| rows.loudness[k] * rows.loudness[k];
+            let louder = if rows.jitters { ((loud(k) + 4.0 * loud(k - 1) + loud(k - 2)) / 6.0).sqrt() } else { 1.0 };
+            differences.push((left[k] - 2.0 * left[k - 1] + left[k - 2]).abs() / louder);
         }
     }
     // Their variance is six times that of a row; more where a line close to half the rate of rows swings them, but no more than is there.

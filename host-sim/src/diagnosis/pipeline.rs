@@ -17,6 +17,7 @@ use flexspline::{ImageError, Table};
 use serde::Serialize;
 use thiserror::Error;
 
+use super::channels;
 use super::report::{Compensation, Diagnosis};
 use super::{DiagnosisError, Extended, Settings, diagnose_extended};
 use crate::causes::CauseName;
@@ -26,7 +27,7 @@ use crate::extension::{
     causes_to_toml, check_by_fem, evaluate, found_geometry,
 };
 use crate::kernels::Kernels;
-use crate::measurement::{ColumnMap, MeasuredError, Recording, Session, read};
+use crate::measurement::{ColumnMap, MeasuredError, Recording, Session, read, read_degrees};
 use crate::mesh::MeshLevel;
 use crate::nominal::Nominal;
 use crate::stepping::{Method, SolveError, SolverSettings};
@@ -229,8 +230,14 @@ pub struct Diagnosed {
 /// # Errors
 /// The rows cannot be read, or do not fit what the model knows.
 pub fn read_rows(path: &Path, columns: &ColumnMap, subject: &Subject<'_>) -> Result<Recording, PipelineError> {
-    let mut recording = read(path, columns, &subject.nominal.gear())?;
+    let gear = subject.nominal.gear();
+    let mut recording = read(path, columns, &gear)?;
     subject.take_away_known(&mut recording)?;
+    if subject.model.is_some() && channels::are_in_degrees(&recording, &subject.nominal) {
+        recording = read_degrees(path, columns, &gear)?;
+        subject.take_away_known(&mut recording)?;
+    }
+    recording.unusable = channels::check_torque(&mut recording, &subject.nominal);
     recording.average_to(MOST_ROWS);
     Ok(recording)
 }
@@ -257,6 +264,9 @@ pub fn diagnose_rows(
         diagnose_extended(&recording.sessions, nominal, table, &settings, |done, of, what| {
             progress(done, of + 1, what)
         })?;
+    if recording.unusable.is_some() {
+        diagnosis.say_nothing_of_the_unit();
+    }
     progress(4, 5, "compensation by the core");
     let table_subject = subject.table_subject();
     let tables = tables_of(subject, &table_subject, &recording.sessions);

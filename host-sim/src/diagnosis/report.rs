@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
+use super::channels::RatioProposal;
 use super::trace::Trace;
 use crate::causes::CauseName;
 
@@ -20,6 +21,43 @@ pub enum Verdict {
     PartlyExplained,
     /// A real discrepancy that no cause in the library explains.
     Unknown,
+}
+
+/// What was found about the unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Finding {
+    /// Something is wrong with it, and it has a name.
+    FaultFound,
+    /// It does what the nominal model says, within noise and the spread between units.
+    NothingFound,
+    /// It departs from the nominal model, and what does it has no name.
+    NotUnderstood,
+    /// The data do not say: what is wrong with them hides what the unit does.
+    DataUnusable,
+}
+
+impl Finding {
+    /// What follows from a verdict, as long as the data are usable.
+    #[must_use]
+    pub const fn of(verdict: Verdict) -> Finding {
+        match verdict {
+            Verdict::None => Finding::NothingFound,
+            Verdict::Explained | Verdict::PartlyExplained => Finding::FaultFound,
+            Verdict::Unknown => Finding::NotUnderstood,
+        }
+    }
+
+    /// For a reader.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Finding::FaultFound => "fault found",
+            Finding::NothingFound => "nothing found",
+            Finding::NotUnderstood => "not understood",
+            Finding::DataUnusable => "data not usable",
+        }
+    }
 }
 
 /// A parameter with its uncertainty.
@@ -97,6 +135,8 @@ pub struct Diagnosis {
     pub schema_version: u32,
     /// Verdict.
     pub verdict: Verdict,
+    /// What was found about the unit.
+    pub finding: Finding,
     /// Causes, strongest first.
     pub causes: Vec<Cause>,
     /// Over all data.
@@ -115,6 +155,9 @@ pub struct Diagnosis {
     pub wander_correlation_s: f64,
     /// What to record to tell look-alikes apart.
     pub next_experiment: Option<String>,
+    /// The whole ratio that the nominal one may be meant to be, where the data turn by another.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ratio_proposed: Option<RatioProposal>,
     /// Of the cause that was asked about, if it is not named: what to record to tell it from those that are.
     #[serde(skip)]
     pub experiment_for_asked: Option<String>,
@@ -123,6 +166,19 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// Takes back all causes: the data do not say what the unit does.
+    pub(super) fn say_nothing_of_the_unit(&mut self) {
+        let unnamed = |cause: Cause| Unexplained {
+            looks_like: format!("{} (the data do not tell)", cause.name),
+            size_arcsec: cause.size_arcsec,
+        };
+        let causes = std::mem::take(&mut self.causes);
+        self.unexplained.extend(causes.into_iter().map(unnamed));
+        (self.verdict, self.finding) = (Verdict::Unknown, Finding::DataUnusable);
+        self.held_out.rms_after_arcsec = self.held_out.rms_before_arcsec;
+        (self.ratio_proposed, self.next_experiment) = (None, None);
+    }
+
     /// A few lines for a terminal.
     #[must_use]
     pub fn text(&self) -> String {
@@ -131,8 +187,10 @@ impl Diagnosis {
             Verdict::None => "nothing beyond noise and unit-to-unit spread",
             Verdict::Explained => "explained",
             Verdict::PartlyExplained => "partly explained",
+            Verdict::Unknown if self.finding == Finding::DataUnusable => "none that these data bear",
             Verdict::Unknown => "a discrepancy that no known cause explains",
         };
+        let _ = writeln!(text, "finding: {}", self.finding.words());
         let _ = writeln!(text, "verdict: {verdict}");
         for cause in &self.causes {
             let _ = writeln!(
@@ -167,6 +225,13 @@ impl Diagnosis {
             "in sessions left out: {:.2} arcsec recalibrated, {:.2} with the causes",
             h.rms_before_arcsec, h.rms_after_arcsec
         );
+        if let Some(ratio) = self.ratio_proposed {
+            let _ = writeln!(
+                text,
+                "ratio: the data turn by {:.3}; if it is a drive of {}, say so in the model, and diagnose again",
+                ratio.found, ratio.proposed
+            );
+        }
         if let Some(next) = &self.next_experiment {
             let _ = writeln!(text, "next: {next}");
         }

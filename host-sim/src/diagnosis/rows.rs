@@ -6,6 +6,9 @@ use crate::measurement::{Session, quantile_of};
 use crate::nominal::{Fixed, Nominal};
 use crate::units::ARCSEC_PER_RAD;
 
+/// Four rows around one say where it was as long as they span no more than so many times what the inner two do.
+const FAR_APART: f64 = 4.0;
+
 /// Which columns were recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Recorded {
@@ -54,6 +57,14 @@ pub struct Rows {
     pub on_flexspline: Vec<f64>,
     /// Angle of the wave on the circular spline's material, rad.
     pub on_circular_spline: Vec<f64>,
+    /// Noise of each row against that of a row of mean worth; 1 where all rows are alike.
+    pub loudness: Vec<f64>,
+    /// Whether angles are not read at one instant, so that rows differ in noise.
+    pub jitters: bool,
+    /// Time by which one angle may be read before the other on the mean, for all that is known of how they are read, s.
+    pub unsure_s: f64,
+    /// Sessions from which on the zero of the error is another one.
+    pub zeros: Vec<usize>,
     /// Median sample period, s.
     pub period: f64,
 }
@@ -87,11 +98,47 @@ impl Rows {
             }
             let begin = rows.time.get(from).copied().unwrap_or(0.0);
             rows.since.extend(rows.time[from..].iter().map(|time| time - begin).collect::<Vec<f64>>());
+            match &session.loudness {
+                Some(loudness) => {
+                    rows.jitters = true;
+                    rows.loudness.extend(loudness);
+                }
+                None => rows.loudness.resize(from + len, 1.0),
+            }
+            rows.unsure_s = rows.unsure_s.max(session.unsure_s);
+            if session.own_zero {
+                rows.zeros.push(rows.sessions.len());
+            }
             rows.sessions.push(from..from + len);
             rows.used.push(len > 3);
         }
+        if rows.jitters {
+            rows.generator = rows.by_neighbours();
+        }
         rows.derive(nominal);
         rows
+    }
+
+    /// The generator angle of each row as those beside it have it: a cubic in time through the two before and the two after. The instant
+    /// at which a row was read is in its error, and whatever follows the angle itself would follow that.
+    fn by_neighbours(&self) -> Vec<f64> {
+        let mut angle = self.generator.clone();
+        for session in &self.sessions {
+            for k in session.start + 2..session.end.saturating_sub(2) {
+                let beside = [k - 2, k - 1, k + 1, k + 2];
+                let t = beside.map(|j| self.time[j] - self.time[k]);
+                if t[3] - t[0] > FAR_APART * (t[2] - t[1]).max(0.0) || t.windows(2).any(|t| t[1] <= t[0]) {
+                    continue;
+                }
+                angle[k] = (0..4)
+                    .map(|j| {
+                        let weight = (0..4).filter(|i| *i != j).map(|i| -t[i] / (t[j] - t[i])).product::<f64>();
+                        weight * self.generator[beside[j]]
+                    })
+                    .sum();
+            }
+        }
+        angle
     }
 
     /// Learns from these sessions alone, as far as they have rows enough.
@@ -123,6 +170,10 @@ impl Rows {
             output: of(&self.output),
             on_flexspline: of(&self.on_flexspline),
             on_circular_spline: of(&self.on_circular_spline),
+            loudness: of(&self.loudness),
+            jitters: self.jitters,
+            zeros: self.zeros.clone(),
+            unsure_s: self.unsure_s,
             period: self.period,
         }
     }
@@ -182,6 +233,12 @@ impl Rows {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.generator.is_empty()
+    }
+
+    /// Noise of all rows together, root mean square, against that of a row of mean worth.
+    #[must_use]
+    pub fn loudness_rms(&self) -> f64 {
+        if self.jitters { rms(&self.loudness) } else { 1.0 }
     }
 
     /// A high percentile of the torque's magnitude, N·m: the scale of the load.

@@ -5,15 +5,16 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::candidate::Law;
+use super::channels::{RatioProposal, proposed_ratio};
 use super::model::{Fit, Problem, Term};
 use super::noise::Noise;
-use super::report::{Cause, Compensation, Diagnosis, HeldOut, Parameter, Residual, Unexplained, Verdict};
+use super::report::{Cause, Compensation, Diagnosis, Finding, HeldOut, Parameter, Residual, Unexplained, Verdict};
 use super::select::{self, Selected, Standing, fit, predicted, standings};
 use super::thresholds::verdict::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
 use super::uncertainty::{self, Known};
 use super::{Settings, experiment, held_out, rivals};
-use crate::causes::CauseName;
+use crate::causes::{CauseName, ParameterName};
 
 /// The verdict, with its causes and what is left.
 #[allow(clippy::too_many_arguments, reason = "all that a search has found")]
@@ -41,7 +42,8 @@ pub(super) fn conclude(
     };
     let before = none.as_ref().map_or(Vec::new(), |fit| left(&[], fit));
     let after = left(&all, &selected.fit);
-    let stride_floor = noise.white / (problem.on.rows.count_used() as f64 / problem.data.len() as f64).sqrt();
+    let stride_floor = noise.white * problem.on.rows.loudness_rms()
+        / (problem.on.rows.count_used() as f64 / problem.data.len() as f64).sqrt();
     let floor = stride_floor.hypot(noise.wander);
     let (rms_before, rms_after) = (problem.certain_rms(&before), problem.certain_rms(&after));
     let explainable = (rms_before * rms_before - floor * floor).max(0.0);
@@ -150,6 +152,8 @@ pub(super) fn conclude(
     Diagnosis {
         schema_version: 1,
         verdict,
+        finding: Finding::of(verdict),
+        ratio_proposed: ratio_proposed(&causes, problem.on.nominal.ratio),
         causes,
         residual: Residual {
             rms_before_arcsec: rms_before,
@@ -167,6 +171,13 @@ pub(super) fn conclude(
         experiment_for_asked,
         trace,
     }
+}
+
+/// The ratio that may be meant, where it is wrong.
+fn ratio_proposed(causes: &[Cause], nominal_ratio: f64) -> Option<RatioProposal> {
+    let wrong = causes.iter().find(|cause| cause.name == CauseName::RatioError)?;
+    let error = wrong.parameters.get(ParameterName::RatioRelativeError.as_str())?;
+    proposed_ratio(nominal_ratio, error.value)
 }
 
 /// What there is with a name and without, arcsec².

@@ -103,6 +103,9 @@ pub fn split(sessions: &[Session]) -> (Vec<Session>, Vec<bool>) {
                 torque_n_m: of(&session.torque_n_m),
                 temperature_c: of(&session.temperature_c),
                 orientation_rad: of(&session.orientation_rad),
+                loudness: of(&session.loudness),
+                own_zero: session.own_zero && from == 0,
+                unsure_s: session.unsure_s,
             }
         };
         parts.extend([cut(0, at), cut(at, session.len())]);

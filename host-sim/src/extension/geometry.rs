@@ -115,6 +115,7 @@ impl Probe {
                 torque_n_m: Some(vec![load; n]),
                 temperature_c: Some(vec![nominal.temperature_c; n]),
                 orientation_rad: Some(vec![orientation_rad; n]),
+                ..Session::default()
             }
         };
         let load = PROBE_N_M.max(1.5 * nominal.friction_torque_n_m);

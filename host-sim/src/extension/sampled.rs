@@ -248,6 +248,7 @@ impl ExtendedTables<'_> {
             torque_n_m: Some(vec![torque; rows]),
             temperature_c: Some(vec![temperature; rows]),
             orientation_rad: Some(vec![self.orientation_rad.unwrap_or(0.0); rows]),
+            ..Session::default()
         }
     }
 }

@@ -30,7 +30,13 @@ impl Session {
         let mean = |values: &mut Vec<f64>| {
             *values = values.chunks(together).map(|rows| rows.iter().sum::<f64>() / rows.len() as f64).collect();
         };
-        let beside = [&mut self.time_s, &mut self.torque_n_m, &mut self.temperature_c, &mut self.orientation_rad];
+        let beside = [
+            &mut self.time_s,
+            &mut self.torque_n_m,
+            &mut self.temperature_c,
+            &mut self.orientation_rad,
+            &mut self.loudness,
+        ];
         beside.into_iter().flatten().for_each(mean);
         mean(&mut self.generator_rad);
         mean(&mut self.error_rad);

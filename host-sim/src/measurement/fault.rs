@@ -24,6 +24,18 @@ pub enum FaultName {
     Quantisation,
     /// A zero that moves with time, the same in every state of the drive.
     Drift,
+    /// The two angles are not read at one instant, and the time between them scatters.
+    ReadJitter,
+    /// The logger stands still every so many rows, and its time counts on.
+    Stalls,
+    /// The counter of an angle begins anew between sessions, whole turns of the motor off.
+    CounterRestart,
+    /// The torque counts against the sign that the wind-up shows.
+    TorqueSign,
+    /// The torque is of another shaft, in another unit, or of something else.
+    TorqueScale,
+    /// The count of an angle leaps by whole turns, or its zero is another one from a session on.
+    PositionJump,
 }
 
 impl FaultName {
@@ -39,6 +51,45 @@ impl FaultName {
             FaultName::UnitMismatch => "unit_mismatch",
             FaultName::Quantisation => "quantisation",
             FaultName::Drift => "drift",
+            FaultName::ReadJitter => "read_jitter",
+            FaultName::Stalls => "stalls",
+            FaultName::CounterRestart => "counter_restart",
+            FaultName::TorqueSign => "torque_sign",
+            FaultName::TorqueScale => "torque_scale",
+            FaultName::PositionJump => "position_jump",
+        }
+    }
+
+    /// What to change at the bench or in the logger, so that it does not come back.
+    #[must_use]
+    pub const fn advice(self) -> &'static str {
+        match self {
+            FaultName::EncoderIndexJump => "check the cable, the shield and the index of the encoder",
+            FaultName::FrozenChannel => {
+                "log every channel anew in each row; check the bus for values that are repeated"
+            }
+            FaultName::MissingSamples => "log at a rate that bus and disk keep up with",
+            FaultName::ClockError => "stamp each row with the clock of the controller when the angles are read",
+            FaultName::Outliers => "check the cable and the interface of the encoder; latch both angles together",
+            FaultName::UnitMismatch => {
+                "map the columns with their units: --columns generator=NAME:UNIT,output=NAME:UNIT"
+            }
+            FaultName::Quantisation => "log the full resolution of the encoder",
+            FaultName::Drift => {
+                "let bench and encoder come to a steady temperature; look after the mount of the encoder"
+            }
+            FaultName::ReadJitter => {
+                "latch both angles by one signal, or read both in one cycle of the bus; turn more slowly meanwhile"
+            }
+            FaultName::Stalls => {
+                "log the time of a clock instead of counting rows; write to disk outside of the loop that reads"
+            }
+            FaultName::CounterRestart => "log the turns of the motor, or home it before each session",
+            FaultName::TorqueSign => {
+                "turn the sign of the torque round: it is positive where it turns the output forward"
+            }
+            FaultName::TorqueScale => "log the torque at the output of this drive, in N.m",
+            FaultName::PositionJump => "log the position unwrapped, and keep its zero from session to session",
         }
     }
 }
@@ -82,6 +133,31 @@ pub struct Fault {
     pub treatment: Treatment,
     /// One sentence for a reader.
     pub what: String,
+    /// What to change at the bench or in the logger.
+    pub advice: &'static str,
+    /// Numbers of its own.
+    #[serde(flatten)]
+    pub measures: Measures,
+}
+
+/// Numbers that only some faults have.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Measures {
+    /// Scatter of the time between the readings of the two angles, one standard deviation, ms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jitter_ms: Option<f64>,
+    /// Rows whose angles were read far apart, which are left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub late_rows: Option<u64>,
+    /// The logger stands still after every so many rows; none where it does so irregularly.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub every_rows: Option<u64>,
+    /// For so long (median), ms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_ms: Option<f64>,
+    /// Turns of the motor, with the sign of what the generator's angle lacks; the largest of several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turns: Option<i64>,
 }
 
 /// A lasting step of the error that is a whole number of tooth pitches: the drive has ratcheted.

@@ -28,7 +28,7 @@ use std::path::Path;
 
 pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
 pub use csv_rows::{CsvRows, NotANumber, Row, TableProblem};
-pub use fault::{Fault, FaultName, ToothStep, Treatment};
+pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
 pub use faults::clock::SESSION_GAP_PERIODS;
 pub use gear::Gear;
 pub use layout::{Layout, Separator};
@@ -55,6 +55,12 @@ pub struct Session {
     pub temperature_c: Option<Vec<f64>>,
     /// Angle of the drive against gravity about its axis, rad.
     pub orientation_rad: Option<Vec<f64>>,
+    /// Noise of each row against that of a row of mean worth, where rows differ: the mean of its inverse square is 1.
+    pub loudness: Option<Vec<f64>>,
+    /// Whether the zero of the error is not that of the session before.
+    pub own_zero: bool,
+    /// Time by which one angle may be read before the other on the mean, for all that is known of how they are read, s.
+    pub unsure_s: f64,
 }
 
 impl Session {
@@ -106,7 +112,13 @@ impl Session {
 
     /// Leaves out the rows for which `drop` is true.
     fn leave_out(&mut self, drop: &[bool]) {
-        let others = [&mut self.time_s, &mut self.torque_n_m, &mut self.temperature_c, &mut self.orientation_rad];
+        let others = [
+            &mut self.time_s,
+            &mut self.torque_n_m,
+            &mut self.temperature_c,
+            &mut self.orientation_rad,
+            &mut self.loudness,
+        ];
         let columns = [&mut self.generator_rad, &mut self.error_rad];
         for values in columns.into_iter().chain(others.into_iter().flatten()) {
             let mut row = 0;
@@ -138,6 +150,8 @@ pub struct Recording {
     pub tooth_steps: Vec<ToothStep>,
     /// What was noticed and is no fault, one sentence each.
     pub notes: Vec<String>,
+    /// Why nothing can be said of the drive from these rows, if so.
+    pub unusable: Option<String>,
 }
 
 /// Reads a file of measured data of a drive with this `gear`.
@@ -149,8 +163,28 @@ pub fn read(path: &Path, columns: &ColumnMap, gear: &Gear) -> Result<Recording, 
     }
 }
 
+/// The same where both angles are in degrees though radians are said, which no ratio tells: a fault, and converted.
+pub(crate) fn read_degrees(path: &Path, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
+    let file = path.display().to_string();
+    match File::open(path) {
+        Ok(source) => parse_as(&file, source, columns, gear, Unit::Degree.factor()),
+        Err(error) => Err(MeasuredError { file, line: None, what: error.to_string() }),
+    }
+}
+
 /// Reads measured data from `source`, a file called `file`.
 pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
+    parse_as(file, source, columns, gear, 1.0)
+}
+
+/// The same with both angles times `angle_scale`.
+fn parse_as(
+    file: &str,
+    source: impl Read,
+    columns: &ColumnMap,
+    gear: &Gear,
+    angle_scale: f64,
+) -> Result<Recording, MeasuredError> {
     let refuse = |what: String| MeasuredError { file: file.to_owned(), line: None, what };
     if gear.ratio == 0.0 || !gear.ratio.is_finite() {
         return Err(refuse(format!("ratio: found {}, allowed: a finite number other than zero", gear.ratio)));
@@ -170,17 +204,27 @@ pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) ->
             size_arcsec: None,
             treatment: Treatment::Masked,
             what: "the last line breaks off: it is left out".to_owned(),
+            advice: FaultName::MissingSamples.advice(),
+            measures: Measures::default(),
         });
+    }
+    if angle_scale != 1.0 {
+        faults::units::both_in_degrees(&mut log, angle_scale, &mut findings);
     }
     faults::missing::fill(&mut log, &mut findings);
     faults::clock::check(&mut log, &mut findings);
     faults::missing::leave_out(&mut log, &mut findings);
     enough(&log).map_err(refuse)?;
     faults::wrap::unwrap(&mut log, &found.columns, gear.ratio, &mut findings);
+    faults::leaps::check(&mut log, gear, &mut findings);
     faults::units::check(&mut log, &found.columns, gear, &mut findings).map_err(refuse)?;
     let error_recorded = log.output_or_error() == Quantity::Error;
+    let other_zeros = faults::leaps::between_sessions(&mut log, gear, &mut findings);
+    faults::stalls::check(&mut log, gear, &mut findings);
     let mut sessions = into_sessions(log, gear.ratio);
+    other_zeros.into_iter().for_each(|session| sessions[session].own_zero = true);
     faults::frozen::check(&mut sessions, gear, error_recorded, &mut findings).map_err(refuse)?;
+    faults::reads::check(&mut sessions, gear, &mut findings);
     faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
     faults::resolution::check(&sessions, gear, error_recorded, &mut findings);
     let steps_are_told = faults::steps::check(&mut sessions, gear, &mut findings);
@@ -190,7 +234,7 @@ pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) ->
     }
     let Findings { mut faults, tooth_steps, notes } = findings;
     faults.sort_by_key(|fault| (fault.first_line, fault.name));
-    Ok(Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes })
+    Ok(Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes, unusable: None })
 }
 
 /// Whether enough rows are left, and anything moves in them.
@@ -224,6 +268,9 @@ fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
         temperature_c: log.take(Quantity::Temperature),
         orientation_rad: log.take(Quantity::Orientation),
         line: std::mem::take(&mut log.line),
+        loudness: None,
+        own_zero: false,
+        unsure_s: 0.0,
     };
     let starts: Vec<usize> = (1..log.session.len()).filter(|row| log.session[*row] != log.session[*row - 1]).collect();
     // From the last session to the first, so that each is cut off the end.
@@ -240,6 +287,7 @@ fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
                 torque_n_m: cut(&mut whole.torque_n_m),
                 temperature_c: cut(&mut whole.temperature_c),
                 orientation_rad: cut(&mut whole.orientation_rad),
+                ..Session::default()
             }
         })
         .collect();

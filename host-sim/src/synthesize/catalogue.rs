@@ -114,11 +114,37 @@ const fn fault_parameters(fault: FaultName) -> (&'static str, &'static [Paramete
             "a zero that moves with time",
             const { &[number(Name::ArcsecPerHour, "how fast", -1e6, 1e6, Value(300.0))] },
         ),
+        FaultName::ReadJitter => (
+            "the two angles are not read at one instant",
+            const { &[number(Name::JitterMs, "scatter of the time between them", 0.0, 100.0, Value(0.5))] },
+        ),
+        FaultName::Stalls => (
+            "the logger stands still now and then, and its time counts on",
+            const {
+                &[
+                    number(Name::EveryRows, "after so many rows", 2.0, 1e5, Value(50.0)),
+                    number(Name::DurationS, "for so long", 0.0, 1e3, Value(0.05)),
+                ]
+            },
+        ),
+        FaultName::CounterRestart => (
+            "the count of the generator begins anew in the sessions after the first",
+            const { &[number(Name::Turns, "off by", -1e5, 1e5, Value(7.0))] },
+        ),
+        FaultName::TorqueSign => ("the torque has the wrong sign", &[]),
+        FaultName::TorqueScale => (
+            "the torque is in another unit, or of another shaft",
+            const { &[number(Name::Factor, "of all values", -1e6, 1e6, Value(0.01))] },
+        ),
+        FaultName::PositionJump => (
+            "the generator's angle leaps by whole turns",
+            const { &[number(Name::Turns, "by how many", -1e5, 1e5, Value(16.0)), TIME] },
+        ),
     }
 }
 
 /// Data faults in the order of lists.
-const FAULTS: [FaultName; 8] = [
+const FAULTS: [FaultName; 14] = [
     FaultName::EncoderIndexJump,
     FaultName::FrozenChannel,
     FaultName::MissingSamples,
@@ -127,6 +153,12 @@ const FAULTS: [FaultName; 8] = [
     FaultName::UnitMismatch,
     FaultName::Quantisation,
     FaultName::Drift,
+    FaultName::ReadJitter,
+    FaultName::Stalls,
+    FaultName::CounterRestart,
+    FaultName::TorqueSign,
+    FaultName::TorqueScale,
+    FaultName::PositionJump,
 ];
 
 /// Everything that can be asked for: the causes of the library, then data faults.

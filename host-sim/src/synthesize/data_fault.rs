@@ -1,8 +1,10 @@
 //! Faults of the data: what goes wrong between the sensors and the file.
 
+use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
 use super::catalogue::{Chosen, Hidden};
+use super::plant::gauss;
 use crate::causes::ParameterName;
 use crate::measurement::{FaultName, Session};
 use crate::units::ARCSEC_PER_RAD;
@@ -12,6 +14,7 @@ const HEADER: &str = "time_s,generator_rad,output_rad,torque_n_m,temperature_c,o
 /// Places of them.
 const TIME: usize = 0;
 const OUTPUT: usize = 2;
+const TORQUE: usize = 3;
 
 /// The rows as CSV text, with the faults among `effects` in them. `ratio` makes output angles of errors.
 #[must_use]
@@ -54,7 +57,7 @@ pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Chosen], random: &mut
     text
 }
 
-fn spoil(rows: &mut [[f64; 6]], fault: FaultName, effect: &Chosen, random: &mut fastrand::Rng) {
+fn spoil(rows: &mut Vec<[f64; 6]>, fault: FaultName, effect: &Chosen, random: &mut fastrand::Rng) {
     use ParameterName as Name;
     let v = |name: Name| effect.value(name);
     let first = rows.first().map_or(0.0, |row| row[TIME]);
@@ -95,6 +98,50 @@ fn spoil(rows: &mut [[f64; 6]], fault: FaultName, effect: &Chosen, random: &mut 
         FaultName::Drift => {
             let rate = v(Name::ArcsecPerHour) / 3600.0 / ARCSEC_PER_RAD;
             rows.iter_mut().for_each(|row| row[OUTPUT] += rate * (row[TIME] - first));
+        }
+        FaultName::ReadJitter => {
+            let jitter_s = 1e-3 * v(Name::JitterMs);
+            let speeds: Vec<f64> = rows
+                .windows(2)
+                .map(|pair| (pair[1][OUTPUT] - pair[0][OUTPUT]) / (pair[1][TIME] - pair[0][TIME]).max(1e-9))
+                .collect();
+            for (row, speed) in rows.iter_mut().zip(speeds) {
+                row[OUTPUT] += jitter_s * gauss(random) * speed;
+            }
+        }
+        FaultName::Stalls => {
+            // Rows that are not written while it stands still, and a time that counts those that are.
+            let (every, lasts_s) = (v(Name::EveryRows) as usize, v(Name::DurationS));
+            let (mut kept, mut lost_s): (Vec<[f64; 6]>, f64) = (Vec::new(), 0.0);
+            let (mut since, mut last_s, mut until_s) = (0, first, f64::NEG_INFINITY);
+            for row in rows.iter() {
+                if row[TIME] < until_s {
+                    lost_s += row[TIME] - last_s;
+                } else {
+                    kept.push(*row);
+                    if let Some(kept) = kept.last_mut() {
+                        kept[TIME] -= lost_s;
+                    }
+                    since += 1;
+                    if since == every {
+                        (since, until_s) = (0, row[TIME] + lasts_s);
+                    }
+                }
+                last_s = row[TIME];
+            }
+            *rows = kept;
+        }
+        FaultName::CounterRestart => {
+            let usual = rows.windows(2).map(|pair| pair[1][TIME] - pair[0][TIME]).fold(f64::INFINITY, f64::min);
+            let gap = rows.windows(2).position(|pair| pair[1][TIME] - pair[0][TIME] > 20.0 * usual);
+            let from = gap.map_or(rows.len(), |gap| gap + 1);
+            rows[from..].iter_mut().for_each(|row| row[1] += TAU * v(Name::Turns).round());
+        }
+        FaultName::TorqueSign => rows.iter_mut().for_each(|row| row[TORQUE] = -row[TORQUE]),
+        FaultName::TorqueScale => rows.iter_mut().for_each(|row| row[TORQUE] *= v(Name::Factor)),
+        FaultName::PositionJump => {
+            let (time, off) = (v(Name::TimeS), TAU * v(Name::Turns).round());
+            rows.iter_mut().filter(|row| row[TIME] >= time).for_each(|row| row[1] += off);
         }
     }
 }
@@ -138,6 +185,10 @@ mod tests {
             ("unit_mismatch", FaultName::UnitMismatch),
             ("quantisation", FaultName::Quantisation),
             ("drift:arcsec_per_hour=300", FaultName::Drift),
+            ("read_jitter:jitter_ms=2", FaultName::ReadJitter),
+            ("stalls", FaultName::Stalls),
+            ("counter_restart", FaultName::CounterRestart),
+            ("position_jump", FaultName::PositionJump),
         ] {
             let found: Vec<FaultName> = recording(effect).faults.iter().map(|fault| fault.name).collect();
             assert!(found.contains(&name), "{effect}: {found:?}");

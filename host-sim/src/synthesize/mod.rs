@@ -86,6 +86,7 @@ fn into_sessions(on: &Excitation, error: &[f64]) -> Vec<Session> {
             torque_n_m: Some(on.torque[s.clone()].to_vec()),
             temperature_c: Some(on.temperature[s.clone()].to_vec()),
             orientation_rad: Some(on.orientation[s.clone()].to_vec()),
+            ..Session::default()
         })
         .collect()
 }

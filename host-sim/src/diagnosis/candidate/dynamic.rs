@@ -128,6 +128,11 @@ const WIND_UP: Role = Role("wind-up");
 const KINEMATIC: Role = Role("kinematic error");
 const TURNING: Role = Role("turning");
 
+/// A load that is damped more than this does not swing.
+const MOST_DAMPING: f64 = 0.5;
+/// A damping beyond this share of the largest stands on the bound: what is fitted is no swinging.
+const ON_THE_BOUND: f64 = 0.98;
+
 /// Spread of the share of a jump that makes the load ring, beside that of a step of the torque.
 const SLIDING: f64 = 0.3;
 
@@ -194,15 +199,18 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
         let mut columns = vec![
             main(ringing(on, &moved_to, frequency, damping), 1.0).called(WIND_UP),
             main(ringing(on, &kinematic, frequency, damping), 1.0).called(KINEMATIC),
-            main(moved, 0.5).called(TURNING),
         ];
+        // The scatter of when an angle is read swings as a load would that the turning shakes: then the turning tells nothing.
+        if !on.rows.jitters {
+            columns.push(main(moved, 0.5).called(TURNING));
+        }
         // Teeth that slide into the next space do so less suddenly.
         columns.extend(skipped.map(|skipped| main(ringing(on, &skipped, frequency, damping), SLIDING)));
         columns
     })
     .shapes([
         Shape::by_factors(Name::FrequencyHz, 1.0f64.min(0.3 * fastest), fastest.clamp(0.5, 80.0), 28),
-        Shape::by_factors(Name::DampingRatio, 0.008, 0.5, 3),
+        Shape::by_factors(Name::DampingRatio, 0.008, MOST_DAMPING, 3),
     ])
     .parameters_by(|_, shape, c| {
         let gains = [WIND_UP, KINEMATIC].map(|role| c.of(role));
@@ -210,7 +218,10 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
         let shape = |name| (name, shape.of(name));
         vec![shape(Name::FrequencyHz), shape(Name::DampingRatio), (Name::Gain, gain)]
     })
-    .physical_if(|_, c| [WIND_UP, KINEMATIC, TURNING].into_iter().any(|role| c.of(role) > 0.0));
+    .physical_if(|shape, c| {
+        let swings = shape.of(Name::DampingRatio) < ON_THE_BOUND * MOST_DAMPING;
+        swings && [WIND_UP, KINEMATIC, TURNING].into_iter().any(|role| c.of(role) > 0.0)
+    });
     // It rings most when the load turns over.
     law.acts.in_crossings = true;
     // Rows are joined by straight lines.

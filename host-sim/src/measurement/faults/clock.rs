@@ -6,7 +6,7 @@ use super::{Findings, span};
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::log::Log;
-use crate::measurement::robust::{median_and_std, median_of, sampled};
+use crate::measurement::robust::{median_and_std, median_of, quantile_of, sampled};
 
 /// A gap longer than so many sample periods starts a new session.
 pub const SESSION_GAP_PERIODS: f64 = 10.0;
@@ -24,6 +24,9 @@ const JITTER_OVER_MOTION: f64 = 5.0;
 const PERIODS_S: [f64; 2] = [1e-7, 3600.0];
 /// Generator speeds that exist, up to 20 000 turns a minute, rad/s.
 const FASTEST_RAD_S: f64 = 2100.0;
+/// Rows farther apart than this (s), for longer than this altogether (s), in which the motor stays slower than this (rad/s), are milliseconds
+/// read as seconds: a bench creeps for minutes, not for days. *Guess*.
+const CREEPS: (f64, f64, f64) = (1.0, 43_200.0, 0.1);
 
 /// Finds faults of the clock, repairs or leaves out what they touch, and parts the rows into sessions.
 pub(in crate::measurement) fn check(log: &mut Log, findings: &mut Findings) {
@@ -263,11 +266,20 @@ fn scale(log: &Log, period: f64, findings: &mut Findings) {
         .map(|row| (turned(generator, row) / (time[row] - time[row - 1])).abs())
         .filter(|speed| *speed > 0.0)
         .collect();
-    let speed = median_of(&mut speeds);
+    let (speed, fastest) = (median_of(&mut speeds), quantile_of(&mut speeds, 0.95));
+    let lasts_s = period * time.len() as f64;
+    let creeps = period > CREEPS.0 && lasts_s > CREEPS.1 && fastest < CREEPS.2;
     let what = if !(PERIODS_S[0]..=PERIODS_S[1]).contains(&period) {
         format!("a sample period of {period:e} s is not plausible")
     } else if speed > FASTEST_RAD_S {
         format!("a generator speed of {speed:.0} rad/s is not plausible")
+    } else if creeps {
+        format!(
+            "{} rows {period:.3} s apart, {:.0} hours in which the generator never exceeds {fastest:.3} rad/s, are milliseconds rather than \
+             seconds",
+            time.len(),
+            lasts_s / 3600.0
+        )
     } else {
         return;
     };

@@ -16,6 +16,10 @@
 //! | output or generator frozen | rows left out |
 //! | torque or temperature frozen | straight line, or channel left out |
 //! | single rows out | rows left out (torque, temperature: mended) |
+//! | the logger stands still while its time counts on | time made anew from the motion |
+//! | an angle leaps by whole motor turns, in a row or between sessions | turns taken out |
+//! | another zero from a session on | the zero of that session is fitted on its own |
+//! | angles read at different instants | rows weigh what their speed leaves of them; rows read far apart left out |
 //! | index jump | step taken out |
 //! | drift | straight line in time taken out |
 //! | coarse resolution, implausible time | named |
@@ -24,9 +28,12 @@ pub(super) mod clock;
 pub(super) mod drift;
 pub(super) mod frozen;
 pub(super) mod lattice;
+pub(super) mod leaps;
 pub(super) mod missing;
 pub(super) mod outliers;
+pub(super) mod reads;
 pub(super) mod resolution;
+pub(super) mod stalls;
 mod state;
 pub(super) mod steps;
 pub(super) mod units;
@@ -35,7 +42,7 @@ pub(super) mod wrap;
 use std::ops::Range;
 
 use super::Session;
-use super::fault::{Fault, FaultName, ToothStep, Treatment};
+use super::fault::{Fault, FaultName, Measures, ToothStep, Treatment};
 use super::log::Log;
 
 /// An arc-second, rad.
@@ -62,6 +69,8 @@ fn span(log: &Log, name: FaultName, first: usize, last: usize) -> Fault {
         size_arcsec: None,
         treatment: Treatment::Kept,
         what: String::new(),
+        advice: name.advice(),
+        measures: Measures::default(),
     }
 }
 
@@ -80,5 +89,7 @@ fn of_rows(session: &Session, name: FaultName, rows: Range<usize>) -> Fault {
         size_arcsec: None,
         treatment: Treatment::Kept,
         what: String::new(),
+        advice: name.advice(),
+        measures: Measures::default(),
     }
 }

@@ -185,7 +185,7 @@ fn report(
 }
 
 /// Whether rows gather at the same angle of a wheel, more than all rows do.
-fn repeat_with_position(sessions: &[Session], found: &[Vec<(usize, f64)>], gear: &Gear) -> bool {
+pub(super) fn repeat_with_position(sessions: &[Session], found: &[Vec<(usize, f64)>], gear: &Gear) -> bool {
     let count: usize = found.iter().map(Vec::len).sum();
     if count < FEW {
         return false;

@@ -494,8 +494,7 @@ mod tests {
             generator_rad: vec![0.0; rows],
             error_rad,
             torque_n_m: Some(torque_n_m),
-            temperature_c: None,
-            orientation_rad: None,
+            ..Session::default()
         }
     }
 

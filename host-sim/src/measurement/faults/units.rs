@@ -40,6 +40,19 @@ pub(in crate::measurement) fn check(
     }
 }
 
+/// Converts both angles.
+pub(in crate::measurement) fn both_in_degrees(log: &mut Log, scale: f64, findings: &mut Findings) {
+    for channel in [Quantity::Generator, Quantity::Output, Quantity::Error] {
+        log.get_mut(channel).into_iter().flatten().for_each(|angle| *angle *= scale);
+    }
+    let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
+    fault.treatment = Treatment::Repaired;
+    fault.what = "generator and output are both in degrees: so the nominal model explains the error to the noise, and not in radians; they \
+                  were converted"
+        .to_owned();
+    findings.faults.push(fault);
+}
+
 fn name(columns: &[Column], quantity: Quantity) -> &str {
     columns.iter().find(|column| column.quantity == quantity).map_or(quantity.name(), |column| &column.name)
 }

@@ -14,6 +14,11 @@ const COVERED: f64 = 0.75;
 const OFTEN: usize = 3;
 /// Steps up to this share of a turn are told from a wrap without help.
 const UNAMBIGUOUS: f64 = 0.4;
+/// A step that differs from the one before by less than this share of a turn goes on as it did; where files are joined without a time
+/// between them, it does not.
+const GOES_ON: f64 = 0.25;
+/// Teeth do not skip by more than so many turns of the motor in a row: two pitches are one.
+const MOST_SKIPPED: f64 = 3.5;
 
 /// Finds wrapped angles (also in a unit other than the one given, which is a fault) and unwraps them.
 pub(in crate::measurement) fn unwrap(log: &mut Log, columns: &[Column], ratio: f64, findings: &mut Findings) {
@@ -96,15 +101,45 @@ fn along(values: &mut [f64], log: &Log, ratio: f64, output: Option<&[f64]>) -> b
     if let Some(output) = output {
         values[0] += TAU * ((output[0] * ratio - values[0]) / TAU).round();
     }
+    let mut last = 0.0;
     for row in 1..values.len() {
+        let plain = nearest(values[row] - values[row - 1]);
+        let expected = output.map_or(plain, |output| (output[row] - output[row - 1]) * ratio);
+        let far = (expected - plain).abs() > MOST_SKIPPED * TAU;
         let step = match output {
-            Some(output) if fast || !log.continues(row) => {
-                let expected = (output[row] - output[row - 1]) * ratio;
+            // What goes on as it did needs no help: there it is the output that may skip, by some teeth.
+            Some(_) if fast || far || !log.continues(row) || (plain - last).abs() > GOES_ON * TAU => {
                 expected + nearest(values[row] - values[row - 1] - expected)
             }
-            _ => nearest(values[row] - values[row - 1]),
+            _ => plain,
         };
         values[row] = values[row - 1] + step;
+        last = step;
     }
     fast
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_files_joined_without_a_time_are_made_continuous_without_a_jump_of_a_turn() {
+        let ratio = 100.0;
+        // The drive went on by 0.7 output turns between the two.
+        let psi: Vec<f64> = (0..2000).map(|k| 0.11 * f64::from(k) + if k < 1000 { 0.0 } else { 70.3 * TAU }).collect();
+        let output: Vec<f64> = psi.iter().map(|psi| psi / ratio).collect();
+        let mut log = Log::default();
+        log.line = (0..2000).collect();
+        let mut wrapped: Vec<f64> = psi.iter().map(|psi| psi.rem_euclid(TAU)).collect();
+        along(&mut wrapped, &log, ratio, Some(&output));
+        let apart = wrapped.iter().zip(&psi).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 1e-6, "{apart}");
+        // Teeth that skip by two pitches, which is a turn of the motor, stay where they are: in the output.
+        let skipped: Vec<f64> =
+            (0..2000).map(|k| 0.0011 * f64::from(k) + if k < 1000 { 0.0 } else { TAU / ratio }).collect();
+        let mut wrapped: Vec<f64> = (0..2000).map(|k| (0.11 * f64::from(k)).rem_euclid(TAU)).collect();
+        along(&mut wrapped, &log, ratio, Some(&skipped));
+        assert!((wrapped[1999] - wrapped[0] - 0.11 * 1999.0).abs() < 1e-6);
+    }
 }

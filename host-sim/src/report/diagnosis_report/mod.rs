@@ -20,7 +20,8 @@ use super::page::{
     Status, Table as PageTable, Text, significant,
 };
 use crate::causes::CauseName;
-use crate::diagnosis::report::{Diagnosis, Verdict};
+use crate::diagnosis::base::BETWEEN_READINGS;
+use crate::diagnosis::report::{Diagnosis, Finding, Verdict};
 use crate::diagnosis::rows::Rows;
 use crate::diagnosis::{Extended, Series};
 use crate::measurement::{Gear, Recording, Session};
@@ -160,6 +161,9 @@ fn thinned(session: &Session, every: usize) -> Session {
         torque_n_m: column(&session.torque_n_m),
         temperature_c: column(&session.temperature_c),
         orientation_rad: column(&session.orientation_rad),
+        loudness: column(&session.loudness),
+        own_zero: session.own_zero,
+        unsure_s: session.unsure_s,
     }
 }
 
@@ -221,6 +225,9 @@ impl Known<'_> {
 
     fn status(&self) -> (Status, Vec<Status>) {
         let faults = !self.sources.recording.faults.is_empty();
+        if self.sources.diagnosis.finding == Finding::DataUnusable {
+            return (Status::DataFaults, Vec::new());
+        }
         let status = match self.sources.diagnosis.verdict {
             Verdict::PartlyExplained => Status::PartlyExplained,
             Verdict::Unknown => Status::Unknown,
@@ -275,6 +282,14 @@ impl Known<'_> {
         let (answer, number, number_is) = match diagnosis.verdict {
             Verdict::Explained => (listed(Text::new("Explained by ")), share, share_is),
             Verdict::PartlyExplained => (listed(Text::new("Partly explained by ")), share, share_is),
+            Verdict::Unknown if diagnosis.finding == Finding::DataUnusable => (
+                Text::new(format!(
+                    "Data not usable: {}.",
+                    self.sources.recording.unusable.as_deref().unwrap_or("their faults hide what the drive does")
+                )),
+                Text::default().error(self.departure_arcsec(), 2),
+                "rms beyond noise, of which nothing can be said".to_owned(),
+            ),
             Verdict::Unknown => (
                 Text::new(
                     "Unknown: the drive departs from the nominal model, and no cause in the library explains how.",
@@ -608,8 +623,11 @@ impl Known<'_> {
         let mut rows: Vec<(usize, Vec<Text>)> = recalibrated
             .iter()
             .map(|(name, p)| {
-                let value = if name == "zero" {
+                let value = if name.starts_with("zero") {
                     Text::default().error(p.value, 3).plain("\u{a0}±\u{a0}").error(p.std, 2)
+                } else if name == BETWEEN_READINGS {
+                    let ms = |seconds: f64| significant(1e3 * seconds, 2);
+                    Text::new(format!("{}\u{a0}±\u{a0}{}\u{a0}ms", ms(p.value), ms(p.std)).replace('-', "−"))
                 } else {
                     Text::new(
                         format!("{:+.1}\u{a0}±\u{a0}{:.1}\u{a0}%", 100.0 * p.value, 100.0 * p.std).replace('-', "−"),
@@ -672,12 +690,13 @@ impl Known<'_> {
                         fault.size_arcsec.map_or_else(|| Text::new("–"), |size| Text::default().error(size, 3)),
                         Text::new(words::treatment(fault.treatment)),
                         Text::new(fault.what.clone()),
+                        Text::new(fault.advice),
                     ]
                 })
                 .collect();
             blocks.push(table(
                 "Faults of the data",
-                &["Fault", "When", "Lines of the file", "Rows", "Size", "Done", "What it is"],
+                &["Fault", "When", "Lines of the file", "Rows", "Size", "Done", "What it is", "What to change"],
                 rows,
             ));
             if recording.faults.len() > MOST {
@@ -773,7 +792,7 @@ mod tests {
     use super::*;
     use crate::diagnosis::report::{Cause, Compensation, HeldOut, Residual, Unexplained};
     use crate::diagnosis::trace::Trace;
-    use crate::measurement::{Fault, FaultName, Treatment};
+    use crate::measurement::{Fault, FaultName, Measures, Treatment};
     use crate::report::page::Span;
     use crate::synthesize::catalogue_drive;
 
@@ -796,6 +815,7 @@ mod tests {
             faults,
             tooth_steps: Vec::new(),
             notes: Vec::new(),
+            unusable: None,
         }
     }
 
@@ -811,6 +831,7 @@ mod tests {
         Diagnosis {
             schema_version: 1,
             verdict,
+            finding: Finding::of(verdict),
             causes: causes.iter().map(cause).collect(),
             residual: Residual {
                 rms_before_arcsec: 13.0,
@@ -825,6 +846,7 @@ mod tests {
             noise_arcsec: [5.0, 0.0],
             wander_correlation_s: 1.0,
             next_experiment: None,
+            ratio_proposed: None,
             experiment_for_asked: None,
             trace: Trace::default(),
         }
@@ -866,6 +888,8 @@ mod tests {
             size_arcsec: Some(53.0),
             treatment: Treatment::Repaired,
             what: "the output jumps".into(),
+            advice: FaultName::EncoderIndexJump.advice(),
+            measures: Measures::default(),
         };
         for (verdict, causes, status, begins, number) in [
             (Verdict::Explained, &[CauseName::Wear][..], Status::Good, "Explained by wear (97 %, 12″ rms).", "75 %"),

@@ -104,6 +104,12 @@ pub(super) fn fault(name: FaultName) -> &'static str {
         FaultName::UnitMismatch => "wrong unit, sign or column",
         FaultName::Quantisation => "coarse resolution",
         FaultName::Drift => "drift",
+        FaultName::ReadJitter => "angles not read at one instant",
+        FaultName::Stalls => "a logger that stands still",
+        FaultName::CounterRestart => "a counter that begins anew",
+        FaultName::TorqueSign => "wrong sign of the torque",
+        FaultName::TorqueScale => "torque of another shaft, unit or origin",
+        FaultName::PositionJump => "a position that jumps",
     }
 }
 

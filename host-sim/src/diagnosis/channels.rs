@@ -1,0 +1,386 @@
+//! Channels held against the nominal model before any cause is asked: does the torque wind this drive up, with its sign and in its unit;
+//! are both angles in degrees, which no ratio tells?
+//!
+//! What floats freely in every drive is taken out first: zeros, the ratio, first orders, the nominal harmonics, speed and the direction of
+//! motion. What is left of the error is then held against what the nominal model says of the torque, as recorded and otherwise.
+
+use super::base::PlayLaw;
+use super::linear::{Gram, Prior, solve};
+use super::noise::white_level;
+use super::rows::{Rows, rms, robust_std};
+use crate::measurement::{Fault, FaultName, Measures, Quantity, Recording, Session, Treatment};
+use crate::nominal::Nominal;
+
+/// Rows that are looked at, about, spread evenly.
+const SAMPLE: usize = 6000;
+/// Zeros of sessions that float, at most.
+const MOST_ZEROS: usize = 24;
+/// Blocks of rows that are left out one at a time, to know how certain a share is: loads repeat, rows do not count one by one.
+const BLOCKS: usize = 24;
+/// What the torque should do is seen from so many times the white noise on, and from so many arcsec. *Guess*.
+const SEEN_OF_NOISE: f64 = 3.0;
+const SEEN_ARCSEC: f64 = 8.0;
+/// A share of it is certain from so many of its standard deviations on. *Source*: by convention.
+const CERTAIN: f64 = 5.0;
+/// Shares that a drive may show of its nominal wind-up and clearance: springs are softer and harder than catalogues say. *Guess*.
+const OF_THIS_DRIVE: [f64; 2] = [0.4, 2.5];
+/// A torque in another unit leaves less than this share of what is left as it stands, and without any torque. *Guess*.
+const EXPLAINS: f64 = 0.5;
+/// One of the wrong sign leaves less than this. *Guess*.
+const EXPLAINS_TURNED: f64 = 0.8;
+/// A torque of which the error shows no more than this is none of this output. *Guess*.
+const NO_EFFECT: f64 = 0.3;
+/// What is left by degrees is noise: so many times the white noise, at most. *Guess*.
+const TO_THE_NOISE: f64 = 2.5;
+/// And radians leave so many times more. *Guess*.
+const FAR_FROM_NOISE: f64 = 4.0;
+/// Residuals farther out than so many standard deviations are cut there.
+const CUT: f64 = 5.0;
+
+/// A sample of the rows with what floats freely taken out of their error.
+struct Freed {
+    places: Vec<usize>,
+    columns: Vec<Vec<f64>>,
+    error: Vec<f64>,
+}
+
+impl Freed {
+    fn new(rows: &Rows, nominal: &Nominal) -> Freed {
+        let used: Vec<usize> = rows.sessions_used().flatten().collect();
+        let places: Vec<usize> = used.iter().copied().step_by(used.len().div_ceil(SAMPLE).max(1)).collect();
+        let of = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { places.iter().map(|k| value(*k)).collect() };
+        let mut columns =
+            vec![of(&|_| 1.0), of(&|k| rows.output[k]), of(&|k| rows.speed[k]), of(&|k| rows.direction[k])];
+        for session in rows.sessions.iter().skip(1).take(MOST_ZEROS) {
+            columns.push(of(&|k| f64::from(u8::from(k >= session.start))));
+        }
+        let mut waves = |order: f64, angle: &[f64]| {
+            columns.push(of(&|k| (order * angle[k]).sin()));
+            columns.push(of(&|k| (order * angle[k]).cos()));
+        };
+        for harmonic in &nominal.harmonics {
+            waves(harmonic.order_per_generator_turn, &rows.generator);
+        }
+        for order in [1.0, 2.0] {
+            waves(order, &rows.output);
+        }
+        waves(1.0, &rows.generator);
+        let mut freed = Freed { error: Vec::new(), columns, places };
+        freed.error = freed.freed(&rows.error);
+        let spread = robust_std(freed.error.iter().copied());
+        freed.error.iter_mut().for_each(|error| *error = error.clamp(-CUT * spread, CUT * spread));
+        freed
+    }
+
+    /// What the free columns leave of a column of all rows, at the places.
+    fn freed(&self, column: &[f64]) -> Vec<f64> {
+        let mut left: Vec<f64> = self.places.iter().map(|k| column[*k]).collect();
+        let size = rms(&left).max(1e-9);
+        let priors: Vec<Prior> =
+            self.columns.iter().map(|c| Prior { mean: 0.0, std: 1e4 * size / rms(c).max(1e-9) }).collect();
+        let views: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).chain([left.as_slice()]).collect();
+        let Some(solution) = solve(&Gram::of(&views, 0..left.len()), &priors, 1.0 / (size * size)) else { return left };
+        for (column, c) in self.columns.iter().zip(&solution.coefficients) {
+            left.iter_mut().zip(column).for_each(|(left, value)| *left -= c * value);
+        }
+        left
+    }
+}
+
+/// How the error stands to what a torque should do.
+#[derive(Clone, Copy, Debug)]
+struct Told {
+    /// What it should do, arcsec rms.
+    size: f64,
+    /// Share of it that the error shows, with its standard deviation.
+    share: f64,
+    std: f64,
+    /// What is left of the error where it does what it should, arcsec.
+    left: f64,
+}
+
+impl Told {
+    /// By nominal wind-up and clearance under `scale` times the recorded torque.
+    fn by(rows: &Rows, nominal: &Nominal, freed: &Freed, scale: f64) -> Told {
+        let torque: Vec<f64> = rows.torque.iter().map(|torque| scale * torque).collect();
+        let flank = PlayLaw::Held.flanks(rows, &torque, nominal);
+        let half = 0.5 * nominal.backlash_arcsec;
+        let should: Vec<f64> = (0..rows.len()).map(|k| nominal.wind_up_arcsec(torque[k]) + half * flank[k]).collect();
+        let should = freed.freed(&should);
+        let products: Vec<[f64; 2]> = should
+            .chunks(should.len().div_ceil(BLOCKS).max(1))
+            .zip(freed.error.chunks(should.len().div_ceil(BLOCKS).max(1)))
+            .map(|(w, e)| [w.iter().map(|w| w * w).sum(), w.iter().zip(e).map(|(w, e)| w * e).sum()])
+            .collect();
+        let all = products.iter().fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+        let share = all[1] / all[0].max(1e-12);
+        let without: Vec<f64> = products.iter().map(|of| (all[1] - of[1]) / (all[0] - of[0]).max(1e-12)).collect();
+        // Jackknife.
+        let blocks = products.len() as f64;
+        let mean = without.iter().sum::<f64>() / blocks;
+        let variance = (blocks - 1.0) / blocks * without.iter().map(|share| (share - mean).powi(2)).sum::<f64>();
+        let left = robust_std(freed.error.iter().zip(&should).map(|(error, should)| error - should));
+        Told { size: rms(&should), share, std: variance.sqrt(), left }
+    }
+
+    fn is_certain(&self) -> bool {
+        self.share.abs() > CERTAIN * self.std
+    }
+}
+
+/// Factors by which a torque may be wrong: the motor's side, milli and kilo, kilogram-force and pound-force inch.
+fn factors(ratio: f64) -> Vec<f64> {
+    let plain = [ratio.abs(), 1.0 / ratio.abs(), 1e3, 1e-3, 9.806_65, 1.0 / 9.806_65, 0.112_985, 1.0 / 0.112_985];
+    plain.into_iter().flat_map(|factor| [factor, -factor]).collect()
+}
+
+/// Holds the torque against what it should do; turned round or converted where that explains it, left out where it does nothing. Gives
+/// why the data are unusable, where they are.
+pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal) -> Option<String> {
+    let rows = Rows::new(&recording.sessions, nominal);
+    if !rows.recorded.torque || rows.torque.iter().all(|torque| *torque == 0.0) || nominal.wind_up_arcsec(1.0) == 0.0 {
+        return None;
+    }
+    let freed = Freed::new(&rows, nominal);
+    let plain: Vec<f64> = (0..rows.len()).map(|k| rows.error[k] - nominal.wind_up_arcsec(rows.torque[k])).collect();
+    let white = white_level(&rows, &rows.error).min(white_level(&rows, &plain));
+    let seen = |told: &Told| told.size > SEEN_ARCSEC.max(SEEN_OF_NOISE * white);
+    let none = robust_std(freed.error.iter().copied());
+    let told = |scale: f64| Told::by(&rows, nominal, &freed, scale);
+    let recorded = told(1.0);
+    let of_this_drive = |told: &Told| (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&told.share) && told.is_certain();
+    if seen(&recorded) && recorded.share > NO_EFFECT {
+        return None;
+    }
+    let turned = told(-1.0);
+    if seen(&turned) && of_this_drive(&turned) && turned.left < EXPLAINS_TURNED * recorded.left.min(none) {
+        scale(recording, -1.0);
+        recording.faults.push(fault(
+            recording,
+            FaultName::TorqueSign,
+            Treatment::Repaired,
+            none,
+            format!(
+                "the error follows the torque with {:.2} (± {:.2}) of the nominal wind-up and clearance: it counts the other way, and was \
+                 turned round",
+                recorded.share, recorded.std
+            ),
+        ));
+        return None;
+    }
+    let best = factors(nominal.ratio)
+        .into_iter()
+        .map(|factor| (factor, told(factor)))
+        .filter(|(_, told)| seen(told) && of_this_drive(told) && told.left < EXPLAINS * recorded.left.min(none))
+        .min_by(|a, b| a.1.left.total_cmp(&b.1.left));
+    if let Some((factor, told)) = best {
+        scale(recording, factor);
+        recording.faults.push(fault(
+            recording,
+            FaultName::TorqueScale,
+            Treatment::Repaired,
+            none,
+            format!(
+                "the torque times {factor:.4} gives the wind-up and clearance that the error shows ({:.2} ± {:.2} of the nominal ones); as \
+                 it stands it leaves {:.0} arcsec, so {:.0}: it was converted",
+                told.share, told.std, recorded.left, told.left
+            ),
+        ));
+        return None;
+    }
+    let nothing = seen(&recorded) && 1.0 - recorded.share > CERTAIN * recorded.std && recorded.left > none;
+    if !nothing {
+        return None;
+    }
+    recording.sessions.iter_mut().for_each(|session| session.torque_n_m = None);
+    let what = format!(
+        "the torque should move the error by {:.0} arcsec rms, and it shows {:.2} (± {:.2}) of that: it is not the torque at this output, and \
+         is not used; what the load does cannot be told from what the drive does",
+        recorded.size, recorded.share, recorded.std
+    );
+    recording.faults.push(fault(recording, FaultName::TorqueScale, Treatment::Masked, recorded.size, what.clone()));
+    Some(what)
+}
+
+/// Multiplies the torque.
+fn scale(recording: &mut Recording, factor: f64) {
+    recording
+        .sessions
+        .iter_mut()
+        .flat_map(|session| &mut session.torque_n_m)
+        .flatten()
+        .for_each(|torque| *torque *= factor);
+}
+
+/// A fault of the torque in all rows.
+fn fault(recording: &Recording, name: FaultName, treatment: Treatment, size_arcsec: f64, what: String) -> Fault {
+    let (first, last) = (recording.sessions.first(), recording.sessions.last());
+    let line = |session: Option<&Session>, last: bool| {
+        session.and_then(|s| if last { s.line.last() } else { s.line.first() }).copied().unwrap_or(0)
+    };
+    let time = |session: Option<&Session>, last: bool| {
+        session.and_then(|s| s.time_s.as_ref()).and_then(|t| if last { t.last() } else { t.first() }).copied()
+    };
+    Fault {
+        name,
+        channel: Some(Quantity::Torque),
+        time_s: time(first, false),
+        until_s: time(last, true),
+        first_line: line(first, false),
+        last_line: line(last, true),
+        rows: recording.sessions.iter().map(|session| session.len() as u64).sum(),
+        size_arcsec: Some(size_arcsec),
+        treatment,
+        what,
+        advice: name.advice(),
+        measures: Measures::default(),
+    }
+}
+
+/// Whether both angles are in degrees where radians are said: degrees explain the error to the noise, with zeros and ratio free, and
+/// radians leave far more. Division by 57 shrinks any misfit; so what is left counts against its own noise, and the ratio is free in both.
+pub(super) fn are_in_degrees(recording: &Recording, nominal: &Nominal) -> bool {
+    let left_of_noise = |scale: f64| -> f64 {
+        let sessions: Vec<Session> = recording
+            .sessions
+            .iter()
+            .map(|session| Session {
+                generator_rad: session.generator_rad.iter().map(|angle| scale * angle).collect(),
+                error_rad: session.error_rad.iter().map(|error| scale * error).collect(),
+                ..session.clone()
+            })
+            .collect();
+        let rows = Rows::new(&sessions, nominal);
+        let freed = Freed::new(&rows, nominal);
+        let told = Told::by(&rows, nominal, &freed, 1.0);
+        let left = if told.share > OF_THIS_DRIVE[0] { told.left } else { robust_std(freed.error.iter().copied()) };
+        left / white_level(&rows, &rows.error)
+    };
+    let rad = left_of_noise(1.0);
+    if rad < FAR_FROM_NOISE || nominal.harmonics.is_empty() && nominal.wind_up_arcsec(1.0) == 0.0 {
+        return false;
+    }
+    let deg = left_of_noise(1f64.to_radians());
+    deg < TO_THE_NOISE && rad > FAR_FROM_NOISE * deg
+}
+
+/// A ratio that the data turn by, and the whole one that it may be meant to be.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct RatioProposal {
+    /// Generator turns for one of the output, as the data have them.
+    pub found: f64,
+    /// The nearest whole ratio.
+    pub proposed: f64,
+}
+
+/// A whole ratio is proposed where the one found is this near…
+const NEAR_WHOLE: f64 = 0.2;
+/// …and the one given is off by at least this share.
+const OFF: f64 = 2e-3;
+
+/// What the ratio may be meant to be, where it is off by `relative_error` (of the nominal output angle).
+#[must_use]
+pub fn proposed_ratio(nominal_ratio: f64, relative_error: f64) -> Option<RatioProposal> {
+    let found = nominal_ratio / (1.0 + relative_error);
+    let proposed = found.round();
+    let other = proposed != nominal_ratio.round() && relative_error.abs() > OFF;
+    (other && (found - proposed).abs() < NEAR_WHOLE).then_some(RatioProposal { found, proposed })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthesize::catalogue_drive;
+
+    /// A drive as its catalogue says under a load that swings, 2 arcsec of noise; `told` is what the column of torque says of the load.
+    fn recording(nominal: &Nominal, told: impl Fn(f64, f64) -> f64) -> Recording {
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut session = Session { time_s: Some(Vec::new()), torque_n_m: Some(Vec::new()), ..Session::default() };
+        let mut flank = 1.0;
+        for k in 0..12_000 {
+            let t = 0.01 * f64::from(k);
+            let load = 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos();
+            let psi = 0.05 * f64::from(k);
+            if load.abs() > nominal.friction_torque_n_m {
+                flank = load.signum();
+            }
+            let noise = 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+            let error = nominal.harmonics_arcsec(psi)
+                + nominal.wind_up_arcsec(load)
+                + 0.5 * nominal.backlash_arcsec * flank
+                + noise;
+            session.line.push(k as u64 + 2);
+            session.generator_rad.push(psi);
+            session.error_rad.push(error / crate::units::ARCSEC_PER_RAD);
+            session.time_s.as_mut().unwrap().push(t);
+            session.torque_n_m.as_mut().unwrap().push(told(t, load));
+        }
+        Recording {
+            file: "made.csv".into(),
+            rows: session.len(),
+            sessions: vec![session],
+            faults: Vec::new(),
+            tooth_steps: Vec::new(),
+            notes: Vec::new(),
+            unusable: None,
+        }
+    }
+
+    /// Fault found, whether data are unusable, and the torque in a row after that.
+    fn checked(told: impl Fn(f64, f64) -> f64) -> (Option<FaultName>, bool, Option<f64>) {
+        let nominal = catalogue_drive();
+        let mut recording = recording(&nominal, told);
+        let unusable = check_torque(&mut recording, &nominal).is_some();
+        let torque = recording.sessions[0].torque_n_m.as_ref().map(|torque| torque[150]);
+        (recording.faults.first().map(|fault| fault.name), unusable, torque)
+    }
+
+    #[test]
+    fn a_torque_is_turned_round_converted_or_left_out_and_a_right_one_left_alone() {
+        let load = 25.0 * (0.9f64 * 1.5).sin() + 6.0 * (2.3f64 * 1.5).cos();
+        let near = |torque: Option<f64>| (torque.unwrap() / load - 1.0).abs() < 1e-6;
+        let (fault, unusable, torque) = checked(|_, load| load);
+        assert!(fault.is_none() && !unusable && near(torque));
+        // A drive twice as stiff as its catalogue is a drive.
+        assert_eq!(checked(|_, load| 2.0 * load).0, None);
+        let (fault, unusable, torque) = checked(|_, load| -load);
+        assert!(fault == Some(FaultName::TorqueSign) && !unusable && near(torque));
+        let ratio = catalogue_drive().ratio;
+        let (fault, unusable, torque) = checked(|_, load| load / ratio.abs());
+        assert!(fault == Some(FaultName::TorqueScale) && !unusable && near(torque));
+        // That of a neighbour, who swings at his own pace; and one that nothing follows.
+        let (fault, unusable, torque) = checked(|t, _| 30.0 * (1.7 * t).sin());
+        assert!(fault == Some(FaultName::TorqueScale) && unusable && torque.is_none());
+        // Nothing recorded is no torque that does nothing.
+        assert_eq!(checked(|_, _| 0.0), (None, false, Some(0.0)));
+    }
+
+    #[test]
+    fn degrees_are_told_from_a_wrong_ratio() {
+        let nominal = catalogue_drive();
+        let mut recording = recording(&nominal, |_, load| load);
+        assert!(!are_in_degrees(&recording, &nominal));
+        let right = recording.clone();
+        for session in &mut recording.sessions {
+            session.generator_rad.iter_mut().for_each(|angle| *angle = angle.to_degrees());
+            session.error_rad.iter_mut().for_each(|angle| *angle = angle.to_degrees());
+        }
+        assert!(are_in_degrees(&recording, &nominal));
+        let mut other_ratio = right;
+        for session in &mut other_ratio.sessions {
+            let by = 1.0 / (nominal.ratio * 1.05) - 1.0 / nominal.ratio;
+            session.error_rad.iter_mut().zip(&session.generator_rad).for_each(|(error, psi)| *error += by * psi);
+        }
+        assert!(!are_in_degrees(&other_ratio, &nominal));
+    }
+
+    #[test]
+    fn a_whole_ratio_is_proposed_near_the_one_found() {
+        let near = |nominal: f64, data: f64| proposed_ratio(nominal, nominal / data - 1.0).map(|p| p.proposed);
+        assert_eq!(near(100.0, 101.0), Some(101.0));
+        assert_eq!(near(95.0, 100.03), Some(100.0));
+        assert_eq!(near(-100.0, -101.05), Some(-101.0));
+        assert_eq!(near(100.0, 100.02), None);
+        assert_eq!(near(100.0, 100.5), None);
+    }
+}
