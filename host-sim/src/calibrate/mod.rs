@@ -25,6 +25,7 @@ use serde::Serialize;
 
 use crate::extension::left_by_core;
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
+use crate::synthesize::dead_zone_n_m;
 use crate::tables::{MadeTable, TableError};
 use choose::{LEAST_GAIN, PENALTIES, best_penalty, nested, path, pruned};
 use folds::{Chosen, Folds};
@@ -332,8 +333,11 @@ fn check_ratio(files: &[Recording], prior: &Prior<'_>) -> Result<Option<String>,
 pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, CalibrationError> {
     prior.core_drive().map_err(CalibrationError::Known)?;
     let doubt = check_ratio(files, prior)?;
-    let recorded = Recorded::of(files, prior);
+    let mut recorded = Recorded::of(files, prior);
     let mut play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
+    if let Some(table) = prior.table {
+        recorded.scales.friction_n_m = dead_zone(files, prior, table, &recorded, play_rad);
+    }
     let prior = &Prior {
         least_friction_n_m: recorded.scales.friction_n_m,
         nominal: prior.nominal.clone(),
@@ -452,6 +456,18 @@ fn with_faults(error: CalibrationError, files: &[Recording]) -> CalibrationError
         }
         other => other,
     }
+}
+
+/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, or that of a drive with the usual friction, whichever
+/// leaves less of the logs.
+fn dead_zone(files: &[Recording], prior: &Prior<'_>, table: &Table<'_>, recorded: &Recorded, play_rad: f64) -> f64 {
+    let of_drive = dead_zone_n_m(table);
+    let left = |least_friction_n_m: f64| -> f64 {
+        let prior = Prior { least_friction_n_m, nominal: prior.nominal.clone(), drive: String::new(), ..*prior };
+        settled(files, &prior, recorded, play_rad).rows.iter().map(|row| row.left_arcsec.powi(2)).sum()
+    };
+    let usual = recorded.scales.friction_n_m;
+    if of_drive >= usual || left(of_drive) <= left(usual) { of_drive } else { usual }
 }
 
 /// The zero of the output in each file.

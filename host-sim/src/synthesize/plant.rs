@@ -144,7 +144,7 @@ impl Plant<'_> {
 }
 
 /// Torque below which a table leaves the output inside its clearance, N·m: where its axis jumps.
-fn dead_zone_n_m(table: &Table<'_>) -> f64 {
+pub(crate) fn dead_zone_n_m(table: &Table<'_>) -> f64 {
     let nodes: Vec<f32> = table.torque_nodes_n_m().collect();
     (0..nodes.len().saturating_sub(1))
         .filter(|node| table.is_torque_jump(*node))
