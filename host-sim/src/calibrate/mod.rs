@@ -25,8 +25,7 @@ use serde::Serialize;
 
 use crate::extension::left_by_core;
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
-use crate::synthesize::dead_zone_n_m;
-use crate::tables::{MadeTable, TableError};
+use crate::tables::{MadeTable, TableError, dead_zone_n_m};
 use choose::{LEAST_GAIN, PENALTIES, best_penalty, nested, path, pruned};
 use folds::{Chosen, Folds};
 pub use interval::{Known, Node, Noise};

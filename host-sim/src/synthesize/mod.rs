@@ -23,7 +23,6 @@ pub use data_fault::to_csv;
 #[cfg(test)]
 pub use effect::{Effect, Strange, What, measure};
 pub use excitation::{Excitation, Plan, Richness};
-pub(crate) use plant::dead_zone_n_m;
 pub use plant::{Plant, Unit};
 
 use catalogue::Setting;
