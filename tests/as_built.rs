@@ -27,9 +27,9 @@ use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Ha
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::motion::Motion;
 use flexspline_sim::stepping::{Increment, Problem, Solver, SolverSettings, State};
-use flexspline_sim::tables::sweep::symmetric_nodes;
-use flexspline_sim::tables::validate::{Validation, ValidationSettings, validate};
+use flexspline_sim::tables::symmetric_nodes;
 use flexspline_sim::tables::{MadeTable, TableSettings, TorqueNodes, make};
+use flexspline_sim::tables::{Validation, ValidationSettings, validate};
 use flexspline_sim::units::ARCSEC_PER_RAD;
 use flexspline_tests::command::Desk;
 use flexspline_tests::motion::{imperfect, on, problem};

@@ -85,6 +85,48 @@ fn a_new_drive_file_is_the_drive_it_was_made_from_and_is_not_lost() {
 }
 
 #[test]
+fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
+    let desk = Desk::new();
+    for (line, teeth, module_mm) in [
+        ("--teeth 200 --module 0.32 --ratio 100 --bore 62 --generator cam", 200.0, 0.32),
+        ("--ratio 101 --module 0.32", 202.0, 0.32),
+        ("--like CSF-25-100 --set flexspline.rim_thickness_mm=0.7", 200.0, 0.3175),
+        ("--teeth 60 --module 1 --generator double-disc", 60.0, 1.0),
+    ] {
+        desk.line(&format!("new own.toml --force {line}")).done();
+        let checked = desk.line("drive --check --drive own.toml --json").done().json();
+        let wheel = &checked["drive"]["flexspline"];
+        assert_eq!(wheel["teeth"].as_f64(), Some(teeth), "{line}");
+        assert_eq!(wheel["module_mm"].as_f64(), Some(module_mm), "{line}");
+        let text = desk.read("own.toml");
+        assert!(text.contains("+ 1.75 modules\nroot_radius_mm"), "{line}: {text}");
+        assert!(text.contains("arcmin with the"), "{line}: {text}");
+        // The rim follows from the bore, or from the radius, or was set.
+        let rim_mm = wheel["rim_thickness_mm"].as_f64().unwrap();
+        let bore = line.contains("--bore");
+        assert_eq!(text.contains("half the bore of 62\nrim_thickness_mm"), bore, "{line}");
+        assert!(!bore || (wheel["root_radius_mm"].as_f64().unwrap() - rim_mm - 31.0).abs() < 1e-3, "{line}");
+        assert_eq!(text.contains("as HHD-95\nrim_thickness_mm"), !bore && !line.contains("--set"), "{line}");
+    }
+    // It can be solved, and its load is that of its size.
+    desk.line("tables --generator cam --mesh coarse --temperatures-c=20 --drive own.toml").done();
+    for (line, said) in [
+        ("--teeth 200 --module 0.32 --ratio 90", "--ratio: found 90, allowed: 100 (circular spline held) or 101"),
+        ("--teeth 201 --module 0.32", "--teeth: found 201, allowed: an even number"),
+        ("--module 0.32", "--module: found alone"),
+        ("--like CSF25", "--like: found \"CSF25\""),
+        ("--bore 62", "add --teeth and --module, or --like"),
+        ("--teeth 200 --module 0.32 --bore 66", "--bore: found 66: the root circle has the diameter 65.12"),
+        ("--teeth 200 --module 0.32 --drive HHD-95-typical", "--drive: found it beside --teeth"),
+    ] {
+        let run = desk.line(&format!("new other.toml {line}"));
+        assert_eq!(run.code, 2, "{line}");
+        assert!(run.stderr.contains(said), "{line}: {}", run.stderr);
+    }
+    assert!(!desk.path("other.toml").exists());
+}
+
+#[test]
 fn a_new_catalogue_model_is_read_and_the_commands_it_names_run() {
     let desk = Desk::new();
     let run = desk.line("new nominal.toml").done();

@@ -13,7 +13,7 @@
 
 use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
 use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::simulate::stress::peak_stress;
+use flexspline_sim::simulate::peak_stress;
 use flexspline_sim::stepping::{Method, Problem, SolverSettings};
 use flexspline_sim::units::ARCSEC_PER_RAD;
 use flexspline_tests::motion::{deformed, imperfect, on};

@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
 
 use flexspline::Table;
-use flexspline_sim::diagnosis::report::{Diagnosis, Verdict};
+use flexspline_sim::diagnosis::{Diagnosis, Verdict};
 use flexspline_sim::diagnosis::{Settings, diagnose};
 use flexspline_sim::drive::{AsBuilt, Drive, GeneratorKind, Harmonic};
 use flexspline_sim::kernels::{KernelPlan, Kernels, make};

@@ -305,7 +305,7 @@ fn get<'a, O, T>(object: *const O, mark: u32) -> Result<&'a T, FlexsplineStatus>
     Ok(unsafe { marked.value.assume_init_ref() })
 }
 
-/// The same, to write.
+/// The object behind a pointer, to write.
 fn get_mut<'a, O, T>(object: *mut O, mark: u32) -> Result<&'a mut T, FlexsplineStatus> {
     get::<O, T>(object, mark)?;
     // SAFETY: as in `get`; the callers see to it that nothing else refers to it during the call.

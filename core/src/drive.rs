@@ -166,7 +166,7 @@ impl Drive {
         }
     }
 
-    /// The same, from the nominal output alone, each phase within 2⁻³² of a period at any number of turns.
+    /// Phases from the nominal output alone, each phase within 2⁻³² of a period at any number of turns.
     #[must_use]
     pub(crate) const fn phases_at_output(&self, nominal: OutputAngle) -> Phases {
         // Not kept: what is kept is checked in every tick.

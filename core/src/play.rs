@@ -46,7 +46,7 @@ const MAX_PLAY_COUNTS: i32 = 1 << 27;
 pub(crate) const MOST_ERROR_COUNTS: u32 =
     MAX_HALF_COUNTS as u32 + (MAX_HALF_COUNTS as u32 >> 8) + 2 * MAX_ADDED_COUNTS as u32;
 
-/// The same while nothing was known of the table.
+/// Largest error that is kept, counts, while nothing was known of the table.
 const MOST_KEPT_COUNTS: u32 = MOST_ERROR_COUNTS + MAX_PLAY_COUNTS as u32;
 
 /// Where the drive rests inside its play: all that must survive a reset.

@@ -30,7 +30,7 @@ use flexspline_sim::drive::GeneratorKind;
 use flexspline_sim::fem::element::{PACKED, add_tangent_and_force, linear_stiffness};
 use flexspline_sim::fem::{Cholesky, ElementPositions, Factor, Pattern};
 use flexspline_sim::mesh::WheelMesh;
-use flexspline_sim::simulate::stress::peak_stress;
+use flexspline_sim::simulate::peak_stress;
 use flexspline_sim::stepping::{CondensedDrive, Method, Problem, State};
 
 use common::{CpuTime, Run, STEP_RAD};

@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use criterion::{Criterion, SamplingMode, criterion_group, criterion_main};
 use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::tables::torque_nodes::NodeChoice;
+use flexspline_sim::tables::NodeChoice;
 use flexspline_sim::tables::{MadeTable, TableSettings, TorqueNodes, make};
 
 use common::CpuTime;

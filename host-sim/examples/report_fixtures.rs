@@ -4,7 +4,7 @@
 
 use std::path::PathBuf;
 
-use flexspline_sim::report::pack::Packed;
+use flexspline_sim::report::Packed;
 use flexspline_sim::report::page::{
     Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity, Section,
     Series, Status, Table, Text, Upright,

@@ -3,7 +3,7 @@
 //! A [`CauseName`] says what the cause is called, in words and in files, which orders it makes, what its misfit may be taken for, what
 //! data have to hold to speak of it, whether a table or a drive can hold it, and which parameters it has. Every property is an
 //! exhaustive match: the compiler asks a new cause for each of them. The laws are not here: the diagnosis fits its own
-//! ([`crate::diagnosis::candidate`]), and [`crate::synthesize`] hides others, so that a mistake in one does not hide in the other.
+//! (`crate::diagnosis::candidate`), and [`crate::synthesize`] hides others, so that a mistake in one does not hide in the other.
 
 mod parameter;
 

@@ -51,7 +51,7 @@ pub mod look;
 pub mod measurement;
 pub mod nominal;
 pub mod output;
-pub mod progress;
+mod progress;
 pub mod report;
 pub mod reproduce;
 pub mod residual;

@@ -19,7 +19,7 @@ pub struct Adjustment {
 impl Adjustment {
     /// Largest magnitude, rad: 0.049.
     pub const MAX_RAD: f32 = Self::MAX_COUNTS as f32 * RAD_PER_COUNT;
-    /// The same in counts.
+    /// Largest adjustment in counts.
     pub const MAX_COUNTS: i32 = MAX_ADDED_COUNTS;
 
     /// From radians at the output, rounded to a count; saturates at ±[`Self::MAX_RAD`], NaN is taken as none.

@@ -538,7 +538,7 @@ mod tests {
     const NOISE: Noise = Noise { torque_n_m: 0.5, load_change_n_m: 0.2, speed_rad_s: 1e-4, twist_rad: Some(1e-6) };
     const TICK_S: f64 = 1e-3;
 
-    /// The same equations, own arithmetic: Runge-Kutta of fourth order in a hundredth of a tick.
+    /// The equations of the predictor in arithmetic of the test's own: Runge-Kutta of fourth order in a hundredth of a tick.
     #[derive(Clone, Copy)]
     struct Plant {
         x: [f64; 3],

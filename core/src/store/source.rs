@@ -122,7 +122,7 @@ impl Source {
         )
     }
 
-    /// The same at a temperature that is finite, of the words of an image.
+    /// This source at a temperature that is finite, of the words of an image.
     pub fn at_temperature(self, words: Words<'_>, temperature_c: f32) -> Self {
         let [range_at, last_at, nodes_at, records_at] = PLACES;
         let number = |i: usize| f32_at(words, i);

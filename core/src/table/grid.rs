@@ -48,7 +48,7 @@ impl Cell {
         [0.5 * s * s, 0.5 + s * t, 0.5 * t * t]
     }
 
-    /// The same weights in 2⁻¹⁵, each within 3 units, together exactly 2¹⁵: for the integers of the control step.
+    /// These weights in 2⁻¹⁵, each within 3 units, together exactly 2¹⁵: for the integers of the control step.
     #[must_use]
     pub const fn weights_q15(self) -> [i32; 3] {
         let t = self.fraction >> 17;

@@ -25,7 +25,7 @@ pub(crate) trait Memory {
     /// `N` words from word `at`. What two copies disagree in is added to `doubt`.
     fn words<const N: usize>(&self, at: usize, doubt: &mut Doubt) -> [u32; N];
 
-    /// The same from half word `at`: the first of `2·N` halves is the low one of the first word.
+    /// Half words from half word `at`: the first of `2·N` halves is the low one of the first word.
     fn halves<const N: usize>(&self, at: usize, doubt: &mut Doubt) -> [u32; N];
 }
 

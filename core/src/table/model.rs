@@ -114,7 +114,7 @@ impl<M: Memory> Model<'_, M> {
         }
     }
 
-    /// The same in counts, as a call of its own.
+    /// Estimate of the output in counts, as a call of its own.
     #[inline(never)]
     pub fn estimate(&self, point: &OperatingPoint, state: &mut PlayState, generator: GeneratorAngle) -> Estimate {
         self.estimate_here(point, state, generator)

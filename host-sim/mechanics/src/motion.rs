@@ -130,7 +130,7 @@ impl<'p> Motion<'p> {
         self.state.output_rad - self.state.generator_rad / self.problem.drive.ratio()
     }
 
-    /// The same in arc-seconds.
+    /// Error of the output in arc-seconds, positive when the output leads.
     pub fn error_arcsec(&self) -> f64 {
         self.error_rad() * ARCSEC_PER_RAD
     }

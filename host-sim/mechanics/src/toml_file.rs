@@ -313,7 +313,7 @@ impl Refused {
         Refused { span: value.span(), at: String::new(), what }
     }
 
-    /// The same, seen from outside of the part `at`.
+    /// This refusal, seen from outside of the part `at`.
     pub fn within(self, at: impl fmt::Display) -> Refused {
         Refused { at: format!("{at}{}", self.at), ..self }
     }

@@ -66,7 +66,7 @@ const WIND_UP_DEGREE: usize = 6;
 /// How the weight of a wave rises with its order: between the energies of a slope (second power) and of a curvature (fourth). Chosen on
 /// halves of the record of `examples/csf17_100`.
 const WAVE_POWER: i32 = 3;
-/// The same for the degrees of the wind-up, a guess.
+/// How the weight of a degree of the wind-up rises with the degree: a guess.
 const DEGREE_POWER: i32 = 4;
 
 /// Where the drive is, as the parts see it.

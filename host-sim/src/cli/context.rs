@@ -60,6 +60,11 @@ impl Context {
                 Drive::from_toml(name, &text).map_err(|error| Failure::BadInput(error.to_string()))?
             }
         };
+        self.with_sets(drive)
+    }
+
+    /// A drive with every `--set`.
+    pub(super) fn with_sets(&self, drive: Drive) -> Result<Drive, Failure> {
         drive
             .with_sets(self.common.sets.iter().map(String::as_str))
             .map_err(|error| Failure::BadInput(error.to_string()))

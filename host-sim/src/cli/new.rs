@@ -6,19 +6,24 @@ use clap::{Args, ValueEnum, ValueHint};
 use serde::Serialize;
 
 use super::context::quoted;
-use super::{Context, Failure, say};
+use super::{Context, Failure, names, say};
+use crate::drive::{Drive, DriveError, FewNumbers, GeneratorKind, MadeDrive};
 use crate::nominal::Nominal;
 use crate::output::write_whole;
 
 /// Write a commented drive file, or a catalogue model, to edit
 ///
 /// A drive file (the default) has every size, stiffness and imperfection of a drive for the FEM, each with its unit, meaning, sign and
-/// allowed range; as it stands it is the drive that it was made from. A catalogue model (a file with "nominal" in its name, or
-/// --kind nominal) has the few numbers that a catalogue gives, for `diagnose --model` and `synthesize --model`.
+/// allowed range; as it stands it is the drive that it was made from. --teeth and --module (or --like, the name of a catalogue's size)
+/// make a drive of one's own, whose teeth clear one another; what follows from them has its formula in the file. A catalogue model
+/// (a file with "nominal" in its name, or --kind nominal) has the few numbers that a catalogue gives, for `diagnose --model` and
+/// `synthesize --model`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   flexspline new drive.toml
+  flexspline new drive.toml --teeth 200 --module 0.32 --bore 62 --generator cam
+  flexspline new drive.toml --like CSF-25-100
   flexspline new drive.toml --from HHD-95-typical --set generator.w0_mm=0.49
   flexspline new nominal.toml")]
 pub(super) struct New {
@@ -31,6 +36,27 @@ pub(super) struct New {
     /// The drive to start from, a built-in one or a file; the same as --drive [default: HHD-95]
     #[arg(long, value_name = "FILE|NAME", value_hint = ValueHint::FilePath)]
     from: Option<String>,
+    /// Teeth of the flexspline, even; the circular spline has two more
+    #[arg(long, value_name = "Z", requires = "module", conflicts_with_all = ["from", "like"])]
+    teeth: Option<u32>,
+    /// Module, mm
+    #[arg(long, value_name = "MM", conflicts_with_all = ["from", "like"])]
+    module: Option<f64>,
+    /// Ratio, instead of --teeth (twice the ratio: circular spline held) or to check them
+    #[arg(long, value_name = "N", requires = "module", allow_negative_numbers = true)]
+    ratio: Option<f64>,
+    /// Diameter of the flexspline's bore, undeformed, mm [default: 1.97 times the pitch radius]
+    #[arg(long, value_name = "MM")]
+    bore: Option<f64>,
+    /// Face width, mm [default: 0.43 times the pitch radius]
+    #[arg(long, value_name = "MM")]
+    width: Option<f64>,
+    /// Generator under which the rigid backlash is made one arc-minute
+    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true)]
+    generator: GeneratorKind,
+    /// Teeth and module as a catalogue's size has them: SERIES-SIZE-RATIO, with a pitch diameter of 2.54 mm a size (Harmonic Drive)
+    #[arg(long, value_name = "NAME", conflicts_with = "from")]
+    like: Option<String>,
     /// Replace the file if it is there
     #[arg(long)]
     force: bool,
@@ -60,13 +86,23 @@ struct Written {
 
 impl New {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
-        let drive = match &self.from {
-            Some(name) if context.has_drive() => {
+        let few = self.few()?;
+        let made = match few {
+            Some(_) if context.has_drive() => {
+                let what = "--drive: found it beside --teeth, --module or --like; give one of them";
+                return Err(Failure::BadInput(what.to_owned()));
+            }
+            Some((name, few)) => Some(few.drive(&name).map_err(|error| refused(&error, self.like.is_some()))?),
+            None => None,
+        };
+        let drive = match (&made, &self.from) {
+            (Some(made), _) => context.with_sets(made.drive.clone())?,
+            (None, Some(name)) if context.has_drive() => {
                 let what = format!("--from: found {name:?} beside --drive, which says the same; give one of the two");
                 return Err(Failure::BadInput(what));
             }
-            Some(name) => context.drive_called("--from", name)?,
-            None => context.drive()?,
+            (None, Some(name)) => context.drive_called("--from", name)?,
+            (None, None) => context.drive()?,
         };
         self.check()?;
         let shown = self.file.display().to_string();
@@ -77,7 +113,7 @@ impl New {
                 let hash = blake3::Hash::from_bytes(drive.hash()).to_hex().to_string();
                 let next =
                     [format!("flexspline drive --check --drive {file}"), format!("flexspline tables --drive {file}")];
-                (drive.to_toml(), Some(hash), next)
+                (made.as_ref().map_or_else(|| drive.to_toml(), |made| with_formulas(made, &drive)), Some(hash), next)
             }
             Kind::Nominal => {
                 let next = [
@@ -98,6 +134,56 @@ impl New {
             };
             format!("wrote {shown}: {what}{}", say::next(&written.next))
         })
+    }
+
+    /// Name and numbers of a drive of one's own, if it is asked for.
+    fn few(&self) -> Result<Option<(String, FewNumbers)>, Failure> {
+        let bad = |what: String| Err(Failure::BadInput(what));
+        let few = |teeth, module_mm| FewNumbers {
+            teeth,
+            module_mm,
+            bore_mm: self.bore,
+            width_mm: self.width,
+            generator: self.generator,
+        };
+        if let Some(name) = &self.like {
+            let Some((size, ratio)) = size_and_ratio(name) else {
+                let what = "--like: found {name:?}, allowed: SERIES-SIZE-RATIO as CSF-25-100, size 5 to 100, ratio 30 to 320; a \
+                            built-in drive goes with --from";
+                return bad(what.replace("{name:?}", &format!("{name:?}")));
+            };
+            return Ok(Some((name.clone(), few(2 * ratio, CATALOGUE_MM_PER_SIZE * size / f64::from(2 * ratio)))));
+        }
+        let Some(module_mm) = self.module else {
+            if self.bore.is_some() || self.width.is_some() {
+                return bad(
+                    "--bore, --width: found without a drive to make; add --teeth and --module, or --like".to_owned()
+                );
+            }
+            return Ok(None);
+        };
+        let teeth = match (self.teeth, self.ratio) {
+            (Some(teeth), None) => teeth,
+            (None, None) => return bad("--module: found alone, allowed: with --teeth or --ratio".to_owned()),
+            (None, Some(ratio)) if ratio.abs().fract() == 0.0 => 2 * ratio.abs() as u32,
+            (Some(teeth), Some(ratio)) if [0, 1].map(|held| f64::from(teeth / 2 + held)).contains(&ratio.abs()) => {
+                teeth
+            }
+            (Some(teeth), Some(ratio)) => {
+                return bad(format!(
+                    "--ratio: found {ratio}, allowed: {} (circular spline held) or {} (flexspline held) with {teeth} teeth and two \
+                     waves; for this ratio: --teeth {}",
+                    teeth / 2,
+                    teeth / 2 + 1,
+                    2.0 * ratio.abs().round(),
+                ));
+            }
+            (None, Some(ratio)) => return bad(format!("--ratio: found {ratio}, allowed: a whole number, or --teeth")),
+        };
+        Ok(Some((
+            self.file.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
+            few(teeth, module_mm),
+        )))
     }
 
     fn kind_by_name(&self) -> Kind {
@@ -122,4 +208,46 @@ impl New {
             _ => Ok(()),
         }
     }
+}
+
+/// Pitch diameter for each size, mm: 63.5 of size 25, as the catalogues of Harmonic Drive have it.
+const CATALOGUE_MM_PER_SIZE: f64 = 2.54;
+
+/// Size and ratio of `CSF-25-100`: the last two numbers.
+fn size_and_ratio(name: &str) -> Option<(f64, u32)> {
+    let mut parts = name.rsplit('-');
+    let ratio: u32 = parts.next()?.parse().ok()?;
+    let size: f64 = parts.next()?.parse().ok()?;
+    let series = parts.next()?;
+    let named = series.starts_with(|first: char| first.is_ascii_alphabetic());
+    (named && (30..=320).contains(&ratio) && (5.0..=100.0).contains(&size)).then_some((size, ratio))
+}
+
+/// A drive that cannot be, by the options that asked for it.
+fn refused(error: &DriveError, like: bool) -> Failure {
+    let says = error.problems.iter().map(|problem| match problem.field.as_str() {
+        "teeth" | "module" if like => format!("--like: {problem}"),
+        "teeth" | "module" | "bore" => format!("--{problem}"),
+        _ => problem.to_string(),
+    });
+    Failure::BadInput(says.collect::<Vec<_>>().join("\n"))
+}
+
+/// The drive's file with a formula above every field that was derived and not set to something else.
+fn with_formulas(made: &MadeDrive, drive: &Drive) -> String {
+    let mut section = String::new();
+    let mut text = String::new();
+    for (derived, line) in made.drive.to_toml().lines().zip(drive.to_toml().lines()) {
+        if let Some((name, _)) = line.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
+            section = name.to_owned();
+        }
+        let path = line.split_once(" = ").map(|(key, _)| format!("{section}.{key}"));
+        let formula = made.formulas.iter().find(|(of, _)| path.as_deref() == Some(of));
+        if let Some((_, formula)) = formula.filter(|_| line == derived) {
+            text += &format!("# {formula}\n");
+        }
+        text += line;
+        text.push('\n');
+    }
+    text
 }

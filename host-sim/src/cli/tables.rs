@@ -56,7 +56,7 @@ pub(super) struct Tables {
     /// How far, in arcsec, a sample of a file may lie from the table [default: 20]
     #[arg(long, value_name = "ARCSEC", requires = "from_samples", allow_negative_numbers = true)]
     deviation_arcsec: Option<f64>,
-    /// Largest torque, N.m [default: 200; four-roller 100, two-roller 20]
+    /// Largest torque, N.m [default: 200; four-roller 100, two-roller 20; by the size of the drive]
     #[arg(long, value_name = "T", conflicts_with = "from_samples", allow_negative_numbers = true)]
     torque_n_m: Option<f64>,
     /// Torque nodes on each side of zero, at most, beside the pair at the drag torque

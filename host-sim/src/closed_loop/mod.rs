@@ -41,7 +41,7 @@ pub struct FlightRow {
     pub uncompensated_arcsec: f64,
     /// With the kinematic error by sign of velocity, at no load.
     pub sign_of_velocity_arcsec: f64,
-    /// The same, recorded at the mean load.
+    /// With the kinematic error by sign of velocity, recorded at the mean load.
     pub sign_of_velocity_mean_load_arcsec: f64,
     /// With the whole table by torque and sign of velocity.
     pub torque_and_sign_arcsec: f64,

@@ -41,7 +41,7 @@ impl PlayLaw {
         self.flanks_from(begun, 1.0, rows, torque, nominal)
     }
 
-    /// The same with a clearance `wider` than nominal, from where each session has `begun` if no load says (first row).
+    /// Flanks with a clearance `wider` than nominal, from where each session has `begun` if no load says (first row).
     fn flanks_from(
         self,
         begun: impl Fn(usize) -> f64,
@@ -134,7 +134,7 @@ pub(super) const FREE: f64 = 1e4;
 const LEAST_TURN: f64 = 1e-3;
 /// A play law that leaves this much less (relative) than the first is taken instead.
 const CLEARLY_BETTER: f64 = 0.995;
-/// The same for a law that leaves the flank in doubt far beyond friction.
+/// A play law is taken that leaves less than the first by this factor though it leaves the flank in doubt far beyond friction.
 const FAR_BETTER: f64 = 0.8;
 /// Rows are uncertain where the torque is below this multiple of friction.
 pub(super) const NEAR_FRICTION: f64 = 1.25;
@@ -152,7 +152,7 @@ impl Base {
         Base::of_laws(rows, nominal, table, &PlayLaw::ALL)
     }
 
-    /// The same with the law of the play known.
+    /// The base model with the law of the play known.
     #[must_use]
     pub fn with_play(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>, law: PlayLaw) -> Base {
         Base::of_laws(rows, nominal, table, &[law])

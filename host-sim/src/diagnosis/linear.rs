@@ -89,14 +89,6 @@ impl Gram {
         }
         Gram { size, products }
     }
-
-    /// Only some of the columns; the data is kept.
-    #[must_use]
-    pub fn select(&self, keep: &[usize]) -> Gram {
-        let index: Vec<usize> = keep.iter().copied().chain([self.size - 1]).collect();
-        let products = index.iter().flat_map(|i| index.iter().map(|j| self.at(*i, *j))).collect();
-        Gram { size: index.len(), products }
-    }
 }
 
 /// From so many columns on their products are a product of matrices.

@@ -1,39 +1,39 @@
 //! Diagnosis: what the nominal model gets wrong in measured data, which physical cause explains it, and what the extension gains.
 //!
 //! The order of work:
-//! 1. [`rows`], [`base`]: the nominal prediction on the data's own excitation, its parameters floating within the unit-to-unit spread.
-//! 2. [`prepare`], [`noise`]: white noise and wander, found with everything explainable taken out; data and columns made white.
-//! 3. [`candidate`]: causes as laws, re-simulated; deviations without a name beside them.
-//! 4. [`mod@select`]: forward, backward, exchange; evidence, size, sessions left out.
-//! 5. [`rivals`]: every rival refitted; look-alikes.
-//! 6. [`remainder`]: lines and steps left; abstention.
-//! 7. `verdict`: which causes may be named, with parameters, uncertainty, and the gain on sessions left out ([`report`]).
+//! 1. `rows`, `base`: the nominal prediction on the data's own excitation, its parameters floating within the unit-to-unit spread.
+//! 2. `prepare`, `noise`: white noise and wander, found with everything explainable taken out; data and columns made white.
+//! 3. `candidate`: causes as laws, re-simulated; deviations without a name beside them.
+//! 4. `select`: forward, backward, exchange; evidence, size, sessions left out.
+//! 5. `rivals`: every rival refitted; look-alikes.
+//! 6. `remainder`: lines and steps left; abstention.
+//! 7. `verdict`: which causes may be named, with parameters, uncertainty, and the gain on sessions left out (`report`).
 //!
-//! Every decision on the way is in the [`trace`]; [`explain`] says from it why a cause was named or not.
+//! Every decision on the way is in the `trace`; `explain` says from it why a cause was named or not.
 
 mod averaged;
-pub mod base;
-pub mod candidate;
+pub(crate) mod base;
+pub(crate) mod candidate;
 mod experiment;
-pub mod explain;
+pub(crate) mod explain;
 mod extended;
 mod held_out;
-pub mod linear;
-pub mod model;
-pub mod noise;
-pub mod pipeline;
-pub mod prepare;
-pub mod remainder;
-pub mod report;
+pub(crate) mod linear;
+pub(crate) mod model;
+pub(crate) mod noise;
+pub(crate) mod pipeline;
+pub(crate) mod prepare;
+pub(crate) mod remainder;
+pub(crate) mod report;
 mod resolution;
-pub mod rivals;
-pub mod rows;
-pub mod select;
+pub(crate) mod rivals;
+pub(crate) mod rows;
+pub(crate) mod select;
 #[cfg(test)]
 mod tests;
 mod thinned;
 pub mod thresholds;
-pub mod trace;
+pub(crate) mod trace;
 mod uncertainty;
 mod verdict;
 
@@ -47,17 +47,19 @@ use crate::measurement::Session;
 use crate::nominal::Nominal;
 use averaged::Averaged;
 use candidate::{Deviation, Excitation, Label, Law, Scales, library, line, unnamed};
+pub use explain::Explanation;
 use extended::Found;
 pub use extended::{Extended, FittedCause, Series};
 use model::{Problem, Term, terms_at};
 use noise::{Noise, Whitener};
+pub use pipeline::{Diagnosed, Extension, Made, MakeTable, Options, PipelineError, Subject, diagnose_rows, read_rows};
 use prepare::FreeColumns;
-use report::{Diagnosis, Unexplained};
+pub use report::{Cause, Compensation, Diagnosis, HeldOut, Parameter, Residual, Unexplained, Verdict};
 use resolution::{Resolution, resolution};
 use rows::Rows;
 use select::{Bests, Scope, Selected, fit, select};
 use thinned::{Sample, Thinned};
-use trace::{Gate, Judged, Stage, Trace};
+pub use trace::{Gate, Judged, Stage, Step, Trace};
 
 /// Why data cannot be diagnosed.
 #[derive(Debug, Error, PartialEq, Eq)]
@@ -129,7 +131,7 @@ pub fn diagnose(
     diagnose_extended(sessions, nominal, table, settings, progress).map(|(diagnosis, _)| diagnosis)
 }
 
-/// The same, with the model that was found, to predict other rows with.
+/// Diagnoses, and gives the model that was found, to predict other rows with.
 ///
 /// # Errors
 /// As [`diagnose`].

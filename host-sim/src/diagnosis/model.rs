@@ -24,11 +24,11 @@ pub struct Problem<'a> {
     pub certain: Vec<bool>,
     /// Data less nominal prediction, averaged.
     pub data: Vec<f64>,
-    /// The same, white.
+    /// `data`, whitened.
     pub data_white: Vec<f64>,
     /// Floating base columns, averaged.
     pub base: Vec<Vec<f64>>,
-    /// The same, white.
+    /// `base`, whitened.
     pub base_white: Vec<Vec<f64>>,
     /// Worth of the information, at most 1.
     pub worth: f64,
@@ -159,12 +159,6 @@ impl White {
         self.columns.len()
     }
 
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.columns.is_empty()
-    }
-
     /// Products of the columns with base, data, and themselves, column by column.
     fn bare_products(&self, problem: &Problem<'_>) -> &[f64] {
         self.products.get_or_init(|| {
@@ -257,7 +251,7 @@ impl<'l> Term<'l> {
         Term { law, places, averaged, white, occam: 0.0, among }
     }
 
-    /// The same with each place moved, within its range and no farther than a step reaches.
+    /// This term with each normalised parameter moved, within its range and no farther than a step reaches.
     #[must_use]
     pub fn moved(&self, problem: &Problem<'_>, mut by: impl FnMut(usize) -> f64) -> Term<'l> {
         let places = self.places.iter().zip(&self.law.shapes).enumerate().map(|(k, (place, shape))| {
@@ -301,12 +295,6 @@ impl<'l> Term<'l> {
     #[must_use]
     pub fn len(&self) -> usize {
         self.white.len()
-    }
-
-    /// Whether the law gave no column.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.white.is_empty()
     }
 
     /// What the term adds to the error, averaged.
@@ -444,7 +432,7 @@ impl Fit {
         &self.solution.coefficients[self.starts[k]..end]
     }
 
-    /// The same columns and priors fitted without a block of the data, whose products are `inside`.
+    /// These columns and priors fitted without a block of the data, whose products are `inside`.
     #[must_use]
     pub fn without(&self, inside: &Gram, worth: f64) -> Option<Solution> {
         let mut outside = self.gram.clone();
@@ -541,7 +529,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         Some(fit)
     }
 
-    /// The same with further columns, each with its prior, after all others; returns their coefficients.
+    /// Fits this model with further columns, each with its prior, after all others; returns their coefficients.
     fn fit_with(&self, added: Option<&White>, further: &[(Vec<f64>, Prior)]) -> Option<(Fit, Vec<f64>)> {
         let problem = self.problem;
         let gram = self.gram.with(&self.meeting(added, further));

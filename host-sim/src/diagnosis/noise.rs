@@ -40,7 +40,7 @@ pub struct Whitener {
     scale: Vec<f64>,
     /// Decay of the wander to the next average.
     decay: Vec<f64>,
-    /// The same, ready for use.
+    /// Gain, scale and decay, ready for use.
     filter: Vec<Step>,
 }
 
@@ -108,18 +108,6 @@ impl Whitener {
     #[must_use]
     pub fn groups(&self) -> &[std::ops::Range<usize>] {
         &self.groups
-    }
-
-    /// Averages.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.groups.len()
-    }
-
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.groups.is_empty()
     }
 
     /// Averages of a column.

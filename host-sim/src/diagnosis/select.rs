@@ -59,7 +59,7 @@ impl<'l> Selected<'l> {
         self.terms.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t).collect()
     }
 
-    /// The same as they are where it is not there.
+    /// The other terms, as they are where term `k` is not in the model.
     #[must_use]
     pub fn without<'s>(&'s self, problem: &Problem<'_>, k: usize) -> Vec<Cow<'s, Term<'l>>> {
         let others = self.others(k);
@@ -776,12 +776,12 @@ pub(super) fn settle<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Optio
     settle_all(problem, selected)
 }
 
-/// The same for one alone, too.
+/// Settles every term of a model beside the others, a single term too.
 pub(super) fn settle_all<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
     settle_from(problem, selected, |_, term| vec![term.clone()])
 }
 
-/// The same where a term has gone that the others were refined beside: those with a lead begin where it points now, too.
+/// Settles every term where one has gone that the others were refined beside: those with a lead begin where it points now, too.
 fn settle_anew<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
     settle_from(problem, selected, |scaffold, term| {
         let anew = if term.law.search.lead.is_some() { scaffold.begin(term.law) } else { Vec::new() };

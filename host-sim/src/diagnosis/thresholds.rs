@@ -7,7 +7,7 @@
 //!
 //! Constants of laws, of noise and of numerical methods stand where they are used.
 
-/// Which terms are chosen: [`select`](mod@super::select).
+/// Which terms are chosen: `select`.
 pub mod selection {
     /// Evidence (natural logarithm of the ratio) below which nothing is named: "very strong" by Kass & Raftery (1995). *Source*.
     pub const LEAST_EVIDENCE: f64 = 6.0;
@@ -58,7 +58,7 @@ pub mod selection {
     pub const UNNAMED_AHEAD: f64 = 5.0;
 }
 
-/// What the data cannot tell apart: [`rivals`](super::rivals).
+/// What the data cannot tell apart: `rivals`.
 pub mod rivals {
     /// Rise of the misfit up to which two causes are not told apart: five standard deviations. *Source*.
     pub const TOLD_APART: f64 = 25.0;
@@ -101,7 +101,7 @@ pub mod verdict {
     pub const KNOWN_BESIDE: f64 = 5.0;
 }
 
-/// What is left when the causes are in: [`remainder`](super::remainder).
+/// What is left when the causes are in: `remainder`.
 pub mod remainder {
     /// Below this a line in time is no different from wander, Hz. *Source*: by definition.
     pub const SLOWEST_LINE_HZ: f64 = 0.15;

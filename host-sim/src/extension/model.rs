@@ -58,7 +58,7 @@ impl Model {
         Model::from_toml(&file, &text)
     }
 
-    /// The same of a text.
+    /// The model in the text of such a file.
     ///
     /// # Errors
     /// Every problem found, each with file, field, value found and what is allowed.

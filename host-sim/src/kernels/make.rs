@@ -141,7 +141,7 @@ pub fn make(
 struct Forces {
     /// On flexspline teeth, by the flanks' push on the circular spline: outward, along, moment about the axis, plus, minus flank.
     flexspline: Vec<[f64; 5]>,
-    /// The same on circular-spline spaces.
+    /// Kernels of flanks on circular-spline spaces.
     circular_spline: Vec<[f64; 5]>,
     /// Of the generator, outward.
     generator: Vec<f64>,

@@ -19,7 +19,7 @@ pub struct Coverage {
     pub output_turns: f64,
     /// Rows in each tenth of a radian, more or less (a 36th) of the output's turn that move forward, and backward.
     pub rows_forward: Vec<usize>,
-    /// The same, backward.
+    /// Rows in each part of the output's turn that move backward.
     pub rows_backward: Vec<usize>,
     /// Shares of the rows that move the generator forward, backward, and not.
     pub directions: [f64; 3],

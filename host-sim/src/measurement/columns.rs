@@ -141,7 +141,7 @@ impl ColumnMap {
         ColumnMap::with_torque_constant(text, None)
     }
 
-    /// The same, with the torque at the output for an ampere where the torque is given as a current, N·m.
+    /// Reads a mapping with the torque at the output for an ampere where the torque is given as a current, N·m.
     pub fn with_torque_constant(text: &str, per_ampere: Option<f64>) -> Result<ColumnMap, MappingError> {
         let mut map = ColumnMap::default();
         for entry in text.split(',').map(str::trim) {

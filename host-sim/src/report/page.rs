@@ -366,7 +366,7 @@ impl Axis {
         Axis { label: label.into(), quantity: Quantity::Degree, linked: true, stretched: None }
     }
 
-    /// The same axis, linear within `within` of zero and logarithmic beyond.
+    /// This axis, linear within `within` of zero and logarithmic beyond.
     pub fn stretched(self, within: f64) -> Axis {
         Axis { stretched: Some(within), ..self }
     }

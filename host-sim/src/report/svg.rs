@@ -14,7 +14,7 @@ const TOP: f64 = 12.0;
 const RIGHT: f64 = 12.0;
 /// Points of a line at most; a sketch has no use for more.
 const MOST_POINTS: usize = 60;
-/// The same of a line that is drawn from least to largest, and of points.
+/// Points at most of a line that is drawn from least to largest, and of a cloud.
 const MOST_DOTS: usize = 150;
 const COLOURS: [&str; 6] = ["#0063a6", "#b3470c", "#00725a", "#8a3f8f", "#6b5b00", "#555555"];
 

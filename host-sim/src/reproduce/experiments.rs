@@ -33,7 +33,7 @@ pub enum Change {
     Drag,
     /// The rim held at a single point of its bore, on the major axis at the start.
     OnePoint,
-    /// The same at a point where the error comes out at zero at the turn.
+    /// The rim held at one point, where the error comes out at zero at the turn.
     OnePointAside,
     /// The rim held at four points.
     FourPoints,
@@ -309,7 +309,7 @@ pub(crate) fn curves(rows: &[crate::simulate::Row]) -> [Vec<[f64; 2]>; 2] {
     [out, back]
 }
 
-/// The same motion with zero on the flank that the output leaves.
+/// The motion of `base` with zero on the flank that the output leaves.
 fn counted_from_the_other_flank(base: &Effect) -> Effect {
     let half = base.metrics.and_then(|metrics| metrics.half_width_arcsec).unwrap_or(0.0);
     let mut effect = shifted(base.clone(), -half);
@@ -320,7 +320,7 @@ fn counted_from_the_other_flank(base: &Effect) -> Effect {
     effect
 }
 
-/// The same with every error more by so much.
+/// `effect` with every error larger by `more_arcsec`.
 fn shifted(mut effect: Effect, more_arcsec: f64) -> Effect {
     let Some(metrics) = &mut effect.metrics else { return effect };
     for curve in &mut effect.curves {

@@ -36,7 +36,7 @@ pub struct ProtocolMetrics {
     pub half_width_arcsec: Option<f64>,
     /// Generator travel during which the output stands after the reversal, rad.
     pub dwell_rad: Option<f64>,
-    /// The same at the output: dwell over the ratio.
+    /// Dwell at the output: that of the generator over the ratio.
     pub dwell_arcsec: Option<f64>,
     /// Error where the generator turns back, +1 rad.
     pub error_at_turn_arcsec: f64,

@@ -4,18 +4,18 @@
 //! generators. Here the same is done with the drive of this project, by contact FEM; each statement of the paper gets the number that
 //! would bear it out, a criterion, and a verdict that follows from the two.
 //!
-//! 1. [`runs`]: the protocol, standard and with another mesh, increment and penalty;
-//! 2. [`metrics`]: what a run comes to; [`rank`]: when one is more than another;
-//! 3. `claims`: the statements, in the order of the paper; [`claim`]: how a verdict comes about; [`paper`]: its numbers;
-//! 4. [`experiments`]: what would have to be changed to get the paper's 10′ to 21′.
+//! 1. `runs`: the protocol, standard and with another mesh, increment and penalty;
+//! 2. `metrics`: what a run comes to; `rank`: when one is more than another;
+//! 3. `claims`: the statements, in the order of the paper; `claim`: how a verdict comes about; `paper`: its numbers;
+//! 4. `experiments`: what would have to be changed to get the paper's 10′ to 21′.
 
-pub mod claim;
+pub(crate) mod claim;
 mod claims;
-pub mod experiments;
-pub mod metrics;
-pub mod paper;
-pub mod rank;
-pub mod runs;
+pub(crate) mod experiments;
+pub(crate) mod metrics;
+pub(crate) mod paper;
+pub(crate) mod rank;
+pub(crate) mod runs;
 
 use std::collections::BTreeMap;
 use std::time::Instant;

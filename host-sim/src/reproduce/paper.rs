@@ -13,13 +13,13 @@ pub const RATIO: f64 = 95.0;
 pub const TRAVEL_RAD: f64 = 1.0;
 /// Largest error of the four-roller drive, rad: text of figure 13.
 pub const ERROR_FOUR_ROLLER_RAD: f64 = 0.006_224_7;
-/// The same as the paper converts it, arc-minutes.
+/// Largest error of the four-roller drive as the paper converts it, arc-minutes.
 pub const ERROR_FOUR_ROLLER_ARCMIN: f64 = 21.0;
 /// Largest error of the double-disc drive, rad: below figure 13; not converted there.
 pub const ERROR_DOUBLE_DISC_RAD: f64 = 0.004_134_4;
 /// Largest error of the cam drive, rad: below figure 13.
 pub const ERROR_CAM_RAD: f64 = 0.003;
-/// The same as the paper converts it, arc-minutes ("about 4").
+/// Largest error of the cam drive as the paper converts it, arc-minutes ("about 4").
 pub const ERROR_CAM_ARCMIN: f64 = 4.0;
 /// Kinematic error that makers recommend, arc-minutes, least and most: below figure 13.
 pub const RECOMMENDED_ARCMIN: [f64; 2] = [1.0, 9.0];

@@ -10,7 +10,7 @@
 
 mod path;
 mod row;
-pub mod stress;
+pub(crate) mod stress;
 mod summary;
 
 use std::f64::consts::TAU;
@@ -25,10 +25,10 @@ use crate::stepping::{Increment, Problem, SolveError, Solver, SolverSettings, St
 
 pub use path::{Path, PathError, PathPoint, read_path};
 pub use row::Row;
+pub use stress::{PeakStress, peak_stress};
 pub use summary::{SUMMARY_SCHEMA, Summary};
 
 use path::LARGEST_TORQUE_N_M;
-use stress::{PeakStress, peak_stress};
 use summary::{Metrics, Touches, largest, shared, wheel_name};
 
 /// Increment of the paper's path, rad.

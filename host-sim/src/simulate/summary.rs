@@ -68,7 +68,7 @@ pub struct Summary {
     /// mean error backward minus mean error forward. Without load it is the clearance of the mesh, pushed to either side
     /// by the drag on the output, so `null` when the load exceeds the drag.
     pub backlash_arcsec: Option<f64>,
-    /// The same difference under a load that exceeds the drag and keeps the flanks of one side together: what friction
+    /// What the output has lost at the first reversal under a load that exceeds the drag and keeps the flanks of one side together: what friction
     /// and the drag leave. `null` when the load does not exceed the drag.
     pub reversal_lost_motion_arcsec: Option<f64>,
     /// Generator travel from the first reversal during which the output stays within 0.05″ of where it stood. Between two

@@ -64,7 +64,7 @@ pub(super) enum Law {
     Hardening { at_full_load: f64, exponent: f64, full_load_n_m: f64 },
     /// Wind-up more than nominal, relative.
     Softer { relative: f64 },
-    /// The same per kelvin.
+    /// Wind-up more than nominal for each kelvin, relative.
     SofterWarm { relative_per_k: f64 },
     /// Springs that slip one after the other.
     Slip { half_width: f64, slip_n_m: f64 },

@@ -77,7 +77,7 @@ pub struct TurnsInfo {
     pub places: usize,
     /// Torque by torque, in the order of the nodes.
     pub by_torque: Vec<TurnsAtTorque>,
-    /// The same in words.
+    /// What is said of the torque nodes, in words.
     pub remark: String,
 }
 

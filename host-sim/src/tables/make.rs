@@ -54,7 +54,7 @@ impl TableSettings {
         let (most, tolerance_arcsec) = CHOICES[usize::from(!repeats(drive))];
         TableSettings {
             torque_nodes: TorqueNodes::Chosen(NodeChoice {
-                largest_n_m: kind.rated_torque_n_m(),
+                largest_n_m: drive.rated_torque_n_m(kind),
                 most,
                 tolerance_arcsec,
             }),

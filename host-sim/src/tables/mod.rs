@@ -7,23 +7,27 @@
 //! ```
 
 mod info;
-pub mod make;
+pub(crate) mod make;
 mod positions;
 mod project;
-pub mod replay;
+pub(crate) mod replay;
 pub mod samples;
 mod source_files;
-pub mod sweep;
-pub mod torque_nodes;
-pub mod turns;
-pub mod validate;
+pub(crate) mod sweep;
+pub(crate) mod torque_nodes;
+pub(crate) mod turns;
+pub(crate) mod validate;
 
 pub use info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
-pub use make::{MakeError, TableProgress, TableSettings, TorqueNodes, make};
+pub use make::{MakeError, TableObserver, TableProgress, TableSettings, TorqueNodes, make};
 pub(crate) use positions::places_that_tell_apart;
 pub(crate) use project::from_plan;
 pub use project::{SampleOptions, TableError, core_drive, core_kind, from_samples, from_sweep};
+pub use replay::{MeasuredRow, MeasurementError, ReplaySummary, ReplayedRow, replay};
 pub use source_files::{c_header, rust_source};
+pub use sweep::{SweepError, SweepPlan, SweepProgress, symmetric_nodes};
+pub use torque_nodes::NodeChoice;
+pub use validate::{ValidateError, Validation, ValidationSettings, validate};
 
 use flexspline::Table;
 

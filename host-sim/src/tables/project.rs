@@ -23,8 +23,8 @@ pub(super) const OUTPUT_ORDERS: [u16; 2] = [1, 2];
 const SAME_TORQUE: f64 = 1e-6;
 /// Deviation (rad) that FEM samples may have from the table; they are exact but for rounding.
 const FEM_DEVIATION_RAD: f64 = 1e-6;
-/// The same for a drive with imperfections, whose error changes with the load in ways that a table has no room for: 120″. What it
-/// is stands in the table; only what is no drive at all is refused.
+/// Largest deviation (rad) of a sample from the table for a drive with imperfections, whose error changes with the load in ways that a
+/// table has no room for: 120″. What it is stands in the table; only what is no drive at all is refused.
 const AS_BUILT_DEVIATION_RAD: f64 = 6e-4;
 /// Negative half-width (rad) taken for the noise of the contact discretisation: 0.1″.
 const HALF_WIDTH_NOISE_RAD: f64 = 5e-7;

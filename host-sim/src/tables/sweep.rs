@@ -41,7 +41,7 @@ impl SweepPlan {
     pub fn for_generator(drive: &Drive, kind: GeneratorKind) -> SweepPlan {
         let temperature = &drive.temperature;
         SweepPlan {
-            torque_nodes_n_m: symmetric_nodes(drive.output.drag_torque_n_m, kind.rated_torque_n_m(), 9),
+            torque_nodes_n_m: symmetric_nodes(drive.output.drag_torque_n_m, drive.rated_torque_n_m(kind), 9),
             temperature_nodes_c: [temperature.minimum_c, temperature.maximum_c].map(|t| t as f32).to_vec(),
             positions: 8,
         }

@@ -5,9 +5,10 @@
 //! roots), and where the table made so far misses it, the middle becomes a node. The same core code reads the trial table as
 //! will read the final one.
 
-use flexspline::{Direction, GeneratorAngle, Table};
+use flexspline::make::ProjectError;
+use flexspline::{Direction, GeneratorAngle, ImageError, Table, WriteError};
 
-use super::project::trial_table;
+use super::project::{TableError, trial_table};
 use super::sweep::{Chain, Computed, KnownNode, Observer, SweepError, SweepPlan, Work, symmetric_nodes};
 use crate::drive::{Drive, GeneratorKind};
 use crate::motion::Motion;
@@ -69,6 +70,14 @@ pub fn choose_torque_nodes(
     // Intervals not yet looked into, by their lower node.
     let mut open: Vec<(f32, f32)> = nodes.windows(2).map(|w| (w[0], w[1])).collect();
     while !open.is_empty() && nodes.len() - 1 < choice.most {
+        let trial = match trial_table(drive, kind, plan, &nodes, &known) {
+            Ok(image) => Some(image),
+            // With so few nodes the curve through them swings so far that the core would not take it.
+            Err(TableError::Project(ProjectError::Write(WriteError::Refused(
+                ImageError::Falls { .. } | ImageError::Steep { .. },
+            )))) => None,
+            Err(other) => return Err(other.into()),
+        };
         let mut missed: Vec<(f64, KnownNode)> = Vec::new();
         open.sort_by(|a, b| a.0.total_cmp(&b.0));
         motion.go_back(unloaded.clone());
@@ -76,8 +85,8 @@ pub fn choose_torque_nodes(
             let middle = (0.5 * (f64::from(*low).sqrt() + f64::from(*high).sqrt())).powi(2) as f32;
             chain.sample(&mut motion, middle)?;
             let points = chain.take_points();
-            let image = trial_table(drive, kind, plan, &nodes, &known)?;
-            missed.push((worst_miss(&image, &points), KnownNode { torque: middle, temperature, points }));
+            let miss = trial.as_ref().map_or(f64::INFINITY, |image| worst_miss(image, &points));
+            missed.push((miss, KnownNode { torque: middle, temperature, points }));
         }
         missed.sort_by(|a, b| b.0.total_cmp(&a.0));
         open.clear();

@@ -97,24 +97,6 @@ pub fn sweep_turns(
     Ok(whole)
 }
 
-/// The transmission error (rad) under a load at generator angles that lie whole flexspline pitches apart, in ascending order:
-/// forward motion without friction on the flanks, at a drag of the output of 0.02 N·m. Over one turn of the output (95 of the
-/// generator) its range is what catalogues call transmission accuracy.
-pub fn errors_over_turns(
-    drive: &Drive,
-    kind: GeneratorKind,
-    torque_n_m: f64,
-    generator_rad: &[f64],
-    settings: SolverSettings,
-    observe: &Observer,
-) -> Result<Vec<f64>, SweepError> {
-    let mut smooth = drive.clone();
-    smooth.flanks.friction_coefficient = 0.0;
-    smooth.output.drag_torque_n_m = SMOOTH_DRAG_N_M;
-    let problem = Problem::new(&smooth, kind, drive.temperature.reference_c, settings)?;
-    Count { observe, work: Work::default() }.errors(&problem, generator_rad, torque_n_m)
-}
-
 /// Loads at which the deviation is looked at, light to heavy, evenly in their cube roots, N m.
 fn levels(largest_n_m: f64) -> [f64; LEVELS] {
     let (first, last) = (LIGHTEST_N_M.cbrt(), largest_n_m.cbrt());

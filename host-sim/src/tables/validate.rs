@@ -85,7 +85,7 @@ pub struct Validation {
     /// "passed" or "bound missed".
     pub status: &'static str,
     /// What it may miss fresh FEM by, arcsec: root mean square. Of a drive that does not repeat from tooth to tooth
-    /// [`RMS_BOUND_ARCSEC`] and one and a half times what the table states itself.
+    /// `RMS_BOUND_ARCSEC` and one and a half times what the table states itself.
     pub rms_bound_arcsec: f64,
     /// Largest, arcsec; likewise.
     pub max_bound_arcsec: f64,
@@ -93,7 +93,7 @@ pub struct Validation {
     pub rms_arcsec: f64,
     /// Largest difference, arcsec.
     pub max_arcsec: f64,
-    /// The same in the reversal alone.
+    /// Root mean square of the difference between table and FEM in the reversal alone, arcsec.
     pub reversal_rms_arcsec: f64,
     /// Largest difference in the reversal, arcsec.
     pub reversal_max_arcsec: f64,

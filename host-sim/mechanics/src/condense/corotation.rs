@@ -44,7 +44,7 @@ impl CoRotation {
         CoRotation { position: position.to_vec(), first_face }
     }
 
-    /// The same frame without the first `nodes` nodes, which are not on a face.
+    /// This frame without the first `nodes` nodes, which are not on a face.
     pub fn without(&self, nodes: usize) -> CoRotation {
         CoRotation { position: self.position[nodes..].to_vec(), first_face: self.first_face - nodes }
     }

@@ -64,7 +64,7 @@ impl Side {
 pub struct FlankGap {
     /// Circumferential gap, mm, positive where open.
     pub gap_mm: f64,
-    /// The same as an angle of the circular spline, rad.
+    /// The gap as an angle of the circular spline, rad.
     pub gap_rad: f64,
     /// Material angle of the tooth from the major axis, rad: tooth `k` is there at generator angle
     /// `2 pi k / z_f - material_angle_rad`.

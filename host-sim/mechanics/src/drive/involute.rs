@@ -76,7 +76,7 @@ impl InvoluteFlank {
         }
     }
 
-    /// The same with so many chords of equal length in place of the involute: what contact on the edges of a mesh sees.
+    /// This flank with so many chords of equal length in place of the involute: what contact on the edges of a mesh sees.
     pub fn with_facets(self, facets: Option<u32>) -> InvoluteFlank {
         InvoluteFlank { facets: facets.filter(|count| *count > 0), ..self }
     }

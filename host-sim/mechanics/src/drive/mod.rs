@@ -13,6 +13,7 @@
 
 mod as_built;
 mod error;
+mod few;
 mod fields;
 mod file;
 mod generator;
@@ -27,6 +28,7 @@ mod tooth;
 
 pub use as_built::{AsBuilt, DamagedFlank, DamagedTooth, Harmonic, RimVariation, Wheel};
 pub use error::DriveError;
+pub use few::{FewNumbers, MadeDrive};
 pub use generator::{GeneratorOutline, OutlineFoot};
 pub use interference::{FlankGap, MeshReport, RigidMesh, Side};
 pub use involute::{Foot, InvoluteFlank};

@@ -22,7 +22,7 @@ impl Placement {
     /// Where the ideal part stands.
     pub const NOMINAL: Placement = Placement { turn: (0.0, 1.0), translation: [0.0; 2] };
 
-    /// The same placement seen in the mirror `y -> -y`, in which flanks of the minus side are looked at.
+    /// This placement seen in the mirror `y -> -y`, in which flanks of the minus side are looked at.
     #[inline]
     pub fn seen_from(self, side: Side) -> Placement {
         match side {

@@ -392,6 +392,17 @@ impl Drive {
         }
     }
 
+    /// Largest load (N m) that tables and kernels are made for unless told otherwise: that of the generator in HHD-95, with the square
+    /// of the diameter and with the width, which leaves the stresses of a drive of like shape as they are; to two digits.
+    pub fn rated_torque_n_m(&self, kind: GeneratorKind) -> f64 {
+        let diameter = |f: &Flexspline| f.module_mm * f64::from(f.teeth);
+        let (ours, like) = (&self.flexspline, Drive::hhd_95().flexspline);
+        let scale = (diameter(ours) / diameter(&like)).powi(2) * ours.width_mm / like.width_mm;
+        let torque = kind.rated_torque_n_m() * scale;
+        let digit = 10_f64.powf(torque.log10().floor() - 1.0);
+        (torque / digit).round() * digit
+    }
+
     /// Signed ratio generator / output, `+z_c / (z_c - z_f)`: the output turns the same way as the generator.
     pub fn ratio(&self) -> f64 {
         let (zf, zc) = (f64::from(self.flexspline.teeth), f64::from(self.circular_spline.teeth));

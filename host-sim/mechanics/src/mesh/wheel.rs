@@ -339,7 +339,7 @@ fn integration_points(
         .collect()
 }
 
-/// The same element with its nodes in the opposite sense; local edge e becomes 3 − e.
+/// An element with its nodes in the opposite sense; local edge e becomes 3 − e.
 fn reverse_order<T: Copy>(n: [T; 8]) -> [T; 8] {
     [n[0], n[3], n[2], n[1], n[7], n[6], n[5], n[4]]
 }

@@ -152,7 +152,7 @@ mod tests {
         }
     }
 
-    /// The same factors whatever the size.
+    /// The factors of a rib do not depend on its size.
     #[test]
     fn ribs_do_not_depend_on_the_scale() {
         let small = Drive::hhd_95();

@@ -35,7 +35,7 @@ impl Tube {
         self.edge_with(self.shell.elements(self.length_mm, n), n, end)
     }
 
-    /// The same with so many elements: they are eliminated one after the other, from the far end on.
+    /// Stiffness of an edge of a tube of so many elements: they are eliminated one after the other, from the far end on.
     pub(super) fn edge_with(&self, elements: usize, n: u32, end: End) -> Edge {
         let element = self.shell.element(self.length_mm / elements as f64, n);
         let mut held: Vec<usize> = match end {
@@ -66,7 +66,7 @@ impl Tube {
     }
 }
 
-/// The same edge seen along an axis that points the other way.
+/// An edge seen along an axis that points the other way.
 pub(super) fn mirrored(edge: Edge) -> Edge {
     let sign = |i: usize| if i == U || i == SLOPE { -1.0 } else { 1.0 };
     std::array::from_fn(|i| std::array::from_fn(|j| sign(i) * sign(j) * edge[i][j]))

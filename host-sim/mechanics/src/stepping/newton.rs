@@ -36,7 +36,7 @@ const LARGEST_STEP: f64 = 0.1;
 const LARGEST_LOAD_STEP: f64 = 100.0;
 /// Factors on the penalties while the way to a new load is found.
 const LOADING_SOFTNESS: [f64; 3] = [1e-3, 3e-2, 1.0];
-/// The same on the way to a far place: of 1, 0.1, 0.03, 0.01 and (0.001, 0.03) before 1 this takes the fewest iterations where most
+/// Factors on the penalties on the way to a far place: of 1, 0.1, 0.03, 0.01 and (0.001, 0.03) before 1 this takes the fewest iterations where most
 /// are needed (20 to 30; cam, 5 µm of eccentricity and pitch errors, 4 and 100 N·m).
 const JUMPING_SOFTNESS: [f64; 2] = [1e-2, 1.0];
 /// Stiffness of the bore (N/mm³) below which it is not softened: the softest penalty on the way to a new load.

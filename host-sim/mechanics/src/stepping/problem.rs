@@ -169,7 +169,7 @@ pub struct Problem {
     pub(super) lateral_stiffness: f64,
     /// What shells in the third dimension add to the slice.
     third: Third,
-    /// The same on the bore of the meshes of this problem.
+    /// The waves on the bore of the meshes of this problem.
     pub(super) waves: Vec<Wave>,
     /// Coulomb drag of the output per mm of width (N mm/mm).
     pub(super) drag: f64,
@@ -250,7 +250,7 @@ impl Problem {
         })
     }
 
-    /// The same problem with a smooth ring, of the rim's bore and thickness, in place of the toothed flexspline: what the
+    /// This problem with a smooth ring, of the rim's bore and thickness, in place of the toothed flexspline: what the
     /// closed forms of [`crate::reference`] describe. Nothing but the generator touches it.
     pub fn smooth_ring(
         drive: &Drive,

@@ -86,7 +86,7 @@ pub const ANTENNA: Profile = Profile {
     temperature_c: [0.0, 40.0],
 };
 
-/// The same in a sixth of the time, for an emulated target and for contact FEM in the loop: a slew, stars, a satellite, four
+/// The antenna's flight in a sixth of the time, for an emulated target and for contact FEM in the loop: a slew, stars, a satellite, four
 /// reversals, a calm.
 pub const BRIEF: Profile = Profile {
     legs: &[

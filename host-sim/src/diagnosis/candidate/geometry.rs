@@ -152,7 +152,7 @@ fn pitch(cause: CauseName, of: Angle) -> Law {
     law
 }
 
-/// The same of a wheel whose error is one smooth wave, as of a cutter or a clamping that is off: order 2 with a little of 1 and 4.
+/// Pitch error of a wheel whose error is one smooth wave, as of a cutter or a clamping that is off: order 2 with a little of 1 and 4.
 fn smooth_pitch(cause: CauseName, of: Angle) -> Law {
     Law::new(cause, move |on, _| {
         let (flank, light) = (&on.base.flank, light(on));

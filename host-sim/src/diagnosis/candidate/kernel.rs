@@ -14,7 +14,7 @@ use crate::kernels::{Gain, Kernels};
 
 /// Share by which a kernel's signature may be wrong: friction, temperature, mesh.
 const KERNEL_MISFIT: f64 = 0.08;
-/// The same of its scale: the size itself is a parameter, and enters otherwise than as a factor.
+/// Share by which the scale of a signature may be wrong: the size itself is a parameter, and enters otherwise than as a factor.
 const SCALE_MISFIT: f64 = 0.02;
 /// Plausible size of an error of pitch, of an oval, µm: one standard deviation.
 const USUAL_UM: f64 = 6.0;

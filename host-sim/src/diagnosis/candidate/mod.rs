@@ -241,7 +241,7 @@ pub enum Tolerance {
     Main(Prior),
     /// A deviation of the law: its size is of the order of this share of the main coefficients.
     Nuisance(f64),
-    /// The same of what comes with the cause by right, and may well be the larger part of it: clearance that a wheel beside its
+    /// A deviation that comes with the cause by right, and may well be the larger part of it: clearance that a wheel beside its
     /// place takes.
     Beside(f64),
     /// A nuisance of these rows alone: what was before anybody recorded. It predicts nothing.
@@ -391,12 +391,12 @@ const NO_KIN: f64 = 0.25;
 
 /// Size of all deviations over that of the law, at most: beyond, the law is there for its deviations.
 const MOST_NUISANCE: f64 = 0.9;
-/// The same for laws that are well known, and whose deviations are those of another cause.
+/// Size of all deviations over that of the law, at most, for laws that are well known, and whose deviations are those of another cause.
 const MOST_NUISANCE_OF_KNOWN: f64 = 0.6;
 
 /// Share by which the law of a contact, a friction or a lubricant may be wrong.
 const USUAL_MISFIT: f64 = 0.10;
-/// The same for pure geometry and counting: sensors, ratio, skipped teeth.
+/// Share by which a law of pure geometry and counting may be wrong: sensors, ratio, skipped teeth.
 const EXACT_MISFIT: f64 = 0.02;
 /// Relative uncertainty of parameters of such laws, and of exact ones.
 const USUAL_DOUBT: f64 = 0.03;
@@ -651,7 +651,7 @@ fn lagged(on: &Excitation<'_>, values: &[f64], lag_s: f64) -> Vec<f64> {
     lagged_from(on, values, lag_s, |_, first| first)
 }
 
-/// The same where it goes on from one session to the next: between them it nears what the next one begins with.
+/// Values that lag where the lag goes on from one session to the next: between them it nears what the next one begins with.
 fn lagged_through(on: &Excitation<'_>, values: &[f64], lag_s: f64) -> Vec<f64> {
     lagged_from(on, values, lag_s, |before, first| match before {
         // Where clocks begin anew nobody knows how long it had.

@@ -33,7 +33,7 @@ const AROUND: usize = 15;
 const SHARE: f64 = 0.05;
 /// Mean resultant length above which four or more outliers repeat with position: a damaged tooth, which is the drive.
 const REPEATS: f64 = 0.9;
-/// The same for many: Rayleigh's n R², chance exp(−12).
+/// Rayleigh's n R² above which many outliers repeat with position: chance exp(−12).
 const REPEATS_MANY: f64 = 12.0;
 
 /// How far row `row` is from the rows before and after, if both say so; 0 if one of them bears it out.

@@ -38,7 +38,7 @@ fn lines(id: &str, title: &str, caption: &str, x: Axis, y: Axis, charts: Vec<(St
     })
 }
 
-/// The same chart for all generators.
+/// One chart, shown whichever generator is chosen.
 fn every(chart: Lines) -> Vec<(String, Lines)> {
     vec![(EVERY_CHOICE.to_owned(), chart)]
 }
