@@ -9,7 +9,6 @@ mod backlash_and_dwell;
 mod bad_input;
 mod bad_measurements;
 mod c_header;
-mod calibrated_units;
 mod calibration;
 mod cli;
 mod cli_files;

@@ -206,7 +206,7 @@ fn a_plan_keeps_the_accuracy_that_it_states_and_its_intervals_hold() {
     let (mut squares, mut expected, mut inside, mut count) = (0.0, 0.0, 0.0, 0.0);
     for seed in 0..6 {
         let made = calibrate(&[played(&planned, seed, law)], &prior).unwrap();
-        let states = interval::spread(&made.recorded.scales, RATIO, [0.0, 6.28], 2000);
+        let states = interval::spread(&made.recorded.scales, RATIO, [0.0, std::f64::consts::TAU], 2000);
         let states: Vec<State> = states.into_iter().filter(|at| at.torque_n_m.abs() > 1.0).collect();
         let model = Prior::of_ratio(RATIO, GeneratorKind::Cam);
         let table = Table::check(&made.table.image).unwrap();
@@ -300,7 +300,7 @@ fn the_phase_of_a_table_is_found_from_a_log() {
     let flat = recording(3, |_, _, torque, _| 1.5 * torque);
     let cost = again.calibration.zero_cost;
     assert!(cost.rms_arcsec_per_generator_deg > 0.4 && cost.most_arcsec_per_generator_deg < 2.0, "{cost:?}");
-    let only_load = calibrate(&[flat.clone()], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
+    let only_load = calibrate(std::slice::from_ref(&flat), &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
     let smooth = Table::check(&only_load.table.image).unwrap();
     let told = zero::align(
         &smooth,
