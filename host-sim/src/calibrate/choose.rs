@@ -4,7 +4,7 @@ use super::folds::{Chosen, Folds};
 
 /// Penalties that are tried, of a column's mean square. Below the least of them a curve is free to run away where nothing was recorded: with a
 /// tenth of it the first eighth of the record of `examples/lara8` is missed by 120 arc-seconds by the others, with it by 25.
-const PENALTIES: [f64; 4] = [1e-4, 1e-3, 1e-2, 1e-1];
+pub(super) const PENALTIES: [f64; 4] = [1e-4, 1e-3, 1e-2, 1e-1];
 /// A part is kept if it takes at least this share of the squares left without it: one per cent of the error. Chosen on the two records of
 /// `examples/`.
 pub(super) const LEAST_GAIN: f64 = 0.02;

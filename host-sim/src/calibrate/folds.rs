@@ -40,7 +40,7 @@ pub(super) struct Folds {
 }
 
 /// What keeps a matrix definite where a column says nothing, of a row.
-const FLOOR: f64 = 1e-9;
+pub(super) const FLOOR: f64 = 1e-9;
 
 impl Folds {
     /// Sums of all parts that may be fitted. With `own_zero` each fold has a zero of its own, found in it; else `zeros` of them are shared.

@@ -12,22 +12,28 @@
 
 mod choose;
 mod folds;
+mod interval;
 mod parts;
+mod plan;
 mod prior;
 mod rows;
 mod table;
+mod zero;
 
 use flexspline::Table;
 use serde::Serialize;
 
 use crate::extension::left_by_core;
-use crate::measurement::{Fault, MeasuredError, Recording, least_and_most};
-use crate::tables::{MadeTable, TableError};
-use choose::{LEAST_GAIN, best_penalty, nested, path, pruned};
+use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
+use crate::tables::{MadeTable, TableError, dead_zone_n_m};
+use choose::{LEAST_GAIN, PENALTIES, best_penalty, nested, path, pruned};
 use folds::{Chosen, Folds};
+pub use interval::{Known, Node, Noise};
 pub use parts::{PartName, Scales, State};
+pub use plan::{Bench, First, Pass, Planned, Wide, plan};
 pub use prior::Prior;
 use rows::{FoldKind, Recorded, Rows, settled};
+pub use zero::{Alignment, OutputZero, ZeroCost, cost};
 
 /// Fewest rows in steady motion that make a table.
 const FEWEST_ROWS: usize = 64;
@@ -44,6 +50,16 @@ const HALF_A_TURN: f64 = 0.5;
 const TURNS_TO_TELL_WHEELS: f64 = 47.5;
 /// Rows that a tooth pitch needs for its curve.
 const ROWS_OF_A_PITCH: f64 = 6.0;
+/// Files do not share their zeros if fits to each alone leave less than this share of what the others leave in it. A guess.
+const ALONE: f64 = 0.3;
+/// Rows that the usual half width is taken of.
+const ROWS_OF_A_WIDTH: usize = 2000;
+/// Generator turns in steps that are short beside a pitch, at least.
+const FINE_TURNS: f64 = 1.0;
+/// The penalty that a plan counts with: the least that a fit takes.
+const PENALTY_OF_PLANS: f64 = PENALTIES[0];
+/// A ratio is refused if another leaves less than this share of the squares. A guess: of what a wrong whole number does, nothing is left.
+const OTHER_RATIO: f64 = 0.25;
 /// A lag that is negative by no more than this, and this share of the largest number of the play, is noise: guesses.
 const NO_LAG_ARCSEC: f64 = 0.5;
 const NO_LAG_SHARE: f64 = 0.1;
@@ -59,6 +75,9 @@ pub enum CalibrationError {
     /// What is known of the drive makes no table.
     #[error("{0}")]
     Known(String),
+    /// The rows turn by another ratio.
+    #[error("{0}")]
+    Ratio(String),
     /// Too few rows in steady motion.
     #[error("{0} rows in steady motion; at least {FEWEST_ROWS} are needed")]
     TooFew(usize),
@@ -74,7 +93,13 @@ impl CalibrationError {
     /// Whether the input is to blame.
     #[must_use]
     pub fn is_bad_input(&self) -> bool {
-        matches!(self, CalibrationError::Measured(_) | CalibrationError::Known(_) | CalibrationError::TooFew(_))
+        matches!(
+            self,
+            CalibrationError::Measured(_)
+                | CalibrationError::Known(_)
+                | CalibrationError::Ratio(_)
+                | CalibrationError::TooFew(_)
+        )
     }
 }
 
@@ -117,16 +142,26 @@ impl Model {
     /// Whether the flanks keep their sides, with half the prior's play where no load decides. A lag that is negative by no more than noise is
     /// none.
     fn has_sound_flanks(&mut self, prior_half_arcsec: f64) -> bool {
-        let Some(play) = self.of(PartName::Play) else { return true };
-        let [lag, by_load, flank] = &mut self.coefficients[play] else { return true };
-        let size = lag.abs().max(by_load.abs()).max(flank.abs());
-        let none = -(NO_LAG_ARCSEC + NO_LAG_SHARE * size);
-        if *lag < none || *lag + *by_load < none || *lag + *flank + prior_half_arcsec < none {
-            return false;
+        let mut least_lag = 0.0;
+        if let Some(play) = self.of(PartName::Play)
+            && let [lag, by_load, flank] = &mut self.coefficients[play]
+        {
+            let size = lag.abs().max(by_load.abs()).max(flank.abs());
+            let none = -(NO_LAG_ARCSEC + NO_LAG_SHARE * size);
+            if *lag < none || *lag + *by_load < none || *lag + *flank + prior_half_arcsec < none {
+                return false;
+            }
+            *lag = lag.max(0.0);
+            *by_load = by_load.max(-*lag);
+            *flank = flank.max(-*lag - prior_half_arcsec);
+            least_lag = lag.min(*lag + *by_load);
         }
-        *lag = lag.max(0.0);
-        *by_load = by_load.max(-*lag);
-        *flank = flank.max(-*lag - prior_half_arcsec);
+        if let Some(temperature) = self.of(PartName::Temperature)
+            && let [_, _, by_warmth] = &mut self.coefficients[temperature]
+        {
+            // Nor does a temperature take more of the lag than there is.
+            *by_warmth = by_warmth.clamp(-least_lag, least_lag);
+        }
         true
     }
 }
@@ -194,6 +229,19 @@ pub struct Calibration {
     pub core: ByCore,
     /// The parts.
     pub parts: Vec<PartSays>,
+    /// Every node of every part, with an interval.
+    pub nodes: Vec<Node>,
+    /// What the rows show of noise.
+    pub noise: Noise,
+    /// Half width of the interval that holds the table's error in a state with 95 %, mean square root over the rows, arcsec.
+    pub half_width_arcsec: f64,
+    /// Phase of the table that was known before, if one was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alignment: Option<Alignment>,
+    /// Zero of the output in each file. Generator angle zero of the table is where the logs read zero.
+    pub output_zeros: Vec<OutputZero>,
+    /// What an error in the zeros of the table costs.
+    pub zero_cost: ZeroCost,
     /// Generator turns for one of the output.
     pub ratio: f64,
     /// Identity of the table.
@@ -220,8 +268,61 @@ pub struct Calibrated {
     pub calibration: Calibration,
     /// The table.
     pub table: MadeTable,
+    /// How well it is known.
+    pub known: Known,
+    rows: Rows,
+    recorded: Recorded,
     /// Rows for a picture: output angle (rad), measured and left by the model (arcsec).
     pub shown: Vec<[f64; 3]>,
+}
+
+impl Calibrated {
+    /// What these logs have shown, for a plan of what to add.
+    #[must_use]
+    pub fn first(&self) -> First<'_> {
+        First {
+            rows: &self.rows.rows,
+            files: self.calibration.files.len(),
+            noise: self.known.noise,
+            scales: self.recorded.scales,
+        }
+    }
+}
+
+/// Refuses a ratio that the rows contradict; says where they doubt it.
+fn check_ratio(files: &[Recording], prior: &Prior<'_>) -> Result<Option<String>, CalibrationError> {
+    let ratio = prior.nominal.ratio;
+    let (mut xx, mut xe, mut ee) = (0.0, 0.0, 0.0);
+    for session in files.iter().flat_map(|file| &file.sessions) {
+        let count = session.len().max(1) as f64;
+        let output = || session.generator_rad.iter().map(|psi| psi / ratio);
+        let (x, e) = (output().sum::<f64>() / count, session.error_rad.iter().sum::<f64>() / count);
+        for (at, error) in output().zip(&session.error_rad) {
+            xx += (at - x) * (at - x);
+            xe += (at - x) * (error - e);
+            ee += (error - e) * (error - e);
+        }
+    }
+    if xx <= 0.0 || ee <= 0.0 {
+        return Ok(None);
+    }
+    let found = ratio / (1.0 + xe / xx);
+    let left = |other: f64| {
+        let slope = ratio / other - 1.0;
+        (ee - 2.0 * slope * xe + slope * slope * xx) / ee
+    };
+    let whole = found.round();
+    if (whole - ratio).abs() >= 1.0 && whole.abs() >= 2.0 && left(whole) < OTHER_RATIO {
+        return Err(CalibrationError::Ratio(format!(
+            "ratio: found {ratio}, but the generator turns {found:.2} times for one turn of the output in these rows; allowed: {whole}, or \
+             other units or signs of the columns"
+        )));
+    }
+    let half = found.floor() + 0.5;
+    let doubt = half != ratio && left(half) < OTHER_RATIO;
+    Ok(doubt.then(|| {
+        format!("the generator turns {found:.2} times for one turn of the output in these rows: is the ratio {half}?")
+    }))
 }
 
 /// Makes the table of a unit from its logs.
@@ -230,8 +331,31 @@ pub struct Calibrated {
 /// Too few rows in steady motion, nothing that gains, or a drive that no table can be of.
 pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, CalibrationError> {
     prior.core_drive().map_err(CalibrationError::Known)?;
-    let recorded = Recorded::of(files, prior);
+    let doubt = check_ratio(files, prior)?;
+    let mut recorded = Recorded::of(files, prior);
     let mut play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
+    if let Some(table) = prior.table {
+        recorded.scales.friction_n_m = dead_zone(files, prior, table, &recorded, play_rad);
+    }
+    let prior = &Prior {
+        least_friction_n_m: recorded.scales.friction_n_m,
+        nominal: prior.nominal.clone(),
+        drive: prior.drive.clone(),
+        ..*prior
+    };
+    let alignment = prior
+        .table
+        .map(|table| zero::align(table, &settled(files, prior, &recorded, play_rad), recorded.scales.friction_n_m));
+    let aligned = Prior {
+        zero_rad: alignment
+            .as_ref()
+            .filter(|found| found.told)
+            .map_or(0.0, |found| found.generator_zero_deg.to_radians()),
+        nominal: prior.nominal.clone(),
+        drive: prior.drive.clone(),
+        ..*prior
+    };
+    let prior = &aligned;
     let mut fitted = fit(files, prior, &recorded, play_rad)?;
     let found = fitted.model.play_arcsec() / crate::units::ARCSEC_PER_RAD;
     if found > 0.0 {
@@ -256,11 +380,13 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
             reasons.join("; ")
         )));
     }
-    let made = table::make(prior, &model, &recorded)?;
+    let made = table::make(prior, &model, &recorded).map_err(|error| with_faults(error, files))?;
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
     let core = by_core(files, &image, &recorded);
+    let fitted_alone = fitted_alone(&rows, &folds, &model);
     let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
-    notes.extend(remarks(prior, &recorded, &model, &parts));
+    notes.extend(doubt);
+    notes.extend(remarks(prior, &recorded, (&model, &parts), (held_out, fitted_alone)));
     sizes(&rows, &model, &mut parts);
     let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);
     let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;
@@ -270,6 +396,12 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
         .zip(&rows.measured_arcsec)
         .map(|(row, measured)| [row.at.output_rad, *measured, zero(row) - mean])
         .collect();
+    let known = Known::of(&rows.rows, &model, files.len())
+        .ok_or_else(|| CalibrationError::Known("the information matrix of these rows is singular".to_owned()))?;
+    let half_widths = rows.rows.iter().step_by(rows.rows.len().div_ceil(ROWS_OF_A_WIDTH).max(1));
+    let (count, squares) = half_widths
+        .fold((0.0, 0.0), |(count, squares), row| (count + 1.0, squares + known.half_width_arcsec(&row.at).powi(2)));
+    let output_zeros = output_zeros(files, &rows, &model, known.noise);
     let calibration = Calibration {
         schema_version: 1,
         files: files.iter().map(|file| file.file.clone()).collect(),
@@ -285,6 +417,12 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
         held_out,
         core,
         parts,
+        nodes: known.nodes(),
+        noise: known.noise,
+        half_width_arcsec: (squares / count).sqrt(),
+        alignment,
+        output_zeros,
+        zero_cost: cost(&image),
         ratio: prior.nominal.ratio,
         table_id: made.info.table_id.clone(),
         image_bytes: made.image.len(),
@@ -295,7 +433,55 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
         notes,
         command: String::new(),
     };
-    Ok(Calibrated { calibration, table: made, shown })
+    Ok(Calibrated { calibration, table: made, known, rows, recorded, shown })
+}
+
+/// What fits of the same parts to each file alone leave in it, arcsec rms; infinite where files are not what is left out.
+fn fitted_alone(rows: &Rows, folds: &Folds, model: &Model) -> f64 {
+    if rows.folds != FoldKind::Files {
+        return f64::INFINITY;
+    }
+    let squares: f64 = folds.all().into_iter().map(|fold| folds.left_in(fold, &[fold], &model.chosen)).sum();
+    (squares / rows.rows.len() as f64).sqrt()
+}
+
+/// What keeps a table from being made, with what was noticed of the units and signs of the logs.
+fn with_faults(error: CalibrationError, files: &[Recording]) -> CalibrationError {
+    let faults = files.iter().flat_map(|file| &file.faults).filter(|fault| fault.name == FaultName::UnitMismatch);
+    let faults: Vec<&str> = faults.map(|fault| fault.what.as_str()).collect();
+    match error {
+        CalibrationError::Table(error) if !faults.is_empty() => {
+            CalibrationError::Known(format!("{error}; of the logs: {}", faults.join("; ")))
+        }
+        other => other,
+    }
+}
+
+/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, or that of a drive with the usual friction, whichever
+/// leaves less of the logs.
+fn dead_zone(files: &[Recording], prior: &Prior<'_>, table: &Table<'_>, recorded: &Recorded, play_rad: f64) -> f64 {
+    let of_drive = dead_zone_n_m(table);
+    let left = |least_friction_n_m: f64| -> f64 {
+        let prior = Prior { least_friction_n_m, nominal: prior.nominal.clone(), drive: String::new(), ..*prior };
+        settled(files, &prior, recorded, play_rad).rows.iter().map(|row| row.left_arcsec.powi(2)).sum()
+    };
+    let usual = recorded.scales.friction_n_m;
+    if of_drive >= usual || left(of_drive) <= left(usual) { of_drive } else { usual }
+}
+
+/// The zero of the output in each file.
+fn output_zeros(files: &[Recording], rows: &Rows, model: &Model, noise: Noise) -> Vec<OutputZero> {
+    let mut sums = vec![(0.0, 0.0); files.len()];
+    for row in &rows.rows {
+        sums[row.zero].0 += row.left_arcsec - model.adds_arcsec(&row.at);
+        sums[row.zero].1 += 1.0;
+    }
+    let zero = |((file, (sum, count)), mean): ((&Recording, (f64, f64)), &f64)| OutputZero {
+        file: file.file.clone(),
+        arcsec: mean + sum / f64::max(count, 1.0),
+        half_width_arcsec: interval::OF_95 * (noise.of_a_row() / f64::max(count, 1.0)).sqrt(),
+    };
+    files.iter().zip(sums).zip(&rows.means_arcsec).map(zero).collect()
 }
 
 struct Fitted {
@@ -434,7 +620,12 @@ fn by_core(files: &[Recording], table: &Table<'_>, recorded: &Recorded) -> ByCor
 }
 
 /// What whoever uses the table has to know.
-fn remarks(prior: &Prior<'_>, recorded: &Recorded, model: &Model, parts: &[PartSays]) -> Vec<String> {
+fn remarks(
+    prior: &Prior<'_>,
+    recorded: &Recorded,
+    (model, parts): (&Model, &[PartSays]),
+    (held_out, fitted_alone): (HeldOut, f64),
+) -> Vec<String> {
     let mut remarks = Vec::new();
     let has = |part: PartName| model.chosen.iter().any(|chosen| chosen.part == part);
     if prior.nominal.teeth.is_none() && prior.table.is_none() {
@@ -453,6 +644,13 @@ fn remarks(prior: &Prior<'_>, recorded: &Recorded, model: &Model, parts: &[PartS
     }
     if recorded.lacks(PartName::Play, prior).is_some() {
         remarks.push("one direction was recorded: after a reversal the table says nothing new of the play".to_owned());
+    }
+    if fitted_alone < ALONE * held_out.rms_after_arcsec {
+        remarks.push(format!(
+            "each log alone is fitted to {fitted_alone:.2} arcsec, and left with {:.2} by the others: they do not seem to share their zeros; home the \
+             encoders in the same place before each log, or give one log alone",
+            held_out.rms_after_arcsec
+        ));
     }
     if has(PartName::OutputAngle) && parts.iter().any(|part| part.name == "wind_up" && part.held_out_gain.is_some()) {
         remarks.push(

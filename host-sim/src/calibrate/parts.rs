@@ -117,7 +117,9 @@ impl Scales {
 
 /// Puts the columns of a part in a state at the end of `to`.
 pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<f64>) {
-    let load = at.torque_n_m / scales.most_torque();
+    // Beyond the loads recorded nothing grows further.
+    let [low, high] = scales.torque_n_m;
+    let load = at.torque_n_m.clamp(low.min(0.0), high.max(0.0)) / scales.most_torque();
     let lag = -at.way;
     match part {
         PartName::WindUp => {

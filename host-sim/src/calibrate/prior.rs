@@ -22,6 +22,10 @@ pub struct Prior<'a> {
     pub hash: [u8; 32],
     /// Generator that the table is marked with.
     pub kind: GeneratorKind,
+    /// What the generator angle of the logs reads where that of `table` is zero, rad.
+    pub zero_rad: f64,
+    /// Least load that is believed to decide the flank, N·m: a smaller one is lost in the noise of the logs' torque.
+    pub least_friction_n_m: f64,
 }
 
 impl<'a> Prior<'a> {
@@ -42,7 +46,31 @@ impl<'a> Prior<'a> {
             kernels: None,
         };
         let hash = *blake3::hash(format!("ratio {ratio}").as_bytes()).as_bytes();
-        Prior { nominal, table: None, drive: format!("ratio {ratio}"), hash, kind }
+        Prior {
+            nominal,
+            table: None,
+            drive: format!("ratio {ratio}"),
+            hash,
+            kind,
+            zero_rad: 0.0,
+            least_friction_n_m: 0.0,
+        }
+    }
+
+    /// A drive known by a table.
+    #[must_use]
+    pub fn of_table(table: &'a Table<'a>, kind: GeneratorKind) -> Prior<'a> {
+        let hash = *blake3::hash(table.image()).as_bytes();
+        let drive = format!("table {}", table.id());
+        Prior {
+            nominal: Nominal::of_table(table),
+            table: Some(table),
+            drive,
+            hash,
+            kind,
+            zero_rad: 0.0,
+            least_friction_n_m: 0.0,
+        }
     }
 
     /// Whether nothing but the ratio is known.
@@ -82,19 +110,21 @@ impl<'a> Prior<'a> {
 
     /// Load beyond which it decides the flank, N·m.
     pub(super) fn friction_n_m(&self) -> f64 {
-        self.nominal.friction_torque_n_m
+        self.nominal.friction_torque_n_m.max(self.least_friction_n_m)
     }
 
     /// Error in steady motion, arcsec.
     pub(super) fn steady_arcsec(&self, at: &State) -> f64 {
         if let Some(table) = self.table {
             let direction = if at.way < 0.0 { Direction::Backward } else { Direction::Forward };
-            let generator = GeneratorAngle::from_rad(at.generator_rad).unwrap_or(GeneratorAngle::ZERO);
-            let error = table.steady_error_rad(generator, at.torque_n_m as f32, at.temperature_c as f32, direction);
+            let generator = GeneratorAngle::from_rad(at.generator_rad - self.zero_rad).unwrap_or(GeneratorAngle::ZERO);
+            // Too small a load leaves the flank to the direction, as none does.
+            let torque = if at.torque_n_m.abs() < self.least_friction_n_m { 0.0 } else { at.torque_n_m };
+            let error = table.steady_error_rad(generator, torque as f32, at.temperature_c as f32, direction);
             return error.map_or(0.0, |rad| f64::from(rad) * ARCSEC_PER_RAD);
         }
         let n = &self.nominal;
-        let loaded = at.torque_n_m != 0.0 && at.torque_n_m.abs() > n.friction_torque_n_m;
+        let loaded = at.torque_n_m != 0.0 && at.torque_n_m.abs() > self.friction_n_m();
         // In motion without load the output lags.
         let flank = if loaded { at.torque_n_m.signum() } else { -at.way };
         n.harmonics_arcsec(at.generator_rad) + n.wind_up_arcsec(at.torque_n_m) + 0.5 * flank * n.backlash_arcsec

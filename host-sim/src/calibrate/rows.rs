@@ -12,8 +12,10 @@ use crate::units::ARCSEC_PER_RAD;
 const BLOCKS: usize = 8;
 /// With so many files, or sessions, each is a fold.
 const ENOUGH_SESSIONS: usize = 3;
+/// Left-out sessions are folds if none of them holds more than this share of the rows: without a larger one the rest is another record. A guess.
+const LARGEST_SESSION: f64 = 0.4;
 /// Rows that are fitted, at most; of longer records every so many-th.
-const MOST_ROWS: usize = 40_000;
+pub(super) const MOST_ROWS: usize = 40_000;
 /// A reversal is one if the generator goes back by this share of its usual step.
 const TURNED_ROUND: f64 = 0.5;
 /// The output has settled on a flank when the generator has turned by so many times the play.
@@ -32,6 +34,8 @@ pub(super) struct Rows {
     pub rows: Vec<Row>,
     /// What was measured in each, arcsec, its file's mean taken out.
     pub measured_arcsec: Vec<f64>,
+    /// What was taken off `left_arcsec` of each file, arcsec.
+    pub means_arcsec: Vec<f64>,
     pub folds: FoldKind,
     /// Rows of the files, and those not used because the output had not settled.
     pub of: usize,
@@ -51,6 +55,8 @@ pub(super) struct Recorded {
     pub backward_share: f64,
     /// Usual step of the generator, rad.
     pub step_rad: f64,
+    /// Generator turns in steps that are short beside a tooth pitch.
+    pub fine_turns: f64,
     pub temperature_c: f64,
 }
 
@@ -76,6 +82,9 @@ impl Recorded {
                 backward += f64::from(step < 0.0);
             }
         }
+        let fine_rad = TAU / (super::ROWS_OF_A_PITCH * prior.tooth_pitches());
+        let all_steps = sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| (p[1] - p[0]).abs()));
+        let fine_turns = all_steps.filter(|step| *step <= fine_rad * (1.0 + 1e-3)).sum::<f64>() / TAU;
         let most = torque.0.abs().max(torque.1.abs());
         Recorded {
             scales: Scales {
@@ -91,6 +100,7 @@ impl Recorded {
             generator_turns: (generator.1 - generator.0) / TAU,
             backward_share: backward / moved.max(1.0),
             step_rad,
+            fine_turns,
             temperature_c: if has_temperature { f64::midpoint(temperature.0, temperature.1) } else { usual },
         }
     }
@@ -121,7 +131,7 @@ impl Recorded {
             PartName::ToothPitch if prior.nominal.teeth.is_none() && prior.table.is_none() => {
                 Some("the teeth are not known, the ratio alone is".to_owned())
             }
-            PartName::ToothPitch if self.step_rad * self.scales.teeth * super::ROWS_OF_A_PITCH > TAU => {
+            PartName::ToothPitch if self.fine_turns < super::FINE_TURNS => {
                 Some(format!("rows are {:.2} tooth pitches apart", self.step_rad * self.scales.teeth / TAU))
             }
             PartName::OutputAngle if self.output_share < super::HALF_A_TURN => {
@@ -148,12 +158,21 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
     let total: usize = files.iter().flat_map(|file| &file.sessions).map(Session::len).sum();
     let every = total.div_ceil(MOST_ROWS).max(1);
     let sessions: usize = files.iter().map(|file| file.sessions.len()).sum();
-    let folds = match (files.len() >= ENOUGH_SESSIONS, sessions >= ENOUGH_SESSIONS) {
+    let largest = files.iter().flat_map(|file| &file.sessions).map(Session::len).max().unwrap_or(0);
+    let by_sessions = sessions >= ENOUGH_SESSIONS && largest as f64 <= LARGEST_SESSION * total as f64;
+    let folds = match (files.len() >= ENOUGH_SESSIONS, by_sessions) {
         (true, _) => FoldKind::Files,
         (_, true) => FoldKind::Sessions,
         _ => FoldKind::Blocks,
     };
-    let mut all = Rows { rows: Vec::new(), measured_arcsec: Vec::new(), folds, of: total, unsettled: 0 };
+    let mut all = Rows {
+        rows: Vec::new(),
+        measured_arcsec: Vec::new(),
+        means_arcsec: Vec::new(),
+        folds,
+        of: total,
+        unsettled: 0,
+    };
     let mut session_number = 0;
     for (zero, file) in files.iter().enumerate() {
         let begin = all.rows.len();
@@ -199,6 +218,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
             mean(&mut all.measured_arcsec[begin..].iter().copied()),
             mean(&mut all.rows[begin..].iter().map(|row| row.left_arcsec)),
         );
+        all.means_arcsec.push(left);
         all.measured_arcsec[begin..].iter_mut().for_each(|value| *value -= measured);
         all.rows[begin..].iter_mut().for_each(|row| row.left_arcsec -= left);
     }

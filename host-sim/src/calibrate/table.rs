@@ -70,21 +70,26 @@ fn nodes(prior: &Prior<'_>, model: &Model, recorded: &Recorded) -> (Vec<f32>, Ve
         None if recorded.has_temperature && warm - cold > super::ONE_TEMPERATURE_K => vec![cold as f32, warm as f32],
         None => vec![recorded.temperature_c as f32],
     };
-    let [low, high] = recorded.scales.torque_n_m;
-    if let Some(table) = prior.table {
-        return (table.torque_nodes_n_m().collect(), temperatures);
-    }
-    if !recorded.has_torque || high - low <= super::SAME_TORQUE * low.abs().max(high.abs()) {
-        return (vec![f64::midpoint(low, high) as f32], temperatures);
-    }
-    let even = (0..TORQUE_NODES).map(|k| low + (high - low) * k as f64 / (TORQUE_NODES - 1) as f64);
+    let [low, high] = match prior.table {
+        Some(table) => table.torque_range_n_m().map(f64::from),
+        None => recorded.scales.torque_n_m,
+    };
     let friction = recorded.scales.friction_n_m;
+    let even: Vec<f64> = match prior.table {
+        // Those inside the dead zone of these logs are its own jump.
+        Some(table) => table.torque_nodes_n_m().map(f64::from).filter(|node| node.abs() >= friction).collect(),
+        None if !recorded.has_torque || high - low <= super::SAME_TORQUE * low.abs().max(high.abs()) => {
+            return (vec![f64::midpoint(low, high) as f32], temperatures);
+        }
+        None => (0..TORQUE_NODES).map(|k| low + (high - low) * k as f64 / (TORQUE_NODES - 1) as f64).collect(),
+    };
     let play = prior.nominal.backlash_arcsec > 0.0 || model.chosen.iter().any(|chosen| chosen.part == PartName::Play);
     let jumps: Vec<f64> =
         [-friction, friction].into_iter().filter(|at| play && friction > 0.0 && *at > low && *at < high).collect();
     let clear = (CLEAR_OF_JUMP[0] * friction).max(CLEAR_OF_JUMP[1] * (high - low)).min(0.9 * friction);
     let half = JUMP_HALF_WIDTH * friction;
-    let mut all: Vec<f64> = even.filter(|node| jumps.iter().all(|jump| (node - jump).abs() > clear)).collect();
+    let mut all: Vec<f64> =
+        even.into_iter().filter(|node| jumps.iter().all(|jump| (node - jump).abs() > clear)).collect();
     all.extend(jumps.iter().flat_map(|jump| [jump - half, jump + half]));
     all.sort_by(f64::total_cmp);
     let mut all: Vec<f32> = all.into_iter().map(|node| node as f32).collect();

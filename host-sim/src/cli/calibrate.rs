@@ -9,11 +9,10 @@ use flexspline::Table;
 use super::context::{Context, quoted, table_image};
 use super::logs::LogOptions;
 use super::{Failure, names, report, say};
-use crate::calibrate::{Calibrated, Calibration, CalibrationError, Prior, calibrate};
+use crate::calibrate::{Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, calibrate, plan};
 use crate::drive::GeneratorKind;
 use crate::extension::Model;
 use crate::measurement::read;
-use crate::nominal::Nominal;
 use crate::output::Outputs;
 use crate::report::calibration_report;
 use crate::tables::{c_header, rust_source};
@@ -23,17 +22,27 @@ use crate::tables::{c_header, rust_source};
 /// Takes what a nominal model or a table says from what was measured, and fits what remains by smooth parts: wind-up by torque, play by
 /// direction, curves over generator, tooth and output angle, temperature. A part is kept if it gains in files, sessions or blocks
 /// that were left out. Writes calibrated.fxt, .h and .rs, calibration.json and report.html.
+///
+/// With --plan it says instead what to record, before there is a log: passes of the bench that tell most in the time there is, with the accuracy
+/// to expect. With --more it says what to add to the logs. Both write plan.csv and plan.json.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("known").required(true).args(["tables", "model", "ratio"]))]
 #[command(after_help = "\
 Examples:
+  flexspline calibrate --plan --ratio 101 --load-n-m=-30,30 --speed-rpm 60 --rate 100
   flexspline calibrate bench.log --ratio 101 --columns generator=#1:turn,output=#2:deg
   flexspline calibrate monday.csv tuesday.csv --model nominal.toml --out unit7
   flexspline calibrate measured.csv --tables out --generator cam")]
 pub(super) struct Calibrate {
     /// Logs of one unit; several files are sessions, each with a zero of its own
-    #[arg(value_name = "LOG", value_hint = ValueHint::FilePath, required = true)]
+    #[arg(value_name = "LOG", value_hint = ValueHint::FilePath, required_unless_present = "plan")]
     logs: Vec<PathBuf>,
+    /// Say what to record on a bench, instead of reading logs
+    #[arg(long, conflicts_with = "logs")]
+    plan: bool,
+    /// Say also what to record next, after these logs
+    #[arg(long, conflicts_with = "plan")]
+    more: bool,
     /// Folder of tables made by `flexspline tables`: the one of --generator is known before
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     tables: Option<PathBuf>,
@@ -48,10 +57,79 @@ pub(super) struct Calibrate {
     generator: GeneratorKind,
     #[command(flatten)]
     columns: LogOptions,
+    #[command(flatten)]
+    bench: BenchOptions,
     /// Do not write report.html
     #[arg(long)]
     no_report: bool,
 }
+
+/// What the bench can do, for --plan and --more.
+#[derive(Debug, Args)]
+struct BenchOptions {
+    /// Time on the bench for --plan or --more, minutes [default: 60, with --more 10]
+    #[arg(long, value_name = "MIN")]
+    minutes: Option<f64>,
+    /// Fastest generator for --plan or --more, rpm [default: 60]
+    #[arg(long, value_name = "RPM")]
+    speed_rpm: Option<f64>,
+    /// Least and largest load at the output for --plan or --more, N.m [default: none]
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1, allow_negative_numbers = true)]
+    load_n_m: Vec<f64>,
+    /// Lowest and highest temperature for --plan or --more, degrees C [default: one, 20]
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1, allow_negative_numbers = true)]
+    temperatures_c: Vec<f64>,
+    /// Travel of the output for --plan or --more, deg [default: a turn, 0,360]
+    #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1, allow_negative_numbers = true)]
+    travel_deg: Vec<f64>,
+    /// Noise of output less generator over ratio from row to row that --plan expects, arcsec [default: 1]
+    #[arg(long, value_name = "ARCSEC")]
+    noise_arcsec: Option<f64>,
+    /// Wander of the sensors within a minute that --plan expects, arcsec [default: 0.5]
+    #[arg(long, value_name = "ARCSEC")]
+    wander_arcsec: Option<f64>,
+}
+
+impl BenchOptions {
+    fn bench(&self, minutes: f64, rate_hz: Option<f64>, temperature_c: f64) -> Result<Bench, Failure> {
+        let usual = Bench::default();
+        let pair = |name: &str, values: &[f64], usual: [f64; 2]| match values {
+            [] => Ok(usual),
+            [one] => Ok([*one, *one]),
+            [low, high] => Ok([*low, *high]),
+            more => Err(Failure::BadInput(format!("{name}: found {} numbers, allowed: one or two", more.len()))),
+        };
+        let bench = Bench {
+            minutes: self.minutes.unwrap_or(minutes),
+            rate_hz: rate_hz.unwrap_or(usual.rate_hz),
+            speed_rpm: self.speed_rpm.unwrap_or(usual.speed_rpm),
+            torque_n_m: pair("--load-n-m", &self.load_n_m, usual.torque_n_m)?,
+            temperature_c: pair("--temperatures-c", &self.temperatures_c, [temperature_c; 2])?,
+            output_deg: pair("--travel-deg", &self.travel_deg, usual.output_deg)?,
+            noise_arcsec: self.noise_arcsec.unwrap_or(usual.noise_arcsec),
+            wander_arcsec: self.wander_arcsec.unwrap_or(usual.wander_arcsec),
+            wander_s: usual.wander_s,
+        };
+        bench.problem().map_or(Ok(bench), |problem| Err(Failure::BadInput(problem)))
+    }
+
+    /// An option that says something where nothing is planned.
+    fn said(&self) -> Option<&'static str> {
+        let said = [
+            ("--minutes", self.minutes.is_some()),
+            ("--speed-rpm", self.speed_rpm.is_some()),
+            ("--load-n-m", !self.load_n_m.is_empty()),
+            ("--temperatures-c", !self.temperatures_c.is_empty()),
+            ("--travel-deg", !self.travel_deg.is_empty()),
+            ("--noise-arcsec", self.noise_arcsec.is_some()),
+            ("--wander-arcsec", self.wander_arcsec.is_some()),
+        ];
+        said.into_iter().find_map(|(name, said)| said.then_some(name))
+    }
+}
+
+/// Minutes on the bench where nobody says how many: for the first log, and for what is added.
+const MINUTES: [f64; 2] = [60.0, 10.0];
 
 impl Calibrate {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
@@ -64,6 +142,12 @@ impl Calibrate {
             None => None,
         };
         let prior = self.prior(table.as_ref())?;
+        if self.plan {
+            return self.write_plan(context, &prior);
+        }
+        if let Some(option) = self.bench.said().filter(|_| !self.more) {
+            return Err(Failure::BadInput(format!("{option}: allowed with --plan or --more")));
+        }
         let gear = prior.nominal.gear();
         let files = self.logs.iter().map(|file| read(file, &map, &gear)).collect::<Result<Vec<_>, _>>();
         let files = files.map_err(|error| Failure::BadInput(error.to_string()))?;
@@ -71,6 +155,7 @@ impl Calibrate {
         let mut made = calibrate(&files, &prior).map_err(|error| self.failed(&error))?;
         made.calibration.command.clone_from(&context.command);
         made.table.info.command.clone_from(&context.command);
+        let further = self.more.then(|| self.further(context, &prior, &made)).transpose()?;
         let mut outputs = Outputs::new();
         let mut put = |name: &str, content: &[u8]| outputs.file(&out.join(name), |file| file.write_all(content));
         put("calibrated.fxt", &made.table.image)?;
@@ -80,8 +165,38 @@ impl Calibrate {
         if !self.no_report {
             report::write(&calibration_report::page(&made), out, &mut outputs)?;
         }
+        if let Some(further) = &further {
+            put_plan(further, out, &mut outputs)?;
+        }
         outputs.finish()?;
-        context.print(&made.calibration, || text(&made, out, !self.no_report) + &say::next(&self.next(out)))
+        let said = Said { calibration: &made.calibration, more: further.as_ref() };
+        context.print(&said, || {
+            let more = further.as_ref().map_or_else(String::new, |further| format!("\n{}", planned_text(further, out)));
+            text(&made, out, !self.no_report) + &more + &say::next(&self.next(out))
+        })
+    }
+
+    /// Says what to record.
+    fn write_plan(&self, context: &Context, prior: &Prior<'_>) -> Result<(), Failure> {
+        let bench = self.bench.bench(MINUTES[0], self.columns.rate_hz(), prior.nominal.temperature_c)?;
+        let mut planned = plan(prior, &bench, None).map_err(Failure::BadInput)?;
+        planned.command.clone_from(&context.command);
+        let out = context.out()?;
+        let mut outputs = Outputs::new();
+        put_plan(&planned, out, &mut outputs)?;
+        outputs.finish()?;
+        context.print(&planned, || planned_text(&planned, out))
+    }
+
+    /// What to add to the logs.
+    fn further(&self, context: &Context, prior: &Prior<'_>, made: &Calibrated) -> Result<Planned, Failure> {
+        let first = made.first();
+        let temperature =
+            f64::midpoint(f64::from(made.calibration.temperature_c[0]), f64::from(made.calibration.temperature_c[1]));
+        let bench = self.bench.bench(MINUTES[1], self.columns.rate_hz(), temperature)?;
+        let mut planned = plan(prior, &bench, Some(&first)).map_err(Failure::BadInput)?;
+        planned.command.clone_from(&context.command);
+        Ok(planned)
     }
 
     /// What went wrong, with the files where the error does not name one.
@@ -96,15 +211,7 @@ impl Calibrate {
 
     fn prior<'t>(&self, table: Option<&'t Table<'t>>) -> Result<Prior<'t>, Failure> {
         if let Some(table) = table {
-            let drive = format!("table {}", table.id());
-            let hash = *blake3::hash(table.image()).as_bytes();
-            return Ok(Prior {
-                nominal: Nominal::of_table(table),
-                table: Some(table),
-                drive,
-                hash,
-                kind: self.generator,
-            });
+            return Ok(Prior::of_table(table, self.generator));
         }
         if let Some(path) = &self.model {
             let model = Model::read(path).map_err(|error| Failure::BadInput(error.to_string()))?;
@@ -115,7 +222,8 @@ impl Calibrate {
             let bytes =
                 std::fs::read(path).map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
             let (drive, hash) = (path.display().to_string(), *blake3::hash(&bytes).as_bytes());
-            return Ok(Prior { nominal: model.nominal, table: None, drive, hash, kind: self.generator });
+            let known = Prior::of_ratio(model.nominal.ratio, self.generator);
+            return Ok(Prior { nominal: model.nominal, drive, hash, ..known });
         }
         let ratio = self.ratio.unwrap_or_default();
         if !(ratio.is_finite() && ratio.abs() >= 2.0 && ratio.abs() <= 1e4) {
@@ -129,6 +237,78 @@ impl Calibrate {
         let table = quoted(&out.join("calibrated.fxt").display().to_string());
         vec![format!("flexspline replay --tables {table} ANOTHER.log")]
     }
+}
+
+/// What `--json` prints: the calibration, and what to add.
+#[derive(serde::Serialize)]
+struct Said<'a> {
+    #[serde(flatten)]
+    calibration: &'a Calibration,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    more: Option<&'a Planned>,
+}
+
+fn put_plan(planned: &Planned, out: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
+    outputs.file(&out.join("plan.csv"), |file| file.write_all(planned.csv().as_bytes()))?;
+    outputs.json(&out.join("plan.json"), planned)?;
+    Ok(())
+}
+
+/// A plan for a reader.
+fn planned_text(planned: &Planned, out: &Path) -> String {
+    let logs = planned.passes.iter().map(|pass| pass.log).max().unwrap_or(0);
+    let mut text = format!(
+        "{}: {} passes in {:.0} minutes, each there and back with a second of rest at either end; {} rows in a second\n",
+        planned.drive,
+        planned.passes.len(),
+        planned.minutes,
+        planned.bench.rate_hz
+    );
+    if logs > 1 {
+        text += "each temperature is a log of its own, recorded when the drive has settled there; the encoders keep their zeros\n";
+    }
+    text += "   log   output, deg           generator, turns      rpm   load, N.m     C   tells most of\n";
+    for p in &planned.passes {
+        let _ = writeln!(
+            text,
+            "  {:>4}  {:>7.1} to {:>7.1}   {:>8.2} to {:>8.2} {:>7.1} {:>10.2} {:>6.1}   {}",
+            p.log,
+            p.from_output_deg,
+            p.to_output_deg,
+            p.from_generator_turn,
+            p.to_generator_turn,
+            p.speed_rpm,
+            p.torque_n_m,
+            p.temperature_c,
+            p.tells.as_str()
+        );
+    }
+    for why in &planned.cannot {
+        let _ = writeln!(text, "not told by these: {why}");
+    }
+    if !planned.widest.is_empty() {
+        text += "widest nodes, half width of 95 %, arcsec: after these logs, and expected\n";
+        for wide in &planned.widest {
+            let now = wide.half_width_arcsec.map_or("not recorded".to_owned(), |half| format!("{half:.2}"));
+            let _ =
+                writeln!(text, "  {:<16} {} {:.1}: {now}, {:.2}", wide.part, wide.of, wide.at, wide.expected_arcsec);
+        }
+    }
+    if let Some(before) = planned.rms_before_arcsec {
+        let _ = writeln!(
+            text,
+            "error of the parts over all that the table is to hold, arcsec rms: {before:.2} after these logs"
+        );
+    }
+    let _ = writeln!(
+        text,
+        "error of the parts to expect, arcsec rms: {:.2}, for a noise of {:.2} arcsec from row to row and {:.2} besides; what no part has, and \
+         an eccentric encoder at the output, come on top",
+        planned.expected_rms_arcsec,
+        planned.noise.white_arcsec,
+        planned.noise.beside_white_arcsec()
+    );
+    text + &format!("wrote to {}/: plan.csv, plan.json", out.display())
 }
 
 fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
@@ -154,6 +334,14 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
         let kept = if part.kept { "kept   " } else { "refused" };
         let _ = writeln!(text, "  {:<16} {kept} {gain} %{size}  {}", part.name, part.why);
     }
+    if let Some(found) = &c.alignment {
+        let used = if found.told { "used" } else { "not told by these logs, not used" };
+        let _ = writeln!(
+            text,
+            "phase of the table: its generator angle 0 is where the logs read {:.3} ± {:.3} deg (it repeats every {:.3} deg): {used}; {}",
+            found.generator_zero_deg, found.generator_half_width_deg, found.repeats_deg, found.why
+        );
+    }
     let removed = 100.0 * (1.0 - held_out.rms_after_arcsec / held_out.rms_before_arcsec);
     let _ = writeln!(
         text,
@@ -164,6 +352,11 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
         text,
         "the core over all rows, reversals among them: {:.2} as measured, {:.2} with the table {}",
         core.rms_before_arcsec, core.rms_after_arcsec, c.table_id
+    );
+    let _ = writeln!(
+        text,
+        "the table holds the error to ±{:.2} arcsec (95 %, where it was recorded); a generator degree in its zero costs {:.2} arcsec rms",
+        c.half_width_arcsec, c.zero_cost.rms_arcsec_per_generator_deg
     );
     let mut files = vec!["calibrated.fxt", "calibrated.h", "calibrated.rs", "calibration.json"];
     files.extend(with_page.then_some("report.html (for any browser)"));

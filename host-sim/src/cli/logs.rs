@@ -40,6 +40,11 @@ impl LogOptions {
         map.at_rate(self.rate).map_err(Failure::BadInput)
     }
 
+    /// Rows in a second, if that is said.
+    pub(super) fn rate_hz(&self) -> Option<f64> {
+        self.rate
+    }
+
     /// Whether anything is said.
     pub(super) fn said(&self) -> bool {
         !self.columns.is_empty() || self.rate.is_some()

@@ -21,6 +21,11 @@ pub use coverage::Coverage;
 pub use picture::text;
 use relation::{RATIOS, counts_of_a_turn, slope, torque_says};
 
+/// A ratio this close to a half is taken for one: a guess.
+const CLOSE_TO_HALF: f64 = 0.1;
+/// Share of the error that a column without a name must explain to be offered as the torque: a guess.
+const NAMELESS: f64 = 0.3;
+
 /// What a column may hold, for all that can be told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -213,8 +218,14 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
     units_of_counts(&mut guesses);
     let ratio = pair(&mut guesses, &mut notes);
     settle(&mut guesses, &mut notes);
-    let error = error_rad(&guesses, ratio.map(f64::round));
+    let proposed = ratio.map(proposed_ratio);
+    let error = error_rad(&guesses, proposed);
     torque(&mut guesses, error.as_deref(), &mut notes);
+    if let Some(half) = proposed.filter(|ratio| ratio.fract() != 0.0) {
+        notes.push(format!(
+            "ratios are whole numbers but for wheels with an odd number of teeth: {half} is nearest to these rows"
+        ));
+    }
     let (kind, period_s, starts) = clock(&guesses, files);
     let columns_option = option(&guesses, first, &mut notes);
     let coverage = coverage::of(&guesses, ratio, &starts);
@@ -244,7 +255,7 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
         header_line: first.has_names.then_some(first.header_line),
         columns,
         ratio_found: ratio,
-        ratio_proposed: ratio.map(f64::round),
+        ratio_proposed: proposed,
         sessions: starts.len(),
         time: kind,
         period_s,
@@ -252,6 +263,12 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
         columns_option,
         notes,
     })
+}
+
+/// The ratio that wheels can have: a whole number, or a half that the rows are close to.
+fn proposed_ratio(found: f64) -> f64 {
+    let half = found.floor() + 0.5;
+    if (found - half).abs() < CLOSE_TO_HALF { half } else { found.round() }
 }
 
 /// What a column says by its name and by its numbers alone.
@@ -571,6 +588,21 @@ fn error_rad(guesses: &[Guess], ratio: Option<f64>) -> Option<Vec<f64>> {
     Some(error.values.iter().map(|value| rad * value).collect())
 }
 
+/// Says which column without a role the error moves with, where none is called a torque.
+fn nameless_torque(guesses: &[Guess], error: &[f64], output: &[f64], notes: &mut Vec<String>) {
+    let nameless = (0..guesses.len()).filter(|k| guesses[*k].role == Role::Unknown && guesses[*k].moves());
+    let says = nameless.filter_map(|k| Some((k + 1, torque_says(error, output, &guesses[k].values)?)));
+    let best = says.filter(|(_, says)| says.share > NAMELESS).max_by(|a, b| a.1.share.total_cmp(&b.1.share));
+    if let Some((place, says)) = best {
+        let sign = if says.slope < 0.0 { "-" } else { "" };
+        notes.push(format!(
+            "column {place} may be the torque: it explains {:.0} % of the error beside the turn of the output; name its unit, \
+             torque=#{place}:{sign}N.m",
+            100.0 * says.share
+        ));
+    }
+}
+
 /// Which column may be the torque, and which way it counts.
 fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>) {
     let output: Option<Vec<f64>> =
@@ -578,9 +610,17 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
             let rad = guess.rad()?;
             Some(guess.values.iter().map(|value| rad * value).collect())
         });
-    let candidates: Vec<usize> = (0..guesses.len())
-        .filter(|k| matches!(guesses[*k].role, Role::Torque | Role::Current) && guesses[*k].moves())
-        .collect();
+    let of_role = |guess: &Guess| matches!(guess.role, Role::Torque | Role::Current);
+    let candidates: Vec<usize> = (0..guesses.len()).filter(|k| of_role(&guesses[*k]) && guesses[*k].moves()).collect();
+    if candidates.is_empty() {
+        // A load that does not change is a load: without it the table would be one for none.
+        if let Some(constant) = guesses.iter_mut().find(|guess| guess.role == Role::Torque && guess.facts.finite > 0) {
+            constant.used = true;
+        }
+        if let (Some(error), Some(output)) = (error, output.as_deref()) {
+            nameless_torque(guesses, error, output, notes);
+        }
+    }
     let says: Vec<_> = candidates
         .iter()
         .map(|k| error.zip(output.as_ref()).and_then(|(error, output)| torque_says(error, output, &guesses[*k].values)))

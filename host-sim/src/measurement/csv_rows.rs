@@ -242,6 +242,15 @@ impl Row<'_> {
         self.record.iter().skip(place).all(|field| field.trim_ascii().is_empty())
     }
 
+    /// Whether it holds the names of the columns once more, as loggers write them that are started anew.
+    pub fn repeats(&self, names: &[String]) -> bool {
+        self.record.len() == names.len()
+            && names
+                .iter()
+                .zip(self.record)
+                .all(|(name, field)| !name.is_empty() && name.as_bytes() == field.trim_ascii())
+    }
+
     /// A field as a number, which may be infinite or NaN if the text says so.
     pub fn number(&self, place: usize) -> Result<f64, NotANumber> {
         let field = self.record.get(place).ok_or(NotANumber::Absent(self.record.len()))?.trim_ascii();
@@ -272,9 +281,9 @@ fn not_csv(start: &[u8]) -> Option<&'static str> {
         (b"\x1F\x8B", "a gzip archive; unpack it first"),
         (b"PK\x03\x04", "a ZIP archive or a workbook (.xlsx); save it as CSV"),
         (b"\xD0\xCF\x11\xE0", "an Office file (.xls); save it as CSV"),
-        (b"\x89HDF", "an HDF5 or MATLAB file; write it as CSV"),
-        (b"MATLAB 5.0", "a MATLAB file; write it as CSV"),
-        (b"PAR1", "a Parquet file; write it as CSV"),
+        (b"\x89HDF", "an HDF5 or MATLAB file; write it as CSV, as examples/to_csv.py does"),
+        (b"MATLAB 5.0", "a MATLAB file; write it as CSV, as examples/to_csv.py does"),
+        (b"PAR1", "a Parquet file; write it as CSV, as examples/to_csv.py does"),
         (b"TDSm", "a TDMS file; write it as CSV"),
         (b"\xFF\xFE", "text in UTF-16; save it as UTF-8"),
         (b"\xFE\xFF", "text in UTF-16; save it as UTF-8"),

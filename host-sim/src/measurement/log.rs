@@ -124,7 +124,9 @@ pub(super) fn read(file: &str, mut source: impl Read, map: &ColumnMap) -> Result
     .map_err(refuse)?;
     let columns = map.resolve(rows.header(), rows.header_line(), layout.as_ref()).map_err(refuse)?;
     let mut notes = map.misspelt(rows.header(), &columns);
-    let width = rows.header().len();
+    let names = rows.header().to_vec();
+    let width = names.len();
+    let mut restarts = Vec::new();
     let header_line = rows.header_line();
     let mut values: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
     let mut log = Log::default();
@@ -133,6 +135,10 @@ pub(super) fn read(file: &str, mut source: impl Read, map: &ColumnMap) -> Result
     while let Some(row) = rows.next_row().map_err(refuse)? {
         if let Some(problem) = short {
             return Err(refuse(problem));
+        }
+        if row.repeats(&names) {
+            restarts.push(row.line);
+            continue;
         }
         let at = |what: String| refuse(TableProblem { line: row.line, what });
         if row.fields() > width && !row.blank_from(width) {
@@ -157,6 +163,12 @@ pub(super) fn read(file: &str, mut source: impl Read, map: &ColumnMap) -> Result
             }
         };
         return Err(refuse(TableProblem { line: header_line, what }));
+    }
+    if let Some(first) = restarts.first() {
+        let times = if restarts.len() == 1 { "once".to_owned() } else { format!("{} times", restarts.len()) };
+        notes.push(format!(
+            "the names of the columns are repeated {times}, first in line {first}: these lines are left out"
+        ));
     }
     for (column, mut values) in columns.iter().zip(values) {
         values.shrink_to_fit();

@@ -86,6 +86,9 @@ pub fn parse(file: &str, mut source: impl Read) -> Result<RawFile, MeasuredError
         .collect();
     let (mut count, mut odd_rows) = (0, 0);
     while let Some(row) = rows.next_row().map_err(refuse)? {
+        if row.repeats(&names) {
+            continue;
+        }
         count += 1;
         odd_rows += usize::from(row.fields() < names.len() || !row.blank_from(names.len()));
         for (place, column) in columns.iter_mut().enumerate() {

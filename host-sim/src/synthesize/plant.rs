@@ -5,6 +5,7 @@ use flexspline::{GeneratorAngle, PlayState, Table};
 use super::excitation::Excitation;
 use super::law::{Law, Now};
 use crate::nominal::Nominal;
+use crate::tables::dead_zone_n_m;
 use crate::units::ARCSEC_PER_RAD;
 
 /// The nominal drive: a catalogue's model, or a table made by FEM and read by the core, whose wind-up and clearance then stand in
@@ -141,13 +142,4 @@ impl Plant<'_> {
             law.add_error(&now, error);
         }
     }
-}
-
-/// Torque below which a table leaves the output inside its clearance, N·m: where its axis jumps.
-fn dead_zone_n_m(table: &Table<'_>) -> f64 {
-    let nodes: Vec<f32> = table.torque_nodes_n_m().collect();
-    (0..nodes.len().saturating_sub(1))
-        .filter(|node| table.is_torque_jump(*node))
-        .map(|node| f64::from(nodes[node].midpoint(nodes[node + 1])).abs())
-        .fold(0.0, f64::max)
 }

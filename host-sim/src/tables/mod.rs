@@ -28,3 +28,14 @@ pub use source_files::{c_header, rust_source};
 pub use sweep::{SweepError, SweepPlan, SweepProgress, symmetric_nodes};
 pub use torque_nodes::NodeChoice;
 pub use validate::{ValidateError, Validation, ValidationSettings, validate};
+
+use flexspline::Table;
+
+/// Torque below which a table leaves the output inside its clearance, N·m: where its axis jumps.
+pub fn dead_zone_n_m(table: &Table<'_>) -> f64 {
+    let nodes: Vec<f32> = table.torque_nodes_n_m().collect();
+    (0..nodes.len().saturating_sub(1))
+        .filter(|node| table.is_torque_jump(*node))
+        .map(|node| f64::from(nodes[node].midpoint(nodes[node + 1])).abs())
+        .fold(0.0, f64::max)
+}

@@ -1,0 +1,524 @@
+//! What to record: the motion that tells most of the parts in the time there is, found from the same columns that the fit uses.
+//!
+//! Passes that a bench can make (over the whole travel there and back at one load; a few slow generator turns) are added one after the other,
+//! each time the one that lowers the expected variance of the table, over all that it is to hold, most for its time. The expected accuracy is that of
+//! the information matrix of all of them, for the noise that is assumed or that a first log has shown.
+
+use std::f64::consts::TAU;
+
+use flexspline_algebra::Mat;
+use serde::Serialize;
+
+use super::folds::{Chosen, Row};
+use super::interval::{Information, Node, Noise, OF_95, covariance, row, spread, widths};
+use super::parts::{PartName, Scales, State};
+use super::rows::MOST_ROWS;
+use super::{LEAST_FRICTION, ONE_TEMPERATURE_K, PENALTY_OF_PLANS, Prior, ROWS_OF_A_PITCH};
+
+/// Loads at which passes are made, where there is a load.
+const LOADS: usize = 7;
+/// Slow generator turns, and the places of the travel at which they are made.
+const SLOW_TURNS: f64 = 2.0;
+const SLOW_PLACES: usize = 4;
+/// Standing at each turning point, s, so that the reversal is seen.
+const REST_S: f64 = 1.0;
+/// States that the accuracy is asked for at, and rows that stand for a pass.
+const ASKED: usize = 1500;
+const ROWS_OF_A_PASS: usize = 500;
+/// A slower pass is not worth its own kind below this share of the speed.
+const SLOWER: f64 = 0.7;
+/// Nodes of a first log that are said to be widest.
+const WIDEST: usize = 8;
+/// Half widths beyond this, arcsec, are those of what was not recorded at all.
+pub(super) const NOT_RECORDED_ARCSEC: f64 = 2e3;
+
+/// What the bench can do, and what the table is to hold.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Bench {
+    /// Time, minutes.
+    pub minutes: f64,
+    /// Rows in a second.
+    pub rate_hz: f64,
+    /// Fastest generator, rpm.
+    pub speed_rpm: f64,
+    /// Least and largest load, N·m; both the same where it cannot be changed.
+    pub torque_n_m: [f64; 2],
+    /// Lowest and highest temperature, °C.
+    pub temperature_c: [f64; 2],
+    /// Travel of the output, deg.
+    pub output_deg: [f64; 2],
+    /// Noise of the error from row to row, arcsec.
+    pub noise_arcsec: f64,
+    /// Wander of the sensors, arcsec, and its time scale, s.
+    pub wander_arcsec: f64,
+    /// See above.
+    pub wander_s: f64,
+}
+
+impl Default for Bench {
+    fn default() -> Bench {
+        Bench {
+            minutes: 60.0,
+            rate_hz: 100.0,
+            speed_rpm: 60.0,
+            torque_n_m: [0.0; 2],
+            temperature_c: [20.0; 2],
+            output_deg: [0.0, 360.0],
+            noise_arcsec: 1.0,
+            wander_arcsec: 0.5,
+            wander_s: 20.0,
+        }
+    }
+}
+
+impl Bench {
+    /// What is wrong with it, if anything.
+    #[must_use]
+    pub fn problem(&self) -> Option<String> {
+        let within = |name: &str, value: f64, low: f64, high: f64| {
+            let good = value.is_finite() && (low..=high).contains(&value);
+            (!good).then(|| format!("{name}: found {value}, allowed: {low} to {high}"))
+        };
+        let rising = |name: &str, [low, high]: [f64; 2]| {
+            let good = low.is_finite() && high.is_finite() && low <= high;
+            (!good).then(|| format!("{name}: found {low} and {high}, allowed: the lower first"))
+        };
+        within("--minutes", self.minutes, 1.0, 1e5)
+            .or_else(|| within("--rate", self.rate_hz, 0.1, 1e6))
+            .or_else(|| within("--speed-rpm", self.speed_rpm, 1e-3, 1e5))
+            .or_else(|| within("--noise-arcsec", self.noise_arcsec, 1e-3, 1e4))
+            .or_else(|| within("--wander-arcsec", self.wander_arcsec, 0.0, 1e4))
+            .or_else(|| rising("--load-n-m", self.torque_n_m))
+            .or_else(|| rising("--temperatures-c", self.temperature_c))
+            .or_else(|| rising("--travel-deg", self.output_deg))
+            .or_else(|| within("--travel-deg (its length)", self.output_deg[1] - self.output_deg[0], 1.0, 3.6e4))
+    }
+
+    /// The noise that it is expected to have, of rows as many as are fitted.
+    fn noise(&self) -> Noise {
+        let (white, wander) = (self.noise_arcsec.powi(2), self.wander_arcsec.powi(2));
+        let rows_in_a_wander = 2.0 * self.wander_s * self.rate_fitted_hz();
+        Noise {
+            rms_arcsec: (white + wander).sqrt(),
+            white_arcsec: self.noise_arcsec,
+            hangs_together: (white + wander * (1.0 + rows_in_a_wander)) / (white + wander),
+        }
+    }
+
+    /// Rows in a second that are fitted: longer records are thinned.
+    fn rate_fitted_hz(&self) -> f64 {
+        self.rate_hz.min(MOST_ROWS as f64 / (60.0 * self.minutes))
+    }
+}
+
+/// A pass: from one angle to the other and back, at one load.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Pass {
+    /// Number of the log, from 1: one for each temperature.
+    pub log: usize,
+    /// When it begins in its log, s, and how long it takes.
+    pub begin_s: f64,
+    /// See above.
+    pub duration_s: f64,
+    /// From this output angle, deg, to that one, and back.
+    pub from_output_deg: f64,
+    /// See above.
+    pub to_output_deg: f64,
+    /// The same of the generator, turns.
+    pub from_generator_turn: f64,
+    /// See above.
+    pub to_generator_turn: f64,
+    /// Speed of the generator, rpm.
+    pub speed_rpm: f64,
+    /// Load, N·m.
+    pub torque_n_m: f64,
+    /// Temperature, °C.
+    pub temperature_c: f64,
+    /// What it tells most of.
+    pub tells: PartName,
+}
+
+/// `plan.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Planned {
+    /// Version of this object.
+    pub schema_version: u32,
+    /// The drive.
+    pub drive: String,
+    /// Generator turns for one of the output.
+    pub ratio: f64,
+    /// What the bench can do.
+    pub bench: Bench,
+    /// The noise that the accuracy holds for.
+    pub noise: Noise,
+    /// What to record.
+    pub passes: Vec<Pass>,
+    /// Time that they take, minutes.
+    pub minutes: f64,
+    /// Expected error of the table's parts over all that it is to hold, arcsec rms: of sensors' noise alone.
+    pub expected_rms_arcsec: f64,
+    /// The same of the first log alone; absent where there is none, or where it has not recorded some part at all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_before_arcsec: Option<f64>,
+    /// Half widths expected at the nodes.
+    pub nodes: Vec<Node>,
+    /// The widest of them after the first log, widest first, with what is expected of them after these passes.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub widest: Vec<Wide>,
+    /// Parts that this bench cannot tell, and why.
+    pub cannot: Vec<String>,
+    /// Command line, once known.
+    pub command: String,
+}
+
+/// A node that a first log leaves wide.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Wide {
+    /// Part.
+    pub part: &'static str,
+    /// Which angle, torque or temperature.
+    pub of: &'static str,
+    /// Its value.
+    pub at: f64,
+    /// Half width after the first log, arcsec; absent if nothing was recorded that tells it.
+    pub half_width_arcsec: Option<f64>,
+    /// Half width that is expected after these passes.
+    pub expected_arcsec: f64,
+}
+
+/// What a first log has shown.
+pub struct First<'a> {
+    pub(super) rows: &'a [Row],
+    pub(super) files: usize,
+    pub(super) noise: Noise,
+    /// Torques and temperatures that it has.
+    pub(super) scales: Scales,
+}
+
+/// A pass that may be made.
+struct Candidate {
+    pass: Pass,
+    warmth: usize,
+    tells: Information,
+}
+
+/// Plans what to record of a drive, after a first log if there is one.
+///
+/// # Errors
+/// A bench with numbers out of range, or with no time for a single pass.
+pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Result<Planned, String> {
+    prior.core_drive()?;
+    if let Some(problem) = bench.problem() {
+        return Err(problem);
+    }
+    let wide = |[a, b]: [f64; 2], other: Option<[f64; 2]>| other.map_or([a, b], |[c, d]| [a.min(c), b.max(d)]);
+    let torque = wide(bench.torque_n_m, first.map(|first| first.scales.torque_n_m));
+    let scales = Scales {
+        torque_n_m: torque,
+        friction_n_m: prior.friction_n_m().max(LEAST_FRICTION * torque[0].abs().max(torque[1].abs())),
+        temperature_c: wide(bench.temperature_c, first.map(|first| first.scales.temperature_c)),
+        teeth: prior.tooth_pitches(),
+    };
+    let ratio = prior.nominal.ratio;
+    let (open, cannot) = open_parts(prior, bench, &scales);
+    let chosen: Vec<Chosen> = open.iter().map(|part| Chosen { part: *part, penalty: PENALTY_OF_PLANS }).collect();
+    let candidates = candidates(prior, bench, &scales, &chosen);
+    let noise = first.map_or_else(|| bench.noise(), |first| first.noise);
+
+    let width = row(&chosen, &state(0.0, 0.0, 0.0, 20.0, 1.0), &scales).len();
+    let warmths = temperatures(bench).len();
+    let mut known = vec![Information::new(width); warmths + first.map_or(0, |first| first.files)];
+    for at in first.iter().flat_map(|first| first.rows) {
+        known[warmths + at.zero].add(&row(&chosen, &at.at, &scales), 1.0);
+    }
+    let before: f64 = known.iter().map(Information::rows).sum();
+    let rows = before + 60.0 * bench.minutes * bench.rate_fitted_hz();
+    let travel = bench.output_deg.map(f64::to_radians);
+    let asked = Asked::of(&scales, ratio, travel, &chosen);
+    let of =
+        |known: &[Information]| covariance(known, &chosen, rows).ok_or("the information matrix is singular".to_owned());
+
+    let mut now = of(&known)?;
+    let at_first = now.clone();
+    let (mut left_s, mut taken) = (60.0 * bench.minutes, Vec::new());
+    loop {
+        let uncertain = asked.mean_variance(&now);
+        let mut best: Option<(f64, usize, Mat)> = None;
+        for (k, candidate) in candidates.iter().enumerate().filter(|(_, c)| c.pass.duration_s <= left_s) {
+            let mut with = known.clone();
+            with[candidate.warmth].join(&candidate.tells);
+            let then = of(&with)?;
+            let gain = (uncertain - asked.mean_variance(&then)) / candidate.pass.duration_s;
+            if best.as_ref().is_none_or(|(most, ..)| gain > *most) {
+                best = Some((gain, k, then));
+            }
+        }
+        let Some((_, k, then)) = best else { break };
+        let tells = asked.tells_most(&chosen, &now, &then);
+        known[candidates[k].warmth].join(&candidates[k].tells);
+        left_s -= candidates[k].pass.duration_s;
+        taken.push((candidates[k].warmth, Pass { tells, ..candidates[k].pass }));
+        now = then;
+    }
+    if taken.is_empty() {
+        let shortest = candidates.iter().map(|c| c.pass.duration_s).fold(f64::INFINITY, f64::min) / 60.0;
+        return Err(format!(
+            "--minutes: found {}, allowed: {shortest:.1} or more, the time of one pass there and back at {} rpm",
+            bench.minutes, bench.speed_rpm
+        ));
+    }
+    let none = |_: &[f64]| 0.0;
+    let nodes = widths(&chosen, &scales, &now, noise.of_a_row(), &none);
+    let rms = |covariance: &Mat| (noise.of_a_row() * asked.mean_variance(covariance)).sqrt();
+    let mut widest = Vec::new();
+    if first.is_some() {
+        let then = widths(&chosen, &scales, &at_first, noise.of_a_row(), &none);
+        let mut order: Vec<usize> = (0..then.len()).collect();
+        order.sort_by(|a, b| then[*b].half_width_arcsec.total_cmp(&then[*a].half_width_arcsec));
+        widest = order
+            .into_iter()
+            .take(WIDEST)
+            .map(|k| Wide {
+                part: then[k].part,
+                of: then[k].of,
+                at: then[k].at,
+                half_width_arcsec: Some(then[k].half_width_arcsec).filter(|half| *half < NOT_RECORDED_ARCSEC),
+                expected_arcsec: nodes[k].half_width_arcsec,
+            })
+            .collect();
+    }
+    let passes = in_order(taken);
+    Ok(Planned {
+        schema_version: 1,
+        drive: prior.drive.clone(),
+        ratio,
+        bench: bench.clone(),
+        noise,
+        minutes: passes.iter().map(|pass| pass.duration_s).sum::<f64>() / 60.0,
+        passes,
+        expected_rms_arcsec: rms(&now),
+        rms_before_arcsec: first.map(|_| rms(&at_first)).filter(|rms| *rms < NOT_RECORDED_ARCSEC / OF_95),
+        nodes,
+        widest,
+        cannot,
+        command: String::new(),
+    })
+}
+
+/// Cold first; at each temperature in the order in which they tell most, so that a log that is broken off is worth most.
+fn in_order(taken: Vec<(usize, Pass)>) -> Vec<Pass> {
+    let warmths = taken.iter().map(|(warmth, _)| warmth + 1).max().unwrap_or(0);
+    let mut passes = Vec::new();
+    for warmth in 0..warmths {
+        let mut begin_s = 0.0;
+        for (_, pass) in taken.iter().filter(|(of, _)| *of == warmth) {
+            passes.push(Pass { begin_s, ..*pass });
+            begin_s += pass.duration_s;
+        }
+    }
+    passes
+}
+
+/// The column of the temperature that moves the zero alone, which logs of one temperature each cannot tell from the encoder's.
+fn column_of_zero(chosen: &[Chosen]) -> Option<usize> {
+    let at = chosen.iter().position(|chosen| chosen.part == PartName::Temperature)?;
+    Some(chosen[..at].iter().map(|chosen| super::parts::weights(chosen.part).len()).sum())
+}
+
+/// What the table is asked for: the mean of `x xᵀ` over all that it is to hold.
+struct Asked {
+    width: usize,
+    moment: Vec<f64>,
+}
+
+impl Asked {
+    fn of(scales: &Scales, ratio: f64, travel: [f64; 2], chosen: &[Chosen]) -> Asked {
+        let mut rows: Vec<Vec<f64>> =
+            spread(scales, ratio, travel, ASKED).iter().map(|at| row(chosen, at, scales)).collect();
+        if let Some(zero) = column_of_zero(chosen) {
+            rows.iter_mut().for_each(|row| row[zero] = 0.0);
+        }
+        // What is the same everywhere is the encoder's zero, and nobody's error.
+        let count = rows.len() as f64;
+        let width = rows.first().map_or(0, Vec::len);
+        let means: Vec<f64> = (0..width).map(|i| rows.iter().map(|row| row[i]).sum::<f64>() / count).collect();
+        let mut moment = vec![0.0; width * width];
+        for row in &rows {
+            for i in 0..width {
+                for j in 0..width {
+                    moment[i * width + j] += (row[i] - means[i]) * (row[j] - means[j]) / count;
+                }
+            }
+        }
+        Asked { width, moment }
+    }
+
+    /// Mean variance of some of the columns.
+    fn variance_of(&self, covariance: &Mat, columns: std::ops::Range<usize>) -> f64 {
+        let pairs = columns.clone().flat_map(|i| columns.clone().map(move |j| (i, j)));
+        pairs.map(|(i, j)| self.moment[i * self.width + j] * covariance[(i, j)]).sum::<f64>().max(0.0)
+    }
+
+    fn mean_variance(&self, covariance: &Mat) -> f64 {
+        self.variance_of(covariance, 0..self.width)
+    }
+
+    /// The part whose variance falls most.
+    fn tells_most(&self, chosen: &[Chosen], before: &Mat, after: &Mat) -> PartName {
+        let mut begin = 0;
+        let mut best = (f64::NEG_INFINITY, PartName::OutputAngle);
+        for one in chosen {
+            let columns = begin..begin + super::parts::weights(one.part).len();
+            begin = columns.end;
+            let gain = self.variance_of(before, columns.clone()) - self.variance_of(after, columns);
+            if gain > best.0 {
+                best = (gain, one.part);
+            }
+        }
+        best.1
+    }
+}
+
+/// Parts that this bench can tell, and why it cannot tell the others.
+fn open_parts(prior: &Prior<'_>, bench: &Bench, scales: &Scales) -> (Vec<PartName>, Vec<String>) {
+    let turns = (bench.output_deg[1] - bench.output_deg[0]) / 360.0;
+    let generator_turns = turns * prior.nominal.ratio.abs();
+    let lacks = |part: PartName| match part {
+        PartName::WindUp if scales.torque_n_m[1] <= scales.torque_n_m[0] => {
+            Some("the load cannot be changed: give its range, --load-n-m LOW,HIGH".to_owned())
+        }
+        PartName::GeneratorAngle if generator_turns < super::MOST_OF_A_TURN => {
+            Some(format!("the travel is {generator_turns:.2} generator turns"))
+        }
+        PartName::MaterialAngle if generator_turns < super::TURNS_TO_TELL_WHEELS => Some(format!(
+            "the travel is {generator_turns:.1} generator turns; {} tell it from the generator angle",
+            super::TURNS_TO_TELL_WHEELS
+        )),
+        PartName::ToothPitch if prior.nominal.teeth.is_none() && prior.table.is_none() => {
+            Some("the teeth are not known, the ratio alone is".to_owned())
+        }
+        PartName::OutputAngle if turns < super::HALF_A_TURN => Some(format!("the travel is {turns:.2} output turns")),
+        PartName::Temperature if scales.temperature_c[1] - scales.temperature_c[0] < ONE_TEMPERATURE_K => {
+            Some("one temperature: give the range, --temperatures-c LOW,HIGH".to_owned())
+        }
+        _ => None,
+    };
+    let open = PartName::ALL.into_iter().filter(|part| lacks(*part).is_none()).collect();
+    let cannot = PartName::ALL
+        .into_iter()
+        .filter_map(|part| lacks(part).map(|why| format!("{}: {why}", part.as_str())))
+        .collect();
+    (open, cannot)
+}
+
+/// Temperatures that are recorded.
+fn temperatures(bench: &Bench) -> Vec<f64> {
+    let [cold, warm] = bench.temperature_c;
+    if warm - cold < ONE_TEMPERATURE_K {
+        vec![f64::midpoint(cold, warm)]
+    } else {
+        vec![cold, f64::midpoint(cold, warm), warm]
+    }
+}
+
+/// Loads of passes: where polynomials of the wind-up tell best, and none.
+fn loads([low, high]: [f64; 2]) -> Vec<f64> {
+    if high <= low {
+        return vec![low];
+    }
+    let most = (LOADS - 1) as f64;
+    let place =
+        |k: usize| f64::midpoint(low, high) - 0.5 * (high - low) * (std::f64::consts::PI * k as f64 / most).cos();
+    let mut loads: Vec<f64> = (0..LOADS).map(place).collect();
+    let close = 0.05 * (high - low);
+    if low < 0.0 && high > 0.0 && loads.iter().all(|load| load.abs() > close) {
+        loads.push(0.0);
+    }
+    // What is meant is none.
+    loads.iter_mut().filter(|load| load.abs() < 1e-9 * (high - low)).for_each(|load| *load = 0.0);
+    loads
+}
+
+fn state(generator_rad: f64, ratio_output: f64, torque_n_m: f64, temperature_c: f64, way: f64) -> State {
+    State { generator_rad, output_rad: ratio_output, torque_n_m, temperature_c, way }
+}
+
+/// The passes that may be made.
+fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[Chosen]) -> Vec<Candidate> {
+    let ratio = prior.nominal.ratio;
+    let [begin, end] = bench.output_deg;
+    let by_teeth = chosen.iter().any(|chosen| chosen.part == PartName::ToothPitch);
+    // So slow that the curve over a pitch has its rows.
+    let slow_rpm = 60.0 * bench.rate_hz / (ROWS_OF_A_PITCH * scales.teeth);
+    let slow = by_teeth && slow_rpm < SLOWER * bench.speed_rpm;
+    let slow_deg = 360.0 * SLOW_TURNS / ratio.abs();
+    let mut ways = vec![(begin, end, bench.speed_rpm)];
+    if slow && slow_deg < end - begin {
+        let step = (end - begin - slow_deg) / (SLOW_PLACES - 1) as f64;
+        ways.extend((0..SLOW_PLACES).map(|k| (begin + step * k as f64, begin + step * k as f64 + slow_deg, slow_rpm)));
+    }
+    let mut all = Vec::new();
+    for (warmth, temperature_c) in temperatures(bench).into_iter().enumerate() {
+        for torque_n_m in loads(bench.torque_n_m) {
+            for &(from, to, speed_rpm) in &ways {
+                let turns = (to - from) / 360.0 * ratio.abs();
+                let moving_s = 2.0 * turns / speed_rpm * 60.0;
+                let duration_s = moving_s + 2.0 * REST_S;
+                let weight = moving_s * bench.rate_fitted_hz() / ROWS_OF_A_PASS as f64;
+                let width = row(chosen, &state(0.0, 0.0, 0.0, 20.0, 1.0), scales).len();
+                let mut tells = Information::new(width);
+                for k in 0..ROWS_OF_A_PASS {
+                    let way = if k % 2 == 0 { 1.0 } else { -1.0 };
+                    let share = (k as f64 + 0.5) / ROWS_OF_A_PASS as f64;
+                    let output = (from + (to - from) * share).to_radians();
+                    // Not all at one phase of generator and teeth.
+                    let generator = output * ratio
+                        + TAU
+                            * (k as f64 * 0.618_033_988_749_895).fract()
+                            * (ratio.abs() / ROWS_OF_A_PASS as f64).min(1.0);
+                    tells.add(&row(chosen, &state(generator, output, torque_n_m, temperature_c, way), scales), weight);
+                }
+                let pass = Pass {
+                    log: warmth + 1,
+                    begin_s: 0.0,
+                    duration_s,
+                    from_output_deg: from,
+                    to_output_deg: to,
+                    from_generator_turn: from / 360.0 * ratio,
+                    to_generator_turn: to / 360.0 * ratio,
+                    speed_rpm,
+                    torque_n_m,
+                    temperature_c,
+                    tells: PartName::OutputAngle,
+                };
+                all.push(Candidate { pass, warmth, tells });
+            }
+        }
+    }
+    all
+}
+
+impl Planned {
+    /// The passes as a table for whoever programs the bench.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        let mut text = "log,begin_s,duration_s,from_output_deg,to_output_deg,from_generator_turn,to_generator_turn,speed_rpm,torque_n_m,temperature_c,tells\n".to_owned();
+        for p in &self.passes {
+            text += &format!(
+                "{},{:.1},{:.1},{:.3},{:.3},{:.3},{:.3},{:.2},{:.3},{:.1},{}\n",
+                p.log,
+                p.begin_s,
+                p.duration_s,
+                p.from_output_deg,
+                p.to_output_deg,
+                p.from_generator_turn,
+                p.to_generator_turn,
+                p.speed_rpm,
+                p.torque_n_m,
+                p.temperature_c,
+                p.tells.as_str()
+            );
+        }
+        text
+    }
+}
