@@ -8,7 +8,7 @@ use super::effect::Strange;
 use super::excitation::Excitation;
 use super::plant::Plant;
 use crate::causes::{CauseName, ParameterName};
-use crate::nominal::Nominal;
+use crate::nominal::{Fixed, Nominal};
 use crate::units::ARCSEC_PER_RAD;
 
 /// Flank angle where teeth bear, rad: the phase of a rectified sine on the flank that carries. A guess of its own: the diagnosis, which
@@ -123,10 +123,15 @@ impl Now<'_> {
     }
 
     fn angle(&self, of: Angle, k: usize) -> f64 {
+        // The wheel that stands sees the generator turn, the one that is the output turns with it.
+        let stands = match self.nominal().teeth.map(|teeth| teeth.fixed) {
+            Some(Fixed::CircularSpline) => Angle::CircularSpline,
+            Some(Fixed::Flexspline) | None => Angle::Flexspline,
+        };
         match of {
-            Angle::Flexspline => self.on.generator[k],
-            Angle::CircularSpline => self.on.generator[k] - self.output(k),
             Angle::Gravity => self.on.generator[k] + self.on.orientation[k],
+            wheel if wheel == stands => self.on.generator[k],
+            Angle::Flexspline | Angle::CircularSpline => self.on.generator[k] - self.output(k),
         }
     }
 
