@@ -3,6 +3,7 @@
 //! Wrong if this fails: a cause that is dropped without a trace; a trace that names a gate which did not decide; an explanation that
 //! blames the drive where the data lack what the cause needs.
 
+use flexspline_sim::causes::CauseName;
 use flexspline_tests::command::Desk;
 use serde_json::Value;
 
@@ -11,8 +12,6 @@ const NOMINAL: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 
     [nominal]\nstiffness_n_m_per_rad = 30000.0\nbacklash_arcsec = 60.0\nfriction_torque_n_m = 1.5\n\
     [[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 10.0\nphase_rad = 0.4\n";
 const HIDDEN: &str = "circular_spline_eccentricity";
-/// Causes of the library.
-const CAUSES: usize = 24;
 
 fn steps<'d>(diagnosis: &'d Value, cause: &str) -> Vec<&'d Value> {
     diagnosis["trace"].as_array().unwrap().iter().filter(|step| step["cause"] == cause).collect()
@@ -37,7 +36,7 @@ fn the_trace_names_the_gate_that_dropped_a_rival() {
     judged.sort_unstable();
     judged.dedup();
     let named = judged.iter().filter(|cause| !cause.contains(' ')).count();
-    assert!(named >= CAUSES, "{named} causes leave a trace: {judged:?}");
+    assert!(named >= CauseName::ALL.len(), "{named} causes leave a trace: {judged:?}");
 
     // What was named passed every gate of the verdict, against limits that it is told beside.
     let verdict: Vec<_> = steps(&diagnosis, HIDDEN).into_iter().filter(|step| step["stage"] == "verdict").collect();
