@@ -50,6 +50,48 @@ fn the_trace_names_the_gate_that_dropped_a_rival() {
     assert!(rival["value"].as_f64().unwrap() > 1000.0 && rival["limit"].as_f64().unwrap() < 0.0, "{rival}");
 }
 
+/// A crack is a damaged tooth that both flanks feel alike and nobody without load.
+#[test]
+fn a_cracked_root_is_told_from_a_damaged_tooth_and_the_gate_says_how() {
+    const CRACK: &str = "cracked_tooth_root";
+    let desk = Desk::new();
+    desk.write("nominal.toml", NOMINAL);
+    let truth = desk
+        .line(&format!(
+            "synthesize --model nominal.toml --effect {CRACK}:amplitude_arcsec=30,angle_rad=0.9 --seed 24 --out made --json"
+        ))
+        .done()
+        .json();
+    let found = desk.line("diagnose made/data.csv --model nominal.toml --no-report --json").done().json();
+    let causes = found["causes"].as_array().unwrap();
+    assert!(causes.len() == 1 && causes[0]["name"] == CRACK, "{causes:?}");
+    let hidden = |name: &str| truth["effects"][0]["parameters"][name].as_f64().unwrap();
+    let said = |name: &str| ["value", "std"].map(|of| causes[0]["parameters"][name][of].as_f64().unwrap());
+    let stated = |[value, std]: [f64; 2], full: f64| [value / full, std / full];
+    // The size at one newton-metre: both state it at a load of their own.
+    for (name, [value, std], wanted) in [
+        (
+            "amplitude_arcsec",
+            stated(said("amplitude_arcsec"), said("full_load_n_m")[0]),
+            hidden("amplitude_arcsec") / hidden("full_load_n_m"),
+        ),
+        ("angle_rad", said("angle_rad"), hidden("angle_rad")),
+        ("width_rad", said("width_rad"), hidden("width_rad")),
+    ] {
+        assert!((value - wanted).abs() < 3.0 * std && std < 0.3 * value, "{name}: {value} +- {std}, hidden {wanted}");
+    }
+
+    // Refitted in the place of the crack, a damaged tooth with its four sizes tells the data no better.
+    let tried = steps(&found, "damaged_tooth");
+    let rival = tried.iter().find(|step| step["gate"] == "as_rival").unwrap_or_else(|| panic!("{tried:?}"));
+    assert!(rival["against"] == CRACK && rival["passed"] == false, "{rival}");
+    assert!(rival["value"].as_f64().unwrap() > 25.0, "{rival}");
+    let line = "diagnose made/data.csv --model nominal.toml --no-report --explain damaged_tooth";
+    let explained = desk.line(line).done().stdout;
+    let why = format!("in the place of {CRACK} it raises the misfit");
+    assert!(explained.contains("It is not named") && explained.contains(&why), "{explained}");
+}
+
 #[test]
 fn a_cause_is_explained_on_one_screen() {
     let desk = Desk::new();
