@@ -11,6 +11,7 @@
 //! lost on the way into a drive or a table; a table that was made with the sessions it is judged on; an extension of a drive
 //! that has nothing.
 
+use flexspline_sim::causes::CauseName;
 use flexspline_tests::command::{Desk, names};
 use serde_json::Value;
 
@@ -170,7 +171,7 @@ fn every_cause_can_be_made_and_reads_back() {
         .filter(|line| !line.starts_with(' '))
         .map(|line| line.split(':').next().unwrap())
         .collect();
-    assert_eq!(causes.len(), 24, "{causes:?}");
+    assert_eq!(causes.len(), CauseName::ALL.len(), "{causes:?}");
     let plain = desk.line("synthesize --model nominal.toml --rows 300 --sessions 3 --seed 2 --out plain").done();
     assert!(plain.stdout.contains("no effect"));
     let nothing = desk.read("plain/data.csv");

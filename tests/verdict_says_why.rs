@@ -3,6 +3,7 @@
 //! Wrong if this fails: a cause that is dropped without a trace; a trace that names a gate which did not decide; an explanation that
 //! blames the drive where the data lack what the cause needs.
 
+use flexspline_sim::causes::CauseName;
 use flexspline_tests::command::Desk;
 use serde_json::Value;
 
@@ -11,8 +12,6 @@ const NOMINAL: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 
     [nominal]\nstiffness_n_m_per_rad = 30000.0\nbacklash_arcsec = 60.0\nfriction_torque_n_m = 1.5\n\
     [[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 10.0\nphase_rad = 0.4\n";
 const HIDDEN: &str = "circular_spline_eccentricity";
-/// Causes of the library.
-const CAUSES: usize = 24;
 
 fn steps<'d>(diagnosis: &'d Value, cause: &str) -> Vec<&'d Value> {
     diagnosis["trace"].as_array().unwrap().iter().filter(|step| step["cause"] == cause).collect()
@@ -37,7 +36,7 @@ fn the_trace_names_the_gate_that_dropped_a_rival() {
     judged.sort_unstable();
     judged.dedup();
     let named = judged.iter().filter(|cause| !cause.contains(' ')).count();
-    assert!(named >= CAUSES, "{named} causes leave a trace: {judged:?}");
+    assert!(named >= CauseName::ALL.len(), "{named} causes leave a trace: {judged:?}");
 
     // What was named passed every gate of the verdict, against limits that it is told beside.
     let verdict: Vec<_> = steps(&diagnosis, HIDDEN).into_iter().filter(|step| step["stage"] == "verdict").collect();
@@ -49,6 +48,48 @@ fn the_trace_names_the_gate_that_dropped_a_rival() {
     assert_eq!((&rival["gate"], &rival["against"]), (&Value::from("as_rival"), &Value::from(HIDDEN)), "{rival}");
     assert_eq!(rival["passed"], false, "{rival}");
     assert!(rival["value"].as_f64().unwrap() > 1000.0 && rival["limit"].as_f64().unwrap() < 0.0, "{rival}");
+}
+
+/// A crack is a damaged tooth that both flanks feel alike and nobody without load.
+#[test]
+fn a_cracked_root_is_told_from_a_damaged_tooth_and_the_gate_says_how() {
+    const CRACK: &str = "cracked_tooth_root";
+    let desk = Desk::new();
+    desk.write("nominal.toml", NOMINAL);
+    let truth = desk
+        .line(&format!(
+            "synthesize --model nominal.toml --effect {CRACK}:amplitude_arcsec=30,angle_rad=0.9 --seed 24 --out made --json"
+        ))
+        .done()
+        .json();
+    let found = desk.line("diagnose made/data.csv --model nominal.toml --no-report --json").done().json();
+    let causes = found["causes"].as_array().unwrap();
+    assert!(causes.len() == 1 && causes[0]["name"] == CRACK, "{causes:?}");
+    let hidden = |name: &str| truth["effects"][0]["parameters"][name].as_f64().unwrap();
+    let said = |name: &str| ["value", "std"].map(|of| causes[0]["parameters"][name][of].as_f64().unwrap());
+    let stated = |[value, std]: [f64; 2], full: f64| [value / full, std / full];
+    // The size at one newton-metre: both state it at a load of their own.
+    for (name, [value, std], wanted) in [
+        (
+            "amplitude_arcsec",
+            stated(said("amplitude_arcsec"), said("full_load_n_m")[0]),
+            hidden("amplitude_arcsec") / hidden("full_load_n_m"),
+        ),
+        ("angle_rad", said("angle_rad"), hidden("angle_rad")),
+        ("width_rad", said("width_rad"), hidden("width_rad")),
+    ] {
+        assert!((value - wanted).abs() < 3.0 * std && std < 0.3 * value, "{name}: {value} +- {std}, hidden {wanted}");
+    }
+
+    // Refitted in the place of the crack, a damaged tooth with its four sizes tells the data no better.
+    let tried = steps(&found, "damaged_tooth");
+    let rival = tried.iter().find(|step| step["gate"] == "as_rival").unwrap_or_else(|| panic!("{tried:?}"));
+    assert!(rival["against"] == CRACK && rival["passed"] == false, "{rival}");
+    assert!(rival["value"].as_f64().unwrap() > 25.0, "{rival}");
+    let line = "diagnose made/data.csv --model nominal.toml --no-report --explain damaged_tooth";
+    let explained = desk.line(line).done().stdout;
+    let why = format!("in the place of {CRACK} it raises the misfit");
+    assert!(explained.contains("It is not named") && explained.contains(&why), "{explained}");
 }
 
 #[test]

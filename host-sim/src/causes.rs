@@ -61,6 +61,8 @@ causes! {
     CamFormError = "cam_form_error",
     /// A tooth lacks material.
     DamagedTooth = "damaged_tooth",
+    /// A tooth of the circular spline is cracked at its root.
+    CrackedToothRoot = "cracked_tooth_root",
     /// The clearance is wider throughout the data.
     BacklashGrowth = "backlash_growth",
     /// The clearance widens during the data.
@@ -329,6 +331,7 @@ impl CauseName {
             CauseName::GeneratorEccentricity => "eccentricity of the generator",
             CauseName::CamFormError => "form error of the generator",
             CauseName::DamagedTooth => "damaged tooth",
+            CauseName::CrackedToothRoot => "cracked tooth root",
             CauseName::BacklashGrowth => "wider backlash",
             CauseName::Wear => "wear",
             CauseName::StiffnessHardening => "hardening stiffness",
@@ -366,6 +369,9 @@ impl CauseName {
                 "a shape that is not the drawn one: tooth mesh and even orders of the generator turn"
             }
             CauseName::DamagedTooth => "a pulse each time a lobe passes one place",
+            CauseName::CrackedToothRoot => {
+                "softer each time a lobe passes one tooth of the circular spline: nothing there without load"
+            }
             CauseName::BacklashGrowth => "more clearance than nominal throughout the data",
             CauseName::Wear => "a clearance that widens from the first row to the last",
             CauseName::StiffnessHardening => "stiffer the higher the load",
@@ -399,6 +405,7 @@ impl CauseName {
             CauseName::GeneratorEccentricity => "generator beside its axis: one lobe carries more",
             CauseName::CamFormError => "form error of the generator",
             CauseName::DamagedTooth => "a tooth that lacks material",
+            CauseName::CrackedToothRoot => "a tooth of the circular spline that bends more than its neighbours",
             CauseName::BacklashGrowth => "a wider clearance throughout",
             CauseName::Wear => "a clearance that widens with travel",
             CauseName::StiffnessHardening => "stiffer the higher the load",
@@ -438,6 +445,7 @@ impl CauseName {
             | CauseName::StiffnessHardening
             | CauseName::StiffnessError
             | CauseName::TorsionalHysteresis
+            | CauseName::CrackedToothRoot
             | CauseName::Ratcheting => Family::Stiffness,
             CauseName::ThermalClearance | CauseName::ThermalStiffness | CauseName::LubricantViscosity => {
                 Family::Thermal
@@ -461,7 +469,7 @@ impl CauseName {
             | CauseName::CircularSplinePitchError
             | CauseName::GeneratorEccentricity
             | CauseName::GravitySideLoad => Kin::Shape,
-            CauseName::DamagedTooth => Kin::Pulse,
+            CauseName::DamagedTooth | CauseName::CrackedToothRoot => Kin::Pulse,
             CauseName::StiffnessHardening
             | CauseName::StiffnessError
             | CauseName::ThermalStiffness
@@ -493,6 +501,7 @@ impl CauseName {
             | CauseName::CamFormError
             | CauseName::GravitySideLoad => &[Need::Teeth],
             CauseName::DamagedTooth => &[Need::Teeth, Need::Turns],
+            CauseName::CrackedToothRoot => &[Need::Teeth, Need::Turns, Need::Load],
             CauseName::StiffnessHardening | CauseName::StiffnessError | CauseName::TorsionalHysteresis => &[Need::Load],
             CauseName::ThermalClearance => &[Need::Temperature, Need::TemperatureSpan],
             CauseName::ThermalStiffness => &[Need::Temperature, Need::TemperatureSpan, Need::Load],
@@ -526,6 +535,11 @@ impl CauseName {
             CauseName::DamagedTooth => {
                 &[(Turn::OfWheel, Fixed(2.0)), (Turn::OfWheel, Fixed(4.0)), (Turn::OfWheel, Fixed(6.0))]
             }
+            CauseName::CrackedToothRoot => &[
+                (Turn::CircularSpline, Fixed(2.0)),
+                (Turn::CircularSpline, Fixed(4.0)),
+                (Turn::CircularSpline, Fixed(6.0)),
+            ],
             CauseName::GravitySideLoad => &[(Turn::Generator, Fixed(2.0)), (Turn::Generator, Fixed(4.0))],
             CauseName::GeneratorEncoderEccentricity => &[(Turn::Generator, Fixed(1.0))],
             CauseName::OutputEncoderEccentricity | CauseName::GravityTorque => &[(Turn::Output, Fixed(1.0))],
@@ -557,6 +571,7 @@ impl CauseName {
             | CauseName::GeneratorEccentricity
             | CauseName::CamFormError
             | CauseName::DamagedTooth
+            | CauseName::CrackedToothRoot
             | CauseName::BacklashGrowth
             | CauseName::StiffnessHardening
             | CauseName::StiffnessError
@@ -615,6 +630,7 @@ impl CauseName {
             | CauseName::GeneratorEncoderEccentricity
             | CauseName::SensorLatency
             | CauseName::RatioError
+            | CauseName::CrackedToothRoot
             | CauseName::Ratcheting => None,
         }
     }
@@ -668,6 +684,28 @@ impl CauseName {
                         },
                         number(Name::Tooth, "which one, from 0", 0.0, 2000.0, Value(40.0)),
                         number(Name::AngleRad, "the same as an angle on the wheel", -TAU, TAU, Follows),
+                        number(Name::WidthRad, "half the arc over which it is felt", 0.02, 0.6, Value(0.15)),
+                    ]
+                }
+            }
+            CauseName::CrackedToothRoot => {
+                const {
+                    &[
+                        number(
+                            Name::AmplitudeArcsec,
+                            "by which it winds up more at the full load",
+                            0.0,
+                            1000.0,
+                            Value(30.0),
+                        ),
+                        number(Name::FullLoadNM, "the torque at which it is stated", 1e-3, 1e6, OfLoad(1.0)),
+                        number(
+                            Name::AngleRad,
+                            "where the tooth, or the one opposite, is on the circular spline",
+                            -TAU,
+                            TAU,
+                            Value(1.2),
+                        ),
                         number(Name::WidthRad, "half the arc over which it is felt", 0.02, 0.6, Value(0.15)),
                     ]
                 }
@@ -808,6 +846,7 @@ impl CauseName {
             | CauseName::OutputEncoderEccentricity
             | CauseName::SensorLatency
             | CauseName::RatioError
+            | CauseName::CrackedToothRoot
             | CauseName::Ratcheting => &[],
         }
     }

@@ -187,7 +187,15 @@ fn played(planned: &Planned, seed: u64, law: impl Fn(f64, f64, f64, f64) -> f64)
     }
     let rows = session.len();
     let (faults, tooth_steps, notes) = (Vec::new(), Vec::new(), Vec::new());
-    Recording { file: "planned.log".to_owned(), rows, sessions: vec![session], faults, tooth_steps, notes, unusable: None }
+    Recording {
+        file: "planned.log".to_owned(),
+        rows,
+        sessions: vec![session],
+        faults,
+        tooth_steps,
+        notes,
+        unusable: None,
+    }
 }
 
 /// A unit of parts alone, and a bench without wander, so that the information matrix says all there is to say.

@@ -633,6 +633,35 @@ fn every_cause_has_a_law_that_knows_its_own_columns_and_shape_parameters() {
     });
 }
 
+#[test]
+fn a_wheel_is_told_from_the_other_whichever_of_them_stands() {
+    for fixed in ["flexspline", "circular_spline"] {
+        let drive = Nominal::from_toml(
+            "test",
+            &format!(
+                "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\nfixed = \"{fixed}\"\n[nominal]\n\
+                 stiffness_n_m_per_rad = 30000.0\nbacklash_arcsec = 60.0\nfriction_torque_n_m = 1.5\n"
+            ),
+        )
+        .unwrap();
+        let plan = Plan {
+            sessions: 5,
+            rows: 3000,
+            rate_hz: 100.0,
+            speed_rad_s: 6.0,
+            torque_n_m: 40.0,
+            richness: Richness::Rich,
+        };
+        let sensors = Sensors { white_arcsec: 2.0, wander_arcsec: 0.8, wander_s: 12.0 };
+        for cause in [CauseName::FlexsplinePitchError, CauseName::CircularSplinePitchError] {
+            let hidden = [effect(cause, 15.0, 0.7, 0.5)];
+            let measured = measure(&drive, &hidden, &plan, &sensors, 0, &mut fastrand::Rng::with_seed(44));
+            let diagnosis = diagnose(&measured, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+            assert_eq!(names(&diagnosis), [cause], "{fixed} stands: {}", diagnosis.text());
+        }
+    }
+}
+
 fn law(laws: &[super::Law], cause: CauseName) -> &super::Law {
     laws.iter().find(|law| law.is(cause)).unwrap()
 }

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::law::{Angle, Encoder, Law, Now, largest};
 use super::plant::{Plant, Unit};
-use super::{Plan, Sensors, add_noise, into_sessions};
-use crate::causes::CauseName;
+use super::{Excitation, Plan, Sensors, Setting, Sizes, add_noise, into_sessions, parse};
+use crate::causes::{CauseName, ParameterName};
 use crate::measurement::Session;
 use crate::nominal::Nominal;
 use crate::units::ARCSEC_PER_TURN;
@@ -15,6 +15,9 @@ const SECOND_OF_RECTIFIED: f64 = 0.424;
 
 /// Resolution of the output encoder, arcsec.
 const STEP_ARCSEC: f64 = 0.3;
+
+/// Sizes of the drive, for laws that are stated in micrometres.
+const SIZES: Sizes = Sizes { pitch_radius_mm: 48.7, base_radius_mm: 44.6 };
 
 /// Effects that are in no library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,7 +88,14 @@ pub struct Effect {
 
 impl Effect {
     /// The law with its numbers, under a torque on the flanks that is known but for this effect.
-    pub(super) fn law(&self, plant: &Plant<'_>, torque: &[f64], changed: bool, random: &mut fastrand::Rng) -> Law {
+    pub(super) fn law(
+        &self,
+        plant: &Plant<'_>,
+        on: &Excitation,
+        torque: &[f64],
+        changed: bool,
+        random: &mut fastrand::Rng,
+    ) -> Law {
         let (size, phase, other) = (self.size, self.phase, self.other);
         let top = largest(torque);
         let half_load_n_m = top * (0.1 + 0.5 * other);
@@ -126,10 +136,8 @@ impl Effect {
                 half_width_rad: 0.06 + 0.2 * other,
                 both_flanks: other > 0.7,
             },
-            CauseName::Wear => Law::Wear { growth: size },
             CauseName::BacklashGrowth => Law::Wider { growth: size * plant.nominal.backlash_arcsec },
             CauseName::ThermalClearance => Law::Breathing { per_k: -size, lag_s: if changed { 20.0 } else { 0.01 } },
-            CauseName::GravityTorque => Law::Unbalance { torque_n_m: size, phase_rad: phase },
             CauseName::StiffnessHardening => Law::Hardening { at_full_load: size, exponent: 3.0, full_load_n_m: top },
             CauseName::StiffnessError => Law::Softer { relative: size },
             CauseName::ThermalStiffness => Law::SofterWarm { relative_per_k: size },
@@ -137,9 +145,6 @@ impl Effect {
             CauseName::LubricantViscosity => Law::DragLag { largest: 0.5 * size },
             CauseName::TorsionalResonance => {
                 Law::Resonance { frequency_hz: size, damping_ratio: if changed { 0.15 } else { 0.02 + 0.06 * other } }
-            }
-            CauseName::OutputEncoderEccentricity => {
-                Law::Disc { encoder: Encoder::Output, amplitude: size, phase_rad: phase }
             }
             CauseName::GeneratorEncoderEccentricity => {
                 Law::Disc { encoder: Encoder::Generator, amplitude: 0.4 * size, phase_rad: phase }
@@ -151,7 +156,31 @@ impl Effect {
                 by: -ARCSEC_PER_TURN / f64::from(plant.nominal.teeth_or_of_two_waves().of_output())
                     * if phase > 4.0 { 2.0 } else { 1.0 },
             },
+            cause => self.as_asked_for(cause, plant, on),
         }
+    }
+
+    /// The law that the command `synthesize` makes of a cause, with this size and place and otherwise its usual parameters. Tests that
+    /// want more of a cause give it an arm of its own above.
+    fn as_asked_for(&self, cause: CauseName, plant: &Plant<'_>, on: &Excitation) -> Law {
+        let mut chosen = parse(cause.as_str()).expect("a cause can be asked for");
+        let size = cause
+            .parameters()
+            .iter()
+            .map(|parameter| parameter.name)
+            .min_by_key(|name| *name != ParameterName::AmplitudeArcsec)
+            .expect("a cause has a parameter");
+        for (parameter, value) in cause.parameters().iter().zip(&mut chosen.values) {
+            *value = match parameter.name {
+                name if name == size => Some(self.size),
+                ParameterName::AngleRad | ParameterName::PhaseRad => Some(self.phase),
+                _ => None,
+            };
+        }
+        let setting = Setting { nominal: plant.nominal, sizes: SIZES, on, load_n_m: largest(&on.torque) };
+        let complete =
+            chosen.completed(&setting, &mut fastrand::Rng::with_seed(0)).expect("usual parameters fit any excitation");
+        Law::of(cause, &complete, &setting)
     }
 }
 
@@ -172,10 +201,10 @@ pub fn measure(
     let unbalanced: Vec<Law> = effects
         .iter()
         .filter(|effect| effect.what == What::Cause(CauseName::GravityTorque))
-        .map(|effect| effect.law(&plant, &on.torque, changed, random))
+        .map(|effect| effect.law(&plant, &on, &on.torque, changed, random))
         .collect();
     let torque = plant.flank_torque(&on, &unbalanced);
-    let laws: Vec<Law> = effects.iter().map(|effect| effect.law(&plant, &torque, changed, random)).collect();
+    let laws: Vec<Law> = effects.iter().map(|effect| effect.law(&plant, &on, &torque, changed, random)).collect();
     let mut error = plant.error(&on, &torque, &laws, &unit, (changed, changed));
     plant.add_laws(&on, &torque, &laws, changed, &mut error);
     add_noise(&on, sensors, &mut error, random);

@@ -8,12 +8,15 @@ use super::effect::Strange;
 use super::excitation::Excitation;
 use super::plant::Plant;
 use crate::causes::{CauseName, ParameterName};
-use crate::nominal::Nominal;
+use crate::nominal::{Fixed, Nominal};
 use crate::units::ARCSEC_PER_RAD;
 
 /// Flank angle where teeth bear, rad: the phase of a rectified sine on the flank that carries. A guess of its own: the diagnosis, which
 /// must not share its laws, expects 0.39.
 const FLANK_ANGLE_RAD: f64 = 0.36;
+/// Half the arc in which a cracked tooth carries over the half width of what is felt of it, which is stated as the deviation of a bell
+/// curve: the square of a parabola comes closest to one (least squares) at this.
+const CARRYING_HALF_ARC: f64 = 2.38;
 /// Steps to a row where a state is followed.
 const STEPS: u32 = 40;
 
@@ -54,6 +57,9 @@ pub(super) enum Law {
     CamForm { amplitude: f64, phase_rad: f64 },
     /// A pulse where a lobe meets the tooth.
     Damage { angle: Angle, amplitude: f64, place_rad: f64, half_width_rad: f64, both_flanks: bool },
+    /// A tooth of the circular spline bends more than its neighbours: the wind-up is more by this at the full load, in the middle of the
+    /// arc in which it carries.
+    Crack { at_full_load: f64, full_load_n_m: f64, place_rad: f64, half_width_rad: f64 },
     /// The clearance is wider by this, whole width.
     Wider { growth: f64 },
     /// The clearance widens with travel, by this in all.
@@ -123,10 +129,15 @@ impl Now<'_> {
     }
 
     fn angle(&self, of: Angle, k: usize) -> f64 {
+        // The wheel that stands sees the generator turn, the one that is the output turns with it.
+        let stands = match self.nominal().teeth.map(|teeth| teeth.fixed) {
+            Some(Fixed::CircularSpline) => Angle::CircularSpline,
+            Some(Fixed::Flexspline) | None => Angle::Flexspline,
+        };
         match of {
-            Angle::Flexspline => self.on.generator[k],
-            Angle::CircularSpline => self.on.generator[k] - self.output(k),
             Angle::Gravity => self.on.generator[k] + self.on.orientation[k],
+            wheel if wheel == stands => self.on.generator[k],
+            Angle::Flexspline | Angle::CircularSpline => self.on.generator[k] - self.output(k),
         }
     }
 
@@ -188,6 +199,12 @@ impl Law {
                 place_rad: v(Name::AngleRad),
                 half_width_rad: v(Name::WidthRad),
                 both_flanks: false,
+            },
+            CauseName::CrackedToothRoot => Law::Crack {
+                at_full_load: v(Name::AmplitudeArcsec),
+                full_load_n_m: v(Name::FullLoadNM),
+                place_rad: v(Name::AngleRad),
+                half_width_rad: v(Name::WidthRad),
             },
             CauseName::BacklashGrowth => Law::Wider { growth: v(Name::GrowthArcsec) },
             CauseName::Wear => Law::Wear { growth: v(Name::GrowthArcsec) },
@@ -342,6 +359,15 @@ impl Law {
                     }
                 }
             }
+            Law::Crack { at_full_load, full_load_n_m, place_rad, half_width_rad } => (0..n).for_each(|k| {
+                let away = (now.angle(Angle::CircularSpline, k) - place_rad + 0.5 * PI).rem_euclid(PI) - 0.5 * PI;
+                let x = away / (CARRYING_HALF_ARC * half_width_rad);
+                // The tooth carries a parabola over its arc, and bends by what it carries: its share counts twice.
+                let share = (1.0 - x * x).max(0.0);
+                let felt = if changed { share.powf(1.5) } else { share * share };
+                let opens = if changed { 1.0 + 0.15 * now.side(k) } else { 1.0 };
+                error[k] += at_full_load * torque[k] / full_load_n_m * felt * opens;
+            }),
             // Clearance and torque carry these.
             Law::Wider { .. } | Law::Wear { .. } | Law::Breathing { .. } | Law::Drag { .. } | Law::Unbalance { .. } => {
             }

@@ -256,16 +256,19 @@ fn cam_form_error() -> Law {
 /// A pulse is nothing beyond so many of its widths.
 const PULSE_ENDS: f64 = 8.0;
 
+/// What is felt of a tooth at an angle (rad) from where a lobe is on it: each half turn brings a lobe.
+pub(super) fn pulse(from_tooth: f64, width: f64) -> f64 {
+    let turns = from_tooth / PI;
+    let away = PI * (turns - turns.round()) / width;
+    if away.abs() < PULSE_ENDS { (-0.5 * away * away).exp() } else { 0.0 }
+}
+
 /// A tooth that lacks material: a pulse each time a lobe of the wave passes it, twice per turn, on the flank that carries, under load.
 fn damaged_tooth(of: Angle) -> Law {
     Law::new(CauseName::DamagedTooth, move |on, shape| {
         let (place, width) = (shape.of(Name::AngleRad), shape.of(Name::WidthRad));
         let load = if on.scales.load > 0.0 { on.scales.load } else { 1.0 };
-        let pulse = by_row(on, |k| {
-            let turns = (angle(on, of, k) - place) / PI;
-            let away = PI * (turns - turns.round()) / width;
-            if away.abs() < PULSE_ENDS { (-0.5 * away * away).exp() } else { 0.0 }
-        });
+        let pulse = by_row(on, |k| pulse(angle(on, of, k) - place, width));
         // The two lobes meet the tooth half a turn apart and may share the load unequally.
         let (first, (sin, cos)) = (kept(on, of, 1.0), place.sin_cos());
         let lobe = of_both(&first[0], &first[1], |c, s| (c * cos + s * sin).signum());

@@ -1,10 +1,11 @@
 //! What the torque does beyond the nominal wind-up and play.
 
+use std::f64::consts::PI;
 use std::ops::Range;
 
 use super::super::prepare::Jump;
 use super::super::rows::rms;
-use super::geometry::{Angle, weighted_waves};
+use super::geometry::{Angle, angle, pulse, weighted_waves};
 use super::{Excitation, Law, Role, Shape, by_row, history, main, nuisance};
 use crate::causes::{CauseName, ParameterName as Name};
 use crate::units::ARCSEC_PER_TURN;
@@ -141,6 +142,49 @@ fn stiffness_error() -> Law {
     law
 }
 
+/// Shares by which the law of a cracked root may be wrong: a crack that opens bends more than one that is pressed shut, the two loaded
+/// zones may carry unequally, and the arc in which the tooth carries has another shape. Guesses.
+const OPENING: f64 = 0.3;
+const UNEQUAL_LOBES: f64 = 0.3;
+const OTHER_ARC: f64 = 0.3;
+/// The arc of another shape, over that of the law.
+const BROADER: f64 = 1.7;
+const BROADER_ARC: Role = Role("broader arc");
+
+/// A tooth of the circular spline that is cracked at its root: the drive winds up more, both ways, while a loaded zone is on it, twice in
+/// a turn of the wave on that wheel. Without load it is where it was.
+fn cracked_tooth_root() -> Law {
+    const WHEEL: Angle = Angle::CircularSpline;
+    Law::new(CauseName::CrackedToothRoot, |on, shape| {
+        let (place, width) = (shape.of(Name::AngleRad), shape.of(Name::WidthRad));
+        let softer = |width: f64| by_row(on, |k| load_share(on, k) * pulse(angle(on, WHEEL, k) - place, width));
+        let size = softer(width);
+        let opening = size.iter().map(|v| v.abs()).collect();
+        let lobe = by_row(on, |k| size[k] * (angle(on, WHEEL, k) - place).cos().signum());
+        vec![
+            main(size, 30.0).called(Role::SIZE),
+            nuisance(opening, OPENING),
+            nuisance(lobe, UNEQUAL_LOBES),
+            nuisance(softer(BROADER * width), OTHER_ARC).called(BROADER_ARC),
+        ]
+    })
+    .shapes([Shape::angle(Name::AngleRad, PI, 30), Shape::by_factors(Name::WidthRad, 0.03, 0.4, 2)])
+    .parameters_by(|on, shape, c| {
+        // Both arcs have their top where the tooth is. Together they are as wide as the bell curve of that height and area.
+        let (narrow, broad) = (c.of(Role::SIZE), c.of(BROADER_ARC));
+        let top = narrow + broad;
+        let width = shape.of(Name::WidthRad) * (narrow + BROADER * broad) / top;
+        vec![
+            (Name::AmplitudeArcsec, top),
+            (Name::FullLoadNM, on.scales.load),
+            (Name::AngleRad, shape.of(Name::AngleRad)),
+            (Name::WidthRad, width),
+        ]
+    })
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0 && c.of(Role::SIZE) + BROADER * c.of(BROADER_ARC) > 0.0)
+    .well_known()
+}
+
 /// Share of a grown clearance by which it may differ around a wheel.
 const UNEVEN_WEAR: f64 = 0.15;
 
@@ -241,7 +285,13 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     if on.speaks_of(CauseName::TorsionalHysteresis) {
         laws.push(torsional_hysteresis(on));
     }
-    laws.extend([stiffness_hardening(), stiffness_error(), backlash_growth(), wear(Progress::Travel)]);
+    laws.extend([
+        stiffness_hardening(),
+        stiffness_error(),
+        backlash_growth(),
+        wear(Progress::Travel),
+        cracked_tooth_root(),
+    ]);
     if on.rows.recorded.time {
         laws.push(wear(Progress::Time));
     }
