@@ -329,6 +329,8 @@ mod tests {
                     "seed",
                     "explain",
                     "ratio",
+                    "teeth",
+                    "module",
                 ];
                 assert!(stated || needs_none || absent.contains(&id.as_str()), "{name} {id} states no default: {help}");
             }
