@@ -43,6 +43,7 @@ pub(super) struct Rows {
 }
 
 /// What the files have recorded.
+#[derive(Clone)]
 pub(super) struct Recorded {
     pub scales: Scales,
     pub has_torque: bool,
