@@ -97,6 +97,11 @@ pub(super) fn variance(covariance: &Mat, x: &[f64]) -> f64 {
     sum.max(0.0)
 }
 
+/// How many columns some parts have.
+pub(super) fn width_of(chosen: &[Chosen]) -> usize {
+    chosen.iter().map(|chosen| weights(chosen.part).len()).sum()
+}
+
 /// All columns of some parts in a state.
 pub(super) fn row(chosen: &[Chosen], at: &State, scales: &Scales) -> Vec<f64> {
     let mut x = Vec::new();
@@ -230,7 +235,7 @@ pub(super) fn widths(
     of_a_row: f64,
     adds: &dyn Fn(&[f64]) -> f64,
 ) -> Vec<Node> {
-    let all: usize = chosen.iter().map(|chosen| weights(chosen.part).len()).sum();
+    let all = width_of(chosen);
     let mut begin = 0;
     let mut nodes = Vec::new();
     for one in chosen {

@@ -35,6 +35,8 @@ pub use prior::Prior;
 use rows::{FoldKind, Recorded, Rows, settled};
 pub use zero::{Alignment, OutputZero, ZeroCost, cost};
 
+/// The golden section: its multiples spread places over a turn and fold no order onto another.
+const GOLDEN: f64 = 0.618_033_988_749_895;
 /// Fewest rows in steady motion that make a table.
 const FEWEST_ROWS: usize = 64;
 /// Load that decides the flank where no model says a friction, of the largest recorded: a guess, small beside any load of interest.
@@ -358,12 +360,7 @@ fn with_dead_zone(
     doubt: Option<String>,
 ) -> Result<Calibrated, CalibrationError> {
     let mut play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
-    let prior = &Prior {
-        least_friction_n_m: recorded.scales.friction_n_m,
-        nominal: prior.nominal.clone(),
-        drive: prior.drive.clone(),
-        ..*prior
-    };
+    let prior = &Prior { least_friction_n_m: recorded.scales.friction_n_m, ..prior.clone() };
     let alignment = prior
         .table
         .map(|table| zero::align(table, &settled(files, prior, &recorded, play_rad), recorded.scales.friction_n_m));
@@ -372,9 +369,7 @@ fn with_dead_zone(
             .as_ref()
             .filter(|found| found.told)
             .map_or(0.0, |found| found.generator_zero_deg.to_radians()),
-        nominal: prior.nominal.clone(),
-        drive: prior.drive.clone(),
-        ..*prior
+        ..prior.clone()
     };
     let prior = &aligned;
     let mut fitted = fit(files, prior, &recorded, play_rad)?;
@@ -484,7 +479,7 @@ fn dead_zones(files: &[Recording], prior: &Prior<'_>, table: &Table<'_>, recorde
     let play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
     let (own, usual) = (dead_zone_n_m(table), recorded.scales.friction_n_m);
     let left = |least_friction_n_m: f64| -> f64 {
-        let prior = Prior { least_friction_n_m, nominal: prior.nominal.clone(), drive: String::new(), ..*prior };
+        let prior = Prior { least_friction_n_m, ..prior.clone() };
         settled(files, &prior, recorded, play_rad).rows.iter().map(|row| row.left_arcsec.powi(2)).sum()
     };
     if own >= usual || left(own) <= left(usual) { [own, usual] } else { [usual, own] }

@@ -10,10 +10,10 @@ use flexspline_algebra::Mat;
 use serde::Serialize;
 
 use super::folds::{Chosen, Row};
-use super::interval::{Information, Node, Noise, OF_95, covariance, row, spread, widths};
+use super::interval::{Information, Node, Noise, OF_95, covariance, row, spread, width_of, widths};
 use super::parts::{PartName, Scales, State};
 use super::rows::MOST_ROWS;
-use super::{LEAST_FRICTION, ONE_TEMPERATURE_K, PENALTY_OF_PLANS, Prior, ROWS_OF_A_PITCH};
+use super::{GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, PENALTY_OF_PLANS, Prior, ROWS_OF_A_PITCH};
 
 /// Loads at which passes are made, where there is a load.
 const LOADS: usize = 7;
@@ -225,7 +225,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
     let candidates = candidates(prior, bench, &scales, &chosen);
     let noise = first.map_or_else(|| bench.noise(), |first| first.noise);
 
-    let width = row(&chosen, &state(0.0, 0.0, 0.0, 20.0, 1.0), &scales).len();
+    let width = width_of(&chosen);
     let warmths = temperatures(bench).len();
     let mut known = vec![Information::new(width); warmths + first.map_or(0, |first| first.files)];
     for at in first.iter().flat_map(|first| first.rows) {
@@ -322,7 +322,7 @@ fn in_order(taken: Vec<(usize, Pass)>) -> Vec<Pass> {
 /// The column of the temperature that moves the zero alone, which logs of one temperature each cannot tell from the encoder's.
 fn column_of_zero(chosen: &[Chosen]) -> Option<usize> {
     let at = chosen.iter().position(|chosen| chosen.part == PartName::Temperature)?;
-    Some(chosen[..at].iter().map(|chosen| super::parts::weights(chosen.part).len()).sum())
+    Some(width_of(&chosen[..at]))
 }
 
 /// What the table is asked for: the mean of `x xᵀ` over all that it is to hold.
@@ -439,10 +439,6 @@ fn loads([low, high]: [f64; 2]) -> Vec<f64> {
     loads
 }
 
-fn state(generator_rad: f64, ratio_output: f64, torque_n_m: f64, temperature_c: f64, way: f64) -> State {
-    State { generator_rad, output_rad: ratio_output, torque_n_m, temperature_c, way }
-}
-
 /// The passes that may be made.
 fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[Chosen]) -> Vec<Candidate> {
     let ratio = prior.nominal.ratio;
@@ -465,18 +461,16 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[Chose
                 let moving_s = 2.0 * turns / speed_rpm * 60.0;
                 let duration_s = moving_s + 2.0 * REST_S;
                 let weight = moving_s * bench.rate_fitted_hz() / ROWS_OF_A_PASS as f64;
-                let width = row(chosen, &state(0.0, 0.0, 0.0, 20.0, 1.0), scales).len();
-                let mut tells = Information::new(width);
+                let mut tells = Information::new(width_of(chosen));
                 for k in 0..ROWS_OF_A_PASS {
                     let way = if k % 2 == 0 { 1.0 } else { -1.0 };
                     let share = (k as f64 + 0.5) / ROWS_OF_A_PASS as f64;
-                    let output = (from + (to - from) * share).to_radians();
+                    let output_rad = (from + (to - from) * share).to_radians();
                     // Not all at one phase of generator and teeth.
-                    let generator = output * ratio
-                        + TAU
-                            * (k as f64 * 0.618_033_988_749_895).fract()
-                            * (ratio.abs() / ROWS_OF_A_PASS as f64).min(1.0);
-                    tells.add(&row(chosen, &state(generator, output, torque_n_m, temperature_c, way), scales), weight);
+                    let generator_rad = output_rad * ratio
+                        + TAU * (k as f64 * GOLDEN).fract() * (ratio.abs() / ROWS_OF_A_PASS as f64).min(1.0);
+                    let at = State { generator_rad, output_rad, torque_n_m, temperature_c, way };
+                    tells.add(&row(chosen, &at, scales), weight);
                 }
                 let pass = Pass {
                     log: warmth + 1,

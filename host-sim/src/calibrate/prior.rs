@@ -11,6 +11,7 @@ use crate::units::ARCSEC_PER_RAD;
 const USUAL_TEMPERATURE_C: f64 = 20.0;
 
 /// What is known before.
+#[derive(Clone)]
 pub struct Prior<'a> {
     /// The nominal model; beside a table its ratio, teeth and temperature are used.
     pub nominal: Nominal,

@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 use flexspline::{Direction, GeneratorAngle, Table};
 use serde::Serialize;
 
+use super::GOLDEN;
 use super::parts::State;
 use super::rows::Rows;
 use crate::units::ARCSEC_PER_RAD;
@@ -106,7 +107,7 @@ pub fn cost(table: &Table<'_>) -> ZeroCost {
     let (mut squares, mut most, mut by_output) = (0.0, 0.0_f64, 0.0);
     // A turn of the output either side is alike.
     for k in 0..PLACES {
-        let angle = TAU * ratio.abs() * (k as f64 * 0.618_033_988_749_895).fract();
+        let angle = TAU * ratio.abs() * (k as f64 * GOLDEN).fract();
         let by_degree = slope(angle, STEP_DEG.to_radians()) / (2.0 * STEP_DEG);
         squares += by_degree * by_degree;
         most = most.max(by_degree.abs());
@@ -130,10 +131,7 @@ fn repeats(table: &Table<'_>) -> f64 {
     let differs = |by: f64| {
         (0..400)
             .map(|k| {
-                let at = State {
-                    generator_rad: TAU * ratio * (f64::from(k) * 0.618_033_988_749_895).fract(),
-                    ..loaded(table, 0.5)
-                };
+                let at = State { generator_rad: TAU * ratio * (f64::from(k) * GOLDEN).fract(), ..loaded(table, 0.5) };
                 let turned = State { generator_rad: at.generator_rad + by, ..at };
                 (steady(table, &turned, 0.0) - steady(table, &at, 0.0)).abs()
             })

@@ -148,9 +148,10 @@ impl New {
         };
         if let Some(name) = &self.like {
             let Some((size, ratio)) = size_and_ratio(name) else {
-                let what = "--like: found {name:?}, allowed: SERIES-SIZE-RATIO as CSF-25-100, size 5 to 100, ratio 30 to 320; a \
-                            built-in drive goes with --from";
-                return bad(what.replace("{name:?}", &format!("{name:?}")));
+                return bad(format!(
+                    "--like: found {name:?}, allowed: SERIES-SIZE-RATIO as CSF-25-100, size 5 to 100, ratio 30 to 320; a built-in drive goes \
+                     with --from"
+                ));
             };
             return Ok(Some((name.clone(), few(2 * ratio, CATALOGUE_MM_PER_SIZE * size / f64::from(2 * ratio)))));
         }

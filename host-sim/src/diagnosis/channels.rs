@@ -240,28 +240,34 @@ fn fault(recording: &Recording, name: FaultName, treatment: Treatment, size_arcs
 /// Whether both angles are in degrees where radians are said: degrees explain the error to the noise, with zeros and ratio free, and
 /// radians leave far more. Division by 57 shrinks any misfit; so what is left counts against its own noise, and the ratio is free in both.
 pub(super) fn are_in_degrees(recording: &Recording, nominal: &Nominal) -> bool {
-    let left_of_noise = |scale: f64| -> f64 {
-        let sessions: Vec<Session> = recording
-            .sessions
-            .iter()
-            .map(|session| Session {
-                generator_rad: session.generator_rad.iter().map(|angle| scale * angle).collect(),
-                error_rad: session.error_rad.iter().map(|error| scale * error).collect(),
-                ..session.clone()
-            })
-            .collect();
-        let rows = Rows::new(&sessions, nominal);
-        let freed = Freed::new(&rows, nominal);
-        let told = Told::by(&rows, nominal, &freed, 1.0);
-        let left = if told.share > OF_THIS_DRIVE[0] { told.left } else { robust_std(freed.error.iter().copied()) };
-        left / white_level(&rows, &rows.error)
-    };
-    let rad = left_of_noise(1.0);
-    if rad < FAR_FROM_NOISE || nominal.harmonics.is_empty() && nominal.wind_up_arcsec(1.0) == 0.0 {
+    if nominal.harmonics.is_empty() && nominal.wind_up_arcsec(1.0) == 0.0 {
         return false;
     }
-    let deg = left_of_noise(1f64.to_radians());
+    let rad = left_of_noise(&recording.sessions, nominal);
+    if rad < FAR_FROM_NOISE {
+        return false;
+    }
+    let radians = |degrees: &[f64]| degrees.iter().map(|angle| angle.to_radians()).collect();
+    let sessions: Vec<Session> = recording
+        .sessions
+        .iter()
+        .map(|session| Session {
+            generator_rad: radians(&session.generator_rad),
+            error_rad: radians(&session.error_rad),
+            ..session.clone()
+        })
+        .collect();
+    let deg = left_of_noise(&sessions, nominal);
     deg < TO_THE_NOISE && rad > FAR_FROM_NOISE * deg
+}
+
+/// What the nominal model leaves of the error with zeros and ratio free, in standard deviations of its white noise.
+fn left_of_noise(sessions: &[Session], nominal: &Nominal) -> f64 {
+    let rows = Rows::new(sessions, nominal);
+    let freed = Freed::new(&rows, nominal);
+    let told = Told::by(&rows, nominal, &freed, 1.0);
+    let left = if told.share > OF_THIS_DRIVE[0] { told.left } else { robust_std(freed.error.iter().copied()) };
+    left / white_level(&rows, &rows.error)
 }
 
 /// A ratio that the data turn by, and the whole one that it may be meant to be.
