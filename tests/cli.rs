@@ -290,3 +290,46 @@ fn help_and_version_are_no_errors() {
     }
     assert!(desk.line("--version").stdout.starts_with("flexspline "));
 }
+
+/// What a study says of a drive is what the table of that drive says, and what it cannot do it says in its rows.
+#[test]
+fn a_study_agrees_with_the_table_of_the_same_drive_and_tells_every_variant() {
+    let desk = Desk::new();
+    let run = desk
+        .line(
+            "study --generator cam --vary generator.w0_mm=0.5,-1 --torque-n-m 200 --keep backlash_arcsec=..100 --json",
+        )
+        .done();
+    let json = run.json();
+    assert_eq!(
+        (json["converged"].as_u64(), json["refused"].as_u64(), json["meet"].as_u64()),
+        (Some(1), Some(1), Some(1))
+    );
+    assert!(json["runs"][1]["why"].as_str().unwrap().contains("generator.w0_mm"));
+    assert_eq!(names(&desk.path("out")), ["report.html", "study.csv", "study.json"]);
+    let rows = desk.read("out/study.csv");
+    assert!(rows.starts_with("variant,generator,generator.w0_mm,t1_n_m,"), "{rows}");
+    assert_eq!(rows.lines().count(), 3);
+
+    let tables = desk.line("tables --generator cam --mesh coarse --no-report --json --out tables").done().json();
+    let stiffness = &tables["tables"][0]["stiffness"];
+    for name in ["k1_n_m_per_rad", "k2_n_m_per_rad", "k3_n_m_per_rad"] {
+        let (sheet, table) = (json["runs"][0]["sheet"][name].as_f64().unwrap(), stiffness[name].as_f64().unwrap());
+        // One place of the generator there, the mean of a pitch and of both directions here.
+        assert!((sheet / table - 1.0).abs() < 0.04, "{name}: {sheet} in the study, {table} of the table");
+    }
+    let backlash = tables["tables"][0]["backlash_arcsec"].as_f64().unwrap();
+    assert!((json["runs"][0]["sheet"]["backlash_arcsec"].as_f64().unwrap() - backlash).abs() < 0.5);
+
+    for (wrong, due) in [
+        ("study --vary generator.w0=0.5", "did you mean `generator.w0_mm`?"),
+        ("study --vary generator.w0_mm=0.5..x", "allowed: PATH=FROM..TO"),
+        ("study --vary generator.w0_mm=0.5 --keep backlash=..3", "did you mean `backlash_arcsec`?"),
+        ("study --vary generator.w0_mm=0.5 --least stress", "max_von_mises_mpa"),
+        ("study --vary generator.w0_mm=0.5 --torque-n-m -3", "allowed: above 0"),
+    ] {
+        let run = desk.line(&format!("{wrong} --out nothing"));
+        assert!(run.code == 2 && run.stderr.contains(due), "{wrong}: {}", run.stderr);
+        assert!(!desk.path("nothing").exists());
+    }
+}

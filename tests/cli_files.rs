@@ -258,6 +258,7 @@ fn every_command_prints_one_json_object_and_nothing_else() {
         "synthesize --model nominal.toml --rows 300 --sessions 4 --seed 1",
         "diagnose out/data.csv --model nominal.toml --no-report",
         "sleeve --drive CUP-95",
+        "study --generator cam --vary generator.w0_mm=0.5 --positions 4",
         "look out/data.csv",
         "calibrate out/data.csv --model nominal.toml",
     ];

@@ -198,6 +198,7 @@ for (const file of [
   "explained/report.html",
   "faults/report.html",
   "reproduce/report.html",
+  "study/report.html",
   "hostile.html",
 ]) {
   const title = file.replace("/report.html", "");

@@ -22,6 +22,7 @@ mod say;
 mod simulate;
 mod sleeve;
 mod stop;
+mod study;
 mod synthesize;
 mod tables;
 mod validate;
@@ -91,6 +92,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
         &[
             ("simulate", "run the drive along a path: kinematic error, backlash, wind-up, stress"),
             ("sleeve", "the sleeve or cup in three dimensions: stiffness by harmonic, tilt, torsion"),
+            ("study", "vary fields of a drive: what a catalogue would print of each variant"),
             ("export", "the mesh, the outlines or a CalculiX deck, for other programs"),
             ("reproduce", "the paper's protocol for all four generators, beside its figures"),
         ],
@@ -165,6 +167,7 @@ fn parse(args: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> Result<
 enum Command {
     Simulate(simulate::Simulate),
     Sleeve(sleeve::SleeveCommand),
+    Study(study::StudyCommand),
     Drive(drive::DriveCommand),
     Export(export::Export),
     Tables(tables::Tables),
@@ -246,6 +249,7 @@ impl Command {
         match self {
             Command::Simulate(command) => command.run(context),
             Command::Sleeve(command) => command.run(context),
+            Command::Study(command) => command.run(context),
             Command::Drive(command) => command.run(context),
             Command::Export(command) => command.run(context),
             Command::Tables(command) => command.run(context),

@@ -37,6 +37,12 @@ pub(super) fn next(commands: &[String]) -> String {
     commands.iter().map(|command| format!("\n{NEXT}{command}")).collect()
 }
 
+/// Says something on stderr beside the result.
+pub(super) fn talk(text: &str) {
+    // Nobody is left to tell if this fails.
+    let _ = writeln!(anstream::stderr(), "{text}");
+}
+
 /// Says on stderr why the command ends.
 pub(super) fn error(message: &str) {
     // Nobody is left to tell if this fails.

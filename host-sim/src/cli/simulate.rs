@@ -134,7 +134,14 @@ impl Simulate {
         if let Some(error) = lost {
             return Err(error.into());
         }
-        let mut simulation = run.map_err(refused_or_failed)?;
+        let mut simulation = run.map_err(|error| {
+            if let (true, SimulateError::Solve(of_solver)) = (context.verbose(), &error)
+                && let Some(residuals) = of_solver.residuals()
+            {
+                say::talk(&format!("relative residual by iteration: {residuals}"));
+            }
+            refused_or_failed(error)
+        })?;
         simulation.summary.command = context.command.clone();
 
         let has_frames = frames.is_some();

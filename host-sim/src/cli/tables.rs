@@ -294,6 +294,16 @@ fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
             info.projection_worst_arcsec,
         ));
     }
+    let stiff: Vec<_> = report.tables.iter().filter_map(|info| Some((info, info.stiffness?))).collect();
+    if !stiff.is_empty() {
+        text.push_str("stiffness    K1 to T1                K2 to T2                K3 above, N.m/rad\n");
+    }
+    for (info, k) in stiff {
+        text.push_str(&format!(
+            "{:<12} {:>8.3e} to {:<7.4} {:>8.3e} to {:<7.4} {:>8.3e}\n",
+            info.generator, k.k1_n_m_per_rad, k.loads.t1_n_m, k.k2_n_m_per_rad, k.loads.t2_n_m, k.k3_n_m_per_rad
+        ));
+    }
     for info in report.tables.iter().filter(|info| info.torque_nodes_resolved == Some(false)) {
         text.push_str(&format!(
             "{}: the torque nodes ran out before the table met the FEM everywhere; see --most-nodes, --torque-n-m\n",

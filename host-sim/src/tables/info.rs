@@ -3,6 +3,7 @@
 use flexspline::make::Sample;
 use serde::Serialize;
 
+use crate::data_sheet::Stiffness;
 use crate::drive::GeneratorKind;
 
 /// A finished table.
@@ -63,6 +64,8 @@ pub struct TableInfo {
     pub backlash_arcsec: f64,
     /// Error in the middle of the play at the ends of the torque axis, arcsec.
     pub wind_up_arcsec: [f64; 2],
+    /// Stiffness as catalogues tell it; null for a table that was not made by FEM of a drive.
+    pub stiffness: Option<Stiffness>,
     /// What is left over whole turns of a drive that does not repeat from tooth to tooth; null for one that does.
     pub turns: Option<TurnsInfo>,
     /// Command line, once known.

@@ -11,6 +11,7 @@ use super::project::{TableError, from_sweep};
 use super::sweep::{SweepError, SweepPlan, SweepProgress, planned_increments};
 use super::torque_nodes::{NodeChoice, choose_torque_nodes};
 use super::turns::{deviation_increments, sweep_turns};
+use crate::data_sheet::Stiffness;
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::{Method, SolveError, SolverSettings};
 
@@ -205,6 +206,8 @@ pub fn make(
     }
     let mut made = from_sweep(drive, &plan, swept, settings.solver, clock.elapsed().as_secs_f64())?;
     made.info.torque_nodes_resolved = chosen.map(|chosen| chosen.resolved);
+    made.info.stiffness =
+        flexspline::Table::check(&made.image).ok().and_then(|table| Stiffness::of_table(drive, &table));
     Ok(made)
 }
 

@@ -305,6 +305,7 @@ fn make(
         inverse_error_arcsec: f64::from(table.inverse_error_bound_rad()) * ARCSEC_PER_RAD,
         backlash_arcsec: backlash,
         wind_up_arcsec: [first, last].map(|t| 0.5 * at(t).iter().sum::<f64>()),
+        stiffness: None,
         turns: None,
         command: String::new(),
     };

@@ -14,11 +14,7 @@ pub enum SolveError {
     #[error(transparent)]
     Mesh(#[from] MeshError),
     /// Newton did not converge, not even in the smallest increment.
-    #[error(
-        "no equilibrium found at generator angle {generator_rad:.6} rad, load {torque_n_m} N.m: {reason}; \
-         relative residual by iteration: {}",
-        history.iter().map(|r| format!("{r:.1e}")).collect::<Vec<_>>().join(" ")
-    )]
+    #[error("no equilibrium found at generator angle {generator_rad:.6} rad, load {torque_n_m} N.m: {reason}")]
     NotConverged {
         /// Where, rad.
         generator_rad: f64,
@@ -57,4 +53,21 @@ pub enum SolveError {
         /// Turn of the output in the last increment, as a share of what the ratio says.
         rate: f64,
     },
+}
+
+impl SolveError {
+    /// Whether the drive is to blame, not the run.
+    pub fn is_bad_input(&self) -> bool {
+        matches!(self, SolveError::Drive(_) | SolveError::Mesh(_))
+    }
+
+    /// Relative residual of each iteration of the last attempt, for who wants to see how it went.
+    pub fn residuals(&self) -> Option<String> {
+        match self {
+            SolveError::NotConverged { history, .. } => {
+                Some(history.iter().map(|r| format!("{r:.1e}")).collect::<Vec<_>>().join(" "))
+            }
+            _ => None,
+        }
+    }
 }

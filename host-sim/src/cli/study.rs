@@ -1,0 +1,300 @@
+//! `flexspline study`: variants of a drive side by side.
+
+use std::fmt::Write as _;
+use std::ops::ControlFlow;
+use std::sync::Mutex;
+use std::time::Instant;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::names::{self, Generators};
+use super::{Context, Failure, report, say};
+use crate::data_sheet::FIGURES;
+use crate::drive::GeneratorKind;
+use crate::mesh::MeshLevel;
+use crate::output::Outputs;
+use crate::report::study_report;
+use crate::stepping::{Method, SolverSettings};
+use crate::study::{
+    Constraint, Effect, Run, RunStatus, Sense, Study, StudyError, StudySettings, Target, Vary, effects, study,
+};
+
+/// Targets where none are given: an exact drive, a stiff one, one that lasts.
+const USUAL_TARGETS: [(&str, Sense); 3] =
+    [("kinematic_error_pp_arcsec", Sense::Least), ("k2_n_m_per_rad", Sense::Most), ("max_von_mises_mpa", Sense::Least)];
+/// Lines of the text for one generator.
+const SHOWN: usize = 5;
+
+/// Vary fields of a drive, and see what a catalogue would print of each variant
+///
+/// Every variant is deformed by each generator, loaded and turned by a tooth pitch, by contact FEM: backlash, lost motion, stiffness
+/// K1, K2, K3, wind-up, transmission error, stresses, teeth in contact. Written are study.csv (a row for each variant and generator),
+/// study.json and report.html: curves or maps, the front of what nothing beats, what each field does.
+///
+/// A variant that finds no equilibrium has the figures until then, its last stable load and the reason; one whose fields make no
+/// drive has the reason.
+#[derive(Debug, Args)]
+#[command(after_help = format!("\
+Examples:
+  flexspline study --vary flexspline.rim_thickness_mm=1.2..2.6:8
+  flexspline study --vary flexspline.rim_thickness_mm=1.2..2.6 --vary generator.w0_mm=0.46..0.5 --generator cam
+  flexspline study --vary flexspline.rim_thickness_mm=1..3 --vary flexspline.width_mm=8..20 --variants 200 \\
+      --keep backlash_arcsec=30..70 --keep max_von_mises_mpa=..300 --least kinematic_error_pp_arcsec
+
+Figures: {}.
+T1 and T2, where the ranges of stiffness end, are 21 and 72 % of the largest load.", FIGURES.map(|(name, _)| name).join(", ")))]
+pub(super) struct StudyCommand {
+    /// A field and its values: PATH=FROM..TO (5 values), PATH=FROM..TO:N, or PATH=VALUE,VALUE,...; repeat for more fields
+    #[arg(long, value_name = "PATH=VALUES", required = true, allow_hyphen_values = true)]
+    vary: Vec<Vary>,
+    /// So many variants spread over all ranges at once (Sobol) [default: every combination of the values]
+    #[arg(long, value_name = "N")]
+    variants: Option<u32>,
+    /// Which spread
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "variants")]
+    seed: u32,
+    /// Wave generator: two-roller, four-roller, double-disc, cam, or all
+    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
+    generator: Generators,
+    /// Largest load, N.m [default: what a table of that generator spans: 200; four-roller 100, two-roller 20; by the size of the drive]
+    #[arg(long, value_name = "T")]
+    torque_n_m: Option<f64>,
+    /// What a variant has to keep to, FIGURE=LEAST..MOST, either end may be left out [default: teeth that clear one another]
+    #[arg(long, value_name = "FIGURE=RANGE", allow_hyphen_values = true)]
+    keep: Vec<Constraint>,
+    /// A figure of which less is better [default: kinematic_error_pp_arcsec, max_von_mises_mpa]
+    #[arg(long, value_name = "FIGURE")]
+    least: Vec<String>,
+    /// A figure of which more is better [default: k2_n_m_per_rad]
+    #[arg(long, value_name = "FIGURE")]
+    most: Vec<String>,
+    /// Positions over the tooth pitch
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u8).range(4..=32))]
+    positions: u8,
+    /// Mesh: coarse, standard or fine
+    #[arg(long, value_name = "LEVEL", default_value = "coarse", value_parser = names::mesh(), hide_possible_values = true)]
+    mesh: MeshLevel,
+}
+
+/// What `--json` prints, and `study.json`.
+#[derive(Serialize)]
+struct Told<'a> {
+    schema_version: u32,
+    tool_version: &'static str,
+    command: &'a str,
+    drive: &'a str,
+    drive_hash: String,
+    /// Runs by how they ended.
+    converged: usize,
+    failed: usize,
+    refused: usize,
+    /// Runs that meet every constraint.
+    meet: usize,
+    effects: &'a [Effect],
+    #[serde(flatten)]
+    study: &'a Study,
+    wall_s: f64,
+}
+
+impl StudyCommand {
+    pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
+        let clock = Instant::now();
+        let drive = context.drive()?;
+        let settings = self.settings()?;
+        let out = context.out()?;
+        let progress = Mutex::new(context.progress("study"));
+        let made = study(&drive, &settings, &|done, of, run| {
+            if let Ok(mut bar) = progress.lock() {
+                if context.verbose() {
+                    bar.line(&line(run));
+                }
+                bar.set(done, of, &format!("variant {} {}", run.variant, run.generator));
+            }
+            ControlFlow::Continue(())
+        })
+        .map_err(|error| match error {
+            StudyError::Stopped => Failure::Failed("stopped; nothing was written".into()),
+            error => Failure::BadInput(error.to_string()),
+        })?;
+        drop(progress);
+
+        let fields_do: Vec<Effect> = settings
+            .generators
+            .iter()
+            .flat_map(|kind| FIGURES.iter().filter_map(|(name, _)| effects(&made, *kind, name)))
+            .collect();
+        let count = |status| made.runs.iter().filter(|run| run.status == status).count();
+        let told = Told {
+            schema_version: 1,
+            tool_version: env!("CARGO_PKG_VERSION"),
+            command: &context.command,
+            drive: &drive.name,
+            drive_hash: blake3::Hash::from_bytes(drive.hash()).to_hex().to_string(),
+            converged: count(RunStatus::Converged),
+            failed: count(RunStatus::Failed),
+            refused: count(RunStatus::Refused),
+            meet: made.runs.iter().filter(|run| run.meets).count(),
+            effects: &fields_do,
+            study: &made,
+            wall_s: clock.elapsed().as_secs_f64(),
+        };
+        let page = study_report::page(study_report::Sources {
+            drive: &drive,
+            command: &context.command,
+            settings: &settings,
+            study: &made,
+            effects: &fields_do,
+        });
+        let mut outputs = Outputs::new();
+        outputs.file(&out.join("study.csv"), |file| file.write_all(csv(&made).as_bytes()))?;
+        outputs.json(&out.join("study.json"), &told)?;
+        report::write(&page, out, &mut outputs)?;
+        outputs.finish()?;
+        context.print(&told, || {
+            let mut text = text(&told, &settings);
+            let _ = write!(
+                text,
+                "wrote study.csv, study.json and report.html to {}/ in {:.0} s",
+                out.display(),
+                told.wall_s
+            );
+            text + &say::next(&best_next(context, &settings, &made))
+        })?;
+        if told.converged == 0 {
+            let why = made.runs.iter().find_map(|run| run.why.as_deref()).unwrap_or_default();
+            return Err(Failure::Failed(format!("no variant converged; the first: {why}")));
+        }
+        Ok(())
+    }
+
+    fn settings(&self) -> Result<StudySettings, Failure> {
+        if let Some(torque) = self.torque_n_m
+            && !(torque > 0.0 && torque.is_finite())
+        {
+            return Err(Failure::BadInput(format!("--torque-n-m: found {torque}, allowed: above 0")));
+        }
+        let named = |option: &str, names: &[String], sense| {
+            names
+                .iter()
+                .map(|name| Target::new(name, sense).map_err(|error| Failure::BadInput(format!("{option}: {error}"))))
+                .collect::<Result<Vec<_>, _>>()
+        };
+        let mut targets = named("--least", &self.least, Sense::Least)?;
+        targets.extend(named("--most", &self.most, Sense::Most)?);
+        if targets.is_empty() {
+            targets.extend(USUAL_TARGETS.iter().filter_map(|(name, sense)| Target::new(name, *sense).ok()));
+        }
+        Ok(StudySettings {
+            vary: self.vary.clone(),
+            spread: self.variants,
+            seed: self.seed,
+            generators: self.generator.0.clone(),
+            torque_n_m: self.torque_n_m,
+            positions: usize::from(self.positions),
+            constraints: self.keep.clone(),
+            targets,
+            solver: SolverSettings { method: Method::Fast, mesh: self.mesh, ..SolverSettings::default() },
+        })
+    }
+}
+
+fn csv(study: &Study) -> String {
+    let cell = |text: &str| {
+        if text.contains([',', '"', '\n']) {
+            format!("\"{}\"", text.replace('"', "\"\"").replace('\n', " "))
+        } else {
+            text.to_owned()
+        }
+    };
+    let fixed = ["variant", "generator"];
+    let loads = ["t1_n_m", "t2_n_m", "largest_n_m"];
+    let end = ["status", "meets", "front", "why"];
+    let figures = FIGURES.map(|(name, _)| name);
+    let fields = study.fields.iter().map(String::as_str);
+    let header: Vec<&str> = fixed.into_iter().chain(fields).chain(loads).chain(figures).chain(end).collect();
+    let mut text = header.join(",") + "\n";
+    let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value}"));
+    for run in &study.runs {
+        let mut row = vec![run.variant.to_string(), run.generator.to_string()];
+        row.extend(run.values.iter().map(|value| cell(value)));
+        row.extend(
+            [run.loads.map(|l| l.t1_n_m), run.loads.map(|l| l.t2_n_m), run.loads.map(|l| l.largest_n_m)].map(number),
+        );
+        row.extend(FIGURES.iter().map(|(_, of)| number(of(&run.sheet))));
+        row.extend([run.status.name().to_owned(), run.meets.to_string(), run.front.to_string()]);
+        row.push(cell(run.why.as_deref().unwrap_or("")));
+        text += &(row.join(",") + "\n");
+    }
+    text
+}
+
+fn line(run: &Run) -> String {
+    let figures: Vec<String> =
+        FIGURES.iter().filter_map(|(name, of)| of(&run.sheet).map(|value| format!("{name} {value:.4}"))).collect();
+    format!(
+        "variant {} {} [{}]: {} {}",
+        run.variant,
+        run.generator,
+        run.values.join(", "),
+        run.status.name(),
+        figures.join(", ")
+    )
+}
+
+/// The front of each generator, best first in the first target.
+fn text(told: &Told<'_>, settings: &StudySettings) -> String {
+    let study = told.study;
+    let mut text = format!(
+        "{}: {} runs; {} converged, {} failed, {} refused; {} meet what has to be kept\n",
+        told.drive,
+        study.runs.len(),
+        told.converged,
+        told.failed,
+        told.refused,
+        told.meet
+    );
+    for kind in &settings.generators {
+        let front = front(study, settings, *kind);
+        let _ = writeln!(text, "{kind}: {} that nothing beats", front.len());
+        for run in front.iter().take(SHOWN) {
+            let values: Vec<String> =
+                study.fields.iter().zip(&run.values).map(|(path, value)| format!("{path}={value}")).collect();
+            let figures: Vec<String> = settings
+                .targets
+                .iter()
+                .map(|target| {
+                    let cost = target.cost(&run.sheet);
+                    format!("{} {:.4}", target.figure, if target.sense == Sense::Most { -cost } else { cost })
+                })
+                .collect();
+            let _ = writeln!(text, "  {:>4}  {}: {}", run.variant, values.join(" "), figures.join(", "));
+        }
+        let more = front.len().saturating_sub(SHOWN);
+        if more > 0 {
+            let _ = writeln!(text, "  and {more} more in study.csv");
+        }
+        let why = study.runs.iter().filter(|run| run.generator == *kind).find_map(|run| run.why.as_deref());
+        if let Some(why) = why {
+            let _ = writeln!(text, "  the first that did not converge: {why}");
+        }
+    }
+    text
+}
+
+fn front<'s>(study: &'s Study, settings: &StudySettings, kind: GeneratorKind) -> Vec<&'s Run> {
+    let mut front: Vec<&Run> = study.runs.iter().filter(|run| run.generator == kind && run.front).collect();
+    if let Some(first) = settings.targets.first() {
+        front.sort_by(|a, b| first.cost(&a.sheet).total_cmp(&first.cost(&b.sheet)));
+    }
+    front
+}
+
+/// Tables of the best variant.
+fn best_next(context: &Context, settings: &StudySettings, study: &Study) -> Vec<String> {
+    let best = settings.generators.iter().find_map(|kind| front(study, settings, *kind).first().copied());
+    let Some(run) = best else { return Vec::new() };
+    let sets: String =
+        study.fields.iter().zip(&run.values).map(|(path, value)| format!(" --set {path}={value}")).collect();
+    vec![context.next(&format!("tables --generator {}{sets}", run.generator))]
+}

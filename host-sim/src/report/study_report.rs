@@ -1,0 +1,389 @@
+//! The page of a study: the front, what each field does, curves or maps of every figure.
+
+use serde_json::{Map, json};
+
+use super::page::{
+    Axis, Block, Choice, Detail, EVERY_CHOICE, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity,
+    Section, Series, Status, Table, Text, significant,
+};
+use crate::data_sheet::FIGURES;
+use crate::drive::{Drive, GeneratorKind};
+use crate::study::{Effect, Run, RunStatus, Sense, Study, StudySettings};
+
+/// Rows of the table of the best.
+const MOST_ROWS: usize = 25;
+
+/// What the page is made from.
+pub struct Sources<'a> {
+    /// The drive that was varied.
+    pub drive: &'a Drive,
+    /// The command line.
+    pub command: &'a str,
+    /// What was studied.
+    pub settings: &'a StudySettings,
+    /// What came out.
+    pub study: &'a Study,
+    /// What the fields do.
+    pub effects: &'a [Effect],
+}
+
+/// The page.
+pub fn page(of: Sources<'_>) -> Page {
+    let Sources { settings, study, .. } = of;
+    let ended = |status| study.runs.iter().filter(|run| run.status == status).count();
+    let (failed, refused) = (ended(RunStatus::Failed), ended(RunStatus::Refused));
+    let interfere = study.runs.iter().filter(|run| run.sheet.rigid_gap_um.is_some_and(|gap| gap < 0.0)).count();
+    let remarks: Vec<String> = [
+        (failed, "found no equilibrium from some load on; their last stable load is in study.csv"),
+        (refused, "make no drive; why is in study.csv"),
+        (interfere, "have teeth that interfere when rigid; they meet nothing"),
+    ]
+    .into_iter()
+    .filter(|(count, _)| *count > 0)
+    .map(|(count, what)| format!("{count} of {} runs {what}.", study.runs.len()))
+    .collect();
+    let kinds = &settings.generators;
+    let mut results = Map::new();
+    results.insert("effects".to_owned(), json!(of.effects));
+    results.insert("runs".to_owned(), json!(study.runs));
+    let mut sections = vec![best(&of)];
+    sections.extend(does(&of));
+    sections.push(trade(&of));
+    sections.push(curves(&of));
+    sections.push(reading());
+    Page {
+        title: format!("Study of {}", of.drive.name),
+        command_name: "study",
+        status: if remarks.is_empty() { Status::Good } else { Status::Remark },
+        also: Vec::new(),
+        remarks,
+        choices: kinds.iter().map(|kind| Choice { id: kind.to_string(), name: kind.to_string() }).collect(),
+        choice_is: "Generator",
+        headlines: kinds.iter().map(|kind| headline(&of, *kind)).collect(),
+        sections,
+        animations: Vec::new(),
+        provenance: vec![
+            ("command".to_owned(), of.command.to_owned()),
+            ("better".to_owned(), better(settings)),
+            ("drive_hash".to_owned(), blake3::Hash::from_bytes(of.drive.hash()).to_hex().to_string()),
+        ],
+        results,
+    }
+}
+
+/// The targets in words.
+fn better(settings: &StudySettings) -> String {
+    let words = |sense| if sense == Sense::Least { "least" } else { "most" };
+    let each = settings.targets.iter().map(|target| format!("{} {}", words(target.sense), target.figure));
+    each.collect::<Vec<_>>().join(", ")
+}
+
+/// A figure as a reader takes it: what it is, its quantity, and its value in the unit of that quantity.
+fn shown(name: &str) -> (String, Quantity) {
+    let (words, quantity) = if let Some(words) = name.strip_suffix("_arcsec") {
+        (words, Quantity::Error)
+    } else if let Some(words) = name.strip_suffix("_mpa") {
+        (words, Quantity::Stress)
+    } else if let Some(words) = name.strip_suffix("_n_m_per_rad") {
+        return (format!("{}, N·m/rad", words.to_uppercase()), Quantity::Count);
+    } else if let Some(words) = name.strip_suffix("_n_m") {
+        (words, Quantity::Torque)
+    } else if let Some(words) = name.strip_suffix("_um") {
+        return (format!("{}, µm", words.replace('_', " ")), Quantity::Count);
+    } else if let Some(words) = name.strip_suffix("_percent") {
+        return (format!("{}, %", words.replace('_', " ")), Quantity::Count);
+    } else {
+        (name, Quantity::Count)
+    };
+    (words.replace('_', " ").replace("pp", "peak to peak"), quantity)
+}
+
+fn heading(name: &str) -> String {
+    let (words, quantity) = shown(name);
+    match quantity {
+        Quantity::Stress => format!("{words}, MPa"),
+        Quantity::Torque => format!("{words}, N·m"),
+        _ => words,
+    }
+}
+
+fn value(name: &str, value: Option<f64>) -> Text {
+    match value {
+        None => Text::new("–"),
+        Some(value) if shown(name).1 == Quantity::Error => Text::default().error(value, 3),
+        Some(value) => Text::new(significant(value, 3)),
+    }
+}
+
+fn of_kind(study: &Study, kind: GeneratorKind) -> impl Iterator<Item = &Run> {
+    study.runs.iter().filter(move |run| run.generator == kind)
+}
+
+/// The front of a generator, best in the first target first.
+fn front<'s>(of: &Sources<'s>, kind: GeneratorKind) -> Vec<&'s Run> {
+    let mut front: Vec<&Run> = of_kind(of.study, kind).filter(|run| run.front).collect();
+    if let Some(first) = of.settings.targets.first() {
+        front.sort_by(|a, b| first.cost(&a.sheet).total_cmp(&first.cost(&b.sheet)));
+    }
+    front
+}
+
+fn headline(of: &Sources<'_>, kind: GeneratorKind) -> Headline {
+    let count = of_kind(of.study, kind).count();
+    let meet = of_kind(of.study, kind).filter(|run| run.meets).count();
+    let name = of.settings.targets.first().map_or("kinematic_error_pp_arcsec", |target| target.figure);
+    let of_figure = FIGURES.iter().find(|(known, _)| *known == name).map(|(_, figure)| figure);
+    let front = front(of, kind);
+    let (answer, number) = match (front.first(), of_figure) {
+        (Some(best), Some(figure)) => {
+            let number = value(name, figure(&best.sheet));
+            (
+                format!("{meet} of {count} variants meet what has to be kept; nothing beats {} of them.", front.len()),
+                number,
+            )
+        }
+        _ => (format!("None of {count} variants meets what has to be kept."), Text::new("–")),
+    };
+    Headline {
+        choice: Some(kind.to_string()),
+        answer: Text::new(answer),
+        number,
+        number_is: format!("{}, of the best", heading(name)),
+    }
+}
+
+fn best(of: &Sources<'_>) -> Section {
+    let header: Vec<String> = ["Variant".to_owned()]
+        .into_iter()
+        .chain(of.study.fields.iter().cloned())
+        .chain(FIGURES.iter().map(|(name, _)| heading(name)))
+        .collect();
+    let blocks = of
+        .settings
+        .generators
+        .iter()
+        .map(|kind| {
+            let front = front(of, *kind);
+            let rows = front.iter().take(MOST_ROWS).map(|run| {
+                let fields = run.values.iter().map(|value| Text::new(value.clone()));
+                let figures = FIGURES.iter().map(|(name, figure)| value(name, figure(&run.sheet)));
+                [Text::new(run.variant.to_string())].into_iter().chain(fields).chain(figures).collect()
+            });
+            let rows: Vec<Vec<Text>> = rows.collect();
+            let caption = if front.len() > MOST_ROWS {
+                format!("The first {MOST_ROWS} of {} variants that nothing beats; all are in study.csv", front.len())
+            } else {
+                "Variants that nothing beats in every target".to_owned()
+            };
+            let table = Table { caption, header: header.clone(), rows };
+            Block::Table { choice: Some(kind.to_string()), table }
+        })
+        .collect();
+    Section { id: "best".to_owned(), title: "The best".to_owned(), detail: Detail::Summary, blocks }
+}
+
+/// What each field does to each figure, from its least value to its largest.
+fn does(of: &Sources<'_>) -> Option<Section> {
+    let header: Vec<String> = ["Figure".to_owned()]
+        .into_iter()
+        .chain(of.study.fields.iter().cloned())
+        .chain(["straight, %".to_owned()])
+        .collect();
+    let blocks: Vec<Block> = of
+        .settings
+        .generators
+        .iter()
+        .filter_map(|kind| {
+            let rows: Vec<Vec<Text>> = of
+                .effects
+                .iter()
+                .filter(|effect| effect.generator == *kind)
+                .map(|effect| {
+                    let changes = effect.change.iter().map(|change| value(effect.figure, *change));
+                    let straight = Text::new(significant(100.0 * effect.straight, 3));
+                    [Text::new(heading(effect.figure))].into_iter().chain(changes).chain([straight]).collect()
+                })
+                .collect();
+            let caption = "Change of each figure from the least to the largest value of a field, the others held: the slopes of a straight \
+                           line through all variants, and the share of the scatter that it explains";
+            let table = Table { caption: caption.to_owned(), header: header.clone(), rows };
+            (!table.rows.is_empty()).then(|| Block::Table { choice: Some(kind.to_string()), table })
+        })
+        .collect();
+    let (id, title) = ("does".to_owned(), "What each field does".to_owned());
+    (!blocks.is_empty()).then_some(Section { id, title, detail: Detail::Summary, blocks })
+}
+
+/// The first two targets against one another.
+fn trade(of: &Sources<'_>) -> Section {
+    let [first, second] = match of.settings.targets.as_slice() {
+        [first, second, ..] => [first.figure, second.figure],
+        [only] if only.figure == "kinematic_error_pp_arcsec" => [only.figure, "k2_n_m_per_rad"],
+        [only] => [only.figure, "kinematic_error_pp_arcsec"],
+        [] => ["kinematic_error_pp_arcsec", "k2_n_m_per_rad"],
+    };
+    let get = |name: &str, run: &Run| FIGURES.iter().find(|(known, _)| *known == name).and_then(|(_, f)| f(&run.sheet));
+    let series = |kind: GeneratorKind, name: &str, colour: usize, mark: Mark, which: &dyn Fn(&Run) -> bool| {
+        let mut points: Vec<[f64; 2]> = of_kind(of.study, kind)
+            .filter(|run| which(run))
+            .filter_map(|run| Some([get(first, run)?, get(second, run)?]))
+            .collect();
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        Series { name: name.to_owned(), mark, colour, points }
+    };
+    let charts = of
+        .settings
+        .generators
+        .iter()
+        .map(|kind| {
+            let lines = Lines {
+                series: vec![
+                    series(*kind, "does not meet", 5, Mark::Dots, &|run| !run.meets),
+                    series(*kind, "meets", 0, Mark::Points, &|run| run.meets && !run.front),
+                    series(*kind, "nothing beats it", 1, Mark::Points, &|run| run.front),
+                ],
+                ..Lines::default()
+            };
+            (kind.to_string(), lines)
+        })
+        .collect();
+    let axis = |name: &str| {
+        let (words, quantity) = shown(name);
+        Axis::new(words, quantity)
+    };
+    let figure = Figure {
+        id: "trade".to_owned(),
+        title: format!("{} against {}", shown(second).0, shown(first).0),
+        caption: Text::new("Each point is a variant."),
+        alt: "Every variant by two of its figures; those that nothing beats stand out".to_owned(),
+        body: FigureBody::Lines { x: axis(first), y: axis(second), charts },
+    };
+    Section {
+        id: "trade".to_owned(),
+        title: "What one pays with what".to_owned(),
+        detail: Detail::Summary,
+        blocks: vec![Block::Figure(figure)],
+    }
+}
+
+/// Every figure over the fields: curves of one field, maps of two on a grid, points of more.
+fn curves(of: &Sources<'_>) -> Section {
+    let grid = of.settings.spread.is_none();
+    let blocks: Vec<Block> = FIGURES
+        .iter()
+        .filter(|(_, figure)| of.study.runs.iter().any(|run| figure(&run.sheet).is_some()))
+        .flat_map(|(name, _)| match of.study.fields.len() {
+            1 => vec![curve(of, name, 0, true)],
+            2 if grid => map(of, name).map_or_else(|| all_curves(of, name), |map| vec![map]),
+            _ => all_curves(of, name),
+        })
+        .map(Block::Figure)
+        .collect();
+    Section { id: "curves".to_owned(), title: "Figure by figure".to_owned(), detail: Detail::Engineering, blocks }
+}
+
+fn all_curves(of: &Sources<'_>, name: &'static str) -> Vec<Figure> {
+    (0..of.study.fields.len()).map(|field| curve(of, name, field, false)).collect()
+}
+
+/// Where a value of a field stands on an axis: its number, or for words its place among them.
+fn place(of: &Sources<'_>, field: usize, value: &str) -> f64 {
+    value.parse().unwrap_or_else(|_| {
+        let grid = of.settings.vary[field].grid();
+        grid.iter().position(|word| word == value).map_or(f64::NAN, |k| k as f64)
+    })
+}
+
+fn curve(of: &Sources<'_>, name: &'static str, field: usize, alone: bool) -> Figure {
+    let figure = FIGURES.iter().find(|(known, _)| *known == name).map(|(_, figure)| figure);
+    let points = |kind: GeneratorKind| {
+        let mut points: Vec<[f64; 2]> = of_kind(of.study, kind)
+            .filter_map(|run| Some([place(of, field, &run.values[field]), figure?(&run.sheet)?]))
+            .collect();
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        points
+    };
+    let limits = || -> Vec<Limit> {
+        let kept = of.settings.constraints.iter().filter(|kept| kept.figure == name);
+        kept.flat_map(|kept| [("at least", kept.least), ("at most", kept.most)])
+            .filter(|(_, y)| y.is_finite())
+            .map(|(name, y)| Limit { name: name.to_owned(), y })
+            .collect()
+    };
+    let kinds = &of.settings.generators;
+    // Of one field all generators share a chart; of several each has its own.
+    let charts = if alone {
+        let series = kinds
+            .iter()
+            .enumerate()
+            .map(|(colour, kind)| Series { name: kind.to_string(), mark: Mark::Line, colour, points: points(*kind) })
+            .collect();
+        vec![(EVERY_CHOICE.to_owned(), Lines { series, limits: limits(), ..Lines::default() })]
+    } else {
+        let chart = |kind: &GeneratorKind| {
+            let series =
+                vec![Series { name: "variants".to_owned(), mark: Mark::Points, colour: 0, points: points(*kind) }];
+            (kind.to_string(), Lines { series, limits: limits(), ..Lines::default() })
+        };
+        kinds.iter().map(chart).collect()
+    };
+    let (words, quantity) = shown(name);
+    let path = &of.study.fields[field];
+    Figure {
+        id: format!("{}-{field}", name.replace('_', "-")),
+        title: format!("{words} over {path}"),
+        caption: Text::default(),
+        alt: format!("{words} of every variant over {path}"),
+        body: FigureBody::Lines { x: Axis::new(path.clone(), Quantity::Count), y: Axis::new(words, quantity), charts },
+    }
+}
+
+/// A figure over a grid of two fields of numbers.
+fn map(of: &Sources<'_>, name: &'static str) -> Option<Figure> {
+    let figure = FIGURES.iter().find(|(known, _)| *known == name)?.1;
+    let axis = |field: usize| -> Option<Vec<f64>> {
+        let values: Option<Vec<f64>> = of.settings.vary[field].grid().iter().map(|value| value.parse().ok()).collect();
+        let mut values = values?;
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        (values.len() > 1).then_some(values)
+    };
+    let (x, y) = (axis(0)?, axis(1)?);
+    let fields = of
+        .settings
+        .generators
+        .iter()
+        .map(|kind| {
+            let mut z = vec![f64::NAN; x.len() * y.len()];
+            for run in of_kind(of.study, *kind) {
+                let at = |axis: &[f64], value: &str| {
+                    let value: f64 = value.parse().ok()?;
+                    axis.iter().position(|known| *known == value)
+                };
+                if let (Some(i), Some(j), Some(value)) =
+                    (at(&x, &run.values[0]), at(&y, &run.values[1]), figure(&run.sheet))
+                {
+                    z[j * x.len() + i] = value;
+                }
+            }
+            (kind.to_string(), Field { x: x.clone(), y: y.clone(), z })
+        })
+        .collect();
+    let (words, quantity) = shown(name);
+    let [across, up] = [0, 1].map(|field| Axis::new(of.study.fields[field].clone(), Quantity::Count));
+    Some(Figure {
+        id: name.replace('_', "-"),
+        title: format!("{words} over both fields"),
+        caption: Text::default(),
+        alt: format!("{words} in colour over {} and {}", of.study.fields[0], of.study.fields[1]),
+        body: FigureBody::Field { x: across, y: up, z: Axis::new(words, quantity), fields },
+    })
+}
+
+fn reading() -> Section {
+    Section::reading(vec![Block::paragraph(
+        "Each variant is loaded from first contact with its generator held, and then turned by a tooth pitch under the largest load. K1 is the \
+         secant of its torsion up to T1, K2 from T1 to T2, K3 above; the clearance of the teeth is no part of them. Stress is the largest nodal \
+         value and grows with the mesh at roots and contacts: compare it between variants, not with a yield strength.",
+    )])
+}

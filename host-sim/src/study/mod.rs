@@ -1,0 +1,249 @@
+//! Variants of a drive side by side: which fields vary, what a catalogue would print of each variant, which of them meet the
+//! constraints, which are best, and what each field does.
+
+mod effects;
+mod judge;
+mod vary;
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::data_sheet::{DataSheet, Loads, data_sheet};
+use crate::drive::{Drive, GeneratorKind};
+use crate::stepping::SolverSettings;
+
+pub use effects::{Effect, effects};
+pub use judge::{Constraint, JudgeError, Sense, Target, figure};
+pub use vary::{Values, Vary, VaryError};
+
+/// Fields that vary at once, at most.
+pub const MOST_FIELDS: usize = 32;
+/// Variants of a study, at most.
+pub const MOST_VARIANTS: usize = 100_000;
+
+/// What to study.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StudySettings {
+    /// The fields that vary, and over what.
+    pub vary: Vec<Vary>,
+    /// So many variants spread over all ranges at once; without it every combination of their values.
+    pub spread: Option<u32>,
+    /// Which spread.
+    pub seed: u32,
+    /// The generators.
+    pub generators: Vec<GeneratorKind>,
+    /// Largest load, N·m; by default what a table of that generator spans.
+    pub torque_n_m: Option<f64>,
+    /// Positions over a tooth pitch, 4 or more.
+    pub positions: usize,
+    /// What a variant has to keep to.
+    pub constraints: Vec<Constraint>,
+    /// What makes a variant better than another.
+    pub targets: Vec<Target>,
+    /// The numerical method.
+    pub solver: SolverSettings,
+}
+
+/// A study that cannot be begun, or was stopped.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum StudyError {
+    /// Nothing varies, or too much.
+    #[error("--vary: found {found}, allowed: 1 to {MOST_FIELDS} different fields")]
+    Fields {
+        /// What was found.
+        found: String,
+    },
+    /// Too many variants.
+    #[error("--vary: found {found} variants, allowed: 1 to {MOST_VARIANTS}; fewer values, or --variants N")]
+    Variants {
+        /// How many.
+        found: usize,
+    },
+    /// No value of a field makes a drive, whatever the others are.
+    #[error("--vary {path}: no value of it makes a drive: {why}")]
+    NoDrive {
+        /// The field.
+        path: String,
+        /// Why its first value is refused.
+        why: String,
+    },
+    /// The observer asked to stop.
+    #[error("stopped")]
+    Stopped,
+}
+
+/// How a run of one variant ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RunStatus {
+    /// All figures are there.
+    Converged,
+    /// No equilibrium from some load on: the figures until then are there.
+    Failed,
+    /// Its fields make no drive.
+    Refused,
+}
+
+impl RunStatus {
+    /// As in the files.
+    pub fn name(self) -> &'static str {
+        match self {
+            RunStatus::Converged => "converged",
+            RunStatus::Failed => "failed",
+            RunStatus::Refused => "refused",
+        }
+    }
+}
+
+/// A variant with one generator.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Run {
+    /// Number of the variant, from 1.
+    pub variant: usize,
+    /// The generator.
+    pub generator: GeneratorKind,
+    /// Values of the fields that vary, in their order.
+    pub values: Vec<String>,
+    /// How the run ended.
+    pub status: RunStatus,
+    /// Why, where it did not converge.
+    pub why: Option<String>,
+    /// The loads of the sheet; missing of a drive that was refused.
+    pub loads: Option<Loads>,
+    /// What a catalogue would print.
+    pub sheet: DataSheet,
+    /// Whether it converged, its teeth clear one another, and every constraint is kept.
+    pub meets: bool,
+    /// Whether it meets, and nothing that meets beats it in every target, of this generator.
+    pub front: bool,
+}
+
+/// What a study gives.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Study {
+    /// The fields that vary.
+    pub fields: Vec<String>,
+    /// Every variant with every generator, by variant, then by generator.
+    pub runs: Vec<Run>,
+}
+
+/// Told after every run: how many are done, of how many, and the last. May ask to stop.
+pub type Observer<'a> = dyn Fn(usize, usize, &Run) -> ControlFlow<()> + Sync + 'a;
+
+/// Runs every variant of `drive` with every generator. The result does not depend on threads.
+///
+/// # Errors
+/// Nothing varies, too much varies, a field can take none of its values, or the observer stopped it. A variant that fails or is
+/// refused is a row of the result.
+pub fn study(drive: &Drive, settings: &StudySettings, observer: &Observer<'_>) -> Result<Study, StudyError> {
+    let variants = variants(drive, settings)?;
+    let paths: Vec<&str> = settings.vary.iter().map(|field| field.path.as_str()).collect();
+    let jobs: Vec<(usize, GeneratorKind)> =
+        (0..variants.len()).flat_map(|variant| settings.generators.iter().map(move |kind| (variant, *kind))).collect();
+    let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let mut runs: Vec<Run> = jobs
+        .par_iter()
+        .with_max_len(1)
+        .filter_map(|&(variant, generator)| {
+            if stopped.load(Ordering::Relaxed) {
+                return None;
+            }
+            let run = run(drive, settings, &paths, variant, &variants[variant], generator);
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            if observer(done, jobs.len(), &run).is_break() {
+                stopped.store(true, Ordering::Relaxed);
+            }
+            Some(run)
+        })
+        .collect();
+    if runs.len() < jobs.len() {
+        return Err(StudyError::Stopped);
+    }
+    judge::judge(&mut runs, &settings.constraints, &settings.targets);
+    Ok(Study { fields: paths.into_iter().map(str::to_owned).collect(), runs })
+}
+
+fn variants(drive: &Drive, settings: &StudySettings) -> Result<Vec<Vec<String>>, StudyError> {
+    let vary = &settings.vary;
+    if !(1..=MOST_FIELDS).contains(&vary.len()) {
+        return Err(StudyError::Fields { found: format!("{} of them", vary.len()) });
+    }
+    if let Some(twice) = vary.iter().enumerate().find_map(|(k, a)| vary[..k].iter().find(|b| a.path == b.path)) {
+        return Err(StudyError::Fields { found: format!("{} twice", twice.path) });
+    }
+    let count = match settings.spread {
+        Some(count) => count as usize,
+        None => vary.iter().map(|field| field.grid().len()).fold(1, usize::saturating_mul),
+    };
+    if !(1..=MOST_VARIANTS).contains(&count) {
+        return Err(StudyError::Variants { found: count });
+    }
+    let variants = match settings.spread {
+        Some(count) => vary::spread(vary, count, settings.seed),
+        None => vary::grid(vary),
+    };
+    // A field that does not exist, or a range that makes no drive, is told before anything is computed.
+    for (k, field) in vary.iter().enumerate() {
+        let refused =
+            |variant: &Vec<String>| drive.with_sets([format!("{}={}", field.path, variant[k]).as_str()]).err();
+        if variants.iter().all(|variant| refused(variant).is_some()) && all_refused(drive, vary, &variants) {
+            let why = refused(&variants[0]).map_or_else(String::new, |error| error.to_string());
+            return Err(StudyError::NoDrive { path: field.path.clone(), why });
+        }
+    }
+    Ok(variants)
+}
+
+/// Whether no variant makes a drive: fields may be possible together that are not alone.
+fn all_refused(drive: &Drive, vary: &[Vary], variants: &[Vec<String>]) -> bool {
+    let paths: Vec<&str> = vary.iter().map(|field| field.path.as_str()).collect();
+    variants.iter().all(|values| varied(drive, &paths, values).is_err())
+}
+
+fn varied(drive: &Drive, paths: &[&str], values: &[String]) -> Result<Drive, crate::drive::DriveError> {
+    let sets: Vec<String> = paths.iter().zip(values).map(|(path, value)| format!("{path}={value}")).collect();
+    drive.with_sets(sets.iter().map(String::as_str))
+}
+
+fn run(
+    drive: &Drive,
+    settings: &StudySettings,
+    paths: &[&str],
+    variant: usize,
+    values: &[String],
+    generator: GeneratorKind,
+) -> Run {
+    let mut run = Run {
+        variant: variant + 1,
+        generator,
+        values: values.to_vec(),
+        status: RunStatus::Refused,
+        why: None,
+        loads: None,
+        sheet: DataSheet::default(),
+        meets: false,
+        front: false,
+    };
+    let drive = match varied(drive, paths, values) {
+        Ok(drive) => drive,
+        Err(error) => return Run { why: Some(error.to_string()), ..run },
+    };
+    let loads = Loads::up_to(settings.torque_n_m.unwrap_or_else(|| drive.rated_torque_n_m(generator)));
+    let (sheet, done) = data_sheet(&drive, generator, loads, settings.positions, settings.solver);
+    (run.loads, run.sheet) = (Some(loads), sheet);
+    match done {
+        Ok(()) => run.status = RunStatus::Converged,
+        Err(error) => {
+            run.status = if error.is_bad_input() { RunStatus::Refused } else { RunStatus::Failed };
+            run.why = Some(error.to_string());
+        }
+    }
+    run
+}
+
+#[cfg(test)]
+mod tests;

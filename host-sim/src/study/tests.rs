@@ -1,0 +1,122 @@
+use super::*;
+use crate::data_sheet::FIGURES;
+use crate::mesh::MeshLevel;
+use crate::stepping::Method;
+
+fn settings(vary: &[&str]) -> StudySettings {
+    StudySettings {
+        vary: vary.iter().map(|text| text.parse().unwrap()).collect(),
+        spread: None,
+        seed: 1,
+        generators: vec![GeneratorKind::Cam],
+        torque_n_m: None,
+        positions: 4,
+        constraints: Vec::new(),
+        targets: vec![Target::new("kinematic_error_pp_arcsec", Sense::Least).unwrap()],
+        solver: SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() },
+    }
+}
+
+fn quietly(settings: &StudySettings) -> Result<Study, StudyError> {
+    study(&Drive::hhd_95(), settings, &|_, _, _| ControlFlow::Continue(()))
+}
+
+/// A run with figures that were made up.
+fn made_up(variant: usize, value: f64, error: f64, stress: f64) -> Run {
+    Run {
+        variant,
+        generator: GeneratorKind::Cam,
+        values: vec![value.to_string()],
+        status: RunStatus::Converged,
+        why: None,
+        loads: None,
+        sheet: DataSheet {
+            rigid_gap_um: Some(1.0),
+            kinematic_error_pp_arcsec: Some(error),
+            max_von_mises_mpa: Some(stress),
+            ..DataSheet::default()
+        },
+        meets: false,
+        front: false,
+    }
+}
+
+/// A thicker rim is stiffer, most where two rollers bend it most, and presses on them harder: the signs are known without FEM.
+#[test]
+fn a_thicker_rim_is_stiffer_under_two_rollers() {
+    let mut settings = settings(&["flexspline.rim_thickness_mm=1.4..2.2:2"]);
+    settings.generators = vec![GeneratorKind::TwoRoller];
+    let study = quietly(&settings).unwrap();
+    let [thin, thick] = [&study.runs[0].sheet, &study.runs[1].sheet];
+    println!("{thin:?}\n{thick:?}");
+    assert!(thick.k1_n_m_per_rad.unwrap() > 2.0 * thin.k1_n_m_per_rad.unwrap());
+    assert!(thick.k2_n_m_per_rad.unwrap() > 1.1 * thin.k2_n_m_per_rad.unwrap());
+    assert!(thick.wind_up_arcsec.unwrap() < thin.wind_up_arcsec.unwrap());
+    assert!(thick.peak_generator_pressure_mpa.unwrap() > thin.peak_generator_pressure_mpa.unwrap());
+}
+
+#[test]
+fn a_field_that_is_not_there_is_told_before_anything_runs() {
+    let error = quietly(&settings(&["flexspline.rim_thicknes_mm=1..2"])).unwrap_err().to_string();
+    assert!(error.contains("rim_thickness_mm"), "{error}");
+    let error = quietly(&settings(&["flexspline.rim_thickness_mm=-2..-1"])).unwrap_err();
+    assert!(matches!(error, StudyError::NoDrive { .. }), "{error}");
+    let twice = quietly(&settings(&["generator.w0_mm=0.4..0.5", "generator.w0_mm=0.4..0.5"])).unwrap_err();
+    assert!(matches!(twice, StudyError::Fields { .. }), "{twice}");
+}
+
+/// What makes no drive is a row that says why, beside the others.
+#[test]
+fn a_variant_that_makes_no_drive_is_refused_with_its_reason_and_the_rest_runs() {
+    let study = quietly(&settings(&["flexspline.rim_thickness_mm=-1,2"])).unwrap();
+    assert_eq!(study.runs[0].status, RunStatus::Refused);
+    assert!(study.runs[0].why.as_ref().unwrap().contains("rim_thickness_mm"));
+    assert_eq!(study.runs[1].status, RunStatus::Converged);
+    assert!(FIGURES.iter().all(|(name, of)| of(&study.runs[1].sheet).is_some_and(f64::is_finite) || panic!("{name}")));
+}
+
+#[test]
+fn constraints_leave_out_and_the_front_is_what_nothing_beats() {
+    let targets = [("kinematic_error_pp_arcsec", Sense::Least), ("max_von_mises_mpa", Sense::Least)]
+        .map(|(name, sense)| Target::new(name, sense).unwrap());
+    let mut runs = [(1.0, 300.0), (2.0, 200.0), (3.0, 250.0), (0.5, 500.0), (2.0, 200.0)]
+        .map(|(e, s)| made_up(1, 1.0, e, s))
+        .to_vec();
+    runs[1].sheet.rigid_gap_um = Some(-1.0);
+    judge::judge(&mut runs, &["max_von_mises_mpa=..400".parse().unwrap()], &targets);
+    let told: Vec<(bool, bool)> = runs.iter().map(|run| (run.meets, run.front)).collect();
+    // The second interferes, the third is beaten by the fifth, the fourth breaks the constraint.
+    assert_eq!(told, [(true, true), (false, false), (true, false), (false, false), (true, true)]);
+}
+
+#[test]
+fn a_constraint_that_cannot_be_read_says_what_is_allowed() {
+    for text in [
+        "max_von_mises_mpa",
+        "max_von_mises_mpa=3",
+        "max_von_mises_mpa=..",
+        "max_von_mises_mpa=5..4",
+        "max_von_mises_mpa=x..",
+    ] {
+        let error = text.parse::<Constraint>().unwrap_err().to_string();
+        assert!(error.contains("LEAST..MOST"), "{error}");
+    }
+    let error = "max_mises_mpa=..3".parse::<Constraint>().unwrap_err().to_string();
+    assert!(error.contains("did you mean") && error.contains("max_von_mises_mpa"), "{error}");
+}
+
+#[test]
+fn effects_are_the_slopes_of_what_is_straight() {
+    let runs: Vec<Run> = (0..6).map(|k| made_up(k, f64::from(k as u32), 10.0 - 1.5 * k as f64, 7.0)).collect();
+    let study = Study { fields: vec!["a".into()], runs };
+    let effect = effects(&study, GeneratorKind::Cam, "kinematic_error_pp_arcsec").unwrap();
+    assert!((effect.change[0].unwrap() + 7.5).abs() < 1e-9 && (effect.straight - 1.0).abs() < 1e-12);
+    assert!(effects(&study, GeneratorKind::Cam, "backlash_arcsec").is_none());
+}
+
+#[test]
+fn a_study_that_is_stopped_gives_nothing() {
+    let stopped =
+        study(&Drive::hhd_95(), &settings(&["generator.w0_mm=0.48..0.49:4"]), &|_, _, _| ControlFlow::Break(()));
+    assert_eq!(stopped.unwrap_err(), StudyError::Stopped);
+}

@@ -1,0 +1,192 @@
+//! What varies in a study, and the variants that are drawn from it.
+
+use std::str::FromStr;
+
+use thiserror::Error;
+
+/// Values of a range where their number is not given.
+const USUAL_VALUES: usize = 5;
+/// Values of a range, at most.
+const MOST_VALUES: usize = 1000;
+
+/// A field of the drive and the values it takes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Vary {
+    /// Path of the field, such as `flexspline.rim_thickness_mm`.
+    pub path: String,
+    /// Its values.
+    pub values: Values,
+}
+
+/// Values of a field.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// From one end to the other.
+    Range {
+        /// First end.
+        from: f64,
+        /// Last end.
+        to: f64,
+        /// Values of a grid, both ends among them; 1 or more.
+        count: usize,
+    },
+    /// These, as they are written.
+    List(Vec<String>),
+}
+
+/// A `PATH=VALUES` that cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "--vary: found {found:?}, {what}; allowed: PATH=FROM..TO, PATH=FROM..TO:N (N values, 1 to {MOST_VALUES}) or PATH=VALUE,VALUE,…"
+)]
+pub struct VaryError {
+    found: String,
+    what: &'static str,
+}
+
+impl FromStr for Vary {
+    type Err = VaryError;
+
+    fn from_str(text: &str) -> Result<Vary, VaryError> {
+        let wrong = |what| VaryError { found: text.to_owned(), what };
+        let (path, values) = text.split_once('=').ok_or_else(|| wrong("which has no ="))?;
+        let path = path.trim();
+        if path.is_empty() {
+            return Err(wrong("which names no field"));
+        }
+        let values = match values.split_once("..") {
+            Some((from, rest)) => {
+                let (to, count) = match rest.split_once(':') {
+                    None => (rest, USUAL_VALUES),
+                    Some((to, count)) => {
+                        (to, count.trim().parse().map_err(|_| wrong("whose number of values is no whole number"))?)
+                    }
+                };
+                let number = |end: &str| end.trim().parse::<f64>().ok().filter(|end| end.is_finite());
+                let (Some(from), Some(to)) = (number(from), number(to)) else {
+                    return Err(wrong("whose ends are not two numbers"));
+                };
+                if !(1..=MOST_VALUES).contains(&count) {
+                    return Err(wrong("which asks for that many values"));
+                }
+                Values::Range { from, to, count }
+            }
+            None => {
+                let list: Vec<String> = values.split(',').map(|value| value.trim().to_owned()).collect();
+                if list.iter().any(String::is_empty) {
+                    return Err(wrong("which has an empty value"));
+                }
+                Values::List(list)
+            }
+        };
+        Ok(Vary { path: path.to_owned(), values })
+    }
+}
+
+impl Vary {
+    /// Its values on a grid, as a drive file would have them.
+    pub fn grid(&self) -> Vec<String> {
+        match &self.values {
+            Values::Range { from, count: 1, .. } => vec![written(*from)],
+            Values::Range { from, to, count } => {
+                let at = |k: usize| from + (to - from) * k as f64 / (count - 1) as f64;
+                (0..*count).map(|k| written(at(k))).collect()
+            }
+            Values::List(list) => list.clone(),
+        }
+    }
+
+    /// Its value at a place of 0 (first) to 1 (excluded).
+    pub fn at(&self, place: f64) -> String {
+        match &self.values {
+            Values::Range { from, to, .. } => written(from + (to - from) * place),
+            Values::List(list) => list[((place * list.len() as f64) as usize).min(list.len() - 1)].clone(),
+        }
+    }
+}
+
+/// A number as a drive file has it, to nine digits: whole numbers without a point, so that fields of whole numbers take them.
+fn written(value: f64) -> String {
+    let rounded: f64 = format!("{value:.8e}").parse().unwrap_or(value);
+    format!("{rounded}")
+}
+
+/// Every combination of the grids of all fields; the last field changes fastest.
+pub fn grid(vary: &[Vary]) -> Vec<Vec<String>> {
+    vary.iter().fold(vec![Vec::new()], |variants, field| {
+        let values = field.grid();
+        variants
+            .iter()
+            .flat_map(|variant| values.iter().map(|value| variant.iter().cloned().chain([value.clone()]).collect()))
+            .collect()
+    })
+}
+
+/// `count` variants spread evenly over all ranges at once: a Sobol sequence with Owen's scrambling (Burley 2020). Variant i does not
+/// depend on how many there are.
+pub fn spread(vary: &[Vary], count: u32, seed: u32) -> Vec<Vec<String>> {
+    (0..count)
+        .map(|i| (0..).zip(vary).map(|(d, field)| field.at(f64::from(sobol_burley::sample(i, d, seed)))).collect())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Vary {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn ranges_and_lists_are_read_as_they_are_written() {
+        assert_eq!(read("generator.w0_mm=0.4..0.5:3").grid(), ["0.4", "0.45", "0.5"]);
+        assert_eq!(read("flexspline.teeth=180..220:3").grid(), ["180", "200", "220"]);
+        assert_eq!(read("sleeve.kind=cup, hat").grid(), ["cup", "hat"]);
+        assert_eq!(read("a.b=1..2").grid().len(), USUAL_VALUES);
+        assert_eq!(read("a.b=-1..-2:1").grid(), ["-1"]);
+        assert_eq!(read("a.b=1e-3..2e-3:2").grid(), ["0.001", "0.002"]);
+    }
+
+    #[test]
+    fn what_cannot_be_read_says_what_is_allowed() {
+        for text in [
+            "a.b",
+            "=1..2",
+            "a.b=1..x",
+            "a.b=1..2:0",
+            "a.b=1..2:2000",
+            "a.b=1..2:1.5",
+            "a.b=1,,2",
+            "a.b=",
+            "a.b=1..inf",
+        ] {
+            let error = text.parse::<Vary>().unwrap_err().to_string();
+            assert!(error.contains(text) && error.contains("allowed: PATH=FROM..TO"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_grid_has_every_combination_once() {
+        let variants = grid(&[read("a=1..2:2"), read("b=x,y,z")]);
+        assert_eq!(variants.len(), 6);
+        assert_eq!(variants[0], ["1", "x"]);
+        assert_eq!(variants[1], ["1", "y"]);
+        assert_eq!(variants[5], ["2", "z"]);
+    }
+
+    /// Sixteen points of a Sobol sequence have one in each sixteenth of every range, scrambled or not.
+    #[test]
+    fn spread_variants_fill_every_range_evenly_and_do_not_depend_on_their_number() {
+        let vary = [read("a=0..16"), read("b=0..16"), read("c=p,q")];
+        let variants = spread(&vary, 16, 1);
+        for field in 0..2 {
+            let mut cells: Vec<usize> = variants.iter().map(|v| v[field].parse::<f64>().unwrap() as usize).collect();
+            cells.sort_unstable();
+            assert_eq!(cells, (0..16).collect::<Vec<_>>());
+        }
+        assert_eq!(variants.iter().filter(|v| v[2] == "p").count(), 8);
+        assert_eq!(spread(&vary, 5, 1), variants[..5]);
+        assert_ne!(spread(&vary, 5, 2), variants[..5]);
+    }
+}
