@@ -58,7 +58,7 @@ pub(super) struct StudyCommand {
     #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
     generator: Generators,
     /// Largest load, N.m [default: what a table of that generator spans: 200; four-roller 100, two-roller 20; by the size of the drive]
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
     torque_n_m: Option<f64>,
     /// What a variant has to keep to, FIGURE=LEAST..MOST, either end may be left out [default: teeth that clear one another]
     #[arg(long, value_name = "FIGURE=RANGE", allow_hyphen_values = true)]
