@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::names::{self, Generators};
 use super::{Context, Failure, report, say};
-use crate::data_sheet::FIGURES;
+use crate::data_sheet::{FIGURES, FigureOf};
 use crate::drive::GeneratorKind;
 use crate::mesh::MeshLevel;
 use crate::output::Outputs;
@@ -38,12 +38,13 @@ const SHOWN: usize = 5;
 #[command(after_help = format!("\
 Examples:
   flexspline study --vary flexspline.rim_thickness_mm=1.2..2.6:8
-  flexspline study --vary flexspline.rim_thickness_mm=1.2..2.6 --vary generator.w0_mm=0.46..0.5 --generator cam
-  flexspline study --vary flexspline.rim_thickness_mm=1..3 --vary flexspline.width_mm=8..20 --variants 200 \\
-      --keep backlash_arcsec=30..70 --keep max_von_mises_mpa=..300 --least kinematic_error_pp_arcsec
+  flexspline study -g cam --vary flexspline.rim_thickness_mm=1.2..2 --vary generator.w0_mm=0.46..0.5
+  flexspline study --vary generator.w0_mm=0.46..0.5 --variants 50 --keep backlash_arcsec=30..70
+  flexspline study --vary generator.w0_mm=0.46..0.5 --least max_von_mises_mpa --most k2_n_m_per_rad
 
-Figures: {}.
-T1 and T2, where the ranges of stiffness end, are 21 and 72 % of the largest load.", FIGURES.map(|(name, _)| name).join(", ")))]
+Figures:
+{}
+T1 and T2, where the ranges of stiffness end, are 21 and 72 % of the largest load.", figures()))]
 pub(super) struct StudyCommand {
     /// A field and its values: PATH=FROM..TO (5 values), PATH=FROM..TO:N, or PATH=VALUE,VALUE,...; repeat for more fields
     #[arg(long, value_name = "PATH=VALUES", required = true, allow_hyphen_values = true)]
@@ -75,6 +76,12 @@ pub(super) struct StudyCommand {
     /// Mesh: coarse, standard or fine
     #[arg(long, value_name = "LEVEL", default_value = "coarse", value_parser = names::mesh(), hide_possible_values = true)]
     mesh: MeshLevel,
+}
+
+/// The names of the figures, three on a line.
+fn figures() -> String {
+    let line = |names: &[FigureOf]| names.iter().map(|(name, _)| format!("  {name:<29}")).collect::<String>();
+    FIGURES.chunks(3).map(|names| line(names).trim_end().to_owned()).collect::<Vec<_>>().join("\n")
 }
 
 /// What `--json` prints, and `study.json`.
