@@ -91,6 +91,15 @@ impl Upset for crate::TableId {
     }
 }
 
+/// Only told.
+impl Upset for crate::GeneratorKind {
+    fn bits(&self) -> usize {
+        0
+    }
+
+    fn flip(&mut self, _: usize, _: &mut String) {}
+}
+
 impl<T: Upset, const N: usize> Upset for [T; N] {
     fn bits(&self) -> usize {
         self.iter().map(Upset::bits).sum()

@@ -206,8 +206,8 @@ crate::upset::upsets!(IdentityCheck { block, top, joined, trees });
 mod tests {
     use super::*;
     use crate::fixture;
-    use crate::upset::Upset;
     use crate::table::Table;
+    use crate::upset::Upset;
     use std::vec::Vec;
 
     /// The hash that `Table::hashed` is to have, by the crate of the authors of BLAKE3.
