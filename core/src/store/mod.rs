@@ -437,7 +437,7 @@ impl Store {
 
     /// Takes `words` words of the images into the CRC-32 of their pages: tells which of two images is damaged, and finds what both
     /// have. Makes as many words of the copies anew. Call it in a slow rate group, the same number each time: a word takes at
-    /// most 723 instructions, and with 16 words every 100 ms the copies follow the temperature within 6 s.
+    /// most 733 instructions, and with 16 words every 100 ms the copies follow the temperature within 6 s.
     pub fn check_images(&mut self, images: &Images<'_>, words: usize) {
         self.mend_source();
         let strangers = self.strangers(images);
