@@ -1,8 +1,8 @@
 //! A sum of 64 bits over words that must not change unnoticed: of what a tick reads and keeps.
 //!
 //! Word after word `s ← (s mod 2³²)·f + ⌊s/2³²⌋ + word`, at the end once more without a word: a step of a generator that multiplies with carry, one
-//! instruction of a Cortex-M4 (`umaal`) beside the one that fetches the word. Modulo the prime `p = 2³²·f − 1` that is `s ← s·2⁻³² + word`, times a
-//! constant: a difference in a word is multiplied with every step, by another factor for each place, so two differences cancel only if
+//! instruction of a Cortex-M4 (`umaal`) beside the one that fetches the word. Modulo the prime `p = 2³²·f − 1` that is `s ← s·2⁻³² + word`: a
+//! difference in a word is multiplied with every step, by another factor for each place, so two differences cancel only if
 //! their ratio modulo p, near 2⁶⁴, is a power of 2³² that fits the distance of their words. No two bits of 24 words and their sum
 //! do, nor a column of neighbours (tests below). Words that are all zeros, or all ones, do not pass where the sum begins with
 //! [`SUMS_START`]. A cyclic check of the same words would take six times the instructions.
