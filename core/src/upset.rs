@@ -26,7 +26,35 @@ macro_rules! numbers {
         }
     )*};
 }
-numbers!(u8, u16, u32, u64, i32, i64);
+numbers!(u8, u16, u32, u64, usize, i32, i64);
+
+impl Upset for bool {
+    fn bits(&self) -> usize {
+        1
+    }
+
+    fn flip(&mut self, _: usize, _: &mut String) {
+        *self = !*self;
+    }
+}
+
+/// The mark that there is something, then all of it: zeros if there was nothing.
+impl<T: Upset + Default> Upset for Option<T> {
+    fn bits(&self) -> usize {
+        1 + self.as_ref().map_or(0, Upset::bits)
+    }
+
+    fn flip(&mut self, bit: usize, path: &mut String) {
+        *self = match self.take() {
+            None => Some(T::default()),
+            Some(_) if bit == 0 => None,
+            Some(mut kept) => {
+                kept.flip(bit - 1, path);
+                Some(kept)
+            }
+        };
+    }
+}
 
 impl Upset for f32 {
     fn bits(&self) -> usize {
@@ -61,6 +89,15 @@ impl Upset for crate::TableId {
     fn flip(&mut self, bit: usize, _: &mut String) {
         self.0[bit / 8] ^= 1 << (bit % 8);
     }
+}
+
+/// Only told.
+impl Upset for crate::GeneratorKind {
+    fn bits(&self) -> usize {
+        0
+    }
+
+    fn flip(&mut self, _: usize, _: &mut String) {}
 }
 
 impl<T: Upset, const N: usize> Upset for [T; N] {

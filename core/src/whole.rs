@@ -1,29 +1,32 @@
-//! Two sums over words that must not change unnoticed: of what a tick reads and keeps.
+//! A sum of 64 bits over words that must not change unnoticed: of what a tick reads and keeps.
 //!
-//! The first takes the words one after another by exclusive or, turned by five bits from word to word; the second takes the first in the
-//! same way, turned by six. Whatever happens to one word changes both. Two bits cancel in the first only if their columns differ by
-//! five for each word from one to the other; the second then still has what the first had in between, a bit in a column of its own for each of
-//! these words, up to 32 of them: no structure has so many. An odd number of bits never cancels. Words
-//! that are all zeros, or all ones, do not pass where the sums begin with [`SUMS_START`]. A cyclic check of the same words would take
-//! four times the instructions. As the second takes the first, each word is needed once: two sums beside each other are made one after
-//! the other by the compiler, with the words on the stack meanwhile.
+//! Word after word `s ← (s mod 2³²)·f + ⌊s/2³²⌋ + word`, at the end once more without a word: a step of a generator that multiplies with carry, one
+//! instruction of a Cortex-M4 (`umaal`) beside the one that fetches the word. Modulo the prime `p = 2³²·f − 1` that is `s ← s·2⁻³² + word`: a
+//! difference in a word is multiplied with every step, by another factor for each place, so two differences cancel only if
+//! their ratio modulo p, near 2⁶⁴, is a power of 2³² that fits the distance of their words. No two bits of 24 words and their sum
+//! do, nor a column of neighbours (tests below). Words that are all zeros, or all ones, do not pass where the sum begins with
+//! [`SUMS_START`]. A cyclic check of the same words would take six times the instructions.
 //!
 //! What is summed up is a call of its own for each structure: inlined, the compiler moves the words to the stack and back.
 
 /// The sums of words: so that a constant can be made of them, and nothing is a loop.
 macro_rules! sums {
     ($start:expr; $($word:expr),* $(,)?) => {{
-        let [mut fives, mut sixes]: [u32; 2] = $start;
+        let [mut low, mut high]: [u32; 2] = $start;
         $(
             let word: u32 = $word;
-            fives = fives.rotate_left(5) ^ word;
-            sixes = sixes.rotate_left(6) ^ fives;
+            // Fits: (2³² − 1)² + 2·(2³² − 1) = 2⁶⁴ − 1. One instruction, umaal.
+            let next = (low as u64).wrapping_mul($crate::whole::FACTOR as u64).wrapping_add(high as u64).wrapping_add(word as u64);
+            (low, high) = (next as u32, (next >> 32) as u32);
         )*
-        // Not in the columns of the last word. As one number: two are given back in memory.
-        (sixes.rotate_left(13) as u64) << 32 | fives as u64
+        // The last word too goes through all columns.
+        (low as u64).wrapping_mul($crate::whole::FACTOR as u64).wrapping_add(high as u64)
     }};
 }
 pub(crate) use sums;
+
+/// 2³² times this, less one, is a prime.
+pub(crate) const FACTOR: u32 = 4_294_957_665;
 
 /// Before the first word.
 pub(crate) const SUMS_START: [u32; 2] = [0x5a69_96a5, 0x1b87_3593];

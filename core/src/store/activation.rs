@@ -13,6 +13,11 @@ use crate::whole::{pair, same, sums};
 /// Words of the images that a step compares, and of the copies that it fills.
 const COMPARED: usize = 64;
 const FILLED: usize = 8;
+/// More steps than any activation takes: 512 records of 64 torques and 8 temperatures at 16 steps each, twice for each of two images.
+/// What goes on for longer was hit.
+const MOST_STEPS: u32 = 40_000;
+/// Of [`Found::images`].
+const OF_SECOND: u32 = 2;
 
 /// What a step does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,8 +27,17 @@ enum Stage {
     /// The first image is checked, or the second.
     First,
     Second,
+    /// Neither is a table: the first is checked again, for what is wrong with it.
+    Refuse,
+    /// What was found is compared with what was found before; if nothing was yet, all begins once more.
+    Confirm,
     Clear,
     Fill,
+}
+
+impl Stage {
+    const ALL: [Self; 7] =
+        [Self::Compare, Self::First, Self::Second, Self::Refuse, Self::Confirm, Self::Clear, Self::Fill];
 }
 
 /// How far an activation is.
@@ -42,27 +56,36 @@ pub enum Progress {
 /// Ticks go on between its steps. While it checks, with the table in use; while it fills, without correction, so a firmware that has to go on
 /// correcting fills a second store and exchanges the two between two ticks: then the table before is also the way back. To give up,
 /// drop it; before the first [`Progress::Filling`] the store has not been touched.
+///
+/// The images are checked twice, and what is found must be the same: an upset of what is kept in here between two steps ends in
+/// [`ActivateError::Torn`] or another error, or changes nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct Activation {
     drive: Drive,
     /// Bits of the temperature, °C; again, each of them turned.
     pub(super) temperature: [u32; 2],
-    stage: Stage,
+    /// Number of the stage: an upset may leave one that there is not.
+    stage: u32,
+    /// Steps so far.
+    taken: u32,
+    /// Words compared; 1 after the last check of an image.
     at: usize,
     same: bool,
     check: Check,
-    /// What is wrong with the first image.
-    first: Option<ImageError>,
+    /// The first image is no table.
+    first_refused: bool,
+    /// By the checks under way, and by those before.
     pub(super) found: Option<Found>,
+    confirmed: Option<Found>,
 }
 
 /// What the store will know of the table, and how much of it was filled: it lies in memory from step to step, so it has sums.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Found {
     source: Source,
     id: TableId,
-    /// All ones if the second image is the sound one, else 0.
-    of_second: u32,
+    /// 1 if the images are the same, and 2 if the second is the sound one.
+    images: u32,
     pub(super) filled: u32,
     sums: [u32; 2],
 }
@@ -75,7 +98,7 @@ impl Found {
             pair(self.source.sums());
             u32::from_le_bytes([a, b, c, d]),
             u32::from_le_bytes([e, f, g, h]),
-            self.of_second,
+            self.images,
             self.filled,
         )
     }
@@ -90,12 +113,14 @@ impl Activation {
         Self {
             drive,
             temperature: [temperature_c.to_bits(), !temperature_c.to_bits()],
-            stage: Stage::Compare,
+            stage: Stage::Compare as u32,
+            taken: 0,
             at: 0,
             same: true,
             check: Check::NEW,
-            first: None,
+            first_refused: false,
             found: None,
+            confirmed: None,
         }
     }
 
@@ -106,40 +131,69 @@ impl Activation {
     /// [`ActivateError`]; the store has not been touched then, and further steps say the same.
     pub fn step(&mut self, store: &mut Store, images: &Images<'_>) -> Result<Progress, ActivateError> {
         let [first, second] = images.words;
-        match self.stage {
+        self.taken = self.taken.wrapping_add(1);
+        let within = self.taken <= MOST_STEPS;
+        let stage = Stage::ALL.get(self.stage as usize).filter(|_| within).ok_or(ActivateError::Torn)?;
+        match *stage {
             Stage::Compare => self.compare(first, second),
             Stage::First => match self.check.step(first.as_flattened()) {
+                Ok(true) if self.at == 0 => self.at = 1,
+                // In a step of its own.
                 Ok(true) => {
                     self.found = Some(self.accept(images, first, 0)?);
-                    self.go_on(if self.same { Stage::Clear } else { Stage::Second });
+                    self.go_on(if self.same { Stage::Confirm } else { Stage::Second });
                 }
                 Ok(false) => {}
                 Err(error) if self.same => return Err(ActivateError::Image(error)),
-                Err(error) => {
-                    self.first = Some(error);
+                Err(_) => {
+                    self.first_refused = true;
                     self.go_on(Stage::Second);
                 }
             },
-            Stage::Second => match (self.check.step(second.as_flattened()), self.first) {
+            Stage::Second => match (self.check.step(second.as_flattened()), self.first_refused) {
                 (Ok(false), _) => {}
                 // Only where the images differ is the second a question.
-                (Ok(true), None) => return Err(ActivateError::TwoTables),
-                (Ok(true), Some(_)) => {
-                    self.found = Some(self.accept(images, second, u32::MAX)?);
-                    self.go_on(Stage::Clear);
+                (Ok(true), false) => return Err(ActivateError::TwoTables),
+                (Ok(true), true) if self.at == 0 => self.at = 1,
+                (Ok(true), true) => {
+                    self.found = Some(self.accept(images, second, OF_SECOND)?);
+                    self.go_on(Stage::Confirm);
                 }
-                (Err(_), Some(error)) => return Err(ActivateError::Image(error)),
-                (Err(_), None) => self.go_on(Stage::Clear),
+                (Err(_), true) => self.go_on(Stage::Refuse),
+                (Err(_), false) => self.go_on(Stage::Confirm),
             },
+            Stage::Refuse => {
+                if self.check.step(first.as_flattened()).map_err(ActivateError::Image)? {
+                    return Err(ActivateError::Torn);
+                }
+            }
+            Stage::Confirm => self.confirm()?,
             Stage::Clear | Stage::Fill => {
-                return self.fill(store, first, second);
+                return self.fill(*stage, store, first, second);
             }
         }
         Ok(Progress::Checking)
     }
 
     fn go_on(&mut self, stage: Stage) {
-        (self.stage, self.at, self.check) = (stage, 0, Check::NEW);
+        (self.stage, self.at, self.check) = (stage as u32, 0, Check::NEW);
+    }
+
+    /// What was found stands if it was found before; else all is checked once more.
+    fn confirm(&mut self) -> Result<(), ActivateError> {
+        let found = self.found.as_ref().filter(|found| found.is_whole()).ok_or(ActivateError::Torn)?;
+        let Some(before) = &self.confirmed else {
+            self.confirmed = self.found.take();
+            (self.same, self.first_refused) = (true, false);
+            self.go_on(Stage::Compare);
+            return Ok(());
+        };
+        // Both whole, so the same if the sums are.
+        if !before.is_whole() || !same(before.sums, found.sums) {
+            return Err(ActivateError::Torn);
+        }
+        self.go_on(Stage::Clear);
+        Ok(())
     }
 
     /// Compares words of the images.
@@ -175,20 +229,27 @@ impl Activation {
             return Err(ActivateError::Torn);
         }
         let source = source.at_temperature(words, f32::from_bits(bits));
-        let mut found = Found { source, id: table.id(), of_second, filled: 0, sums: [0; 2] };
+        let images = of_second | self.same as u32;
+        let mut found = Found { source, id: table.id(), images, filled: 0, sums: [0; 2] };
         found.sums = pair(found.sums());
         Ok(found)
     }
 
     /// Takes the table before out of the store, then fills words of both copies, and after the last puts the table into use.
-    fn fill(&mut self, store: &mut Store, first: Words<'_>, second: Words<'_>) -> Result<Progress, ActivateError> {
+    fn fill(
+        &mut self,
+        stage: Stage,
+        store: &mut Store,
+        first: Words<'_>,
+        second: Words<'_>,
+    ) -> Result<Progress, ActivateError> {
         let found = self.found.as_mut().filter(|found| found.is_whole()).ok_or(ActivateError::Torn)?;
-        if self.stage == Stage::Clear {
+        if stage == Stage::Clear {
             store.know(&Source { marks: found.source.marks & !ACTIVE, ..found.source });
-            self.stage = Stage::Fill;
+            self.stage = Stage::Fill as u32;
             return Ok(Progress::Filling);
         }
-        let images = [if found.of_second == 0 { first } else { second }; 2];
+        let images = [if found.images & OF_SECOND == 0 { first } else { second }; 2];
         let all = STORE_WORDS.saturating_add(SLACK);
         let from = found.filled as usize;
         let to = from.saturating_add(FILLED).min(all);
@@ -210,9 +271,25 @@ impl Activation {
         store.scrub = Scrub::START;
         store.damaged = Damaged::NONE;
         store.id = [found.id; 2];
-        Ok(Progress::Done(found.id))
+        let id = found.id;
+        // Further steps say the same, however many.
+        self.taken = 0;
+        Ok(Progress::Done(id))
     }
 }
 
 #[cfg(test)]
-crate::upset::upsets!(Found { source, id, of_second, filled, sums });
+crate::upset::upsets!(Found { source, id, images, filled, sums });
+#[cfg(test)]
+crate::upset::upsets!(Activation {
+    drive,
+    temperature,
+    stage,
+    taken,
+    at,
+    same,
+    check,
+    first_refused,
+    found,
+    confirmed
+});

@@ -349,18 +349,10 @@ impl Store {
         self.source().marks & ACTIVE != 0
     }
 
-    /// Locates a torque, with this added to D and H, counts ([`OperatingPoint::adjusted`]). The same work for all values.
-    ///
-    /// A call of its own, as the other parts of a tick: all in one function, more is moved to the stack and back than calls cost.
-    #[inline(never)]
-    pub(crate) fn locate(&self, torque_n_m: f32, mean: i32, half_width: i32) -> OperatingPoint {
-        self.locate_here(torque_n_m, mean, half_width)
-    }
-
     /// Locates a torque where nobody else asks whether what is known of the table is whole.
     #[inline(always)]
     pub(crate) fn locate_whole(&self, torque_n_m: f32) -> OperatingPoint {
-        let mut point = self.locate_here(torque_n_m, 0, 0);
+        let mut point = self.locate(torque_n_m, 0, 0);
         let [first, _] = &self.source;
         point.doubt.0 |= !first.is_whole() as u32;
         point
@@ -373,8 +365,9 @@ impl Store {
         grid::search_64(start, torque).min(last)
     }
 
+    /// Locates a torque, with this added to D and H, counts ([`OperatingPoint::adjusted`]). The same work for all values.
     #[inline(always)]
-    fn locate_here(&self, torque_n_m: f32, mean: i32, half_width: i32) -> OperatingPoint {
+    pub(crate) fn locate(&self, torque_n_m: f32, mean: i32, half_width: i32) -> OperatingPoint {
         let source = self.source();
         let torque = num::within(torque_n_m, source.torque_range);
         let interval = self.interval(torque, source.last_torque as usize);
@@ -437,7 +430,7 @@ impl Store {
 
     /// Takes `words` words of the images into the CRC-32 of their pages: tells which of two images is damaged, and finds what both
     /// have. Makes as many words of the copies anew. Call it in a slow rate group, the same number each time: a word takes at
-    /// most 723 instructions, and with 16 words every 100 ms the copies follow the temperature within 6 s.
+    /// most 733 instructions, and with 16 words every 100 ms the copies follow the temperature within 6 s.
     pub fn check_images(&mut self, images: &Images<'_>, words: usize) {
         self.mend_source();
         let strangers = self.strangers(images);

@@ -69,3 +69,8 @@ impl Bounds {
         bound
     }
 }
+
+#[cfg(test)]
+crate::upset::upsets!(Bounds { error_rad, periodic_rad, slope, curve_slope, ripple_cells, rounding_rad });
+#[cfg(test)]
+crate::upset::upsets!(InverseBound { iterations, error_rad });

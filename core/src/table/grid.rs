@@ -126,6 +126,9 @@ impl PeriodicAxis {
     }
 }
 
+#[cfg(test)]
+crate::upset::upsets!(PeriodicAxis { nodes });
+
 /// A place on a clamped axis: between node `below` and node `above`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Place {

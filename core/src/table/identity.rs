@@ -37,6 +37,8 @@ pub enum Identity {
 }
 
 /// Takes an image in, block by block: holds nothing of it, so give the same with every step.
+///
+/// An upset of it between two steps ends in [`Identity::Other`], or changes nothing: ask once more before an image is given up.
 #[derive(Clone, Copy, Debug)]
 pub struct IdentityCheck {
     /// Blocks of the body that were taken in.
@@ -117,6 +119,10 @@ impl IdentityCheck {
     fn join(&mut self, level: usize, last: bool) -> bool {
         let before = self.block.saturating_sub(1) / BLOCKS_OF_CHUNK;
         let left = before.checked_shr(level as u32).unwrap_or(0);
+        if last && left == 0 {
+            // Beyond the last tree: only an upset leads here, and it ends here.
+            return true;
+        }
         self.joined = Some(level.saturating_add(1));
         if left & 1 != 0 {
             let tree = self.trees.get(level).copied().unwrap_or_default();
@@ -194,10 +200,14 @@ const fn mix([a, b, c, d]: [u32; 4], x: u32, y: u32) -> [u32; 4] {
 }
 
 #[cfg(test)]
+crate::upset::upsets!(IdentityCheck { block, top, joined, trees });
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::fixture;
     use crate::table::Table;
+    use crate::upset::Upset;
     use std::vec::Vec;
 
     /// The hash that `Table::hashed` is to have, by the crate of the authors of BLAKE3.
@@ -250,6 +260,42 @@ mod tests {
             let Identity::Other(id) = found(&image) else { panic!("{words}") };
             assert_eq!(id.0, hash.as_bytes()[..8], "{words}");
         }
+    }
+
+    /// Every bit of what is kept from step to step, at blocks within a chunk, at its end and among joins: an answer comes, no later than as if
+    /// all began anew; an image that is not the one of its id is never taken for it.
+    #[test]
+    #[cfg_attr(miri, ignore = "takes too long")]
+    fn an_upset_of_the_check_never_makes_another_image_the_one_of_its_id() {
+        let mut own = fixture::image(true);
+        let Identity::Other(real) = found(&own) else { panic!("a fixture has no BLAKE3") };
+        own[ID_OFFSET..ID_OFFSET + 8].copy_from_slice(&real.0);
+        let mut other = own.clone();
+        other[3000] ^= 4;
+        let (mut steps, mut whole) = (0, IdentityCheck::new());
+        while whole.step(&own) == Identity::Hashing {
+            steps += 1;
+        }
+        let (mut torn, mut harmless) = (0, 0);
+        for image in [&own, &other] {
+            let mut check = IdentityCheck::new();
+            for step in 0..steps {
+                if step % 13 == 0 || check.joined.is_some() {
+                    for bit in 0..check.bits() {
+                        let mut hit = check;
+                        hit.flip(bit, &mut std::string::String::new());
+                        let found = (0..2 * steps + 200).map(|_| hit.step(image)).find(|f| *f != Identity::Hashing);
+                        match found {
+                            Some(Identity::Same(_)) if image == &own => harmless += 1,
+                            Some(Identity::Other(_)) => torn += 1,
+                            _ => panic!("step {step}, bit {bit}: {found:?}"),
+                        }
+                    }
+                }
+                assert_eq!(check.step(image), Identity::Hashing);
+            }
+        }
+        assert!(torn > 10_000 && harmless > 100, "{torn} {harmless}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::layout::{
     CRC_BYTES, DERIVED_WORDS, Layout, MAX_AXIS_VALUE, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES,
     NODE_WORDS, PAGE_BYTES, UNITS_PER_COUNT, cell_width, counted, image_bytes, limit_counts, word,
 };
-use super::sums::page_intact;
+use super::sums::{page_of, page_sum};
 use crate::angle::RAD_PER_COUNT;
 use crate::crc::{CRC_START, crc_bytes};
 use crate::drive::Drive;
@@ -74,7 +74,7 @@ fn rad(counts: f32) -> f32 {
 }
 
 /// How much of an image a step of a check goes over: bytes of a checksum, numbers of a curve or a record, nodes.
-const STEP_BYTES: usize = PAGE_BYTES;
+const STEP_BYTES: usize = PAGE_BYTES / 2;
 const STEP_NUMBERS: usize = 12;
 const STEP_NODES: usize = 4;
 
@@ -106,6 +106,32 @@ enum Stage {
     Done,
 }
 
+impl Stage {
+    const ALL: [Self; 21] = [
+        Self::Envelope,
+        Self::Crc,
+        Self::Identity,
+        Self::Pages,
+        Self::Places,
+        Self::TorqueAxis,
+        Self::TemperatureAxis,
+        Self::Unit,
+        Self::Jumps,
+        Self::Nodes,
+        Self::Closed,
+        Self::Narrowest,
+        Self::Forward,
+        Self::Backward,
+        Self::Curves,
+        Self::CurvesClosed,
+        Self::Bounds,
+        Self::Rise,
+        Self::Inverse,
+        Self::Derived,
+        Self::Done,
+    ];
+}
+
 /// What is known of an image once its sizes are.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Facts {
@@ -132,7 +158,8 @@ pub(crate) struct Facts {
 /// A step takes at most 2000 instructions on a Cortex-M4F, held by `tests/run firmware`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Check {
-    stage: Stage,
+    /// Number of the stage: an upset may leave one that there is not.
+    stage: u32,
     /// Where in the stage, and where in the part that is looked at there.
     at: usize,
     within: usize,
@@ -150,7 +177,7 @@ pub(crate) struct Check {
 
 impl Check {
     pub const NEW: Self = Self {
-        stage: Stage::Envelope,
+        stage: Stage::Envelope as u32,
         at: 0,
         within: 0,
         crc: CRC_START,
@@ -167,10 +194,10 @@ impl Check {
     /// The first check that fails, in the order of [`ImageError`].
     #[inline(never)]
     pub fn step(&mut self, image: &[u8]) -> Result<bool, ImageError> {
-        if self.stage == Stage::Done {
+        if self.is_done() {
             return Ok(true);
         }
-        let next = match self.stage {
+        let next = match self.stage() {
             Stage::Envelope => {
                 check_envelope(image)?;
                 Some(Stage::Crc)
@@ -184,17 +211,26 @@ impl Check {
             _ => self.numbers(image)?,
         };
         if let Some(next) = next {
-            self.stage = next;
+            self.stage = next as u32;
             (self.at, self.within) = (0, 0);
         }
-        Ok(self.stage == Stage::Done)
+        Ok(self.is_done())
+    }
+
+    const fn is_done(&self) -> bool {
+        self.stage == Stage::Done as u32
+    }
+
+    /// The stage; the first for one that there is not, and then the checksum does not match.
+    fn stage(&self) -> Stage {
+        Stage::ALL.get(self.stage as usize).copied().unwrap_or(Stage::Envelope)
     }
 
     /// A step among the numbers; the next stage if this one has ended.
     fn numbers(&mut self, image: &[u8]) -> Result<Option<Stage>, ImageError> {
         let words = image.get(..self.facts.body_bytes).unwrap_or_default().as_chunks::<4>().0;
         let records = self.facts.torque_nodes.saturating_mul(self.facts.temperature_nodes);
-        Ok(match self.stage {
+        Ok(match self.stage() {
             Stage::Places => {
                 self.facts.check_places(image, words)?;
                 Some(Stage::TorqueAxis)
@@ -295,7 +331,7 @@ impl Check {
 
     /// Goes on with another part of the same record.
     fn next_part(&mut self, stage: Stage) {
-        self.stage = stage;
+        self.stage = stage as u32;
         self.within = 0;
     }
 
@@ -314,13 +350,22 @@ impl Check {
         Ok(ended)
     }
 
-    /// Checks one page; true after the last.
+    /// Takes some bytes into the CRC-32 of a page, and compares it after its last; true after the last page.
     fn page(&mut self, image: &[u8]) -> Result<bool, ImageError> {
         let body_bytes = self.facts.body_bytes;
-        if !page_intact(image, body_bytes, self.at) {
-            return Err(ImageError::PageCrc { page: self.at });
+        let error = ImageError::PageCrc { page: self.at };
+        let page = page_of(image, body_bytes, self.at).ok_or(error)?;
+        let end = self.within.saturating_add(STEP_BYTES).min(page.len());
+        let before = if self.within == 0 { CRC_START } else { self.crc };
+        self.crc = crc_bytes(before, page.get(self.within..end).unwrap_or_default());
+        self.within = end;
+        if end < page.len() {
+            return Ok(false);
         }
-        self.at = self.at.saturating_add(1);
+        if page_sum(image, body_bytes, self.at) != Some(!self.crc) {
+            return Err(error);
+        }
+        (self.at, self.within) = (self.at.saturating_add(1), 0);
         Ok(self.at >= body_bytes.div_ceil(PAGE_BYTES))
     }
 
@@ -496,7 +541,7 @@ impl Check {
     /// Coefficient `i` of the closed curve that is looked at, rad.
     #[inline(never)]
     fn number(&self, words: Words<'_>, i: usize) -> f32 {
-        let first = match self.stage {
+        let first = match self.stage() {
             Stage::Forward => 0,
             Stage::Backward => self.facts.layout.record,
             _ => {
@@ -752,7 +797,7 @@ impl Facts {
 impl Check {
     /// The table of the image that was given with every step, once the last is done.
     pub fn table<'a>(&self, image: &'a [u8]) -> Option<Table<'a>> {
-        (self.stage == Stage::Done).then(|| self.facts.table(image))
+        self.is_done().then(|| self.facts.table(image))
     }
 }
 
@@ -782,9 +827,39 @@ impl<'a> Table<'a> {
     /// [`Self::check`] but for the words that follow from the bounds.
     pub(super) fn found(image: &'a [u8]) -> Result<Facts, ImageError> {
         let mut check = Check::NEW;
-        while check.stage != Stage::Derived {
+        while check.stage() != Stage::Derived {
             check.step(image)?;
         }
         Ok(check.facts)
+    }
+}
+
+#[cfg(test)]
+crate::upset::upsets!(Check { stage, at, within, crc, facts, before, highest, most, least });
+#[cfg(test)]
+crate::upset::upsets!(Facts {
+    body_bytes,
+    drive,
+    generator_kind,
+    torque_nodes,
+    temperature_nodes,
+    ripple,
+    cell_width,
+    curve_nodes,
+    layout,
+    jumps,
+    bounds,
+    inverse,
+    narrowest,
+});
+
+#[cfg(test)]
+mod tests {
+    use super::Stage;
+
+    #[test]
+    fn stages_are_found_by_their_number() {
+        assert!((0..).zip(Stage::ALL).all(|(number, stage)| stage as u32 == number));
+        assert_eq!(Stage::ALL.last(), Some(&Stage::Done));
     }
 }

@@ -115,6 +115,9 @@ impl Layout {
     }
 }
 
+#[cfg(test)]
+crate::upset::upsets!(Layout { curves, nodes, node_plane, records, record, end });
+
 /// Width of a cell of the ripple at the output, counts.
 pub(super) fn cell_width(drive: &Drive, ripple_nodes: usize) -> f32 {
     if ripple_nodes == 0 {

@@ -21,10 +21,15 @@ pub(super) fn page_of(image: &[u8], body_bytes: usize, page: usize) -> Option<&[
     image.get(..body_bytes)?.chunks(PAGE_BYTES).nth(page)
 }
 
+/// The checksum that is stated for a page.
+pub(super) fn page_sum(image: &[u8], body_bytes: usize, page: usize) -> Option<u32> {
+    let sums = image.get(body_bytes..)?.as_chunks::<CRC_BYTES>().0;
+    sums.get(page).copied().map(u32::from_le_bytes)
+}
+
 pub(crate) fn page_intact(image: &[u8], body_bytes: usize, page: usize) -> bool {
-    let sums = image.get(body_bytes..).map_or(&[][..], |sums| sums.as_chunks::<CRC_BYTES>().0);
-    match (page_of(image, body_bytes, page), sums.get(page)) {
-        (Some(bytes), Some(sum)) => crc32(bytes) == u32::from_le_bytes(*sum),
+    match (page_of(image, body_bytes, page), page_sum(image, body_bytes, page)) {
+        (Some(bytes), Some(sum)) => crc32(bytes) == sum,
         _ => false,
     }
 }
