@@ -54,6 +54,9 @@ pub mod selection {
     pub const LEAST_GAIN: f64 = 0.5;
     /// Evidence by which a cause has to be ahead of another to take its place. *Chosen*.
     pub const AHEAD: f64 = 3.0;
+    /// Evidence by which the second order and the subdivision of the generator's encoder have to be ahead of wheels, which make the same waves
+    /// and leave traces of the flank and of other orders besides: as clear as a cause that may be small. *Guess*.
+    pub const AFTER_WHEELS: f64 = CLEAR_EVIDENCE;
     /// Evidence by which something unnamed has to be ahead of the best cause to be taken before it. *Guess*.
     pub const UNNAMED_AHEAD: f64 = 5.0;
 }

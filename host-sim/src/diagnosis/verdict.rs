@@ -54,13 +54,18 @@ pub(super) fn conclude(
     let size = |k: &usize| standings[*k].size.powi(2);
     let (by_name, without_name) = (
         named.iter().map(size).sum::<f64>(),
-        (0..selected.terms.len()).filter(|k| !named.contains(k)).map(|k| size(&k)).sum::<f64>(),
+        (0..selected.terms.len())
+            .filter(|k| !named.contains(k) && !selected.terms[*k].law.is_zero_of_sessions())
+            .map(|k| size(&k))
+            .sum::<f64>(),
     );
+    // A zero that the bench sets in each session hides nothing of what goes on within one; with nothing else found it is not understood.
+    let zeros_alone = named.is_empty() && all.iter().any(|term| term.law.is_zero_of_sessions());
     let strongest = named.iter().map(|k| standings[*k].size).fold(0.0, f64::max);
     left_over.retain(|l| l.size_arcsec > LEAST_LEFT_OF_STRONGEST * strongest);
     let described = without_name;
     let without_name = without_name + left_over.iter().map(|l| l.size_arcsec.powi(2)).fold(0.0, f64::max);
-    let significant_left = without_name > 0.0;
+    let significant_left = without_name > 0.0 || zeros_alone;
     let held = held_out::evaluate(problem, &all);
     let abstained = Abstention { by_name, without_name, described, unexplained, explainable };
     let gates = if named.is_empty() { Vec::new() } else { abstained.gates(significant_left, held.total, noise.white) };
@@ -230,7 +235,9 @@ fn understood(
     trace: &mut Trace,
 ) -> Vec<usize> {
     let is_named = |k: &usize| selected.terms[*k].law.named();
-    let unnamed = (0..selected.terms.len()).filter(|k| !is_named(k)).map(|k| standings[k].size);
+    let unnamed = (0..selected.terms.len())
+        .filter(|k| !is_named(k) && !selected.terms[*k].law.is_zero_of_sessions())
+        .map(|k| standings[k].size);
     let not_understood = unnamed.chain(left_over.iter().map(|l| l.size_arcsec)).fold(0.0, f64::max);
     let mut named = Vec::new();
     for k in (0..selected.terms.len()).filter(is_named) {
