@@ -141,9 +141,14 @@ pub(super) fn conclude(
     });
     let verdict = match verdict {
         Verdict::Explained | Verdict::PartlyExplained if causes.is_empty() => Verdict::Unknown,
-        Verdict::Explained if !told_better.is_empty() => Verdict::PartlyExplained,
+        Verdict::Explained if !told_better.is_empty() || !is_explained(problem, rms_after, floor, held.total) => {
+            Verdict::PartlyExplained
+        }
         other => other,
     };
+    if verdict != Verdict::None && next_experiment.is_none() {
+        next_experiment = Some(experiment::anyhow(problem.on, verdict == Verdict::Unknown));
+    }
     // Nothing named, nothing extended: what has no name helps to see what is there, and predicts nothing for anybody.
     let mut held_out = held.total;
     if causes.is_empty() {
@@ -176,6 +181,14 @@ pub(super) fn conclude(
         experiment_for_asked,
         trace,
     }
+}
+
+/// Whether causes explain the error: what is left is near the noise, and in sessions left out the model with them beats the nominal one and
+/// none at all.
+fn is_explained(problem: &Problem<'_>, rms_after: f64, floor: f64, held_out: HeldOut) -> bool {
+    let compared = compensation(problem, held_out.rms_after_arcsec);
+    let best_without = compared.rms_uncompensated_arcsec.min(held_out.rms_before_arcsec);
+    rms_after <= NEAR_NOISE * floor && compared.rms_extended_tables_arcsec < best_without
 }
 
 /// The ratio that may be meant, where it is wrong.

@@ -34,22 +34,24 @@ fn encoder(cause: CauseName, phase: fn(&Excitation<'_>, usize) -> f64, per_ratio
 /// Share of a second order that its own first overtone may have, and a subdivision of its own: signals of unlike size make little of it. Guess.
 const OVERTONE: f64 = 0.15;
 
-/// A line of an encoder at `order` waves in a turn of it, with a little of its overtone.
+/// A line of an encoder at `order` waves in a turn of it, with a little of its overtone. At the generator there is none: overtones are what
+/// tells a wheel.
 fn waves_of(
     cause: CauseName,
     phase: fn(&Excitation<'_>, usize) -> f64,
     order: f64,
+    has_overtone: bool,
     parameters: impl Fn(&Excitation<'_>, f64, f64) -> Vec<Named> + Send + Sync + 'static,
 ) -> Law {
     Law::new(cause, move |on, _| {
         let wave = |order: f64, shift: f64| by_row(on, |k| (order * phase(on, k) - shift).cos());
         let quarter = std::f64::consts::FRAC_PI_2;
-        vec![
-            main(wave(order, 0.0), 15.0).called(WAVE),
-            main(wave(order, quarter), 15.0).called(WAVE),
-            nuisance(wave(2.0 * order, 0.0), OVERTONE),
-            nuisance(wave(2.0 * order, quarter), OVERTONE),
-        ]
+        let mut columns =
+            vec![main(wave(order, 0.0), 15.0).called(WAVE), main(wave(order, quarter), 15.0).called(WAVE)];
+        if has_overtone {
+            columns.extend([0.0, quarter].map(|shift| nuisance(wave(2.0 * order, shift), OVERTONE)));
+        }
+        columns
     })
     .parameters_by(move |on, _, c| {
         let [cos, sin] = c.wave(WAVE);
@@ -73,8 +75,8 @@ fn encoder_tilt() -> [Law; 2] {
             (Name::PhaseRad, phase),
         ]
     };
-    let of_generator = waves_of(CauseName::GeneratorEncoderTilt, GENERATOR, 2.0, at_generator);
-    [waves_of(CauseName::OutputEncoderTilt, OUTPUT, 2.0, at_output), of_generator.after_wheels()]
+    let of_generator = waves_of(CauseName::GeneratorEncoderTilt, GENERATOR, 2.0, false, at_generator);
+    [waves_of(CauseName::OutputEncoderTilt, OUTPUT, 2.0, true, at_output), of_generator.after_wheels()]
 }
 
 /// Waves in a turn that interpolation leaves: four of a magnet with two poles, and so on for 4, 8, ... signal periods in a turn, the orders
@@ -84,7 +86,7 @@ const SUBDIVISIONS: [f64; 5] = [4.0, 8.0, 16.0, 32.0, 64.0];
 /// An encoder that divides the periods of its signals unevenly.
 fn encoder_subdivision(of_output: bool, order: f64) -> Law {
     let angle = if of_output { OUTPUT } else { GENERATOR };
-    let law = waves_of(CauseName::EncoderSubdivision, angle, order, move |on, amplitude, phase| {
+    let law = waves_of(CauseName::EncoderSubdivision, angle, order, of_output, move |on, amplitude, phase| {
         let at_generator = (Name::GeneratorAmplitudeArcsec, amplitude * on.nominal.ratio.abs());
         [(Name::AmplitudeArcsec, amplitude)]
             .into_iter()

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::super::prepare::Jump;
 use super::super::rows::rms;
 use super::geometry::{Angle, angle, pulse, weighted_waves};
-use super::{Excitation, Law, Role, Shape, beside, by_row, history, main, nuisance};
+use super::{Excitation, Law, Role, Shape, by_row, history, main, nuisance};
 use crate::causes::{CauseName, ParameterName as Name};
 use crate::units::ARCSEC_PER_TURN;
 
@@ -121,77 +121,6 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
 /// Share of a loop by which another curve of it may look like something that lags the load in time: where the load swings with one period the
 /// two are one. *Chosen* on Bouc-Wen loops of 2 to 12 arcsec, none of which were named before.
 const LOOKS_LIKE_CREEP: f64 = 0.5;
-/// Springs that stand for a continuum of them, which slip from no torque at all up to the last one's.
-const SPRINGS: usize = 12;
-/// The straight part of many springs is compliance, and may be larger than their loop.
-const STRAIGHT: f64 = 2.0;
-/// Springs may slip earlier or later than evenly, and a loop may bend with the load. Guesses.
-const UNEVENLY: f64 = 0.5;
-const BENT: f64 = 0.3;
-
-/// What a continuum of springs holds (Iwan 1966, evenly distributed: the loop of Rayleigh 1887 up to the torque at which the last one slips),
-/// in units of that torque; without the part that goes straight with the torque, which is compliance like any other.
-fn loop_of_many(on: &Excitation<'_>, last_slip: f64) -> Vec<f64> {
-    let mut held = vec![0.0; on.rows.len()];
-    for j in 0..SPRINGS {
-        let slip = last_slip * (j as f64 + 0.5) / SPRINGS as f64;
-        let share = slip / last_slip / SPRINGS as f64;
-        held.iter_mut().zip(stop_operator(on, slip)).for_each(|(sum, held)| *sum += share * held);
-    }
-    let torque = &on.rows.torque;
-    let (along, square) =
-        held.iter().zip(torque).fold((0.0, 0.0), |(along, square), (held, t)| (along + held * t, square + t * t));
-    let straight = along / f64::max(square, 1e-12);
-    held.iter_mut().zip(torque).for_each(|(held, t)| *held -= straight * t);
-    held
-}
-
-/// The loop of a smooth hysteresis, whose springs never slip all at once: small swings of the load have small loops, and no torque stands out.
-fn smooth_hysteresis(on: &Excitation<'_>) -> Law {
-    let load = on.scales.load;
-    let mut law = Law::new(CauseName::TorsionalHysteresis, |on, shape| {
-        let last = 2.0 * shape.of(Name::SlipTorqueNM);
-        let of = |last: f64| -> Vec<f64> { loop_of_many(on, last).into_iter().map(|held| -held).collect() };
-        let even = of(last);
-        let size = rms(&even).max(1e-12);
-        // A loop of one rms: its size is told by the data, whatever share of the load its springs slip at.
-        let scaled = |values: &[f64]| -> Vec<f64> { values.iter().map(|v| v / size).collect() };
-        let wider = even.iter().map(|v| v.abs()).collect::<Vec<f64>>();
-        let mut columns = vec![
-            main(scaled(&even), 15.0).called(SPRING),
-            nuisance(scaled(&of(0.4 * last)), UNEVENLY).called(EARLIER_SPRING),
-            nuisance(scaled(&wider), WIDER_ONE_WAY),
-            beside(by_row(on, |k| load_share(on, k)), STRAIGHT),
-            nuisance(by_row(on, |k| load_share(on, k).powi(3)), BENT),
-            nuisance(by_row(on, |k| load_share(on, k).abs()), WIDER_ONE_WAY),
-        ];
-        columns.extend(unknown_beginnings(on, 0.5 * last).into_iter().map(|held| history(held, 1.0)));
-        columns
-    })
-    .whole()
-    .evaluated_on_averages()
-    .shapes([Shape::by_factors(Name::SlipTorqueNM, 0.05 * load, 2.0 * load, 4)])
-    .parameters_by(|on, shape, c| {
-        let (full, slips) = (on.scales.load, shape.of(Name::SlipTorqueNM));
-        // On the way back from the full load each spring holds this much against it when the torque passes zero, in units of the last slip.
-        let held = |last: f64| -> f64 {
-            let of = |j: usize| {
-                let slip = last * (j as f64 + 0.5) / SPRINGS as f64;
-                (full - slip).clamp(0.0, slip) / last / SPRINGS as f64
-            };
-            (0..SPRINGS).map(of).sum()
-        };
-        let size = rms(&loop_of_many(on, 2.0 * slips)).max(1e-12);
-        let half_width = (c.of(SPRING) * held(2.0 * slips) + c.of(EARLIER_SPRING) * held(0.8 * slips)) / size;
-        vec![(Name::HalfWidthArcsec, half_width), (Name::SlipTorqueNM, slips)]
-    })
-    .physical_if(|_, c| c.of(SPRING) > 0.0);
-    law.wrong.doubt = 0.15;
-    law.wrong.most_nuisance = 2.0;
-    law.wrong.misfit_unnamed = LOOKS_LIKE_CREEP;
-    law
-}
-
 /// Stiffer the higher the load: the wind-up lags behind the nominal line by a power of the torque.
 fn stiffness_hardening() -> Law {
     Law::new(CauseName::StiffnessHardening, |on, shape| {
@@ -365,7 +294,6 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = Vec::new();
     if on.speaks_of(CauseName::TorsionalHysteresis) {
         laws.push(torsional_hysteresis(on));
-        laws.push(smooth_hysteresis(on));
     }
     laws.extend([
         stiffness_hardening(),
