@@ -79,9 +79,9 @@ fn the_page_of_a_diagnosis_agrees_with_diagnosis_json() {
     assert_eq!(json["provenance"]["Command"], diagnosis["command"]);
     let hash = json["provenance"][format!("BLAKE3 of {example}/error_vs_input.csv")].as_str().unwrap();
     assert_eq!(hash.len(), 64);
-    let stamp = match diagnosis["verdict"].as_str().unwrap() {
-        "partly_explained" => "partly explained",
-        "unknown" => "unknown",
+    let stamp = match diagnosis["finding"].as_str().unwrap() {
+        "fault_found" => "fault found",
+        "not_understood" => "not understood",
         _ => "good",
     };
     assert_eq!(json["status"], stamp);

@@ -18,7 +18,7 @@ use crate::drive::Wheel;
 use crate::suggest::did_you_mean;
 use Multiple::{Fixed, Harmonic, ToothMesh};
 use Usual::{Follows, OfLoad, ToothPitch, Value};
-use parameter::{ARCSECONDS, HALF_LOAD, HARMONIC, WHEELS, microns, phase};
+use parameter::{ARCSECONDS, ENCODERS, HALF_LOAD, HARMONIC, WHEELS, microns, phase};
 pub use parameter::{Factor, Kind, Parameter, ParameterName, TIME, Usual, number};
 
 macro_rules! causes {
@@ -89,6 +89,12 @@ causes! {
     OutputEncoderEccentricity = "output_encoder_eccentricity",
     /// The disc of the generator's encoder stands off its axis.
     GeneratorEncoderEccentricity = "generator_encoder_eccentricity",
+    /// The output encoder reads twice around wrong: a tilted disc, a magnet that is not square.
+    OutputEncoderTilt = "output_encoder_tilt",
+    /// The generator's encoder reads twice around wrong.
+    GeneratorEncoderTilt = "generator_encoder_tilt",
+    /// An encoder divides its periods unevenly: four and more waves around it.
+    EncoderSubdivision = "encoder_subdivision",
     /// The output is read later than the generator.
     SensorLatency = "sensor_latency",
     /// The ratio is another one.
@@ -186,6 +192,12 @@ pub enum Need {
     Time,
     /// A generator that moves.
     Motion,
+    /// A speed or a load that changes fast enough to make a load swing.
+    Swings,
+    /// An output that turns through half a turn.
+    HalfOutputTurn,
+    /// So much use that a drive may have worn meanwhile.
+    Use,
     /// A lasting jump of the error by whole teeth.
     Jump,
 }
@@ -203,6 +215,9 @@ impl Need {
             Need::TemperatureSpan => "the temperature stays close to the nominal one",
             Need::Time => "no time was recorded",
             Need::Motion => "the generator does not move",
+            Need::Swings => "speed and load stay as they are: nothing makes a load swing",
+            Need::HalfOutputTurn => "the output turns through less than half a turn",
+            Need::Use => "the drive is used too little for wear in between",
             Need::Jump => "the error has no lasting jump by whole teeth",
         }
     }
@@ -219,6 +234,9 @@ impl Need {
             Need::TemperatureSpan => Some("record sessions at temperatures that differ by 20 K or more"),
             Need::Time => Some("record the time of each row (time_s)"),
             Need::Motion => Some("record the drive in motion, at several speeds"),
+            Need::Swings => Some("record steps of the load, stops and starts, and several speeds"),
+            Need::HalfOutputTurn => Some("turn the output through a whole turn"),
+            Need::Use => Some("record again after hours of use, with the same zero"),
             Need::Jump => None,
         }
     }
@@ -237,6 +255,8 @@ pub enum Turn {
     Generator,
     /// The output.
     Output,
+    /// Generator or output, as the parameter `encoder` says.
+    OfEncoder,
 }
 
 /// How often a wave comes in a turn.
@@ -345,6 +365,9 @@ impl CauseName {
             CauseName::TorsionalResonance => "torsional resonance",
             CauseName::OutputEncoderEccentricity => "eccentricity of the output encoder",
             CauseName::GeneratorEncoderEccentricity => "eccentricity of the generator encoder",
+            CauseName::OutputEncoderTilt => "tilt of the output encoder",
+            CauseName::GeneratorEncoderTilt => "tilt of the generator encoder",
+            CauseName::EncoderSubdivision => "subdivision error of an encoder",
             CauseName::SensorLatency => "time between the sensors",
             CauseName::RatioError => "another ratio",
             CauseName::Ratcheting => "ratcheting",
@@ -385,6 +408,13 @@ impl CauseName {
             CauseName::TorsionalResonance => "the inertia of the load on the spring of the drive",
             CauseName::OutputEncoderEccentricity => "one wave in an output turn, whatever the load",
             CauseName::GeneratorEncoderEccentricity => "one wave in a generator turn, whatever the load",
+            CauseName::OutputEncoderTilt => "two waves in an output turn, whatever the load",
+            CauseName::GeneratorEncoderTilt => {
+                "two waves in a generator turn, the same on both flanks and under any load"
+            }
+            CauseName::EncoderSubdivision => {
+                "four waves or a multiple in a turn of an encoder, whatever the load and the speed"
+            }
             CauseName::SensorLatency => {
                 "output and generator are read at different instants: an error in proportion to speed"
             }
@@ -421,6 +451,11 @@ impl CauseName {
             CauseName::TorsionalResonance => "the load's inertia on the drive's spring",
             CauseName::OutputEncoderEccentricity => "disc of the output encoder off its axis",
             CauseName::GeneratorEncoderEccentricity => "disc of the generator's encoder off its axis",
+            CauseName::OutputEncoderTilt => "output encoder that is tilted, or whose magnet is not square on its axis",
+            CauseName::GeneratorEncoderTilt => {
+                "generator's encoder that is tilted, or whose magnet is not square on its axis"
+            }
+            CauseName::EncoderSubdivision => "an encoder that divides its periods unevenly",
             CauseName::SensorLatency => "the output's reading is older than the generator's",
             CauseName::RatioError => "an error in proportion to the output angle",
             CauseName::Ratcheting => "teeth that skip",
@@ -453,6 +488,9 @@ impl CauseName {
             CauseName::GravityTorque | CauseName::TorsionalResonance => Family::Dynamic,
             CauseName::OutputEncoderEccentricity
             | CauseName::GeneratorEncoderEccentricity
+            | CauseName::OutputEncoderTilt
+            | CauseName::GeneratorEncoderTilt
+            | CauseName::EncoderSubdivision
             | CauseName::SensorLatency
             | CauseName::RatioError => Family::Sensor,
         }
@@ -468,7 +506,9 @@ impl CauseName {
             | CauseName::FlexsplinePitchError
             | CauseName::CircularSplinePitchError
             | CauseName::GeneratorEccentricity
-            | CauseName::GravitySideLoad => Kin::Shape,
+            | CauseName::GravitySideLoad
+            // Wheels make waves of the generator angle, too.
+            | CauseName::GeneratorEncoderTilt => Kin::Shape,
             CauseName::DamagedTooth | CauseName::CrackedToothRoot => Kin::Pulse,
             CauseName::StiffnessHardening
             | CauseName::StiffnessError
@@ -483,6 +523,8 @@ impl CauseName {
             | CauseName::TorsionalResonance
             | CauseName::OutputEncoderEccentricity
             | CauseName::GeneratorEncoderEccentricity
+            | CauseName::OutputEncoderTilt
+            | CauseName::EncoderSubdivision
             | CauseName::RatioError
             | CauseName::Ratcheting => Kin::Unlike,
         }
@@ -507,13 +549,17 @@ impl CauseName {
             CauseName::ThermalStiffness => &[Need::Temperature, Need::TemperatureSpan, Need::Load],
             CauseName::LubricantViscosity => &[Need::Time, Need::Motion],
             CauseName::GravityTorque => &[Need::Spring],
-            CauseName::TorsionalResonance | CauseName::SensorLatency => &[Need::Time],
+            CauseName::TorsionalResonance => &[Need::Time, Need::Swings],
+            CauseName::SensorLatency => &[Need::Time],
             CauseName::Ratcheting => &[Need::Teeth, Need::Jump],
+            CauseName::Wear => &[Need::Use],
             CauseName::BacklashGrowth
-            | CauseName::Wear
             | CauseName::OutputEncoderEccentricity
             | CauseName::GeneratorEncoderEccentricity
+            | CauseName::GeneratorEncoderTilt
+            | CauseName::EncoderSubdivision
             | CauseName::RatioError => &[],
+            CauseName::OutputEncoderTilt => &[Need::HalfOutputTurn],
         }
     }
 
@@ -542,6 +588,9 @@ impl CauseName {
             ],
             CauseName::GravitySideLoad => &[(Turn::Generator, Fixed(2.0)), (Turn::Generator, Fixed(4.0))],
             CauseName::GeneratorEncoderEccentricity => &[(Turn::Generator, Fixed(1.0))],
+            CauseName::GeneratorEncoderTilt => &[(Turn::Generator, Fixed(2.0))],
+            CauseName::OutputEncoderTilt => &[(Turn::Output, Fixed(2.0))],
+            CauseName::EncoderSubdivision => &[(Turn::OfEncoder, Harmonic)],
             CauseName::OutputEncoderEccentricity | CauseName::GravityTorque => &[(Turn::Output, Fixed(1.0))],
             // They follow load, time, temperature or speed.
             CauseName::BacklashGrowth
@@ -578,7 +627,10 @@ impl CauseName {
             | CauseName::ThermalClearance
             | CauseName::ThermalStiffness
             | CauseName::OutputEncoderEccentricity
-            | CauseName::GeneratorEncoderEccentricity => InTable::Yes,
+            | CauseName::GeneratorEncoderEccentricity
+            | CauseName::OutputEncoderTilt
+            | CauseName::GeneratorEncoderTilt
+            | CauseName::EncoderSubdivision => InTable::Yes,
             CauseName::GravityTorque | CauseName::GravitySideLoad => InTable::AtOneOrientation,
             CauseName::SensorLatency | CauseName::LubricantViscosity => {
                 InTable::No("it follows the speed, and a table knows none")
@@ -628,6 +680,9 @@ impl CauseName {
             | CauseName::TorsionalResonance
             | CauseName::OutputEncoderEccentricity
             | CauseName::GeneratorEncoderEccentricity
+            | CauseName::OutputEncoderTilt
+            | CauseName::GeneratorEncoderTilt
+            | CauseName::EncoderSubdivision
             | CauseName::SensorLatency
             | CauseName::RatioError
             | CauseName::CrackedToothRoot
@@ -801,6 +856,37 @@ impl CauseName {
                     ]
                 }
             }
+            CauseName::OutputEncoderTilt => {
+                const {
+                    &[
+                        number(Name::AmplitudeArcsec, "at the output", 0.0, 10_000.0, Value(15.0)),
+                        phase("of sin(2 output + phase)"),
+                    ]
+                }
+            }
+            CauseName::GeneratorEncoderTilt => {
+                const {
+                    &[
+                        number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(8.0)),
+                        number(Name::GeneratorAmplitudeArcsec, "the same at the generator", 0.0, 1e5, Follows),
+                        phase("of sin(2 generator + phase)"),
+                    ]
+                }
+            }
+            CauseName::EncoderSubdivision => {
+                const {
+                    &[
+                        number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(6.0)),
+                        number(Name::GeneratorAmplitudeArcsec, "the same at the generator", 0.0, 1e5, Follows),
+                        number(Name::Harmonic, "waves in a turn of the encoder", 3.0, 65_536.0, Value(4.0)),
+                        Parameter {
+                            words: ENCODERS,
+                            ..number(Name::Encoder, "0 generator, 1 output", 0.0, 1.0, Value(0.0))
+                        },
+                        phase("of sin(harmonic angle + phase)"),
+                    ]
+                }
+            }
             CauseName::SensorLatency => {
                 const { &[number(Name::DelayS, "positive: the output's is older", -0.1, 0.1, Value(0.002))] }
             }
@@ -830,7 +916,9 @@ impl CauseName {
                 (Name::DepthUm, Name::AmplitudeArcsec, Factor::AlongNormal),
                 (Name::Tooth, Name::AngleRad, Factor::Tooth),
             ],
-            CauseName::GeneratorEncoderEccentricity => {
+            CauseName::GeneratorEncoderEccentricity
+            | CauseName::GeneratorEncoderTilt
+            | CauseName::EncoderSubdivision => {
                 &[(Name::AmplitudeArcsec, Name::GeneratorAmplitudeArcsec, Factor::Ratio)]
             }
             CauseName::BacklashGrowth
@@ -844,6 +932,7 @@ impl CauseName {
             | CauseName::GravityTorque
             | CauseName::TorsionalResonance
             | CauseName::OutputEncoderEccentricity
+            | CauseName::OutputEncoderTilt
             | CauseName::SensorLatency
             | CauseName::RatioError
             | CauseName::CrackedToothRoot

@@ -41,6 +41,7 @@ names! {
     DragBendPerK = "drag_bend_per_k",
     DragNM = "drag_n_m",
     DurationS = "duration_s",
+    Encoder = "encoder",
     Events = "events",
     EveryRows = "every_rows",
     Exponent = "exponent",
@@ -104,6 +105,7 @@ impl ParameterName {
             | ParameterName::Events
             | ParameterName::EveryRows
             | ParameterName::Turns
+            | ParameterName::Encoder
             | ParameterName::Channel => Kind::Count,
             ParameterName::AmplitudeArcsec
             | ParameterName::AmplitudeUm
@@ -244,3 +246,5 @@ pub(super) const HARMONIC: Parameter =
 /// The instant of an event.
 pub const TIME: Parameter = number(ParameterName::TimeS, "when", -1e9, 1e12, Usual::Instant(0.3, 0.7));
 pub(super) const WHEELS: &[&str] = &["flexspline", "circular_spline"];
+/// Words for the parameter `encoder`.
+pub(super) const ENCODERS: &[&str] = &["generator", "output"];

@@ -10,7 +10,7 @@ use super::base::Base;
 use super::candidate::{Excitation, Law};
 use super::model::{Problem, Scaffold, Term};
 use super::noise::{Noise, Whitener};
-use super::rows::Rows;
+use super::rows::{Rows, quantile};
 use crate::measurement::Session;
 
 /// One run: text, and session by session how it is driven at `share` (0 to 1) of its time.
@@ -94,6 +94,39 @@ fn menu() -> Vec<Run> {
             [|s| state(0.01 * s, steps(s), 0.0, 0.0)],
         ),
     ]
+}
+
+/// Speeds that differ by less than this factor are one speed. *Guess*.
+const ONE_SPEED: f64 = 1.5;
+
+/// What to record where no look-alike asks for a run: what the data lack, or the same again.
+#[must_use]
+pub fn anyhow(on: &Excitation<'_>, not_understood: bool) -> String {
+    let rows = on.rows;
+    let speeds = |share: f64| quantile(rows.speed.iter().map(|speed| speed.abs()).filter(|speed| *speed > 0.0), share);
+    let mut asked: Vec<&str> = Vec::new();
+    if !rows.recorded.time {
+        asked.push("record the time of each row");
+    }
+    if !rows.recorded.torque {
+        asked.push("record the torque at the output");
+    }
+    if rows.recorded.time && speeds(0.9) < ONE_SPEED * speeds(0.1) {
+        asked.push("run at three speeds, one of them a third of this one");
+    }
+    if rows.sessions_used().count() < 3 {
+        asked.push("record three sessions or more");
+    }
+    if asked.is_empty() {
+        let again = if not_understood {
+            "the same run slower, at a third of the speed, and once with another load: what stays where it is comes from angles, what moves \
+             from time or load"
+        } else {
+            "the same run again on another day, then with the cause put right: it should come back, and be gone"
+        };
+        return again.to_owned();
+    }
+    asked.join("; ")
 }
 
 /// The run of the menu that tells `term` from each of `alike` best, with how far the closest then stands off.

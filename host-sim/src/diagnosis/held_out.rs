@@ -1,9 +1,10 @@
-//! Gain on sessions that took no part in the fit: each session predicted by a fit to the others, without any offset of its own. Which
-//! causes are fitted was chosen on all sessions.
+//! Gain on sessions that took no part in the fit: each session predicted by a fit to the others, without any offset of its own
+//! unless the bench sets its zero anew in each. Which causes are fitted was chosen on all sessions.
 
 use super::linear::Gram;
 use super::model::{Problem, Scaffold, Term, white_columns};
 use super::report::{HeldOut, Unexplained};
+use super::rows::mean;
 use super::select::{self, Selected, blocks};
 use super::trace::{Gate, Judged, Stage, Trace};
 
@@ -18,7 +19,8 @@ pub struct Evaluated {
 /// Leaves out one session after another.
 #[must_use]
 pub fn evaluate(problem: &Problem<'_>, terms: &[&Term<'_>]) -> Evaluated {
-    let square = |terms: &[&Term<'_>], linearised: bool| left_out(problem, terms, linearised).unwrap_or(f64::NAN);
+    let zero = Zero::of(terms);
+    let square = |terms: &[&Term<'_>], linearised: bool| left_out(problem, terms, linearised, zero).unwrap_or(f64::NAN);
     let before = square(&[], false);
     let after = if terms.is_empty() { before } else { square(terms, true) };
     let gains = (0..terms.len())
@@ -39,7 +41,8 @@ pub fn proved<'l>(
     mut selected: Selected<'l>,
     trace: &mut Trace,
 ) -> (Selected<'l>, Vec<Unexplained>) {
-    let square = |terms: &[&Term<'l>]| left_out(problem, terms, true).unwrap_or(f64::INFINITY);
+    let zero = Zero::of(&selected.terms.iter().collect::<Vec<_>>());
+    let square = |terms: &[&Term<'l>]| left_out(problem, terms, true, zero).unwrap_or(f64::INFINITY);
     let none = square(&[]);
     let mut aside = Vec::new();
     while selected.terms.len() > 1 {
@@ -48,6 +51,7 @@ pub fn proved<'l>(
             break;
         }
         let best = (0..selected.terms.len())
+            .filter(|k| !selected.terms[*k].law.is_zero_of_sessions())
             .map(|k| (square(&selected.others(k)), k))
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .filter(|(without, _)| *without < all);
@@ -65,9 +69,26 @@ pub fn proved<'l>(
     (selected, aside)
 }
 
+/// Where the zero of a session left out comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Zero {
+    /// It is that of the others.
+    Shared,
+    /// The bench sets it in each session: it is found in the session itself.
+    Own,
+}
+
+impl Zero {
+    /// Of a model with these terms.
+    #[must_use]
+    pub fn of(terms: &[&Term<'_>]) -> Zero {
+        if terms.iter().any(|term| term.law.is_zero_of_sessions()) { Zero::Own } else { Zero::Shared }
+    }
+}
+
 /// Mean squared error of prediction, arcsec², over averages without uncertain rows. With `anew` the shape parameters are
 /// found without the session as well, by a step of Gauss-Newton where that tells the others better.
-fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], anew: bool) -> Option<f64> {
+fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], anew: bool, zero: Zero) -> Option<f64> {
     let scaffold = Scaffold::new(problem, terms.to_vec());
     let fit = scaffold.fit(None)?;
     let white = white_columns(problem, terms, &[]);
@@ -92,11 +113,16 @@ fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], anew: bool) -> Option<f6
         let (solution, moved) = &best;
         let there = moved.as_ref().map_or_else(|| terms.to_vec(), |moved| moved.iter().collect());
         let columns: Vec<&Vec<f64>> = problem.base.iter().chain(there.iter().flat_map(|t| &t.averaged)).collect();
-        for g in block.filter(|g| problem.certain[*g]) {
-            let predicted: f64 = columns.iter().zip(&solution.coefficients).map(|(column, c)| c * column[g]).sum();
-            sum += (problem.data[g] - predicted).powi(2);
-            count += 1;
-        }
+        let left: Vec<f64> = block
+            .filter(|g| problem.certain[*g])
+            .map(|g| {
+                let predicted: f64 = columns.iter().zip(&solution.coefficients).map(|(column, c)| c * column[g]).sum();
+                problem.data[g] - predicted
+            })
+            .collect();
+        let own = if zero == Zero::Own { mean(&left) } else { 0.0 };
+        sum += left.iter().map(|left| (left - own).powi(2)).sum::<f64>();
+        count += left.len();
     }
     Some(sum / count.max(1) as f64)
 }

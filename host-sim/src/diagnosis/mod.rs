@@ -24,6 +24,7 @@ pub(crate) mod model;
 pub(crate) mod noise;
 pub(crate) mod pipeline;
 pub(crate) mod prepare;
+mod quieted;
 pub(crate) mod remainder;
 pub(crate) mod report;
 mod resolution;

@@ -230,7 +230,8 @@ pub struct Term<'l> {
     pub averaged: Vec<Vec<f64>>,
     /// Columns, white.
     pub white: White,
-    /// What freedom of the shape parameters costs: logarithm of the share of their range that the data leave (0 before refinement).
+    /// What freedom of the shape parameters costs: logarithm of the share of their range that the data leave (0 before refinement); less the
+    /// odds against the law before any data.
     pub occam: f64,
     /// What other causes leave to it.
     among: Option<Arc<Among>>,
@@ -248,7 +249,7 @@ impl<'l> Term<'l> {
         let recorded = problem.excitation(law);
         let on = left_by(among.as_deref(), &recorded);
         let (averaged, white) = White::of(problem, law, columns(law, Extent::Whole, &on, &places));
-        Term { law, places, averaged, white, occam: 0.0, among }
+        Term { law, places, averaged, white, occam: -law.search.odds_against, among }
     }
 
     /// This term with each normalised parameter moved, within its range and no farther than a step reaches.
@@ -703,7 +704,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             let (free, moves) = self.fit_with(Some(&term.white), &self.derivatives(&term, &coefficients))?;
             let now = fit.solution.evidence;
             let promised = 0.5 * (fit.solution.misfit - free.solution.misfit);
-            term.occam = (free.solution.evidence - now - promised).min(0.0);
+            term.occam = (free.solution.evidence - now - promised).min(0.0) - term.law.search.odds_against;
             let in_reach = now + FARTHER_THAN_LINEAR * (free.solution.evidence - now).max(0.0) + BEYOND_LINEAR;
             if step == 0 && in_reach < least_evidence {
                 return None;

@@ -17,9 +17,9 @@ use flexspline::{ImageError, Table};
 use serde::Serialize;
 use thiserror::Error;
 
-use super::channels;
 use super::report::{Compensation, Diagnosis};
 use super::{DiagnosisError, Extended, Settings, diagnose_extended};
+use super::{channels, quieted};
 use crate::causes::CauseName;
 use crate::drive::{Drive, DriveError, GeneratorKind};
 use crate::extension::{
@@ -238,6 +238,7 @@ pub fn read_rows(path: &Path, columns: &ColumnMap, subject: &Subject<'_>) -> Res
         subject.take_away_known(&mut recording)?;
     }
     recording.unusable = channels::check_torque(&mut recording, &subject.nominal);
+    recording.notes.extend(quieted::torque(&mut recording.sessions, &subject.nominal));
     recording.average_to(MOST_ROWS);
     Ok(recording)
 }

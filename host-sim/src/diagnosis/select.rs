@@ -7,6 +7,7 @@ use std::collections::{HashMap, HashSet};
 use rayon::prelude::*;
 
 use super::candidate::{Coefficients, Law, Role, Tolerance};
+use super::held_out::Zero;
 use super::linear::Gram;
 use super::model::{Fit, Problem, Scaffold, Term, among_each_other, white_columns};
 use super::thresholds::selection::*;
@@ -403,6 +404,8 @@ pub fn blocks(problem: &Problem<'_>) -> Vec<std::ops::Range<usize>> {
 
 /// Relative gain of squared innovations in blocks left out, by having all `terms` instead of `fewer`.
 fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]) -> f64 {
+    // Nobody foretells a zero that the bench sets in each session: there it is found in the block itself. The first column is the zero.
+    let own_zero = Zero::of(terms) == Zero::Own;
     let misfit = |terms: &[&Term<'_>]| -> Option<f64> {
         let columns = white_columns(problem, terms, &[]);
         let fit = Scaffold::new(problem, terms.to_vec()).fit(None)?;
@@ -418,6 +421,10 @@ fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]
                 for j in 0..n {
                     left += c[i] * c[j] * inside.at(i, j);
                 }
+            }
+            if own_zero {
+                let along: f64 = inside.at(0, n) - (0..n).map(|j| c[j] * inside.at(0, j)).sum::<f64>();
+                left -= along * along / inside.at(0, 0).max(f64::MIN_POSITIVE);
             }
             all += left;
         }

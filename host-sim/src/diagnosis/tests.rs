@@ -814,3 +814,86 @@ fn a_softer_spring_gives_way_to_drag_and_gravity_as_well() {
         }
     });
 }
+
+#[test]
+fn the_orders_of_an_encoder_are_told_apart_with_their_sizes() {
+    let hidden = [
+        effect(CauseName::OutputEncoderEccentricity, 30.0, 0.7, 0.5),
+        effect(CauseName::OutputEncoderTilt, 20.0, 2.1, 0.5),
+    ];
+    for law in [0, 1] {
+        let found = diagnosed(&hidden, law, 41 + u64::from(law));
+        let mut named = names(&found);
+        named.sort_unstable();
+        assert_eq!(named, [CauseName::OutputEncoderEccentricity, CauseName::OutputEncoderTilt], "{law}");
+        for (cause, size) in [(CauseName::OutputEncoderEccentricity, 30.0), (CauseName::OutputEncoderTilt, 20.0)] {
+            let amplitude =
+                found.causes.iter().find(|found| found.name == cause).unwrap().parameters["amplitude_arcsec"].value;
+            assert!((amplitude - size).abs() < 0.1 * size, "{cause}: {amplitude} for {size}");
+        }
+    }
+}
+
+#[test]
+fn four_waves_in_a_turn_of_the_generator_are_its_encoder_and_no_resonance() {
+    for law in [0, 1] {
+        let found = diagnosed(&[effect(CauseName::EncoderSubdivision, 8.0, 1.0, 0.5)], law, 51 + u64::from(law));
+        assert_eq!(names(&found), [CauseName::EncoderSubdivision], "{law}");
+        let told = &found.causes[0].parameters;
+        assert_eq!((told["harmonic"].value, told["encoder"].value), (4.0, 0.0));
+    }
+}
+
+#[test]
+fn a_tilted_encoder_of_the_generator_is_listed_with_the_wheel_that_makes_the_same_waves() {
+    let found = diagnosed(&[effect(CauseName::GeneratorEncoderTilt, 15.0, 1.0, 0.5)], 0, 61);
+    let first = &found.causes[0];
+    let told = [first.name].into_iter().chain(first.look_alikes.iter().copied());
+    assert!(told.into_iter().any(|cause| cause == CauseName::GeneratorEncoderTilt), "{first:?}");
+}
+
+#[test]
+fn at_one_speed_and_load_nothing_makes_a_load_swing() {
+    let steady = |swings: bool| -> Session {
+        let angle = |k: f64| 0.05 * k + if swings { 3.0 * (0.02 * k).sin() } else { 0.0 };
+        Session {
+            time_s: Some((0..3000).map(|k| 0.01 * f64::from(k)).collect()),
+            generator_rad: (0..3000).map(|k| angle(f64::from(k))).collect(),
+            error_rad: (0..3000).map(|k| 1e-5 * (4.0 * angle(f64::from(k))).sin()).collect(),
+            ..Session::default()
+        }
+    };
+    for (swings, lacks) in [(false, Some(crate::causes::Need::Swings)), (true, None)] {
+        excited_by(&[steady(swings)], &catalogue_drive(), |on| {
+            assert_eq!(on.lacks(CauseName::TorsionalResonance), lacks);
+        });
+    }
+}
+
+#[test]
+fn half_a_minute_wears_nothing_and_a_part_of_a_turn_shows_no_second_order() {
+    let short = Session {
+        time_s: Some((0..3000).map(|k| 0.01 * f64::from(k)).collect()),
+        generator_rad: (0..3000).map(|k| 0.05 * f64::from(k)).collect(),
+        error_rad: vec![0.0; 3000],
+        ..Session::default()
+    };
+    excited_by(&[short], &catalogue_drive(), |on| {
+        assert_eq!(on.lacks(CauseName::Wear), Some(crate::causes::Need::Use));
+        assert_eq!(on.lacks(CauseName::OutputEncoderTilt), Some(crate::causes::Need::HalfOutputTurn));
+    });
+}
+
+#[test]
+fn a_zero_that_is_set_in_each_session_hides_no_cause() {
+    let mut sessions = data(&[effect(CauseName::CircularSplineEccentricity, 8.0, 0.8, 0.5)], Richness::Rich, 0, 71);
+    for (k, session) in sessions.iter_mut().enumerate() {
+        let zero = [0.0, 90.0, -60.0, 130.0, -110.0, 40.0][k % 6] / crate::units::ARCSEC_PER_RAD;
+        session.error_rad.iter_mut().for_each(|error| *error += zero);
+    }
+    let found =
+        super::diagnose(&sessions, &catalogue_drive(), None, &super::Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!(names(&found), [CauseName::CircularSplineEccentricity]);
+    assert!(found.unexplained.iter().any(|left| left.looks_like == "another zero in each session"));
+    assert!(found.held_out.rms_after_arcsec < 0.5 * found.held_out.rms_before_arcsec, "{:?}", found.held_out);
+}

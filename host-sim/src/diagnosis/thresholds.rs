@@ -54,6 +54,9 @@ pub mod selection {
     pub const LEAST_GAIN: f64 = 0.5;
     /// Evidence by which a cause has to be ahead of another to take its place. *Chosen*.
     pub const AHEAD: f64 = 3.0;
+    /// Evidence by which the second order and the subdivision of the generator's encoder have to be ahead of wheels, which make the same waves
+    /// and leave traces of the flank and of other orders besides: as clear as a cause that may be small. *Guess*.
+    pub const AFTER_WHEELS: f64 = CLEAR_EVIDENCE;
     /// Evidence by which something unnamed has to be ahead of the best cause to be taken before it. *Guess*.
     pub const UNNAMED_AHEAD: f64 = 5.0;
 }
@@ -95,6 +98,9 @@ pub mod verdict {
     pub const LEAST_BESIDE_DESCRIBED: f64 = 0.05;
     /// Share of the square of what is beyond noise that may stay without any description where causes are named. *Chosen*.
     pub const MOST_UNEXPLAINED: f64 = 0.5;
+    /// What is left of an explained error is no more than so many times the noise, wander with it. *Source*: where abstention begins in the
+    /// method that `docs/theory.md` describes.
+    pub const NEAR_NOISE: f64 = 1.6;
     /// Something without a name is large beside a cause from this share of its size on: what is not understood may reach into it. *Chosen*.
     pub const LARGE_BESIDE: f64 = 0.7;
     /// Then what the cause adds has to be so many times the uncertainty of that. *Chosen*.

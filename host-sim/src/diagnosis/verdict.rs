@@ -54,13 +54,18 @@ pub(super) fn conclude(
     let size = |k: &usize| standings[*k].size.powi(2);
     let (by_name, without_name) = (
         named.iter().map(size).sum::<f64>(),
-        (0..selected.terms.len()).filter(|k| !named.contains(k)).map(|k| size(&k)).sum::<f64>(),
+        (0..selected.terms.len())
+            .filter(|k| !named.contains(k) && !selected.terms[*k].law.is_zero_of_sessions())
+            .map(|k| size(&k))
+            .sum::<f64>(),
     );
+    // A zero that the bench sets in each session hides nothing of what goes on within one; with nothing else found it is not understood.
+    let zeros_alone = named.is_empty() && all.iter().any(|term| term.law.is_zero_of_sessions());
     let strongest = named.iter().map(|k| standings[*k].size).fold(0.0, f64::max);
     left_over.retain(|l| l.size_arcsec > LEAST_LEFT_OF_STRONGEST * strongest);
     let described = without_name;
     let without_name = without_name + left_over.iter().map(|l| l.size_arcsec.powi(2)).fold(0.0, f64::max);
-    let significant_left = without_name > 0.0;
+    let significant_left = without_name > 0.0 || zeros_alone;
     let held = held_out::evaluate(problem, &all);
     let abstained = Abstention { by_name, without_name, described, unexplained, explainable };
     let gates = if named.is_empty() { Vec::new() } else { abstained.gates(significant_left, held.total, noise.white) };
@@ -136,9 +141,14 @@ pub(super) fn conclude(
     });
     let verdict = match verdict {
         Verdict::Explained | Verdict::PartlyExplained if causes.is_empty() => Verdict::Unknown,
-        Verdict::Explained if !told_better.is_empty() => Verdict::PartlyExplained,
+        Verdict::Explained if !told_better.is_empty() || !is_explained(problem, rms_after, floor, held.total) => {
+            Verdict::PartlyExplained
+        }
         other => other,
     };
+    if verdict != Verdict::None && next_experiment.is_none() {
+        next_experiment = Some(experiment::anyhow(problem.on, verdict == Verdict::Unknown));
+    }
     // Nothing named, nothing extended: what has no name helps to see what is there, and predicts nothing for anybody.
     let mut held_out = held.total;
     if causes.is_empty() {
@@ -171,6 +181,14 @@ pub(super) fn conclude(
         experiment_for_asked,
         trace,
     }
+}
+
+/// Whether causes explain the error: what is left is near the noise, and in sessions left out the model with them beats the nominal one and
+/// none at all.
+fn is_explained(problem: &Problem<'_>, rms_after: f64, floor: f64, held_out: HeldOut) -> bool {
+    let compared = compensation(problem, held_out.rms_after_arcsec);
+    let best_without = compared.rms_uncompensated_arcsec.min(held_out.rms_before_arcsec);
+    rms_after <= NEAR_NOISE * floor && compared.rms_extended_tables_arcsec < best_without
 }
 
 /// The ratio that may be meant, where it is wrong.
@@ -230,7 +248,9 @@ fn understood(
     trace: &mut Trace,
 ) -> Vec<usize> {
     let is_named = |k: &usize| selected.terms[*k].law.named();
-    let unnamed = (0..selected.terms.len()).filter(|k| !is_named(k)).map(|k| standings[k].size);
+    let unnamed = (0..selected.terms.len())
+        .filter(|k| !is_named(k) && !selected.terms[*k].law.is_zero_of_sessions())
+        .map(|k| standings[k].size);
     let not_understood = unnamed.chain(left_over.iter().map(|l| l.size_arcsec)).fold(0.0, f64::max);
     let mut named = Vec::new();
     for k in (0..selected.terms.len()).filter(is_named) {

@@ -17,7 +17,7 @@ mod gear;
 mod layout;
 mod log;
 pub mod raw;
-mod robust;
+pub(crate) mod robust;
 mod rollover;
 mod slower;
 mod unit;

@@ -29,10 +29,10 @@ pub enum Status {
     Remark,
     /// Measured data had faults, which were repaired or left out.
     DataFaults,
-    /// A significant part of what was measured is not explained.
-    PartlyExplained,
-    /// What was measured is not explained.
-    Unknown,
+    /// Something is wrong with the unit, and it has a name.
+    FaultFound,
+    /// The unit departs from what is nominal, and what does it has no name.
+    NotUnderstood,
     /// A value is used outside the range it was made for.
     Extrapolates,
     /// A bound was missed.
@@ -48,8 +48,8 @@ impl Status {
             Status::Good => "good",
             Status::Remark => "remark",
             Status::DataFaults => "data faults",
-            Status::PartlyExplained => "partly explained",
-            Status::Unknown => "unknown",
+            Status::FaultFound => "fault found",
+            Status::NotUnderstood => "not understood",
             Status::Extrapolates => "extrapolates",
             Status::BoundMissed => "bound missed",
             Status::NotConverged => "not converged",
@@ -719,8 +719,8 @@ mod tests {
             (Status::Good, "good", false),
             (Status::Remark, "remark", false),
             (Status::DataFaults, "data faults", false),
-            (Status::PartlyExplained, "partly explained", false),
-            (Status::Unknown, "unknown", false),
+            (Status::FaultFound, "fault found", false),
+            (Status::NotUnderstood, "not understood", false),
             (Status::Extrapolates, "extrapolates", false),
             (Status::BoundMissed, "bound missed", true),
             (Status::NotConverged, "not converged", true),

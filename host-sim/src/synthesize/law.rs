@@ -17,6 +17,8 @@ const FLANK_ANGLE_RAD: f64 = 0.36;
 /// Half the arc in which a cracked tooth carries over the half width of what is felt of it, which is stated as the deviation of a bell
 /// curve: the square of a parabola comes closest to one (least squares) at this.
 const CARRYING_HALF_ARC: f64 = 2.38;
+/// The largest first wave of a reading under signals of unlike size, rad of theirs: beyond, it is this shape made larger.
+const MOST_UNLIKE: f64 = 0.25;
 /// Steps to a row where a state is followed.
 const STEPS: u32 = 40;
 
@@ -85,6 +87,9 @@ pub(super) enum Law {
     Resonance { frequency_hz: f64, damping_ratio: f64 },
     /// `A sin(angle + phase)` in a reading.
     Disc { encoder: Encoder, amplitude: f64, phase_rad: f64 },
+    /// A reading that is an angle `x` under two signals of unlike size, `atan2((1 + a) sin nx, cos nx) / n`: order 2n of the angle, of this
+    /// amplitude, and little of its multiples.
+    Unlike { encoder: Encoder, order: f64, amplitude: f64, phase_rad: f64 },
     /// The output's reading is older by this.
     Latency { delay_s: f64 },
     /// Error in proportion to the output angle.
@@ -237,6 +242,24 @@ impl Law {
             CauseName::GeneratorEncoderEccentricity => {
                 Law::Disc { encoder: Encoder::Generator, amplitude: v(Name::AmplitudeArcsec), phase_rad: phase() }
             }
+            CauseName::OutputEncoderTilt => Law::Unlike {
+                encoder: Encoder::Output,
+                order: 2.0,
+                amplitude: v(Name::AmplitudeArcsec),
+                phase_rad: phase(),
+            },
+            CauseName::GeneratorEncoderTilt => Law::Unlike {
+                encoder: Encoder::Generator,
+                order: 2.0,
+                amplitude: v(Name::AmplitudeArcsec),
+                phase_rad: phase(),
+            },
+            CauseName::EncoderSubdivision => Law::Unlike {
+                encoder: if v(Name::Encoder) > 0.5 { Encoder::Output } else { Encoder::Generator },
+                order: v(Name::Harmonic),
+                amplitude: v(Name::AmplitudeArcsec),
+                phase_rad: phase(),
+            },
             CauseName::SensorLatency => Law::Latency { delay_s: v(Name::DelayS) },
             CauseName::RatioError => Law::Ratio { relative: v(Name::RatioRelativeError) },
             CauseName::Ratcheting => {
@@ -249,7 +272,7 @@ impl Law {
     pub fn stage(&self) -> Stage {
         match self {
             Law::Resonance { .. } => Stage::Inertia,
-            Law::Disc { .. } | Law::Latency { .. } | Law::Ratio { .. } => Stage::Reading,
+            Law::Disc { .. } | Law::Unlike { .. } | Law::Latency { .. } | Law::Ratio { .. } => Stage::Reading,
             _ => Stage::Mesh,
         }
     }
@@ -407,6 +430,25 @@ impl Law {
                 let x = phase_rad + if *encoder == Encoder::Output { now.output(k) } else { on.generator[k] };
                 error[k] += amplitude * (x.sin() + if changed { 0.1 * (2.0 * x + 1.0).sin() } else { 0.0 });
             }),
+            Law::Unlike { encoder, order, amplitude, phase_rad } => {
+                // Signals of a circle pressed to an ellipse: the reading runs ahead and behind twice in a period of theirs. One arcsec of
+                // the angle that they turn by is this much of it at the output.
+                let at_output = if *encoder == Encoder::Output { 1.0 } else { 1.0 / now.nominal().ratio.abs() };
+                let signals = 0.5 * order;
+                let per_signal = ARCSEC_PER_RAD * at_output / signals;
+                // The first wave of what follows is m, its overtones m²/2, m³/3, ..., for signals that are unlike by 2m / (1 - m).
+                let first = (amplitude / per_signal).clamp(1e-9, MOST_UNLIKE);
+                let unlike = 2.0 * first / (1.0 - first);
+                let scale = amplitude / first;
+                (0..n).for_each(|k| {
+                    let angle = if *encoder == Encoder::Output { now.output(k) } else { on.generator[k] };
+                    // sin(order angle + phase) is sin 2x of the signals' angle x.
+                    let x = signals * angle + 0.5 * phase_rad;
+                    let (sin, cos) = x.sin_cos();
+                    let ahead = (unlike * sin * cos).atan2(1.0 + unlike * sin * sin);
+                    error[k] += scale * ahead * if changed { 1.0 + 0.1 * (2.0 * x).sin() } else { 1.0 };
+                });
+            }
             Law::Latency { delay_s } => {
                 let per_speed = delay_s / now.nominal().ratio * ARCSEC_PER_RAD;
                 error.iter_mut().zip(on.speeds()).for_each(|(e, speed)| *e -= per_speed * speed);

@@ -44,6 +44,10 @@ outside! {
     VibrationBursts "vibration_bursts",
 }
 
+/// Effects that do to the readings what a cause of the contract does, by the name of that cause: a shaft askew before an encoder and the encoder
+/// itself askew are one second order. That name is right, any other wrong.
+pub const ALSO_CALLED: [(&str, &str); 1] = [("misaligned_shaft", "output_encoder_tilt")];
+
 impl Serialize for Outside {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())

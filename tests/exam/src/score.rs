@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use crate::answer::Answer;
+use crate::outside::ALSO_CALLED;
 use crate::rate::Rate;
 use crate::truth::Truth;
 
@@ -137,9 +138,15 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
             judged.null_not_none = is_quiet(&truth.bench).then(|| answer.verdict != "none");
         }
         "outside" if !truth.outside_looks_named() => {
-            judged.outside_named = Some(any_named);
+            let also_called = |name: &str| {
+                let is =
+                    |(effect, cause): &(&str, &str)| *cause == name && truth.hidden.iter().any(|h| h.name == *effect);
+                ALSO_CALLED.iter().any(is)
+            };
+            let wrong = answer.causes.iter().any(|cause| !also_called(&cause.name));
+            judged.outside_named = Some(wrong);
             if truth.hidden.iter().any(|hidden| hidden.counts()) {
-                judged.outside_unknown = Some(answer.verdict == "unknown");
+                judged.outside_unknown = Some(answer.verdict == "unknown" || any_named && !wrong);
             }
         }
         "fault" => {

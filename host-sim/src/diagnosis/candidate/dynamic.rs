@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use super::{Excitation, Law, Role, Shape, Shaped, by_row, main, main_about};
 use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::base::PlayLaw;
+use crate::diagnosis::rows::quantile;
 use crate::diagnosis::thinned::Thinned;
 use crate::units::ARCSEC_PER_RAD;
 
@@ -130,11 +131,49 @@ const TURNING: Role = Role("turning");
 
 /// A load that is damped more than this does not swing.
 const MOST_DAMPING: f64 = 0.5;
-/// A damping beyond this share of the largest stands on the bound: what is fitted is no swinging.
-const ON_THE_BOUND: f64 = 0.98;
+/// A damping beyond this share of the largest stands on the bound, or as good as: what is fitted hardly swings, and a flank that takes
+/// some milliseconds to change looks like it.
+const ON_THE_BOUND: f64 = 0.8;
 
 /// Spread of the share of a jump that makes the load ring, beside that of a step of the torque.
 const SLIDING: f64 = 0.3;
+
+/// Speeds that are apart by this share make the waves of the drive sweep over frequencies; a load that changes by this share in so many
+/// seconds is a step. Guesses.
+const SPEEDS_APART: f64 = 0.2;
+const STEP_SHARE: f64 = 0.1;
+const STEP_S: f64 = 0.1;
+/// Starts, stops and steps that have to be there.
+const FEWEST_STEPS: usize = 3;
+
+/// Whether speed or load changes so that a load on a spring would swing: waves at one speed are a line in time, whatever makes them.
+pub(super) fn makes_a_load_swing(on: &Excitation<'_>) -> bool {
+    let rows = on.rows;
+    if !on.scales.jumps.is_empty() {
+        return true;
+    }
+    let speeds = |share: f64| quantile(rows.speed.iter().map(|speed| speed.abs()), share);
+    let (slow, fast) = (speeds(0.1), speeds(0.9));
+    if fast - slow > SPEEDS_APART * fast {
+        return true;
+    }
+    let apart = (STEP_S / rows.period.max(1e-9)).ceil().max(1.0) as usize;
+    let steps_of = |values: &[f64], least: f64| -> usize {
+        let in_session = |session: &std::ops::Range<usize>| {
+            let within = &values[session.clone()];
+            within
+                .iter()
+                .step_by(apart)
+                .zip(within.iter().skip(apart).step_by(apart))
+                .filter(|(a, b)| (*a - *b).abs() > least)
+                .count()
+        };
+        rows.sessions.iter().map(in_session).sum()
+    };
+    let of_speed = steps_of(&rows.speed, SPEEDS_APART * fast.max(1e-9));
+    let of_load = if on.scales.load > 0.0 { steps_of(&rows.torque, STEP_SHARE * on.scales.load) } else { 0 };
+    of_speed + of_load >= FEWEST_STEPS
+}
 
 /// What all jumps add, each from where it has half its height on, if there are any.
 fn skipped(on: &Excitation<'_>) -> Option<Vec<f64>> {

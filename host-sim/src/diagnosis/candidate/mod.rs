@@ -25,7 +25,9 @@ use super::base::Base;
 use super::linear::Prior;
 use super::prepare::{Jump, whole_pitches};
 use super::rows::Rows;
+use super::thresholds::selection::AFTER_WHEELS;
 use crate::causes::{CauseName, Kin, Need, ParameterName};
+use crate::measurement::robust::least_and_most;
 use crate::nominal::Nominal;
 
 pub use among::{Acting, Among, Zones, left_by, together};
@@ -58,6 +60,11 @@ const FEWEST_TURNS_OF_PULSES: f64 = 6.0;
 /// constant.
 const LEAST_SPAN_K: f64 = 2.0;
 const LEAST_OFF_NOMINAL_K: f64 = 5.0;
+
+/// Least use in which a drive may have worn: generator turns, and seconds from the first row to the last where time is known. Steel teeth
+/// under oil wear by micrometres in hours: this is where even a dry or a plastic one has hardly begun.
+const USED_TURNS: f64 = 20.0;
+const USED_S: f64 = 60.0;
 
 /// A load that nobody recorded on an unloaded drive may be so many times its friction, or wind it up by so much, arcsec.
 const UNLOADED_FRICTIONS: f64 = 4.0;
@@ -104,11 +111,24 @@ impl<'a> Excitation<'a> {
             }
             Need::Time => rows.recorded.time,
             Need::Motion => rows.speed.iter().any(|w| *w != 0.0),
+            Need::Swings => dynamic::makes_a_load_swing(self),
+            Need::HalfOutputTurn => self.output_span_rad() >= PI,
+            Need::Use => {
+                let turned = rows.travel.last().is_some_and(|travel| *travel >= USED_TURNS * 2.0 * PI);
+                let lasts = rows.recorded.time && self.scales.duration_s >= USED_S;
+                if rows.recorded.time { turned && lasts } else { turned }
+            }
             Need::Jump => {
                 let jumps = &self.scales.jumps;
                 !jumps.is_empty() && jumps.iter().all(|jump| whole_pitches(self.nominal, jump.height_arcsec).is_some())
             }
         }
+    }
+
+    /// From the least output angle to the largest, rad.
+    fn output_span_rad(&self) -> f64 {
+        let (low, high) = least_and_most(self.rows.output.iter().copied());
+        (high - low).max(0.0)
     }
 
     /// Whether the drive is turned against gravity during the data.
@@ -350,6 +370,8 @@ struct Evaluated {
 pub struct Wrong {
     /// Share of its size by which it may be wrong: what is smaller than that beside it may be its own misfit.
     pub misfit: f64,
+    /// The same where it may look like a deviation without a name.
+    pub misfit_unnamed: f64,
     /// What that misfit may be taken for.
     pub kin: Kin,
     /// Largest size of all nuisance over that of the main columns.
@@ -367,6 +389,8 @@ pub struct Search {
     pub lead: Option<Lead>,
     /// With its nuisance columns, as its main ones mean nothing without them.
     pub whole: bool,
+    /// Natural logarithm of the odds against it before any data, beside the other laws.
+    pub odds_against: f64,
     /// It is a free profile: what it may hold has to be taken out before the noise is measured, the finest detail too.
     pub free_form: bool,
 }
@@ -420,6 +444,7 @@ impl Law {
             },
             wrong: Wrong {
                 misfit: USUAL_MISFIT,
+                misfit_unnamed: 0.0,
                 kin: label.kin(),
                 most_nuisance: MOST_NUISANCE,
                 doubt: USUAL_DOUBT,
@@ -439,6 +464,11 @@ impl Law {
     pub const fn named(&self) -> bool {
         self.cause().is_some()
     }
+    /// Whether it is the bench's zero in each session: what nobody can foretell of a session, and what says nothing of the drive.
+    #[must_use]
+    pub const fn is_zero_of_sessions(&self) -> bool {
+        !self.wrong.foretells
+    }
     /// Whether it tells of this cause.
     #[must_use]
     pub fn is(&self, cause: CauseName) -> bool {
@@ -456,6 +486,12 @@ impl Law {
     }
     fn well_known(mut self) -> Law {
         self.wrong.most_nuisance = MOST_NUISANCE_OF_KNOWN;
+        self
+    }
+    /// An encoder that reads what a wheel may do as well: odds are on the wheel, and its misfit may look like this law.
+    fn after_wheels(mut self) -> Law {
+        self.search.odds_against = AFTER_WHEELS;
+        self.wrong.kin = Kin::Shape;
         self
     }
     fn evaluated_on_averages(mut self) -> Law {
@@ -598,7 +634,10 @@ impl Law {
     /// How much of its size another law may be named for wrongly.
     #[must_use]
     pub fn misfit_as(&self, other: &Law) -> f64 {
-        self.wrong.misfit * if self.wrong.kin.like(other.wrong.kin) || !other.named() { 1.0 } else { NO_KIN }
+        if !other.named() {
+            return self.wrong.misfit.max(self.wrong.misfit_unnamed);
+        }
+        self.wrong.misfit * if self.wrong.kin.like(other.wrong.kin) { 1.0 } else { NO_KIN }
     }
 
     /// Values of the shape parameters at places between 0 and 1.
@@ -641,7 +680,7 @@ pub fn library(on: &Excitation<'_>) -> Vec<Law> {
     laws.extend(stiffness::laws(on));
     laws.extend(thermal::laws(on));
     laws.extend(dynamic::laws(on));
-    laws.extend(sensor::laws());
+    laws.extend(sensor::laws(on));
     laws.retain(|law| law.cause().is_none_or(|cause| on.speaks_of(cause)));
     laws
 }

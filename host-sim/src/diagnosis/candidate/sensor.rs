@@ -1,6 +1,8 @@
 //! What the sensors do: geometry of the encoders, time between their readings, a wrong ratio. None knows of load.
 
-use super::{Excitation, Law, Role, by_row, main, nuisance, polar};
+use std::f64::consts::TAU;
+
+use super::{Excitation, Law, Named, Role, by_row, main, nuisance, polar};
 use crate::causes::{CauseName, ParameterName as Name};
 
 /// The first order of an encoder.
@@ -29,6 +31,72 @@ fn encoder(cause: CauseName, phase: fn(&Excitation<'_>, usize) -> f64, per_ratio
     })
 }
 
+/// Share of a second order that its own first overtone may have, and a subdivision of its own: signals of unlike size make little of it. Guess.
+const OVERTONE: f64 = 0.15;
+
+/// A line of an encoder at `order` waves in a turn of it, with a little of its overtone. At the generator there is none: overtones are what
+/// tells a wheel.
+fn waves_of(
+    cause: CauseName,
+    phase: fn(&Excitation<'_>, usize) -> f64,
+    order: f64,
+    has_overtone: bool,
+    parameters: impl Fn(&Excitation<'_>, f64, f64) -> Vec<Named> + Send + Sync + 'static,
+) -> Law {
+    Law::new(cause, move |on, _| {
+        let wave = |order: f64, shift: f64| by_row(on, |k| (order * phase(on, k) - shift).cos());
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let mut columns =
+            vec![main(wave(order, 0.0), 15.0).called(WAVE), main(wave(order, quarter), 15.0).called(WAVE)];
+        if has_overtone {
+            columns.extend([0.0, quarter].map(|shift| nuisance(wave(2.0 * order, shift), OVERTONE)));
+        }
+        columns
+    })
+    .parameters_by(move |on, _, c| {
+        let [cos, sin] = c.wave(WAVE);
+        let (amplitude, phase) = polar(sin, cos);
+        parameters(on, amplitude, phase)
+    })
+}
+
+const OUTPUT: fn(&Excitation<'_>, usize) -> f64 = |on, k| on.rows.output[k];
+const GENERATOR: fn(&Excitation<'_>, usize) -> f64 = |on, k| on.rows.generator[k];
+
+/// The second order of an encoder: a disc or a magnet that is tilted, a ring that is not flat, two signals of unlike size in a magnetic one.
+fn encoder_tilt() -> [Law; 2] {
+    let at_output =
+        |_: &Excitation<'_>, amplitude, phase| vec![(Name::AmplitudeArcsec, amplitude), (Name::PhaseRad, phase)];
+    let at_generator = |on: &Excitation<'_>, amplitude: f64, phase| {
+        let generator_arcsec = amplitude * on.nominal.ratio.abs();
+        vec![
+            (Name::AmplitudeArcsec, amplitude),
+            (Name::GeneratorAmplitudeArcsec, generator_arcsec),
+            (Name::PhaseRad, phase),
+        ]
+    };
+    let of_generator = waves_of(CauseName::GeneratorEncoderTilt, GENERATOR, 2.0, false, at_generator);
+    [waves_of(CauseName::OutputEncoderTilt, OUTPUT, 2.0, true, at_output), of_generator.after_wheels()]
+}
+
+/// Waves in a turn that interpolation leaves: four of a magnet with two poles, and so on for 4, 8, ... signal periods in a turn, the orders
+/// that loggers of such encoders resolve.
+const SUBDIVISIONS: [f64; 5] = [4.0, 8.0, 16.0, 32.0, 64.0];
+
+/// An encoder that divides the periods of its signals unevenly.
+fn encoder_subdivision(of_output: bool, order: f64) -> Law {
+    let angle = if of_output { OUTPUT } else { GENERATOR };
+    let law = waves_of(CauseName::EncoderSubdivision, angle, order, of_output, move |on, amplitude, phase| {
+        let at_generator = (Name::GeneratorAmplitudeArcsec, amplitude * on.nominal.ratio.abs());
+        [(Name::AmplitudeArcsec, amplitude)]
+            .into_iter()
+            .chain((!of_output).then_some(at_generator))
+            .chain([(Name::Harmonic, order), (Name::Encoder, f64::from(u8::from(of_output))), (Name::PhaseRad, phase)])
+            .collect()
+    });
+    if of_output { law } else { law.after_wheels() }
+}
+
 /// The output is read later than the generator.
 fn sensor_latency() -> Law {
     Law::new(CauseName::SensorLatency, |on, _| {
@@ -52,12 +120,27 @@ fn ratio_error() -> Law {
     .parameters_by(|_, _, c| vec![(Name::RatioRelativeError, c.of(Role::SIZE))])
 }
 
-pub(super) fn laws() -> Vec<Law> {
-    let laws = [
-        encoder(CauseName::OutputEncoderEccentricity, |on, k| on.rows.output[k], false),
-        encoder(CauseName::GeneratorEncoderEccentricity, |on, k| on.rows.generator[k], true),
+/// Periods of a subdivision that the output has to turn through: fewer are a curve that anything may make.
+const FEWEST_PERIODS: f64 = 1.5;
+
+pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
+    let turned = on.output_span_rad() / TAU;
+    let seen = |of_output: bool, order: f64| !of_output || turned * order >= FEWEST_PERIODS;
+    let subdivisions = [false, true].into_iter().flat_map(|of_output| {
+        SUBDIVISIONS
+            .into_iter()
+            .filter(move |order| seen(of_output, *order))
+            .map(move |order| encoder_subdivision(of_output, order))
+    });
+    [
+        encoder(CauseName::OutputEncoderEccentricity, OUTPUT, false),
+        encoder(CauseName::GeneratorEncoderEccentricity, GENERATOR, true),
         ratio_error(),
         sensor_latency(),
-    ];
-    laws.into_iter().map(Law::exact).collect()
+    ]
+    .into_iter()
+    .chain(encoder_tilt())
+    .chain(subdivisions)
+    .map(Law::exact)
+    .collect()
 }

@@ -225,14 +225,13 @@ impl Known<'_> {
 
     fn status(&self) -> (Status, Vec<Status>) {
         let faults = !self.sources.recording.faults.is_empty();
-        if self.sources.diagnosis.finding == Finding::DataUnusable {
-            return (Status::DataFaults, Vec::new());
-        }
-        let status = match self.sources.diagnosis.verdict {
-            Verdict::PartlyExplained => Status::PartlyExplained,
-            Verdict::Unknown => Status::Unknown,
-            Verdict::None | Verdict::Explained if faults => return (Status::DataFaults, Vec::new()),
-            Verdict::None | Verdict::Explained => Status::Good,
+        // What was found about the unit, not how well a curve fits.
+        let status = match self.sources.diagnosis.finding {
+            Finding::FaultFound => Status::FaultFound,
+            Finding::NotUnderstood => Status::NotUnderstood,
+            Finding::DataUnusable => return (Status::DataFaults, Vec::new()),
+            Finding::NothingFound if faults => return (Status::DataFaults, Vec::new()),
+            Finding::NothingFound => Status::Good,
         };
         (status, if faults { vec![Status::DataFaults] } else { Vec::new() })
     }
@@ -243,16 +242,6 @@ impl Known<'_> {
             "sessions left out of the fit"
         } else {
             "quarters of the data left out of the fit"
-        }
-    }
-
-    /// Share of the squared error that the causes remove where they were not fitted; none if nothing was there to remove.
-    fn explained_share(&self) -> f64 {
-        let held = self.sources.diagnosis.held_out;
-        if held.rms_before_arcsec > 0.0 {
-            (1.0 - (held.rms_after_arcsec / held.rms_before_arcsec).powi(2)).max(0.0)
-        } else {
-            0.0
         }
     }
 
@@ -277,8 +266,10 @@ impl Known<'_> {
             }
             text.plain(".")
         };
-        let share = Text::default().strong(words::percent(self.explained_share()));
-        let share_is = format!("of the squared error in {} is explained", self.left_out());
+        // Never a second percentage beside the confidence: what proves the causes is what they leave.
+        let held = diagnosis.held_out;
+        let share = Text::default().error(held.rms_before_arcsec, 2).plain(" → ").error(held.rms_after_arcsec, 2);
+        let share_is = format!("rms in {}, without the causes and with them", self.left_out());
         let (answer, number, number_is) = match diagnosis.verdict {
             Verdict::Explained => (listed(Text::new("Explained by ")), share, share_is),
             Verdict::PartlyExplained => (listed(Text::new("Partly explained by ")), share, share_is),
@@ -892,15 +883,21 @@ mod tests {
             measures: Measures::default(),
         };
         for (verdict, causes, status, begins, number) in [
-            (Verdict::Explained, &[CauseName::Wear][..], Status::Good, "Explained by wear (97 %, 12″ rms).", "75 %"),
+            (
+                Verdict::Explained,
+                &[CauseName::Wear][..],
+                Status::FaultFound,
+                "Explained by wear (97 %, 12″ rms).",
+                "10″ → 5″",
+            ),
             (
                 Verdict::PartlyExplained,
                 &[CauseName::Wear, CauseName::Ratcheting],
-                Status::PartlyExplained,
+                Status::FaultFound,
                 "Partly explained by wear (97 %, 12″ rms) and ratcheting",
-                "75 %",
+                "10″ → 5″",
             ),
-            (Verdict::Unknown, &[], Status::Unknown, "Unknown: ", "30″"),
+            (Verdict::Unknown, &[], Status::NotUnderstood, "Unknown: ", "30″"),
             (Verdict::None, &[], Status::Good, "Nothing found: ", "13″"),
         ] {
             let page = page_of(&diagnosis(verdict, causes), Vec::new());

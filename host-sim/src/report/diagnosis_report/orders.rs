@@ -17,7 +17,8 @@ fn per_generator_turn(turn: Turn, cause: &Cause, nominal: &Nominal) -> f64 {
         Turn::OfWheel if parameter(cause, ParameterName::Wheel).is_some_and(|wheel| wheel > 0.5) => on_circular_spline,
         Turn::OfWheel => on_flexspline,
         Turn::Generator => 1.0,
-        Turn::Output => 1.0 / nominal.ratio.abs(),
+        Turn::OfEncoder if parameter(cause, ParameterName::Encoder).is_none_or(|encoder| encoder < 0.5) => 1.0,
+        Turn::Output | Turn::OfEncoder => 1.0 / nominal.ratio.abs(),
     }
 }
 
