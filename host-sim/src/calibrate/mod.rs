@@ -334,22 +334,11 @@ fn check_ratio(files: &[Recording], prior: &Prior<'_>) -> Result<Option<String>,
 pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, CalibrationError> {
     prior.core_drive().map_err(CalibrationError::Known)?;
     let doubt = check_ratio(files, prior)?;
-    let recorded = Recorded::of(files, prior);
-    let Some(table) = prior.table else {
-        return with_dead_zone(files, prior, recorded, doubt).map_err(|error| with_faults(error, files));
-    };
-    // Between nodes left out or put in beside a jump a curve may swing so far that the core refuses it: then the other dead zone.
-    let [first, other] = dead_zones(files, prior, table, &recorded);
-    let within = |friction_n_m: f64| {
-        let mut recorded = recorded.clone();
-        recorded.scales.friction_n_m = friction_n_m;
-        with_dead_zone(files, prior, recorded, doubt.clone())
-    };
-    let made = match within(first) {
-        Err(CalibrationError::Table(_)) if other != first => within(other),
-        made => made,
-    };
-    made.map_err(|error| with_faults(error, files))
+    let mut recorded = Recorded::of(files, prior);
+    if let Some(table) = prior.table {
+        recorded.scales.friction_n_m = dead_zone(files, prior, table, &recorded);
+    }
+    with_dead_zone(files, prior, recorded, doubt).map_err(|error| with_faults(error, files))
 }
 
 /// Calibrates with the load that decides the flank as it stands in `recorded`; `doubt` is what is said of the ratio.
@@ -473,16 +462,16 @@ fn with_faults(error: CalibrationError, files: &[Recording]) -> CalibrationError
     }
 }
 
-/// Loads below which the direction decides the flank beside a table, N·m: its own dead zone, and that of a drive with the usual friction; first the
-/// one that leaves less of the logs.
-fn dead_zones(files: &[Recording], prior: &Prior<'_>, table: &Table<'_>, recorded: &Recorded) -> [f64; 2] {
+/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, or that of a drive with the usual friction, whichever
+/// leaves less of the logs.
+fn dead_zone(files: &[Recording], prior: &Prior<'_>, table: &Table<'_>, recorded: &Recorded) -> f64 {
     let play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
     let (own, usual) = (dead_zone_n_m(table), recorded.scales.friction_n_m);
     let left = |least_friction_n_m: f64| -> f64 {
         let prior = Prior { least_friction_n_m, ..prior.clone() };
         settled(files, &prior, recorded, play_rad).rows.iter().map(|row| row.left_arcsec.powi(2)).sum()
     };
-    if own >= usual || left(own) <= left(usual) { [own, usual] } else { [usual, own] }
+    if own > 0.0 && (own >= usual || left(own) <= left(usual)) { own } else { usual }
 }
 
 /// The zero of the output in each file.
