@@ -335,24 +335,23 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     prior.core_drive().map_err(CalibrationError::Known)?;
     let doubt = check_ratio(files, prior)?;
     let mut recorded = Recorded::of(files, prior);
+    let play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
+    let mut rows = settled(files, prior, &recorded, play_rad);
     if let Some(table) = prior.table {
-        recorded.scales.friction_n_m = dead_zone(files, prior, table, &recorded);
+        (rows, recorded.scales.friction_n_m) = dead_zone(rows, prior, table, recorded.scales.friction_n_m);
     }
-    with_dead_zone(files, prior, recorded, doubt).map_err(|error| with_faults(error, files))
+    with_dead_zone(files, prior, (rows, recorded), doubt).map_err(|error| with_faults(error, files))
 }
 
-/// Calibrates with the load that decides the flank as it stands in `recorded`; `doubt` is what is said of the ratio.
+/// Calibrates from `rows` with the load that decides the flank as it stands in `recorded`; `doubt` is what is said of the ratio.
 fn with_dead_zone(
     files: &[Recording],
     prior: &Prior<'_>,
-    recorded: Recorded,
+    (rows, recorded): (Rows, Recorded),
     doubt: Option<String>,
 ) -> Result<Calibrated, CalibrationError> {
-    let mut play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
     let prior = &Prior { least_friction_n_m: recorded.scales.friction_n_m, ..prior.clone() };
-    let alignment = prior
-        .table
-        .map(|table| zero::align(table, &settled(files, prior, &recorded, play_rad), recorded.scales.friction_n_m));
+    let alignment = prior.table.map(|table| zero::align(table, &rows, recorded.scales.friction_n_m));
     let aligned = Prior {
         zero_rad: alignment
             .as_ref()
@@ -361,12 +360,12 @@ fn with_dead_zone(
         ..prior.clone()
     };
     let prior = &aligned;
-    let mut fitted = fit(files, prior, &recorded, play_rad)?;
+    let mut fitted = fit(rows.less(prior), prior, &recorded)?;
     let found = fitted.model.play_arcsec() / crate::units::ARCSEC_PER_RAD;
     if found > 0.0 {
         // Now that the play is known, without the rows inside it.
-        play_rad += found;
-        fitted = fit(files, prior, &recorded, play_rad)?;
+        let play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD + found;
+        fitted = fit(settled(files, prior, &recorded, play_rad), prior, &recorded)?;
     }
     let Fitted { rows, folds, model, held_out, mut parts } = fitted;
     // No table is the simplest of all; a prior that is wrong may leave more than that even with parts beside it.
@@ -378,17 +377,25 @@ fn with_dead_zone(
         } else {
             "what was known before is further off than the parts mend in what was left out"
         };
+        let alone = fitted_alone(&rows, &folds, &every_part(&folds));
+        let zeros = (alone < ALONE * held_out.rms_after_arcsec).then(|| {
+            format!(
+                "; each log alone is fitted to {alone:.2}: do they share their zeros? Home the encoders in the same place before each log, or give \
+                 one log alone"
+            )
+        });
         return Err(CalibrationError::NothingGained(format!(
-            "{what}, so no table is better than none ({:.2} arcsec rms as measured, {:.2} with the table): {}",
+            "{what}, so no table is better than none ({:.2} arcsec rms as measured, {:.2} with the table): {}{}",
             held_out.rms_before_arcsec,
             held_out.rms_after_arcsec,
-            reasons.join("; ")
+            reasons.join("; "),
+            zeros.unwrap_or_default()
         )));
     }
     let made = table::make(prior, &model, &recorded)?;
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
     let core = by_core(files, &image, &recorded);
-    let fitted_alone = fitted_alone(&rows, &folds, &model);
+    let fitted_alone = fitted_alone(&rows, &folds, &model.chosen);
     let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
     notes.extend(doubt);
     notes.extend(remarks(prior, &recorded, (&model, &parts), (held_out, fitted_alone)));
@@ -441,12 +448,17 @@ fn with_dead_zone(
     Ok(Calibrated { calibration, table: made, known, rows, recorded, shown })
 }
 
-/// What fits of the same parts to each file alone leave in it, arcsec rms; infinite where files are not what is left out.
-fn fitted_alone(rows: &Rows, folds: &Folds, model: &Model) -> f64 {
+/// All parts that may be fitted.
+fn every_part(folds: &Folds) -> Vec<Chosen> {
+    folds.parts().iter().map(|part| Chosen { part: *part, penalty: PENALTIES[0] }).collect()
+}
+
+/// What fits of some parts to each file alone leave in it, arcsec rms; infinite where files are not what is left out.
+fn fitted_alone(rows: &Rows, folds: &Folds, chosen: &[Chosen]) -> f64 {
     if rows.folds != FoldKind::Files {
         return f64::INFINITY;
     }
-    let squares: f64 = folds.all().into_iter().map(|fold| folds.left_in(fold, &[fold], &model.chosen)).sum();
+    let squares: f64 = folds.all().into_iter().map(|fold| folds.left_in(fold, &[fold], chosen)).sum();
     (squares / rows.rows.len() as f64).sqrt()
 }
 
@@ -462,16 +474,21 @@ fn with_faults(error: CalibrationError, files: &[Recording]) -> CalibrationError
     }
 }
 
-/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, or that of a drive with the usual friction, whichever
-/// leaves less of the logs.
-fn dead_zone(files: &[Recording], prior: &Prior<'_>, table: &Table<'_>, recorded: &Recorded) -> f64 {
-    let play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
-    let (own, usual) = (dead_zone_n_m(table), recorded.scales.friction_n_m);
-    let left = |least_friction_n_m: f64| -> f64 {
-        let prior = Prior { least_friction_n_m, ..prior.clone() };
-        settled(files, &prior, recorded, play_rad).rows.iter().map(|row| row.left_arcsec.powi(2)).sum()
+/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, or that of a drive with the `usual` friction,
+/// whichever leaves less of the rows; with the rows less what the table says so.
+fn dead_zone(rows: Rows, prior: &Prior<'_>, table: &Table<'_>, usual: f64) -> (Rows, f64) {
+    let own = dead_zone_n_m(table);
+    let with = |rows: Rows, least_friction_n_m: f64| {
+        let rows = rows.less(&Prior { least_friction_n_m, ..prior.clone() });
+        let left: f64 = rows.rows.iter().map(|row| row.left_arcsec.powi(2)).sum();
+        (rows, left)
     };
-    if own > 0.0 && (own >= usual || left(own) <= left(usual)) { own } else { usual }
+    let (rows, by_usual) = with(rows, usual);
+    if own <= 0.0 {
+        return (rows, usual);
+    }
+    let (rows, by_own) = with(rows, own);
+    if own >= usual || by_own <= by_usual { (rows, own) } else { (with(rows, usual).0, usual) }
 }
 
 /// The zero of the output in each file.
@@ -498,8 +515,7 @@ struct Fitted {
 }
 
 /// Chooses and fits parts to the rows that are outside of a play.
-fn fit(files: &[Recording], prior: &Prior<'_>, recorded: &Recorded, play_rad: f64) -> Result<Fitted, CalibrationError> {
-    let rows = settled(files, prior, recorded, play_rad);
+fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded) -> Result<Fitted, CalibrationError> {
     if rows.rows.len() < FEWEST_ROWS {
         return Err(CalibrationError::TooFew(rows.rows.len()));
     }
@@ -508,14 +524,14 @@ fn fit(files: &[Recording], prior: &Prior<'_>, recorded: &Recorded, play_rad: f6
     let own_zero = rows.folds == FoldKind::Files;
     let mut backwards = false;
     loop {
-        let folds = Folds::new(&rows.rows, &open, &recorded.scales, files.len(), own_zero);
+        let folds = Folds::new(&rows.rows, &open, &recorded.scales, rows.means_arcsec.len(), own_zero);
         let all = folds.all();
         let left = nested(&folds);
         let path = path(&folds, &all);
         // The fewest parts that leave least where neither choice nor fit was made.
         let most = (0..path.len()).min_by(|a, b| left[*a].total_cmp(&left[*b])).unwrap_or(0);
         let chosen = pruned(&folds, &all, path[most].clone());
-        let zeros = if own_zero { 0 } else { files.len() };
+        let zeros = if own_zero { 0 } else { rows.means_arcsec.len() };
         let coefficients = folds.fit(&all, &chosen).unwrap_or_default().split_off(zeros);
         let mut model = Model { chosen, coefficients, scales: recorded.scales };
         if !model.has_sound_flanks(0.5 * prior.nominal.backlash_arcsec) {

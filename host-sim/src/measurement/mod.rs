@@ -16,6 +16,7 @@ mod faults;
 mod gear;
 mod layout;
 mod log;
+mod phd2;
 pub mod raw;
 mod robust;
 mod rollover;
@@ -189,7 +190,7 @@ fn parse_as(
     if gear.ratio == 0.0 || !gear.ratio.is_finite() {
         return Err(refuse(format!("ratio: found {}, allowed: a finite number other than zero", gear.ratio)));
     }
-    let (mut log, found) = log::read(file, source, columns)?;
+    let (mut log, found) = log::read(file, source, columns, gear.ratio)?;
     let rows = log.len();
     let mut findings = Findings { notes: found.notes, ..Findings::default() };
     if let Some(line) = found.broken_off {
