@@ -332,15 +332,38 @@ fn check_ratio(files: &[Recording], prior: &Prior<'_>) -> Result<Option<String>,
 /// # Errors
 /// Too few rows in steady motion, nothing that gains, or a drive that no table can be of.
 pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, CalibrationError> {
+    let parted: Vec<Recording>;
+    let files = if files.iter().flat_map(|file| &file.sessions).any(|session| session.own_zero) {
+        parted = files.iter().flat_map(by_zeros).collect();
+        &parted
+    } else {
+        files
+    };
     prior.core_drive().map_err(CalibrationError::Known)?;
     let doubt = check_ratio(files, prior)?;
     let mut recorded = Recorded::of(files, prior);
     let play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
     let mut rows = settled(files, prior, &recorded, play_rad);
     if let Some(table) = prior.table {
-        (rows, recorded.scales.friction_n_m) = dead_zone(rows, prior, table, recorded.scales.friction_n_m);
+        (rows, recorded.scales.friction_n_m) = dead_zone(rows, prior, table, &recorded);
     }
     with_dead_zone(files, prior, (rows, recorded), doubt).map_err(|error| with_faults(error, files))
+}
+
+/// A file in pieces, each with one zero.
+fn by_zeros(file: &Recording) -> Vec<Recording> {
+    let mut pieces: Vec<Recording> = Vec::new();
+    for session in &file.sessions {
+        match pieces.last_mut().filter(|_| !session.own_zero) {
+            Some(piece) => piece.sessions.push(session.clone()),
+            None if pieces.is_empty() => pieces.push(Recording { sessions: vec![session.clone()], ..file.clone() }),
+            None => {
+                let (faults, notes) = (Vec::new(), Vec::new());
+                pieces.push(Recording { sessions: vec![session.clone()], faults, notes, ..file.clone() });
+            }
+        }
+    }
+    pieces
 }
 
 /// Calibrates from `rows` with the load that decides the flank as it stands in `recorded`; `doubt` is what is said of the ratio.
@@ -360,12 +383,12 @@ fn with_dead_zone(
         ..prior.clone()
     };
     let prior = &aligned;
-    let mut fitted = fit(rows.less(prior), prior, &recorded)?;
+    let mut fitted = fit(rows.sure(&recorded).less(prior), prior, &recorded)?;
     let found = fitted.model.play_arcsec() / crate::units::ARCSEC_PER_RAD;
     if found > 0.0 {
         // Now that the play is known, without the rows inside it.
         let play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD + found;
-        fitted = fit(settled(files, prior, &recorded, play_rad), prior, &recorded)?;
+        fitted = fit(settled(files, prior, &recorded, play_rad).sure(&recorded).less(prior), prior, &recorded)?;
     }
     let Fitted { rows, folds, model, held_out, mut parts } = fitted;
     // No table is the simplest of all; a prior that is wrong may leave more than that even with parts beside it.
@@ -474,13 +497,14 @@ fn with_faults(error: CalibrationError, files: &[Recording]) -> CalibrationError
     }
 }
 
-/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, or that of a drive with the `usual` friction,
-/// whichever leaves less of the rows; with the rows less what the table says so.
-fn dead_zone(rows: Rows, prior: &Prior<'_>, table: &Table<'_>, usual: f64) -> (Rows, f64) {
-    let own = dead_zone_n_m(table);
+/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, or that of a drive with the usual friction, whichever
+/// leaves less of the rows; with the rows less what the table says so.
+fn dead_zone(rows: Rows, prior: &Prior<'_>, table: &Table<'_>, recorded: &Recorded) -> (Rows, f64) {
+    let (own, usual) = (dead_zone_n_m(table), recorded.scales.friction_n_m);
     let with = |rows: Rows, least_friction_n_m: f64| {
         let rows = rows.less(&Prior { least_friction_n_m, ..prior.clone() });
-        let left: f64 = rows.rows.iter().map(|row| row.left_arcsec.powi(2)).sum();
+        let sure = rows.rows.iter().filter(|row| Rows::is_sure(&row.at, own, recorded));
+        let left: f64 = sure.map(|row| row.left_arcsec.powi(2)).sum();
         (rows, left)
     };
     let (rows, by_usual) = with(rows, usual);

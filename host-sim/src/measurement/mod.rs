@@ -224,6 +224,7 @@ fn parse_as(
     faults::stalls::check(&mut log, gear, &mut findings);
     let mut sessions = into_sessions(log, gear.ratio);
     other_zeros.into_iter().for_each(|session| sessions[session].own_zero = true);
+    sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= found.own_zeros);
     faults::frozen::check(&mut sessions, gear, error_recorded, &mut findings).map_err(refuse)?;
     faults::reads::check(&mut sessions, gear, &mut findings);
     faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);

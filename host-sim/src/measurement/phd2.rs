@@ -282,7 +282,7 @@ mod tests {
     #[test]
     fn sections_and_dithers_have_zeros_of_their_own_and_what_is_missing_is_said() {
         let text = night(true, 1.0);
-        let dithered = text.replacen("\n800,", "\nINFO: DITHER by 1.5, -2.25, new lock pos = 969.6, 605.2\n800,", 1);
+        let dithered = text.replacen("\n900,", "\nINFO: DITHER by 1.5, -2.25, new lock pos = 969.6, 605.2\n900,", 1);
         assert_eq!(read_night(&dithered).sessions.len(), 2);
         for (from, to, said) in [
             ("Pixel scale", "Pixels", "no \"Pixel scale"),
