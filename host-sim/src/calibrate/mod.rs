@@ -354,13 +354,20 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
 fn by_zeros(file: &Recording) -> Vec<Recording> {
     let mut pieces: Vec<Recording> = Vec::new();
     for session in &file.sessions {
-        match pieces.last_mut().filter(|_| !session.own_zero) {
-            Some(piece) => piece.sessions.push(session.clone()),
-            None if pieces.is_empty() => pieces.push(Recording { sessions: vec![session.clone()], ..file.clone() }),
-            None => {
-                let (faults, notes) = (Vec::new(), Vec::new());
-                pieces.push(Recording { sessions: vec![session.clone()], faults, notes, ..file.clone() });
-            }
+        if pieces.is_empty() || session.own_zero {
+            let whole = if pieces.is_empty() { Some(file) } else { None };
+            pieces.push(Recording {
+                file: file.file.clone(),
+                rows: file.rows,
+                sessions: Vec::new(),
+                faults: whole.map_or_else(Vec::new, |file| file.faults.clone()),
+                tooth_steps: whole.map_or_else(Vec::new, |file| file.tooth_steps.clone()),
+                notes: whole.map_or_else(Vec::new, |file| file.notes.clone()),
+                unusable: file.unusable.clone(),
+            });
+        }
+        if let Some(piece) = pieces.last_mut() {
+            piece.sessions.push(session.clone());
         }
     }
     pieces
