@@ -553,6 +553,7 @@ mod tests {
         let places = |rpm: f64, rate: f64| {
             let mut places: Vec<f64> = (0..200).map(|k| (f64::from(k) * rpm / 60.0 / rate).fract()).collect();
             places.sort_by(f64::total_cmp);
+            places.push(places[0] + 1.0);
             places.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max)
         };
         // A fifth of a turn from row to row, half a turn, and a whole one.
