@@ -26,13 +26,13 @@ use flexspline_sim::tables::{self, samples};
 const FAST: fn() -> SolverSettings = || SolverSettings { method: Method::Fast, ..SolverSettings::default() };
 
 /// The plant of a generator, by contact FEM.
-fn map(kind: GeneratorKind) -> DenseMap {
+pub(crate) fn map(kind: GeneratorKind) -> DenseMap {
     let file = format!("{}/firmware/plant/{kind}.csv", env!("CARGO_MANIFEST_DIR"));
     DenseMap::parse(kind, &file, &std::fs::read_to_string(&file).unwrap()).unwrap()
 }
 
 /// Its table, of other contact FEM.
-fn image(kind: GeneratorKind) -> Vec<u8> {
+pub(crate) fn image(kind: GeneratorKind) -> Vec<u8> {
     let file = format!("{}/firmware/samples/{kind}.samples.csv", env!("CARGO_MANIFEST_DIR"));
     let bytes = std::fs::read(&file).unwrap();
     let samples = samples::parse(&file, &bytes).unwrap();

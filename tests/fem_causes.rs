@@ -43,7 +43,7 @@ fn coarse() -> SolverSettings {
 }
 
 /// Table and kernels of the ideal drive.
-fn known() -> &'static (Vec<u8>, Arc<Kernels>) {
+pub(crate) fn known() -> &'static (Vec<u8>, Arc<Kernels>) {
     static KNOWN: OnceLock<(Vec<u8>, Arc<Kernels>)> = OnceLock::new();
     KNOWN.get_or_init(|| {
         let desk = Desk::new();

@@ -11,11 +11,13 @@ use serde::Serialize;
 
 use super::Model;
 use super::folds::{Chosen, FLOOR, Row};
-use super::parts::{PartName, Scales, State, columns, weights};
-use crate::measurement::white_noise;
+use super::parts::{GENERATOR_ORDERS, PartName, Scales, State, columns, weights};
+use crate::measurement::{median_of, white_noise};
 
 /// Standard deviations of an interval that holds 95 %.
 pub(super) const OF_95: f64 = 1.96;
+/// Rows are close if the highest order turns by no more than this from one to the next: an eighth of its wave.
+const CLOSE_RAD: f64 = PI / 4.0;
 /// Rows that hang together are looked for in stretches of these lengths, as long as there are so many stretches.
 const STRETCHES: [usize; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
 const FEWEST_STRETCHES: usize = 20;
@@ -114,15 +116,15 @@ pub(super) fn row(chosen: &[Chosen], at: &State, scales: &Scales) -> Vec<f64> {
 pub struct Noise {
     /// What the model leaves of the rows that it was fitted to, arcsec rms.
     pub rms_arcsec: f64,
-    /// Of that the part that changes from row to row.
+    /// Of that the noise of single rows; 0 where rows are so far apart that what no part has changes from row to row as well.
     pub white_arcsec: f64,
     /// How much more the mean of many rows varies than if all of it did: 1 or more.
     pub hangs_together: f64,
 }
 
 impl Noise {
-    /// From what is left of the rows of each file, in order.
-    pub fn of(left: &[Vec<f64>], coefficients: usize) -> Noise {
+    /// From what is left of the rows of each file, in order, and the generator's usual step between them.
+    pub fn of(left: &[Vec<f64>], coefficients: usize, step_rad: f64) -> Noise {
         let rows: usize = left.iter().map(Vec::len).sum();
         let squares: f64 = left.iter().flatten().map(|e| e * e).sum();
         let variance = squares / rows.saturating_sub(coefficients).max(1) as f64;
@@ -138,7 +140,8 @@ impl Noise {
                 most = most.max(length as f64 * of_means / variance);
             }
         }
-        let white = white_noise(left.iter().map(Vec::as_slice)).min(variance.sqrt());
+        let close = step_rad * f64::from(GENERATOR_ORDERS) <= CLOSE_RAD;
+        let white = if close { white_noise(left.iter().map(Vec::as_slice)).min(variance.sqrt()) } else { 0.0 };
         Noise { rms_arcsec: variance.sqrt(), white_arcsec: white, hangs_together: most }
     }
 
@@ -251,6 +254,13 @@ pub(super) fn widths(
     nodes
 }
 
+/// Usual step of the generator from row to row, rad.
+fn usual_step(rows: &[Row]) -> f64 {
+    let mut steps: Vec<f64> =
+        rows.windows(2).map(|pair| (pair[1].at.generator_rad - pair[0].at.generator_rad).abs()).collect();
+    if steps.is_empty() { 0.0 } else { median_of(&mut steps) }
+}
+
 /// How well a fitted model is known.
 #[derive(Debug, Clone)]
 pub struct Known {
@@ -286,7 +296,12 @@ impl Known {
             .map(|(penalty, coefficient)| penalty * coefficient)
             .collect();
         let pulled = (0..width).map(|i| (0..width).map(|j| covariance[(i, j)] * weighted[j]).sum::<f64>()).collect();
-        Some(Known { model: model.clone(), covariance, pulled, noise: Noise::of(&left, width + files) })
+        Some(Known {
+            model: model.clone(),
+            covariance,
+            pulled,
+            noise: Noise::of(&left, width + files, usual_step(rows)),
+        })
     }
 
     /// Half width of the interval that holds, with 95 %, what the table has at a state against the true error there, arcsec, but for one zero of

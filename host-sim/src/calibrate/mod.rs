@@ -332,38 +332,56 @@ fn check_ratio(files: &[Recording], prior: &Prior<'_>) -> Result<Option<String>,
 /// # Errors
 /// Too few rows in steady motion, nothing that gains, or a drive that no table can be of.
 pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, CalibrationError> {
+    let parted: Vec<Recording>;
+    let files = if files.iter().flat_map(|file| &file.sessions).any(|session| session.own_zero) {
+        parted = files.iter().flat_map(by_zeros).collect();
+        &parted
+    } else {
+        files
+    };
     prior.core_drive().map_err(CalibrationError::Known)?;
     let doubt = check_ratio(files, prior)?;
-    let recorded = Recorded::of(files, prior);
-    let Some(table) = prior.table else {
-        return with_dead_zone(files, prior, recorded, doubt).map_err(|error| with_faults(error, files));
-    };
-    // Between nodes left out or put in beside a jump a curve may swing so far that the core refuses it: then the other dead zone.
-    let [first, other] = dead_zones(files, prior, table, &recorded);
-    let within = |friction_n_m: f64| {
-        let mut recorded = recorded.clone();
-        recorded.scales.friction_n_m = friction_n_m;
-        with_dead_zone(files, prior, recorded, doubt.clone())
-    };
-    let made = match within(first) {
-        Err(CalibrationError::Table(_)) if other != first => within(other),
-        made => made,
-    };
-    made.map_err(|error| with_faults(error, files))
+    let mut recorded = Recorded::of(files, prior);
+    let play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
+    let mut rows = settled(files, prior, &recorded, play_rad);
+    if let Some(table) = prior.table {
+        (rows, recorded.scales.friction_n_m) = dead_zone(rows, prior, table, &recorded);
+    }
+    with_dead_zone(files, prior, (rows, recorded), doubt).map_err(|error| with_faults(error, files))
 }
 
-/// Calibrates with the load that decides the flank as it stands in `recorded`; `doubt` is what is said of the ratio.
+/// A file in pieces, each with one zero.
+fn by_zeros(file: &Recording) -> Vec<Recording> {
+    let mut pieces: Vec<Recording> = Vec::new();
+    for session in &file.sessions {
+        if pieces.is_empty() || session.own_zero {
+            let whole = if pieces.is_empty() { Some(file) } else { None };
+            pieces.push(Recording {
+                file: file.file.clone(),
+                rows: file.rows,
+                sessions: Vec::new(),
+                faults: whole.map_or_else(Vec::new, |file| file.faults.clone()),
+                tooth_steps: whole.map_or_else(Vec::new, |file| file.tooth_steps.clone()),
+                notes: whole.map_or_else(Vec::new, |file| file.notes.clone()),
+                unusable: file.unusable.clone(),
+            });
+        }
+        if let Some(piece) = pieces.last_mut() {
+            piece.sessions.push(session.clone());
+        }
+    }
+    pieces
+}
+
+/// Calibrates from `rows` with the load that decides the flank as it stands in `recorded`; `doubt` is what is said of the ratio.
 fn with_dead_zone(
     files: &[Recording],
     prior: &Prior<'_>,
-    recorded: Recorded,
+    (rows, recorded): (Rows, Recorded),
     doubt: Option<String>,
 ) -> Result<Calibrated, CalibrationError> {
-    let mut play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
     let prior = &Prior { least_friction_n_m: recorded.scales.friction_n_m, ..prior.clone() };
-    let alignment = prior
-        .table
-        .map(|table| zero::align(table, &settled(files, prior, &recorded, play_rad), recorded.scales.friction_n_m));
+    let alignment = prior.table.map(|table| zero::align(table, &rows, recorded.scales.friction_n_m));
     let aligned = Prior {
         zero_rad: alignment
             .as_ref()
@@ -372,12 +390,12 @@ fn with_dead_zone(
         ..prior.clone()
     };
     let prior = &aligned;
-    let mut fitted = fit(files, prior, &recorded, play_rad)?;
+    let mut fitted = fit(rows.sure(&recorded).less(prior), prior, &recorded)?;
     let found = fitted.model.play_arcsec() / crate::units::ARCSEC_PER_RAD;
     if found > 0.0 {
         // Now that the play is known, without the rows inside it.
-        play_rad += found;
-        fitted = fit(files, prior, &recorded, play_rad)?;
+        let play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD + found;
+        fitted = fit(settled(files, prior, &recorded, play_rad).sure(&recorded).less(prior), prior, &recorded)?;
     }
     let Fitted { rows, folds, model, held_out, mut parts } = fitted;
     // No table is the simplest of all; a prior that is wrong may leave more than that even with parts beside it.
@@ -389,17 +407,25 @@ fn with_dead_zone(
         } else {
             "what was known before is further off than the parts mend in what was left out"
         };
+        let alone = fitted_alone(&rows, &folds, &every_part(&folds));
+        let zeros = (alone < ALONE * held_out.rms_after_arcsec).then(|| {
+            format!(
+                "; each log alone is fitted to {alone:.2}: do they share their zeros? Home the encoders in the same place before each log, or give \
+                 one log alone"
+            )
+        });
         return Err(CalibrationError::NothingGained(format!(
-            "{what}, so no table is better than none ({:.2} arcsec rms as measured, {:.2} with the table): {}",
+            "{what}, so no table is better than none ({:.2} arcsec rms as measured, {:.2} with the table): {}{}",
             held_out.rms_before_arcsec,
             held_out.rms_after_arcsec,
-            reasons.join("; ")
+            reasons.join("; "),
+            zeros.unwrap_or_default()
         )));
     }
     let made = table::make(prior, &model, &recorded)?;
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
     let core = by_core(files, &image, &recorded);
-    let fitted_alone = fitted_alone(&rows, &folds, &model);
+    let fitted_alone = fitted_alone(&rows, &folds, &model.chosen);
     let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
     notes.extend(doubt);
     notes.extend(remarks(prior, &recorded, (&model, &parts), (held_out, fitted_alone)));
@@ -452,12 +478,17 @@ fn with_dead_zone(
     Ok(Calibrated { calibration, table: made, known, rows, recorded, shown })
 }
 
-/// What fits of the same parts to each file alone leave in it, arcsec rms; infinite where files are not what is left out.
-fn fitted_alone(rows: &Rows, folds: &Folds, model: &Model) -> f64 {
+/// All parts that may be fitted.
+fn every_part(folds: &Folds) -> Vec<Chosen> {
+    folds.parts().iter().map(|part| Chosen { part: *part, penalty: PENALTIES[0] }).collect()
+}
+
+/// What fits of some parts to each file alone leave in it, arcsec rms; infinite where files are not what is left out.
+fn fitted_alone(rows: &Rows, folds: &Folds, chosen: &[Chosen]) -> f64 {
     if rows.folds != FoldKind::Files {
         return f64::INFINITY;
     }
-    let squares: f64 = folds.all().into_iter().map(|fold| folds.left_in(fold, &[fold], &model.chosen)).sum();
+    let squares: f64 = folds.all().into_iter().map(|fold| folds.left_in(fold, &[fold], chosen)).sum();
     (squares / rows.rows.len() as f64).sqrt()
 }
 
@@ -473,16 +504,22 @@ fn with_faults(error: CalibrationError, files: &[Recording]) -> CalibrationError
     }
 }
 
-/// Loads below which the direction decides the flank beside a table, N·m: its own dead zone, and that of a drive with the usual friction; first the
-/// one that leaves less of the logs.
-fn dead_zones(files: &[Recording], prior: &Prior<'_>, table: &Table<'_>, recorded: &Recorded) -> [f64; 2] {
-    let play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
+/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, or that of a drive with the usual friction, whichever
+/// leaves less of the rows; with the rows less what the table says so.
+fn dead_zone(rows: Rows, prior: &Prior<'_>, table: &Table<'_>, recorded: &Recorded) -> (Rows, f64) {
     let (own, usual) = (dead_zone_n_m(table), recorded.scales.friction_n_m);
-    let left = |least_friction_n_m: f64| -> f64 {
-        let prior = Prior { least_friction_n_m, ..prior.clone() };
-        settled(files, &prior, recorded, play_rad).rows.iter().map(|row| row.left_arcsec.powi(2)).sum()
+    let with = |rows: Rows, least_friction_n_m: f64| {
+        let rows = rows.less(&Prior { least_friction_n_m, ..prior.clone() });
+        let sure = rows.rows.iter().filter(|row| Rows::is_sure(&row.at, own, recorded));
+        let left: f64 = sure.map(|row| row.left_arcsec.powi(2)).sum();
+        (rows, left)
     };
-    if own >= usual || left(own) <= left(usual) { [own, usual] } else { [usual, own] }
+    let (rows, by_usual) = with(rows, usual);
+    if own <= 0.0 {
+        return (rows, usual);
+    }
+    let (rows, by_own) = with(rows, own);
+    if own >= usual || by_own <= by_usual { (rows, own) } else { (with(rows, usual).0, usual) }
 }
 
 /// The zero of the output in each file.
@@ -509,8 +546,7 @@ struct Fitted {
 }
 
 /// Chooses and fits parts to the rows that are outside of a play.
-fn fit(files: &[Recording], prior: &Prior<'_>, recorded: &Recorded, play_rad: f64) -> Result<Fitted, CalibrationError> {
-    let rows = settled(files, prior, recorded, play_rad);
+fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded) -> Result<Fitted, CalibrationError> {
     if rows.rows.len() < FEWEST_ROWS {
         return Err(CalibrationError::TooFew(rows.rows.len()));
     }
@@ -519,14 +555,14 @@ fn fit(files: &[Recording], prior: &Prior<'_>, recorded: &Recorded, play_rad: f6
     let own_zero = rows.folds == FoldKind::Files;
     let mut backwards = false;
     loop {
-        let folds = Folds::new(&rows.rows, &open, &recorded.scales, files.len(), own_zero);
+        let folds = Folds::new(&rows.rows, &open, &recorded.scales, rows.means_arcsec.len(), own_zero);
         let all = folds.all();
         let left = nested(&folds);
         let path = path(&folds, &all);
         // The fewest parts that leave least where neither choice nor fit was made.
         let most = (0..path.len()).min_by(|a, b| left[*a].total_cmp(&left[*b])).unwrap_or(0);
         let chosen = pruned(&folds, &all, path[most].clone());
-        let zeros = if own_zero { 0 } else { files.len() };
+        let zeros = if own_zero { 0 } else { rows.means_arcsec.len() };
         let coefficients = folds.fit(&all, &chosen).unwrap_or_default().split_off(zeros);
         let mut model = Model { chosen, coefficients, scales: recorded.scales };
         if !model.has_sound_flanks(0.5 * prior.nominal.backlash_arcsec) {

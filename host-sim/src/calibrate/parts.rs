@@ -11,7 +11,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PartName {
-    /// Wind-up by torque.
+    /// Wind-up by torque: a polynomial, and a bend at light loads.
     WindUp,
     /// Play: by direction of motion, and by the flank that the load bears on.
     Play,
@@ -63,6 +63,9 @@ pub(super) const OUTPUT_ORDERS: u16 = 6;
 pub(super) const TOOTH_ORDERS: u16 = 3;
 /// Degree of the wind-up over the torques recorded.
 const WIND_UP_DEGREE: usize = 6;
+/// Load, of the largest recorded, at which half of what light loads do is done: clearance that closes, teeth that come into contact. A polynomial
+/// has no such bend, and swings between the loads recorded instead. A guess, between the dead zone and the first loads of a plan.
+const LIGHT_LOAD: f64 = 0.05;
 /// How the weight of a wave rises with its order: between the energies of a slope (second power) and of a curvature (fourth). Chosen on
 /// halves of the record of `examples/csf17_100`.
 const WAVE_POWER: i32 = 3;
@@ -127,6 +130,8 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
             // No wind-up without a load, where that was recorded.
             let zero = chebyshev(scales.torque_share(0.0));
             to.extend(ends.iter().zip(zero).map(|(value, zero)| value - zero));
+            let load = at.torque_n_m.clamp(low, high) / scales.most_torque();
+            to.push(load / (load.abs() + LIGHT_LOAD));
         }
         PartName::Play => {
             let flank = if at.torque_n_m.abs() > scales.friction_n_m { at.torque_n_m.signum() } else { lag };
@@ -147,7 +152,9 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
 pub(super) fn weights(part: PartName) -> Vec<f64> {
     let of_waves = |orders: u16| (1..=orders).flat_map(|k| [f64::from(k).powi(WAVE_POWER); 2]).collect();
     match part {
-        PartName::WindUp => (1..=WIND_UP_DEGREE).map(|k| (k as f64).powi(DEGREE_POWER)).collect(),
+        PartName::WindUp => {
+            (1..=WIND_UP_DEGREE).map(|k| (k as f64).powi(DEGREE_POWER)).chain(std::iter::once(1.0)).collect()
+        }
         PartName::Play | PartName::Temperature => vec![1.0; 3],
         PartName::GeneratorAngle | PartName::MaterialAngle => of_waves(GENERATOR_ORDERS),
         PartName::ToothPitch => of_waves(TOOTH_ORDERS),

@@ -16,7 +16,7 @@ use super::rows::MOST_ROWS;
 use super::{GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, PENALTY_OF_PLANS, Prior, ROWS_OF_A_PITCH};
 
 /// Loads at which passes are made, where there is a load.
-const LOADS: usize = 7;
+const LOADS: usize = 11;
 /// Slow generator turns, and the places of the travel at which they are made.
 const SLOW_TURNS: f64 = 2.0;
 const SLOW_PLACES: usize = 4;
@@ -27,6 +27,10 @@ const ASKED: usize = 1500;
 const ROWS_OF_A_PASS: usize = 500;
 /// A slower pass is not worth its own kind below this share of the speed.
 const SLOWER: f64 = 0.7;
+/// Slowest that a pass is made to spread its rows, of the fastest; speeds that are tried; and places of a turn that rows would come back to.
+const SLOWEST_TO_SPREAD: f64 = 0.9;
+const SPEEDS: usize = 101;
+const PLACES_OF_A_TURN: u32 = 24;
 /// Nodes of a first log that are said to be widest.
 const WIDEST: usize = 8;
 /// Half widths beyond this, arcsec, are those of what was not recorded at all.
@@ -244,7 +248,12 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
     loop {
         let uncertain = asked.mean_variance(&now);
         let mut best: Option<(f64, usize, Mat)> = None;
-        for (k, candidate) in candidates.iter().enumerate().filter(|(_, c)| c.pass.duration_s <= left_s) {
+        // Each load once before one is repeated: the parts do not know all that a load does.
+        let fresh = |c: &Candidate| taken.iter().all(|(_, pass): &(usize, Pass)| pass.torque_n_m != c.pass.torque_n_m);
+        let fits = |c: &Candidate| c.pass.duration_s <= left_s;
+        let all_taken = !candidates.iter().any(|c| fits(c) && fresh(c));
+        let open = |c: &Candidate| fits(c) && (all_taken || fresh(c));
+        for (k, candidate) in candidates.iter().enumerate().filter(|(_, c)| open(c)) {
             let mut with = known.clone();
             with[candidate.warmth].join(&candidate.tells);
             let then = of(&with)?;
@@ -421,14 +430,13 @@ fn temperatures(bench: &Bench) -> Vec<f64> {
     }
 }
 
-/// Loads of passes: where polynomials of the wind-up tell best, and none.
+/// Loads of passes, evenly, so that what no part has is seen between them, and none.
 fn loads([low, high]: [f64; 2]) -> Vec<f64> {
     if high <= low {
         return vec![low];
     }
     let most = (LOADS - 1) as f64;
-    let place =
-        |k: usize| f64::midpoint(low, high) - 0.5 * (high - low) * (std::f64::consts::PI * k as f64 / most).cos();
+    let place = |k: usize| low + (high - low) * k as f64 / most;
     let mut loads: Vec<f64> = (0..LOADS).map(place).collect();
     let close = 0.05 * (high - low);
     if low < 0.0 && high > 0.0 && loads.iter().all(|load| load.abs() > close) {
@@ -437,6 +445,25 @@ fn loads([low, high]: [f64; 2]) -> Vec<f64> {
     // What is meant is none.
     loads.iter_mut().filter(|load| load.abs() < 1e-9 * (high - low)).for_each(|load| *load = 0.0);
     loads
+}
+
+/// A speed at which rows do not come back to the same few places of the generator's turn: the one, of those not much slower than the
+/// fastest, whose turns from row to row stay farthest from every fraction with a small denominator.
+fn spreading_rpm(fastest: f64, rate_hz: f64) -> f64 {
+    let turns_of_a_row = |rpm: f64| rpm / 60.0 / rate_hz;
+    if turns_of_a_row(fastest) * f64::from(PLACES_OF_A_TURN) < 1.0 {
+        return fastest;
+    }
+    let apart = |rpm: f64| {
+        let off = |q: u32| {
+            let turns = f64::from(q) * turns_of_a_row(rpm);
+            (turns - turns.round()).abs()
+        };
+        (1..=PLACES_OF_A_TURN).map(off).fold(f64::INFINITY, f64::min)
+    };
+    let step = (1.0 - SLOWEST_TO_SPREAD) / (SPEEDS - 1) as f64;
+    let speeds = (0..SPEEDS).map(|k| fastest * (1.0 - step * k as f64));
+    speeds.max_by(|a, b| apart(*a).total_cmp(&apart(*b))).unwrap_or(fastest)
 }
 
 /// The passes that may be made.
@@ -448,7 +475,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[Chose
     let slow_rpm = 60.0 * bench.rate_hz / (ROWS_OF_A_PITCH * scales.teeth);
     let slow = by_teeth && slow_rpm < SLOWER * bench.speed_rpm;
     let slow_deg = 360.0 * SLOW_TURNS / ratio.abs();
-    let mut ways = vec![(begin, end, bench.speed_rpm)];
+    let mut ways = vec![(begin, end, spreading_rpm(bench.speed_rpm, bench.rate_hz))];
     if slow && slow_deg < end - begin {
         let step = (end - begin - slow_deg) / (SLOW_PLACES - 1) as f64;
         ways.extend((0..SLOW_PLACES).map(|k| (begin + step * k as f64, begin + step * k as f64 + slow_deg, slow_rpm)));
@@ -514,5 +541,27 @@ impl Planned {
             );
         }
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_a_pass_are_spread_over_the_turn() {
+        let places = |rpm: f64, rate: f64| {
+            let mut places: Vec<f64> = (0..200).map(|k| (f64::from(k) * rpm / 60.0 / rate).fract()).collect();
+            places.sort_by(f64::total_cmp);
+            places.push(places[0] + 1.0);
+            places.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max)
+        };
+        // A fifth of a turn from row to row, half a turn, and a whole one.
+        for rate in [5.0, 2.0, 1.0] {
+            let rpm = spreading_rpm(60.0, rate);
+            assert!((54.0..=60.0).contains(&rpm) && places(60.0, rate) > 0.1, "{rpm}");
+            assert!(places(rpm, rate) < 0.05, "{rpm} at {rate}: {}", places(rpm, rate));
+        }
+        assert_eq!(spreading_rpm(60.0, 100.0), 60.0);
     }
 }

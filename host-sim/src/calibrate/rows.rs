@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::folds::Row;
 use super::parts::{PartName, Scales, State};
 use super::prior::Prior;
-use crate::measurement::{Recording, Session, least_and_most, quantile_of, sampled};
+use crate::measurement::{Recording, Session, least_and_most, quantile_of, sampled, white_noise};
 use crate::units::ARCSEC_PER_RAD;
 
 /// Folds that one record is cut into: blocks of a tenth of it or so, which say what a table does beyond what it saw.
@@ -21,6 +21,9 @@ const TURNED_ROUND: f64 = 0.5;
 /// The output has settled on a flank when the generator has turned by so many times the play.
 const SETTLED: f64 = 1.5;
 
+/// A load decides the flank if it is so many standard deviations of its noise beyond what decides it.
+const SURE: f64 = 3.0;
+
 /// How the folds were made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum FoldKind {
@@ -34,7 +37,8 @@ pub(super) struct Rows {
     pub rows: Vec<Row>,
     /// What was measured in each, arcsec, its file's mean taken out.
     pub measured_arcsec: Vec<f64>,
-    /// What was taken off `left_arcsec` of each file, arcsec.
+    /// What was taken off `measured_arcsec` and off `left_arcsec` of each file, arcsec.
+    measured_means_arcsec: Vec<f64>,
     pub means_arcsec: Vec<f64>,
     pub folds: FoldKind,
     /// Rows of the files, and those not used because the output had not settled.
@@ -54,6 +58,8 @@ pub(super) struct Recorded {
     pub generator_turns: f64,
     /// Of the rows that move.
     pub backward_share: f64,
+    /// Noise of the torque from row to row, N·m.
+    pub torque_noise_n_m: f64,
     /// Usual step of the generator, rad.
     pub step_rad: f64,
     /// Generator turns in steps that are short beside a tooth pitch.
@@ -87,7 +93,9 @@ impl Recorded {
         let all_steps = sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| (p[1] - p[0]).abs()));
         let fine_turns = all_steps.filter(|step| *step <= fine_rad * (1.0 + 1e-3)).sum::<f64>() / TAU;
         let most = torque.0.abs().max(torque.1.abs());
+        let torque_noise_n_m = white_noise(sessions().filter_map(|session| session.torque_n_m.as_deref()));
         Recorded {
+            torque_noise_n_m,
             scales: Scales {
                 torque_n_m: if has_torque { [torque.0, torque.1] } else { [0.0; 2] },
                 friction_n_m: prior.friction_n_m().max(if has_torque { super::LEAST_FRICTION * most } else { 0.0 }),
@@ -157,7 +165,9 @@ fn covered(angles: impl Iterator<Item = f64>, parts: usize) -> f64 {
 /// The rows on which a steady model can be judged; `play_rad` is the whole play at the output.
 pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorded, play_rad: f64) -> Rows {
     let total: usize = files.iter().flat_map(|file| &file.sessions).map(Session::len).sum();
-    let every = total.div_ceil(MOST_ROWS).max(1);
+    // Not every so many-th exactly: such rows may all lie at the same few angles.
+    let every = (total as f64 / MOST_ROWS as f64).max(1.0);
+    let every = if every > 1.0 { every + super::GOLDEN } else { 1.0 };
     let sessions: usize = files.iter().map(|file| file.sessions.len()).sum();
     let largest = files.iter().flat_map(|file| &file.sessions).map(Session::len).max().unwrap_or(0);
     let by_sessions = sessions >= ENOUGH_SESSIONS && largest as f64 <= LARGEST_SESSION * total as f64;
@@ -169,6 +179,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
     let mut all = Rows {
         rows: Vec::new(),
         measured_arcsec: Vec::new(),
+        measured_means_arcsec: Vec::new(),
         means_arcsec: Vec::new(),
         folds,
         of: total,
@@ -184,7 +195,8 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
                 recorded.step_rad,
                 SETTLED * play_rad * prior.nominal.ratio.abs(),
             );
-            for k in (0..session.len()).step_by(every) {
+            let thinned = (0..).map(|k| (f64::from(k) * every) as usize).take_while(|k| *k < session.len());
+            for k in thinned {
                 let Some(way) = ways[k] else {
                     all.unsettled += 1;
                     continue;
@@ -198,9 +210,8 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
                     temperature_c: at(&session.temperature_c, recorded.temperature_c),
                     way,
                 };
-                let measured = session.error_rad[k] * ARCSEC_PER_RAD;
-                all.measured_arcsec.push(measured);
-                all.rows.push(Row { at, left_arcsec: measured - prior.steady_arcsec(&at), zero, fold: session_number });
+                all.measured_arcsec.push(session.error_rad[k] * ARCSEC_PER_RAD);
+                all.rows.push(Row { at, left_arcsec: 0.0, zero, fold: session_number });
             }
             session_number += 1;
         }
@@ -214,16 +225,45 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
             };
         }
         // Zeros of encoders are large numbers that squares do not like.
-        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / rows.max(1) as f64;
-        let (measured, left) = (
-            mean(&mut all.measured_arcsec[begin..].iter().copied()),
-            mean(&mut all.rows[begin..].iter().map(|row| row.left_arcsec)),
-        );
-        all.means_arcsec.push(left);
-        all.measured_arcsec[begin..].iter_mut().for_each(|value| *value -= measured);
-        all.rows[begin..].iter_mut().for_each(|row| row.left_arcsec -= left);
+        let measured = &mut all.measured_arcsec[begin..];
+        let mean = measured.iter().sum::<f64>() / rows.max(1) as f64;
+        measured.iter_mut().for_each(|value| *value -= mean);
+        all.measured_means_arcsec.push(mean);
     }
-    all
+    all.less(prior)
+}
+
+impl Rows {
+    /// Whether the load of a row decides the flank or not, for all that its sensor's noise leaves open.
+    pub fn is_sure(at: &State, friction_n_m: f64, recorded: &Recorded) -> bool {
+        (at.torque_n_m.abs() - friction_n_m).abs() >= SURE * recorded.torque_noise_n_m
+    }
+
+    /// Without the rows of which the noise of the torque leaves open on which flank they lie.
+    pub fn sure(mut self, recorded: &Recorded) -> Rows {
+        let friction = recorded.scales.friction_n_m;
+        let keep: Vec<bool> = self.rows.iter().map(|row| Self::is_sure(&row.at, friction, recorded)).collect();
+        let mut kept = keep.iter();
+        self.rows.retain(|_| *kept.next().unwrap_or(&true));
+        let mut kept = keep.iter();
+        self.measured_arcsec.retain(|_| *kept.next().unwrap_or(&true));
+        self.unsettled += keep.iter().filter(|keep| !**keep).count();
+        self
+    }
+
+    /// With what a prior says taken off what was measured, and the mean of each file off that.
+    pub fn less(mut self, prior: &Prior<'_>) -> Rows {
+        let mut sums = vec![(0.0, 0.0); self.measured_means_arcsec.len()];
+        for (row, measured) in self.rows.iter_mut().zip(&self.measured_arcsec) {
+            row.left_arcsec = measured - prior.steady_arcsec(&row.at);
+            let (sum, count) = &mut sums[row.zero];
+            (*sum, *count) = (*sum + row.left_arcsec, *count + 1.0);
+        }
+        let means: Vec<f64> = sums.iter().map(|(sum, count)| sum / f64::max(*count, 1.0)).collect();
+        self.rows.iter_mut().for_each(|row| row.left_arcsec -= means[row.zero]);
+        self.means_arcsec = self.measured_means_arcsec.iter().zip(&means).map(|(a, b)| a + b).collect();
+        self
+    }
 }
 
 /// Direction of the output in each row; `None` before the first motion and until the play is through after a reversal.

@@ -256,7 +256,41 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
             gear(file("t,motor: enc,load: enc,torque\n", ",", degrees)),
             By("time=#1:s,generator=#2:deg,output=#3:deg,torque=#4:N.m"),
         ),
+        (
+            "counts with a gain and an offset",
+            gear(file("time,motor,load,torque\n", ",", |t, k| {
+                let fields = with(plain(t, k), 2, counts(t.output_rad[k] + 2.5, 16_777_216.0));
+                with(fields, 3, format!("{:.5}", (t.torque_n_m[k] + 4.0) / 20.0))
+            })),
+            By("time=time:s,generator=motor:rad,output=load:count/2^24-0.25,torque=torque:V*20-4"),
+        ),
         // Damaged, or not said enough.
+        ("a header alone", b"time_s,generator_rad,output_rad\n".to_vec(), NoTable(&["no rows of numbers"])),
+        (
+            "a header alone, read",
+            b"time_s,generator_rad,output_rad\n".to_vec(),
+            Refused("", &["log.txt:1: no rows after the header; at least 16"]),
+        ),
+        (
+            "a guide log",
+            b"PHD2 version 2.6.13 [Linux], Log version 2.5. Log enabled at 2026-11-01 20:00:00\n".to_vec(),
+            NoTable(&["guide log", "flexspline calibrate FILE --ratio N"]),
+        ),
+        (
+            "a guide log without frames",
+            b"PHD2 version 2.6.13 [Linux], Log version 2.5. Log enabled at 2026-11-01 20:00:00\n".to_vec(),
+            Refused("", &["log.txt:1: 0 guided frames"]),
+        ),
+        (
+            "a current without a torque constant",
+            gear(file("time,motor,load,torque\n", ",", plain)),
+            Refused("generator=motor:rad,output=load:rad,torque=torque:mA", &["--torque-constant"]),
+        ),
+        (
+            "counts without a number",
+            gear(file("time,motor,load,torque\n", ",", plain)),
+            Refused("generator=motor:count,output=load:rad", &["counts make a turn"]),
+        ),
         ("nothing", Vec::new(), NoTable(&["log.txt:1: ", "no rows of numbers"])),
         ("prose", b"Measured on Tuesday.\nAll went well.\n".to_vec(), NoTable(&["no rows of numbers"])),
         ("a workbook", b"PK\x03\x04\x14\0".to_vec(), NoTable(&["workbook", "save it as CSV"])),
@@ -394,8 +428,63 @@ fn odd_files_are_read_right_or_end_in_one_clear_error() {
         }
     }
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
-    // "nothing" and "prose" say the same of different lines.
-    assert!(messages.len() + 1 >= refused, "two mistakes got the same message: {messages:#?}");
+    // "nothing", "prose" and a header alone say the same of different lines.
+    assert!(messages.len() + 2 >= refused, "two mistakes got the same message: {messages:#?}");
+}
+
+/// Damaged files of which the rest is read: each row that is left is that of its line.
+#[test]
+fn what_is_left_of_a_damaged_file_is_right() {
+    const MAP: &str = "time=time:s,generator=motor:rad,output=load:rad,torque=torque:N.m";
+    let truth = truth();
+    let whole = file("time;motor;load;torque\n", ";", plain);
+    let broken: Vec<&str> = whole.lines().collect();
+    let holes = |from: usize, to: usize, text: &'static str| {
+        file("time;motor;load;torque\n", ";", move |t, k| {
+            if (from..to).contains(&k) { with(plain(t, k), 2, text.to_owned()) } else { plain(t, k) }
+        })
+    };
+    for (name, text, fewest, fault) in [
+        ("cut off in its last line", broken[..1401].join("\n") + "\n5.6;8", 1400, "missing_samples"),
+        ("a run of NaN", holes(600, 640, "NaN"), ROWS - 40, "missing_samples"),
+        ("a run of nothing", holes(600, 640, ""), ROWS - 40, "missing_samples"),
+        ("names once more", [&broken[..700], &broken[..1], &broken[700..]].concat().join("\n"), ROWS, ""),
+    ] {
+        let recording = read(text.as_bytes(), MAP).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let rows: usize = recording.sessions.iter().map(crate::measurement::Session::len).sum();
+        assert!(rows >= fewest && rows <= ROWS, "{name}: {rows} rows");
+        let told = recording.faults.iter().any(|found| found.name.as_str() == fault);
+        assert!(told || fault.is_empty(), "{name}: {:?}", recording.faults);
+        for session in &recording.sessions {
+            let output = session.output_rad(RATIO);
+            for k in 0..session.len() {
+                let line = session.line[k] as usize;
+                let of = line - 2 - usize::from(name.starts_with("names") && line > 700);
+                // A straight line through what was not recorded is a filled row.
+                let filled = (600..640).contains(&of) && name.starts_with("a run");
+                let off = (session.generator_rad[k] - truth.generator_rad[of]).abs();
+                assert!(
+                    off < 1e-6 && (filled || (output[k] - truth.output_rad[of]).abs() < 1e-8),
+                    "{name}: line {line}"
+                );
+            }
+        }
+    }
+    // Time that is counted where the file has none.
+    let text = file("motor;load\n", ";", |t, k| plain(t, k)[1..3].to_vec());
+    let map = ColumnMap::parse("generator=motor:rad,output=load:rad").unwrap().at_rate(Some(250.0)).unwrap();
+    let counted = parse("log.txt", text.as_bytes(), &map, &Gear::of_ratio(RATIO)).unwrap();
+    let time = counted.sessions[0].time_s.as_ref().unwrap();
+    assert!((time[ROWS - 1] - time[0] - 0.004 * (ROWS - 1) as f64).abs() < 1e-9);
+    assert!(counted.notes.iter().any(|note| note.contains("250 rows in a second")), "{:?}", counted.notes);
+    // A torque constant as an option of its own.
+    let text = file("time,motor,load,current\n", ",", |t, k| {
+        with(plain(t, k), 3, format!("{:.2}", 1e3 * t.torque_n_m[k] / 3.5))
+    });
+    let map = "time=time:s,generator=motor:rad,output=load:rad,torque=current:mA";
+    let map = ColumnMap::with_torque_constant(map, Some(3.5)).unwrap();
+    let with_torque = parse("log.txt", text.as_bytes(), &map, &Gear::of_ratio(RATIO)).unwrap();
+    right(&with_torque, true).unwrap();
 }
 
 #[test]

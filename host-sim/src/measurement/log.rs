@@ -8,7 +8,7 @@ use super::clock_text;
 use super::columns::{Column, ColumnMap, Quantity};
 use super::csv_rows::{CsvRows, NotANumber, Row, TableProblem};
 use super::layout::{HEAD, Layout, missing};
-use super::{rollover, slower};
+use super::{phd2, rollover, slower};
 
 /// Fewest rows that say anything about noise or an order.
 pub const FEWEST_ROWS: usize = 16;
@@ -106,15 +106,30 @@ pub(super) struct Found {
     pub broken_off: Option<u64>,
     /// What was read otherwise than it stands, or not at all though it may have been meant.
     pub notes: Vec<String>,
+    /// Whether each session has a zero of its own.
+    pub own_zeros: bool,
 }
 
-/// Reads a file called `file`.
-pub(super) fn read(file: &str, mut source: impl Read, map: &ColumnMap) -> Result<(Log, Found), MeasuredError> {
+/// Reads a file called `file`; `ratio` is that of the axis of a guide log, which says no generator angle.
+pub(super) fn read(
+    file: &str,
+    mut source: impl Read,
+    map: &ColumnMap,
+    ratio: f64,
+) -> Result<(Log, Found), MeasuredError> {
     let refuse =
         |problem: TableProblem| MeasuredError { file: file.to_owned(), line: Some(problem.line), what: problem.what };
     let mut head = Vec::new();
     let begun = source.by_ref().take(HEAD).read_to_end(&mut head);
     begun.map_err(|error| refuse(TableProblem { line: 1, what: error.to_string() }))?;
+    if phd2::is_one(&head) {
+        let (log, notes) = phd2::read(Cursor::new(head).chain(source), ratio).map_err(refuse)?;
+        if log.len() < FEWEST_ROWS {
+            let what = format!("{} guided frames with a star; at least {FEWEST_ROWS} are needed", log.len());
+            return Err(refuse(TableProblem { line: 1, what }));
+        }
+        return Ok((log, Found { columns: phd2::columns(), broken_off: None, notes, own_zeros: true }));
+    }
     let layout = Layout::of(&head, &map.known());
     let source = Cursor::new(head).chain(source);
     let mut rows = match &layout {
@@ -178,7 +193,7 @@ pub(super) fn read(file: &str, mut source: impl Read, map: &ColumnMap) -> Result
     count_time(&mut log, map, &mut notes).map_err(|what| refuse(TableProblem { line: header_line, what }))?;
     rollover::undo(&mut log, &columns, &mut notes);
     slower::fill(&mut log, &mut notes);
-    Ok((log, Found { columns, broken_off, notes }))
+    Ok((log, Found { columns, broken_off, notes, own_zeros: false }))
 }
 
 /// The time of rows that were recorded at a rate, where the file has none.

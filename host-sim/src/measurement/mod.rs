@@ -16,6 +16,7 @@ mod faults;
 mod gear;
 mod layout;
 mod log;
+mod phd2;
 pub mod raw;
 pub(crate) mod robust;
 mod rollover;
@@ -189,7 +190,7 @@ fn parse_as(
     if gear.ratio == 0.0 || !gear.ratio.is_finite() {
         return Err(refuse(format!("ratio: found {}, allowed: a finite number other than zero", gear.ratio)));
     }
-    let (mut log, found) = log::read(file, source, columns)?;
+    let (mut log, found) = log::read(file, source, columns, gear.ratio)?;
     let rows = log.len();
     let mut findings = Findings { notes: found.notes, ..Findings::default() };
     if let Some(line) = found.broken_off {
@@ -223,6 +224,7 @@ fn parse_as(
     faults::stalls::check(&mut log, gear, &mut findings);
     let mut sessions = into_sessions(log, gear.ratio);
     other_zeros.into_iter().for_each(|session| sessions[session].own_zero = true);
+    sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= found.own_zeros);
     faults::frozen::check(&mut sessions, gear, error_recorded, &mut findings).map_err(refuse)?;
     faults::reads::check(&mut sessions, gear, &mut findings);
     faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);

@@ -4,10 +4,10 @@ use std::fs::File;
 use std::io::{Cursor, Read};
 use std::path::Path;
 
-use super::clock_text;
 use super::csv_rows::{CsvRows, NotANumber, TableProblem};
 use super::layout::{HEAD, Layout, Separator, missing};
 use super::log::{FEWEST_ROWS, MeasuredError};
+use super::{clock_text, phd2};
 
 /// A file as it stands.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,6 +69,12 @@ pub fn parse(file: &str, mut source: impl Read) -> Result<RawFile, MeasuredError
     let mut head = Vec::new();
     let begun = source.by_ref().take(HEAD).read_to_end(&mut head);
     begun.map_err(|error| refuse(TableProblem { line: 1, what: error.to_string() }))?;
+    if phd2::is_one(&head) {
+        let what =
+            "a guide log of PHD2 has columns of its own, and needs no mapping: flexspline calibrate FILE --ratio N"
+                .to_owned();
+        return Err(refuse(TableProblem { line: 1, what }));
+    }
     let layout = Layout::of(&head, &[]);
     let source = Cursor::new(head).chain(source);
     let mut rows = match &layout {

@@ -27,6 +27,7 @@ pub use replay::{MeasuredRow, MeasurementError, ReplaySummary, ReplayedRow, repl
 pub use source_files::{c_header, rust_source};
 pub use sweep::{SweepError, SweepPlan, SweepProgress, symmetric_nodes};
 pub use torque_nodes::NodeChoice;
+pub(crate) use torque_nodes::{accepted, refined};
 pub use validate::{ValidateError, Validation, ValidationSettings, validate};
 
 use flexspline::Table;

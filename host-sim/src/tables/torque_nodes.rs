@@ -60,55 +60,94 @@ pub fn choose_torque_nodes(
     let unloaded = motion.state().clone();
     let mut chain = Chain::new(plan, temperature_c, observe);
     let all = symmetric_nodes(drive.output.drag_torque_n_m, choice.largest_n_m, FIRST_NODES);
-    let mut nodes: Vec<f32> = all.into_iter().filter(|t| f64::from(*t) > drive.output.drag_torque_n_m).collect();
+    let nodes: Vec<f32> = all.into_iter().filter(|t| f64::from(*t) > drive.output.drag_torque_n_m).collect();
 
-    let mut known: Vec<KnownNode> = Vec::new();
+    let mut sampled: Vec<KnownNode> = Vec::new();
     for torque in &nodes {
         chain.sample(&mut motion, *torque)?;
-        known.push(KnownNode { torque: *torque, temperature, points: chain.take_points() });
+        sampled.push(KnownNode { torque: *torque, temperature, points: chain.take_points() });
     }
-    // Intervals not yet looked into, by their lower node.
-    let mut open: Vec<(f32, f32)> = nodes.windows(2).map(|w| (w[0], w[1])).collect();
-    while !open.is_empty() && nodes.len() - 1 < choice.most {
-        let trial = match trial_table(drive, kind, plan, &nodes, &known) {
-            Ok(image) => Some(image),
-            // With so few nodes the curve through them swings so far that the core would not take it.
-            Err(TableError::Project(ProjectError::Write(WriteError::Refused(
-                ImageError::Falls { .. } | ImageError::Steep { .. },
-            )))) => None,
-            Err(other) => return Err(other.into()),
-        };
-        let mut missed: Vec<(f64, KnownNode)> = Vec::new();
-        open.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let open = nodes.windows(2).map(|w| [w[0], w[1]]).collect();
+    let refined = refined(nodes, open, choice.most + 1, choice.tolerance_arcsec, |nodes, middles| {
+        sampled.retain(|node| nodes.contains(&node.torque));
+        let trial = accepted(trial_table(drive, kind, plan, nodes, &sampled))?;
         motion.go_back(unloaded.clone());
-        for (low, high) in &open {
-            let middle = (0.5 * (f64::from(*low).sqrt() + f64::from(*high).sqrt())).powi(2) as f32;
-            chain.sample(&mut motion, middle)?;
+        let missed = |middle: &f32| {
+            chain.sample(&mut motion, *middle)?;
             let points = chain.take_points();
-            let miss = trial.as_ref().map_or(f64::INFINITY, |image| worst_miss(image, &points));
-            missed.push((miss, KnownNode { torque: middle, temperature, points }));
-        }
-        missed.sort_by(|a, b| b.0.total_cmp(&a.0));
-        open.clear();
-        for (miss, node) in missed {
-            let middle = node.torque;
-            if miss > choice.tolerance_arcsec / ARCSEC_PER_RAD && nodes.len() - 1 < choice.most {
-                let place = nodes.partition_point(|t| *t < middle);
-                open.extend([(nodes[place - 1], middle), (middle, nodes[place])]);
-                nodes.insert(place, middle);
-                known.push(node);
-            }
-        }
-    }
+            let miss = trial.as_ref().map_or(f64::INFINITY, |image| ARCSEC_PER_RAD * worst_miss(image, &points));
+            sampled.push(KnownNode { torque: *middle, temperature, points });
+            Ok(miss)
+        };
+        middles.iter().map(missed).collect::<Result<Vec<f64>, SweepError>>()
+    })?;
+    let nodes = refined.nodes;
+    sampled.retain(|node| nodes.contains(&node.torque));
     let drag = drive.output.drag_torque_n_m;
     let before_jump = (2.0 * drag - f64::from(nodes[0])) as f32;
     let positive: Vec<f32> = std::iter::once(before_jump).chain(nodes).collect();
     Ok(ChosenNodes {
         torque_nodes_n_m: positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).collect(),
-        known,
-        resolved: open.is_empty(),
+        known: sampled,
+        resolved: refined.resolved,
         work: chain.work,
     })
+}
+
+/// Torque nodes as they were put in.
+pub(crate) struct Refined {
+    /// Ascending.
+    pub nodes: Vec<f32>,
+    /// Whether no middle of an interval is missed by more than the tolerance; if not, the nodes ran out.
+    pub resolved: bool,
+}
+
+/// Puts a node into the middle (of the roots) of every interval of `open` where the table of the nodes so far misses by more than
+/// `tolerance`, the worst first, and looks into the halves again, until nothing is missed or there are `most` nodes. `misses` is given the nodes
+/// so far and the middles that are asked for.
+pub(crate) fn refined<E>(
+    mut nodes: Vec<f32>,
+    mut open: Vec<[f32; 2]>,
+    most: usize,
+    tolerance: f64,
+    mut misses: impl FnMut(&[f32], &[f32]) -> Result<Vec<f64>, E>,
+) -> Result<Refined, E> {
+    while !open.is_empty() && nodes.len() < most {
+        open.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let middles: Vec<f32> = open.iter().map(|[low, high]| middle(*low, *high)).collect();
+        let mut missed: Vec<(f64, f32)> = misses(&nodes, &middles)?.into_iter().zip(middles).collect();
+        missed.retain(|(miss, _)| *miss > tolerance);
+        missed.sort_by(|a, b| b.0.total_cmp(&a.0));
+        open.clear();
+        for (_, middle) in missed {
+            if nodes.len() < most {
+                let place = nodes.partition_point(|node| *node < middle);
+                open.extend([[nodes[place - 1], middle], [middle, nodes[place]]]);
+                nodes.insert(place, middle);
+            }
+        }
+    }
+    Ok(Refined { nodes, resolved: open.is_empty() })
+}
+
+/// The middle of the roots of two loads; of loads of either sign their mean.
+fn middle(low: f32, high: f32) -> f32 {
+    let (a, b) = (f64::from(low), f64::from(high));
+    if a * b <= 0.0 {
+        return f64::midpoint(a, b) as f32;
+    }
+    (a.signum() * f64::midpoint(a.abs().sqrt(), b.abs().sqrt()).powi(2)) as f32
+}
+
+/// A trial table, or none: with few nodes the curve through them may swing so far that the core would not take it.
+pub(crate) fn accepted<T>(trial: Result<T, TableError>) -> Result<Option<T>, TableError> {
+    match trial {
+        Ok(trial) => Ok(Some(trial)),
+        Err(TableError::Project(ProjectError::Write(WriteError::Refused(
+            ImageError::Falls { .. } | ImageError::Steep { .. },
+        )))) => Ok(None),
+        Err(other) => Err(other),
+    }
 }
 
 /// Largest difference between a trial table and samples of one torque, rad.

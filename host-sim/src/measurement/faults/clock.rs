@@ -68,6 +68,7 @@ fn order(log: &mut Log, findings: &mut Findings) -> Vec<u64> {
     let (mut strays, mut resets) = (Vec::new(), Vec::new());
     for row in 0..rows {
         let t = time[row];
+        number += u32::from(row > 0 && !log.continues(row));
         if !t.is_finite() {
             session[row] = number;
             continue;
