@@ -4,8 +4,11 @@
 //! measure, [`loops`] the theory of the loops that close over all of it.
 #![forbid(unsafe_code)]
 
+pub mod flight;
 pub mod friction;
 pub mod gear;
 pub mod loops;
 pub mod plant;
+pub mod scenario;
 pub mod servo;
+pub mod table;

@@ -17,7 +17,7 @@ pub const PARTS: usize = 3;
 /// Most repetitions in a step; seven are usual.
 const REPETITIONS: usize = 40;
 /// Two speeds are the same if they differ by no more than this part of themselves, and this much, rad/s.
-const SAME: [f64; 2] = [1e-13, 1e-18];
+const SAME: [f64; 2] = [1e-11, 1e-16];
 /// Over shorter ways than this the slope at the middle is exact to rounding, rad.
 const SHORT_RAD: f64 = 1e-9;
 
@@ -155,6 +155,8 @@ impl Plant {
         let mut end = self.meshed;
         let mut loss = 0.0;
         let mut outside = 0.0;
+        // As fast, and with as much in the mesh, as in the step before.
+        let rubbing = self.cold * self.settings.friction.level_n_m(self.mean[0], self.middle.torque_n_m);
         for _ in 0..REPETITIONS {
             let way: [f64; PARTS] = core::array::from_fn(|k| h * mean[k]);
             let middle: [f64; PARTS] = core::array::from_fn(|k| start[k] + 0.5 * way[k]);
@@ -167,7 +169,7 @@ impl Plant {
             let [weight_n_m, most_at] = self.settings.gravity;
             outside = outside_n_m + weight_n_m * libm::cos(middle[1] - most_at);
             push[1] += outside;
-            let (next, heat) = self.rubbed(h, &inertias, &push, &mean);
+            let (next, heat) = self.rubbed(h, &inertias, &push, rubbing);
             loss = lost + heat;
             let same = (0..PARTS).all(|k| (next[k] - mean[k]).abs() <= SAME[0] * next[k].abs() + SAME[1]);
             mean = next;
@@ -240,9 +242,9 @@ impl Plant {
     }
 
     /// The mean speed that the push gives against friction, and the heat of it.
-    fn rubbed(&self, h: f64, inertias: &[f64; PARTS], push: &[f64; PARTS], mean: &[f64; PARTS]) -> ([f64; PARTS], f64) {
+    fn rubbed(&self, h: f64, inertias: &[f64; PARTS], push: &[f64; PARTS], rubbing_n_m: f64) -> ([f64; PARTS], f64) {
         let PlantSettings { friction, drag_n_m, .. } = &self.settings;
-        let rubbing = [self.cold * friction.level_n_m(mean[0], self.middle.torque_n_m), *drag_n_m, 0.0];
+        let rubbing = [rubbing_n_m, *drag_n_m, 0.0];
         let viscous = [self.cold * friction.viscous_n_m_s, 0.0, 0.0];
         let mut heat = 0.0;
         let next = core::array::from_fn(|k| {
