@@ -544,9 +544,12 @@ impl Sensing {
             let rubbing = scenario.friction_known * self.rubbing_n_m(now.rate_rad_s, self.told_n_m);
             let found = made.masses.motor_kg_m2 * acceleration - servo.current_n_m() + rubbing;
             let share = 1.0 - libm::exp(-TAU * made.bandwidth_hz * tick_s);
-            self.told_n_m +=
-                if self.age_s.is_finite() { share * (found - self.told_n_m) } else { found - self.told_n_m };
-            self.age_s = 0.0;
+            // The friction has the sign of the target's rate only as long as the correction is slower than that.
+            let most = SLOWER * now.rate_rad_s.abs() * tick_s * made.soft_n_m_per_rad;
+            let wanted = share * (found - self.told_n_m);
+            self.told_n_m += wanted.clamp(-most, most);
+            // What is held back is as old as what it is held back from.
+            self.age_s = if wanted.abs() > most { self.age_s + tick_s } else { 0.0 };
         } else {
             self.age_s += tick_s;
         }
