@@ -46,6 +46,7 @@ pub mod closed_loop;
 pub mod diagnosis;
 pub mod export;
 pub mod extension;
+pub mod fly;
 pub mod kernels;
 pub mod look;
 pub mod measurement;

@@ -9,6 +9,7 @@ mod context;
 mod diagnose;
 mod drive;
 mod export;
+mod fly;
 mod kernels;
 mod logs;
 mod look;
@@ -91,6 +92,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
         &[
             ("simulate", "run the drive along a path: kinematic error, backlash, wind-up, stress"),
             ("sleeve", "the sleeve or cup in three dimensions: stiffness by harmonic, tilt, torsion"),
+            ("fly", "a joint with mass in closed loop, with and without compensation"),
             ("export", "the mesh, the outlines or a CalculiX deck, for other programs"),
             ("reproduce", "the paper's protocol for all four generators, beside its figures"),
         ],
@@ -166,6 +168,7 @@ enum Command {
     Simulate(simulate::Simulate),
     Sleeve(sleeve::SleeveCommand),
     Drive(drive::DriveCommand),
+    Fly(fly::Fly),
     Export(export::Export),
     Tables(tables::Tables),
     Kernels(kernels::KernelsCommand),
@@ -247,6 +250,7 @@ impl Command {
             Command::Simulate(command) => command.run(context),
             Command::Sleeve(command) => command.run(context),
             Command::Drive(command) => command.run(context),
+            Command::Fly(command) => command.run(context),
             Command::Export(command) => command.run(context),
             Command::Tables(command) => command.run(context),
             Command::Kernels(command) => command.run(context),
