@@ -36,6 +36,8 @@ const TABLE_DRAG_N_M: f64 = 0.02;
 pub const DISTANCE: [f64; 2] = [0.5, 0.2];
 /// Widest low-pass of a torque, Hz: a tenth of the sampling frequency of usual torque sensors (guess).
 const WIDEST_HZ: f64 = 100.0;
+/// Low-pass of a torque on the load, Hz: what is faster than that is noise to a dish (guess: ten times the corner of gusts). No loop limits it.
+const KNOWN_HZ: f64 = 10.0;
 /// The slope along the way is taken over this time, s.
 const AHEAD_S: f32 = 4e-3;
 /// After a change of the target's rate the motor's current tells no torque for so long, s: friction builds up anew.
@@ -156,7 +158,9 @@ pub struct Flight {
     pub flown: Vec<Flown>,
     /// Whether the compensated joint comes to rest after a knock as the one without compensation does.
     pub stable: bool,
-    /// Low-pass of the torque in the mesh, Hz; that which keeps the margin.
+    /// From what the torque was known: nothing, where no low-pass of the torque in the mesh keeps the margin.
+    pub torque: TorqueKnown,
+    /// Low-pass of the torque, Hz.
     pub bandwidth_hz: f64,
     /// Phase margin of the servo (degrees, at Hz) with the load, and its least distance from −1.
     pub phase_margin_deg: [f64; 2],
@@ -177,6 +181,8 @@ struct Made<'s> {
     masses: TwoMasses,
     /// Stiffness under a tenth of the largest load.
     soft_n_m_per_rad: f64,
+    /// From what the torque is known, as far as it may be used.
+    torque: TorqueKnown,
     bandwidth_hz: f64,
 }
 
@@ -199,6 +205,7 @@ pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, String> {
     Ok(Flight {
         flown: flown.into_iter().collect::<Result<_, _>>()?,
         stable: stable(&made)?,
+        torque: made.torque,
         bandwidth_hz: made.bandwidth_hz,
         phase_margin_deg: made.masses.phase_margin_deg(&scenario.servo),
         servo_distance: if margin.stable { margin.distance } else { 0.0 },
@@ -234,12 +241,23 @@ fn made<'s>(scenario: &'s Scenario, unit: &'s Unit) -> Result<Made<'s>, String> 
     let soft = TwoMasses { stiffness: self::stiffness(&unit.nominal, 0.1 * scenario.largest_n_m()), ..masses };
     let path = Path { gain: 1.0, bandwidth_hz: 0.0, late_s: 0.0, rate_fed_forward: false };
     let widest = |masses: &TwoMasses| masses.widest_hz(&scenario.servo, &path, DISTANCE, WIDEST_HZ);
-    let bandwidth_hz = match scenario.torque {
-        TorqueKnown::OnLoad | TorqueKnown::Not => WIDEST_HZ,
-        TorqueKnown::InMesh => widest(&masses).min(widest(&soft)),
-        TorqueKnown::Current => widest(&masses).min(widest(&soft)).min(CURRENT_HZ),
+    let both = widest(&masses).zip(widest(&soft)).map(|(a, b)| a.min(b));
+    // Where no low-pass keeps the margin the torque in the mesh is not used.
+    let (torque, bandwidth_hz) = match (scenario.torque, both) {
+        (TorqueKnown::InMesh, Some(hz)) => (TorqueKnown::InMesh, hz),
+        (TorqueKnown::Current, Some(hz)) => (TorqueKnown::Current, hz.min(CURRENT_HZ)),
+        (TorqueKnown::OnLoad, _) => (TorqueKnown::OnLoad, KNOWN_HZ),
+        _ => (TorqueKnown::Not, KNOWN_HZ),
     };
-    Ok(Made { scenario, unit, image: [image.clone(), image], masses, soft_n_m_per_rad: soft.stiffness, bandwidth_hz })
+    Ok(Made {
+        scenario,
+        unit,
+        image: [image.clone(), image],
+        masses,
+        soft_n_m_per_rad: soft.stiffness,
+        torque,
+        bandwidth_hz,
+    })
 }
 
 /// Slope of the wind-up around a torque, N·m/rad.
@@ -411,13 +429,16 @@ impl<'a> Controller<'a> {
                     .map_err(|error| format!("the table cannot be flown: {error:?}"))?;
                 let mut state = JointState::new();
                 state.request(Mode::Tracking).map_err(|error| error.to_string())?;
-                let on_load = matches!(scenario.torque, TorqueKnown::OnLoad | TorqueKnown::Not);
+                let on_load = matches!(made.torque, TorqueKnown::OnLoad | TorqueKnown::Not);
+                // What the low-pass leaves of white noise.
+                let turned = TAU * made.bandwidth_hz * scenario.servo.tick_s;
+                let behind = (turned / (2.0 + turned)).sqrt();
                 let path = TorquePath::new(TorqueSettings {
                     tick_s: scenario.servo.tick_s as f32,
                     bandwidth_hz: made.bandwidth_hz as f32,
                     drag_n_m: if on_load { scenario.drag_n_m as f32 } else { 0.0 },
                     table_drag_n_m: TABLE_DRAG_N_M as f32,
-                    hold_n_m: (3.0 * scenario.torque_noise_n_m) as f32,
+                    hold_n_m: (3.0 * behind * scenario.torque_noise_n_m) as f32,
                 })
                 .map_err(setting)?;
                 Self::Core(Box::new(Core { joint, images, store, state, path }))
@@ -449,7 +470,7 @@ impl<'a> Controller<'a> {
                 let at = |time: f64| {
                     let target = target_rad + rate_rad_s * time;
                     let mut error = 0.0;
-                    for _ in 0..3 {
+                    for _ in 0..2 {
                         error = ideal.gear.error_under_rad((target - error) * ratio, told.mesh_n_m, way);
                     }
                     error
@@ -514,7 +535,7 @@ impl Sensing {
     fn read(&mut self, made: &Made<'_>, plant: &Plant, servo: &mut Servo, now: &Moment) -> TorqueReading {
         let scenario = made.scenario;
         let noise = scenario.torque_noise_n_m * self.noise.normal();
-        match scenario.torque {
+        match made.torque {
             // What the load's inertia asks for on the way of the target is known before, and cannot feed back.
             TorqueKnown::OnLoad => {
                 let known = on_load_n_m(scenario, now) + noise;
@@ -663,7 +684,8 @@ fn lane(made: &Made<'_>, kind: usize) -> Result<Flown, String> {
     Ok(flown)
 }
 
-/// A target that stands, a knock, and what is left of it: speed of the load (rad/s) in the last half second.
+/// A target that stands, a knock, and what is left of it: speed of the load (rad/s rms) about its mean, which a slow low-pass moves, in the
+/// last half second.
 fn left_of_a_knock(made: &Made<'_>, kind: usize) -> Result<f64, String> {
     let mut lane = Lane::new(made, kind)?;
     let outside = made.scenario.load.bias_n_m + 0.5 * made.scenario.load.swing[0];
@@ -673,7 +695,7 @@ fn left_of_a_knock(made: &Made<'_>, kind: usize) -> Result<f64, String> {
         ..Moment::default()
     };
     let second = (1.0 / made.scenario.servo.tick_s) as u32;
-    let mut left = Score::default();
+    let (mut left, mut sum) = (Score::default(), 0.0);
     for tick in 0..4 * second {
         if tick == second {
             let mut rates = lane.plant.rate_rad_s;
@@ -683,9 +705,11 @@ fn left_of_a_knock(made: &Made<'_>, kind: usize) -> Result<f64, String> {
         lane.tick(made, &now(tick));
         if 2 * tick >= 7 * second {
             left.add(lane.plant.rate_rad_s[1]);
+            sum += lane.plant.rate_rad_s[1];
         }
     }
-    Ok(left.rms())
+    let mean = sum / f64::from(left.count.max(1));
+    Ok((left.rms() * left.rms() - mean * mean).max(0.0).sqrt())
 }
 
 /// Speed below which a joint counts as at rest, rad/s: 4″/s, with an encoder that steps.

@@ -34,8 +34,8 @@ const CURVES: usize = 1 + 2 * PITCH_HARMONICS;
 const INTERVALS: usize = 512;
 /// Phases at which a spring is sampled.
 const PHASES: usize = 16;
-/// Halvings in which a torque is found: to a part in 2⁶⁰ of the largest.
-const HALVINGS: usize = 60;
+/// Halvings in which a torque or a twist is found: to 2⁻⁴⁰ of the range.
+const HALVINGS: usize = 40;
 
 /// One interval of a curve: the energy at its beginning, and the torque as a cubic of the place in it, from 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -341,9 +341,9 @@ impl Gear {
             }
         }
         let twist = libm::copysign(0.5 * (low + high), side);
-        // Lines over the output angle: twice is enough, they are gentle.
+        // Lines over the output angle are gentle.
         let mut output = generator_rad / self.ratio + twist;
-        for _ in 0..3 {
+        for _ in 0..2 {
             output = generator_rad / self.ratio + twist + self.error(generator_rad, output)[0];
         }
         output - generator_rad / self.ratio

@@ -175,14 +175,14 @@ impl TwoMasses {
     /// The widest low-pass (Hz) with which the mesh torque's loop is stable at this distance from +1, up to the most that is asked for, with
     /// a drive that is stiffer or softer by a part; that of a table which does not know it.
     ///
-    /// Found by halving: a wider low-pass only ever brings the loop's resonance, which is its nearest point, closer.
+    /// `None` if there is none: then the servo by itself is about to ring, and only a torque on the load may be compensated. Found by halving: a wider low-pass only ever brings the loop's resonance, which is its nearest point, closer.
     pub fn widest_hz(
         &self,
         servo: &ServoSettings,
         path: &TorquePath,
         [distance, unknown]: [f64; 2],
         most_hz: f64,
-    ) -> f64 {
+    ) -> Option<f64> {
         let keeps = |bandwidth_hz: f64| {
             [1.0 - unknown, 1.0, 1.0 + unknown].iter().all(|wrong| {
                 let unit = TwoMasses { stiffness: self.stiffness * wrong, ..*self };
@@ -191,7 +191,10 @@ impl TwoMasses {
             })
         };
         if keeps(most_hz) {
-            return most_hz;
+            return Some(most_hz);
+        }
+        if !keeps(FROM_HZ) {
+            return None;
         }
         let (mut low, mut high) = (FROM_HZ, most_hz);
         for _ in 0..12 {
@@ -202,7 +205,7 @@ impl TwoMasses {
                 high = middle;
             }
         }
-        low
+        Some(low)
     }
 }
 

@@ -33,7 +33,7 @@ pub struct Results {
     pub scenario: String,
     /// Wave generator.
     pub generator: String,
-    /// From what the torque is known, and what the table knows.
+    /// From what the torque is known (`none` also where no low-pass of the torque in the mesh keeps the margin), and what the table knows.
     pub torque: String,
     /// See there.
     pub table: String,
@@ -91,11 +91,11 @@ pub fn results(flown: &super::Flown, flight: &Flight) -> Option<Results> {
     let rms = by_controller(flight, |flown| flown.error.rms())?;
     let digest = flight.flown.iter().fold(0_u64, |sum, flown| sum.rotate_left(9) ^ flown.digest);
     let core = flight.flown.get(COMPENSATED)?;
-    let current = scenario.torque == flexspline_motion::scenario::TorqueKnown::Current;
+    let current = flight.torque == flexspline_motion::scenario::TorqueKnown::Current;
     Some(Results {
         scenario: scenario.name.clone(),
         generator: flown.kind.to_string(),
-        torque: snake(&format!("{:?}", scenario.torque)),
+        torque: snake(&format!("{:?}", flight.torque)),
         table: snake(&format!("{:?}", scenario.table)),
         seconds: scenario.seconds(),
         rms_arcsec: rms,
