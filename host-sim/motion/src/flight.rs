@@ -3,8 +3,8 @@
 use core::f64::consts::TAU;
 
 use flexspline::{
-    Adjustment, Direction, Drive, Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode, OutputAngle,
-    Overrun, Store, TorquePath, TorqueReading, TorqueSettings,
+    Adjustment, Approach, Direction, Drive, Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode,
+    OutputAngle, Overrun, Store, TorquePath, TorqueReading, TorqueSettings,
 };
 
 use super::friction::Friction;
@@ -22,6 +22,9 @@ pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
 pub const CONTROLLERS: [&str; 5] = ["none", "fourier", "fourier_by_direction", "compensated", "ideal"];
 /// The core among them.
 pub const COMPENSATED: usize = 3;
+
+/// Beside those, for [`fly_one`]: the core's table, torque and rate, by the sign of the target's velocity instead of a play that is followed.
+pub const BY_TORQUE: usize = CONTROLLERS.len();
 
 /// Time at the beginning that is not scored, s: all start at rest without knowing where in their play.
 pub const START_UP_S: f64 = 2.0;
@@ -309,6 +312,7 @@ enum Controller<'a> {
     Fourier(Box<Fourier>),
     Ideal(Box<Ideal>),
     Core(Box<Core<'a>>),
+    ByTorque(Box<Core<'a>>, Limiter),
 }
 
 /// A command, its rate, and what the limiter and the table could not do.
@@ -411,7 +415,7 @@ impl<'a> Controller<'a> {
         Ok(match kind {
             0 => Self::Uncompensated,
             1 | 2 => Self::Fourier(Box::new(Fourier::new(made, kind == 2))),
-            COMPENSATED => {
+            COMPENSATED | BY_TORQUE => {
                 let limits = Limits {
                     tick_s: scenario.servo.tick_s as f32,
                     rate_rad_s: RATE_RAD_S as f32,
@@ -441,7 +445,8 @@ impl<'a> Controller<'a> {
                     hold_n_m: (3.0 * behind * scenario.torque_noise_n_m) as f32,
                 })
                 .map_err(setting)?;
-                Self::Core(Box::new(Core { joint, images, store, state, path }))
+                let core = Box::new(Core { joint, images, store, state, path });
+                if kind == BY_TORQUE { Self::ByTorque(core, Limiter::default()) } else { Self::Core(core) }
             }
             _ => Self::Ideal(Box::new(Ideal { gear: unit.built.clone(), limiter: Limiter::default() })),
         })
@@ -479,6 +484,16 @@ impl<'a> Controller<'a> {
                 corrected(at(0.0), slope, &mut ideal.limiter)
             }
             Self::Core(core) => core.tick(told, nominal_rate),
+            Self::ByTorque(core, limiter) => {
+                let torque_n_m = core.path.tick(told.reading, told.direction);
+                let target = OutputAngle::from_rad(target_rad).unwrap_or(OutputAngle::ZERO);
+                let approach = Approach::Moving(told.direction);
+                let error = core.joint.inverse(&core.store, target, torque_n_m, approach).predicted_error_rad;
+                let rate = core.joint.rate_ahead(&core.store, target, rate_rad_s as f32, torque_n_m, AHEAD_S);
+                let still = rate_rad_s == 0.0 || rate.is_nan();
+                let slope = if still { 0.0 } else { rate_rad_s - f64::from(rate) / ratio };
+                corrected(f64::from(error), slope, limiter)
+            }
         }
     }
 }

@@ -1,7 +1,9 @@
 //! Flights with drives by a law: what the core gains on a unit that its table does not know, in motion.
 
 use flexspline::{Drive, FixedMember};
-use flexspline_motion::flight::{ARCSEC_PER_RAD, COMPENSATED, CONTROLLERS, Flight, Flown, Unit, fly, fly_one};
+use flexspline_motion::flight::{
+    ARCSEC_PER_RAD, BY_TORQUE, COMPENSATED, CONTROLLERS, Flight, Flown, Unit, fly, fly_one,
+};
 use flexspline_motion::gear::Sampled;
 use flexspline_motion::scenario::{Leg, Load, Scenario, TableKnown, TorqueKnown};
 use flexspline_motion::servo::ServoSettings;
@@ -124,4 +126,29 @@ fn a_flight_is_the_same_to_the_last_bit() {
     assert_eq!(one, two);
     // Another seed is another sky.
     assert_ne!(one, alone(&Scenario { seed: 4, ..scenario() }, COMPENSATED).digest);
+}
+
+/// Where the state of the play gains over the same table by the sign of the target's velocity, and where it does not.
+#[test]
+fn the_play_is_held_against_the_same_table_by_the_sign_of_velocity() {
+    let calm = Load { bias_n_m: 0.0, swing: [0.0, 0.05], gust: [0.0, 0.3], ..scenario().load };
+    let crossing = Load { swing: [3.0, 0.4], ..calm };
+    let turning: Vec<Leg> = [(2.0, 0.0)]
+        .into_iter()
+        .chain((0..10).map(|k| (1.0, if k % 2 == 0 { 1e-3 } else { -1e-3 })))
+        .map(|(seconds, rate_rad_s)| Leg { seconds, rate_rad_s })
+        .collect();
+    for (what, load, legs, drag_n_m) in [
+        ("loaded", scenario().load, scenario().legs, 0.5),
+        ("load crosses zero", crossing, scenario().legs, 0.5),
+        ("reverses every second, calm", calm, turning.clone(), 0.5),
+        ("reverses every second, calm, no drag", calm, turning, 0.02),
+    ] {
+        let scenario = Scenario { load, legs, drag_n_m, ..scenario() };
+        let [none, core, by_torque] = [0, COMPENSATED, BY_TORQUE].map(|kind| alone(&scenario, kind).error.rms());
+        println!("{what}: {none:.2} without, {core:.2} core, {by_torque:.2} by torque and sign of velocity");
+        // Without load and drag neither knows the flank: the load coasts from one to the other.
+        let known = drag_n_m > 0.1;
+        assert!(core < none && (!known || core < 1.05 * by_torque), "{what}: {core} {by_torque}");
+    }
 }
