@@ -23,6 +23,7 @@ mod fem_causes;
 mod friction;
 mod fxt_format;
 mod independence;
+mod joint_in_motion;
 mod measured_data;
 mod mirror_symmetry;
 mod one_pitch_periodicity;

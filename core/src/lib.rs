@@ -223,7 +223,8 @@ pub use joint::{
     Disturbance, FittedSlip, Flags, Inertias, Input, Joint, JointState, Learning, Limits, LoadTorque, Measured, Mode,
     ModeError, Noise, NominalOutput, Now, Output, OutputAhead, Overrun, PREDICTOR_PARTS, Predictor, PredictorError,
     PredictorState, RateGroup, RestoreError, SAVED_JOINT_BYTES, Seen, SettingError, Slip, SlipBank, SlipElement,
-    SlipState, SlipVariable, Term, TorqueSlipElement, Verdict, saved_adapt_bytes, saved_slip_bytes,
+    SlipState, SlipVariable, Term, TorquePath, TorqueReading, TorqueSettings, TorqueSlipElement, Verdict,
+    saved_adapt_bytes, saved_slip_bytes,
 };
 pub use play::{Direction, PlayState, SAVED_STATE_BYTES};
 pub use self_test::{SelfTestError, self_test};

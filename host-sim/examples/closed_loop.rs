@@ -3,11 +3,10 @@
 //! ```sh
 //! cargo run --release --example closed_loop -- map tests/firmware/plant [GENERATOR...]    # contact FEM, minutes
 //! cargo run --release --example closed_loop -- fly antenna|brief TABLES [OUT]
-//! cargo run --release --example closed_loop -- inert antenna|brief TABLES [OUT]
 //! cargo run --release --example closed_loop -- rover TABLES
 //! ```
 //! `TABLES` is a folder of `<generator>.fxt`. With `OUT` every tick of the flights is written there as CSV. `fly brief` prints,
-//! line by line, what the program `antenna` prints on the target, and `rover` what `rover` does; `inert` gives the load inertia.
+//! line by line, what the program `antenna` prints on the target, and `rover` what `rover` does.
 
 use std::error::Error;
 use std::path::Path;
@@ -18,7 +17,6 @@ use flexspline_sim::closed_loop::flight::gear::Gear;
 use flexspline_sim::closed_loop::flight::profile::{ANTENNA, BRIEF, Profile};
 use flexspline_sim::closed_loop::flight::rover::RoverJoint;
 use flexspline_sim::closed_loop::flight::servo::{SERVO, ServoSettings};
-use flexspline_sim::closed_loop::inertia::{DISH, InertGear};
 use flexspline_sim::closed_loop::map::DenseMap;
 use flexspline_sim::closed_loop::{fly, write_flight};
 use flexspline_sim::drive::{Drive, GeneratorKind};
@@ -34,7 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
         ["map", folder, kinds @ ..] => make_maps(Path::new(folder), kinds),
         ["rover", tables] => rover(Path::new(tables)),
-        [how @ ("fly" | "inert"), profile, tables, out @ ..] => {
+        ["fly", profile, tables, out @ ..] => {
             let profile = match *profile {
                 "antenna" => ANTENNA,
                 "brief" => BRIEF,
@@ -46,20 +44,12 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let map = DenseMap::parse(kind, &plant, &std::fs::read_to_string(&plant)?)?;
                 let image = std::fs::read(Path::new(tables).join(format!("{kind}.fxt")))?;
                 let out = out.first().map(Path::new);
-                if *how == "fly" {
-                    let gear = Gear::new(map.view(), profile.temperature_c[0]);
-                    run(kind, &image, gear, SERVO, &profile, out)?;
-                } else {
-                    let gear = InertGear::new(map.view(), profile.temperature_c[0], DISH);
-                    run(kind, &image, gear, SERVO, &profile, out)?;
-                }
+                let gear = Gear::new(map.view(), profile.temperature_c[0]);
+                run(kind, &image, gear, SERVO, &profile, out)?;
             }
             Ok(())
         }
-        _ => Err(
-            "allowed: map FOLDER [GENERATOR...], fly PROFILE TABLES [OUT], inert PROFILE TABLES [OUT], rover TABLES"
-                .into(),
-        ),
+        _ => Err("allowed: map FOLDER [GENERATOR...], fly PROFILE TABLES [OUT], rover TABLES".into()),
     }
 }
 

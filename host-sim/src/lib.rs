@@ -3,7 +3,7 @@
 //! ```text
 //! drive.toml -> drive -> mesh -> fem, contact -> stepping -> motion -> tables -> image (.fxt), read by the crate `flexspline`
 //!                                                              |
-//!                                   simulate, kernels, reproduce, closed_loop
+//!                                   simulate, kernels, reproduce, closed_loop, fly
 //! measured.csv -> measurement -> residual -> diagnosis (beside a table, or nominal.toml) -> extension -> drive, tables
 //! ```
 //!
@@ -47,6 +47,7 @@ pub mod data_sheet;
 pub mod diagnosis;
 pub mod export;
 pub mod extension;
+pub mod fly;
 pub mod kernels;
 pub mod look;
 pub mod measurement;

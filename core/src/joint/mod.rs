@@ -3,6 +3,7 @@
 mod adapt;
 mod adjustment;
 mod aged;
+mod feed_forward;
 mod limits;
 mod mode;
 mod predictor;
@@ -11,6 +12,7 @@ mod runtime;
 mod signals;
 mod slip;
 mod state;
+mod torque_path;
 
 pub use adapt::{
     AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Coefficient, Learning, Seen, Term, Verdict,
@@ -32,3 +34,4 @@ pub use slip::{
     saved_slip_bytes,
 };
 pub use state::{JointState, RestoreError, SAVED_JOINT_BYTES};
+pub use torque_path::{TorquePath, TorqueReading, TorqueSettings};

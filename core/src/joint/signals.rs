@@ -11,7 +11,8 @@ pub struct Input {
     pub generator: Option<GeneratorAngle>,
     /// Where the output shall be.
     pub target: OutputAngle,
-    /// Load torque at the output, N·m, positive when it turns the output forward.
+    /// Load torque at the output, N·m, positive when it turns the output forward: that in the mesh, with the drag added that the table was made with
+    /// ([`TorquePath`](crate::TorquePath) makes it of a reading).
     pub torque_n_m: f32,
     /// Ticks that were missed since the last call.
     pub missed_ticks: u16,

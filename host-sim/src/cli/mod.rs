@@ -9,6 +9,7 @@ mod context;
 mod diagnose;
 mod drive;
 mod export;
+mod fly;
 mod kernels;
 mod logs;
 mod look;
@@ -93,6 +94,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
             ("simulate", "run the drive along a path: kinematic error, backlash, wind-up, stress"),
             ("sleeve", "the sleeve or cup in three dimensions: stiffness by harmonic, tilt, torsion"),
             ("study", "vary fields of a drive: what a catalogue would print of each variant"),
+            ("fly", "a joint with mass in closed loop, with and without compensation"),
             ("export", "the mesh, the outlines or a CalculiX deck, for other programs"),
             ("reproduce", "the paper's protocol for all four generators, beside its figures"),
         ],
@@ -169,6 +171,7 @@ enum Command {
     Sleeve(sleeve::SleeveCommand),
     Study(study::StudyCommand),
     Drive(drive::DriveCommand),
+    Fly(fly::Fly),
     Export(export::Export),
     Tables(tables::Tables),
     Kernels(kernels::KernelsCommand),
@@ -251,6 +254,7 @@ impl Command {
             Command::Sleeve(command) => command.run(context),
             Command::Study(command) => command.run(context),
             Command::Drive(command) => command.run(context),
+            Command::Fly(command) => command.run(context),
             Command::Export(command) => command.run(context),
             Command::Tables(command) => command.run(context),
             Command::Kernels(command) => command.run(context),

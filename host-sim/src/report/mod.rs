@@ -10,6 +10,7 @@ mod assets;
 pub(crate) mod calibration_report;
 pub(crate) mod diagnosis_report;
 mod drive_report;
+pub(crate) mod flight_report;
 pub(crate) mod pack;
 pub mod page;
 pub(crate) mod reproduction_report;

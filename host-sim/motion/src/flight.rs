@@ -1,0 +1,736 @@
+//! A joint flown by every controller, each with its own motor, drive and load under one sky.
+
+use core::f64::consts::TAU;
+
+use flexspline::{
+    Adjustment, Approach, Direction, Drive, Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode,
+    OutputAngle, Overrun, Store, TorquePath, TorqueReading, TorqueSettings,
+};
+
+use super::friction::Friction;
+use super::gear::{Gear, Line, Sampled, Spring};
+use super::loops::{TorquePath as Path, TwoMasses};
+use super::plant::{Plant, PlantSettings};
+use super::scenario::{Load, Moment, Scenario, TableKnown, TorqueKnown};
+use super::servo::{Asked, Noise, Servo};
+use super::table::{Sampling, image};
+
+/// Arc-seconds in a radian.
+pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
+
+/// Controllers, in the order of the results.
+pub const CONTROLLERS: [&str; 5] = ["none", "fourier", "fourier_by_direction", "compensated", "ideal"];
+/// The core among them.
+pub const COMPENSATED: usize = 3;
+
+/// Beside those, for [`fly_one`]: the core's table, torque and rate, by the sign of the target's velocity instead of a play that is followed.
+pub const BY_TORQUE: usize = CONTROLLERS.len();
+
+/// Time at the beginning that is not scored, s: all start at rest without knowing where in their play.
+pub const START_UP_S: f64 = 2.0;
+/// Limits of every correction, suited to the servo.
+const RATE_RAD_S: f64 = 0.05;
+const ACCELERATION_RAD_S2: f64 = 5.0;
+/// Nearer targets keep the flank, rad: 0.5″.
+const HOLD_RAD: f32 = 2.4e-6;
+/// Drag that tables are made with, N·m: that of the drive as designed.
+const TABLE_DRAG_N_M: f64 = 0.02;
+/// Distance that the loop of a torque in the mesh keeps from +1, with a drive a fifth stiffer or softer than its table says.
+pub const DISTANCE: [f64; 2] = [0.5, 0.2];
+/// Widest low-pass of a torque, Hz: a tenth of the sampling frequency of usual torque sensors (guess).
+const WIDEST_HZ: f64 = 100.0;
+/// Low-pass of a torque on the load, Hz: what is faster than that is noise to a dish (guess: ten times the corner of gusts). No loop limits it.
+const KNOWN_HZ: f64 = 10.0;
+/// The slope along the way is taken over this time, s.
+const AHEAD_S: f32 = 4e-3;
+/// After a change of the target's rate the motor's current tells no torque for so long, s: friction builds up anew.
+const SETTLES_S: f64 = 0.3;
+/// Part of the target's rate that a correction by the motor's current may have.
+const SLOWER: f64 = 0.3;
+/// Noise of the torque that the current tells, behind its low-pass, for its bound, N·m.
+const CURRENT_SURE_N_M: f64 = 0.5;
+/// Low-pass of the torque told by the motor's current, Hz: the motor's own acceleration is told by two differences of the encoder.
+const CURRENT_HZ: f64 = 2.0;
+/// Noise of the samples of a calibrated table, rad: 1″.
+const CALIBRATION_NOISE_RAD: f64 = 1.0 / ARCSEC_PER_RAD;
+/// Share of the lines that an extended table knows.
+const EXTENDED_SHARE: f64 = 0.95;
+
+/// A drive as designed and as built.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unit {
+    /// Tooth counts.
+    pub drive: Drive,
+    /// As designed.
+    pub nominal: Gear,
+    /// As built.
+    pub built: Gear,
+}
+
+impl Unit {
+    /// A unit of a drive whose nominal spring was sampled from a map: with the lines that wheels eccentric by 10 µm, pitch errors of 2 µm and an
+    /// encoder eccentric by 2 µm make in HHD-95 (amplitudes by the closed forms of rigid wheels), 6 % stiffer, and with 2″ more
+    /// clearance. None of it is in the nominal table.
+    pub fn of_spring(drive: Drive, spring: Sampled) -> Self {
+        let ratio = drive.exact_ratio();
+        let line = |generator: f64, output: f64, arcsec: f64, phase_rad: f64| Line {
+            generator,
+            output,
+            amplitude_rad: arcsec / ARCSEC_PER_RAD,
+            phase_rad,
+        };
+        let lines = vec![
+            line(2.0, -2.0, 19.5, 0.9),
+            line(4.0, -4.0, 3.9, 2.0),
+            line(2.0, 0.0, 8.5, 0.3),
+            line(1.0, 0.0, 3.0, 1.7),
+            line(0.0, 1.0, 10.0, 0.5),
+        ];
+        let built = Spring::Sampled(Box::new(spring.as_built(1.06, 2.0 / ARCSEC_PER_RAD)));
+        Self {
+            drive,
+            nominal: Gear { ratio, lines: Vec::new(), spring: Spring::Sampled(Box::new(spring)) },
+            built: Gear { ratio, lines, spring: built },
+        }
+    }
+
+    /// What a table is sampled from.
+    fn known(&self, table: TableKnown) -> Gear {
+        match table {
+            TableKnown::Nominal => self.nominal.clone(),
+            TableKnown::Extended => {
+                let shrunk = |line: &Line| Line { amplitude_rad: EXTENDED_SHARE * line.amplitude_rad, ..*line };
+                Gear { lines: self.built.lines.iter().map(shrunk).collect(), ..self.nominal.clone() }
+            }
+            TableKnown::Calibrated => self.built.clone(),
+        }
+    }
+}
+
+/// Root mean square and largest.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Score {
+    squares: f64,
+    largest: f64,
+    count: u32,
+}
+
+impl Score {
+    fn add(&mut self, value: f64) {
+        self.squares += value * value;
+        self.largest = self.largest.max(value.abs());
+        self.count += 1;
+    }
+
+    /// Root mean square; 0 of none.
+    pub fn rms(&self) -> f64 {
+        if self.count == 0 { 0.0 } else { (self.squares / f64::from(self.count)).sqrt() }
+    }
+
+    /// Largest.
+    pub fn largest(&self) -> f64 {
+        self.largest
+    }
+}
+
+/// What one controller's joint did.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Flown {
+    /// Output less target, arcsec.
+    pub error: Score,
+    /// Speed of the output less the target's, arcsec/s.
+    pub ripple: Score,
+    /// Torque in the mesh, N·m.
+    pub mesh: Score,
+    /// Ticks in which the motor gave all it has, the limiter held back, nothing was corrected.
+    pub limits: [u32; 3],
+    /// Every so many ticks: time, error (arcsec), mesh torque (N·m).
+    pub rows: Vec<[f64; 3]>,
+    /// Errors of every tick, arcsec, for a spectrum.
+    pub errors: Vec<f32>,
+    /// Share of ticks in which the torque that the current told lay within the bound that was stated with it.
+    pub told: f64,
+    /// All bits of all errors.
+    pub digest: u64,
+}
+
+/// A flight: the results by controller.
+#[derive(Clone, Debug)]
+pub struct Flight {
+    /// By controller.
+    pub flown: Vec<Flown>,
+    /// Whether the compensated joint comes to rest after a knock as the one without compensation does.
+    pub stable: bool,
+    /// From what the torque was known: nothing, where no low-pass of the torque in the mesh keeps the margin.
+    pub torque: TorqueKnown,
+    /// Low-pass of the torque, Hz.
+    pub bandwidth_hz: f64,
+    /// Phase margin of the servo (degrees, at Hz) with the load, and its least distance from −1.
+    pub phase_margin_deg: [f64; 2],
+    /// See there.
+    pub servo_distance: f64,
+    /// Stiffness under the mean load, N·m/rad, and resonances with the motor held and free, Hz.
+    pub stiffness: f64,
+    /// See there.
+    pub resonances_hz: [f64; 2],
+}
+
+/// What every lane is made of.
+struct Made<'s> {
+    scenario: &'s Scenario,
+    unit: &'s Unit,
+    /// Twice, as a joint has it.
+    image: [Vec<u8>; 2],
+    masses: TwoMasses,
+    /// Stiffness under a tenth of the largest load.
+    soft_n_m_per_rad: f64,
+    /// From what the torque is known, as far as it may be used.
+    torque: TorqueKnown,
+    bandwidth_hz: f64,
+}
+
+/// Flies a scenario.
+///
+/// # Errors
+/// What cannot be flown, in words.
+pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, String> {
+    let made = made(scenario, unit)?;
+    let flown: Vec<Result<Flown, String>> = std::thread::scope(|threads| {
+        let flying: Vec<_> = (0..CONTROLLERS.len())
+            .map(|k| {
+                let made = &made;
+                threads.spawn(move || lane(made, k))
+            })
+            .collect();
+        flying.into_iter().map(|lane| lane.join().unwrap_or_else(|_| Err("a lane ended early".to_owned()))).collect()
+    });
+    let margin = made.masses.servo(&scenario.servo);
+    Ok(Flight {
+        flown: flown.into_iter().collect::<Result<_, _>>()?,
+        stable: stable(&made)?,
+        torque: made.torque,
+        bandwidth_hz: made.bandwidth_hz,
+        phase_margin_deg: made.masses.phase_margin_deg(&scenario.servo),
+        servo_distance: if margin.stable { margin.distance } else { 0.0 },
+        stiffness: made.masses.stiffness,
+        resonances_hz: [made.masses.locked_hz(), made.masses.free_hz()],
+    })
+}
+
+/// Flies one controller alone: for benches.
+///
+/// # Errors
+/// As [`fly`].
+pub fn fly_one(scenario: &Scenario, unit: &Unit, controller: usize) -> Result<Flown, String> {
+    lane(&made(scenario, unit)?, controller)
+}
+
+fn made<'s>(scenario: &'s Scenario, unit: &'s Unit) -> Result<Made<'s>, String> {
+    let largest_n_m = 1.5 * scenario.largest_n_m() + 1.0;
+    let noise_rad = if scenario.table == TableKnown::Calibrated { CALIBRATION_NOISE_RAD } else { 0.0 };
+    let sampling = Sampling { largest_n_m, drag_n_m: TABLE_DRAG_N_M, temperature_c: scenario.temperature_c, noise_rad };
+    let known = unit.known(scenario.table);
+    let image = image(&known, unit.drive, &sampling).map_err(|error| format!("no table: {error:?}"))?;
+    // The stiffest that the flight comes to: the loop of the mesh torque is judged by what the table says there.
+    let stiffness = stiffness(&unit.nominal, scenario.largest_n_m());
+    let masses = TwoMasses {
+        motor_kg_m2: motor_kg_m2(scenario, unit),
+        load_kg_m2: scenario.load_kg_m2,
+        stiffness,
+        damping_s: damping_s(scenario, unit),
+        ratio: unit.nominal.ratio,
+    };
+    // At light load the drive is softer: the low-pass has to do for both.
+    let soft = TwoMasses { stiffness: self::stiffness(&unit.nominal, 0.1 * scenario.largest_n_m()), ..masses };
+    let path = Path { gain: 1.0, bandwidth_hz: 0.0, late_s: 0.0, rate_fed_forward: false };
+    let widest = |masses: &TwoMasses| masses.widest_hz(&scenario.servo, &path, DISTANCE, WIDEST_HZ);
+    let both = widest(&masses).zip(widest(&soft)).map(|(a, b)| a.min(b));
+    // Where no low-pass keeps the margin the torque in the mesh is not used.
+    let (torque, bandwidth_hz) = match (scenario.torque, both) {
+        (TorqueKnown::InMesh, Some(hz)) => (TorqueKnown::InMesh, hz),
+        (TorqueKnown::Current, Some(hz)) => (TorqueKnown::Current, hz.min(CURRENT_HZ)),
+        (TorqueKnown::OnLoad, _) => (TorqueKnown::OnLoad, KNOWN_HZ),
+        _ => (TorqueKnown::Not, KNOWN_HZ),
+    };
+    Ok(Made {
+        scenario,
+        unit,
+        image: [image.clone(), image],
+        masses,
+        soft_n_m_per_rad: soft.stiffness,
+        torque,
+        bandwidth_hz,
+    })
+}
+
+/// Slope of the wind-up around a torque, N·m/rad.
+fn stiffness(gear: &Gear, torque_n_m: f64) -> f64 {
+    let at = |share: f64| gear.error_under_rad(0.0, share * torque_n_m.max(0.1), 1.0);
+    0.4 * torque_n_m.max(0.1) / (at(1.2) - at(0.8))
+}
+
+fn motor_kg_m2(scenario: &Scenario, unit: &Unit) -> f64 {
+    scenario.servo.inertia_kg_m2 * unit.nominal.ratio * unit.nominal.ratio
+}
+
+/// The damping's time from the part of critical damping at the stiffness of the largest load.
+fn damping_s(scenario: &Scenario, unit: &Unit) -> f64 {
+    let stiffness = stiffness(&unit.nominal, scenario.largest_n_m());
+    let free = stiffness * (1.0 / motor_kg_m2(scenario, unit) + 1.0 / scenario.load_kg_m2);
+    2.0 * scenario.damping / free.sqrt()
+}
+
+fn plant(made: &Made<'_>) -> Plant {
+    let Made { scenario, unit, .. } = *made;
+    let settings = PlantSettings {
+        motor_kg_m2: motor_kg_m2(scenario, unit),
+        load_kg_m2: scenario.load_kg_m2,
+        gear: unit.built.clone(),
+        damping_s: damping_s(scenario, unit),
+        friction: Friction::EROB80_100,
+        drag_n_m: scenario.drag_n_m,
+        slip: Vec::new(),
+        appendage: None,
+        gravity: scenario.load.gravity,
+    };
+    Plant::new(settings, scenario.temperature_c)
+}
+
+/// What a controller is told in a tick.
+struct Told {
+    generator: GeneratorAngle,
+    moment: Moment,
+    direction: Direction,
+    reading: TorqueReading,
+    /// What only the ideal is told: the torque in the mesh if the load were at rest, N·m.
+    mesh_n_m: f64,
+}
+
+/// Ways to command the generator.
+enum Controller<'a> {
+    Uncompensated,
+    Fourier(Box<Fourier>),
+    Ideal(Box<Ideal>),
+    Core(Box<Core<'a>>),
+    ByTorque(Box<Core<'a>>, Limiter),
+}
+
+/// A command, its rate, and what the limiter and the table could not do.
+struct Commanded {
+    command: GeneratorAngle,
+    rate_rad_s: f64,
+    held_back: bool,
+    not_corrected: bool,
+}
+
+/// Moves a correction within limits, as the core does.
+#[derive(Default)]
+struct Limiter {
+    at: f64,
+    speed: f64,
+    goal: f64,
+}
+
+impl Limiter {
+    fn go(&mut self, goal: f64, tick_s: f64) -> f64 {
+        let pace = (goal - self.goal) / tick_s;
+        let lag = self.goal - self.at;
+        self.goal = goal;
+        let step = ACCELERATION_RAD_S2 * tick_s;
+        let stoppable = (step * (0.25 * step + 2.0 * lag.abs() / tick_s)).sqrt() - 0.5 * step;
+        let wanted = pace + libm::copysign(stoppable.min(lag.abs() / tick_s), lag);
+        self.speed = (self.speed + (wanted - self.speed).clamp(-step, step)).clamp(-RATE_RAD_S, RATE_RAD_S);
+        self.at += self.speed * tick_s;
+        self.at
+    }
+}
+
+/// Points of a curve over a tooth pitch.
+const CURVE: usize = 64;
+
+/// The unit's own error over the angles, recorded at the mean load: what a motion controller's error map holds.
+struct Fourier {
+    lines: Gear,
+    teeth: f64,
+    /// Forward and backward, or their mean twice.
+    curves: [[f64; CURVE]; 2],
+    limiter: Limiter,
+}
+
+impl Fourier {
+    fn new(made: &Made<'_>, by_direction: bool) -> Self {
+        let Made { scenario, unit, .. } = *made;
+        let plain = Gear { lines: Vec::new(), ..unit.built.clone() };
+        let teeth = f64::from(unit.drive.ripple_order());
+        let mut curves = [1.0, -1.0].map(|way| {
+            let mesh = scenario.mean_n_m() - way * scenario.drag_n_m;
+            let at = |k: usize| plain.error_under_rad(TAU / teeth * k as f64 / CURVE as f64, mesh, -way);
+            core::array::from_fn(at)
+        });
+        if !by_direction {
+            let [forward, backward] = curves;
+            let mean: [f64; CURVE] = core::array::from_fn(|k| 0.5 * (forward[k] + backward[k]));
+            curves = [mean; 2];
+        }
+        Self { lines: unit.built.clone(), teeth, curves, limiter: Limiter::default() }
+    }
+
+    fn error(&self, output_rad: f64, direction: Direction) -> f64 {
+        let curve = &self.curves[usize::from(direction == Direction::Backward)];
+        let mut error = 0.0;
+        for _ in 0..2 {
+            let generator = (output_rad - error) * self.lines.ratio;
+            let place = libm::fmod(generator * self.teeth / TAU, 1.0);
+            let place = (place - libm::floor(place)) * CURVE as f64;
+            let (first, share) = (place as usize % CURVE, place - libm::floor(place));
+            let ripple = curve[first] + share * (curve[(first + 1) % CURVE] - curve[first]);
+            error = ripple + self.lines.error(generator, output_rad)[0];
+        }
+        error
+    }
+}
+
+/// The unit itself, and the true torque: no table can do better, but for what the joint's motion adds.
+struct Ideal {
+    gear: Gear,
+    limiter: Limiter,
+}
+
+/// The core.
+struct Core<'a> {
+    joint: Joint,
+    images: Images<'a>,
+    store: Store,
+    state: JointState,
+    path: TorquePath,
+}
+
+fn setting(error: flexspline::SettingError) -> String {
+    error.to_string()
+}
+
+impl<'a> Controller<'a> {
+    fn new(made: &'a Made<'_>, kind: usize) -> Result<Self, String> {
+        let Made { scenario, unit, .. } = made;
+        Ok(match kind {
+            0 => Self::Uncompensated,
+            1 | 2 => Self::Fourier(Box::new(Fourier::new(made, kind == 2))),
+            COMPENSATED | BY_TORQUE => {
+                let limits = Limits {
+                    tick_s: scenario.servo.tick_s as f32,
+                    rate_rad_s: RATE_RAD_S as f32,
+                    acceleration_rad_s2: ACCELERATION_RAD_S2 as f32,
+                    generator_rate_rad_s: 600.0,
+                    patience: 5,
+                    hold_rad: HOLD_RAD,
+                };
+                let joint = Joint::new(unit.drive, limits, Overrun::SkipAndCount).map_err(setting)?;
+                let [image, twin] = &made.image;
+                let images = Images::new(image, twin);
+                let mut store = Store::new();
+                store
+                    .activate(&images, &unit.drive, scenario.temperature_c as f32)
+                    .map_err(|error| format!("the table cannot be flown: {error:?}"))?;
+                let mut state = JointState::new();
+                state.request(Mode::Tracking).map_err(|error| error.to_string())?;
+                let on_load = matches!(made.torque, TorqueKnown::OnLoad | TorqueKnown::Not);
+                // What the low-pass leaves of white noise.
+                let turned = TAU * made.bandwidth_hz * scenario.servo.tick_s;
+                let behind = (turned / (2.0 + turned)).sqrt();
+                let path = TorquePath::new(TorqueSettings {
+                    tick_s: scenario.servo.tick_s as f32,
+                    bandwidth_hz: made.bandwidth_hz as f32,
+                    drag_n_m: if on_load { scenario.drag_n_m as f32 } else { 0.0 },
+                    table_drag_n_m: TABLE_DRAG_N_M as f32,
+                    hold_n_m: (3.0 * behind * scenario.torque_noise_n_m) as f32,
+                })
+                .map_err(setting)?;
+                let core = Box::new(Core { joint, images, store, state, path });
+                if kind == BY_TORQUE { Self::ByTorque(core, Limiter::default()) } else { Self::Core(core) }
+            }
+            _ => Self::Ideal(Box::new(Ideal { gear: unit.built.clone(), limiter: Limiter::default() })),
+        })
+    }
+
+    fn tick(&mut self, made: &Made<'_>, told: &Told) -> Commanded {
+        let Moment { target_rad, rate_rad_s, .. } = told.moment;
+        let (ratio, tick_s) = (made.unit.nominal.ratio, made.scenario.servo.tick_s);
+        let nominal_rate = rate_rad_s * ratio;
+        let corrected = |goal: f64, slope: f64, limiter: &mut Limiter| {
+            let correction = limiter.go(goal, tick_s);
+            let command = GeneratorAngle::from_rad((target_rad - correction) * ratio).unwrap_or(GeneratorAngle::ZERO);
+            let held_back = (goal - correction).abs() > 5e-7;
+            Commanded { command, rate_rad_s: nominal_rate - slope * ratio, held_back, not_corrected: false }
+        };
+        let ahead = f64::from(AHEAD_S) * 0.5;
+        match self {
+            Self::Uncompensated => corrected(0.0, 0.0, &mut Limiter::default()),
+            Self::Fourier(fourier) => {
+                let at = |time: f64| fourier.error(target_rad + rate_rad_s * time, told.direction);
+                let slope = (at(ahead) - at(-ahead)) / (2.0 * ahead);
+                corrected(at(0.0), slope, &mut fourier.limiter)
+            }
+            Self::Ideal(ideal) => {
+                let way = if told.direction == Direction::Forward { -1.0 } else { 1.0 };
+                let at = |time: f64| {
+                    let target = target_rad + rate_rad_s * time;
+                    let mut error = 0.0;
+                    for _ in 0..2 {
+                        error = ideal.gear.error_under_rad((target - error) * ratio, told.mesh_n_m, way);
+                    }
+                    error
+                };
+                let slope = (at(ahead) - at(-ahead)) / (2.0 * ahead);
+                corrected(at(0.0), slope, &mut ideal.limiter)
+            }
+            Self::Core(core) => core.tick(told, nominal_rate),
+            Self::ByTorque(core, limiter) => {
+                let torque_n_m = core.path.tick(told.reading, told.direction);
+                let target = OutputAngle::from_rad(target_rad).unwrap_or(OutputAngle::ZERO);
+                let approach = Approach::Moving(told.direction);
+                let error = core.joint.inverse(&core.store, target, torque_n_m, approach).predicted_error_rad;
+                let rate = core.joint.rate_ahead(&core.store, target, rate_rad_s as f32, torque_n_m, AHEAD_S);
+                let still = rate_rad_s == 0.0 || rate.is_nan();
+                let slope = if still { 0.0 } else { rate_rad_s - f64::from(rate) / ratio };
+                corrected(f64::from(error), slope, limiter)
+            }
+        }
+    }
+}
+
+impl Core<'_> {
+    fn tick(&mut self, told: &Told, nominal_rate: f64) -> Commanded {
+        let Moment { target_rad, rate_rad_s, .. } = told.moment;
+        let torque_n_m = self.path.tick(told.reading, told.direction);
+        let target = OutputAngle::from_rad(target_rad).unwrap_or(OutputAngle::ZERO);
+        let input = Input {
+            generator: Some(told.generator),
+            target,
+            torque_n_m,
+            missed_ticks: 0,
+            adjustment: Adjustment::default(),
+        };
+        let rate = self.joint.rate_ahead(&self.store, target, rate_rad_s as f32, torque_n_m, AHEAD_S);
+        let out = self.joint.tick(&self.images, &mut self.store, &mut self.state, &input);
+        Commanded {
+            command: out.command,
+            rate_rad_s: if rate_rad_s == 0.0 || rate.is_nan() { nominal_rate } else { f64::from(rate) },
+            held_back: out.flags.contains(Flags::HELD_BACK),
+            not_corrected: out.flags.contains(Flags::NOT_CORRECTED),
+        }
+    }
+}
+
+/// What the joint knows of the torque in a tick.
+struct Sensing {
+    noise: Noise,
+    before_rad_s: f64,
+    friction: Friction,
+    even_s: f64,
+    /// The torque in the mesh that the motor's current told last, N·m, behind a low-pass, and how old it is, s.
+    told_n_m: f64,
+    age_s: f64,
+    /// It lies within ± this of the true one.
+    bound_n_m: f64,
+}
+
+impl Sensing {
+    fn new(scenario: &Scenario) -> Self {
+        Self {
+            noise: Noise::new(scenario.seed ^ 0x9b1d),
+            before_rad_s: 0.0,
+            friction: Friction::EROB80_100,
+            even_s: 0.0,
+            told_n_m: scenario.mean_n_m(),
+            age_s: 0.0,
+            bound_n_m: f64::INFINITY,
+        }
+    }
+
+    fn read(&mut self, made: &Made<'_>, plant: &Plant, servo: &mut Servo, now: &Moment) -> TorqueReading {
+        let scenario = made.scenario;
+        let noise = scenario.torque_noise_n_m * self.noise.normal();
+        match made.torque {
+            // What the load's inertia asks for on the way of the target is known before, and cannot feed back.
+            TorqueKnown::OnLoad => {
+                let known = on_load_n_m(scenario, now) + noise;
+                TorqueReading::OnLoad((known - scenario.load_kg_m2 * now.acceleration_rad_s2) as f32)
+            }
+            TorqueKnown::Not => TorqueReading::OnLoad(scenario.mean_n_m() as f32),
+            TorqueKnown::InMesh => TorqueReading::InMesh((plant.mesh_n_m() + noise) as f32),
+            TorqueKnown::Current => {
+                self.by_current(made, servo, now);
+                TorqueReading::InMesh(self.told_n_m as f32)
+            }
+        }
+    }
+
+    /// The motor's current less friction and inertia, while the target moves evenly; else what it was, with a bound that grows as the load may
+    /// have changed.
+    fn by_current(&mut self, made: &Made<'_>, servo: &mut Servo, now: &Moment) {
+        let scenario = made.scenario;
+        let tick_s = scenario.servo.tick_s;
+        let rate = servo.rate_rad_s();
+        let acceleration = (rate - self.before_rad_s) / tick_s;
+        self.before_rad_s = rate;
+        let even = now.rate_rad_s != 0.0 && now.acceleration_rad_s2 == 0.0;
+        self.even_s = if even { self.even_s + tick_s } else { 0.0 };
+        let level = self.friction.level_n_m(now.rate_rad_s, self.told_n_m);
+        if self.even_s >= SETTLES_S {
+            let rubbing = scenario.friction_known * self.rubbing_n_m(now.rate_rad_s, self.told_n_m);
+            let found = made.masses.motor_kg_m2 * acceleration - servo.current_n_m() + rubbing;
+            let share = 1.0 - libm::exp(-TAU * made.bandwidth_hz * tick_s);
+            // The friction has the sign of the target's rate only as long as the correction is slower than that.
+            let most = SLOWER * now.rate_rad_s.abs() * tick_s * made.soft_n_m_per_rad;
+            let wanted = share * (found - self.told_n_m);
+            self.told_n_m += wanted.clamp(-most, most);
+            // What is held back is as old as what it is held back from.
+            self.age_s = if wanted.abs() > most { self.age_s + tick_s } else { 0.0 };
+        } else {
+            self.age_s += tick_s;
+        }
+        let Load { swing, gust, step, .. } = scenario.load;
+        let late_s = self.age_s + 1.0 / (TAU * made.bandwidth_hz);
+        let blown = 2.0 * gust[0] * (2.0 * (1.0 - libm::exp(-TAU * gust[1] * late_s))).sqrt();
+        let swung = swing[0].abs() * (TAU * swing[1] * late_s).min(2.0);
+        let unknown = (1.0 - scenario.friction_known) * level;
+        self.bound_n_m = unknown + blown + swung + step[0].abs() + CURRENT_SURE_N_M;
+    }
+
+    /// Friction that a rate has to overcome, N·m at the output.
+    fn rubbing_n_m(&self, rate_rad_s: f64, mesh_n_m: f64) -> f64 {
+        if rate_rad_s == 0.0 {
+            return 0.0;
+        }
+        let level = self.friction.level_n_m(rate_rad_s, mesh_n_m);
+        libm::copysign(level, rate_rad_s) + self.friction.viscous_n_m_s * rate_rad_s
+    }
+}
+
+/// What gravity and wind do to the load, N·m.
+fn on_load_n_m(scenario: &Scenario, now: &Moment) -> f64 {
+    let [weight, most_at] = scenario.load.gravity;
+    now.outside_n_m[0] + weight * libm::cos(now.target_rad - most_at)
+}
+
+/// Rows of a flight in the report, at most.
+const ROWS: f64 = 4000.0;
+
+struct Lane<'a> {
+    plant: Plant,
+    servo: Servo,
+    sensing: Sensing,
+    controller: Controller<'a>,
+    direction: Direction,
+}
+
+impl<'a> Lane<'a> {
+    fn new(made: &'a Made<'_>, kind: usize) -> Result<Self, String> {
+        let scenario = made.scenario;
+        Ok(Self {
+            plant: plant(made),
+            servo: Servo::new(scenario.servo, made.unit.nominal.ratio, scenario.seed),
+            sensing: Sensing::new(scenario),
+            controller: Controller::new(made, kind)?,
+            direction: Direction::Forward,
+        })
+    }
+
+    fn tick(&mut self, made: &Made<'_>, now: &Moment) -> Commanded {
+        let scenario = made.scenario;
+        let generator = self.servo.read(&self.plant);
+        let reading = self.sensing.read(made, &self.plant, &mut self.servo, now);
+        if now.rate_rad_s != 0.0 {
+            self.direction = if now.rate_rad_s > 0.0 { Direction::Forward } else { Direction::Backward };
+        }
+        let way = if self.direction == Direction::Forward { 1.0 } else { -1.0 };
+        let inertia = scenario.load_kg_m2 * now.acceleration_rad_s2;
+        let mesh_n_m = on_load_n_m(scenario, now) - way * scenario.drag_n_m - inertia;
+        let told = Told { generator, moment: *now, direction: self.direction, reading, mesh_n_m };
+        let commanded = self.controller.tick(made, &told);
+        // The load has to be accelerated too.
+        let both = 1.0 + scenario.load_kg_m2 / made.masses.motor_kg_m2;
+        let asked = Asked {
+            command: commanded.command,
+            rate_rad_s: commanded.rate_rad_s,
+            acceleration_rad_s2: now.acceleration_rad_s2 * made.unit.nominal.ratio * both,
+            friction_n_m: scenario.friction_known * self.sensing.rubbing_n_m(now.rate_rad_s, mesh_n_m)
+                / made.unit.nominal.ratio,
+        };
+        let [first, last] = now.outside_n_m;
+        let tick_s = scenario.servo.tick_s;
+        self.servo.go(&mut self.plant, &asked, |time| first + (last - first) * time / tick_s);
+        commanded
+    }
+}
+
+fn lane(made: &Made<'_>, kind: usize) -> Result<Flown, String> {
+    let scenario = made.scenario;
+    let mut lane = Lane::new(made, kind)?;
+    let every = (scenario.seconds() / scenario.servo.tick_s / ROWS).ceil().max(1.0) as usize;
+    let mut flown = Flown { digest: 0xcbf2_9ce4_8422_2325, ..Flown::default() };
+    let mut within = 0_u32;
+    for (tick, now) in scenario.moments().enumerate() {
+        let error = (lane.plant.angle_rad[1] - now.target_rad) * ARCSEC_PER_RAD;
+        let ripple = (lane.plant.rate_rad_s[1] - now.rate_rad_s) * ARCSEC_PER_RAD;
+        let mesh = lane.plant.mesh_n_m();
+        if !error.is_finite() || error.abs() > 1e6 {
+            return Err(format!("{}: the joint runs away at {:.2} s", CONTROLLERS[kind], now.time_s));
+        }
+        flown.digest = (flown.digest ^ error.to_bits()).wrapping_mul(0x0100_0000_01b3);
+        let commanded = lane.tick(made, &now);
+        if now.time_s >= START_UP_S {
+            flown.error.add(error);
+            if now.steady {
+                flown.ripple.add(ripple);
+            }
+            let off = lane.sensing.told_n_m - mesh;
+            within += u32::from(off.abs() <= lane.sensing.bound_n_m);
+            flown.mesh.add(mesh);
+            flown.errors.push(error as f32);
+            let limits = [lane.servo.saturated(), commanded.held_back, commanded.not_corrected];
+            flown.limits.iter_mut().zip(limits).for_each(|(count, there)| *count += u32::from(there));
+        }
+        if tick % every == 0 {
+            flown.rows.push([now.time_s, error, mesh]);
+        }
+    }
+    flown.told = f64::from(within) / flown.errors.len().max(1) as f64;
+    Ok(flown)
+}
+
+/// A target that stands, a knock, and what is left of it: speed of the load (rad/s rms) about its mean, which a slow low-pass moves, in the
+/// last half second.
+fn left_of_a_knock(made: &Made<'_>, kind: usize) -> Result<f64, String> {
+    let mut lane = Lane::new(made, kind)?;
+    let outside = made.scenario.load.bias_n_m + 0.5 * made.scenario.load.swing[0];
+    let now = |tick: u32| Moment {
+        time_s: f64::from(tick) * made.scenario.servo.tick_s,
+        outside_n_m: [outside; 2],
+        ..Moment::default()
+    };
+    let second = (1.0 / made.scenario.servo.tick_s) as u32;
+    let (mut left, mut sum) = (Score::default(), 0.0);
+    for tick in 0..4 * second {
+        if tick == second {
+            let mut rates = lane.plant.rate_rad_s;
+            rates[1] += 1e-3;
+            lane.plant.set_motion(lane.plant.angle_rad, rates);
+        }
+        lane.tick(made, &now(tick));
+        if 2 * tick >= 7 * second {
+            left.add(lane.plant.rate_rad_s[1]);
+            sum += lane.plant.rate_rad_s[1];
+        }
+    }
+    let mean = sum / f64::from(left.count.max(1));
+    Ok((left.rms() * left.rms() - mean * mean).max(0.0).sqrt())
+}
+
+/// Speed below which a joint counts as at rest, rad/s: 4″/s, with an encoder that steps.
+const AT_REST_RAD_S: f64 = 2e-5;
+
+fn stable(made: &Made<'_>) -> Result<bool, String> {
+    let [without, with] = [0, COMPENSATED].map(|kind| left_of_a_knock(made, kind));
+    Ok(with? <= (2.0 * without?).max(AT_REST_RAD_S))
+}

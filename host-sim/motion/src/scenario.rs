@@ -1,0 +1,212 @@
+//! What a joint is asked to do, what does it, and what is known of it.
+
+use core::f64::consts::TAU;
+
+use super::servo::{Noise, ServoSettings};
+
+/// A stretch of time in which the target goes to a rate and keeps it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leg {
+    /// How long, s.
+    pub seconds: f64,
+    /// Rate of the target at the output, rad/s.
+    pub rate_rad_s: f64,
+}
+
+/// Torques on the load from outside, N·m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Load {
+    /// What is always there.
+    pub bias_n_m: f64,
+    /// A slow swing: amplitude, and Hz.
+    pub swing: [f64; 2],
+    /// Gusts: rms, and the corner of their spectrum (first order), Hz.
+    pub gust: [f64; 2],
+    /// Steps up and down, as a wheel over stones: size, and period in s.
+    pub step: [f64; 2],
+    /// Weight times arm, and the output angle where it pulls forward most, rad.
+    pub gravity: [f64; 2],
+}
+
+/// From what the torque is known in flight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TorqueKnown {
+    /// On the load, from a model or a sensor there: with noise.
+    OnLoad,
+    /// In the mesh, from a sensor between drive and load: with noise.
+    InMesh,
+    /// From the motor's current, through a model of the friction.
+    Current,
+    /// Not at all: the mean of the load.
+    Not,
+}
+
+/// What the table of the joint knows of the unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TableKnown {
+    /// The drive as designed.
+    Nominal,
+    /// The drive as designed, and the lines of the unit as a diagnosis tells them: 5 % too small (guess).
+    Extended,
+    /// The unit, sampled at rest with noise.
+    Calibrated,
+}
+
+/// Everything.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scenario {
+    /// Its name.
+    pub name: String,
+    /// Its legs.
+    pub legs: Vec<Leg>,
+    /// Acceleration between legs, rad/s².
+    pub acceleration_rad_s2: f64,
+    /// What pulls at the load.
+    pub load: Load,
+    /// Inertia of the load, kg·m².
+    pub load_kg_m2: f64,
+    /// Coulomb drag of the output, N·m.
+    pub drag_n_m: f64,
+    /// Part of critical damping of the twist, at the stiffness under the largest load (guess: 0.02).
+    pub damping: f64,
+    /// Temperature of the drive, °C.
+    pub temperature_c: f64,
+    /// The servo.
+    pub servo: ServoSettings,
+    /// Share of the friction on the motor's side that the servo is told before, by the sign of the target's rate.
+    pub friction_known: f64,
+    /// From what the torque is known.
+    pub torque: TorqueKnown,
+    /// Noise of the torque, N·m rms.
+    pub torque_noise_n_m: f64,
+    /// What the table knows.
+    pub table: TableKnown,
+    /// Start of the numbers that look random.
+    pub seed: u32,
+}
+
+/// A rate held for this long is steady, s.
+const STEADY_S: f64 = 0.5;
+
+/// What is asked for at one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moment {
+    /// Time, s.
+    pub time_s: f64,
+    /// Target of the output, rad, and its rate and acceleration.
+    pub target_rad: f64,
+    /// rad/s.
+    pub rate_rad_s: f64,
+    /// rad/s².
+    pub acceleration_rad_s2: f64,
+    /// Whether the target has moved at this rate for half a second.
+    pub steady: bool,
+    /// Torque on the load at the beginning of the tick, without gravity's, N·m, and at its end.
+    pub outside_n_m: [f64; 2],
+}
+
+impl Scenario {
+    /// Time of the whole flight, s.
+    pub fn seconds(&self) -> f64 {
+        self.legs.iter().map(|leg| leg.seconds).sum()
+    }
+
+    /// Largest torque on the load that is to be expected, N·m.
+    pub fn largest_n_m(&self) -> f64 {
+        let Load { bias_n_m, swing, gust, step, gravity } = self.load;
+        bias_n_m.abs()
+            + swing[0].abs()
+            + 4.0 * gust[0]
+            + step[0].abs()
+            + gravity[0].abs()
+            + self.load_kg_m2 * self.acceleration_rad_s2
+    }
+
+    /// Mean of the torque on the load as far as it is known before, N·m.
+    pub fn mean_n_m(&self) -> f64 {
+        self.load.bias_n_m
+    }
+
+    /// What is asked for at every tick.
+    pub fn moments(&self) -> Moments<'_> {
+        Moments {
+            scenario: self,
+            noise: Noise::new(self.seed ^ 0x5bd1),
+            gust: 0.0,
+            leg: 0,
+            leg_ends: 0.0,
+            tick: 0,
+            target_rad: 0.0,
+            rate_rad_s: 0.0,
+            even_s: 0.0,
+            outside_n_m: self.load.bias_n_m,
+        }
+    }
+}
+
+/// The moments of a flight, in order.
+#[derive(Clone, Debug)]
+pub struct Moments<'s> {
+    scenario: &'s Scenario,
+    noise: Noise,
+    gust: f64,
+    leg: usize,
+    leg_ends: f64,
+    tick: u32,
+    target_rad: f64,
+    rate_rad_s: f64,
+    even_s: f64,
+    outside_n_m: f64,
+}
+
+impl Moments<'_> {
+    /// Torque from outside a tick on.
+    fn outside(&mut self) -> f64 {
+        let Load { bias_n_m, swing, gust, step, .. } = self.scenario.load;
+        let tick_s = self.scenario.servo.tick_s;
+        let time_s = f64::from(self.tick + 1) * tick_s;
+        let share = 1.0 - libm::exp(-TAU * gust[1] * tick_s);
+        // The noise behind the low-pass has the rms asked for.
+        let drive = gust[0] * ((2.0 - share) / share).sqrt() * self.noise.normal();
+        self.gust += if gust[0] > 0.0 { share * (drive - self.gust) } else { 0.0 };
+        let stepped = if step[1] > 0.0 {
+            // Up and down within a hundredth of the period.
+            let at = libm::sin(TAU * time_s / step[1]) * (100.0 / TAU);
+            step[0] * at.clamp(-1.0, 1.0)
+        } else {
+            0.0
+        };
+        bias_n_m + swing[0] * libm::sin(TAU * swing[1] * time_s) + self.gust + stepped
+    }
+}
+
+impl Iterator for Moments<'_> {
+    type Item = Moment;
+
+    fn next(&mut self) -> Option<Moment> {
+        let tick_s = self.scenario.servo.tick_s;
+        let time_s = f64::from(self.tick) * tick_s;
+        while time_s >= self.leg_ends - 0.5 * tick_s {
+            self.leg_ends += self.scenario.legs.get(self.leg)?.seconds;
+            self.leg += 1;
+        }
+        let wanted = self.scenario.legs.get(self.leg - 1)?.rate_rad_s;
+        let most = self.scenario.acceleration_rad_s2 * tick_s;
+        let change = (wanted - self.rate_rad_s).clamp(-most, most);
+        let before = self.outside_n_m;
+        self.outside_n_m = self.outside();
+        let moment = Moment {
+            time_s,
+            target_rad: self.target_rad,
+            rate_rad_s: self.rate_rad_s,
+            acceleration_rad_s2: change / tick_s,
+            steady: self.rate_rad_s != 0.0 && self.even_s >= STEADY_S,
+            outside_n_m: [before, self.outside_n_m],
+        };
+        self.target_rad += (self.rate_rad_s + 0.5 * change) * tick_s;
+        self.rate_rad_s += change;
+        self.even_s = if change == 0.0 { self.even_s + tick_s } else { 0.0 };
+        self.tick += 1;
+        Some(moment)
+    }
+}

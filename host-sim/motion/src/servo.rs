@@ -1,0 +1,166 @@
+//! The servo as drives have it: a position loop around a speed loop around the current, sampled, late, with an encoder of so many counts.
+
+use core::f64::consts::TAU;
+
+use flexspline::GeneratorAngle;
+
+use super::plant::Plant;
+
+/// What a servo is made of; bandwidths of a rigid motor alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoSettings {
+    /// Time from tick to tick, s.
+    pub tick_s: f64,
+    /// Steps of the plant in a tick.
+    pub steps: usize,
+    /// Steps of the plant from a sample to the current that it asks for: computing, bus, current loop.
+    pub late_steps: usize,
+    /// Inertia that it is tuned for, kg·m² at the motor.
+    pub inertia_kg_m2: f64,
+    /// Largest torque, N·m at the motor.
+    pub largest_n_m: f64,
+    /// Position loop, Hz.
+    pub position_hz: f64,
+    /// Speed loop, Hz.
+    pub speed_hz: f64,
+    /// Corner of the integral part of the speed loop, Hz.
+    pub integral_hz: f64,
+    /// Bits of the encoder in a motor turn.
+    pub encoder_bits: u32,
+    /// The encoder is read up to so much too late, evenly spread, s.
+    pub jitter_s: f64,
+    /// Noise of the torque told from the motor's current, N·m at the motor, rms.
+    pub current_noise_n_m: f64,
+}
+
+/// What the servo is asked for in a tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked {
+    /// Where the generator shall be.
+    pub command: GeneratorAngle,
+    /// Its rate, fed forward, rad/s of the generator.
+    pub rate_rad_s: f64,
+    /// Its acceleration, fed forward, rad/s².
+    pub acceleration_rad_s2: f64,
+    /// Torque that friction is expected to take, fed forward, N·m at the motor.
+    pub friction_n_m: f64,
+}
+
+/// A motor with its servo and its encoder.
+#[derive(Clone, Debug)]
+pub struct Servo {
+    /// What it is made of.
+    pub settings: ServoSettings,
+    ratio: f64,
+    noise: Noise,
+    torque_n_m: f64,
+    next_n_m: f64,
+    integral_n_m: f64,
+    shown: GeneratorAngle,
+    before: GeneratorAngle,
+}
+
+impl Servo {
+    /// At rest at zero, on a drive of a ratio.
+    pub fn new(settings: ServoSettings, ratio: f64, seed: u32) -> Self {
+        Self {
+            settings,
+            ratio,
+            noise: Noise::new(seed),
+            torque_n_m: 0.0,
+            next_n_m: 0.0,
+            integral_n_m: 0.0,
+            shown: GeneratorAngle::ZERO,
+            before: GeneratorAngle::ZERO,
+        }
+    }
+
+    /// Reads the encoder: once in each tick, first of all.
+    pub fn read(&mut self, plant: &Plant) -> GeneratorAngle {
+        let ServoSettings { encoder_bits, jitter_s, .. } = self.settings;
+        let late = jitter_s * 0.5 * (1.0 + self.noise.part());
+        let angle = (plant.angle_rad[0] - late * plant.rate_rad_s[0]) * self.ratio;
+        let steps = f64::from(1u32 << encoder_bits);
+        let counts = libm::floor(angle * (steps / TAU) + 0.5) as i64;
+        self.before = self.shown;
+        self.shown = GeneratorAngle::from_counts(counts << (32 - encoder_bits));
+        self.shown
+    }
+
+    /// Motor torque times ratio as its current tells it, N·m at the output, of the tick before.
+    pub fn current_n_m(&mut self) -> f64 {
+        self.ratio * (self.torque_n_m + self.settings.current_noise_n_m * self.noise.normal())
+    }
+
+    /// Speed of the motor over the ratio as the encoder shows it, rad/s.
+    pub fn rate_rad_s(&self) -> f64 {
+        angle_rad(self.shown.minus_counts(self.before)) / self.settings.tick_s / self.ratio
+    }
+
+    /// Whether the motor gives all it has.
+    pub fn saturated(&self) -> bool {
+        self.next_n_m.abs() >= self.settings.largest_n_m
+    }
+
+    /// One tick: the current is set, and the plant goes on under a torque from outside.
+    pub fn go(&mut self, plant: &mut Plant, asked: &Asked, outside_n_m: impl Fn(f64) -> f64) {
+        let ServoSettings { tick_s, steps, late_steps, .. } = self.settings;
+        self.control(asked);
+        let step_s = tick_s / steps as f64;
+        for step in 0..steps {
+            if step == late_steps {
+                self.torque_n_m = self.next_n_m;
+            }
+            plant.step(step_s, self.torque_n_m * self.ratio, outside_n_m((step as f64 + 0.5) * step_s));
+        }
+    }
+
+    fn control(&mut self, asked: &Asked) {
+        let ServoSettings { tick_s, inertia_kg_m2, largest_n_m, position_hz, speed_hz, integral_hz, .. } =
+            self.settings;
+        // What was asked for before and has not come is late by a tick.
+        self.torque_n_m = self.next_n_m;
+        let speed = self.rate_rad_s() * self.ratio;
+        let wanted = asked.rate_rad_s + TAU * position_hz * angle_rad(asked.command.minus_counts(self.shown));
+        let gain = TAU * speed_hz * inertia_kg_m2;
+        let torque = gain * (wanted - speed)
+            + self.integral_n_m
+            + inertia_kg_m2 * asked.acceleration_rad_s2
+            + asked.friction_n_m;
+        self.next_n_m = torque.clamp(-largest_n_m, largest_n_m);
+        if self.next_n_m == torque {
+            self.integral_n_m += gain * TAU * integral_hz * tick_s * (wanted - speed);
+        }
+    }
+}
+
+/// Counts of an angle as radians.
+fn angle_rad(counts: i64) -> f64 {
+    counts as f64 * (TAU / 4_294_967_296.0)
+}
+
+/// Numbers that look random, the same in every run.
+#[derive(Clone, Debug)]
+pub struct Noise(u32);
+
+impl Noise {
+    /// From a seed.
+    pub fn new(seed: u32) -> Self {
+        Self(seed)
+    }
+
+    /// Evenly between −1 and 1.
+    pub fn part(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9);
+        let mut x = self.0;
+        x = (x ^ (x >> 16)).wrapping_mul(0x85eb_ca6b);
+        x = (x ^ (x >> 13)).wrapping_mul(0xc2b2_ae35);
+        f64::from(x ^ (x >> 16)) * (2.0 / 4_294_967_296.0) - 1.0
+    }
+
+    /// Nearly normal, of standard deviation 1: the sum of four.
+    pub fn normal(&mut self) -> f64 {
+        let sum = self.part() + self.part() + self.part() + self.part();
+        sum * (0.75_f64).sqrt()
+    }
+}

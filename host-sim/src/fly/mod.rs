@@ -1,0 +1,72 @@
+//! Flights of a joint with mass: scenarios with a name or from a file, on units built from the contact FEM of the four generators.
+//!
+//! What moves is in `flexspline-motion`; here scenarios are read, units made, and results put into numbers.
+
+mod built_in;
+mod file;
+mod results;
+
+use flexspline_motion::flight::{Flight, Unit, fly};
+use flexspline_motion::gear::Sampled;
+use flexspline_motion::scenario::Scenario;
+
+use crate::closed_loop::flight::gear::Gear;
+use crate::closed_loop::map::DenseMap;
+use crate::drive::{Drive, GeneratorKind};
+use crate::tables::core_drive;
+
+pub use built_in::{SCENARIOS, built_in};
+pub use file::read;
+pub use results::{ByController, Results, Row, results, spectrum};
+
+/// A scenario, and what flies it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flown {
+    /// Which generator the drive has.
+    pub kind: GeneratorKind,
+    /// What is flown.
+    pub scenario: Scenario,
+}
+
+/// The maps of HHD-95 by contact FEM, at points that made no table (`examples/closed_loop.rs map`).
+fn map(kind: GeneratorKind) -> &'static str {
+    match kind {
+        GeneratorKind::TwoRoller => include_str!("../../../tests/firmware/plant/two-roller.csv"),
+        GeneratorKind::FourRoller => include_str!("../../../tests/firmware/plant/four-roller.csv"),
+        GeneratorKind::DoubleDisc => include_str!("../../../tests/firmware/plant/double-disc.csv"),
+        GeneratorKind::Cam => include_str!("../../../tests/firmware/plant/cam.csv"),
+    }
+}
+
+/// A unit of HHD-95 with this generator at a temperature: wind-up, clearance and ripple of the contact FEM, and what was built otherwise.
+///
+/// # Errors
+/// What is wrong, in words.
+pub fn unit(kind: GeneratorKind, temperature_c: f64) -> Result<Unit, String> {
+    let name = format!("{kind}.csv");
+    let map = DenseMap::parse(kind, &name, map(kind)).map_err(|error| error.to_string())?;
+    let gear = Gear::new(map.view(), temperature_c);
+    let teeth = gear.map().header.teeth;
+    let largest = gear.map().header.largest_n_m;
+    let law = |phase: f64, flank: f64| gear.elastic_error_rad(phase * std::f64::consts::TAU / teeth, flank, 1.0);
+    let drive = core_drive(&Drive::hhd_95()).map_err(|error| error.to_string())?;
+    Ok(Unit::of_spring(drive, Sampled::of_law(teeth, largest, law)))
+}
+
+impl Flown {
+    /// Flies it.
+    ///
+    /// # Errors
+    /// What cannot be flown, in words.
+    pub fn fly(&self) -> Result<Flight, String> {
+        let most = self.kind.rated_torque_n_m();
+        let largest = self.scenario.largest_n_m();
+        if largest > most {
+            return Err(format!(
+                "load: found up to {largest:.1} N.m, allowed: {most} N.m with a {} generator",
+                self.kind
+            ));
+        }
+        fly(&self.scenario, &unit(self.kind, self.scenario.temperature_c)?)
+    }
+}

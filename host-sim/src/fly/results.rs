@@ -1,0 +1,182 @@
+//! A flight in numbers.
+
+use flexspline_motion::flight::{COMPENSATED, Flight, Flown, START_UP_S};
+use flexspline_motion::scenario::Scenario;
+use serde::Serialize;
+
+use flexspline_algebra::spectrum as sums_of;
+
+/// Output less target within this of where it ends counts as settled, arcsec.
+const SETTLED_ARCSEC: f64 = 2.0;
+/// Ticks of one spectrum.
+const WINDOW: usize = 4096;
+
+/// One number to each controller.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ByController<T> {
+    /// Target times ratio.
+    pub none: T,
+    /// The unit's own error over the angles, at the mean load.
+    pub fourier: T,
+    /// The same, by the sign of velocity.
+    pub fourier_by_direction: T,
+    /// The core.
+    pub compensated: T,
+    /// The unit's own law and the true torque at rest: what a quasi-static inverse can do.
+    pub ideal: T,
+}
+
+/// What `flexspline fly` gives.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Results {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Wave generator.
+    pub generator: String,
+    /// From what the torque is known (`none` also where no low-pass of the torque in the mesh keeps the margin), and what the table knows.
+    pub torque: String,
+    /// See there.
+    pub table: String,
+    /// Simulated time, s.
+    pub seconds: f64,
+    /// Output less target.
+    pub rms_arcsec: ByController<f64>,
+    /// Largest of it.
+    pub max_arcsec: ByController<f64>,
+    /// Speed of the output less that of the target while that moves evenly, arcsec/s rms.
+    pub velocity_ripple: ByController<f64>,
+    /// Torque in the mesh, N·m, largest.
+    pub mesh_n_m: ByController<f64>,
+    /// From the end of a slew until the output stays within 2″ of where it comes to rest, s, mean; none if the scenario never stands.
+    pub settle_s: Option<ByController<f64>>,
+    /// Share of what the ideal removes that the core removes.
+    pub removed: f64,
+    /// Whether the compensated joint comes to rest after a knock as the one without compensation does.
+    pub stable: bool,
+    /// Low-pass of a torque in the mesh that keeps the margin, Hz.
+    pub bandwidth_hz: f64,
+    /// Phase margin of the servo, degrees, at Hz; its least distance from −1.
+    pub phase_margin_deg: [f64; 2],
+    /// See there.
+    pub servo_distance: f64,
+    /// Resonances with motor held and free, Hz.
+    pub resonances_hz: [f64; 2],
+    /// Ticks in which the motor gave all it has, the limiter held back, nothing was corrected, with the core.
+    pub limited_ticks: [u32; 3],
+    /// Share of ticks in which the torque told by the motor's current lay within its bound; none where another is used.
+    pub torque_within_bound: Option<f64>,
+    /// All bits of all errors of all controllers.
+    pub digest: String,
+}
+
+/// A point of a curve.
+pub type Row = [f64; 2];
+
+fn by_controller<T>(flight: &Flight, value: impl Fn(&Flown) -> T) -> Option<ByController<T>> {
+    let mut values = flight.flown.iter().map(value);
+    let mut next = || values.next();
+    Some(ByController {
+        none: next()?,
+        fourier: next()?,
+        fourier_by_direction: next()?,
+        compensated: next()?,
+        ideal: next()?,
+    })
+}
+
+/// The numbers of a flight; `None` if a controller is missing.
+#[must_use]
+pub fn results(flown: &super::Flown, flight: &Flight) -> Option<Results> {
+    let scenario = &flown.scenario;
+    let rms = by_controller(flight, |flown| flown.error.rms())?;
+    let digest = flight.flown.iter().fold(0_u64, |sum, flown| sum.rotate_left(9) ^ flown.digest);
+    let core = flight.flown.get(COMPENSATED)?;
+    let current = flight.torque == flexspline_motion::scenario::TorqueKnown::Current;
+    Some(Results {
+        scenario: scenario.name.clone(),
+        generator: flown.kind.to_string(),
+        torque: snake(&format!("{:?}", flight.torque)),
+        table: snake(&format!("{:?}", scenario.table)),
+        seconds: scenario.seconds(),
+        rms_arcsec: rms,
+        max_arcsec: by_controller(flight, |flown| flown.error.largest())?,
+        velocity_ripple: by_controller(flight, |flown| flown.ripple.rms())?,
+        mesh_n_m: by_controller(flight, |flown| flown.mesh.largest())?,
+        settle_s: if stands(scenario).next().is_some() {
+            by_controller(flight, |flown| settle_s(scenario, flown))
+        } else {
+            None
+        },
+        removed: (rms.none - rms.compensated) / (rms.none - rms.ideal),
+        stable: flight.stable,
+        bandwidth_hz: flight.bandwidth_hz,
+        phase_margin_deg: flight.phase_margin_deg,
+        servo_distance: flight.servo_distance,
+        resonances_hz: flight.resonances_hz,
+        limited_ticks: core.limits,
+        torque_within_bound: current.then_some(core.told),
+        digest: format!("{digest:016x}"),
+    })
+}
+
+/// `OnLoad` as `on_load`; what is not known is `none`.
+fn snake(name: &str) -> String {
+    match name {
+        "OnLoad" => "on_load".to_owned(),
+        "InMesh" => "in_mesh".to_owned(),
+        "Not" => "none".to_owned(),
+        other => other.to_lowercase(),
+    }
+}
+
+/// From when until when the target stands after it moved, s.
+fn stands(scenario: &Scenario) -> impl Iterator<Item = [f64; 2]> + '_ {
+    let mut begins = 0.0;
+    let mut before = 0.0_f64;
+    scenario.legs.iter().filter_map(move |leg| {
+        let (from, rate) = (begins, before);
+        begins += leg.seconds;
+        before = leg.rate_rad_s;
+        let stopped = from + rate.abs() / scenario.acceleration_rad_s2;
+        (leg.rate_rad_s == 0.0 && rate != 0.0 && stopped < begins).then_some([stopped, begins])
+    })
+}
+
+fn settle_s(scenario: &Scenario, flown: &Flown) -> f64 {
+    let tick_s = scenario.servo.tick_s;
+    let index = |time: f64| (((time - START_UP_S) / tick_s).max(0.0) as usize).min(flown.errors.len());
+    let (mut sum, mut count) = (0.0, 0.0);
+    for [from, to] in stands(scenario) {
+        let stretch = &flown.errors[index(from)..index(to)];
+        let Some(last) = stretch.last() else { continue };
+        let outside = stretch.iter().rposition(|error| f64::from((error - last).abs()) > SETTLED_ARCSEC);
+        sum += outside.map_or(0.0, |at| (at + 1) as f64 * tick_s);
+        count += 1.0;
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// Amplitude of the error (arcsec) over frequency (Hz): rms of windows of 4 s, by Hann, averaged.
+#[must_use]
+pub fn spectrum(scenario: &Scenario, flown: &Flown) -> Vec<Row> {
+    let mut power = vec![0.0; WINDOW / 2 + 1];
+    let mut count = 0.0;
+    for window in flown.errors.chunks_exact(WINDOW) {
+        let mean = window.iter().copied().map(f64::from).sum::<f64>() / WINDOW as f64;
+        let mut values: Vec<f64> = window
+            .iter()
+            .enumerate()
+            .map(|(k, value)| {
+                let hann = 1.0 - (std::f64::consts::TAU * k as f64 / WINDOW as f64).cos();
+                hann * (f64::from(*value) - mean)
+            })
+            .collect();
+        for (sum, line) in power.iter_mut().zip(sums_of(&mut values)) {
+            *sum += (line.norm() * 2.0 / WINDOW as f64).powi(2);
+        }
+        count += 1.0;
+    }
+    let hz = 1.0 / (WINDOW as f64 * scenario.servo.tick_s);
+    let amplitude = |(k, sum): (usize, &f64)| [k as f64 * hz, (sum / f64::max(count, 1.0)).sqrt()];
+    power.iter().enumerate().skip(1).take_while(|(k, _)| *k as f64 * hz <= 100.0).map(amplitude).collect()
+}
