@@ -261,6 +261,7 @@ fn every_command_prints_one_json_object_and_nothing_else() {
         "study --generator cam --vary generator.w0_mm=0.5 --positions 4",
         "look out/data.csv",
         "calibrate out/data.csv --model nominal.toml",
+        "fly camera --no-report",
     ];
     for line in lines {
         let run = desk.line(&format!("{line} --json"));

@@ -75,6 +75,12 @@ impl Context {
         self.common.drive != super::USUAL_DRIVE
     }
 
+    /// The option that asks for another drive than the usual one, if there is one.
+    pub(super) fn changes_the_drive(&self) -> Option<&'static str> {
+        let by_set = || (!self.common.sets.is_empty()).then_some("--set");
+        if self.has_drive() { Some("--drive") } else { by_set() }
+    }
+
     /// A command to type next, of the same drive.
     pub(super) fn next(&self, words: &str) -> String {
         let mut command = format!("flexspline {words}");

@@ -33,6 +33,10 @@ pub(super) struct Fly {
 
 impl Fly {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
+        if let Some(option) = context.changes_the_drive() {
+            let what = "the unit of a flight is that of its scenario; allowed: unit and table in a scenario file";
+            return Err(Failure::BadInput(format!("{option}: {what}")));
+        }
         let flown = self.flown()?;
         let out = context.out()?;
         let flight = flown.fly().map_err(Failure::Failed)?;

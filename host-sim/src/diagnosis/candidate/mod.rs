@@ -491,6 +491,10 @@ impl Law {
     /// An encoder that reads what a wheel may do as well: odds are on the wheel, and its misfit may look like this law.
     fn after_wheels(mut self) -> Law {
         self.search.odds_against = AFTER_WHEELS;
+        self.kin_of_shapes()
+    }
+    /// What a misfit of wheels may look like: of an eccentric spline whose flanks bind, a second order of the output of a sixth of its size.
+    fn kin_of_shapes(mut self) -> Law {
         self.wrong.kin = Kin::Shape;
         self
     }

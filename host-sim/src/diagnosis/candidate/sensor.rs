@@ -76,7 +76,8 @@ fn encoder_tilt() -> [Law; 2] {
         ]
     };
     let of_generator = waves_of(CauseName::GeneratorEncoderTilt, GENERATOR, 2.0, false, at_generator);
-    [waves_of(CauseName::OutputEncoderTilt, OUTPUT, 2.0, true, at_output), of_generator.after_wheels()]
+    let of_output = waves_of(CauseName::OutputEncoderTilt, OUTPUT, 2.0, true, at_output);
+    [of_output.kin_of_shapes(), of_generator.after_wheels()]
 }
 
 /// Waves in a turn that interpolation leaves: four of a magnet with two poles, and so on for 4, 8, ... signal periods in a turn, the orders
