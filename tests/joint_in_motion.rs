@@ -28,9 +28,14 @@ fn with_an_inert_load_the_core_removes_what_a_quasi_static_inverse_removes() {
         let rms = found.rms_arcsec;
         println!(
             "{kind}: {:.1} none, {:.1} by angle, {:.1} by angle and direction, {:.1} core, {:.1} ideal; removed {:.3}",
-            rms.none, rms.fourier, rms.fourier_by_direction, rms.compensated, rms.ideal, found.removed
+            rms.none,
+            rms.fourier,
+            rms.fourier_by_direction,
+            rms.compensated,
+            rms.ideal,
+            found.removed.unwrap()
         );
-        assert!(found.removed > 0.95 && found.stable, "{kind}");
+        assert!(found.removed.unwrap() > 0.95 && found.stable, "{kind}");
         assert!(rms.compensated < rms.fourier_by_direction && rms.compensated < 0.5 * rms.none, "{kind}");
     }
 }
@@ -41,10 +46,10 @@ fn with_an_inert_load_the_core_removes_what_a_quasi_static_inverse_removes() {
 fn a_torque_in_the_mesh_passes_only_as_far_as_its_loop_keeps_the_margin() {
     let [stiff, soft] =
         [GeneratorKind::DoubleDisc, GeneratorKind::TwoRoller].map(|kind| flight(&dish(kind, "in_mesh")));
-    println!("double disc: {} {:.2} Hz, removed {:.3}", stiff.torque, stiff.bandwidth_hz, stiff.removed);
-    println!("two rollers: {} {:.2} Hz, removed {:.3}", soft.torque, soft.bandwidth_hz, soft.removed);
-    assert!(stiff.torque == "in_mesh" && stiff.stable && stiff.removed > 0.8);
-    assert!(soft.torque == "in_mesh" && soft.removed > 0.5 && soft.bandwidth_hz < 1.0);
+    println!("double disc: {} {:.2} Hz, removed {:.3}", stiff.torque, stiff.bandwidth_hz, stiff.removed.unwrap());
+    println!("two rollers: {} {:.2} Hz, removed {:.3}", soft.torque, soft.bandwidth_hz, soft.removed.unwrap());
+    assert!(stiff.torque == "in_mesh" && stiff.stable && stiff.removed.unwrap() > 0.8);
+    assert!(soft.torque == "in_mesh" && soft.removed.unwrap() > 0.5 && soft.bandwidth_hz < 1.0);
 }
 
 #[test]
@@ -54,10 +59,13 @@ fn scenarios_with_a_name_are_stable_and_better_with_the_core_than_with_any_error
         let rms = found.rms_arcsec;
         println!(
             "{name}: {:.1} none, {:.1} core, {:.1} ideal, removed {:.3}",
-            rms.none, rms.compensated, rms.ideal, found.removed
+            rms.none,
+            rms.compensated,
+            rms.ideal,
+            found.removed.unwrap()
         );
         // The low-pass of the torque is late for the steps of a wheel over stones.
-        assert!(found.stable && found.removed > 0.85, "{name}");
+        assert!(found.stable && found.removed.unwrap() > 0.85, "{name}");
         assert!(rms.compensated < rms.fourier.min(rms.fourier_by_direction).min(rms.none), "{name}");
     }
 }

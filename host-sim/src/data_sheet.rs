@@ -152,6 +152,9 @@ pub fn data_sheet(
 ) -> (DataSheet, Result<(), SolveError>) {
     let mut sheet = DataSheet { rigid_gap_um: rigid_gap_um(drive, kind), ..DataSheet::default() };
     let done = fill(&mut sheet, drive, kind, loads, positions, settings);
+    if let (Err(SolveError::NotConverged { reached_n_m, .. }), Some(last)) = (&done, &mut sheet.last_stable_n_m) {
+        *last = last.max(*reached_n_m);
+    }
     (sheet, done)
 }
 

@@ -127,6 +127,11 @@ impl Score {
         if self.count == 0 { 0.0 } else { (self.squares / f64::from(self.count)).sqrt() }
     }
 
+    /// Root mean square; not a number of none.
+    pub fn rms_if_any(&self) -> f64 {
+        if self.count == 0 { f64::NAN } else { self.rms() }
+    }
+
     /// Largest.
     pub fn largest(&self) -> f64 {
         self.largest

@@ -81,6 +81,12 @@ impl Context {
         if self.has_drive() { Some("--drive") } else { by_set() }
     }
 
+    /// Whether `--set` sets this field.
+    pub(super) fn sets_field(&self, path: &str) -> bool {
+        let assignments = self.common.sets.iter().flat_map(|set| set.split(','));
+        assignments.filter_map(|set| set.split_once('=')).any(|(set, _)| set.trim() == path)
+    }
+
     /// A command to type next, of the same drive.
     pub(super) fn next(&self, words: &str) -> String {
         let mut command = format!("flexspline {words}");

@@ -34,7 +34,7 @@ pub(super) struct Fly {
 impl Fly {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         if let Some(option) = context.changes_the_drive() {
-            let what = "the unit of a flight is that of its scenario; allowed: unit and table in a scenario file";
+            let what = "a flight has the unit of its scenario; allowed: table, load, servo and more in a scenario file (docs/motion.md)";
             return Err(Failure::BadInput(format!("{option}: {what}")));
         }
         let flown = self.flown()?;
@@ -84,13 +84,17 @@ fn text(results: &Results, out: &Path, report: bool) -> String {
     let columns = [&results.rms_arcsec, &results.max_arcsec, &results.velocity_ripple].map(line);
     for (k, name) in flexspline_motion::flight::CONTROLLERS.iter().enumerate() {
         let [rms, max, ripple] = columns.map(|column| column[k]);
-        let _ = writeln!(text, "{:22}{rms:10.2}{max:10.2}{ripple:14.1}", name.replace('_', " "));
+        let ripple = if ripple.is_finite() { format!("{ripple:.1}") } else { "–".to_owned() };
+        let _ = writeln!(text, "{:22}{rms:10.2}{max:10.2}{ripple:>14}", name.replace('_', " "));
     }
     let [margin, at_hz] = results.phase_margin_deg;
+    let removed = match results.removed {
+        Some(share) => format!("removed {:.1} % of what an ideal inverse removes", 100.0 * share),
+        None => "an ideal inverse removes next to nothing here".to_owned(),
+    };
     let _ = writeln!(
         text,
-        "removed {:.1} % of what an ideal inverse removes; {}; servo's phase margin {margin:.0}° at {at_hz:.0} Hz",
-        100.0 * results.removed,
+        "{removed}; {}; servo's phase margin {margin:.0}° at {at_hz:.0} Hz",
         if results.stable { "stable" } else { "NOT stable" }
     );
     let written = if report { "report.html and flight.json" } else { "flight.json" };

@@ -129,7 +129,13 @@ impl New {
             Written { schema_version: 1, kind, written: vec![self.file.clone()], drive_hash, next: next.to_vec() };
         context.print(&written, || {
             let what = match kind {
-                Kind::Drive => format!("the drive {}, every field explained", drive.name),
+                Kind::Drive => format!(
+                    "the drive {}, every field explained; ratio {} with the flexspline held, as it is simulated, {} with the circular \
+                     spline held",
+                    drive.name,
+                    drive.ratio(),
+                    1.0 - drive.ratio()
+                ),
                 Kind::Nominal => "a catalogue model: put in the numbers of your drive".to_owned(),
             };
             format!("wrote {shown}: {what}{}", say::next(&written.next))

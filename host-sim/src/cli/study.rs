@@ -32,6 +32,8 @@ const SHOWN: usize = 5;
 /// K1, K2, K3, wind-up, transmission error, stresses, teeth in contact. Written are study.csv (a row for each variant and generator),
 /// study.json and report.html: curves or maps, the front of what nothing beats, what each field does.
 ///
+/// A drive with imperfections is looked at in one place of its turns, and the gap of its rigid teeth is that of the drawing.
+///
 /// A variant that finds no equilibrium has the figures until then, its last stable load and the reason; one whose fields make no
 /// drive has the reason.
 #[derive(Debug, Args)]
@@ -109,6 +111,12 @@ impl StudyCommand {
         let clock = Instant::now();
         let drive = context.drive()?;
         let settings = self.settings()?;
+        if let Some(field) = settings.vary.iter().find(|field| context.sets_field(&field.path)) {
+            return Err(Failure::BadInput(format!(
+                "--set {0}: found it beside --vary {0}, which says otherwise; give one of the two",
+                field.path
+            )));
+        }
         let out = context.out()?;
         let progress = Mutex::new(context.progress("study"));
         let made = study(&drive, &settings, &|done, of, run| {
@@ -297,9 +305,10 @@ fn front<'s>(study: &'s Study, settings: &StudySettings, kind: GeneratorKind) ->
     front
 }
 
-/// Tables of the best variant.
+/// Tables of the best variant of all generators, in the first target.
 fn best_next(context: &Context, settings: &StudySettings, study: &Study) -> Vec<String> {
-    let best = settings.generators.iter().find_map(|kind| front(study, settings, *kind).first().copied());
+    let cost = |run: &Run| settings.targets.first().map_or(0.0, |first| first.cost(&run.sheet));
+    let best = study.runs.iter().filter(|run| run.front).min_by(|a, b| cost(a).total_cmp(&cost(b)));
     let Some(run) = best else { return Vec::new() };
     let sets: String =
         study.fields.iter().zip(&run.values).map(|(path, value)| format!(" --set {path}={value}")).collect();

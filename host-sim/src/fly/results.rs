@@ -43,14 +43,14 @@ pub struct Results {
     pub rms_arcsec: ByController<f64>,
     /// Largest of it.
     pub max_arcsec: ByController<f64>,
-    /// Speed of the output less that of the target while that moves evenly, arcsec/s rms.
+    /// Speed of the output less that of the target while that moves evenly, arcsec/s rms; not a number (`null`) where it never does.
     pub velocity_ripple: ByController<f64>,
     /// Torque in the mesh, N·m, largest.
     pub mesh_n_m: ByController<f64>,
     /// From the end of a slew until the output stays within 2″ of where it comes to rest, s, mean; none if the scenario never stands.
     pub settle_s: Option<ByController<f64>>,
-    /// Share of what the ideal removes that the core removes.
-    pub removed: f64,
+    /// Share of what the ideal removes that the core removes; none where the ideal removes next to nothing.
+    pub removed: Option<f64>,
     /// Whether the compensated joint comes to rest after a knock as the one without compensation does.
     pub stable: bool,
     /// Low-pass of a torque in the mesh that keeps the margin, Hz.
@@ -71,6 +71,9 @@ pub struct Results {
 
 /// A point of a curve.
 pub type Row = [f64; 2];
+
+/// Where an ideal leaves more than this of the error, no share of what it removes is told. *Guess*.
+const IDEAL_REMOVES: f64 = 0.98;
 
 fn by_controller<T>(flight: &Flight, value: impl Fn(&Flown) -> T) -> Option<ByController<T>> {
     let mut values = flight.flown.iter().map(value);
@@ -100,14 +103,14 @@ pub fn results(flown: &super::Flown, flight: &Flight) -> Option<Results> {
         seconds: scenario.seconds(),
         rms_arcsec: rms,
         max_arcsec: by_controller(flight, |flown| flown.error.largest())?,
-        velocity_ripple: by_controller(flight, |flown| flown.ripple.rms())?,
+        velocity_ripple: by_controller(flight, |flown| flown.ripple.rms_if_any())?,
         mesh_n_m: by_controller(flight, |flown| flown.mesh.largest())?,
         settle_s: if stands(scenario).next().is_some() {
             by_controller(flight, |flown| settle_s(scenario, flown))
         } else {
             None
         },
-        removed: (rms.none - rms.compensated) / (rms.none - rms.ideal),
+        removed: (rms.ideal < IDEAL_REMOVES * rms.none).then(|| (rms.none - rms.compensated) / (rms.none - rms.ideal)),
         stable: flight.stable,
         bandwidth_hz: flight.bandwidth_hz,
         phase_margin_deg: flight.phase_margin_deg,

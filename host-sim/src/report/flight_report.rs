@@ -68,7 +68,8 @@ fn tracking(flight: &Flight, results: &Results) -> Section {
         .map(|(k, name)| {
             let mut row = vec![Text::new(name.replace('_', " "))];
             row.extend(columns[..2].iter().map(|column| Text::default().error(column[k], 3)));
-            row.push(Text::new(format!("{:.1} ″/s", columns[2][k])));
+            let ripple = columns[2][k];
+            row.push(Text::new(if ripple.is_finite() { format!("{ripple:.1} ″/s") } else { "–".to_owned() }));
             row.push(results.settle_s.as_ref().map_or(Text::new("–"), |s| Text::new(format!("{:.2} s", cells(s)[k]))));
             row
         })
@@ -140,7 +141,10 @@ fn details(flown: &Flown, flight: &Flight, results: &Results) -> Section {
         line("Ticks in which the motor gave all it has", all.to_string()),
         line("Ticks in which the limiter held back", held_back.to_string()),
         line("Ticks without a correction", not.to_string()),
-        line("Of what an ideal inverse removes the core removes", format!("{:.1} %", 100.0 * results.removed)),
+        line(
+            "Of what an ideal inverse removes the core removes",
+            results.removed.map_or("–".to_owned(), |share| format!("{:.1} %", 100.0 * share)),
+        ),
     ];
     if let Some(share) = results.torque_within_bound {
         rows.push(line(

@@ -62,6 +62,9 @@ impl FromStr for Vary {
                         (to, count.trim().parse().map_err(|_| wrong("whose number of values is no whole number"))?)
                     }
                 };
+                if rest.starts_with('.') {
+                    return Err(wrong("which has more than two points"));
+                }
                 let number = |end: &str| end.trim().parse::<f64>().ok().filter(|end| end.is_finite());
                 let (Some(from), Some(to)) = (number(from), number(to)) else {
                     return Err(wrong("whose ends are not two numbers"));
@@ -160,6 +163,7 @@ mod tests {
             "a.b=1,,2",
             "a.b=",
             "a.b=1..inf",
+            "a.b=1...2",
         ] {
             let error = text.parse::<Vary>().unwrap_err().to_string();
             assert!(error.contains(text) && error.contains("allowed: PATH=FROM..TO"), "{error}");

@@ -14,12 +14,17 @@ pub enum SolveError {
     #[error(transparent)]
     Mesh(#[from] MeshError),
     /// Newton did not converge, not even in the smallest increment.
-    #[error("no equilibrium found at generator angle {generator_rad:.6} rad, load {torque_n_m} N.m: {reason}")]
+    #[error(
+        "no equilibrium found at generator angle {generator_rad:.6} rad, load {torque_n_m} N.m: {reason}{}",
+        beyond(*torque_n_m, *reached_n_m)
+    )]
     NotConverged {
         /// Where, rad.
         generator_rad: f64,
         /// Under which load.
         torque_n_m: f64,
+        /// The last load on the way for which there was an equilibrium, N m.
+        reached_n_m: f64,
         /// What stopped it.
         reason: &'static str,
         /// Residual of each iteration relative to the contact forces.
@@ -53,6 +58,11 @@ pub enum SolveError {
         /// Turn of the output in the last increment, as a share of what the ratio says.
         rate: f64,
     },
+}
+
+/// The last load that there was an equilibrium for, where a load came on.
+fn beyond(torque_n_m: f64, reached_n_m: f64) -> String {
+    if torque_n_m == reached_n_m { String::new() } else { format!("; the last load with one is {reached_n_m:.4} N.m") }
 }
 
 impl SolveError {

@@ -214,6 +214,12 @@ impl<'p> Solver<'p> {
     ) -> Result<(State, Increment), SolveError> {
         let mut state = from.clone();
         let mut iterations = 0;
+        let beyond = |error, reached: &State| match error {
+            SolveError::NotConverged { generator_rad, torque_n_m, reason, history, .. } => {
+                SolveError::NotConverged { generator_rad, torque_n_m, reached_n_m: reached.torque_n_m, reason, history }
+            }
+            error => error,
+        };
         let (turn, load) = (generator_rad - from.generator_rad, torque_n_m - from.torque_n_m);
         // A load that comes on from nothing is best brought on in a few steps.
         let first = if load.abs() > LARGEST_LOAD_STEP { LARGEST_LOAD_STEP / load.abs() } else { 1.0 };
@@ -243,7 +249,7 @@ impl<'p> Solver<'p> {
                     halvings += 1;
                     self.patient = halvings >= PATIENT_AFTER;
                 }
-                Err(error) => return Err(error),
+                Err(error) => return Err(beyond(error, &state)),
             }
         }
     }
@@ -300,8 +306,13 @@ impl<'p> Solver<'p> {
 
     fn newton(&mut self, from: &State, generator_rad: f64, torque_n_m: f64) -> Result<(State, Increment), SolveError> {
         let settings = self.problem.settings;
-        let failed =
-            |history: Vec<f64>, reason| SolveError::NotConverged { generator_rad, torque_n_m, reason, history };
+        let failed = |history: Vec<f64>, reason| SolveError::NotConverged {
+            generator_rad,
+            torque_n_m,
+            reached_n_m: torque_n_m,
+            reason,
+            history,
+        };
         let mut state = self.passed.predict(self.problem, from, generator_rad, torque_n_m);
         let mut near = NearPairs::default();
         self.balance_output(&mut state, from, torque_n_m, &mut near);

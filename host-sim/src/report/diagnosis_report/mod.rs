@@ -245,11 +245,13 @@ impl Known<'_> {
         }
     }
 
-    /// What departs from the nominal model beyond noise, arcsec rms: lines that averages hide are not in the residual.
+    /// What departs from the nominal model beyond noise, arcsec rms. Lines that averages hide are not in the residual: where that is no more than
+    /// noise they are what departs. Otherwise what was found is part of it, and two parts may cancel one another.
     fn departure_arcsec(&self) -> f64 {
         let (left, unexplained) = (self.sources.diagnosis.residual, &self.sources.diagnosis.unexplained);
-        let found = unexplained.iter().map(|u| u.size_arcsec.powi(2)).sum::<f64>().sqrt();
-        (left.rms_before_arcsec.powi(2) - left.noise_floor_arcsec.powi(2)).max(0.0).sqrt().max(found)
+        let beyond = (left.rms_before_arcsec.powi(2) - left.noise_floor_arcsec.powi(2)).max(0.0).sqrt();
+        let found = unexplained.iter().map(|u| u.size_arcsec).fold(0.0, f64::max);
+        if beyond > left.noise_floor_arcsec { beyond } else { beyond.max(found) }
     }
 
     fn headline(&self) -> Headline {
