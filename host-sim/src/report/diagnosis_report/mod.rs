@@ -899,7 +899,7 @@ mod tests {
                 "Partly explained by wear (97 %, 12″ rms) and ratcheting",
                 "10″ → 5″",
             ),
-            (Verdict::Unknown, &[], Status::NotUnderstood, "Unknown: ", "30″"),
+            (Verdict::Unknown, &[], Status::NotUnderstood, "Unknown: ", "12″"),
             (Verdict::None, &[], Status::Good, "Nothing found: ", "13″"),
         ] {
             let page = page_of(&diagnosis(verdict, causes), Vec::new());
