@@ -561,9 +561,10 @@ await check("a link opens its generator at its figure", async () => {
     const heading = await page.locator("h1").textContent();
     const number = await page.locator(".number strong").first().textContent();
     const { rms_before_arcsec: before, rms_after_arcsec: after } = diagnosis.held_out;
-    const share = Math.round(100 * (1 - (after / before) ** 2));
+    const twoDigits = (v) => `${v.toFixed(Math.max(0, 1 - Math.floor(Math.log10(v))))}″`;
+    const due = `${twoDigits(before)} → ${twoDigits(after)}`;
     assert(heading.startsWith("Explained by eccentricity of the output encoder ("), heading);
-    assert(number.trim() === `${share} %`, `${number} instead of ${share} %`);
+    assert(number.trim() === due, `${number} instead of ${due}`);
     const box = await page.locator(".number").boundingBox();
     assert(box.y + box.height < 900, "not on the first screen");
     return `${heading} ${number}, after ${readyMs} ms`;
