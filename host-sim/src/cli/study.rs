@@ -11,7 +11,6 @@ use serde::Serialize;
 use super::names::{self, Generators};
 use super::{Context, Failure, report, say};
 use crate::data_sheet::{FIGURES, FigureOf};
-use crate::drive::GeneratorKind;
 use crate::mesh::MeshLevel;
 use crate::output::Outputs;
 use crate::report::study_report;
@@ -270,7 +269,7 @@ fn text(told: &Told<'_>, settings: &StudySettings) -> String {
         told.meet
     );
     for kind in &settings.generators {
-        let front = front(study, settings, *kind);
+        let front = study.front(*kind, &settings.targets);
         let _ = writeln!(text, "{kind}: {} that nothing beats", front.len());
         for run in front.iter().take(SHOWN) {
             let values: Vec<String> =
@@ -295,14 +294,6 @@ fn text(told: &Told<'_>, settings: &StudySettings) -> String {
         }
     }
     text
-}
-
-fn front<'s>(study: &'s Study, settings: &StudySettings, kind: GeneratorKind) -> Vec<&'s Run> {
-    let mut front: Vec<&Run> = study.runs.iter().filter(|run| run.generator == kind && run.front).collect();
-    if let Some(first) = settings.targets.first() {
-        front.sort_by(|a, b| first.cost(&a.sheet).total_cmp(&first.cost(&b.sheet)));
-    }
-    front
 }
 
 /// Tables of the best variant of all generators, in the first target.

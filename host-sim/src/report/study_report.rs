@@ -8,7 +8,7 @@ use super::page::{
 };
 use crate::data_sheet::FIGURES;
 use crate::drive::{Drive, GeneratorKind};
-use crate::study::{Effect, Run, RunStatus, Sense, Study, StudySettings};
+use crate::study::{Effect, Run, RunStatus, Sense, Study, StudySettings, figure};
 
 /// Rows of the table of the best.
 const MOST_ROWS: usize = 25;
@@ -119,23 +119,14 @@ fn of_kind(study: &Study, kind: GeneratorKind) -> impl Iterator<Item = &Run> {
     study.runs.iter().filter(move |run| run.generator == kind)
 }
 
-/// The front of a generator, best in the first target first.
-fn front<'s>(of: &Sources<'s>, kind: GeneratorKind) -> Vec<&'s Run> {
-    let mut front: Vec<&Run> = of_kind(of.study, kind).filter(|run| run.front).collect();
-    if let Some(first) = of.settings.targets.first() {
-        front.sort_by(|a, b| first.cost(&a.sheet).total_cmp(&first.cost(&b.sheet)));
-    }
-    front
-}
-
 fn headline(of: &Sources<'_>, kind: GeneratorKind) -> Headline {
     let count = of_kind(of.study, kind).count();
     let meet = of_kind(of.study, kind).filter(|run| run.meets).count();
     let name = of.settings.targets.first().map_or("kinematic_error_pp_arcsec", |target| target.figure);
-    let of_figure = FIGURES.iter().find(|(known, _)| *known == name).map(|(_, figure)| figure);
-    let front = front(of, kind);
+    let of_figure = figure(name).ok();
+    let front = of.study.front(kind, &of.settings.targets);
     let (answer, number) = match (front.first(), of_figure) {
-        (Some(best), Some(figure)) => {
+        (Some(best), Some((_, figure))) => {
             let number = value(name, figure(&best.sheet));
             (
                 format!("{meet} of {count} variants meet what has to be kept; nothing beats {} of them.", front.len()),
@@ -163,7 +154,7 @@ fn best(of: &Sources<'_>) -> Section {
         .generators
         .iter()
         .map(|kind| {
-            let front = front(of, *kind);
+            let front = of.study.front(*kind, &of.settings.targets);
             let rows = front.iter().take(MOST_ROWS).map(|run| {
                 let fields = run.values.iter().map(|value| Text::new(value.clone()));
                 let figures = FIGURES.iter().map(|(name, figure)| value(name, figure(&run.sheet)));
@@ -222,7 +213,7 @@ fn trade(of: &Sources<'_>) -> Section {
         [only] => [only.figure, "kinematic_error_pp_arcsec"],
         [] => ["kinematic_error_pp_arcsec", "k2_n_m_per_rad"],
     };
-    let get = |name: &str, run: &Run| FIGURES.iter().find(|(known, _)| *known == name).and_then(|(_, f)| f(&run.sheet));
+    let get = |name: &str, run: &Run| figure(name).ok().and_then(|(_, f)| f(&run.sheet));
     let series = |kind: GeneratorKind, name: &str, colour: usize, mark: Mark, which: &dyn Fn(&Run) -> bool| {
         let mut points: Vec<[f64; 2]> = of_kind(of.study, kind)
             .filter(|run| which(run))
@@ -295,7 +286,7 @@ fn place(of: &Sources<'_>, field: usize, value: &str) -> f64 {
 }
 
 fn curve(of: &Sources<'_>, name: &'static str, field: usize, alone: bool) -> Figure {
-    let figure = FIGURES.iter().find(|(known, _)| *known == name).map(|(_, figure)| figure);
+    let figure = figure(name).ok().map(|(_, figure)| figure);
     let points = |kind: GeneratorKind| {
         let mut points: Vec<[f64; 2]> = of_kind(of.study, kind)
             .filter_map(|run| Some([place(of, field, &run.values[field]), figure?(&run.sheet)?]))
@@ -340,7 +331,7 @@ fn curve(of: &Sources<'_>, name: &'static str, field: usize, alone: bool) -> Fig
 
 /// A figure over a grid of two fields of numbers.
 fn map(of: &Sources<'_>, name: &'static str) -> Option<Figure> {
-    let figure = FIGURES.iter().find(|(known, _)| *known == name)?.1;
+    let (_, figure) = figure(name).ok()?;
     let axis = |field: usize| -> Option<Vec<f64>> {
         let values: Option<Vec<f64>> = of.settings.vary[field].grid().iter().map(|value| value.parse().ok()).collect();
         let mut values = values?;

@@ -25,7 +25,7 @@ pub struct Effect {
 
 /// The effects of all fields on a figure, by least squares over the variants that have it; none where these are too few.
 pub fn effects(study: &Study, generator: GeneratorKind, name: &'static str) -> Option<Effect> {
-    let of = figure(name).ok()?;
+    let (_, of) = figure(name).ok()?;
     let runs: Vec<(&Run, f64)> = study
         .runs
         .iter()

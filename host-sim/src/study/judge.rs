@@ -5,15 +5,15 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use super::{Run, RunStatus};
-use crate::data_sheet::{DataSheet, FIGURES};
+use crate::data_sheet::{DataSheet, FIGURES, FigureOf};
 use crate::suggest::did_you_mean;
 
 /// A figure by name.
 ///
 /// # Errors
 /// There is none of that name.
-pub fn figure(name: &str) -> Result<fn(&DataSheet) -> Option<f64>, JudgeError> {
-    FIGURES.iter().find(|(known, _)| *known == name).map(|(_, of)| *of).ok_or_else(|| JudgeError::Figure {
+pub fn figure(name: &str) -> Result<FigureOf, JudgeError> {
+    FIGURES.into_iter().find(|(known, _)| *known == name).ok_or_else(|| JudgeError::Figure {
         found: name.to_owned(),
         hint: did_you_mean("; ", name, FIGURES.map(|(known, _)| known)),
     })
@@ -64,13 +64,16 @@ impl FromStr for Constraint {
         if least > most || (least.is_infinite() && most.is_infinite()) {
             return Err(wrong());
         }
-        Ok(Constraint { figure: named(name.trim())?, least, most })
+        Ok(Constraint { figure: figure(name.trim())?.0, least, most })
     }
 }
 
 impl Constraint {
     fn keeps(&self, sheet: &DataSheet) -> bool {
-        figure(self.figure).ok().and_then(|of| of(sheet)).is_some_and(|value| (self.least..=self.most).contains(&value))
+        figure(self.figure)
+            .ok()
+            .and_then(|(_, of)| of(sheet))
+            .is_some_and(|value| (self.least..=self.most).contains(&value))
     }
 }
 
@@ -98,19 +101,14 @@ impl Target {
     /// # Errors
     /// There is no figure of that name.
     pub fn new(name: &str, sense: Sense) -> Result<Target, JudgeError> {
-        Ok(Target { figure: named(name)?, sense })
+        Ok(Target { figure: figure(name)?.0, sense })
     }
 
     /// The figure, turned so that less is better.
     pub fn cost(&self, sheet: &DataSheet) -> f64 {
-        let value = figure(self.figure).ok().and_then(|of| of(sheet)).unwrap_or(f64::NAN);
+        let value = figure(self.figure).ok().and_then(|(_, of)| of(sheet)).unwrap_or(f64::NAN);
         if self.sense == Sense::Least { value } else { -value }
     }
-}
-
-fn named(name: &str) -> Result<&'static str, JudgeError> {
-    figure(name)?;
-    Ok(FIGURES.iter().find(|(known, _)| *known == name).map_or("", |(known, _)| known))
 }
 
 /// Marks what meets the constraints, and of each generator what nothing that meets them beats (Pareto's front).

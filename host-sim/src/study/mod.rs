@@ -131,6 +131,17 @@ pub struct Study {
     pub runs: Vec<Run>,
 }
 
+impl Study {
+    /// What nothing beats of a generator, best in the first target first.
+    pub fn front(&self, generator: GeneratorKind, targets: &[Target]) -> Vec<&Run> {
+        let mut front: Vec<&Run> = self.runs.iter().filter(|run| run.generator == generator && run.front).collect();
+        if let Some(first) = targets.first() {
+            front.sort_by(|a, b| first.cost(&a.sheet).total_cmp(&first.cost(&b.sheet)));
+        }
+        front
+    }
+}
+
 /// Told after every run: how many are done, of how many, and the last. May ask to stop.
 pub type Observer<'a> = dyn Fn(usize, usize, &Run) -> ControlFlow<()> + Sync + 'a;
 
@@ -186,22 +197,19 @@ fn variants(drive: &Drive, settings: &StudySettings) -> Result<Vec<Vec<String>>,
         Some(count) => vary::spread(vary, count, settings.seed),
         None => vary::grid(vary),
     };
-    // A field that does not exist, or a range that makes no drive, is told before anything is computed.
-    for (k, field) in vary.iter().enumerate() {
-        let refused =
-            |variant: &Vec<String>| drive.with_sets([format!("{}={}", field.path, variant[k]).as_str()]).err();
-        if variants.iter().all(|variant| refused(variant).is_some()) && all_refused(drive, vary, &variants) {
-            let why = refused(&variants[0]).map_or_else(String::new, |error| error.to_string());
-            return Err(StudyError::NoDrive { path: field.path.clone(), why });
+    // A field that does not exist, or a range that makes no drive, is told before anything is computed. Fields may be possible together
+    // that are not alone.
+    let paths: Vec<&str> = vary.iter().map(|field| field.path.as_str()).collect();
+    if variants.iter().all(|values| varied(drive, &paths, values).is_err()) {
+        for (k, path) in paths.iter().enumerate() {
+            let alone = |values: &Vec<String>| varied(drive, &paths[k..=k], &values[k..=k]).err();
+            if variants.iter().all(|values| alone(values).is_some()) {
+                let why = alone(&variants[0]).map_or_else(String::new, |error| error.to_string());
+                return Err(StudyError::NoDrive { path: (*path).to_owned(), why });
+            }
         }
     }
     Ok(variants)
-}
-
-/// Whether no variant makes a drive: fields may be possible together that are not alone.
-fn all_refused(drive: &Drive, vary: &[Vary], variants: &[Vec<String>]) -> bool {
-    let paths: Vec<&str> = vary.iter().map(|field| field.path.as_str()).collect();
-    variants.iter().all(|values| varied(drive, &paths, values).is_err())
 }
 
 fn varied(drive: &Drive, paths: &[&str], values: &[String]) -> Result<Drive, crate::drive::DriveError> {
