@@ -31,10 +31,10 @@ pub struct Flown {
 /// The maps of HHD-95 by contact FEM, at points that made no table (`examples/closed_loop.rs map`).
 fn map(kind: GeneratorKind) -> &'static str {
     match kind {
-        GeneratorKind::TwoRoller => include_str!("../../../tests/firmware/plant/two-roller.csv"),
-        GeneratorKind::FourRoller => include_str!("../../../tests/firmware/plant/four-roller.csv"),
-        GeneratorKind::DoubleDisc => include_str!("../../../tests/firmware/plant/double-disc.csv"),
-        GeneratorKind::Cam => include_str!("../../../tests/firmware/plant/cam.csv"),
+        GeneratorKind::TwoRoller => include_str!("../../plant/two-roller.csv"),
+        GeneratorKind::FourRoller => include_str!("../../plant/four-roller.csv"),
+        GeneratorKind::DoubleDisc => include_str!("../../plant/double-disc.csv"),
+        GeneratorKind::Cam => include_str!("../../plant/cam.csv"),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Single rows that neither the rows before nor those after bear out.
 
 use super::resolution::seen;
+use super::steps::{HELD, largest_torque};
 use super::{ARCSEC, Findings, of_rows};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
@@ -17,6 +18,9 @@ const LEAST_RAD: f64 = 3.0 * ARCSEC;
 const STEPS: f64 = 2.0;
 /// And, in torque and temperature, by this share of the range.
 const LEAST_OF_RANGE: f64 = 0.05;
+/// A few outliers of torque or temperature are named only if one is so large, as a share of the range: loads that change from row to row
+/// give small ones.
+const LARGE_OF_RANGE: f64 = 0.5;
 /// The pulse of a tooth is this wide, rad of the generator; rows that are farther apart may catch it once.
 const TOOTH_RAD: f64 = 0.05;
 /// Fewer outliers than this, or any in fast motion, are named only if they are large: teeth and kinks of the motion give small ones.
@@ -25,6 +29,8 @@ const FEW: usize = 4;
 const LARGE_RAD: f64 = 120.0 * ARCSEC;
 /// Load changes at once if it does by so many times its usual pace.
 const LOAD_PACE: f64 = 10.0;
+/// Load that changes by this share of its largest within the rows beside moves the drive: play is thrown over, wind-up follows.
+const SWINGS: f64 = 0.05;
 /// Rows before and after that are looked at.
 const BESIDE: usize = 3;
 /// Rows around, for what is usual there.
@@ -35,6 +41,39 @@ const SHARE: f64 = 0.05;
 const REPEATS: f64 = 0.9;
 /// Rayleigh's n R² above which many outliers repeat with position: chance exp(−12).
 const REPEATS_MANY: f64 = 12.0;
+
+/// How far row `row` is from the rows before and after, and from where they go on to, if all say so; 0 if one of them bears it out. A
+/// load turns sharply within a row and means it, and the wind-up with it: such a tip goes on as one of its sides does.
+fn off_course(values: &[f64], row: usize) -> f64 {
+    if row < BESIDE || row + BESIDE >= values.len() {
+        return 0.0;
+    }
+    let (before, after) = ([3, 2, 1].map(|k| values[row - k]), [3, 2, 1].map(|k| values[row + k]));
+    let borne_out = [before[2], after[2], carried_on(before), carried_on(after)];
+    let low = borne_out.into_iter().fold(f64::INFINITY, f64::min);
+    let high = borne_out.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let beyond = values[row] - values[row].clamp(low, high);
+    let by = out_by(values, row);
+    if beyond * by <= 0.0 { 0.0 } else { by.signum() * by.abs().min(beyond.abs()) }
+}
+
+/// Where three rows go on to: their median slope (Theil and Sen) from the median of where it puts them, so that one of them may be out.
+fn carried_on([a, b, c]: [f64; BESIDE]) -> f64 {
+    let slope = median_of(&mut [b - a, c - b, 0.5 * (c - a)]);
+    median_of(&mut [a + 3.0 * slope, b + 2.0 * slope, c + slope])
+}
+
+/// Whether the load moves the drive for a row: it swings, and either holds no flank there or stands out itself.
+fn load_swings(session: &Session, row: usize, largest_n_m: f64) -> bool {
+    session.torque_n_m.as_ref().is_some_and(|torque| {
+        let near = &torque[row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(torque.len())];
+        let low = near.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = near.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let beside = &torque[row.saturating_sub(1)..(row + 2).min(torque.len())];
+        let let_go = beside.iter().any(|torque| torque.abs() < HELD * largest_n_m);
+        high - low > SWINGS * largest_n_m && (let_go || out_by(torque, row).abs() > SWINGS * largest_n_m)
+    })
+}
 
 /// How far row `row` is from the rows before and after, if both say so; 0 if one of them bears it out.
 fn out_by(values: &[f64], row: usize) -> f64 {
@@ -66,11 +105,14 @@ fn steady(session: &Session, row: usize) -> bool {
     })
 }
 
+/// A row, and by how much it is out.
+type Out = (usize, f64);
+
 /// Rows that are out by more than `least`.
-fn rows_out(values: &[f64], least: f64) -> Vec<(usize, f64)> {
+fn rows_out(values: &[f64], least: f64) -> Vec<Out> {
     let mut found = Vec::new();
     for row in BESIDE..values.len().saturating_sub(BESIDE) {
-        let by = out_by(values, row);
+        let by = off_course(values, row);
         if by.abs() <= least {
             continue;
         }
@@ -94,20 +136,38 @@ pub(in crate::measurement) fn check(
     error_recorded: bool,
     findings: &mut Findings,
 ) {
+    of_error(sessions, gear, error_recorded, findings);
+    for channel in [Quantity::Torque, Quantity::Temperature] {
+        of_load(sessions, channel, findings);
+    }
+}
+
+/// Outliers of the error: left out, and named where they are the data's and not the drive's.
+fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, findings: &mut Findings) {
     let rows: usize = sessions.iter().map(Session::len).sum();
     let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
     let resolution = seen(sessions, gear, error_recorded).into_iter().map(|(_, step)| step).fold(0.0, f64::max);
     let least = (OUT * noise).max(LEAST_RAD).max(STEPS * resolution);
-    let found: Vec<Vec<(usize, f64)>> = sessions
+    let largest_n_m = largest_torque(sessions);
+    let (moved, found): (Vec<Vec<Out>>, Vec<Vec<Out>>) = sessions
         .iter()
         .map(|session| {
-            let mut rows = rows_out(&session.error_rad, least);
-            rows.retain(|(row, _)| steady(session, *row));
-            rows
+            let steady = rows_out(&session.error_rad, least).into_iter().filter(|(row, _)| steady(session, *row));
+            steady.partition(|(row, _)| load_swings(session, *row, largest_n_m))
         })
-        .collect();
-    let count: usize = found.iter().map(Vec::len).sum();
-    if count > 0 && count as f64 <= SHARE * rows as f64 {
+        .unzip();
+    let number = |found: &[Vec<Out>]| found.iter().map(Vec::len).sum::<usize>();
+    let some = |count: usize| count > 0 && count as f64 <= SHARE * rows as f64;
+    let mut leave_out: Vec<&Vec<Vec<Out>>> = Vec::new();
+    if some(number(&moved)) {
+        findings.notes.push(format!(
+            "{} single rows stand out where the load swings within a row, and the drive with it; they are left out",
+            number(&moved)
+        ));
+        leave_out.push(&moved);
+    }
+    let count = number(&found);
+    if some(count) {
         let fast = found.iter().zip(sessions.iter()).all(|(rows, session)| {
             rows.iter().all(|(row, _)| {
                 (session.generator_rad[row + 1] - session.generator_rad[row - 1]).abs() > 2.0 * TOOTH_RAD
@@ -124,43 +184,48 @@ pub(in crate::measurement) fn check(
                 .push(format!("{count} single rows stand out, always in the same position: the drive, not the data"));
         } else {
             report(sessions, &found, Quantity::Error, Treatment::Masked, "their rows are left out", findings);
-            for (session, found) in sessions.iter_mut().zip(&found) {
-                let mut drop = vec![false; session.len()];
-                found.iter().for_each(|(row, _)| drop[*row] = true);
-                if !found.is_empty() {
-                    session.leave_out(&drop);
-                }
-            }
+            leave_out.push(&found);
         }
     }
-    for channel in [Quantity::Torque, Quantity::Temperature] {
-        let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(channel)).collect();
-        let mut some: Vec<f64> = series.iter().flat_map(|values| sampled(values)).collect();
-        let range = quantile_of(&mut some, 0.99) - quantile_of(&mut some, 0.01);
-        let least = (OUT * white_noise(series)).max(LEAST_OF_RANGE * range);
-        if least == 0.0 {
-            continue;
+    for (number, session) in sessions.iter_mut().enumerate() {
+        let mut drop = vec![false; session.len()];
+        leave_out.iter().flat_map(|found| &found[number]).for_each(|(row, _)| drop[*row] = true);
+        if drop.contains(&true) {
+            session.leave_out(&drop);
         }
-        let found: Vec<Vec<(usize, f64)>> = sessions
-            .iter()
-            .map(|session| session.beside(channel).map_or_else(Vec::new, |v| rows_out(v, least)))
-            .collect();
-        let count: usize = found.iter().map(Vec::len).sum();
-        if count == 0 || count as f64 > SHARE * rows as f64 {
-            continue;
-        }
-        report(sessions, &found, channel, Treatment::Repaired, "the rows beside stand in", findings);
-        for (session, found) in sessions.iter_mut().zip(&found) {
-            if let Some(values) = session.beside_mut(channel) {
-                found.iter().for_each(|(row, _)| values[*row] = 0.5 * (values[row - 1] + values[row + 1]));
-            }
+    }
+}
+
+/// Outliers of torque or temperature: mended from the rows beside.
+fn of_load(sessions: &mut [Session], channel: Quantity, findings: &mut Findings) {
+    let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(channel)).collect();
+    let mut some: Vec<f64> = series.iter().flat_map(|values| sampled(values)).collect();
+    let range = quantile_of(&mut some, 0.99) - quantile_of(&mut some, 0.01);
+    let least = (OUT * white_noise(series)).max(LEAST_OF_RANGE * range);
+    if least == 0.0 {
+        return;
+    }
+    let found: Vec<Vec<Out>> = sessions
+        .iter()
+        .map(|session| session.beside(channel).map_or_else(Vec::new, |values| rows_out(values, least)))
+        .collect();
+    let rows: usize = sessions.iter().map(Session::len).sum();
+    let count: usize = found.iter().map(Vec::len).sum();
+    let large = found.iter().flatten().any(|(_, by)| by.abs() > LARGE_OF_RANGE * range);
+    if count == 0 || count as f64 > SHARE * rows as f64 || (count < FEW && !large) {
+        return;
+    }
+    report(sessions, &found, channel, Treatment::Repaired, "the rows beside stand in", findings);
+    for (session, found) in sessions.iter_mut().zip(&found) {
+        if let Some(values) = session.beside_mut(channel) {
+            found.iter().for_each(|(row, _)| values[*row] = 0.5 * (values[row - 1] + values[row + 1]));
         }
     }
 }
 
 fn report(
     sessions: &[Session],
-    found: &[Vec<(usize, f64)>],
+    found: &[Vec<Out>],
     channel: Quantity,
     treatment: Treatment,
     done: &str,
@@ -174,6 +239,9 @@ fn report(
     (fault.until_s, fault.last_line) = (end.until_s, end.last_line);
     fault.rows = all().count() as u64;
     (fault.channel, fault.treatment) = (Some(channel), treatment);
+    if channel != Quantity::Error {
+        fault.advice = "check the cable and the amplifier of this sensor; log its raw values";
+    }
     let size = if channel == Quantity::Error {
         fault.size_arcsec = Some(largest / ARCSEC);
         format!("{:.1} arcsec", largest / ARCSEC)
@@ -185,7 +253,7 @@ fn report(
 }
 
 /// Whether rows gather at the same angle of a wheel, more than all rows do.
-pub(super) fn repeat_with_position(sessions: &[Session], found: &[Vec<(usize, f64)>], gear: &Gear) -> bool {
+pub(super) fn repeat_with_position(sessions: &[Session], found: &[Vec<Out>], gear: &Gear) -> bool {
     let count: usize = found.iter().map(Vec::len).sum();
     if count < FEW {
         return false;
@@ -211,4 +279,35 @@ pub(super) fn repeat_with_position(sessions: &[Session], found: &[Vec<(usize, f6
         let n = count as f64;
         of_found > of_all + 0.3 && (of_found > REPEATS || n * of_found.powi(2) > REPEATS_MANY)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tip_of_a_load_is_borne_out_by_its_sides_and_a_spike_is_not() {
+        let mut load: Vec<f64> = (0..41).map(|k| 40.0 - 1.5 * (f64::from(k) - 20.0).abs()).collect();
+        let found = |load: &[f64]| rows_out(load, 1.0).iter().map(|(row, _)| *row).collect::<Vec<_>>();
+        assert!(out_by(&load, 20) > 2.0, "a tip stands above the rows beside");
+        assert_eq!(found(&load), [0_usize; 0]);
+        load[10] += 20.0;
+        assert_eq!(found(&load), [10]);
+        load[30] -= 20.0;
+        assert_eq!(found(&load), [10, 30]);
+    }
+
+    #[test]
+    fn a_row_in_which_the_load_swings_is_the_drives() {
+        let session = |torque: [f64; 7]| Session {
+            generator_rad: (0..7).map(|k| 0.05 * f64::from(k)).collect(),
+            torque_n_m: Some(torque.to_vec()),
+            ..Session::default()
+        };
+        let swings = |torque| load_swings(&session(torque), 3, 40.0);
+        assert!(swings([-6.6, -5.1, -3.8, -0.4, -2.9, -4.1, -4.2]), "a flank is let go");
+        assert!(!swings([0.4; 7]), "a load that does not change leaves the play where it is");
+        assert!(swings([-24.6, -22.7, -20.3, -16.9, -20.7, -19.2, -21.7]), "wind-up follows a tip");
+        assert!(!swings([-26.6, -25.1, -23.8, -22.4, -21.9, -20.1, -19.2]), "and no more than a tip");
+    }
 }

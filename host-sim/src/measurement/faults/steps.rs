@@ -40,7 +40,7 @@ const ROUNDS: usize = 4;
 /// A step is that many whole tooth pitches if it differs by less than this share of one.
 const WHOLE_PITCH: f64 = 0.01;
 /// Load of this share of its largest holds the drive on one flank.
-const HELD: f64 = 0.1;
+pub(super) const HELD: f64 = 0.1;
 /// Wider than any traverse of the clearance, rad: such a step may follow a reversal.
 const LONGEST_TRAVERSE_RAD: f64 = 1200.0 * ARCSEC;
 /// Wider than any clearance, rad: such a step needs no load to show that no flank was changed.
@@ -341,7 +341,8 @@ pub(super) fn whole_pitches(size: f64, gear: &Gear) -> bool {
     })
 }
 
-fn largest_torque(sessions: &[Session]) -> f64 {
+/// Largest torque of either sign, N·m; 0 where none was recorded.
+pub(super) fn largest_torque(sessions: &[Session]) -> f64 {
     sessions
         .iter()
         .filter_map(|s| s.torque_n_m.as_ref())
