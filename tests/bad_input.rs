@@ -143,6 +143,8 @@ fn wrong_table_images_are_refused() {
     // Sound, but of another drive than the one given.
     refused(&desk, "validate --tables good --drive HHD-95-typical --out nothing", "BLAKE3");
     refused(&desk, "validate --tables . --out nothing", "--tables");
+    refused(&desk, "diagnose measured.csv --tables good/cam.fxt --out nothing", "--tables good --generator cam");
+    refused(&desk, "diagnose measured.csv --tables good --generator two-roller --out nothing", "--generator cam");
     for (text, said) in [
         ("generator_rad\n0\n", "output_rad nor error_arcsec"),
         ("output_rad,generator_rad\n0,x\n", "generator_rad: found \"x\""),

@@ -156,10 +156,29 @@ impl Context {
 /// The table of a generator in a folder that `flexspline tables` wrote: its file and its bytes, not looked at yet.
 pub(super) fn table_image(folder: &Path, generator: GeneratorKind) -> Result<(PathBuf, Vec<u8>), Failure> {
     let path = folder.join(format!("{generator}.fxt"));
-    match std::fs::read(&path) {
-        Ok(bytes) => Ok((path, bytes)),
-        Err(error) => Err(Failure::BadInput(format!("{}: {error}", path.display()))),
+    if folder.is_file() {
+        let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let kind =
+            folder.file_stem().and_then(|stem| stem.to_str()).and_then(|stem| stem.parse::<GeneratorKind>().ok());
+        let option = kind.map_or_else(String::new, |kind| format!(" --generator {kind}"));
+        return Err(Failure::BadInput(format!(
+            "--tables: found the file {}; allowed: a folder that `flexspline tables` wrote, here --tables {}{option}",
+            folder.display(),
+            quoted(&parent.display().to_string())
+        )));
     }
+    std::fs::read(&path).map(|bytes| (path.clone(), bytes)).map_err(|error| {
+        let others: Vec<&str> = GeneratorKind::ALL
+            .iter()
+            .map(|kind| kind.name())
+            .filter(|name| folder.join(format!("{name}.fxt")).exists())
+            .collect();
+        let hint = match others.as_slice() {
+            [] => String::new(),
+            names => format!("; the folder holds the tables of {}: --generator {}", names.join(", "), names[0]),
+        };
+        Failure::BadInput(format!("{}: {error}{hint}", path.display()))
+    })
 }
 
 /// A word as a shell takes it.
