@@ -41,6 +41,10 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 const FEWEST_ROWS: usize = 64;
 /// Load that decides the flank where no model says a friction, of the largest recorded: a guess, small beside any load of interest.
 const LEAST_FRICTION: f64 = 0.02;
+/// Rows between two dead zones tell them apart if their load is clear of both by so many times the torque's noise…
+const CLEAR_OF_NOISE: f64 = 6.0;
+/// …and if the other leaves less than this share of their squares: where it is right, half of them lie on the wrong flank.
+const OTHER_DEAD_ZONE: f64 = 0.8;
 /// Torques within this share of the largest are one.
 const SAME_TORQUE: f64 = 1e-3;
 /// Share of the motion that the rarer direction must have for the play to be seen.
@@ -390,12 +394,16 @@ fn with_dead_zone(
         ..prior.clone()
     };
     let prior = &aligned;
-    let mut fitted = fit(rows.sure(&recorded).less(prior), prior, &recorded)?;
+    let mut fitted = fit(rows.sure(recorded.scales.friction_n_m, &recorded).less(prior), prior, &recorded)?;
     let found = fitted.model.play_arcsec() / crate::units::ARCSEC_PER_RAD;
     if found > 0.0 {
         // Now that the play is known, without the rows inside it.
         let play_rad = prior.nominal.backlash_arcsec / crate::units::ARCSEC_PER_RAD + found;
-        fitted = fit(settled(files, prior, &recorded, play_rad).sure(&recorded).less(prior), prior, &recorded)?;
+        fitted = fit(
+            settled(files, prior, &recorded, play_rad).sure(recorded.scales.friction_n_m, &recorded).less(prior),
+            prior,
+            &recorded,
+        )?;
     }
     let Fitted { rows, folds, model, held_out, mut parts } = fitted;
     // No table is the simplest of all; a prior that is wrong may leave more than that even with parts beside it.
@@ -504,22 +512,27 @@ fn with_faults(error: CalibrationError, files: &[Recording]) -> CalibrationError
     }
 }
 
-/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, or that of a drive with the usual friction, whichever
-/// leaves less of the rows; with the rows less what the table says so.
+/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, unless rows with loads between it and that of a drive
+/// with the usual friction say otherwise; with the rows less what the table says so.
 fn dead_zone(rows: Rows, prior: &Prior<'_>, table: &Table<'_>, recorded: &Recorded) -> (Rows, f64) {
     let (own, usual) = (dead_zone_n_m(table), recorded.scales.friction_n_m);
-    let with = |rows: Rows, least_friction_n_m: f64| {
-        let rows = rows.less(&Prior { least_friction_n_m, ..prior.clone() });
-        let sure = rows.rows.iter().filter(|row| Rows::is_sure(&row.at, own, recorded));
-        let left: f64 = sure.map(|row| row.left_arcsec.powi(2)).sum();
-        (rows, left)
-    };
-    let (rows, by_usual) = with(rows, usual);
+    let less = |rows: Rows, least_friction_n_m: f64| rows.less(&Prior { least_friction_n_m, ..prior.clone() });
     if own <= 0.0 {
-        return (rows, usual);
+        return (less(rows, usual), usual);
     }
-    let (rows, by_own) = with(rows, own);
-    if own >= usual || by_own <= by_usual { (rows, own) } else { (with(rows, usual).0, usual) }
+    // A row on a flank that the noise of its torque has drawn would move the mean of its file, and with it all others.
+    let sure = rows.clone().sure(own, recorded).sure(usual, recorded);
+    let noise = CLEAR_OF_NOISE * recorded.torque_noise_n_m;
+    let between = own + noise..usual - noise;
+    let left = |friction_n_m: f64| -> Vec<f64> {
+        let rows = less(sure.clone(), friction_n_m).rows.into_iter();
+        rows.filter(|row| between.contains(&row.at.torque_n_m.abs())).map(|row| row.left_arcsec.powi(2)).collect()
+    };
+    let (by_own, by_usual) = (left(own), left(usual));
+    let other =
+        by_own.len() >= FEWEST_ROWS && by_usual.iter().sum::<f64>() < OTHER_DEAD_ZONE * by_own.iter().sum::<f64>();
+    let chosen = if own < usual && other { usual } else { own };
+    (less(rows, chosen), chosen)
 }
 
 /// The zero of the output in each file.

@@ -33,6 +33,7 @@ pub(super) enum FoldKind {
 }
 
 /// Rows of all files.
+#[derive(Clone)]
 pub(super) struct Rows {
     pub rows: Vec<Row>,
     /// What was measured in each, arcsec, its file's mean taken out.
@@ -235,14 +236,13 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
 
 impl Rows {
     /// Whether the load of a row decides the flank or not, for all that its sensor's noise leaves open.
-    pub fn is_sure(at: &State, friction_n_m: f64, recorded: &Recorded) -> bool {
+    fn is_sure(at: &State, friction_n_m: f64, recorded: &Recorded) -> bool {
         (at.torque_n_m.abs() - friction_n_m).abs() >= SURE * recorded.torque_noise_n_m
     }
 
-    /// Without the rows of which the noise of the torque leaves open on which flank they lie.
-    pub fn sure(mut self, recorded: &Recorded) -> Rows {
-        let friction = recorded.scales.friction_n_m;
-        let keep: Vec<bool> = self.rows.iter().map(|row| Self::is_sure(&row.at, friction, recorded)).collect();
+    /// Without the rows of which the noise of the torque leaves open on which flank they lie, where loads from `friction_n_m` on decide it.
+    pub fn sure(mut self, friction_n_m: f64, recorded: &Recorded) -> Rows {
+        let keep: Vec<bool> = self.rows.iter().map(|row| Self::is_sure(&row.at, friction_n_m, recorded)).collect();
         let mut kept = keep.iter();
         self.rows.retain(|_| *kept.next().unwrap_or(&true));
         let mut kept = keep.iter();
