@@ -71,38 +71,38 @@ enum {
 
 /* Numbers: sums wrap, conversions saturate, as in Rust. */
 
-static int32_t i32(uint32_t bits)
+static inline int32_t i32(uint32_t bits)
 {
     return (int32_t)bits;
 }
 
-static int32_t add(int32_t a, int32_t b)
+static inline int32_t add(int32_t a, int32_t b)
 {
     return i32((uint32_t)a + (uint32_t)b);
 }
 
-static int32_t sub(int32_t a, int32_t b)
+static inline int32_t sub(int32_t a, int32_t b)
 {
     return i32((uint32_t)a - (uint32_t)b);
 }
 
-static int32_t mul(int32_t a, int32_t b)
+static inline int32_t mul(int32_t a, int32_t b)
 {
     return i32((uint32_t)a * (uint32_t)b);
 }
 
-static int32_t saturate(int64_t value)
+static inline int32_t saturate(int64_t value)
 {
     return value > INT32_MAX ? INT32_MAX : value < INT32_MIN ? INT32_MIN : (int32_t)value;
 }
 
 /* a*b/2^32, rounded down. */
-static int32_t mul_high(int32_t a, int32_t b)
+static inline int32_t mul_high(int32_t a, int32_t b)
 {
     return i32((uint32_t)((uint64_t)((int64_t)a * b) >> 32));
 }
 
-static uint32_t bits_of(float value)
+static inline uint32_t bits_of(float value)
 {
     union {
         float f;
@@ -112,7 +112,7 @@ static uint32_t bits_of(float value)
     return both.u;
 }
 
-static float float_of(uint32_t bits)
+static inline float float_of(uint32_t bits)
 {
     union {
         uint32_t u;
@@ -122,18 +122,18 @@ static float float_of(uint32_t bits)
     return both.f;
 }
 
-static float magnitude(float value)
+static inline float magnitude(float value)
 {
     return float_of(bits_of(value) & 0x7fffffffu);
 }
 
-static bool is_finite(float value)
+static inline bool is_finite(float value)
 {
     return (bits_of(value) & 0x7fffffffu) < 0x7f800000u;
 }
 
 /* Towards zero; the end of the range beyond it; 0 of NaN. */
-static int32_t to_i32(float value)
+static inline int32_t to_i32(float value)
 {
     if (value >= -2147483648.0f && value < 2147483648.0f)
         return (int32_t)value;
@@ -141,20 +141,20 @@ static int32_t to_i32(float value)
 }
 
 /* The larger; the second if the first is NaN. */
-static float larger(float a, float b)
+static inline float larger(float a, float b)
 {
     return a > b ? a : b;
 }
 
 /* Within a range; its lower end if NaN. */
-static float within(float value, float least, float most)
+static inline float within(float value, float least, float most)
 {
     const float above = value > least ? value : least;
     return above < most ? above : most;
 }
 
 /* Square root, to 3e-7 of it. */
-static float root_of(float value)
+static inline float root_of(float value)
 {
     const uint32_t bits = (bits_of(value) & 0x80000000u) != 0u ? 0u : bits_of(value);
     const float x = float_of(bits);
@@ -177,13 +177,13 @@ static float rad_of(float counts)
 
 /* Memory: what lies beyond the end is zero. */
 
-static uint32_t word_from(const uint8_t *at)
+static inline uint32_t word_from(const uint8_t *at)
 {
     return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
 }
 
 /* `count` words from a byte on: all of them or zeros. */
-static void words_from(const uint8_t *image, uint32_t bytes, uint32_t at, uint32_t count, uint32_t *words)
+static inline void words_from(const uint8_t *image, uint32_t bytes, uint32_t at, uint32_t count, uint32_t *words)
 {
     const bool there = at <= bytes && bytes - at >= 4u * count;
     for (uint32_t i = 0; i < count; i++)
@@ -191,29 +191,29 @@ static void words_from(const uint8_t *image, uint32_t bytes, uint32_t at, uint32
 }
 
 /* Words of the body. */
-static void words_at(const fxt_table *table, uint32_t at, uint32_t count, uint32_t *words)
+static inline void words_at(const fxt_table *table, uint32_t at, uint32_t count, uint32_t *words)
 {
     words_from(table->image, table->body_bytes, 4u * at, count, words);
 }
 
-static uint32_t word_at(const fxt_table *table, uint32_t at)
+static inline uint32_t word_at(const fxt_table *table, uint32_t at)
 {
     uint32_t word;
     words_at(table, at, 1, &word);
     return word;
 }
 
-static float number_at(const fxt_table *table, uint32_t at)
+static inline float number_at(const fxt_table *table, uint32_t at)
 {
     return float_of(word_at(table, at));
 }
 
-static int32_t low(uint32_t word)
+static inline int32_t low(uint32_t word)
 {
     return (int16_t)(word & 0xffffu);
 }
 
-static int32_t high(uint32_t word)
+static inline int32_t high(uint32_t word)
 {
     return (int16_t)(word >> 16);
 }
@@ -252,7 +252,7 @@ static fxt_factor factor_new(uint32_t times, uint32_t over)
     return factor;
 }
 
-static int64_t factor_of(const fxt_factor *factor, int64_t counts)
+static inline int64_t factor_of(const fxt_factor *factor, int64_t counts)
 {
     const uint64_t above = (uint64_t)(counts >> 32), below = (uint32_t)counts;
     const uint64_t fraction_high = factor->fraction >> 32, fraction_low = (uint32_t)factor->fraction;
@@ -275,19 +275,19 @@ static fxt_rate rate_new(const fxt_factor *factor, uint32_t times, bool reversed
     return rate;
 }
 
-static uint32_t rate_phase(const fxt_rate *rate, int64_t counts)
+static inline uint32_t rate_phase(const fxt_rate *rate, int64_t counts)
 {
     const uint64_t turns = (uint64_t)(counts >> 32);
     const uint32_t late = (uint32_t)(turns * rate->rest >> 32);
     return (uint32_t)((uint64_t)counts * rate->periods >> 32) + late;
 }
 
-static int64_t minus(int64_t angle, int64_t counts)
+static inline int64_t minus(int64_t angle, int64_t counts)
 {
     return (int64_t)((uint64_t)angle - (uint64_t)counts);
 }
 
-static int64_t plus(int64_t angle, int64_t counts)
+static inline int64_t plus(int64_t angle, int64_t counts)
 {
     return (int64_t)((uint64_t)angle + (uint64_t)counts);
 }
@@ -305,7 +305,7 @@ static int64_t nominal_generator(const fxt_table *table, int64_t output)
 }
 
 /* a - b in counts if that is within half a turn, else a quarter turn with its sign. */
-static int32_t minus_near(int64_t a, int64_t b)
+static inline int32_t minus_near(int64_t a, int64_t b)
 {
     const int64_t counts = minus(a, b);
     if (counts >= INT32_MIN && counts <= INT32_MAX)
@@ -340,7 +340,7 @@ typedef struct {
     bool finite, in_range, led_astray;
 } point;
 
-static uint32_t search(const fxt_table *table, uint32_t first, uint32_t step, float value)
+static inline uint32_t search(const fxt_table *table, uint32_t first, uint32_t step, float value)
 {
     uint32_t found = 0;
     for (; step > 0; step >>= 1)
@@ -427,18 +427,18 @@ static bool allows_error(const fxt_table *table, int32_t error)
 }
 
 /* Records around a point: two, or four where there are temperatures. */
-static uint32_t row_at(const point *at, uint32_t number)
+static inline uint32_t row_at(const point *at, uint32_t number)
 {
     return at->row + ((number & 1u) != 0u ? at->torque_step : 0u) + ((number & 2u) != 0u ? at->plane_step : 0u);
 }
 
-static uint32_t rows_of(const point *at)
+static inline uint32_t rows_of(const point *at)
 {
     return at->plane_step != 0u ? 4u : 2u;
 }
 
 /* Values of one direction in a record. */
-static uint32_t ripple_row(uint32_t nodes)
+static inline uint32_t ripple_row(uint32_t nodes)
 {
     return nodes == 0u ? 0u : (nodes + 5u) & ~1u;
 }
@@ -447,7 +447,7 @@ typedef struct {
     uint32_t node, fraction;
 } cell;
 
-static cell cell_at(uint32_t nodes, uint32_t phase)
+static inline cell cell_at(uint32_t nodes, uint32_t phase)
 {
     const uint64_t scaled = (uint64_t)phase * nodes + ((uint64_t)1 << 31);
     const cell at = {(uint32_t)(scaled >> 32), (uint32_t)scaled};
@@ -455,7 +455,7 @@ static cell cell_at(uint32_t nodes, uint32_t phase)
 }
 
 /* B-spline weights of the three nodes around the place, 2^-15. */
-static void weights_q15(cell at, int32_t weights[3])
+static inline void weights_q15(cell at, int32_t weights[3])
 {
     const uint32_t t = at.fraction >> 17, s = 0x8000u - t;
     const uint32_t first = s * s >> 16, last = t * t >> 16;
@@ -490,7 +490,7 @@ static int32_t curves_at(const fxt_table *table, const phases *where)
 }
 
 /* Half words of the records: two in a word. */
-static void halves_at(const fxt_table *table, uint32_t at, uint32_t count, uint32_t *words)
+static inline void halves_at(const fxt_table *table, uint32_t at, uint32_t count, uint32_t *words)
 {
     words_from(table->image, table->bytes, 2u * at, count, words);
 }
@@ -604,17 +604,17 @@ static bool solve(const fxt_table *table, const point *at, int64_t target, bool 
 
 /* The play. */
 
-static int32_t clamped(int32_t offset, int32_t half)
+static inline int32_t clamped(int32_t offset, int32_t half)
 {
     return offset < -half ? -half : offset > half ? half : offset;
 }
 
-static int32_t play_offset(const fxt_play *play)
+static inline int32_t play_offset(const fxt_play *play)
 {
     return add(play->lower, play->upper) >> 1;
 }
 
-static int32_t play_uncertainty(const fxt_play *play)
+static inline int32_t play_uncertainty(const fxt_play *play)
 {
     const int32_t width = saturate((int64_t)play->upper - play->lower);
     return add(width >> 1, width & 1);
