@@ -25,6 +25,13 @@ fn desk() -> Desk {
     desk
 }
 
+/// Writes a file and the folders that it is in.
+fn put(desk: &Desk, name: &str, text: &str) {
+    let path = desk.path(name);
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    fs::write(path, text).unwrap();
+}
+
 #[test]
 fn every_file_is_the_one_of_the_manifest() {
     let desk = desk();
@@ -68,9 +75,9 @@ fn a_bundle_replaces_a_bundle_and_nothing_else() {
     bundle("made").done();
     assert!(!desk.path("made/left_over.txt").exists());
     // A folder with other files, even where one of them is called as ours.
-    desk.write("mine/main.c", "int main(void);");
+    put(&desk, "mine/main.c", "int main(void);");
     for name in ["README.md", "manifest.json"] {
-        desk.write(&format!("mine/{name}"), "{}");
+        put(&desk, &format!("mine/{name}"), "{}");
         let run = bundle("mine");
         assert_eq!(run.code, 2);
         assert!(run.stderr.contains("has files that are no bundle"), "{}", run.stderr);
@@ -82,7 +89,7 @@ fn a_bundle_replaces_a_bundle_and_nothing_else() {
 #[test]
 fn what_is_wrong_is_said_before_anything_is_written() {
     let desk = desk();
-    desk.write("none/readme.txt", "");
+    put(&desk, "none/readme.txt", "");
     let mut image = fs::read(desk.path("out/cam.fxt")).unwrap();
     fs::create_dir_all(desk.path("twice")).unwrap();
     for name in ["a-b.fxt", "a_b.fxt"] {
@@ -90,8 +97,8 @@ fn what_is_wrong_is_said_before_anything_is_written() {
     }
     image[300] ^= 1;
     fs::write(desk.path("torn.fxt"), &image).unwrap();
-    desk.write("libraries/thumbv7m-none-eabi/libflexspline.a", "no archive");
-    desk.write("libraries/thumbv6m-none-eabi/libflexspline.a", "!<arch>\nof another library");
+    put(&desk, "libraries/thumbv7m-none-eabi/libflexspline.a", "no archive");
+    put(&desk, "libraries/thumbv6m-none-eabi/libflexspline.a", "!<arch>\nof another library");
     for (line, said) in [
         ("--tables absent.fxt", "absent.fxt"),
         ("--tables none", "none: holds no .fxt file"),
@@ -116,7 +123,7 @@ fn what_is_wrong_is_said_before_anything_is_written() {
 fn libraries_are_taken_from_a_folder_and_those_that_lack_are_named() {
     let desk = desk();
     let archive = "!<arch>\nwith flexspline_tick in it";
-    desk.write("libraries/thumbv7m-none-eabi/libflexspline.a", archive);
+    put(&desk, "libraries/thumbv7m-none-eabi/libflexspline.a", archive);
     let all = desk.line("bundle --tables out --libraries libraries --out made --json").done().json();
     assert_eq!(all["targets"], serde_json::json!(["thumbv7m-none-eabi"]));
     let missing = all["missing"].as_array().unwrap();

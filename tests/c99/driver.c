@@ -103,7 +103,7 @@ static void same_command(const fxt_command *found, uint32_t kind)
 }
 
 /* An image and its verdict; at odd images the image lies at an odd address. */
-static bool open_image(fxt_table *table)
+static bool open_image(fxt_table *table, uint8_t **opened)
 {
     static uint8_t memory[100001];
     const uint32_t length = word();
@@ -113,6 +113,7 @@ static bool open_image(fxt_table *table)
         return false;
     }
     image = alone(image, length);
+    *opened = image;
     const fxt_verdict verdict = fxt_open(table, image, length);
     const uint32_t reason = byte(), field = byte(), index = word(), temperature = word();
     if ((uint32_t)verdict.reason != reason || (uint32_t)verdict.field != field || verdict.index != index ||
@@ -231,19 +232,45 @@ static void restore(void)
     same(equal == restored, "restored and saved again", 3);
 }
 
+/* The memory of an accepted image changes after the check: whatever is read then lies in it, and an error is within the stated limit. */
+static void damage(const fxt_table *table, uint8_t *image)
+{
+    fxt_play play = fxt_play_unknown();
+    const float limit = 1.002f * fxt_tell(table).error_limit_rad + 1e-6f;
+    uint32_t mixed = 1;
+    for (uint32_t i = 0; i < 64u; i++) {
+        fxt_prediction now;
+        fxt_command next;
+        mixed = mixed * 1664525u + 1013904223u;
+        if (image != NULL)
+            image[(mixed >> 8) % table->bytes] ^= (uint8_t)(1u << (mixed & 7u));
+        /* Torque, temperature, and where the parts are. */
+        if (image != NULL && i % 4u == 0u)
+            image[136u + (mixed >> 16) % 60u] = (uint8_t)(mixed >> 24);
+        const float at = (float)((int32_t)mixed >> 24);
+        fxt_step(table, &play, (int64_t)mixed << 8, (int64_t)mixed << 2, at, at, &now, &next);
+        /* The play of before may still be in the first. */
+        const float error = now.transmission_error_rad, aimed = next.predicted_error_rad;
+        const bool bounded = error >= -2.0f * limit && error <= 2.0f * limit && aimed >= -2.0f * limit && aimed <= 2.0f * limit;
+        same(bounded && now.quality <= FXT_DISABLED && next.quality <= FXT_DISABLED, "after damage", i);
+    }
+}
+
 static int compare(void)
 {
     static fxt_table table;
     fxt_play play = fxt_play_unknown();
     bool whole = true, ended = false;
+    uint8_t *image = NULL;
     while (whole && !ended) {
         uint8_t record = 0;
         whole = read_bytes(&record, 1);
-        if (record == 1)
-            whole = whole && open_image(&table);
-        if (record == 1)
+        if (record < 2 && table.image != NULL)
+            damage(&table, image);
+        if (record == 1) {
+            whole = whole && open_image(&table, &image);
             play = fxt_play_unknown();
-        else if (record == 2)
+        } else if (record == 2)
             call(&table, &play);
         else if (record == 3)
             restore();

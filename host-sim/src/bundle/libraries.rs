@@ -140,24 +140,13 @@ impl Places {
         let folder =
             std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| checkout.join("target"), PathBuf::from).join("bundle");
         let folder = std::path::absolute(&folder).unwrap_or(folder);
-        // With an operating system the panic handler is that of the standard library.
-        let features = if target.contains("-none-") { "c-api" } else { "c-api,std" };
+        // Without an operating system the library is one piece with no panic path; with one it has the panic handler of the standard library.
+        let (features, lto) = if target.contains("-none-") { ("c-api", "fat") } else { ("c-api,std", "off") };
         let output = Command::new("cargo")
-            .args([
-                "rustc",
-                "--release",
-                "-p",
-                "flexspline",
-                "--features",
-                features,
-                "--target",
-                target,
-                "--crate-type",
-                "staticlib",
-            ])
-            .arg("--target-dir")
+            .args(["rustc", "--release", "-p", "flexspline", "--features", features, "--target", target])
+            .args(["--crate-type", "staticlib", "--target-dir"])
             .arg(&folder)
-            .envs([("CARGO_PROFILE_RELEASE_PANIC", "abort"), ("CARGO_PROFILE_RELEASE_LTO", "fat")])
+            .envs([("CARGO_PROFILE_RELEASE_PANIC", "abort"), ("CARGO_PROFILE_RELEASE_LTO", lto)])
             .envs([("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "1"), ("CARGO_PROFILE_RELEASE_DEBUG", "false")])
             .current_dir(checkout)
             .stdin(Stdio::null())

@@ -39,13 +39,14 @@ const FIXED: [(&str, &str); 8] = [
 ];
 
 /// Path and text of what names tables and versions.
-const TEMPLATES: [(&str, &str); 6] = [
+const TEMPLATES: [(&str, &str); 7] = [
     ("CMakeLists.txt", include_str!("templates/CMakeLists.txt")),
     ("zephyr/CMakeLists.txt", include_str!("templates/zephyr/CMakeLists.txt")),
     ("idf_component.yml", include_str!("templates/idf_component.yml")),
     ("library.json", include_str!("templates/library.json")),
     ("library.properties", include_str!("templates/library.properties")),
     ("README.md", include_str!("templates/readme.in")),
+    ("example.c", include_str!("templates/example.c")),
 ];
 
 /// What is wrong with the tables of a bundle.

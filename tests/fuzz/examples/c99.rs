@@ -191,7 +191,7 @@ impl<W: Write> Vectors<W> {
     fn saved(&mut self, play: &PlayState, mixed: &mut Mixed) -> std::io::Result<()> {
         let mut bytes = play.save();
         let number = mixed.number();
-        if number % 4 > 0 {
+        if !number.is_multiple_of(4) {
             bytes[number as usize / 4 % 28] ^= 1 << (number >> 40 & 7);
         }
         self.out.write_all(&[3])?;
@@ -247,23 +247,55 @@ impl<W: Write> Vectors<W> {
     }
 }
 
-/// A table whose wind-up has a step at a torque node, up or down, under right checksums: steeper than any drive, or falling.
-fn stepped(choices: &mut Choices<'_>) -> Vec<u8> {
-    let mut image = tables::BASES[[1, 2, 3, 5][choices.below(4)]].clone();
+/// A sound table whose numbers of one kind are moved by `part` of a large change, under right checksums: a step of D at a torque node, H,
+/// the slope of D at a node, the ripple unit, or a curve.
+fn moved(base: &[u8], [kind, split, sign]: [usize; 3], part: f64) -> Vec<u8> {
+    let mut image = base.to_vec();
     let (torques, temperatures) = (usize::from(image[110]), usize::from(image[111]));
     let nodes = 4 * usize::from(u16::from_le_bytes([image[164], image[165]]));
-    // As often as not in the jump at −1.5 N·m, as high as the stated limit of the error lets it be.
-    let split = if choices.any() { 4.min(torques - 1) } else { choices.below(torques) };
-    let size = if choices.any() { 1.0 } else { choices.part() };
-    let half_step = (9e-3 * size / COUNT_RAD) as f32;
+    let part = if sign == 0 { part } else { -part };
+    let change = |place: &mut [u8], to: &dyn Fn(f64) -> f64| {
+        let before = f32::from_le_bytes(place.try_into().expect("four bytes"));
+        let bits = (to(before.into()) as f32).to_bits() & !1 | before.to_bits() & 1;
+        place.copy_from_slice(&bits.to_le_bytes());
+    };
     for index in 0..torques * temperatures {
-        let place = &mut image[nodes + 12 * index..][..4];
-        let mean = f32::from_le_bytes(place.try_into().expect("four bytes"));
-        let step = if index % torques < split { -half_step } else { half_step };
-        place.copy_from_slice(&(mean + step).to_le_bytes());
+        let node = &mut image[nodes + 12 * index..][..12];
+        let side = if index % torques < split { -1.0 } else { 1.0 };
+        match kind {
+            0 => change(&mut node[..4], &|mean| mean + side * part * 9e-3 / COUNT_RAD),
+            1 => change(&mut node[8..], &|half| half * (1.0 + 30.0 * part).max(0.0)),
+            2 if index % torques == split => change(&mut node[4..8], &|slope| slope + part * 0.3 / COUNT_RAD),
+            _ => {}
+        }
+    }
+    let word = |image: &[u8], at: usize| u32::from_le_bytes(image[at..at + 4].try_into().expect("four bytes"));
+    if kind == 3 {
+        let unit = f64::from(word(&image, 116)) * 10f64.powf(3.0 * part);
+        image[116..120].copy_from_slice(&(unit as u32).to_le_bytes());
+    }
+    if kind == 4 {
+        for at in (4 * 136..nodes).step_by(4) {
+            let value = (f64::from(word(&image, at) as i32) * 10f64.powf(3.0 * part)) as i32;
+            image[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        }
     }
     flexspline::reseal(&mut image);
     image
+}
+
+/// The two images next to each other of which one is accepted and one is not; or the end of the change, if it is accepted too.
+fn at_the_limit(choices: &mut Choices<'_>) -> [Vec<u8>; 2] {
+    let base = &tables::BASES[[1, 2, 3, 5][choices.below(4)]];
+    // As often as not at the jump at −1.5 N·m.
+    let split = if choices.any() { 4.min(usize::from(base[110]) - 1) } else { choices.below(base[110].into()) };
+    let of = [choices.below(5), split, choices.below(2)];
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if Table::check(&moved(base, of, middle)).is_ok() { low = middle } else { high = middle }
+    }
+    [low, high].map(|part| moved(base, of, part))
 }
 
 struct Asked {
@@ -292,24 +324,25 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for number in 0..images {
         let bytes = mixed.bytes(2048);
         let mut choices = Choices::new(&bytes);
-        // Every third of a table that was named, the others as the fuzz target of images makes them.
+        // Every third of a table that was named, some at a limit, the others as the fuzz target of images makes them.
         let hostile = if number.is_multiple_of(3) && !named.is_empty() {
             let mut image = sound[choices.below(named.len())].clone();
             if number.is_multiple_of(2) {
-                image::change_bytes(&mut image, &mut choices)
+                image::change_bytes(&mut image, &mut choices);
             } else {
-                image::change_numbers(&mut image, &mut choices)
+                image::change_numbers(&mut image, &mut choices);
             }
-            Some(image)
+            vec![image]
         } else if number.is_multiple_of(31) {
-            Some(stepped(&mut choices))
+            at_the_limit(&mut choices).to_vec()
         } else {
-            image::hostile(&mut choices)
+            image::hostile(&mut choices).into_iter().collect()
         };
-        let Some(image) = hostile else { continue };
-        vectors.image(&image)?;
-        if let Ok(table) = Table::check(&image) {
-            vectors.ticks(&table, 16, &mut mixed)?;
+        for image in hostile {
+            vectors.image(&image)?;
+            if let Ok(table) = Table::check(&image) {
+                vectors.ticks(&table, 16, &mut mixed)?;
+            }
         }
     }
     vectors.out.write_all(&[0])?;
