@@ -8,6 +8,7 @@ mod as_built;
 mod backlash_and_dwell;
 mod bad_input;
 mod bad_measurements;
+mod bundle;
 mod c_header;
 mod calibrated_drives;
 mod calibration;

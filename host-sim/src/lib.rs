@@ -39,6 +39,7 @@ pub use flexspline_mechanics::{
     condense, contact, drive, fem, mesh, motion, reference, sleeve, stepping, suggest, toml_file, units,
 };
 
+pub mod bundle;
 pub mod calibrate;
 pub mod causes;
 pub mod cli;

@@ -3,6 +3,7 @@
 //! What a command computes is a library function that knows nothing of the command line. Here options are read and
 //! checked, the function is called, and its result is written and shown. Data goes to stdout, talk to stderr.
 
+mod bundle;
 mod calibrate;
 mod completions;
 mod context;
@@ -104,6 +105,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
         &[
             ("tables", "compensation tables for firmware, from FEM or from samples"),
             ("validate", "are they right? against fresh FEM at other points"),
+            ("bundle", "tables, a reader in C99 and the core, for your firmware's build"),
             ("kernels", "what a deviation of any tooth does to the output, for diagnose"),
         ],
     ),
@@ -176,6 +178,7 @@ enum Command {
     Tables(tables::Tables),
     Kernels(kernels::KernelsCommand),
     Validate(validate::Validate),
+    Bundle(bundle::BundleCommand),
     Calibrate(calibrate::Calibrate),
     Replay(replay::Replay),
     Synthesize(synthesize::Synthesize),
@@ -259,6 +262,7 @@ impl Command {
             Command::Tables(command) => command.run(context),
             Command::Kernels(command) => command.run(context),
             Command::Validate(command) => command.run(context),
+            Command::Bundle(command) => command.run(context),
             Command::Calibrate(command) => command.run(context),
             Command::Replay(command) => command.run(context),
             Command::Synthesize(command) => command.run(context),

@@ -58,7 +58,8 @@ fn header_comment(table: &MadeTable, mark: &str) -> String {
     text
 }
 
-fn put_bytes(text: &mut String, bytes: &[u8]) {
+/// The bytes of an image, sixteen to a line, for Rust and C.
+pub(crate) fn put_bytes(text: &mut String, bytes: &[u8]) {
     for row in bytes.chunks(16) {
         text.push_str("   ");
         for byte in row {

@@ -14,33 +14,38 @@ pub const COUNT_RAD: f32 = TAU / 4_294_967_296.0;
 /// One image. The first byte says where it comes from.
 pub fn run(data: &[u8]) {
     let mut choices = Choices::new(data);
-    let image = match choices.below(4) {
-        0 => choices.bytes(65_535).to_vec(),
-        1 => {
-            let mut image = BASES[choices.below(BASES.len())].clone();
-            change_bytes(&mut image, &mut choices);
-            image
-        }
-        2 => {
-            let mut image = BASES[choices.below(BASES.len())].clone();
-            change_numbers(&mut image, &mut choices);
-            image
-        }
-        _ => {
-            let Some(mut image) = Numbers::any(&mut choices).and_then(|numbers| numbers.image().ok()) else { return };
-            if choices.any() {
-                change_numbers(&mut image, &mut choices);
-            }
-            image
-        }
-    };
+    let Some(image) = hostile(&mut choices) else { return };
     if let Ok(table) = Table::check(&image) {
         keeps_its_promises(&table, &mut choices);
     }
 }
 
+/// An image: any bytes, a sound one damaged on the way, one with wrong numbers under right checksums, or one of any numbers.
+pub fn hostile(choices: &mut Choices<'_>) -> Option<Vec<u8>> {
+    match choices.below(4) {
+        0 => Some(choices.bytes(65_535).to_vec()),
+        1 => {
+            let mut image = BASES[choices.below(BASES.len())].clone();
+            change_bytes(&mut image, choices);
+            Some(image)
+        }
+        2 => {
+            let mut image = BASES[choices.below(BASES.len())].clone();
+            change_numbers(&mut image, choices);
+            Some(image)
+        }
+        _ => {
+            let mut image = Numbers::any(choices)?.image().ok()?;
+            if choices.any() {
+                change_numbers(&mut image, choices);
+            }
+            Some(image)
+        }
+    }
+}
+
 /// Damage on the way: checksums stay as they were.
-fn change_bytes(image: &mut Vec<u8>, choices: &mut Choices<'_>) {
+pub fn change_bytes(image: &mut Vec<u8>, choices: &mut Choices<'_>) {
     for _ in 0..=choices.below(4) {
         let at = choices.below(image.len().max(1));
         match choices.below(4) {
@@ -63,7 +68,7 @@ fn put(image: &mut [u8], at: usize, value: u32) {
 }
 
 /// Wrong numbers, then the checksums and whatever follows from the numbers made right: what is left are the checks of meaning.
-fn change_numbers(image: &mut [u8], choices: &mut Choices<'_>) {
+pub fn change_numbers(image: &mut [u8], choices: &mut Choices<'_>) {
     for _ in 0..=choices.below(12) {
         let low = |at: usize, image: &[u8]| word(image, at) as usize & 0xffff;
         let high = |at: usize, image: &[u8]| word(image, at) as usize >> 16;

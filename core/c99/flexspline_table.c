@@ -1,0 +1,1434 @@
+/* See flexspline_table.h. Each function has the name of what it follows in the Rust core (core/src/table, core/src/play.rs, core/src/drive.rs),
+ * where the reasons are told; the order of every sum and product is the core's, so that all bits are. */
+#include "flexspline_table.h"
+
+#include <float.h>
+
+#if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || \
+    (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
+#error "flexspline_table.c: compile it without -ffast-math and its parts"
+#endif
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
+#error "flexspline_table.c: float is computed in another precision (x87?); use -msse2 -mfpmath=sse, or the compiler's like"
+#endif
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+/* GCC does not know the pragma of the standard; where the option -ffp-contract=off cannot be given (Arduino), this does the same. */
+#pragma GCC optimize("fp-contract=off")
+#endif
+
+/* Single and double precision of IEEE 754, two's complement, and a right shift that keeps the sign. */
+typedef char fxt_needs_ieee_single[(FLT_MANT_DIG == 24 && FLT_MAX_EXP == 128 && sizeof(float) == 4) ? 1 : -1];
+typedef char fxt_needs_ieee_double[(DBL_MANT_DIG == 53 && DBL_MAX_EXP == 1024 && sizeof(double) == 8) ? 1 : -1];
+typedef char fxt_needs_signed_shift[(((int32_t)-5 >> 1) == -3 && ((int64_t)-5 >> 1) == -3) ? 1 : -1];
+typedef char fxt_needs_two_complement[((int32_t)0xfffffffdu == -3 && (int16_t)0xfffd == -3) ? 1 : -1];
+typedef char fxt_needs_32_bit_sizes[(SIZE_MAX >= 0xffffffffu) ? 1 : -1];
+
+#define TAU 6.283185307179586
+#define TURN 4294967296.0
+static const float rad_per_count = (float)(TAU / TURN);
+static const float tau_f32 = (float)TAU;
+
+/* Limits of the format. */
+enum {
+    HEADER_BYTES = 256,
+    TEXT_BYTES = 24,
+    LEAST_BYTES = 584,
+    TORQUE_SLOTS = 64,
+    TEMPERATURE_SLOTS = 8,
+    MOST_RIPPLE_NODES = 32,
+    LEAST_PERIODIC_NODES = 4,
+    MOST_PERIODIC_NODES = 128,
+    NODE_WORDS = 3,
+    MOST_ITERATIONS = 8,
+    HOLD_COUNTS = 8
+};
+/* Where things are, in words. */
+enum {
+    AT_RIPPLE_UNIT = 29,
+    AT_LIMIT = 30,
+    AT_TORQUE_RANGE = 34,
+    AT_TEMPERATURE_RANGE = 36,
+    AT_CELL_WIDTH = 39,
+    AT_LAST = 40,
+    AT_NODES = 41,
+    AT_RECORDS = 42,
+    AT_RECORD_STEP = 43,
+    AT_CURVE_WORDS = 44,
+    AT_ITERATIONS = 47,
+    AT_HOLD = 48,
+    AT_BODY = 49,
+    AT_TORQUE_NODES = 64,
+    AT_TEMPERATURE_NODES = 128,
+    AT_CURVES = 136
+};
+/* 2^-24 cells in one. */
+#define CELL INT32_C(0x1000000)
+/* The largest half-width of a play, and the largest error that is kept, counts. */
+#define MOST_PLAY INT32_C(0x8000000)
+#define MOST_KEPT (34178720u + (34178720u >> 8) + 2u * 33554431u + 0x8000000u)
+
+/* Numbers: sums wrap, conversions saturate, as in Rust. */
+
+static inline int32_t i32(uint32_t bits)
+{
+    return (int32_t)bits;
+}
+
+static inline int32_t add(int32_t a, int32_t b)
+{
+    return i32((uint32_t)a + (uint32_t)b);
+}
+
+static inline int32_t sub(int32_t a, int32_t b)
+{
+    return i32((uint32_t)a - (uint32_t)b);
+}
+
+static inline int32_t mul(int32_t a, int32_t b)
+{
+    return i32((uint32_t)a * (uint32_t)b);
+}
+
+static inline int32_t saturate(int64_t value)
+{
+    return value > INT32_MAX ? INT32_MAX : value < INT32_MIN ? INT32_MIN : (int32_t)value;
+}
+
+/* a*b/2^32, rounded down. */
+static inline int32_t mul_high(int32_t a, int32_t b)
+{
+    return i32((uint32_t)((uint64_t)((int64_t)a * b) >> 32));
+}
+
+static inline uint32_t bits_of(float value)
+{
+    union {
+        float f;
+        uint32_t u;
+    } both;
+    both.f = value;
+    return both.u;
+}
+
+static inline float float_of(uint32_t bits)
+{
+    union {
+        uint32_t u;
+        float f;
+    } both;
+    both.u = bits;
+    return both.f;
+}
+
+static inline float magnitude(float value)
+{
+    return float_of(bits_of(value) & 0x7fffffffu);
+}
+
+static inline bool is_finite(float value)
+{
+    return (bits_of(value) & 0x7fffffffu) < 0x7f800000u;
+}
+
+/* Towards zero; the end of the range beyond it; 0 of NaN. */
+static inline int32_t to_i32(float value)
+{
+    if (value >= -2147483648.0f && value < 2147483648.0f)
+        return (int32_t)value;
+    return value > 0.0f ? INT32_MAX : value < 0.0f ? INT32_MIN : 0;
+}
+
+/* The larger; the second if the first is NaN. */
+static inline float larger(float a, float b)
+{
+    return a > b ? a : b;
+}
+
+/* Within a range; its lower end if NaN. */
+static inline float within(float value, float least, float most)
+{
+    const float above = value > least ? value : least;
+    return above < most ? above : most;
+}
+
+/* Square root, to 3e-7 of it. */
+static inline float root_of(float value)
+{
+    const uint32_t bits = (bits_of(value) & 0x80000000u) != 0u ? 0u : bits_of(value);
+    const float x = float_of(bits);
+    const float half = 0.5f * x;
+    float inverse = float_of(0x5f3759dfu - (bits >> 1));
+    for (int i = 0; i < 3; i++)
+        inverse = inverse * (1.5f - half * inverse * inverse);
+    return x * inverse;
+}
+
+static double counts_of_rad(double rad)
+{
+    return rad * (TURN / TAU);
+}
+
+static float rad_of(float counts)
+{
+    return counts * rad_per_count;
+}
+
+/* Memory: what lies beyond the end is zero. */
+
+static inline uint32_t word_from(const uint8_t *at)
+{
+    return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
+}
+
+/* `count` words from a byte on: all of them or zeros. */
+static inline void words_from(const uint8_t *image, uint32_t bytes, uint32_t at, uint32_t count, uint32_t *words)
+{
+    const bool there = at <= bytes && bytes - at >= 4u * count;
+    for (uint32_t i = 0; i < count; i++)
+        words[i] = there ? word_from(image + at + 4u * i) : 0u;
+}
+
+/* Words of the body. */
+static inline void words_at(const fxt_table *table, uint32_t at, uint32_t count, uint32_t *words)
+{
+    words_from(table->image, table->body_bytes, 4u * at, count, words);
+}
+
+static inline uint32_t word_at(const fxt_table *table, uint32_t at)
+{
+    uint32_t word;
+    words_at(table, at, 1, &word);
+    return word;
+}
+
+static inline float number_at(const fxt_table *table, uint32_t at)
+{
+    return float_of(word_at(table, at));
+}
+
+static inline int32_t low(uint32_t word)
+{
+    return (int16_t)(word & 0xffffu);
+}
+
+static inline int32_t high(uint32_t word)
+{
+    return (int16_t)(word >> 16);
+}
+
+/* CRC-32 of ISO-HDLC, four bits at a time; before the last inversion. */
+static uint32_t crc_bytes(uint32_t crc, const uint8_t *bytes, uint32_t count)
+{
+    static const uint32_t of_nibble[16] = {0x00000000u, 0x1db71064u, 0x3b6e20c8u, 0x26d930acu, 0x76dc4190u, 0x6b6b51f4u,
+                                           0x4db26158u, 0x5005713cu, 0xedb88320u, 0xf00f9344u, 0xd6d6a3e8u, 0xcb61b38cu,
+                                           0x9b64c2b0u, 0x86d3d2d4u, 0xa00ae278u, 0xbdbdf21cu};
+    for (uint32_t i = 0; i < count; i++) {
+        crc ^= bytes[i];
+        crc = crc >> 4 ^ of_nibble[crc & 15u];
+        crc = crc >> 4 ^ of_nibble[crc & 15u];
+    }
+    return crc;
+}
+
+static uint32_t crc32_of(const uint8_t *bytes, uint32_t count)
+{
+    return ~crc_bytes(0xffffffffu, bytes, count);
+}
+
+/* The drive: tooth counts and the nominal motion. */
+
+static fxt_factor factor_new(uint32_t times, uint32_t over)
+{
+    fxt_factor factor = {0, times / over};
+    uint32_t remainder = times % over;
+    for (int digit = 0; digit < 4; digit++) {
+        const uint32_t part = remainder << 16;
+        factor.fraction = factor.fraction << 16 | part / over;
+        remainder = part % over;
+    }
+    factor.fraction = (factor.fraction + (remainder * 2u >= over ? 1u : 0u)) & ~(uint64_t)1;
+    return factor;
+}
+
+static inline int64_t factor_of(const fxt_factor *factor, int64_t counts)
+{
+    const uint64_t above = (uint64_t)(counts >> 32), below = (uint32_t)counts;
+    const uint64_t fraction_high = factor->fraction >> 32, fraction_low = (uint32_t)factor->fraction;
+    const uint64_t lowest = below * fraction_low >> 32;
+    const uint64_t middle = below * fraction_high + lowest;
+    const uint64_t other = above * fraction_low + (uint32_t)middle + ((uint64_t)1 << 31);
+    const uint64_t scaled = above * fraction_high + (middle >> 32) + (uint64_t)((int64_t)other >> 32);
+    return (int64_t)((uint64_t)counts * factor->whole + scaled);
+}
+
+static fxt_rate rate_new(const fxt_factor *factor, uint32_t times, bool reversed)
+{
+    const uint64_t below = (uint64_t)(uint32_t)factor->fraction * times;
+    const uint64_t whole = ((uint64_t)factor->whole << 32) + (factor->fraction >> 32);
+    fxt_rate rate = {whole * times + (below >> 32), (uint32_t)below};
+    if (reversed) {
+        rate.rest = 0u - rate.rest;
+        rate.periods = ~rate.periods + (rate.rest == 0u ? 1u : 0u);
+    }
+    return rate;
+}
+
+static inline uint32_t rate_phase(const fxt_rate *rate, int64_t counts)
+{
+    const uint64_t turns = (uint64_t)(counts >> 32);
+    const uint32_t late = (uint32_t)(turns * rate->rest >> 32);
+    return (uint32_t)((uint64_t)counts * rate->periods >> 32) + late;
+}
+
+static inline int64_t minus(int64_t angle, int64_t counts)
+{
+    return (int64_t)((uint64_t)angle - (uint64_t)counts);
+}
+
+static inline int64_t plus(int64_t angle, int64_t counts)
+{
+    return (int64_t)((uint64_t)angle + (uint64_t)counts);
+}
+
+static int64_t nominal_output(const fxt_table *table, int64_t generator)
+{
+    const int64_t output = factor_of(&table->to_output, generator);
+    return table->reversed ? minus(0, output) : output;
+}
+
+static int64_t nominal_generator(const fxt_table *table, int64_t output)
+{
+    const int64_t generator = factor_of(&table->to_generator, output);
+    return table->reversed ? minus(0, generator) : generator;
+}
+
+/* a - b in counts if that is within half a turn, else a quarter turn with its sign. */
+static inline int32_t minus_near(int64_t a, int64_t b)
+{
+    const int64_t counts = minus(a, b);
+    if (counts >= INT32_MIN && counts <= INT32_MAX)
+        return (int32_t)counts;
+    return counts < 0 ? ~(INT32_MAX >> 1) : INT32_MAX >> 1;
+}
+
+typedef struct {
+    uint32_t generator, material, output, tooth;
+} phases;
+
+static phases phases_at(const fxt_table *table, int64_t generator, int64_t nominal)
+{
+    const uint32_t fraction = (uint32_t)generator;
+    const phases at = {fraction, fraction - (uint32_t)nominal, (uint32_t)nominal, fraction * table->ripple_order};
+    return at;
+}
+
+static phases phases_at_output(const fxt_table *table, int64_t nominal)
+{
+    const uint32_t generator = rate_phase(&table->generator_rate, nominal);
+    const phases at = {generator, generator - (uint32_t)nominal, (uint32_t)nominal, 0};
+    return at;
+}
+
+/* A torque and temperature, located in the table. */
+
+typedef struct {
+    uint32_t row, torque_step, plane_step; /* half words */
+    int32_t shares[4];                     /* 2^-30 */
+    int32_t mean, half_width, jump;        /* counts */
+    bool finite, in_range, led_astray;
+} point;
+
+static inline uint32_t search(const fxt_table *table, uint32_t first, uint32_t step, float value)
+{
+    uint32_t found = 0;
+    for (; step > 0; step >>= 1)
+        if (number_at(table, first + (found | step)) <= value)
+            found |= step;
+    return found;
+}
+
+static point locate(const fxt_table *table, float torque_n_m, float temperature_c)
+{
+    uint32_t words[6], warmer[6];
+    float here[6];
+    point at;
+    words_at(table, AT_TORQUE_RANGE, 4, words);
+    const float torque = within(torque_n_m, float_of(words[0]), float_of(words[1]));
+    const float temperature = within(temperature_c, float_of(words[2]), float_of(words[3]));
+    words_at(table, AT_LAST, 4, words);
+    const uint32_t last_torque = words[0] & 0xffffu, last_temperature = words[0] >> 16;
+    const uint32_t nodes = words[1] & 0xffffu, node_plane = words[1] >> 16;
+    const uint32_t records = words[2] & 0xffffu, record_plane = words[2] >> 16;
+    const uint32_t record_step = words[3] & 0xffffu;
+
+    uint32_t interval = search(table, AT_TORQUE_NODES, TORQUE_SLOTS / 2, torque);
+    interval = interval < last_torque ? interval : last_torque;
+    words_at(table, AT_TORQUE_NODES + interval, 2, words);
+    const float low_torque = float_of(words[0]), width = float_of(words[1]) - low_torque;
+    uint32_t plane = search(table, AT_TEMPERATURE_NODES, TEMPERATURE_SLOTS / 2, temperature);
+    plane = plane < last_temperature ? plane : last_temperature;
+    words_at(table, AT_TEMPERATURE_NODES + plane, 2, words);
+    const float cold = float_of(words[0]);
+    const float warm = (temperature - cold) / (float_of(words[1]) - cold);
+
+    const uint32_t first = nodes + plane * node_plane + interval * NODE_WORDS;
+    words_at(table, first, 6, words);
+    words_at(table, first + node_plane, 6, warmer);
+    for (int i = 0; i < 6; i++) {
+        const float value = float_of(words[i]);
+        here[i] = value + warm * (float_of(warmer[i]) - value);
+    }
+    const bool jump = (words[2] & 1u) != 0u;
+    const float weight = (torque - low_torque) / width;
+    const float rise = here[3] - here[0], widening = here[5] - here[2];
+    const float rest = 1.0f - weight;
+    float bend = weight * rest * (rest * (width * here[1] - rise) + weight * (rise - width * here[4]));
+    bend = jump ? 0.0f : bend;
+    const int32_t t = to_i32(weight * 16384.0f), w = to_i32(warm * 16384.0f);
+    const int32_t both = mul(t, w) >> 14;
+    const int32_t shares[4] = {add(sub(sub(16384, t), w), both), sub(t, both), sub(w, both), both};
+    for (int i = 0; i < 4; i++)
+        at.shares[i] = i32((uint32_t)shares[i] << 16);
+    const bool inside = (uint32_t)t - 1u < 16383u;
+    at.jump = jump && inside ? to_i32(magnitude(rise) + magnitude(widening)) : 0;
+    at.mean = to_i32(here[0] + weight * rise + bend);
+    at.half_width = to_i32(here[2] + weight * widening);
+    at.row = 2u * (records + plane * record_plane + interval * record_step);
+    at.torque_step = 2u * record_step;
+    at.plane_step = 2u * record_plane;
+    at.finite = is_finite(torque_n_m) && is_finite(temperature_c) && table->image != NULL;
+    at.in_range = torque == torque_n_m && temperature == temperature_c;
+    /* Only where the memory changed after it was checked. */
+    at.led_astray = (uint32_t)t > 16384u;
+    return at;
+}
+
+static fxt_quality quality_of(const point *at, bool sane, bool known)
+{
+    if (!sane)
+        return FXT_DISABLED;
+    if (!at->in_range)
+        return FXT_EXTRAPOLATED;
+    return known && at->jump == 0 ? FXT_IN_RANGE : FXT_UNCERTAIN;
+}
+
+/* |centre| + |half| is within what an accepted table can give. */
+static bool allows(const fxt_table *table, int32_t centre, int32_t half)
+{
+    const int32_t below = centre > 0 ? -centre : centre, width = half > 0 ? -half : half;
+    return saturate((int64_t)below + width) >= sub(0, table->limit);
+}
+
+static bool allows_error(const fxt_table *table, int32_t error)
+{
+    return (uint32_t)error + (uint32_t)table->limit <= (uint32_t)table->limit * 2u;
+}
+
+/* Records around a point: two, or four where there are temperatures. */
+static inline uint32_t row_at(const point *at, uint32_t number)
+{
+    return at->row + ((number & 1u) != 0u ? at->torque_step : 0u) + ((number & 2u) != 0u ? at->plane_step : 0u);
+}
+
+static inline uint32_t rows_of(const point *at)
+{
+    return at->plane_step != 0u ? 4u : 2u;
+}
+
+/* Values of one direction in a record. */
+static inline uint32_t ripple_row(uint32_t nodes)
+{
+    return nodes == 0u ? 0u : (nodes + 5u) & ~1u;
+}
+
+typedef struct {
+    uint32_t node, fraction;
+} cell;
+
+static inline cell cell_at(uint32_t nodes, uint32_t phase)
+{
+    const uint64_t scaled = (uint64_t)phase * nodes + ((uint64_t)1 << 31);
+    const cell at = {(uint32_t)(scaled >> 32), (uint32_t)scaled};
+    return at;
+}
+
+/* B-spline weights of the three nodes around the place, 2^-15. */
+static inline void weights_q15(cell at, int32_t weights[3])
+{
+    const uint32_t t = at.fraction >> 17, s = 0x8000u - t;
+    const uint32_t first = s * s >> 16, last = t * t >> 16;
+    weights[0] = i32(first);
+    weights[1] = i32(0x8000u - first - last);
+    weights[2] = i32(last);
+}
+
+static bool has_curves(const fxt_table *table)
+{
+    return (table->curves[0] | table->curves[1] | table->curves[2]) >> 16 != 0u;
+}
+
+/* A + B + C, counts. */
+static int32_t curves_at(const fxt_table *table, const phases *where)
+{
+    const uint32_t phase[3] = {where->generator, where->material, where->output};
+    int32_t sum = 0;
+    for (uint32_t curve = 0; curve < 3; curve++) {
+        const uint32_t nodes = table->curves[curve] >> 16, first = table->curves[curve] & 0xffffu;
+        if (nodes == 0u)
+            continue;
+        const cell at = cell_at(nodes, phase[curve]);
+        uint32_t words[3];
+        int32_t weights[3];
+        words_at(table, first + at.node, 3, words);
+        weights_q15(at, weights);
+        for (int i = 0; i < 3; i++)
+            sum = add(sum, mul_high(i32(words[i]), i32((uint32_t)weights[i] << 16)));
+    }
+    return sum;
+}
+
+/* Half words of the records: two in a word. */
+static inline void halves_at(const fxt_table *table, uint32_t at, uint32_t count, uint32_t *words)
+{
+    words_from(table->image, table->bytes, 2u * at, count, words);
+}
+
+/* The ripple of forward and of backward motion, counts. */
+static void ripple_at(const fxt_table *table, const point *at, uint32_t tooth, int32_t ripple[2])
+{
+    const cell where = cell_at(table->ripple_nodes, tooth);
+    const uint32_t backward_row = ripple_row(table->ripple_nodes), rows = rows_of(at);
+    int32_t weights[3];
+    weights_q15(where, weights);
+    for (int i = 0; i < 3; i++)
+        weights[i] = (int16_t)weights[i];
+    ripple[0] = ripple[1] = 0;
+    for (uint32_t row = 0; row < rows; row++) {
+        for (uint32_t side = 0; side < 2; side++) {
+            uint32_t words[2];
+            halves_at(table, row_at(at, row) + where.node + (side != 0u ? backward_row : 0u), 2, words);
+            int32_t own = add(mul(low(words[0]), weights[0]), mul(high(words[0]), weights[1]));
+            own = add(own, mul(low(words[1]), weights[2]));
+            ripple[side] = add(ripple[side], mul_high(own, at->shares[row]));
+        }
+    }
+    for (int side = 0; side < 2; side++)
+        ripple[side] = mul_high(ripple[side], i32(table->ripple_unit));
+}
+
+/* Centre and half-width of the play, counts; false where they are not what an accepted table can give. */
+static bool play_at(const fxt_table *table, const point *at, const phases *where, int32_t *centre, int32_t *half)
+{
+    *centre = at->mean;
+    *half = at->half_width;
+    if (table->ripple_nodes > 0u) {
+        int32_t ripple[2];
+        ripple_at(table, at, where->tooth, ripple);
+        *centre = add(*centre, add(ripple[0], ripple[1]) >> 1);
+        *half = add(*half, sub(ripple[1], ripple[0]) >> 1);
+    }
+    if (has_curves(table))
+        *centre = add(*centre, curves_at(table, where));
+    *half = *half < 0 ? 0 : *half;
+    return allows(table, *centre, *half);
+}
+
+/* How far from a place the solution of x + ripple(x) = place is, 2^-24 cells, from the phase at a guess so far ahead of it. */
+static int32_t to_solution(const fxt_table *table, const point *at, uint32_t tooth, int32_t ahead, bool backward)
+{
+    const cell guess = cell_at(table->ripple_nodes, tooth);
+    const uint32_t node = guess.node == 0u ? table->ripple_nodes : guess.node;
+    const uint32_t first = node - 1u + (backward ? ripple_row(table->ripple_nodes) : 0u), rows = rows_of(at);
+    int32_t sums[5] = {0, 0, 0, 0, 0};
+    for (uint32_t row = 0; row < rows; row++) {
+        uint32_t words[3];
+        const int32_t share = at->shares[row] >> 16;
+        halves_at(table, row_at(at, row) + first, 3, words);
+        sums[0] = add(sums[0], mul(low(words[0]), share));
+        sums[1] = add(sums[1], mul(high(words[0]), share));
+        sums[2] = add(sums[2], mul(low(words[1]), share));
+        sums[3] = add(sums[3], mul(high(words[1]), share));
+        sums[4] = add(sums[4], mul(low(words[2]), share));
+    }
+    for (int i = 0; i < 5; i++)
+        sums[i] = mul_high(sums[i], table->ripple_cells);
+    const int32_t place = sub(i32(guess.fraction ^ 0x80000000u) >> 8, ahead);
+    /* What is missing at either end of the node's cell tells whether the solution is in it, before or after. */
+    int which = sub(add(sums[1], sums[2]) >> 1, place) <= CELL / 2 ? 1 : 0;
+    which += sub(add(sums[2], sums[3]) >> 1, place) <= -CELL / 2 ? 1 : 0;
+    const int32_t a = sums[which], b = sums[which + 1], c = sums[which + 2];
+    const int32_t start = sub(which * CELL - CELL / 2 * 3, place);
+    const float linear = (float)add(CELL, sub(b, a));
+    const float bend = (float)add(sub(a, b), sub(c, b));
+    const float missing = (float)add(add(a, b) >> 1, start);
+    const float twice = missing + missing;
+    const float root = twice / (linear + root_of(linear * linear - bend * twice));
+    int32_t along = to_i32(root * -(float)CELL);
+    along = along > 0 ? along : 0;
+    along = along < CELL ? along : CELL;
+    return add(start, along);
+}
+
+/* 2^-24 cells in counts. */
+static int32_t counts_of_cells(const fxt_table *table, int32_t cells)
+{
+    return to_i32((float)cells * (table->cell_width * (1.0f / (float)CELL)));
+}
+
+/* The error on one side of the play where that brings the output to a target, counts; false where no accepted table gives it. */
+static bool solve(const fxt_table *table, const point *at, int64_t target, bool backward, int32_t *error)
+{
+    const int32_t base = backward ? add(at->mean, at->half_width) : sub(at->mean, at->half_width);
+    int32_t curves = 0, ahead = 0;
+    *error = base;
+    const uint32_t iterations = table->iterations < MOST_ITERATIONS ? table->iterations : MOST_ITERATIONS;
+    for (uint32_t i = 0; i < iterations; i++) {
+        int32_t guess = *error;
+        if (has_curves(table)) {
+            const phases where = phases_at_output(table, minus(target, *error));
+            const int32_t before = curves;
+            curves = curves_at(table, &where);
+            guess = sub(add(guess, curves), before);
+        }
+        *error = add(base, curves);
+        if (table->ripple_nodes > 0u) {
+            const uint32_t tooth = rate_phase(&table->tooth_rate, minus(target, guess));
+            ahead = to_solution(table, at, tooth, ahead, backward);
+            *error = sub(*error, counts_of_cells(table, ahead));
+        }
+    }
+    return allows_error(table, *error);
+}
+
+/* The play. */
+
+static inline int32_t clamped(int32_t offset, int32_t half)
+{
+    return offset < -half ? -half : offset > half ? half : offset;
+}
+
+static inline int32_t play_offset(const fxt_play *play)
+{
+    return add(play->lower, play->upper) >> 1;
+}
+
+static inline int32_t play_uncertainty(const fxt_play *play)
+{
+    const int32_t width = saturate((int64_t)play->upper - play->lower);
+    return add(width >> 1, width & 1);
+}
+
+/* Moves the play to `nominal` with the centre and half-width there; those of the last update if they are not sane. */
+static int32_t play_update(fxt_play *play, int64_t nominal, int32_t centre, int32_t half, bool sane)
+{
+    const bool started = play->half >= 0;
+    const int32_t last_half = started ? play->half : MOST_PLAY;
+    const int32_t last_centre = started ? sub(play->error, play_offset(play)) : 0;
+    half = sane ? half : last_half;
+    half = (uint32_t)half > (uint32_t)MOST_PLAY ? MOST_PLAY : half;
+    centre = sane ? centre : last_centre;
+    const int64_t went = (int64_t)minus_near(nominal, play->nominal) + sub(centre, last_centre);
+    const int32_t moved = started ? saturate(went) : 0;
+    play->lower = clamped(saturate((int64_t)play->lower - moved), half);
+    play->upper = clamped(saturate((int64_t)play->upper - moved), half);
+    play->nominal = nominal;
+    play->half = half;
+    play->error = add(centre, play_offset(play));
+    return play->error;
+}
+
+static fxt_prediction follow(const fxt_table *table, const point *at, fxt_play *play, int64_t generator)
+{
+    const int64_t nominal = nominal_output(table, generator);
+    const phases where = phases_at(table, generator, nominal);
+    int32_t centre, half;
+    const bool sane = play_at(table, at, &where, &centre, &half) && at->finite && !at->led_astray;
+    const int32_t followed = play_update(play, nominal, centre, half, sane);
+    const int32_t error = sane ? followed : 0;
+    const int32_t uncertainty = sane ? add(play_uncertainty(play), at->jump) : table->limit;
+    fxt_prediction now;
+    now.output = plus(nominal, error);
+    now.nominal = nominal;
+    now.transmission_error_rad = (float)error * rad_per_count;
+    now.uncertainty_rad = (float)uncertainty * rad_per_count;
+    now.quality = quality_of(at, sane, fxt_play_known(play));
+    return now;
+}
+
+static fxt_command commanded(const fxt_table *table, const point *at, int64_t target, bool sane, int64_t nominal, int32_t error,
+                             int32_t uncertainty)
+{
+    fxt_command command;
+    sane = sane && at->finite && !at->led_astray;
+    command.quality = quality_of(at, sane, uncertainty <= 0);
+    command.generator = nominal_generator(table, sane ? nominal : target);
+    command.predicted_error_rad = (float)(sane ? error : 0) * rad_per_count;
+    command.uncertainty_rad = (float)(sane ? add(uncertainty, at->jump) : table->limit) * rad_per_count;
+    return command;
+}
+
+static fxt_command aim_moving(const fxt_table *table, const point *at, int64_t target, bool backward)
+{
+    int32_t error;
+    const bool sane = solve(table, at, target, backward, &error);
+    return commanded(table, at, target, sane, minus(target, error), error, 0);
+}
+
+static fxt_command aim_from(const fxt_table *table, const point *at, int64_t target, const fxt_play *play)
+{
+    int32_t error;
+    if (play->half < 0) {
+        int32_t back;
+        const bool forward_sane = solve(table, at, target, false, &error);
+        const bool sane = solve(table, at, target, true, &back) && forward_sane;
+        const int32_t middle = add(error, back) >> 1;
+        return commanded(table, at, target, sane, minus(target, middle), middle, at->half_width);
+    }
+    const int32_t ahead = minus_near(target, plus(play->nominal, play->error));
+    const int32_t away = ahead == INT32_MIN ? INT32_MAX : ahead < 0 ? -ahead : ahead;
+    const int32_t unknown = play_uncertainty(play);
+    const bool sane = solve(table, at, target, ahead <= 0, &error);
+    if (away <= table->hold)
+        return commanded(table, at, target, sane, play->nominal, play->error, unknown);
+    /* A target inside the interval may lie on the other side of the output: then the whole play is in doubt. */
+    const int32_t guess = away <= unknown && unknown > 0 ? mul(at->half_width, 2) : 0;
+    return commanded(table, at, target, sane, minus(target, error), error, guess);
+}
+
+/* The check of an image. */
+
+typedef struct {
+    fxt_table *table;
+    fxt_verdict verdict;
+    uint32_t torques, temperatures, ripple_nodes, curve_nodes[3];
+    uint32_t circular_spline_teeth;
+    uint32_t curves[3], nodes, node_plane, records, record, end;
+    uint64_t jumps;
+    float ratio, tooth_periods;
+    float error_rad, periodic_rad, slope, curve_slope, cells, rounding_rad;
+} check;
+
+static bool refuse(check *is, fxt_reason reason, fxt_field field, uint32_t index, uint32_t temperature)
+{
+    const fxt_verdict verdict = {reason, field, index, temperature};
+    is->verdict = verdict;
+    return false;
+}
+
+static bool finite_is(check *is, fxt_field field, uint32_t index, float value)
+{
+    return is_finite(value) || refuse(is, FXT_NOT_FINITE, field, index, 0);
+}
+
+static bool in_range(check *is, fxt_field field, uint32_t index, float value, float least, float most)
+{
+    if (!finite_is(is, field, index, value))
+        return false;
+    return (value >= least && value <= most) || refuse(is, FXT_OUT_OF_RANGE, field, 0, 0);
+}
+
+static bool derived_is(check *is, uint32_t at, uint32_t value)
+{
+    return word_at(is->table, at) == value || refuse(is, FXT_DERIVED, FXT_NO_FIELD, 4u * at, 0);
+}
+
+static uint32_t u16_at(const uint8_t *image, uint32_t at)
+{
+    return (uint32_t)image[at] | (uint32_t)image[at + 1u] << 8;
+}
+
+static bool check_envelope(check *is, const uint8_t *image, size_t bytes)
+{
+    static const uint8_t magic[8] = {0x89, 'F', 'X', 'T', 0x0d, 0x0a, 0x1a, 0x0a};
+    if (image == NULL || bytes < LEAST_BYTES)
+        return refuse(is, FXT_TOO_SHORT, FXT_NO_FIELD, 0, 0);
+    for (int i = 0; i < 8; i++)
+        if (image[i] != magic[i])
+            return refuse(is, FXT_MAGIC, FXT_NO_FIELD, 0, 0);
+    if (u16_at(image, 10) != 0xfeffu)
+        return refuse(is, FXT_BYTE_ORDER, FXT_NO_FIELD, u16_at(image, 10), 0);
+    if (u16_at(image, 8) != FXT_FORMAT_VERSION)
+        return refuse(is, FXT_VERSION, FXT_NO_FIELD, u16_at(image, 8), 0);
+    const uint32_t stated = word_from(image + 12);
+    if (stated != bytes)
+        return refuse(is, FXT_LENGTH, FXT_NO_FIELD, stated, 0);
+    const uint32_t computed = crc32_of(image, stated - 4u);
+    if (computed != word_from(image + stated - 4u))
+        return refuse(is, FXT_CRC, FXT_NO_FIELD, computed, 0);
+    return true;
+}
+
+static bool check_text(check *is, const uint8_t *text, fxt_field field)
+{
+    uint32_t length = 0;
+    while (length < TEXT_BYTES && text[length] >= 0x20 && text[length] < 0x7f)
+        length++;
+    while (length < TEXT_BYTES && text[length] == 0)
+        length++;
+    return length == TEXT_BYTES || refuse(is, FXT_TEXT, field, 0, 0);
+}
+
+static bool check_drive(check *is, const uint8_t *image)
+{
+    fxt_table *table = is->table;
+    const uint32_t flexspline = u16_at(image, 106), circular = u16_at(image, 108);
+    if (image[105] > 1)
+        return refuse(is, FXT_FIXED_MEMBER, FXT_NO_FIELD, image[105], 0);
+    const uint32_t waves = circular > flexspline ? circular - flexspline : 0u;
+    if (flexspline == 0u || waves == 0u || waves > flexspline)
+        return refuse(is, FXT_TEETH, FXT_NO_FIELD, flexspline, 0);
+    table->reversed = image[105] == 1;
+    const uint32_t teeth = table->reversed ? flexspline : circular;
+    table->ripple_order = table->reversed ? circular : flexspline;
+    table->to_output = factor_new(waves, teeth);
+    table->to_generator = factor_new(teeth, waves);
+    table->generator_rate = rate_new(&table->to_generator, 1, table->reversed);
+    table->tooth_rate = rate_new(&table->to_generator, table->ripple_order, table->reversed);
+    is->circular_spline_teeth = circular;
+    is->ratio = (float)teeth / (float)waves;
+    is->ratio = table->reversed ? -is->ratio : is->ratio;
+    is->tooth_periods = is->ratio * (float)table->ripple_order;
+    return true;
+}
+
+static bool count_is(check *is, fxt_field field, uint32_t found, uint32_t least, uint32_t most)
+{
+    const bool absent = least == LEAST_PERIODIC_NODES && found == 0u;
+    return absent || (found >= least && found <= most) || refuse(is, FXT_COUNT, field, found, 0);
+}
+
+static uint32_t stored(uint32_t nodes)
+{
+    return nodes == 0u ? 0u : nodes + 3u;
+}
+
+/* What an image is for, and its sizes. */
+static bool check_identity(check *is, const uint8_t *image)
+{
+    for (uint32_t at = 200; at < HEADER_BYTES; at++)
+        if (image[at] != 0)
+            return refuse(is, FXT_RESERVED, FXT_NO_FIELD, at, 0);
+    if (!check_text(is, image + 56, FXT_TOOL_VERSION) || !check_text(is, image + 80, FXT_MESH_LEVEL) || !check_drive(is, image))
+        return false;
+    if (image[104] > 4)
+        return refuse(is, FXT_GENERATOR_KIND, FXT_NO_FIELD, image[104], 0);
+    is->torques = image[110];
+    is->temperatures = image[111];
+    is->ripple_nodes = image[112];
+    if (!count_is(is, FXT_TORQUE_NODES, is->torques, 1, TORQUE_SLOTS) ||
+        !count_is(is, FXT_TEMPERATURE_NODES, is->temperatures, 1, TEMPERATURE_SLOTS) ||
+        !count_is(is, FXT_RIPPLE_NODES, is->ripple_nodes, LEAST_PERIODIC_NODES, MOST_RIPPLE_NODES))
+        return false;
+    uint32_t next = AT_CURVES;
+    for (uint32_t i = 0; i < 3; i++) {
+        is->curve_nodes[i] = image[113u + i];
+        if (!count_is(is, (fxt_field)((uint32_t)FXT_GENERATOR_CURVE + i), is->curve_nodes[i], LEAST_PERIODIC_NODES, MOST_PERIODIC_NODES))
+            return false;
+        is->curves[i] = next;
+        next += stored(is->curve_nodes[i]);
+    }
+    is->nodes = next;
+    is->node_plane = (is->torques > 1u ? is->torques : 2u) * NODE_WORDS;
+    is->records = is->nodes + is->node_plane * is->temperatures;
+    is->record = ripple_row(is->ripple_nodes);
+    is->end = is->records + is->record * is->torques * is->temperatures;
+    is->table->body_bytes = 4u * is->end;
+    const uint32_t pages = (is->table->body_bytes + FXT_PAGE_BYTES - 1u) / FXT_PAGE_BYTES;
+    const uint32_t needed = is->table->body_bytes + 4u * (pages + 1u);
+    return needed == is->table->bytes || refuse(is, FXT_SIZE, FXT_NO_FIELD, needed, 0);
+}
+
+static uint32_t along(uint32_t nodes, uint32_t step)
+{
+    return nodes > 1u ? step : 0u;
+}
+
+static uint32_t pair(uint32_t below, uint32_t above)
+{
+    return (below & 0xffffu) | above << 16;
+}
+
+/* Words that follow from the sizes, the error limit, and what follows from it. */
+static bool check_places(check *is)
+{
+    const float cell_width =
+        is->ripple_nodes == 0u ? 1.0f : (float)(TURN / ((double)is->ripple_nodes * (double)is->tooth_periods));
+    const uint32_t last_torque = is->torques > 2u ? is->torques - 2u : 0u;
+    const uint32_t last_temperature = is->temperatures > 2u ? is->temperatures - 2u : 0u;
+    const uint32_t plan[7] = {
+        pair(last_torque, last_temperature),
+        pair(is->nodes, along(is->temperatures, is->node_plane)),
+        pair(is->records, along(is->temperatures, is->record * is->torques)),
+        pair(along(is->torques, is->record), is->ripple_nodes),
+        pair(is->curves[0], is->curve_nodes[0]),
+        pair(is->curves[1], is->curve_nodes[1]),
+        pair(is->curves[2], is->curve_nodes[2]),
+    };
+    if (!derived_is(is, AT_BODY, is->end) || !derived_is(is, AT_CELL_WIDTH, bits_of(cell_width)))
+        return false;
+    for (uint32_t i = 0; i < 7; i++)
+        if (!derived_is(is, AT_LAST + i, plan[i]))
+            return false;
+    is->table->cell_width = cell_width;
+    const float limit = number_at(is->table, 38);
+    return in_range(is, FXT_ERROR_LIMIT, 0, limit, FLT_MIN, 0.05f) &&
+           derived_is(is, AT_LIMIT, (uint32_t)(counts_of_rad((double)limit) * 1.001 + 16.0));
+}
+
+static bool check_axis(check *is, fxt_field field, uint32_t first, uint32_t nodes, uint32_t slots)
+{
+    for (uint32_t i = 0; i < slots; i++) {
+        const float node = number_at(is->table, first + i);
+        if (i >= nodes) {
+            if (!derived_is(is, first + i, bits_of(FLT_MAX)))
+                return false;
+            continue;
+        }
+        if (!in_range(is, field, i, node, -1e6f, 1e6f))
+            return false;
+        if (i > 0u && node <= number_at(is->table, first + i - 1u))
+            return refuse(is, FXT_NOT_INCREASING, field, i, 0);
+    }
+    return true;
+}
+
+/* A range lies inside its axis; an axis of one node holds wherever its maker says. */
+static bool check_range(check *is, fxt_field field, uint32_t at, uint32_t first, uint32_t nodes)
+{
+    const float least = number_at(is->table, at), most = number_at(is->table, at + 1u);
+    const float from = nodes > 1u ? number_at(is->table, first) : -1e6f;
+    const float to = nodes > 1u ? number_at(is->table, first + nodes - 1u) : 1e6f;
+    return in_range(is, field, 0, least, from, to) && in_range(is, field, 1, most, least, to);
+}
+
+static bool check_header_numbers(check *is)
+{
+    const fxt_table *table = is->table;
+    const float residual = number_at(table, 31), worst = number_at(table, 32), rms = number_at(table, 33);
+    if (!check_range(is, FXT_TORQUE_RANGE, AT_TORQUE_RANGE, AT_TORQUE_NODES, is->torques) ||
+        !check_range(is, FXT_TEMPERATURE_RANGE, AT_TEMPERATURE_RANGE, AT_TEMPERATURE_NODES, is->temperatures) ||
+        !in_range(is, FXT_SOLVER_RESIDUAL, 0, residual, 0.0f, FLT_MAX) || !in_range(is, FXT_PROJECTION_WORST, 0, worst, 0.0f, 0.05f) ||
+        !in_range(is, FXT_PROJECTION_RMS, 0, rms, 0.0f, worst))
+        return false;
+    /* So that the ripple in cells, and in counts, fits the integers of a step. */
+    const float widest = magnitude(table->cell_width) * 255.0f;
+    const float most = is->ripple_nodes == 0u || widest > 2147483648.0f ? 2147483648.0f : widest;
+    return in_range(is, FXT_MEAN_RIPPLE, 0, (float)word_at(table, AT_RIPPLE_UNIT), 0.0f, most);
+}
+
+static float torque_at(const check *is, uint32_t node)
+{
+    return number_at(is->table, AT_TORQUE_NODES + node);
+}
+
+/* Whether the interval above a torque node is a jump: at most an eighth as wide as each neighbour it has. */
+static bool jump_at(const check *is, uint32_t node)
+{
+    const uint32_t intervals = is->torques - 1u;
+    if (node >= intervals || intervals <= 1u)
+        return false;
+    const float own = (torque_at(is, node + 1u) - torque_at(is, node)) * 8.0f;
+    return (node == 0u || torque_at(is, node) - torque_at(is, node - 1u) >= own) &&
+           (node + 1u == intervals || torque_at(is, node + 2u) - torque_at(is, node + 1u) >= own);
+}
+
+static bool is_jump(const check *is, uint32_t node)
+{
+    return (is->jumps >> node & 1u) != 0u;
+}
+
+static uint32_t node_at(const check *is, uint32_t index)
+{
+    return is->nodes + index * (is->torques > 1u ? NODE_WORDS : 2u * NODE_WORDS);
+}
+
+/* What D and H can give at each node, and between it and the one before: a cubic stays within its control points. */
+static bool check_nodes(check *is)
+{
+    const float most = (float)counts_of_rad((double)0.05f);
+    float torque_below = 0, mean_below = 0, slope_below = 0, half_below = 0;
+    for (uint32_t index = 0; index < is->torques * is->temperatures; index++) {
+        const uint32_t node = index % is->torques, at = node_at(is, index);
+        const float mean = number_at(is->table, at), slope = number_at(is->table, at + 1u), half = number_at(is->table, at + 2u);
+        if (!in_range(is, FXT_MEAN, index, mean, -most, most) || !finite_is(is, FXT_MEAN_SLOPE, index, slope) ||
+            !in_range(is, FXT_HALF_WIDTH, index, half, 0.0f, most))
+            return false;
+        if (((bits_of(half) & 1u) != 0u) != is_jump(is, node))
+            return refuse(is, FXT_DERIVED, FXT_NO_FIELD, 4u * (at + 2u), 0);
+        if (is->torques == 1u) {
+            for (uint32_t i = 0; i < NODE_WORDS; i++)
+                if (!derived_is(is, at + NODE_WORDS + i, word_at(is->table, at + i)))
+                    return false;
+            if (!in_range(is, FXT_MEAN_SLOPE, index, slope, 0.0f, 0.0f))
+                return false;
+        }
+        const float torque = torque_at(is, node);
+        is->error_rad = larger(is->error_rad, rad_of(magnitude(mean) + half));
+        if (node > 0u && !is_jump(is, node - 1u)) {
+            const float third = (torque - torque_below) / 3.0f;
+            float inner = larger(magnitude(mean_below + slope_below * third), magnitude(mean - slope * third));
+            inner = is_finite(inner) ? inner : float_of(0x7f800000u);
+            is->error_rad = larger(is->error_rad, rad_of(inner + larger(half, half_below)));
+        }
+        torque_below = torque;
+        mean_below = mean;
+        slope_below = slope;
+        half_below = half;
+    }
+    return true;
+}
+
+static uint32_t leading_zeros(uint64_t bits)
+{
+    uint32_t zeros = 0;
+    while (zeros < 64u && (bits >> (63u - zeros) & 1u) == 0u)
+        zeros++;
+    return zeros;
+}
+
+static uint32_t trailing_zeros(uint64_t bits)
+{
+    uint32_t zeros = 0;
+    while (zeros < 64u && (bits >> zeros & 1u) == 0u)
+        zeros++;
+    return zeros;
+}
+
+/* Whether the error of both flanks grows with the load up to each node, and no faster than a drive can. */
+static bool check_rise(check *is)
+{
+    const float pitch_rad = tau_f32 / (float)is->circular_spline_teeth;
+    const uint32_t first = trailing_zeros(is->jumps), zeros = leading_zeros(is->jumps), last = zeros > 63u ? 0u : 63u - zeros;
+    const float endless = float_of(0xff800000u);
+    float highest[2] = {endless, endless};
+    for (uint32_t index = 0; index < is->torques * is->temperatures; index++) {
+        const uint32_t torque = index % is->torques, temperature = index / is->torques;
+        if (torque == 0u) {
+            highest[0] = highest[1] = endless;
+            continue;
+        }
+        const uint32_t below = torque - 1u, from = node_at(is, index - 1u), to = node_at(is, index);
+        const float mean_low = rad_of(number_at(is->table, from)), mean_high = rad_of(number_at(is->table, to));
+        const float slope_low = rad_of(number_at(is->table, from + 1u)), slope_high = rad_of(number_at(is->table, to + 1u));
+        const float half_low = rad_of(number_at(is->table, from + 2u)), half_high = rad_of(number_at(is->table, to + 2u));
+        const float width = torque_at(is, torque) - torque_at(is, below), third = width / 3.0f;
+        const bool jump = is_jump(is, below);
+        const float rise = mean_high - mean_low;
+        const float widening = jump ? half_high - half_low : (half_high - half_low) / 3.0f;
+        const float a = jump ? rise : slope_low * third;
+        const float b = jump ? rise : rise - (slope_low + slope_high) * third;
+        const float c = jump ? rise : slope_high * third;
+        const float allowed = jump ? 0.5f * pitch_rad : 1.0f * third;
+        const float most = larger(larger(a, b), c) + magnitude(widening);
+        float least = -larger(larger(-a, -b), -c) - magnitude(widening);
+        for (int side = 0; side < 2; side++) {
+            const float sign = side == 0 ? -1.0f : 1.0f;
+            highest[side] = larger(highest[side], mean_low + sign * half_low);
+            const float change = mean_high + sign * half_high - highest[side];
+            least = change < least ? change : least;
+        }
+        const bool lets_go = first < below && below < last && !jump;
+        if (least < -(lets_go ? 0.5f * pitch_rad : 5.0e-5f))
+            return refuse(is, FXT_FALLS, FXT_NO_FIELD, torque, temperature);
+        if (most > allowed + 5.0e-5f)
+            return refuse(is, FXT_STEEP, FXT_NO_FIELD, torque, temperature);
+    }
+    return true;
+}
+
+/* Numbers of a closed curve, rad: of A, B, C, or of a ripple. */
+typedef struct {
+    const fxt_table *table;
+    uint32_t words, halves; /* where it starts: in words; or in half words from there */
+    bool is_ripple;
+    float unit;
+} curve;
+
+static int32_t half_at(const fxt_table *table, uint32_t words, uint32_t half)
+{
+    const uint32_t word = word_at(table, words + half / 2u);
+    return half % 2u == 0u ? low(word) : high(word);
+}
+
+static float curve_rad(const curve *of, uint32_t i)
+{
+    if (of->is_ripple)
+        return rad_of((float)half_at(of->table, of->words, of->halves + i) * of->unit);
+    return rad_of((float)i32(word_at(of->table, of->words + i)) * 0.5f);
+}
+
+/* What a closed B-spline has at most: coefficient, slope per node spacing, value. */
+static void extremes(const curve *of, uint32_t count, float most[3])
+{
+    most[0] = most[1] = most[2] = 0.0f;
+    for (uint32_t i = 0; i + 2u < count; i++) {
+        const float a = curve_rad(of, i), b = curve_rad(of, i + 1u), c = curve_rad(of, i + 2u);
+        const float turn = (a - b) / (a - 2.0f * b + c);
+        const float there = 0.5f * (a + b) + 0.5f * turn * (b - a);
+        const float top = turn > 0.0f && turn < 1.0f ? magnitude(there) : 0.0f;
+        most[0] = larger(most[0], magnitude(a));
+        most[1] = larger(most[1], magnitude(b - a));
+        most[2] = larger(most[2], larger(top, 0.5f * magnitude(a + b)));
+    }
+}
+
+static const float weight_rounding = 3.0f / 32768.0f;
+
+/* A record: closed, the play nowhere negative, and what its two ripples can give. */
+static bool check_record(check *is, uint32_t index)
+{
+    const fxt_table *table = is->table;
+    const uint32_t words = is->records + index * is->record, nodes = is->ripple_nodes;
+    const float unit = (float)word_at(table, AT_RIPPLE_UNIT) * (1.0f / 524288.0f);
+    for (uint32_t i = 0; i < 2u * is->record; i++) {
+        const uint32_t first = i < is->record ? 0u : is->record;
+        const uint32_t node = (i - first + nodes - 1u) % nodes + 1u;
+        if (half_at(table, words, i) != half_at(table, words, first + node))
+            return refuse(is, FXT_NOT_CLOSED, FXT_MEAN_RIPPLE, i, 0);
+    }
+    const float half = number_at(table, node_at(is, index) + 2u);
+    float least = half;
+    for (uint32_t i = 0; i < stored(nodes); i++) {
+        const float forward = (float)half_at(table, words, i), backward = (float)half_at(table, words, i + is->record);
+        const float play = half + 0.5f * (backward * unit - forward * unit);
+        least = play < least ? play : least;
+    }
+    if (least < -(3.0f + unit))
+        return refuse(is, FXT_NEGATIVE_HALF_WIDTH, FXT_NO_FIELD, index % is->torques, index / is->torques);
+    const float cells_per_rad = (float)nodes * magnitude(is->tooth_periods) / tau_f32;
+    for (uint32_t side = 0; side < 2; side++) {
+        const curve of = {table, words, side * is->record, true, unit};
+        float most[3];
+        extremes(&of, stored(nodes), most);
+        is->periodic_rad = larger(is->periodic_rad, most[0]);
+        is->slope = larger(is->slope, most[1] * cells_per_rad);
+        is->cells = larger(is->cells, most[2] * cells_per_rad);
+        is->rounding_rad = larger(is->rounding_rad, weight_rounding * most[1]);
+    }
+    return true;
+}
+
+static bool check_curve(check *is, uint32_t index)
+{
+    const fxt_field field = (fxt_field)((uint32_t)FXT_GENERATOR_CURVE + index);
+    const uint32_t nodes = is->curve_nodes[index], count = stored(nodes), at = is->curves[index];
+    const curve of = {is->table, at, 0, false, 0.0f};
+    for (uint32_t i = 0; i < count; i++)
+        if (!in_range(is, field, i, curve_rad(&of, i), -0.05f, 0.05f))
+            return false;
+    if (count > 0u) {
+        const uint32_t repeats[3] = {0, nodes + 1u, nodes + 2u}, own[3] = {nodes, 1, 2};
+        for (int i = 0; i < 3; i++)
+            if (word_at(is->table, at + repeats[i]) != word_at(is->table, at + own[i]))
+                return refuse(is, FXT_NOT_CLOSED, field, repeats[i], 0);
+    }
+    float most[3];
+    extremes(&of, count, most);
+    const float periods = index == 0u ? is->ratio : index == 1u ? is->ratio - 1.0f : 1.0f;
+    if (index == 0u)
+        is->error_rad = is->error_rad + is->periodic_rad;
+    const float slope = most[1] * (float)nodes * magnitude(periods) / tau_f32;
+    is->rounding_rad = is->rounding_rad + 2.0f * weight_rounding * most[1];
+    is->error_rad = is->error_rad + most[0];
+    is->periodic_rad = is->periodic_rad + most[0];
+    is->slope = is->slope + slope;
+    is->curve_slope = is->curve_slope + slope;
+    return true;
+}
+
+/* Iterations of the inverse and what they leave; the words that say so. */
+static bool check_inverse(check *is)
+{
+    fxt_table *table = is->table;
+    const float cell_rad = is->ripple_nodes == 0u ? float_of(0x7f800000u) : rad_of(magnitude(table->cell_width));
+    const float rate = is->curve_slope / (1.0f - is->slope);
+    float left = is->periodic_rad, away = is->cells * cell_rad + is->periodic_rad * rate;
+    uint32_t iterations = 0;
+    while (iterations < MOST_ITERATIONS) {
+        const float beyond = larger(away - cell_rad, 0.0f);
+        left = left * rate + beyond;
+        away = left * (1.0f + rate);
+        iterations++;
+        if (left <= 1.0e-7f)
+            break;
+    }
+    const float place = is_finite(cell_rad) ? 4.0f * FLT_EPSILON * cell_rad : 0.0f;
+    left = left + (is->rounding_rad + place) / (1.0f - is->slope);
+    if (!(left <= 1.0e-6f))
+        return refuse(is, FXT_INVERSE, FXT_NO_FIELD, 0, 0);
+    table->inverse_error_rad = left;
+    const int32_t hold = add((int32_t)counts_of_rad((double)left), HOLD_COUNTS);
+    return derived_is(is, AT_ITERATIONS, iterations) && derived_is(is, AT_HOLD, (uint32_t)hold);
+}
+
+static bool check_numbers(check *is)
+{
+    if (!check_places(is) || !check_axis(is, FXT_TORQUE_NODES, AT_TORQUE_NODES, is->torques, TORQUE_SLOTS) ||
+        !check_axis(is, FXT_TEMPERATURE_NODES, AT_TEMPERATURE_NODES, is->temperatures, TEMPERATURE_SLOTS) ||
+        !check_header_numbers(is))
+        return false;
+    for (uint32_t i = 0; i < is->torques; i++)
+        is->jumps |= (uint64_t)(jump_at(is, i) ? 1u : 0u) << i;
+    if (!check_nodes(is))
+        return false;
+    if (is->ripple_nodes > 0u)
+        for (uint32_t i = 0; i < is->torques * is->temperatures; i++)
+            if (!check_record(is, i))
+                return false;
+    for (uint32_t i = 0; i < 3; i++)
+        if (!check_curve(is, i))
+            return false;
+    if (!(is->error_rad <= number_at(is->table, 38)))
+        return refuse(is, FXT_ERROR_BOUND, FXT_NO_FIELD, 0, 0);
+    if (!(is->slope < 1.0f))
+        return refuse(is, FXT_SLOPE, FXT_NO_FIELD, 0, 0);
+    return check_rise(is) && check_inverse(is);
+}
+
+/* What is computed as the core computes it: products rounded before they are added, small numbers kept, to nearest. */
+static bool arithmetic_is_exact(void)
+{
+    volatile float a = 1.0f + 1.0f / 4096.0f, b = 1.0f + 2.0f / 4096.0f, least = FLT_MIN, one = 1.0f, bit = 0.75f * FLT_EPSILON;
+    const float x = a, y = b, product_less = x * x - y, low_sum = x * x + -y;
+    const float half = least * 0.5f, up = one + bit, down = -one - bit;
+    return product_less == 0.0f && low_sum == 0.0f && half > 0.0f && up == one + FLT_EPSILON && down == -one - FLT_EPSILON;
+}
+
+static void clear(fxt_table *table)
+{
+    const fxt_table none = {0};
+    *table = none;
+}
+
+fxt_verdict fxt_open(fxt_table *table, const void *image, size_t bytes)
+{
+    const check start = {0};
+    check is = start;
+    const uint8_t *at = image;
+    clear(table);
+    is.table = table;
+    if (!arithmetic_is_exact()) {
+        (void)refuse(&is, FXT_ARITHMETIC, FXT_NO_FIELD, 0, 0);
+        return is.verdict;
+    }
+    if (check_envelope(&is, at, bytes)) {
+        table->image = at;
+        table->bytes = (uint32_t)bytes;
+        bool whole = check_identity(&is, at);
+        for (uint32_t page = 0; whole && page < fxt_page_count(table); page++)
+            whole = fxt_page_intact(table, page) || refuse(&is, FXT_PAGE_CRC, FXT_NO_FIELD, page, 0);
+        if (whole && check_numbers(&is)) {
+            /* What a step needs of it: as the core's plan. */
+            table->ripple_nodes = word_at(table, AT_RECORD_STEP) >> 16;
+            table->ripple_unit = word_at(table, AT_RIPPLE_UNIT);
+            table->ripple_cells = to_i32((float)table->ripple_unit * (8388608.0f / table->cell_width));
+            for (uint32_t i = 0; i < 3; i++)
+                table->curves[i] = word_at(table, AT_CURVE_WORDS + i);
+            table->limit = i32(word_at(table, AT_LIMIT));
+            table->iterations = word_at(table, AT_ITERATIONS);
+            table->hold = i32(word_at(table, AT_HOLD));
+            const float bounds[6] = {is.error_rad, is.periodic_rad, is.slope, is.curve_slope, is.cells, is.rounding_rad};
+            for (int i = 0; i < 6; i++)
+                table->bounds[i] = bounds[i];
+            return is.verdict;
+        }
+    }
+    clear(table);
+    return is.verdict;
+}
+
+const char *fxt_reason_name(fxt_reason reason)
+{
+    static const char *const names[] = {
+        "ok", "too short", "magic", "version", "byte order", "length", "crc", "page crc", "reserved", "text", "generator kind",
+        "fixed member", "teeth", "count", "size", "not finite", "not increasing", "not closed", "derived", "out of range",
+        "negative half-width", "error bound", "slope", "falls", "steep", "inverse", "arithmetic"};
+    return (uint32_t)reason < sizeof names / sizeof names[0] ? names[reason] : "unknown";
+}
+
+const char *fxt_field_name(fxt_field field)
+{
+    static const char *const names[] = {
+        "none", "tool version", "mesh level", "torque nodes", "temperature nodes", "ripple nodes", "curve over the generator angle",
+        "curve over the material phase", "curve over the output angle", "mean error", "half-width of the play",
+        "slope of the mean error", "ripple of the mean", "solver residual", "worst projection error", "rms projection error",
+        "torque range", "temperature range", "error limit"};
+    return (uint32_t)field < sizeof names / sizeof names[0] ? names[field] : "unknown";
+}
+
+fxt_info fxt_tell(const fxt_table *table)
+{
+    static const fxt_info none;
+    fxt_info info = none;
+    const uint8_t *image = table->image;
+    if (image == NULL)
+        return info;
+    for (uint32_t i = 0; i < 8; i++)
+        info.table_id[i] = image[48u + i];
+    for (uint32_t i = 0; i < 32; i++)
+        info.drive_hash[i] = image[16u + i];
+    for (uint32_t i = 0; i < TEXT_BYTES; i++) {
+        info.tool_version[i] = (char)image[56u + i];
+        info.mesh_level[i] = (char)image[80u + i];
+    }
+    info.generator_kind = image[104];
+    info.fixed_member = image[105];
+    info.flexspline_teeth = (uint16_t)u16_at(image, 106);
+    info.circular_spline_teeth = (uint16_t)u16_at(image, 108);
+    info.torque_nodes = image[110];
+    info.temperature_nodes = image[111];
+    info.ripple_nodes = image[112];
+    for (uint32_t i = 0; i < 3; i++)
+        info.curve_nodes[i] = image[113u + i];
+    for (uint32_t i = 0; i < 2; i++) {
+        info.torque_range_n_m[i] = number_at(table, AT_TORQUE_RANGE + i);
+        info.temperature_range_c[i] = number_at(table, AT_TEMPERATURE_RANGE + i);
+    }
+    const uint32_t waves = (uint32_t)info.circular_spline_teeth - info.flexspline_teeth;
+    const uint32_t teeth = table->reversed ? info.flexspline_teeth : info.circular_spline_teeth;
+    const float ratio = (float)teeth / (float)(waves > 0u ? waves : 1u);
+    info.ratio = table->reversed ? -ratio : ratio;
+    info.error_limit_rad = number_at(table, 38);
+    info.solver_residual = number_at(table, 31);
+    info.projection_worst_rad = number_at(table, 32);
+    info.projection_rms_rad = number_at(table, 33);
+    info.inverse_error_rad = table->inverse_error_rad;
+    info.inverse_iterations = table->iterations;
+    return info;
+}
+
+uint32_t fxt_page_count(const fxt_table *table)
+{
+    return (table->body_bytes + FXT_PAGE_BYTES - 1u) / FXT_PAGE_BYTES;
+}
+
+bool fxt_page_intact(const fxt_table *table, uint32_t page)
+{
+    if (page >= fxt_page_count(table))
+        return false;
+    const uint32_t at = page * FXT_PAGE_BYTES, left = table->body_bytes - at;
+    uint32_t sum;
+    words_from(table->image, table->bytes, table->body_bytes + 4u * page, 1, &sum);
+    return crc32_of(table->image + at, left < FXT_PAGE_BYTES ? left : FXT_PAGE_BYTES) == sum;
+}
+
+fxt_play fxt_play_unknown(void)
+{
+    const fxt_play play = {0, 0, INT32_MIN, INT32_MAX, -1};
+    return play;
+}
+
+fxt_play fxt_play_after(fxt_direction direction)
+{
+    const int32_t side = direction == FXT_FORWARD ? INT32_MIN : INT32_MAX;
+    const fxt_play play = {0, 0, side, side, -1};
+    return play;
+}
+
+bool fxt_play_known(const fxt_play *play)
+{
+    return play->lower == play->upper;
+}
+
+bool fxt_play_output(const fxt_play *play, int64_t *output)
+{
+    *output = plus(play->nominal, play->error);
+    return play->half >= 0;
+}
+
+float fxt_play_offset_rad(const fxt_play *play)
+{
+    return play->half < 0 ? 0.0f : (float)play_offset(play) * rad_per_count;
+}
+
+float fxt_play_uncertainty_rad(const fxt_play *play)
+{
+    return (float)play_uncertainty(play) * rad_per_count;
+}
+
+static void put_word(uint8_t *to, uint32_t word)
+{
+    for (uint32_t i = 0; i < 4; i++)
+        to[i] = (uint8_t)(word >> 8u * i & 0xffu);
+}
+
+void fxt_play_save(const fxt_play *play, uint8_t saved[FXT_SAVED_PLAY_BYTES])
+{
+    put_word(saved, (uint32_t)play->nominal);
+    put_word(saved + 4, (uint32_t)((uint64_t)play->nominal >> 32));
+    put_word(saved + 8, (uint32_t)play->error);
+    put_word(saved + 12, (uint32_t)play->lower);
+    put_word(saved + 16, (uint32_t)play->upper);
+    put_word(saved + 20, (uint32_t)play->half);
+    put_word(saved + 24, crc32_of(saved, 24));
+}
+
+bool fxt_play_restore(fxt_play *play, const uint8_t saved[FXT_SAVED_PLAY_BYTES])
+{
+    const uint64_t nominal = (uint64_t)word_from(saved + 4) << 32 | word_from(saved);
+    const fxt_play found = {(int64_t)nominal, i32(word_from(saved + 8)), i32(word_from(saved + 12)), i32(word_from(saved + 16)),
+                            i32(word_from(saved + 20))};
+    const uint32_t size = found.error < 0 ? 0u - (uint32_t)found.error : (uint32_t)found.error;
+    const bool started =
+        found.half >= 0 && found.half <= MOST_PLAY && found.lower >= -found.half && found.upper <= found.half;
+    const bool fresh = found.half == -1 && (found.lower == INT32_MIN || found.lower == INT32_MAX);
+    const bool possible = found.lower <= found.upper && size <= MOST_KEPT && (started || fresh);
+    if (!possible || word_from(saved + 24) != crc32_of(saved, 24))
+        return false;
+    *play = found;
+    return true;
+}
+
+fxt_prediction fxt_forward(const fxt_table *table, fxt_play *play, int64_t generator, float torque_n_m, float temperature_c)
+{
+    const point at = locate(table, torque_n_m, temperature_c);
+    return follow(table, &at, play, generator);
+}
+
+fxt_command fxt_inverse(const fxt_table *table, int64_t target, float torque_n_m, float temperature_c, fxt_direction direction)
+{
+    const point at = locate(table, torque_n_m, temperature_c);
+    return aim_moving(table, &at, target, direction == FXT_BACKWARD);
+}
+
+fxt_command fxt_inverse_from(const fxt_table *table, int64_t target, float torque_n_m, float temperature_c, const fxt_play *play)
+{
+    const point at = locate(table, torque_n_m, temperature_c);
+    return aim_from(table, &at, target, play);
+}
+
+void fxt_step(const fxt_table *table, fxt_play *play, int64_t measured, int64_t target, float torque_n_m, float temperature_c,
+              fxt_prediction *prediction, fxt_command *command)
+{
+    const point at = locate(table, torque_n_m, temperature_c);
+    *prediction = follow(table, &at, play, measured);
+    *command = aim_from(table, &at, target, play);
+}
+
+bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_m, float temperature_c, fxt_direction direction,
+                      float *error_rad)
+{
+    const point at = locate(table, torque_n_m, temperature_c);
+    const phases where = phases_at(table, generator, nominal_output(table, generator));
+    int32_t centre, half;
+    const bool sane = play_at(table, &at, &where, &centre, &half);
+    *error_rad = (float)(direction == FXT_BACKWARD ? add(centre, half) : sub(centre, half)) * rad_per_count;
+    return sane && at.finite;
+}
+
+bool fxt_from_rad(double rad, int64_t *counts)
+{
+    const double exact = rad / TAU * TURN;
+    *counts = 0;
+    if (!(exact > -9.223372e18 && exact < 9.223372e18))
+        return false;
+    *counts = (int64_t)(exact + (exact < 0.0 ? -0.5 : 0.5));
+    return true;
+}
+
+double fxt_to_rad(int64_t counts)
+{
+    return (double)counts * (TAU / TURN);
+}

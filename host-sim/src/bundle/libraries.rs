@@ -1,0 +1,182 @@
+//! The core as static libraries: where they lie, or how they are built.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use thiserror::Error;
+
+/// The C interface of the libraries.
+pub const HEADER: &str = include_str!("../../../core/include/flexspline.h");
+
+/// Targets of Rust that a bundle knows, and what they are.
+pub const TARGETS: [(&str, &str); 8] = [
+    ("thumbv6m-none-eabi", "Cortex-M0, M0+"),
+    ("thumbv7m-none-eabi", "Cortex-M3"),
+    ("thumbv7em-none-eabi", "Cortex-M4, M7 without floating point in registers"),
+    ("thumbv7em-none-eabihf", "Cortex-M4F, M7F"),
+    ("thumbv8m.main-none-eabihf", "Cortex-M33F, M55"),
+    ("riscv32imac-unknown-none-elf", "RISC-V, 32 bits, without floating point"),
+    ("riscv64gc-unknown-none-elf", "RISC-V, 64 bits"),
+    ("x86_64-unknown-linux-gnu", "Linux on a PC"),
+];
+
+const ARCHIVE: &str = "libflexspline.a";
+
+/// A static library.
+#[derive(Debug)]
+pub struct Library {
+    /// Its target.
+    pub target: String,
+    /// Its contents.
+    pub archive: Vec<u8>,
+}
+
+/// Why a library cannot be had.
+#[derive(Debug, Error)]
+pub enum LibraryError {
+    /// A file that is there and is none.
+    #[error("{}: {why}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// Nowhere to be found, and why it cannot be built.
+    #[error("{target}: {why}")]
+    Missing {
+        /// The target.
+        target: String,
+        /// What to do.
+        why: String,
+    },
+    /// The build failed.
+    #[error("{target}: cargo could not build it:\n{log}")]
+    Build {
+        /// The target.
+        target: String,
+        /// What it said last.
+        log: String,
+    },
+}
+
+/// Where libraries are looked for.
+#[derive(Debug)]
+pub struct Places {
+    /// Folders that hold `<target>/libflexspline.a`; the first that has it counts.
+    folders: Vec<PathBuf>,
+    /// A checkout of the sources.
+    checkout: Option<PathBuf>,
+}
+
+impl Places {
+    /// A folder that was named; or that of a release, beside this program, and then the checkout around the current folder.
+    #[must_use]
+    pub fn new(named: Option<&Path>) -> Places {
+        if let Some(named) = named {
+            return Places { folders: vec![named.to_owned()], checkout: None };
+        }
+        let program = std::env::current_exe().ok();
+        let release = program.as_deref().and_then(Path::parent).map(|folder| folder.join("../share/flexspline/lib"));
+        let here = std::env::current_dir().unwrap_or_default();
+        let checkout = here.ancestors().find(|folder| is_checkout(folder)).map(Path::to_owned);
+        Places { folders: release.into_iter().collect(), checkout }
+    }
+
+    /// The library of a target that lies somewhere; `None` if it would have to be built.
+    ///
+    /// # Errors
+    /// It lies there and is none; it cannot be had at all.
+    pub fn find(&self, target: &str) -> Result<Option<Library>, LibraryError> {
+        let found = self.folders.iter().map(|folder| folder.join(target).join(ARCHIVE)).find(|path| path.exists());
+        if let Some(path) = found {
+            return read(target, &path).map(Some);
+        }
+        self.can_build(target).map(|()| None)
+    }
+
+    /// Whether cargo is there and has the target.
+    fn can_build(&self, target: &str) -> Result<(), LibraryError> {
+        let missing = |why: String| LibraryError::Missing { target: target.to_owned(), why };
+        let Some(checkout) = &self.checkout else {
+            let looked = self.folders.iter().map(|folder| folder.display().to_string()).collect::<Vec<_>>().join(", ");
+            return Err(missing(format!(
+                "no {target}/{ARCHIVE} in {looked}, and no checkout of the sources here to build it; a release has the libraries, \
+                 --libraries names another folder"
+            )));
+        };
+        let header = fs::read_to_string(checkout.join("core/include/flexspline.h")).unwrap_or_default();
+        if header != HEADER {
+            return Err(missing(format!(
+                "the sources in {} have another C interface than this program; build the program of the same sources",
+                checkout.display()
+            )));
+        }
+        let asked =
+            Command::new("rustc").args(["--print", "target-libdir", "--target", target]).current_dir(checkout).output();
+        let folder = match asked {
+            Ok(output) if output.status.success() => String::from_utf8_lossy(&output.stdout).trim().to_owned(),
+            Ok(output) => return Err(missing(String::from_utf8_lossy(&output.stderr).trim().to_owned())),
+            Err(error) => {
+                return Err(missing(format!("rustc cannot be run ({error}); install Rust from https://rustup.rs")));
+            }
+        };
+        let installed = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
+        if installed {
+            Ok(())
+        } else {
+            Err(missing(format!("the Rust target is not installed: rustup target add {target}")))
+        }
+    }
+
+    /// Builds the library of a target from the checkout.
+    ///
+    /// # Errors
+    /// What cargo says.
+    pub fn build(&self, target: &str) -> Result<Library, LibraryError> {
+        self.can_build(target)?;
+        let checkout = self.checkout.as_deref().unwrap_or(Path::new("."));
+        let folder =
+            std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| checkout.join("target"), PathBuf::from).join("bundle");
+        let folder = std::path::absolute(&folder).unwrap_or(folder);
+        // Without an operating system the library is one piece with no panic path; with one it has the panic handler of the standard library.
+        let (features, lto) = if target.contains("-none-") { ("c-api", "fat") } else { ("c-api,std", "off") };
+        let output = Command::new("cargo")
+            .args(["rustc", "--release", "-p", "flexspline", "--features", features, "--target", target])
+            .args(["--crate-type", "staticlib", "--target-dir"])
+            .arg(&folder)
+            .envs([("CARGO_PROFILE_RELEASE_PANIC", "abort"), ("CARGO_PROFILE_RELEASE_LTO", lto)])
+            .envs([("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "1"), ("CARGO_PROFILE_RELEASE_DEBUG", "false")])
+            .current_dir(checkout)
+            .stdin(Stdio::null())
+            .output();
+        let failed = |log: String| LibraryError::Build { target: target.to_owned(), log };
+        let output = output.map_err(|error| failed(error.to_string()))?;
+        if !output.status.success() {
+            let said = String::from_utf8_lossy(&output.stderr);
+            let last = said.lines().rev().take(12).collect::<Vec<_>>();
+            return Err(failed(last.into_iter().rev().collect::<Vec<_>>().join("\n")));
+        }
+        read(target, &folder.join(target).join("release").join(ARCHIVE))
+    }
+}
+
+/// Whether the sources of the core are in this folder.
+fn is_checkout(folder: &Path) -> bool {
+    fs::read_to_string(folder.join("core/Cargo.toml")).is_ok_and(|text| text.contains("name = \"flexspline\"\n"))
+}
+
+/// A file that is a static library of the core.
+fn read(target: &str, path: &Path) -> Result<Library, LibraryError> {
+    let wrong = |why: String| LibraryError::File { path: path.to_owned(), why };
+    let archive = fs::read(path).map_err(|error| wrong(error.to_string()))?;
+    if !archive.starts_with(b"!<arch>\n") {
+        return Err(wrong("is no static library (ar archive)".to_owned()));
+    }
+    let symbol = b"flexspline_tick";
+    if !archive.windows(symbol.len()).any(|window| window == symbol) {
+        return Err(wrong("is not the core with its C interface: it has no flexspline_tick".to_owned()));
+    }
+    Ok(Library { target: target.to_owned(), archive })
+}

@@ -1,0 +1,207 @@
+//! `flexspline bundle`: what firmware people add to a project.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueHint};
+use serde::Serialize;
+
+use super::Failure;
+use super::context::Context;
+use crate::bundle::libraries::{Library, LibraryError, Places, TARGETS};
+use crate::bundle::{Bundle, MANIFEST, Manifest, Table, TableEntry, tar_gz};
+use crate::output::{Outputs, WholeFolder, prepare_folder};
+use crate::suggest::{likeliest, question};
+
+/// Tables, a reader in C99, the core as static libraries, vectors and build files, in one folder for firmware
+///
+/// Writes what CMake, Zephyr, PlatformIO, ESP-IDF and Arduino take as it is: c99/ (the reader), include/, tables/ (as .fxt and as C),
+/// lib/<target>/ (the core), vectors/ (what a port has to say) and manifest.json. Replaces a bundle that is there, and no other folder.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  flexspline bundle --tables out --out firmware/flexspline
+  flexspline bundle --tables out/cam.fxt --target thumbv7em-none-eabihf --out bundle --archive
+  flexspline bundle --tables out --no-core --out bundle")]
+pub(super) struct BundleCommand {
+    /// Folder with table images, or one image
+    #[arg(long, value_name = "DIR|FILE.fxt", value_hint = ValueHint::AnyPath)]
+    tables: PathBuf,
+    /// Targets of the static library, several with commas, or repeated; default: all that can be had
+    #[arg(long = "target", value_name = "TARGET", value_delimiter = ',')]
+    targets: Vec<String>,
+    /// No static libraries: the reader in C99 alone
+    #[arg(long, conflicts_with_all = ["targets", "libraries"])]
+    no_core: bool,
+    /// Folder with TARGET/libflexspline.a; default: that of the release, beside this program, or a build of the sources here
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    libraries: Option<PathBuf>,
+    /// The same as one file beside the folder, DIR.tar.gz
+    #[arg(long)]
+    archive: bool,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct Bundled {
+    folder: String,
+    archive: Option<String>,
+    tables: Vec<TableEntry>,
+    targets: Vec<String>,
+    missing: Vec<Missing>,
+    files: Vec<String>,
+}
+
+/// A target without a library.
+#[derive(Debug, Serialize)]
+struct Missing {
+    target: String,
+    why: String,
+}
+
+impl BundleCommand {
+    pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
+        let out = self.out(context)?;
+        let tables = self.read_tables()?;
+        let bundle = Bundle::new(tables, &self.tables.display().to_string()).map_err(bad_input)?;
+        let (libraries, missing) = self.libraries(context)?;
+        let (files, manifest) = bundle.with(libraries).files();
+        let archive = self.write(&out, &files)?;
+        let bundled = Bundled {
+            folder: out.display().to_string(),
+            archive: archive.map(|path| path.display().to_string()),
+            tables: manifest.tables,
+            targets: manifest.targets,
+            missing,
+            files: files.into_iter().map(|(path, _)| path).collect(),
+        };
+        context.print(&bundled, || text(&bundled))
+    }
+
+    /// The folder, which is not there, is empty, or is a bundle.
+    fn out(&self, context: &Context) -> Result<PathBuf, Failure> {
+        if !context.has_out() {
+            return Err(Failure::BadInput(
+                "--out: found none; say which folder the bundle is to be, for instance --out bundle".to_owned(),
+            ));
+        }
+        let out =
+            std::path::absolute(context.out_path()).map_err(|error| Failure::BadInput(format!("--out: {error}")))?;
+        let refused = |found: &str| {
+            Failure::BadInput(format!(
+                "--out: {} {found}; allowed: a new folder, an empty one, or a bundle to be replaced",
+                out.display()
+            ))
+        };
+        if out.exists() {
+            let mut entries = fs::read_dir(&out).map_err(|error| refused(&format!("is no folder ({error})")))?;
+            let manifest =
+                fs::read(out.join(MANIFEST)).ok().and_then(|text| serde_json::from_slice::<Manifest>(&text).ok());
+            if entries.next().is_some() && manifest.is_none_or(|manifest| manifest.bundle != "flexspline") {
+                return Err(refused("has files that are no bundle"));
+            }
+        }
+        let parent = out.parent().ok_or_else(|| refused("is no folder of its own"))?;
+        prepare_folder(parent).map_err(|error| Failure::BadInput(format!("--out: {error}")))?;
+        Ok(out)
+    }
+
+    fn read_tables(&self) -> Result<Vec<Table>, Failure> {
+        let place = &self.tables;
+        let unreadable = |path: &Path, error| Failure::BadInput(format!("{}: {error}", path.display()));
+        let mut paths = vec![place.clone()];
+        if place.is_dir() {
+            let entries = fs::read_dir(place).map_err(|error| unreadable(place, error))?;
+            paths = entries.filter_map(Result::ok).map(|entry| entry.path()).collect();
+            paths.retain(|path| path.extension().is_some_and(|kind| kind == "fxt"));
+            paths.sort();
+        }
+        let table = |path: PathBuf| {
+            let image = fs::read(&path).map_err(|error| unreadable(&path, error))?;
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            Table::new(&path.display().to_string(), &stem, image).map_err(bad_input)
+        };
+        paths.into_iter().map(table).collect()
+    }
+
+    /// The libraries that were asked for; without `--target` all that can be had, and what the others lack.
+    fn libraries(&self, context: &Context) -> Result<(Vec<Library>, Vec<Missing>), Failure> {
+        if self.no_core {
+            return Ok((Vec::new(), Vec::new()));
+        }
+        let known = TARGETS.map(|(target, _)| target);
+        for asked in &self.targets {
+            if !known.contains(&asked.as_str()) {
+                let hint = likeliest(asked, known).map_or_else(String::new, |meant| format!("; {}", question(meant)));
+                return Err(Failure::BadInput(format!(
+                    "--target: found {asked:?}; allowed: {}{hint}",
+                    known.join(", ")
+                )));
+            }
+        }
+        let places = Places::new(self.libraries.as_deref());
+        let all = self.targets.is_empty();
+        let (mut libraries, mut to_build, mut missing) = (Vec::new(), Vec::new(), Vec::new());
+        for target in known.into_iter().filter(|target| all || self.targets.iter().any(|asked| asked == target)) {
+            match places.find(target) {
+                Ok(Some(library)) => libraries.push(library),
+                Ok(None) => to_build.push(target),
+                Err(LibraryError::Missing { target, why }) if all => missing.push(Missing { target, why }),
+                Err(error) => return Err(Failure::BadInput(format!("--target: {error}"))),
+            }
+        }
+        let mut progress = context.progress("libraries");
+        for (done, target) in to_build.iter().enumerate() {
+            progress.set(done, to_build.len(), target);
+            libraries.push(places.build(target).map_err(|error| Failure::Failed(error.to_string()))?);
+        }
+        libraries.sort_by_key(|library| known.iter().position(|target| *target == library.target));
+        Ok((libraries, missing))
+    }
+
+    /// All of it or nothing.
+    fn write(&self, out: &Path, files: &[(String, Vec<u8>)]) -> Result<Option<PathBuf>, Failure> {
+        let folder = WholeFolder::new(out)?;
+        for (path, contents) in files {
+            let path = folder.path().join(path);
+            let put = || {
+                fs::create_dir_all(path.parent().unwrap_or(&path))?;
+                fs::write(&path, contents)
+            };
+            put().map_err(|error| Failure::Failed(format!("cannot write {}: {error}", path.display())))?;
+        }
+        let mut outputs = Outputs::new();
+        let mut archive = None;
+        if self.archive {
+            let name = out.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let path = out.with_file_name(format!("{name}.tar.gz"));
+            outputs.file(&path, |file| tar_gz(file, &name, files))?;
+            archive = Some(path);
+        }
+        outputs.folder(folder);
+        outputs.finish()?;
+        Ok(archive)
+    }
+}
+
+fn bad_input(error: impl std::fmt::Display) -> Failure {
+    Failure::BadInput(format!("--tables: {error}"))
+}
+
+fn text(bundled: &Bundled) -> String {
+    let mut lines = Vec::new();
+    for TableEntry { file, table_id, generator, .. } in &bundled.tables {
+        lines.push(format!("table {table_id}, {generator} ({file})"));
+    }
+    for target in &bundled.targets {
+        let what = TARGETS.iter().find(|(known, _)| known == target).map_or("", |(_, what)| *what);
+        lines.push(format!("  core for {target:<30} {what}"));
+    }
+    for Missing { target, why } in &bundled.missing {
+        lines.push(format!("  no core for {target}: {why}"));
+    }
+    lines.push(format!("wrote {} files to {}", bundled.files.len(), bundled.folder));
+    lines.extend(bundled.archive.as_ref().map(|archive| format!("wrote {archive}")));
+    lines.push(format!("first steps: {}/README.md", bundled.folder));
+    lines.join("\n")
+}
