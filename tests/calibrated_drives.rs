@@ -408,8 +408,8 @@ fn ways(generator: &[f64]) -> Vec<f64> {
 
 /// Share of what a table can take out that is taken out at least, and what is left, of what the best of the other tables leaves, at most: below
 /// and above what ten drives gave when this was written.
-const LEAST_REMOVED: f64 = 0.75;
-const LARGEST_OF_OTHERS: f64 = 0.6;
+const LEAST_REMOVED: f64 = 0.9;
+const LARGEST_OF_OTHERS: f64 = 0.5;
 
 /// Figures of one drive, arcsec rms over other days.
 #[derive(Debug, Default, Clone, Copy)]
