@@ -40,6 +40,7 @@ pub use flexspline_mechanics::{
 };
 
 pub mod calibrate;
+pub mod campaign;
 pub mod causes;
 pub mod cli;
 pub mod closed_loop;

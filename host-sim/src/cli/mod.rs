@@ -4,6 +4,7 @@
 //! checked, the function is called, and its result is written and shown. Data goes to stdout, talk to stderr.
 
 mod calibrate;
+mod campaign;
 mod completions;
 mod context;
 mod diagnose;
@@ -94,6 +95,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
             ("simulate", "run the drive along a path: kinematic error, backlash, wind-up, stress"),
             ("sleeve", "the sleeve or cup in three dimensions: stiffness by harmonic, tilt, torsion"),
             ("study", "vary fields of a drive: what a catalogue would print of each variant"),
+            ("campaign", "tolerances: thousands of drives on any engine, and what to tighten first"),
             ("fly", "a joint with mass in closed loop, with and without compensation"),
             ("export", "the mesh, the outlines or a CalculiX deck, for other programs"),
             ("reproduce", "the paper's protocol for all four generators, beside its figures"),
@@ -170,6 +172,7 @@ enum Command {
     Simulate(simulate::Simulate),
     Sleeve(sleeve::SleeveCommand),
     Study(study::StudyCommand),
+    Campaign(campaign::CampaignCommand),
     Drive(drive::DriveCommand),
     Fly(fly::Fly),
     Export(export::Export),
@@ -253,6 +256,7 @@ impl Command {
             Command::Simulate(command) => command.run(context),
             Command::Sleeve(command) => command.run(context),
             Command::Study(command) => command.run(context),
+            Command::Campaign(command) => command.run(context),
             Command::Drive(command) => command.run(context),
             Command::Fly(command) => command.run(context),
             Command::Export(command) => command.run(context),
