@@ -293,7 +293,14 @@ impl Model {
             nominal: Vec::new(),
         };
         let middle = model.curves(&Drawn::middle(tolerances));
-        model.nominal = model.places.iter().map(|place| [0, 1].map(|load| model.error(&middle, place, load))).collect();
+        model.nominal = model
+            .places
+            .iter()
+            .map(|place| {
+                let [plus, minus, ..] = model.errors(&middle, place);
+                [plus, minus]
+            })
+            .collect();
         model
     }
 
@@ -355,32 +362,41 @@ impl Model {
         [x + u + apart[2][0], y + v + apart[2][1]]
     }
 
-    /// Error at a place under one of the [`SIGNS`], arcsec.
-    fn error(&self, curves: &Curves, place: &Place, load: usize) -> f64 {
+    /// Error of what is alike everywhere, arcsec.
+    fn wave_error(&self, curves: &Curves, place: &Place, load: usize) -> f64 {
         let (size, negative) = SIGNS[load];
         let in_pitch = place.generator * f64::from(self.teeth[0]);
         // Mirrored, the drive stands on the other side of its place and errs the other way.
-        let mut error =
-            if negative { -along(&curves.waves[size], -in_pitch) } else { along(&curves.waves[size], in_pitch) };
+        if negative { -along(&curves.waves[size], -in_pitch) } else { along(&curves.waves[size], in_pitch) }
+    }
+
+    /// Errors at a place under each of the [`SIGNS`], arcsec.
+    fn errors(&self, curves: &Curves, place: &Place) -> [f64; 4] {
+        let mut errors = std::array::from_fn(|load| self.wave_error(curves, place, load));
         for (w, turns) in [place.generator, place.on_circular_spline].into_iter().enumerate() {
             if let Some(fields) = &curves.wheels[w] {
                 let around = (self.wheels[w].teeth / self.wheels[w].period) as f64;
-                error += along(&fields[load], turns * around);
+                for (error, field) in errors.iter_mut().zip(fields) {
+                    *error += along(field, turns * around);
+                }
             }
         }
         if let Some(oval) = &curves.oval {
             // cos 2(α − crest) and sin 2(α − crest), α the angle of the wave.
             let [c, s] = place.circular_spline_direction;
             let (c2, s2) = (c * c - s * s, 2.0 * c * s);
-            let [g, h] = self.ovals[load];
-            error += g * (c2 * oval[0] + s2 * oval[1]) - h * (s2 * oval[0] - c2 * oval[1]);
+            for (error, [g, h]) in errors.iter_mut().zip(&self.ovals) {
+                *error += g * (c2 * oval[0] + s2 * oval[1]) - h * (s2 * oval[0] - c2 * oval[1]);
+            }
         }
         if let Some(apart) = &curves.apart {
             let [x, y] = Model::apart_at(apart, place);
             let (distance, direction) = ((x * x + y * y).sqrt(), libm::atan2(y, x));
-            error += self.eccentric(distance, direction, negative, self.loads[size]);
+            for (error, (size, negative)) in errors.iter_mut().zip(SIGNS) {
+                *error += self.eccentric(distance, direction, negative, self.loads[size]);
+            }
         }
-        error
+        errors
     }
 
     /// Between sizes linear, as [`Kernels::eccentric_field`].
@@ -394,8 +410,7 @@ impl Model {
     /// The figures of a drive, in the order of [`FIGURES`].
     pub fn figures(&self, drawn: &Drawn) -> Vec<f64> {
         let curves = self.curves(drawn);
-        let errors: Vec<[f64; 4]> =
-            self.places.iter().map(|place| std::array::from_fn(|load| self.error(&curves, place, load))).collect();
+        let errors: Vec<[f64; 4]> = self.places.iter().map(|place| self.errors(&curves, place)).collect();
         let loaded: Vec<f64> = errors.iter().map(|e| e[0]).collect();
         let lost: Vec<f64> = errors.iter().map(|e| e[2] - e[3]).collect();
         let (pp, rms) = spread(&loaded);
@@ -414,7 +429,7 @@ impl Model {
             )
         });
         let [no, nominal, unit] = self.left(&curves, &errors);
-        let at_places: Vec<f64> = self.fem_places.iter().map(|place| self.error(&curves, place, 0)).collect();
+        let at_places: Vec<f64> = self.fem_places.iter().map(|place| self.errors(&curves, place)[0]).collect();
         let (places_pp, places_rms) = spread(&at_places);
         let (r, c) = (self.ratio, self.ratio - 1.0);
         let mut all = vec![pp, rms, order(2.0 * r), order(2.0 * c), order(4.0 * r), order(4.0 * c)];
@@ -433,11 +448,14 @@ impl Model {
     /// Mean of a curve times cosine and sine of so many waves.
     fn projected(&self, errors: &[f64], waves: usize) -> [f64; 2] {
         let n = errors.len();
-        let (mut c, mut s, mut at) = (0.0, 0.0, 0);
+        let (mut c, mut s, mut at, step) = (0.0, 0.0, 0, waves % n);
         for error in errors {
             c += error * self.circle[at][0];
             s += error * self.circle[at][1];
-            at = (at + waves) % n;
+            at += step;
+            if at >= n {
+                at -= n;
+            }
         }
         [c / n as f64, s / n as f64]
     }
@@ -454,9 +472,8 @@ impl Model {
         // A table of this drive has its wave and its mean under either load; the curves take what is in their orders.
         let mut rest = 0.0;
         for load in [0, 1] {
-            let wave = Curves { wheels: [None, None], oval: None, apart: None, waves: curves.waves.clone() };
-            let beyond: Vec<f64> =
-                self.places.iter().zip(errors).map(|(place, e)| e[load] - self.error(&wave, place, load)).collect();
+            let here = self.places.iter().zip(errors);
+            let beyond: Vec<f64> = here.map(|(place, e)| e[load] - self.wave_error(curves, place, load)).collect();
             let mut square = spread(&beyond).1.powi(2);
             for (orders, per) in TABLE_ORDERS.into_iter().zip([self.ratio, self.ratio - 1.0, 1.0]) {
                 for k in 1..=orders {

@@ -21,8 +21,8 @@ const SHARES: [f64; 7] = [0.01, 0.05, 0.5, 0.9, 0.95, 0.99, 0.999];
 const WORST: usize = 20;
 /// Figures whose variance is shared out.
 pub const SHARED: [&str; 3] = ["error_pp_arcsec", "lost_motion_arcsec", "unit_table_rms_arcsec"];
-/// Points of each replicate of the shares.
-const SHARE_POINTS: u32 = 256;
+/// Points of each replicate of the shares: a power of two, at least and at most, and no more than an eighth of the drives.
+const SHARE_POINTS: [u32; 2] = [16, 256];
 /// Drives, at most, that a tolerance is halved for.
 const HALVED_DRIVES: u32 = 2048;
 /// Blocks of these, for intervals.
@@ -288,7 +288,9 @@ fn of_generator(
         let all = model.figures(drawn);
         shared.iter().map(|k| all[*k]).collect::<Vec<f64>>()
     };
-    let all_shares = shares(&plan.tolerances, teeth, hash, SHARE_POINTS, &evaluated);
+    let points = (plan.drives / BLOCKS as u32).clamp(SHARE_POINTS[0], SHARE_POINTS[1]);
+    let points = 1 << points.ilog2();
+    let all_shares = shares(&plan.tolerances, teeth, hash, points, &evaluated);
     let apart = column("axes_apart_um");
     let known = plan.generators[g].kernels.eccentric.sizes_um.last().copied().unwrap_or(0.0);
     let fem_pp = column("fem_places_pp_arcsec");
