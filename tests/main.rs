@@ -11,6 +11,7 @@ mod bad_measurements;
 mod c_header;
 mod calibrated_drives;
 mod calibration;
+mod campaign;
 mod cli;
 mod cli_files;
 mod cli_terminal;
