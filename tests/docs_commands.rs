@@ -453,6 +453,9 @@ fn commands_and_options_in_the_text_exist() {
     for command in commands.iter().filter(|command| **command != "help") {
         known += &help(&[command]);
     }
+    for step in ["plan", "run", "reduce"] {
+        known += &help(&["campaign", step]);
+    }
     let mut wrong = Vec::new();
     // What changed is not what is: the change log is history.
     for page in pages().iter().filter(|page| page.name != Path::new("CHANGELOG.md")) {

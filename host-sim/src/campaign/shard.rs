@@ -41,7 +41,7 @@ pub struct Shard {
     pub drive: Vec<i32>,
     /// Number of the generator.
     pub generator: Vec<i32>,
-    /// The other columns, in the order of [`column_names`].
+    /// The other columns: what was drawn, phases, figures by kernels and by FEM.
     pub columns: Vec<Vec<f64>>,
 }
 
