@@ -6,6 +6,7 @@
 
 use std::fs::{self, File};
 use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -243,9 +244,11 @@ pub fn look(plan: &Plan, hash: &[u8; 32], folder: &Path, shard: u32) -> ShardSta
         Err(error) if error.kind() == io::ErrorKind::NotFound => return ShardState::Missing,
         Err(error) => return ShardState::Damaged(error.to_string()),
     };
-    match decode(plan, hash, shard, file) {
-        Ok(state) => state,
-        Err(error) => ShardState::Damaged(format!("damaged: {error}")),
+    // A reader of Parquet may panic over bytes that are none: that is a damaged file, too.
+    match catch_unwind(AssertUnwindSafe(|| decode(plan, hash, shard, file))) {
+        Ok(Ok(state)) => state,
+        Ok(Err(error)) => ShardState::Damaged(format!("damaged: {error}")),
+        Err(_) => ShardState::Damaged("damaged: it cannot be read".to_owned()),
     }
 }
 
