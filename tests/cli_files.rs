@@ -240,6 +240,7 @@ fn every_command_prints_one_json_object_and_nothing_else() {
     desk.write("path.csv", "generator_rad\n0\n");
     desk.write("samples.csv", &samples());
     desk.write("measured.csv", "generator_rad,output_rad\n0,0\n1,0.0105\n2,0.021\n");
+    desk.write("tolerances.toml", include_str!("../examples/campaign/teeth.toml"));
     let lines = [
         "new nominal.toml",
         "new drive.toml",
@@ -263,6 +264,10 @@ fn every_command_prints_one_json_object_and_nothing_else() {
         "look out/data.csv",
         "calibrate out/data.csv --model nominal.toml",
         "fly camera --no-report",
+        "campaign plan --example",
+        "campaign plan tolerances.toml --drives 64 --shards 2 --out campaign",
+        "campaign run campaign --shard all",
+        "campaign reduce campaign",
     ];
     for line in lines {
         let run = desk.line(&format!("{line} --json"));

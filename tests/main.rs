@@ -12,6 +12,7 @@ mod bundle;
 mod c_header;
 mod calibrated_drives;
 mod calibration;
+mod campaign;
 mod cli;
 mod cli_files;
 mod cli_terminal;

@@ -140,34 +140,29 @@ pub const FIGURES: [FigureOf; 13] = [
     ("last_stable_n_m", |s| s.last_stable_n_m),
 ];
 
-/// The sheet of a drive with one generator, at reference temperature. `positions` over the tooth pitch, 4 or more.
+/// The sheet of a drive with one generator at a temperature. `positions` over the tooth pitch, 4 or more.
 ///
 /// Where no equilibrium is found the sheet has what was found until then, and the error says where it ended.
 pub fn data_sheet(
     drive: &Drive,
     kind: GeneratorKind,
+    temperature_c: f64,
     loads: Loads,
     positions: usize,
     settings: SolverSettings,
 ) -> (DataSheet, Result<(), SolveError>) {
     let mut sheet = DataSheet { rigid_gap_um: rigid_gap_um(drive, kind), ..DataSheet::default() };
-    let done = fill(&mut sheet, drive, kind, loads, positions, settings);
+    let done = Problem::new(drive, kind, temperature_c, settings)
+        .and_then(|problem| fill(&mut sheet, &problem, loads, positions));
     if let (Err(SolveError::NotConverged { reached_n_m, .. }), Some(last)) = (&done, &mut sheet.last_stable_n_m) {
         *last = last.max(*reached_n_m);
     }
     (sheet, done)
 }
 
-fn fill(
-    sheet: &mut DataSheet,
-    drive: &Drive,
-    kind: GeneratorKind,
-    loads: Loads,
-    positions: usize,
-    settings: SolverSettings,
-) -> Result<(), SolveError> {
-    let problem = Problem::new(drive, kind, drive.temperature.reference_c, settings)?;
-    let mut motion = Motion::deformed(&problem, 0.0)?;
+fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize) -> Result<(), SolveError> {
+    let drive = &problem.drive;
+    let mut motion = Motion::deformed(problem, 0.0)?;
     sheet.last_stable_n_m = Some(0.0);
     let unloaded = motion.state().clone();
     let touch = touch_n_m(drive, loads);
@@ -223,7 +218,7 @@ fn fill(
     sheet.peak_generator_pressure_mpa = Some(most(|increment| increment.peak_pressure_mpa[1]));
     let in_contact = most(|increment| increment.flank_contacts as f64);
     sheet.teeth_in_contact_percent = Some(100.0 * in_contact / f64::from(drive.flexspline.teeth));
-    sheet.max_von_mises_mpa = Some(peak_stress(&problem, motion.state()).von_mises_mpa);
+    sheet.max_von_mises_mpa = Some(peak_stress(problem, motion.state()).von_mises_mpa);
     Ok(())
 }
 

@@ -3,7 +3,7 @@
 //! ```text
 //! drive.toml -> drive -> mesh -> fem, contact -> stepping -> motion -> tables -> image (.fxt), read by the crate `flexspline`
 //!                                                              |
-//!                                   simulate, kernels, reproduce, closed_loop, fly
+//!                                   simulate, kernels, campaign, reproduce, closed_loop, fly
 //! measured.csv -> measurement -> residual -> diagnosis (beside a table, or nominal.toml) -> extension -> drive, tables
 //! ```
 //!
@@ -41,6 +41,7 @@ pub use flexspline_mechanics::{
 
 pub mod bundle;
 pub mod calibrate;
+pub mod campaign;
 pub mod causes;
 pub mod cli;
 pub mod closed_loop;

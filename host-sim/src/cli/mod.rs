@@ -5,6 +5,7 @@
 
 mod bundle;
 mod calibrate;
+mod campaign;
 mod completions;
 mod context;
 mod diagnose;
@@ -95,6 +96,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
             ("simulate", "run the drive along a path: kinematic error, backlash, wind-up, stress"),
             ("sleeve", "the sleeve or cup in three dimensions: stiffness by harmonic, tilt, torsion"),
             ("study", "vary fields of a drive: what a catalogue would print of each variant"),
+            ("campaign", "tolerances: thousands of drives on any engine, and what to tighten first"),
             ("fly", "a joint with mass in closed loop, with and without compensation"),
             ("export", "the mesh, the outlines or a CalculiX deck, for other programs"),
             ("reproduce", "the paper's protocol for all four generators, beside its figures"),
@@ -172,6 +174,7 @@ enum Command {
     Simulate(simulate::Simulate),
     Sleeve(sleeve::SleeveCommand),
     Study(study::StudyCommand),
+    Campaign(campaign::CampaignCommand),
     Drive(drive::DriveCommand),
     Fly(fly::Fly),
     Export(export::Export),
@@ -256,6 +259,7 @@ impl Command {
             Command::Simulate(command) => command.run(context),
             Command::Sleeve(command) => command.run(context),
             Command::Study(command) => command.run(context),
+            Command::Campaign(command) => command.run(context),
             Command::Drive(command) => command.run(context),
             Command::Fly(command) => command.run(context),
             Command::Export(command) => command.run(context),

@@ -26,6 +26,8 @@ pub struct KernelPlan {
     pub directions: usize,
     /// Samples to a tooth pitch.
     pub positions: usize,
+    /// Temperature, °C; without it that at which the sizes of the drive hold.
+    pub temperature_c: Option<f64>,
 }
 
 impl KernelPlan {
@@ -42,6 +44,7 @@ impl KernelPlan {
             sizes_um: vec![2.5, 5.0, 7.0, 9.0, 12.0, 17.0, 30.0],
             directions: 19,
             positions: 8,
+            temperature_c: None,
         }
     }
 
@@ -96,7 +99,7 @@ pub fn make(
     let mut smooth = drive.clone();
     smooth.flanks.friction_coefficient = 0.0;
     smooth.output.drag_torque_n_m = DRAG_N_M;
-    let temperature_c = drive.temperature.reference_c;
+    let temperature_c = plan.temperature_c.unwrap_or(drive.temperature.reference_c);
     let problem = Problem::new(&smooth, kind, temperature_c, settings)?;
     let done = AtomicUsize::new(0);
     let told = || match progress(done.fetch_add(1, Ordering::Relaxed) + 1) {
@@ -268,7 +271,7 @@ fn eccentric(
     // On the circular spline whole pitches of the generator are whole pitches of its own.
     let pitches = f64::from(drive.circular_spline.teeth) / repeats as f64;
     let whole = |direction: usize| (pitches * direction as f64 / plan.directions as f64).round();
-    let temperature_c = drive.temperature.reference_c;
+    let temperature_c = plan.temperature_c.unwrap_or(drive.temperature.reference_c);
     let sizes = [0.0].into_iter().chain(plan.sizes_um.iter().copied());
     let problems = sizes
         .map(|size_um| {

@@ -182,6 +182,14 @@ impl Kernels {
         self.under(torque_n_m, gain, |l| conjugate(gain(l)))
     }
 
+    /// Error (arcsec) for each µm that one tooth (or space) at `place_rad` from the major axis is displaced along the pitch.
+    #[must_use]
+    pub fn displaced(&self, wheel: Wheel, place_rad: f64, torque_n_m: f64) -> f64 {
+        let at = |l: &LoadKernels, place: f64| self.at(&l.wheel(wheel).along, wheel, place);
+        // Mirrored, place, displacement and error all change their sign.
+        self.under(torque_n_m, |l| at(l, place_rad), |l| at(l, -place_rad))
+    }
+
     /// Response to an oval circular spline, `cos(2 α)` µm outward, with the displacement along the ring and the rotation of a ring that
     /// keeps its length.
     #[must_use]
@@ -280,7 +288,7 @@ impl Kernels {
     }
 
     /// Whether sizes fit one another, so that evaluation cannot fail.
-    fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         let ascending = |of: &[f64]| !of.is_empty() && of[0] > 0.0 && of.windows(2).all(|w| w[0] < w[1]);
         let torques: Vec<f64> = self.loads.iter().map(|l| l.torque_n_m).collect();
         let e = &self.eccentric;

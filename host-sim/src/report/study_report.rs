@@ -98,7 +98,7 @@ fn shown(name: &str) -> (String, Quantity) {
     (words.replace('_', " ").replace("pp", "peak to peak"), quantity)
 }
 
-fn heading(name: &str) -> String {
+pub(super) fn heading(name: &str) -> String {
     let (words, quantity) = shown(name);
     match quantity {
         Quantity::Stress => format!("{words}, MPa"),
@@ -107,7 +107,7 @@ fn heading(name: &str) -> String {
     }
 }
 
-fn value(name: &str, value: Option<f64>) -> Text {
+pub(super) fn value(name: &str, value: Option<f64>) -> Text {
     match value {
         None => Text::new("–"),
         Some(value) if shown(name).1 == Quantity::Error => Text::default().error(value, 3),

@@ -241,7 +241,8 @@ fn run(
         Err(error) => return Run { why: Some(error.to_string()), ..run },
     };
     let loads = Loads::up_to(settings.torque_n_m.unwrap_or_else(|| drive.rated_torque_n_m(generator)));
-    let (sheet, done) = data_sheet(&drive, generator, loads, settings.positions, settings.solver);
+    let (sheet, done) =
+        data_sheet(&drive, generator, drive.temperature.reference_c, loads, settings.positions, settings.solver);
     (run.loads, run.sheet) = (Some(loads), sheet);
     match done {
         Ok(()) => run.status = RunStatus::Converged,
