@@ -33,9 +33,7 @@ impl Drive {
 
     /// With fields changed, each `path=value`.
     fn with_sets(&self, sets: Vec<String>) -> PyResult<Drive> {
-        // The place that the message names is an option of the command.
-        let unnamed = |error: flexspline_sim::drive::DriveError| error.to_string().replace("--set ", "set ");
-        self.0.with_sets(sets.iter().map(String::as_str)).map(Drive).map_err(|error| bad(unnamed(error)))
+        self.0.with_sets(sets.iter().map(String::as_str)).map(Drive).map_err(bad)
     }
 
     fn to_toml(&self) -> String {

@@ -36,11 +36,29 @@ impl Failure {
 impl From<Failure> for PyErr {
     fn from(failure: Failure) -> PyErr {
         match failure {
-            Failure::BadInput(what) => exceptions::BadInput::new_err(what),
-            Failure::NotConverged(what) => exceptions::NotConverged::new_err(what),
-            Failure::NothingGained(what) => exceptions::NothingGained::new_err(what),
+            Failure::BadInput(what) => exceptions::BadInput::new_err(with_arguments(&what)),
+            Failure::NotConverged(what) => exceptions::NotConverged::new_err(with_arguments(&what)),
+            Failure::NothingGained(what) => exceptions::NothingGained::new_err(with_arguments(&what)),
         }
     }
+}
+
+/// A message with the names of arguments where it speaks of options of the command: `--node-tolerance-arcsec` is `node_tolerance_arcsec`.
+fn with_arguments(message: &str) -> String {
+    let mut text = String::with_capacity(message.len());
+    let mut rest = message;
+    while let Some(at) = rest.find("--") {
+        let (before, option) = rest.split_at(at);
+        text += before;
+        let name = &option[2..];
+        let end = name.find(|c: char| !(c.is_ascii_lowercase() || c == '-')).unwrap_or(name.len());
+        text += &match &name[..end] {
+            "rate" => "rate_hz".to_owned(),
+            name => name.replace('-', "_"),
+        };
+        rest = &name[end..];
+    }
+    text + rest
 }
 
 /// An exception about the input.

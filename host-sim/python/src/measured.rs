@@ -53,14 +53,9 @@ fn column_map((columns, rate_hz, torque_constant): &Reading) -> Result<ColumnMap
     let map = if columns.is_empty() {
         ColumnMap::default()
     } else {
-        ColumnMap::with_torque_constant(columns, *torque_constant).map_err(|error| unoptioned(&error.to_string()))?
+        ColumnMap::with_torque_constant(columns, *torque_constant).map_err(Failure::bad)?
     };
-    map.at_rate(*rate_hz).map_err(|error| unoptioned(&error))
-}
-
-/// A message about an option of the command, of which an argument has the name.
-fn unoptioned(message: &str) -> Failure {
-    Failure::bad(message.replace("--columns ", "columns=").replace("--columns", "columns").replace("--rate", "rate_hz"))
+    map.at_rate(*rate_hz).map_err(Failure::bad)
 }
 
 /// What is known of the drive before.

@@ -54,7 +54,7 @@ pub fn study(
         run_study(&drive, &settings, &|done, of, run| {
             watch.tell(done, of, format!("variant {} {}", run.variant, run.generator))
         })
-        .map_err(|error: StudyError| Failure::bad(error.to_string().replace("--", "")))
+        .map_err(|error: StudyError| Failure::bad(error))
     })?;
     serde_json::to_string(&made).map_err(bad)
 }

@@ -24,6 +24,10 @@ ARCSEC_PER_RAD: float = _native.Table.arcsec_per_rad
 """Arc-seconds in a radian, as every number here is converted."""
 
 
+MadeTable = tuple[str, bytes, str, str, str, str | None]
+"""A table as it is made: generator, image, text of its JSON, Rust source, C header, samples as CSV."""
+
+
 class Quality(enum.IntEnum):
     """How far an answer can be trusted, worst last: the column ``quality``."""
 
@@ -201,7 +205,7 @@ class Table:
         return cls(_native.Table.check("image", bytes(image)))
 
     @classmethod
-    def _made(cls, parts: _native.MadeTable) -> Table:
+    def _made(cls, parts: MadeTable) -> Table:
         _, image, info, rust, header, samples = parts
         table = cls(_native.Table.check("image", image))
         table.info, table.samples_csv, table._sources = Fields(info), samples, (rust, header)

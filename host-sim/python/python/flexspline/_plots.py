@@ -74,10 +74,9 @@ def table(
         pitch = 2 * np.pi / (of.flexspline_teeth if of.fixed == "flexspline" else of.circular_spline_teeth)
         generator = np.linspace(0, _PITCHES * pitch, _POINTS)
         torques = np.linspace(*of.torque_range_n_m, _CURVES) if torques_n_m is None else torques_n_m
-        for torque in torques:
-            # The table is of the output's direction; 0 N·m stands for the middle of the play.
-            error = of.forward(generator, float(torque), temperature, direction=1).error_arcsec
-            ax.plot(generator, error - error.mean(), label=f"{torque:g} N·m")
+        for load in torques:
+            error = of.forward(generator, float(load), temperature, direction=1).error_arcsec
+            ax.plot(generator, error - error.mean(), label=f"{load:g} N·m")
         return _labelled(ax, "generator angle, rad", "ripple about its mean, arcsec", title)
     raise BadInput(f"what: found {what!r}, allowed: 'wind-up', 'ripple'")
 

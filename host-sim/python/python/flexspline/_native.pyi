@@ -4,13 +4,15 @@ from typing import Any, TypedDict, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = ["Drive", "PlayState", "Table", "__version__", "calibrate", "diagnose", "project", "simulate", "study", "tables"]
+
 __version__: str
 
 _Floats = NDArray[np.float64]
 _Teller = Callable[[int, int, str], object] | None
 _Log = str | tuple[str, bytes]
 _Reading = tuple[str, float | None, float | None]
-MadeTable = tuple[str, bytes, str, str, str, str | None]
+_MadeTable = tuple[str, bytes, str, str, str, str | None]
 
 class _Header(TypedDict):
     table_id: str
@@ -127,7 +129,7 @@ def tables(
     solver: str,
     threads: int | None,
     progress: _Teller,
-) -> list[MadeTable]: ...
+) -> list[_MadeTable]: ...
 def project(
     drive: Drive,
     generator_name: str,
@@ -135,7 +137,7 @@ def project(
     *,
     half_width_arcsec: float | None,
     deviation_arcsec: float | None,
-) -> MadeTable: ...
+) -> _MadeTable: ...
 def study(
     drive: Drive,
     vary: list[str],
@@ -160,7 +162,7 @@ def calibrate(
     *,
     threads: int | None,
     progress: _Teller,
-) -> tuple[str, MadeTable, dict[str, Any]]: ...
+) -> tuple[str, _MadeTable, dict[str, Any]]: ...
 def diagnose(
     log: _Log,
     known: float | str | bytes,
@@ -172,4 +174,4 @@ def diagnose(
     explain: str | None,
     threads: int | None,
     progress: _Teller,
-) -> tuple[str, str | None, MadeTable | None, tuple[str, str] | None, dict[str, Any]]: ...
+) -> tuple[str, str | None, _MadeTable | None, tuple[str, str] | None, dict[str, Any]]: ...
