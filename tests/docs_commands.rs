@@ -6,7 +6,8 @@
 //! ```text
 //! sh             run, block after block, in a copy of the project of each page's own, by the program that was built
 //! sh slow        only parsed here; run by `cargo test -- --include-ignored` (`tests/run host --long`)
-//! sh firmware    run by `tests/run firmware`, which has to name the page
+//! sh firmware    run by `tests/run firmware`, which has to name the page; `sh python` likewise
+//! python         run by the tests of `tests/run python`: only on its page
 //! rust           compiled and run as a documentation test: `tests/lib.rs` has to hold the page
 //! toml           a drive, or a nominal model if it has [nominal]; `toml cargo` is neither
 //! ```
@@ -41,7 +42,9 @@ const NOT_RUN: [(&str, &str); 12] = [
 /// Programs beside ours that a block may call.
 const HELPERS: [&str; 9] = ["cd", "cp", "cmp", "mkdir", "cat", "head", "awk", "ls", "rm"];
 /// Parts of `tests/run` that run blocks marked with their name.
-const PARTS: [&str; 1] = ["firmware"];
+const PARTS: [&str; 2] = ["firmware", "python"];
+/// The page whose Python is run, by the tests of `host-sim/python`.
+const PYTHON: &str = "docs/python.md";
 /// Pictures of examples are small, bytes.
 const LARGEST_PICTURE: u64 = 150_000;
 /// Lines of an example's page: one screen.
@@ -261,10 +264,17 @@ fn what_is_wrong_is_found() {
     assert!(copy.run(&one("cargo run --release -- drive --check --drive absent.toml")).is_err());
 }
 
+/// `tests/run` with its parts.
+fn runner() -> String {
+    let parts = fs::read_dir(root().join("tests/parts")).unwrap().map(|entry| entry.unwrap().path());
+    let files = parts.chain([root().join("tests/run")]);
+    files.map(|file| fs::read_to_string(file).unwrap()).collect()
+}
+
 #[test]
 fn every_block_says_what_it_is() {
     let lib = fs::read_to_string(root().join("tests/lib.rs")).unwrap();
-    let runner = fs::read_to_string(root().join("tests/run")).unwrap();
+    let runner = runner();
     let mut wrong = Vec::new();
     for page in pages() {
         let name = page.name.to_str().unwrap();
@@ -279,6 +289,7 @@ fn every_block_says_what_it_is() {
                     let held = format!("include_str!(\"../{name}\")");
                     lib.contains(&held).then_some(()).ok_or(format!("tests/lib.rs does not hold {held}"))
                 }
+                ("python", "") => (name == PYTHON).then_some(()).ok_or(format!("only those of {PYTHON} are run")),
                 ("toml", "cargo") => Ok(()),
                 ("toml", "") => read_toml(name, &block.text),
                 (language, mark) => Err(format!("`{language} {mark}` is no kind of block")),
