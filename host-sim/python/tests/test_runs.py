@@ -19,6 +19,7 @@ import pytest
 import flexspline
 from conftest import MODEL, PROJECT, command, read_json, same_json
 from flexspline import BadInput, Drive, NotConverged, NothingGained, Table
+from flexspline._inputs import log
 
 
 def read_csv(path: Path) -> dict[str, list[str]]:
@@ -122,8 +123,9 @@ def test_diagnose_is_the_command(log_file: Path, tmp_path: Path) -> None:
 def test_columns_in_memory_are_the_file(log_file: Path) -> None:
     of_file = flexspline.diagnose(log_file, model=MODEL).json
     frame = frame_of(log_file)
-    for data in (frame, pyarrow.Table.from_pandas(frame), dict(frame.items())):
-        assert flexspline.diagnose(data, model=MODEL).json == of_file
+    assert flexspline.diagnose(frame, model=MODEL).json == of_file
+    for data in (pyarrow.Table.from_pandas(frame), dict(frame.items())):
+        assert log(data) == log(frame), "from here on they are the same"
     renamed = frame.rename(columns={"generator_rad": "motor"}).assign(motor=lambda f: f["motor"] / (2 * np.pi), note="text")
     mapped = flexspline.diagnose(renamed, model=MODEL, columns={"generator": "motor:turn"})
     assert [cause.name for cause in mapped.causes] == [cause["name"] for cause in of_file["causes"]]
@@ -232,13 +234,13 @@ def test_a_run_that_fails_says_so() -> None:
 def test_logs_without_anything_to_gain_say_so() -> None:
     random = np.random.default_rng(3)
     generator = np.tile(np.concatenate([np.linspace(0.0, 60.0, 2000), np.linspace(60.0, 0.0, 2000)]), 2)
-    log = {
+    aimless = {
         "time_s": 0.01 * np.arange(generator.size),
         "generator_rad": generator,
         "output_rad": generator / 101 + random.normal(0.0, 5e-6, generator.size),
     }
     with pytest.raises(NothingGained, match="no table is better than none"):
-        flexspline.calibrate(log, ratio=101)
+        flexspline.calibrate(aimless, ratio=101)
 
 
 def test_a_table_of_another_drive_is_refused(log_file: Path, table: Table) -> None:

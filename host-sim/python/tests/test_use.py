@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import importlib
+import pickle
 import re
 import subprocess
 import sys
@@ -42,16 +43,22 @@ axes = table.plot("ripple")
 WRONG_USER = ('flexspline.simulate(drive, "cam", mesh="corse")', 'table.forward("a", trque=1)', "flexspline.calibrate(['a'], ratio='x')")
 
 
+@pytest.fixture(scope="session")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """What mypy has seen of numpy, which takes most of its time."""
+    return str(tmp_path_factory.mktemp("mypy"))
+
+
 def mypy(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True, cwd=cwd, check=False)
 
 
-def test_a_strictly_typed_program_passes_and_a_wrong_one_does_not(tmp_path: Path) -> None:
+def test_a_strictly_typed_program_passes_and_a_wrong_one_does_not(tmp_path: Path, cache: str) -> None:
     (tmp_path / "user.py").write_text(USER)
-    said = mypy("mypy", "--strict", "--cache-dir", str(tmp_path / "cache"), "user.py", cwd=tmp_path)
+    said = mypy("mypy", "--strict", "--cache-dir", cache, "user.py", cwd=tmp_path)
     assert said.returncode == 0, said.stdout + said.stderr
     (tmp_path / "user.py").write_text(USER + "\n".join(WRONG_USER))
-    said = mypy("mypy", "--strict", "--cache-dir", str(tmp_path / "cache"), "user.py", cwd=tmp_path)
+    said = mypy("mypy", "--strict", "--cache-dir", cache, "user.py", cwd=tmp_path)
     assert said.returncode != 0 and f"Found {len(WRONG_USER)} errors" in said.stdout, said.stdout
 
 
@@ -60,9 +67,9 @@ def test_stub_and_module_agree(tmp_path: Path) -> None:
     assert said.returncode == 0, said.stdout + said.stderr
 
 
-def test_the_package_is_strictly_typed_itself(tmp_path: Path) -> None:
+def test_the_package_is_strictly_typed_itself(tmp_path: Path, cache: str) -> None:
     settings = PROJECT / "host-sim/python/pyproject.toml"
-    said = mypy("mypy", "--config-file", str(settings), "--cache-dir", str(tmp_path), "-p", "flexspline", cwd=tmp_path)
+    said = mypy("mypy", "--config-file", str(settings), "--cache-dir", cache, "-p", "flexspline", cwd=tmp_path)
     assert said.returncode == 0, said.stdout + said.stderr
 
 
@@ -125,6 +132,17 @@ def test_fields_are_attributes_all_the_way_down() -> None:
     assert flexspline.Fields(fields.to_json()) == fields and "a" in fields and "b_arcsec" in dir(fields.a)
     with pytest.raises(AttributeError, match="has no field 'd'; it has a, list, none"):
         _ = fields.d
+
+
+def test_what_goes_to_other_processes_arrives(table: Table) -> None:
+    made = flexspline.table_from_samples(PROJECT / "tests/firmware/samples/cam.samples.csv")
+    state = flexspline.PlayState()
+    said = table.forward(np.linspace(0, 1, 50), 12.0, state=state)
+    for one in (table, made, said, state, flexspline.PlayState(), flexspline.Drive("CUP-95")):
+        again = pickle.loads(pickle.dumps(one))
+        assert repr(again) == repr(one) and type(again) is type(one)
+    assert pickle.loads(pickle.dumps(made)).info == made.info
+    assert pickle.loads(pickle.dumps(said)).output_rad.tobytes() == said.output_rad.tobytes()
 
 
 def test_what_is_optional_is_only_asked_for_where_it_is_needed(image: Path) -> None:

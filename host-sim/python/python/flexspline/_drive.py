@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 import os
 import tomllib
@@ -40,9 +41,11 @@ class Drive:
             try:
                 text = Path(name).read_text(encoding="utf-8")
             except OSError as error:
+                like = difflib.get_close_matches(name, self.BUILT_IN, n=1)
+                hint = f"; did you mean `{like[0]}`?" if like else ""
                 raise BadInput(
                     f"drive: found {name!r}, which cannot be read as a file ({error.strerror or error}); allowed: a drive file, or one of "
-                    f"the built-in drives {', '.join(self.BUILT_IN)}"
+                    f"the built-in drives {', '.join(self.BUILT_IN)}{hint}"
                 ) from None
             known = _native.Drive.from_toml(name, text)
         self._inner = known
@@ -103,6 +106,9 @@ class Drive:
 
     def __hash__(self) -> int:
         return hash(self.to_toml())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Drive.from_toml, (self.to_toml(), self.name)
 
     def __repr__(self) -> str:
         return f"Drive({self.name!r}, ratio {self.ratio:g})"

@@ -88,6 +88,9 @@ class PlayState:
         """The estimate is wrong by no more, rad."""
         return self._inner.uncertainty_rad
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return PlayState.restore, (self.save(),)
+
     def __repr__(self) -> str:
         return f"PlayState(offset_rad={self.offset_rad:.3g}, uncertainty_rad={self.uncertainty_rad:.3g})"
 
@@ -433,6 +436,10 @@ class Table:
         from . import _plots
 
         return _plots.table(self, what, torques_n_m, temperature_c, ax)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        state = {"info": self.info, "samples_csv": self.samples_csv, "_sources": self._sources}
+        return Table.open, (self.image,), state
 
     def __repr__(self) -> str:
         low, high = self.torque_range_n_m
