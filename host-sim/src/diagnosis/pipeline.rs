@@ -27,7 +27,7 @@ use crate::extension::{
     causes_to_toml, check_by_fem, evaluate, found_geometry,
 };
 use crate::kernels::Kernels;
-use crate::measurement::{ColumnMap, MeasuredError, Recording, Session, read, read_degrees};
+use crate::measurement::{ColumnMap, MeasuredError, Recording, Session, parse, parse_degrees, read, read_degrees};
 use crate::mesh::MeshLevel;
 use crate::nominal::Nominal;
 use crate::stepping::{Method, SolveError, SolverSettings};
@@ -231,10 +231,33 @@ pub struct Diagnosed {
 /// The rows cannot be read, or do not fit what the model knows.
 pub fn read_rows(path: &Path, columns: &ColumnMap, subject: &Subject<'_>) -> Result<Recording, PipelineError> {
     let gear = subject.nominal.gear();
-    let mut recording = read(path, columns, &gear)?;
+    rows_of(subject, || read(path, columns, &gear), || read_degrees(path, columns, &gear))
+}
+
+/// The same of rows that stand in memory: `bytes` of a file called `file`.
+///
+/// # Errors
+/// As [`read_rows`].
+pub fn parse_rows(
+    file: &str,
+    bytes: &[u8],
+    columns: &ColumnMap,
+    subject: &Subject<'_>,
+) -> Result<Recording, PipelineError> {
+    let gear = subject.nominal.gear();
+    rows_of(subject, || parse(file, bytes, columns, &gear), || parse_degrees(file, bytes, columns, &gear))
+}
+
+/// Rows in radians, or the same in degrees where that is what they are.
+fn rows_of(
+    subject: &Subject<'_>,
+    in_radians: impl FnOnce() -> Result<Recording, MeasuredError>,
+    in_degrees: impl FnOnce() -> Result<Recording, MeasuredError>,
+) -> Result<Recording, PipelineError> {
+    let mut recording = in_radians()?;
     subject.take_away_known(&mut recording)?;
     if subject.model.is_some() && channels::are_in_degrees(&recording, &subject.nominal) {
-        recording = read_degrees(path, columns, &gear)?;
+        recording = in_degrees()?;
         subject.take_away_known(&mut recording)?;
     }
     recording.unusable = channels::check_torque(&mut recording, &subject.nominal);

@@ -168,7 +168,7 @@ pub fn read(path: &Path, columns: &ColumnMap, gear: &Gear) -> Result<Recording, 
 pub(crate) fn read_degrees(path: &Path, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
     let file = path.display().to_string();
     match File::open(path) {
-        Ok(source) => parse_as(&file, source, columns, gear, Unit::Degree.factor()),
+        Ok(source) => parse_degrees(&file, source, columns, gear),
         Err(error) => Err(MeasuredError { file, line: None, what: error.to_string() }),
     }
 }
@@ -176,6 +176,16 @@ pub(crate) fn read_degrees(path: &Path, columns: &ColumnMap, gear: &Gear) -> Res
 /// Reads measured data from `source`, a file called `file`.
 pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
     parse_as(file, source, columns, gear, 1.0)
+}
+
+/// [`parse`] as [`read_degrees`] reads.
+pub(crate) fn parse_degrees(
+    file: &str,
+    source: impl Read,
+    columns: &ColumnMap,
+    gear: &Gear,
+) -> Result<Recording, MeasuredError> {
+    parse_as(file, source, columns, gear, Unit::Degree.factor())
 }
 
 /// The same with both angles times `angle_scale`.

@@ -1,0 +1,475 @@
+"""What the command does, as functions: simulate, tables, study, calibrate, diagnose."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _native
+from ._columns import Columns, FloatArray
+from ._drive import Drive, drive_of
+from ._errors import BadInput
+from ._fields import Fields, rows_html
+from ._inputs import PathLike, columns_option, log, names, numbers, path_text, spread, table_columns
+from ._progress import Progress, shown
+from ._table import Table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+GENERATORS = ("two-roller", "four-roller", "double-disc", "cam")
+"""The wave generators by name."""
+
+Mesh = Literal["coarse", "standard", "fine"]
+Solver = Literal["fast", "reference"]
+
+
+class Simulation(Columns):
+    """A run along a path: a row for each increment, the columns of ``results.csv``; and ``summary``."""
+
+    step: NDArray[np.int64]
+    generator_rad: FloatArray
+    """Generator angle, rad."""
+    output_rad: FloatArray
+    """Output angle, rad."""
+    error_arcsec: FloatArray
+    """Output angle less generator over ratio, arcsec; positive when the output leads."""
+    torque_n_m: FloatArray
+    """Load, N·m; positive turns the output forward."""
+    flank_contacts: NDArray[np.int64]
+    generator_contacts: NDArray[np.int64]
+    max_von_mises_mpa: FloatArray
+    """Largest von Mises stress of both wheels, MPa."""
+    iterations: NDArray[np.int64]
+    temperature_c: FloatArray
+    settled: NDArray[np.bool_]
+    """Whether start-up is over since the last reversal or change of load."""
+    summary: Fields
+    """``summary.json``: backlash_arcsec, kinematic_error_pp_arcsec, wind_up_arcsec, max_von_mises_mpa and others."""
+
+    def __init__(self, columns: Mapping[str, Any], summary: Fields) -> None:
+        super().__init__(columns)
+        self.summary = summary
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """The error (arcsec) over the generator angle (rad); needs matplotlib."""
+        from . import _plots
+
+        return _plots.simulation(self, ax)
+
+    def __repr__(self) -> str:
+        return f"Simulation({self.rows} rows, {self.summary.drive}, {self.summary.generator}, path {self.summary.path})"
+
+    def _repr_html_(self) -> str:
+        told = {name: value for name, value in self.summary.json.items() if value is not None}
+        return rows_html(told, f"{self.rows} rows") + super()._repr_html_()
+
+
+def simulate(
+    drive: Drive | PathLike,
+    generator: str,
+    *,
+    path: str | PathLike | object = "paper",
+    torque_n_m: float | None = None,
+    temperature_c: float | None = None,
+    increment_rad: float | None = None,
+    direction: Literal[1, -1] | None = None,
+    mesh: Mesh = "standard",
+    solver: Solver = "fast",
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Simulation:
+    """Contact FEM of a drive along a path of its generator: ``flexspline simulate``.
+
+    ``path`` is ``paper`` (+1 rad, then -2 rad), ``pitch`` (settled, then one tooth pitch), ``turn`` (settled, then a turn), the path of a CSV,
+    or a table of columns (dict, DataFrame) with ``generator_rad`` and where wanted ``torque_n_m`` and ``temperature_c``.
+    Load N·m at the output (default 0), positive turns it forward; temperature °C (default: the drive's reference).
+    ``direction`` +1 or -1 is that of ``pitch`` and ``turn``. Raises `BadInput`, or `NotConverged`.
+
+    >>> simulate("HHD-95", "cam", path="pitch", torque_n_m=50, mesh="coarse").summary.wind_up_arcsec > 0
+    True
+    """
+    name, points = "points", None
+    if isinstance(path, (str, os.PathLike)):
+        name = os.fspath(path)
+    else:
+        points = _points(path)
+    with shown(progress, "simulate") as tell:
+        columns, summary = _native.simulate(
+            drive_of(drive)._inner,
+            generator,
+            name,
+            points,
+            increment_rad=increment_rad,
+            direction=direction,
+            torque_n_m=torque_n_m,
+            temperature_c=temperature_c,
+            mesh=mesh,
+            solver=solver,
+            threads=threads,
+            progress=tell,
+        )
+    return Simulation(columns, Fields(summary))
+
+
+def _points(path: object) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
+    columns = table_columns(path)
+    if "generator_rad" not in columns:
+        raise BadInput(f"path: found columns {', '.join(columns)}, required: generator_rad; allowed too: torque_n_m, temperature_c")
+    generator = numbers("path.generator_rad", columns["generator_rad"])
+
+    def beside(name: str) -> FloatArray | None:
+        if name not in columns:
+            return None
+        column = spread(numbers(f"path.{name}", columns[name]), generator.size)
+        if column.size != generator.size:
+            raise BadInput(f"path.{name}: found {column.size} values, allowed: {generator.size}, as of generator_rad")
+        return column
+
+    return generator, beside("torque_n_m"), beside("temperature_c")
+
+
+def tables(
+    drive: Drive | PathLike = "HHD-95",
+    generators: str | Sequence[str] = GENERATORS,
+    *,
+    torque_n_m: float | None = None,
+    most_nodes: int | None = None,
+    node_tolerance_arcsec: float | None = None,
+    positions: int = 8,
+    temperatures_c: Sequence[float] | None = None,
+    mesh: Mesh = "standard",
+    solver: Solver = "fast",
+    threads: int | None = None,
+    progress: Progress = None,
+) -> dict[str, Table]:
+    """Compensation tables by contact FEM, one for each generator: ``flexspline tables``.
+
+    ``torque_n_m`` is the largest load (default: the generator's rated torque, by the size of the drive), ``most_nodes`` the torque nodes either
+    side of zero at most, ``node_tolerance_arcsec`` the miss at which one is added, ``positions`` the samples over a tooth pitch (4 to 32),
+    ``temperatures_c`` the temperature nodes (default: the ends of the operating range).
+
+    >>> tables("HHD-95", "cam", mesh="coarse")["cam"].save("out")  # doctest: +SKIP
+    """
+    with shown(progress, "tables") as tell:
+        made = _native.tables(
+            drive_of(drive)._inner,
+            names("generators", generators),
+            torque_n_m=torque_n_m,
+            most_nodes=most_nodes,
+            node_tolerance_arcsec=node_tolerance_arcsec,
+            positions=positions,
+            temperatures_c=None if temperatures_c is None else numbers("temperatures_c", temperatures_c).tolist(),
+            mesh=mesh,
+            solver=solver,
+            threads=threads,
+            progress=tell,
+        )
+    return {parts[0]: Table._made(parts) for parts in made}
+
+
+def table_from_samples(
+    samples: PathLike,
+    drive: Drive | PathLike = "HHD-95",
+    generator: str = "cam",
+    *,
+    half_width_arcsec: float | None = None,
+    deviation_arcsec: float | None = None,
+) -> Table:
+    """The table of samples from another program or a bench: ``flexspline tables --from-samples``.
+
+    A CSV with ``generator_rad, torque_n_m, temperature_c, direction`` (1 or -1) and ``output_rad``. ``half_width_arcsec`` is that of the play
+    where there is one direction only, ``deviation_arcsec`` how far a sample may lie from the table (default 20).
+    """
+    parts = _native.project(
+        drive_of(drive)._inner,
+        generator,
+        path_text("samples", samples),
+        half_width_arcsec=half_width_arcsec,
+        deviation_arcsec=deviation_arcsec,
+    )
+    return Table._made(parts)
+
+
+class Study(Columns):
+    """Variants of a drive side by side: the columns of ``study.csv``, a row for each variant with each generator."""
+
+    variant: NDArray[np.int64]
+    generator: list[str]
+    status: list[str]
+    """``converged``, ``failed`` (no equilibrium from some load on) or ``refused`` (its fields make no drive)."""
+    meets: NDArray[np.bool_]
+    front: NDArray[np.bool_]
+    """What meets, and nothing that meets beats in every target."""
+    json: dict[str, Any]
+    """Fields and runs as in ``study.json``."""
+
+    def __init__(self, json: Mapping[str, Any]) -> None:
+        runs = json["runs"]
+        fields = {path: [_number(run["values"][k]) for run in runs] for k, path in enumerate(json["fields"])}
+        figures = list(runs[0]["sheet"]) if runs else []
+        loads = ("t1_n_m", "t2_n_m", "largest_n_m")
+        super().__init__(
+            {
+                "variant": np.array([run["variant"] for run in runs], dtype=np.int64),
+                "generator": [run["generator"] for run in runs],
+                **{path: _column(values) for path, values in fields.items()},
+                **{name: _column([(run["loads"] or {}).get(name) for run in runs]) for name in loads},
+                **{name: _column([run["sheet"].get(name) for run in runs]) for name in figures},
+                "status": [run["status"] for run in runs],
+                "meets": np.array([run["meets"] for run in runs], dtype=np.bool_),
+                "front": np.array([run["front"] for run in runs], dtype=np.bool_),
+                "why": [run["why"] or "" for run in runs],
+            }
+        )
+        self.json = dict(json)
+
+    def plot(self, x: str, y: str, ax: Axes | None = None) -> Axes:
+        """Column ``y`` over column ``x``, what nothing beats marked; needs matplotlib."""
+        from . import _plots
+
+        return _plots.study(self, x, y, ax)
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _column(values: list[Any]) -> Any:
+    if any(isinstance(value, str) for value in values):
+        return ["" if value is None else str(value) for value in values]
+    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+
+
+def study(
+    drive: Drive | PathLike,
+    vary: Mapping[str, str | Sequence[float]],
+    generators: str | Sequence[str] = GENERATORS,
+    *,
+    variants: int | None = None,
+    seed: int = 1,
+    torque_n_m: float | None = None,
+    keep: Sequence[str] = (),
+    least: Sequence[str] = (),
+    most: Sequence[str] = (),
+    positions: int = 6,
+    mesh: Mesh = "coarse",
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Study:
+    """Variants of a drive side by side: ``flexspline study``.
+
+    ``vary`` says fields and values: ``{"flexspline.rim_thickness_mm": "1.2..2.6:8"}`` (from, to, how many) or a list. Every combination runs, or
+    with ``variants`` so many spread over all ranges. ``keep`` holds constraints (``backlash_arcsec=30..70``); ``least`` and ``most`` name
+    figures that decide what nothing beats (by default kinematic error and stress, and K2).
+    """
+    if not (least or most):
+        least, most = ("kinematic_error_pp_arcsec", "max_von_mises_mpa"), ("k2_n_m_per_rad",)
+    ranges = [
+        f"{path}={values}" if isinstance(values, str) else f"{path}={','.join(repr(value) for value in numbers(path, values).tolist())}"
+        for path, values in vary.items()
+    ]
+    with shown(progress, "study") as tell:
+        text = _native.study(
+            drive_of(drive)._inner,
+            ranges,
+            names("generators", generators),
+            variants=variants,
+            seed=seed,
+            torque_n_m=torque_n_m,
+            keep=list(keep),
+            least=list(least),
+            most=list(most),
+            positions=positions,
+            mesh=mesh,
+            threads=threads,
+            progress=tell,
+        )
+    return Study(Fields(text).json)
+
+
+class Calibration(Fields):
+    """A unit's table from its logs: the fields of ``calibration.json``, ``table``, and ``shown``."""
+
+    held_out: Fields
+    """rms_before_arcsec, rms_prior_arcsec, rms_after_arcsec where nothing was fitted."""
+    parts: list[Fields]
+    """What was fitted: name, kept, held_out_gain, size_arcsec, why."""
+    half_width_arcsec: float
+    """The table holds the error to this either way (95 %), arcsec."""
+    data_faults: list[Fields]
+    notes: list[str]
+    table: Table
+    """The table."""
+    shown: Columns
+    """Rows for a picture: output_rad, measured_arcsec, left_arcsec."""
+
+    def __init__(self, text: str, table: Table, shown_rows: Columns) -> None:
+        super().__init__(text)
+        self.table, self.shown = table, shown_rows
+
+    def save(self, folder: PathLike) -> list[Path]:
+        """Writes ``calibrated.fxt``, .json, .rs, .h and ``calibration.json`` into a folder; gives what was written."""
+        written = self.table._save_as(Path(folder), "calibrated")
+        target = Path(folder) / "calibration.json"
+        target.write_text(self.to_json() + "\n", encoding="utf-8")
+        return [*written, target]
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Error as measured and as left (arcsec) over the output angle (deg); needs matplotlib."""
+        from . import _plots
+
+        return _plots.calibration(self, ax)
+
+
+def calibrate(
+    logs: object,
+    *,
+    ratio: float | None = None,
+    model: PathLike | None = None,
+    table: Table | PathLike | bytes | None = None,
+    generator: str = "cam",
+    columns: str | Mapping[str, str] = "",
+    rate_hz: float | None = None,
+    torque_constant: float | None = None,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Calibration:
+    """Logs of one unit to its table: ``flexspline calibrate``.
+
+    ``logs``: one log or a list, each a path or a table of columns (DataFrame, Arrow table, dict of arrays). What is known before is one of
+    ``ratio`` (negative where generator and output turn opposite ways), ``model`` (the path of a nominal.toml) and ``table``.
+    Columns are ``time_s, generator_rad, output_rad`` or ``error_arcsec, torque_n_m, temperature_c`` unless ``columns`` maps them, as
+    ``{"generator": "wave_gen_turns:turn"}``; ``rate_hz`` where there is no time; ``torque_constant`` N·m for an ampere.
+    Raises `BadInput`, or `NothingGained` where no table is better than none.
+
+    >>> calibrate("bench.csv", ratio=101).save("unit7")  # doctest: +SKIP
+    """
+    several = list(logs) if isinstance(logs, (list, tuple)) else [logs]
+    if not several:
+        raise BadInput("logs: found none, allowed: one or more")
+    with shown(progress, "calibrate") as tell:
+        text, parts, rows = _native.calibrate(
+            [log(one, f"data {k}" if len(several) > 1 else "data") for k, one in enumerate(several, 1)],
+            _known(ratio, model, table),
+            generator,
+            (columns_option(columns), rate_hz, torque_constant),
+            threads=threads,
+            progress=tell,
+        )
+    return Calibration(text, Table._made(parts), Columns(rows))
+
+
+class Diagnosis(Fields):
+    """A verdict on measured rows: the fields of ``diagnosis.json``, ``rows``, and what was made of the causes."""
+
+    verdict: str
+    """``none``, ``explained``, ``partly_explained`` or ``unknown``."""
+    finding: str
+    """``fault_found``, ``nothing_found``, ``not_understood`` or ``data_unusable``."""
+    causes: list[Fields]
+    """Strongest first: name, confidence, parameters (value, std), held_out_gain, size_arcsec, look_alikes."""
+    data_faults: list[Fields]
+    next_experiment: str | None
+    """What to record to tell look-alikes apart."""
+    rows: Columns
+    """Rows that were looked at: session, time_s, generator_rad, error_arcsec, nominal_arcsec, recalibrated_arcsec, extended_arcsec."""
+    drive_toml: str | None
+    """The extended drive or model with the causes; None where none was found."""
+    extended_table: Table | None
+    """The table that holds the causes, where it leaves less error than the nominal one in sessions held out."""
+    explanation: str | None
+    """Why the cause of ``explain`` was named or not."""
+
+    def __init__(self, text: str, rows: Columns, drive_toml: str | None, table: Table | None, explanation: str | None) -> None:
+        super().__init__(text)
+        self.rows, self.drive_toml, self.extended_table, self.explanation = rows, drive_toml, table, explanation
+
+    def save(self, folder: PathLike) -> list[Path]:
+        """Writes ``diagnosis.json``, and where causes were found ``drive-extended.toml`` and the extended table; gives what was written."""
+        into = Path(folder)
+        into.mkdir(parents=True, exist_ok=True)
+        written = [into / "diagnosis.json"]
+        written[0].write_text(self.to_json() + "\n", encoding="utf-8")
+        if self.drive_toml is not None:
+            written.append(into / "drive-extended.toml")
+            written[1].write_text(self.drive_toml, encoding="utf-8")
+        if self.extended_table is not None:
+            written.extend(self.extended_table._save_as(into, f"{self.extended_table.generator}-extended"))
+        return written
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """What the nominal model leaves of the error and what is left with the causes (arcsec), over time or rows; needs matplotlib."""
+        from . import _plots
+
+        return _plots.diagnosis(self, ax)
+
+    def __repr__(self) -> str:
+        found = ", ".join(f"{cause.name} ({100 * cause.confidence:.0f} %)" for cause in self.causes)
+        return f"Diagnosis({self.finding}, {self.verdict}: {found or 'no cause'})"
+
+
+def diagnose(
+    data: object,
+    *,
+    model: PathLike | None = None,
+    table: Table | PathLike | bytes | None = None,
+    drive: Drive | PathLike = "HHD-95",
+    generator: str | None = None,
+    columns: str | Mapping[str, str] = "",
+    rate_hz: float | None = None,
+    torque_constant: float | None = None,
+    kernels: PathLike | None = None,
+    explain: str | None = None,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> Diagnosis:
+    """What the simulation gets wrong in measured data, and why: ``flexspline diagnose``.
+
+    ``data``: the path of a log, or a table of columns (DataFrame, Arrow table, dict of arrays); columns as for `calibrate`. The nominal model is
+    ``model`` (the path of a nominal.toml or drive-extended.toml) or the ``table`` of ``drive``. ``generator`` is by default the table's, else
+    ``cam``. ``kernels`` is the path of a .kernels.json of that table; ``explain`` asks about a cause by name.
+
+    >>> diagnose("bench.csv", model="nominal.toml").causes  # doctest: +SKIP
+    """
+    opened = None if table is None else _opened(table)
+    kind = generator or ("cam" if opened is None else opened.generator)
+    with shown(progress, "diagnose") as tell:
+        text, drive_toml, parts, explanation, rows = _native.diagnose(
+            log(data),
+            _known(None, model, opened),
+            drive_of(drive)._inner,
+            kind,
+            (columns_option(columns), rate_hz, torque_constant),
+            kernels=None if kernels is None else path_text("kernels", kernels),
+            explain=explain,
+            threads=threads,
+            progress=tell,
+        )
+    extended = None if parts is None else Table._made(parts)
+    return Diagnosis(text, Columns(rows), drive_toml, extended, None if explanation is None else explanation[0])
+
+
+def _opened(table: Table | PathLike | bytes) -> Table:
+    return table if isinstance(table, Table) else Table.open(table)
+
+
+def _known(ratio: float | None, model: PathLike | None, table: Table | PathLike | bytes | None) -> float | str | bytes:
+    """What is known of the drive before: one of the three."""
+    given = [name for name, value in (("ratio", ratio), ("model", model), ("table", table)) if value is not None]
+    if len(given) != 1:
+        raise BadInput(f"found {' and '.join(given) or 'none of ratio, model, table'}, allowed: one of ratio, model and table")
+    if ratio is not None:
+        return float(ratio)
+    if model is not None:
+        return path_text("model", model)
+    assert table is not None
+    return _opened(table).image

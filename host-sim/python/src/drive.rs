@@ -1,0 +1,68 @@
+//! A drive: built in, from a file, with fields set.
+
+use flexspline_sim::drive::{Drive as Inner, GeneratorKind};
+use flexspline_sim::mesh::MeshLevel;
+use flexspline_sim::stepping::Method;
+use pyo3::prelude::*;
+
+use crate::failure::{Failure, bad};
+
+/// A drive that has passed every check.
+#[pyclass(frozen, module = "flexspline._native")]
+pub struct Drive(pub Inner);
+
+#[pymethods]
+impl Drive {
+    /// Names of the drives that are built in.
+    #[staticmethod]
+    fn built_in() -> Vec<&'static str> {
+        Inner::BUILT_IN.to_vec()
+    }
+
+    /// The built-in drive of that name, if there is one.
+    #[staticmethod]
+    fn named(name: &str) -> Option<Drive> {
+        Inner::built_in(name).map(Drive)
+    }
+
+    /// The drive in the text of a file.
+    #[staticmethod]
+    fn from_toml(file_name: &str, text: &str) -> PyResult<Drive> {
+        Inner::from_toml(file_name, text).map(Drive).map_err(bad)
+    }
+
+    /// With fields changed, each `path=value`.
+    fn with_sets(&self, sets: Vec<String>) -> PyResult<Drive> {
+        self.0.with_sets(sets.iter().map(String::as_str)).map(Drive).map_err(bad)
+    }
+
+    fn to_toml(&self) -> String {
+        self.0.to_toml()
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    /// BLAKE3 of the drive's physics, hexadecimal.
+    #[getter]
+    fn drive_hash(&self) -> String {
+        blake3::Hash::from_bytes(self.0.hash()).to_hex().to_string()
+    }
+
+    #[getter]
+    fn ratio(&self) -> f64 {
+        self.0.ratio()
+    }
+}
+
+/// The generator of that name.
+pub fn generator(name: &str) -> Result<GeneratorKind, Failure> {
+    name.parse::<GeneratorKind>().map_err(|error| Failure::bad(format!("generator: {error}")))
+}
+
+/// Mesh and solver of those names.
+pub fn method(mesh: &str, solver: &str) -> Result<(MeshLevel, Method), Failure> {
+    Ok((mesh.parse().map_err(Failure::bad)?, solver.parse().map_err(Failure::bad)?))
+}

@@ -1,0 +1,286 @@
+//! Measured data: to a table (`calibrate`), to a verdict (`diagnose`).
+
+use std::path::{Path, PathBuf};
+
+use flexspline::Table;
+use flexspline_sim::calibrate::{CalibrationError, Prior, calibrate as fit};
+use flexspline_sim::causes::CauseName;
+use flexspline_sim::diagnosis::{
+    Diagnosis, Explanation, Extension, Options, PipelineError, Series, Subject, diagnose_rows, parse_rows, read_rows,
+};
+use flexspline_sim::drive::GeneratorKind;
+use flexspline_sim::extension::Model;
+use flexspline_sim::kernels::Kernels;
+use flexspline_sim::measurement::{ColumnMap, Fault, Session, parse, read};
+use flexspline_sim::units::ARCSEC_PER_RAD;
+use numpy::IntoPyArray;
+use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::PyDict;
+use serde::Serialize;
+
+use crate::drive::{Drive, generator};
+use crate::failure::{Failure, bad};
+use crate::run::run;
+use crate::tables::{Parts, parts};
+
+/// A log: a file, or a CSV in memory under a name.
+#[derive(FromPyObject)]
+pub enum LogFrom {
+    #[pyo3(transparent)]
+    File(PathBuf),
+    #[pyo3(transparent)]
+    Memory((String, PyBackedBytes)),
+}
+
+impl LogFrom {
+    fn name(&self) -> String {
+        match self {
+            LogFrom::File(path) => path.display().to_string(),
+            LogFrom::Memory((name, _)) => name.clone(),
+        }
+    }
+}
+
+/// How the columns of logs are read: mapping, rows in a second, torque of an ampere.
+type Reading = (String, Option<f64>, Option<f64>);
+
+fn column_map((columns, rate_hz, torque_constant): &Reading) -> Result<ColumnMap, Failure> {
+    if let Some(constant) = torque_constant.filter(|constant| !(constant.is_finite() && *constant != 0.0)) {
+        let what = format!("torque_constant: found {constant}, allowed: a number other than zero, N.m for an ampere");
+        return Err(Failure::bad(what));
+    }
+    let map = if columns.is_empty() {
+        ColumnMap::default()
+    } else {
+        ColumnMap::with_torque_constant(columns, *torque_constant).map_err(Failure::bad)?
+    };
+    map.at_rate(*rate_hz).map_err(Failure::bad)
+}
+
+/// What is known of the drive before.
+#[derive(FromPyObject)]
+pub enum KnownFrom {
+    #[pyo3(transparent)]
+    Ratio(f64),
+    /// The image of a table.
+    #[pyo3(transparent)]
+    Image(PyBackedBytes),
+    /// A nominal model.
+    #[pyo3(transparent)]
+    Model(PathBuf),
+}
+
+/// Logs of one unit to its table: the text of `calibration.json`, the table, and the rows of a picture.
+#[pyfunction]
+#[pyo3(signature = (logs, known, generator_name, reading, *, threads, progress))]
+pub fn calibrate<'py>(
+    py: Python<'py>,
+    logs: Vec<LogFrom>,
+    known: KnownFrom,
+    generator_name: &str,
+    reading: Reading,
+    threads: Option<usize>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<(String, Parts<'py>, Bound<'py, PyDict>)> {
+    let kind = generator(generator_name)?;
+    let map = column_map(&reading)?;
+    let made = run(py, threads, progress, move |watch| {
+        let image =
+            if let KnownFrom::Image(image) = &known { Some(Table::check(image).map_err(Failure::bad)?) } else { None };
+        let prior = match (&image, &known) {
+            (Some(table), _) => Prior::of_table(table, kind),
+            (None, KnownFrom::Model(path)) => prior_of_model(path, kind)?,
+            (None, KnownFrom::Ratio(ratio)) => prior_of_ratio(*ratio, kind)?,
+            (None, KnownFrom::Image(_)) => return Err(Failure::bad("table: no image")),
+        };
+        let gear = prior.nominal.gear();
+        let one = |(k, log): (usize, &LogFrom)| {
+            watch.tell_or_unwind(k, logs.len() + 1, format!("reading {}", log.name()));
+            match log {
+                LogFrom::File(path) => read(path, &map, &gear),
+                LogFrom::Memory((name, bytes)) => parse(name, &bytes[..], &map, &gear),
+            }
+            .map_err(Failure::bad)
+        };
+        let files = logs.iter().enumerate().map(one).collect::<Result<Vec<_>, Failure>>()?;
+        watch.tell_or_unwind(logs.len(), logs.len() + 1, "fitting".to_owned());
+        let made = fit(&files, &prior).map_err(|error| calibration_failure(&error, &logs))?;
+        watch.tell_or_unwind(logs.len() + 1, logs.len() + 1, "done".to_owned());
+        Ok((made.calibration, made.table, made.shown))
+    })?;
+    let (calibration, table, shown) = made;
+    let column = |of: usize| shown.iter().map(|row| row[of]).collect::<Vec<f64>>().into_pyarray(py);
+    let rows = PyDict::new(py);
+    rows.set_item("output_rad", column(0))?;
+    rows.set_item("measured_arcsec", column(1))?;
+    rows.set_item("left_arcsec", column(2))?;
+    Ok((serde_json::to_string(&calibration).map_err(bad)?, parts(py, &table)?, rows))
+}
+
+fn prior_of_model(path: &Path, kind: GeneratorKind) -> Result<Prior<'static>, Failure> {
+    let model = Model::read(path).map_err(Failure::bad)?;
+    if !model.causes.is_empty() {
+        let what =
+            "found [[extension.cause]], allowed: a nominal model without causes; what they are is fitted here anew";
+        return Err(Failure::bad(format!("{}: {what}", path.display())));
+    }
+    let bytes = std::fs::read(path).map_err(|error| Failure::bad(format!("{}: {error}", path.display())))?;
+    let (drive, hash) = (path.display().to_string(), *blake3::hash(&bytes).as_bytes());
+    let known = Prior::of_ratio(model.nominal.ratio, kind);
+    Ok(Prior { nominal: model.nominal, drive, hash, ..known })
+}
+
+fn prior_of_ratio(ratio: f64, kind: GeneratorKind) -> Result<Prior<'static>, Failure> {
+    if !(ratio.is_finite() && ratio.abs() >= 2.0 && ratio.abs() <= 1e4) {
+        return Err(Failure::bad(format!("ratio: found {ratio}, allowed: 2 to 10000, or negative")));
+    }
+    Ok(Prior::of_ratio(ratio, kind))
+}
+
+fn calibration_failure(error: &CalibrationError, logs: &[LogFrom]) -> Failure {
+    let names: Vec<String> = logs.iter().map(LogFrom::name).collect();
+    let what = match error {
+        CalibrationError::Measured(_) | CalibrationError::Known(_) => error.to_string(),
+        _ => format!("{}: {error}", names.join(", ")),
+    };
+    match error {
+        CalibrationError::NothingGained(_) => Failure::NothingGained(what),
+        _ => Failure::of(what, error.is_bad_input()),
+    }
+}
+
+/// `diagnosis.json`.
+#[derive(Serialize)]
+struct Written<'a> {
+    #[serde(flatten)]
+    diagnosis: &'a Diagnosis,
+    extension: &'a Extension,
+    data_faults: &'a [Fault],
+    notes: &'a [String],
+    command: &'a str,
+}
+
+/// What a diagnosis gives: text of the JSON, drive-extended.toml, extended table, why a cause was named or not, columns.
+type Diagnosed<'py> = (String, Option<String>, Option<Parts<'py>>, Option<(String, String)>, Bound<'py, PyDict>);
+
+/// Names what the simulation gets wrong in measured data.
+#[pyfunction]
+#[pyo3(signature = (log, known, drive, generator_name, reading, *, kernels, explain, threads, progress))]
+#[expect(clippy::too_many_arguments, reason = "each is an option of the run")]
+pub fn diagnose<'py>(
+    py: Python<'py>,
+    log: LogFrom,
+    known: KnownFrom,
+    drive: &Drive,
+    generator_name: &str,
+    reading: Reading,
+    kernels: Option<PathBuf>,
+    explain: Option<&str>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Diagnosed<'py>> {
+    let kind = generator(generator_name)?;
+    let map = column_map(&reading)?;
+    let asked = explain.map(str::parse::<CauseName>).transpose().map_err(|error| bad(format!("explain: {error}")))?;
+    let drive = drive.0.clone();
+    let done = run(py, threads, progress, move |watch| {
+        let failed = |error: PipelineError| {
+            let what = match &error {
+                PipelineError::Known(_) | PipelineError::Diagnosis(_) => format!("{}: {error}", log.name()),
+                _ => error.to_string(),
+            };
+            Failure::of(what, error.is_bad_input())
+        };
+        let subject = match &known {
+            KnownFrom::Model(path) => Subject::of_model(Model::read(path).map_err(Failure::bad)?, drive.clone(), kind),
+            KnownFrom::Image(image) => Subject::of_table(image, drive.clone(), kind).map_err(Failure::bad)?,
+            KnownFrom::Ratio(_) => return Err(Failure::bad("expected model or table")),
+        };
+        let subject = match &kernels {
+            Some(path) => with_kernels(subject, path)?,
+            None => subject,
+        };
+        let recording = match &log {
+            LogFrom::File(path) => read_rows(path, &map, &subject),
+            LogFrom::Memory((name, bytes)) => parse_rows(name, bytes, &map, &subject),
+        };
+        let options = Options { asked, ..Options::default() };
+        let tell = |done: usize, of: usize, what: &str| watch.tell_or_unwind(done, of, what.to_owned());
+        let done = diagnose_rows(recording.map_err(failed)?, &subject, &options, tell).map_err(failed)?;
+        let made = done.extend(&subject, &options, || tell(4, 5, "FEM of the extended drive")).map_err(failed)?;
+        let mut extension = made.extension;
+        // As the command lists what it writes.
+        extension.files.extend(made.drive_toml.as_ref().map(|_| "drive-extended.toml".to_owned()));
+        if let Some(table) = &made.table {
+            extension
+                .files
+                .extend(["fxt", "json", "rs", "h"].map(|ending| format!("{}-extended.{ending}", table.kind)));
+        }
+        let written = Written {
+            diagnosis: &done.diagnosis,
+            extension: &extension,
+            data_faults: &done.recording.faults,
+            notes: &done.recording.notes,
+            command: "",
+        };
+        let json = serde_json::to_string(&written).map_err(Failure::bad)?;
+        let explanation = asked.map(|cause| {
+            let explanation = Explanation::of(&done.diagnosis, cause);
+            Ok((explanation.text().trim_end().to_owned(), serde_json::to_string(&explanation).map_err(Failure::bad)?))
+        });
+        let series = done.extended.predict(&done.recording.sessions, &subject.nominal, subject.table.as_ref());
+        let rows = Rows::of(&done.recording.sessions, &series);
+        Ok((json, made.drive_toml, made.table, explanation.transpose()?, rows))
+    })?;
+    let (json, drive_toml, table, explanation, rows) = done;
+    let table = table.map(|table| parts(py, &table)).transpose()?;
+    Ok((json, drive_toml, table, explanation, rows.columns(py)?))
+}
+
+/// A subject with the influence kernels of a file.
+fn with_kernels<'a>(subject: Subject<'a>, path: &Path) -> Result<Subject<'a>, Failure> {
+    let named = |what: String| Failure::bad(format!("{}: {what}", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|error| named(error.to_string()))?;
+    let kernels = Kernels::from_json(&text).map_err(named)?;
+    subject.with_kernels(kernels).map_err(|error| named(error.to_string()))
+}
+
+/// The rows that a diagnosis looked at, with what the models say of them.
+struct Rows {
+    session: Vec<i64>,
+    numbers: Vec<(&'static str, Vec<f64>)>,
+}
+
+impl Rows {
+    fn of(sessions: &[Session], series: &[Series]) -> Rows {
+        let pairs = || sessions.iter().zip(series);
+        let session = sessions.iter().enumerate().flat_map(|(k, session)| vec![k as i64 + 1; session.len()]).collect();
+        let of =
+            |values: fn(&Session, &Series) -> Vec<f64>| pairs().flat_map(|(a, b)| values(a, b)).collect::<Vec<f64>>();
+        let or_absent = |values: &Option<Vec<f64>>, rows: usize| values.clone().unwrap_or_else(|| vec![f64::NAN; rows]);
+        let beside = |values: fn(&Session) -> &Option<Vec<f64>>| {
+            sessions.iter().flat_map(|session| or_absent(values(session), session.len())).collect::<Vec<f64>>()
+        };
+        let numbers = vec![
+            ("time_s", beside(|session| &session.time_s)),
+            ("generator_rad", of(|session, _| session.generator_rad.clone())),
+            ("error_arcsec", of(|session, _| session.error_rad.iter().map(|e| e * ARCSEC_PER_RAD).collect())),
+            ("torque_n_m", beside(|session| &session.torque_n_m)),
+            ("temperature_c", beside(|session| &session.temperature_c)),
+            ("nominal_arcsec", of(|_, series| series.nominal_arcsec.clone())),
+            ("recalibrated_arcsec", of(|_, series| series.recalibrated_arcsec.clone())),
+            ("extended_arcsec", of(|_, series| series.extended_arcsec.clone())),
+        ];
+        Rows { session, numbers }
+    }
+
+    fn columns<'py>(self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let columns = PyDict::new(py);
+        columns.set_item("session", self.session.into_pyarray(py))?;
+        for (name, values) in self.numbers {
+            columns.set_item(name, values.into_pyarray(py))?;
+        }
+        Ok(columns)
+    }
+}
