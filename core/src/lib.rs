@@ -197,6 +197,7 @@ pub mod c_api;
 mod campaign;
 mod crc;
 mod drive;
+mod encoder;
 mod error;
 #[cfg(test)]
 mod fixture;
@@ -217,6 +218,7 @@ mod whole;
 
 pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};
+pub use encoder::{Encoder, EncoderError, EncoderSettings, EncoderState, EncoderWrap};
 pub use error::{DriveError, Field, ImageError};
 pub use joint::{
     AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Aged, Ahead, Coefficient,
