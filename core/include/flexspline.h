@@ -1252,8 +1252,9 @@ enum FlexsplineStatus flexspline_recorder_take(struct FlexsplineRecorder *record
 enum FlexsplineStatus flexspline_record_encode(const struct FlexsplineRecord *record,
                                                uint8_t (*bytes)[FLEXSPLINE_RECORD_BYTES]);
 
-// Reads such bytes, on the ground: `FLEXSPLINE_STATUS_SAVED` if they are damaged or no record, `FLEXSPLINE_STATUS_ARGUMENT` if they are one of another version.
-enum FlexsplineStatus flexspline_record_decode(const uint8_t (*bytes)[FLEXSPLINE_RECORD_BYTES],
+// Reads such bytes (`FLEXSPLINE_RECORD_BYTES`), on the ground: `FLEXSPLINE_STATUS_SAVED` if they are damaged or no record,
+// `FLEXSPLINE_STATUS_ARGUMENT` if they are one of another version.
+enum FlexsplineStatus flexspline_record_decode(const uint8_t *first,
                                                struct FlexsplineRecord *record);
 
 // Begins to receive a table of so many bytes. The buffer is the caller's and is given with every call; it is no image in use.
@@ -1429,5 +1430,6 @@ FLEXSPLINE_OBJECT_(FlexsplineRecorder, FLEXSPLINE_RECORDER_WORDS);
 FLEXSPLINE_OBJECT_(FlexsplineTorquePath, FLEXSPLINE_TORQUE_PATH_WORDS);
 FLEXSPLINE_OBJECT_(FlexsplineAged, FLEXSPLINE_AGED_WORDS);
 FLEXSPLINE_OBJECT_(FlexsplineEncoder, FLEXSPLINE_ENCODER_WORDS);
+FLEXSPLINE_CHECK_(packed_structures, sizeof(FlexsplineStateReport) == 8);
 FLEXSPLINE_CHECK_(FlexsplineWord_, sizeof(uint64_t) == 8 && sizeof(float) == 4 && sizeof(double) == 8);
 #endif

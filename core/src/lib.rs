@@ -183,7 +183,8 @@
     )
 )]
 
-#[cfg(any(test, feature = "std"))]
+// A static library for a PC has the panic handler of `std`; on the target it has one that cannot be linked.
+#[cfg(any(test, feature = "std", all(feature = "c-api", not(target_os = "none"))))]
 extern crate std;
 
 mod angle;

@@ -272,13 +272,13 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
                 let (mut bytes, mut back) = ([0; FLEXSPLINE_RECORD_BYTES], FlexsplineRecord::default());
                 assert_eq!(flexspline_record_encode(&c_record, &mut bytes), Done);
                 assert_eq!(bytes, record.encode(), "{tick}");
-                assert_eq!(flexspline_record_decode(&bytes, &mut back), Done);
+                assert_eq!(flexspline_record_decode(bytes.as_ptr(), &mut back), Done);
                 assert_eq!(
                     (back.tick, back.lost, back.output_counts),
                     (c_record.tick, c_record.lost, c_record.output_counts)
                 );
                 (taken, bytes[9]) = (taken + 1, !bytes[9]);
-                assert_eq!(flexspline_record_decode(&bytes, &mut back), Saved);
+                assert_eq!(flexspline_record_decode(bytes.as_ptr(), &mut back), Saved);
             }
         }
 
@@ -523,7 +523,7 @@ fn what_is_not_allowed_is_refused() {
     assert_eq!((flexspline_record_encode(&bad, &mut bytes), bytes), (Argument, [0; FLEXSPLINE_RECORD_BYTES]));
     let mut old = crate::Record::of(0, &JointState::new(), &Store::new(), &given(&out).unwrap()).encode();
     old[2] = 1;
-    assert_eq!(flexspline_record_decode(&old, at), Argument);
+    assert_eq!(flexspline_record_decode(old.as_ptr(), at), Argument);
 
     let mut learner = room!(FlexsplineLearner);
     let init = |learner: &mut FlexsplineLearner, settings: &FlexsplineLearnSettings, list: &[FlexsplineCoefficient]| {

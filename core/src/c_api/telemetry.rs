@@ -265,16 +265,15 @@ pub extern "C" fn flexspline_record_encode(
     status(encode())
 }
 
-/// Reads such bytes, on the ground: `FLEXSPLINE_STATUS_SAVED` if they are damaged or no record, `FLEXSPLINE_STATUS_ARGUMENT` if they are one of another version.
+/// Reads such bytes (`FLEXSPLINE_RECORD_BYTES`), on the ground: `FLEXSPLINE_STATUS_SAVED` if they are damaged or no record,
+/// `FLEXSPLINE_STATUS_ARGUMENT` if they are one of another version.
 #[unsafe(no_mangle)]
-pub extern "C" fn flexspline_record_decode(
-    bytes: *const [u8; FLEXSPLINE_RECORD_BYTES],
-    record: *mut FlexsplineRecord,
-) -> FlexsplineStatus {
+pub extern "C" fn flexspline_record_decode(first: *const u8, record: *mut FlexsplineRecord) -> FlexsplineStatus {
     let decode = || {
-        apart([span(record), span(bytes)])?;
         usable(record)?;
-        let found = Record::decode(&copied(bytes)?).map_err(|error| match error {
+        apart([span(record), (first as usize, FLEXSPLINE_RECORD_BYTES)])?;
+        let found = copied(first.cast::<[u8; FLEXSPLINE_RECORD_BYTES]>())?;
+        let found = Record::decode(&found).map_err(|error| match error {
             RecordError::Version { .. } => FlexsplineStatus::Argument,
             RecordError::Mark | RecordError::Crc { .. } | RecordError::Reserved => FlexsplineStatus::Saved,
         })?;
