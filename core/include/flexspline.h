@@ -1,5 +1,5 @@
 // Compensation of strain wave drives on a microcontroller: the C interface of the crate flexspline.
-// Made by cbindgen of core/src/c_api.rs; tests/c_header.rs sees that it is up to date.
+// Made by cbindgen of core/src/c_api.rs; tests/c_header.rs sees that it is up to date. docs/c_interface.md says how to use it.
 
 #ifndef FLEXSPLINE_H
 #define FLEXSPLINE_H
@@ -1145,7 +1145,8 @@ enum FlexsplineStatus flexspline_learner_reset(struct FlexsplineLearner *learner
 
 // One tick, every tick and in order, after `flexspline_tick` with what it was given and gave: learns from the output angle measured at the same
 // moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and tells what to add in the next tick. Nothing that comes in can make
-// that exceed the limits. `input` holds the adjustment that was in force.
+// that exceed the limits. `input` is that of the tick with the learner's own adjustment alone: what springs or a model of yours added beside it counts
+// as known then, and is not learnt a second time.
 enum FlexsplineStatus flexspline_learner_update(struct FlexsplineLearner *learner,
                                                 const struct FlexsplineState *state,
                                                 const struct FlexsplineInput *input,

@@ -290,7 +290,8 @@ pub extern "C" fn flexspline_learner_reset(learner: *mut FlexsplineLearner) -> F
 
 /// One tick, every tick and in order, after `flexspline_tick` with what it was given and gave: learns from the output angle measured at the same
 /// moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and tells what to add in the next tick. Nothing that comes in can make
-/// that exceed the limits. `input` holds the adjustment that was in force.
+/// that exceed the limits. `input` is that of the tick with the learner's own adjustment alone: what springs or a model of yours added beside it counts
+/// as known then, and is not learnt a second time.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_update(
     learner: *mut FlexsplineLearner,

@@ -54,7 +54,8 @@ use factors::{dot, measure, transform, wander_by};
 /// One tick as the adapter sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'s> {
-    /// What the tick was given: generator, torque, and the adjustment that was in force.
+    /// What the tick was given: generator, torque, and of the adjustment what this adapter said. What was added beside it (springs that slip)
+    /// is left out here and counts as known; left in, it is learnt a second time.
     pub input: &'s Input,
     /// The play after the tick.
     pub play: &'s PlayState,
