@@ -204,7 +204,7 @@ int main(void)
         must(flexspline_record_decode(bytes, &last), "decode");
         sent++;
     }
-    printf("%d records, %d lost; the last: tick %lu, %s, %s, correction %.1f arcsec\n", sent, last.lost, (unsigned long)last.tick,
+    fprintf(stderr, "%d records, %d lost; the last: tick %lu, %s, %s, correction %.1f arcsec\n", sent, last.lost, (unsigned long)last.tick,
            flexspline_mode_name(last.mode), flexspline_quality_name(last.quality), last.correction_rad * 206264.806);
     return 0;
 }
