@@ -55,6 +55,7 @@
 //! # let reached = Table::check(&image).unwrap().forward(&mut state.play().clone(), command, 12.0, 20.0);
 //! # assert!(reached.output.minus_rad(target).abs() < 2e-8, "{}", reached.output.minus_rad(target));
 //! ```
+//! What an encoder counts becomes an angle by [`Encoder`], and back: any counts in a turn, registers that begin anew, no drift.
 //! In a slow rate group ([`RateGroup`]) the firmware tells the temperature ([`Store::set_temperature`]) and lets a few words of the
 //! images be checked ([`Store::check_images`]). Where no loop runs, as on the host, [`Table`] alone answers: [`Table::forward`],
 //! [`Table::inverse`].

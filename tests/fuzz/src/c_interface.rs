@@ -334,6 +334,46 @@ struct Objects {
     tables_usable: bool,
 }
 
+/// Makes one of each object beside a tick, so that what is chosen then finds them.
+fn begin_beside(memory: &Memory) {
+    let at = |kind: usize| memory.at(PLACES.beside + 2 * kind * BESIDE_WORDS);
+    let term = |term, order| c::FlexsplineCoefficient { limit: 1e-4, initial_std: 5e-5, term, order };
+    let terms = [term(0, 0), term(1, 0), term(2, 0), term(3, 2), term(4, 2)];
+    let learn = c::FlexsplineLearnSettings {
+        noise_rad: 2e-6,
+        memory_measurements: 100.0,
+        gate: 5.0,
+        settle_rad: 1e-5,
+        torque_limit_n_m: 20.0,
+    };
+    let springs = [c::FlexsplineSpring { width: 1e-4, gain: 0.1 }; 3];
+    let torque = c::FlexsplineTorqueSettings {
+        tick_s: 1e-3,
+        bandwidth_hz: 20.0,
+        drag_n_m: 0.5,
+        table_drag_n_m: 0.1,
+        hold_n_m: 0.1,
+    };
+    let counts = c::FlexsplineEncoderSettings { zero_counts: 0, counts_per_turn: 20_000, wrap_bits: 16, reversed: 0 };
+    let begun = [
+        c::flexspline_learner_init(at(0).cast(), &learn, terms.as_ptr(), 5),
+        c::flexspline_learner_set(at(0).cast(), c::FLEXSPLINE_LEARNING_ON),
+        c::flexspline_slip_init(at(1).cast(), c::FLEXSPLINE_SLIP_OF_TORQUE, springs.as_ptr(), 3),
+        c::flexspline_torque_init(at(2).cast(), &torque),
+        c::flexspline_aged_init(at(3).cast(), 3),
+        c::flexspline_encoder_init(at(4).cast(), &counts),
+        c::flexspline_encoder_start(at(4).cast(), 7, 0),
+        c::flexspline_recorder_init(at(5).cast(), 4, 1, 0, c::FLEXSPLINE_FULL_LOSE_OLDEST),
+        c::flexspline_predictor_init(at(6).cast(), &*PARTS),
+        c::flexspline_observer_init(at(7).cast()),
+        c::flexspline_upload_begin(at(8).cast(), 8 * BUFFER_WORDS),
+        c::flexspline_watch_init(at(9).cast()),
+        c::flexspline_activation_begin(at(10).cast(), memory.at(PLACES.joints[0]).cast(), 20.0),
+        c::flexspline_identity_begin(at(11).cast()),
+    ];
+    assert!(begun.iter().all(|begun| *begun as u32 == OK), "{begun:?}");
+}
+
 /// A text of the library: within it, and not for ever.
 fn is_text(text: *const std::ffi::c_char) -> bool {
     // SAFETY: static, and ends.
@@ -815,6 +855,7 @@ pub fn run(data: &[u8]) {
             assert_eq!(flexspline_joint_init(memory.at(PLACES.joints[0]), &settings), OK);
             assert_eq!(flexspline_state_init(memory.at(PLACES.states[0])), OK);
         }
+        begin_beside(&memory);
     }
     let mut kept = Vec::new();
     let (mut table, mut table_usable) = any_images(&mut Choices::new(&[]), &mut kept);
