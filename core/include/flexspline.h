@@ -426,7 +426,8 @@ typedef struct FlexsplineInput {
   // Where the output shall be.
   int64_t target_counts;
   // Load torque at the output, N m, positive when it turns the output forward: that in the mesh, with the drag added that the
-  // table was made with (times the direction), not that on the load where drag or inertia differ.
+  // table was made with (times the direction), not that on the load where drag or inertia differ: `flexspline_torque_tick` makes it
+  // of a reading.
   float torque_n_m;
   // Ticks missed since the last call.
   uint16_t missed_ticks;

@@ -205,7 +205,8 @@ pub struct FlexsplineInput {
     /// Where the output shall be.
     pub target_counts: i64,
     /// Load torque at the output, N m, positive when it turns the output forward: that in the mesh, with the drag added that the
-    /// table was made with (times the direction), not that on the load where drag or inertia differ.
+    /// table was made with (times the direction), not that on the load where drag or inertia differ: `flexspline_torque_tick` makes it
+    /// of a reading.
     pub torque_n_m: f32,
     /// Ticks missed since the last call.
     pub missed_ticks: u16,

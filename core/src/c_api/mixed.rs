@@ -99,6 +99,7 @@ fn predictor() -> Predictor {
 
 /// All in one loop, each fed by what the one before gave, in C and in Rust.
 #[test]
+#[cfg_attr(miri, ignore = "takes too long")]
 fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
     let image = fixture::image(false);
     let twin = image.clone();
