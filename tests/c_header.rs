@@ -1,26 +1,186 @@
-//! The C header that is checked in is the one that cbindgen makes of the C interface.
+//! The C header that is checked in is the one that cbindgen makes of the C interface, and what it once promised stays until the version
+//! changes.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// Files of the C interface, in the order of the header.
+const SOURCES: [&str; 8] = [
+    "c_api.rs",
+    "c_api/names.rs",
+    "c_api/encoder.rs",
+    "c_api/torque.rs",
+    "c_api/ask.rs",
+    "c_api/learn.rs",
+    "c_api/telemetry.rs",
+    "c_api/beside.rs",
+];
+
+fn core() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../core")
+}
+
+fn kept_header() -> String {
+    fs::read_to_string(core().join("include/flexspline.h")).unwrap()
+}
 
 #[test]
 fn the_header_is_up_to_date() {
-    let core = Path::new(env!("CARGO_MANIFEST_DIR")).join("../core");
-    let config = cbindgen::Config::from_file(core.join("cbindgen.toml")).unwrap();
+    let config = cbindgen::Config::from_file(core().join("cbindgen.toml")).unwrap();
+    let mut builder = cbindgen::Builder::new().with_config(config);
+    for file in SOURCES {
+        builder = builder.with_src(core().join("src").join(file));
+    }
     let mut made = Vec::new();
-    cbindgen::Builder::new()
-        .with_config(config)
-        .with_src(core.join("src/c_api.rs"))
-        .with_src(core.join("src/c_api/beside.rs"))
-        .generate()
-        .expect("cbindgen reads the C interface")
-        .write(&mut made);
+    builder.generate().expect("cbindgen reads the C interface").write(&mut made);
     let made = String::from_utf8(made).unwrap();
-    let kept = fs::read_to_string(core.join("include/flexspline.h")).unwrap();
+    if std::env::var_os("FLEXSPLINE_KEEP_HEADER").is_some() {
+        fs::write(core().join("include/flexspline.h"), &made).unwrap();
+    }
+    let kept = kept_header();
     let line = made.lines().zip(kept.lines()).position(|(made, kept)| made != kept);
     assert!(
         made == kept,
-        "core/include/flexspline.h differs from what cbindgen makes, from line {}; the header it should be:\n{made}",
+        "core/include/flexspline.h differs from what cbindgen makes, from line {}: run this test with FLEXSPLINE_KEEP_HEADER=1",
         line.map_or(made.lines().count().min(kept.lines().count()), |line| line + 1)
     );
+}
+
+/// What a program in C relies on, by name: functions with their parameters, structures with their fields, enumerations with their
+/// values, constants. The version is none of it.
+fn promises(header: &str) -> BTreeMap<String, String> {
+    let body = header.split("#endif  /* FLEXSPLINE_H */").next().unwrap();
+    let code: String =
+        body.lines().map(|line| line.split("//").next().unwrap().trim_end()).fold(String::new(), |mut code, line| {
+            let _ = writeln!(code, "{line}");
+            code
+        });
+    let mut found = BTreeMap::new();
+    for line in code.lines() {
+        if let [name, value] = line.strip_prefix("#define ").unwrap_or_default().split(' ').collect::<Vec<_>>()[..]
+            && value.parse::<i64>().is_ok()
+            && !name.starts_with("FLEXSPLINE_VERSION")
+        {
+            found.insert(name.to_owned(), format!("constant {name} {value}"));
+        }
+    }
+    let plain: String =
+        code.lines().filter(|line| !line.starts_with('#') && !line.ends_with('\\')).collect::<Vec<_>>().join(" ");
+    let plain = plain.split_whitespace().collect::<Vec<_>>().join(" ");
+    for part in plain.split("typedef ").skip(1) {
+        let (inside, rest) = part.split_once('}').unwrap();
+        let name = rest.split(';').next().unwrap().trim();
+        let (head, fields) = inside.split_once('{').unwrap();
+        found.insert(name.to_owned(), format!("{} {{{} }}", head.trim(), fields.trim_end().trim_end_matches(',')));
+    }
+    let functions = plain.rsplit_once("extern \"C\" {").unwrap().1;
+    for statement in functions.split(';') {
+        let Some((head, _)) = statement.split_once('(') else { continue };
+        let name = head.rsplit([' ', '*']).next().unwrap();
+        found.insert(name.to_owned(), statement.trim().to_owned());
+    }
+    found
+}
+
+fn functions(header: &str) -> BTreeSet<String> {
+    promises(header).into_keys().filter(|name| name.starts_with("flexspline_")).collect()
+}
+
+/// What of `before` is no longer so. An enumeration may go on.
+fn broken(before: &BTreeMap<String, String>, now: &BTreeMap<String, String>) -> Vec<String> {
+    let goes_on = |text: &str, now: &str| text.starts_with("enum ") && now.starts_with(text.trim_end_matches(" }"));
+    let stays = |text: &str, now: &str| text == now || goes_on(text, now);
+    let gone = before.iter().filter(|(name, text)| !now.get(*name).is_some_and(|now| stays(text, now)));
+    gone.map(|(name, text)| format!("was:  {text}\nnow:  {}", now.get(name).map_or("nothing", |t| t))).collect()
+}
+
+/// The list that is checked in: a version, then a promise on each line.
+fn kept_list() -> (String, BTreeMap<String, String>) {
+    let text = fs::read_to_string(core().join("include/flexspline.abi")).unwrap_or_default();
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let version = lines.next().unwrap_or_default().to_owned();
+    let named = |line: &str| line.split_once(": ").map(|(name, text)| (name.to_owned(), text.to_owned()));
+    (version, lines.filter_map(named).collect())
+}
+
+#[test]
+fn nothing_that_the_header_promised_changes_without_the_version() {
+    let now = promises(&kept_header());
+    let (version, kept) = kept_list();
+    let here = env!("CARGO_PKG_VERSION");
+    let wrong = if version == here { broken(&kept, &now) } else { Vec::new() };
+    assert!(
+        wrong.is_empty(),
+        "programs in C for {version} break; take it back, or raise the version:\n{}",
+        wrong.join("\n")
+    );
+    if std::env::var_os("FLEXSPLINE_KEEP_ABI").is_some() {
+        let mut text = "# What flexspline.h promises in this version: tests/c_header.rs. FLEXSPLINE_KEEP_ABI=1 adds what is new.\n".to_owned();
+        let _ = writeln!(text, "{here}");
+        for (name, promise) in &now {
+            let _ = writeln!(text, "{name}: {promise}");
+        }
+        fs::write(core().join("include/flexspline.abi"), text).unwrap();
+    }
+    assert!(
+        kept_list() == (here.to_owned(), now),
+        "core/include/flexspline.abi: run this test with FLEXSPLINE_KEEP_ABI=1"
+    );
+}
+
+#[test]
+fn a_broken_promise_is_found() {
+    let header = kept_header();
+    let kept = promises(&header);
+    assert!(kept.len() > 200 && functions(&header).len() > 80, "{} {}", kept.len(), functions(&header).len());
+    let after = |from: &str, to: &str| {
+        let changed = header.replacen(from, to, 1);
+        assert!(changed != header, "{from}");
+        broken(&kept, &promises(&changed))
+    };
+    assert!(after("uint16_t words);", "uint32_t words);")[0].contains("flexspline_store_check_images"));
+    assert!(after("  float hold_rad;", "  float keep_rad;")[0].contains("FlexsplineSettings"));
+    assert!(after("FLEXSPLINE_STATUS_TORN = 17,", "FLEXSPLINE_STATUS_TORN = 18,")[0].contains("FlexsplineStatus"));
+    assert!(after("#define FLEXSPLINE_FLAG_SAFE 256", "#define FLEXSPLINE_FLAG_SAFE 257")[0].contains("256"));
+    assert!(after("flexspline_self_test(void)", "flexspline_test(void)")[0].contains("now:  nothing"));
+    assert!(after("FLEXSPLINE_STATUS_OTHER_DRIVE = 7,", "")[0].contains("FlexsplineStatus"));
+    assert!(after("FLEXSPLINE_STATUS_SELF_TEST = 18,", "FLEXSPLINE_STATUS_SELF_TEST = 18, MORE = 19,").is_empty());
+    // What is only said otherwise, and what is new, breaks nothing.
+    assert!(after("// Done.", "// Well.").is_empty());
+    assert!(
+        after("uint16_t flexspline_format_version(void);", "uint16_t flexspline_format_version(void);\nint more(int);")
+            .is_empty()
+    );
+}
+
+/// A function that nobody calls is one that nobody knows to work.
+#[test]
+fn every_function_is_called_on_the_target_fuzzed_and_on_the_page() {
+    let root = core().join("..");
+    let read = |file: &str| fs::read_to_string(root.join(file)).unwrap();
+    for (what, text) in [
+        ("tests/firmware/c", read("tests/firmware/c/main.c") + &read("tests/firmware/c/beside.c")),
+        ("tests/fuzz/src/c_interface.rs", read("tests/fuzz/src/c_interface.rs")),
+        ("docs/c_interface.md", read("docs/c_interface.md")),
+    ] {
+        let words: BTreeSet<&str> = text.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+        let functions = functions(&kept_header());
+        let missing: Vec<_> = functions.iter().filter(|name| !words.contains(name.as_str())).collect();
+        assert!(missing.is_empty(), "not in {what}: {missing:?}");
+    }
+}
+
+/// The sum over all sizes leaves none out.
+#[test]
+fn the_layout_holds_every_type() {
+    let header = kept_header();
+    let names = fs::read_to_string(core().join("src/c_api/names.rs")).unwrap();
+    let types: Vec<_> = promises(&header).into_keys().filter(|name| name.starts_with("Flexspline")).collect();
+    assert!(types.len() > 40);
+    for name in types {
+        assert!(header.contains(&format!("  FLEXSPLINE_AND_SIZE_({name})")), "core/cbindgen.toml: {name}");
+        assert!(names.contains(&format!("size_of::<{name}>(),")), "core/src/c_api/names.rs: {name}");
+    }
 }

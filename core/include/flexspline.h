@@ -1,11 +1,17 @@
 // Compensation of strain wave drives on a microcontroller: the C interface of the crate flexspline.
-// Made by cbindgen of core/src/c_api.rs; tests/c_header.rs sees that it is up to date.
+// Made by cbindgen of core/src/c_api.rs; tests/c_header.rs sees that it is up to date. docs/c_interface.md says how to use it.
 
 #ifndef FLEXSPLINE_H
 #define FLEXSPLINE_H
 
 #include <stddef.h>
 #include <stdint.h>
+
+#define FLEXSPLINE_TEXT_OF_(number) #number
+#define FLEXSPLINE_TEXT_OF(number) FLEXSPLINE_TEXT_OF_(number)
+// Version of this header as text, as `flexspline_version` says of the library.
+#define FLEXSPLINE_VERSION \
+  FLEXSPLINE_TEXT_OF(FLEXSPLINE_VERSION_MAJOR) "." FLEXSPLINE_TEXT_OF(FLEXSPLINE_VERSION_MINOR) "." FLEXSPLINE_TEXT_OF(FLEXSPLINE_VERSION_PATCH)
 
 // There was no sample.
 #define FLEXSPLINE_FLAG_SAMPLE_LOST 1
@@ -54,6 +60,183 @@
 
 // Bytes of a saved state.
 #define FLEXSPLINE_SAVED_BYTES 72
+
+// Version of this header: the first of three numbers.
+#define FLEXSPLINE_VERSION_MAJOR 0
+
+// The second.
+#define FLEXSPLINE_VERSION_MINOR 1
+
+// The third.
+#define FLEXSPLINE_VERSION_PATCH 0
+
+// 10000 times the first, 100 times the second, and the third: as `flexspline_version_number` says of the library.
+#define FLEXSPLINE_VERSION_NUMBER 100
+
+// No correction: it is taken back within the limits. The start.
+#define FLEXSPLINE_MODE_OFF 0
+
+// The correction follows the table.
+#define FLEXSPLINE_MODE_TRACKING 1
+
+// The correction stays as it is.
+#define FLEXSPLINE_MODE_HOLD 2
+
+// No correction, and none before off was asked for: after a fault.
+#define FLEXSPLINE_MODE_SAFE 3
+
+// Trust estimate and correction.
+#define FLEXSPLINE_QUALITY_IN_RANGE 0
+
+// The side of the play is not known yet: the uncertainty says by how much the estimate can be off.
+#define FLEXSPLINE_QUALITY_UNCERTAIN 1
+
+// Torque or temperature lies beyond the table: that of its edge is used.
+#define FLEXSPLINE_QUALITY_EXTRAPOLATED 2
+
+// Nothing can be said: the error is taken as none.
+#define FLEXSPLINE_QUALITY_DISABLED 3
+
+// Both images are whole, as far as they were checked.
+#define FLEXSPLINE_HEALTH_SOUND 0
+
+// A page of one image is damaged, and can be written again from the other.
+#define FLEXSPLINE_HEALTH_ONE_IMAGE 1
+
+// A page is damaged in both images.
+#define FLEXSPLINE_HEALTH_LOST 2
+
+// There is no table.
+#define FLEXSPLINE_HEALTH_EMPTY 3
+
+// What is known of the table is not whole: activate it again.
+#define FLEXSPLINE_HEALTH_TORN 4
+
+// A tick that came late: the ticks missed are counted, nothing more.
+#define FLEXSPLINE_OVERRUN_SKIP 0
+
+// The correction stays as it is in that tick.
+#define FLEXSPLINE_OVERRUN_HOLD 1
+
+// The correction fades out within `fade_ticks`, stays there as long, and comes back.
+#define FLEXSPLINE_OVERRUN_FADE 2
+
+// The flexspline is fixed, the circular spline is the output.
+#define FLEXSPLINE_FIXED_FLEXSPLINE 0
+
+// The circular spline is fixed, the flexspline is the output.
+#define FLEXSPLINE_FIXED_CIRCULAR_SPLINE 1
+
+// `flexspline_activation_step`: the images are checked, the store is as it was.
+#define FLEXSPLINE_PROGRESS_CHECKING 0
+
+// The store is filled, and has no table meanwhile.
+#define FLEXSPLINE_PROGRESS_FILLING 1
+
+// The table is in use.
+#define FLEXSPLINE_PROGRESS_DONE 2
+
+// `flexspline_identity_step`: there is more to take in.
+#define FLEXSPLINE_IDENTITY_HASHING 0
+
+// The image is the one of its id.
+#define FLEXSPLINE_IDENTITY_SAME 1
+
+// It is not.
+#define FLEXSPLINE_IDENTITY_OTHER 2
+
+// Eight-byte words of a [`FlexsplineEncoder`].
+#define FLEXSPLINE_ENCODER_WORDS 7
+
+// Eight-byte words of a [`FlexsplineTorquePath`].
+#define FLEXSPLINE_TORQUE_PATH_WORDS 5
+
+// Eight-byte words of a [`FlexsplineAged`].
+#define FLEXSPLINE_AGED_WORDS 4
+
+// The torque is that on the load: what gravity, wind and the like do to it, less inertia times the acceleration of the target.
+#define FLEXSPLINE_TORQUE_ON_LOAD 0
+
+// The torque is that in the mesh: of a sensor between drive and load, of the twist, or of the motor's current less its friction.
+#define FLEXSPLINE_TORQUE_IN_MESH 1
+
+// Largest number of coefficients of a learner.
+#define FLEXSPLINE_LEARNER_COEFFICIENTS 7
+
+// Eight-byte words of a [`FlexsplineLearner`].
+#define FLEXSPLINE_LEARNER_WORDS 64
+
+// Bytes of a saved learner with the largest number of coefficients; n of them take 2 n (n - 1) + 8 n + 8.
+#define FLEXSPLINE_SAVED_LEARNER_BYTES 148
+
+// Largest number of springs.
+#define FLEXSPLINE_SLIP_SPRINGS 8
+
+// Eight-byte words of a [`FlexsplineSlip`].
+#define FLEXSPLINE_SLIP_WORDS 21
+
+// Bytes of saved springs with the largest number of them; n of them take 8 n + 16.
+#define FLEXSPLINE_SAVED_SLIP_BYTES 80
+
+// Offset of the mean error, rad.
+#define FLEXSPLINE_TERM_MEAN 0
+
+// Wind-up beside that of the table, rad/(N m).
+#define FLEXSPLINE_TERM_WIND_UP 1
+
+// Half-width of the play beside that of the table, rad.
+#define FLEXSPLINE_TERM_HALF_WIDTH 2
+
+// Cosine of `order` periods in a generator turn, rad.
+#define FLEXSPLINE_TERM_COSINE 3
+
+// Sine of `order` periods in a generator turn, rad.
+#define FLEXSPLINE_TERM_SINE 4
+
+// The adjustment is zero; what was learnt is kept. The start.
+#define FLEXSPLINE_LEARNING_OFF 0
+
+// What was learnt is used and stays as it is.
+#define FLEXSPLINE_LEARNING_FROZEN 1
+
+// Measurements are used.
+#define FLEXSPLINE_LEARNING_ON 2
+
+// There was no measurement, or nothing is to be learnt.
+#define FLEXSPLINE_VERDICT_IDLE 0
+
+// It was used.
+#define FLEXSPLINE_VERDICT_USED 1
+
+// Within what is not known anyway: it says nothing.
+#define FLEXSPLINE_VERDICT_QUIET 2
+
+// Beyond the gate.
+#define FLEXSPLINE_VERDICT_OUTLIER 3
+
+// Too soon after a reversal.
+#define FLEXSPLINE_VERDICT_UNSETTLED 4
+
+// No coefficient changes the output enough here to be seen in the noise.
+#define FLEXSPLINE_VERDICT_UNEXCITED 5
+
+// The tick itself was not to be trusted.
+#define FLEXSPLINE_VERDICT_UNTRUSTED 6
+
+// Springs that slip with the nominal output: widths in rad, 0 to 0.05, gains without a unit.
+#define FLEXSPLINE_SLIP_OF_OUTPUT 0
+
+// Springs that slip with the load torque: widths in N m, 0 to 10000, gains in rad/(N m).
+#define FLEXSPLINE_SLIP_OF_TORQUE 1
+
+// Eight-byte words of a [`FlexsplineRecorder`].
+#define FLEXSPLINE_RECORDER_WORDS 4
+
+// Where all places hold a record: the oldest is lost, the end of a story is kept.
+#define FLEXSPLINE_FULL_LOSE_OLDEST 0
+
+// The new one is lost, the beginning is kept.
+#define FLEXSPLINE_FULL_LOSE_NEW 1
 
 // Bytes of a record of telemetry.
 #define FLEXSPLINE_RECORD_BYTES 52
@@ -156,9 +339,9 @@ typedef struct FlexsplineSettings {
   uint16_t flexspline_teeth;
   // Teeth of the circular spline, more than those.
   uint16_t circular_spline_teeth;
-  // 0: the flexspline is fixed; 1: the circular spline.
+  // `FLEXSPLINE_FIXED_...`.
   uint8_t fixed_member;
-  // 0: skip late ticks and count; 1: hold the last correction; 2: fade out.
+  // `FLEXSPLINE_OVERRUN_...`.
   uint8_t overrun;
   // Ticks of a fade.
   uint16_t fade_ticks;
@@ -218,7 +401,7 @@ typedef struct FlexsplineStoreReport {
   uint32_t pages_damaged;
   // Passes over both copies.
   uint32_t passes;
-  // 0 sound, 1 a page of one image is damaged, 2 of both: lost, 3 no table, 4 torn: activate again.
+  // `FLEXSPLINE_HEALTH_...`.
   uint8_t health;
   // Image with a page that can be written again from the other: 0 or 1; 255 if there is none.
   uint8_t damaged_image;
@@ -230,7 +413,7 @@ typedef struct FlexsplineStoreReport {
 typedef struct FlexsplineStateReport {
   // Ticks missed since the start; wraps.
   uint32_t missed_ticks;
-  // 0 off, 1 tracking, 2 hold, 3 safe.
+  // `FLEXSPLINE_MODE_...`.
   uint8_t mode;
   // 1 if the side of the play is known, else 0.
   uint8_t side_known;
@@ -243,7 +426,8 @@ typedef struct FlexsplineInput {
   // Where the output shall be.
   int64_t target_counts;
   // Load torque at the output, N m, positive when it turns the output forward: that in the mesh, with the drag added that the
-  // table was made with (times the direction), not that on the load where drag or inertia differ.
+  // table was made with (times the direction), not that on the load where drag or inertia differ: `flexspline_torque_tick` makes it
+  // of a reading.
   float torque_n_m;
   // Ticks missed since the last call.
   uint16_t missed_ticks;
@@ -269,11 +453,264 @@ typedef struct FlexsplineOutput {
   float correction_rad;
   // What the limiter held back, rad.
   float held_back_rad;
-  // 0 in range, 1 uncertain, 2 extrapolated, 3 disabled.
+  // `FLEXSPLINE_QUALITY_...`.
   uint8_t quality;
   // `FLEXSPLINE_FLAG_...`.
   uint16_t flags;
 } FlexsplineOutput;
+
+// An encoder, and where it is.
+typedef struct FlexsplineEncoder {
+  uint64_t opaque[FLEXSPLINE_ENCODER_WORDS];
+} FlexsplineEncoder;
+
+// How an encoder counts.
+typedef struct FlexsplineEncoderSettings {
+  // What it reads at the angle 0, counts of the encoder: -2^62 to 2^62.
+  int64_t zero_counts;
+  // Counts in a turn, 2 to 2^31: four times the lines of an incremental one.
+  uint32_t counts_per_turn;
+  // Bits of the register, 1 to 64: it begins anew after 2^bits counts. 0: it begins anew after each turn. A signed register is given by
+  // its bits, those above them zero.
+  uint8_t wrap_bits;
+  // 1 if it counts up where the angle falls, else 0.
+  uint8_t reversed;
+} FlexsplineEncoderSettings;
+
+// From a reading of torque to the one that a tick is given.
+typedef struct FlexsplineTorquePath {
+  uint64_t opaque[FLEXSPLINE_TORQUE_PATH_WORDS];
+} FlexsplineTorquePath;
+
+// What a reading of torque goes through.
+typedef struct FlexsplineTorqueSettings {
+  // Time from tick to tick, s.
+  float tick_s;
+  // Corner of the low-pass, Hz: of the first order.
+  float bandwidth_hz;
+  // Coulomb drag of the output of this unit, N m; 0 or more.
+  float drag_n_m;
+  // Coulomb drag that the table was made with, N m; 0 or more.
+  float table_drag_n_m;
+  // A torque in the mesh below this does not change the flank, N m: some three times the peak of the noise. 0 or more.
+  float hold_n_m;
+} FlexsplineTorqueSettings;
+
+// A measurement with its age.
+typedef struct FlexsplineAged {
+  uint64_t opaque[FLEXSPLINE_AGED_WORDS];
+} FlexsplineAged;
+
+// What the output is expected to do.
+typedef struct FlexsplinePrediction {
+  // Output angle, counts of 2^-32 turn: nominal plus transmission error.
+  int64_t output_counts;
+  // Nominal output angle: generator over ratio.
+  int64_t nominal_counts;
+  // Actual less nominal, rad; 0 if disabled.
+  float transmission_error_rad;
+  // The error lies within +- this as far as play and jumps go, rad.
+  float uncertainty_rad;
+  // `FLEXSPLINE_QUALITY_...`.
+  uint8_t quality;
+} FlexsplinePrediction;
+
+// What to command for a wanted output angle.
+typedef struct FlexsplineCommand {
+  // Generator angle to go to, counts of 2^-32 turn.
+  int64_t generator_counts;
+  // The transmission error expected there, rad; 0 if disabled.
+  float predicted_error_rad;
+  // It lies within +- this, rad.
+  float uncertainty_rad;
+  // `FLEXSPLINE_QUALITY_...`.
+  uint8_t quality;
+} FlexsplineCommand;
+
+// Where a drive rests inside its play.
+typedef struct FlexsplinePlay {
+  // Nominal output of the last tick with a sample, counts of 2^-32 turn; 0 before the first.
+  int64_t nominal_counts;
+  // Estimated output then; 0 before the first.
+  int64_t output_counts;
+  // Offset from the middle of the play, rad: the middle of what is possible.
+  float offset_rad;
+  // It is off by no more than this, rad.
+  float uncertainty_rad;
+  // 1 if the side is known, else 0.
+  uint8_t is_known;
+  // 0 before the first tick with a sample and a table, else 1.
+  uint8_t is_started;
+} FlexsplinePlay;
+
+// What an image says of itself.
+typedef struct FlexsplineImageReport {
+  // Id of the table: the first 8 bytes of the BLAKE3 of its contents, as reports show them in hexadecimal digits.
+  uint8_t table_id[8];
+  // Torques that it holds for, N m, both ends included.
+  float torque_range_n_m[2];
+  // Temperatures that it holds for, degrees C, both ends included.
+  float temperature_range_c[2];
+  // No error that it gives is larger, rad.
+  float error_limit_rad;
+  // What it misses of the samples that it was made of at most, rad.
+  float projection_worst_rad;
+  // Root of the mean square of that, rad.
+  float projection_rms_rad;
+  // Teeth of the flexspline.
+  uint16_t flexspline_teeth;
+  // Teeth of the circular spline.
+  uint16_t circular_spline_teeth;
+  // `FLEXSPLINE_FIXED_...`.
+  uint8_t fixed_member;
+  // Kind of wave generator: 0 other, 1 two-roller, 2 four-roller, 3 double-disc, 4 cam (`flexspline_generator_name`).
+  uint8_t generator;
+} FlexsplineImageReport;
+
+// A few coefficients that measurements of the output teach, and what is learnt.
+typedef struct FlexsplineLearner {
+  uint64_t opaque[FLEXSPLINE_LEARNER_WORDS];
+} FlexsplineLearner;
+
+// How a learner learns.
+typedef struct FlexsplineLearnSettings {
+  // Standard deviation of one measurement, rad at the output: its noise and what the table missed of its samples.
+  float noise_rad;
+  // Measurements after which what was learnt in their direction is forgotten: 1 to 1000000.
+  float memory_measurements;
+  // Standard deviations beyond which an innovation is an outlier: 1 to 100.
+  float gate;
+  // Way at the output after a reversal that is left out beside four times the limit of the half-width, rad; 0 to 0.049.
+  float settle_rad;
+  // Torque beyond which the wind-up's share grows no more, N m.
+  float torque_limit_n_m;
+} FlexsplineLearnSettings;
+
+// A coefficient to be learnt.
+typedef struct FlexsplineCoefficient {
+  // It stays within +- this: rad, or rad/(N m); above 0, 0.049 at most.
+  float limit;
+  // Standard deviation that it is expected to have at first, and never exceeds: same unit; 1e-6 to 10 times the limit.
+  float initial_std;
+  // `FLEXSPLINE_TERM_...`.
+  uint8_t term;
+  // Periods in a generator turn, 1 to 255, of a cosine or sine; else 0.
+  uint8_t order;
+} FlexsplineCoefficient;
+
+// What a learner adds in the next tick.
+typedef struct FlexsplineAdapted {
+  // For `FlexsplineInput` of the next tick: mean error, counts of 2^-32 turn at the output.
+  int32_t mean_counts;
+  // The same: half-width of the play.
+  int32_t half_width_counts;
+  // Standard deviation of what it adds to the error, rad.
+  float uncertainty_rad;
+  // What became of the measurement: `FLEXSPLINE_VERDICT_...`.
+  uint8_t verdict;
+} FlexsplineAdapted;
+
+// A coefficient as learnt.
+typedef struct FlexsplineLearnt {
+  // Its value: rad, or rad/(N m).
+  float value;
+  // Its standard deviation, same unit.
+  float std;
+} FlexsplineLearnt;
+
+// What became of measurements; counters stop at their largest value.
+typedef struct FlexsplineLearnerReport {
+  // Used.
+  uint32_t used;
+  // Within what is not known anyway.
+  uint32_t quiet;
+  // Outliers.
+  uint32_t outliers;
+  // Outliers in a row until now: many say that the output encoder or its zero is not what it was.
+  uint32_t outliers_in_a_row;
+  // Too soon after a reversal.
+  uint32_t unsettled;
+  // No coefficient was excited.
+  uint32_t unexcited;
+  // The tick was not to be trusted.
+  uint32_t untrusted;
+  // Coefficients held at their limit, once for each and each measurement.
+  uint32_t limited;
+  // Starts from zero because the state was hit by an upset.
+  uint32_t restarts;
+  // `FLEXSPLINE_LEARNING_...`.
+  uint8_t learning;
+  // Number of coefficients.
+  uint8_t coefficients;
+} FlexsplineLearnerReport;
+
+// Springs that slip, and their deflections.
+typedef struct FlexsplineSlip {
+  uint64_t opaque[FLEXSPLINE_SLIP_WORDS];
+} FlexsplineSlip;
+
+// A spring that slips.
+typedef struct FlexsplineSpring {
+  // Deflection at which it slips: rad of the nominal output, or N m.
+  float width;
+  // Error per deflection: without a unit, or rad/(N m).
+  float gain;
+} FlexsplineSpring;
+
+// What springs add.
+typedef struct FlexsplineSlipReport {
+  // Error at the output, rad.
+  float error_rad;
+  // It lies within +- this, rad: 0 once every spring has slipped from one end to the other.
+  float uncertainty_rad;
+  // The error for `flexspline_input_add`, counts of 2^-32 turn at the output.
+  int32_t mean_counts;
+  // 1 if every deflection is known, else 0.
+  uint8_t is_known;
+} FlexsplineSlipReport;
+
+// Which records of the caller's list wait to be sent.
+typedef struct FlexsplineRecorder {
+  uint64_t opaque[FLEXSPLINE_RECORDER_WORDS];
+} FlexsplineRecorder;
+
+// One tick, as it is kept and as it was sent.
+typedef struct FlexsplineRecord {
+  // Estimated output, counts of 2^-32 turn.
+  int64_t output_counts;
+  // Number of the tick.
+  uint32_t tick;
+  // Transmission error, rad.
+  float transmission_error_rad;
+  // It lies within +- this, rad.
+  float uncertainty_rad;
+  // Correction, rad at the output.
+  float correction_rad;
+  // What the limiter held back of it, rad.
+  float held_back_rad;
+  // Number of the record; wraps.
+  uint16_t number;
+  // Records lost since the start; wraps.
+  uint16_t lost;
+  // `FLEXSPLINE_FLAG_...`.
+  uint16_t flags;
+  // Ticks missed since the start; wraps, as all counters.
+  uint16_t missed_ticks;
+  // Ticks that were done again because something was not whole.
+  uint16_t doubtful_ticks;
+  // Words of the copies that were found to differ and made anew.
+  uint16_t words_mended;
+  // Words that could not be made anew.
+  uint16_t words_skipped;
+  // Pages of an image found damaged.
+  uint16_t pages_damaged;
+  // `FLEXSPLINE_QUALITY_...`.
+  uint8_t quality;
+  // `FLEXSPLINE_MODE_...`.
+  uint8_t mode;
+  // `FLEXSPLINE_HEALTH_...`.
+  uint8_t health;
+} FlexsplineRecord;
 
 // How far a table on its way in has come.
 typedef struct FlexsplineUpload {
@@ -291,11 +728,11 @@ typedef struct FlexsplineEvents {
   uint32_t missed_ticks;
   // `FLEXSPLINE_EVENT_...`; what follows is only told with its event.
   uint16_t events;
-  // 0 off, 1 tracking, 2 hold, 3 safe.
+  // `FLEXSPLINE_MODE_...`.
   uint8_t mode_before;
   // The mode now.
   uint8_t mode;
-  // As in `FlexsplineStoreReport`.
+  // `FLEXSPLINE_HEALTH_...`.
   uint8_t health_before;
   // The health now.
   uint8_t health;
@@ -309,6 +746,44 @@ typedef struct FlexsplineEvents {
 typedef struct FlexsplinePredictor {
   uint64_t opaque[FLEXSPLINE_PREDICTOR_WORDS];
 } FlexsplinePredictor;
+
+// Two inertias, at the output.
+typedef struct FlexsplineInertias {
+  // Motor, generator and what turns with them: their inertia times the square of the ratio, kg m^2.
+  double motor_kg_m2;
+  // Load, kg m^2.
+  double load_kg_m2;
+  // Torsional stiffness, N m/rad: the slope of the wind-up.
+  double stiffness_n_m_per_rad;
+  // Damping beside it, N m s/rad.
+  double damping_n_m_s_per_rad;
+} FlexsplineInertias;
+
+// How much of what is measured and assumed can be trusted: standard deviations.
+typedef struct FlexsplineNoise {
+  // Motor torque at the output, N m.
+  double torque_n_m;
+  // Change of the torque on the load in a tick, N m.
+  double load_change_n_m;
+  // Motor speed over the ratio as measured in one tick, rad/s.
+  double speed_rad_s;
+  // Twist as measured, rad; of no matter without an encoder at the output.
+  double twist_rad;
+  // 0 without an encoder at the output, else 1.
+  uint8_t has_twist;
+} FlexsplineNoise;
+
+// How far what is measured and assumed can be off: bounds, each +-.
+typedef struct FlexsplineDisturbance {
+  // Motor torque at the output, N m.
+  float torque_n_m;
+  // Change of the torque on the load in a tick, N m.
+  float load_change_n_m;
+  // Motor speed over the ratio as measured, rad/s.
+  float speed_rad_s;
+  // Twist as measured, rad; of no matter without an encoder at the output.
+  float twist_rad;
+} FlexsplineDisturbance;
 
 // What an observer estimates.
 typedef struct FlexsplineObserver {
@@ -369,7 +844,7 @@ typedef struct FlexsplineAhead {
   float motor_rad;
   // Twist then, rad.
   float twist_rad;
-  // 0 in range, 1 uncertain, 2 extrapolated, 3 disabled: the worse of now and then.
+  // `FLEXSPLINE_QUALITY_...`: the worse of now and then.
   uint8_t quality;
 } FlexsplineAhead;
 
@@ -398,8 +873,7 @@ enum FlexsplineStatus flexspline_activation_begin(struct FlexsplineActivation *a
                                                   const struct FlexsplineJoint *joint,
                                                   float temperature_c);
 
-// A step: the same store and images with each, until `progress` is 2. 0: the images are checked, the store is as it was; 1: the store is
-// filled, and has no table meanwhile; 2: the table is in use. If a step fails the activation is over; begin again.
+// A step: the same store and images with each, until `progress` (`FLEXSPLINE_PROGRESS_...`) is done. If a step fails the activation is over; begin again.
 enum FlexsplineStatus flexspline_activation_step(struct FlexsplineActivation *activation,
                                                  struct FlexsplineStore *store,
                                                  const struct FlexsplineImages *table,
@@ -408,8 +882,8 @@ enum FlexsplineStatus flexspline_activation_step(struct FlexsplineActivation *ac
 // Begins to find out whether an image is the one of its id.
 enum FlexsplineStatus flexspline_identity_begin(struct FlexsplineIdentity *identity);
 
-// Takes in a block of 64 bytes of the image, the same one with each step. `found` is 0 while there is more, then 1 if the image is the one of its id,
-// or 2 if it is not; with the next step it begins anew.
+// Takes in a block of 64 bytes of the image, the same one with each step. `found` (`FLEXSPLINE_IDENTITY_...`) is hashing while there is more, then same or other;
+// with the next step it begins anew.
 enum FlexsplineStatus flexspline_identity_step(struct FlexsplineIdentity *identity,
                                                const uint8_t *image,
                                                size_t image_bytes,
@@ -445,8 +919,10 @@ enum FlexsplineStatus flexspline_store_mend_page(struct FlexsplineStore *store,
 // rate group.
 enum FlexsplineStatus flexspline_joint_mend(struct FlexsplineJoint *joint);
 
-// Changes the mode: 0 off, 1 tracking, 2 hold, 3 safe.
-enum FlexsplineStatus flexspline_state_request(struct FlexsplineState *state, uint8_t mode);
+// Changes the mode (`FLEXSPLINE_MODE_...`): `FLEXSPLINE_STATUS_MODE` where there is no such transition
+// (`flexspline_mode_may_become`).
+enum FlexsplineStatus flexspline_state_request(struct FlexsplineState *state,
+                                               uint8_t mode);
 
 // On command: which side of the play the drive rests on is not known any more, as after work on it.
 enum FlexsplineStatus flexspline_state_forget_side(struct FlexsplineState *state);
@@ -468,28 +944,320 @@ enum FlexsplineStatus flexspline_state_restore(struct FlexsplineState *state,
                                                const struct FlexsplineStore *store,
                                                const uint8_t (*saved)[FLEXSPLINE_SAVED_BYTES]);
 
-// Version of this library, as text.
-const char *flexspline_version(void);
-
-// Version of the table format that is read.
-uint16_t flexspline_format_version(void);
-
-// Name of a mode.
-const char *flexspline_mode_name(uint8_t mode);
-
-// Name of a health, as in `FlexsplineStoreReport`.
-const char *flexspline_health_name(uint8_t health);
-
-// Name of one flag.
-const char *flexspline_flag_name(uint16_t flag);
-
-// One tick.
+// One tick: from what was measured to what to command, once every `tick_s` and in the order of time. `FLEXSPLINE_STATUS_OK` also where no
+// correction could be made: `flags` and `quality` of the output say so.
 enum FlexsplineStatus flexspline_tick(const struct FlexsplineJoint *joint,
                                       const struct FlexsplineImages *table,
                                       struct FlexsplineStore *store,
                                       struct FlexsplineState *state,
                                       const struct FlexsplineInput *input,
                                       struct FlexsplineOutput *output);
+
+// A sum of the sizes of all types of this header, as the library has them. Where it is not `FLEXSPLINE_LAYOUT` the program was compiled
+// with another header, or with options that change a layout (packed structures, enumerations of another size): do not go on.
+uint32_t flexspline_layout(void);
+
+// Version of this library, as text.
+const char *flexspline_version(void);
+
+// Version of this library, to compare with `FLEXSPLINE_VERSION_NUMBER` of the header.
+uint32_t flexspline_version_number(void);
+
+// Version of the table format that is read.
+uint16_t flexspline_format_version(void);
+
+// What a status says, in a few words.
+const char *flexspline_status_text(int status);
+
+// Name of a mode.
+const char *flexspline_mode_name(uint8_t mode);
+
+// 1 if a mode may be followed by another, else 0: everything may become off or safe; off and hold tracking; tracking hold.
+uint8_t flexspline_mode_may_become(uint8_t mode,
+                                   uint8_t next);
+
+// Name of a quality.
+const char *flexspline_quality_name(uint8_t quality);
+
+// Name of a health, as in `FlexsplineStoreReport`.
+const char *flexspline_health_name(uint8_t health);
+
+// Name of one flag: of `FLEXSPLINE_FLAG_...`, one bit at a time.
+const char *flexspline_flag_name(uint16_t flag);
+
+// Name of one event: of `FLEXSPLINE_EVENT_...`, one bit at a time.
+const char *flexspline_event_name(uint16_t event);
+
+// Name of what is done in a tick that came late: of `FLEXSPLINE_OVERRUN_...`.
+const char *flexspline_overrun_name(uint8_t overrun);
+
+// Name of a fixed member: of `FLEXSPLINE_FIXED_...`.
+const char *flexspline_fixed_member_name(uint8_t fixed_member);
+
+// Name of a kind of wave generator, as in `FlexsplineImageReport`.
+const char *flexspline_generator_name(uint8_t generator);
+
+// Name of how far an activation is: of `FLEXSPLINE_PROGRESS_...`.
+const char *flexspline_progress_name(uint8_t progress);
+
+// Name of what was found of an identity: of `FLEXSPLINE_IDENTITY_...`.
+const char *flexspline_identity_name(uint8_t found);
+
+// Name of what learning does: of `FLEXSPLINE_LEARNING_...`.
+const char *flexspline_learning_name(uint8_t learning);
+
+// Name of what became of a measurement: of `FLEXSPLINE_VERDICT_...`.
+const char *flexspline_verdict_name(uint8_t verdict);
+
+// Name of a coefficient: of `FLEXSPLINE_TERM_...`.
+const char *flexspline_term_name(uint8_t term);
+
+// Makes an encoder of its settings, `FLEXSPLINE_STATUS_ARGUMENT` if they cannot be; where it is is not known yet.
+enum FlexsplineStatus flexspline_encoder_init(struct FlexsplineEncoder *encoder,
+                                              const struct FlexsplineEncoderSettings *settings);
+
+// The first reading after a reset: of all angles with this reading the one nearest to `near_counts` (2^-32 turn) is taken, which is 0 or
+// the angle that was saved. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that.
+enum FlexsplineStatus flexspline_encoder_start(struct FlexsplineEncoder *encoder,
+                                               uint64_t reading,
+                                               int64_t near_counts);
+
+// Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two readings it may move by less than half of what the
+// register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick no sample then),
+// `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`.
+enum FlexsplineStatus flexspline_encoder_read(struct FlexsplineEncoder *encoder,
+                                              uint64_t reading,
+                                              int64_t *angle_counts);
+
+// What the register reads at an angle, to the nearest count: for a drive that is commanded in counts of its encoder.
+enum FlexsplineStatus flexspline_encoder_reading(const struct FlexsplineEncoder *encoder,
+                                                 int64_t angle_counts,
+                                                 uint64_t *reading);
+
+// Counts of 2^-32 turn of an angle in radians, to the nearest; `FLEXSPLINE_STATUS_ARGUMENT` if it is not finite or beyond 2^31 turns. For
+// start-up and the host: in double precision.
+enum FlexsplineStatus flexspline_counts_from_rad(double rad,
+                                                 int64_t *angle_counts);
+
+// Radians of an angle in counts of 2^-32 turn. For start-up and the host: in double precision.
+double flexspline_rad_from_counts(int64_t angle_counts);
+
+// Radians from one angle to another, both in counts of 2^-32 turn, held within half a turn: in single precision, exact to 1.2e-7 of it.
+float flexspline_rad_between(int64_t from_counts,
+                             int64_t to_counts);
+
+// 1 if a slower group that runs in every `divisor`-th tick, from `offset` on, runs in tick number `tick`, else 0; 0 too where `divisor` is 0 or
+// `offset` not below it.
+uint8_t flexspline_is_due(uint32_t tick,
+                          uint32_t divisor,
+                          uint32_t offset);
+
+// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time or bandwidth is not finite and positive, or a drag or hold not
+// finite or below 0.
+enum FlexsplineStatus flexspline_torque_init(struct FlexsplineTorquePath *path,
+                                             const struct FlexsplineTorqueSettings *settings);
+
+// One tick: a reading, N m, positive where it turns the output forward, where it was measured (`FLEXSPLINE_TORQUE_...`), and the direction in which
+// the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite gives NaN, and is forgotten.
+enum FlexsplineStatus flexspline_torque_tick(struct FlexsplineTorquePath *path,
+                                             uint8_t place,
+                                             float reading_n_m,
+                                             int8_t direction,
+                                             float *torque_n_m);
+
+// Nothing measured yet; what is older than `most_ticks` is not used.
+enum FlexsplineStatus flexspline_aged_init(struct FlexsplineAged *aged, uint16_t most_ticks);
+
+// One tick: what was measured in it, if anything (`has_measured` 1, else 0); the value to use, or NaN where it is too old, or was hit by an
+// upset. A tick takes NaN as torque: it keeps its correction for `patience` ticks, then fades it out.
+enum FlexsplineStatus flexspline_aged_tick(struct FlexsplineAged *aged,
+                                           uint8_t has_measured,
+                                           float measured,
+                                           float *value);
+
+// 1 if there is no value that may be used, else 0: ask for the sensor.
+enum FlexsplineStatus flexspline_aged_is_stale(const struct FlexsplineAged *aged,
+                                               uint8_t *is_stale);
+
+// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal one and what the error adds, along the way
+// of the target over `ahead_s` (some ticks, above 0). For the speed loop of a servo; it cannot feed a torque back. NaN where the table gives nothing. Two
+// inverse solutions: for a tick that has the time, or every few ticks.
+enum FlexsplineStatus flexspline_rate_ahead(const struct FlexsplineJoint *joint,
+                                            const struct FlexsplineStore *store,
+                                            int64_t target_counts,
+                                            float rate_rad_s,
+                                            float torque_n_m,
+                                            float ahead_s,
+                                            float *generator_rate_rad_s);
+
+// Where the output will be at a generator angle, counts of 2^-32 turn, under a torque, N m: from where the state rests, which stays as it is. A path
+// with a reversal is that of ticks.
+enum FlexsplineStatus flexspline_forward(const struct FlexsplineJoint *joint,
+                                         const struct FlexsplineStore *store,
+                                         const struct FlexsplineState *state,
+                                         int64_t generator_counts,
+                                         float torque_n_m,
+                                         struct FlexsplinePrediction *prediction);
+
+// Generator angle that brings the output to a target, counts of 2^-32 turn, under a torque, N m: in steady motion forward (+1) or backward (-1), or
+// from where the state rests (0). No limiter and no mode: that is the tick's part.
+enum FlexsplineStatus flexspline_inverse(const struct FlexsplineJoint *joint,
+                                         const struct FlexsplineStore *store,
+                                         const struct FlexsplineState *state,
+                                         int64_t target_counts,
+                                         float torque_n_m,
+                                         int8_t direction,
+                                         struct FlexsplineCommand *command);
+
+// Nominal output angle of a generator angle, counts of 2^-32 turn: generator over ratio.
+enum FlexsplineStatus flexspline_nominal_output(const struct FlexsplineJoint *joint,
+                                                int64_t generator_counts,
+                                                int64_t *output_counts);
+
+// Generator angle whose nominal output is an output angle, counts of 2^-32 turn: output times ratio.
+enum FlexsplineStatus flexspline_nominal_generator(const struct FlexsplineJoint *joint,
+                                                   int64_t output_counts,
+                                                   int64_t *generator_counts);
+
+// Ratio of a joint's drive, signed: generator turns in a turn of the output.
+enum FlexsplineStatus flexspline_ratio(const struct FlexsplineJoint *joint, float *ratio);
+
+// Tells where a drive rests inside its play, as the last tick left it.
+enum FlexsplineStatus flexspline_state_play(const struct FlexsplineState *state,
+                                            struct FlexsplinePlay *play);
+
+// Checks one image in full, without a store, and tells what it says of itself. The work grows with the image: for start-up, or the host.
+enum FlexsplineStatus flexspline_image_report(const uint8_t *image,
+                                              size_t image_bytes,
+                                              struct FlexsplineImageReport *report);
+
+// Makes a learner of 1 to `FLEXSPLINE_LEARNER_COEFFICIENTS` coefficients that has learnt nothing yet and is off; `FLEXSPLINE_STATUS_ARGUMENT` if a
+// setting is out of its range. An update takes as long with one as with all.
+enum FlexsplineStatus flexspline_learner_init(struct FlexsplineLearner *learner,
+                                              const struct FlexsplineLearnSettings *settings,
+                                              const struct FlexsplineCoefficient *coefficients,
+                                              uint8_t number);
+
+// Switches learning (`FLEXSPLINE_LEARNING_...`), from the next update on.
+enum FlexsplineStatus flexspline_learner_set(struct FlexsplineLearner *learner, uint8_t learning);
+
+// Forgets what was learnt; counters and `FLEXSPLINE_LEARNING_...` stay. The limiter of the joint takes the adjustment out.
+enum FlexsplineStatus flexspline_learner_reset(struct FlexsplineLearner *learner);
+
+// One tick, every tick and in order, after `flexspline_tick` with what it was given and gave: learns from the output angle measured at the same
+// moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and tells what to add in the next tick. Nothing that comes in can make
+// that exceed the limits. `input` is that of the tick with the learner's own adjustment alone: what springs or a model of yours added beside it counts
+// as known then, and is not learnt a second time.
+enum FlexsplineStatus flexspline_learner_update(struct FlexsplineLearner *learner,
+                                                const struct FlexsplineState *state,
+                                                const struct FlexsplineInput *input,
+                                                const struct FlexsplineOutput *output,
+                                                uint8_t has_measured,
+                                                int64_t measured_counts,
+                                                struct FlexsplineAdapted *adapted);
+
+// Tells a coefficient, by its place in the list that the learner was made of; `FLEXSPLINE_STATUS_ARGUMENT` beyond it.
+enum FlexsplineStatus flexspline_learner_coefficient(const struct FlexsplineLearner *learner,
+                                                     uint8_t place,
+                                                     struct FlexsplineLearnt *learnt);
+
+// Tells what became of measurements.
+enum FlexsplineStatus flexspline_learner_report(const struct FlexsplineLearner *learner,
+                                                struct FlexsplineLearnerReport *report);
+
+// Writes what was learnt, with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_LEARNER_BYTES` at most. `FLEXSPLINE_STATUS_TOO_LARGE` if there is
+// less room. The same bytes as in Rust.
+enum FlexsplineStatus flexspline_learner_save(const struct FlexsplineLearner *learner,
+                                              uint8_t *saved,
+                                              size_t saved_bytes,
+                                              size_t *written);
+
+// Takes back what a learner of the same coefficients saved, and is off; `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, or were saved with other
+// coefficients. The learner is made first, by `flexspline_learner_init`.
+enum FlexsplineStatus flexspline_learner_restore(struct FlexsplineLearner *learner,
+                                                 const uint8_t *saved,
+                                                 size_t saved_bytes);
+
+// Makes 1 to `FLEXSPLINE_SLIP_SPRINGS` springs that slip with `variable` (`FLEXSPLINE_SLIP_OF_...`), no deflection of which is known;
+// `FLEXSPLINE_STATUS_ARGUMENT` if a width is not allowed or a gain not finite.
+enum FlexsplineStatus flexspline_slip_init(struct FlexsplineSlip *slip,
+                                           uint8_t variable,
+                                           const struct FlexsplineSpring *springs,
+                                           uint8_t number);
+
+// Sets all deflections anew: 0, not known, as after a reset; 1, none, as before the first motion or after strokes that died away.
+enum FlexsplineStatus flexspline_slip_set(struct FlexsplineSlip *slip,
+                                          uint8_t is_relaxed);
+
+// One tick of springs that slip with the nominal output (`flexspline_nominal_output`), counts of 2^-32 turn: what they add in the next.
+// `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the torque.
+enum FlexsplineStatus flexspline_slip_update(struct FlexsplineSlip *slip,
+                                             int64_t nominal_counts,
+                                             struct FlexsplineSlipReport *report);
+
+// One tick of springs that slip with the load torque, N m: what they add in the next. A torque that is not finite moves nothing.
+// `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the output.
+enum FlexsplineStatus flexspline_slip_update_torque(struct FlexsplineSlip *slip,
+                                                    float torque_n_m,
+                                                    struct FlexsplineSlipReport *report);
+
+// Writes the deflections with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_SLIP_BYTES` at most. `FLEXSPLINE_STATUS_TOO_LARGE` if there is less room,
+// or before the first update. The same bytes as in Rust.
+enum FlexsplineStatus flexspline_slip_save(const struct FlexsplineSlip *slip,
+                                           uint8_t *saved,
+                                           size_t saved_bytes,
+                                           size_t *written);
+
+// Takes back the deflections that the same springs saved; only if the joint (of springs on the torque: the load) cannot have moved meanwhile.
+// `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, or of other springs. The springs are made first, by `flexspline_slip_init`.
+enum FlexsplineStatus flexspline_slip_restore(struct FlexsplineSlip *slip,
+                                              const uint8_t *saved,
+                                              size_t saved_bytes);
+
+// Adds to the adjustment of an input, counts of 2^-32 turn at the output: what a learner, springs or a friction model of your own say. Each sum is held within
+// +-0.049 rad.
+enum FlexsplineStatus flexspline_input_add(struct FlexsplineInput *input,
+                                           int32_t mean_counts,
+                                           int32_t half_width_counts);
+
+// The same in radians at the output; NaN adds nothing.
+enum FlexsplineStatus flexspline_input_add_rad(struct FlexsplineInput *input,
+                                               float mean_rad,
+                                               float half_width_rad);
+
+// Makes a recorder for a list of so many records (1 or more), which is the caller's and given with every call. It keeps every `divisor`-th tick, from
+// `offset` on; `full` (`FLEXSPLINE_FULL_...`) says what is lost where there is no room.
+enum FlexsplineStatus flexspline_recorder_init(struct FlexsplineRecorder *recorder,
+                                               uint16_t places,
+                                               uint32_t divisor,
+                                               uint32_t offset,
+                                               uint8_t full);
+
+// One tick, after `flexspline_tick`: kept if it is due, or whether due or not (`at_once` 1: something happened). Never waits. `records` are those that the
+// recorder was made for.
+enum FlexsplineStatus flexspline_recorder_see(struct FlexsplineRecorder *recorder,
+                                              struct FlexsplineRecord *records,
+                                              uint32_t tick,
+                                              uint8_t at_once,
+                                              const struct FlexsplineState *state,
+                                              const struct FlexsplineStore *store,
+                                              const struct FlexsplineOutput *output);
+
+// Takes the oldest record out: `is_taken` is 1, or 0 if none waits, and `record` is as it was. With the interrupt of the tick held off.
+enum FlexsplineStatus flexspline_recorder_take(struct FlexsplineRecorder *recorder,
+                                               const struct FlexsplineRecord *records,
+                                               struct FlexsplineRecord *record,
+                                               uint8_t *is_taken);
+
+// Writes a record as `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32, for the ground: docs/telemetry.xtce.xml is their dictionary.
+// `FLEXSPLINE_STATUS_ARGUMENT` if its quality, mode or health is none.
+enum FlexsplineStatus flexspline_record_encode(const struct FlexsplineRecord *record,
+                                               uint8_t (*bytes)[FLEXSPLINE_RECORD_BYTES]);
+
+// Reads such bytes (`FLEXSPLINE_RECORD_BYTES`), on the ground: `FLEXSPLINE_STATUS_SAVED` if they are damaged or no record,
+// `FLEXSPLINE_STATUS_ARGUMENT` if they are one of another version.
+enum FlexsplineStatus flexspline_record_decode(const uint8_t *first,
+                                               struct FlexsplineRecord *record);
 
 // Begins to receive a table of so many bytes. The buffer is the caller's and is given with every call; it is no image in use.
 enum FlexsplineStatus flexspline_upload_begin(struct FlexsplineUpload *upload,
@@ -533,6 +1301,23 @@ enum FlexsplineStatus flexspline_record(uint32_t tick,
 enum FlexsplineStatus flexspline_predictor_init(struct FlexsplinePredictor *predictor,
                                                 const float (*parts)[FLEXSPLINE_PREDICTOR_PARTS]);
 
+// Makes a predictor of two inertias: discretises them over a tick and finds the gains of the observer, in double precision. For the host, or for a start-up that has
+// the time (some 20000 products of small matrices). `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite and positive, or the observer does not contract.
+enum FlexsplineStatus flexspline_predictor_of(struct FlexsplinePredictor *predictor,
+                                              const struct FlexsplineInertias *inertias,
+                                              const struct FlexsplineNoise *noise,
+                                              double tick_s);
+
+// Tells the numbers of a predictor, for `flexspline_predictor_init` of the firmware.
+enum FlexsplineStatus flexspline_predictor_parts(const struct FlexsplinePredictor *predictor,
+                                                 float (*parts)[FLEXSPLINE_PREDICTOR_PARTS]);
+
+// Tells what the observer can be off by while the disturbances stay within their bounds: twist rad, speeds of motor and load rad/s, torque on the load N m; for
+// `FlexsplineNow`. For the host or start-up: 10000 ticks in double precision.
+enum FlexsplineStatus flexspline_predictor_state_bound(const struct FlexsplinePredictor *predictor,
+                                                       const struct FlexsplineDisturbance *disturbance,
+                                                       float (*bound)[4]);
+
 // Makes an observer at rest, without load.
 enum FlexsplineStatus flexspline_observer_init(struct FlexsplineObserver *observer);
 
@@ -560,3 +1345,93 @@ enum FlexsplineStatus flexspline_predict(const struct FlexsplinePredictor *predi
 #endif  // __cplusplus
 
 #endif  /* FLEXSPLINE_H */
+
+
+#ifndef FLEXSPLINE_LAYOUT
+// What `flexspline_layout` says where program and library agree on the size of all types above: `if (flexspline_layout() != FLEXSPLINE_LAYOUT) stop();`
+#define FLEXSPLINE_AND_SIZE_(type) * 31u + (uint32_t)sizeof(type))
+#define FLEXSPLINE_LAYOUT \
+  (((((((((((((((((((((((((((((((((((((((((((((0u \
+  FLEXSPLINE_AND_SIZE_(FlexsplineStatus) \
+  FLEXSPLINE_AND_SIZE_(size_t) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineStore) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineActivation) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineIdentity) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineJoint) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineState) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineSettings) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineImages) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineInput) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineOutput) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineStoreReport) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineStateReport) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineUpload) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineWatch) \
+  FLEXSPLINE_AND_SIZE_(FlexsplinePredictor) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineObserver) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineEvents) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineMeasured) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineObserverReport) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineNow) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineAhead) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineInertias) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineNoise) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineDisturbance) \
+  FLEXSPLINE_AND_SIZE_(FlexsplinePrediction) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineCommand) \
+  FLEXSPLINE_AND_SIZE_(FlexsplinePlay) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineImageReport) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineTorqueSettings) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineTorquePath) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineAged) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineCoefficient) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineLearnSettings) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineLearner) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineAdapted) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineLearnerReport) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineLearnt) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineSpring) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineSlip) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineSlipReport) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineRecorder) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineRecord) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineEncoderSettings) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineEncoder)
+
+// Sizes and alignments that the compiler can check without the library.
+#if defined(__cplusplus)
+#define FLEXSPLINE_CHECK_(name, condition) static_assert(condition, "flexspline.h: size or alignment of " #name)
+#elif defined(__STDC_VERSION__) && __STDC_VERSION__ >= 201112L
+#define FLEXSPLINE_CHECK_(name, condition) _Static_assert(condition, "flexspline.h: size or alignment of " #name)
+#else
+#define FLEXSPLINE_CHECK_(name, condition) typedef char flexspline_size_or_alignment_of_##name[(condition) ? 1 : -1]
+#endif
+struct FlexsplineWord_ {
+  char before;
+  uint64_t word;
+};
+#define FLEXSPLINE_OBJECT_(type, words) \
+  struct type##Aligned_ { \
+    char before; \
+    type object; \
+  }; \
+  FLEXSPLINE_CHECK_(type, sizeof(type) == 8 * (words) && \
+                              offsetof(struct type##Aligned_, object) == offsetof(struct FlexsplineWord_, word))
+FLEXSPLINE_OBJECT_(FlexsplineStore, FLEXSPLINE_STORE_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineJoint, FLEXSPLINE_JOINT_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineState, FLEXSPLINE_STATE_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineActivation, FLEXSPLINE_ACTIVATION_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineIdentity, FLEXSPLINE_IDENTITY_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineUpload, FLEXSPLINE_UPLOAD_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineWatch, FLEXSPLINE_WATCH_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplinePredictor, FLEXSPLINE_PREDICTOR_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineObserver, FLEXSPLINE_OBSERVER_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineLearner, FLEXSPLINE_LEARNER_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineSlip, FLEXSPLINE_SLIP_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineRecorder, FLEXSPLINE_RECORDER_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineTorquePath, FLEXSPLINE_TORQUE_PATH_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineAged, FLEXSPLINE_AGED_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineEncoder, FLEXSPLINE_ENCODER_WORDS);
+FLEXSPLINE_CHECK_(packed_structures, sizeof(FlexsplineStateReport) == 8);
+FLEXSPLINE_CHECK_(FlexsplineWord_, sizeof(uint64_t) == 8 && sizeof(float) == 4 && sizeof(double) == 8);
+#endif

@@ -15,18 +15,25 @@
 //! is aligned points to an object of its type, and images have the length given.
 #![allow(unsafe_code)]
 
+mod ask;
 mod beside;
+mod encoder;
+mod learn;
+mod names;
+mod telemetry;
+mod torque;
 
+use beside::{given, health_code, quality_code};
+#[cfg(not(feature = "fuzzing"))]
+use names::*;
 #[cfg(feature = "fuzzing")]
-pub use beside::*;
-use beside::{health_code, quality_code};
+pub use {ask::*, beside::*, encoder::*, learn::*, names::*, telemetry::*, torque::*};
 
 use crate::{
-    ActivateError, Activation, Adjustment, Counters, Drive, FORMAT_VERSION, FixedMember, Flags, GeneratorAngle,
-    Identity, IdentityCheck, ImageError, Images, Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun,
-    Progress, RestoreError, SAVED_JOINT_BYTES, Store, mend_page, self_test,
+    ActivateError, Activation, Adjustment, Counters, Drive, FixedMember, Flags, GeneratorAngle, Identity,
+    IdentityCheck, ImageError, Images, Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun, Progress,
+    RestoreError, SAVED_JOINT_BYTES, Store, mend_page, self_test,
 };
-use core::ffi::c_char;
 use core::mem::{MaybeUninit, align_of, size_of};
 
 #[cfg(all(target_os = "none", not(test)))]
@@ -154,9 +161,9 @@ pub struct FlexsplineSettings {
     pub flexspline_teeth: u16,
     /// Teeth of the circular spline, more than those.
     pub circular_spline_teeth: u16,
-    /// 0: the flexspline is fixed; 1: the circular spline.
+    /// `FLEXSPLINE_FIXED_...`.
     pub fixed_member: u8,
-    /// 0: skip late ticks and count; 1: hold the last correction; 2: fade out.
+    /// `FLEXSPLINE_OVERRUN_...`.
     pub overrun: u8,
     /// Ticks of a fade.
     pub fade_ticks: u16,
@@ -198,7 +205,8 @@ pub struct FlexsplineInput {
     /// Where the output shall be.
     pub target_counts: i64,
     /// Load torque at the output, N m, positive when it turns the output forward: that in the mesh, with the drag added that the
-    /// table was made with (times the direction), not that on the load where drag or inertia differ.
+    /// table was made with (times the direction), not that on the load where drag or inertia differ: `flexspline_torque_tick` makes it
+    /// of a reading.
     pub torque_n_m: f32,
     /// Ticks missed since the last call.
     pub missed_ticks: u16,
@@ -226,7 +234,7 @@ pub struct FlexsplineOutput {
     pub correction_rad: f32,
     /// What the limiter held back, rad.
     pub held_back_rad: f32,
-    /// 0 in range, 1 uncertain, 2 extrapolated, 3 disabled.
+    /// `FLEXSPLINE_QUALITY_...`.
     pub quality: u8,
     /// `FLEXSPLINE_FLAG_...`.
     pub flags: u16,
@@ -248,7 +256,7 @@ pub struct FlexsplineStoreReport {
     pub pages_damaged: u32,
     /// Passes over both copies.
     pub passes: u32,
-    /// 0 sound, 1 a page of one image is damaged, 2 of both: lost, 3 no table, 4 torn: activate again.
+    /// `FLEXSPLINE_HEALTH_...`.
     pub health: u8,
     /// Image with a page that can be written again from the other: 0 or 1; 255 if there is none.
     pub damaged_image: u8,
@@ -262,7 +270,7 @@ pub struct FlexsplineStoreReport {
 pub struct FlexsplineStateReport {
     /// Ticks missed since the start; wraps.
     pub missed_ticks: u32,
-    /// 0 off, 1 tracking, 2 hold, 3 safe.
+    /// `FLEXSPLINE_MODE_...`.
     pub mode: u8,
     /// 1 if the side of the play is known, else 0.
     pub side_known: u8,
@@ -349,6 +357,27 @@ fn copied<T: Copy>(object: *const T) -> Result<T, FlexsplineStatus> {
     Ok(unsafe { *object })
 }
 
+/// The first entries of a list of the caller, the rest as given; `Argument` for none, or more than there are places.
+fn list<T: Copy, const N: usize>(first: *const T, number: u8, mut to: [T; N]) -> Result<[T; N], FlexsplineStatus> {
+    usable(first)?;
+    let number = number as usize;
+    if number == 0 || number > N {
+        return Err(FlexsplineStatus::Argument);
+    }
+    for (place, to) in to.iter_mut().take(number).enumerate() {
+        *to = copied(first.wrapping_add(place))?;
+    }
+    Ok(to)
+}
+
+/// Writes an answer; where that is must have been found apart from all that is borrowed.
+fn give<T>(to: *mut T, value: T) -> Result<(), FlexsplineStatus> {
+    usable(to)?;
+    // SAFETY: not null, aligned, and the caller's.
+    unsafe { to.write(value) };
+    Ok(())
+}
+
 fn bytes<'a>(first: *const u8, length: usize) -> Result<&'a [u8], FlexsplineStatus> {
     usable(first)?;
     if length > isize::MAX as usize {
@@ -372,6 +401,21 @@ fn images<'a, const N: usize>(
         }
     }
     Ok(found)
+}
+
+/// Bytes to write; where they are must have been found apart from all that is borrowed.
+fn bytes_mut<'a>(first: *mut u8, length: usize) -> Result<&'a mut [u8], FlexsplineStatus> {
+    usable(first)?;
+    if length > isize::MAX as usize {
+        return Err(FlexsplineStatus::Argument);
+    }
+    // SAFETY: not null; the caller says that so many bytes are there, and they are its own. Not kept beyond the call.
+    Ok(unsafe { core::slice::from_raw_parts_mut(first, length) })
+}
+
+/// Whether what is written is apart from what is read.
+fn clear<const N: usize>(written: (usize, usize), read: [(usize, usize); N]) -> Result<(), FlexsplineStatus> {
+    read.into_iter().try_for_each(|read| apart([written, read]))
 }
 
 fn status(result: Result<(), FlexsplineStatus>) -> FlexsplineStatus {
@@ -417,14 +461,14 @@ pub extern "C" fn flexspline_joint_init(
     let make = || {
         let s = copied(settings)?;
         let fixed = match s.fixed_member {
-            0 => FixedMember::Flexspline,
-            1 => FixedMember::CircularSpline,
+            FLEXSPLINE_FIXED_FLEXSPLINE => FixedMember::Flexspline,
+            FLEXSPLINE_FIXED_CIRCULAR_SPLINE => FixedMember::CircularSpline,
             _ => return Err(FlexsplineStatus::Argument),
         };
         let overrun = match s.overrun {
-            0 => Overrun::SkipAndCount,
-            1 => Overrun::HoldLast,
-            2 if s.fade_ticks > 0 => Overrun::FadeOut { ticks: s.fade_ticks },
+            FLEXSPLINE_OVERRUN_SKIP => Overrun::SkipAndCount,
+            FLEXSPLINE_OVERRUN_HOLD => Overrun::HoldLast,
+            FLEXSPLINE_OVERRUN_FADE if s.fade_ticks > 0 => Overrun::FadeOut { ticks: s.fade_ticks },
             _ => return Err(FlexsplineStatus::Argument),
         };
         let limits = Limits {
@@ -495,8 +539,7 @@ pub extern "C" fn flexspline_activation_begin(
     status(begin())
 }
 
-/// A step: the same store and images with each, until `progress` is 2. 0: the images are checked, the store is as it was; 1: the store is
-/// filled, and has no table meanwhile; 2: the table is in use. If a step fails the activation is over; begin again.
+/// A step: the same store and images with each, until `progress` (`FLEXSPLINE_PROGRESS_...`) is done. If a step fails the activation is over; begin again.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_activation_step(
     activation: *mut FlexsplineActivation,
@@ -511,9 +554,9 @@ pub extern "C" fn flexspline_activation_step(
         let activation: &mut Activation = get_mut(activation, ACTIVATION_MARK)?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
         let code = match activation.step(store, &images).map_err(activate_status)? {
-            Progress::Checking => 0,
-            Progress::Filling => 1,
-            Progress::Done(_) => 2,
+            Progress::Checking => FLEXSPLINE_PROGRESS_CHECKING,
+            Progress::Filling => FLEXSPLINE_PROGRESS_FILLING,
+            Progress::Done(_) => FLEXSPLINE_PROGRESS_DONE,
         };
         // SAFETY: not null; the caller's, apart from everything else.
         unsafe { progress.write(code) };
@@ -528,8 +571,8 @@ pub extern "C" fn flexspline_identity_begin(identity: *mut FlexsplineIdentity) -
     status(put(identity, IDENTITY_MARK, IdentityCheck::new()))
 }
 
-/// Takes in a block of 64 bytes of the image, the same one with each step. `found` is 0 while there is more, then 1 if the image is the one of its id,
-/// or 2 if it is not; with the next step it begins anew.
+/// Takes in a block of 64 bytes of the image, the same one with each step. `found` (`FLEXSPLINE_IDENTITY_...`) is hashing while there is more, then same or other;
+/// with the next step it begins anew.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_identity_step(
     identity: *mut FlexsplineIdentity,
@@ -543,9 +586,9 @@ pub extern "C" fn flexspline_identity_step(
         let image = bytes(image, image_bytes)?;
         let identity: &mut IdentityCheck = get_mut(identity, IDENTITY_MARK)?;
         let code = match identity.step(image) {
-            Identity::Hashing => 0,
-            Identity::Same(_) => 1,
-            Identity::Other(_) => 2,
+            Identity::Hashing => FLEXSPLINE_IDENTITY_HASHING,
+            Identity::Same(_) => FLEXSPLINE_IDENTITY_SAME,
+            Identity::Other(_) => FLEXSPLINE_IDENTITY_OTHER,
         };
         // SAFETY: not null; the caller's, apart from everything else.
         unsafe { found.write(code) };
@@ -659,12 +702,13 @@ pub extern "C" fn flexspline_joint_mend(joint: *mut FlexsplineJoint) -> Flexspli
     status(mend())
 }
 
-/// Changes the mode: 0 off, 1 tracking, 2 hold, 3 safe.
+/// Changes the mode (`FLEXSPLINE_MODE_...`): `FLEXSPLINE_STATUS_MODE` where there is no such transition
+/// (`flexspline_mode_may_become`).
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_request(state: *mut FlexsplineState, mode: u8) -> FlexsplineStatus {
     let request = || {
         let state: &mut JointState = get_mut(state, STATE_MARK)?;
-        if mode > 3 {
+        if mode > FLEXSPLINE_MODE_SAFE {
             return Err(FlexsplineStatus::Argument);
         }
         state.request(Mode::from_code(mode as u32)).map_err(|_| FlexsplineStatus::Mode)
@@ -753,65 +797,21 @@ pub extern "C" fn flexspline_state_restore(
     status(restore())
 }
 
-/// Version of this library, as text.
-#[unsafe(no_mangle)]
-pub extern "C" fn flexspline_version() -> *const c_char {
-    concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
+/// What a tick is given.
+#[inline(always)]
+fn told(input: &FlexsplineInput) -> Input {
+    let generator = GeneratorAngle::from_counts(input.generator_counts);
+    Input {
+        generator: if input.has_generator != 0 { Some(generator) } else { None },
+        target: OutputAngle::from_counts(input.target_counts),
+        torque_n_m: input.torque_n_m,
+        missed_ticks: input.missed_ticks,
+        adjustment: Adjustment { mean_counts: input.mean_counts, half_width_counts: input.half_width_counts },
+    }
 }
 
-/// Version of the table format that is read.
-#[unsafe(no_mangle)]
-pub extern "C" fn flexspline_format_version() -> u16 {
-    FORMAT_VERSION
-}
-
-/// Name of a mode.
-#[unsafe(no_mangle)]
-pub extern "C" fn flexspline_mode_name(mode: u8) -> *const c_char {
-    let name = match mode {
-        0 => c"off",
-        1 => c"tracking",
-        2 => c"hold",
-        3 => c"safe",
-        _ => c"?",
-    };
-    name.as_ptr()
-}
-
-/// Name of a health, as in `FlexsplineStoreReport`.
-#[unsafe(no_mangle)]
-pub extern "C" fn flexspline_health_name(health: u8) -> *const c_char {
-    let name = match health {
-        0 => c"sound",
-        1 => c"one image",
-        2 => c"lost",
-        3 => c"empty",
-        4 => c"torn",
-        _ => c"?",
-    };
-    name.as_ptr()
-}
-
-/// Name of one flag.
-#[unsafe(no_mangle)]
-pub extern "C" fn flexspline_flag_name(flag: u16) -> *const c_char {
-    let name = match flag {
-        FLEXSPLINE_FLAG_SAMPLE_LOST => c"sample lost",
-        FLEXSPLINE_FLAG_GLITCH => c"glitch",
-        FLEXSPLINE_FLAG_OVERRUN => c"overrun",
-        FLEXSPLINE_FLAG_HELD_BACK => c"held back",
-        FLEXSPLINE_FLAG_NOT_CORRECTED => c"not corrected",
-        FLEXSPLINE_FLAG_TABLE_DOUBT => c"table doubt",
-        FLEXSPLINE_FLAG_STATE_TORN => c"state torn",
-        FLEXSPLINE_FLAG_JOINT_TORN => c"joint torn",
-        FLEXSPLINE_FLAG_SAFE => c"safe",
-        FLEXSPLINE_FLAG_OTHER_IMAGES => c"other images",
-        _ => c"?",
-    };
-    name.as_ptr()
-}
-
-/// One tick.
+/// One tick: from what was measured to what to command, once every `tick_s` and in the order of time. `FLEXSPLINE_STATUS_OK` also where no
+/// correction could be made: `flags` and `quality` of the output say so.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_tick(
     joint: *const FlexsplineJoint,
@@ -829,14 +829,7 @@ pub extern "C" fn flexspline_tick(
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
         let state: &mut JointState = get_mut(state, STATE_MARK)?;
-        let generator = GeneratorAngle::from_counts(input.generator_counts);
-        let input = Input {
-            generator: if input.has_generator != 0 { Some(generator) } else { None },
-            target: OutputAngle::from_counts(input.target_counts),
-            torque_n_m: input.torque_n_m,
-            missed_ticks: input.missed_ticks,
-            adjustment: Adjustment { mean_counts: input.mean_counts, half_width_counts: input.half_width_counts },
-        };
+        let input = told(&input);
         let found = joint.tick(&images, store, state, &input);
         let given = FlexsplineOutput {
             command_counts: found.command.counts(),
@@ -856,6 +849,9 @@ pub extern "C" fn flexspline_tick(
 }
 
 #[cfg(test)]
+mod mixed;
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::fixture;
@@ -863,7 +859,7 @@ mod tests {
     use std::boxed::Box;
     use std::vec::Vec;
 
-    const SETTINGS: FlexsplineSettings = FlexsplineSettings {
+    pub(super) const SETTINGS: FlexsplineSettings = FlexsplineSettings {
         flexspline_teeth: 188,
         circular_spline_teeth: 190,
         fixed_member: 0,
@@ -1089,10 +1085,10 @@ mod tests {
         assert_eq!(flexspline_state_forget_side(&mut o.state), FlexsplineStatus::Ok);
         assert_eq!(flexspline_joint_mend(&mut o.joint), FlexsplineStatus::Ok);
         // SAFETY: texts of the library.
-        let text = |name: *const c_char| unsafe { core::ffi::CStr::from_ptr(name) }.to_str().unwrap();
+        let text = |name: *const core::ffi::c_char| unsafe { core::ffi::CStr::from_ptr(name) }.to_str().unwrap();
         assert_eq!(text(flexspline_version()), env!("CARGO_PKG_VERSION"));
         assert_eq!([text(flexspline_mode_name(3)), text(flexspline_health_name(4))], ["safe", "torn"]);
-        assert_eq!((flexspline_format_version(), text(flexspline_mode_name(9))), (FORMAT_VERSION, "?"));
+        assert_eq!((flexspline_format_version(), text(flexspline_mode_name(9))), (crate::FORMAT_VERSION, "?"));
         let flags = [Flags::SAMPLE_LOST, Flags::TABLE_DOUBT, Flags::JOINT_TORN, Flags::SAFE, Flags::OTHER_IMAGES];
         let names = ["sample lost", "table doubt", "joint torn", "safe", "other images"];
         assert!(flags.iter().zip(names).all(|(flag, name)| text(flexspline_flag_name(flag.bits())) == name));

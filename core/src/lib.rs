@@ -55,6 +55,7 @@
 //! # let reached = Table::check(&image).unwrap().forward(&mut state.play().clone(), command, 12.0, 20.0);
 //! # assert!(reached.output.minus_rad(target).abs() < 2e-8, "{}", reached.output.minus_rad(target));
 //! ```
+//! What an encoder counts becomes an angle by [`Encoder`], and back: any counts in a turn, registers that begin anew, no drift.
 //! In a slow rate group ([`RateGroup`]) the firmware tells the temperature ([`Store::set_temperature`]) and lets a few words of the
 //! images be checked ([`Store::check_images`]). Where no loop runs, as on the host, [`Table`] alone answers: [`Table::forward`],
 //! [`Table::inverse`].
@@ -183,7 +184,8 @@
     )
 )]
 
-#[cfg(any(test, feature = "std"))]
+// A static library for a PC has the panic handler of `std`; on the target it has one that cannot be linked.
+#[cfg(any(test, feature = "std", all(feature = "c-api", not(target_os = "none"))))]
 extern crate std;
 
 mod angle;
@@ -197,6 +199,7 @@ pub mod c_api;
 mod campaign;
 mod crc;
 mod drive;
+mod encoder;
 mod error;
 #[cfg(test)]
 mod fixture;
@@ -217,6 +220,7 @@ mod whole;
 
 pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};
+pub use encoder::{Encoder, EncoderError, EncoderSettings, EncoderState, EncoderWrap};
 pub use error::{DriveError, Field, ImageError};
 pub use joint::{
     AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Aged, Ahead, Coefficient,

@@ -1,12 +1,14 @@
 //! What goes on beside a tick: a table received in chunks, events, records for the ground, an observer and what lies ahead.
 
+use super::names::*;
 use super::{
     FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, JOINT_MARK, Marked,
-    STATE_MARK, STORE_MARK, apart, bytes, copied, get, get_mut, image_status, put, span, status, usable,
+    STATE_MARK, STORE_MARK, apart, bytes, clear, copied, get, get_mut, give, image_status, put, span, status, usable,
 };
 use crate::{
-    Disturbance, Event, Flags, GeneratorAngle, Health, Joint, JointState, Measured, Mode, Now, Output, OutputAngle,
-    PREDICTOR_PARTS, Predictor, PredictorState, Quality, RECORD_BYTES, Record, Store, Upload, UploadError, Watch,
+    Disturbance, Event, Flags, GeneratorAngle, Health, Inertias, Joint, JointState, Measured, Mode, Noise, Now, Output,
+    OutputAngle, PREDICTOR_PARTS, Predictor, PredictorState, Quality, RECORD_BYTES, Record, Store, Upload, UploadError,
+    Watch,
 };
 use core::mem::{MaybeUninit, align_of, size_of};
 
@@ -44,28 +46,28 @@ pub const FLEXSPLINE_EVENT_STATE_TORN: u16 = 128;
 #[repr(C)]
 #[derive(Debug)]
 pub struct FlexsplineUpload {
-    opaque: [MaybeUninit<u64>; FLEXSPLINE_UPLOAD_WORDS],
+    pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_UPLOAD_WORDS],
 }
 
 /// Knows how the last tick was.
 #[repr(C)]
 #[derive(Debug)]
 pub struct FlexsplineWatch {
-    opaque: [MaybeUninit<u64>; FLEXSPLINE_WATCH_WORDS],
+    pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_WATCH_WORDS],
 }
 
 /// Two inertias and an observer of them: all that does not change while they run.
 #[repr(C)]
 #[derive(Debug)]
 pub struct FlexsplinePredictor {
-    opaque: [MaybeUninit<u64>; FLEXSPLINE_PREDICTOR_WORDS],
+    pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_PREDICTOR_WORDS],
 }
 
 /// What an observer estimates.
 #[repr(C)]
 #[derive(Debug)]
 pub struct FlexsplineObserver {
-    opaque: [MaybeUninit<u64>; FLEXSPLINE_OBSERVER_WORDS],
+    pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_OBSERVER_WORDS],
 }
 
 /// What changed in a tick.
@@ -76,11 +78,11 @@ pub struct FlexsplineEvents {
     pub missed_ticks: u32,
     /// `FLEXSPLINE_EVENT_...`; what follows is only told with its event.
     pub events: u16,
-    /// 0 off, 1 tracking, 2 hold, 3 safe.
+    /// `FLEXSPLINE_MODE_...`.
     pub mode_before: u8,
     /// The mode now.
     pub mode: u8,
-    /// As in `FlexsplineStoreReport`.
+    /// `FLEXSPLINE_HEALTH_...`.
     pub health_before: u8,
     /// The health now.
     pub health: u8,
@@ -152,8 +154,52 @@ pub struct FlexsplineAhead {
     pub motor_rad: f32,
     /// Twist then, rad.
     pub twist_rad: f32,
-    /// 0 in range, 1 uncertain, 2 extrapolated, 3 disabled: the worse of now and then.
+    /// `FLEXSPLINE_QUALITY_...`: the worse of now and then.
     pub quality: u8,
+}
+
+/// Two inertias, at the output.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct FlexsplineInertias {
+    /// Motor, generator and what turns with them: their inertia times the square of the ratio, kg m^2.
+    pub motor_kg_m2: f64,
+    /// Load, kg m^2.
+    pub load_kg_m2: f64,
+    /// Torsional stiffness, N m/rad: the slope of the wind-up.
+    pub stiffness_n_m_per_rad: f64,
+    /// Damping beside it, N m s/rad.
+    pub damping_n_m_s_per_rad: f64,
+}
+
+/// How much of what is measured and assumed can be trusted: standard deviations.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct FlexsplineNoise {
+    /// Motor torque at the output, N m.
+    pub torque_n_m: f64,
+    /// Change of the torque on the load in a tick, N m.
+    pub load_change_n_m: f64,
+    /// Motor speed over the ratio as measured in one tick, rad/s.
+    pub speed_rad_s: f64,
+    /// Twist as measured, rad; of no matter without an encoder at the output.
+    pub twist_rad: f64,
+    /// 0 without an encoder at the output, else 1.
+    pub has_twist: u8,
+}
+
+/// How far what is measured and assumed can be off: bounds, each +-.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct FlexsplineDisturbance {
+    /// Motor torque at the output, N m.
+    pub torque_n_m: f32,
+    /// Change of the torque on the load in a tick, N m.
+    pub load_change_n_m: f32,
+    /// Motor speed over the ratio as measured, rad/s.
+    pub speed_rad_s: f32,
+    /// Twist as measured, rad; of no matter without an encoder at the output.
+    pub twist_rad: f32,
 }
 
 /// Announced and received bytes.
@@ -181,25 +227,48 @@ const _: () = {
 
 pub(super) const fn quality_code(quality: Quality) -> u8 {
     match quality {
-        Quality::InRange => 0,
-        Quality::Uncertain => 1,
-        Quality::Extrapolated => 2,
-        Quality::Disabled => 3,
+        Quality::InRange => FLEXSPLINE_QUALITY_IN_RANGE,
+        Quality::Uncertain => FLEXSPLINE_QUALITY_UNCERTAIN,
+        Quality::Extrapolated => FLEXSPLINE_QUALITY_EXTRAPOLATED,
+        Quality::Disabled => FLEXSPLINE_QUALITY_DISABLED,
     }
 }
 
 pub(super) const fn health_code(health: Health) -> u8 {
     match health {
-        Health::Sound => 0,
-        Health::OneImage => 1,
-        Health::Lost => 2,
-        Health::Empty => 3,
-        Health::Torn => 4,
+        Health::Sound => FLEXSPLINE_HEALTH_SOUND,
+        Health::OneImage => FLEXSPLINE_HEALTH_ONE_IMAGE,
+        Health::Lost => FLEXSPLINE_HEALTH_LOST,
+        Health::Empty => FLEXSPLINE_HEALTH_EMPTY,
+        Health::Torn => FLEXSPLINE_HEALTH_TORN,
     }
 }
 
+/// Back from its number.
+pub(super) const fn quality_of(code: u8) -> Result<Quality, FlexsplineStatus> {
+    Ok(match code {
+        FLEXSPLINE_QUALITY_IN_RANGE => Quality::InRange,
+        FLEXSPLINE_QUALITY_UNCERTAIN => Quality::Uncertain,
+        FLEXSPLINE_QUALITY_EXTRAPOLATED => Quality::Extrapolated,
+        FLEXSPLINE_QUALITY_DISABLED => Quality::Disabled,
+        _ => return Err(FlexsplineStatus::Argument),
+    })
+}
+
+/// Back from its number.
+pub(super) const fn health_of(code: u8) -> Result<Health, FlexsplineStatus> {
+    Ok(match code {
+        FLEXSPLINE_HEALTH_SOUND => Health::Sound,
+        FLEXSPLINE_HEALTH_ONE_IMAGE => Health::OneImage,
+        FLEXSPLINE_HEALTH_LOST => Health::Lost,
+        FLEXSPLINE_HEALTH_EMPTY => Health::Empty,
+        FLEXSPLINE_HEALTH_TORN => Health::Torn,
+        _ => return Err(FlexsplineStatus::Argument),
+    })
+}
+
 /// What a tick gave, back from C.
-fn given(output: *const FlexsplineOutput) -> Result<Output, FlexsplineStatus> {
+pub(super) fn given(output: *const FlexsplineOutput) -> Result<Output, FlexsplineStatus> {
     let found = copied(output)?;
     Ok(Output {
         command: GeneratorAngle::from_counts(found.command_counts),
@@ -208,13 +277,7 @@ fn given(output: *const FlexsplineOutput) -> Result<Output, FlexsplineStatus> {
         uncertainty_rad: found.uncertainty_rad,
         correction_rad: found.correction_rad,
         held_back_rad: found.held_back_rad,
-        quality: match found.quality {
-            0 => Quality::InRange,
-            1 => Quality::Uncertain,
-            2 => Quality::Extrapolated,
-            3 => Quality::Disabled,
-            _ => return Err(FlexsplineStatus::Argument),
-        },
+        quality: quality_of(found.quality)?,
         flags: Flags::of_bits(found.flags),
     })
 }
@@ -383,6 +446,69 @@ pub extern "C" fn flexspline_predictor_init(
         put(predictor, PREDICTOR_MARK, made)
     };
     status(make())
+}
+
+/// Makes a predictor of two inertias: discretises them over a tick and finds the gains of the observer, in double precision. For the host, or for a start-up that has
+/// the time (some 20000 products of small matrices). `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite and positive, or the observer does not contract.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_predictor_of(
+    predictor: *mut FlexsplinePredictor,
+    inertias: *const FlexsplineInertias,
+    noise: *const FlexsplineNoise,
+    tick_s: f64,
+) -> FlexsplineStatus {
+    let make = || {
+        let (i, n) = (copied(inertias)?, copied(noise)?);
+        usable(predictor)?;
+        let inertias = Inertias {
+            motor_kg_m2: i.motor_kg_m2,
+            load_kg_m2: i.load_kg_m2,
+            stiffness_n_m_per_rad: i.stiffness_n_m_per_rad,
+            damping_n_m_s_per_rad: i.damping_n_m_s_per_rad,
+        };
+        let noise = Noise {
+            torque_n_m: n.torque_n_m,
+            load_change_n_m: n.load_change_n_m,
+            speed_rad_s: n.speed_rad_s,
+            twist_rad: (n.has_twist != 0).then_some(n.twist_rad),
+        };
+        let made = Predictor::new(inertias, noise, tick_s).map_err(|_| FlexsplineStatus::Argument)?;
+        put(predictor, PREDICTOR_MARK, made)
+    };
+    status(make())
+}
+
+/// Tells the numbers of a predictor, for `flexspline_predictor_init` of the firmware.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_predictor_parts(
+    predictor: *const FlexsplinePredictor,
+    parts: *mut [f32; FLEXSPLINE_PREDICTOR_PARTS],
+) -> FlexsplineStatus {
+    let tell = || {
+        apart([span(predictor), span(parts)])?;
+        let predictor: &Predictor = get(predictor, PREDICTOR_MARK)?;
+        give(parts, predictor.parts())
+    };
+    status(tell())
+}
+
+/// Tells what the observer can be off by while the disturbances stay within their bounds: twist rad, speeds of motor and load rad/s, torque on the load N m; for
+/// `FlexsplineNow`. For the host or start-up: 10000 ticks in double precision.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_predictor_state_bound(
+    predictor: *const FlexsplinePredictor,
+    disturbance: *const FlexsplineDisturbance,
+    bound: *mut [f32; 4],
+) -> FlexsplineStatus {
+    let tell = || {
+        clear(span(bound), [span(predictor), span(disturbance)])?;
+        usable(bound)?;
+        let FlexsplineDisturbance { torque_n_m, load_change_n_m, speed_rad_s, twist_rad } = copied(disturbance)?;
+        let predictor: &Predictor = get(predictor, PREDICTOR_MARK)?;
+        let disturbance = Disturbance { torque_n_m, load_change_n_m, speed_rad_s, twist_rad };
+        give(bound, predictor.state_bound(&disturbance))
+    };
+    status(tell())
 }
 
 /// Makes an observer at rest, without load.

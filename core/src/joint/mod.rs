@@ -14,6 +14,8 @@ mod slip;
 mod state;
 mod torque_path;
 
+#[cfg(feature = "c-api")]
+pub(crate) use adapt::NO_COEFFICIENT;
 pub use adapt::{
     AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Coefficient, Learning, Seen, Term, Verdict,
     saved_adapt_bytes,

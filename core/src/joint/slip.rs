@@ -131,7 +131,7 @@ impl<const N: usize> SlipBank<N, NominalOutput> {
     pub fn new(elements: [SlipElement; N]) -> Option<Self> {
         let sound = |e: &SlipElement| e.width_rad >= 0.0 && e.width_rad <= 0.05 && e.gain.is_finite();
         let width = |e: SlipElement| counts_from_rad(e.width_rad).min(MAX_HALF_COUNTS);
-        elements.iter().all(sound).then(|| Self::of(elements.map(width), elements.map(|e| e.gain * RAD_PER_COUNT)))
+        elements.iter().all(sound).then(|| Self::of(elements.map(width), elements.map(|e| e.gain * RAD_PER_COUNT), N))
     }
 
     /// Follows the motion to `nominal`, once each tick. The same work for all values.
@@ -161,7 +161,7 @@ impl<const N: usize> SlipBank<N, LoadTorque> {
             |e: &TorqueSlipElement| e.width_n_m >= 0.0 && e.width_n_m <= MAX_N_M && e.gain_rad_per_n_m.is_finite();
         let width = |e: TorqueSlipElement| (e.width_n_m * PER_N_M) as i32;
         let gain = |e: TorqueSlipElement| e.gain_rad_per_n_m / PER_N_M;
-        elements.iter().all(sound).then(|| Self::of(elements.map(width), elements.map(gain)))
+        elements.iter().all(sound).then(|| Self::of(elements.map(width), elements.map(gain), N))
     }
 
     /// Follows the load torque, N·m, once each tick: beyond ±10 000 N·m it is taken there, and one that is not finite moves
@@ -193,10 +193,18 @@ pub const fn saved_slip_bytes(elements: usize) -> usize {
 }
 
 impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
-    fn of(widths: [i32; N], gains: [f32; N]) -> Self {
-        let words = widths.into_iter().map(i32::to_le_bytes).chain(gains.map(f32::to_le_bytes));
+    /// The sum is over the first so many springs.
+    fn of(widths: [i32; N], gains: [f32; N], used: usize) -> Self {
+        let gains_used = gains.into_iter().take(used).map(f32::to_le_bytes);
+        let words = widths.into_iter().take(used).map(i32::to_le_bytes).chain(gains_used);
         let sum = words.fold(V::KIND, |sum, word| sum.rotate_left(7) ^ crc32(&word));
         Self { widths, gains, sum, variable: PhantomData }
+    }
+
+    /// A bank of the first so many springs: those after them, of no width and no gain, are in no sum and no saved state.
+    #[cfg(feature = "c-api")]
+    pub(crate) fn of_first(self, used: usize) -> Self {
+        Self::of(self.widths, self.gains, used)
     }
 
     fn follow(&self, state: &mut SlipState<N, V>, at: i64) -> Slip {
@@ -230,29 +238,40 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
     ///
     /// Little endian: variable (`i64`), lower ends, upper ends (`i32`), sum of the settings, CRC-32.
     pub fn save(&self, state: &SlipState<N, V>, bytes: &mut [u8]) -> Option<usize> {
-        let bytes = bytes.get_mut(..saved_slip_bytes(N)).filter(|_| state.started)?;
+        self.save_first(state, N, bytes)
+    }
+
+    /// The same of the first so many springs.
+    pub(crate) fn save_first(&self, state: &SlipState<N, V>, used: usize, bytes: &mut [u8]) -> Option<usize> {
+        let bytes = bytes.get_mut(..saved_slip_bytes(used)).filter(|_| state.started)?;
         let (contents, crc) = bytes.split_last_chunk_mut::<4>()?;
         let at = [state.at as i32, (state.at >> 32) as i32];
-        let words = at.iter().chain(&state.lower).chain(&state.upper).copied().chain([self.sum as i32]);
+        let ends = state.lower.iter().take(used).chain(state.upper.iter().take(used));
+        let words = at.iter().chain(ends).copied().chain([self.sum as i32]);
         for (to, from) in contents.as_chunks_mut::<4>().0.iter_mut().zip(words) {
             *to = from.to_le_bytes();
         }
         *crc = crc32(contents).to_le_bytes();
-        Some(saved_slip_bytes(N))
+        Some(saved_slip_bytes(used))
     }
 
     /// A state from [`Self::save`]; `None` if the bytes are damaged or were saved with other springs. Only if the joint cannot have
     /// moved (for a bank on the torque: the load cannot have changed) meanwhile, else [`SlipState::unknown`].
     #[must_use]
     pub fn restore(&self, bytes: &[u8]) -> Option<SlipState<N, V>> {
-        let bytes = bytes.get(..saved_slip_bytes(N))?;
+        self.restore_first(N, bytes)
+    }
+
+    /// The same of the first so many springs.
+    pub(crate) fn restore_first(&self, used: usize, bytes: &[u8]) -> Option<SlipState<N, V>> {
+        let bytes = bytes.get(..saved_slip_bytes(used))?;
         let (contents, crc) = bytes.split_last_chunk::<4>()?;
         let mut words = contents.as_chunks::<4>().0.iter().map(|word| i32::from_le_bytes(*word));
         let (low, high) = (words.next()?, words.next()?);
-        let mut state = SlipState::unknown();
+        let mut state = SlipState::relaxed();
         state.at = (high as i64) << 32 | low as u32 as i64;
         state.started = true;
-        for to in state.lower.iter_mut().chain(&mut state.upper) {
+        for to in state.lower.iter_mut().take(used).chain(state.upper.iter_mut().take(used)) {
             *to = words.next()?;
         }
         let intact = words.next()? == self.sum as i32 && u32::from_le_bytes(*crc) == crc32(contents);
@@ -309,7 +328,7 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         }
         let mut per_count = self.widths.map(|width| 1.0 / f64::from(width.max(1)));
         per_count.iter_mut().zip(gains).for_each(|(per_count, gain)| *per_count *= gain);
-        let bank = Self::of(self.widths, per_count.map(|gain| gain as f32));
+        let bank = Self::of(self.widths, per_count.map(|gain| gain as f32), N);
         Some(FittedSlip { bank, offset_rad, rms_rad: libm::sqrt((left / number).max(0.0)), used })
     }
 }
@@ -437,7 +456,7 @@ mod tests {
         }
         let mut other = bank();
         other.gains[1] *= 2.0;
-        assert_eq!(SlipBank::<3>::of(other.widths, other.gains).restore(&saved), None);
+        assert_eq!(SlipBank::<3>::of(other.widths, other.gains, 3).restore(&saved), None);
         for (lower, upper) in [(1, 0), (-WIDTH, 0), (0, WIDTH)] {
             let impossible = SlipState { lower: [lower, 0, 0], upper: [upper, 0, 0], ..state };
             bank().save(&impossible, &mut saved).unwrap();

@@ -3,6 +3,7 @@
 //
 //   tests/run firmware
 
+#include "beside.h"
 #include "cam.h"
 #include "flexspline.h"
 
@@ -203,5 +204,12 @@ int run(void)
     static uint8_t record[FLEXSPLINE_RECORD_BYTES];
     if (flexspline_record(2000, 0, 0, &state, &store, &out, &record) || record[0] != 'F' || record[1] != 'X')
         return 25;
+    uint32_t sum = 0;
+    const int failed = beside(&table, 2000, &sum);
+    if (failed)
+        return 40 + failed;
+    print("c-beside: ");
+    print_number(sum);
+    print("\n");
     return receive();
 }

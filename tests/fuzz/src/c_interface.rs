@@ -5,6 +5,8 @@
 
 use crate::Choices;
 use crate::tables::BASES;
+use flexspline::c_api as c;
+use std::mem::{align_of, size_of};
 use std::ptr::{null, null_mut};
 
 /// As in `core/include/flexspline.h`.
@@ -121,14 +123,29 @@ const OK: u32 = 0;
 const POINTER: u32 = 1;
 const NOT_INITIALISED: u32 = 2;
 const OVERLAP: u32 = 3;
+/// Of no call: an activation failed at a step, and is over.
+const ENDED: u32 = 99;
 
 const STORE_WORDS: usize = 1072;
 const JOINT_WORDS: usize = 32;
 const STATE_WORDS: usize = 24;
 /// Words of whatever else is written.
-const OTHER_WORDS: usize = 12;
+const OTHER_WORDS: usize = 24;
+/// Words of the objects beside a tick, two of each: the largest is that of an activation.
+const BESIDE_WORDS: usize = 88;
+/// Kinds of these objects.
+const BESIDE: usize = 12;
+/// Records in the list of a recorder.
+const RECORDS: usize = 8;
+const RECORDS_WORDS: usize = RECORDS * size_of::<c::FlexsplineRecord>() / 8;
+/// Bytes of a table on its way in, as words.
+const BUFFER_WORDS: usize = 32;
 /// Two of each object, what is written, and room for a store beyond the last.
-const WORDS: usize = 2 * (STORE_WORDS + JOINT_WORDS + STATE_WORDS) + 2 * OTHER_WORDS + STORE_WORDS;
+const WORDS: usize = 2 * (STORE_WORDS + JOINT_WORDS + STATE_WORDS + BESIDE * BESIDE_WORDS)
+    + 2 * OTHER_WORDS
+    + RECORDS_WORDS
+    + BUFFER_WORDS
+    + STORE_WORDS;
 
 /// Where things are in the memory.
 struct Places {
@@ -137,18 +154,26 @@ struct Places {
     states: [usize; 2],
     output: usize,
     saved: usize,
+    beside: usize,
+    records: usize,
+    buffer: usize,
 }
 
 const PLACES: Places = {
     let joints = 2 * STORE_WORDS;
     let states = joints + 2 * JOINT_WORDS;
     let output = states + 2 * STATE_WORDS;
+    let beside = output + 2 * OTHER_WORDS;
+    let records = beside + 2 * BESIDE * BESIDE_WORDS;
     Places {
         stores: [0, STORE_WORDS],
         joints: [joints, joints + JOINT_WORDS],
         states: [states, states + STATE_WORDS],
         output,
         saved: output + OTHER_WORDS,
+        beside,
+        records,
+        buffer: records + RECORDS_WORDS,
     }
 };
 
@@ -157,6 +182,14 @@ const PLACES: Places = {
 struct Given {
     pointer: Object,
     usable: bool,
+}
+
+/// Where an answer goes, whether there is room, and whether that is inside an object.
+#[derive(Clone, Copy)]
+struct Answer<T> {
+    pointer: *mut T,
+    usable: bool,
+    overlaps: bool,
 }
 
 struct Memory {
@@ -183,6 +216,27 @@ impl Memory {
             1 => Given { pointer: right.wrapping_byte_add(1 + choices.below(7)), usable: false },
             _ => Given { pointer: right, usable: true },
         }
+    }
+
+    /// An object of the kinds beside a tick, as [`Self::object`].
+    fn beside(&self, choices: &mut Choices<'_>, kind: usize) -> Given {
+        let first = PLACES.beside + 2 * kind * BESIDE_WORDS;
+        self.object(choices, [first, first + BESIDE_WORDS])
+    }
+
+    /// Where an answer is to go: right, null, beside it, or inside an object of the call.
+    fn answer<T>(&self, choices: &mut Choices<'_>, objects: &[Given]) -> Answer<T> {
+        let right: *mut T = self.at(PLACES.output).cast();
+        let (pointer, usable, overlaps) = match choices.below(12) {
+            0 => (null_mut(), false, false),
+            1 if align_of::<T>() > 1 => (right.wrapping_byte_add(1), false, false),
+            2 if !objects.is_empty() => {
+                let inside = objects[choices.below(objects.len())];
+                (inside.pointer.wrapping_add(1).cast(), inside.usable, true)
+            }
+            _ => (right, true, false),
+        };
+        Answer { pointer, usable, overlaps }
     }
 
     fn copy(&self) -> Vec<u64> {
@@ -271,6 +325,531 @@ fn any_images(choices: &mut Choices<'_>, kept: &mut Vec<Vec<u8>>) -> (Images, bo
     (images, first.2 && second.2)
 }
 
+/// What every call beside a tick may be given.
+struct Objects {
+    store: Given,
+    joint: Given,
+    state: Given,
+    tables: *const Images,
+    tables_usable: bool,
+}
+
+/// Makes one of each object beside a tick, so that what is chosen then finds them.
+fn begin_beside(memory: &Memory) {
+    let at = |kind: usize| memory.at(PLACES.beside + 2 * kind * BESIDE_WORDS);
+    let term = |term, order| c::FlexsplineCoefficient { limit: 1e-4, initial_std: 5e-5, term, order };
+    let terms = [term(0, 0), term(1, 0), term(2, 0), term(3, 2), term(4, 2)];
+    let learn = c::FlexsplineLearnSettings {
+        noise_rad: 2e-6,
+        memory_measurements: 100.0,
+        gate: 5.0,
+        settle_rad: 1e-5,
+        torque_limit_n_m: 20.0,
+    };
+    let springs = [c::FlexsplineSpring { width: 1e-4, gain: 0.1 }; 3];
+    let torque = c::FlexsplineTorqueSettings {
+        tick_s: 1e-3,
+        bandwidth_hz: 20.0,
+        drag_n_m: 0.5,
+        table_drag_n_m: 0.1,
+        hold_n_m: 0.1,
+    };
+    let counts = c::FlexsplineEncoderSettings { zero_counts: 0, counts_per_turn: 20_000, wrap_bits: 16, reversed: 0 };
+    let begun = [
+        c::flexspline_learner_init(at(0).cast(), &learn, terms.as_ptr(), 5),
+        c::flexspline_learner_set(at(0).cast(), c::FLEXSPLINE_LEARNING_ON),
+        c::flexspline_slip_init(at(1).cast(), c::FLEXSPLINE_SLIP_OF_TORQUE, springs.as_ptr(), 3),
+        c::flexspline_torque_init(at(2).cast(), &torque),
+        c::flexspline_aged_init(at(3).cast(), 3),
+        c::flexspline_encoder_init(at(4).cast(), &counts),
+        c::flexspline_encoder_start(at(4).cast(), 7, 0),
+        c::flexspline_recorder_init(at(5).cast(), 4, 1, 0, c::FLEXSPLINE_FULL_LOSE_OLDEST),
+        c::flexspline_predictor_init(at(6).cast(), &*PARTS),
+        c::flexspline_observer_init(at(7).cast()),
+        c::flexspline_upload_begin(at(8).cast(), 8 * BUFFER_WORDS),
+        c::flexspline_watch_init(at(9).cast()),
+        c::flexspline_activation_begin(at(10).cast(), memory.at(PLACES.joints[0]).cast(), 20.0),
+        c::flexspline_identity_begin(at(11).cast()),
+    ];
+    assert!(begun.iter().all(|begun| *begun as u32 == OK), "{begun:?}");
+}
+
+/// A text of the library: within it, and not for ever.
+fn is_text(text: *const std::ffi::c_char) -> bool {
+    // SAFETY: static, and ends.
+    let text = unsafe { std::ffi::CStr::from_ptr(text) };
+    (1..60).contains(&text.to_bytes().len())
+}
+
+/// A call beside a tick: what it told, whether all it was given can be used, and whether something overlaps.
+fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool, bool) {
+    let [learner, slip, path, aged, encoder, recorder] = [0, 1, 2, 3, 4, 5].map(|kind| memory.beside(choices, kind));
+    let [predictor, observer, upload, watch, activation, identity] =
+        [6, 7, 8, 9, 10, 11].map(|kind| memory.beside(choices, kind));
+    let (store, joint, state) = (o.store, o.joint, o.state);
+    let all = |objects: &[Given]| objects.iter().all(|object| object.usable);
+    let records: *mut c::FlexsplineRecord = memory.at(PLACES.records).cast();
+    let buffer: *mut u8 = memory.at(PLACES.buffer).cast();
+    let output = [c::FlexsplineOutput {
+        command_counts: choices.any(),
+        output_counts: choices.any(),
+        transmission_error_rad: choices.wild(),
+        uncertainty_rad: choices.wild(),
+        correction_rad: choices.wild(),
+        held_back_rad: choices.wild(),
+        quality: choices.below(6) as u8,
+        flags: choices.any(),
+    }; 2];
+    let (output, output_usable) = plain(choices, &output);
+    let number = choices.below(10) as u8;
+    match choices.below(46) {
+        0 => {
+            let settings = [c::FlexsplineLearnSettings {
+                noise_rad: if choices.below(4) == 0 { choices.wild() } else { 2e-6 },
+                memory_measurements: if choices.below(4) == 0 { choices.wild() } else { 100.0 },
+                gate: if choices.below(4) == 0 { choices.wild() } else { 5.0 },
+                settle_rad: 1e-5,
+                torque_limit_n_m: if choices.below(4) == 0 { choices.wild() } else { 20.0 },
+            }; 2];
+            let (settings, told) = plain(choices, &settings);
+            let mut list = [c::FlexsplineCoefficient { limit: 1e-4, initial_std: 1e-5, term: 0, order: 0 }; 16];
+            for one in &mut list {
+                one.term = choices.below(6) as u8;
+                one.order = if one.term > 2 || choices.below(16) == 0 { choices.any() } else { 0 };
+                if choices.below(16) == 0 {
+                    one.limit = choices.wild();
+                }
+            }
+            let status = c::flexspline_learner_init(learner.pointer.cast(), settings, list.as_ptr(), number);
+            (status as u32, learner.usable && told, false)
+        }
+        1 => (c::flexspline_learner_set(learner.pointer.cast(), choices.below(4) as u8) as u32, learner.usable, false),
+        2 => (c::flexspline_learner_reset(learner.pointer.cast()) as u32, learner.usable, false),
+        3..=6 => {
+            let input = [c::FlexsplineInput {
+                generator_counts: choices.any::<i32>().into(),
+                target_counts: 0,
+                torque_n_m: choices.wild(),
+                missed_ticks: 0,
+                has_generator: choices.below(4) as u8,
+                mean_counts: choices.any(),
+                half_width_counts: choices.any(),
+            }; 2];
+            let (input, told) = plain(choices, &input);
+            let to = memory.answer::<c::FlexsplineAdapted>(choices, &[learner, state]);
+            let (has, measured) = (choices.below(4) as u8, choices.any::<i32>().into());
+            let (learner_at, state_at) = (learner.pointer.cast(), state.pointer.cast());
+            let status = c::flexspline_learner_update(learner_at, state_at, input, output, has, measured, to.pointer);
+            if status as u32 == OK {
+                let found = unsafe { to.pointer.read() };
+                let most = 1 << 25;
+                assert!(found.mean_counts.abs() < most && found.half_width_counts.abs() < most, "{found:?}");
+                assert!(found.uncertainty_rad >= 0.0 && found.verdict <= 6, "{found:?}");
+            }
+            (status as u32, all(&[learner, state]) && told && output_usable && to.usable, to.overlaps)
+        }
+        7 => {
+            let to = memory.answer(choices, &[learner]);
+            let status = c::flexspline_learner_coefficient(learner.pointer.cast(), number, to.pointer);
+            (status as u32, learner.usable && to.usable, to.overlaps)
+        }
+        8 => {
+            let to = memory.answer(choices, &[learner]);
+            (
+                c::flexspline_learner_report(learner.pointer.cast(), to.pointer) as u32,
+                learner.usable && to.usable,
+                to.overlaps,
+            )
+        }
+        9 | 10 => {
+            let (of, call) = if choices.any() { (learner, 0) } else { (slip, 1) };
+            let to = memory.answer(choices, &[of]);
+            let saved: *mut u8 = memory.at(PLACES.saved).cast();
+            let room = choices.below(8 * OTHER_WORDS);
+            let status = match call {
+                0 => c::flexspline_learner_save(of.pointer.cast(), saved, room, to.pointer),
+                _ => c::flexspline_slip_save(of.pointer.cast(), saved, room, to.pointer),
+            };
+            (status as u32, of.usable && to.usable, to.overlaps)
+        }
+        11 => {
+            let saved: *const u8 = memory.at(PLACES.saved).cast::<u8>().cast_const();
+            let length = choices.below(8 * OTHER_WORDS);
+            match choices.any() {
+                true => {
+                    (c::flexspline_learner_restore(learner.pointer.cast(), saved, length) as u32, learner.usable, false)
+                }
+                false => (c::flexspline_slip_restore(slip.pointer.cast(), saved, length) as u32, slip.usable, false),
+            }
+        }
+        12 => {
+            let mut list = [c::FlexsplineSpring { width: 1e-4, gain: 0.1 }; 16];
+            for one in &mut list {
+                if choices.below(16) == 0 {
+                    (one.width, one.gain) = (choices.wild(), choices.wild());
+                }
+            }
+            let variable = choices.below(3) as u8;
+            let status = c::flexspline_slip_init(slip.pointer.cast(), variable, list.as_ptr(), number);
+            (status as u32, slip.usable, false)
+        }
+        13 => (c::flexspline_slip_set(slip.pointer.cast(), choices.below(3) as u8) as u32, slip.usable, false),
+        14..=16 => {
+            let to = memory.answer::<c::FlexsplineSlipReport>(choices, &[slip]);
+            let status = match choices.any() {
+                true => c::flexspline_slip_update(slip.pointer.cast(), choices.any(), to.pointer),
+                false => c::flexspline_slip_update_torque(slip.pointer.cast(), choices.wild(), to.pointer),
+            };
+            if status as u32 == OK {
+                let found = unsafe { to.pointer.read() };
+                assert!(found.mean_counts.abs() < 1 << 25 && found.is_known <= 1, "{found:?}");
+            }
+            (status as u32, slip.usable && to.usable, to.overlaps)
+        }
+        17 => {
+            let settings = [c::FlexsplineTorqueSettings {
+                tick_s: if choices.below(4) == 0 { choices.wild() } else { 1e-3 },
+                bandwidth_hz: if choices.below(4) == 0 { choices.wild() } else { 20.0 },
+                drag_n_m: if choices.below(4) == 0 { choices.wild() } else { 0.5 },
+                table_drag_n_m: 0.1,
+                hold_n_m: 0.1,
+            }; 2];
+            let (settings, told) = plain(choices, &settings);
+            (c::flexspline_torque_init(path.pointer.cast(), settings) as u32, path.usable && told, false)
+        }
+        18 => {
+            let to = memory.answer(choices, &[path]);
+            let (place, direction) = (choices.below(3) as u8, choices.below(3) as i8 - 1);
+            let status = c::flexspline_torque_tick(path.pointer.cast(), place, choices.wild(), direction, to.pointer);
+            (status as u32, path.usable && to.usable, to.overlaps)
+        }
+        19 => (c::flexspline_aged_init(aged.pointer.cast(), choices.any()) as u32, aged.usable, false),
+        20 => {
+            let to = memory.answer(choices, &[aged]);
+            let status =
+                c::flexspline_aged_tick(aged.pointer.cast(), choices.below(3) as u8, choices.wild(), to.pointer);
+            (status as u32, aged.usable && to.usable, to.overlaps)
+        }
+        21 => {
+            let to = memory.answer(choices, &[aged]);
+            let status = c::flexspline_aged_is_stale(aged.pointer.cast(), to.pointer);
+            (status as u32, aged.usable && to.usable, to.overlaps)
+        }
+        22 => {
+            let settings = [c::FlexsplineEncoderSettings {
+                zero_counts: choices.any(),
+                counts_per_turn: if choices.any() { 20_000 } else { choices.any() },
+                wrap_bits: choices.below(70) as u8,
+                reversed: choices.below(3) as u8,
+            }; 2];
+            let (settings, told) = plain(choices, &settings);
+            (c::flexspline_encoder_init(encoder.pointer.cast(), settings) as u32, encoder.usable && told, false)
+        }
+        23 => {
+            let reading = if choices.any() { choices.any::<u16>().into() } else { choices.any() };
+            let status = c::flexspline_encoder_start(encoder.pointer.cast(), reading, choices.any());
+            (status as u32, encoder.usable, false)
+        }
+        24 | 25 => {
+            let to = memory.answer(choices, &[encoder]);
+            let reading = if choices.any() { choices.any::<u16>().into() } else { choices.any() };
+            let status = c::flexspline_encoder_read(encoder.pointer.cast(), reading, to.pointer);
+            (status as u32, encoder.usable && to.usable, to.overlaps)
+        }
+        26 => {
+            let to = memory.answer(choices, &[encoder]);
+            let status = c::flexspline_encoder_reading(encoder.pointer.cast(), choices.any(), to.pointer);
+            (status as u32, encoder.usable && to.usable, to.overlaps)
+        }
+        27 => {
+            let (places, offset) = (choices.below(RECORDS + 1) as u16, choices.below(3) as u32);
+            let (divisor, full) = (choices.below(4) as u32, choices.below(3) as u8);
+            let status = c::flexspline_recorder_init(recorder.pointer.cast(), places, divisor, offset, full);
+            (status as u32, recorder.usable, false)
+        }
+        28 | 29 => {
+            let inside = choices.below(8) == 0;
+            let list = if inside { state.pointer.cast() } else { records };
+            let [store, state, recorder] = [store, state, recorder];
+            let status = c::flexspline_recorder_see(
+                recorder.pointer.cast(),
+                list,
+                choices.any(),
+                choices.below(2) as u8,
+                state.pointer.cast(),
+                store.pointer.cast(),
+                output,
+            );
+            (status as u32, all(&[store, state, recorder]) && output_usable, inside)
+        }
+        30 => {
+            let to = memory.answer(choices, &[recorder]);
+            let is_taken: *mut u8 = memory.at(PLACES.saved).cast();
+            let status = c::flexspline_recorder_take(recorder.pointer.cast(), records, to.pointer, is_taken);
+            (status as u32, recorder.usable && to.usable, to.overlaps)
+        }
+        31 => {
+            let (from, to) = (memory.at(PLACES.saved), memory.answer(choices, &[]));
+            match choices.any() {
+                true => (c::flexspline_record_encode(from.cast(), to.pointer) as u32, to.usable, false),
+                false => {
+                    let to = memory.answer(choices, &[]);
+                    (c::flexspline_record_decode(from.cast(), to.pointer) as u32, to.usable, false)
+                }
+            }
+        }
+        32 => {
+            let to = memory.answer::<[u8; c::FLEXSPLINE_RECORD_BYTES]>(choices, &[state, store]);
+            let (state_at, store_at) = (state.pointer.cast(), store.pointer.cast());
+            let status = c::flexspline_record(choices.any(), 1, 0, state_at, store_at, output, to.pointer);
+            (status as u32, all(&[state, store]) && output_usable && to.usable, to.overlaps)
+        }
+        33 => match choices.any() {
+            true => (c::flexspline_watch_init(watch.pointer.cast()) as u32, watch.usable, false),
+            false => {
+                let to = memory.answer(choices, &[watch, state, store]);
+                let (state_at, store_at) = (state.pointer.cast(), store.pointer.cast());
+                let status = c::flexspline_watch_see(watch.pointer.cast(), state_at, store_at, output, to.pointer);
+                (status as u32, all(&[watch, state, store]) && output_usable && to.usable, to.overlaps)
+            }
+        },
+        34 => {
+            // The numbers of a sound predictor, now and then one of them another; finding the gains takes too long for a fuzzer.
+            let mut parts = [*PARTS; 2];
+            if choices.any() {
+                parts[0][choices.below(PARTS.len())] = choices.wild();
+            }
+            let (parts, told) = plain(choices, &parts);
+            (c::flexspline_predictor_init(predictor.pointer.cast(), parts) as u32, predictor.usable && told, false)
+        }
+        35 => match choices.any() {
+            true => (c::flexspline_observer_init(observer.pointer.cast()) as u32, observer.usable, false),
+            false => {
+                let to = memory.answer(choices, &[observer]);
+                let status = c::flexspline_observer_report(observer.pointer.cast(), to.pointer);
+                (status as u32, observer.usable && to.usable, to.overlaps)
+            }
+        },
+        36 => {
+            let measured = [c::FlexsplineMeasured {
+                torque_n_m: choices.wild(),
+                speed_rad_s: choices.wild(),
+                twist_rad: choices.wild(),
+            }; 2];
+            let (measured, told) = plain(choices, &measured);
+            let status = c::flexspline_observer_step(observer.pointer.cast(), predictor.pointer.cast(), measured);
+            (status as u32, all(&[observer, predictor]) && told, false)
+        }
+        37 => {
+            let now = [c::FlexsplineNow {
+                generator_counts: choices.any(),
+                measured_counts: choices.any(),
+                measured_bound_rad: choices.wild(),
+                torque_n_m: choices.wild(),
+                torque_off_n_m: choices.wild(),
+                load_change_n_m: choices.wild(),
+                state_bound: [choices.wild(), 1e-4, choices.wild(), 0.1],
+                ticks: choices.below(30) as u16,
+                has_measured: choices.below(3) as u8,
+            }; 2];
+            let (now, told) = plain(choices, &now);
+            let to = memory.answer(choices, &[predictor, observer, joint, store, state]);
+            let status = c::flexspline_predict(
+                predictor.pointer.cast(),
+                observer.pointer.cast(),
+                joint.pointer.cast(),
+                store.pointer.cast(),
+                state.pointer.cast(),
+                now,
+                to.pointer,
+            );
+            (status as u32, all(&[predictor, observer, joint, store, state]) && told && to.usable, to.overlaps)
+        }
+        38 => {
+            let to = memory.answer(choices, &[predictor]);
+            let status = c::flexspline_predictor_parts(predictor.pointer.cast(), to.pointer);
+            (status as u32, predictor.usable && to.usable, to.overlaps)
+        }
+        39 => {
+            let to = memory.answer(choices, &[joint, store, state]);
+            let (joint_at, store_at, state_at) = (joint.pointer.cast(), store.pointer.cast(), state.pointer.cast());
+            let torque = choices.wild();
+            let status = c::flexspline_forward(joint_at, store_at, state_at, choices.any(), torque, to.pointer);
+            (status as u32, all(&[joint, store, state]) && to.usable, to.overlaps)
+        }
+        40 => {
+            let to = memory.answer(choices, &[joint, store, state]);
+            let (joint_at, store_at, state_at) = (joint.pointer.cast(), store.pointer.cast(), state.pointer.cast());
+            let (target, torque, way) = (choices.any(), choices.wild(), choices.below(5) as i8 - 2);
+            let status = c::flexspline_inverse(joint_at, store_at, state_at, target, torque, way, to.pointer);
+            (status as u32, all(&[joint, store, state]) && to.usable, to.overlaps)
+        }
+        41 => {
+            let (joint_at, store_at) = (joint.pointer.cast(), store.pointer.cast());
+            let objects = [joint, store];
+            let to = memory.answer(choices, &objects);
+            let (rate, torque, ahead) = (choices.wild(), choices.wild(), choices.wild());
+            let status = c::flexspline_rate_ahead(joint_at, store_at, choices.any(), rate, torque, ahead, to.pointer);
+            (status as u32, all(&objects) && to.usable, to.overlaps)
+        }
+        42 => {
+            let joint_at = joint.pointer.cast();
+            let to = memory.answer(choices, &[joint]);
+            let status = match choices.below(4) {
+                0 => c::flexspline_nominal_output(joint_at, choices.any(), to.pointer),
+                1 => c::flexspline_nominal_generator(joint_at, choices.any(), to.pointer),
+                2 => {
+                    let to = memory.answer(choices, &[joint]);
+                    let status = c::flexspline_ratio(joint_at, to.pointer);
+                    return (status as u32, joint.usable && to.usable, to.overlaps);
+                }
+                _ => {
+                    let to = memory.answer(choices, &[state]);
+                    let status = c::flexspline_state_play(state.pointer.cast(), to.pointer);
+                    return (status as u32, state.usable && to.usable, to.overlaps);
+                }
+            };
+            (status as u32, joint.usable && to.usable, to.overlaps)
+        }
+        43 => {
+            let to = memory.answer::<u8>(choices, &[activation, store]);
+            if choices.below(16) == 0 {
+                let temperature = choices.wild();
+                let begun =
+                    c::flexspline_activation_begin(activation.pointer.cast(), joint.pointer.cast(), temperature);
+                return (begun as u32, all(&[activation, joint]), false);
+            }
+            let usable = all(&[activation, store]) && to.usable && o.tables_usable;
+            let (activation_at, store_at) = (activation.pointer.cast(), store.pointer.cast());
+            let mut status = 0;
+            // Far enough to fill the store now and then.
+            for _ in 0..1 + 40 * choices.below(16) {
+                status = c::flexspline_activation_step(activation_at, store_at, o.tables.cast(), to.pointer) as u32;
+                if status != OK {
+                    break;
+                }
+            }
+            // A step that fails ends the activation, and what was done before it stays.
+            let refused_at_once = [POINTER, NOT_INITIALISED, OVERLAP].contains(&status);
+            (
+                if status != OK && !refused_at_once && usable && !to.overlaps { ENDED } else { status },
+                usable,
+                to.overlaps,
+            )
+        }
+        44 => match choices.below(4) {
+            0 => (c::flexspline_identity_begin(identity.pointer.cast()) as u32, identity.usable, false),
+            1 => {
+                let to = memory.answer(choices, &[identity]);
+                let image = &BASES[choices.below(3)];
+                let length = choices.below(image.len() + 1);
+                let status = c::flexspline_identity_step(identity.pointer.cast(), image.as_ptr(), length, to.pointer);
+                (status as u32, identity.usable && to.usable, to.overlaps)
+            }
+            2 => {
+                let to = memory.answer(choices, &[]);
+                let image = &BASES[choices.below(3)];
+                let length = if choices.any() { image.len() } else { choices.below(image.len()) };
+                (c::flexspline_image_report(image.as_ptr(), length, to.pointer) as u32, to.usable, false)
+            }
+            _ => {
+                let (length, page) = (choices.below(8 * BUFFER_WORDS + 1), choices.below(40) as u8);
+                let image = choices.below(3) as u8;
+                let good = &BASES[0];
+                let status =
+                    c::flexspline_store_mend_page(store.pointer.cast(), buffer, good.as_ptr(), length, image, page);
+                (status as u32, store.usable, false)
+            }
+        },
+        _ => {
+            let announced = choices.below(8 * BUFFER_WORDS + 20);
+            match choices.below(6) {
+                0 => (c::flexspline_upload_begin(upload.pointer.cast(), announced) as u32, upload.usable, false),
+                1 | 2 => {
+                    let (offset, length) = (choices.below(40), choices.below(40));
+                    let chunk = BASES[0].as_ptr();
+                    let upload_at = upload.pointer.cast();
+                    let status = c::flexspline_upload_chunk(upload_at, buffer, 8 * BUFFER_WORDS, offset, chunk, length);
+                    (status as u32, upload.usable, false)
+                }
+                3 => {
+                    let to = memory.answer(choices, &[upload]);
+                    let status =
+                        c::flexspline_upload_finish(upload.pointer.cast(), buffer, 8 * BUFFER_WORDS, to.pointer);
+                    (status as u32, upload.usable && to.usable, to.overlaps)
+                }
+                4 => {
+                    let input: *mut c::FlexsplineInput = memory.at(PLACES.output).cast();
+                    let status = match choices.any() {
+                        true => c::flexspline_input_add(input, choices.any(), choices.any()),
+                        false => c::flexspline_input_add_rad(input, choices.wild(), choices.wild()),
+                    };
+                    let found = unsafe { input.read() };
+                    assert!(found.mean_counts.abs() < 1 << 25 && found.half_width_counts.abs() < 1 << 25);
+                    (status as u32, true, false)
+                }
+                _ => {
+                    let (code, bits) = (choices.any::<u8>(), choices.any::<u16>());
+                    let names = [
+                        c::flexspline_mode_name,
+                        c::flexspline_quality_name,
+                        c::flexspline_health_name,
+                        c::flexspline_overrun_name,
+                        c::flexspline_fixed_member_name,
+                        c::flexspline_generator_name,
+                        c::flexspline_progress_name,
+                        c::flexspline_identity_name,
+                        c::flexspline_learning_name,
+                        c::flexspline_verdict_name,
+                        c::flexspline_term_name,
+                    ];
+                    assert!(names.iter().all(|name| is_text(name(code))));
+                    assert!(is_text(c::flexspline_flag_name(bits)) && is_text(c::flexspline_event_name(bits)));
+                    assert!(is_text(c::flexspline_status_text(choices.any())) && is_text(c::flexspline_version()));
+                    assert!(c::flexspline_mode_may_become(code, code) <= 1 && c::flexspline_is_due(7, 3, 1) == 1);
+                    assert!(c::flexspline_version_number() > 0 && c::flexspline_layout() != 0);
+                    assert!(c::flexspline_format_version() > 0);
+                    let (from, to) = (choices.any(), choices.any());
+                    assert!(c::flexspline_rad_between(from, to).abs() < 3.15);
+                    assert!(c::flexspline_rad_from_counts(from).is_finite());
+                    let answer = memory.answer(choices, &[]);
+                    let rad = f64::from(choices.wild());
+                    (c::flexspline_counts_from_rad(rad, answer.pointer) as u32, answer.usable, false)
+                }
+            }
+        }
+    }
+}
+
+/// Numbers of a predictor.
+static PARTS: std::sync::LazyLock<[f32; c::FLEXSPLINE_PREDICTOR_PARTS]> = std::sync::LazyLock::new(|| {
+    // To find gains takes too long in an interpreter: there one whose state halves in a tick.
+    if cfg!(miri) {
+        let mut parts = [0.0; c::FLEXSPLINE_PREDICTOR_PARTS];
+        [0, 5, 10, 15].iter().for_each(|place| parts[*place] = 0.5);
+        parts[c::FLEXSPLINE_PREDICTOR_PARTS - 1] = 3e4;
+        return parts;
+    }
+    let mut room = vec![0u64; BESIDE_WORDS];
+    let inertias = c::FlexsplineInertias {
+        motor_kg_m2: 1.0,
+        load_kg_m2: 3.0,
+        stiffness_n_m_per_rad: 3e4,
+        damping_n_m_s_per_rad: 20.0,
+    };
+    let noise =
+        c::FlexsplineNoise { torque_n_m: 0.5, load_change_n_m: 0.2, speed_rad_s: 1e-4, twist_rad: 1e-6, has_twist: 1 };
+    let at = room.as_mut_ptr();
+    let (mut parts, mut bound) = ([0.0; c::FLEXSPLINE_PREDICTOR_PARTS], [0.0; 4]);
+    assert_eq!(c::flexspline_predictor_of(at.cast(), &inertias, &noise, 1e-3) as u32, OK);
+    assert_eq!(c::flexspline_predictor_parts(at.cast(), &mut parts) as u32, OK);
+    let off = c::FlexsplineDisturbance { torque_n_m: 0.5, load_change_n_m: 0.05, speed_rad_s: 1e-4, twist_rad: 1e-6 };
+    assert_eq!(c::flexspline_predictor_state_bound(at.cast(), &off, &mut bound) as u32, OK);
+    assert!(bound.iter().all(|bound| *bound > 0.0));
+    assert_eq!(c::flexspline_self_test() as u32, OK);
+    parts
+});
+
 /// Any calls.
 pub fn run(data: &[u8]) {
     let mut choices = Choices::new(data);
@@ -283,6 +862,7 @@ pub fn run(data: &[u8]) {
             assert_eq!(flexspline_joint_init(memory.at(PLACES.joints[0]), &settings), OK);
             assert_eq!(flexspline_state_init(memory.at(PLACES.states[0])), OK);
         }
+        begin_beside(&memory);
     }
     let mut kept = Vec::new();
     let (mut table, mut table_usable) = any_images(&mut Choices::new(&[]), &mut kept);
@@ -302,6 +882,7 @@ pub fn run(data: &[u8]) {
         let before = memory.copy();
         let temperature = choices.wild();
         // SAFETY of the calls: every pointer that is aligned and not null points into the memory, or to what is kept.
+        let mut loose = false;
         let (status, usable, refused) = match choices.below(18) {
             0 => (unsafe { flexspline_store_init(store.pointer) }, store.usable, false),
             1 => {
@@ -350,6 +931,11 @@ pub fn run(data: &[u8]) {
                 let status = unsafe { flexspline_store_report(store.pointer, memory.at(PLACES.saved)) };
                 (status, store.usable, false)
             }
+            16 | 17 => {
+                loose = true;
+                let objects = Objects { store, joint, state, tables, tables_usable: told && table_usable };
+                beside(&mut choices, &memory, &objects)
+            }
             _ => {
                 let input = [Input {
                     generator_counts: choices.any::<i32>().into(),
@@ -387,17 +973,17 @@ pub fn run(data: &[u8]) {
                 (status, objects && told && table_usable && given && usable, overlaps)
             }
         };
-        assert!(status <= 13, "{status}");
+        assert!(status <= 18 || status == ENDED, "{status}");
         if !usable || refused {
-            assert_ne!(status, OK);
+            assert!(status != OK && status != ENDED, "{status}");
         }
         if usable && !refused {
             assert!(status != POINTER && status != OVERLAP, "{status}");
         }
         if usable && refused {
-            assert!(status == OVERLAP || status == NOT_INITIALISED, "{status}");
+            assert!(status == OVERLAP || status == NOT_INITIALISED || loose && status != OK, "{status}");
         }
-        if status != OK {
+        if status != OK && status != ENDED {
             assert_eq!(memory.copy(), before, "status {status} and yet something changed");
         }
     }

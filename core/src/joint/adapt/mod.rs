@@ -54,7 +54,8 @@ use factors::{dot, measure, transform, wander_by};
 /// One tick as the adapter sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'s> {
-    /// What the tick was given: generator, torque, and the adjustment that was in force.
+    /// What the tick was given: generator, torque, and of the adjustment what this adapter said. What was added beside it (springs that slip)
+    /// is left out here and counts as known; left in, it is learnt a second time.
     pub input: &'s Input,
     /// The play after the tick.
     pub play: &'s PlayState,
@@ -103,6 +104,10 @@ pub const fn saved_adapt_bytes(coefficients: usize) -> usize {
     coefficients.saturating_mul(2).saturating_add(upper).saturating_add(2).saturating_mul(4)
 }
 
+/// Takes a place and adds nothing: the sine of no period is 0 at every angle.
+#[cfg(feature = "c-api")]
+pub(crate) const NO_COEFFICIENT: Coefficient = Coefficient { term: Term::Sin(0), limit: 1.0, initial_std: 1.0 };
+
 /// Weakest excitation that is used: all coefficients at their limits move the output by a tenth of the noise.
 const WEAKEST: f32 = 0.01;
 /// Steps back from contact that are noise of the generator's encoder, counts (2.9e-8 rad).
@@ -133,6 +138,12 @@ impl<const N: usize> Adapter<N> {
     /// # Errors
     /// [`AdaptError`] names the first that is out of its range.
     pub fn new(settings: &AdaptSettings<N>) -> Result<Self, AdaptError> {
+        Self::of_first(settings, N)
+    }
+
+    /// An adapter of the first so many coefficients: those after them (`NO_COEFFICIENT`) change no bit of what these come to, and are
+    /// in no sum and no saved state.
+    pub(crate) fn of_first(settings: &AdaptSettings<N>, used: usize) -> Result<Self, AdaptError> {
         let AdaptSettings { coefficients, noise_rad, memory_measurements, gate, settle_rad, torque_limit_n_m } =
             *settings;
         let most = Adjustment::MAX_RAD;
@@ -145,7 +156,7 @@ impl<const N: usize> Adapter<N> {
         checked("settle_rad", settle_rad, 0.0, most)?;
         checked("torque_limit_n_m", torque_limit_n_m, 0.0, 1e6)?;
         let mut half_limit = 0.0;
-        for Coefficient { term, limit, initial_std } in coefficients {
+        for Coefficient { term, limit, initial_std } in coefficients.into_iter().take(used) {
             checked("limit", limit, 1e-12, most)?;
             checked("initial_std", initial_std, 1e-6 * limit, 10.0 * limit)?;
             match term {
@@ -156,7 +167,7 @@ impl<const N: usize> Adapter<N> {
         }
         let square = |value: f32| value * value;
         let mut sum = 0u32;
-        for Coefficient { term, limit, initial_std } in coefficients {
+        for Coefficient { term, limit, initial_std } in coefficients.into_iter().take(used) {
             let (kind, order) = match term {
                 Term::Mean => (0, 0),
                 Term::WindUp => (1, 0),
@@ -404,26 +415,37 @@ impl<const N: usize> Adapter<N> {
     /// | 4 | sum of the settings |
     /// | 4 | CRC-32 of all before |
     pub fn save(&self, state: &AdaptState<N>, bytes: &mut [u8]) -> Option<usize> {
-        let bytes = bytes.get_mut(..saved_adapt_bytes(N))?;
+        self.save_first(state, N, bytes)
+    }
+
+    /// The same of the first so many coefficients.
+    pub(crate) fn save_first(&self, state: &AdaptState<N>, used: usize, bytes: &mut [u8]) -> Option<usize> {
+        let bytes = bytes.get_mut(..saved_adapt_bytes(used))?;
         let (contents, crc) = bytes.split_last_chunk_mut::<4>()?;
-        let above = state.u.iter().enumerate().flat_map(|(j, column)| column.iter().take(j));
-        let numbers = state.x.iter().chain(&state.d).chain(above).map(|number| number.to_bits());
+        let above = state.u.iter().take(used).enumerate().flat_map(|(j, column)| column.iter().take(j));
+        let numbers = state.x.iter().take(used).chain(state.d.iter().take(used)).chain(above);
+        let numbers = numbers.map(|number| number.to_bits());
         for (to, from) in contents.as_chunks_mut::<4>().0.iter_mut().zip(numbers.chain([self.sum])) {
             *to = from.to_le_bytes();
         }
         *crc = crc32(contents).to_le_bytes();
-        Some(saved_adapt_bytes(N))
+        Some(saved_adapt_bytes(used))
     }
 
     /// A state from [`Self::save`], in [`Learning::Off`]; `None` if the bytes are damaged or were saved with other coefficients.
     #[must_use]
     pub fn restore(&self, bytes: &[u8]) -> Option<AdaptState<N>> {
-        let bytes = bytes.get(..saved_adapt_bytes(N))?;
+        self.restore_first(N, bytes)
+    }
+
+    /// The same of the first so many coefficients.
+    pub(crate) fn restore_first(&self, used: usize, bytes: &[u8]) -> Option<AdaptState<N>> {
+        let bytes = bytes.get(..saved_adapt_bytes(used))?;
         let (contents, crc) = bytes.split_last_chunk::<4>()?;
         let mut words = contents.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word));
         let mut state = self.start();
-        let above = state.u.iter_mut().enumerate().flat_map(|(j, column)| column.iter_mut().take(j));
-        for to in state.x.iter_mut().chain(&mut state.d).chain(above) {
+        let above = state.u.iter_mut().take(used).enumerate().flat_map(|(j, column)| column.iter_mut().take(j));
+        for to in state.x.iter_mut().take(used).chain(state.d.iter_mut().take(used)).chain(above) {
             *to = f32::from_bits(words.next()?);
         }
         let same = words.next()? == self.sum && u32::from_le_bytes(*crc) == crc32(contents);

@@ -1,0 +1,150 @@
+//! From the register of an encoder to an angle and back; angles in other units; rate groups.
+
+use super::{FlexsplineStatus, Marked, apart, copied, get, get_mut, give, put, span, status, usable};
+use crate::{Encoder, EncoderSettings, EncoderState, EncoderWrap, OutputAngle, RateGroup};
+use core::mem::{MaybeUninit, align_of, size_of};
+
+/// Eight-byte words of a [`FlexsplineEncoder`].
+pub const FLEXSPLINE_ENCODER_WORDS: usize = 7;
+
+/// An encoder, and where it is.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplineEncoder {
+    pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_ENCODER_WORDS],
+}
+
+/// How an encoder counts.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct FlexsplineEncoderSettings {
+    /// What it reads at the angle 0, counts of the encoder: -2^62 to 2^62.
+    pub zero_counts: i64,
+    /// Counts in a turn, 2 to 2^31: four times the lines of an incremental one.
+    pub counts_per_turn: u32,
+    /// Bits of the register, 1 to 64: it begins anew after 2^bits counts. 0: it begins anew after each turn. A signed register is given by
+    /// its bits, those above them zero.
+    pub wrap_bits: u8,
+    /// 1 if it counts up where the angle falls, else 0.
+    pub reversed: u8,
+}
+
+/// What is kept of an encoder.
+#[derive(Clone, Copy)]
+struct Followed {
+    encoder: Encoder,
+    at: Option<EncoderState>,
+}
+
+const ENCODER_MARK: u32 = 0x7845_5446;
+
+const _: () = {
+    assert!(size_of::<Marked<Followed>>() <= size_of::<FlexsplineEncoder>() && align_of::<Marked<Followed>>() <= 8);
+};
+
+/// Makes an encoder of its settings, `FLEXSPLINE_STATUS_ARGUMENT` if they cannot be; where it is is not known yet.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_encoder_init(
+    encoder: *mut FlexsplineEncoder,
+    settings: *const FlexsplineEncoderSettings,
+) -> FlexsplineStatus {
+    let make = || {
+        let s = copied(settings)?;
+        if s.reversed > 1 {
+            return Err(FlexsplineStatus::Argument);
+        }
+        let settings = EncoderSettings {
+            counts_per_turn: s.counts_per_turn,
+            wrap: if s.wrap_bits == 0 { EncoderWrap::Turn } else { EncoderWrap::Bits(s.wrap_bits) },
+            reversed: s.reversed == 1,
+            zero_counts: s.zero_counts,
+        };
+        let made = Encoder::new(settings).map_err(|_| FlexsplineStatus::Argument)?;
+        put(encoder, ENCODER_MARK, Followed { encoder: made, at: None })
+    };
+    status(make())
+}
+
+/// The first reading after a reset: of all angles with this reading the one nearest to `near_counts` (2^-32 turn) is taken, which is 0 or
+/// the angle that was saved. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_encoder_start(
+    encoder: *mut FlexsplineEncoder,
+    reading: u64,
+    near_counts: i64,
+) -> FlexsplineStatus {
+    let start = || {
+        let followed: &mut Followed = get_mut(encoder, ENCODER_MARK)?;
+        let at = followed.encoder.start(reading, near_counts).ok_or(FlexsplineStatus::Argument)?;
+        followed.at = Some(at);
+        Ok(())
+    };
+    status(start())
+}
+
+/// Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two readings it may move by less than half of what the
+/// register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick no sample then),
+/// `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_encoder_read(
+    encoder: *mut FlexsplineEncoder,
+    reading: u64,
+    angle_counts: *mut i64,
+) -> FlexsplineStatus {
+    let read = || {
+        apart([span(encoder), span(angle_counts)])?;
+        usable(angle_counts)?;
+        let Followed { encoder, at } = get_mut(encoder, ENCODER_MARK)?;
+        let at = at.as_mut().ok_or(FlexsplineStatus::NotInitialised)?;
+        if !encoder.read(at, reading) {
+            return Err(FlexsplineStatus::Argument);
+        }
+        give(angle_counts, encoder.angle_counts(at))
+    };
+    status(read())
+}
+
+/// What the register reads at an angle, to the nearest count: for a drive that is commanded in counts of its encoder.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_encoder_reading(
+    encoder: *const FlexsplineEncoder,
+    angle_counts: i64,
+    reading: *mut u64,
+) -> FlexsplineStatus {
+    let tell = || {
+        apart([span(encoder), span(reading)])?;
+        let followed: &Followed = get(encoder, ENCODER_MARK)?;
+        give(reading, followed.encoder.reading(angle_counts))
+    };
+    status(tell())
+}
+
+/// Counts of 2^-32 turn of an angle in radians, to the nearest; `FLEXSPLINE_STATUS_ARGUMENT` if it is not finite or beyond 2^31 turns. For
+/// start-up and the host: in double precision.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_counts_from_rad(rad: f64, angle_counts: *mut i64) -> FlexsplineStatus {
+    let tell = || {
+        usable(angle_counts)?;
+        give(angle_counts, OutputAngle::from_rad(rad).ok_or(FlexsplineStatus::Argument)?.counts())
+    };
+    status(tell())
+}
+
+/// Radians of an angle in counts of 2^-32 turn. For start-up and the host: in double precision.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_rad_from_counts(angle_counts: i64) -> f64 {
+    OutputAngle::from_counts(angle_counts).to_rad()
+}
+
+/// Radians from one angle to another, both in counts of 2^-32 turn, held within half a turn: in single precision, exact to 1.2e-7 of it.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_rad_between(from_counts: i64, to_counts: i64) -> f32 {
+    OutputAngle::from_counts(to_counts).minus_rad(OutputAngle::from_counts(from_counts))
+}
+
+/// 1 if a slower group that runs in every `divisor`-th tick, from `offset` on, runs in tick number `tick`, else 0; 0 too where `divisor` is 0 or
+/// `offset` not below it.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_is_due(tick: u32, divisor: u32, offset: u32) -> u8 {
+    RateGroup::new(divisor, offset).is_some_and(|group| group.is_due(tick)) as u8
+}

@@ -1,0 +1,612 @@
+//! What is added to the table: what measurements of the output teach, and springs that slip.
+
+use super::{
+    FlexsplineInput, FlexsplineOutput, FlexsplineState, FlexsplineStatus, Marked, STATE_MARK, apart, bytes, bytes_mut,
+    clear, copied, get, get_mut, give, given, list, put, span, status, told, usable,
+};
+use crate::joint::NO_COEFFICIENT;
+use crate::{
+    AdaptCounters, AdaptSettings, AdaptState, Adapter, Adjustment, Coefficient, JointState, Learning, LoadTorque,
+    OutputAngle, Seen, Slip, SlipBank, SlipElement, SlipState, Term, TorqueSlipElement, Verdict, saved_adapt_bytes,
+    saved_slip_bytes,
+};
+use core::mem::{MaybeUninit, align_of, size_of};
+
+/// Largest number of coefficients of a learner.
+pub const FLEXSPLINE_LEARNER_COEFFICIENTS: usize = 7;
+/// Eight-byte words of a [`FlexsplineLearner`].
+pub const FLEXSPLINE_LEARNER_WORDS: usize = 64;
+/// Bytes of a saved learner with the largest number of coefficients; n of them take 2 n (n - 1) + 8 n + 8.
+pub const FLEXSPLINE_SAVED_LEARNER_BYTES: usize = 148;
+/// Largest number of springs.
+pub const FLEXSPLINE_SLIP_SPRINGS: usize = 8;
+/// Eight-byte words of a [`FlexsplineSlip`].
+pub const FLEXSPLINE_SLIP_WORDS: usize = 21;
+/// Bytes of saved springs with the largest number of them; n of them take 8 n + 16.
+pub const FLEXSPLINE_SAVED_SLIP_BYTES: usize = 80;
+
+/// Offset of the mean error, rad.
+pub const FLEXSPLINE_TERM_MEAN: u8 = 0;
+/// Wind-up beside that of the table, rad/(N m).
+pub const FLEXSPLINE_TERM_WIND_UP: u8 = 1;
+/// Half-width of the play beside that of the table, rad.
+pub const FLEXSPLINE_TERM_HALF_WIDTH: u8 = 2;
+/// Cosine of `order` periods in a generator turn, rad.
+pub const FLEXSPLINE_TERM_COSINE: u8 = 3;
+/// Sine of `order` periods in a generator turn, rad.
+pub const FLEXSPLINE_TERM_SINE: u8 = 4;
+
+/// The adjustment is zero; what was learnt is kept. The start.
+pub const FLEXSPLINE_LEARNING_OFF: u8 = 0;
+/// What was learnt is used and stays as it is.
+pub const FLEXSPLINE_LEARNING_FROZEN: u8 = 1;
+/// Measurements are used.
+pub const FLEXSPLINE_LEARNING_ON: u8 = 2;
+
+/// There was no measurement, or nothing is to be learnt.
+pub const FLEXSPLINE_VERDICT_IDLE: u8 = 0;
+/// It was used.
+pub const FLEXSPLINE_VERDICT_USED: u8 = 1;
+/// Within what is not known anyway: it says nothing.
+pub const FLEXSPLINE_VERDICT_QUIET: u8 = 2;
+/// Beyond the gate.
+pub const FLEXSPLINE_VERDICT_OUTLIER: u8 = 3;
+/// Too soon after a reversal.
+pub const FLEXSPLINE_VERDICT_UNSETTLED: u8 = 4;
+/// No coefficient changes the output enough here to be seen in the noise.
+pub const FLEXSPLINE_VERDICT_UNEXCITED: u8 = 5;
+/// The tick itself was not to be trusted.
+pub const FLEXSPLINE_VERDICT_UNTRUSTED: u8 = 6;
+
+/// Springs that slip with the nominal output: widths in rad, 0 to 0.05, gains without a unit.
+pub const FLEXSPLINE_SLIP_OF_OUTPUT: u8 = 0;
+/// Springs that slip with the load torque: widths in N m, 0 to 10000, gains in rad/(N m).
+pub const FLEXSPLINE_SLIP_OF_TORQUE: u8 = 1;
+
+/// A few coefficients that measurements of the output teach, and what is learnt.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplineLearner {
+    pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_LEARNER_WORDS],
+}
+
+/// Springs that slip, and their deflections.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplineSlip {
+    pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_SLIP_WORDS],
+}
+
+/// A coefficient to be learnt.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct FlexsplineCoefficient {
+    /// It stays within +- this: rad, or rad/(N m); above 0, 0.049 at most.
+    pub limit: f32,
+    /// Standard deviation that it is expected to have at first, and never exceeds: same unit; 1e-6 to 10 times the limit.
+    pub initial_std: f32,
+    /// `FLEXSPLINE_TERM_...`.
+    pub term: u8,
+    /// Periods in a generator turn, 1 to 255, of a cosine or sine; else 0.
+    pub order: u8,
+}
+
+/// How a learner learns.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct FlexsplineLearnSettings {
+    /// Standard deviation of one measurement, rad at the output: its noise and what the table missed of its samples.
+    pub noise_rad: f32,
+    /// Measurements after which what was learnt in their direction is forgotten: 1 to 1000000.
+    pub memory_measurements: f32,
+    /// Standard deviations beyond which an innovation is an outlier: 1 to 100.
+    pub gate: f32,
+    /// Way at the output after a reversal that is left out beside four times the limit of the half-width, rad; 0 to 0.049.
+    pub settle_rad: f32,
+    /// Torque beyond which the wind-up's share grows no more, N m.
+    pub torque_limit_n_m: f32,
+}
+
+/// What a learner adds in the next tick.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineAdapted {
+    /// For `FlexsplineInput` of the next tick: mean error, counts of 2^-32 turn at the output.
+    pub mean_counts: i32,
+    /// The same: half-width of the play.
+    pub half_width_counts: i32,
+    /// Standard deviation of what it adds to the error, rad.
+    pub uncertainty_rad: f32,
+    /// What became of the measurement: `FLEXSPLINE_VERDICT_...`.
+    pub verdict: u8,
+}
+
+/// What became of measurements; counters stop at their largest value.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineLearnerReport {
+    /// Used.
+    pub used: u32,
+    /// Within what is not known anyway.
+    pub quiet: u32,
+    /// Outliers.
+    pub outliers: u32,
+    /// Outliers in a row until now: many say that the output encoder or its zero is not what it was.
+    pub outliers_in_a_row: u32,
+    /// Too soon after a reversal.
+    pub unsettled: u32,
+    /// No coefficient was excited.
+    pub unexcited: u32,
+    /// The tick was not to be trusted.
+    pub untrusted: u32,
+    /// Coefficients held at their limit, once for each and each measurement.
+    pub limited: u32,
+    /// Starts from zero because the state was hit by an upset.
+    pub restarts: u32,
+    /// `FLEXSPLINE_LEARNING_...`.
+    pub learning: u8,
+    /// Number of coefficients.
+    pub coefficients: u8,
+}
+
+/// A coefficient as learnt.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineLearnt {
+    /// Its value: rad, or rad/(N m).
+    pub value: f32,
+    /// Its standard deviation, same unit.
+    pub std: f32,
+}
+
+/// A spring that slips.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineSpring {
+    /// Deflection at which it slips: rad of the nominal output, or N m.
+    pub width: f32,
+    /// Error per deflection: without a unit, or rad/(N m).
+    pub gain: f32,
+}
+
+/// What springs add.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineSlipReport {
+    /// Error at the output, rad.
+    pub error_rad: f32,
+    /// It lies within +- this, rad: 0 once every spring has slipped from one end to the other.
+    pub uncertainty_rad: f32,
+    /// The error for `flexspline_input_add`, counts of 2^-32 turn at the output.
+    pub mean_counts: i32,
+    /// 1 if every deflection is known, else 0.
+    pub is_known: u8,
+}
+
+const MOST: usize = FLEXSPLINE_LEARNER_COEFFICIENTS;
+const SPRINGS: usize = FLEXSPLINE_SLIP_SPRINGS;
+
+/// An adapter with what it has learnt, of the first so many coefficients.
+#[derive(Clone, Copy)]
+struct Learner {
+    adapter: Adapter<MOST>,
+    state: AdaptState<MOST>,
+    used: u8,
+}
+
+/// A bank with its deflections.
+#[derive(Clone, Copy)]
+enum Bank {
+    Output(SlipBank<SPRINGS>, SlipState<SPRINGS>),
+    Torque(SlipBank<SPRINGS, LoadTorque>, SlipState<SPRINGS, LoadTorque>),
+}
+
+/// The first so many springs of a bank.
+#[derive(Clone, Copy)]
+struct Springs {
+    bank: Bank,
+    used: u8,
+}
+
+const LEARNER_MARK: u32 = 0x784c_5446;
+const SLIP_MARK: u32 = 0x7842_5446;
+
+const _: () = {
+    assert!(size_of::<Marked<Learner>>() <= size_of::<FlexsplineLearner>() && align_of::<Marked<Learner>>() <= 8);
+    assert!(size_of::<Marked<Springs>>() <= size_of::<FlexsplineSlip>() && align_of::<Marked<Springs>>() <= 8);
+    assert!(FLEXSPLINE_SAVED_LEARNER_BYTES == saved_adapt_bytes(MOST));
+    assert!(FLEXSPLINE_SAVED_SLIP_BYTES == saved_slip_bytes(SPRINGS));
+};
+
+fn coefficient(c: FlexsplineCoefficient) -> Result<Coefficient, FlexsplineStatus> {
+    let term = match (c.term, c.order) {
+        (FLEXSPLINE_TERM_MEAN, 0) => Term::Mean,
+        (FLEXSPLINE_TERM_WIND_UP, 0) => Term::WindUp,
+        (FLEXSPLINE_TERM_HALF_WIDTH, 0) => Term::HalfWidth,
+        (FLEXSPLINE_TERM_COSINE, order) => Term::Cos(order),
+        (FLEXSPLINE_TERM_SINE, order) => Term::Sin(order),
+        _ => return Err(FlexsplineStatus::Argument),
+    };
+    Ok(Coefficient { term, limit: c.limit, initial_std: c.initial_std })
+}
+
+/// Makes a learner of 1 to `FLEXSPLINE_LEARNER_COEFFICIENTS` coefficients that has learnt nothing yet and is off; `FLEXSPLINE_STATUS_ARGUMENT` if a
+/// setting is out of its range. An update takes as long with one as with all.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_learner_init(
+    learner: *mut FlexsplineLearner,
+    settings: *const FlexsplineLearnSettings,
+    coefficients: *const FlexsplineCoefficient,
+    number: u8,
+) -> FlexsplineStatus {
+    let make = || {
+        let s = copied(settings)?;
+        let none = FlexsplineCoefficient { limit: 0.0, initial_std: 0.0, term: 0, order: 0 };
+        let wanted = list(coefficients, number, [none; MOST])?;
+        let mut found = [NO_COEFFICIENT; MOST];
+        for (to, from) in found.iter_mut().zip(wanted).take(number as usize) {
+            *to = coefficient(from)?;
+        }
+        let settings = AdaptSettings {
+            coefficients: found,
+            noise_rad: s.noise_rad,
+            memory_measurements: s.memory_measurements,
+            gate: s.gate,
+            settle_rad: s.settle_rad,
+            torque_limit_n_m: s.torque_limit_n_m,
+        };
+        let adapter = Adapter::of_first(&settings, number as usize).map_err(|_| FlexsplineStatus::Argument)?;
+        put(learner, LEARNER_MARK, Learner { adapter, state: adapter.start(), used: number })
+    };
+    status(make())
+}
+
+/// Switches learning (`FLEXSPLINE_LEARNING_...`), from the next update on.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_learner_set(learner: *mut FlexsplineLearner, learning: u8) -> FlexsplineStatus {
+    let set = || {
+        let learner: &mut Learner = get_mut(learner, LEARNER_MARK)?;
+        learner.state.set_learning(match learning {
+            FLEXSPLINE_LEARNING_OFF => Learning::Off,
+            FLEXSPLINE_LEARNING_FROZEN => Learning::Frozen,
+            FLEXSPLINE_LEARNING_ON => Learning::On,
+            _ => return Err(FlexsplineStatus::Argument),
+        });
+        Ok(())
+    };
+    status(set())
+}
+
+/// Forgets what was learnt; counters and `FLEXSPLINE_LEARNING_...` stay. The limiter of the joint takes the adjustment out.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_learner_reset(learner: *mut FlexsplineLearner) -> FlexsplineStatus {
+    let reset = || {
+        let Learner { adapter, state, .. } = get_mut(learner, LEARNER_MARK)?;
+        adapter.reset(state);
+        Ok(())
+    };
+    status(reset())
+}
+
+/// One tick, every tick and in order, after `flexspline_tick` with what it was given and gave: learns from the output angle measured at the same
+/// moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and tells what to add in the next tick. Nothing that comes in can make
+/// that exceed the limits. `input` is that of the tick with the learner's own adjustment alone: what springs or a model of yours added beside it counts
+/// as known then, and is not learnt a second time.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_learner_update(
+    learner: *mut FlexsplineLearner,
+    state: *const FlexsplineState,
+    input: *const FlexsplineInput,
+    output: *const FlexsplineOutput,
+    has_measured: u8,
+    measured_counts: i64,
+    adapted: *mut FlexsplineAdapted,
+) -> FlexsplineStatus {
+    let update = || {
+        for written in [span(learner), span(adapted)] {
+            clear(written, [span(state), span(input), span(output)])?;
+        }
+        apart([span(learner), span(adapted)])?;
+        usable(adapted)?;
+        let (input, output) = (told(&copied(input)?), given(output)?);
+        let state: &JointState = get(state, STATE_MARK)?;
+        let learner: &mut Learner = get_mut(learner, LEARNER_MARK)?;
+        let measured = (has_measured != 0).then_some(OutputAngle::from_counts(measured_counts));
+        let seen = Seen { input: &input, play: state.play(), output: &output, measured };
+        let found = learner.adapter.update(&mut learner.state, &seen);
+        give(
+            adapted,
+            FlexsplineAdapted {
+                mean_counts: found.adjustment.mean_counts,
+                half_width_counts: found.adjustment.half_width_counts,
+                uncertainty_rad: found.uncertainty_rad,
+                verdict: match found.verdict {
+                    Verdict::Idle => FLEXSPLINE_VERDICT_IDLE,
+                    Verdict::Used => FLEXSPLINE_VERDICT_USED,
+                    Verdict::Quiet => FLEXSPLINE_VERDICT_QUIET,
+                    Verdict::Outlier => FLEXSPLINE_VERDICT_OUTLIER,
+                    Verdict::Unsettled => FLEXSPLINE_VERDICT_UNSETTLED,
+                    Verdict::Unexcited => FLEXSPLINE_VERDICT_UNEXCITED,
+                    Verdict::Untrusted => FLEXSPLINE_VERDICT_UNTRUSTED,
+                },
+            },
+        )
+    };
+    status(update())
+}
+
+/// Tells a coefficient, by its place in the list that the learner was made of; `FLEXSPLINE_STATUS_ARGUMENT` beyond it.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_learner_coefficient(
+    learner: *const FlexsplineLearner,
+    place: u8,
+    learnt: *mut FlexsplineLearnt,
+) -> FlexsplineStatus {
+    let tell = || {
+        apart([span(learner), span(learnt)])?;
+        let learner: &Learner = get(learner, LEARNER_MARK)?;
+        let found = learner.adapter.coefficients(&learner.state);
+        let known = found.iter().take(learner.used as usize).nth(place as usize);
+        let &(value, std) = known.ok_or(FlexsplineStatus::Argument)?;
+        give(learnt, FlexsplineLearnt { value, std })
+    };
+    status(tell())
+}
+
+/// Tells what became of measurements.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_learner_report(
+    learner: *const FlexsplineLearner,
+    report: *mut FlexsplineLearnerReport,
+) -> FlexsplineStatus {
+    let tell = || {
+        apart([span(learner), span(report)])?;
+        let learner: &Learner = get(learner, LEARNER_MARK)?;
+        let AdaptCounters {
+            used,
+            quiet,
+            outliers,
+            outliers_in_a_row,
+            unsettled,
+            unexcited,
+            untrusted,
+            limited,
+            restarts,
+        } = learner.state.counters();
+        give(
+            report,
+            FlexsplineLearnerReport {
+                used,
+                quiet,
+                outliers,
+                outliers_in_a_row,
+                unsettled,
+                unexcited,
+                untrusted,
+                limited,
+                restarts,
+                learning: match learner.state.learning() {
+                    Learning::Off => FLEXSPLINE_LEARNING_OFF,
+                    Learning::Frozen => FLEXSPLINE_LEARNING_FROZEN,
+                    Learning::On => FLEXSPLINE_LEARNING_ON,
+                },
+                coefficients: learner.used,
+            },
+        )
+    };
+    status(tell())
+}
+
+/// Writes what was learnt, with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_LEARNER_BYTES` at most. `FLEXSPLINE_STATUS_TOO_LARGE` if there is
+/// less room. The same bytes as in Rust.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_learner_save(
+    learner: *const FlexsplineLearner,
+    saved: *mut u8,
+    saved_bytes: usize,
+    written: *mut usize,
+) -> FlexsplineStatus {
+    let save = || {
+        usable(written)?;
+        let room = (saved as usize, saved_bytes);
+        apart([span(learner), room, span(written)])?;
+        let learner: &Learner = get(learner, LEARNER_MARK)?;
+        let room = bytes_mut(saved, saved_bytes)?;
+        let took = learner.adapter.save_first(&learner.state, learner.used as usize, room);
+        give(written, took.ok_or(FlexsplineStatus::TooLarge)?)
+    };
+    status(save())
+}
+
+/// Takes back what a learner of the same coefficients saved, and is off; `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, or were saved with other
+/// coefficients. The learner is made first, by `flexspline_learner_init`.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_learner_restore(
+    learner: *mut FlexsplineLearner,
+    saved: *const u8,
+    saved_bytes: usize,
+) -> FlexsplineStatus {
+    let restore = || {
+        apart([span(learner), (saved as usize, saved_bytes)])?;
+        let kept = bytes(saved, saved_bytes)?;
+        let learner: &mut Learner = get_mut(learner, LEARNER_MARK)?;
+        let found = learner.adapter.restore_first(learner.used as usize, kept);
+        learner.state = found.ok_or(FlexsplineStatus::Saved)?;
+        Ok(())
+    };
+    status(restore())
+}
+
+/// Makes 1 to `FLEXSPLINE_SLIP_SPRINGS` springs that slip with `variable` (`FLEXSPLINE_SLIP_OF_...`), no deflection of which is known;
+/// `FLEXSPLINE_STATUS_ARGUMENT` if a width is not allowed or a gain not finite.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_slip_init(
+    slip: *mut FlexsplineSlip,
+    variable: u8,
+    springs: *const FlexsplineSpring,
+    number: u8,
+) -> FlexsplineStatus {
+    let make = || {
+        let springs = list(springs, number, [FlexsplineSpring::default(); SPRINGS])?;
+        let bank = match variable {
+            FLEXSPLINE_SLIP_OF_OUTPUT => {
+                let bank = SlipBank::new(springs.map(|s| SlipElement { width_rad: s.width, gain: s.gain }));
+                bank.map(|bank| Bank::Output(bank.of_first(number as usize), SlipState::unknown()))
+            }
+            FLEXSPLINE_SLIP_OF_TORQUE => {
+                let spring = |s: FlexsplineSpring| TorqueSlipElement { width_n_m: s.width, gain_rad_per_n_m: s.gain };
+                let bank = SlipBank::of_torque(springs.map(spring));
+                bank.map(|bank| Bank::Torque(bank.of_first(number as usize), SlipState::unknown()))
+            }
+            _ => None,
+        };
+        put(slip, SLIP_MARK, Springs { bank: bank.ok_or(FlexsplineStatus::Argument)?, used: number })
+    };
+    status(make())
+}
+
+/// Sets all deflections anew: 0, not known, as after a reset; 1, none, as before the first motion or after strokes that died away.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_slip_set(slip: *mut FlexsplineSlip, is_relaxed: u8) -> FlexsplineStatus {
+    let set = || {
+        let Springs { bank, .. } = get_mut(slip, SLIP_MARK)?;
+        if is_relaxed > 1 {
+            return Err(FlexsplineStatus::Argument);
+        }
+        match bank {
+            Bank::Output(_, state) => {
+                *state = if is_relaxed == 1 { SlipState::relaxed() } else { SlipState::unknown() }
+            }
+            Bank::Torque(_, state) => {
+                *state = if is_relaxed == 1 { SlipState::relaxed() } else { SlipState::unknown() }
+            }
+        }
+        Ok(())
+    };
+    status(set())
+}
+
+fn slip_report(slip: Slip, is_known: bool) -> FlexsplineSlipReport {
+    FlexsplineSlipReport {
+        error_rad: slip.error_rad,
+        uncertainty_rad: slip.uncertainty_rad,
+        mean_counts: slip.mean_counts(),
+        is_known: is_known as u8,
+    }
+}
+
+/// One tick of springs that slip with the nominal output (`flexspline_nominal_output`), counts of 2^-32 turn: what they add in the next.
+/// `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the torque.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_slip_update(
+    slip: *mut FlexsplineSlip,
+    nominal_counts: i64,
+    report: *mut FlexsplineSlipReport,
+) -> FlexsplineStatus {
+    let update = || {
+        apart([span(slip), span(report)])?;
+        usable(report)?;
+        let Springs { bank: Bank::Output(bank, state), .. } = get_mut(slip, SLIP_MARK)? else {
+            return Err(FlexsplineStatus::Argument);
+        };
+        let found = bank.update(state, OutputAngle::from_counts(nominal_counts));
+        give(report, slip_report(found, state.is_known()))
+    };
+    status(update())
+}
+
+/// One tick of springs that slip with the load torque, N m: what they add in the next. A torque that is not finite moves nothing.
+/// `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the output.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_slip_update_torque(
+    slip: *mut FlexsplineSlip,
+    torque_n_m: f32,
+    report: *mut FlexsplineSlipReport,
+) -> FlexsplineStatus {
+    let update = || {
+        apart([span(slip), span(report)])?;
+        usable(report)?;
+        let Springs { bank: Bank::Torque(bank, state), .. } = get_mut(slip, SLIP_MARK)? else {
+            return Err(FlexsplineStatus::Argument);
+        };
+        let found = bank.update(state, torque_n_m);
+        give(report, slip_report(found, state.is_known()))
+    };
+    status(update())
+}
+
+/// Writes the deflections with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_SLIP_BYTES` at most. `FLEXSPLINE_STATUS_TOO_LARGE` if there is less room,
+/// or before the first update. The same bytes as in Rust.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_slip_save(
+    slip: *const FlexsplineSlip,
+    saved: *mut u8,
+    saved_bytes: usize,
+    written: *mut usize,
+) -> FlexsplineStatus {
+    let save = || {
+        usable(written)?;
+        apart([span(slip), (saved as usize, saved_bytes), span(written)])?;
+        let &Springs { ref bank, used } = get(slip, SLIP_MARK)?;
+        let (room, used) = (bytes_mut(saved, saved_bytes)?, used as usize);
+        let took = match bank {
+            Bank::Output(bank, state) => bank.save_first(state, used, room),
+            Bank::Torque(bank, state) => bank.save_first(state, used, room),
+        };
+        give(written, took.ok_or(FlexsplineStatus::TooLarge)?)
+    };
+    status(save())
+}
+
+/// Takes back the deflections that the same springs saved; only if the joint (of springs on the torque: the load) cannot have moved meanwhile.
+/// `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, or of other springs. The springs are made first, by `flexspline_slip_init`.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_slip_restore(
+    slip: *mut FlexsplineSlip,
+    saved: *const u8,
+    saved_bytes: usize,
+) -> FlexsplineStatus {
+    let restore = || {
+        apart([span(slip), (saved as usize, saved_bytes)])?;
+        let kept = bytes(saved, saved_bytes)?;
+        let Springs { bank, used } = get_mut(slip, SLIP_MARK)?;
+        let used = *used as usize;
+        match bank {
+            Bank::Output(bank, state) => *state = bank.restore_first(used, kept).ok_or(FlexsplineStatus::Saved)?,
+            Bank::Torque(bank, state) => *state = bank.restore_first(used, kept).ok_or(FlexsplineStatus::Saved)?,
+        }
+        Ok(())
+    };
+    status(restore())
+}
+
+/// Adds to the adjustment of an input, counts of 2^-32 turn at the output: what a learner, springs or a friction model of your own say. Each sum is held within
+/// +-0.049 rad.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_input_add(
+    input: *mut FlexsplineInput,
+    mean_counts: i32,
+    half_width_counts: i32,
+) -> FlexsplineStatus {
+    let add = || {
+        let before = copied(input)?;
+        let sum = |one: i32, other: i32| {
+            one.saturating_add(other).max(Adjustment::MAX_COUNTS.wrapping_neg()).min(Adjustment::MAX_COUNTS)
+        };
+        let mean_counts = sum(before.mean_counts, mean_counts);
+        let half_width_counts = sum(before.half_width_counts, half_width_counts);
+        give(input, FlexsplineInput { mean_counts, half_width_counts, ..before })
+    };
+    status(add())
+}
+
+/// The same in radians at the output; NaN adds nothing.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_input_add_rad(
+    input: *mut FlexsplineInput,
+    mean_rad: f32,
+    half_width_rad: f32,
+) -> FlexsplineStatus {
+    let Adjustment { mean_counts, half_width_counts } = Adjustment::from_rad(mean_rad, half_width_rad);
+    flexspline_input_add(input, mean_counts, half_width_counts)
+}

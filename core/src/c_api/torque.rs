@@ -1,0 +1,173 @@
+//! Which torque a tick is given, how old it is, and the rate that goes with a command.
+
+use super::{
+    FlexsplineJoint, FlexsplineStatus, FlexsplineStore, JOINT_MARK, Marked, STORE_MARK, apart, clear, copied, get,
+    get_mut, give, put, span, status, usable,
+};
+use crate::{Aged, Direction, Joint, OutputAngle, Store, TorquePath, TorqueReading, TorqueSettings};
+use core::mem::{MaybeUninit, align_of, size_of};
+
+/// Eight-byte words of a [`FlexsplineTorquePath`].
+pub const FLEXSPLINE_TORQUE_PATH_WORDS: usize = 5;
+/// Eight-byte words of a [`FlexsplineAged`].
+pub const FLEXSPLINE_AGED_WORDS: usize = 4;
+
+/// The torque is that on the load: what gravity, wind and the like do to it, less inertia times the acceleration of the target.
+pub const FLEXSPLINE_TORQUE_ON_LOAD: u8 = 0;
+/// The torque is that in the mesh: of a sensor between drive and load, of the twist, or of the motor's current less its friction.
+pub const FLEXSPLINE_TORQUE_IN_MESH: u8 = 1;
+
+/// From a reading of torque to the one that a tick is given.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplineTorquePath {
+    pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_TORQUE_PATH_WORDS],
+}
+
+/// A measurement with its age.
+#[repr(C)]
+#[derive(Debug)]
+pub struct FlexsplineAged {
+    pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_AGED_WORDS],
+}
+
+/// What a reading of torque goes through.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct FlexsplineTorqueSettings {
+    /// Time from tick to tick, s.
+    pub tick_s: f32,
+    /// Corner of the low-pass, Hz: of the first order.
+    pub bandwidth_hz: f32,
+    /// Coulomb drag of the output of this unit, N m; 0 or more.
+    pub drag_n_m: f32,
+    /// Coulomb drag that the table was made with, N m; 0 or more.
+    pub table_drag_n_m: f32,
+    /// A torque in the mesh below this does not change the flank, N m: some three times the peak of the noise. 0 or more.
+    pub hold_n_m: f32,
+}
+
+const TORQUE_PATH_MARK: u32 = 0x7854_5446;
+const AGED_MARK: u32 = 0x7847_5446;
+
+const _: () = {
+    assert!(
+        size_of::<Marked<TorquePath>>() <= size_of::<FlexsplineTorquePath>() && align_of::<Marked<TorquePath>>() <= 8
+    );
+    assert!(size_of::<Marked<Aged>>() <= size_of::<FlexsplineAged>() && align_of::<Marked<Aged>>() <= 8);
+};
+
+/// The direction of a sign: what is 0 is none.
+fn direction_of(sign: i8) -> Result<Direction, FlexsplineStatus> {
+    match sign {
+        1 => Ok(Direction::Forward),
+        -1 => Ok(Direction::Backward),
+        _ => Err(FlexsplineStatus::Argument),
+    }
+}
+
+/// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time or bandwidth is not finite and positive, or a drag or hold not
+/// finite or below 0.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_torque_init(
+    path: *mut FlexsplineTorquePath,
+    settings: *const FlexsplineTorqueSettings,
+) -> FlexsplineStatus {
+    let make = || {
+        let s = copied(settings)?;
+        let settings = TorqueSettings {
+            tick_s: s.tick_s,
+            bandwidth_hz: s.bandwidth_hz,
+            drag_n_m: s.drag_n_m,
+            table_drag_n_m: s.table_drag_n_m,
+            hold_n_m: s.hold_n_m,
+        };
+        put(path, TORQUE_PATH_MARK, TorquePath::new(settings).map_err(|_| FlexsplineStatus::Argument)?)
+    };
+    status(make())
+}
+
+/// One tick: a reading, N m, positive where it turns the output forward, where it was measured (`FLEXSPLINE_TORQUE_...`), and the direction in which
+/// the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite gives NaN, and is forgotten.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_torque_tick(
+    path: *mut FlexsplineTorquePath,
+    place: u8,
+    reading_n_m: f32,
+    direction: i8,
+    torque_n_m: *mut f32,
+) -> FlexsplineStatus {
+    let tick = || {
+        apart([span(path), span(torque_n_m)])?;
+        usable(torque_n_m)?;
+        let path: &mut TorquePath = get_mut(path, TORQUE_PATH_MARK)?;
+        let reading = match place {
+            FLEXSPLINE_TORQUE_ON_LOAD => TorqueReading::OnLoad(reading_n_m),
+            FLEXSPLINE_TORQUE_IN_MESH => TorqueReading::InMesh(reading_n_m),
+            _ => return Err(FlexsplineStatus::Argument),
+        };
+        give(torque_n_m, path.tick(reading, direction_of(direction)?))
+    };
+    status(tick())
+}
+
+/// Nothing measured yet; what is older than `most_ticks` is not used.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_aged_init(aged: *mut FlexsplineAged, most_ticks: u16) -> FlexsplineStatus {
+    status(put(aged, AGED_MARK, Aged::new(most_ticks)))
+}
+
+/// One tick: what was measured in it, if anything (`has_measured` 1, else 0); the value to use, or NaN where it is too old, or was hit by an
+/// upset. A tick takes NaN as torque: it keeps its correction for `patience` ticks, then fades it out.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_aged_tick(
+    aged: *mut FlexsplineAged,
+    has_measured: u8,
+    measured: f32,
+    value: *mut f32,
+) -> FlexsplineStatus {
+    let tick = || {
+        apart([span(aged), span(value)])?;
+        usable(value)?;
+        let aged: &mut Aged = get_mut(aged, AGED_MARK)?;
+        give(value, aged.tick((has_measured != 0).then_some(measured)))
+    };
+    status(tick())
+}
+
+/// 1 if there is no value that may be used, else 0: ask for the sensor.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_aged_is_stale(aged: *const FlexsplineAged, is_stale: *mut u8) -> FlexsplineStatus {
+    let tell = || {
+        apart([span(aged), span(is_stale)])?;
+        let aged: &Aged = get(aged, AGED_MARK)?;
+        give(is_stale, aged.is_stale() as u8)
+    };
+    status(tell())
+}
+
+/// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal one and what the error adds, along the way
+/// of the target over `ahead_s` (some ticks, above 0). For the speed loop of a servo; it cannot feed a torque back. NaN where the table gives nothing. Two
+/// inverse solutions: for a tick that has the time, or every few ticks.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_rate_ahead(
+    joint: *const FlexsplineJoint,
+    store: *const FlexsplineStore,
+    target_counts: i64,
+    rate_rad_s: f32,
+    torque_n_m: f32,
+    ahead_s: f32,
+    generator_rate_rad_s: *mut f32,
+) -> FlexsplineStatus {
+    let tell = || {
+        clear(span(generator_rate_rad_s), [span(joint), span(store)])?;
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let store: &Store = get(store, STORE_MARK)?;
+        if !(ahead_s > 0.0 && ahead_s.is_finite() && rate_rad_s.is_finite()) {
+            return Err(FlexsplineStatus::Argument);
+        }
+        let target = OutputAngle::from_counts(target_counts);
+        give(generator_rate_rad_s, joint.rate_ahead(store, target, rate_rad_s, torque_n_m, ahead_s))
+    };
+    status(tell())
+}
