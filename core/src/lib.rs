@@ -218,6 +218,8 @@ mod whole;
 pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};
 pub use error::{DriveError, Field, ImageError};
+#[cfg(feature = "std")]
+pub use joint::JOINT_STATE_WORDS;
 pub use joint::{
     AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Aged, Ahead, Coefficient,
     Disturbance, FittedSlip, Flags, Inertias, Input, Joint, JointState, Learning, Limits, LoadTorque, Measured, Mode,
