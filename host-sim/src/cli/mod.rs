@@ -9,6 +9,7 @@ mod context;
 mod diagnose;
 mod drive;
 mod export;
+mod export_fmu;
 mod fly;
 mod kernels;
 mod logs;
@@ -95,7 +96,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
             ("sleeve", "the sleeve or cup in three dimensions: stiffness by harmonic, tilt, torsion"),
             ("study", "vary fields of a drive: what a catalogue would print of each variant"),
             ("fly", "a joint with mass in closed loop, with and without compensation"),
-            ("export", "the mesh, the outlines or a CalculiX deck, for other programs"),
+            ("export", "the mesh, the outlines, a CalculiX deck or an FMU, for other programs"),
             ("reproduce", "the paper's protocol for all four generators, beside its figures"),
         ],
     ),
@@ -339,6 +340,7 @@ mod tests {
                     "ratio",
                     "teeth",
                     "module",
+                    "generator",
                 ];
                 assert!(stated || needs_none || absent.contains(&id.as_str()), "{name} {id} states no default: {help}");
             }
