@@ -7,6 +7,7 @@
 //! sh             run, block after block, in a copy of the project of each page's own, by the program that was built
 //! sh slow        only parsed here; run by `cargo test -- --include-ignored` (`tests/run host --long`)
 //! sh firmware    run by `tests/run firmware`, which has to name the page
+//! sh fmu         run by `tests/run fmu`, likewise
 //! rust           compiled and run as a documentation test: `tests/lib.rs` has to hold the page
 //! toml           a drive, or a nominal model if it has [nominal]; `toml cargo` is neither
 //! ```
@@ -41,7 +42,7 @@ const NOT_RUN: [(&str, &str); 12] = [
 /// Programs beside ours that a block may call.
 const HELPERS: [&str; 9] = ["cd", "cp", "cmp", "mkdir", "cat", "head", "awk", "ls", "rm"];
 /// Parts of `tests/run` that run blocks marked with their name.
-const PARTS: [&str; 1] = ["firmware"];
+const PARTS: [&str; 2] = ["firmware", "fmu"];
 /// Pictures of examples are small, bytes.
 const LARGEST_PICTURE: u64 = 150_000;
 /// Lines of an example's page: one screen.
@@ -264,7 +265,10 @@ fn what_is_wrong_is_found() {
 #[test]
 fn every_block_says_what_it_is() {
     let lib = fs::read_to_string(root().join("tests/lib.rs")).unwrap();
-    let runner = fs::read_to_string(root().join("tests/run")).unwrap();
+    let mut runner = fs::read_to_string(root().join("tests/run")).unwrap();
+    for part in fs::read_dir(root().join("tests/parts")).unwrap() {
+        runner += &fs::read_to_string(part.unwrap().path()).unwrap();
+    }
     let mut wrong = Vec::new();
     for page in pages() {
         let name = page.name.to_str().unwrap();

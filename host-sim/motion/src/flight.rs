@@ -241,20 +241,20 @@ pub fn fly_one(scenario: &Scenario, unit: &Unit, controller: usize) -> Result<Fl
     lane(&made(scenario, unit, None)?, controller)
 }
 
-/// The image of the table that a scenario's joint flies with.
+/// The image of the table that a scenario's joint flies with; `id` makes its id of what is hashed for it.
 ///
 /// # Errors
 /// Why there is none, in words.
-pub fn table_image(scenario: &Scenario, unit: &Unit) -> Result<Vec<u8>, String> {
+pub fn table_image(scenario: &Scenario, unit: &Unit, id: impl FnOnce(&[u8]) -> [u8; 8]) -> Result<Vec<u8>, String> {
     let largest_n_m = 1.5 * scenario.largest_n_m() + 1.0;
     let noise_rad = if scenario.table == TableKnown::Calibrated { CALIBRATION_NOISE_RAD } else { 0.0 };
     let sampling = Sampling { largest_n_m, drag_n_m: TABLE_DRAG_N_M, temperature_c: scenario.temperature_c, noise_rad };
-    image(&unit.known(scenario.table), unit.drive, &sampling).map_err(|error| format!("no table: {error:?}"))
+    image(&unit.known(scenario.table), unit.drive, &sampling, id).map_err(|error| format!("no table: {error:?}"))
 }
 
 /// With the image of a table that was made before, or one made for the scenario.
 fn made(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>) -> Result<Made, String> {
-    let image = image.map_or_else(|| table_image(scenario, unit), Ok)?;
+    let image = image.map_or_else(|| table_image(scenario, unit, |_| [0; 8]), Ok)?;
     // The stiffest that the flight comes to: the loop of the mesh torque is judged by what the table says there.
     let stiffness = stiffness(&unit.nominal, scenario.largest_n_m());
     let masses = TwoMasses {

@@ -45,11 +45,16 @@ pub struct Sampling {
     pub noise_rad: f64,
 }
 
-/// The image of a table.
+/// The image of a table; `id` makes its id of what is hashed for it.
 ///
 /// # Errors
 /// [`ProjectError`].
-pub fn image(gear: &Gear, drive: Drive, sampling: &Sampling) -> Result<Vec<u8>, ProjectError> {
+pub fn image(
+    gear: &Gear,
+    drive: Drive,
+    sampling: &Sampling,
+    id: impl FnOnce(&[u8]) -> [u8; 8],
+) -> Result<Vec<u8>, ProjectError> {
     let torques = torques(sampling);
     let temperatures = [sampling.temperature_c as f32];
     let curve = |orders: &'static [u16]| {
@@ -90,7 +95,7 @@ pub fn image(gear: &Gear, drive: Drive, sampling: &Sampling) -> Result<Vec<u8>, 
         temperature_range_c: [temperatures[0]; 2],
         error_limit_rad: (1.5 * largest + 1e-4).min(f64::from(MAX_ERROR_RAD)) as f32,
     };
-    let fit = make_image(&plan, &provenance, &samples, workspace, &mut image, |_| [0; 8])?;
+    let fit = make_image(&plan, &provenance, &samples, workspace, &mut image, id)?;
     image.truncate(fit.image_bytes);
     Ok(image)
 }
@@ -215,7 +220,7 @@ mod tests {
         let gear = Gear { ratio: 95.0, lines, spring: Spring::Sampled(Box::new(Sampled::of_law(188.0, 60.0, law))) };
         let drive = Drive::new(188, 190, FixedMember::Flexspline).unwrap();
         let sampling = Sampling { largest_n_m: 50.0, drag_n_m: 0.02, temperature_c: 20.0, noise_rad: 0.0 };
-        let image = image(&gear, drive, &sampling).unwrap();
+        let image = image(&gear, drive, &sampling, |_| [0; 8]).unwrap();
         let found = gear_of(&Table::check(&image).unwrap(), 20.0, 0.02).unwrap();
         let (mut worst, mut most) = (0.0_f64, 0.0_f64);
         for k in 0..500 {

@@ -49,10 +49,10 @@ pub fn compensation(image: Vec<u8>) -> Result<Fmu, String> {
 pub fn joint(flown: &Flown, image: Option<Vec<u8>>) -> Result<Fmu, String> {
     let scenario = &flown.scenario;
     let Some(image) = image else {
-        let Unit { drive, nominal, built } = unit(flown.kind, scenario.temperature_c)?;
-        let unit = Unit { drive, nominal, built };
-        let image = table_image(scenario, &unit)?;
-        return Fmu::new(ModelKind::Joint, &starts_of(scenario), image, Some([unit.built, unit.nominal]));
+        let unit = unit(flown.kind, scenario.temperature_c)?;
+        let image = table_image(scenario, &unit, table_id)?;
+        let Unit { built, nominal, .. } = unit;
+        return Fmu::new(ModelKind::Joint, &starts_of(scenario), image, Some([built, nominal]));
     };
     let table = Table::check(&image).map_err(|error| error.to_string())?;
     if table.drive().exact_ratio() < 0.0 {
@@ -155,4 +155,11 @@ fn guid(resources: &Resources) -> String {
     let hex = hasher.finalize().to_hex();
     let parts = [&hex[0..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..32]];
     format!("{{{}}}", parts.join("-"))
+}
+
+/// The id of a table by what is hashed for it.
+fn table_id(hashed: &[u8]) -> [u8; 8] {
+    let mut id = [0; 8];
+    id.copy_from_slice(&blake3::hash(hashed).as_bytes()[..8]);
+    id
 }
