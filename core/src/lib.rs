@@ -218,7 +218,7 @@ mod whole;
 pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};
 pub use error::{DriveError, Field, ImageError};
-#[cfg(feature = "std")]
+#[cfg(any(test, feature = "std"))]
 pub use joint::JOINT_STATE_WORDS;
 pub use joint::{
     AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Aged, Ahead, Coefficient,

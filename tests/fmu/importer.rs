@@ -1,5 +1,6 @@
 //! A small importer of FMI 2.0: unzips an FMU, loads its library for Linux, and calls it as C does, with declarations of its own.
 
+use std::cell::Cell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -167,7 +168,7 @@ impl Imported {
         if component.is_null() {
             Err(log.into_inner().unwrap())
         } else {
-            Ok(Instance { of: self, component, log, time: 0.0 })
+            Ok(Instance { of: self, component, log, time: Cell::new(0.0) })
         }
     }
 
@@ -195,7 +196,7 @@ pub struct Instance<'a> {
     pub of: &'a Imported,
     pub component: *mut c_void,
     log: Box<Mutex<Vec<Line>>>,
-    pub time: f64,
+    pub time: Cell<f64>,
 }
 
 impl Drop for Instance<'_> {
@@ -295,10 +296,10 @@ impl Instance<'_> {
     }
 
     /// A step from where the last one ended.
-    pub fn step(&mut self, seconds: f64) -> c_int {
-        let status = self.step_from(self.time, seconds);
+    pub fn step(&self, seconds: f64) -> c_int {
+        let status = self.step_from(self.time.get(), seconds);
         if status == OK {
-            self.time += seconds;
+            self.time.set(self.time.get() + seconds);
         }
         status
     }

@@ -391,10 +391,10 @@ impl JointState {
 }
 
 /// Words of a state as a simulation keeps it.
-#[cfg(feature = "std")]
+#[cfg(any(test, feature = "std"))]
 pub const JOINT_STATE_WORDS: usize = 19;
 
-#[cfg(feature = "std")]
+#[cfg(any(test, feature = "std"))]
 impl JointState {
     /// All of it, for a simulation that goes on from here, now or elsewhere. Unlike what [`Self::save`] keeps over a reset, with mode,
     /// limiter and all counters: the ticks that follow are the same.
@@ -490,3 +490,47 @@ crate::upset::upsets!(Kept {
     fading,
     marks,
 });
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::angle::OutputAngle;
+    use crate::fixture::{self, LIMITS};
+    use crate::joint::{Adjustment, Input, Overrun};
+    use crate::store::Images;
+
+    #[test]
+    fn a_state_of_its_words_goes_on_the_same_and_no_changed_word_is_taken() {
+        let (one, two) = (fixture::image(true), fixture::image(true));
+        let images = Images::new(&one, &two);
+        let joint = Joint::new(fixture::drive(), LIMITS, Overrun::FadeOut { ticks: 20 }).unwrap();
+        let (mut store, mut state) = (Store::new(), JointState::new());
+        assert_eq!(JointState::of_words(&state.words()), Some(state));
+        store.activate(&images, &fixture::drive(), 20.0).unwrap();
+        state.request(Mode::Tracking).unwrap();
+        for k in 0..200_u16 {
+            let input = Input {
+                // Lost samples, glitches and late ticks: every counter is in use at some time.
+                generator: (k % 7 != 0)
+                    .then(|| GeneratorAngle::from_rad(if k % 31 > 27 { 9.0 } else { 1e-3 * f64::from(k) }).unwrap()),
+                target: OutputAngle::from_rad(1e-4 * f64::from(k % 60)).unwrap(),
+                torque_n_m: if k % 40 > 35 { f32::NAN } else { 3.0 },
+                missed_ticks: u16::from(k % 50 == 0),
+                adjustment: Adjustment::from_rad(1e-6, 0.0),
+            };
+            let words = state.words();
+            let mut again = JointState::of_words(&words).unwrap();
+            let mut copy = store.clone();
+            assert_eq!(
+                joint.tick(&images, &mut store, &mut state, &input),
+                joint.tick(&images, &mut copy, &mut again, &input)
+            );
+            assert_eq!(state, again, "{k}");
+            for place in 0..JOINT_STATE_WORDS {
+                let mut changed = words;
+                changed[place] ^= 1 << (k % 32);
+                assert_eq!(JointState::of_words(&changed).is_some(), place == 17, "{place}");
+            }
+        }
+    }
+}

@@ -87,14 +87,14 @@ impl TorquePath {
     }
 
     /// What changes from tick to tick, for a simulation that goes on from here.
-    #[cfg(feature = "std")]
+    #[cfg(any(test, feature = "std"))]
     #[must_use]
     pub const fn kept(&self) -> [f32; 2] {
         [self.behind, self.flank]
     }
 
     /// Goes on from what [`Self::kept`] gave.
-    #[cfg(feature = "std")]
+    #[cfg(any(test, feature = "std"))]
     pub const fn go_on(&mut self, [behind, flank]: [f32; 2]) {
         self.behind = behind;
         self.flank = flank;

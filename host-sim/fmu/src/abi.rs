@@ -1,4 +1,4 @@
-//! The functions of FMI 2.0 (section 2.1.2: a library exports them by these names), with our own declarations of its types.
+//! The functions of FMI 2.0 (section 2.1.1: a library exports them by these names), with our own declarations of its types.
 //!
 //! A component is a number that is looked up, and never a pointer that is followed: a call with one that was freed, or that never was, is
 //! refused. Pointers to arrays and strings are read as the standard says they are, null pointers are refused. No panic gets out.
