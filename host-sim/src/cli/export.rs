@@ -76,8 +76,8 @@ fn beside_tables(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
         "generator" => arg
             .required(false)
-            .required_unless_present_any(others)
-            .default_value_ifs(others.map(|other| (other, ArgPredicate::IsPresent, "cam")))
+            .required_if_eq_any(["vtu", "csv", "inp"].map(|format| ("format", format)))
+            .default_value_if("format", ArgPredicate::Equals("fmu".into()), "cam")
             .conflicts_with_all(others),
         "mesh" | "solver" | "flank_penalty" | "bore_penalty" | "tolerance" | "max_iterations" | "generator_rad" => {
             arg.conflicts_with_all(others)
