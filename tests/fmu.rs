@@ -203,9 +203,9 @@ fn steps_of_any_size_make_whole_ticks_and_carry_the_rest() {
     assert_ne!(after(&[0.4e-3]), ticks(1));
     assert_eq!(after(&[0.4e-3, 0.4e-3, 0.4e-3]), ticks(1));
     assert_eq!(after(&[2.5e-3, 2.5e-3]), ticks(5));
+    assert_eq!(after(&[0.005 / 3.0; 3]), ticks(5));
+    assert_ne!(ticks(4), ticks(5));
     assert_eq!(after(&[0.1]), ticks(100));
-    assert_eq!(after(&[0.1 / 3.0; 3]), ticks(100));
-    assert_ne!(ticks(99), ticks(100));
 
     let instance = fmu.instance("stops");
     assert_eq!((instance.set_up(Some(1.0)), instance.call("fmi2EnterInitializationMode")), (OK, OK));
@@ -279,7 +279,7 @@ fn the_joint_flies_as_fly_does() {
     assert_eq!(errors.next(), None);
     println!("off the flight by {worst:.2e}\" where it errs by {most:.2}\"");
     // The load's slope is rounded once more on its way through the interface.
-    assert!(worst < 1e-3 && most > 1.0, "{worst} of {most}");
+    assert!(worst < 1e-4 && most > 10.0, "{worst} of {most}");
 }
 
 #[test]
