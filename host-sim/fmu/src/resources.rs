@@ -227,10 +227,7 @@ mod tests {
             said(&format!("{model}# remark\nx = 1")),
             "model.txt:3: x: the model compensation has no such variable"
         );
-        assert_eq!(
-            said(&format!("{model}tick_s = fast")),
-            "model.txt:2: tick_s: found \"fast\", which is no value of it"
-        );
+        assert_eq!(said(&format!("{model}tick = fast")), "model.txt:2: tick: found \"fast\", which is no value of it");
         assert_eq!(said(model), "model.txt: guid is missing");
         assert!(said(&format!("{model}guid = 1")).starts_with("table.fxt: "));
     }
