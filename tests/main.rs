@@ -22,6 +22,7 @@ mod docs_commands;
 mod element_patch_and_rates;
 mod fast_equals_reference;
 mod fem_causes;
+mod fmu;
 mod friction;
 mod fxt_format;
 mod independence;

@@ -222,6 +222,8 @@ pub use angle::{GeneratorAngle, OutputAngle};
 pub use drive::{Drive, FixedMember, Phases};
 pub use encoder::{Encoder, EncoderError, EncoderSettings, EncoderState, EncoderWrap};
 pub use error::{DriveError, Field, ImageError};
+#[cfg(any(test, feature = "std"))]
+pub use joint::JOINT_STATE_WORDS;
 pub use joint::{
     AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Aged, Ahead, Coefficient,
     Disturbance, FittedSlip, Flags, Inertias, Input, Joint, JointState, Learning, Limits, LoadTorque, Measured, Mode,

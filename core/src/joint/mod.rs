@@ -35,5 +35,7 @@ pub use slip::{
     FittedSlip, LoadTorque, NominalOutput, Slip, SlipBank, SlipElement, SlipState, SlipVariable, TorqueSlipElement,
     saved_slip_bytes,
 };
+#[cfg(any(test, feature = "std"))]
+pub use state::JOINT_STATE_WORDS;
 pub use state::{JointState, RestoreError, SAVED_JOINT_BYTES};
 pub use torque_path::{TorquePath, TorqueReading, TorqueSettings};

@@ -390,6 +390,86 @@ impl JointState {
     }
 }
 
+/// Words of a state as a simulation keeps it.
+#[cfg(any(test, feature = "std"))]
+pub const JOINT_STATE_WORDS: usize = 19;
+
+#[cfg(any(test, feature = "std"))]
+impl JointState {
+    /// All of it, for a simulation that goes on from here, now or elsewhere. Unlike what [`Self::save`] keeps over a reset, with mode,
+    /// limiter and all counters: the ticks that follow are the same.
+    #[must_use]
+    pub fn words(&self) -> [u32; JOINT_STATE_WORDS] {
+        let kept = self.open().0;
+        let (nominal, [error, lower, upper, half]) = kept.play.parts();
+        let generator = kept.generator.counts();
+        [
+            low(nominal),
+            high(nominal),
+            error as u32,
+            lower as u32,
+            upper as u32,
+            half as u32,
+            kept.adjusted as u32,
+            low(generator),
+            high(generator),
+            kept.correction as u32,
+            kept.goal as u32,
+            kept.aimed as u32,
+            kept.speed as u32,
+            kept.glitches as u32,
+            kept.uncorrected as u32,
+            kept.fading,
+            kept.marks,
+            self.missed_ticks,
+            crc32(&kept.sums().to_le_bytes()),
+        ]
+    }
+
+    /// A state from [`Self::words`], for the same joint with the same table; `None` if no joint can have had it.
+    #[must_use]
+    pub fn of_words(words: &[u32; JOINT_STATE_WORDS]) -> Option<Self> {
+        let &[
+            a,
+            b,
+            error,
+            lower,
+            upper,
+            half,
+            adjusted,
+            c,
+            d,
+            correction,
+            goal,
+            aimed,
+            speed,
+            glitches,
+            uncorrected,
+            fading,
+            marks,
+            missed_ticks,
+            sum,
+        ] = words;
+        let long = |low: u32, high: u32| (high as i64) << 32 | low as i64;
+        let kept = Kept {
+            play: PlayState::of(long(a, b), [error, lower, upper, half].map(|word| word as i32))?,
+            adjusted: adjusted as i32,
+            generator: GeneratorAngle::from_counts(long(c, d)),
+            correction: correction as i32,
+            goal: goal as i32,
+            aimed: aimed as i32,
+            speed: speed as i32,
+            glitches: u16::try_from(glitches).ok()?,
+            uncorrected: u16::try_from(uncorrected).ok()?,
+            fading,
+            marks,
+        };
+        let small = [correction, speed].iter().all(|fine| (*fine as i32).unsigned_abs() <= MOST_FINE);
+        let whole = crc32(&kept.sums().to_le_bytes()) == sum;
+        (small && whole).then(|| Self { copies: [kept.sealed(); 2], missed_ticks })
+    }
+}
+
 const _: () = assert!(size_of::<Kept>() == 64);
 
 #[cfg(test)]
@@ -410,3 +490,47 @@ crate::upset::upsets!(Kept {
     fading,
     marks,
 });
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::angle::OutputAngle;
+    use crate::fixture::{self, LIMITS};
+    use crate::joint::{Adjustment, Input, Overrun};
+    use crate::store::Images;
+
+    #[test]
+    fn a_state_of_its_words_goes_on_the_same_and_no_changed_word_is_taken() {
+        let (one, two) = (fixture::image(true), fixture::image(true));
+        let images = Images::new(&one, &two);
+        let joint = Joint::new(fixture::drive(), LIMITS, Overrun::FadeOut { ticks: 20 }).unwrap();
+        let (mut store, mut state) = (Store::new(), JointState::new());
+        assert_eq!(JointState::of_words(&state.words()), Some(state));
+        store.activate(&images, &fixture::drive(), 20.0).unwrap();
+        state.request(Mode::Tracking).unwrap();
+        for k in 0..200_u16 {
+            let input = Input {
+                // Lost samples, glitches and late ticks: every counter is in use at some time.
+                generator: (k % 7 != 0)
+                    .then(|| GeneratorAngle::from_rad(if k % 31 > 27 { 9.0 } else { 1e-3 * f64::from(k) }).unwrap()),
+                target: OutputAngle::from_rad(1e-4 * f64::from(k % 60)).unwrap(),
+                torque_n_m: if k % 40 > 35 { f32::NAN } else { 3.0 },
+                missed_ticks: u16::from(k % 50 == 0),
+                adjustment: Adjustment::from_rad(1e-6, 0.0),
+            };
+            let words = state.words();
+            let mut again = JointState::of_words(&words).unwrap();
+            let mut copy = store.clone();
+            assert_eq!(
+                joint.tick(&images, &mut store, &mut state, &input),
+                joint.tick(&images, &mut copy, &mut again, &input)
+            );
+            assert_eq!(state, again, "{k}");
+            for place in 0..JOINT_STATE_WORDS {
+                let mut changed = words;
+                changed[place] ^= 1 << (k % 32);
+                assert_eq!(JointState::of_words(&changed).is_some(), place == 17, "{place}");
+            }
+        }
+    }
+}

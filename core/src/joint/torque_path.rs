@@ -86,6 +86,20 @@ impl TorquePath {
         Ok(Self { settings, share, behind: f32::NAN, flank: 1.0 })
     }
 
+    /// What changes from tick to tick, for a simulation that goes on from here.
+    #[cfg(any(test, feature = "std"))]
+    #[must_use]
+    pub const fn kept(&self) -> [f32; 2] {
+        [self.behind, self.flank]
+    }
+
+    /// Goes on from what [`Self::kept`] gave.
+    #[cfg(any(test, feature = "std"))]
+    pub const fn go_on(&mut self, [behind, flank]: [f32; 2]) {
+        self.behind = behind;
+        self.flank = flank;
+    }
+
     /// One tick: a reading, and the direction in which the output moves or moved last; what to give to
     /// [`Input::torque_n_m`](crate::Input::torque_n_m). A reading that is not finite gives NaN and is forgotten.
     #[must_use]

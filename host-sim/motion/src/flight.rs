@@ -15,6 +15,10 @@ use super::scenario::{Load, Moment, Scenario, TableKnown, TorqueKnown};
 use super::servo::{Asked, Noise, Servo};
 use super::table::{Sampling, image};
 
+mod one;
+
+pub use one::{OneJoint, Ticked};
+
 /// Arc-seconds in a radian.
 pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
 
@@ -34,7 +38,7 @@ const ACCELERATION_RAD_S2: f64 = 5.0;
 /// Nearer targets keep the flank, rad: 0.5″.
 const HOLD_RAD: f32 = 2.4e-6;
 /// Drag that tables are made with, N·m: that of the drive as designed.
-const TABLE_DRAG_N_M: f64 = 0.02;
+pub const TABLE_DRAG_N_M: f64 = 0.02;
 /// Distance that the loop of a torque in the mesh keeps from +1, with a drive a fifth stiffer or softer than its table says.
 pub const DISTANCE: [f64; 2] = [0.5, 0.2];
 /// Widest low-pass of a torque, Hz: a tenth of the sampling frequency of usual torque sensors (guess).
@@ -181,9 +185,9 @@ pub struct Flight {
 }
 
 /// What every lane is made of.
-struct Made<'s> {
-    scenario: &'s Scenario,
-    unit: &'s Unit,
+struct Made {
+    scenario: Scenario,
+    unit: Unit,
     /// Twice, as a joint has it.
     image: [Vec<u8>; 2],
     masses: TwoMasses,
@@ -194,12 +198,19 @@ struct Made<'s> {
     bandwidth_hz: f64,
 }
 
+impl Made {
+    fn images(&self) -> Images<'_> {
+        let [image, twin] = &self.image;
+        Images::new(image, twin)
+    }
+}
+
 /// Flies a scenario.
 ///
 /// # Errors
 /// What cannot be flown, in words.
 pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, String> {
-    let made = made(scenario, unit)?;
+    let made = made(scenario, unit, None)?;
     let flown: Vec<Result<Flown, String>> = std::thread::scope(|threads| {
         let flying: Vec<_> = (0..CONTROLLERS.len())
             .map(|k| {
@@ -227,15 +238,23 @@ pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, String> {
 /// # Errors
 /// As [`fly`].
 pub fn fly_one(scenario: &Scenario, unit: &Unit, controller: usize) -> Result<Flown, String> {
-    lane(&made(scenario, unit)?, controller)
+    lane(&made(scenario, unit, None)?, controller)
 }
 
-fn made<'s>(scenario: &'s Scenario, unit: &'s Unit) -> Result<Made<'s>, String> {
+/// The image of the table that a scenario's joint flies with; `id` makes its id of what is hashed for it.
+///
+/// # Errors
+/// Why there is none, in words.
+pub fn table_image(scenario: &Scenario, unit: &Unit, id: impl FnOnce(&[u8]) -> [u8; 8]) -> Result<Vec<u8>, String> {
     let largest_n_m = 1.5 * scenario.largest_n_m() + 1.0;
     let noise_rad = if scenario.table == TableKnown::Calibrated { CALIBRATION_NOISE_RAD } else { 0.0 };
     let sampling = Sampling { largest_n_m, drag_n_m: TABLE_DRAG_N_M, temperature_c: scenario.temperature_c, noise_rad };
-    let known = unit.known(scenario.table);
-    let image = image(&known, unit.drive, &sampling).map_err(|error| format!("no table: {error:?}"))?;
+    image(&unit.known(scenario.table), unit.drive, &sampling, id).map_err(|error| format!("no table: {error:?}"))
+}
+
+/// With the image of a table that was made before, or one made for the scenario.
+fn made(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>) -> Result<Made, String> {
+    let image = image.map_or_else(|| table_image(scenario, unit, |_| [0; 8]), Ok)?;
     // The stiffest that the flight comes to: the loop of the mesh torque is judged by what the table says there.
     let stiffness = stiffness(&unit.nominal, scenario.largest_n_m());
     let masses = TwoMasses {
@@ -258,8 +277,8 @@ fn made<'s>(scenario: &'s Scenario, unit: &'s Unit) -> Result<Made<'s>, String> 
         _ => (TorqueKnown::Not, KNOWN_HZ),
     };
     Ok(Made {
-        scenario,
-        unit,
+        scenario: scenario.clone(),
+        unit: unit.clone(),
         image: [image.clone(), image],
         masses,
         soft_n_m_per_rad: soft.stiffness,
@@ -285,8 +304,8 @@ fn damping_s(scenario: &Scenario, unit: &Unit) -> f64 {
     2.0 * scenario.damping / free.sqrt()
 }
 
-fn plant(made: &Made<'_>) -> Plant {
-    let Made { scenario, unit, .. } = *made;
+fn plant(made: &Made) -> Plant {
+    let Made { scenario, unit, .. } = made;
     let settings = PlantSettings {
         motor_kg_m2: motor_kg_m2(scenario, unit),
         load_kg_m2: scenario.load_kg_m2,
@@ -312,12 +331,12 @@ struct Told {
 }
 
 /// Ways to command the generator.
-enum Controller<'a> {
+enum Controller {
     Uncompensated,
     Fourier(Box<Fourier>),
     Ideal(Box<Ideal>),
-    Core(Box<Core<'a>>),
-    ByTorque(Box<Core<'a>>, Limiter),
+    Core(Box<Core>),
+    ByTorque(Box<Core>, Limiter),
 }
 
 /// A command, its rate, and what the limiter and the table could not do.
@@ -363,8 +382,8 @@ struct Fourier {
 }
 
 impl Fourier {
-    fn new(made: &Made<'_>, by_direction: bool) -> Self {
-        let Made { scenario, unit, .. } = *made;
+    fn new(made: &Made, by_direction: bool) -> Self {
+        let Made { scenario, unit, .. } = made;
         let plain = Gear { lines: Vec::new(), ..unit.built.clone() };
         let teeth = f64::from(unit.drive.ripple_order());
         let mut curves = [1.0, -1.0].map(|way| {
@@ -402,9 +421,8 @@ struct Ideal {
 }
 
 /// The core.
-struct Core<'a> {
+struct Core {
     joint: Joint,
-    images: Images<'a>,
     store: Store,
     state: JointState,
     path: TorquePath,
@@ -414,8 +432,8 @@ fn setting(error: flexspline::SettingError) -> String {
     error.to_string()
 }
 
-impl<'a> Controller<'a> {
-    fn new(made: &'a Made<'_>, kind: usize) -> Result<Self, String> {
+impl Controller {
+    fn new(made: &Made, kind: usize) -> Result<Self, String> {
         let Made { scenario, unit, .. } = made;
         Ok(match kind {
             0 => Self::Uncompensated,
@@ -430,11 +448,9 @@ impl<'a> Controller<'a> {
                     hold_rad: HOLD_RAD,
                 };
                 let joint = Joint::new(unit.drive, limits, Overrun::SkipAndCount).map_err(setting)?;
-                let [image, twin] = &made.image;
-                let images = Images::new(image, twin);
                 let mut store = Store::new();
                 store
-                    .activate(&images, &unit.drive, scenario.temperature_c as f32)
+                    .activate(&made.images(), &unit.drive, scenario.temperature_c as f32)
                     .map_err(|error| format!("the table cannot be flown: {error:?}"))?;
                 let mut state = JointState::new();
                 state.request(Mode::Tracking).map_err(|error| error.to_string())?;
@@ -450,14 +466,14 @@ impl<'a> Controller<'a> {
                     hold_n_m: (3.0 * behind * scenario.torque_noise_n_m) as f32,
                 })
                 .map_err(setting)?;
-                let core = Box::new(Core { joint, images, store, state, path });
+                let core = Box::new(Core { joint, store, state, path });
                 if kind == BY_TORQUE { Self::ByTorque(core, Limiter::default()) } else { Self::Core(core) }
             }
             _ => Self::Ideal(Box::new(Ideal { gear: unit.built.clone(), limiter: Limiter::default() })),
         })
     }
 
-    fn tick(&mut self, made: &Made<'_>, told: &Told) -> Commanded {
+    fn tick(&mut self, made: &Made, told: &Told) -> Commanded {
         let Moment { target_rad, rate_rad_s, .. } = told.moment;
         let (ratio, tick_s) = (made.unit.nominal.ratio, made.scenario.servo.tick_s);
         let nominal_rate = rate_rad_s * ratio;
@@ -488,7 +504,7 @@ impl<'a> Controller<'a> {
                 let slope = (at(ahead) - at(-ahead)) / (2.0 * ahead);
                 corrected(at(0.0), slope, &mut ideal.limiter)
             }
-            Self::Core(core) => core.tick(told, nominal_rate),
+            Self::Core(core) => core.tick(made, told, nominal_rate),
             Self::ByTorque(core, limiter) => {
                 let torque_n_m = core.path.tick(told.reading, told.direction);
                 let target = OutputAngle::from_rad(target_rad).unwrap_or(OutputAngle::ZERO);
@@ -503,8 +519,8 @@ impl<'a> Controller<'a> {
     }
 }
 
-impl Core<'_> {
-    fn tick(&mut self, told: &Told, nominal_rate: f64) -> Commanded {
+impl Core {
+    fn tick(&mut self, made: &Made, told: &Told, nominal_rate: f64) -> Commanded {
         let Moment { target_rad, rate_rad_s, .. } = told.moment;
         let torque_n_m = self.path.tick(told.reading, told.direction);
         let target = OutputAngle::from_rad(target_rad).unwrap_or(OutputAngle::ZERO);
@@ -516,7 +532,7 @@ impl Core<'_> {
             adjustment: Adjustment::default(),
         };
         let rate = self.joint.rate_ahead(&self.store, target, rate_rad_s as f32, torque_n_m, AHEAD_S);
-        let out = self.joint.tick(&self.images, &mut self.store, &mut self.state, &input);
+        let out = self.joint.tick(&made.images(), &mut self.store, &mut self.state, &input);
         Commanded {
             command: out.command,
             rate_rad_s: if rate_rad_s == 0.0 || rate.is_nan() { nominal_rate } else { f64::from(rate) },
@@ -552,8 +568,8 @@ impl Sensing {
         }
     }
 
-    fn read(&mut self, made: &Made<'_>, plant: &Plant, servo: &mut Servo, now: &Moment) -> TorqueReading {
-        let scenario = made.scenario;
+    fn read(&mut self, made: &Made, plant: &Plant, servo: &mut Servo, now: &Moment) -> TorqueReading {
+        let scenario = &made.scenario;
         let noise = scenario.torque_noise_n_m * self.noise.normal();
         match made.torque {
             // What the load's inertia asks for on the way of the target is known before, and cannot feed back.
@@ -572,8 +588,8 @@ impl Sensing {
 
     /// The motor's current less friction and inertia, while the target moves evenly; else what it was, with a bound that grows as the load may
     /// have changed.
-    fn by_current(&mut self, made: &Made<'_>, servo: &mut Servo, now: &Moment) {
-        let scenario = made.scenario;
+    fn by_current(&mut self, made: &Made, servo: &mut Servo, now: &Moment) {
+        let scenario = &made.scenario;
         let tick_s = scenario.servo.tick_s;
         let rate = servo.rate_rad_s();
         let acceleration = (rate - self.before_rad_s) / tick_s;
@@ -621,17 +637,17 @@ fn on_load_n_m(scenario: &Scenario, now: &Moment) -> f64 {
 /// Rows of a flight in the report, at most.
 const ROWS: f64 = 4000.0;
 
-struct Lane<'a> {
+struct Lane {
     plant: Plant,
     servo: Servo,
     sensing: Sensing,
-    controller: Controller<'a>,
+    controller: Controller,
     direction: Direction,
 }
 
-impl<'a> Lane<'a> {
-    fn new(made: &'a Made<'_>, kind: usize) -> Result<Self, String> {
-        let scenario = made.scenario;
+impl Lane {
+    fn new(made: &Made, kind: usize) -> Result<Self, String> {
+        let scenario = &made.scenario;
         Ok(Self {
             plant: plant(made),
             servo: Servo::new(scenario.servo, made.unit.nominal.ratio, scenario.seed),
@@ -641,8 +657,8 @@ impl<'a> Lane<'a> {
         })
     }
 
-    fn tick(&mut self, made: &Made<'_>, now: &Moment) -> Commanded {
-        let scenario = made.scenario;
+    fn tick(&mut self, made: &Made, now: &Moment) -> Commanded {
+        let scenario = &made.scenario;
         let generator = self.servo.read(&self.plant);
         let reading = self.sensing.read(made, &self.plant, &mut self.servo, now);
         if now.rate_rad_s != 0.0 {
@@ -669,8 +685,8 @@ impl<'a> Lane<'a> {
     }
 }
 
-fn lane(made: &Made<'_>, kind: usize) -> Result<Flown, String> {
-    let scenario = made.scenario;
+fn lane(made: &Made, kind: usize) -> Result<Flown, String> {
+    let scenario = &made.scenario;
     let mut lane = Lane::new(made, kind)?;
     let every = (scenario.seconds() / scenario.servo.tick_s / ROWS).ceil().max(1.0) as usize;
     let mut flown = Flown { digest: 0xcbf2_9ce4_8422_2325, ..Flown::default() };
@@ -706,7 +722,7 @@ fn lane(made: &Made<'_>, kind: usize) -> Result<Flown, String> {
 
 /// A target that stands, a knock, and what is left of it: speed of the load (rad/s rms) about its mean, which a slow low-pass moves, in the
 /// last half second.
-fn left_of_a_knock(made: &Made<'_>, kind: usize) -> Result<f64, String> {
+fn left_of_a_knock(made: &Made, kind: usize) -> Result<f64, String> {
     let mut lane = Lane::new(made, kind)?;
     let outside = made.scenario.load.bias_n_m + 0.5 * made.scenario.load.swing[0];
     let now = |tick: u32| Moment {
@@ -735,7 +751,7 @@ fn left_of_a_knock(made: &Made<'_>, kind: usize) -> Result<f64, String> {
 /// Speed below which a joint counts as at rest, rad/s: 4″/s, with an encoder that steps.
 const AT_REST_RAD_S: f64 = 2e-5;
 
-fn stable(made: &Made<'_>) -> Result<bool, String> {
+fn stable(made: &Made) -> Result<bool, String> {
     let [without, with] = [0, COMPENSATED].map(|kind| left_of_a_knock(made, kind));
     Ok(with? <= (2.0 * without?).max(AT_REST_RAD_S))
 }

@@ -10,6 +10,8 @@
 
 use core::f64::consts::TAU;
 
+use super::keep::kept;
+
 /// A line of the kinematic error: `amplitude·sin(generator·ψ + output·δ + phase)`, rad at the output.
 ///
 /// An error of the flexspline's teeth of order k has `generator = k`; one of the circular spline, which is met at ψ − δ, `k` and
@@ -273,6 +275,8 @@ pub struct Meshed {
     pub energy_by: [f64; 2],
 }
 
+kept!(Meshed { energy_j, torque_n_m, stiffness, twist_rad, twist_by[..], energy_by[..] });
+
 impl Gear {
     /// The kinematic error, and its slopes over generator and output angle.
     pub fn error(&self, generator_rad: f64, output_rad: f64) -> [f64; 3] {
@@ -284,6 +288,62 @@ impl Gear {
             out[2] += amplitude_rad * c * output;
         }
         out
+    }
+
+    /// All of it as numbers, for a file: ratio, how many lines, the lines, and the spring.
+    pub fn numbers(&self) -> Vec<f64> {
+        let mut numbers = vec![self.ratio, self.lines.len() as f64];
+        for Line { generator, output, amplitude_rad, phase_rad } in &self.lines {
+            numbers.extend([generator, output, amplitude_rad, phase_rad]);
+        }
+        match &self.spring {
+            Spring::Cubic { half_clearance_rad, stiffness, hardening } => {
+                numbers.extend([0.0, *half_clearance_rad, *stiffness, *hardening]);
+            }
+            Spring::Sampled(sampled) => {
+                numbers.extend([1.0, sampled.width_rad, sampled.teeth]);
+                for Piece { energy, torque } in sampled.pieces.iter().flatten() {
+                    numbers.push(*energy);
+                    numbers.extend(torque);
+                }
+            }
+        }
+        numbers
+    }
+
+    /// From [`Self::numbers`]; `None` if numbers are missing, too many, or not finite.
+    pub fn of_numbers(numbers: &[f64]) -> Option<Self> {
+        if !numbers.iter().all(|number| number.is_finite()) {
+            return None;
+        }
+        let ([ratio, count], rest) = numbers.split_first_chunk::<2>()?;
+        // More than there are numbers is refused by the split.
+        let (lines, rest) = rest.split_at_checked((*count as usize).checked_mul(4)?)?;
+        let line = |&[generator, output, amplitude_rad, phase_rad]: &[f64; 4]| Line {
+            generator,
+            output,
+            amplitude_rad,
+            phase_rad,
+        };
+        let lines = lines.as_chunks::<4>().0.iter().map(line).collect();
+        let (kind, rest) = rest.split_first()?;
+        let spring = if *kind == 0.0 {
+            let &[half_clearance_rad, stiffness, hardening] = rest else { return None };
+            Spring::Cubic { half_clearance_rad, stiffness, hardening }
+        } else {
+            let (&[width_rad, teeth], rest) = rest.split_first_chunk::<2>()?;
+            let (numbers, left) = rest.as_chunks::<{ 5 * CURVES }>();
+            if numbers.len() != INTERVALS || !left.is_empty() || width_rad <= 0.0 {
+                return None;
+            }
+            let curve = |numbers: &[f64], k: usize| {
+                let at = |n: usize| numbers[5 * k + n];
+                Piece { energy: at(0), torque: [at(1), at(2), at(3), at(4)] }
+            };
+            let pieces = numbers.iter().map(|numbers| core::array::from_fn(|k| curve(numbers, k))).collect();
+            Spring::Sampled(Box::new(Sampled { pieces, width_rad, teeth }))
+        };
+        (*ratio != 0.0).then_some(Self { ratio: *ratio, lines, spring })
     }
 
     fn sprung(&self, generator_rad: f64, twist: f64) -> Sprung {
@@ -379,6 +439,22 @@ mod tests {
                 let mirrored = plain.error_under_rad(-TAU / 188.0 * phase, -flank, -1.0);
                 assert!((mirrored + found).abs() < 1e-12);
             }
+        }
+    }
+
+    #[test]
+    fn a_gear_of_numbers_is_the_same_and_damaged_ones_are_refused() {
+        let gear = gear();
+        let numbers = gear.numbers();
+        assert_eq!(Gear::of_numbers(&numbers), Some(gear));
+        let cubic = Spring::Cubic { half_clearance_rad: 1e-4, stiffness: 4e5, hardening: 2e12 };
+        let cubic = Gear { ratio: -94.0, lines: Vec::new(), spring: cubic };
+        assert_eq!(Gear::of_numbers(&cubic.numbers()), Some(cubic));
+        assert_eq!(Gear::of_numbers(&numbers[..numbers.len() - 1]), None);
+        for (at, value) in [(0, 0.0), (1, 1e300), (1, 1.0), (7, f64::NAN)] {
+            let mut damaged = numbers.clone();
+            damaged[at] = value;
+            assert_eq!(Gear::of_numbers(&damaged), None, "{at} {value}");
         }
     }
 

@@ -11,6 +11,7 @@
 
 use super::friction::{Friction, SlipElement, slipped};
 use super::gear::{Gear, Meshed};
+use super::keep::kept;
 
 /// Coordinates: motor, load, appendage.
 pub const PARTS: usize = 3;
@@ -66,6 +67,8 @@ pub struct Energy {
     pub heat: f64,
 }
 
+kept!(Energy { motor, outside, heat });
+
 /// A plant in motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plant {
@@ -87,6 +90,10 @@ pub struct Plant {
     mean: [f64; PARTS],
     before: [f64; PARTS],
 }
+
+kept!(Plant {
+    angle_rad[..], rate_rad_s[..], energy, temperature_c, cold, slip_n_m[..], meshed, middle, mean[..], before[..]
+});
 
 impl Plant {
     /// At rest with all angles zero.

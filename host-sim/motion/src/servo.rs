@@ -4,6 +4,7 @@ use core::f64::consts::TAU;
 
 use flexspline::GeneratorAngle;
 
+use super::keep::{Kept, kept};
 use super::plant::Plant;
 
 /// What a servo is made of; bandwidths of a rigid motor alone.
@@ -60,6 +61,8 @@ pub struct Servo {
     before: GeneratorAngle,
 }
 
+kept!(Servo { noise, torque_n_m, next_n_m, integral_n_m, shown, before });
+
 impl Servo {
     /// At rest at zero, on a drive of a ratio.
     pub fn new(settings: ServoSettings, ratio: f64, seed: u32) -> Self {
@@ -90,6 +93,11 @@ impl Servo {
     /// Motor torque times ratio as its current tells it, N·m at the output, of the tick before.
     pub fn current_n_m(&mut self) -> f64 {
         self.ratio * (self.torque_n_m + self.settings.current_noise_n_m * self.noise.normal())
+    }
+
+    /// Torque that the motor gives, N·m at the motor.
+    pub fn motor_n_m(&self) -> f64 {
+        self.torque_n_m
     }
 
     /// Speed of the motor over the ratio as the encoder shows it, rad/s.
@@ -142,6 +150,16 @@ fn angle_rad(counts: i64) -> f64 {
 /// Numbers that look random, the same in every run.
 #[derive(Clone, Debug)]
 pub struct Noise(u32);
+
+impl Kept for Noise {
+    fn keep(&self, to: &mut Vec<u64>) {
+        self.0.keep(to);
+    }
+
+    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
+        self.0.take(from)
+    }
+}
 
 impl Noise {
     /// From a seed.

@@ -1,13 +1,14 @@
-//! A compensation table sampled from a gear at rest: what a drive's table, an extended or a calibrated one knows of it.
+//! A compensation table sampled from a gear at rest: what a drive's table, an extended or a calibrated one knows of it. And the other way
+//! round, the gear that a table describes.
 
 use core::f64::consts::TAU;
 
 use flexspline::make::{
     Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, ProjectError, Sample, Workspace, make_image,
 };
-use flexspline::{Direction, Drive, GeneratorKind, MAX_ERROR_RAD, Provenance};
+use flexspline::{Direction, Drive, GeneratorAngle, GeneratorKind, MAX_ERROR_RAD, Provenance, Table};
 
-use super::gear::Gear;
+use super::gear::{Gear, Line, Sampled, Spring};
 use super::servo::Noise;
 
 /// Nodes on each side of the dead zone, and how they crowd towards it: node k of n at `(k/n)^CROWDING` of the way.
@@ -24,6 +25,13 @@ const PLACES_OF_A_TURN: usize = 997;
 const ORDERS: [u16; 4] = [1, 2, 3, 4];
 const OUTPUT_ORDERS: [u16; 2] = [1, 2];
 
+/// Orders looked for in a table: of the generator, of its angle to the output, of the output.
+const FOUND_ORDERS: [i32; 3] = [8, 8, 4];
+/// Places over whole turns of the output at which they are looked for: a prime above what any of them turns by, with their ripple.
+const FOUND_PLACES: i32 = 8009;
+/// Smaller lines than this are rounding of the table, rad: 0.002″.
+const SMALLEST_LINE_RAD: f64 = 1e-8;
+
 /// What is sampled.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampling {
@@ -37,11 +45,16 @@ pub struct Sampling {
     pub noise_rad: f64,
 }
 
-/// The image of a table.
+/// The image of a table; `id` makes its id of what is hashed for it.
 ///
 /// # Errors
 /// [`ProjectError`].
-pub fn image(gear: &Gear, drive: Drive, sampling: &Sampling) -> Result<Vec<u8>, ProjectError> {
+pub fn image(
+    gear: &Gear,
+    drive: Drive,
+    sampling: &Sampling,
+    id: impl FnOnce(&[u8]) -> [u8; 8],
+) -> Result<Vec<u8>, ProjectError> {
     let torques = torques(sampling);
     let temperatures = [sampling.temperature_c as f32];
     let curve = |orders: &'static [u16]| {
@@ -82,9 +95,63 @@ pub fn image(gear: &Gear, drive: Drive, sampling: &Sampling) -> Result<Vec<u8>, 
         temperature_range_c: [temperatures[0]; 2],
         error_limit_rad: (1.5 * largest + 1e-4).min(f64::from(MAX_ERROR_RAD)) as f32,
     };
-    let fit = make_image(&plan, &provenance, &samples, workspace, &mut image, |_| [0; 8])?;
+    let fit = make_image(&plan, &provenance, &samples, workspace, &mut image, id)?;
     image.truncate(fit.image_bytes);
     Ok(image)
+}
+
+/// The gear that a table describes at a temperature: with a load on it at rest it is where the table says that steady motion ends on the flank
+/// which carries the load.
+///
+/// The table was made with a drag `drag_n_m`: what it has for backward motion under a load `T` is a flank that carries `T + drag`. `None` if
+/// the table gives nothing at this temperature.
+pub fn gear_of(table: &Table<'_>, temperature_c: f64, drag_n_m: f64) -> Option<Gear> {
+    let ratio = table.drive().exact_ratio();
+    let at = |generator_rad: f64, flank_n_m: f64| {
+        let generator = GeneratorAngle::from_rad(generator_rad)?;
+        let torque = (flank_n_m - drag_n_m).max(0.0) as f32;
+        table.steady_error_rad(generator, torque, temperature_c as f32, Direction::Backward).map(f64::from)
+    };
+    let [_, largest] = table.torque_range_n_m().map(f64::from);
+    at(0.0, largest)?;
+    let lines = lines(table, |generator_rad| at(generator_rad, 0.5 * largest).unwrap_or(0.0));
+    let mut gear =
+        Gear { ratio, lines, spring: Spring::Cubic { half_clearance_rad: 0.0, stiffness: 0.0, hardening: 0.0 } };
+    let teeth = f64::from(table.drive().ripple_order());
+    let law = |phase: f64, flank_n_m: f64| {
+        let generator_rad = TAU / teeth * phase;
+        let [of_lines, ..] = gear.error(generator_rad, generator_rad / ratio);
+        at(generator_rad, flank_n_m).unwrap_or(0.0) - of_lines
+    };
+    let spring = Spring::Sampled(Box::new(Sampled::of_law(teeth, largest, law)));
+    gear.spring = spring;
+    Some(gear)
+}
+
+/// Lines of an error over so many turns of the output that all orders are whole.
+fn lines(table: &Table<'_>, error: impl Fn(f64) -> f64) -> Vec<Line> {
+    let drive = table.drive();
+    let ratio = drive.exact_ratio();
+    let waves = i32::from(drive.circular_spline_teeth() - drive.flexspline_teeth());
+    let sweep = TAU * f64::from(waves);
+    let places: Vec<f64> = (0..FOUND_PLACES).map(|k| sweep * ratio * f64::from(k) / f64::from(FOUND_PLACES)).collect();
+    let errors: Vec<f64> = places.iter().map(|&generator_rad| error(generator_rad)).collect();
+    let [generator, material, output] = FOUND_ORDERS;
+    let orders =
+        (1..=generator).map(|k| (k, 0)).chain((1..=material).map(|k| (k, -k))).chain((1..=output).map(|k| (0, k)));
+    let line = |(generator, output): (i32, i32)| {
+        let (generator, output) = (f64::from(generator), f64::from(output));
+        let (mut sine, mut cosine) = (0.0, 0.0);
+        for (psi, error) in places.iter().zip(&errors) {
+            let (s, c) = libm::sincos(generator * psi + output * psi / ratio);
+            sine += error * s;
+            cosine += error * c;
+        }
+        let scale = 2.0 / f64::from(FOUND_PLACES);
+        let amplitude_rad = scale * libm::hypot(sine, cosine);
+        Line { generator, output, amplitude_rad, phase_rad: libm::atan2(cosine, sine) }
+    };
+    orders.map(line).filter(|line| line.amplitude_rad > SMALLEST_LINE_RAD).collect()
 }
 
 fn torques(sampling: &Sampling) -> Vec<f32> {
@@ -130,4 +197,42 @@ fn samples(gear: &Gear, sampling: &Sampling, torques: &[f32]) -> Vec<Sample> {
         }
     }
     samples
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flexspline::FixedMember;
+
+    /// A gear with a ripple and lines, its table, and the gear of that.
+    #[test]
+    fn the_gear_of_a_table_is_the_one_that_it_was_made_of() {
+        let law = |phase: f64, flank: f64| {
+            1.5e-4 + 3e-6 * flank + 4e-5 * flank / (1.0 + 0.2 * flank) + 2e-6 * libm::cos(TAU * phase + 0.3)
+        };
+        let line = |generator: f64, output: f64, amplitude_rad: f64, phase_rad: f64| Line {
+            generator,
+            output,
+            amplitude_rad,
+            phase_rad,
+        };
+        let lines = vec![line(2.0, 0.0, 4e-5, 0.3), line(4.0, -4.0, 2e-5, 1.0), line(0.0, 1.0, 5e-5, -2.0)];
+        let gear = Gear { ratio: 95.0, lines, spring: Spring::Sampled(Box::new(Sampled::of_law(188.0, 60.0, law))) };
+        let drive = Drive::new(188, 190, FixedMember::Flexspline).unwrap();
+        let sampling = Sampling { largest_n_m: 50.0, drag_n_m: 0.02, temperature_c: 20.0, noise_rad: 0.0 };
+        let image = image(&gear, drive, &sampling, |_| [0; 8]).unwrap();
+        let found = gear_of(&Table::check(&image).unwrap(), 20.0, 0.02).unwrap();
+        let (mut worst, mut most) = (0.0_f64, 0.0_f64);
+        for k in 0..500 {
+            let generator_rad = 7.3 * f64::from(k);
+            for mesh_n_m in [-40.0, -3.0, -0.5, 0.5, 8.0, 45.0] {
+                let [made, found] = [&gear, &found].map(|gear| gear.error_under_rad(generator_rad, mesh_n_m, mesh_n_m));
+                worst = worst.max((found - made).abs());
+                most = most.max(made.abs());
+            }
+        }
+        println!("off by {:.3}\" of {:.0}\"", worst * 206_264.8, most * 206_264.8);
+        // What a table of these nodes leaves: a curve of eight nodes in a period, and the wind-up between two nodes of torque.
+        assert!(worst < 2e-7, "{worst}");
+    }
 }

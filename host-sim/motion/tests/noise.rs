@@ -17,7 +17,7 @@ fn through(acceleration_rad_s2: f32, bandwidth_hz: Option<f32>) -> [f64; 2] {
     let spring = Spring::Sampled(Box::new(Sampled::of_law(188.0, 20.0, law)));
     let gear = Gear { ratio: drive.exact_ratio(), lines: Vec::new(), spring };
     let sampling = Sampling { largest_n_m: 10.0, drag_n_m: 0.02, temperature_c: 20.0, noise_rad: 0.0 };
-    let made = image(&gear, drive, &sampling).unwrap();
+    let made = image(&gear, drive, &sampling, |_| [0; 8]).unwrap();
     let twin = made.clone();
     let images = Images::new(&made, &twin);
     let mut store = Store::new();

@@ -3,10 +3,12 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::builder::ArgPredicate;
+use clap::{Arg, Args, ValueEnum, ValueHint};
 use serde::Serialize;
 
 use super::context::quoted;
+use super::export_fmu::FmuOptions;
 use super::simulate::{ModelOptions, refused_or_failed, show};
 use super::{Context, Failure, say};
 use crate::export::{Deck, DeckSettings, outlines, write_vtu};
@@ -21,28 +23,39 @@ const POINTS_PER_PIECE: usize = 24;
 /// smaller on the way.
 const LARGEST_STEP_RAD: f64 = 0.1;
 
-/// Export the deformed mesh, the outlines or a CalculiX and Abaqus deck for other programs
+/// Export a mesh, outlines, a deck, or a table for other programs
 ///
 /// vtu: both wheels deformed and loaded at one generator angle, with displacement and von Mises stress, for ParaView.
 /// csv: the outlines of tooth, space and generator, undeformed, each in its own frame.
 /// inp: the undeformed mesh with contact, holding and load as a deck for CalculiX and Abaqus, which deforms, loads and turns
 /// the drive; mm, N, MPa, a slice of 1 mm.
+/// fmu: a table (--tables), or a joint with mass, for simulators that import FMI 2.0 co-simulation: docs/fmu.md.
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(
+    mut_args(beside_tables),
+    after_help = "\
 Examples:
   flexspline export --format vtu --generator two-roller --torque-n-m 20
   flexspline export --format csv --generator double-disc --out drawings
+  flexspline export --format fmu --tables out/cam.fxt
+  flexspline export --format fmu --tables out/cam.fxt --model joint --scenario camera
   flexspline export --format inp --generator cam --torque-n-m 50 --set output.drag_torque_n_m=0
 
 The last one is run by: OMP_NUM_THREADS=1 ccx out/cam. It prints to out/cam.dat, at the end of each
 step, the output angle (node set OUTPUT, first component, rad), the displacements of the bore (BORE)
-and the stresses of the elements along it (BORE_ROW).")]
+and the stresses of the elements along it (BORE_ROW)."
+)]
 pub(super) struct Export {
     #[command(flatten)]
     model: ModelOptions,
     /// What to write
     #[arg(long, value_enum)]
     format: Format,
+    /// Table image, for the formats that take a table
+    #[arg(long, value_name = "FILE.fxt", value_hint = ValueHint::FilePath)]
+    tables: Option<PathBuf>,
+    #[command(flatten)]
+    fmu: FmuOptions,
     /// Generator angle of the mesh, rad [default: 0]
     #[arg(long, value_name = "RAD", allow_negative_numbers = true)]
     generator_rad: Option<f64>,
@@ -57,6 +70,22 @@ pub(super) struct Export {
     last_torque_n_m: Option<f64>,
 }
 
+/// With a table or a scenario there is no mesh: what is of the mesh alone is refused, and no generator is asked for.
+fn beside_tables(arg: Arg) -> Arg {
+    let others = ["tables", "scenario"];
+    match arg.get_id().as_str() {
+        "generator" => arg
+            .required(false)
+            .required_if_eq_any(["vtu", "csv", "inp"].map(|format| ("format", format)))
+            .default_value_if("format", ArgPredicate::Equals("fmu".into()), "cam")
+            .conflicts_with_all(others),
+        "mesh" | "solver" | "flank_penalty" | "bore_penalty" | "tolerance" | "max_iterations" | "generator_rad" => {
+            arg.conflicts_with_all(others)
+        }
+        _ => arg,
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
     /// Deformed mesh: <G>.vtu
@@ -65,6 +94,8 @@ enum Format {
     Csv,
     /// CalculiX and Abaqus deck: <G>.inp
     Inp,
+    /// FMU for co-simulation: flexspline_compensation.fmu, or flexspline_joint.fmu
+    Fmu,
 }
 
 /// Result with `--json`.
@@ -78,6 +109,7 @@ impl Export {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         self.check()?;
         let written = match self.format {
+            Format::Fmu => return self.fmu.run(context, self.tables.as_deref()),
             Format::Vtu => self.mesh(context)?,
             Format::Csv => self.outlines(context)?,
             Format::Inp => self.deck(context)?,
@@ -85,7 +117,7 @@ impl Export {
         let shown = quoted(&written.display().to_string());
         let next = match self.format {
             Format::Vtu => vec![format!("paraview {shown}")],
-            Format::Csv => Vec::new(),
+            Format::Csv | Format::Fmu => Vec::new(),
             Format::Inp => vec![format!("OMP_NUM_THREADS=1 ccx {}", shown.trim_end_matches(".inp"))],
         };
         let text = format!("wrote {}{}", written.display(), say::next(&next));
@@ -94,6 +126,14 @@ impl Export {
 
     /// Refuses options that the format has no use for, and numbers that are none.
     fn check(&self) -> Result<(), Failure> {
+        if self.format == Format::Fmu {
+            self.fmu.refuse_loads([
+                ("--torque-n-m", self.model.torque_n_m.is_some()),
+                ("--temperature-c", self.model.temperature_c.is_some()),
+            ])?;
+        } else if let Some(option) = self.fmu.given().or(self.tables.is_some().then_some("--tables")) {
+            return Err(Failure::BadInput(format!("{option}: allowed with --format fmu")));
+        }
         let of_decks = [
             ("--increments", self.increments.is_some()),
             ("--step-rad", self.step_rad.is_some()),

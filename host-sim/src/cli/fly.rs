@@ -37,7 +37,7 @@ impl Fly {
             let what = "a flight has the unit of its scenario; allowed: table, load, servo and more in a scenario file (docs/motion.md)";
             return Err(Failure::BadInput(format!("{option}: {what}")));
         }
-        let flown = self.flown()?;
+        let flown = scenario(&self.scenario)?;
         let out = context.out()?;
         let flight = flown.fly().map_err(Failure::Failed)?;
         let results = results(&flown, &flight).ok_or_else(|| Failure::Failed("a controller is missing".to_owned()))?;
@@ -50,21 +50,21 @@ impl Fly {
         outputs.finish()?;
         context.print(&results, || text(&results, out, !self.no_report))
     }
+}
 
-    fn flown(&self) -> Result<Flown, Failure> {
-        if let Some(flown) = built_in(&self.scenario) {
-            return Ok(flown);
-        }
-        let text = std::fs::read_to_string(&self.scenario).map_err(|error| {
-            let hint = did_you_mean("; ", &self.scenario, SCENARIOS);
-            Failure::BadInput(format!(
-                "scenario: found {:?}, which cannot be read as a file ({error}); allowed: {}, or a TOML file{hint}",
-                self.scenario,
-                SCENARIOS.join(", ")
-            ))
-        })?;
-        read(&self.scenario, &text).map_err(Failure::BadInput)
+/// The scenario of a name, or of a file.
+pub(super) fn scenario(name: &str) -> Result<Flown, Failure> {
+    if let Some(flown) = built_in(name) {
+        return Ok(flown);
     }
+    let text = std::fs::read_to_string(name).map_err(|error| {
+        let hint = did_you_mean("; ", name, SCENARIOS);
+        Failure::BadInput(format!(
+            "scenario: found {name:?}, which cannot be read as a file ({error}); allowed: {}, or a TOML file{hint}",
+            SCENARIOS.join(", ")
+        ))
+    })?;
+    read(name, &text).map_err(Failure::BadInput)
 }
 
 fn text(results: &Results, out: &Path, report: bool) -> String {

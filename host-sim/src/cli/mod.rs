@@ -11,6 +11,7 @@ mod context;
 mod diagnose;
 mod drive;
 mod export;
+mod export_fmu;
 mod fly;
 mod kernels;
 mod logs;
@@ -98,7 +99,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
             ("study", "vary fields of a drive: what a catalogue would print of each variant"),
             ("campaign", "tolerances: thousands of drives on any engine, and what to tighten first"),
             ("fly", "a joint with mass in closed loop, with and without compensation"),
-            ("export", "the mesh, the outlines or a CalculiX deck, for other programs"),
+            ("export", "the mesh, the outlines, a CalculiX deck or an FMU, for other programs"),
             ("reproduce", "the paper's protocol for all four generators, beside its figures"),
         ],
     ),
@@ -347,6 +348,7 @@ mod tests {
                     "ratio",
                     "teeth",
                     "module",
+                    "generator",
                 ];
                 assert!(stated || needs_none || absent.contains(&id.as_str()), "{name} {id} states no default: {help}");
             }

@@ -1,5 +1,6 @@
 //! The same mesh, state, outlines and problem for other programs.
 
+pub mod fmu;
 mod inp;
 mod outlines;
 mod vtu;

@@ -1,0 +1,287 @@
+//! The core's joint over its table: where to turn the generator so that the output comes to where it is wanted.
+
+use flexspline::{
+    Adjustment, Direction, Flags, GeneratorAngle, Images, Input, JOINT_STATE_WORDS, Joint, JointState, Limits, Mode,
+    OutputAngle, Overrun, Quality, Store, Table, TorquePath, TorqueReading, TorqueSettings,
+};
+use flexspline_motion::flight::{ARCSEC_PER_RAD, TABLE_DRAG_N_M};
+use flexspline_motion::keep::Kept;
+
+use crate::instance::{Inputs, Model};
+use crate::resources::Resources;
+use crate::variables::{Choices, Kind, Role, Variable, variables};
+
+/// What a joint does with its correction.
+pub static MODES: Choices = Choices {
+    name: "Mode",
+    items: &[
+        ("off", "no correction; one that is there is taken back within the limits"),
+        ("tracking", "the correction follows the table"),
+        ("hold", "the correction stays as it is"),
+        ("safe", "no correction before off was asked for"),
+    ],
+};
+/// How far an answer of the table can be trusted.
+pub static QUALITIES: Choices = Choices {
+    name: "Quality",
+    items: &[
+        ("in_range", "inside the range of the table, side of the play known"),
+        ("uncertain", "known to within the uncertainty"),
+        ("extrapolated", "torque or temperature beyond the table, the value at its edge is used"),
+        ("disabled", "no correction"),
+    ],
+};
+/// Which torque is given.
+pub static READINGS: Choices = Choices {
+    name: "TorqueReading",
+    items: &[
+        (
+            "table",
+            "on the load in steady motion with the drag that the table was made with; goes to the table as it is",
+        ),
+        ("in_mesh", "in the mesh: goes through a low-pass and the hold"),
+        ("on_load", "on the load: also less the drag of this unit"),
+    ],
+};
+
+const POSITIVE: [f64; 2] = [1e-9, 1e9];
+const NOT_NEGATIVE: [f64; 2] = [0.0, 1e9];
+
+variables! {
+    OUTPUT_COMMAND => Variable::input("output_command", "rad", 0.0, "where the output shall be");
+    OUTPUT_COMMAND_RATE => Variable::input("output_command_rate", "rad/s", 0.0, "its rate, for generator_command_rate and the direction of the drag; 0 if not known");
+    GENERATOR_ANGLE => Variable::input("generator_angle", "rad", 0.0, "measured generator angle; read where generator_measured is set");
+    TORQUE => Variable::input("torque", "N.m", 0.0, "torque, positive where it turns the output forward; torque_is says which");
+    TEMPERATURE => Variable::input("temperature", "degC", 20.0, "temperature of the drive");
+    MODE => Variable { name: "mode", kind: Kind::Choice(&MODES), role: Role::Tunable, start: 1.0, range: [0.0, 3.0], says: "mode asked for; a change that is not legal is logged, and the mode stays" };
+    GENERATOR_MEASURED => Variable::parameter("generator_measured", Kind::Boolean, 0.0, [0.0, 1.0], "the generator is where generator_angle says; else where it was commanded a tick before");
+    TORQUE_IS => Variable::parameter("torque_is", Kind::Choice(&READINGS), 0.0, [0.0, 2.0], "which torque is given");
+    TORQUE_BANDWIDTH => Variable::parameter("torque_bandwidth", Kind::Real("Hz"), 100.0, POSITIVE, "corner of the low-pass of a torque in the mesh or on the load");
+    DRAG => Variable::parameter("drag", Kind::Real("N.m"), 0.0, NOT_NEGATIVE, "Coulomb drag of the output of this unit, taken off a torque on the load");
+    TABLE_DRAG => Variable::parameter("table_drag", Kind::Real("N.m"), TABLE_DRAG_N_M, NOT_NEGATIVE, "Coulomb drag of the output that the table was made with");
+    TORQUE_HOLD => Variable::parameter("torque_hold", Kind::Real("N.m"), 0.0, NOT_NEGATIVE, "a torque in the mesh below this does not change the flank");
+    TICK => Variable::parameter("tick", Kind::Real("s"), 1e-3, [1e-6, 10.0], "time from tick to tick");
+    RATE_LIMIT => Variable::parameter("rate_limit", Kind::Real("rad/s"), 0.05, POSITIVE, "fastest correction at the output");
+    ACCELERATION_LIMIT => Variable::parameter("acceleration_limit", Kind::Real("rad/s2"), 5.0, POSITIVE, "largest acceleration of the correction at the output");
+    GENERATOR_RATE_LIMIT => Variable::parameter("generator_rate_limit", Kind::Real("rad/s"), 600.0, POSITIVE, "a generator that moves faster from tick to tick is a glitch");
+    PATIENCE => Variable::parameter("patience", Kind::Integer, 5.0, [0.0, 65_534.0], "ticks for which a glitch is not believed, and the last correction is kept where none can be made");
+    HOLD => Variable::parameter("hold", Kind::Real("rad"), 2.4e-6, [0.0, 0.05], "nearer targets keep the flank; 0 for none");
+    RATE_AHEAD => Variable::parameter("rate_ahead", Kind::Real("s"), 4e-3, [1e-6, 10.0], "generator_command_rate is the table's slope over this time");
+    GENERATOR_COMMAND => Variable::output("generator_command", Kind::Real("rad"), "where to turn the generator");
+    GENERATOR_COMMAND_RATE => Variable::output("generator_command_rate", Kind::Real("rad/s"), "its rate, to feed forward to a speed loop");
+    CORRECTION => Variable::output("correction", Kind::Real("arcsec"), "output_command less generator_command over the ratio");
+    HELD_BACK => Variable::output("held_back", Kind::Real("arcsec"), "what the limiter held back of the correction");
+    PREDICTED_OUTPUT => Variable::output("predicted_output", Kind::Real("rad"), "where the table says that the output is");
+    PREDICTED_ERROR => Variable::output("predicted_error", Kind::Real("arcsec"), "the transmission error there: output less generator over the ratio, positive where the output leads");
+    UNCERTAINTY => Variable::output("uncertainty", Kind::Real("arcsec"), "it lies within this either way, as far as play and jumps go");
+    QUALITY => Variable::output("quality", Kind::Choice(&QUALITIES), "how far estimate and correction can be trusted");
+    FLAGS => Variable::output("flags", Kind::Integer, "what happened in the tick, sum of: 1 no sample, 2 sample not believed, 8 held back, 16 not corrected, 32 table in doubt, 256 safe");
+    NOT_CORRECTED => Variable::output("not_corrected", Kind::Boolean, "no correction could be made in the tick");
+    MODE_NOW => Variable::output("mode_now", Kind::Choice(&MODES), "mode of the joint");
+    RATIO => Variable::constant("ratio", Kind::Real("rad/rad"), "generator over output");
+    TABLE_ID => Variable::constant("table_id", Kind::Text, "id of the table");
+}
+
+/// The outputs before the first tick: the command without a correction.
+pub fn initial(values: &mut [f64]) {
+    VARIABLES
+        .iter()
+        .zip(values.iter_mut())
+        .filter(|(variable, _)| variable.is_output())
+        .for_each(|(_, value)| *value = 0.0);
+    values[GENERATOR_COMMAND] = values[OUTPUT_COMMAND] * values[RATIO];
+    values[GENERATOR_COMMAND_RATE] = values[OUTPUT_COMMAND_RATE] * values[RATIO];
+    values[PREDICTED_OUTPUT] = values[OUTPUT_COMMAND];
+    values[QUALITY] = f64::from(quality(Quality::Disabled));
+}
+
+const fn quality(quality: Quality) -> u8 {
+    match quality {
+        Quality::InRange => 0,
+        Quality::Uncertain => 1,
+        Quality::Extrapolated => 2,
+        Quality::Disabled => 3,
+    }
+}
+
+const fn code(mode: Mode) -> u8 {
+    match mode {
+        Mode::Off => 0,
+        Mode::Tracking => 1,
+        Mode::Hold => 2,
+        Mode::Safe => 3,
+    }
+}
+
+const fn mode(code: u32) -> Mode {
+    match code {
+        0 => Mode::Off,
+        1 => Mode::Tracking,
+        2 => Mode::Hold,
+        _ => Mode::Safe,
+    }
+}
+
+/// The joint in a simulation.
+pub struct Compensation {
+    joint: Joint,
+    image: [Vec<u8>; 2],
+    store: Store,
+    state: JointState,
+    path: TorquePath,
+    temperature_c: f32,
+    asked: u32,
+    command: GeneratorAngle,
+    target: OutputAngle,
+    direction: Direction,
+}
+
+impl Compensation {
+    /// With the values of its parameters and its first inputs.
+    ///
+    /// # Errors
+    /// Which of them cannot be.
+    pub fn new(resources: &Resources, values: &[f64]) -> Result<Self, String> {
+        let table = Table::check(&resources.image).map_err(|error| error.to_string())?;
+        let limits = Limits {
+            tick_s: values[TICK] as f32,
+            rate_rad_s: values[RATE_LIMIT] as f32,
+            acceleration_rad_s2: values[ACCELERATION_LIMIT] as f32,
+            generator_rate_rad_s: values[GENERATOR_RATE_LIMIT] as f32,
+            patience: values[PATIENCE] as u16,
+            hold_rad: values[HOLD] as f32,
+        };
+        let joint = Joint::new(*table.drive(), limits, Overrun::SkipAndCount).map_err(|error| error.to_string())?;
+        let path = TorquePath::new(TorqueSettings {
+            tick_s: values[TICK] as f32,
+            bandwidth_hz: values[TORQUE_BANDWIDTH] as f32,
+            drag_n_m: values[DRAG] as f32,
+            table_drag_n_m: values[TABLE_DRAG] as f32,
+            hold_n_m: values[TORQUE_HOLD] as f32,
+        })
+        .map_err(|error| error.to_string())?;
+        let image = [resources.image.clone(), resources.image.clone()];
+        let mut store = Store::new();
+        let temperature_c = values[TEMPERATURE] as f32;
+        let activated = store.activate(&Images::new(&image[0], &image[1]), joint.drive(), temperature_c);
+        activated.map_err(|error| format!("temperature {temperature_c}: {error}"))?;
+        let target = angle(values[OUTPUT_COMMAND], "output_command", OutputAngle::from_rad)?;
+        let command = joint.drive().nominal_generator(target);
+        Ok(Self {
+            joint,
+            image,
+            store,
+            state: JointState::new(),
+            path,
+            temperature_c,
+            asked: 0,
+            command,
+            target,
+            direction: Direction::Forward,
+        })
+    }
+
+    /// The copies follow a temperature at once: a simulation need not spread the work over a slow rate group.
+    fn follow(&mut self, temperature_c: f32) {
+        if temperature_c.to_bits() == self.temperature_c.to_bits() {
+            return;
+        }
+        let [image, twin] = &self.image;
+        let images = Images::new(image, twin);
+        if self.store.set_temperature(&images, temperature_c) {
+            self.store.check_images(&images, self.store.used_words());
+            self.temperature_c = temperature_c;
+        }
+    }
+
+    fn torque_n_m(&mut self, is: f64, torque_n_m: f32) -> f32 {
+        match is as u8 {
+            0 => torque_n_m,
+            1 => self.path.tick(TorqueReading::InMesh(torque_n_m), self.direction),
+            _ => self.path.tick(TorqueReading::OnLoad(torque_n_m), self.direction),
+        }
+    }
+}
+
+fn angle<T>(rad: f64, name: &str, of: impl Fn(f64) -> Option<T>) -> Result<T, String> {
+    of(rad).ok_or_else(|| format!("{name}: found {rad}, allowed: a finite angle of less than 2e9 turns"))
+}
+
+impl Model for Compensation {
+    fn tick_s(&self, values: &[f64]) -> f64 {
+        values[TICK]
+    }
+
+    fn tick(&mut self, at: &Inputs<'_>, outputs: &mut [f64], says: &mut dyn FnMut(String)) -> Result<(), String> {
+        let rate_rad_s = at.start(OUTPUT_COMMAND_RATE);
+        let target = angle(at.start(OUTPUT_COMMAND), "output_command", OutputAngle::from_rad)?;
+        let asked = at.start(MODE) as u32;
+        if asked != self.asked {
+            self.asked = asked;
+            if let Err(error) = self.state.request(mode(asked)) {
+                says(format!("mode: {error}"));
+            }
+        }
+        self.follow(at.start(TEMPERATURE) as f32);
+        let moved = if rate_rad_s == 0.0 { target.minus_counts(self.target) as f64 } else { rate_rad_s };
+        if moved != 0.0 {
+            self.direction = if moved > 0.0 { Direction::Forward } else { Direction::Backward };
+        }
+        self.target = target;
+        let torque_n_m = self.torque_n_m(at.start(TORQUE_IS), at.start(TORQUE) as f32);
+        let measured = at.start(GENERATOR_MEASURED) != 0.0;
+        let generator = if measured { GeneratorAngle::from_rad(at.start(GENERATOR_ANGLE)) } else { Some(self.command) };
+        let input = Input { generator, target, torque_n_m, missed_ticks: 0, adjustment: Adjustment::default() };
+        let ahead_s = at.start(RATE_AHEAD) as f32;
+        let rate = self.joint.rate_ahead(&self.store, target, rate_rad_s as f32, torque_n_m, ahead_s);
+        let [image, twin] = &self.image;
+        let out = self.joint.tick(&Images::new(image, twin), &mut self.store, &mut self.state, &input);
+        self.command = out.command;
+
+        let arcsec = |rad: f32| f64::from(rad) * ARCSEC_PER_RAD;
+        let nominal = rate_rad_s * at.start(RATIO);
+        outputs[GENERATOR_COMMAND] = out.command.to_rad();
+        outputs[GENERATOR_COMMAND_RATE] = if rate_rad_s == 0.0 || rate.is_nan() { nominal } else { f64::from(rate) };
+        outputs[CORRECTION] = arcsec(out.correction_rad);
+        outputs[HELD_BACK] = arcsec(out.held_back_rad);
+        outputs[PREDICTED_OUTPUT] = out.output.to_rad();
+        outputs[PREDICTED_ERROR] = arcsec(out.transmission_error_rad);
+        outputs[UNCERTAINTY] = arcsec(out.uncertainty_rad);
+        outputs[QUALITY] = f64::from(quality(out.quality));
+        outputs[FLAGS] = f64::from(out.flags.bits());
+        outputs[NOT_CORRECTED] = f64::from(u8::from(out.flags.contains(Flags::NOT_CORRECTED)));
+        outputs[MODE_NOW] = f64::from(code(self.state.mode()));
+        Ok(())
+    }
+
+    fn keep(&self, to: &mut Vec<u64>) {
+        self.state.words()[..].keep(to);
+        self.path.kept().map(f32::to_bits)[..].keep(to);
+        self.temperature_c.to_bits().keep(to);
+        self.asked.keep(to);
+        self.command.keep(to);
+        GeneratorAngle::from_counts(self.target.counts()).keep(to);
+        u32::from(self.direction == Direction::Backward).keep(to);
+    }
+
+    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
+        let mut words = [0_u32; JOINT_STATE_WORDS];
+        words[..].take(from)?;
+        self.state = JointState::of_words(&words)?;
+        let mut bits = [0_u32; 2];
+        bits[..].take(from)?;
+        self.path.go_on(bits.map(f32::from_bits));
+        let mut temperature = 0_u32;
+        temperature.take(from)?;
+        self.follow(f32::from_bits(temperature));
+        self.asked.take(from)?;
+        self.command.take(from)?;
+        let mut target = GeneratorAngle::ZERO;
+        target.take(from)?;
+        self.target = OutputAngle::from_counts(target.counts());
+        let mut backward = 0_u32;
+        backward.take(from)?;
+        self.direction = if backward == 0 { Direction::Forward } else { Direction::Backward };
+        Some(())
+    }
+}

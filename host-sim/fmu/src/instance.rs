@@ -1,0 +1,549 @@
+//! One simulation: what an importer may call when, its values, its time, and its state as bytes.
+//!
+//! States and calls are those of sections 2.1.6 to 2.1.8 and 4.2.4 of the standard. A call that is not allowed is refused: it returns an error with a
+//! line in the log, and nothing changes. A model that cannot go on ends in [`State::Failed`].
+//!
+//! A model has ticks of a fixed time. A communication step does all ticks that end within it; what is left of the step is carried over
+//! to the next. An input holds from the point at which it was set on, or changes with the derivative that was given for the step.
+
+use std::collections::BTreeMap;
+use std::ffi::{CStr, CString};
+use std::path::Path;
+
+use crate::compensation::{self, Compensation};
+use crate::joint::{self, MovingJoint};
+use crate::resources::Resources;
+use crate::variables::{Kind, ModelKind, Role, Variable};
+
+/// `fmi2Status`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(i32)]
+pub enum Status {
+    /// Done.
+    Ok = 0,
+    /// Done, with a remark in the log.
+    Warning = 1,
+    /// Not available.
+    Discard = 2,
+    /// Refused, or the model cannot go on.
+    Error = 3,
+}
+
+/// Where in its life an instance is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Made, or reset.
+    Instantiated,
+    /// Between the calls that enter and exit the initialisation.
+    Initializing,
+    /// Ready for the next step.
+    Stepping,
+    /// A step failed: only to be reset, set to another state, or freed.
+    Failed,
+    /// At its end.
+    Terminated,
+}
+
+impl State {
+    const ALL: [State; 5] =
+        [State::Instantiated, State::Initializing, State::Stepping, State::Failed, State::Terminated];
+
+    const fn name(self) -> &'static str {
+        match self {
+            State::Instantiated => "instantiated",
+            State::Initializing => "initialization mode",
+            State::Stepping => "step complete",
+            State::Failed => "step failed",
+            State::Terminated => "terminated",
+        }
+    }
+}
+
+/// Categories of the log, as `modelDescription.xml` lists them: errors, warnings, and what happened.
+pub const CATEGORIES: [&str; 3] = ["logStatusError", "logStatusWarning", "logEvents"];
+
+/// Takes a line: status, category, text.
+pub type Log = Box<dyn Fn(Status, &str, &str) + Send>;
+
+/// The values of a tick.
+pub struct Inputs<'a> {
+    values: &'a [f64],
+    slopes: &'a [f64],
+    begins_s: f64,
+    ends_s: f64,
+}
+
+impl Inputs<'_> {
+    /// A value at the beginning of the tick.
+    pub fn start(&self, place: usize) -> f64 {
+        self.at(place, self.begins_s)
+    }
+
+    /// A value at the end of the tick.
+    pub fn end(&self, place: usize) -> f64 {
+        self.at(place, self.ends_s)
+    }
+
+    fn at(&self, place: usize, since_s: f64) -> f64 {
+        // A value of which no derivative was given is left as it is, infinite or not a number too.
+        if self.slopes[place] == 0.0 { self.values[place] } else { self.values[place] + self.slopes[place] * since_s }
+    }
+}
+
+/// What is simulated.
+pub trait Model: Send {
+    /// Time of a tick, s.
+    fn tick_s(&self, values: &[f64]) -> f64;
+
+    /// One tick: outputs go where they are among the values.
+    ///
+    /// # Errors
+    /// Why the model cannot go on.
+    fn tick(&mut self, at: &Inputs<'_>, outputs: &mut [f64], says: &mut dyn FnMut(String)) -> Result<(), String>;
+
+    /// Adds all that changes.
+    fn keep(&self, to: &mut Vec<u64>);
+
+    /// Takes up what was kept by a model with the same parameters.
+    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()>;
+}
+
+fn made(resources: &Resources, values: &[f64]) -> Result<Box<dyn Model>, String> {
+    Ok(match resources.kind {
+        ModelKind::Compensation => Box::new(Compensation::new(resources, values)?),
+        ModelKind::Joint => Box::new(MovingJoint::new(resources, values)?),
+    })
+}
+
+/// A tick that ends this part of a tick after the step still belongs to it: communication points are sums of rounded numbers.
+const SLACK: f64 = 1e-3;
+/// Most ticks in one communication step: a slip in the unit of time is told, and does not run for hours. *Guess*.
+const MOST_TICKS: f64 = 1e8;
+/// What the bytes of a state begin with; the last byte is the version.
+const STATE_MARK: u64 = u64::from_le_bytes(*b"FXS\0FMU\x01");
+
+/// One simulation.
+pub struct Instance {
+    resources: Resources,
+    log: Log,
+    logging: [bool; CATEGORIES.len()],
+    state: State,
+    values: Vec<f64>,
+    slopes: Vec<f64>,
+    model: Option<Box<dyn Model>>,
+    set_up: bool,
+    start_s: f64,
+    stop_s: Option<f64>,
+    time_s: f64,
+    ticks: u64,
+    table_id: CString,
+    states: BTreeMap<usize, Vec<u8>>,
+}
+
+impl Instance {
+    /// From the folder of resources, for the description with this GUID.
+    ///
+    /// # Errors
+    /// What is wrong with the folder, or that the description belongs to another one.
+    pub fn new(folder: &Path, guid: &str, log: Log, logging: bool) -> Result<Self, (Log, String)> {
+        match Resources::read(folder) {
+            Err(error) => Err((log, error)),
+            Ok(resources) if resources.guid != guid => {
+                let what = format!("guid: found \"{guid}\", allowed: {}", resources.guid);
+                Err((log, what))
+            }
+            Ok(resources) => Ok(Self::of(resources, log, logging)),
+        }
+    }
+
+    /// Of resources.
+    pub fn of(resources: Resources, log: Log, logging: bool) -> Self {
+        let values = resources.starts.clone();
+        Self {
+            slopes: vec![0.0; values.len()],
+            values,
+            table_id: CString::new(resources.table_id.to_string()).unwrap_or_default(),
+            resources,
+            log,
+            logging: [logging; CATEGORIES.len()],
+            state: State::Instantiated,
+            model: None,
+            set_up: false,
+            start_s: 0.0,
+            stop_s: None,
+            time_s: 0.0,
+            ticks: 0,
+            states: BTreeMap::new(),
+        }
+    }
+
+    /// Says in the log that something is refused.
+    pub fn refuse(&self, what: &str) -> Status {
+        (self.log)(Status::Error, CATEGORIES[0], what);
+        Status::Error
+    }
+
+    fn warn(&self, what: &str) -> Status {
+        (self.log)(Status::Warning, CATEGORIES[1], what);
+        Status::Warning
+    }
+
+    fn tell(&self, what: &str) {
+        if self.logging[2] {
+            (self.log)(Status::Ok, CATEGORIES[2], what);
+        }
+    }
+
+    fn expect(&self, call: &str, allowed: &[State]) -> Result<(), Status> {
+        if allowed.contains(&self.state) {
+            return Ok(());
+        }
+        let names: Vec<&str> = allowed.iter().map(|state| state.name()).collect();
+        Err(self.refuse(&format!(
+            "{call}: called in the state \"{}\", allowed: {}",
+            self.state.name(),
+            names.join(", ")
+        )))
+    }
+
+    fn variable(&self, call: &str, reference: u32) -> Result<&'static Variable, Status> {
+        let variables = self.resources.kind.variables();
+        variables.get(reference as usize).ok_or_else(|| {
+            self.refuse(&format!("{call}: found value reference {reference}, allowed: 0 to {}", variables.len() - 1))
+        })
+    }
+
+    /// `fmi2SetDebugLogging`: all categories, or those named.
+    pub fn set_logging(&mut self, on: bool, categories: &[&str]) -> Status {
+        let unknown = categories.iter().find(|category| !CATEGORIES.contains(category));
+        if let Some(unknown) = unknown {
+            let allowed = CATEGORIES.join(", ");
+            return self.refuse(&format!("fmi2SetDebugLogging: found category \"{unknown}\", allowed: {allowed}"));
+        }
+        for (name, logged) in CATEGORIES.iter().zip(&mut self.logging) {
+            if categories.is_empty() || categories.contains(name) {
+                *logged = on;
+            }
+        }
+        Status::Ok
+    }
+
+    /// `fmi2SetupExperiment`.
+    pub fn set_up(&mut self, start_s: f64, stop_s: Option<f64>) -> Result<(), Status> {
+        self.expect("fmi2SetupExperiment", &[State::Instantiated])?;
+        if !start_s.is_finite() || stop_s.is_some_and(|stop_s| !(stop_s >= start_s && stop_s.is_finite())) {
+            let stop = stop_s.map_or(String::new(), |stop_s| format!(" to {stop_s}"));
+            return Err(
+                self.refuse(&format!("fmi2SetupExperiment: found {start_s}{stop} s, allowed: finite, in order"))
+            );
+        }
+        self.set_up = true;
+        (self.start_s, self.stop_s, self.time_s) = (start_s, stop_s, start_s);
+        Ok(())
+    }
+
+    /// `fmi2EnterInitializationMode`.
+    pub fn enter_initialization(&mut self) -> Result<(), Status> {
+        self.expect("fmi2EnterInitializationMode", &[State::Instantiated])?;
+        self.state = State::Initializing;
+        if self.set_up {
+            return Ok(());
+        }
+        Err(self.warn("fmi2EnterInitializationMode: fmi2SetupExperiment was not called; the start is at 0 s"))
+    }
+
+    /// `fmi2ExitInitializationMode`: the model is made of the parameters.
+    pub fn exit_initialization(&mut self) -> Result<(), Status> {
+        self.expect("fmi2ExitInitializationMode", &[State::Initializing])?;
+        self.model = Some(
+            made(&self.resources, &self.values)
+                .map_err(|error| self.refuse(&format!("fmi2ExitInitializationMode: {error}")))?,
+        );
+        self.start_outputs();
+        self.ticks = 0;
+        self.state = State::Stepping;
+        self.tell(&format!("initialised; {}", crate::MARK));
+        Ok(())
+    }
+
+    fn start_outputs(&mut self) {
+        match self.resources.kind {
+            ModelKind::Compensation => compensation::initial(&mut self.values),
+            ModelKind::Joint => joint::initial(&mut self.values),
+        }
+    }
+
+    /// `fmi2Terminate`.
+    pub fn terminate(&mut self) -> Result<(), Status> {
+        self.expect("fmi2Terminate", &[State::Stepping, State::Failed])?;
+        self.state = State::Terminated;
+        Ok(())
+    }
+
+    /// `fmi2Reset`: as after it was made, with all start values.
+    pub fn reset(&mut self) {
+        self.values.clone_from(&self.resources.starts);
+        self.slopes.fill(0.0);
+        self.model = None;
+        self.set_up = false;
+        (self.start_s, self.stop_s, self.time_s, self.ticks) = (0.0, None, 0.0, 0);
+        self.state = State::Instantiated;
+    }
+
+    /// Reads values of a type.
+    pub fn get(&mut self, call: &str, like: fn(Kind) -> bool, references: &[u32]) -> Result<Vec<f64>, Status> {
+        self.expect(call, &[State::Initializing, State::Stepping, State::Failed, State::Terminated])?;
+        if self.state == State::Initializing {
+            self.start_outputs();
+        }
+        references.iter().map(|&reference| self.place(call, like, reference).map(|place| self.values[place])).collect()
+    }
+
+    /// Reads the only text that there is.
+    pub fn get_text(&self, call: &str, reference: u32) -> Result<&CStr, Status> {
+        self.expect(call, &[State::Initializing, State::Stepping, State::Failed, State::Terminated])?;
+        self.place(call, |kind| kind == Kind::Text, reference).map(|_| self.table_id.as_c_str())
+    }
+
+    /// Sets values of a type: all of them, or none.
+    pub fn set(&mut self, call: &str, like: fn(Kind) -> bool, set: &[(u32, f64)]) -> Result<(), Status> {
+        self.expect(call, &[State::Instantiated, State::Initializing, State::Stepping])?;
+        for &(reference, value) in set {
+            let place = self.place(call, like, reference)?;
+            let variable = &self.resources.kind.variables()[place];
+            let now = match variable.role {
+                Role::Input | Role::Tunable => true,
+                Role::Parameter => self.state != State::Stepping,
+                Role::Output | Role::Motion | Role::Constant => false,
+            };
+            if !now {
+                let why = if variable.role == Role::Parameter { "after the initialisation" } else { "at all" };
+                return Err(self.refuse(&format!("{call}: {} cannot be set {why}", variable.name)));
+            }
+            if !variable.allows(value) {
+                return Err(self.refuse(&format!(
+                    "{call}: {}: found {value}, allowed: {}",
+                    variable.name,
+                    allowed(variable)
+                )));
+            }
+        }
+        for &(reference, value) in set {
+            self.values[reference as usize] = value;
+        }
+        Ok(())
+    }
+
+    fn place(&self, call: &str, like: fn(Kind) -> bool, reference: u32) -> Result<usize, Status> {
+        let variable = self.variable(call, reference)?;
+        if like(variable.kind) {
+            return Ok(reference as usize);
+        }
+        Err(self.refuse(&format!("{call}: {} (value reference {reference}) is of another type", variable.name)))
+    }
+
+    /// `fmi2SetRealInputDerivatives`: of the first order, for the next step.
+    pub fn set_slopes(&mut self, set: &[(u32, i32, f64)]) -> Result<(), Status> {
+        let call = "fmi2SetRealInputDerivatives";
+        self.expect(call, &[State::Instantiated, State::Initializing, State::Stepping])?;
+        for &(reference, order, value) in set {
+            let variable = self.variable(call, reference)?;
+            if variable.role != Role::Input || order != 1 || !value.is_finite() {
+                let what = format!("{call}: {}: found order {order}, {value}, allowed: inputs, order 1", variable.name);
+                return Err(self.refuse(&what));
+            }
+        }
+        for &(reference, _, value) in set {
+            self.slopes[reference as usize] = value;
+        }
+        Ok(())
+    }
+
+    /// `fmi2DoStep`: all ticks that end within it.
+    pub fn step(&mut self, from_s: f64, step_s: f64) -> Result<(), Status> {
+        let call = "fmi2DoStep";
+        self.expect(call, &[State::Stepping])?;
+        let Some(mut model) = self.model.take() else { return Err(self.refuse("fmi2DoStep: no model")) };
+        let done = self.ticked(call, model.as_mut(), from_s, step_s);
+        self.model = Some(model);
+        done
+    }
+
+    fn ticked(&mut self, call: &str, model: &mut dyn Model, from_s: f64, step_s: f64) -> Result<(), Status> {
+        let tick_s = model.tick_s(&self.values);
+        let slack_s = SLACK * tick_s + 1e-12 * from_s.abs();
+        let to_s = from_s + step_s;
+        if !(step_s > 0.0 && to_s.is_finite()) {
+            return Err(self.refuse(&format!("{call}: found a step of {step_s} s from {from_s} s, allowed: above 0")));
+        }
+        if (from_s - self.time_s).abs() > slack_s {
+            return Err(self.refuse(&format!("{call}: found a step from {from_s} s, allowed: from {} s", self.time_s)));
+        }
+        // Section 2.1.6: not beyond a stop time that was stated.
+        if let Some(stop_s) = self.stop_s.filter(|stop_s| to_s > stop_s + slack_s) {
+            return Err(self.refuse(&format!("{call}: found a step to {to_s} s, allowed: to {stop_s} s")));
+        }
+        let due = ((to_s - self.start_s) / tick_s + SLACK).floor();
+        if due - self.ticks as f64 > MOST_TICKS {
+            return Err(self
+                .refuse(&format!("{call}: found a step of {step_s} s, allowed: {MOST_TICKS:e} ticks of {tick_s} s")));
+        }
+        while (self.ticks as f64) < due {
+            let begins_s = self.start_s + self.ticks as f64 * tick_s - from_s;
+            let inputs = self.values.clone();
+            let at = Inputs {
+                values: &inputs,
+                slopes: &self.slopes,
+                // What began in the step before has the inputs of this one.
+                begins_s: begins_s.max(0.0),
+                ends_s: (begins_s + tick_s).max(0.0),
+            };
+            let mut said = Vec::new();
+            let ticked = model.tick(&at, &mut self.values, &mut |what| said.push(what));
+            for what in said {
+                self.warn(&what);
+            }
+            if let Err(error) = ticked {
+                self.state = State::Failed;
+                return Err(self.refuse(&format!("{call}: at {:.6} s: {error}", from_s + begins_s)));
+            }
+            self.ticks += 1;
+        }
+        self.slopes.fill(0.0);
+        self.time_s = to_s;
+        Ok(())
+    }
+
+    /// End of the last step that succeeded, s.
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// Where in its life it is.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// All that changes, as bytes: for this description on any machine.
+    pub fn bytes(&self) -> Vec<u8> {
+        let mut words = vec![STATE_MARK, digest(self.resources.guid.bytes().map(u64::from)), self.state as u64];
+        words.extend([u64::from(self.set_up), self.start_s.to_bits()]);
+        words.extend([u64::from(self.stop_s.is_some()), self.stop_s.unwrap_or(0.0).to_bits()]);
+        words.extend([self.time_s.to_bits(), self.ticks, u64::from(self.model.is_some())]);
+        words.extend(self.values.iter().chain(&self.slopes).map(|value| value.to_bits()));
+        if let Some(model) = &self.model {
+            model.keep(&mut words);
+        }
+        words.push(digest(words.iter().copied()));
+        words.into_iter().flat_map(u64::to_le_bytes).collect()
+    }
+
+    /// Whether bytes are a whole state of this description.
+    ///
+    /// # Errors
+    /// Why they are not.
+    pub fn check(&self, bytes: &[u8]) -> Result<(), String> {
+        self.words(bytes).map(|_| ())
+    }
+
+    /// The words of a state but for mark, description and sum.
+    fn words(&self, bytes: &[u8]) -> Result<Vec<u64>, String> {
+        let (words, left) = bytes.as_chunks::<8>();
+        let mut words: Vec<u64> = words.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
+        let sum = words.pop().filter(|_| left.is_empty()).ok_or("no state")?;
+        if sum != digest(words.iter().copied()) {
+            return Err("a damaged state".to_owned());
+        }
+        let of = digest(self.resources.guid.bytes().map(u64::from));
+        match words.split_first_chunk::<2>() {
+            Some((&[STATE_MARK, guid], rest)) if guid == of => Ok(rest.to_vec()),
+            _ => Err("a state of another FMU".to_owned()),
+        }
+    }
+
+    /// Goes on from bytes.
+    ///
+    /// # Errors
+    /// Why they are no state of this description; then nothing changes, or, where the model itself cannot take them up, it has failed.
+    pub fn go_on_from(&mut self, bytes: &[u8]) -> Result<(), String> {
+        let words = self.words(bytes)?;
+        let (&[state, set_up, start, stops, stop, time, ticks, has_model], rest) =
+            words.split_first_chunk::<8>().ok_or("no state")?;
+        let count = self.values.len();
+        let (numbers, kept) = rest.split_at_checked(2 * count).ok_or("no state")?;
+        let numbers: Vec<f64> = numbers.iter().map(|word| f64::from_bits(*word)).collect();
+        let (values, slopes) = numbers.split_at(count);
+        let variables = self.resources.kind.variables();
+        let sound = |(variable, value): (&Variable, &f64)| variable.is_output() || variable.allows(*value);
+        let state = State::ALL.into_iter().find(|known| *known as u64 == state).ok_or("no state")?;
+        if !variables.iter().zip(values).all(sound) {
+            return Err("impossible values".to_owned());
+        }
+        let model = if has_model == 0 { None } else { Some(self.taken(values, kept)?) };
+        self.model = model;
+        self.state = state;
+        self.set_up = set_up != 0;
+        self.values.copy_from_slice(values);
+        self.slopes.copy_from_slice(slopes);
+        (self.start_s, self.time_s, self.ticks) = (f64::from_bits(start), f64::from_bits(time), ticks);
+        self.stop_s = (stops != 0).then_some(f64::from_bits(stop));
+        Ok(())
+    }
+
+    /// The model of these values in a state that was kept: the one that there is, where its parameters are the same.
+    fn taken(&mut self, values: &[f64], kept: &[u64]) -> Result<Box<dyn Model>, String> {
+        let variables = self.resources.kind.variables().iter();
+        let same = |((variable, a), b): ((&Variable, &f64), &f64)| variable.role != Role::Parameter || a == b;
+        let mut model = match self.model.take() {
+            Some(model) if variables.zip(&self.values).zip(values).all(same) => model,
+            _ => made(&self.resources, values)?,
+        };
+        let mut from = kept.iter().copied();
+        if model.take(&mut from).is_none() || from.next().is_some() {
+            self.state = State::Failed;
+            return Err("a state that no model has".to_owned());
+        }
+        Ok(model)
+    }
+
+    /// Keeps its state under a name, over one that is there.
+    pub fn keep(&mut self, name: usize) {
+        let bytes = self.bytes();
+        self.states.insert(name, bytes);
+    }
+
+    /// Keeps bytes under a name.
+    pub fn keep_bytes(&mut self, name: usize, bytes: Vec<u8>) {
+        self.states.insert(name, bytes);
+    }
+
+    /// What was kept under a name.
+    pub fn kept(&self, name: usize) -> Option<&Vec<u8>> {
+        self.states.get(&name)
+    }
+
+    /// Forgets what was kept under a name; false if nothing was.
+    pub fn forget(&mut self, name: usize) -> bool {
+        self.states.remove(&name).is_some()
+    }
+
+    /// It cannot be trusted any more.
+    pub fn fail(&mut self) {
+        self.state = State::Failed;
+    }
+}
+
+fn allowed(variable: &Variable) -> String {
+    match (variable.kind, variable.range) {
+        (Kind::Boolean, _) => "0 or 1".to_owned(),
+        (Kind::Choice(choices), _) => format!("0 to {}", choices.items.len() - 1),
+        (_, [least, most]) => format!("{least} to {most}"),
+    }
+}
+
+/// A hash of words (FNV-1a, 64 bits): against damage, not against intent.
+fn digest(words: impl Iterator<Item = u64>) -> u64 {
+    words.fold(0xcbf2_9ce4_8422_2325, |sum, word| {
+        word.to_le_bytes().iter().fold(sum, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
+    })
+}

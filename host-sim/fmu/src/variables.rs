@@ -1,0 +1,206 @@
+//! Variables of a model: what its description says of them, and what an importer may do with them.
+
+/// Units, by the symbol that is shown: exponents of kg, m, s, K, rad; factor and offset to them.
+pub const UNITS: [(&str, [i8; 5], f64, f64); 12] = [
+    ("rad", [0, 0, 0, 0, 1], 1.0, 0.0),
+    ("rad/s", [0, 0, -1, 0, 1], 1.0, 0.0),
+    ("rad/s2", [0, 0, -2, 0, 1], 1.0, 0.0),
+    ("arcsec", [0, 0, 0, 0, 1], core::f64::consts::PI / 648_000.0, 0.0),
+    ("N.m", [1, 2, -2, 0, 0], 1.0, 0.0),
+    ("J", [1, 2, -2, 0, 0], 1.0, 0.0),
+    ("kg.m2", [1, 2, 0, 0, 0], 1.0, 0.0),
+    ("degC", [0, 0, 0, 1, 0], 1.0, 273.15),
+    ("s", [0, 0, 1, 0, 0], 1.0, 0.0),
+    ("Hz", [0, 0, -1, 0, 0], 1.0, 0.0),
+    ("rad/rad", [0, 0, 0, 0, 0], 1.0, 0.0),
+    ("1", [0, 0, 0, 0, 0], 1.0, 0.0),
+];
+
+/// A list of named numbers, from 0 on.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Choices {
+    /// Name of the type.
+    pub name: &'static str,
+    /// Names, and what they mean.
+    pub items: &'static [(&'static str, &'static str)],
+}
+
+/// Type of a variable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// A number with a unit.
+    Real(&'static str),
+    /// A whole number.
+    Integer,
+    /// Yes or no.
+    Boolean,
+    /// One of a list; read and set as an integer.
+    Choice(&'static Choices),
+    /// Text; constants only.
+    Text,
+}
+
+/// What a variable is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Set before the initialisation ends.
+    Parameter,
+    /// Set at any communication point.
+    Tunable,
+    /// Set at any communication point, and may change between.
+    Input,
+    /// Read; changes in steps only.
+    Output,
+    /// Read; changes all the time.
+    Motion,
+    /// Never changes.
+    Constant,
+}
+
+/// A variable; its value reference is its place in the list.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Variable {
+    /// Its name.
+    pub name: &'static str,
+    /// Its type.
+    pub kind: Kind,
+    /// What it is for.
+    pub role: Role,
+    /// Where it starts, unless the resources say otherwise; integers, choices and yes (1) or no (0) as numbers.
+    pub start: f64,
+    /// Least and largest value that is taken, for parameters.
+    pub range: [f64; 2],
+    /// What it is, with its sign.
+    pub says: &'static str,
+}
+
+/// Any number.
+pub const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
+impl Variable {
+    /// A parameter within a range.
+    pub const fn parameter(
+        name: &'static str,
+        kind: Kind,
+        start: f64,
+        range: [f64; 2],
+        says: &'static str,
+    ) -> Variable {
+        Variable { name, kind, role: Role::Parameter, start, range, says }
+    }
+
+    /// An input.
+    pub const fn input(name: &'static str, unit: &'static str, start: f64, says: &'static str) -> Variable {
+        Variable { name, kind: Kind::Real(unit), role: Role::Input, start, range: ANY, says }
+    }
+
+    /// An output that changes in steps.
+    pub const fn output(name: &'static str, kind: Kind, says: &'static str) -> Variable {
+        Variable { name, kind, role: Role::Output, start: 0.0, range: ANY, says }
+    }
+
+    /// An output that changes all the time.
+    pub const fn motion(name: &'static str, unit: &'static str, says: &'static str) -> Variable {
+        Variable { name, kind: Kind::Real(unit), role: Role::Motion, start: 0.0, range: ANY, says }
+    }
+
+    /// A constant.
+    pub const fn constant(name: &'static str, kind: Kind, says: &'static str) -> Variable {
+        Variable { name, kind, role: Role::Constant, start: 0.0, range: ANY, says }
+    }
+
+    /// Whether it is read only.
+    pub const fn is_output(&self) -> bool {
+        matches!(self.role, Role::Output | Role::Motion)
+    }
+
+    /// Whether an importer may set it to this value: a finite number in its range, whole where it has to be.
+    pub fn allows(&self, value: f64) -> bool {
+        let [least, most] = match self.kind {
+            Kind::Boolean => [0.0, 1.0],
+            Kind::Choice(choices) => [0.0, choices.items.len() as f64 - 1.0],
+            _ => self.range,
+        };
+        let whole = matches!(self.kind, Kind::Real(_)) || value == value.trunc();
+        // What an input may not be is said when it is used: a sensor may fail.
+        self.role == Role::Input || (value.is_finite() && value >= least && value <= most && whole)
+    }
+}
+
+/// The models of this library.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ModelKind {
+    /// The core's joint over a table.
+    Compensation,
+    /// A joint with mass.
+    Joint,
+}
+
+impl ModelKind {
+    /// Both.
+    pub const ALL: [ModelKind; 2] = [ModelKind::Compensation, ModelKind::Joint];
+
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            ModelKind::Compensation => "compensation",
+            ModelKind::Joint => "joint",
+        }
+    }
+
+    /// Its name in an FMU: that of its library, too.
+    pub const fn identifier(self) -> &'static str {
+        match self {
+            ModelKind::Compensation => "flexspline_compensation",
+            ModelKind::Joint => "flexspline_joint",
+        }
+    }
+
+    /// Its variables.
+    pub const fn variables(self) -> &'static [Variable] {
+        match self {
+            ModelKind::Compensation => crate::compensation::VARIABLES,
+            ModelKind::Joint => crate::joint::VARIABLES,
+        }
+    }
+
+    /// Where a variable of this name is.
+    pub fn place(self, name: &str) -> Option<usize> {
+        self.variables().iter().position(|variable| variable.name == name)
+    }
+}
+
+/// A list of variables, and a constant for the place of each.
+macro_rules! variables {
+    ($($place:ident => $variable:expr;)+) => {
+        // A model need not look at all of them.
+        #[allow(clippy::upper_case_acronyms, non_camel_case_types, dead_code)]
+        enum Place {
+            $($place),+
+        }
+        $(#[allow(dead_code)]
+        const $place: usize = Place::$place as usize;)+
+
+        /// All of them.
+        pub const VARIABLES: &[Variable] = &[$($variable),+];
+    };
+}
+pub(crate) use variables;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn variables_have_names_of_their_own_known_units_and_starts_that_they_allow() {
+        for kind in ModelKind::ALL {
+            for (place, variable) in kind.variables().iter().enumerate() {
+                assert_eq!(kind.place(variable.name), Some(place), "{}", variable.name);
+                assert!(variable.is_output() || variable.allows(variable.start), "{}", variable.name);
+                if let Kind::Real(unit) = variable.kind {
+                    assert!(UNITS.iter().any(|(name, ..)| *name == unit), "{}: {unit}", variable.name);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! One joint of a flight, ticked from outside: what a simulator of something larger drives.
+
+use super::{COMPENSATED, Commanded, Controller, Lane, Made, Sensing, Unit, made};
+use crate::keep::{Kept, kept};
+use crate::plant::Plant;
+use crate::scenario::{Moment, Scenario};
+use flexspline::{Direction, JOINT_STATE_WORDS, JointState};
+
+/// A joint with mass, its servo, and what commands it; as [`super::fly`] flies it, tick by tick.
+pub struct OneJoint {
+    made: Made,
+    lane: Lane,
+    started_j: f64,
+}
+
+/// What a tick gave beside what moved.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ticked {
+    /// Where the generator was told to be, rad.
+    pub command_rad: f64,
+    /// The correction in it, rad at the output: target less command over ratio.
+    pub correction_rad: f64,
+    /// The motor gives all it has.
+    pub saturated: bool,
+    /// The limiter held the correction back.
+    pub held_back: bool,
+    /// The table could not be used.
+    pub not_corrected: bool,
+}
+
+kept!(Sensing { noise, before_rad_s, even_s, told_n_m, age_s, bound_n_m });
+
+impl OneJoint {
+    /// At rest at zero; with the image of a table that was made before, or one made for the scenario; with the core or with none.
+    ///
+    /// # Errors
+    /// What cannot be flown, in words.
+    pub fn new(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>, compensated: bool) -> Result<Self, String> {
+        let made = made(scenario, unit, image)?;
+        let lane = Lane::new(&made, if compensated { COMPENSATED } else { 0 })?;
+        let started_j = lane.plant.stored_j();
+        Ok(Self { made, lane, started_j })
+    }
+
+    /// One tick of the servo: the target at its beginning, the torque on the load at both ends.
+    pub fn tick(&mut self, now: &Moment) -> Ticked {
+        let Commanded { command, held_back, not_corrected, .. } = self.lane.tick(&self.made, now);
+        let command_rad = command.to_rad();
+        Ticked {
+            command_rad,
+            correction_rad: now.target_rad - command_rad / self.made.unit.nominal.ratio,
+            saturated: self.lane.servo.saturated(),
+            held_back,
+            not_corrected,
+        }
+    }
+
+    /// As long as a tick without the servo: the motor's torque (N·m at the motor), and the torque on the load at both ends.
+    pub fn push(&mut self, motor_n_m: f64, [first, last]: [f64; 2]) {
+        let servo = &self.made.scenario.servo;
+        let (motor_n_m, step_s) = (motor_n_m * self.made.unit.nominal.ratio, servo.tick_s / servo.steps as f64);
+        for step in 0..servo.steps {
+            let share = (step as f64 + 0.5) / servo.steps as f64;
+            self.lane.plant.step(step_s, motor_n_m, first + (last - first) * share);
+        }
+    }
+
+    /// Motor, drive and load.
+    pub fn plant(&self) -> &Plant {
+        &self.lane.plant
+    }
+
+    /// Torque that the servo's motor gives, N·m at the motor.
+    pub fn motor_n_m(&self) -> f64 {
+        self.lane.servo.motor_n_m()
+    }
+
+    /// Generator over output.
+    pub fn ratio(&self) -> f64 {
+        self.made.unit.nominal.ratio
+    }
+
+    /// What was put in less what became heat and what is stored, J since the start: 0 but for rounding.
+    pub fn missing_j(&self) -> f64 {
+        let energy = self.plant().energy;
+        energy.motor + energy.outside - energy.heat - (self.plant().stored_j() - self.started_j)
+    }
+}
+
+impl Kept for OneJoint {
+    fn keep(&self, to: &mut Vec<u64>) {
+        self.lane.plant.keep(to);
+        self.lane.servo.keep(to);
+        self.lane.sensing.keep(to);
+        u32::from(self.lane.direction == Direction::Backward).keep(to);
+        if let Controller::Core(core) = &self.lane.controller {
+            core.state.words()[..].keep(to);
+            let [behind, flank] = core.path.kept();
+            behind.to_bits().keep(to);
+            flank.to_bits().keep(to);
+        }
+    }
+
+    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
+        self.lane.plant.take(from)?;
+        self.lane.servo.take(from)?;
+        self.lane.sensing.take(from)?;
+        let mut backward = 0_u32;
+        backward.take(from)?;
+        self.lane.direction = if backward == 0 { Direction::Forward } else { Direction::Backward };
+        if let Controller::Core(core) = &mut self.lane.controller {
+            let mut words = [0_u32; JOINT_STATE_WORDS];
+            words[..].take(from)?;
+            core.state = JointState::of_words(&words)?;
+            let mut bits = [0_u32; 2];
+            bits[..].take(from)?;
+            core.path.go_on(bits.map(f32::from_bits));
+        }
+        Some(())
+    }
+}

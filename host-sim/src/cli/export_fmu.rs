@@ -1,0 +1,119 @@
+//! `flexspline export --format fmu`: a table, or a joint with mass, for simulators that import FMI 2.0.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum, ValueHint};
+use serde::Serialize;
+
+use super::{Context, Failure, fly};
+use crate::export::fmu::{Fmu, compensation, find_libraries, joint};
+use crate::output::write_whole;
+
+/// The scenario of a joint where none is named.
+const USUAL_SCENARIO: &str = "antenna";
+
+/// Options of this format.
+#[derive(Debug, Args)]
+pub(super) struct FmuOptions {
+    /// What the FMU simulates: compensation (the core over its table) or joint (motor, servo, drive and load) [default: compensation]
+    #[arg(long, value_enum, value_name = "MODEL", help_heading = "FMU", hide_possible_values = true)]
+    model: Option<Model>,
+    /// Masses, friction, servo and expected load of a joint: antenna, rover, camera, telescope, or a TOML file [default: antenna]
+    #[arg(long, value_name = "SCENARIO", help_heading = "FMU", value_hint = ValueHint::FilePath)]
+    scenario: Option<String>,
+    /// Library of flexspline-fmu to put in, repeatable for several platforms [default: those beside this program]
+    #[arg(long, value_name = "FILE", help_heading = "FMU", value_hint = ValueHint::FilePath)]
+    library: Vec<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Model {
+    Compensation,
+    Joint,
+}
+
+/// Result with `--json`.
+#[derive(Serialize)]
+struct Exported {
+    schema_version: u32,
+    written: Vec<PathBuf>,
+    model: &'static str,
+    guid: String,
+    table_id: String,
+    platforms: Vec<&'static str>,
+}
+
+impl FmuOptions {
+    /// The first of its options that is given.
+    pub(super) fn given(&self) -> Option<&'static str> {
+        let given = [
+            ("--model", self.model.is_some()),
+            ("--scenario", self.scenario.is_some()),
+            ("--library", !self.library.is_empty()),
+        ];
+        given.into_iter().find(|(_, given)| *given).map(|(option, _)| option)
+    }
+
+    /// Refuses loads: those of an FMU are its inputs.
+    pub(super) fn refuse_loads(&self, loads: [(&str, bool); 2]) -> Result<(), Failure> {
+        match loads.into_iter().find(|(_, given)| *given) {
+            Some((option, _)) => {
+                Err(Failure::BadInput(format!("{option}: loads and temperatures are inputs of an FMU")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    pub(super) fn run(&self, context: &Context, tables: Option<&Path>) -> Result<(), Failure> {
+        if let Some(option) = context.changes_the_drive() {
+            return Err(Failure::BadInput(format!(
+                "{option}: an FMU has the drive of its table; allowed: --tables FILE.fxt"
+            )));
+        }
+        let fmu = self.fmu(tables)?;
+        let libraries = find_libraries(&self.library).map_err(Failure::BadInput)?;
+        let resources = fmu.resources();
+        let file = context.out()?.join(format!("{}.fmu", resources.kind.identifier()));
+        write_whole(&file, |out| fmu.write(out, &libraries))?;
+        let platforms: Vec<&str> = libraries.iter().map(|library| library.platform.folder).collect();
+        let text = format!(
+            "wrote {}: {} with table {}, for {}",
+            file.display(),
+            resources.kind.name(),
+            resources.table_id,
+            platforms.join(", ")
+        );
+        let exported = Exported {
+            schema_version: 1,
+            written: vec![file],
+            model: resources.kind.name(),
+            guid: resources.guid.clone(),
+            table_id: resources.table_id.to_string(),
+            platforms,
+        };
+        context.print(&exported, || text)
+    }
+
+    fn fmu(&self, tables: Option<&Path>) -> Result<Fmu, Failure> {
+        let image = tables
+            .map(|file| std::fs::read(file).map_err(|error| Failure::BadInput(format!("{}: {error}", file.display()))));
+        let image = image.transpose()?;
+        let of_table = |error: String| {
+            let file = tables.map_or("scenario".to_owned(), |file| file.display().to_string());
+            Failure::BadInput(format!("{file}: {error}"))
+        };
+        match (self.model.unwrap_or(Model::Compensation), image) {
+            (Model::Compensation, _) if self.scenario.is_some() => Err(Failure::BadInput(
+                "--scenario: the compensation alone has no mass; allowed with --model joint".to_owned(),
+            )),
+            (Model::Compensation, None) => Err(Failure::BadInput(
+                "--tables: missing; needed for the compensation: an image as flexspline tables writes it".to_owned(),
+            )),
+            (Model::Compensation, Some(image)) => compensation(image).map_err(of_table),
+            (Model::Joint, image) => {
+                let flown = fly::scenario(self.scenario.as_deref().unwrap_or(USUAL_SCENARIO))?;
+                joint(&flown, image).map_err(of_table)
+            }
+        }
+    }
+}

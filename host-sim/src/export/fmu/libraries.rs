@@ -1,0 +1,131 @@
+//! The libraries that go into an FMU: named, beside the program, or where a release or cargo puts them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A platform of FMI 2.0 (section 2.3): its folder, how its library ends and is called by cargo, and what such a file begins with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Platform {
+    /// Folder of `binaries`.
+    pub folder: &'static str,
+    /// Ending.
+    pub extension: &'static str,
+    /// As cargo calls it.
+    pub file: &'static str,
+    /// Name of cargo's target.
+    target: &'static str,
+    magic: &'static [u8],
+}
+
+/// Those that a library may be for; all of 64 bits.
+const PLATFORMS: [Platform; 3] = [
+    Platform {
+        folder: "linux64",
+        extension: "so",
+        file: "libflexspline_fmu.so",
+        target: "x86_64-unknown-linux-gnu",
+        // ELF of 64 bits, little-endian.
+        magic: b"\x7fELF\x02\x01",
+    },
+    Platform {
+        folder: "win64",
+        extension: "dll",
+        file: "flexspline_fmu.dll",
+        target: "x86_64-pc-windows-gnu",
+        magic: b"MZ",
+    },
+    Platform {
+        folder: "darwin64",
+        extension: "dylib",
+        file: "libflexspline_fmu.dylib",
+        target: "x86_64-apple-darwin",
+        magic: b"\xcf\xfa\xed\xfe",
+    },
+];
+
+/// Machine of an ELF file: where it stands, and that of x86-64.
+const ELF_MACHINE: (usize, [u8; 2]) = (18, [62, 0]);
+
+/// A library and what it is for.
+#[derive(Debug, Clone)]
+pub struct Library {
+    /// Where it runs.
+    pub platform: &'static Platform,
+    /// Where it was found.
+    pub file: PathBuf,
+    /// Itself.
+    pub bytes: Vec<u8>,
+}
+
+/// The libraries of these files, one for each platform; without any, those that lie where a build or a release has them.
+///
+/// # Errors
+/// A file that is none, or what to do where there is none at all.
+pub fn find_libraries(named: &[PathBuf]) -> Result<Vec<Library>, String> {
+    let mut libraries: Vec<Library> = Vec::new();
+    for file in named {
+        let library = read(file)?;
+        if let Some(other) = libraries.iter().find(|other| other.platform == library.platform) {
+            let (other, folder) = (other.file.display(), library.platform.folder);
+            return Err(format!("--library: found {other} and {}, both for {folder}; allowed: one", file.display()));
+        }
+        libraries.push(library);
+    }
+    if !named.is_empty() {
+        return Ok(libraries);
+    }
+    let program =
+        std::env::current_exe().and_then(fs::canonicalize).map_err(|error| format!("this program: {error}"))?;
+    let beside = program.parent().unwrap_or(Path::new("."));
+    for platform in &PLATFORMS {
+        // One that does not fit is left out: it is of an earlier build.
+        let found =
+            places(beside, platform).into_iter().filter(|file| file.is_file()).find_map(|file| read(&file).ok());
+        libraries.extend(found);
+    }
+    if libraries.is_empty() {
+        let looked: Vec<String> = places(beside, &PLATFORMS[0]).iter().map(|file| file.display().to_string()).collect();
+        return Err(format!(
+            "found no library for an FMU; looked for {}. In a checkout run: cargo build --release -p flexspline-fmu, and give --library \
+             target/release/{}",
+            looked.join(", "),
+            PLATFORMS[0].file
+        ));
+    }
+    Ok(libraries)
+}
+
+/// Where the library of a platform may lie, the likeliest to be new first.
+fn places(beside: &Path, platform: &Platform) -> Vec<PathBuf> {
+    let Platform { folder, file, target, .. } = platform;
+    let mut places = vec![
+        // Cargo has there what it built along with the program.
+        beside.join("deps").join(file),
+        beside.join(file),
+        // A release.
+        beside.join("../share/flexspline/fmu").join(folder).join(file),
+    ];
+    // Cargo's folder of another target.
+    if let (Some(profile), Some(targets)) = (beside.file_name(), beside.parent()) {
+        places.push(targets.join(target).join(profile).join(file));
+        places.push(targets.join(target).join("release").join(file));
+    }
+    places
+}
+
+fn read(file: &Path) -> Result<Library, String> {
+    let refuse =
+        |what: &str| format!("{}: {what}; allowed: a library that cargo built of flexspline-fmu", file.display());
+    let bytes = fs::read(file).map_err(|error| refuse(&error.to_string()))?;
+    let platform = PLATFORMS.iter().find(|platform| bytes.starts_with(platform.magic));
+    let platform = platform.ok_or_else(|| refuse("no library of Linux, Windows or macOS with 64 bits"))?;
+    let (at, machine) = ELF_MACHINE;
+    if platform.extension == "so" && bytes.get(at..at + 2) != Some(&machine) {
+        return Err(refuse("a library of another processor; linux64 is x86-64"));
+    }
+    let mark = flexspline_fmu::MARK.as_bytes();
+    if !bytes.windows(mark.len()).any(|window| window == mark) {
+        return Err(refuse(&format!("no library for FMUs of this version (\"{}\")", flexspline_fmu::MARK)));
+    }
+    Ok(Library { platform, file: file.to_owned(), bytes })
+}

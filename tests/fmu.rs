@@ -1,0 +1,447 @@
+//! FMUs of `flexspline export --format fmu`, imported as a simulator does it: the zip, its description, and the library through `dlopen`.
+//!
+//! Wrong if these fail: an FMU that is not the core or not the flight, a state that is not all of it, an importer's mistake that ends its program.
+
+mod importer;
+
+use std::ffi::{c_int, c_void};
+use std::ptr::null_mut;
+
+use flexspline::*;
+use flexspline_motion::flight::{COMPENSATED, START_UP_S, fly_one};
+use flexspline_sim::fly::{built_in, unit};
+use flexspline_tests::command::Desk;
+use importer::{DISCARD, ERROR, FUNCTIONS, Imported, Instance, OK, WARNING};
+
+/// A desk with the table of the cam.
+fn desk() -> Desk {
+    let desk = Desk::new();
+    let samples = concat!(env!("CARGO_MANIFEST_DIR"), "/firmware/samples/cam.samples.csv");
+    desk.line(&format!("tables -q --no-report --generator cam --from-samples {samples} --out .")).done();
+    desk
+}
+
+/// An FMU made by these options, imported into a folder whose name has to be escaped in a URI.
+fn imported(desk: &Desk, options: &str) -> Imported {
+    let exported = desk.line(&format!("export --format fmu --json --out fmu {options}")).done().json();
+    let file = desk.path(exported["written"][0].as_str().unwrap());
+    let folder = desk.path(&format!("100 % {}", exported["model"].as_str().unwrap()));
+    let imported = Imported::new(&file, &folder);
+    assert_eq!(exported["guid"], imported.guid());
+    imported
+}
+
+/// Target, rate, torque and temperature of a tick: slews both ways, a load that changes its sign, warming in steps.
+fn asked(tick: u32) -> [f64; 4] {
+    let time = f64::from(tick) * 1e-3;
+    let (swing, rate) = (0.05 * (0.9 * time).sin(), 0.05 * 0.9 * (0.9 * time).cos());
+    [swing, rate, 30.0 * (2.3 * time).sin(), 15.0 + f64::from(tick / 400)]
+}
+
+const NAMES: [&str; 4] = ["output_command", "output_command_rate", "torque", "temperature"];
+const OUTPUTS: [&str; 7] = [
+    "generator_command",
+    "generator_command_rate",
+    "correction",
+    "held_back",
+    "predicted_output",
+    "predicted_error",
+    "uncertainty",
+];
+
+fn bits<const N: usize>(values: [f64; N]) -> [u64; N] {
+    values.map(f64::to_bits)
+}
+
+/// A tick of the FMU: all it gives.
+fn ticked(instance: &Instance<'_>, tick: u32) -> ([u64; 7], [c_int; 4]) {
+    for (name, value) in NAMES.iter().zip(asked(tick)) {
+        instance.set(name, value);
+    }
+    assert_eq!(instance.step(1e-3), OK, "{:?}", instance.log());
+    (bits(instance.reals(OUTPUTS)), ["quality", "flags", "mode_now", "not_corrected"].map(|name| instance.number(name)))
+}
+
+#[test]
+fn the_fmu_of_a_table_gives_the_bits_of_the_core() {
+    let desk = desk();
+    let fmu = imported(&desk, "--tables cam.fxt");
+    let instance = fmu.ready("one", &[("temperature", asked(0)[3])]);
+    let image = std::fs::read(desk.path("cam.fxt")).unwrap();
+    let twin = image.clone();
+    let images = Images::new(&image, &twin);
+    let drive = *Table::check(&image).unwrap().drive();
+    assert_eq!(instance.text("table_id"), Table::check(&image).unwrap().id().to_string());
+    let limits = Limits {
+        tick_s: 1e-3,
+        rate_rad_s: 0.05,
+        acceleration_rad_s2: 5.0,
+        generator_rate_rad_s: 600.0,
+        patience: 5,
+        hold_rad: 2.4e-6,
+    };
+    let joint = Joint::new(drive, limits, Overrun::SkipAndCount).unwrap();
+    let (mut store, mut state) = (Store::new(), JointState::new());
+    store.activate(&images, &drive, asked(0)[3] as f32).unwrap();
+    state.request(Mode::Tracking).unwrap();
+    let mut command = GeneratorAngle::ZERO;
+    let arcsec = |rad: f32| f64::from(rad) * 206_264.806_247_096_36;
+    let mut corrected = 0.0_f64;
+    for tick in 0..3000 {
+        let [target, rate, torque, temperature] = asked(tick);
+        if tick > 0 && temperature != asked(tick - 1)[3] {
+            assert!(store.set_temperature(&images, temperature as f32));
+            store.check_images(&images, store.used_words());
+        }
+        let target = OutputAngle::from_rad(target).unwrap();
+        let input = Input {
+            generator: Some(command),
+            target,
+            torque_n_m: torque as f32,
+            missed_ticks: 0,
+            adjustment: Adjustment::default(),
+        };
+        let ahead = joint.rate_ahead(&store, target, rate as f32, torque as f32, 4e-3);
+        let out = joint.tick(&images, &mut store, &mut state, &input);
+        command = out.command;
+        let wanted = bits([
+            out.command.to_rad(),
+            f64::from(ahead),
+            arcsec(out.correction_rad),
+            arcsec(out.held_back_rad),
+            out.output.to_rad(),
+            arcsec(out.transmission_error_rad),
+            arcsec(out.uncertainty_rad),
+        ]);
+        let not_corrected = out.flags.contains(Flags::NOT_CORRECTED);
+        let numbers = [out.quality as c_int, c_int::from(out.flags.bits()), 1, c_int::from(not_corrected)];
+        assert_eq!(ticked(&instance, tick), (wanted, numbers), "tick {tick}");
+        corrected = corrected.max(arcsec(out.correction_rad).abs());
+    }
+    // It did correct, and the temperature did come through.
+    assert!(corrected > 20.0, "{corrected}");
+}
+
+#[test]
+fn a_state_goes_on_with_the_same_bits_here_and_in_another_instance() {
+    let desk = desk();
+    for options in ["--tables cam.fxt", "--tables cam.fxt --model joint --scenario camera"] {
+        let fmu = imported(&desk, options);
+        let joint = options.contains("joint");
+        let run = |instance: &Instance<'_>, ticks: std::ops::Range<u32>| -> Vec<u64> {
+            let mut all = Vec::new();
+            for tick in ticks {
+                if joint {
+                    let [target, rate, torque, _] = asked(tick);
+                    for (name, value) in [("target", target), ("target_rate", rate), ("load_torque", 0.2 * torque)] {
+                        instance.set(name, value);
+                    }
+                    assert_eq!(instance.step(1e-3), OK, "{:?}", instance.log());
+                    all.extend(bits(instance.reals([
+                        "output_angle",
+                        "motor_rate",
+                        "mesh_torque",
+                        "energy_error",
+                        "correction",
+                    ])));
+                } else {
+                    all.extend(ticked(instance, tick).0);
+                }
+            }
+            all
+        };
+        let instance = fmu.ready("one", &[]);
+        run(&instance, 0..700);
+        let mut state = null_mut();
+        assert_eq!(instance.state(&mut state), OK);
+        let at = instance.time.get();
+        let first = run(&instance, 700..1400);
+        assert_eq!(instance.set_state(state), OK, "{:?}", instance.log());
+        instance.time.set(at);
+        let again = run(&instance, 700..1400);
+        assert!(first == again, "{options}: the same instance");
+        let bytes = instance.serialised(state);
+        // Another one, in another state, with other parameters and nothing of the first.
+        let tick = if joint { ("load_inertia", 0.5) } else { ("rate_limit", 0.01) };
+        let other = fmu.ready("other", &[tick]);
+        run(&other, 0..50);
+        let mut there = null_mut();
+        assert_eq!(other.deserialised(&bytes, &mut there), OK, "{:?}", other.log());
+        assert_eq!(other.set_state(there), OK, "{:?}", other.log());
+        other.time.set(at);
+        assert!(first == run(&other, 700..1400), "{options}: another instance");
+        // A state that is kept again in the same place, freed, and damaged.
+        let place = state;
+        assert_eq!((instance.state(&mut state), state), (OK, place));
+        assert_eq!((instance.free_state(&mut state), state), (OK, null_mut()));
+        assert_eq!((instance.free_state(&mut state), instance.set_state(place)), (OK, ERROR));
+        assert_eq!(other.set_state(place), ERROR);
+        for at in [0, 9, 17, bytes.len() / 2, bytes.len() - 1] {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 4;
+            assert_eq!(instance.deserialised(&damaged, &mut state), ERROR, "{at}");
+        }
+        assert_eq!(instance.deserialised(&bytes[..bytes.len() - 8], &mut state), ERROR);
+        assert_eq!(instance.deserialised(&[], &mut state), ERROR);
+    }
+}
+
+#[test]
+fn steps_of_any_size_make_whole_ticks_and_carry_the_rest() {
+    let desk = desk();
+    let fmu = imported(&desk, "--tables cam.fxt");
+    let inputs = [("output_command", 0.02), ("torque", 12.0)];
+    let after = |steps: &[f64]| {
+        let instance = fmu.ready("one", &inputs);
+        for step in steps {
+            assert_eq!(instance.step(*step), OK, "{:?}", instance.log());
+        }
+        bits(instance.reals(OUTPUTS))
+    };
+    let ticks = |count: usize| after(&vec![1e-3; count]);
+    assert_eq!(after(&[0.4e-3]), after(&[0.9e-3]));
+    assert_ne!(after(&[0.4e-3]), ticks(1));
+    assert_eq!(after(&[0.4e-3, 0.4e-3, 0.4e-3]), ticks(1));
+    assert_eq!(after(&[2.5e-3, 2.5e-3]), ticks(5));
+    assert_eq!(after(&[0.005 / 3.0; 3]), ticks(5));
+    assert_ne!(ticks(4), ticks(5));
+    assert_eq!(after(&[0.1]), ticks(100));
+
+    let instance = fmu.instance("stops");
+    assert_eq!((instance.set_up(Some(1.0)), instance.call("fmi2EnterInitializationMode")), (OK, OK));
+    assert_eq!(instance.call("fmi2ExitInitializationMode"), OK);
+    for bad in [0.0, -1e-3, f64::NAN, f64::INFINITY, 1e9, 1.1] {
+        assert_eq!(instance.step(bad), ERROR, "{bad}");
+    }
+    assert_eq!(instance.step_from(0.5, 1e-3), ERROR);
+    assert_eq!((instance.step(0.7), instance.step(0.3), instance.step(0.1)), (OK, OK, ERROR));
+}
+
+#[test]
+fn instances_do_not_know_of_each_other() {
+    let desk = desk();
+    let fmu = imported(&desk, "--tables cam.fxt");
+    let alone: Vec<_> = {
+        let instance = fmu.ready("alone", &[]);
+        (0..400).map(|tick| ticked(&instance, tick)).collect()
+    };
+    let (one, two) = (fmu.ready("one", &[]), fmu.ready("two", &[("mode", 0.0), ("rate_limit", 0.001)]));
+    for (tick, wanted) in (0..).zip(&alone) {
+        assert_eq!(&ticked(&one, tick), wanted);
+        assert_ne!(ticked(&two, tick).1, wanted.1);
+    }
+    std::thread::scope(|threads| {
+        for _ in 0..3 {
+            threads.spawn(|| {
+                let instance = fmu.ready("in a thread", &[]);
+                for (tick, wanted) in (0..).zip(&alone) {
+                    assert_eq!(&ticked(&instance, tick), wanted);
+                }
+            });
+        }
+    });
+}
+
+#[test]
+fn the_joint_flies_as_fly_does() {
+    let desk = Desk::new();
+    let fmu = imported(&desk, "--model joint --scenario camera");
+    let mut flown = built_in("camera").unwrap();
+    flown.scenario.legs.truncate(3);
+    let unit = unit(flown.kind, flown.scenario.temperature_c).unwrap();
+    let flight = fly_one(&flown.scenario, &unit, COMPENSATED).unwrap();
+    let instance = fmu.ready("joint", &[]);
+    let [mut worst, mut most] = [0.0_f64; 2];
+    let mut errors = flight.errors.iter();
+    let tick_s = flown.scenario.servo.tick_s;
+    let mut output = 0.0;
+    for moment in flown.scenario.moments() {
+        if moment.time_s >= START_UP_S {
+            let wanted = f64::from(*errors.next().unwrap());
+            let found = (output - moment.target_rad) * 206_264.806_247_096_36;
+            worst = worst.max((found - wanted).abs());
+            most = most.max(wanted.abs());
+        }
+        let [first, last] = moment.outside_n_m;
+        let inputs = [
+            ("target", moment.target_rad),
+            ("target_rate", moment.rate_rad_s),
+            ("target_acceleration", moment.acceleration_rad_s2),
+            ("load_torque", first),
+        ];
+        for (name, value) in inputs {
+            instance.set(name, value);
+        }
+        instance.slope("load_torque", (last - first) / tick_s);
+        assert_eq!(instance.step(tick_s), OK, "{:?}", instance.log());
+        [output] = instance.reals(["output_angle"]);
+    }
+    assert_eq!(errors.next(), None);
+    println!("off the flight by {worst:.2e}\" where it errs by {most:.2}\"");
+    // The load's slope is rounded once more on its way through the interface.
+    assert!(worst < 1e-4 && most > 10.0, "{worst} of {most}");
+}
+
+#[test]
+fn the_joint_keeps_its_books_and_the_table_takes_its_error_out() {
+    let desk = desk();
+    let fmu = imported(&desk, "--tables cam.fxt --model joint --scenario camera");
+    let pushed = fmu.ready("pushed", &[("servo", 0.0), ("gravity_torque", 0.0), ("drag", 0.1)]);
+    for tick in 0..5000 {
+        pushed.set("motor_torque", 0.4 * (0.01 * f64::from(tick)).sin());
+        pushed.set("load_torque", 4.0 * (0.017 * f64::from(tick)).cos());
+        assert_eq!(pushed.step(1e-3), OK, "{:?}", pushed.log());
+    }
+    let [missing, work, heat, stored] = pushed.reals(["energy_error", "motor_work", "heat", "stored_energy"]);
+    println!("motor {work:.3} J, heat {heat:.3} J, stored {stored:.2e} J, missing {missing:.1e} J");
+    assert!(heat > 0.1 && missing.abs() < 1e-8 * heat, "{missing} of {heat}");
+
+    // A slow turn under a steady load, compensated and not.
+    let left = |compensate: f64| {
+        let set = [("compensate", compensate), ("gravity_torque", 0.0), ("torque_noise", 0.0), ("friction_known", 1.0)];
+        let instance = fmu.ready("turns", &set);
+        let (mut squares, mut count, mut target) = (0.0, 0.0, 0.0);
+        let rate = 0.01;
+        for tick in 0..6000 {
+            instance.set("target", target);
+            instance.set("target_rate", rate);
+            instance.set("load_torque", 10.0);
+            assert_eq!(instance.step(1e-3), OK, "{:?}", instance.log());
+            target += rate * 1e-3;
+            if tick >= 3000 {
+                let [output] = instance.reals(["output_angle"]);
+                squares += ((output - target) * 206_264.8_f64).powi(2);
+                count += 1.0;
+            }
+        }
+        let rms: f64 = squares / count;
+        rms.sqrt()
+    };
+    let [without, with] = [0.0, 1.0].map(left);
+    println!("left without {without:.1}\", with {with:.2}\"");
+    assert!(without > 25.0 && with < 0.1 * without, "{without} {with}");
+}
+
+#[test]
+fn calls_in_a_wrong_state_and_wrong_arguments_are_refused_with_a_line_in_the_log() {
+    let desk = desk();
+    let fmu = imported(&desk, "--tables cam.fxt");
+    // Nothing comes of the wrong model, description, kind or folder, and it is said why.
+    let (guid, location) = (fmu.guid(), fmu.location());
+    for (name, kind, guid, location, why) in [
+        ("one", 0, &*guid, &*location, "model exchange"),
+        ("one", 1, "{0}", &location, "guid"),
+        ("", 1, &guid, &location, "instance name"),
+        ("one", 1, &guid, "file:///nowhere%20at%20100%25", "/nowhere at 100%/model.txt"),
+        ("one", 1, &guid, "http://x/resources", "allowed: file:///folder"),
+    ] {
+        let Err(log) = fmu.instance_with(name, kind, guid, location) else { panic!("{why} was made") };
+        let [line] = &log[..] else { panic!("{why}: {log:?}") };
+        assert!(line.message.contains(why) && line.status == ERROR && line.instance == name, "{why}: {line:?}");
+    }
+
+    let instance = fmu.instance("one");
+    let refused = |instance: &Instance<'_>, status: c_int, why: &str| {
+        let log = instance.log();
+        assert_eq!(status, ERROR, "{why}");
+        assert!(log.last().is_some_and(|line| line.message.contains(why)), "{why}: {log:?}");
+        assert_eq!(log.last().unwrap().category, "logStatusError");
+    };
+    refused(&instance, instance.call("fmi2ExitInitializationMode"), "\"instantiated\"");
+    refused(&instance, instance.call("fmi2Terminate"), "fmi2Terminate");
+    refused(&instance, instance.step(1e-3), "fmi2DoStep");
+    refused(&instance, instance.get_reals(&[0], &mut [0.0]), "fmi2GetReal");
+    // Without an experiment it starts at 0, with a warning.
+    assert_eq!(instance.call("fmi2EnterInitializationMode"), WARNING);
+    refused(&instance, instance.set_up(None), "\"initialization mode\"");
+    refused(&instance, instance.step(1e-3), "fmi2DoStep");
+    instance.set("output_command", 0.1);
+    let [command, ratio] = instance.reals(["generator_command", "ratio"]);
+    assert_eq!((command, ratio), (0.1 * 95.0, 95.0));
+    assert_eq!(instance.call("fmi2ExitInitializationMode"), OK);
+    refused(&instance, instance.try_set("tick", 2e-3), "after the initialisation");
+    refused(&instance, instance.try_set("ratio", 2e-3), "at all");
+    refused(&instance, instance.try_set("correction", 2e-3), "at all");
+    refused(&instance, instance.try_set("mode", 7.0), "mode: found 7, allowed: 0 to 3");
+    refused(&instance, instance.get_reals(&[4_000_000_000], &mut [0.0]), "value reference 4000000000");
+    refused(&instance, instance.get_reals(&[fmu.reference("flags")], &mut [0.0]), "of another type");
+    // A legal call is a mode that cannot follow: warned of, and the mode stays.
+    instance.set("mode", 3.0);
+    assert_eq!(instance.step(1e-3), OK);
+    instance.set("mode", 1.0);
+    assert_eq!((instance.step(1e-3), instance.number("mode_now")), (OK, 3));
+    assert_eq!(instance.log().last().unwrap().message, "mode: no transition from Safe to Tracking");
+    // What is no angle ends the model, not the program; a reset begins anew.
+    instance.set("output_command", f64::NAN);
+    refused(&instance, instance.step(1e-3), "output_command: found NaN");
+    refused(&instance, instance.step(1e-3), "\"step failed\"");
+    assert_eq!(instance.call("fmi2Reset"), OK);
+    assert_eq!((instance.set_up(None), instance.call("fmi2EnterInitializationMode")), (OK, OK));
+    assert_eq!((instance.call("fmi2ExitInitializationMode"), instance.step_from(0.0, 1e-3)), (OK, OK));
+    assert_eq!(instance.call("fmi2Terminate"), OK);
+    refused(&instance, instance.call("fmi2EnterInitializationMode"), "\"terminated\"");
+
+    // Parameters that no joint can have.
+    let odd = fmu.instance("odd");
+    assert_eq!(odd.set_up(None), OK);
+    odd.set("tick", 1e-6);
+    odd.set("rate_limit", 1e-9);
+    assert_eq!(odd.call("fmi2EnterInitializationMode"), OK);
+    refused(&odd, odd.call("fmi2ExitInitializationMode"), "rate_rad_s");
+}
+
+/// Every function with zeros and null pointers for all its arguments, in every state, on components that live, are null, were freed, or never were.
+#[test]
+fn no_function_falls_over_null_pointers_and_strange_components() {
+    type Any = unsafe extern "C" fn(*mut c_void, usize, usize, usize, usize, usize, usize) -> c_int;
+    let desk = desk();
+    let fmu = imported(&desk, "--tables cam.fxt");
+    let freed = fmu.instance("freed").component;
+    let strange =
+        [null_mut(), freed, std::ptr::without_provenance_mut(1), std::ptr::without_provenance_mut(usize::MAX)];
+    // Without a component, or with real numbers, which go another way than pointers and counts.
+    let plain = ["fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2Instantiate", "fmi2FreeInstance", "fmi2DoStep"];
+    for name in FUNCTIONS.into_iter().filter(|name| !plain.contains(name)) {
+        for component in strange {
+            assert_eq!(
+                unsafe { fmu.function::<Any>(name)(component, 0, 0, 0, 0, 0, 0) },
+                ERROR,
+                "{name} {component:?}"
+            );
+        }
+    }
+    for component in strange {
+        unsafe { fmu.function::<unsafe extern "C" fn(*mut c_void)>("fmi2FreeInstance")(component) };
+    }
+    for ready in [false, true] {
+        let instance = if ready { fmu.ready("one", &[]) } else { fmu.instance("one") };
+        for name in FUNCTIONS.into_iter().filter(|name| !plain.contains(name)) {
+            // The count is the third argument of what takes lists: null pointers to one value.
+            let status = unsafe { fmu.function::<Any>(name)(instance.component, 0, 1, 0, 0, 0, 0) };
+            let fine = [
+                "fmi2EnterInitializationMode",
+                "fmi2ExitInitializationMode",
+                "fmi2SetupExperiment",
+                "fmi2Reset",
+                "fmi2FreeFMUstate",
+                "fmi2Terminate",
+                "fmi2SetTime",
+            ];
+            let other = [
+                "fmi2GetStatus",
+                "fmi2GetRealStatus",
+                "fmi2GetIntegerStatus",
+                "fmi2GetBooleanStatus",
+                "fmi2GetStringStatus",
+            ];
+            let wanted = match name {
+                name if other.contains(&name) => DISCARD,
+                name if fine.contains(&name) && status != ERROR => status,
+                _ => ERROR,
+            };
+            assert_eq!(status, wanted, "{name}");
+        }
+    }
+    let version = fmu.function::<unsafe extern "C" fn() -> *const std::ffi::c_char>("fmi2GetVersion");
+    assert_eq!(unsafe { std::ffi::CStr::from_ptr(version()) }, c"2.0");
+}

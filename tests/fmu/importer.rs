@@ -1,0 +1,352 @@
+//! A small importer of FMI 2.0: unzips an FMU, loads its library for Linux, and calls it as C does, with declarations of its own.
+
+use std::cell::Cell;
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use libloading::{Library, Symbol};
+use zip::ZipArchive;
+
+pub const OK: c_int = 0;
+pub const WARNING: c_int = 1;
+pub const DISCARD: c_int = 2;
+pub const ERROR: c_int = 3;
+
+/// All functions of the standard.
+pub const FUNCTIONS: [&str; 44] = [
+    "fmi2CancelStep",
+    "fmi2CompletedIntegratorStep",
+    "fmi2DeSerializeFMUstate",
+    "fmi2DoStep",
+    "fmi2EnterContinuousTimeMode",
+    "fmi2EnterEventMode",
+    "fmi2EnterInitializationMode",
+    "fmi2ExitInitializationMode",
+    "fmi2FreeFMUstate",
+    "fmi2FreeInstance",
+    "fmi2GetBoolean",
+    "fmi2GetBooleanStatus",
+    "fmi2GetContinuousStates",
+    "fmi2GetDerivatives",
+    "fmi2GetDirectionalDerivative",
+    "fmi2GetEventIndicators",
+    "fmi2GetFMUstate",
+    "fmi2GetInteger",
+    "fmi2GetIntegerStatus",
+    "fmi2GetNominalsOfContinuousStates",
+    "fmi2GetReal",
+    "fmi2GetRealOutputDerivatives",
+    "fmi2GetRealStatus",
+    "fmi2GetStatus",
+    "fmi2GetString",
+    "fmi2GetStringStatus",
+    "fmi2GetTypesPlatform",
+    "fmi2GetVersion",
+    "fmi2Instantiate",
+    "fmi2NewDiscreteStates",
+    "fmi2Reset",
+    "fmi2SerializeFMUstate",
+    "fmi2SerializedFMUstateSize",
+    "fmi2SetBoolean",
+    "fmi2SetContinuousStates",
+    "fmi2SetDebugLogging",
+    "fmi2SetFMUstate",
+    "fmi2SetInteger",
+    "fmi2SetReal",
+    "fmi2SetRealInputDerivatives",
+    "fmi2SetString",
+    "fmi2SetTime",
+    "fmi2SetupExperiment",
+    "fmi2Terminate",
+];
+
+/// `fmi2CallbackFunctions`.
+#[repr(C)]
+pub struct Callbacks {
+    logger: unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char),
+    allocate: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
+    free: Option<unsafe extern "C" fn(*mut c_void)>,
+    finished: Option<unsafe extern "C" fn(*mut c_void, c_int)>,
+    environment: *const Mutex<Vec<Line>>,
+}
+
+/// A line of the log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    pub instance: String,
+    pub status: c_int,
+    pub category: String,
+    pub message: String,
+}
+
+/// No argument follows the message, so it is read as what `printf` makes of it.
+unsafe extern "C" fn logger(
+    environment: *mut c_void,
+    instance: *const c_char,
+    status: c_int,
+    category: *const c_char,
+    message: *const c_char,
+) {
+    let text = |pointer| unsafe { CStr::from_ptr(pointer) }.to_str().unwrap().to_owned();
+    let line = Line {
+        instance: text(instance),
+        status,
+        category: text(category),
+        message: text(message).replace("%%", "%").replace("##", "#"),
+    };
+    unsafe { &*(environment as *const Mutex<Vec<Line>>) }.lock().unwrap().push(line);
+}
+
+/// An FMU, unzipped and loaded.
+pub struct Imported {
+    pub folder: PathBuf,
+    pub xml: String,
+    library: Library,
+}
+
+impl Imported {
+    /// From a file, into a folder.
+    pub fn new(fmu: &Path, folder: &Path) -> Imported {
+        let mut zip = ZipArchive::new(File::open(fmu).unwrap()).unwrap();
+        zip.extract(folder).unwrap();
+        let xml = fs::read_to_string(folder.join("modelDescription.xml")).unwrap();
+        let identifier = attribute(&xml, "modelIdentifier");
+        let library = folder.join("binaries/linux64").join(format!("{identifier}.so"));
+        let library = unsafe { Library::new(library) }.unwrap();
+        Imported { folder: folder.to_owned(), xml, library }
+    }
+
+    pub fn function<T>(&self, name: &str) -> Symbol<'_, T> {
+        unsafe { self.library.get(name.as_bytes()) }.unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    /// Value reference of a variable.
+    pub fn reference(&self, name: &str) -> u32 {
+        let line = self.xml.lines().find(|line| line.contains(&format!("<ScalarVariable name=\"{name}\" ")));
+        attribute(line.unwrap_or_else(|| panic!("no variable {name}")), "valueReference").parse().unwrap()
+    }
+
+    pub fn guid(&self) -> String {
+        attribute(&self.xml, "guid")
+    }
+
+    /// The resources as a URI.
+    pub fn location(&self) -> String {
+        format!("file://{}/resources", self.folder.display().to_string().replace('%', "%25").replace(' ', "%20"))
+    }
+
+    /// An instance in the state after it is made.
+    pub fn instance(&self, name: &str) -> Instance<'_> {
+        self.instance_with(name, 1, &self.guid(), &self.location()).unwrap_or_else(|log| panic!("{log:?}"))
+    }
+
+    /// An instance of what is said, or the log of why not.
+    pub fn instance_with(
+        &self,
+        name: &str,
+        kind: c_int,
+        guid: &str,
+        location: &str,
+    ) -> Result<Instance<'_>, Vec<Line>> {
+        let log = Box::new(Mutex::new(Vec::new()));
+        let callbacks = Callbacks { logger, allocate: None, free: None, finished: None, environment: &*log };
+        let text = |text: &str| CString::new(text).unwrap();
+        let (name, guid, location) = (text(name), text(guid), text(location));
+        type Instantiate = unsafe extern "C" fn(
+            *const c_char,
+            c_int,
+            *const c_char,
+            *const c_char,
+            *const Callbacks,
+            c_int,
+            c_int,
+        ) -> *mut c_void;
+        let instantiate = self.function::<Instantiate>("fmi2Instantiate");
+        let component = unsafe { instantiate(name.as_ptr(), kind, guid.as_ptr(), location.as_ptr(), &callbacks, 0, 0) };
+        if component.is_null() {
+            Err(log.into_inner().unwrap())
+        } else {
+            Ok(Instance { of: self, component, log, time: Cell::new(0.0) })
+        }
+    }
+
+    /// An instance that is ready to step from 0 s, with these parameters and first inputs.
+    pub fn ready(&self, name: &str, set: &[(&str, f64)]) -> Instance<'_> {
+        let instance = self.instance(name);
+        assert_eq!(instance.set_up(None), OK);
+        for (name, value) in set {
+            instance.set(name, *value);
+        }
+        assert_eq!(instance.call("fmi2EnterInitializationMode"), OK);
+        assert_eq!(instance.call("fmi2ExitInitializationMode"), OK, "{:?}", instance.log());
+        instance
+    }
+}
+
+/// Value of the first attribute of a name.
+pub fn attribute(text: &str, name: &str) -> String {
+    let from = text.split(&format!(" {name}=\"")).nth(1).unwrap_or_else(|| panic!("no {name} in {text}"));
+    from.split('"').next().unwrap().to_owned()
+}
+
+/// An instance, freed at the end.
+pub struct Instance<'a> {
+    pub of: &'a Imported,
+    pub component: *mut c_void,
+    log: Box<Mutex<Vec<Line>>>,
+    pub time: Cell<f64>,
+}
+
+impl Drop for Instance<'_> {
+    fn drop(&mut self) {
+        let free = self.of.function::<unsafe extern "C" fn(*mut c_void)>("fmi2FreeInstance");
+        unsafe { free(self.component) }
+    }
+}
+
+impl Instance<'_> {
+    /// What was logged so far.
+    pub fn log(&self) -> Vec<Line> {
+        self.log.lock().unwrap().clone()
+    }
+
+    /// A function without arguments.
+    pub fn call(&self, name: &str) -> c_int {
+        unsafe { self.of.function::<unsafe extern "C" fn(*mut c_void) -> c_int>(name)(self.component) }
+    }
+
+    pub fn set_up(&self, stop: Option<f64>) -> c_int {
+        type SetUp = unsafe extern "C" fn(*mut c_void, c_int, f64, f64, c_int, f64) -> c_int;
+        let set_up = self.of.function::<SetUp>("fmi2SetupExperiment");
+        unsafe { set_up(self.component, 0, 0.0, 0.0, stop.is_some().into(), stop.unwrap_or(0.0)) }
+    }
+
+    /// Sets a variable, of whichever type it is.
+    pub fn set(&self, name: &str, value: f64) {
+        assert_eq!(self.try_set(name, value), OK, "{name}: {:?}", self.log());
+    }
+
+    pub fn try_set(&self, name: &str, value: f64) -> c_int {
+        let reference = [self.of.reference(name)];
+        let element = self.of.xml.lines().find(|line| line.contains(&format!("name=\"{name}\" "))).unwrap();
+        type Set<T> = unsafe extern "C" fn(*mut c_void, *const u32, usize, *const T) -> c_int;
+        unsafe {
+            if element.contains("<Real") {
+                self.of.function::<Set<f64>>("fmi2SetReal")(self.component, reference.as_ptr(), 1, &value)
+            } else if element.contains("<Boolean") {
+                self.of.function::<Set<c_int>>("fmi2SetBoolean")(
+                    self.component,
+                    reference.as_ptr(),
+                    1,
+                    &(value as c_int),
+                )
+            } else {
+                self.of.function::<Set<c_int>>("fmi2SetInteger")(
+                    self.component,
+                    reference.as_ptr(),
+                    1,
+                    &(value as c_int),
+                )
+            }
+        }
+    }
+
+    /// Reads real variables.
+    pub fn reals<const N: usize>(&self, names: [&str; N]) -> [f64; N] {
+        let references = names.map(|name| self.of.reference(name));
+        let mut values = [f64::NAN; N];
+        assert_eq!(self.get_reals(&references, &mut values), OK, "{:?}", self.log());
+        values
+    }
+
+    pub fn get_reals(&self, references: &[u32], values: &mut [f64]) -> c_int {
+        type Get = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut f64) -> c_int;
+        let get = self.of.function::<Get>("fmi2GetReal");
+        unsafe { get(self.component, references.as_ptr(), references.len(), values.as_mut_ptr()) }
+    }
+
+    /// Reads an integer, a choice or a truth.
+    pub fn number(&self, name: &str) -> c_int {
+        type Get = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut c_int) -> c_int;
+        let (reference, mut value) = (self.of.reference(name), -1);
+        let get = |function| unsafe { self.of.function::<Get>(function)(self.component, &reference, 1, &mut value) };
+        let element = self.of.xml.lines().find(|line| line.contains(&format!("name=\"{name}\" "))).unwrap();
+        let function = if element.contains("<Boolean") { "fmi2GetBoolean" } else { "fmi2GetInteger" };
+        let mut get = get;
+        assert_eq!(get(function), OK, "{name}: {:?}", self.log());
+        value
+    }
+
+    pub fn text(&self, name: &str) -> String {
+        type Get = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut *const c_char) -> c_int;
+        let (reference, mut value) = (self.of.reference(name), std::ptr::null());
+        let get = self.of.function::<Get>("fmi2GetString");
+        assert_eq!(unsafe { get(self.component, &reference, 1, &mut value) }, OK);
+        unsafe { CStr::from_ptr(value) }.to_str().unwrap().to_owned()
+    }
+
+    /// The derivative of an input for the next step.
+    pub fn slope(&self, name: &str, value: f64) {
+        type Set = unsafe extern "C" fn(*mut c_void, *const u32, usize, *const c_int, *const f64) -> c_int;
+        let set = self.of.function::<Set>("fmi2SetRealInputDerivatives");
+        let reference = self.of.reference(name);
+        assert_eq!(unsafe { set(self.component, &reference, 1, &1, &value) }, OK, "{:?}", self.log());
+    }
+
+    /// A step from where the last one ended.
+    pub fn step(&self, seconds: f64) -> c_int {
+        let status = self.step_from(self.time.get(), seconds);
+        if status == OK {
+            self.time.set(self.time.get() + seconds);
+        }
+        status
+    }
+
+    pub fn step_from(&self, from: f64, seconds: f64) -> c_int {
+        type Step = unsafe extern "C" fn(*mut c_void, f64, f64, c_int) -> c_int;
+        unsafe { self.of.function::<Step>("fmi2DoStep")(self.component, from, seconds, 1) }
+    }
+
+    /// Its state, in a place that holds one already or null.
+    pub fn state(&self, place: &mut *mut c_void) -> c_int {
+        type Get = unsafe extern "C" fn(*mut c_void, *mut *mut c_void) -> c_int;
+        unsafe { self.of.function::<Get>("fmi2GetFMUstate")(self.component, place) }
+    }
+
+    pub fn set_state(&self, state: *mut c_void) -> c_int {
+        unsafe {
+            self.of.function::<unsafe extern "C" fn(*mut c_void, *mut c_void) -> c_int>("fmi2SetFMUstate")(
+                self.component,
+                state,
+            )
+        }
+    }
+
+    pub fn free_state(&self, state: &mut *mut c_void) -> c_int {
+        type Free = unsafe extern "C" fn(*mut c_void, *mut *mut c_void) -> c_int;
+        unsafe { self.of.function::<Free>("fmi2FreeFMUstate")(self.component, state) }
+    }
+
+    pub fn serialised(&self, state: *mut c_void) -> Vec<u8> {
+        type Size = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut usize) -> c_int;
+        type Serialise = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut u8, usize) -> c_int;
+        let mut size = 0;
+        assert_eq!(
+            unsafe { self.of.function::<Size>("fmi2SerializedFMUstateSize")(self.component, state, &mut size) },
+            OK
+        );
+        let mut bytes = vec![0; size];
+        let serialise = self.of.function::<Serialise>("fmi2SerializeFMUstate");
+        assert_eq!(unsafe { serialise(self.component, state, bytes.as_mut_ptr(), size - 1) }, ERROR);
+        assert_eq!(unsafe { serialise(self.component, state, bytes.as_mut_ptr(), size) }, OK);
+        bytes
+    }
+
+    pub fn deserialised(&self, bytes: &[u8], place: &mut *mut c_void) -> c_int {
+        type DeSerialise = unsafe extern "C" fn(*mut c_void, *const u8, usize, *mut *mut c_void) -> c_int;
+        let function = self.of.function::<DeSerialise>("fmi2DeSerializeFMUstate");
+        unsafe { function(self.component, bytes.as_ptr(), bytes.len(), place) }
+    }
+}
