@@ -3,10 +3,12 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::builder::ArgPredicate;
+use clap::{Arg, Args, ValueEnum, ValueHint};
 use serde::Serialize;
 
 use super::context::quoted;
+use super::export_playback::{PlaybackFormat, PlaybackOptions};
 use super::simulate::{ModelOptions, refused_or_failed, show};
 use super::{Context, Failure, say};
 use crate::export::{Deck, DeckSettings, outlines, write_vtu};
@@ -21,28 +23,41 @@ const POINTS_PER_PIECE: usize = 24;
 /// smaller on the way.
 const LARGEST_STEP_RAD: f64 = 0.1;
 
-/// Export the deformed mesh, the outlines or a CalculiX and Abaqus deck for other programs
+/// Export a mesh, outlines, a deck, or a table for the playback of others
 ///
 /// vtu: both wheels deformed and loaded at one generator angle, with displacement and von Mises stress, for ParaView.
 /// csv: the outlines of tooth, space and generator, undeformed, each in its own frame.
 /// inp: the undeformed mesh with contact, holding and load as a deck for CalculiX and Abaqus, which deforms, loads and turns
 /// the drive; mm, N, MPa, a slice of 1 mm.
+/// eqmod, onstepx, linuxcnc, beckhoff, moteus, odrive, ros2, cfs, fprime: a table (--tables) resampled for the lookup of that device,
+/// that lookup simulated, and what it leaves, on the table's own model and on a unit's data (--data): docs/doors.md.
 #[derive(Debug, Args)]
-#[command(after_help = "\
+#[command(
+    mut_args(beside_tables),
+    after_help = "\
 Examples:
   flexspline export --format vtu --generator two-roller --torque-n-m 20
   flexspline export --format csv --generator double-disc --out drawings
+  flexspline export --format linuxcnc --tables out/cam.fxt --from-deg 0 --to-deg 20
+  flexspline export --format moteus --tables out/calibrated.fxt --torque-n-m 12 --data bench.csv
   flexspline export --format inp --generator cam --torque-n-m 50 --set output.drag_torque_n_m=0
 
 The last one is run by: OMP_NUM_THREADS=1 ccx out/cam. It prints to out/cam.dat, at the end of each
 step, the output angle (node set OUTPUT, first component, rad), the displacements of the bore (BORE)
-and the stresses of the elements along it (BORE_ROW).")]
+and the stresses of the elements along it (BORE_ROW)."
+)]
 pub(super) struct Export {
     #[command(flatten)]
     model: ModelOptions,
     /// What to write
     #[arg(long, value_enum)]
     format: Format,
+    /// Table image, for all formats but vtu, csv and inp; --torque-n-m and --temperature-c are then the section of it that is
+    /// taken [default: the middle of what it holds for]
+    #[arg(long, value_name = "FILE.fxt", value_hint = ValueHint::FilePath)]
+    tables: Option<PathBuf>,
+    #[command(flatten)]
+    playback: PlaybackOptions,
     /// Generator angle of the mesh, rad [default: 0]
     #[arg(long, value_name = "RAD", allow_negative_numbers = true)]
     generator_rad: Option<f64>,
@@ -57,6 +72,21 @@ pub(super) struct Export {
     last_torque_n_m: Option<f64>,
 }
 
+/// With a table there is no mesh: what is of the mesh alone is refused, and no generator is asked for.
+fn beside_tables(arg: Arg) -> Arg {
+    match arg.get_id().as_str() {
+        "generator" => arg
+            .required(false)
+            .required_unless_present("tables")
+            .default_value_if("tables", ArgPredicate::IsPresent, "cam")
+            .conflicts_with("tables"),
+        "mesh" | "solver" | "flank_penalty" | "bore_penalty" | "tolerance" | "max_iterations" | "generator_rad" => {
+            arg.conflicts_with("tables")
+        }
+        _ => arg,
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
     /// Deformed mesh: <G>.vtu
@@ -65,6 +95,42 @@ enum Format {
     Csv,
     /// CalculiX and Abaqus deck: <G>.inp
     Inp,
+    /// EQMOD periodic error curve: eqmod_pec.txt
+    Eqmod,
+    /// OnStepX periodic error commands: onstepx_pec.txt
+    Onstepx,
+    /// LinuxCNC screw compensation: flexspline.comp
+    Linuxcnc,
+    /// Beckhoff position compensation: flexspline_compensation.TcGVL.st, or achskw.lis
+    Beckhoff,
+    /// moteus encoder compensation: moteus.cfg
+    Moteus,
+    /// ODrive: nothing fits, and why
+    Odrive,
+    /// ros2_control simple transmission: transmission.xml
+    Ros2,
+    /// The core's image as a cFS table: flexspline.tbl and its sources
+    Cfs,
+    /// The core's image as F Prime parameters: flexspline_prm.json, flexspline.fpp
+    Fprime,
+}
+
+impl Format {
+    /// The formats of others' playback.
+    fn playback(self) -> Option<PlaybackFormat> {
+        match self {
+            Format::Vtu | Format::Csv | Format::Inp => None,
+            Format::Eqmod => Some(PlaybackFormat::Eqmod),
+            Format::Onstepx => Some(PlaybackFormat::Onstepx),
+            Format::Linuxcnc => Some(PlaybackFormat::Linuxcnc),
+            Format::Beckhoff => Some(PlaybackFormat::Beckhoff),
+            Format::Moteus => Some(PlaybackFormat::Moteus),
+            Format::Odrive => Some(PlaybackFormat::Odrive),
+            Format::Ros2 => Some(PlaybackFormat::Ros2),
+            Format::Cfs => Some(PlaybackFormat::Cfs),
+            Format::Fprime => Some(PlaybackFormat::Fprime),
+        }
+    }
 }
 
 /// Result with `--json`.
@@ -77,16 +143,20 @@ struct Exported {
 impl Export {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         self.check()?;
+        if let Some(format) = self.format.playback() {
+            let load = [self.model.torque_n_m, self.model.temperature_c];
+            return self.playback.run(context, format, self.tables.as_deref(), load);
+        }
         let written = match self.format {
             Format::Vtu => self.mesh(context)?,
-            Format::Csv => self.outlines(context)?,
             Format::Inp => self.deck(context)?,
+            _ => self.outlines(context)?,
         };
         let shown = quoted(&written.display().to_string());
         let next = match self.format {
             Format::Vtu => vec![format!("paraview {shown}")],
-            Format::Csv => Vec::new(),
             Format::Inp => vec![format!("OMP_NUM_THREADS=1 ccx {}", shown.trim_end_matches(".inp"))],
+            _ => Vec::new(),
         };
         let text = format!("wrote {}{}", written.display(), say::next(&next));
         context.print(&Exported { schema_version: 1, written: vec![written] }, || text)
@@ -94,6 +164,12 @@ impl Export {
 
     /// Refuses options that the format has no use for, and numbers that are none.
     fn check(&self) -> Result<(), Failure> {
+        self.playback.check(self.format.playback())?;
+        if self.tables.is_some() && self.format.playback().is_none() {
+            return Err(Failure::BadInput(
+                "--tables: vtu, csv and inp are made of the drive; allowed with the formats that take a table".into(),
+            ));
+        }
         let of_decks = [
             ("--increments", self.increments.is_some()),
             ("--step-rad", self.step_rad.is_some()),

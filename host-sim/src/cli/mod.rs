@@ -9,6 +9,7 @@ mod context;
 mod diagnose;
 mod drive;
 mod export;
+mod export_playback;
 mod fly;
 mod kernels;
 mod logs;
@@ -339,6 +340,8 @@ mod tests {
                     "ratio",
                     "teeth",
                     "module",
+                    "generator",
+                    "data",
                 ];
                 assert!(stated || needs_none || absent.contains(&id.as_str()), "{name} {id} states no default: {help}");
             }

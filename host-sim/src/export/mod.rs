@@ -2,6 +2,7 @@
 
 mod inp;
 mod outlines;
+pub mod playback;
 mod vtu;
 
 pub use inp::{Deck, DeckError, DeckSettings, Equation, Face, STABILISING_LATERAL, STABILISING_TORSION, Term};
