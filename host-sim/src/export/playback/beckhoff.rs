@@ -101,6 +101,10 @@ impl Player for Nc {
         &self.directions
     }
 
+    fn takes_a_side(&self) -> bool {
+        true
+    }
+
     fn travel(&self) -> Option<[f64; 2]> {
         Some(self.travel)
     }

@@ -115,6 +115,11 @@ pub trait Player {
         None
     }
 
+    /// Whether it can be made for one direction of the output alone.
+    fn takes_a_side(&self) -> bool {
+        false
+    }
+
     /// What its points are, for the reason of a refusal: "256 points over 360 deg, 2.7 to a generator turn".
     fn points(&self) -> String;
 
@@ -335,9 +340,13 @@ pub fn worth_it(section: &Section<'_>, figures: &ModelFigures, player: &dyn Play
     }
     let by_play = figures.rms_left_by_play_arcsec;
     let why = if 2.0 * by_play * by_play > played * played {
+        let side = if player.takes_a_side() {
+            "; where the joint always comes from one side, say --direction forward or backward"
+        } else {
+            ""
+        };
         format!(
-            "play dominates: the two directions differ by ±{by_play:.2} arcsec rms, and this lookup holds one value for both; \
-             where the joint always comes from one side, say --direction forward or backward"
+            "play dominates: the two directions differ by ±{by_play:.2} arcsec rms, and this lookup holds one value for both{side}"
         )
     } else {
         let samples = section.samples(player.travel(), JUDGE_POINTS, player.directions());

@@ -79,6 +79,10 @@ impl Player for Moteus {
         &self.directions
     }
 
+    fn takes_a_side(&self) -> bool {
+        true
+    }
+
     fn points(&self) -> String {
         format!("{SIZE} bytes over a generator turn, none of what changes from turn to turn")
     }

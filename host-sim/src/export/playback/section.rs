@@ -76,12 +76,13 @@ impl<'a> Section<'a> {
     /// Order per generator turn, up to 32, that holds most of these samples, and its amplitude in rad.
     pub fn strongest_order(&self, samples: &[Sample]) -> (u32, f64) {
         let count = samples.len().max(1) as f64;
+        let mean = samples.iter().map(|sample| sample.error_rad).sum::<f64>() / count;
         let amplitude = |order: u32| {
             let (mut c, mut s) = (0.0, 0.0);
             for sample in samples {
                 let (sine, cosine) = (f64::from(order) * sample.generator_rad).sin_cos();
-                c += sample.error_rad * cosine;
-                s += sample.error_rad * sine;
+                c += (sample.error_rad - mean) * cosine;
+                s += (sample.error_rad - mean) * sine;
             }
             2.0 / count * c.hypot(s)
         };
