@@ -23,7 +23,7 @@ const POINTS_PER_PIECE: usize = 24;
 /// smaller on the way.
 const LARGEST_STEP_RAD: f64 = 0.1;
 
-/// Export a mesh, outlines, a deck, or a table for the playback of others
+/// Export a mesh, outlines, a deck, or a table for other programs
 ///
 /// vtu: both wheels deformed and loaded at one generator angle, with displacement and von Mises stress, for ParaView.
 /// csv: the outlines of tooth, space and generator, undeformed, each in its own frame.
