@@ -160,7 +160,8 @@ fn linuxcnc_triplets_leave_what_is_said_in_both_types() {
 
 /// The numbers after a name, as `Name := 1.5`.
 fn named(text: &str, name: &str) -> Vec<f64> {
-    let after = text.split(&format!("{name} := ")).skip(1);
+    let name = format!("{name} := ");
+    let after = text.split(&name).skip(1);
     after.map(|rest| rest.split([',', ')', ';']).next().unwrap().parse().unwrap()).collect()
 }
 
