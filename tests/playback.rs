@@ -282,29 +282,35 @@ fn onstepx_seconds_leave_what_is_said_and_a_short_buffer_is_refused() {
             let (entry, steps) = command.strip_prefix(":WR").unwrap().split_once(',').unwrap();
             buffer[entry.parse::<usize>().unwrap()] = steps.parse::<i8>().unwrap().into();
         }
-        // The controller's loop, every 10 ms of an output turn of sidereal seconds.
-        let (mut motor, mut index, mut began, mut last) = (0.0f64, 0usize, 0u32, -1.0);
-        let mut left = Vec::new();
-        for poll in 0..8_640_000u32 {
-            let place = motor.floor().rem_euclid(worm);
-            if place < last {
-                (index, began) = (0, poll);
+        // The controller's loop, every 10 ms of an output turn of sidereal seconds, with the entries so many seconds late.
+        let left = |late: usize| {
+            let (mut motor, mut index, mut began, mut last) = (0.0f64, 0usize, 0u32, -1.0);
+            let mut left = Vec::new();
+            for poll in 0..8_640_000u32 {
+                let place = motor.floor().rem_euclid(worm);
+                if place < last {
+                    (index, began) = (0, poll);
+                }
+                last = place;
+                if poll - began >= 100 {
+                    (index, began) = ((index + 1) % size, poll);
+                }
+                let added = f64::from(buffer[(index + size - late) % size]);
+                if poll % 100 == 50 {
+                    let led = motor / (steps_per_degree * 360.0) * TAU;
+                    let tracked = f64::from(poll) / 8_640_000.0 * TAU;
+                    let sign = f64::from(direction.sign());
+                    left.push(led - tracked + sign * error(&table, sign * led, direction));
+                }
+                motor += (rate + added) / 100.0;
             }
-            last = place;
-            if poll - began >= 100 {
-                (index, began) = ((index + 1) % size, poll);
-            }
-            // One second after the one that it stands for.
-            let added = f64::from(buffer[(index + size - 1) % size]);
-            if poll % 100 == 50 {
-                let led = motor / (steps_per_degree * 360.0) * TAU;
-                let tracked = f64::from(poll) / 8_640_000.0 * TAU;
-                let sign = f64::from(direction.sign());
-                left.push(led - tracked + sign * error(&table, sign * led, direction));
-            }
-            motor += (rate + added) / 100.0;
-        }
-        same(&out, &said, left_in_time(left), 0.03);
+            left_in_time(left)
+        };
+        // A second plays the entry before its own.
+        let right = left(1);
+        same(&out, &said, right, 0.03);
+        let gap = |found: f64| (number(&said, "/model/rms_played_arcsec") - found).abs();
+        assert!(gap(right) < gap(left(0)) && gap(right) < gap(left(2)), "{right}, {}, {}", left(0), left(2));
         helps(&out, &said, 1.6);
     }
 }
@@ -484,6 +490,7 @@ fn what_is_pointless_is_refused_with_the_reason_and_options_that_do_not_fit_too(
         ("--format moteus --generator cam".to_owned(), &["--tables"]),
         ("--tables cal/calibrated.fxt --format moteus --torque-n-m 1e4".to_owned(), &["--torque-n-m", "10000"]),
         (format!("{unit} --format cfs --table-name TABLE"), &["APP.TABLE"]),
+        (format!("{unit} --format onstepx --buffer-s 40000"), &["--buffer-s", "30000"]),
     ] {
         let run = desk.line(&format!("export {line}"));
         assert_eq!(run.code, 2, "{line}: {}", run.stdout);

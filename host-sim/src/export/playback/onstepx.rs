@@ -48,6 +48,10 @@ struct Timing {
 
 impl Timing {
     fn new(ratio: f64, steps_a_degree: f64, buffer_s: u32) -> Result<Timing, Refusal> {
+        if !BUFFER_S.contains(&buffer_s) {
+            let [least, most] = [BUFFER_S.start(), BUFFER_S.end()];
+            return Err(Refusal::Impossible(format!("--buffer-s: found {buffer_s}; allowed: {least} to {most} s")));
+        }
         let rate = steps_a_degree / SECONDS_A_DEGREE;
         let worm_steps = (steps_a_degree * 360.0 / ratio.abs()).round();
         let seconds = worm_steps / rate;
