@@ -30,6 +30,7 @@ mod joint_in_motion;
 mod measured_data;
 mod mirror_symmetry;
 mod one_pitch_periodicity;
+mod playback;
 mod real_data;
 mod report;
 mod reproduce;

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::context::quoted;
 use super::export_fmu::FmuOptions;
+use super::export_playback::{PlaybackFormat, PlaybackOptions};
 use super::simulate::{ModelOptions, refused_or_failed, show};
 use super::{Context, Failure, say};
 use crate::export::{Deck, DeckSettings, outlines, write_vtu};
@@ -30,6 +31,8 @@ const LARGEST_STEP_RAD: f64 = 0.1;
 /// inp: the undeformed mesh with contact, holding and load as a deck for CalculiX and Abaqus, which deforms, loads and turns
 /// the drive; mm, N, MPa, a slice of 1 mm.
 /// fmu: a table (--tables), or a joint with mass, for simulators that import FMI 2.0 co-simulation: docs/fmu.md.
+/// eqmod, onstepx, linuxcnc, beckhoff, moteus, odrive, ros2, cfs, fprime: a table (--tables) resampled for the lookup of that device,
+/// that lookup simulated, and what it leaves, on the table's own model and on a unit's data (--data): docs/doors.md.
 #[derive(Debug, Args)]
 #[command(
     mut_args(beside_tables),
@@ -39,6 +42,8 @@ Examples:
   flexspline export --format csv --generator double-disc --out drawings
   flexspline export --format fmu --tables out/cam.fxt
   flexspline export --format fmu --tables out/cam.fxt --model joint --scenario camera
+  flexspline export --format linuxcnc --tables out/cam.fxt --from-deg 0 --to-deg 20
+  flexspline export --format moteus --tables out/calibrated.fxt --torque-n-m 12 --data bench.csv
   flexspline export --format inp --generator cam --torque-n-m 50 --set output.drag_torque_n_m=0
 
 The last one is run by: OMP_NUM_THREADS=1 ccx out/cam. It prints to out/cam.dat, at the end of each
@@ -51,9 +56,12 @@ pub(super) struct Export {
     /// What to write
     #[arg(long, value_enum)]
     format: Format,
-    /// Table image, for the formats that take a table
+    /// Table image, for all formats but vtu, csv and inp; --torque-n-m and --temperature-c are then the section of it that is
+    /// taken [default: the middle of what it holds for]
     #[arg(long, value_name = "FILE.fxt", value_hint = ValueHint::FilePath)]
     tables: Option<PathBuf>,
+    #[command(flatten)]
+    playback: PlaybackOptions,
     #[command(flatten)]
     fmu: FmuOptions,
     /// Generator angle of the mesh, rad [default: 0]
@@ -70,14 +78,19 @@ pub(super) struct Export {
     last_torque_n_m: Option<f64>,
 }
 
+/// Formats of a drive's mesh, and those of a table.
+const OF_A_MESH: [&str; 3] = ["vtu", "csv", "inp"];
+const OF_A_TABLE: [&str; 10] =
+    ["fmu", "eqmod", "onstepx", "linuxcnc", "beckhoff", "moteus", "odrive", "ros2", "cfs", "fprime"];
+
 /// With a table or a scenario there is no mesh: what is of the mesh alone is refused, and no generator is asked for.
 fn beside_tables(arg: Arg) -> Arg {
     let others = ["tables", "scenario"];
     match arg.get_id().as_str() {
         "generator" => arg
             .required(false)
-            .required_if_eq_any(["vtu", "csv", "inp"].map(|format| ("format", format)))
-            .default_value_if("format", ArgPredicate::Equals("fmu".into()), "cam")
+            .required_if_eq_any(OF_A_MESH.map(|format| ("format", format)))
+            .default_value_ifs(OF_A_TABLE.map(|format| ("format", ArgPredicate::Equals(format.into()), Some("cam"))))
             .conflicts_with_all(others),
         "mesh" | "solver" | "flank_penalty" | "bore_penalty" | "tolerance" | "max_iterations" | "generator_rad" => {
             arg.conflicts_with_all(others)
@@ -96,6 +109,42 @@ enum Format {
     Inp,
     /// FMU for co-simulation: flexspline_compensation.fmu, or flexspline_joint.fmu
     Fmu,
+    /// EQMOD periodic error curve: eqmod_pec.txt
+    Eqmod,
+    /// OnStepX periodic error commands: onstepx_pec.txt
+    Onstepx,
+    /// LinuxCNC screw compensation: flexspline.comp
+    Linuxcnc,
+    /// Beckhoff position compensation: flexspline_compensation.TcGVL.st, or achskw.lis
+    Beckhoff,
+    /// moteus encoder compensation: moteus.cfg
+    Moteus,
+    /// ODrive: nothing fits, and why
+    Odrive,
+    /// ros2_control simple transmission: transmission.xml
+    Ros2,
+    /// The core's image as a cFS table: flexspline.tbl and its sources
+    Cfs,
+    /// The core's image as F Prime parameters: flexspline_prm.json, flexspline.fpp
+    Fprime,
+}
+
+impl Format {
+    /// The formats of others' playback.
+    fn playback(self) -> Option<PlaybackFormat> {
+        match self {
+            Format::Vtu | Format::Csv | Format::Inp | Format::Fmu => None,
+            Format::Eqmod => Some(PlaybackFormat::Eqmod),
+            Format::Onstepx => Some(PlaybackFormat::Onstepx),
+            Format::Linuxcnc => Some(PlaybackFormat::Linuxcnc),
+            Format::Beckhoff => Some(PlaybackFormat::Beckhoff),
+            Format::Moteus => Some(PlaybackFormat::Moteus),
+            Format::Odrive => Some(PlaybackFormat::Odrive),
+            Format::Ros2 => Some(PlaybackFormat::Ros2),
+            Format::Cfs => Some(PlaybackFormat::Cfs),
+            Format::Fprime => Some(PlaybackFormat::Fprime),
+        }
+    }
 }
 
 /// Result with `--json`.
@@ -108,17 +157,21 @@ struct Exported {
 impl Export {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         self.check()?;
+        if let Some(format) = self.format.playback() {
+            let load = [self.model.torque_n_m, self.model.temperature_c];
+            return self.playback.run(context, format, self.tables.as_deref(), load);
+        }
         let written = match self.format {
             Format::Fmu => return self.fmu.run(context, self.tables.as_deref()),
             Format::Vtu => self.mesh(context)?,
-            Format::Csv => self.outlines(context)?,
             Format::Inp => self.deck(context)?,
+            _ => self.outlines(context)?,
         };
         let shown = quoted(&written.display().to_string());
         let next = match self.format {
             Format::Vtu => vec![format!("paraview {shown}")],
-            Format::Csv | Format::Fmu => Vec::new(),
             Format::Inp => vec![format!("OMP_NUM_THREADS=1 ccx {}", shown.trim_end_matches(".inp"))],
+            _ => Vec::new(),
         };
         let text = format!("wrote {}{}", written.display(), say::next(&next));
         context.print(&Exported { schema_version: 1, written: vec![written] }, || text)
@@ -126,13 +179,18 @@ impl Export {
 
     /// Refuses options that the format has no use for, and numbers that are none.
     fn check(&self) -> Result<(), Failure> {
+        self.playback.check(self.format.playback())?;
         if self.format == Format::Fmu {
             self.fmu.refuse_loads([
                 ("--torque-n-m", self.model.torque_n_m.is_some()),
                 ("--temperature-c", self.model.temperature_c.is_some()),
             ])?;
-        } else if let Some(option) = self.fmu.given().or(self.tables.is_some().then_some("--tables")) {
+        } else if let Some(option) = self.fmu.given() {
             return Err(Failure::BadInput(format!("{option}: allowed with --format fmu")));
+        } else if self.tables.is_some() && self.format.playback().is_none() {
+            return Err(Failure::BadInput(
+                "--tables: vtu, csv and inp are made of the drive; allowed with the formats that take a table".into(),
+            ));
         }
         let of_decks = [
             ("--increments", self.increments.is_some()),

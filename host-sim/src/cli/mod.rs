@@ -12,6 +12,7 @@ mod diagnose;
 mod drive;
 mod export;
 mod export_fmu;
+mod export_playback;
 mod fly;
 mod kernels;
 mod logs;
@@ -349,6 +350,7 @@ mod tests {
                     "teeth",
                     "module",
                     "generator",
+                    "data",
                 ];
                 assert!(stated || needs_none || absent.contains(&id.as_str()), "{name} {id} states no default: {help}");
             }

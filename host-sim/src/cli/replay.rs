@@ -46,15 +46,9 @@ impl Replay {
         let image = read(&self.tables)?;
         let table =
             Table::check(&image).map_err(|error| Failure::BadInput(format!("{}: {error}", self.tables.display())))?;
-        let ratio = table.drive().exact_ratio();
         // Found out before the rows are read.
         context.out()?;
-        let rows = if self.logs.said() {
-            of_log(&self.data, &self.logs.map()?, &table, self.temperature_c)?
-        } else {
-            parse(&self.data.display().to_string(), &read(&self.data)?, ratio, self.temperature_c)
-                .map_err(|error| Failure::BadInput(error.to_string()))?
-        };
+        let rows = measured(&self.data, &self.logs, &table, self.temperature_c)?;
         let (replayed, mut summary) = replay(&table, &rows);
         summary.command.clone_from(&context.command);
         let out = context.out()?;
@@ -77,6 +71,21 @@ impl Replay {
         let data = quoted(&self.data.display().to_string());
         vec![context.next(&format!("diagnose {data} --tables {} --generator {kind}", quoted(&folder)))]
     }
+}
+
+/// The rows of a file with our own columns, or of a log whose columns are said.
+pub(super) fn measured(
+    data: &Path,
+    logs: &LogOptions,
+    table: &Table<'_>,
+    temperature_c: f64,
+) -> Result<Vec<MeasuredRow>, Failure> {
+    if logs.said() {
+        return of_log(data, &logs.map()?, table, temperature_c);
+    }
+    let bytes = std::fs::read(data).map_err(|error| Failure::BadInput(format!("{}: {error}", data.display())))?;
+    parse(&data.display().to_string(), &bytes, table.drive().exact_ratio(), temperature_c)
+        .map_err(|error| Failure::BadInput(error.to_string()))
 }
 
 /// The rows of a log with columns of its own, checked as those of a diagnosis.

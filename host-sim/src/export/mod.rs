@@ -3,6 +3,7 @@
 pub mod fmu;
 mod inp;
 mod outlines;
+pub mod playback;
 mod vtu;
 
 pub use inp::{Deck, DeckError, DeckSettings, Equation, Face, STABILISING_LATERAL, STABILISING_TORSION, Term};
