@@ -179,7 +179,7 @@ enum Command {
     Campaign(campaign::CampaignCommand),
     Drive(drive::DriveCommand),
     Fly(fly::Fly),
-    Export(export::Export),
+    Export(Box<export::Export>),
     Tables(tables::Tables),
     Kernels(kernels::KernelsCommand),
     Validate(validate::Validate),
