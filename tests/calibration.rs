@@ -108,4 +108,19 @@ fn the_command_writes_a_table_that_replay_reads() {
     let run = desk.line(&format!("calibrate noise.csv --ratio 100 --columns {map} --out none"));
     assert!(run.code == 1 && run.stderr.contains("no part gains"), "{} {}", run.code, run.stderr);
     assert!(!desk.path("none").exists());
+    // The same log under two names, and slips of the pen in a plan.
+    desk.write("again.csv", &log);
+    for (line, said) in [
+        (format!("calibrate noise.csv again.csv --ratio 100 --columns {map} --out none"), "the same rows"),
+        ("calibrate --plan --ratio 100 --speed-rpm 100000 --out none".to_owned(), "--speed-rpm"),
+        ("calibrate --plan --ratio 100 --load-n-m -5,1e9 --out none".to_owned(), "--load-n-m"),
+        ("calibrate --plan --ratio 100 --temperatures-c -300,20 --out none".to_owned(), "--temperatures-c"),
+    ] {
+        let run = desk.line(&line);
+        assert!(run.code == 2 && run.stderr.contains(said), "{line}: {} {}", run.code, run.stderr);
+        assert!(!desk.path("none").exists());
+    }
+    // Half a turn of the output tells the wheels apart, whatever the ratio.
+    let plan = desk.line("calibrate --plan --ratio 160 --travel-deg 0,150 --out plan").done();
+    assert!(plan.stdout.contains("80 tell it from the generator angle"), "{}", plan.stdout);
 }

@@ -24,7 +24,7 @@ use flexspline::Table;
 use serde::Serialize;
 
 use crate::extension::left_by_core;
-use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
+use crate::measurement::{Fault, FaultName, MeasuredError, Recording, Session, least_and_most};
 use crate::tables::{MadeTable, TableError, dead_zone_n_m};
 use choose::{LEAST_GAIN, PENALTIES, best_penalty, nested, path, pruned};
 use folds::{Chosen, Folds};
@@ -52,8 +52,6 @@ const BOTH_WAYS: f64 = 0.1;
 /// Shares of a turn that must have been recorded for a curve over it: of the generator, and of the output.
 const MOST_OF_A_TURN: f64 = 0.75;
 const HALF_A_TURN: f64 = 0.5;
-/// Generator turns that separate two waves a turn from two a turn against the output, less a margin.
-const TURNS_TO_TELL_WHEELS: f64 = 47.5;
 /// Rows that a tooth pitch needs for its curve.
 const ROWS_OF_A_PITCH: f64 = 6.0;
 /// Files do not share their zeros if fits to each alone leave less than this share of what the others leave in it. A guess.
@@ -331,11 +329,31 @@ fn check_ratio(files: &[Recording], prior: &Prior<'_>) -> Result<Option<String>,
     }))
 }
 
+/// Generator turns that tell two waves in a turn from two in a turn against the output: half a turn of the output, in which the one gains a wave on
+/// the other.
+fn turns_to_tell_wheels(ratio: f64) -> f64 {
+    0.5 * ratio.abs()
+}
+
+/// The first two files that hold the same rows: one log that was given twice would be left out by what was fitted to it.
+fn given_twice(files: &[Recording]) -> Option<[&str; 2]> {
+    let angles = |file: &Recording| {
+        let rows = |session: &Session| [session.generator_rad.clone(), session.error_rad.clone()];
+        file.sessions.iter().map(rows).collect::<Vec<_>>()
+    };
+    let pairs = (0..files.len()).flat_map(|k| (0..k).map(move |j| (j, k)));
+    let mut same = pairs.filter(|(j, k)| files[*j].rows == files[*k].rows && angles(&files[*j]) == angles(&files[*k]));
+    same.next().map(|(j, k)| [files[j].file.as_str(), files[k].file.as_str()])
+}
+
 /// Makes the table of a unit from its logs.
 ///
 /// # Errors
 /// Too few rows in steady motion, nothing that gains, or a drive that no table can be of.
 pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, CalibrationError> {
+    if let Some([one, other]) = given_twice(files) {
+        return Err(CalibrationError::Known(format!("{one} and {other} hold the same rows: give each log once")));
+    }
     let parted: Vec<Recording>;
     let files = if files.iter().flat_map(|file| &file.sessions).any(|session| session.own_zero) {
         parted = files.iter().flat_map(by_zeros).collect();

@@ -15,6 +15,10 @@ use super::parts::{PartName, Scales, State};
 use super::rows::MOST_ROWS;
 use super::{GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, PENALTY_OF_PLANS, Prior, ROWS_OF_A_PITCH};
 
+/// Beyond what any bench or catalogue of these drives has, so a slip of the pen: generator, load and temperature. Guesses.
+const FASTEST_RPM: f64 = 2e4;
+const LARGEST_N_M: f64 = 1e5;
+const TEMPERATURES_C: [f64; 2] = [-200.0, 300.0];
 /// Loads at which passes are made, where there is a load.
 const LOADS: usize = 11;
 /// Slow generator turns, and the places of the travel at which they are made.
@@ -89,11 +93,15 @@ impl Bench {
         };
         within("--minutes", self.minutes, 1.0, 1e5)
             .or_else(|| within("--rate", self.rate_hz, 0.1, 1e6))
-            .or_else(|| within("--speed-rpm", self.speed_rpm, 1e-3, 1e5))
+            .or_else(|| within("--speed-rpm", self.speed_rpm, 1e-3, FASTEST_RPM))
             .or_else(|| within("--noise-arcsec", self.noise_arcsec, 1e-3, 1e4))
             .or_else(|| within("--wander-arcsec", self.wander_arcsec, 0.0, 1e4))
             .or_else(|| rising("--load-n-m", self.torque_n_m))
             .or_else(|| rising("--temperatures-c", self.temperature_c))
+            .or_else(|| within("--load-n-m", self.torque_n_m[0], -LARGEST_N_M, LARGEST_N_M))
+            .or_else(|| within("--load-n-m", self.torque_n_m[1], -LARGEST_N_M, LARGEST_N_M))
+            .or_else(|| within("--temperatures-c", self.temperature_c[0], TEMPERATURES_C[0], TEMPERATURES_C[1]))
+            .or_else(|| within("--temperatures-c", self.temperature_c[1], TEMPERATURES_C[0], TEMPERATURES_C[1]))
             .or_else(|| rising("--travel-deg", self.output_deg))
             .or_else(|| within("--travel-deg (its length)", self.output_deg[1] - self.output_deg[0], 1.0, 3.6e4))
     }
@@ -392,6 +400,7 @@ impl Asked {
 fn open_parts(prior: &Prior<'_>, bench: &Bench, scales: &Scales) -> (Vec<PartName>, Vec<String>) {
     let turns = (bench.output_deg[1] - bench.output_deg[0]) / 360.0;
     let generator_turns = turns * prior.nominal.ratio.abs();
+    let turns_to_tell = super::turns_to_tell_wheels(prior.nominal.ratio);
     let lacks = |part: PartName| match part {
         PartName::WindUp if scales.torque_n_m[1] <= scales.torque_n_m[0] => {
             Some("the load cannot be changed: give its range, --load-n-m LOW,HIGH".to_owned())
@@ -399,9 +408,8 @@ fn open_parts(prior: &Prior<'_>, bench: &Bench, scales: &Scales) -> (Vec<PartNam
         PartName::GeneratorAngle if generator_turns < super::MOST_OF_A_TURN => {
             Some(format!("the travel is {generator_turns:.2} generator turns"))
         }
-        PartName::MaterialAngle if generator_turns < super::TURNS_TO_TELL_WHEELS => Some(format!(
-            "the travel is {generator_turns:.1} generator turns; {} tell it from the generator angle",
-            super::TURNS_TO_TELL_WHEELS
+        PartName::MaterialAngle if generator_turns < turns_to_tell => Some(format!(
+            "the travel is {generator_turns:.1} generator turns; {turns_to_tell} tell it from the generator angle"
         )),
         PartName::ToothPitch if prior.nominal.teeth.is_none() && prior.table.is_none() => {
             Some("the teeth are not known, the ratio alone is".to_owned())

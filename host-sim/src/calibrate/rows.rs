@@ -119,6 +119,7 @@ impl Recorded {
     pub fn lacks(&self, part: PartName, prior: &Prior<'_>) -> Option<String> {
         let [low, high] = self.scales.torque_n_m;
         let [cold, warm] = self.scales.temperature_c;
+        let turns_to_tell = super::turns_to_tell_wheels(prior.nominal.ratio);
         match part {
             PartName::WindUp if !self.has_torque => Some("no torque was recorded".to_owned()),
             PartName::WindUp if high - low < super::SAME_TORQUE * low.abs().max(high.abs()) || high <= low => {
@@ -133,10 +134,9 @@ impl Recorded {
             PartName::GeneratorAngle if self.generator_share < super::MOST_OF_A_TURN => {
                 Some(format!("{:.0} % of a generator turn was recorded", 100.0 * self.generator_share))
             }
-            PartName::MaterialAngle if self.generator_turns < super::TURNS_TO_TELL_WHEELS => Some(format!(
-                "{:.1} generator turns; {} tell it from the generator angle",
-                self.generator_turns,
-                super::TURNS_TO_TELL_WHEELS
+            PartName::MaterialAngle if self.generator_turns < turns_to_tell => Some(format!(
+                "{:.1} generator turns; {turns_to_tell} tell it from the generator angle",
+                self.generator_turns
             )),
             PartName::ToothPitch if prior.nominal.teeth.is_none() && prior.table.is_none() => {
                 Some("the teeth are not known, the ratio alone is".to_owned())

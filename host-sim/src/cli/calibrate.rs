@@ -74,13 +74,13 @@ struct BenchOptions {
     #[arg(long, value_name = "RPM")]
     speed_rpm: Option<f64>,
     /// Least and largest load at the output for --plan or --more, N.m [default: none]
-    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1, allow_negative_numbers = true)]
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
     load_n_m: Vec<f64>,
     /// Lowest and highest temperature for --plan or --more, degrees C [default: one, 20]
-    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1, allow_negative_numbers = true)]
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
     temperatures_c: Vec<f64>,
     /// Travel of the output for --plan or --more, deg [default: a turn, 0,360]
-    #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1, allow_negative_numbers = true)]
+    #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
     travel_deg: Vec<f64>,
     /// Noise of output less generator over ratio from row to row that --plan expects, arcsec [default: 1]
     #[arg(long, value_name = "ARCSEC")]

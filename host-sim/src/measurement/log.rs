@@ -123,6 +123,12 @@ pub(super) fn read(
     let begun = source.by_ref().take(HEAD).read_to_end(&mut head);
     begun.map_err(|error| refuse(TableProblem { line: 1, what: error.to_string() }))?;
     if phd2::is_one(&head) {
+        if *map != ColumnMap::default() {
+            let what =
+                "a guide log of PHD2 has columns and times of its own, found --columns or --rate; allowed: neither"
+                    .to_owned();
+            return Err(refuse(TableProblem { line: 1, what }));
+        }
         let (log, notes) = phd2::read(Cursor::new(head).chain(source), ratio).map_err(refuse)?;
         if log.len() < FEWEST_ROWS {
             let what = format!("{} guided frames with a star; at least {FEWEST_ROWS} are needed", log.len());

@@ -13,8 +13,8 @@ use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::SolverSettings;
 use crate::units::ARCSEC_PER_RAD;
 
-/// Full turns that separate 2 per generator turn from 2 per turn of the generator against the output, less a margin.
-const TURNS_FOR_HARMONICS: f64 = 47.5;
+/// Turns of the output that separate 2 per generator turn from 2 per turn of the generator against the output.
+const OUTPUT_TURNS_FOR_HARMONICS: f64 = 0.5;
 /// Orders fitted where the samples cover enough turns: per generator turn, per turn against the output, per output turn.
 pub(super) const GENERATOR_ORDERS: [u16; 4] = [1, 2, 3, 4];
 pub(super) const MATERIAL_ORDERS: [u16; 4] = [1, 2, 3, 4];
@@ -199,7 +199,7 @@ pub fn from_samples(
     let (least, most) = snapped
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), s| (a.min(s.generator_rad), b.max(s.generator_rad)));
-    let long = (most - least) / std::f64::consts::TAU >= TURNS_FOR_HARMONICS;
+    let long = (most - least) / std::f64::consts::TAU >= OUTPUT_TURNS_FOR_HARMONICS * drive.ratio().abs();
     let harmonics = |orders| if long { harmonics_of(orders) } else { Harmonics::default() };
     let plan = Plan {
         drive: core_drive(drive)?,
