@@ -8,6 +8,8 @@ use std::fs;
 
 use flexspline_tests::command::{Desk, names};
 
+use crate::fxt_format::crc32;
+
 /// Runs a command that must be refused; the message, without the name of the file.
 #[track_caller]
 fn refused(desk: &Desk, line: &str, said: &str) -> String {
@@ -141,6 +143,26 @@ fn wrong_table_images_are_refused() {
         refused(&desk, "validate --tables wrong --out nothing", "cam.fxt");
     }
     // Sound, but of another drive than the one given.
+    // Changed, and its sums made good: the id tells.
+    let other = damage(&|image| {
+        let body = 4 * u32::from_le_bytes(image[196..200].try_into().unwrap()) as usize;
+        image[56] ^= 1;
+        let page = crc32(&image[..256]);
+        image[body..body + 4].copy_from_slice(&page.to_le_bytes());
+        let end = image.len() - 4;
+        let all = crc32(&image[..end]);
+        image[end..].copy_from_slice(&all.to_le_bytes());
+    });
+    fs::write(desk.path("wrong/cam.fxt"), other).unwrap();
+    for command in [
+        "replay --tables wrong/cam.fxt measured.csv",
+        "diagnose measured.csv --tables wrong",
+        "validate --tables wrong",
+    ] {
+        refused(&desk, &format!("{command} --out nothing"), "changed after it was made");
+    }
+    refused(&desk, "replay --tables wrong measured.csv --out nothing", "FILE.fxt");
+    refused(&desk, "diagnose measured.csv --tables nowhere --out nothing", "flexspline tables");
     refused(&desk, "validate --tables good --drive HHD-95-typical --out nothing", "BLAKE3");
     refused(&desk, "validate --tables . --out nothing", "--tables");
     refused(&desk, "diagnose measured.csv --tables good/cam.fxt --out nothing", "--tables good --generator cam");

@@ -718,6 +718,11 @@ fn remarks(
             teeth.flexspline, teeth.circular_spline
         ));
     }
+    if model.chosen.is_empty() {
+        remarks.push(
+            "no part gains in what was left out: the table is what was known before, its zeros aside; are the logs of this unit, and of one?".to_owned(),
+        );
+    }
     if recorded.output_share < 1.0 && has(PartName::OutputAngle) {
         remarks.push(format!(
             "{:.0} % of an output turn was recorded: in the rest the curve over the output angle is the smoothest that joins its ends, and not \

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use flexspline::{Identity, IdentityCheck, Table};
+
 use super::{Common, Failure, say};
 use crate::drive::{Drive, GeneratorKind};
 use crate::output::prepare_folder;
@@ -167,18 +169,48 @@ pub(super) fn table_image(folder: &Path, generator: GeneratorKind) -> Result<(Pa
             quoted(&parent.display().to_string())
         )));
     }
-    std::fs::read(&path).map(|bytes| (path.clone(), bytes)).map_err(|error| {
-        let others: Vec<&str> = GeneratorKind::ALL
-            .iter()
-            .map(|kind| kind.name())
-            .filter(|name| folder.join(format!("{name}.fxt")).exists())
-            .collect();
-        let hint = match others.as_slice() {
-            [] => String::new(),
-            names => format!("; the folder holds the tables of {}: --generator {}", names.join(", "), names[0]),
+    if path.is_file() {
+        return image_file(&path).map(|bytes| (path, bytes));
+    }
+    let there = |kind: &GeneratorKind| folder.join(format!("{kind}.fxt")).exists();
+    let others: Vec<&str> = GeneratorKind::ALL.iter().filter(|kind| there(kind)).map(|kind| kind.name()).collect();
+    Err(Failure::BadInput(match others.as_slice() {
+        [] => format!(
+            "--tables: found no {generator}.fxt in {}; allowed: a folder that `flexspline tables` wrote",
+            folder.display()
+        ),
+        names => format!(
+            "{}: not there; the folder holds the tables of {}: --generator {}",
+            path.display(),
+            names.join(", "),
+            names[0]
+        ),
+    }))
+}
+
+/// The bytes of an image, sound or not; one that is sound but not of its id, as the identity is told in flight, is refused here.
+pub(super) fn image_file(path: &Path) -> Result<Vec<u8>, Failure> {
+    let bad = |what: String| Failure::BadInput(format!("{}: {what}", path.display()));
+    if path.is_dir() {
+        return Err(bad("found a folder; allowed: a table image, FILE.fxt".to_owned()));
+    }
+    let bytes = std::fs::read(path).map_err(|error| bad(error.to_string()))?;
+    if let Ok(table) = Table::check(&bytes) {
+        let mut check = IdentityCheck::new();
+        let found = loop {
+            match check.step(&bytes) {
+                Identity::Hashing => {}
+                Identity::Same(id) | Identity::Other(id) => break id,
+            }
         };
-        Failure::BadInput(format!("{}: {error}{hint}", path.display()))
-    })
+        if found != table.id() {
+            return Err(bad(format!(
+                "its contents have the id {found}, and it says {}: it was changed after it was made; make it anew",
+                table.id()
+            )));
+        }
+    }
+    Ok(bytes)
 }
 
 /// A word as a shell takes it.

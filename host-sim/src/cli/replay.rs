@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueHint};
 use flexspline::Table;
 
-use super::context::{Context, quoted};
+use super::context::{Context, image_file, quoted};
 use super::logs::LogOptions;
 use super::{Failure, say};
 use crate::drive::GeneratorKind;
@@ -40,10 +40,7 @@ pub(super) struct Replay {
 
 impl Replay {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
-        let read = |path: &PathBuf| {
-            std::fs::read(path).map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))
-        };
-        let image = read(&self.tables)?;
+        let image = image_file(&self.tables)?;
         let table =
             Table::check(&image).map_err(|error| Failure::BadInput(format!("{}: {error}", self.tables.display())))?;
         // Found out before the rows are read.

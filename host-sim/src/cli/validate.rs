@@ -9,7 +9,7 @@ use flexspline::Table;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::context::{Context, quoted};
+use super::context::{Context, image_file, quoted};
 use super::names::{self, Generators};
 use super::{Failure, report, say};
 use crate::drive::{Drive, GeneratorKind};
@@ -204,14 +204,7 @@ impl Validate {
                 self.tables.display()
             )));
         }
-        present
-            .into_iter()
-            .map(|path| {
-                let bytes = std::fs::read(&path)
-                    .map_err(|error| Failure::BadInput(format!("--tables: {}: {error}", path.display())))?;
-                Ok((path, bytes))
-            })
-            .collect()
+        present.into_iter().map(|path| image_file(&path).map(|bytes| (path, bytes))).collect()
     }
 }
 
