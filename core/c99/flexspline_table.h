@@ -22,7 +22,9 @@
  * Not in here, but in the core with its C interface (flexspline.h): two copies of the table compared in each tick, state that is whole after
  * an upset, the limiter of the correction, glitches and late samples, learning, predictor, uploads, telemetry, the BLAKE3 of the table.
  *
- * Compile it without contraction and without -ffast-math: -ffp-contract=off. fxt_open refuses with FXT_ARITHMETIC where that was forgotten. */
+ * Compile it without contraction and without -ffast-math or any of its parts: -ffp-contract=off. Where that was forgotten it does not compile, or
+ * fxt_open refuses with FXT_ARITHMETIC; two parts that Clang takes alone are found by vectors/check only (-freciprocal-math,
+ * -fassociative-math). */
 #ifndef FLEXSPLINE_TABLE_H
 #define FLEXSPLINE_TABLE_H
 
