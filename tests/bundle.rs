@@ -5,6 +5,7 @@
 
 use std::fs;
 
+use flexspline_sim::bundle::libraries::TARGETS;
 use flexspline_tests::command::Desk;
 
 /// A desk with the table `out/cam.fxt`.
@@ -71,9 +72,44 @@ fn a_bundle_replaces_a_bundle_and_nothing_else() {
     let desk = desk();
     let bundle = |out: &str| desk.line(&format!("bundle --tables out --no-core --out {out}"));
     bundle("made").done();
-    desk.write("made/left_over.txt", "of another version");
     bundle("made").done();
-    assert!(!desk.path("made/left_over.txt").exists());
+    bundle("made/").done();
+    // Its own files and nothing else: what came since, or was changed, stays, and so does all the rest.
+    let before = desk.read("made/manifest.json");
+    let refused = |out: &str, said: &str| {
+        let run = bundle(out);
+        assert_eq!(run.code, 2, "{out}");
+        assert!(run.stderr.contains(said), "{out}: {}", run.stderr);
+        assert_eq!(desk.read("made/manifest.json"), before);
+    };
+    for (name, part) in [
+        ("app/main.c", "app"),
+        (".git/refs/heads/main", ".git"),
+        ("tables/note.txt", "tables/note.txt"),
+        ("manifest.json.old", "manifest.json.old"),
+    ] {
+        put(&desk, &format!("made/{name}"), "mine");
+        refused("made", &format!("made has {name}, which is not of the bundle"));
+        assert_eq!(desk.read(&format!("made/{name}")), "mine");
+        let part = desk.path("made").join(part);
+        if part.is_dir() { fs::remove_dir_all(part) } else { fs::remove_file(part) }.unwrap();
+    }
+    bundle("made").done();
+    let example = desk.read("made/example.c");
+    desk.write("made/example.c", "int main(void);");
+    refused("made", "made has example.c, which was changed since");
+    assert_eq!(desk.read("made/example.c"), "int main(void);");
+    desk.write("made/example.c", &example);
+    #[cfg(unix)]
+    for (link, to) in [("link", "made"), ("dangling", "absent")] {
+        std::os::unix::fs::symlink(desk.path(to), desk.path(link)).unwrap();
+        for out in [link.to_owned(), format!("{link}/")] {
+            refused(&out, "is a symbolic link");
+        }
+        assert!(desk.path(link).is_symlink());
+        assert!(!desk.path("absent").exists());
+    }
+    bundle("made").done();
     // A folder with other files, even where one of them is called as ours.
     put(&desk, "mine/main.c", "int main(void);");
     for name in ["README.md", "manifest.json"] {
@@ -135,5 +171,9 @@ fn libraries_are_taken_from_a_folder_and_those_that_lack_are_named() {
     assert_eq!(desk.read("made/lib/thumbv7m-none-eabi/libflexspline.a"), archive);
     assert!(desk.read("made/README.md").contains("`thumbv7m-none-eabi`"));
     let text = desk.line("bundle --tables out --libraries libraries --out made").done().stdout;
-    assert!(text.contains("no core for thumbv7em-none-eabihf: "), "{text}");
+    // One reason, told once.
+    assert_eq!(text.matches("no core for").count(), 1, "{text}");
+    assert!(text.contains("no core for 7 targets: no TARGET/libflexspline.a in libraries"), "{text}");
+    assert!(TARGETS.iter().all(|(target, _)| text.contains(target)), "{text}");
+    assert!(text.lines().filter(|line| line.starts_with("    ")).all(|line| line.len() <= 120), "{text}");
 }

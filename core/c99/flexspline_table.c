@@ -604,24 +604,52 @@ static bool solve(const fxt_table *table, const point *at, int64_t target, bool 
 
 /* The play. */
 
+/* As the core has it: bounds of the offset from the centre, counts; half-width at the last update, -1 before the first. */
+typedef struct {
+    int64_t nominal;
+    int32_t error, lower, upper, half;
+} play_state;
+
+static const play_state unknown_state = {0, 0, INT32_MIN, INT32_MAX, -1};
+
+/* Each number of a fxt_play is kept beside that of an unknown side, so that memory of zeros is one: a known play may be all zero here. */
+static inline play_state state_of(const fxt_play *play)
+{
+    play_state is = unknown_state;
+    if (play == NULL)
+        return is;
+    is.nominal = play->nominal;
+    is.error = play->error;
+    is.lower = i32(play->lower ^ 0x80000000u);
+    is.upper = i32(play->upper ^ 0x7fffffffu);
+    is.half = i32(~play->half);
+    return is;
+}
+
+static inline fxt_play kept(const play_state *is)
+{
+    const fxt_play play = {is->nominal, is->error, (uint32_t)is->lower ^ 0x80000000u, (uint32_t)is->upper ^ 0x7fffffffu, ~(uint32_t)is->half};
+    return play;
+}
+
 static inline int32_t clamped(int32_t offset, int32_t half)
 {
     return offset < -half ? -half : offset > half ? half : offset;
 }
 
-static inline int32_t play_offset(const fxt_play *play)
+static inline int32_t play_offset(const play_state *play)
 {
     return add(play->lower, play->upper) >> 1;
 }
 
-static inline int32_t play_uncertainty(const fxt_play *play)
+static inline int32_t play_uncertainty(const play_state *play)
 {
     const int32_t width = saturate((int64_t)play->upper - play->lower);
     return add(width >> 1, width & 1);
 }
 
 /* Moves the play to `nominal` with the centre and half-width there; those of the last update if they are not sane. */
-static int32_t play_update(fxt_play *play, int64_t nominal, int32_t centre, int32_t half, bool sane)
+static int32_t play_update(play_state *play, int64_t nominal, int32_t centre, int32_t half, bool sane)
 {
     const bool started = play->half >= 0;
     const int32_t last_half = started ? play->half : MOST_PLAY;
@@ -639,7 +667,7 @@ static int32_t play_update(fxt_play *play, int64_t nominal, int32_t centre, int3
     return play->error;
 }
 
-static fxt_prediction follow(const fxt_table *table, const point *at, fxt_play *play, int64_t generator)
+static fxt_prediction follow(const fxt_table *table, const point *at, play_state *play, int64_t generator)
 {
     const int64_t nominal = nominal_output(table, generator);
     const phases where = phases_at(table, generator, nominal);
@@ -653,7 +681,7 @@ static fxt_prediction follow(const fxt_table *table, const point *at, fxt_play *
     now.nominal = nominal;
     now.transmission_error_rad = (float)error * rad_per_count;
     now.uncertainty_rad = (float)uncertainty * rad_per_count;
-    now.quality = quality_of(at, sane, fxt_play_known(play));
+    now.quality = quality_of(at, sane, play->lower == play->upper);
     return now;
 }
 
@@ -676,7 +704,7 @@ static fxt_command aim_moving(const fxt_table *table, const point *at, int64_t t
     return commanded(table, at, target, sane, minus(target, error), error, 0);
 }
 
-static fxt_command aim_from(const fxt_table *table, const point *at, int64_t target, const fxt_play *play)
+static fxt_command aim_from(const fxt_table *table, const point *at, int64_t target, const play_state *play)
 {
     int32_t error;
     if (play->half < 0) {
@@ -1196,10 +1224,12 @@ static bool arithmetic_is_exact(void)
     return product_less == 0.0f && low_sum == 0.0f && half > 0.0f && up == one + FLT_EPSILON && down == -one - FLT_EPSILON;
 }
 
-static void clear(fxt_table *table)
+/* One that was refused. */
+static const fxt_table no_table;
+
+static inline const fxt_table *given(const fxt_table *table)
 {
-    const fxt_table none = {0};
-    *table = none;
+    return table != NULL ? table : &no_table;
 }
 
 fxt_verdict fxt_open(fxt_table *table, const void *image, size_t bytes)
@@ -1207,7 +1237,11 @@ fxt_verdict fxt_open(fxt_table *table, const void *image, size_t bytes)
     const check start = {0};
     check is = start;
     const uint8_t *at = image;
-    clear(table);
+    if (table == NULL) {
+        (void)refuse(&is, FXT_NO_TABLE, FXT_NO_FIELD, 0, 0);
+        return is.verdict;
+    }
+    *table = no_table;
     is.table = table;
     if (!arithmetic_is_exact()) {
         (void)refuse(&is, FXT_ARITHMETIC, FXT_NO_FIELD, 0, 0);
@@ -1235,7 +1269,7 @@ fxt_verdict fxt_open(fxt_table *table, const void *image, size_t bytes)
             return is.verdict;
         }
     }
-    clear(table);
+    *table = no_table;
     return is.verdict;
 }
 
@@ -1244,7 +1278,7 @@ const char *fxt_reason_name(fxt_reason reason)
     static const char *const names[] = {
         "ok", "too short", "magic", "version", "byte order", "length", "crc", "page crc", "reserved", "text", "generator kind",
         "fixed member", "teeth", "count", "size", "not finite", "not increasing", "not closed", "derived", "out of range",
-        "negative half-width", "error bound", "slope", "falls", "steep", "inverse", "arithmetic"};
+        "negative half-width", "error bound", "slope", "falls", "steep", "inverse", "arithmetic", "no table"};
     return (uint32_t)reason < sizeof names / sizeof names[0] ? names[reason] : "unknown";
 }
 
@@ -1262,7 +1296,7 @@ fxt_info fxt_tell(const fxt_table *table)
 {
     static const fxt_info none;
     fxt_info info = none;
-    const uint8_t *image = table->image;
+    const uint8_t *image = given(table)->image;
     if (image == NULL)
         return info;
     for (uint32_t i = 0; i < 8; i++)
@@ -1301,7 +1335,7 @@ fxt_info fxt_tell(const fxt_table *table)
 
 uint32_t fxt_page_count(const fxt_table *table)
 {
-    return (table->body_bytes + FXT_PAGE_BYTES - 1u) / FXT_PAGE_BYTES;
+    return (given(table)->body_bytes + FXT_PAGE_BYTES - 1u) / FXT_PAGE_BYTES;
 }
 
 bool fxt_page_intact(const fxt_table *table, uint32_t page)
@@ -1316,36 +1350,41 @@ bool fxt_page_intact(const fxt_table *table, uint32_t page)
 
 fxt_play fxt_play_unknown(void)
 {
-    const fxt_play play = {0, 0, INT32_MIN, INT32_MAX, -1};
-    return play;
+    return kept(&unknown_state);
 }
 
 fxt_play fxt_play_after(fxt_direction direction)
 {
     const int32_t side = direction == FXT_FORWARD ? INT32_MIN : INT32_MAX;
-    const fxt_play play = {0, 0, side, side, -1};
-    return play;
+    const play_state is = {0, 0, side, side, -1};
+    return kept(&is);
 }
 
 bool fxt_play_known(const fxt_play *play)
 {
-    return play->lower == play->upper;
+    const play_state is = state_of(play);
+    return is.lower == is.upper;
 }
 
 bool fxt_play_output(const fxt_play *play, int64_t *output)
 {
-    *output = plus(play->nominal, play->error);
-    return play->half >= 0;
+    const play_state is = state_of(play);
+    if (output == NULL)
+        return false;
+    *output = plus(is.nominal, is.error);
+    return is.half >= 0;
 }
 
 float fxt_play_offset_rad(const fxt_play *play)
 {
-    return play->half < 0 ? 0.0f : (float)play_offset(play) * rad_per_count;
+    const play_state is = state_of(play);
+    return is.half < 0 ? 0.0f : (float)play_offset(&is) * rad_per_count;
 }
 
 float fxt_play_uncertainty_rad(const fxt_play *play)
 {
-    return (float)play_uncertainty(play) * rad_per_count;
+    const play_state is = state_of(play);
+    return (float)play_uncertainty(&is) * rad_per_count;
 }
 
 static void put_word(uint8_t *to, uint32_t word)
@@ -1356,20 +1395,25 @@ static void put_word(uint8_t *to, uint32_t word)
 
 void fxt_play_save(const fxt_play *play, uint8_t saved[FXT_SAVED_PLAY_BYTES])
 {
-    put_word(saved, (uint32_t)play->nominal);
-    put_word(saved + 4, (uint32_t)((uint64_t)play->nominal >> 32));
-    put_word(saved + 8, (uint32_t)play->error);
-    put_word(saved + 12, (uint32_t)play->lower);
-    put_word(saved + 16, (uint32_t)play->upper);
-    put_word(saved + 20, (uint32_t)play->half);
+    const play_state is = state_of(play);
+    if (saved == NULL)
+        return;
+    put_word(saved, (uint32_t)is.nominal);
+    put_word(saved + 4, (uint32_t)((uint64_t)is.nominal >> 32));
+    put_word(saved + 8, (uint32_t)is.error);
+    put_word(saved + 12, (uint32_t)is.lower);
+    put_word(saved + 16, (uint32_t)is.upper);
+    put_word(saved + 20, (uint32_t)is.half);
     put_word(saved + 24, crc32_of(saved, 24));
 }
 
 bool fxt_play_restore(fxt_play *play, const uint8_t saved[FXT_SAVED_PLAY_BYTES])
 {
+    if (play == NULL || saved == NULL)
+        return false;
     const uint64_t nominal = (uint64_t)word_from(saved + 4) << 32 | word_from(saved);
-    const fxt_play found = {(int64_t)nominal, i32(word_from(saved + 8)), i32(word_from(saved + 12)), i32(word_from(saved + 16)),
-                            i32(word_from(saved + 20))};
+    const play_state found = {(int64_t)nominal, i32(word_from(saved + 8)), i32(word_from(saved + 12)), i32(word_from(saved + 16)),
+                              i32(word_from(saved + 20))};
     const uint32_t size = found.error < 0 ? 0u - (uint32_t)found.error : (uint32_t)found.error;
     const bool started =
         found.half >= 0 && found.half <= MOST_PLAY && found.lower >= -found.half && found.upper <= found.half;
@@ -1377,39 +1421,60 @@ bool fxt_play_restore(fxt_play *play, const uint8_t saved[FXT_SAVED_PLAY_BYTES])
     const bool possible = found.lower <= found.upper && size <= MOST_KEPT && (started || fresh);
     if (!possible || word_from(saved + 24) != crc32_of(saved, 24))
         return false;
-    *play = found;
+    *play = kept(&found);
     return true;
+}
+
+/* Located for a call with a play; without one nothing can be corrected. */
+static inline point locate_with(const fxt_table *table, float torque_n_m, float temperature_c, const fxt_play *play)
+{
+    point at = locate(table, torque_n_m, temperature_c);
+    at.finite = at.finite && play != NULL;
+    return at;
 }
 
 fxt_prediction fxt_forward(const fxt_table *table, fxt_play *play, int64_t generator, float torque_n_m, float temperature_c)
 {
-    const point at = locate(table, torque_n_m, temperature_c);
-    return follow(table, &at, play, generator);
+    const point at = locate_with(given(table), torque_n_m, temperature_c, play);
+    play_state is = state_of(play);
+    const fxt_prediction now = follow(given(table), &at, &is, generator);
+    if (play != NULL)
+        *play = kept(&is);
+    return now;
 }
 
 fxt_command fxt_inverse(const fxt_table *table, int64_t target, float torque_n_m, float temperature_c, fxt_direction direction)
 {
-    const point at = locate(table, torque_n_m, temperature_c);
-    return aim_moving(table, &at, target, direction == FXT_BACKWARD);
+    const point at = locate(given(table), torque_n_m, temperature_c);
+    return aim_moving(given(table), &at, target, direction == FXT_BACKWARD);
 }
 
 fxt_command fxt_inverse_from(const fxt_table *table, int64_t target, float torque_n_m, float temperature_c, const fxt_play *play)
 {
-    const point at = locate(table, torque_n_m, temperature_c);
-    return aim_from(table, &at, target, play);
+    const point at = locate_with(given(table), torque_n_m, temperature_c, play);
+    const play_state is = state_of(play);
+    return aim_from(given(table), &at, target, &is);
 }
 
 void fxt_step(const fxt_table *table, fxt_play *play, int64_t measured, int64_t target, float torque_n_m, float temperature_c,
               fxt_prediction *prediction, fxt_command *command)
 {
-    const point at = locate(table, torque_n_m, temperature_c);
-    *prediction = follow(table, &at, play, measured);
-    *command = aim_from(table, &at, target, play);
+    const point at = locate_with(given(table), torque_n_m, temperature_c, play);
+    play_state is = state_of(play);
+    const fxt_prediction now = follow(given(table), &at, &is, measured);
+    if (play != NULL)
+        *play = kept(&is);
+    if (prediction != NULL)
+        *prediction = now;
+    if (command != NULL)
+        *command = aim_from(given(table), &at, target, &is);
 }
 
 bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_m, float temperature_c, fxt_direction direction,
                       float *error_rad)
 {
+    if (given(table)->image == NULL || error_rad == NULL)
+        return false;
     const point at = locate(table, torque_n_m, temperature_c);
     const phases where = phases_at(table, generator, nominal_output(table, generator));
     int32_t centre, half;
@@ -1421,6 +1486,8 @@ bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_
 bool fxt_from_rad(double rad, int64_t *counts)
 {
     const double exact = rad / TAU * TURN;
+    if (counts == NULL)
+        return false;
     *counts = 0;
     if (!(exact > -9.223372e18 && exact < 9.223372e18))
         return false;

@@ -8,7 +8,13 @@
  *   if (fxt_open(&table, image, image_bytes).reason != FXT_OK) stop();
  *   // every tick:
  *   fxt_step(&table, &play, measured, target, torque_n_m, temperature_c, &now, &command);
- *   // now.output: where the output is; command.generator: where the generator has to go
+ *   // now.output: where the output is; command.generator: where the generator has to go, if command.quality is not FXT_DISABLED
+ *   // in the background, a page at a time: is the memory of the table still what fxt_open checked? nothing else finds that out
+ *   if (!fxt_page_intact(&table, page++ % fxt_page_count(&table))) stop();
+ *
+ * A pointer that is NULL is refused: each function says how below. A table that was refused, or is NULL, knows no ratio: all its angles are 0.
+ * A command has no limiter: from one tick to the next it moves as far as the correction does, the whole of it where the quality becomes
+ * FXT_DISABLED. Watch the quality, and limit the rate.
  *
  * Angles are counts of 2^-32 turn in 64 bits: whole turns above, the fraction below. Positive is counter-clockwise; a positive torque turns
  * the output forward. Torque N*m, temperature degrees Celsius, errors rad at the output.
@@ -16,7 +22,9 @@
  * Not in here, but in the core with its C interface (flexspline.h): two copies of the table compared in each tick, state that is whole after
  * an upset, the limiter of the correction, glitches and late samples, learning, predictor, uploads, telemetry, the BLAKE3 of the table.
  *
- * Compile it without contraction and without -ffast-math: -ffp-contract=off. fxt_open refuses with FXT_ARITHMETIC where that was forgotten. */
+ * Compile it without contraction and without -ffast-math or any of its parts: -ffp-contract=off. Where that was forgotten it does not compile, or
+ * fxt_open refuses with FXT_ARITHMETIC; two parts that Clang takes alone are found by vectors/check only (-freciprocal-math,
+ * -fassociative-math). */
 #ifndef FLEXSPLINE_TABLE_H
 #define FLEXSPLINE_TABLE_H
 
@@ -61,7 +69,8 @@ typedef enum fxt_reason {
     FXT_FALLS,               /* the error falls while the load grows; index: torque node above, temperature: temperature node */
     FXT_STEEP,               /* it grows faster than that of any drive; likewise */
     FXT_INVERSE,             /* the inverse does not come close enough in its iterations */
-    FXT_ARITHMETIC           /* not the image: this code was compiled so that sums differ from the core's (contraction, fast math) */
+    FXT_ARITHMETIC,          /* not the image: this code was compiled so that sums differ from the core's (contraction, fast math) */
+    FXT_NO_TABLE             /* not the image: the pointer to the table is NULL */
 } fxt_reason;
 
 /* The field that a reason is about. */
@@ -100,7 +109,8 @@ typedef enum fxt_quality {
     FXT_IN_RANGE = 0,
     FXT_UNCERTAIN,    /* known to within the uncertainty only: inside a jump, or the side of the play is not known yet */
     FXT_EXTRAPOLATED, /* torque or temperature outside the range of the table; the value at its edge is used */
-    FXT_DISABLED      /* an input was not finite, or the memory of the table changed: no correction is made */
+    FXT_DISABLED      /* no correction: an input was not finite, or a number from a changed image is beyond the limits of the table. Most
+                         changes of its memory are not seen here but by fxt_page_intact alone */
 } fxt_quality;
 
 /* A direction of motion of the output. */
@@ -151,10 +161,12 @@ typedef struct fxt_info {
     uint32_t inverse_iterations;
 } fxt_info;
 
-/* Where the drive rests inside its play: all that must survive a reset. Its fields are nobody else's. */
+/* Where the drive rests inside its play: all that must survive a reset. Its fields are nobody else's. Memory of zeros (static, {0}) is that
+ * of fxt_play_unknown. */
 typedef struct fxt_play {
     int64_t nominal;
-    int32_t error, lower, upper, half;
+    int32_t error;
+    uint32_t lower, upper, half;
 } fxt_play;
 
 /* What the output is expected to do. */
@@ -172,42 +184,50 @@ typedef struct fxt_command {
     fxt_quality quality;
 } fxt_command;
 
-/* Checks an image in full and opens it; nothing of it is used before. A table that was refused answers FXT_DISABLED to everything. */
+/* Checks an image in full and opens it; nothing of it is used before, and nothing is checked again after. A table that was refused answers
+ * FXT_DISABLED to everything, as NULL does. */
 fxt_verdict fxt_open(fxt_table *table, const void *image, size_t bytes);
 /* "crc", "not increasing"; "torque nodes". */
 const char *fxt_reason_name(fxt_reason reason);
 const char *fxt_field_name(fxt_field field);
 /* What the table is for; all zero for one that was refused. */
 fxt_info fxt_tell(const fxt_table *table);
-/* Whether one page of 256 bytes of the image still matches its checksum, and how many there are. */
+/* Whether one page of 256 bytes of the image still matches its checksum, and how many there are. The only function that sees that the memory
+ * changed after fxt_open: a step with a changed table is wrong by some two error limits at most, in any quality. */
 bool fxt_page_intact(const fxt_table *table, uint32_t page);
 uint32_t fxt_page_count(const fxt_table *table);
 
 /* After a reset: anywhere inside the play. After motion through all of it: on the side of that direction. */
 fxt_play fxt_play_unknown(void);
 fxt_play fxt_play_after(fxt_direction direction);
-/* Whether the side is known, where the output was last, counts (false before the first step), and the middle of the play from it, rad. */
+/* Whether the side is known, where the output was last, counts (false before the first step), and the middle of the play from it, rad. A NULL
+ * play is one that is unknown. */
 bool fxt_play_known(const fxt_play *play);
 bool fxt_play_output(const fxt_play *play, int64_t *output);
 float fxt_play_offset_rad(const fxt_play *play);
 float fxt_play_uncertainty_rad(const fxt_play *play);
-/* To bytes with a checksum for storage across a reset, the same as the core's, and back; false if they are damaged. */
+/* To bytes with a checksum for storage across a reset, the same as the core's, and back; false if they are damaged. Checked are the checksum
+ * and that some play can have these numbers. Not checked: that it was saved with this table and this drive, and that nothing moved since.
+ * That is yours to know; else start from fxt_play_unknown. A NULL play is saved as an unknown one; nothing is restored from or to NULL. */
 void fxt_play_save(const fxt_play *play, uint8_t saved[FXT_SAVED_PLAY_BYTES]);
 bool fxt_play_restore(fxt_play *play, const uint8_t saved[FXT_SAVED_PLAY_BYTES]);
 
-/* The output at a generator angle. Call it once for every measured angle, in order: the play lives on the turning points. */
+/* The output at a generator angle. Call it once for every measured angle, in order: the play lives on the turning points. Here and below a NULL
+ * play gives the angles of the ideal drive, FXT_DISABLED. */
 fxt_prediction fxt_forward(const fxt_table *table, fxt_play *play, int64_t generator, float torque_n_m, float temperature_c);
-/* The generator angle that brings the output to a target: in steady motion, or from where the drive rests now. */
+/* The generator angle that brings the output to a target: in steady motion, or from where the drive rests now. As in the core it wraps beyond
+ * 2^31 generator turns, whatever the quality says: keep targets within 2^31 turns over the ratio (some 2e7 turns at 100). */
 fxt_command fxt_inverse(const fxt_table *table, int64_t target, float torque_n_m, float temperature_c, fxt_direction direction);
 fxt_command fxt_inverse_from(const fxt_table *table, int64_t target, float torque_n_m, float temperature_c, const fxt_play *play);
-/* Both in one: forward at the measured angle, then from there to the target. Torque and temperature are located once. */
+/* Both in one: forward at the measured angle, then from there to the target. Torque and temperature are located once. An answer that is not
+ * wanted may be NULL. */
 void fxt_step(const fxt_table *table, fxt_play *play, int64_t measured, int64_t target, float torque_n_m, float temperature_c,
               fxt_prediction *prediction, fxt_command *command);
-/* The transmission error in steady motion, rad; false if there is none. */
+/* The transmission error in steady motion, rad; false if there is none, or no place for it. */
 bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_m, float temperature_c, fxt_direction direction,
                       float *error_rad);
 
-/* Radians to the nearest count, false beyond 2^31 turns; counts to radians. For start-up: double precision. */
+/* Radians to the nearest count, false beyond 2^31 turns and without a place for it; counts to radians. For start-up: double precision. */
 bool fxt_from_rad(double rad, int64_t *counts);
 double fxt_to_rad(int64_t counts);
 

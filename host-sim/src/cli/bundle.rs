@@ -1,6 +1,8 @@
 //! `flexspline bundle`: what firmware people add to a project.
 
+use std::collections::BTreeMap;
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueHint};
@@ -16,7 +18,8 @@ use crate::suggest::{likeliest, question};
 /// Tables, a reader in C99, the core as static libraries, vectors and build files, in one folder for firmware
 ///
 /// Writes what CMake, Zephyr, PlatformIO, ESP-IDF and Arduino take as it is: c99/ (the reader), include/, tables/ (as .fxt and as C),
-/// lib/<target>/ (the core), vectors/ (what a port has to say) and manifest.json. Replaces a bundle that is there, and no other folder.
+/// lib/<target>/ (the core), vectors/ (what a port has to say) and manifest.json. Replaces a bundle that is there as it was written, and no
+/// other folder.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -40,6 +43,9 @@ pub(super) struct BundleCommand {
     #[arg(long)]
     archive: bool,
 }
+
+/// So that a line of them has some hundred characters.
+const TARGETS_A_LINE: usize = 4;
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
@@ -87,21 +93,10 @@ impl BundleCommand {
         }
         let out =
             std::path::absolute(context.out_path()).map_err(|error| Failure::BadInput(format!("--out: {error}")))?;
-        let refused = |found: &str| {
-            Failure::BadInput(format!(
-                "--out: {} {found}; allowed: a new folder, an empty one, or a bundle to be replaced",
-                out.display()
-            ))
-        };
-        if out.exists() {
-            let mut entries = fs::read_dir(&out).map_err(|error| refused(&format!("is no folder ({error})")))?;
-            let manifest =
-                fs::read(out.join(MANIFEST)).ok().and_then(|text| serde_json::from_slice::<Manifest>(&text).ok());
-            if entries.next().is_some() && manifest.is_none_or(|manifest| manifest.bundle != "flexspline") {
-                return Err(refused("has files that are no bundle"));
-            }
-        }
-        let parent = out.parent().ok_or_else(|| refused("is no folder of its own"))?;
+        // Without a slash at its end, which would lead through a link.
+        let out: PathBuf = out.components().collect();
+        may_be_replaced(&out)?;
+        let parent = out.parent().ok_or_else(|| refused(&out, "is no folder of its own"))?;
         prepare_folder(parent).map_err(|error| Failure::BadInput(format!("--out: {error}")))?;
         Ok(out)
     }
@@ -178,10 +173,69 @@ impl BundleCommand {
             outputs.file(&path, |file| tar_gz(file, &name, files))?;
             archive = Some(path);
         }
+        // Libraries take minutes, and files may have come meanwhile.
+        may_be_replaced(out)?;
         outputs.folder(folder);
         outputs.finish()?;
         Ok(archive)
     }
+}
+
+fn refused(out: &Path, found: &str) -> Failure {
+    Failure::BadInput(format!(
+        "--out: {} {found}; allowed: a new folder, an empty one, or a bundle as it was written, to be replaced",
+        out.display()
+    ))
+}
+
+/// Whether a folder can go: it is not there, is empty, or each of its files is the one of its manifest.
+fn may_be_replaced(out: &Path) -> Result<(), Failure> {
+    let Ok(about) = fs::symlink_metadata(out) else { return Ok(()) };
+    if about.is_symlink() {
+        return Err(refused(out, "is a symbolic link; name the folder itself"));
+    }
+    let mut entries = fs::read_dir(out).map_err(|error| refused(out, &format!("is no folder ({error})")))?;
+    if entries.next().is_none() {
+        return Ok(());
+    }
+    let manifest = fs::read(out.join(MANIFEST)).ok().and_then(|text| serde_json::from_slice::<Manifest>(&text).ok());
+    let Some(manifest) = manifest.filter(|manifest| manifest.bundle == "flexspline") else {
+        return Err(refused(out, "has files that are no bundle"));
+    };
+    match foreign(out, out, &manifest) {
+        Ok(None) => Ok(()),
+        Ok(Some(found)) => Err(refused(out, &found)),
+        Err(error) => Err(refused(out, &format!("cannot be read in full ({error})"))),
+    }
+}
+
+/// What is first in a folder of a bundle, by name, and is none of the manifest's files as they were written.
+fn foreign(top: &Path, folder: &Path, manifest: &Manifest) -> io::Result<Option<String>> {
+    let mut entries = fs::read_dir(folder)?.collect::<io::Result<Vec<_>>>()?;
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        let path = entry.path();
+        let inside = path.strip_prefix(top).unwrap_or(&path);
+        let kind = entry.file_type()?;
+        if inside == Path::new(MANIFEST) && kind.is_file() {
+            continue;
+        }
+        if kind.is_dir() {
+            if let Some(found) = foreign(top, &path, manifest)? {
+                return Ok(Some(found));
+            }
+            if manifest.files.iter().any(|file| Path::new(&file.path).starts_with(inside)) {
+                continue;
+            }
+        }
+        let Some(file) = manifest.files.iter().find(|file| kind.is_file() && Path::new(&file.path) == inside) else {
+            return Ok(Some(format!("has {}, which is not of the bundle", inside.display())));
+        };
+        if blake3::hash(&fs::read(&path)?).to_hex().as_str() != file.blake3 {
+            return Ok(Some(format!("has {}, which was changed since", inside.display())));
+        }
+    }
+    Ok(None)
 }
 
 fn bad_input(error: impl std::fmt::Display) -> Failure {
@@ -197,11 +251,27 @@ fn text(bundled: &Bundled) -> String {
         let what = TARGETS.iter().find(|(known, _)| known == target).map_or("", |(_, what)| *what);
         lines.push(format!("  core for {target:<30} {what}"));
     }
-    for Missing { target, why } in &bundled.missing {
-        lines.push(format!("  no core for {target}: {why}"));
-    }
+    lines.extend(without_core(&bundled.missing));
     lines.push(format!("wrote {} files to {}", bundled.files.len(), bundled.folder));
     lines.extend(bundled.archive.as_ref().map(|archive| format!("wrote {archive}")));
     lines.push(format!("first steps: {}/README.md", bundled.folder));
     lines.join("\n")
+}
+
+/// Targets without a library: each reason once, with all targets that have it.
+fn without_core(missing: &[Missing]) -> Vec<String> {
+    let mut reasons: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+    for Missing { target, why } in missing {
+        reasons.entry(why.replace(target.as_str(), "TARGET")).or_default().push(target);
+    }
+    let mut lines = Vec::new();
+    for (why, targets) in reasons {
+        if let [target] = targets[..] {
+            lines.push(format!("  no core for {target}: {}", why.replace("TARGET", target)));
+        } else {
+            lines.push(format!("  no core for {} targets: {why}", targets.len()));
+            lines.extend(targets.chunks(TARGETS_A_LINE).map(|some| format!("    {}", some.join(", "))));
+        }
+    }
+    lines
 }

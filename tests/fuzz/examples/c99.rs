@@ -230,7 +230,11 @@ impl<W: Write> Vectors<W> {
                 _ => 4,
             };
             let ahead = (mixed.number() as i64) >> (32 + mixed.number() % 32);
-            let target = if number >> 45 & 7 == 0 { output } else { output.wrapping_add(ahead) };
+            let mut target = if number >> 45 & 7 == 0 { output } else { output.wrapping_add(ahead) };
+            // Any angle, also those whose command wraps.
+            if number.is_multiple_of(1021) {
+                target = mixed.number() as i64;
+            }
             let asked = Asked {
                 generator: GeneratorAngle::from_counts(generator),
                 target: OutputAngle::from_counts(target),

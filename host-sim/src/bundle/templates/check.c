@@ -1,6 +1,7 @@
-/* Steps of each table beside what the core says of them, bit by bit: 0 if a port is right, else the number of the first step that differs.
+/* Steps of each table beside what the core says of them, bit by bit: 0 if a port is right, else the number of the first step that differs, or
+ * less than 0 where a table is refused: -reason of fxt_open.
  *
- * On a PC: cc -std=c99 -ffp-contract=off -I include vectors/check.c c99/flexspline_table.c tables/[a-z]*.c -o check && ./check
+ * On a PC: cc -std=c99 -ffp-contract=off -I include vectors/check.c c99/flexspline_table.c tables/[a-z]*.c -o ../check && ../check
  * On a target: compile with -D FLEXSPLINE_NO_MAIN and call flexspline_check. */
 #include "vectors.h"
 
@@ -30,9 +31,11 @@ int flexspline_check(void)
         fxt_table table;
         fxt_play play = fxt_play_unknown();
         const fxt_verdict verdict = fxt_open(&table, flexspline_cases[i].image, flexspline_cases[i].bytes);
+        if (verdict.reason != FXT_OK)
+            return -(int)verdict.reason;
         for (uint32_t step = 0; step < flexspline_cases[i].steps; step++) {
             number++;
-            if (verdict.reason != FXT_OK || !agrees(&table, &play, &flexspline_cases[i].vectors[step]))
+            if (!agrees(&table, &play, &flexspline_cases[i].vectors[step]))
                 return number;
         }
     }
@@ -45,7 +48,12 @@ int flexspline_check(void)
 int main(void)
 {
     const int wrong = flexspline_check();
-    printf(wrong == 0 ? "all steps have the bits of the core\n" : "step %d differs\n", wrong);
+    if (wrong < 0)
+        printf("table refused: %s\n", fxt_reason_name((fxt_reason)-wrong));
+    else if (wrong > 0)
+        printf("step %d differs\n", wrong);
+    else
+        printf("all steps have the bits of the core\n");
     return wrong != 0;
 }
 #endif
