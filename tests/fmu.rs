@@ -445,3 +445,35 @@ fn no_function_falls_over_null_pointers_and_strange_components() {
     let version = fmu.function::<unsafe extern "C" fn() -> *const std::ffi::c_char>("fmi2GetVersion");
     assert_eq!(unsafe { std::ffi::CStr::from_ptr(version()) }, c"2.0");
 }
+
+#[test]
+fn a_joint_says_how_far_its_core_trusts_the_table_and_refuses_targets_that_no_angle_holds() {
+    let desk = desk();
+    let fmu = imported(&desk, "--tables cam.fxt --model joint --scenario camera");
+    let quality = |set: &[(&str, f64)], load: f64| {
+        let instance = fmu.ready("one", set);
+        assert_eq!(instance.number("quality"), 3, "disabled before the first tick");
+        for tick in 0..300 {
+            instance.set("target", 1e-5 * f64::from(tick));
+            instance.set("target_rate", 0.01);
+            instance.set("load_torque", load);
+            assert_eq!(instance.step(1e-3), OK, "{:?}", instance.log());
+        }
+        instance.number("quality")
+    };
+    let quiet = [("gravity_torque", 0.0), ("torque_noise", 0.0)];
+    assert_eq!(quality(&quiet, 10.0), 0);
+    assert_eq!(quality(&quiet, 5000.0), 2);
+    assert_eq!(quality(&[("compensate", 0.0)], 10.0), 3);
+    assert_eq!(quality(&[("servo", 0.0)], 0.0), 3);
+    for target in [1e30, -1e30, 1e9 * std::f64::consts::TAU] {
+        let instance = fmu.ready("far", &[]);
+        instance.set("target", target);
+        assert_eq!(instance.step(1e-3), ERROR, "{target}");
+        let log = instance.log();
+        assert!(log.last().unwrap().message.contains("target: found"), "{log:?}");
+    }
+    let pushed = fmu.ready("pushed", &[("servo", 0.0)]);
+    pushed.set("target", 1e30);
+    assert_eq!(pushed.step(1e-3), OK, "not read: {:?}", pushed.log());
+}

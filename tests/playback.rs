@@ -506,3 +506,181 @@ fn what_is_pointless_is_refused_with_the_reason_and_options_that_do_not_fit_too(
     let xml = desk.read("ros2/transmission.xml");
     assert!(xml.contains("<mechanical_reduction>95</mechanical_reduction>"), "{xml}");
 }
+
+/// A table of commas without its header, each row changed.
+fn changed(name: &str, rows: usize, change: impl Fn(&str, &mut f64)) -> String {
+    let text = UNIT.desk.read(name);
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let header = lines.next().unwrap();
+    let mut changed = format!("{header}\n");
+    for line in lines.take(rows) {
+        let values = header.split(',').zip(line.split(',')).map(|(column, value)| {
+            let Ok(mut value) = value.parse::<f64>() else { return value.to_owned() };
+            change(column, &mut value);
+            format!("{value:.9}")
+        });
+        changed += &(values.collect::<Vec<_>>().join(",") + "\n");
+    }
+    changed
+}
+
+#[test]
+fn data_that_the_playback_makes_worse_are_refused_and_say_whether_the_table_is_theirs() {
+    let desk = &UNIT.desk;
+    let export = |data: &str, more: &str, out: &str| {
+        desk.line(&format!(
+            "export --format moteus --tables cal/calibrated.fxt --torque-n-m {LOAD_N_M} --temperature-c 20 --data {data} --out {out} --json \
+             {more}"
+        ))
+    };
+    // Both angles turned over, a generator zero a third of a turn off, another ratio, the error of a unit turned over.
+    desk.write(
+        "turned.csv",
+        &changed("run/data.csv", usize::MAX, |column, value| {
+            if matches!(column, "generator_rad" | "output_rad" | "error_arcsec") {
+                *value = -*value;
+            }
+        }),
+    );
+    desk.write(
+        "shifted.csv",
+        &changed("run/data.csv", usize::MAX, |column, value| match column {
+            "generator_rad" => *value += 2.0,
+            "output_rad" => *value += 2.0 / RATIO,
+            _ => {}
+        }),
+    );
+    desk.write(
+        "ratio.csv",
+        &changed("run/data.csv", usize::MAX, |column, value| {
+            if column == "generator_rad" {
+                *value *= 1.01;
+            }
+        }),
+    );
+    for data in ["turned.csv", "shifted.csv", "ratio.csv"] {
+        let run = export(data, "", "worse");
+        assert_eq!(run.code, 2, "{data}: {}", run.stdout);
+        for reason in ["the unit's data", "more than 70 %", "the core leaves", "do not belong to this table", "--force"]
+        {
+            assert!(run.stderr.contains(reason), "{data}: no {reason} in {}", run.stderr);
+        }
+        let forced = export(data, "--force", &format!("forced_{data}")).done().json();
+        assert!(forced["notes"].to_string().contains("written by --force. the unit's data"), "{forced}");
+    }
+    assert!(!desk.path("worse").exists(), "nothing is written");
+    // The error alone turned over: the other sign would do.
+    let mut rows = String::from("generator_rad,error_arcsec,torque_n_m\n");
+    for line in desk.read("run/data.csv").lines().skip_while(|line| !line.starts_with("time_s")).skip(1) {
+        let values: Vec<f64> = line.split(',').map(|value| value.parse().unwrap()).collect();
+        let [generator, output] = [values[1], values[2]];
+        let _ = writeln!(rows, "{generator},{:.6},{LOAD_N_M}", -(output - generator / RATIO) * ARCSEC);
+    }
+    desk.write("sign.csv", &rows);
+    let run = export("sign.csv", "", "worse");
+    assert!(run.code == 2 && run.stderr.contains("if the error had the other sign"), "{}", run.stderr);
+    // A handful of rows judges nothing.
+    desk.write("few.csv", &changed("run/data.csv", 7, |_, _| {}));
+    let few = export("few.csv", "", "few").done().json();
+    assert!(few["playback"].is_null() && few["notes"].to_string().contains("not judged by the data: 7 rows"), "{few}");
+    // How data are read, without data.
+    for option in ["--columns generator=#1:rad", "--rate 10", "--torque-constant 2"] {
+        let run = desk
+            .line(&format!("export --format moteus --tables cal/calibrated.fxt --torque-n-m 12 --out worse {option}"));
+        let name = option.split(' ').next().unwrap();
+        assert!(
+            run.code == 2 && run.stderr.contains(name) && run.stderr.contains("--data"),
+            "{option}: {}",
+            run.stderr
+        );
+    }
+}
+
+#[test]
+fn loads_beside_the_section_and_what_was_left_out_are_said() {
+    let desk = &UNIT.desk;
+    desk.write(
+        "heavy.csv",
+        &changed("run/data.csv", usize::MAX, |column, value| {
+            if column == "torque_n_m" {
+                *value = 5000.0;
+            }
+        }),
+    );
+    let line = format!(
+        "export --format moteus --tables cal/calibrated.fxt --torque-n-m {LOAD_N_M} --data heavy.csv --force --out heavy --json"
+    );
+    let said = desk.line(&line).done().json();
+    let notes = said["notes"].to_string();
+    assert!(notes.contains("loads of the data: 5000 to 5000 N.m") && notes.contains("12 N.m that the file"), "{notes}");
+    assert!(notes.contains("7959 of 7959 rows of the data are extrapolated by the core"), "{notes}");
+    let written: Value = serde_json::from_str(&desk.read("heavy/playback.json")).unwrap();
+    assert_eq!(number(&written, "/playback/rows_extrapolated"), 7959.0);
+    let near = export("moteus", "near");
+    assert!(!near["notes"].to_string().contains("of the data"), "{near}");
+    // The mean of the table at its load, as it is found here.
+    let table = Table::check(&UNIT.image).unwrap();
+    let led = |k: u32| TAU * f64::from(k) / f64::from(POINTS);
+    let both = BOTH.map(|direction| (0..POINTS).map(|k| error(&table, led(k), direction)).sum::<f64>());
+    let mean = (both[0] + both[1]) / f64::from(2 * POINTS) * ARCSEC;
+    let left_out = number(&near, "/model/mean_left_out_arcsec");
+    assert!((left_out - mean).abs() < 0.01 * mean.abs() && mean.abs() > 1.0, "{left_out}, {mean}");
+}
+
+#[test]
+fn a_foreign_file_stays_and_the_program_writes_over_its_own() {
+    let desk = &UNIT.desk;
+    for (format, file, foreign) in [
+        ("moteus", "moteus.cfg", "conf set servo.pid_position.kp 4\nconf set motor_position.sources.0.type 1\n"),
+        ("onstepx --buffer-s 912", "onstepx_pec.txt", ":WR0,3#\n:GVP#\n"),
+        ("eqmod", "eqmod_pec.txt", "# my curve\n0 0 1.5\n"),
+        ("fprime", "flexspline_prm.json", "{}\n"),
+        ("linuxcnc --to-deg 20", "playback.json", "{}\n"),
+    ] {
+        let out = format!("kept_{file}");
+        let line = format!("export --tables cal/calibrated.fxt --torque-n-m {LOAD_N_M} --out {out} --format {format}");
+        std::fs::create_dir(desk.path(&out)).unwrap();
+        desk.write(&format!("{out}/{file}"), foreign);
+        let run = desk.line(&line);
+        assert!(
+            run.code == 2 && run.stderr.contains("--force") && run.stderr.contains(file),
+            "{format}: {}",
+            run.stderr
+        );
+        assert_eq!(desk.read(&format!("{out}/{file}")), foreign);
+        desk.line(&format!("{line} --force")).done();
+        // Of its own, for another load.
+        desk.line(&format!("{line} --temperature-c 20")).done();
+    }
+}
+
+#[test]
+fn a_zero_that_costs_is_told_and_so_is_another_number_of_points() {
+    let desk = &UNIT.desk;
+    let line = "export --tables cal/calibrated.fxt --torque-n-m 12 --json --out zeros --format";
+    let played = |zero: i64| {
+        let said = desk.line(&format!("{line} eqmod --motor-zero {zero}")).done().json();
+        (number(&said, "/model/rms_played_arcsec"), said["notes"].to_string())
+    };
+    let (good, notes) = played(0);
+    assert!(!notes.contains("--motor-zero"), "{notes}");
+    let mut told = 0;
+    for zero in [-120, -60, -20, -5] {
+        let (bad, notes) = played(zero);
+        println!("{zero}: {bad:.2}, at 0 {good:.2}");
+        if bad > 2.0 * good {
+            let better = notes.split("; --motor-zero ").nth(1).unwrap_or_else(|| panic!("{zero}: {notes}"));
+            let better: i64 = better.split(' ').next().unwrap().parse().unwrap();
+            assert!(played(better).0 < 0.5 * bad, "{zero}: {better} is said to be better");
+            told += 1;
+        }
+    }
+    assert!(told > 0, "no zero costs");
+    for asked in [5000, 14] {
+        let run = desk.line(&format!("{line} beckhoff --controller cnc --force --points {asked}")).done().json();
+        let text = desk.read("zeros/achskw.lis");
+        let entries = text.lines().find_map(|line| line.strip_prefix("kw.ssfk.kw_nr_max ")).unwrap();
+        let notes = run["notes"].to_string();
+        assert!(notes.contains(&format!("--points {asked}: {entries} entries were written")), "{notes}");
+    }
+}

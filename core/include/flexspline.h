@@ -449,7 +449,7 @@ typedef struct FlexsplineOutput {
   float transmission_error_rad;
   // It lies within +- this, rad.
   float uncertainty_rad;
-  // Correction in the command, rad.
+  // Correction in the command, rad: target less command over ratio. It is taken off the target, and has the sign of the error.
   float correction_rad;
   // What the limiter held back, rad.
   float held_back_rad;
@@ -684,7 +684,7 @@ typedef struct FlexsplineRecord {
   float transmission_error_rad;
   // It lies within +- this, rad.
   float uncertainty_rad;
-  // Correction, rad at the output.
+  // Correction, rad at the output: target less command over ratio.
   float correction_rad;
   // What the limiter held back of it, rad.
   float held_back_rad;

@@ -230,7 +230,7 @@ pub struct FlexsplineOutput {
     pub transmission_error_rad: f32,
     /// It lies within +- this, rad.
     pub uncertainty_rad: f32,
-    /// Correction in the command, rad.
+    /// Correction in the command, rad: target less command over ratio. It is taken off the target, and has the sign of the error.
     pub correction_rad: f32,
     /// What the limiter held back, rad.
     pub held_back_rad: f32,

@@ -36,7 +36,7 @@ pub struct FlexsplineRecord {
     pub transmission_error_rad: f32,
     /// It lies within +- this, rad.
     pub uncertainty_rad: f32,
-    /// Correction, rad at the output.
+    /// Correction, rad at the output: target less command over ratio.
     pub correction_rad: f32,
     /// What the limiter held back of it, rad.
     pub held_back_rad: f32,

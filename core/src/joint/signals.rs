@@ -86,7 +86,8 @@ pub struct Output {
     pub transmission_error_rad: f32,
     /// It lies within ± this, as far as play and jumps go, rad.
     pub uncertainty_rad: f32,
-    /// The correction in the command: the target less the nominal output of the command, rad.
+    /// The correction in the command: target − command/ratio, rad. It is taken off the target, and so has the sign of the
+    /// transmission error that it takes out.
     pub correction_rad: f32,
     /// What the limiter held back of the correction, rad.
     pub held_back_rad: f32,

@@ -95,7 +95,8 @@ pub fn initial(values: &mut [f64]) {
     values[QUALITY] = f64::from(quality(Quality::Disabled));
 }
 
-const fn quality(quality: Quality) -> u8 {
+/// Its place in [`QUALITIES`].
+pub const fn quality(quality: Quality) -> u8 {
     match quality {
         Quality::InRange => 0,
         Quality::Uncertain => 1,

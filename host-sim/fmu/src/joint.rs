@@ -1,11 +1,12 @@
 //! A joint with mass: motor, servo, drive and load, as `flexspline fly` flies it.
 
-use flexspline::Table;
+use flexspline::{GeneratorAngle, OutputAngle, Quality, Table};
 use flexspline_motion::flight::{ARCSEC_PER_RAD, OneJoint, Ticked, Unit};
 use flexspline_motion::keep::Kept;
 use flexspline_motion::scenario::{Load, Moment, Scenario, TableKnown, TorqueKnown};
 use flexspline_motion::servo::ServoSettings;
 
+use crate::compensation::{QUALITIES, quality};
 use crate::instance::{Inputs, Model};
 use crate::resources::Resources;
 use crate::variables::{Choices, Kind, Variable, variables};
@@ -73,10 +74,11 @@ variables! {
     HEAT => Variable::motion("heat", "J", "energy turned into heat since the start");
     ENERGY_ERROR => Variable::motion("energy_error", "J", "both works less heat less what is stored now beyond the start: rounding");
     GENERATOR_COMMAND => Variable::output("generator_command", Kind::Real("rad"), "where the servo was told to turn the generator");
-    CORRECTION => Variable::output("correction", Kind::Real("arcsec"), "target less generator_command over the ratio");
+    CORRECTION => Variable::output("correction", Kind::Real("arcsec"), "target less generator_command over the ratio: it is taken off the target");
     SATURATED => Variable::output("saturated", Kind::Boolean, "the servo's motor gives all it has");
     HELD_BACK => Variable::output("held_back", Kind::Boolean, "the limiter held the correction back");
     NOT_CORRECTED => Variable::output("not_corrected", Kind::Boolean, "no correction could be made in the tick");
+    QUALITY => Variable::output("quality", Kind::Choice(&QUALITIES), "how far the core trusts its estimate and its correction; disabled where it does not correct");
     TEMPERATURE => Variable::constant("temperature", Kind::Real("degC"), "temperature of drive and lubricant");
     RATIO => Variable::constant("ratio", Kind::Real("rad/rad"), "generator over output");
     TABLE_ID => Variable::constant("table_id", Kind::Text, "id of the table");
@@ -174,6 +176,7 @@ pub fn initial(values: &mut [f64]) {
         .zip(values.iter_mut())
         .filter(|(variable, _)| variable.is_output())
         .for_each(|(_, value)| *value = 0.0);
+    values[QUALITY] = f64::from(quality(Quality::Disabled));
 }
 
 /// The joint in a simulation.
@@ -210,6 +213,15 @@ impl Model for MovingJoint {
             return Err(format!("{}: found {}, allowed: a finite number", VARIABLES[place].name, at.start(place)));
         }
         let servo = at.start(SERVO) != 0.0;
+        if servo {
+            let target_rad = at.start(TARGET);
+            let held = OutputAngle::from_rad(target_rad).and(GeneratorAngle::from_rad(target_rad * joint.ratio()));
+            held.ok_or_else(|| {
+                format!(
+                    "target: found {target_rad}, allowed: an angle for which the generator makes less than 2e9 turns"
+                )
+            })?;
+        }
         let ticked = if servo {
             joint.tick(&Moment {
                 time_s: 0.0,
@@ -248,6 +260,7 @@ impl Model for MovingJoint {
         {
             outputs[place] = f64::from(u8::from(set));
         }
+        outputs[QUALITY] = f64::from(quality(ticked.quality.unwrap_or(Quality::Disabled)));
         Ok(())
     }
 

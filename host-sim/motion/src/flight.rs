@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 
 use flexspline::{
     Adjustment, Approach, Direction, Drive, Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode,
-    OutputAngle, Overrun, Store, TorquePath, TorqueReading, TorqueSettings,
+    OutputAngle, Overrun, Quality, Store, TorquePath, TorqueReading, TorqueSettings,
 };
 
 use super::friction::Friction;
@@ -345,6 +345,8 @@ struct Commanded {
     rate_rad_s: f64,
     held_back: bool,
     not_corrected: bool,
+    /// How far the core trusts it; none of what commands without the core.
+    quality: Option<Quality>,
 }
 
 /// Moves a correction within limits, as the core does.
@@ -481,7 +483,8 @@ impl Controller {
             let correction = limiter.go(goal, tick_s);
             let command = GeneratorAngle::from_rad((target_rad - correction) * ratio).unwrap_or(GeneratorAngle::ZERO);
             let held_back = (goal - correction).abs() > 5e-7;
-            Commanded { command, rate_rad_s: nominal_rate - slope * ratio, held_back, not_corrected: false }
+            let rate_rad_s = nominal_rate - slope * ratio;
+            Commanded { command, rate_rad_s, held_back, not_corrected: false, quality: None }
         };
         let ahead = f64::from(AHEAD_S) * 0.5;
         match self {
@@ -538,6 +541,7 @@ impl Core {
             rate_rad_s: if rate_rad_s == 0.0 || rate.is_nan() { nominal_rate } else { f64::from(rate) },
             held_back: out.flags.contains(Flags::HELD_BACK),
             not_corrected: out.flags.contains(Flags::NOT_CORRECTED),
+            quality: Some(out.quality),
         }
     }
 }

@@ -11,9 +11,9 @@ use super::logs::LogOptions;
 use super::replay::measured;
 use super::{Failure, say};
 use crate::export::playback::{
-    BOTH, Cfs, Cnc, CompType, DataFigures, Eqmod, EqmodMount, Fprime, LinuxCnc, MAX_TABLE_BYTES, MAX_TRIPLETS,
-    ModelFigures, Moteus, Nc, OnStepX, Origin, Player, Refusal, Ros2, Section, Written, core_on_model, on_data,
-    on_model, worth_it,
+    BOTH, Cfs, Cnc, CompType, DataFigures, Eqmod, EqmodMount, FEWEST_ROWS, Fprime, LinuxCnc, MAX_TABLE_BYTES,
+    MAX_TRIPLETS, ModelFigures, Moteus, Nc, OnStepX, Origin, Player, Refusal, Ros2, Section, Written, core_on_model,
+    on_data, on_model, worth_it,
 };
 use crate::output::Outputs;
 use crate::tables::replay::replay;
@@ -93,7 +93,7 @@ pub(super) struct PlaybackOptions {
     data: Option<PathBuf>,
     #[command(flatten)]
     logs: LogOptions,
-    /// Write a file that leaves nearly all of the error, or a table larger than the default of cFS
+    /// Write a file that leaves nearly all of the error, or a table larger than the default of cFS, or over a file of another hand
     #[arg(long)]
     force: bool,
     /// Directions of the output's motion: moteus and beckhoff hold one value for both [default: both]; eqmod and onstepx track
@@ -193,11 +193,11 @@ impl PlaybackOptions {
         let track: &[_] = &[EqmodFormat, Onstepx];
         let travel: &[_] = &[Linuxcnc, Beckhoff];
         let sided: &[_] = &[EqmodFormat, Onstepx, Beckhoff, Moteus];
-        let forced: &[_] = &[EqmodFormat, Onstepx, Linuxcnc, Beckhoff, Moteus, Ros2, CfsFormat];
         let any: &[_] = &[EqmodFormat, Onstepx, Linuxcnc, Beckhoff, Moteus, Ros2, CfsFormat, FprimeFormat];
         let options = [
-            ("--data", self.data.is_some() || self.logs.said(), any),
-            ("--force", self.force, forced),
+            ("--data", self.data.is_some(), any),
+            (self.logs.given().unwrap_or_default(), self.logs.given().is_some(), any),
+            ("--force", self.force, any),
             ("--direction", self.direction.is_some(), sided),
             ("--direction both", self.direction == Some(Directions::Both), &sided[2..]),
             ("--from-deg", self.from_deg.is_some(), travel),
@@ -226,6 +226,13 @@ impl PlaybackOptions {
                     used.join(", ")
                 )));
             }
+        }
+        if let Some(option) = self.logs.given().filter(|_| self.data.is_none()) {
+            return Err(Failure::BadInput(format!("{option}: says how --data is read; allowed with --data")));
+        }
+        if self.logs.given() == Some("--torque-constant") {
+            let what = "--torque-constant: is for a torque column in A or mA; allowed with --columns, which names it";
+            return Err(Failure::BadInput(what.to_owned()));
         }
         for (option, value) in [
             ("--steps-per-degree", self.steps_per_degree),
@@ -266,10 +273,15 @@ impl PlaybackOptions {
         if let Some(player) = player.filter(|_| !self.force) {
             worth_it(&section, &model, player)?;
         }
-        let playback = self.data.as_deref().map(|data| self.judge(data, &table, temperature_c, player)).transpose()?;
+        let mut notes = made.notes;
+        let playback = match &self.data {
+            Some(data) => self.judge(data, &table, [torque_n_m, temperature_c], player, &mut notes)?,
+            None => None,
+        };
         let out = context.out()?;
         let mut outputs = Outputs::new();
         let mut written = Vec::new();
+        self.refuse_foreign(&out, &made.files)?;
         for file in &made.files {
             let path = out.join(&file.name);
             outputs.file(&path, |to| to.write_all(&file.bytes))?;
@@ -285,7 +297,7 @@ impl PlaybackOptions {
             written,
             model,
             playback,
-            notes: made.notes,
+            notes,
         };
         outputs.json(&out.join("playback.json"), &played)?;
         outputs.finish()?;
@@ -296,12 +308,47 @@ impl PlaybackOptions {
         &self,
         data: &Path,
         table: &Table<'_>,
-        temperature_c: f64,
+        [torque_n_m, temperature_c]: [f64; 2],
         player: Option<&dyn Player>,
-    ) -> Result<DataFigures, Failure> {
+        notes: &mut Vec<String>,
+    ) -> Result<Option<DataFigures>, Failure> {
         let rows = measured(data, &self.logs, table, temperature_c)?;
         let (replayed, _) = replay(table, &rows);
-        Ok(on_data(table, &rows, &replayed, player)?)
+        let figures = on_data(table, torque_n_m, &rows, &replayed, player)?;
+        if figures.rows < FEWEST_ROWS {
+            notes.push(format!(
+                "not judged by the data: {} rows lie where this device plays, fewer than {FEWEST_ROWS}",
+                figures.rows
+            ));
+            return Ok(None);
+        }
+        let known = figures.notes(table, torque_n_m);
+        match figures.worth_it() {
+            Err(Refusal::Pointless(why)) if self.force => notes.push(format!("written by --force. {why}")),
+            Err(Refusal::Pointless(why)) => {
+                let why: Vec<String> = std::iter::once(why).chain(known).collect();
+                return Err(Refusal::Pointless(why.join("; ")).into());
+            }
+            other => other?,
+        }
+        notes.extend(known);
+        Ok(Some(figures))
+    }
+
+    /// Refuses to write over files of another hand; `playback.json` has the id of a table, too.
+    fn refuse_foreign(&self, out: &Path, files: &[Written]) -> Result<(), Failure> {
+        let foreign = |file: &&Written| {
+            let old = std::fs::read(out.join(&file.name));
+            !self.force && old.is_ok_and(|old| !file.replaces(&old))
+        };
+        let figures = Written { name: "playback.json".to_owned(), bytes: b"table_id".to_vec() };
+        match files.iter().chain([&figures]).find(foreign) {
+            Some(file) => Err(Failure::BadInput(format!(
+                "{}: exists, and is not of this program; choose another --out, or --force writes over it",
+                out.join(&file.name).display()
+            ))),
+            None => Ok(()),
+        }
     }
 
     fn make(
@@ -421,10 +468,11 @@ fn text(played: &Played) -> String {
         format!("  table's own model, uncorrected, rms {:>12.3} arcsec", model.rms_uncorrected_arcsec),
         format!("  left by this playback, rms         {:>12.3} arcsec", model.rms_played_arcsec),
         format!("  left by this playback, largest     {:>12.3} arcsec", model.max_played_arcsec),
+        format!("  mean error, left out of all these  {:>12.3} arcsec", model.mean_left_out_arcsec),
     ];
     for load in &model.loads {
         lines.push(format!(
-            "  at {:>8.2} N.m {:>12.3} arcsec uncorrected, left {:>12.3} arcsec",
+            "  at {:>8.2} N.m, less the same mean {:>12.3} arcsec uncorrected, left {:>12.3} arcsec",
             load.torque_n_m, load.rms_uncorrected_arcsec, load.rms_played_arcsec
         ));
     }
@@ -435,6 +483,7 @@ fn text(played: &Played) -> String {
         ));
         lines.push(format!("  left by this playback, rms         {:>12.3} arcsec", data.rms_played_arcsec));
         lines.push(format!("  left by the core, rms              {:>12.3} arcsec", data.rms_core_arcsec));
+        lines.push(format!("  mean of the data, left out         {:>12.3} arcsec", data.mean_left_out_arcsec));
     }
     lines.push(format!("simulated from {}; not tried on hardware", played.simulated_from));
     lines.extend(played.notes.iter().map(|note| format!("note: {note}")));

@@ -45,6 +45,16 @@ impl LogOptions {
         self.rate
     }
 
+    /// The first of its options that is given.
+    pub(super) fn given(&self) -> Option<&'static str> {
+        let given = [
+            ("--columns", !self.columns.is_empty()),
+            ("--rate", self.rate.is_some()),
+            ("--torque-constant", self.torque_constant.is_some()),
+        ];
+        given.into_iter().find(|(_, given)| *given).map(|(option, _)| option)
+    }
+
     /// Whether anything is said.
     pub(super) fn said(&self) -> bool {
         !self.columns.is_empty() || self.rate.is_some()

@@ -4,7 +4,7 @@ use super::{COMPENSATED, Commanded, Controller, Lane, Made, Sensing, Unit, made}
 use crate::keep::{Kept, kept};
 use crate::plant::Plant;
 use crate::scenario::{Moment, Scenario};
-use flexspline::{Direction, JOINT_STATE_WORDS, JointState};
+use flexspline::{Direction, JOINT_STATE_WORDS, JointState, Quality};
 
 /// A joint with mass, its servo, and what commands it; as [`super::fly`] flies it, tick by tick.
 pub struct OneJoint {
@@ -26,6 +26,8 @@ pub struct Ticked {
     pub held_back: bool,
     /// The table could not be used.
     pub not_corrected: bool,
+    /// How far the core trusts estimate and correction; none without the core.
+    pub quality: Option<Quality>,
 }
 
 kept!(Sensing { noise, before_rad_s, even_s, told_n_m, age_s, bound_n_m });
@@ -44,7 +46,7 @@ impl OneJoint {
 
     /// One tick of the servo: the target at its beginning, the torque on the load at both ends.
     pub fn tick(&mut self, now: &Moment) -> Ticked {
-        let Commanded { command, held_back, not_corrected, .. } = self.lane.tick(&self.made, now);
+        let Commanded { command, held_back, not_corrected, quality, .. } = self.lane.tick(&self.made, now);
         let command_rad = command.to_rad();
         Ticked {
             command_rad,
@@ -52,6 +54,7 @@ impl OneJoint {
             saturated: self.lane.servo.saturated(),
             held_back,
             not_corrected,
+            quality,
         }
     }
 

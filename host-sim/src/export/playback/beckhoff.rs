@@ -160,6 +160,8 @@ impl Player for Nc {
 pub struct Cnc {
     travel: [f64; 2],
     points_a_turn: f64,
+    /// Most entries that were asked for.
+    asked: Option<u32>,
     /// Place of the first entry and distance of two, 0.0001 degrees.
     start: i64,
     interval: i64,
@@ -203,7 +205,7 @@ impl Cnc {
             curve
         });
         let turns = step / TAU * section.ratio().abs();
-        Ok(Cnc { travel, points_a_turn: 1.0 / turns, start, interval, curves })
+        Ok(Cnc { travel, points_a_turn: 1.0 / turns, asked: points, start, interval, curves })
     }
 }
 
@@ -262,6 +264,14 @@ impl Player for Cnc {
         let mut notes =
             vec!["add kopf.achs_nr and kopf.log_achs_name of the axis; switch on by lr_param.ssfk 1".to_owned()];
         notes.extend(more);
+        notes.extend(self.asked.filter(|asked| *asked as usize != entries).map(|asked| {
+            format!(
+                "--points {asked}: {entries} entries were written, {} units of 0.0001 deg apart; a list has one distance, a whole \
+                 number of units, and entries at that distance fill {}",
+                self.interval,
+                degrees(self.travel)
+            )
+        }));
         notes
     }
 }

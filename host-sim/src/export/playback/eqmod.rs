@@ -12,7 +12,7 @@ use flexspline::Direction;
 
 use super::hats::Hats;
 use super::track::{Track, wanted_in_time};
-use super::{FIT_POINTS, Origin, Player, Refusal, Section, Written};
+use super::{FIT_POINTS, Origin, Player, Refusal, Section, Written, mean, rms};
 use crate::units::ARCSEC_PER_RAD;
 
 /// `SID_RATE`, arcsec/s.
@@ -27,6 +27,13 @@ const MOST_RATE: f64 = 3.0;
 const PERIODS: std::ops::RangeInclusive<u32> = 30..=32_000;
 /// Where in its second the first tick of a playback lies.
 const FIRST_TICK_S: f64 = 0.5;
+
+/// Places in a worm turn at which another zero is tried.
+const ZEROS: u32 = 8;
+/// A zero that leaves less than this share is told: a guess of what is worth a new alignment.
+const CLEARLY_BETTER: f64 = 0.7;
+/// Every so many points of the fit judge a zero: prime, so that no order of the drive divides what is left.
+const JUDGE_EVERY: usize = 31;
 
 /// The mount as EQMOD knows it.
 #[derive(Debug, Clone, Copy)]
@@ -47,6 +54,8 @@ pub struct Eqmod {
     /// Error at each second, arcsec, and the motor position there.
     curve: Vec<(f64, u32)>,
     track: Track,
+    /// Another zero that does clearly better, and what both leave on the table's model, arcsec rms.
+    better: Option<(i64, [f64; 2])>,
 }
 
 impl Eqmod {
@@ -72,15 +81,28 @@ impl Eqmod {
         let corrections = hats.solve();
         // `Import` takes out the line from the first to the last value; a curve that ends as it began is left as it is.
         let slope = (corrections[period - 1] - corrections[0]) / (period - 1) as f64;
-        let motor = |k: usize| {
-            let steps = (SIDEREAL * k as f64 * mount.steps_a_turn / CIRCLE) as i64 + mount.motor_zero;
-            steps.rem_euclid(worm_steps as i64) as u32
-        };
         let value = |k: usize| ((-corrections[k] + slope * k as f64) * 1e4).round() / 1e4;
-        let curve: Vec<(f64, u32)> = (0..period).map(|k| (value(k), motor(k))).collect();
-        let playback = Playback::import(&curve, worm_steps, mount);
-        let track = Track::new(direction, playback.run(mount));
-        Ok(Eqmod { period, worm_steps: worm_steps as u32, curve, track })
+        // The counter starts anew once a worm turn, and where in the curve that falls is a matter of the zero.
+        let with_zero = |motor_zero: i64| {
+            let mount = Mount { motor_zero, ..mount };
+            let motor = |k: usize| {
+                let steps = (SIDEREAL * k as f64 * mount.steps_a_turn / CIRCLE) as i64 + motor_zero;
+                steps.rem_euclid(worm_steps as i64) as u32
+            };
+            let curve: Vec<(f64, u32)> = (0..period).map(|k| (value(k), motor(k))).collect();
+            let track = Track::new(direction, Playback::import(&curve, worm_steps, mount).run(mount));
+            let left: Vec<f64> = samples
+                .iter()
+                .step_by(JUDGE_EVERY)
+                .map(|sample| (sample.error_rad + track.at(sample.led_rad)) * ARCSEC_PER_RAD)
+                .collect();
+            (rms(&left, mean(left.iter().copied())), curve, track)
+        };
+        let (left, curve, track) = with_zero(mount.motor_zero);
+        let others = (0..ZEROS).map(|k| (worm_steps * f64::from(k) / f64::from(ZEROS)) as i64);
+        let best = others.map(|zero| (zero, with_zero(zero).0)).min_by(|one, other| one.1.total_cmp(&other.1));
+        let better = best.filter(|(_, best)| *best < CLEARLY_BETTER * left).map(|(zero, best)| (zero, [left, best]));
+        Ok(Eqmod { period, worm_steps: worm_steps as u32, curve, track, better })
     }
 }
 
@@ -211,12 +233,19 @@ impl Player for Eqmod {
     }
 
     fn notes(&self) -> Vec<String> {
-        vec![
+        let mut notes = vec![
             format!("EQMOD's own worm has to be {} steps; PEC gain 1, threshold 0, phase 0", self.worm_steps),
             format!(
                 "a rate that is {:.3} arcsec an output turn off is left to guiding; the mount's own divider makes one too",
                 self.track.drift_arcsec()
             ),
-        ]
+        ];
+        notes.extend(self.better.map(|(zero, [left, best])| {
+            format!(
+                "this --motor-zero has the counter of a worm turn start anew where EQMOD loses its place, and leaves {left:.2} arcsec rms \
+                 on the table's own model; --motor-zero {zero} would leave {best:.2}: set the mount's counter so"
+            )
+        }));
+        notes
     }
 }

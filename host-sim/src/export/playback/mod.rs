@@ -19,6 +19,7 @@ mod ros2;
 mod section;
 mod track;
 
+use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use flexspline::{Direction, Table};
@@ -47,6 +48,10 @@ const JUDGE_POINTS: u32 = 32_749;
 const JUDGE_LOADS: usize = 5;
 /// A file that leaves more than this share of the error is refused: a guess of what is not worth the risk of a wrong one.
 pub const POINTLESS: f64 = 0.7;
+/// Fewer rows of a unit's data than this are not judged by: some to each half wave of order 2 over a few generator turns, a guess.
+pub const FEWEST_ROWS: usize = 32;
+/// Loads of the data that lie further from the section's than this share of the table's range are told: a guess.
+const NEAR_LOAD: f64 = 0.1;
 /// Rounds in which a corrected command is met: a correction changes by less than its place does, so each is a digit or more.
 const MEET_ROUNDS: usize = 60;
 
@@ -73,6 +78,23 @@ pub struct Written {
 impl Written {
     fn text(name: &str, text: String) -> Written {
         Written { name: name.to_owned(), bytes: text.into_bytes() }
+    }
+
+    /// Whether what stands in its place was written by this program, as far as can be told: it has the mark that this file has,
+    /// or, where the format takes no comment, no line of another kind.
+    pub fn replaces(&self, old: &[u8]) -> bool {
+        let has = |bytes: &[u8], mark: &str| bytes.windows(mark.len()).any(|window| window == mark.as_bytes());
+        if let Some(mark) = ["table_id", "flexspline ", "FLEXSPLINE"].into_iter().find(|mark| has(&self.bytes, mark)) {
+            return has(old, mark);
+        }
+        let kinds = |bytes: &[u8]| -> BTreeSet<String> {
+            let kind = |line: &str| {
+                let key = line.rsplit_once(' ').map_or(line, |(key, _)| key);
+                key.chars().filter(|letter| !letter.is_ascii_digit() && *letter != '-').collect()
+            };
+            String::from_utf8_lossy(bytes).lines().map(kind).collect()
+        };
+        kinds(old).is_subset(&kinds(&self.bytes))
     }
 }
 
@@ -173,7 +195,7 @@ fn rms(values: &[f64], zero: f64) -> f64 {
 pub struct LoadFigures {
     /// Load, N·m.
     pub torque_n_m: f64,
-    /// Error without playback, arcsec, about its mean at the nominal load.
+    /// Error without playback, arcsec, about its mean at the nominal load: a shift from load to load counts.
     pub rms_uncorrected_arcsec: f64,
     /// With it, likewise.
     pub rms_played_arcsec: f64,
@@ -186,6 +208,9 @@ pub struct ModelFigures {
     pub torque_n_m: f64,
     /// Temperature, °C.
     pub temperature_c: f64,
+    /// Mean error at the nominal load, arcsec, left out of all figures and of what a controller's own lookup is given: a constant
+    /// shift, which homing holds.
+    pub mean_left_out_arcsec: f64,
     /// Error without playback at the nominal load, arcsec, about its mean.
     pub rms_uncorrected_arcsec: f64,
     /// With it.
@@ -203,12 +228,23 @@ pub struct ModelFigures {
 pub struct DataFigures {
     /// Rows in which the device plays.
     pub rows: usize,
+    /// Of them, those at which load or temperature lie beyond the table: the core takes the value at its edge.
+    pub rows_extrapolated: usize,
+    /// Least, mean and largest load of these rows, N·m.
+    pub loads_n_m: [f64; 3],
+    /// Those whose load is further from the section's than a tenth of the table's range.
+    pub rows_off_load: usize,
+    /// Mean of the measured error, arcsec, left out of the figures.
+    pub mean_left_out_arcsec: f64,
     /// Measured error, arcsec, about its mean.
     pub rms_uncorrected_arcsec: f64,
     /// Left by the device.
     pub rms_played_arcsec: f64,
     /// Left by the core with the same table.
     pub rms_core_arcsec: f64,
+    /// Left by the core if the measured error had the other sign.
+    #[serde(skip)]
+    rms_core_turned_arcsec: f64,
 }
 
 /// Error left at these points, arcsec: without a player nothing is added.
@@ -247,6 +283,7 @@ pub fn on_model(table: &Table<'_>, torque_n_m: f64, temperature_c: f64, player: 
     ModelFigures {
         torque_n_m,
         temperature_c,
+        mean_left_out_arcsec: zeros[0],
         rms_uncorrected_arcsec: uncorrected,
         rms_played_arcsec: played,
         max_played_arcsec: nominal[1].iter().fold(0.0, |most, value| f64::max(most, (value - zeros[1]).abs())),
@@ -273,6 +310,7 @@ pub fn core_on_model(table: &Table<'_>, torque_n_m: f64, temperature_c: f64) -> 
     ModelFigures {
         torque_n_m,
         temperature_c,
+        mean_left_out_arcsec: zero,
         rms_uncorrected_arcsec,
         rms_played_arcsec: bound,
         max_played_arcsec: bound,
@@ -281,15 +319,19 @@ pub fn core_on_model(table: &Table<'_>, torque_n_m: f64, temperature_c: f64) -> 
     }
 }
 
-/// What a player leaves on measured rows, beside what the core left of them; without a player the core plays.
+/// What a player leaves on measured rows, beside what the core left of them; without a player the core plays. `torque_n_m` is the
+/// load of the section.
 pub fn on_data(
     table: &Table<'_>,
+    torque_n_m: f64,
     rows: &[MeasuredRow],
     replayed: &[ReplayedRow],
     player: Option<&dyn Player>,
 ) -> Result<DataFigures, Refusal> {
     let ratio = table.drive().exact_ratio();
-    let mut kept: [Vec<f64>; 3] = Default::default();
+    let mut kept: [Vec<f64>; 4] = Default::default();
+    let mut loads_n_m = Vec::new();
+    let mut rows_extrapolated = 0;
     for (k, direction) in directions_of(rows, ratio).into_iter().enumerate() {
         let row = &rows[k];
         let led_rad = row.generator_rad / ratio;
@@ -303,6 +345,9 @@ pub fn on_data(
             kept[0].push(row.error_arcsec);
             kept[1].push(added.map_or(core, |added| row.error_arcsec + added));
             kept[2].push(core);
+            kept[3].push(row.error_arcsec + replayed[k].predicted_arcsec);
+            loads_n_m.push(row.torque_n_m);
+            rows_extrapolated += usize::from(replayed[k].quality == "extrapolated");
         }
     }
     if kept[0].is_empty() {
@@ -310,9 +355,87 @@ pub fn on_data(
             "no row of the data lies where this device plays: look at the travel and the direction".to_owned(),
         ));
     }
-    let [rms_uncorrected_arcsec, rms_played_arcsec, rms_core_arcsec] =
-        kept.each_ref().map(|values| rms(values, mean(values.iter().copied())));
-    Ok(DataFigures { rows: kept[0].len(), rms_uncorrected_arcsec, rms_played_arcsec, rms_core_arcsec })
+    let means = kept.each_ref().map(|values| mean(values.iter().copied()));
+    let [rms_uncorrected_arcsec, rms_played_arcsec, rms_core_arcsec, rms_core_turned_arcsec] =
+        std::array::from_fn(|k| rms(&kept[k], means[k]));
+    let near_n_m = near_load_n_m(table);
+    Ok(DataFigures {
+        rows: kept[0].len(),
+        rows_extrapolated,
+        loads_n_m: [
+            loads_n_m.iter().copied().fold(f64::INFINITY, f64::min),
+            mean(loads_n_m.iter().copied()),
+            loads_n_m.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        ],
+        rows_off_load: loads_n_m.iter().filter(|load| (**load - torque_n_m).abs() > near_n_m).count(),
+        mean_left_out_arcsec: means[0],
+        rms_uncorrected_arcsec,
+        rms_played_arcsec,
+        rms_core_arcsec,
+        rms_core_turned_arcsec,
+    })
+}
+
+/// How far a load may be from the section's before it is told, N·m; a table of one load holds for that alone, to a single
+/// precision's rounding.
+fn near_load_n_m(table: &Table<'_>) -> f64 {
+    let [least, most] = table.torque_range_n_m().map(f64::from);
+    (NEAR_LOAD * (most - least)).max(1e-6 * most.abs())
+}
+
+impl DataFigures {
+    /// What a reader of the figures has to know of the data: loads beside the section, rows beyond the table.
+    pub fn notes(&self, table: &Table<'_>, torque_n_m: f64) -> Vec<String> {
+        let [least, mean, most] = self.loads_n_m;
+        let off = (self.rows_off_load > 0).then(|| {
+            format!(
+                "{} of {} rows of the data have a load more than {:.3} N.m from the {torque_n_m} N.m that the file is made for (loads of \
+                 the data: {least} to {most} N.m, mean {mean:.3}); a playback does not know the load",
+                self.rows_off_load,
+                self.rows,
+                near_load_n_m(table)
+            )
+        });
+        let beyond = (self.rows_extrapolated > 0).then(|| {
+            let [low, high] = table.torque_range_n_m();
+            let [cold, warm] = table.temperature_range_c();
+            format!(
+                "{} of {} rows of the data are extrapolated by the core: the table holds from {low} to {high} N.m and from {cold} to \
+                 {warm} degrees C",
+                self.rows_extrapolated, self.rows
+            )
+        });
+        off.into_iter().chain(beyond).collect()
+    }
+
+    /// Refuses a file that would not help this unit, and says whether the table is that of the data at all.
+    pub fn worth_it(&self) -> Result<(), Refusal> {
+        let (all, played, core) = (self.rms_uncorrected_arcsec, self.rms_played_arcsec, self.rms_core_arcsec);
+        if played <= POINTLESS * all {
+            return Ok(());
+        }
+        let turned = self.rms_core_turned_arcsec;
+        let why = if core <= POINTLESS * all {
+            format!(
+                "the core leaves {core:.2} with the same table, so the data belong to it, and hold what this playback does not know: \
+                 other loads, or play"
+            )
+        } else if turned <= POINTLESS * all {
+            format!(
+                "the core leaves {core:.2} too, but {turned:.2} if the error had the other sign: turn that of the error in --columns \
+                 (error=NAME:-arcsec)"
+            )
+        } else {
+            format!(
+                "the core leaves {core:.2} too, so the data do not belong to this table: another unit, another zero or sign of the \
+                 generator or the output, another ratio"
+            )
+        };
+        Err(Refusal::Pointless(format!(
+            "the unit's data: of {all:.2} arcsec rms this playback leaves {played:.2}, more than {:.0} %. {why}",
+            100.0 * POINTLESS
+        )))
+    }
 }
 
 /// Direction of the output at each row: that of the step to it; where it stands, the one before; at the start, the first there is.
