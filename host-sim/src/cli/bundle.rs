@@ -9,7 +9,7 @@ use clap::{Args, ValueHint};
 use serde::Serialize;
 
 use super::Failure;
-use super::context::Context;
+use super::context::{Context, image_file};
 use crate::bundle::libraries::{Library, LibraryError, Places, TARGETS};
 use crate::bundle::{Bundle, MANIFEST, Manifest, Table, TableEntry, tar_gz};
 use crate::output::{Outputs, WholeFolder, prepare_folder};
@@ -112,7 +112,7 @@ impl BundleCommand {
             paths.sort();
         }
         let table = |path: PathBuf| {
-            let image = fs::read(&path).map_err(|error| unreadable(&path, error))?;
+            let image = image_file(&path)?;
             let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             Table::new(&path.display().to_string(), &stem, image).map_err(bad_input)
         };

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum, ValueHint};
 use serde::Serialize;
 
+use super::context::image_file;
 use super::{Context, Failure, fly};
 use crate::export::fmu::{Fmu, compensation, find_libraries, joint};
 use crate::output::write_whole;
@@ -95,9 +96,7 @@ impl FmuOptions {
     }
 
     fn fmu(&self, tables: Option<&Path>) -> Result<Fmu, Failure> {
-        let image = tables
-            .map(|file| std::fs::read(file).map_err(|error| Failure::BadInput(format!("{}: {error}", file.display()))));
-        let image = image.transpose()?;
+        let image = tables.map(image_file).transpose()?;
         let of_table = |error: String| {
             let file = tables.map_or("scenario".to_owned(), |file| file.display().to_string());
             Failure::BadInput(format!("{file}: {error}"))

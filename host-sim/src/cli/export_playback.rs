@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum, ValueHint};
 use flexspline::{Direction, Table};
 use serde::Serialize;
 
-use super::context::Context;
+use super::context::{Context, image_file};
 use super::logs::LogOptions;
 use super::replay::measured;
 use super::{Failure, say};
@@ -257,8 +257,7 @@ impl PlaybackOptions {
         let tables = tables.ok_or_else(|| {
             Failure::BadInput(format!("--tables: needed by --format {}; allowed: a .fxt image", format.name()))
         })?;
-        let image =
-            std::fs::read(tables).map_err(|error| Failure::BadInput(format!("{}: {error}", tables.display())))?;
+        let image = image_file(tables)?;
         let table =
             Table::check(&image).map_err(|error| Failure::BadInput(format!("{}: {error}", tables.display())))?;
         let [torque_n_m, temperature_c] = section_of(&table, load)?;
