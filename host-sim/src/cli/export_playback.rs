@@ -280,7 +280,7 @@ impl PlaybackOptions {
         let out = context.out()?;
         let mut outputs = Outputs::new();
         let mut written = Vec::new();
-        self.refuse_foreign(&out, &made.files)?;
+        self.refuse_foreign(out, &made.files)?;
         for file in &made.files {
             let path = out.join(&file.name);
             outputs.file(&path, |to| to.write_all(&file.bytes))?;
