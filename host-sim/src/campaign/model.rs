@@ -24,7 +24,7 @@ use crate::kernels::{EccentricField, Gain, Kernels, PlaceOfLoad};
 use crate::tables::places_that_tell_apart;
 
 /// The figures of a drive by kernels, as columns of a shard have them.
-pub const FIGURES: [&str; 20] = [
+pub const FIGURES: [&str; 21] = [
     "error_pp_arcsec",
     "error_rms_arcsec",
     "flexspline_order_2_arcsec",
@@ -45,7 +45,10 @@ pub const FIGURES: [&str; 20] = [
     "axes_apart_um",
     "places_pp_arcsec",
     "places_rms_arcsec",
+    CLOSED,
 ];
+/// Share of the places, %, where no play is left between the flanks: lost motion there is that of the elastic wind-up alone.
+pub const CLOSED: &str = "play_closed_percent";
 /// Figures of a data sheet that follow what is alike everywhere.
 pub const SHEET: [&str; 6] =
     ["backlash_arcsec", "k1_n_m_per_rad", "k2_n_m_per_rad", "k3_n_m_per_rad", "wind_up_arcsec", "max_von_mises_mpa"];
@@ -242,6 +245,8 @@ pub struct Model {
     ovals: Vec<Gain>,
     apart: Vec<(f64, EccentricField)>,
     loads: [PlaceOfLoad; 2],
+    /// The light load, N·m.
+    light_n_m: f64,
     places: Vec<Place>,
     fem_places: Vec<Place>,
     /// Cosine and sine of a turn in as many steps as there are places.
@@ -282,6 +287,7 @@ impl Model {
             ovals: signed.iter().map(|torque| kernels.ovality(*torque)).collect(),
             apart: kernels.eccentric.sizes_um.iter().map(|size| (*size, kernels.eccentric_field(*size))).collect(),
             loads: torques_n_m.map(|torque| kernels.place_of_load(torque)),
+            light_n_m: torques_n_m[1],
             places: even(count),
             fem_places: even(fem_places),
             circle: (0..count)
@@ -412,7 +418,11 @@ impl Model {
         let curves = self.curves(drawn);
         let errors: Vec<[f64; 4]> = self.places.iter().map(|place| self.errors(&curves, place)).collect();
         let loaded: Vec<f64> = errors.iter().map(|e| e[0]).collect();
-        let lost: Vec<f64> = errors.iter().map(|e| e[2] - e[3]).collect();
+        let state = self.state(drawn);
+        let wind_up = least_wind_up(&state, self.light_n_m);
+        let by_kernels = errors.iter().map(|e| e[2] - e[3]);
+        let closed = by_kernels.clone().filter(|lost| *lost < wind_up).count();
+        let lost: Vec<f64> = by_kernels.map(|lost| lost.max(wind_up)).collect();
         let (pp, rms) = spread(&loaded);
         let order = |waves: f64| self.amplitude(&loaded, waves);
         let most = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -434,8 +444,8 @@ impl Model {
         let (r, c) = (self.ratio, self.ratio - 1.0);
         let mut all = vec![pp, rms, order(2.0 * r), order(2.0 * c), order(4.0 * r), order(4.0 * c)];
         all.extend([lost.iter().sum::<f64>() / lost.len() as f64, most(&lost), no, nominal, unit]);
-        all.extend_from_slice(&self.state(drawn)[2 * WAVE..]);
-        all.extend([apart, places_pp, places_rms]);
+        all.extend_from_slice(&state[2 * WAVE..]);
+        all.extend([apart, places_pp, places_rms, 100.0 * closed as f64 / lost.len() as f64]);
         all
     }
 
@@ -486,6 +496,17 @@ impl Model {
         [no, nominal, rest.sqrt()]
     }
 }
+
+/// Lost motion where there is no play, arcsec: what a drive as stiff as the stiffest of K1, K2 and K3 winds up between the light loads.
+///
+/// Kernels add what each deviation takes of the play. Once it is used up flanks bear on both sides, and nothing is left to be taken.
+fn least_wind_up(state: &[f64], light_n_m: f64) -> f64 {
+    let sheet = SHEET.iter().zip(&state[2 * WAVE..]);
+    let stiffest = sheet.filter(|(name, _)| name.starts_with('k')).map(|(_, k)| *k).fold(0.0, f64::max);
+    if stiffest > 0.0 { 2.0 * light_n_m / stiffest * ARCSEC_PER_RAD } else { 0.0 }
+}
+
+const ARCSEC_PER_RAD: f64 = 648_000.0 / std::f64::consts::PI;
 
 /// Peak to peak, and root mean square about the mean.
 pub(super) fn spread(values: &[f64]) -> (f64, f64) {

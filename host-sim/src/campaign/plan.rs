@@ -77,6 +77,8 @@ pub struct Plan {
     pub mesh: String,
     /// What the FEM says of the drive as drawn, with each generator.
     pub generators: Vec<OfOne>,
+    /// BLAKE3 of the text with nothing here: kernels belong to the drive, loads and tolerances beside them.
+    pub blake3: String,
 }
 
 /// One generator of a plan.
@@ -119,7 +121,6 @@ pub fn plan(of: &Tolerances, settings: PlanSettings, progress: &PlanProgress<'_>
             return Err(PlanError::BadInput(format!("{option}: found {found}, allowed: {least} to {most}")));
         }
     }
-    every_limit_makes_a_drive(of)?;
     let middle = Drawn::middle(&of.list);
     let drawn_as = with_alike(of, &middle)?;
     let rated = of.generators.iter().map(|kind| of.drive.rated_torque_n_m(*kind)).fold(f64::INFINITY, f64::min);
@@ -143,7 +144,7 @@ pub fn plan(of: &Tolerances, settings: PlanSettings, progress: &PlanProgress<'_>
         before += 1 + 2 * alike;
         generators.push(OfOne { kernels, response });
     }
-    Ok(Plan {
+    let mut plan = Plan {
         schema_version: SCHEMA,
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
         drive_toml: of.drive.to_toml(),
@@ -157,7 +158,10 @@ pub fn plan(of: &Tolerances, settings: PlanSettings, progress: &PlanProgress<'_>
         fem_places: settings.fem_places,
         mesh: settings.mesh.to_string(),
         generators,
-    })
+        blake3: String::new(),
+    };
+    plan.seal();
+    Ok(plan)
 }
 
 /// The drive with the values of what is alike everywhere, and nothing else.
@@ -169,28 +173,6 @@ fn with_alike(of: &Tolerances, drawn: &Drawn) -> Result<Drive, PlanError> {
     let mut drive = alone.drive(&of.drive, &of.list).map_err(|error| PlanError::BadInput(error.to_string()))?;
     drive.as_built = drive.as_built.uniform_part();
     Ok(drive)
-}
-
-/// Each tolerance at either of its limits, the others in their middle.
-fn every_limit_makes_a_drive(of: &Tolerances) -> Result<(), PlanError> {
-    let teeth = [of.drive.flexspline.teeth, of.drive.circular_spline.teeth];
-    for (t, tolerance) in of.list.iter().enumerate() {
-        for limit in tolerance.distribution.limits {
-            let mut drawn = Drawn::middle(&of.list);
-            drawn.values[t] = limit;
-            if let Acts::Teeth { wheel, .. } = tolerance.acts {
-                drawn.teeth_um[t] =
-                    vec![limit; teeth[usize::from(wheel == crate::drive::Wheel::CircularSpline)] as usize];
-            }
-            drawn.drive(&of.drive, &of.list).map_err(|error| {
-                PlanError::BadInput(format!(
-                    "tolerance {:?} at its limit {limit} makes no drive: {error}",
-                    tolerance.name
-                ))
-            })?;
-        }
-    }
-    Ok(())
 }
 
 /// Kernels at the loads of the campaign, and displacements as far as its tolerances go.
@@ -279,6 +261,12 @@ impl Plan {
         text
     }
 
+    /// Notes the checksum of the plan in it.
+    pub(super) fn seal(&mut self) {
+        self.blake3.clear();
+        self.blake3 = blake3::hash(self.text().as_bytes()).to_hex().to_string();
+    }
+
     /// Reads the plan of a folder, and its hash.
     ///
     /// # Errors
@@ -295,6 +283,11 @@ impl Plan {
                 plan.tool_version,
                 env!("CARGO_PKG_VERSION")
             )));
+        }
+        let unsealed = text.replacen(&format!("\"blake3\":\"{}\"", plan.blake3), "\"blake3\":\"\"", 1);
+        if blake3::hash(unsealed.as_bytes()).to_hex().as_str() != plan.blake3 {
+            let what = "changed after it was planned, so that its kernels may be those of another drive; plan anew";
+            return Err(told(what.to_owned()));
         }
         for one in &plan.generators {
             one.kernels.check().map_err(told)?;

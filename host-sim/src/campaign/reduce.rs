@@ -7,7 +7,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::draw::{Draw, drawn};
-use super::model::{FIGURES, Model};
+use super::model::{CLOSED, FIGURES, Model};
 use super::plan::Plan;
 use super::shard::{Shard, ShardState, column_names, look, path, strangers};
 use super::statistics::{Exceeded, Interval, Quantile, correlation, exceeded, mean, of_replicates, quantile, std_dev};
@@ -24,7 +24,7 @@ pub const SHARED: [&str; 3] = ["error_pp_arcsec", "lost_motion_arcsec", "unit_ta
 /// Points of each replicate of the shares: a power of two, at least and at most, and no more than an eighth of the drives.
 const SHARE_POINTS: [u32; 2] = [16, 256];
 /// Drives, at most, that a tolerance is halved for.
-const HALVED_DRIVES: u32 = 2048;
+const HALVED_DRIVES: usize = 2048;
 /// Blocks of these, for intervals.
 const BLOCKS: usize = 8;
 /// The quantile that tightening is judged by.
@@ -32,7 +32,7 @@ pub const JUDGED: f64 = 0.95;
 /// Below this correlation of drives above a limit, by kernels and by FEM, and with fewer of either than that, a probability is not corrected.
 const LEAST_CORRELATION: f64 = 0.5;
 const LEAST_ABOVE: usize = 10;
-/// Fewest drives by FEM that are compared.
+/// Fewest drives by FEM that have a correlation, means and probabilities.
 const LEAST_FEM: usize = 8;
 
 /// A campaign, reduced.
@@ -61,7 +61,7 @@ pub struct OfGenerator {
     pub exceeded: Vec<Exceeded>,
     /// Shares of the variance, of [`SHARED`].
     pub shares: Vec<FigureShares>,
-    /// What halving each tolerance buys, most first.
+    /// What halving each tolerance buys for each of [`SHARED`], one after the other, most first.
     pub tighten: Vec<Tightened>,
     /// Kernels beside FEM.
     pub fem: Option<FemComparison>,
@@ -69,6 +69,8 @@ pub struct OfGenerator {
     pub fem_failed: usize,
     /// Drives whose axes stand further apart than any that the kernels know.
     pub beyond_kernels: usize,
+    /// Drives that have no play left at some place: lost motion there is the wind-up alone.
+    pub play_closed: usize,
     /// The worst drives.
     pub worst: Vec<WorstDrive>,
     /// Errors of the drives, peak to peak, sorted, arcsec.
@@ -104,15 +106,19 @@ pub struct FigureShares {
 /// What a tolerance buys that is halved.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Tightened {
+    /// The figure.
+    pub figure: &'static str,
     /// The tolerance.
     pub tolerance: String,
-    /// Error, peak to peak, that 95 % of the drives stay below, before, arcsec.
+    /// Drives that this was found with: the first of those that are in.
+    pub drives: usize,
+    /// What 95 % of these drives stay below in this figure, before, arcsec.
     pub before_arcsec: f64,
     /// And with the tolerance halved, the draws the same.
     pub after_arcsec: f64,
     /// What is gained, arcsec.
     pub gain_arcsec: Interval,
-    /// Share of the drives above each limit of the plan, before and after.
+    /// Share of the drives whose error is above each limit of the plan, before and after; nothing of other figures.
     pub above: Vec<[f64; 3]>,
 }
 
@@ -121,9 +127,13 @@ pub struct Tightened {
 pub struct FemComparison {
     /// Drives.
     pub drives: usize,
-    /// By figure.
+    /// Drives that correlation, means and probabilities take.
+    pub drives_needed: usize,
+    /// Largest difference of the error, peak to peak, by kernels and by FEM, arcsec.
+    pub largest_difference_arcsec: f64,
+    /// By figure; nothing of too few drives.
     pub figures: Vec<Controlled>,
-    /// Probabilities of an error above a limit.
+    /// Probabilities of an error above a limit; nothing of too few drives.
     pub tails: Vec<Tail>,
 }
 
@@ -270,8 +280,7 @@ fn of_generator(
     let rows = rows_of(shards, g);
     let names = column_names(plan);
     let column = |name: &str| -> Vec<f64> {
-        // Figures stand last, so that a tolerance may have the name of one.
-        let at = names.iter().rposition(|known| known == name).unwrap_or(0);
+        let at = names.iter().position(|known| known == name).unwrap_or(0);
         rows.iter().map(|(_, row)| row[at]).collect()
     };
     let spread = |figure: &'static str| {
@@ -308,60 +317,82 @@ fn of_generator(
         figures: FIGURES.iter().map(|figure| spread(figure)).collect(),
         exceeded: plan.exceed_arcsec.iter().map(|limit| exceeded(&errors, *limit)).collect(),
         shares: SHARED.iter().zip(all_shares).map(|(figure, shares)| FigureShares { figure, shares }).collect(),
-        tighten: tighten(plan, hash, model),
+        tighten: tighten(plan, hash, model, &rows),
         fem: comparison(&compared, &plan.exceed_arcsec),
         fem_failed: failed,
         beyond_kernels: apart.iter().filter(|size| **size > known).count(),
+        play_closed: column(CLOSED).iter().filter(|share| **share > 0.0).count(),
         worst: worst(plan, hash, drawn_as, &rows, &errors),
         errors: sorted,
         pairs,
     }
 }
 
-/// Each tolerance halved, on the same draws.
-fn tighten(plan: &Plan, hash: &[u8; 32], model: &Model) -> Vec<Tightened> {
+/// Each tolerance halved, on the same draws of the first drives that are in.
+fn tighten(plan: &Plan, hash: &[u8; 32], model: &Model, rows: &[Row]) -> Vec<Tightened> {
     let draw = Draw::of_plan(hash);
-    let count = plan.drives.min(HALVED_DRIVES);
-    let errors = |tolerances: &[Tolerance]| -> Vec<f64> {
-        (0..count)
-            .into_par_iter()
-            .map(|i| model.figures(&drawn(tolerances, plan.teeth(), &draw.point(tolerances.len(), i)))[0])
-            .collect()
+    let in_it: Vec<u32> = rows.iter().take(HALVED_DRIVES).map(|(drive, _)| *drive).collect();
+    let columns = SHARED.map(|name| FIGURES.iter().position(|known| *known == name).unwrap_or(0));
+    // By figure of `SHARED`, by drive.
+    let figures = |tolerances: &[Tolerance]| -> Vec<Vec<f64>> {
+        let all: Vec<Vec<f64>> = in_it
+            .par_iter()
+            .map(|i| model.figures(&drawn(tolerances, plan.teeth(), &draw.point(tolerances.len(), *i))))
+            .collect();
+        columns.iter().map(|column| all.iter().map(|of| of[*column]).collect()).collect()
     };
-    let before = errors(&plan.tolerances);
-    let mut all: Vec<Tightened> = (0..plan.tolerances.len())
+    let before = figures(&plan.tolerances);
+    let after: Vec<Vec<Vec<f64>>> = (0..plan.tolerances.len())
         .map(|t| {
             let mut halved = plan.tolerances.clone();
             halved[t].distribution = halved[t].distribution.halved();
-            let after = errors(&halved);
-            let gains: Vec<f64> = (0..BLOCKS).map(|b| judged(&before, b) - judged(&after, b)).collect();
-            let [was, is] = [&before, &after].map(|all| {
-                let mut sorted = all.clone();
-                sorted.sort_by(f64::total_cmp);
-                quantile(&sorted, JUDGED).of.value
-            });
-            let share = |of: &[f64], limit: f64| exceeded(of, limit).of.value;
-            let mut gain_arcsec = of_replicates(&gains);
-            let shift = was - is - gain_arcsec.value;
-            gain_arcsec = Interval { value: was - is, low: gain_arcsec.low + shift, high: gain_arcsec.high + shift };
-            Tightened {
-                tolerance: plan.tolerances[t].name.clone(),
-                before_arcsec: was,
-                after_arcsec: is,
-                gain_arcsec,
-                above: plan.exceed_arcsec.iter().map(|x| [*x, share(&before, *x), share(&after, *x)]).collect(),
-            }
+            figures(&halved)
         })
         .collect();
-    all.sort_by(|a, b| b.gain_arcsec.value.total_cmp(&a.gain_arcsec.value));
-    all
+    let of_figure = |(f, figure): (usize, &&'static str)| {
+        let mut ranked: Vec<Tightened> = plan
+            .tolerances
+            .iter()
+            .zip(&after)
+            .map(|(tolerance, after)| tightened(figure, &tolerance.name, [&before[f], &after[f]], &plan.exceed_arcsec))
+            .collect();
+        ranked.sort_by(|a, b| b.gain_arcsec.value.total_cmp(&a.gain_arcsec.value));
+        ranked
+    };
+    SHARED.iter().enumerate().flat_map(of_figure).collect()
+}
+
+/// A figure of the same drives before and after.
+fn tightened(figure: &'static str, tolerance: &str, [before, after]: [&Vec<f64>; 2], limits: &[f64]) -> Tightened {
+    let [was, is] = [before, after].map(|all| {
+        let mut sorted = all.clone();
+        sorted.sort_by(f64::total_cmp);
+        quantile(&sorted, JUDGED).value
+    });
+    let blocks = BLOCKS.min(before.len());
+    let gains: Vec<f64> = (0..blocks).map(|b| judged(before, b) - judged(after, b)).collect();
+    let mut gain_arcsec = of_replicates(&gains);
+    let shift = was - is - gain_arcsec.value;
+    gain_arcsec = Interval { value: was - is, low: gain_arcsec.low + shift, high: gain_arcsec.high + shift };
+    // Limits are those of the error.
+    let limits = if figure == FIGURES[0] { limits } else { &[] };
+    let share = |of: &[f64], limit: f64| exceeded(of, limit).of.value;
+    Tightened {
+        figure,
+        tolerance: tolerance.to_owned(),
+        drives: before.len(),
+        before_arcsec: was,
+        after_arcsec: is,
+        gain_arcsec,
+        above: limits.iter().map(|x| [*x, share(before, *x), share(after, *x)]).collect(),
+    }
 }
 
 /// The quantile of one block of every [`BLOCKS`]-th drive.
 fn judged(errors: &[f64], block: usize) -> f64 {
     let mut mine: Vec<f64> = errors.iter().copied().skip(block).step_by(BLOCKS).collect();
     mine.sort_by(f64::total_cmp);
-    quantile(&mine, JUDGED).of.value
+    quantile(&mine, JUDGED).value
 }
 
 /// Kernels and FEM on the same drives; `of` are figures by kernels of all drives and by FEM of some.
@@ -371,8 +402,21 @@ pub(super) fn comparison(of: &[(&'static str, &Vec<f64>, &Vec<f64>)], limits: &[
     };
     let (_, kernels, fem) = of.first()?;
     let (some, by_fem) = pairs(kernels, fem);
-    if by_fem.len() < LEAST_FEM {
+    if by_fem.is_empty() {
         return None;
+    }
+    let largest_difference_arcsec = some.iter().zip(&by_fem).map(|(k, f)| (k - f).abs()).fold(0.0, f64::max);
+    let told = |figures, tails| {
+        Some(FemComparison {
+            drives: by_fem.len(),
+            drives_needed: LEAST_FEM,
+            largest_difference_arcsec,
+            figures,
+            tails,
+        })
+    };
+    if by_fem.len() < LEAST_FEM {
+        return told(Vec::new(), Vec::new());
     }
     let figures = of
         .iter()
@@ -392,9 +436,9 @@ pub(super) fn comparison(of: &[(&'static str, &Vec<f64>, &Vec<f64>)], limits: &[
     let mut limits = limits.to_vec();
     let mut sorted = by_fem.clone();
     sorted.sort_by(f64::total_cmp);
-    limits.push(quantile(&sorted, 0.5).of.value);
+    limits.push(quantile(&sorted, 0.5).value);
     let tails = limits.iter().map(|limit| tail(*limit, kernels, &some, &by_fem)).collect();
-    Some(FemComparison { drives: by_fem.len(), figures, tails })
+    told(figures, tails)
 }
 
 /// Half of a 95 % interval of a mean.

@@ -94,10 +94,13 @@ pub fn path(folder: &Path, shard: u32) -> PathBuf {
     folder.join("shards").join(format!("{shard:04}.parquet"))
 }
 
+/// The first two columns.
+pub const OWN_COLUMNS: [&str; 2] = ["drive", "generator"];
+
 /// Names of all columns but the first two.
 pub fn column_names(plan: &Plan) -> Vec<String> {
     let values = plan.tolerances.iter().map(|t| t.name.clone());
-    let phases = plan.tolerances.iter().filter(|t| t.acts.has_phase()).map(|t| format!("{}, phase_deg", t.name));
+    let phases = plan.tolerances.iter().filter_map(|t| t.phase_column());
     let figures = FIGURES.iter().chain(&FEM_FIGURES).map(|name| (*name).to_owned());
     values.chain(phases).chain(figures).collect()
 }
@@ -196,7 +199,7 @@ fn encode(plan: &Plan, hash: &[u8; 32], shard: u32, rows: &Shard) -> Result<Vec<
     let field = |name: &str, physical| {
         Type::primitive_type_builder(name, physical).with_repetition(Repetition::REQUIRED).build().map(Arc::new)
     };
-    let mut fields = vec![field("drive", PhysicalType::INT32)?, field("generator", PhysicalType::INT32)?];
+    let mut fields = vec![field(OWN_COLUMNS[0], PhysicalType::INT32)?, field(OWN_COLUMNS[1], PhysicalType::INT32)?];
     for name in column_names(plan) {
         fields.push(field(&name, PhysicalType::DOUBLE)?);
     }

@@ -23,9 +23,14 @@ pub struct Interval {
 pub struct Quantile {
     /// Share of the drives below.
     pub share: f64,
-    /// The value; its interval by order statistics.
-    #[serde(flatten)]
-    pub of: Interval,
+    /// The value.
+    pub value: f64,
+    /// Lower end of its interval by order statistics; nothing where the sample is too small to have one.
+    pub low: Option<f64>,
+    /// Upper end.
+    pub high: Option<f64>,
+    /// Drives that have both ends.
+    pub drives_for_both_ends: usize,
 }
 
 /// How often a figure is above a limit.
@@ -141,10 +146,9 @@ pub fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
 /// probability [`CONFIDENCE`]. Points of a scrambled net scatter less than independent ones, so that it then holds more often.
 pub fn quantile(sorted: &[f64], share: f64) -> Quantile {
     let n = sorted.len();
-    let at = |rank: usize| sorted[rank.clamp(1, n) - 1];
     let rank = (share * n as f64).ceil() as usize;
     // P(B <= k) by the recurrence of the binomial terms, from the logarithm of the first.
-    let (mut low, mut high) = (0, n);
+    let (mut low, mut high) = (0, n + 1);
     let tail = 0.5 * (1.0 - CONFIDENCE);
     let (ln_p, ln_q) = (libm::log(share), libm::log1p(-share));
     let mut ln_term = n as f64 * ln_q;
@@ -160,7 +164,10 @@ pub fn quantile(sorted: &[f64], share: f64) -> Quantile {
         }
         ln_term += libm::log((n - k) as f64 / (k + 1) as f64) + ln_p - ln_q;
     }
-    Quantile { share, of: Interval { value: at(rank), low: at(low), high: at(high) } }
+    // Rank 0 and rank n + 1 are no drive's: the end is where no drive of the sample has to be.
+    let end = |rank: usize| rank.checked_sub(1).and_then(|k| sorted.get(k).copied());
+    let drives_for_both_ends = (libm::log(tail) / ln_p.max(ln_q)).ceil() as usize;
+    Quantile { share, value: sorted[rank.clamp(1, n) - 1], low: end(low), high: end(high), drives_for_both_ends }
 }
 
 /// Share of a sample above a limit, with Wilson's interval.
@@ -215,8 +222,20 @@ mod tests {
     fn ranks_of_a_median_are_those_of_the_books() {
         let sorted: Vec<f64> = (1..=100).map(f64::from).collect();
         let median = quantile(&sorted, 0.5);
-        assert_eq!((median.of.value, median.of.low, median.of.high), (50.0, 40.0, 61.0));
+        assert_eq!((median.value, median.low, median.high), (50.0, Some(40.0), Some(61.0)));
         let rare = exceeded(&sorted, 1000.0);
         assert!(rare.of.low == 0.0 && (rare.of.high - 0.037).abs() < 1e-3);
+    }
+
+    /// The largest of n is above the 95 % value with 1 - 0.95^n: of 8 it bounds nothing, of 72 it does with 97.5 %.
+    #[test]
+    fn a_sample_that_is_too_small_bounds_nothing() {
+        let of = |n: u32, share| quantile(&(1..=n).map(f64::from).collect::<Vec<f64>>(), share);
+        let few = of(8, 0.95);
+        assert_eq!((few.value, few.high, few.drives_for_both_ends), (8.0, None, 72));
+        assert!(few.low.is_some(), "{few:?}");
+        assert!(of(71, 0.95).high.is_none() && of(72, 0.95).high == Some(72.0));
+        assert!(of(71, 0.05).low.is_none() && of(72, 0.05).low == Some(1.0));
+        assert_eq!((of(5, 0.5).low, of(5, 0.5).high, of(6, 0.5).low), (None, None, Some(1.0)));
     }
 }

@@ -84,7 +84,7 @@ fn plan_of(text: &str, drives: u32, shards: u32) -> Plan {
             above: vec![1.0; STATE],
         })
         .collect();
-    Plan {
+    let mut plan = Plan {
         schema_version: 1,
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
         drive_toml: of.drive.to_toml(),
@@ -98,7 +98,10 @@ fn plan_of(text: &str, drives: u32, shards: u32) -> Plan {
         fem_places: 5,
         mesh: "coarse".to_owned(),
         generators: vec![OfOne { kernels: kernels(), response: Response { middle: vec![0.0; STATE], parabolas } }],
-    }
+        blake3: String::new(),
+    };
+    plan.seal();
+    plan
 }
 
 #[test]
@@ -148,6 +151,18 @@ fn the_example_is_read_and_mistakes_are_named_by_line_field_value_and_what_is_al
         assert!(told.contains(said) && told.contains("t.toml"), "{told}");
     }
     assert!(refused(&format!("{ECCENTRIC}{ECCENTRIC}")).contains("twice"));
+    for (name, column) in [("drive", "drive"), ("generator", "generator"), ("error_pp_arcsec", "error_pp_arcsec")] {
+        let told = refused(&format!("{ECCENTRIC}{THICK}name = \"{name}\"\n"));
+        assert!(told.starts_with("t.toml:5: tolerance[1].name: found") && told.contains(column), "{told}");
+    }
+    let phase = "as_built.circular_spline_eccentricity_um, phase_deg";
+    assert!(refused(&format!("{ECCENTRIC}{THICK}name = \"{phase}\"\n")).contains(phase));
+    let told = refused(&format!("{ECCENTRIC}{}", THICK.replace("0.03", "50")));
+    assert!(told.starts_with("t.toml:5: tolerance[1]: ") && told.contains("makes no drive"), "{told}");
+    let told = refused(&THICK.replace("plus_minus = 0.03", "std = 0.01\nlimits = [4, 1]"));
+    assert!(told.contains("the least first"), "{told}");
+    let third = tolerances(&THICK.replace("0.03", "0.05")).list[0].distribution.to_string();
+    assert!(third.contains("std 0.01667,"), "{third}");
     assert!(refused(&format!("drive = \"HHD-95-typical\"\n{ECCENTRIC}")).contains("as drawn"));
 }
 
@@ -228,6 +243,40 @@ fn the_model_is_that_of_the_kernels() {
     assert!((apart[at("no_table_rms_arcsec")] - apart[at("nominal_table_rms_arcsec")]).abs() < 1e-9);
 }
 
+/// A drive whose axis takes more of the play than there is has none: its lost motion is what its stiffness winds up, not less.
+#[test]
+fn flanks_do_not_overlap() {
+    let mut plan = plan_of(ECCENTRIC, 8, 1);
+    let state = &mut plan.generators[0].response.middle;
+    // Half the play beside either light load, and stiffnesses of N·m/rad.
+    let play = 6.0;
+    state[WAVE..2 * WAVE].fill(0.5 * play);
+    state[2 * WAVE + 1..2 * WAVE + 4].copy_from_slice(&[2e5, 3e5, 4e5]);
+    // A displaced axis takes of it whichever way it stands.
+    let light = &mut plan.generators[0].kernels.eccentric.deviation_arcsec[0][0];
+    light.fill(-10.0 * PER_UM);
+    let model = &plan.models()[0];
+    let at = |name: &str| FIGURES.iter().position(|known| *known == name).unwrap();
+    let made = |size| model.figures(&Drawn { values: vec![size], phases_deg: vec![0.0], teeth_um: vec![Vec::new()] });
+    let wind_up = 2.0 / 4e5 * 206_264.8;
+    for (size, expected, closed) in [(0.0, play, 0.0), (1.0, play - 2.0 * PER_UM, 0.0), (5.0, wind_up, 100.0)] {
+        let all = made(size);
+        for figure in ["lost_motion_arcsec", "most_lost_motion_arcsec"] {
+            assert!((all[at(figure)] - expected).abs() < 1e-6, "{size}: {} {expected}", all[at(figure)]);
+        }
+        assert_eq!(all[at("play_closed_percent")], closed);
+    }
+}
+
+#[test]
+fn a_few_drives_by_fem_are_told_of_without_a_correlation() {
+    let (kernels, fem) = (vec![1.0, 2.0, 3.0], vec![1.5, f64::NAN, 2.25]);
+    let of = comparison(&[("places_pp_arcsec", &kernels, &fem)], &[4.0]).unwrap();
+    assert_eq!((of.drives, of.drives_needed, of.largest_difference_arcsec), (2, 8, 0.75));
+    assert!(of.figures.is_empty() && of.tails.is_empty());
+    assert!(comparison(&[("places_pp_arcsec", &kernels, &vec![f64::NAN; 3])], &[4.0]).is_none());
+}
+
 /// Closed form: an eccentricity whose components are normal has a size, and here an order, of Rayleigh's distribution.
 #[test]
 fn intervals_of_quantiles_cover_the_closed_form() {
@@ -244,8 +293,8 @@ fn intervals_of_quantiles_cover_the_closed_form() {
                 let sizes = (0..256).map(|i| PER_UM * draw.drive(&plan.tolerances, plan.teeth(), i).values[0]);
                 let mut sizes: Vec<f64> = sizes.collect();
                 sizes.sort_by(f64::total_cmp);
-                let of = quantile(&sizes, share).of;
-                (of.low..=of.high).contains(&truth)
+                let of = quantile(&sizes, share);
+                (of.low.unwrap()..=of.high.unwrap()).contains(&truth)
             })
             .count();
         println!("{share}: {covered} of 200");
@@ -257,8 +306,8 @@ fn intervals_of_quantiles_cover_the_closed_form() {
             let mut random = fastrand::Rng::with_seed(*seed);
             let mut sample: Vec<f64> = (0..500).map(|_| random.f64()).collect();
             sample.sort_by(f64::total_cmp);
-            let of = quantile(&sample, 0.9).of;
-            (of.low..=of.high).contains(&0.9)
+            let of = quantile(&sample, 0.9);
+            (of.low.unwrap()..=of.high.unwrap()).contains(&0.9)
         })
         .count();
     assert!((372..=396).contains(&covered), "{covered} of 400");
@@ -379,6 +428,18 @@ fn what_is_missing_is_named_and_a_partial_campaign_says_so() {
     assert!(of.worst.windows(2).all(|pair| pair[0].error_pp_arcsec >= pair[1].error_pp_arcsec));
     let again = Drive::from_toml("worst.toml", &of.worst[0].toml).unwrap();
     assert_eq!(again.as_built.circular_spline_eccentricity_um, of.worst[0].values[0]);
+    for figure in SHARED {
+        assert_eq!(of.tighten.iter().filter(|t| t.figure == figure).count(), 2);
+    }
+    // One quantile has one value: of what is in, not of what was planned.
+    for campaign in [&part, &whole] {
+        let of = &campaign.generators[0];
+        for first in &of.tighten {
+            let figure = of.figures.iter().find(|f| f.figure == first.figure).unwrap();
+            let judged = figure.quantiles.iter().find(|q| q.share == JUDGED).unwrap();
+            assert_eq!((first.before_arcsec, first.drives), (judged.value, campaign.drives), "{}", first.figure);
+        }
+    }
     // The eccentricity makes the error here, and half of it is half of the error.
     assert_eq!(of.tighten[0].tolerance, "as_built.circular_spline_eccentricity_um");
     assert!((of.tighten[0].after_arcsec / of.tighten[0].before_arcsec - 0.5).abs() < 0.1, "{:?}", of.tighten);
@@ -399,6 +460,10 @@ fn a_plan_is_read_as_it_was_written() {
     let figures = [&again, &once_more, &plan].map(|plan| plan.models()[0].figures(&drive));
     assert!(figures[0].iter().zip(&figures[1]).all(|(a, b)| a.to_bits() == b.to_bits()), "{figures:?}");
     assert!(figures[0].iter().zip(&figures[2]).all(|(a, b)| (a - b).abs() < 1e-9), "{figures:?}");
+    let by_hand = plan.text().replacen("\"temperature_c\":20.0", "\"temperature_c\":60.0", 1);
+    assert_ne!(by_hand, plan.text());
+    fs::write(Plan::path(folder.path()), by_hand).unwrap();
+    assert!(Plan::read(folder.path()).unwrap_err().to_string().contains("changed after it was planned"));
     fs::write(Plan::path(folder.path()), plan.text().replacen(env!("CARGO_PKG_VERSION"), "0.0.1", 1)).unwrap();
     assert!(Plan::read(folder.path()).unwrap_err().to_string().contains("plan anew"));
     assert_eq!(plan.generators[0].response.middle.len(), 2 * WAVE + 6);

@@ -6,6 +6,10 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use toml::de::DeValue;
 
+use super::by_fem::FEM_FIGURES;
+use super::draw::Drawn;
+use super::model::FIGURES;
+use super::shard::OWN_COLUMNS;
 use super::statistics::{normal_cdf, normal_quantile};
 use crate::drive::{Drive, GeneratorKind, Wheel};
 use crate::suggest::likeliest_path;
@@ -50,6 +54,18 @@ pub struct Tolerance {
     pub acts: Acts,
     /// How it scatters.
     pub distribution: Distribution,
+}
+
+impl Tolerance {
+    /// Its columns in a shard: what was drawn, and the phase.
+    pub fn columns(&self) -> impl Iterator<Item = String> {
+        std::iter::once(self.name.clone()).chain(self.phase_column())
+    }
+
+    /// The column of its phase.
+    pub fn phase_column(&self) -> Option<String> {
+        self.acts.has_phase().then(|| format!("{}, phase_deg", self.name))
+    }
 }
 
 /// How a field acts, and by which kernels.
@@ -164,12 +180,17 @@ impl fmt::Display for Distribution {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [low, high] = self.limits;
         match self.law {
-            Law::Normal { mean, std } => write!(f, "normal, mean {mean}, std {std}")?,
-            Law::Uniform => return write!(f, "uniform, {low} to {high}"),
-            Law::Rayleigh { std } => write!(f, "rayleigh, std {std}")?,
+            Law::Normal { mean, std } => write!(f, "normal, mean {}, std {}", told(mean), told(std))?,
+            Law::Uniform => return write!(f, "uniform, {} to {}", told(low), told(high)),
+            Law::Rayleigh { std } => write!(f, "rayleigh, std {}", told(std))?,
         }
-        write!(f, ", within {low} to {high}")
+        write!(f, ", within {} to {}", told(low), told(high))
     }
+}
+
+/// A number with four digits, in as few characters as these take.
+fn told(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 impl Acts {
@@ -221,6 +242,7 @@ impl Acts {
 const KEYS: [&str; 6] = ["drive", "generator", "torque_n_m", "temperature_c", "exceed_arcsec", "tolerance"];
 const TOLERANCE_KEYS: [&str; 9] =
     ["name", "field", "order", "errors", "distribution", "mean", "std", "limits", "plus_minus"];
+const TWO_LIMITS: &str = "two numbers, the least first, then a larger one";
 const ANY_ORDER: Allowed = from(1.0, 1000.0);
 const POSITIVE: Allowed = above(0.0, 1e9);
 
@@ -301,6 +323,18 @@ impl Tolerances {
                     let what = format!("found {:?} twice, allowed: once", list[k].name);
                     file.refuse(value.span(), &format!("tolerance[{k}]"), what);
                 }
+                if file.is_sound() {
+                    let spans = value.get_ref().as_array().into_iter().flatten().map(Spanned::span);
+                    for (k, span) in spans.enumerate().take(list.len()) {
+                        if let Some(column) = column_taken(&list, k) {
+                            let what = format!("found {column:?}, which another column of the shards has; give a name");
+                            file.refuse(span.clone(), &format!("tolerance[{k}].name"), what);
+                        }
+                        if let Err(what) = every_limit_makes_a_drive(&drive, &list, k) {
+                            file.refuse(span, &format!("tolerance[{k}]"), what);
+                        }
+                    }
+                }
             }
         }
         if file.is_sound() {
@@ -309,6 +343,31 @@ impl Tolerances {
             Err(told(file))
         }
     }
+}
+
+/// A column of tolerance `k` that a shard has already.
+fn column_taken(list: &[Tolerance], k: usize) -> Option<String> {
+    let others = list.iter().enumerate().filter(|(other, _)| *other != k).flat_map(|(_, other)| other.columns());
+    let taken: Vec<String> = others.chain(OWN_COLUMNS.iter().map(|name| (*name).to_owned())).collect();
+    let figure = |name: &String| FIGURES.iter().chain(&FEM_FIGURES).any(|known| known == name);
+    list[k].columns().find(|column| taken.contains(column) || figure(column))
+}
+
+/// A tolerance at either of its limits, the others in their middle.
+fn every_limit_makes_a_drive(drive: &Drive, list: &[Tolerance], k: usize) -> Result<(), String> {
+    let teeth = [drive.flexspline.teeth, drive.circular_spline.teeth];
+    let tolerance = &list[k];
+    for limit in tolerance.distribution.limits {
+        let mut drawn = Drawn::middle(list);
+        drawn.values[k] = limit;
+        if let Acts::Teeth { wheel, .. } = tolerance.acts {
+            drawn.teeth_um[k] = vec![limit; teeth[usize::from(wheel == Wheel::CircularSpline)] as usize];
+        }
+        drawn
+            .drive(drive, list)
+            .map_err(|error| format!("{:?} at its limit {limit} makes no drive: {error}", tolerance.name))?;
+    }
+    Ok(())
 }
 
 /// Load where none is given, of the rated one: a guess at what a joint sees most.
@@ -363,10 +422,10 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
         table.given("plus_minus", |value| crate::toml_file::real(&POSITIVE, value))?,
     );
     let limits = table.given("limits", |value| {
-        let pair = each_of(value, "two numbers, least and largest", any)?;
+        let pair = each_of(value, TWO_LIMITS, any)?;
         match pair[..] {
             [low, high] if low < high => Ok([low, high]),
-            _ => Err(Refused::found(value, "two numbers, least and largest")),
+            _ => Err(Refused::found(value, TWO_LIMITS)),
         }
     })?;
     let is_size = !matches!(acts, Acts::Alike | Acts::Teeth { .. });

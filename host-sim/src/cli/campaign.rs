@@ -13,8 +13,8 @@ use serde::Serialize;
 use super::context::quoted;
 use super::{Context, Failure, names, report, say};
 use crate::campaign::{
-    Became, Campaign, EXAMPLE, JUDGED, OfGenerator, Plan, PlanError, PlanSettings, ReduceError, ShardError, ShardState,
-    Tolerances, look, plan, reduce, run_shard, worst_path,
+    Became, Campaign, EXAMPLE, JUDGED, OfGenerator, Plan, PlanError, PlanSettings, Quantile, ReduceError, SHARED,
+    ShardError, ShardState, Tolerances, look, plan, reduce, run_shard, worst_path,
 };
 use crate::mesh::MeshLevel;
 use crate::output::{Outputs, prepare_folder, write_whole};
@@ -231,13 +231,13 @@ impl PlanCommand {
         context.print(&told, || {
             let folder = quoted(&out.display().to_string());
             format!(
-                "plan {}: {} drives of {}, {} tolerances, {} shards, {} drives by FEM\nwrote {} in {:.0} s",
+                "plan {}: {} of {}, {}, {}, {} by FEM\nwrote {} in {:.0} s",
                 told.plan_hash,
-                told.drives,
+                counted(told.drives as usize, "drive"),
                 told.drive,
-                told.tolerances.len(),
-                told.shards,
-                told.fem_drives,
+                counted(told.tolerances.len(), "tolerance"),
+                counted(told.shards as usize, "shard"),
+                counted(told.fem_drives as usize, "drive"),
                 path.display(),
                 told.wall_s
             ) + &say::next(&[
@@ -324,9 +324,9 @@ impl RunCommand {
         ran.wall_s = clock.elapsed().as_secs_f64();
         context.print(&ran, || {
             format!(
-                "plan {}: {} shards computed, {} computed anew, {} there already, in {:.1} s",
+                "plan {}: {} computed, {} computed anew, {} there already, in {:.1} s",
                 ran.plan_hash,
-                ran.computed.len(),
+                counted(ran.computed.len(), "shard"),
                 ran.redone.len(),
                 ran.there.len(),
                 ran.wall_s
@@ -407,6 +407,22 @@ impl ReduceCommand {
     }
 }
 
+/// So many of something.
+fn counted(count: usize, of: &str) -> String {
+    format!("{count} {of}{}", if count == 1 { "" } else { "s" })
+}
+
+/// The interval of a quantile, or which end the drives do not have.
+fn interval(of: &Quantile) -> String {
+    let needed = of.drives_for_both_ends;
+    match (of.low, of.high) {
+        (Some(low), Some(high)) => format!("{low:.3} to {high:.3}"),
+        (Some(low), None) => format!("{low:.3} and more; no upper bound, {needed} drives have one"),
+        (None, Some(high)) => format!("{high:.3} and less; no lower bound, {needed} drives have one"),
+        (None, None) => format!("no bounds, {needed} drives have them"),
+    }
+}
+
 /// What is said of one generator.
 fn lines(of: &OfGenerator) -> String {
     let mut text = format!("{}\n", of.generator);
@@ -418,28 +434,48 @@ fn lines(of: &OfGenerator) -> String {
         "unit_table_rms_arcsec",
     ] {
         let Some(figure) = of.figures.iter().find(|figure| figure.figure == name) else { continue };
-        let at = |share: f64| figure.quantiles.iter().find(|q| q.share == share).map_or(f64::NAN, |q| q.of.value);
-        let high = figure.quantiles.iter().find(|q| q.share == JUDGED);
-        let (low, most) = high.map_or((f64::NAN, f64::NAN), |q| (q.of.low, q.of.high));
+        let at = |share: f64| figure.quantiles.iter().find(|q| q.share == share).map_or(f64::NAN, |q| q.value);
+        let judged = figure.quantiles.iter().find(|q| q.share == JUDGED);
         let _ = writeln!(
             text,
-            "  {name:<26} half of the drives below {:.3}, 95 % below {:.3} ({low:.3} to {most:.3})",
+            "  {name:<26} half of the drives below {:.3}, 95 % below {:.3} ({})",
             at(0.5),
-            at(JUDGED)
+            at(JUDGED),
+            judged.map_or_else(String::new, interval)
         );
     }
     for exceeded in &of.exceeded {
         let (value, low, high) = (100.0 * exceeded.of.value, 100.0 * exceeded.of.low, 100.0 * exceeded.of.high);
         let _ = writeln!(text, "  P(error > {}\") = {value:.3} % ({low:.3} to {high:.3})", exceeded.above);
     }
-    if let Some(first) = of.tighten.first() {
+    if of.play_closed > 0 {
         let _ = writeln!(
             text,
-            "  tighten first: {}; halved, 95 % are below {:.2}\" instead of {:.2}\"",
-            first.tolerance, first.after_arcsec, first.before_arcsec
+            "  no play is left somewhere on {} by kernels; there lost motion is the wind-up alone",
+            counted(of.play_closed, "drive")
+        );
+    }
+    for figure in SHARED {
+        let Some(first) = of.tighten.iter().find(|tightened| tightened.figure == figure) else { continue };
+        let _ = writeln!(
+            text,
+            "  for {figure} tighten first: {}; halved, 95 % of {} are below {:.3} instead of {:.3}",
+            first.tolerance,
+            counted(first.drives, "drive"),
+            first.after_arcsec,
+            first.before_arcsec
         );
     }
     if let Some(fem) = &of.fem {
+        if fem.figures.is_empty() {
+            let _ = writeln!(
+                text,
+                "  {} by FEM: too few for a correlation, {} are needed; largest difference {:.3} of error_pp_arcsec by kernels",
+                counted(fem.drives, "drive"),
+                fem.drives_needed,
+                fem.largest_difference_arcsec
+            );
+        }
         for figure in &fem.figures {
             let _ = writeln!(
                 text,

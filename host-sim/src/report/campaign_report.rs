@@ -7,7 +7,7 @@ use super::page::{
     Status, Table, Text, Upright, significant,
 };
 use super::study_report::{heading, value};
-use crate::campaign::{Campaign, JUDGED, OfGenerator, Plan, SHARED};
+use crate::campaign::{Campaign, JUDGED, OfGenerator, Plan, SHARED, Tightened};
 use crate::drive::Drive;
 
 /// Points of the curve of the distribution.
@@ -50,6 +50,21 @@ pub fn page(of: Sources<'_>) -> Page {
                 one.generator, one.beyond_kernels
             ));
         }
+        if one.play_closed > 0 {
+            remarks.push(format!(
+                "{}: on {} of {} drives no play is left somewhere by kernels; lost motion there is the elastic wind-up alone.",
+                one.generator, one.play_closed, campaign.drives
+            ));
+        }
+        if let Some(fem) = one.fem.as_ref().filter(|fem| fem.figures.is_empty()) {
+            remarks.push(format!(
+                "{}: drives by FEM are too few for a correlation: {}, {} are needed; largest difference {}″.",
+                one.generator,
+                fem.drives,
+                fem.drives_needed,
+                significant(fem.largest_difference_arcsec, 3)
+            ));
+        }
         if one.fem_failed > 0 {
             remarks.push(format!("{}: {} drives by FEM found no equilibrium.", one.generator, one.fem_failed));
         }
@@ -75,7 +90,7 @@ pub fn page(of: Sources<'_>) -> Page {
             .map(|one| Choice { id: one.generator.to_string(), name: one.generator.to_string() })
             .collect(),
         choice_is: "Generator",
-        headlines: all.iter().map(|one| headline(campaign, one)).collect(),
+        headlines: all.iter().map(headline).collect(),
         sections,
         animations: Vec::new(),
         provenance: vec![
@@ -90,21 +105,23 @@ pub fn page(of: Sources<'_>) -> Page {
     }
 }
 
-fn headline(campaign: &Campaign, one: &OfGenerator) -> Headline {
+fn headline(one: &OfGenerator) -> Headline {
     let first = one.tighten.first();
     let answer = match first {
-        Some(first) if first.gain_arcsec.low > 0.0 => {
-            Text::new(format!("Tighten {} first: halved, 95 % of the drives stay below ", first.tolerance))
-                .error(first.after_arcsec, 3)
-                .plain(", now below ")
-        }
-        _ => Text::new(format!("No tolerance alone buys much; of {} drives 95 % stay below ", campaign.drives)),
+        Some(first) if first.gain_arcsec.low > 0.0 => Text::new(format!(
+            "Tighten {} first for the error, peak to peak: halved, 95 % of {} drives stay below ",
+            first.tolerance, first.drives
+        ))
+        .error(first.after_arcsec, 3)
+        .plain(", now below "),
+        _ => Text::new(format!("No tolerance alone buys much; of {} drives 95 % stay below ", one.errors.len())),
     };
+    let told = first.filter(|first| first.gain_arcsec.low > 0.0).map(|first| first.before_arcsec);
     let number = one.figures.first().and_then(|f| f.quantiles.iter().find(|q| q.share == JUDGED));
-    let value = number.map_or(f64::NAN, |q| q.of.value);
+    let value = number.map_or(f64::NAN, |q| q.value);
     Headline {
         choice: Some(one.generator.to_string()),
-        answer: answer.error(value, 3).plain("."),
+        answer: answer.error(told.unwrap_or(value), 3).plain("."),
         number: Text::default().error(value, 3),
         number_is: "error peak to peak that 95 % of the drives stay below".to_owned(),
     }
@@ -125,8 +142,13 @@ fn words(list: &[&str]) -> Vec<String> {
     list.iter().map(|word| (*word).to_owned()).collect()
 }
 
+/// Shares and errors (arcsec) below this are shown as nothing.
+const NOTHING: f64 = 1e-5;
+
 fn percent(share: f64) -> String {
-    format!("{} %", significant(100.0 * share, 3))
+    // An estimate of a share may lie a little below none.
+    let shown = if share < NOTHING { 0.0 } else { 100.0 * share };
+    format!("{} %", significant(shown, 3))
 }
 
 fn percents(low: f64, high: f64) -> Text {
@@ -184,14 +206,14 @@ fn scatter(of: &Sources<'_>) -> Section {
                 value(figure.figure, Some(figure.std)),
             ];
             row.extend(shown.iter().map(|share| {
-                value(figure.figure, figure.quantiles.iter().find(|q| q.share == *share).map(|q| q.of.value))
+                value(figure.figure, figure.quantiles.iter().find(|q| q.share == *share).map(|q| q.value))
             }));
             let judged = figure.quantiles.iter().find(|q| q.share == JUDGED);
-            row.extend([judged.map(|q| q.of.low), judged.map(|q| q.of.high)].map(|end| value(figure.figure, end)));
+            row.extend([judged.and_then(|q| q.low), judged.and_then(|q| q.high)].map(|end| value(figure.figure, end)));
             row
         });
         Table {
-            caption: "Figures of the drives; the interval is that of the 95 % value".to_owned(),
+            caption: "Figures of the drives; the interval is that of the 95 % value, – where the drives are too few to bound it".to_owned(),
             header: words(&["Figure", "mean", "std", "5 %", "50 %", "95 %", "99 %", "from", "to"]),
             rows: rows.collect(),
         }
@@ -209,7 +231,7 @@ fn left(of: &Sources<'_>) -> Section {
         .into_iter()
         .filter_map(|(what, name)| {
             let figure = one.figures.iter().find(|figure| figure.figure == name)?;
-            let at = |share: f64| figure.quantiles.iter().find(|q| q.share == share).map(|q| q.of.value);
+            let at = |share: f64| figure.quantiles.iter().find(|q| q.share == share).map(|q| q.value);
             let cells = [Some(figure.mean), at(0.5), at(JUDGED), at(0.99)].map(|x| value(name, x));
             Some([Text::new(what)].into_iter().chain(cells).collect())
         });
@@ -223,25 +245,34 @@ fn left(of: &Sources<'_>) -> Section {
 }
 
 fn tighten(of: &Sources<'_>) -> Section {
-    let blocks = tables(of, |one| {
-        let mut header = words(&["Tolerance, halved", "95 % below", "gain", "from", "to"]);
-        header.extend(
-            of.plan.exceed_arcsec.iter().flat_map(|x| [format!("above {x}″, now"), format!("above {x}″, halved")]),
-        );
-        let rows = one.tighten.iter().map(|t| {
-            let mut row = vec![Text::new(t.tolerance.clone())];
-            let gain = [t.after_arcsec, t.gain_arcsec.value, t.gain_arcsec.low, t.gain_arcsec.high];
-            row.extend(gain.map(|x| Text::default().error(x, 3)));
-            row.extend(t.above.iter().flat_map(|[_, before, after]| [before, after].map(|x| Text::new(percent(*x)))));
-            row
-        });
-        Table {
-            caption: "Each tolerance halved, the others as they are, the same drives by kernels".to_owned(),
-            header,
-            rows: rows.collect(),
-        }
-    });
+    let blocks = SHARED.iter().flat_map(|figure| tables(of, |one| ranking(of.plan, one, figure))).collect();
     Section { id: "tighten".to_owned(), title: "What to tighten first".to_owned(), detail: Detail::Summary, blocks }
+}
+
+/// What halving each tolerance does to a figure.
+fn ranking(plan: &Plan, one: &OfGenerator, figure: &str) -> Table {
+    let ranked: Vec<&Tightened> = one.tighten.iter().filter(|t| t.figure == figure).collect();
+    let mut header = words(&["Tolerance, halved", "95 % below", "gain", "from", "to"]);
+    if ranked.iter().any(|t| !t.above.is_empty()) {
+        let limits = plan.exceed_arcsec.iter();
+        header.extend(limits.flat_map(|x| [format!("above {x}″, now"), format!("above {x}″, halved")]));
+    }
+    let rows = ranked.iter().map(|t| {
+        let mut row = vec![Text::new(t.tolerance.clone())];
+        let gain = [t.after_arcsec, t.gain_arcsec.value, t.gain_arcsec.low, t.gain_arcsec.high];
+        row.extend(gain.map(|x| Text::default().error(if x.abs() < NOTHING { 0.0 } else { x }, 3)));
+        row.extend(t.above.iter().flat_map(|[_, before, after]| [before, after].map(|x| Text::new(percent(*x)))));
+        row
+    });
+    let drives = ranked.first().map_or(0, |t| t.drives);
+    Table {
+        caption: format!(
+            "{}: each tolerance halved, the others as they are, the first {drives} drives by kernels",
+            heading(figure)
+        ),
+        header,
+        rows: rows.collect(),
+    }
 }
 
 fn shares(of: &Sources<'_>) -> Section {
