@@ -28,14 +28,14 @@ const STEPS: usize = 400;
 
 /// Path and text of what is the same in every bundle.
 const FIXED: [(&str, &str); 8] = [
-    ("c99/flexspline_table.c", include_str!("../../../core/c99/flexspline_table.c")),
-    ("c99/flexspline_table.h", include_str!("../../../core/c99/flexspline_table.h")),
+    ("c99/flexspline_table.c", include_str!("../../shipped/flexspline_table.c")),
+    ("c99/flexspline_table.h", include_str!("../../shipped/flexspline_table.h")),
     ("include/flexspline.h", libraries::HEADER),
     ("vectors/check.c", include_str!("templates/check.c")),
     ("zephyr/module.yml", include_str!("templates/zephyr/module.yml")),
     ("zephyr/Kconfig", include_str!("templates/zephyr/Kconfig")),
-    ("LICENSE-MIT", include_str!("../../../LICENSE-MIT")),
-    ("LICENSE-APACHE", include_str!("../../../LICENSE-APACHE")),
+    ("LICENSE-MIT", include_str!("../../shipped/LICENSE-MIT")),
+    ("LICENSE-APACHE", include_str!("../../shipped/LICENSE-APACHE")),
 ];
 
 /// Path and text of what names tables and versions.

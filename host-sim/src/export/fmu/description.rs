@@ -10,8 +10,8 @@ use flexspline_fmu::variables::{Choices, Kind, ModelKind, Role, UNITS, Variable}
 /// Licences of what is in the library; `license.txt` is where readers begin.
 pub(super) const LICENCES: [(&str, &str); 3] = [
     ("license.txt", "flexspline is licensed under MIT or Apache-2.0, at your choice: LICENSE-MIT, LICENSE-APACHE.\n"),
-    ("LICENSE-MIT", include_str!("../../../../LICENSE-MIT")),
-    ("LICENSE-APACHE", include_str!("../../../../LICENSE-APACHE")),
+    ("LICENSE-MIT", include_str!("../../../shipped/LICENSE-MIT")),
+    ("LICENSE-APACHE", include_str!("../../../shipped/LICENSE-APACHE")),
 ];
 
 /// Time of the experiment that is proposed, s, and its steps.
