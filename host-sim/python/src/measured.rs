@@ -6,18 +6,17 @@ use flexspline::Table;
 use flexspline_sim::calibrate::{CalibrationError, Prior, calibrate as fit};
 use flexspline_sim::causes::CauseName;
 use flexspline_sim::diagnosis::{
-    Diagnosis, Explanation, Extension, Options, PipelineError, Series, Subject, diagnose_rows, parse_rows, read_rows,
+    Explanation, Options, PipelineError, Series, Subject, diagnose_rows, parse_rows, read_rows,
 };
 use flexspline_sim::drive::GeneratorKind;
 use flexspline_sim::extension::Model;
 use flexspline_sim::kernels::Kernels;
-use flexspline_sim::measurement::{ColumnMap, Fault, Session, parse, read};
+use flexspline_sim::measurement::{ColumnMap, Session, parse, read};
 use flexspline_sim::units::ARCSEC_PER_RAD;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyDict;
-use serde::Serialize;
 
 use crate::drive::{Drive, generator};
 use crate::failure::{Failure, bad};
@@ -150,17 +149,6 @@ fn calibration_failure(error: &CalibrationError, logs: &[LogFrom]) -> Failure {
     }
 }
 
-/// `diagnosis.json`.
-#[derive(Serialize)]
-struct Written<'a> {
-    #[serde(flatten)]
-    diagnosis: &'a Diagnosis,
-    extension: &'a Extension,
-    data_faults: &'a [Fault],
-    notes: &'a [String],
-    command: &'a str,
-}
-
 /// What a diagnosis gives: text of the JSON, drive-extended.toml, extended table, why a cause was named or not, columns.
 type Diagnosed<'py> = (String, Option<String>, Option<Parts<'py>>, Option<(String, String)>, Bound<'py, PyDict>);
 
@@ -217,14 +205,7 @@ pub fn diagnose<'py>(
                 .files
                 .extend(["fxt", "json", "rs", "h"].map(|ending| format!("{}-extended.{ending}", table.kind)));
         }
-        let written = Written {
-            diagnosis: &done.diagnosis,
-            extension: &extension,
-            data_faults: &done.recording.faults,
-            notes: &done.recording.notes,
-            command: "",
-        };
-        let json = serde_json::to_string(&written).map_err(Failure::bad)?;
+        let json = serde_json::to_string(&done.file(&extension, "")).map_err(Failure::bad)?;
         let explanation = asked.map(|cause| {
             let explanation = Explanation::of(&done.diagnosis, cause);
             Ok((explanation.text().trim_end().to_owned(), serde_json::to_string(&explanation).map_err(Failure::bad)?))

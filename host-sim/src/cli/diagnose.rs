@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueHint};
-use serde::Serialize;
 
 use super::context::{Context, quoted, table_image};
 use super::logs::LogOptions;
@@ -19,7 +18,7 @@ use crate::diagnosis::report::Diagnosis;
 use crate::drive::{Drive, GeneratorKind};
 use crate::extension::Model;
 use crate::kernels::Kernels;
-use crate::measurement::{Fault, Recording};
+use crate::measurement::Recording;
 use crate::mesh::MeshLevel;
 use crate::output::Outputs;
 use crate::tables::{c_header, rust_source};
@@ -66,17 +65,6 @@ pub(super) struct Diagnose {
     no_report: bool,
 }
 
-/// `diagnosis.json`: the diagnosis, the faults of the data and what was written.
-#[derive(Serialize)]
-struct Written<'a> {
-    #[serde(flatten)]
-    diagnosis: &'a Diagnosis,
-    extension: &'a Extension,
-    data_faults: &'a [Fault],
-    notes: &'a [String],
-    command: &'a str,
-}
-
 impl Diagnose {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let map = self.logs.map()?;
@@ -109,13 +97,7 @@ impl Diagnose {
         self.write(context, &mut made, out, &mut outputs)?;
         let Diagnosed { recording, diagnosis, extended, .. } = &done;
         let extension = &made.extension;
-        let written = Written {
-            diagnosis,
-            extension,
-            data_faults: &recording.faults,
-            notes: &recording.notes,
-            command: &context.command,
-        };
+        let written = done.file(extension, &context.command);
         outputs.json(&out.join("diagnosis.json"), &written)?;
         if !self.no_report {
             let inputs = [Some(self.data.as_path()), self.model.as_deref()];

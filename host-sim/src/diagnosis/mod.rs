@@ -55,7 +55,8 @@ pub use extended::{Extended, FittedCause, Series};
 use model::{Problem, Term, terms_at};
 use noise::{Noise, Whitener};
 pub use pipeline::{
-    Diagnosed, Extension, Made, MakeTable, Options, PipelineError, Subject, diagnose_rows, parse_rows, read_rows,
+    Diagnosed, DiagnosisFile, Extension, Made, MakeTable, Options, PipelineError, Subject, diagnose_rows, parse_rows,
+    read_rows,
 };
 use prepare::FreeColumns;
 pub use report::{Cause, Compensation, Diagnosis, HeldOut, Parameter, Residual, Unexplained, Verdict};

@@ -27,7 +27,9 @@ use crate::extension::{
     causes_to_toml, check_by_fem, evaluate, found_geometry,
 };
 use crate::kernels::Kernels;
-use crate::measurement::{ColumnMap, MeasuredError, Recording, Session, parse, parse_degrees, read, read_degrees};
+use crate::measurement::{
+    ColumnMap, Fault, MeasuredError, Recording, Session, parse, parse_degrees, read, read_degrees,
+};
 use crate::mesh::MeshLevel;
 use crate::nominal::Nominal;
 use crate::stepping::{Method, SolveError, SolverSettings};
@@ -355,7 +357,25 @@ pub struct Made {
     pub table: Option<MadeTable>,
 }
 
+/// `diagnosis.json`: the diagnosis, the faults of the data and what was written.
+#[derive(Serialize)]
+pub struct DiagnosisFile<'a> {
+    #[serde(flatten)]
+    diagnosis: &'a Diagnosis,
+    extension: &'a Extension,
+    data_faults: &'a [Fault],
+    notes: &'a [String],
+    command: &'a str,
+}
+
 impl Diagnosed {
+    /// What `diagnosis.json` holds, with what became of the causes, and the command that asked.
+    #[must_use]
+    pub fn file<'a>(&'a self, extension: &'a Extension, command: &'a str) -> DiagnosisFile<'a> {
+        let Recording { faults, notes, .. } = &self.recording;
+        DiagnosisFile { diagnosis: &self.diagnosis, extension, data_faults: faults, notes, command }
+    }
+
     /// Makes the extended drive, and the extended tables if they are worth it; nothing where no cause was found. `by_fem` is told before the
     /// FEM of the drive begins.
     ///
