@@ -82,13 +82,8 @@ variables! {
     TABLE_ID => Variable::constant("table_id", Kind::Text, "id of the table");
 }
 
-/// The outputs before the first tick: the command without a correction.
+/// The outputs before the first tick where they are not zero: the command without a correction.
 pub fn initial(values: &mut [f64]) {
-    VARIABLES
-        .iter()
-        .zip(values.iter_mut())
-        .filter(|(variable, _)| variable.is_output())
-        .for_each(|(_, value)| *value = 0.0);
     values[GENERATOR_COMMAND] = values[OUTPUT_COMMAND] * values[RATIO];
     values[GENERATOR_COMMAND_RATE] = values[OUTPUT_COMMAND_RATE] * values[RATIO];
     values[PREDICTED_OUTPUT] = values[OUTPUT_COMMAND];

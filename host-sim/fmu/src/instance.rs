@@ -267,6 +267,8 @@ impl Instance {
     }
 
     fn start_outputs(&mut self) {
+        let variables = self.resources.kind.variables().iter().zip(&mut self.values);
+        variables.filter(|(variable, _)| variable.is_output()).for_each(|(_, value)| *value = 0.0);
         match self.resources.kind {
             ModelKind::Compensation => compensation::initial(&mut self.values),
             ModelKind::Joint => joint::initial(&mut self.values),

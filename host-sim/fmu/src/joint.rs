@@ -169,13 +169,8 @@ fn scenario_of(values: &[f64]) -> Scenario {
     }
 }
 
-/// The outputs before the first tick: all stands at zero.
+/// The outputs before the first tick where they are not zero: all stands.
 pub fn initial(values: &mut [f64]) {
-    VARIABLES
-        .iter()
-        .zip(values.iter_mut())
-        .filter(|(variable, _)| variable.is_output())
-        .for_each(|(_, value)| *value = 0.0);
     values[QUALITY] = f64::from(quality(Quality::Disabled));
 }
 

@@ -3,8 +3,6 @@
 //! Sizes and phases are points of a Sobol sequence with Owen's scrambling (Burley 2020), two dimensions to a tolerance; errors of teeth
 //! are noise by a counter, so that tooth k of drive i needs no other tooth and no other drive.
 
-use std::f64::consts::TAU;
-
 use super::statistics::mean;
 use super::tolerance::{Acts, Law, TeethError, Tolerance};
 use crate::drive::{AsBuilt, Drive, DriveError, Harmonic, Wheel};
@@ -212,9 +210,4 @@ impl Drawn {
             teeth_um: vec![Vec::new(); tolerances.len()],
         }
     }
-}
-
-/// Angle of a harmonic's crest and other angles, rad, in a turn.
-pub(super) fn radians(degrees: f64) -> f64 {
-    degrees / 360.0 * TAU
 }

@@ -17,11 +17,12 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use super::draw::{Drawn, radians};
+use super::draw::Drawn;
 use super::tolerance::{Acts, Tolerance};
 use crate::drive::{AsBuilt, Wheel};
 use crate::kernels::{EccentricField, Gain, Kernels, PlaceOfLoad};
 use crate::tables::places_that_tell_apart;
+use crate::units::ARCSEC_PER_RAD;
 
 /// The figures of a drive by kernels, as columns of a shard have them.
 pub const FIGURES: [&str; 21] = [
@@ -142,7 +143,7 @@ impl WheelSums {
         let mut all = if list.is_empty() { vec![0.0; self.teeth] } else { list.clone() };
         for harmonic in harmonics {
             for (k, error) in all.iter_mut().enumerate() {
-                let angle = TAU * k as f64 / self.teeth as f64 - radians(harmonic.phase_deg);
+                let angle = TAU * k as f64 / self.teeth as f64 - harmonic.phase_deg.to_radians();
                 *error += harmonic.amplitude_um * libm::cos(f64::from(harmonic.order) * angle);
             }
         }
@@ -221,7 +222,7 @@ fn turned([x, y]: [f64; 2], [c, s]: [f64; 2]) -> [f64; 2] {
 }
 
 fn vector(size: f64, phase_deg: f64) -> [f64; 2] {
-    let angle = radians(phase_deg);
+    let angle = phase_deg.to_radians();
     [size * libm::cos(angle), size * libm::sin(angle)]
 }
 
@@ -505,8 +506,6 @@ fn least_wind_up(state: &[f64], light_n_m: f64) -> f64 {
     let stiffest = sheet.filter(|(name, _)| name.starts_with('k')).map(|(_, k)| *k).fold(0.0, f64::max);
     if stiffest > 0.0 { 2.0 * light_n_m / stiffest * ARCSEC_PER_RAD } else { 0.0 }
 }
-
-const ARCSEC_PER_RAD: f64 = 648_000.0 / std::f64::consts::PI;
 
 /// Peak to peak, and root mean square about the mean.
 pub(super) fn spread(values: &[f64]) -> (f64, f64) {
