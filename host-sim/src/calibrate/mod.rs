@@ -24,7 +24,7 @@ use flexspline::Table;
 use serde::Serialize;
 
 use crate::extension::left_by_core;
-use crate::measurement::{Fault, FaultName, MeasuredError, Recording, Session, least_and_most};
+use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
 use crate::tables::{MadeTable, TableError, dead_zone_n_m};
 use choose::{LEAST_GAIN, PENALTIES, best_penalty, nested, path, pruned};
 use folds::{Chosen, Folds};
@@ -337,12 +337,11 @@ fn turns_to_tell_wheels(ratio: f64) -> f64 {
 
 /// The first two files that hold the same rows: one log that was given twice would be left out by what was fitted to it.
 fn given_twice(files: &[Recording]) -> Option<[&str; 2]> {
-    let angles = |file: &Recording| {
-        let rows = |session: &Session| [session.generator_rad.clone(), session.error_rad.clone()];
-        file.sessions.iter().map(rows).collect::<Vec<_>>()
-    };
+    fn angles(file: &Recording) -> impl Iterator<Item = [&[f64]; 2]> {
+        file.sessions.iter().map(|session| [session.generator_rad.as_slice(), &session.error_rad])
+    }
     let pairs = (0..files.len()).flat_map(|k| (0..k).map(move |j| (j, k)));
-    let mut same = pairs.filter(|(j, k)| files[*j].rows == files[*k].rows && angles(&files[*j]) == angles(&files[*k]));
+    let mut same = pairs.filter(|(j, k)| files[*j].rows == files[*k].rows && angles(&files[*j]).eq(angles(&files[*k])));
     same.next().map(|(j, k)| [files[j].file.as_str(), files[k].file.as_str()])
 }
 
@@ -535,8 +534,9 @@ fn with_faults(error: CalibrationError, files: &[Recording]) -> CalibrationError
 fn dead_zone(rows: Rows, prior: &Prior<'_>, table: &Table<'_>, recorded: &Recorded) -> (Rows, f64) {
     let (own, usual) = (dead_zone_n_m(table), recorded.scales.friction_n_m);
     let less = |rows: Rows, least_friction_n_m: f64| rows.less(&Prior { least_friction_n_m, ..prior.clone() });
-    if own <= 0.0 {
-        return (less(rows, usual), usual);
+    if own <= 0.0 || own >= usual {
+        let larger = own.max(usual);
+        return (less(rows, larger), larger);
     }
     // A row on a flank that the noise of its torque has drawn would move the mean of its file, and with it all others.
     let sure = rows.clone().sure(own, recorded).sure(usual, recorded);
@@ -549,7 +549,7 @@ fn dead_zone(rows: Rows, prior: &Prior<'_>, table: &Table<'_>, recorded: &Record
     let (by_own, by_usual) = (left(own), left(usual));
     let other =
         by_own.len() >= FEWEST_ROWS && by_usual.iter().sum::<f64>() < OTHER_DEAD_ZONE * by_own.iter().sum::<f64>();
-    let chosen = if own < usual && other { usual } else { own };
+    let chosen = if other { usual } else { own };
     (less(rows, chosen), chosen)
 }
 

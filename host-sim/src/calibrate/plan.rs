@@ -17,7 +17,7 @@ use super::{GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, PENALTY_OF_PLANS, Prior, 
 
 /// Beyond what any bench or catalogue of these drives has, so a slip of the pen: generator, load and temperature. Guesses.
 const FASTEST_RPM: f64 = 2e4;
-const LARGEST_N_M: f64 = 1e5;
+const LOADS_N_M: [f64; 2] = [-1e5, 1e5];
 const TEMPERATURES_C: [f64; 2] = [-200.0, 300.0];
 /// Loads at which passes are made, where there is a load.
 const LOADS: usize = 11;
@@ -91,6 +91,9 @@ impl Bench {
             let good = low.is_finite() && high.is_finite() && low <= high;
             (!good).then(|| format!("{name}: found {low} and {high}, allowed: the lower first"))
         };
+        let both = |name: &str, ends: [f64; 2], [low, high]: [f64; 2]| {
+            ends.into_iter().find_map(|end| within(name, end, low, high))
+        };
         within("--minutes", self.minutes, 1.0, 1e5)
             .or_else(|| within("--rate", self.rate_hz, 0.1, 1e6))
             .or_else(|| within("--speed-rpm", self.speed_rpm, 1e-3, FASTEST_RPM))
@@ -98,10 +101,8 @@ impl Bench {
             .or_else(|| within("--wander-arcsec", self.wander_arcsec, 0.0, 1e4))
             .or_else(|| rising("--load-n-m", self.torque_n_m))
             .or_else(|| rising("--temperatures-c", self.temperature_c))
-            .or_else(|| within("--load-n-m", self.torque_n_m[0], -LARGEST_N_M, LARGEST_N_M))
-            .or_else(|| within("--load-n-m", self.torque_n_m[1], -LARGEST_N_M, LARGEST_N_M))
-            .or_else(|| within("--temperatures-c", self.temperature_c[0], TEMPERATURES_C[0], TEMPERATURES_C[1]))
-            .or_else(|| within("--temperatures-c", self.temperature_c[1], TEMPERATURES_C[0], TEMPERATURES_C[1]))
+            .or_else(|| both("--load-n-m", self.torque_n_m, LOADS_N_M))
+            .or_else(|| both("--temperatures-c", self.temperature_c, TEMPERATURES_C))
             .or_else(|| rising("--travel-deg", self.output_deg))
             .or_else(|| within("--travel-deg (its length)", self.output_deg[1] - self.output_deg[0], 1.0, 3.6e4))
     }

@@ -7,7 +7,7 @@ use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
-use crate::measurement::robust::{median_of, quantile_of, sampled, white_noise};
+use crate::measurement::robust::{least_and_most, median_of, quantile_of, sampled, white_noise};
 
 /// A row is out by so many standard deviations of the white noise…
 const OUT: f64 = 10.0;
@@ -45,15 +45,14 @@ const REPEATS_MANY: f64 = 12.0;
 /// How far row `row` is from the rows before and after, and from where they go on to, if all say so; 0 if one of them bears it out. A
 /// load turns sharply within a row and means it, and the wind-up with it: such a tip goes on as one of its sides does.
 fn off_course(values: &[f64], row: usize) -> f64 {
-    if row < BESIDE || row + BESIDE >= values.len() {
+    let by = out_by(values, row);
+    if by == 0.0 {
         return 0.0;
     }
     let (before, after) = ([3, 2, 1].map(|k| values[row - k]), [3, 2, 1].map(|k| values[row + k]));
     let borne_out = [before[2], after[2], carried_on(before), carried_on(after)];
-    let low = borne_out.into_iter().fold(f64::INFINITY, f64::min);
-    let high = borne_out.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let (low, high) = least_and_most(borne_out);
     let beyond = values[row] - values[row].clamp(low, high);
-    let by = out_by(values, row);
     if beyond * by <= 0.0 { 0.0 } else { by.signum() * by.abs().min(beyond.abs()) }
 }
 
@@ -67,8 +66,7 @@ fn carried_on([a, b, c]: [f64; BESIDE]) -> f64 {
 fn load_swings(session: &Session, row: usize, largest_n_m: f64) -> bool {
     session.torque_n_m.as_ref().is_some_and(|torque| {
         let near = &torque[row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(torque.len())];
-        let low = near.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = near.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (low, high) = least_and_most(near.iter().copied());
         let beside = &torque[row.saturating_sub(1)..(row + 2).min(torque.len())];
         let let_go = beside.iter().any(|torque| torque.abs() < HELD * largest_n_m);
         high - low > SWINGS * largest_n_m && (let_go || out_by(torque, row).abs() > SWINGS * largest_n_m)
@@ -112,6 +110,10 @@ type Out = (usize, f64);
 fn rows_out(values: &[f64], least: f64) -> Vec<Out> {
     let mut found = Vec::new();
     for row in BESIDE..values.len().saturating_sub(BESIDE) {
+        // The cheaper bound first: it is the larger one.
+        if out_by(values, row).abs() <= least {
+            continue;
+        }
         let by = off_course(values, row);
         if by.abs() <= least {
             continue;
