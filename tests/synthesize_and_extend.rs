@@ -207,7 +207,7 @@ fn wrong_requests_are_refused_and_leave_nothing() {
         (format!("{model} --rows 3"), "--rows"),
         (format!("{model} --like nowhere.csv"), "nowhere.csv"),
         ("synthesize --model nowhere.toml --out made".to_owned(), "nowhere.toml"),
-        ("synthesize --tables nowhere --out made".to_owned(), "nowhere/cam.fxt"),
+        ("synthesize --tables nowhere --out made".to_owned(), "found no cam.fxt in nowhere"),
         ("synthesize --generator gear --out made".to_owned(), "gear"),
     ] {
         let before = names(&desk.path("."));
