@@ -10,11 +10,11 @@ use flexspline_tests::command::Desk;
 fn drives_by_kernels_are_those_by_fem() {
     let desk = Desk::new();
     desk.write("teeth.toml", include_str!("../examples/campaign/teeth.toml"));
-    desk.line("campaign plan teeth.toml --drives 16 --shards 2 --fem 16 --fem-places 5 --out small").done();
+    desk.line("campaign plan teeth.toml --drives 8 --shards 2 --fem 8 --fem-places 5 --out small").done();
     desk.line("campaign run small --shard all").done();
     let reduced = desk.line("campaign reduce small --json").done().json();
     let fem = &reduced["generators"][0]["fem"];
-    assert_eq!((fem["drives"].as_u64(), reduced["generators"][0]["fem_failed"].as_u64()), (Some(16), Some(0)));
+    assert_eq!((fem["drives"].as_u64(), reduced["generators"][0]["fem_failed"].as_u64()), (Some(8), Some(0)));
     for figure in fem["figures"].as_array().unwrap() {
         println!("{figure}");
         let of = |name: &str| figure[name].as_f64().unwrap();

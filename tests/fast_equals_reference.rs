@@ -162,6 +162,7 @@ fn every_imperfection_at_once() {
 }
 
 #[test]
+#[ignore = "half a minute of a processor: all of them at once are compared always"]
 fn one_imperfection_of_each_kind() {
     type Change = fn(&mut Drive);
     let harmonic = |order, amplitude_um| vec![Harmonic { order, amplitude_um, phase_deg: 20.0 }];

@@ -104,7 +104,8 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
         mesh: MeshLevel::Coarse,
         torque_n_m: 50.0,
         last_torque_n_m: 25.0,
-        increments: 2,
+        // An increment of CalculiX takes more than a minute: the short form turns once.
+        increments: if options.long { 2 } else { 1 },
         step_rad: 0.01,
         parts: 1,
         penalties: PENALTIES,
