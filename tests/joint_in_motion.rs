@@ -4,7 +4,7 @@
 use std::process::Command;
 
 use flexspline_sim::drive::GeneratorKind;
-use flexspline_sim::fly::{Flown, Results, built_in, read, results};
+use flexspline_sim::fly::{Flown, Results, SCENARIOS, built_in, read, results};
 use flexspline_tests::command::flexspline;
 use serde_json::Value;
 
@@ -40,8 +40,8 @@ fn with_an_inert_load_the_core_removes_what_a_quasi_static_inverse_removes() {
     }
 }
 
-/// The low-pass of a torque in the mesh is wide on a stiff drive, which stays stable, and on a soft one so narrow that it tells little more than a
-/// mean; whether that one comes to rest after a knock is not claimed.
+/// The low-pass of a torque in the mesh is wide on a stiff drive, and on a soft one so narrow that it tells little more than a mean; both come to
+/// rest after a knock.
 #[test]
 fn a_torque_in_the_mesh_passes_only_as_far_as_its_loop_keeps_the_margin() {
     let [stiff, soft] =
@@ -49,12 +49,12 @@ fn a_torque_in_the_mesh_passes_only_as_far_as_its_loop_keeps_the_margin() {
     println!("double disc: {} {:.2} Hz, removed {:.3}", stiff.torque, stiff.bandwidth_hz, stiff.removed.unwrap());
     println!("two rollers: {} {:.2} Hz, removed {:.3}", soft.torque, soft.bandwidth_hz, soft.removed.unwrap());
     assert!(stiff.torque == "in_mesh" && stiff.stable && stiff.removed.unwrap() > 0.8);
-    assert!(soft.torque == "in_mesh" && soft.removed.unwrap() > 0.5 && soft.bandwidth_hz < 1.0);
+    assert!(soft.torque == "in_mesh" && soft.stable && soft.removed.unwrap() > 0.5 && soft.bandwidth_hz < 1.0);
 }
 
 #[test]
-fn scenarios_with_a_name_are_stable_and_better_with_the_core_than_with_any_error_map() {
-    for name in ["rover", "camera"] {
+fn scenarios_with_a_name_are_stable_and_lose_less_than_a_tenth_of_what_the_ideal_removes() {
+    for name in SCENARIOS {
         let found = flight(&built_in(name).unwrap());
         let rms = found.rms_arcsec;
         println!(
@@ -64,9 +64,31 @@ fn scenarios_with_a_name_are_stable_and_better_with_the_core_than_with_any_error
             rms.ideal,
             found.removed.unwrap()
         );
-        // The low-pass of the torque is late for the steps of a wheel over stones.
-        assert!(found.stable && found.removed.unwrap() > 0.85, "{name}");
+        assert!(found.stable && found.removed.unwrap() > 0.95, "{name}");
         assert!(rms.compensated < rms.fourier.min(rms.fourier_by_direction).min(rms.none), "{name}");
+    }
+}
+
+/// A dish at a constant rate under a constant load: what ripples is the drive. Wind moves the output as much with a table as without.
+#[test]
+fn at_a_constant_rate_the_ripple_is_a_fifth_and_that_of_wind_stays() {
+    for (rate, gust, least) in [(0.02, 0.0, 5.0), (0.05, 0.0, 5.0), (0.02, 4.0, 0.9)] {
+        let text = format!(
+            "base = \"antenna\"\nlegs = [[2.0, 0.0], [18.0, {rate}]]\n[load]\nswing = [0.0, 0.03]\ngust = [{gust}, 0.3]\n"
+        );
+        let ripple = flight(&read("rate.toml", &text).unwrap()).velocity_ripple;
+        println!("{rate} rad/s, gusts of {gust} N.m: {ripple:.1?} arcsec/s");
+        assert!(ripple.none > least * ripple.compensated, "{rate} {gust}: {ripple:?}");
+    }
+}
+
+/// Without a torque sensor: the motor's current tells a torque that lies within the bound that is stated with it.
+#[test]
+fn the_bound_of_the_torque_by_the_motors_current_holds() {
+    for kind in GeneratorKind::ALL {
+        let found = flight(&dish(kind, "current"));
+        println!("{kind}: removed {:.3}, within {:.3}", found.removed.unwrap(), found.torque_within_bound.unwrap());
+        assert!(found.torque_within_bound.unwrap() > 0.95 && found.removed.unwrap() > 0.75 && found.stable, "{kind}");
     }
 }
 

@@ -32,6 +32,7 @@ use crate::play::PlayState;
 use crate::store::{Images, Store, Told};
 use crate::table::{Approach, Command, Estimate, MAX_ERROR_RAD, Memory, Model, Prediction, Quality, departure};
 use crate::whole::{SUMS_START, pair, same, sums};
+use core::num::NonZeroU32;
 
 /// Less than a count.
 const WITHIN: i32 = FINE - 1;
@@ -410,21 +411,24 @@ impl Settings {
 
     /// Moves the correction towards the goal, and never beyond `most`, whatever state it is in.
     ///
-    /// The goal's own speed is followed; what lies between is closed as fast as it can be stopped again: in steps of one tick,
-    /// from a distance `l` with `√(a²/4 + 2al) − a/2`.
+    /// As fast as it can be stopped there in whole ticks, braking with half of the acceleration `b`: from a distance `l` the speed is
+    /// `(l + b·n(n + 1)/2)/(n + 1)`, with so many ticks `n` of braking as bring that between `n·b` and `(n + 1)·b`. So it never leaves the range of the goals that
+    /// it was given, and a goal that moves by less than `b` in a tick is where it is. Braking with all of the acceleration takes a fifth less time, and
+    /// lets slow noise out 7 % larger than it came in.
     #[inline(always)]
     fn limit(&self, now: &mut Kept, goal: i32, most: i32) -> i32 {
         let before = now.correction;
-        let pace = goal.wrapping_sub(now.aimed);
-        let lag = now.aimed.wrapping_sub(before);
-        now.aimed = goal;
+        let lag = goal.wrapping_sub(before);
         let away = lag.unsigned_abs();
-        let gain = self.acceleration as f32;
-        let stoppable = num::sqrt(0.25 * gain * gain + (gain + gain) * away as f32) - 0.5 * gain;
-        let stoppable = stoppable as u32;
-        let stoppable = (if stoppable < away { stoppable } else { away }) as i32;
         let side = lag >> 31;
-        let wanted = pace.saturating_add((stoppable ^ side).wrapping_sub(side));
+        let braking = (self.acceleration as u32).wrapping_add(1) >> 1;
+        // Rounded up, so that it is right or one too many.
+        let root = num::sqrt(1.0 + 8.0 * (away as f32 / braking as f32));
+        let ticks = (0.5 * (root * (1.0 + 1e-6) - 1.0)) as u32;
+        let lost = |ticks: u32| braking.wrapping_mul(ticks).wrapping_mul(ticks.wrapping_add(1)) >> 1;
+        let ticks = ticks.wrapping_sub((lost(ticks) > away) as u32);
+        let stoppable = away.wrapping_add(lost(ticks)) / NonZeroU32::MIN.saturating_add(ticks);
+        let wanted = (stoppable as i32 ^ side).wrapping_sub(side);
         let (slower, faster) = (now.speed.wrapping_sub(self.acceleration), now.speed.wrapping_add(self.acceleration));
         let speed = within(within(wanted, slower, faster), self.rate.wrapping_neg(), self.rate);
         // Where a smaller table was activated it is on its way back, and goes no further out.
@@ -875,6 +879,91 @@ mod tests {
         }
     }
 
+    /// A limiter alone: fine counts in a tick and in a tick more each tick.
+    struct Limited {
+        settings: Settings,
+        now: Kept,
+    }
+
+    impl Limited {
+        fn new(rate: i32, acceleration: i32) -> Self {
+            let Joint { copies: [settings, _] } = Joint::new(fixture::drive(), LIMITS, Overrun::SkipAndCount).unwrap();
+            Self { settings: Settings { rate, acceleration, ..settings }, now: JointState::new().open().0 }
+        }
+
+        /// One tick; no limit is broken by a single count.
+        fn go(&mut self, goal: i32) -> i32 {
+            let (before, speed) = (self.now.correction, self.now.speed);
+            let found = self.settings.limit(&mut self.now, goal, MOST_FINE as i32);
+            let moved = found - before;
+            assert!(moved == self.now.speed && moved.abs() <= self.settings.rate, "rate {moved}");
+            assert!((moved - speed).abs() <= self.settings.acceleration, "acceleration {}", moved - speed);
+            found
+        }
+    }
+
+    #[test]
+    fn a_step_ends_where_it_is_asked_to_without_going_beyond() {
+        for acceleration in [1, 2, 7, 1000, 30_000, 40_000_000] {
+            for goal in [1, 5, 999, 1_000_003, -70_000_000, MOST_FINE as i32] {
+                let mut limited = Limited::new(100_000_000, acceleration);
+                let (mut before, mut ticks) = (0, 0);
+                while before != goal {
+                    let now = limited.go(goal);
+                    assert!(
+                        now.abs() <= goal.abs() && (now - before).signum() == goal.signum(),
+                        "{acceleration} {goal}: {now}"
+                    );
+                    (before, ticks) = (now, ticks + 1);
+                }
+                // Speeding up with all, braking with half of it: √(6·way/acceleration); and rounding to whole ticks and counts.
+                let least = (6.0 * f64::from(goal.abs()) / f64::from(acceleration)).sqrt();
+                assert!(f64::from(ticks) <= 1.01 * least + 8.0, "{acceleration} {goal}: {ticks} {least}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_goal_slower_than_half_of_the_acceleration_is_where_it_is_and_a_faster_one_is_ahead_by_what_stopping_takes() {
+        for (pace, lag) in [(500, 0), (-500, 0), (2500, 5000), (-2500, -5000)] {
+            let mut limited = Limited::new(100_000, 1000);
+            let mut found = 0;
+            for k in 1..=50 {
+                found = limited.go(k * pace);
+            }
+            // 2000, 1500, 1000 and 500 more, if the goal stopped here.
+            assert_eq!(50 * pace - found, lag, "{pace}");
+        }
+    }
+
+    /// Noise of every colour, and of every size against the acceleration: never larger than it came in.
+    #[test]
+    fn noise_comes_out_no_larger_than_it_came_in() {
+        let mut seed = 1_u32;
+        let mut white = || {
+            let mut one = || {
+                seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                f64::from(seed >> 8) / f64::from(1 << 23) - 1.0
+            };
+            one() + one() + one() + one()
+        };
+        for acceleration in [10, 100, 1000, 10_000, 100_000, 1_000_000] {
+            for share in [1.0, 0.4, 0.1, 0.03, 0.01, 0.003] {
+                let mut limited = Limited::new(i32::MAX / 8, acceleration);
+                let (mut slow, mut sums) = (0.0, [[0.0; 2]; 2]);
+                for _ in 0..20_000 {
+                    slow += share * (white() - slow);
+                    let goal = (1e5 * slow) as i32;
+                    for (sum, value) in sums.iter_mut().zip([goal, limited.go(goal)]) {
+                        *sum = [sum[0] + f64::from(value), sum[1] + f64::from(value).powi(2)];
+                    }
+                }
+                let [came, left] = sums.map(|[sum, squares]| (squares / 2e4 - (sum / 2e4).powi(2)).sqrt());
+                assert!(left <= came, "acceleration {acceleration}, share {share}: {came} in, {left} out");
+            }
+        }
+    }
+
     /// With a checksum that fits: what no joint can have saved is refused all the same.
     #[test]
     fn impossible_saved_states_are_refused() {
@@ -906,6 +995,24 @@ mod tests {
     }
 
     proptest! {
+        /// Whatever it is asked for, the correction stays between what it was asked for.
+        #[test]
+        fn the_correction_never_leaves_the_range_of_its_goals(
+            goals in prop::collection::vec((-(MOST_FINE as i32)..MOST_FINE as i32, 0u32..26, 1u8..40), 1..60),
+            rate in 1i32..300_000_000, acceleration in 1u32..29,
+        ) {
+            let mut limited = Limited::new(rate, (1 << acceleration) | 1);
+            let (mut least, mut most) = (0, 0);
+            for (goal, smaller, ticks) in goals {
+                let goal = goal >> smaller;
+                (least, most) = (least.min(goal), most.max(goal));
+                for _ in 0..ticks {
+                    let found = limited.go(goal);
+                    prop_assert!((least..=most).contains(&found), "{found} outside {least} to {most}");
+                }
+            }
+        }
+
         /// Whatever comes in, the correction moves within its limits and stays within the table's.
         #[test]
         fn any_input_keeps_the_limits(

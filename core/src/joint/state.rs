@@ -38,9 +38,9 @@ pub(super) struct Kept {
     pub generator: GeneratorAngle,
     /// The correction, fine counts.
     pub correction: i32,
-    /// What is wanted, and what of it was asked of the limiter.
+    /// What is wanted of it.
     pub goal: i32,
-    pub aimed: i32,
+    /// What it moved by in the last tick.
     pub speed: i32,
     /// Ticks in a row with a glitch, and without a correction.
     pub glitches: u16,
@@ -72,7 +72,6 @@ impl Kept {
         generator: GeneratorAngle::ZERO,
         correction: 0,
         goal: 0,
-        aimed: 0,
         speed: 0,
         glitches: 0,
         uncorrected: 0,
@@ -96,7 +95,6 @@ impl Kept {
             high(self.generator.counts()),
             self.correction as u32,
             self.goal as u32,
-            self.aimed as u32,
             self.speed as u32,
             self.glitches as u32 | (self.uncorrected as u32) << 16,
             self.fading,
@@ -214,7 +212,7 @@ impl JointState {
         // What both have is likely to be what is commanded, and taken back within the limits.
         let correction = if one == other && one.unsigned_abs() <= MOST_FINE { one } else { 0 };
         let marks = Mode::Safe.code();
-        *kept = Kept { correction, goal: correction, aimed: correction, marks, ..Kept::NEW };
+        *kept = Kept { correction, goal: correction, marks, ..Kept::NEW };
         Found::Lost
     }
 
@@ -379,7 +377,6 @@ impl JointState {
             generator: GeneratorAngle::from_counts(long(12)),
             correction,
             goal: correction,
-            aimed: correction,
             speed,
             marks: Mode::Off.code() | SAVED | flank,
             ..Kept::NEW
@@ -392,7 +389,7 @@ impl JointState {
 
 /// Words of a state as a simulation keeps it.
 #[cfg(any(test, feature = "std"))]
-pub const JOINT_STATE_WORDS: usize = 19;
+pub const JOINT_STATE_WORDS: usize = 18;
 
 #[cfg(any(test, feature = "std"))]
 impl JointState {
@@ -415,7 +412,6 @@ impl JointState {
             high(generator),
             kept.correction as u32,
             kept.goal as u32,
-            kept.aimed as u32,
             kept.speed as u32,
             kept.glitches as u32,
             kept.uncorrected as u32,
@@ -441,7 +437,6 @@ impl JointState {
             d,
             correction,
             goal,
-            aimed,
             speed,
             glitches,
             uncorrected,
@@ -457,7 +452,6 @@ impl JointState {
             generator: GeneratorAngle::from_counts(long(c, d)),
             correction: correction as i32,
             goal: goal as i32,
-            aimed: aimed as i32,
             speed: speed as i32,
             glitches: u16::try_from(glitches).ok()?,
             uncorrected: u16::try_from(uncorrected).ok()?,
@@ -483,7 +477,6 @@ crate::upset::upsets!(Kept {
     generator,
     correction,
     goal,
-    aimed,
     speed,
     glitches,
     uncorrected,
@@ -529,7 +522,7 @@ mod tests {
             for place in 0..JOINT_STATE_WORDS {
                 let mut changed = words;
                 changed[place] ^= 1 << (k % 32);
-                assert_eq!(JointState::of_words(&changed).is_some(), place == 17, "{place}");
+                assert_eq!(JointState::of_words(&changed).is_some(), place == 16, "{place}");
             }
         }
     }

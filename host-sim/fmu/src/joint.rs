@@ -43,6 +43,7 @@ variables! {
     GRAVITY_TORQUE => Variable::parameter("gravity_torque", Kind::Real("N.m"), 0.0, TORQUE, "weight times arm of the load");
     GRAVITY_ANGLE => Variable::parameter("gravity_angle", Kind::Real("rad"), 0.0, [-100.0, 100.0], "output angle at which the weight pulls forward most");
     FRICTION_KNOWN => Variable::parameter("friction_known", Kind::Real("1"), 0.8, [0.0, 1.0], "share of the motor's friction that the servo is told before");
+    LOAD_FED_FORWARD => Variable::parameter("load_fed_forward", Kind::Real("1"), 1.0, [0.0, 1.0], "share of a torque known on the load that the servo is told before");
     LOAD_MEAN => Variable::parameter("load_mean", Kind::Real("N.m"), 0.0, TORQUE, "load that is expected: its mean");
     LOAD_SWING => Variable::parameter("load_swing", Kind::Real("N.m"), 0.0, TORQUE, "load that is expected: amplitude of a slow swing");
     LOAD_SWING_FREQUENCY => Variable::parameter("load_swing_frequency", Kind::Real("Hz"), 0.0, NOT_NEGATIVE, "load that is expected: frequency of the swing");
@@ -103,6 +104,7 @@ pub fn starts_of(scenario: &Scenario) -> Vec<(&'static str, f64)> {
         (GRAVITY_TORQUE, load.gravity[0]),
         (GRAVITY_ANGLE, load.gravity[1]),
         (FRICTION_KNOWN, scenario.friction_known),
+        (LOAD_FED_FORWARD, scenario.load_fed_forward),
         (LOAD_MEAN, load.bias_n_m),
         (LOAD_SWING, load.swing[0]),
         (LOAD_SWING_FREQUENCY, load.swing[1]),
@@ -142,6 +144,7 @@ fn scenario_of(values: &[f64]) -> Scenario {
         drag_n_m: values[DRAG],
         damping: values[DAMPING],
         temperature_c: values[TEMPERATURE],
+        warming_k_s: 0.0,
         servo: ServoSettings {
             tick_s: values[TICK],
             steps: values[STEPS] as usize,
@@ -155,7 +158,9 @@ fn scenario_of(values: &[f64]) -> Scenario {
             jitter_s: values[ENCODER_JITTER],
             current_noise_n_m: values[CURRENT_NOISE],
         },
+        friction: 1.0,
         friction_known: values[FRICTION_KNOWN],
+        load_fed_forward: values[LOAD_FED_FORWARD],
         torque: match values[TORQUE_KNOWN] as u8 {
             0 => TorqueKnown::OnLoad,
             1 => TorqueKnown::InMesh,

@@ -43,8 +43,6 @@ pub const TABLE_DRAG_N_M: f64 = 0.02;
 pub const DISTANCE: [f64; 2] = [0.5, 0.2];
 /// Widest low-pass of a torque, Hz: a tenth of the sampling frequency of usual torque sensors (guess).
 const WIDEST_HZ: f64 = 100.0;
-/// Low-pass of a torque on the load, Hz: what is faster than that is noise to a dish (guess: ten times the corner of gusts). No loop limits it.
-const KNOWN_HZ: f64 = 10.0;
 /// The slope along the way is taken over this time, s.
 const AHEAD_S: f32 = 4e-3;
 /// After a change of the target's rate the motor's current tells no torque for so long, s: friction builds up anew.
@@ -55,8 +53,9 @@ const SLOWER: f64 = 0.3;
 const CURRENT_SURE_N_M: f64 = 0.5;
 /// Low-pass of the torque told by the motor's current, Hz: the motor's own acceleration is told by two differences of the encoder.
 const CURRENT_HZ: f64 = 2.0;
-/// Noise of the samples of a calibrated table, rad: 1″.
-const CALIBRATION_NOISE_RAD: f64 = 1.0 / ARCSEC_PER_RAD;
+/// Noise of the samples of a calibrated table, rad: a reading has 1″, and a hundred of them, a tenth of a second at 1 kHz, are averaged at each
+/// place. Of single readings the curve of the tooth pitch would be noise of some 0.5″, which costs nothing in pointing and ripples by tens of ″/s.
+const CALIBRATION_NOISE_RAD: f64 = 0.1 / ARCSEC_PER_RAD;
 /// Share of the lines that an extended table knows.
 const EXTENDED_SHARE: f64 = 0.95;
 
@@ -210,12 +209,20 @@ impl Made {
 /// # Errors
 /// What cannot be flown, in words.
 pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, String> {
+    fly_told(scenario, unit, &|| {})
+}
+
+/// Flies a scenario; `told` is called by each controller's joint for each second that it flew.
+///
+/// # Errors
+/// What cannot be flown, in words.
+pub fn fly_told(scenario: &Scenario, unit: &Unit, told: &(dyn Fn() + Sync)) -> Result<Flight, String> {
     let made = made(scenario, unit, None)?;
     let flown: Vec<Result<Flown, String>> = std::thread::scope(|threads| {
         let flying: Vec<_> = (0..CONTROLLERS.len())
             .map(|k| {
                 let made = &made;
-                threads.spawn(move || lane(made, k))
+                threads.spawn(move || lane(made, k, told))
             })
             .collect();
         flying.into_iter().map(|lane| lane.join().unwrap_or_else(|_| Err("a lane ended early".to_owned()))).collect()
@@ -238,7 +245,7 @@ pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, String> {
 /// # Errors
 /// As [`fly`].
 pub fn fly_one(scenario: &Scenario, unit: &Unit, controller: usize) -> Result<Flown, String> {
-    lane(&made(scenario, unit, None)?, controller)
+    lane(&made(scenario, unit, None)?, controller, &|| {})
 }
 
 /// The image of the table that a scenario's joint flies with; `id` makes its id of what is hashed for it.
@@ -266,6 +273,8 @@ fn made(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>) -> Result<Made
     };
     // At light load the drive is softer: the low-pass has to do for both.
     let soft = TwoMasses { stiffness: self::stiffness(&unit.nominal, 0.1 * scenario.largest_n_m()), ..masses };
+    // No loop limits what is known on the load.
+    let known_hz = scenario.told_best_hz(WIDEST_HZ);
     let path = Path { gain: 1.0, bandwidth_hz: 0.0, late_s: 0.0, rate_fed_forward: false };
     let widest = |masses: &TwoMasses| masses.widest_hz(&scenario.servo, &path, DISTANCE, WIDEST_HZ);
     let both = widest(&masses).zip(widest(&soft)).map(|(a, b)| a.min(b));
@@ -273,8 +282,8 @@ fn made(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>) -> Result<Made
     let (torque, bandwidth_hz) = match (scenario.torque, both) {
         (TorqueKnown::InMesh, Some(hz)) => (TorqueKnown::InMesh, hz),
         (TorqueKnown::Current, Some(hz)) => (TorqueKnown::Current, hz.min(CURRENT_HZ)),
-        (TorqueKnown::OnLoad, _) => (TorqueKnown::OnLoad, KNOWN_HZ),
-        _ => (TorqueKnown::Not, KNOWN_HZ),
+        (TorqueKnown::OnLoad, _) => (TorqueKnown::OnLoad, known_hz),
+        _ => (TorqueKnown::Not, known_hz),
     };
     Ok(Made {
         scenario: scenario.clone(),
@@ -311,7 +320,7 @@ fn plant(made: &Made) -> Plant {
         load_kg_m2: scenario.load_kg_m2,
         gear: unit.built.clone(),
         damping_s: damping_s(scenario, unit),
-        friction: Friction::EROB80_100,
+        friction: Friction::EROB80_100.times(scenario.friction),
         drag_n_m: scenario.drag_n_m,
         slip: Vec::new(),
         appendage: None,
@@ -354,18 +363,18 @@ struct Commanded {
 struct Limiter {
     at: f64,
     speed: f64,
-    goal: f64,
 }
 
 impl Limiter {
     fn go(&mut self, goal: f64, tick_s: f64) -> f64 {
-        let pace = (goal - self.goal) / tick_s;
-        let lag = self.goal - self.at;
-        self.goal = goal;
+        // As in whole ticks the core stops: with half of the acceleration.
         let step = ACCELERATION_RAD_S2 * tick_s;
-        let stoppable = (step * (0.25 * step + 2.0 * lag.abs() / tick_s)).sqrt() - 0.5 * step;
-        let wanted = pace + libm::copysign(stoppable.min(lag.abs() / tick_s), lag);
-        self.speed = (self.speed + (wanted - self.speed).clamp(-step, step)).clamp(-RATE_RAD_S, RATE_RAD_S);
+        let lag = (goal - self.at) / tick_s;
+        let (away, braking) = (lag.abs(), 0.5 * step);
+        let ticks = libm::floor(0.5 * ((1.0 + 8.0 * away / braking).sqrt() - 1.0));
+        let stoppable = (away + 0.5 * braking * ticks * (ticks + 1.0)) / (ticks + 1.0);
+        let wanted = libm::copysign(stoppable, lag);
+        self.speed = wanted.clamp(self.speed - step, self.speed + step).clamp(-RATE_RAD_S, RATE_RAD_S);
         self.at += self.speed * tick_s;
         self.at
     }
@@ -460,7 +469,7 @@ impl Controller {
                 // What the low-pass leaves of white noise.
                 let turned = TAU * made.bandwidth_hz * scenario.servo.tick_s;
                 let behind = (turned / (2.0 + turned)).sqrt();
-                let path = TorquePath::new(TorqueSettings {
+                let mut path = TorquePath::new(TorqueSettings {
                     tick_s: scenario.servo.tick_s as f32,
                     bandwidth_hz: made.bandwidth_hz as f32,
                     drag_n_m: if on_load { scenario.drag_n_m as f32 } else { 0.0 },
@@ -468,6 +477,8 @@ impl Controller {
                     hold_n_m: (3.0 * behind * scenario.torque_noise_n_m) as f32,
                 })
                 .map_err(setting)?;
+                // A low-pass that takes minutes starts from what is expected, not from a joint that carries nothing yet.
+                let _ = path.tick(TorqueReading::InMesh(scenario.mean_n_m() as f32), Direction::Forward);
                 let core = Box::new(Core { joint, store, state, path });
                 if kind == BY_TORQUE { Self::ByTorque(core, Limiter::default()) } else { Self::Core(core) }
             }
@@ -552,11 +563,16 @@ struct Sensing {
     before_rad_s: f64,
     friction: Friction,
     even_s: f64,
-    /// The torque in the mesh that the motor's current told last, N·m, behind a low-pass, and how old it is, s.
+    /// Torque on the load that the motor's current tells, N·m: behind a low-pass, what of that is believed by now, and how old it is, s.
+    heard_n_m: f64,
     told_n_m: f64,
     age_s: f64,
+    /// The drag, with the sign of the last motion, N·m.
+    drag_n_m: f64,
     /// It lies within ± this of the true one.
     bound_n_m: f64,
+    /// Torque known on the load behind its low-pass, for the servo, N·m; NaN before the first.
+    fed_n_m: f64,
 }
 
 impl Sensing {
@@ -564,11 +580,14 @@ impl Sensing {
         Self {
             noise: Noise::new(scenario.seed ^ 0x9b1d),
             before_rad_s: 0.0,
-            friction: Friction::EROB80_100,
+            friction: Friction::EROB80_100.times(scenario.friction),
             even_s: 0.0,
+            heard_n_m: scenario.mean_n_m(),
             told_n_m: scenario.mean_n_m(),
             age_s: 0.0,
+            drag_n_m: scenario.drag_n_m,
             bound_n_m: f64::INFINITY,
+            fed_n_m: f64::NAN,
         }
     }
 
@@ -579,19 +598,23 @@ impl Sensing {
             // What the load's inertia asks for on the way of the target is known before, and cannot feed back.
             TorqueKnown::OnLoad => {
                 let known = on_load_n_m(scenario, now) + noise;
+                let turned = TAU * made.bandwidth_hz * scenario.servo.tick_s;
+                let share = if self.fed_n_m.is_finite() { turned / (1.0 + turned) } else { 1.0 };
+                let before = if self.fed_n_m.is_finite() { self.fed_n_m } else { 0.0 };
+                self.fed_n_m = before + share * (known - before);
                 TorqueReading::OnLoad((known - scenario.load_kg_m2 * now.acceleration_rad_s2) as f32)
             }
             TorqueKnown::Not => TorqueReading::OnLoad(scenario.mean_n_m() as f32),
             TorqueKnown::InMesh => TorqueReading::InMesh((plant.mesh_n_m() + noise) as f32),
             TorqueKnown::Current => {
                 self.by_current(made, servo, now);
-                TorqueReading::InMesh(self.told_n_m as f32)
+                TorqueReading::InMesh((self.told_n_m - self.drag_n_m) as f32)
             }
         }
     }
 
     /// The motor's current less friction and inertia, while the target moves evenly; else what it was, with a bound that grows as the load may
-    /// have changed.
+    /// have changed. Kept as a torque on the load: that does not change where the target turns back, as the one in the mesh does by twice the drag.
     fn by_current(&mut self, made: &Made, servo: &mut Servo, now: &Moment) {
         let scenario = &made.scenario;
         let tick_s = scenario.servo.tick_s;
@@ -600,26 +623,38 @@ impl Sensing {
         self.before_rad_s = rate;
         let even = now.rate_rad_s != 0.0 && now.acceleration_rad_s2 == 0.0;
         self.even_s = if even { self.even_s + tick_s } else { 0.0 };
-        let level = self.friction.level_n_m(now.rate_rad_s, self.told_n_m);
+        if now.rate_rad_s != 0.0 {
+            self.drag_n_m = libm::copysign(scenario.drag_n_m, now.rate_rad_s);
+        }
+        let rubbing = self.rubbing_n_m(now.rate_rad_s, self.told_n_m - self.drag_n_m);
+        let share = 1.0 - libm::exp(-TAU * made.bandwidth_hz * tick_s);
+        self.age_s += tick_s;
         if self.even_s >= SETTLES_S {
-            let rubbing = scenario.friction_known * self.rubbing_n_m(now.rate_rad_s, self.told_n_m);
-            let found = made.masses.motor_kg_m2 * acceleration - servo.current_n_m() + rubbing;
-            let share = 1.0 - libm::exp(-TAU * made.bandwidth_hz * tick_s);
+            let mesh = made.masses.motor_kg_m2 * acceleration - servo.current_n_m() + scenario.friction_known * rubbing;
+            self.heard_n_m += share * (mesh + self.drag_n_m - self.heard_n_m);
             // The friction has the sign of the target's rate only as long as the correction is slower than that.
             let most = SLOWER * now.rate_rad_s.abs() * tick_s * made.soft_n_m_per_rad;
-            let wanted = share * (found - self.told_n_m);
-            self.told_n_m += wanted.clamp(-most, most);
-            // What is held back is as old as what it is held back from.
-            self.age_s = if wanted.abs() > most { self.age_s + tick_s } else { 0.0 };
-        } else {
-            self.age_s += tick_s;
+            self.told_n_m += (self.heard_n_m - self.told_n_m).clamp(-most, most);
+            // The mean age of what is behind the low-pass.
+            self.age_s *= 1.0 - share;
         }
         let Load { swing, gust, step, .. } = scenario.load;
-        let late_s = self.age_s + 1.0 / (TAU * made.bandwidth_hz);
-        let blown = 2.0 * gust[0] * (2.0 * (1.0 - libm::exp(-TAU * gust[1] * late_s))).sqrt();
-        let swung = swing[0].abs() * (TAU * swing[1] * late_s).min(2.0);
-        let unknown = (1.0 - scenario.friction_known) * level;
-        self.bound_n_m = unknown + blown + swung + step[0].abs() + CURRENT_SURE_N_M;
+        let blown = 2.0 * gust[0] * (2.0 * (1.0 - libm::exp(-TAU * gust[1] * self.age_s))).sqrt();
+        let swung = swing[0].abs() * (TAU * swing[1] * self.age_s).min(2.0);
+        // At rest friction may have either sign, and the drag too.
+        let unknown = if now.rate_rad_s == 0.0 { 2.0 * scenario.drag_n_m } else { 0.0 };
+        let rubbed = (1.0 - scenario.friction_known) * self.friction.level_n_m(now.rate_rad_s, self.told_n_m)
+            + (1.0 - scenario.friction_known) * self.friction.viscous_n_m_s * now.rate_rad_s.abs();
+        let turning = scenario.load_kg_m2 * now.acceleration_rad_s2.abs();
+        let held_back = (self.heard_n_m - self.told_n_m).abs();
+        self.bound_n_m = rubbed + unknown + turning + held_back + blown + swung + step[0].abs() + CURRENT_SURE_N_M;
+    }
+
+    /// What of the load the motor has to hold, N·m at the output: of a torque known on the load, less the drag while that has a sign. Its
+    /// inertia is fed forward as the target's acceleration.
+    fn held_n_m(&self, scenario: &Scenario, now: &Moment) -> f64 {
+        let drag = if now.rate_rad_s == 0.0 { 0.0 } else { libm::copysign(scenario.drag_n_m, now.rate_rad_s) };
+        if self.fed_n_m.is_finite() { self.fed_n_m - drag } else { 0.0 }
     }
 
     /// Friction that a rate has to overcome, N·m at the output.
@@ -679,9 +714,13 @@ impl Lane {
             command: commanded.command,
             rate_rad_s: commanded.rate_rad_s,
             acceleration_rad_s2: now.acceleration_rad_s2 * made.unit.nominal.ratio * both,
-            friction_n_m: scenario.friction_known * self.sensing.rubbing_n_m(now.rate_rad_s, mesh_n_m)
+            torque_n_m: (scenario.friction_known * self.sensing.rubbing_n_m(now.rate_rad_s, mesh_n_m)
+                - scenario.load_fed_forward * self.sensing.held_n_m(scenario, now))
                 / made.unit.nominal.ratio,
         };
+        if scenario.warming_k_s != 0.0 {
+            self.plant.set_temperature(scenario.temperature_c + scenario.warming_k_s * now.time_s);
+        }
         let [first, last] = now.outside_n_m;
         let tick_s = scenario.servo.tick_s;
         self.servo.go(&mut self.plant, &asked, |time| first + (last - first) * time / tick_s);
@@ -689,12 +728,13 @@ impl Lane {
     }
 }
 
-fn lane(made: &Made, kind: usize) -> Result<Flown, String> {
+fn lane(made: &Made, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown, String> {
     let scenario = &made.scenario;
     let mut lane = Lane::new(made, kind)?;
     let every = (scenario.seconds() / scenario.servo.tick_s / ROWS).ceil().max(1.0) as usize;
     let mut flown = Flown { digest: 0xcbf2_9ce4_8422_2325, ..Flown::default() };
     let mut within = 0_u32;
+    let second = (1.0 / scenario.servo.tick_s) as usize;
     for (tick, now) in scenario.moments().enumerate() {
         let error = (lane.plant.angle_rad[1] - now.target_rad) * ARCSEC_PER_RAD;
         let ripple = (lane.plant.rate_rad_s[1] - now.rate_rad_s) * ARCSEC_PER_RAD;
@@ -703,13 +743,16 @@ fn lane(made: &Made, kind: usize) -> Result<Flown, String> {
             return Err(format!("{}: the joint runs away at {:.2} s", CONTROLLERS[kind], now.time_s));
         }
         flown.digest = (flown.digest ^ error.to_bits()).wrapping_mul(0x0100_0000_01b3);
+        if tick % second == second - 1 {
+            told();
+        }
         let commanded = lane.tick(made, &now);
         if now.time_s >= START_UP_S {
             flown.error.add(error);
             if now.steady {
                 flown.ripple.add(ripple);
             }
-            let off = lane.sensing.told_n_m - mesh;
+            let off = lane.sensing.told_n_m - lane.sensing.drag_n_m - mesh;
             within += u32::from(off.abs() <= lane.sensing.bound_n_m);
             flown.mesh.add(mesh);
             flown.errors.push(error as f32);
@@ -736,14 +779,16 @@ fn left_of_a_knock(made: &Made, kind: usize) -> Result<f64, String> {
     };
     let second = (1.0 / made.scenario.servo.tick_s) as u32;
     let (mut left, mut sum) = (Score::default(), 0.0);
-    for tick in 0..4 * second {
-        if tick == second {
+    // Until a slow low-pass follows, the motor creeps after the torque that it tells, and sticks and slips: that is no ringing.
+    let knocked = second + (TIME_CONSTANTS / (TAU * made.bandwidth_hz * made.scenario.servo.tick_s)) as u32;
+    for tick in 0..knocked + 3 * second {
+        if tick == knocked {
             let mut rates = lane.plant.rate_rad_s;
             rates[1] += 1e-3;
             lane.plant.set_motion(lane.plant.angle_rad, rates);
         }
         lane.tick(made, &now(tick));
-        if 2 * tick >= 7 * second {
+        if 2 * tick >= 2 * knocked + 5 * second {
             left.add(lane.plant.rate_rad_s[1]);
             sum += lane.plant.rate_rad_s[1];
         }
@@ -751,6 +796,9 @@ fn left_of_a_knock(made: &Made, kind: usize) -> Result<f64, String> {
     let mean = sum / f64::from(left.count.max(1));
     Ok((left.rms() * left.rms() - mean * mean).max(0.0).sqrt())
 }
+
+/// Time constants of the torque's low-pass before the knock: what is left of a step of it is 3e-4.
+const TIME_CONSTANTS: f64 = 8.0;
 
 /// Speed below which a joint counts as at rest, rad/s: 4″/s, with an encoder that steps.
 const AT_REST_RAD_S: f64 = 2e-5;

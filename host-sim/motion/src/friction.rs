@@ -60,6 +60,18 @@ impl Friction {
         ..Friction::NONE
     };
 
+    /// So many times as much at every speed and load.
+    pub fn times(&self, share: f64) -> Self {
+        Self {
+            base_n_m: share * self.base_n_m,
+            load_base: share * self.load_base,
+            stribeck_n_m: share * self.stribeck_n_m,
+            load_stribeck: share * self.load_stribeck,
+            viscous_n_m_s: share * self.viscous_n_m_s,
+            ..*self
+        }
+    }
+
     /// What the cold does, as a factor.
     pub fn cold(&self, temperature_c: f64) -> f64 {
         libm::exp((self.reference_c - temperature_c) / self.cold_k)

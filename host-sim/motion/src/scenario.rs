@@ -69,12 +69,19 @@ pub struct Scenario {
     pub drag_n_m: f64,
     /// Part of critical damping of the twist, at the stiffness under the largest load (guess: 0.02).
     pub damping: f64,
-    /// Temperature of the drive, °C.
+    /// Temperature of the drive at the beginning, °C.
     pub temperature_c: f64,
+    /// What its lubricant warms by, K/s: the friction on the motor's side goes with it.
+    pub warming_k_s: f64,
     /// The servo.
     pub servo: ServoSettings,
+    /// Times the friction of eRob80 that there is on the motor's side; 0 for none.
+    pub friction: f64,
     /// Share of the friction on the motor's side that the servo is told before, by the sign of the target's rate.
     pub friction_known: f64,
+    /// Share of a torque known on the load that the servo is told before: what weight and wind will ask of the motor. No other torque is told to it,
+    /// as that would close a loop.
+    pub load_fed_forward: f64,
     /// From what the torque is known.
     pub torque: TorqueKnown,
     /// Noise of the torque, N·m rms.
@@ -85,6 +92,8 @@ pub struct Scenario {
     pub seed: u32,
 }
 
+/// Slowest low-pass of a torque known on the load, Hz (guess).
+const LEAST_HZ: f64 = 1.0;
 /// A rate held for this long is steady, s.
 const STEADY_S: f64 = 0.5;
 
@@ -120,6 +129,32 @@ impl Scenario {
             + step[0].abs()
             + gravity[0].abs()
             + self.load_kg_m2 * self.acceleration_rad_s2
+    }
+
+    /// Corner of the low-pass with which a torque known on the load is told best, Hz: between what is late behind it and the noise that passes it.
+    ///
+    /// Gusts, and steps for which chance is taken, wander: their mean square change in a tick against the noise gives the gain of a stationary
+    /// Kalman filter (R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Eng. 82, 1960). What swings changes evenly:
+    /// there the corner is where the lag is as large as the noise. 1 Hz at least, as weather changes, and `widest_hz` at most.
+    pub fn told_best_hz(&self, widest_hz: f64) -> f64 {
+        let Load { swing, gust, step, gravity, .. } = self.load;
+        let tick_s = self.servo.tick_s;
+        let noise = self.torque_noise_n_m;
+        if noise == 0.0 {
+            return widest_hz;
+        }
+        let blown = 2.0 * gust[0] * gust[0] * (1.0 - libm::exp(-TAU * gust[1] * tick_s));
+        // Up by twice the step, and down again, in each period.
+        let stepped = if step[1] > 0.0 { 8.0 * step[0] * step[0] * tick_s / step[1] } else { 0.0 };
+        let wander = (blown + stepped) / (noise * noise);
+        // Of gain²/(1 − gain) = wander; and what a low-pass of that gain turns in a tick.
+        let gain = 0.5 * ((wander * (wander + 4.0)).sqrt() - wander);
+        let wandering_hz = gain / (1.0 - gain).max(1e-9) / (TAU * tick_s);
+        let fastest = self.legs.iter().map(|leg| leg.rate_rad_s.abs()).fold(0.0, f64::max);
+        let slope = (TAU * swing[1] * swing[0].abs()).max(fastest * gravity[0].abs());
+        // Lag slope/(2π f), noise √(π f tick).
+        let swinging_hz = libm::cbrt((slope / (TAU * noise)).powi(2) / (0.5 * TAU * tick_s));
+        wandering_hz.max(swinging_hz).clamp(LEAST_HZ.min(widest_hz), widest_hz)
     }
 
     /// Mean of the torque on the load as far as it is known before, N·m.

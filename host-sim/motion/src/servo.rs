@@ -43,8 +43,8 @@ pub struct Asked {
     pub rate_rad_s: f64,
     /// Its acceleration, fed forward, rad/s².
     pub acceleration_rad_s2: f64,
-    /// Torque that friction is expected to take, fed forward, N·m at the motor.
-    pub friction_n_m: f64,
+    /// Torque that friction and load are expected to take, fed forward, N·m at the motor.
+    pub torque_n_m: f64,
 }
 
 /// A motor with its servo and its encoder.
@@ -131,10 +131,8 @@ impl Servo {
         let speed = self.rate_rad_s() * self.ratio;
         let wanted = asked.rate_rad_s + TAU * position_hz * angle_rad(asked.command.minus_counts(self.shown));
         let gain = TAU * speed_hz * inertia_kg_m2;
-        let torque = gain * (wanted - speed)
-            + self.integral_n_m
-            + inertia_kg_m2 * asked.acceleration_rad_s2
-            + asked.friction_n_m;
+        let torque =
+            gain * (wanted - speed) + self.integral_n_m + inertia_kg_m2 * asked.acceleration_rad_s2 + asked.torque_n_m;
         self.next_n_m = torque.clamp(-largest_n_m, largest_n_m);
         if self.next_n_m == torque {
             self.integral_n_m += gain * TAU * integral_hz * tick_s * (wanted - speed);

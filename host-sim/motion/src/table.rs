@@ -18,7 +18,7 @@ const CROWDING: f64 = 3.2;
 const JUMP_HALF_WIDTH: f64 = 0.05;
 /// Nodes over a tooth pitch, and places on a pitch at nodes other than the first.
 const RIPPLE_NODES: usize = 8;
-const PLACES: usize = 16;
+const PLACES: usize = 64;
 /// Places over the output turn at one node: a prime, so that no order folds onto another.
 const PLACES_OF_A_TURN: usize = 997;
 /// Orders of curves.

@@ -29,6 +29,7 @@ fn scenario() -> Scenario {
         drag_n_m: 0.5,
         damping: 0.02,
         temperature_c: 20.0,
+        warming_k_s: 0.0,
         servo: ServoSettings {
             tick_s: 1e-3,
             steps: 5,
@@ -42,7 +43,9 @@ fn scenario() -> Scenario {
             jitter_s: 5e-6,
             current_noise_n_m: 1e-3,
         },
+        friction: 1.0,
         friction_known: 0.8,
+        load_fed_forward: 1.0,
         torque: TorqueKnown::OnLoad,
         torque_noise_n_m: 0.05,
         table: TableKnown::Calibrated,

@@ -85,7 +85,7 @@ fn knocked(joint: &TwoMasses, servo: &ServoSettings, path: Option<&TorquePath>, 
                 command: GeneratorAngle::from_rad(correction).unwrap(),
                 rate_rad_s: if fed { (correction - before) / TICK_S } else { 0.0 },
                 acceleration_rad_s2: 0.0,
-                friction_n_m: 0.0,
+                torque_n_m: 0.0,
             };
             before = correction;
             if split {

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::Args;
 
@@ -39,7 +41,15 @@ impl Fly {
         }
         let flown = scenario(&self.scenario)?;
         let out = context.out()?;
-        let flight = flown.fly().map_err(Failure::Failed)?;
+        let (progress, done) = (Mutex::new(context.progress("fly")), AtomicUsize::new(0));
+        let told = || {
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            if let Ok(mut bar) = progress.lock() {
+                bar.set(done, flown.seconds_of_all(), "seconds of all joints");
+            }
+        };
+        let flight = flown.fly_told(&told).map_err(Failure::Failed)?;
+        drop(progress);
         let results = results(&flown, &flight).ok_or_else(|| Failure::Failed("a controller is missing".to_owned()))?;
         let mut outputs = Outputs::new();
         outputs.json(&out.join("flight.json"), &results)?;
@@ -69,7 +79,7 @@ pub(super) fn scenario(name: &str) -> Result<Flown, Failure> {
 
 fn text(results: &Results, out: &Path, report: bool) -> String {
     let mut text = format!(
-        "{}, {} generator, {:.0} s; torque {}, table {}\n{:22}{:>10}{:>10}{:>14}\n",
+        "{}, {} generator, {:.0} s; torque {}, table {}\n{:22}{:>10}{:>10}{:>14}{:>12}\n",
         results.scenario,
         results.generator,
         results.seconds,
@@ -78,14 +88,17 @@ fn text(results: &Results, out: &Path, report: bool) -> String {
         "",
         "rms ″",
         "max ″",
-        "ripple ″/s"
+        "ripple ″/s",
+        "settles s"
     );
     let line = |of: &ByController<f64>| [of.none, of.fourier, of.fourier_by_direction, of.compensated, of.ideal];
     let columns = [&results.rms_arcsec, &results.max_arcsec, &results.velocity_ripple].map(line);
+    let settles = results.settle_s.as_ref().map(line);
     for (k, name) in flexspline_motion::flight::CONTROLLERS.iter().enumerate() {
         let [rms, max, ripple] = columns.map(|column| column[k]);
         let ripple = if ripple.is_finite() { format!("{ripple:.1}") } else { "–".to_owned() };
-        let _ = writeln!(text, "{:22}{rms:10.2}{max:10.2}{ripple:>14}", name.replace('_', " "));
+        let settles = settles.map_or_else(|| "–".to_owned(), |seconds| format!("{:.2}", seconds[k]));
+        let _ = writeln!(text, "{:22}{rms:10.2}{max:10.2}{ripple:>14}{settles:>12}", name.replace('_', " "));
     }
     let [margin, at_hz] = results.phase_margin_deg;
     let removed = match results.removed {

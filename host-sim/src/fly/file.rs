@@ -6,6 +6,7 @@ use serde::Deserialize;
 use super::Flown;
 use super::built_in::{SCENARIOS, built_in};
 use crate::suggest::did_you_mean;
+use crate::toml_file::TomlFile;
 
 /// What a file may say.
 #[derive(Debug, Deserialize)]
@@ -20,7 +21,10 @@ struct File {
     drag_n_m: Option<f64>,
     damping: Option<f64>,
     temperature_c: Option<f64>,
+    warming_k_s: Option<f64>,
+    friction: Option<f64>,
     friction_known: Option<f64>,
+    load_fed_forward: Option<f64>,
     torque: Option<String>,
     torque_noise_n_m: Option<f64>,
     table: Option<String>,
@@ -60,6 +64,42 @@ const TORQUES: [(&str, TorqueKnown); 4] = [
 ];
 const TABLES: [(&str, TableKnown); 3] =
     [("nominal", TableKnown::Nominal), ("extended", TableKnown::Extended), ("calibrated", TableKnown::Calibrated)];
+/// Temperatures of a flight, °C: what tables of HHD-95 have.
+const COLDEST_C: f64 = -60.0;
+const WARMEST_C: f64 = 80.0;
+/// Every key.
+const KEYS: [&str; 30] = [
+    "base",
+    "name",
+    "generator",
+    "legs",
+    "acceleration_rad_s2",
+    "load_kg_m2",
+    "drag_n_m",
+    "damping",
+    "temperature_c",
+    "warming_k_s",
+    "friction",
+    "friction_known",
+    "load_fed_forward",
+    "torque",
+    "torque_noise_n_m",
+    "table",
+    "seed",
+    "load.bias_n_m",
+    "load.swing",
+    "load.gust",
+    "load.step",
+    "load.gravity",
+    "servo.inertia_kg_m2",
+    "servo.largest_n_m",
+    "servo.position_hz",
+    "servo.speed_hz",
+    "servo.integral_hz",
+    "servo.late_steps",
+    "servo.encoder_bits",
+    "servo.jitter_s",
+];
 /// Longest flight, s.
 const LONGEST_S: f64 = 3600.0;
 
@@ -115,6 +155,13 @@ impl Setter<'_> {
 /// # Errors
 /// File, field, value found and what is allowed.
 pub fn read(name: &str, text: &str) -> Result<Flown, String> {
+    let mut whole = TomlFile::new(name, text);
+    if let Some(table) = whole.parse() {
+        whole.refuse_unknown_keys(&table, &KEYS, &[]);
+    }
+    if let Some(problem) = whole.problems().first() {
+        return Err(problem.to_string());
+    }
     let file: File = toml::from_str(text).map_err(|error| format!("{name}: {}", error.to_string().trim_end()))?;
     let set = Setter { file: name };
     let mut flown = built_in(&file.base).ok_or_else(|| {
@@ -143,8 +190,16 @@ pub fn read(name: &str, text: &str) -> Result<Flown, String> {
     set.number("load_kg_m2", &mut scenario.load_kg_m2, file.load_kg_m2, [0.01, 1e3])?;
     set.number("drag_n_m", &mut scenario.drag_n_m, file.drag_n_m, [0.0, 10.0])?;
     set.number("damping", &mut scenario.damping, file.damping, [1e-4, 0.5])?;
-    set.number("temperature_c", &mut scenario.temperature_c, file.temperature_c, [-60.0, 80.0])?;
+    set.number("temperature_c", &mut scenario.temperature_c, file.temperature_c, [COLDEST_C, WARMEST_C])?;
+    set.number("warming_k_s", &mut scenario.warming_k_s, file.warming_k_s, [-1.0, 1.0])?;
+    let ends_c = scenario.temperature_c + scenario.warming_k_s * scenario.seconds();
+    if !(COLDEST_C..=WARMEST_C).contains(&ends_c) {
+        let allowed = format!("a flight that ends at {COLDEST_C} to {WARMEST_C} °C");
+        return Err(set.refused("warming_k_s", format!("an end at {ends_c:.0} °C"), &allowed));
+    }
+    set.number("friction", &mut scenario.friction, file.friction, [0.0, 10.0])?;
     set.number("friction_known", &mut scenario.friction_known, file.friction_known, [0.0, 1.0])?;
+    set.number("load_fed_forward", &mut scenario.load_fed_forward, file.load_fed_forward, [0.0, 1.0])?;
     set.number("torque_noise_n_m", &mut scenario.torque_noise_n_m, file.torque_noise_n_m, [0.0, 10.0])?;
     set.named("torque", &mut scenario.torque, file.torque.as_ref(), &TORQUES)?;
     set.named("table", &mut scenario.table, file.table.as_ref(), &TABLES)?;
@@ -182,6 +237,27 @@ pub fn read(name: &str, text: &str) -> Result<Flown, String> {
 mod tests {
     use super::*;
 
+    /// A key that is read and not in the list would be refused.
+    #[test]
+    fn every_key_is_read() {
+        let value = |key: &str| match key {
+            "base" => "\"rover\"",
+            "name" => "\"own\"",
+            "generator" => "\"cam\"",
+            "torque" => "\"none\"",
+            "table" => "\"nominal\"",
+            "legs" => "[[2.0, 0.0], [2.0, 0.01]]",
+            "load.swing" | "load.gust" | "load.step" | "load.gravity" => "[1.0, 0.5]",
+            "seed" | "servo.late_steps" => "1",
+            "servo.encoder_bits" => "16",
+            "servo.jitter_s" | "warming_k_s" => "1e-3",
+            _ => "0.3",
+        };
+        let lines = KEYS.iter().map(|key| format!("{key} = {}\n", value(key)));
+        let found = read("own.toml", &lines.collect::<String>());
+        assert_eq!(found.as_ref().map(|flown| flown.scenario.servo.speed_hz), Ok(0.3), "{found:?}");
+    }
+
     #[test]
     fn a_file_changes_what_it_names_and_a_bad_one_says_where() {
         let good =
@@ -207,6 +283,11 @@ mod tests {
             let found = read("own.toml", text).unwrap_err();
             assert!(found.starts_with(said), "{found}");
         }
-        assert!(read("own.toml", "base = \"rover\"\nspeed = 1").unwrap_err().contains("own.toml: "));
+        assert!(read("own.toml", "base = \"rover\"\nspeed = 1").unwrap_err().starts_with("own.toml:2: speed: "));
+        let misspelt = read("own.toml", "base = \"rover\"\n[servo]\nencoder_bit = 20").unwrap_err();
+        assert!(misspelt.starts_with("own.toml:3: servo.encoder_bit: unknown key"), "{misspelt}");
+        assert!(misspelt.contains("did you mean `servo.encoder_bits`?"), "{misspelt}");
+        let hot = read("own.toml", "base = \"telescope\"\nwarming_k_s = 1.0").unwrap_err();
+        assert!(hot.starts_with("own.toml: warming_k_s: found an end at 82 °C, allowed: "), "{hot}");
     }
 }

@@ -6,7 +6,7 @@ mod built_in;
 mod file;
 mod results;
 
-use flexspline_motion::flight::{Flight, Unit, fly};
+use flexspline_motion::flight::{CONTROLLERS, Flight, Unit, fly_told};
 use flexspline_motion::gear::Sampled;
 use flexspline_motion::scenario::Scenario;
 
@@ -59,6 +59,20 @@ impl Flown {
     /// # Errors
     /// What cannot be flown, in words.
     pub fn fly(&self) -> Result<Flight, String> {
+        self.fly_told(&|| {})
+    }
+
+    /// Seconds that all its joints fly, together.
+    #[must_use]
+    pub fn seconds_of_all(&self) -> usize {
+        CONTROLLERS.len() * self.scenario.seconds() as usize
+    }
+
+    /// Flies it; `told` is called for each second that one of its joints flew.
+    ///
+    /// # Errors
+    /// What cannot be flown, in words.
+    pub fn fly_told(&self, told: &(dyn Fn() + Sync)) -> Result<Flight, String> {
         let most = self.kind.rated_torque_n_m();
         let largest = self.scenario.largest_n_m();
         if largest > most {
@@ -67,6 +81,6 @@ impl Flown {
                 self.kind
             ));
         }
-        fly(&self.scenario, &unit(self.kind, self.scenario.temperature_c)?)
+        fly_told(&self.scenario, &unit(self.kind, self.scenario.temperature_c)?, told)
     }
 }

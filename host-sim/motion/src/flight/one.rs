@@ -30,7 +30,7 @@ pub struct Ticked {
     pub quality: Option<Quality>,
 }
 
-kept!(Sensing { noise, before_rad_s, even_s, told_n_m, age_s, bound_n_m });
+kept!(Sensing { noise, before_rad_s, even_s, heard_n_m, told_n_m, age_s, drag_n_m, bound_n_m, fed_n_m });
 
 impl OneJoint {
     /// At rest at zero; with the image of a table that was made before, or one made for the scenario; with the core or with none.

@@ -72,27 +72,27 @@ impl Uncompensated {
     }
 }
 
-/// Moves a correction towards its goal within [`LIMITS`], as the core's limiter does its own: follows the pace of the goal and
-/// closes the rest as fast as it can be stopped again.
+/// Moves a correction towards its goal within [`LIMITS`], as the core's limiter does its own: as fast as it can be stopped there in whole ticks,
+/// braking with half of the acceleration.
 #[derive(Clone, Debug, Default)]
 pub struct Limiter {
     at_rad: f64,
     speed_rad_s: f64,
+    /// What was asked for last.
     goal_rad: f64,
 }
 
 impl Limiter {
     /// One tick.
     pub fn go(&mut self, goal_rad: f64) -> f64 {
-        let (rate, acceleration) = (f64::from(LIMITS.rate_rad_s), f64::from(LIMITS.acceleration_rad_s2));
-        let pace = (goal_rad - self.goal_rad) / TICK_S;
-        let lag = goal_rad - self.at_rad - pace * TICK_S;
+        let (rate, step) = (f64::from(LIMITS.rate_rad_s), f64::from(LIMITS.acceleration_rad_s2) * TICK_S);
         self.goal_rad = goal_rad;
-        let step = acceleration * TICK_S;
-        let stoppable = libm::sqrt(step * (0.25 * step + 2.0 * lag.abs() / TICK_S)) - 0.5 * step;
-        let closing = libm::copysign(stoppable.min(lag.abs() / TICK_S), lag);
-        let wanted = (pace + closing).clamp(-rate, rate);
-        self.speed_rad_s = (self.speed_rad_s + (wanted - self.speed_rad_s).clamp(-step, step)).clamp(-rate, rate);
+        let lag = (goal_rad - self.at_rad) / TICK_S;
+        let (away, braking) = (lag.abs(), 0.5 * step);
+        let ticks = libm::floor(0.5 * (libm::sqrt(1.0 + 8.0 * away / braking) - 1.0));
+        let stoppable = (away + 0.5 * braking * ticks * (ticks + 1.0)) / (ticks + 1.0);
+        let wanted = libm::copysign(stoppable, lag);
+        self.speed_rad_s = wanted.clamp(self.speed_rad_s - step, self.speed_rad_s + step).clamp(-rate, rate);
         self.at_rad += self.speed_rad_s * TICK_S;
         self.at_rad
     }
