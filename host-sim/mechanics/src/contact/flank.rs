@@ -600,7 +600,7 @@ impl<'a> FlankContact<'a> {
         // An open pair is open by its gaps where the face is nearest.
         let bearing = self.bearing(pair, &field, law, points);
         let later = bearing.map_or(0.0, |bearing| bearing.later_mm);
-        let mut bears_more = MeanBearing::new(n);
+        let mut uneven = field.across.is_some().then(|| MeanBearing::new(n));
         for point in points {
             let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
             // Most points are open, and a glance says so.
@@ -691,8 +691,8 @@ impl<'a> FlankContact<'a> {
                 });
             }
             out.load += normal_load;
-            if field.across.is_some() {
-                bears_more.add(&index, &g, g_output, kn);
+            if let Some(uneven) = &mut uneven {
+                uneven.add(&index, &g, g_output, kn);
             }
             out.torque += normal_load * g_output - tangential_load * s_output;
             out.corner += kn * g_output * g_output + kt * s_output * s_output;
@@ -706,15 +706,15 @@ impl<'a> FlankContact<'a> {
                 out.attack[k] += normal_load * x_space[k];
             }
         }
-        if let (Some(out), Some(bearing), Some(_)) = (&mut out, bearing, &field.across) {
-            bears_more.soften(out, bearing.softness);
+        if let (Some(out), Some(bearing), Some(uneven)) = (&mut out, bearing, uneven) {
+            uneven.soften(out, bearing.softness);
             out.peak *= bearing.peak_over_mean;
             out.along_face = Some(AlongFace {
                 peak_over_mean: bearing.peak_over_mean,
                 share: bearing.share,
                 moment: bearing.moment,
-                by_output: bears_more.by_output * bearing.later_by_slope,
-                by_node: bears_more.by_node.into_iter().map(|by| by * bearing.later_by_slope).collect(),
+                by_output: uneven.by_output * bearing.later_by_slope,
+                by_node: uneven.by_node.into_iter().map(|by| by * bearing.later_by_slope).collect(),
                 by_slope: bearing.moment_by_slope,
             });
         }
