@@ -213,7 +213,7 @@ fn flank_derivatives(drive: &Drive, moment_bound: f64) {
     // More load than equilibrium has, so that many points touch.
     let output = run.state().output_rad + 2e-6;
     let (u, v) = (disturb(&run.state().u, &mut noise), disturb(&run.state().v, &mut noise));
-    let at = Configuration { u: &u, v: &v, output_rad: output };
+    let at = Configuration { u: &u, v: &v, output_rad: output, leans: &[] };
 
     let mut worst = [0.0_f64; 6];
     let mut touching = 0;
@@ -223,7 +223,12 @@ fn flank_derivatives(drive: &Drive, moment_bound: f64) {
         for pair in flanks.near_pairs(at, 0.015) {
             let mut layout = flanks.layout(pair, at);
             if friction > 0.0 {
-                let before = Configuration { u: &run.state().u, v: &run.state().v, output_rad: run.state().output_rad };
+                let before = Configuration {
+                    u: &run.state().u,
+                    v: &run.state().v,
+                    output_rad: run.state().output_rad,
+                    leans: &[],
+                };
                 flanks.start_friction(pair, before, &Vec::new(), &mut layout.points);
             }
             let Some(here) = flanks.evaluate(pair, at, law, &layout.points) else { continue };
@@ -244,7 +249,7 @@ fn flank_derivatives(drive: &Drive, moment_bound: f64) {
                     v[2 * n] += by * direction[2 * (fs.len() + k)];
                     v[2 * n + 1] += by * direction[2 * (fs.len() + k) + 1];
                 }
-                let at = Configuration { u: &u, v: &v, output_rad: output + by * output_direction };
+                let at = Configuration { u: &u, v: &v, output_rad: output + by * output_direction, leans: &[] };
                 let all = flanks.evaluate(pair, at, law, points).unwrap();
                 // The peak of a single point is its pressure.
                 let energy = points
@@ -266,7 +271,7 @@ fn flank_derivatives(drive: &Drive, moment_bound: f64) {
                             u[2 * n] += by * direction[2 * k];
                             u[2 * n + 1] += by * direction[2 * k + 1];
                         }
-                        let at = Configuration { u: &u, v: &v, output_rad: output };
+                        let at = Configuration { u: &u, v: &v, output_rad: output, leans: &[] };
                         flanks.evaluate(pair, at, law, &[**p]).is_some()
                     };
                     touches(1e-7) && touches(-1e-7)

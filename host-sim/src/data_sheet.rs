@@ -114,6 +114,12 @@ pub struct DataSheet {
     pub peak_flank_pressure_mpa: Option<f64>,
     /// Largest pressure between generator and bore, MPa.
     pub peak_generator_pressure_mpa: Option<f64>,
+    /// Largest force of the generator along its major axis on one half of the rim, outward, N.
+    pub lobe_force_n: Option<f64>,
+    /// Largest tilt of a tooth along its face, outward, mrad: the coning of the rim in its sleeve.
+    pub tilt_mrad: Option<f64>,
+    /// Load along the face of the flank that bears most anywhere: peak over mean.
+    pub load_across_face_peak_over_mean: Option<f64>,
     /// Teeth of the flexspline that carry the largest load, percent.
     pub teeth_in_contact_percent: Option<f64>,
     /// Largest load at which equilibrium was found, N·m.
@@ -124,7 +130,7 @@ pub struct DataSheet {
 pub type FigureOf = (&'static str, fn(&DataSheet) -> Option<f64>);
 
 /// The figures that can be asked for by name, as the fields are called.
-pub const FIGURES: [FigureOf; 13] = [
+pub const FIGURES: [FigureOf; 16] = [
     ("rigid_gap_um", |s| s.rigid_gap_um),
     ("backlash_arcsec", |s| s.backlash_arcsec),
     ("lost_motion_arcsec", |s| s.lost_motion_arcsec),
@@ -136,6 +142,9 @@ pub const FIGURES: [FigureOf; 13] = [
     ("max_von_mises_mpa", |s| s.max_von_mises_mpa),
     ("peak_flank_pressure_mpa", |s| s.peak_flank_pressure_mpa),
     ("peak_generator_pressure_mpa", |s| s.peak_generator_pressure_mpa),
+    ("lobe_force_n", |s| s.lobe_force_n),
+    ("tilt_mrad", |s| s.tilt_mrad),
+    ("load_across_face_peak_over_mean", |s| s.load_across_face_peak_over_mean),
     ("teeth_in_contact_percent", |s| s.teeth_in_contact_percent),
     ("last_stable_n_m", |s| s.last_stable_n_m),
 ];
@@ -216,6 +225,9 @@ fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize
     sheet.kinematic_error_pp_arcsec = Some(high - low);
     sheet.peak_flank_pressure_mpa = Some(most(|increment| increment.peak_pressure_mpa[0]));
     sheet.peak_generator_pressure_mpa = Some(most(|increment| increment.peak_pressure_mpa[1]));
+    sheet.lobe_force_n = Some(most(|increment| increment.lobe_force_n));
+    sheet.tilt_mrad = Some(most(|increment| 1e3 * increment.face.tilt_rad));
+    sheet.load_across_face_peak_over_mean = Some(most(|increment| increment.face.peak_over_mean));
     let in_contact = most(|increment| increment.flank_contacts as f64);
     sheet.teeth_in_contact_percent = Some(100.0 * in_contact / f64::from(drive.flexspline.teeth));
     sheet.max_von_mises_mpa = Some(peak_stress(problem, motion.state()).von_mises_mpa);

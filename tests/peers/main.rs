@@ -4,7 +4,7 @@
 //! solvers goes the same way on the same mesh: deformed, loaded, turned in increments, and at the end brought to another
 //! load. Compared are the output angle, the wind-up between the two loads, the displacements of the bore, the stress along
 //! it, and what both cost. The short form is the cam on the coarse mesh; `--long` adds the standard mesh and what CalculiX
-//! itself leaves open (each increment in two parts). Rollers are not compared: see the header of `export/inp.rs`.
+//! itself leaves open (each increment in two parts). A cup and a closed sleeve in solid elements stand beside our shells. Rollers are not compared: see the header of `export/inp.rs`.
 //!
 //! Prints what it finds, a line for each claim, and one line of ratios at the end; ends with 1 if a claim fails.
 
@@ -12,6 +12,7 @@ mod case;
 mod dat;
 mod ours;
 mod program;
+mod sleeve;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -35,6 +36,8 @@ const WIND_UP: f64 = 0.01;
 /// Difference of the stress that 99 % of the points along the bore keep to, relative to the largest stress: CalculiX itself
 /// moves single points by 0.5 to 2 MPa from run to run, with the last digits of the deck.
 const STRESS: f64 = 0.03;
+/// Friction of the case that has any.
+const FRICTION: f64 = 0.08;
 /// How many times less processor time than CalculiX an increment of our solver takes: from 60 000 unknowns on, and below.
 fn cpu_ratio(solver: Method, unknowns: usize) -> f64 {
     match (solver, unknowns >= LARGE) {
@@ -109,11 +112,13 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
         step_rad: 0.01,
         parts: 1,
         penalties: PENALTIES,
+        friction: 0.0,
     };
     let mut cases = vec![short];
     if options.long || options.case.is_some() {
         cases.push(Case { mesh: MeshLevel::Standard, ..short });
         cases.push(Case { parts: 2, ..short });
+        cases.push(Case { friction: FRICTION, increments: 1, ..short });
     }
     if let Some(name) = &options.case {
         let names: Vec<String> = cases.iter().map(Case::name).collect();
@@ -123,6 +128,9 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
         }
     }
     let mut lines = Vec::new();
+    if options.case.is_none() {
+        lines.push(sleeve::sleeves(&options.ccx, &flexspline, &options.out, claims)?);
+    }
     let mut whole: Option<Vec<f64>> = None;
     for case in cases {
         let (line, peer) = beside(&case, options, &flexspline, claims)?;

@@ -12,9 +12,10 @@ use super::export_fmu::FmuOptions;
 use super::export_playback::{PlaybackFormat, PlaybackOptions};
 use super::simulate::{ModelOptions, refused_or_failed, show};
 use super::{Context, Failure, say};
-use crate::export::{Deck, DeckSettings, outlines, write_vtu};
+use crate::drive::Drive;
+use crate::export::{Deck, DeckSettings, SleeveDeck, outlines, write_vtu, write_whole_flexspline};
 use crate::output::{OutputError, write_csv, write_whole};
-use crate::simulate::{Path, PathPoint, simulate};
+use crate::simulate::{Observation, Path, PathPoint, simulate};
 use crate::stepping::Problem;
 
 /// Intervals to a piece of a tooth outline, of 0.01 to 0.1 mm in all.
@@ -26,10 +27,11 @@ const LARGEST_STEP_RAD: f64 = 0.1;
 
 /// Export a mesh, outlines, a deck, or a table for other programs
 ///
-/// vtu: both wheels deformed and loaded at one generator angle, with displacement and von Mises stress, for ParaView.
+/// vtu: both wheels deformed and loaded at one generator angle, with displacement and von Mises stress, for ParaView; of a drive with a
+/// sleeve in three dimensions also the whole flexspline, <G>-3d.vtu.
 /// csv: the outlines of tooth, space and generator, undeformed, each in its own frame.
 /// inp: the undeformed mesh with contact, holding and load as a deck for CalculiX and Abaqus, which deforms, loads and turns
-/// the drive; mm, N, MPa, a slice of 1 mm.
+/// the drive; mm, N, MPa, a slice of 1 mm. Of a drive with a sleeve in three dimensions (CUP-95): the flexspline alone, in solids, under w0.
 /// fmu: a table (--tables), or a joint with mass, for simulators that import FMI 2.0 co-simulation: docs/fmu.md.
 /// eqmod, onstepx, linuxcnc, beckhoff, moteus, odrive, ros2, cfs, fprime: a table (--tables) resampled for the lookup of that device,
 /// that lookup simulated, and what it leaves, on the table's own model and on a unit's data (--data): docs/doors.md.
@@ -101,11 +103,11 @@ fn beside_tables(arg: Arg) -> Arg {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
-    /// Deformed mesh: <G>.vtu
+    /// Deformed mesh: <G>.vtu, and <G>-3d.vtu of a sleeve in three dimensions
     Vtu,
     /// Outlines: <G>-outlines.csv
     Csv,
-    /// CalculiX and Abaqus deck: <G>.inp
+    /// CalculiX and Abaqus deck: <G>.inp, or sleeve.inp in three dimensions
     Inp,
     /// FMU for co-simulation: flexspline_compensation.fmu, or flexspline_joint.fmu
     Fmu,
@@ -164,17 +166,18 @@ impl Export {
         let written = match self.format {
             Format::Fmu => return self.fmu.run(context, self.tables.as_deref()),
             Format::Vtu => self.mesh(context)?,
-            Format::Inp => self.deck(context)?,
-            _ => self.outlines(context)?,
+            Format::Inp => vec![self.deck(context)?],
+            _ => vec![self.outlines(context)?],
         };
-        let shown = quoted(&written.display().to_string());
+        let all: Vec<String> = written.iter().map(|file| file.display().to_string()).collect();
+        let shown = quoted(&all[all.len() - 1]);
         let next = match self.format {
             Format::Vtu => vec![format!("paraview {shown}")],
             Format::Inp => vec![format!("OMP_NUM_THREADS=1 ccx {}", shown.trim_end_matches(".inp"))],
             _ => Vec::new(),
         };
-        let text = format!("wrote {}{}", written.display(), say::next(&next));
-        context.print(&Exported { schema_version: 1, written: vec![written] }, || text)
+        let text = format!("wrote {}{}", all.join(", "), say::next(&next));
+        context.print(&Exported { schema_version: 1, written }, || text)
     }
 
     /// Refuses options that the format has no use for, and numbers that are none.
@@ -223,19 +226,25 @@ impl Export {
         Ok(())
     }
 
-    fn mesh(&self, context: &Context) -> Result<PathBuf, Failure> {
+    fn mesh(&self, context: &Context) -> Result<Vec<PathBuf>, Failure> {
         let drive = context.drive()?;
         let generator_rad = self.generator_rad.unwrap_or(0.0);
         let point = PathPoint { generator_rad, ..PathPoint::default() };
         let settings = self.model.settings(Path::Points(vec![point]));
         settings.check(&drive).map_err(|error| Failure::BadInput(error.to_string()))?;
         let file = context.out()?.join(format!("{}.vtu", self.model.generator));
+        let whole = drive.sleeve.is_shell().then(|| file.with_file_name(format!("{}-3d.vtu", self.model.generator)));
+        let write = |now: &Observation| -> Result<(), OutputError> {
+            write_whole(&file, |out| write_vtu(out, now.problem, now.state))?;
+            let Some(whole) = &whole else { return Ok(()) };
+            write_whole(whole, |out| write_whole_flexspline(out, now.problem, now.state))
+        };
         let mut progress = context.progress(self.model.generator.name());
         let mut lost: Option<OutputError> = None;
         let run = simulate(&drive, &settings, &mut |now| {
             show(&mut progress, now);
             if now.row.is_some()
-                && let Err(error) = write_whole(&file, |out| write_vtu(out, now.problem, now.state))
+                && let Err(error) = write(now)
             {
                 lost = Some(error);
                 return ControlFlow::Break(());
@@ -246,11 +255,14 @@ impl Export {
             return Err(error.into());
         }
         run.map_err(refused_or_failed)?;
-        Ok(file)
+        Ok(std::iter::once(file.clone()).chain(whole.clone()).collect())
     }
 
     fn deck(&self, context: &Context) -> Result<PathBuf, Failure> {
         let drive = context.drive()?;
+        if drive.sleeve.is_shell() {
+            return self.sleeve_deck(context, &drive);
+        }
         let settings = self.model.settings(Path::Points(vec![PathPoint::default()]));
         settings.check(&drive).map_err(|error| Failure::BadInput(error.to_string()))?;
         let temperature_c = settings.temperature_c.unwrap_or(drive.temperature.reference_c);
@@ -264,6 +276,26 @@ impl Export {
         };
         let deck = Deck::new(&problem, path).map_err(|error| Failure::BadInput(error.to_string()))?;
         let file = context.out()?.join(format!("{}.inp", self.model.generator));
+        write_whole(&file, |out| deck.write(out))?;
+        Ok(file)
+    }
+
+    /// The flexspline of a drive with a sleeve of shells, alone and in three dimensions.
+    fn sleeve_deck(&self, context: &Context, drive: &Drive) -> Result<PathBuf, Failure> {
+        let of_the_plane = [
+            ("--torque-n-m", self.model.torque_n_m.is_some()),
+            ("--temperature-c", self.model.temperature_c.is_some()),
+            ("--increments", self.increments.is_some()),
+            ("--step-rad", self.step_rad.is_some()),
+            ("--last-torque-n-m", self.last_torque_n_m.is_some()),
+        ];
+        if let Some((option, _)) = of_the_plane.into_iter().find(|(_, given)| *given) {
+            return Err(Failure::BadInput(format!(
+                "{option}: the deck of a sleeve is the flexspline alone, under w0; allowed with a plane drive (--set sleeve.kind=springs)"
+            )));
+        }
+        let deck = SleeveDeck::new(drive).map_err(|error| Failure::BadInput(error.to_string()))?;
+        let file = context.out()?.join("sleeve.inp");
         write_whole(&file, |out| deck.write(out))?;
         Ok(file)
     }

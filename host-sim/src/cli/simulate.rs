@@ -272,7 +272,7 @@ fn report(summary: &Summary, out: &FilePath, has_frames: bool) -> String {
     );
     let mut put = |name: &str, value: Option<f64>, unit: &str, digits: usize| {
         if let Some(value) = value {
-            let _ = writeln!(text, "  {name:<34} {value:>12.digits$} {unit}");
+            let _ = writeln!(text, "  {name:<36} {value:>12.digits$} {unit}");
         }
     };
     put("load torque", summary.torque_n_m, "N.m", 3);
@@ -287,6 +287,11 @@ fn report(summary: &Summary, out: &FilePath, has_frames: bool) -> String {
     put("largest von Mises stress", Some(summary.max_von_mises_mpa), "MPa", 1);
     put("largest flank pressure", Some(summary.peak_flank_pressure_mpa), "MPa", 1);
     put("largest generator pressure", Some(summary.peak_generator_pressure_mpa), "MPa", 1);
+    put("largest force of a lobe", Some(summary.lobe_force_n), "N", 1);
+    let leans = summary.tilt_mrad != 0.0 || summary.load_across_face_peak_over_mean != 1.0;
+    put("largest tilt of the teeth", leans.then_some(summary.tilt_mrad), "mrad", 3);
+    put("load along the face, peak over mean", leans.then_some(summary.load_across_face_peak_over_mean), "", 2);
+    put("share of that face that bears", leans.then_some(summary.face_in_contact), "", 3);
     put("time", Some(summary.wall_s), "s", 2);
     let _ = writeln!(
         text,

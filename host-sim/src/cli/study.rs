@@ -81,7 +81,7 @@ pub(super) struct StudyCommand {
 
 /// The names of the figures, three on a line.
 fn figures() -> String {
-    let line = |names: &[FigureOf]| names.iter().map(|(name, _)| format!("  {name:<29}")).collect::<String>();
+    let line = |names: &[FigureOf]| names.iter().map(|(name, _)| format!("  {name:<32}")).collect::<String>();
     FIGURES.chunks(3).map(|names| line(names).trim_end().to_owned()).collect::<Vec<_>>().join("\n")
 }
 

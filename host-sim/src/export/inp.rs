@@ -39,6 +39,7 @@
 
 mod generator;
 mod holding;
+mod sleeve;
 
 use std::io::{self, Write};
 use std::ops::Range;
@@ -47,11 +48,12 @@ use thiserror::Error;
 
 use crate::contact::BoreLaw;
 use crate::drive::{DriveError, RigidMesh};
-use crate::mesh::WheelMesh;
+use crate::mesh::{MeshError, WheelMesh};
 use crate::stepping::Problem;
 
 use generator::GeneratorBody;
 use holding::bore_sums;
+pub use sleeve::SleeveDeck;
 
 /// A point in the plane, mm.
 type Point = [f64; 2];
@@ -96,9 +98,24 @@ pub enum DeckError {
     Drag(f64),
     /// A sleeve in three dimensions.
     #[error(
-        "sleeve.kind: found \"{0}\", and a deck is plane; allowed: \"springs\", \"none\" (--set sleeve.kind=springs)"
+        "sleeve.kind: found \"{0}\", and a deck with contact is plane; allowed: \"springs\", \"none\" (--set sleeve.kind=springs)"
     )]
     Shells(&'static str),
+    /// An end of the sleeve that the deck in three dimensions has not.
+    #[error(
+        "sleeve.{field}: found \"{found}\", and the deck in three dimensions has no plates; allowed: {allowed} (--set sleeve.{field}=…)"
+    )]
+    End {
+        /// Field of the sleeve.
+        field: &'static str,
+        /// Its value.
+        found: &'static str,
+        /// What a deck has.
+        allowed: &'static str,
+    },
+    /// An impossible mesh.
+    #[error(transparent)]
+    Mesh(MeshError),
     /// No backlash to take up.
     #[error("the teeth of the drive have no clearance: rigid backlash {0:.3e} rad; a deck needs some to start from")]
     NoClearance(f64),

@@ -140,13 +140,13 @@ impl<'a> Wheel<'a> {
     }
 }
 
-fn vectors(out: &mut dyn Write, name: &str, values: &[f32]) -> io::Result<()> {
+pub(super) fn vectors(out: &mut dyn Write, name: &str, values: &[f32]) -> io::Result<()> {
     let attributes = format!(r#"type="Float32" Name="{name}" NumberOfComponents="3""#);
     array(out, &attributes, values.iter().flat_map(|x| x.to_le_bytes()))
 }
 
 /// A data array: its length in bytes, then the bytes, in base64.
-fn array(out: &mut dyn Write, attributes: &str, bytes: impl IntoIterator<Item = u8>) -> io::Result<()> {
+pub(super) fn array(out: &mut dyn Write, attributes: &str, bytes: impl IntoIterator<Item = u8>) -> io::Result<()> {
     let mut payload = vec![0; 8];
     payload.extend(bytes);
     let length = payload.len() as u64 - 8;

@@ -230,7 +230,7 @@ impl Taken {
     /// Normal forces of the flanks, as resultants at their points of attack.
     fn add_flank_forces(&mut self, problem: &Problem, state: &State, frame: i64) {
         let flanks = problem.flanks();
-        let at = Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad };
+        let at = Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad, leans: &state.leans };
         let law = FlankLaw { stiffness: problem.settings.flank_penalty, stick_stiffness: 0.0, friction: 0.0 };
         let width = problem.drive.flexspline.width_mm;
         for pair in flanks.near_pairs(at, NEAR_MM) {

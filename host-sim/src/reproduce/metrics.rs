@@ -143,6 +143,8 @@ mod tests {
             peak_flank_pressure_mpa: 0.0,
             peak_generator_pressure_mpa: 0.0,
             residual: 0.0,
+            face: crate::stepping::Face::EVEN,
+            lobe_force_n: 0.0,
             settled: true,
             turn_rad: 0.0,
         }

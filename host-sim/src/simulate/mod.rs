@@ -21,7 +21,7 @@ use thiserror::Error;
 
 use crate::drive::{Drive, GeneratorKind, ThermalState};
 use crate::motion::Motion;
-use crate::stepping::{Increment, Problem, SolveError, Solver, SolverSettings, State};
+use crate::stepping::{Face, Increment, Problem, SolveError, Solver, SolverSettings, State};
 
 pub use path::{Path, PathError, PathPoint, read_path};
 pub use row::Row;
@@ -461,6 +461,8 @@ impl<'a> Run<'a> {
             peak_generator_pressure_mpa: increment.peak_pressure_mpa[1],
             residual: increment.residual,
             settled: motion.settled(),
+            face: increment.face,
+            lobe_force_n: increment.lobe_force_n,
             turn_rad,
         };
         if self.peak.is_none_or(|(highest, _)| peak.von_mises_mpa > highest.von_mises_mpa) {
@@ -545,6 +547,9 @@ impl<'a> Run<'a> {
             .touches
             .map(|touches| if torque_n_m.unwrap_or(0.0) > 0.0 { touches.forward } else { touches.backward });
         let (peak, peak_step) = self.peak.expect("every path has a row");
+        let uneven =
+            rows.iter().map(|row| row.face).reduce(|a, b| if b.peak_over_mean > a.peak_over_mean { b } else { a });
+        let uneven = uneven.unwrap_or(Face::EVEN);
         let summary = Summary {
             schema_version: SUMMARY_SCHEMA,
             tool_version: env!("CARGO_PKG_VERSION"),
@@ -577,6 +582,11 @@ impl<'a> Run<'a> {
             max_von_mises_step: peak_step,
             peak_flank_pressure_mpa: largest(rows, |row| row.peak_flank_pressure_mpa),
             peak_generator_pressure_mpa: largest(rows, |row| row.peak_generator_pressure_mpa),
+            lobe_force_n: largest(rows, |row| row.lobe_force_n),
+            tilt_mrad: 1e3 * largest(rows, |row| row.face.tilt_rad),
+            skew_mrad: 1e3 * largest(rows, |row| row.face.skew_rad),
+            load_across_face_peak_over_mean: uneven.peak_over_mean,
+            face_in_contact: uneven.share,
             generator_torque_mean_n_m: metrics.generator_torque,
             generator_torque_virtual_work_n_m: metrics.generator_torque_expected,
             torque_balance_worst_n_m: largest(rows, |row| row.torque_balance_n_m.abs()),

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::stepping::Face;
+
 /// The drive after an increment; the fields are the columns of `results.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
@@ -40,6 +42,12 @@ pub struct Row {
     /// Whether the drive has settled since the last reversal or change of load or temperature, by the rule of [`crate::motion`]: the
     /// output follows, and friction between the flanks has had two tooth pitches.
     pub settled: bool,
+    /// The teeth along their face, and how the load lies along it.
+    #[serde(skip)]
+    pub face: Face,
+    /// Force of the generator along its major axis on the half of the rim at 0°, outward, N.
+    #[serde(skip)]
+    pub lobe_force_n: f64,
     /// Generator travel of the increment, rad, signed.
     #[serde(skip)]
     pub turn_rad: f64,

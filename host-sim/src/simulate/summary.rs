@@ -93,8 +93,19 @@ pub struct Summary {
     pub max_von_mises_position_mm: [f64; 2],
     /// When: step of the results.
     pub max_von_mises_step: usize,
-    /// Largest pressure between flanks.
+    /// Largest pressure between flanks; where they do not bear evenly along the face, the mean pressure times
+    /// `load_across_face_peak_over_mean`.
     pub peak_flank_pressure_mpa: f64,
+    /// Largest force of the generator along its major axis on one half of the rim, outward, N.
+    pub lobe_force_n: f64,
+    /// Largest tilt of a tooth along its face, outward, mrad: the coning of the rim. 0 in a plane model.
+    pub tilt_mrad: f64,
+    /// Largest skew of a tooth along its face, around, mrad.
+    pub skew_mrad: f64,
+    /// How the load lies along the face of the flank that bears most anywhere, at the row of the largest: peak over mean. 1 is even.
+    pub load_across_face_peak_over_mean: f64,
+    /// Share of the face of that flank that bears, at that row.
+    pub face_in_contact: f64,
     /// Largest pressure between generator and bore.
     pub peak_generator_pressure_mpa: f64,
     /// Mean torque of the generator over the first settled stretch.
@@ -334,6 +345,8 @@ mod tests {
                     peak_flank_pressure_mpa: 0.0,
                     peak_generator_pressure_mpa: 0.0,
                     residual: 0.0,
+                    face: crate::stepping::Face::EVEN,
+                    lobe_force_n: 0.0,
                     settled: travel.settled(0.0),
                     turn_rad: generator - from,
                 });

@@ -19,6 +19,7 @@
 use crate::fem::element::edge_shape;
 use crate::mesh::{FlankMesh, WheelMesh, rotate};
 
+use super::face::{Across, Bearing, FaceLaw, Lean};
 use super::quadrature::gauss_legendre;
 use crate::drive::{FlankDeviations, Foot, InvoluteFlank, Placement, Side};
 
@@ -92,6 +93,8 @@ pub struct FlankContact<'a> {
     rule: Vec<(f64, f64)>,
     /// What straight facets of the space add to it at most, mm; zero where it is smooth.
     deepest_facet: f64,
+    /// The load along the face, where it is not even.
+    face: Option<FaceLaw>,
 }
 
 /// Where the gap of a pair is looked at in the search.
@@ -122,6 +125,27 @@ pub struct PairContribution {
     pub attack: [f64; 2],
     /// The points that slip: what the tangent leaves out.
     pub slipping: Vec<SlipPoint>,
+    /// Mean load over the face, N/mm.
+    pub load: f64,
+    /// How the load lies along the face, where it is not even.
+    pub along_face: Option<AlongFace>,
+}
+
+/// How the load of a pair lies along the face, and what a slope s of its offsets ([`FaceLaw::slope`]) changes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AlongFace {
+    /// Peak over mean.
+    pub peak_over_mean: f64,
+    /// Share of the face that bears.
+    pub share: f64,
+    /// Force on s: mean over the face of load times place, N.
+    pub moment: f64,
+    /// Tangent between s and the local unknowns.
+    pub by_node: Vec<f64>,
+    /// Between s and the output angle.
+    pub by_output: f64,
+    /// Of s alone, N.
+    pub by_slope: f64,
 }
 
 /// A point that slips: a change of its gap changes the force along the flank, by `stiffness` times the change along `slip`.
@@ -150,6 +174,8 @@ pub struct Configuration<'s> {
     pub v: &'s [f64],
     /// Output angle, rad.
     pub output_rad: f64,
+    /// How each flexspline tooth leans along its face; empty where none does.
+    pub leans: &'s [Lean],
 }
 
 /// Displacements of a pair's flank nodes in local frames (tooth frame and space frame, mirrored for the minus side).
@@ -162,8 +188,10 @@ struct LocalField {
     tooth: Placement,
     /// Where the space stands in its frame.
     space: Placement,
-    /// Depth missing on both flanks.
+    /// Depth missing on both flanks, less what the face is nearer somewhere than in the plane slice.
     depth: f64,
+    /// The offsets along the face, where there are any.
+    across: Option<Across>,
     /// No point of the circular-spline flank is displaced by more.
     largest_cs: f64,
 }
@@ -176,6 +204,7 @@ impl LocalField {
         tooth: Placement::NOMINAL,
         space: Placement::NOMINAL,
         depth: 0.0,
+        across: None,
         largest_cs: 0.0,
     };
 }
@@ -204,7 +233,24 @@ impl<'a> FlankContact<'a> {
         let (fs_turns, cs_turns) = (turns(fs_mesh), turns(cs_mesh));
         let rule = gauss_legendre(4);
         let deepest_facet = space.deepest_facet();
-        FlankContact { fs_mesh, cs_mesh, tooth, space, deviations, coarse, fs_turns, cs_turns, rule, deepest_facet }
+        FlankContact {
+            fs_mesh,
+            cs_mesh,
+            tooth,
+            space,
+            deviations,
+            coarse,
+            fs_turns,
+            cs_turns,
+            rule,
+            deepest_facet,
+            face: None,
+        }
+    }
+
+    /// This contact with a law of the load along the face.
+    pub fn with_face(self, face: Option<FaceLaw>) -> Self {
+        FlankContact { face, ..self }
     }
 
     /// Flank nodes of the flexspline side of a pair.
@@ -230,7 +276,7 @@ impl<'a> FlankContact<'a> {
         let mut pairs = Vec::new();
         let mut field = LocalField::EMPTY;
         let insets = self.tooth.half_angle(self.tooth.tip_radius);
-        let lowest = self.space.tip_radius - 0.05 - self.deviations.largest;
+        let lowest = self.space.tip_radius - 0.05 - self.deviations.largest - self.largest_offset(at);
         let spaces = self.cs_mesh.teeth as isize;
         for tooth in 0..self.fs_mesh.teeth {
             for side in Side::BOTH {
@@ -256,7 +302,8 @@ impl<'a> FlankContact<'a> {
         pairs
     }
 
-    /// Smallest gap of a pair at a few points of the flank (mm); points outside the space's flank do not count.
+    /// Smallest gap of a pair at a few points of the flank (mm), where the face is nearest; points outside the space's flank do not count
+    /// unless the face is uneven: its offsets may bring the rounding of a tip to bear alone.
     pub fn smallest_gap(&self, pair: FlankPair, at: Configuration) -> f64 {
         self.smallest_gap_in(pair, &self.local_field(pair, at))
     }
@@ -267,7 +314,8 @@ impl<'a> FlankContact<'a> {
             .map(|point| {
                 let foot =
                     self.foot(pair, field, self.seen_from_space(field, point.position, point.edge, &point.shape));
-                if foot.radius < self.space.tip_radius + 1e-9 { f64::INFINITY } else { foot.distance }
+                let outside = field.across.is_none() && foot.radius < self.space.tip_radius + 1e-9;
+                if outside { f64::INFINITY } else { foot.distance }
             })
             .fold(f64::INFINITY, f64::min)
     }
@@ -320,7 +368,30 @@ impl<'a> FlankContact<'a> {
         }
         field.tooth = tooth.seen_from(pair.side);
         field.space = deviations.spaces[pair.space].seen_from(pair.side);
-        field.depth = deviations.tooth_depth[pair.tooth][side] + deviations.space_depth[pair.space][side];
+        let lean = at.leans.get(pair.tooth).copied().unwrap_or_default();
+        field.across = self.face.and_then(|face| face.across(lean, pair.side));
+        let early = field.across.as_ref().map_or(0.0, Across::early_mm);
+        field.depth = deviations.tooth_depth[pair.tooth][side] + deviations.space_depth[pair.space][side] - early;
+    }
+
+    /// What the faces are nearer somewhere at most, mm.
+    fn largest_offset(&self, at: Configuration) -> f64 {
+        let Some(face) = self.face else { return 0.0 };
+        0.5 * face.width_mm * at.leans.iter().map(|lean| lean[0].hypot(lean[1])).fold(0.0, f64::max)
+    }
+
+    /// How the pair bears along its face: `None` where it is open, nothing later and nothing softer where the face is even.
+    fn bearing(&self, pair: FlankPair, field: &LocalField, law: FlankLaw, points: &[FlankPoint]) -> Option<Bearing> {
+        let Some(across) = &field.across else { return Some(Bearing::EVEN) };
+        let near = points.iter().filter_map(|point| {
+            let x = self.seen_from_space(field, point.position, point.edge, &point.shape);
+            if self.least_distance(field, x) > 0.0 {
+                return None;
+            }
+            let foot = self.foot(pair, field, x);
+            (foot.distance < 0.0).then_some((foot.distance, point.weight))
+        });
+        across.bearing(law, &near.collect::<Vec<_>>())
     }
 
     /// Foot, on the deformed circular spline, of a point given in the space frame, whose origin lies on the axis of the output.
@@ -467,12 +538,14 @@ impl<'a> FlankContact<'a> {
         points: &[FlankPoint],
     ) -> FrictionHistory {
         let field = self.local_field(pair, at);
+        // An open pair has no pressure anyway.
+        let later = self.bearing(pair, &field, law, points).map_or(0.0, |bearing| bearing.later_mm);
         points
             .iter()
             .map(|point| {
                 let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
                 let foot = self.foot(pair, &field, x);
-                let pressure = (-law.stiffness * foot.distance).max(0.0);
+                let pressure = (-law.stiffness * (foot.distance + later)).max(0.0);
                 (point.arc, traction(law, pressure, point, foot.arc).0)
             })
             .collect()
@@ -524,6 +597,10 @@ impl<'a> FlankContact<'a> {
         let back = (-field.turn.0, field.turn.1);
         let cs = self.cs_flank(pair);
         let mut out: Option<PairContribution> = None;
+        // An open pair is open by its gaps where the face is nearest.
+        let bearing = self.bearing(pair, &field, law, points);
+        let later = bearing.map_or(0.0, |bearing| bearing.later_mm);
+        let mut uneven = field.across.is_some().then(|| MeanBearing::new(n));
         for point in points {
             let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
             // Most points are open, and a glance says so.
@@ -534,7 +611,8 @@ impl<'a> FlankContact<'a> {
             }
             let foot = self.foot(pair, &field, x);
             *smallest_gap = smallest_gap.min(foot.distance);
-            if foot.distance >= 0.0 {
+            let gap = foot.distance + later;
+            if gap >= 0.0 {
                 continue;
             }
             let out = out.get_or_insert_with(|| PairContribution {
@@ -547,8 +625,10 @@ impl<'a> FlankContact<'a> {
                 resultant: [0.0; 2],
                 attack: [0.0; 2],
                 slipping: Vec::new(),
+                load: 0.0,
+                along_face: None,
             });
-            let pressure = -law.stiffness * foot.distance;
+            let pressure = -law.stiffness * gap;
             out.peak = out.peak.max(pressure);
             let (cs_edge, xi) = cs.locate(foot.radius);
             let cs_shape = edge_shape(xi);
@@ -610,6 +690,10 @@ impl<'a> FlankContact<'a> {
                     stiffness: -friction / pressure * kn,
                 });
             }
+            out.load += normal_load;
+            if let Some(uneven) = &mut uneven {
+                uneven.add(&index, &g, g_output, kn);
+            }
             out.torque += normal_load * g_output - tangential_load * s_output;
             out.corner += kn * g_output * g_output + kt * s_output * s_output;
             // Force on the circular spline, for reports.
@@ -622,7 +706,59 @@ impl<'a> FlankContact<'a> {
                 out.attack[k] += normal_load * x_space[k];
             }
         }
+        if let (Some(out), Some(bearing), Some(uneven)) = (&mut out, bearing, uneven) {
+            uneven.soften(out, bearing.softness);
+            out.peak *= bearing.peak_over_mean;
+            out.along_face = Some(AlongFace {
+                peak_over_mean: bearing.peak_over_mean,
+                share: bearing.share,
+                moment: bearing.moment,
+                by_output: uneven.by_output * bearing.later_by_slope,
+                by_node: uneven.by_node.into_iter().map(|by| by * bearing.later_by_slope).collect(),
+                by_slope: bearing.moment_by_slope,
+            });
+        }
         out
+    }
+}
+
+/// How the mean load of a pair changes with its unknowns: what an uneven face takes from the tangent.
+struct MeanBearing {
+    /// By the nodes (N/mm per mm) and by the output angle.
+    by_node: Vec<f64>,
+    by_output: f64,
+    /// By all gaps together.
+    stiffness: f64,
+}
+
+impl MeanBearing {
+    fn new(unknowns: usize) -> MeanBearing {
+        MeanBearing { by_node: vec![0.0; unknowns], by_output: 0.0, stiffness: 0.0 }
+    }
+
+    /// Adds a point with the derivatives of its gap.
+    fn add(&mut self, index: &[usize; 12], gap: &[f64; 12], gap_by_output: f64, stiffness: f64) {
+        for (i, g) in index.iter().zip(gap) {
+            self.by_node[*i] += stiffness * g;
+        }
+        self.by_output += stiffness * gap_by_output;
+        self.stiffness += stiffness;
+    }
+
+    /// A mean load that grows by q moves the flank back by `softness * q`: one spring in series with all points.
+    fn soften(&self, out: &mut PairContribution, softness: f64) {
+        let factor = softness / (1.0 + softness * self.stiffness);
+        if factor == 0.0 {
+            return;
+        }
+        let n = self.by_node.len();
+        for (i, a) in self.by_node.iter().enumerate().filter(|(_, a)| **a != 0.0) {
+            out.border[i] -= factor * a * self.by_output;
+            for (entry, b) in out.stiffness[i * n..=i * n + i].iter_mut().zip(&self.by_node) {
+                *entry -= factor * a * b;
+            }
+        }
+        out.corner -= factor * self.by_output * self.by_output;
     }
 }
 
@@ -673,7 +809,7 @@ mod tests {
         with_flanks(|flanks, fs, cs| {
             let (u, v) = (vec![0.0; 2 * fs.nodes.len()], vec![0.0; 2 * cs.nodes.len()]);
             let gap = |side, output_rad| {
-                flanks.smallest_gap(FlankPair { side, ..PAIR }, Configuration { u: &u, v: &v, output_rad })
+                flanks.smallest_gap(FlankPair { side, ..PAIR }, Configuration { u: &u, v: &v, output_rad, leans: &[] })
             };
             let start = gap(Side::Plus, 0.0);
             assert!(start > 0.0 && start < 0.5, "tooth 0 stands in space 0 with {start} mm");
@@ -693,7 +829,7 @@ mod tests {
             let (u, v) = (wave(fs.nodes.len(), 5e-3), wave(cs.nodes.len(), 5e-3));
             let (mut tightest, mut rounded) = (f64::INFINITY, 0);
             for k in 0..40 {
-                let at = Configuration { u: &u, v: &v, output_rad: 1e-4 * f64::from(k) - 2e-3 };
+                let at = Configuration { u: &u, v: &v, output_rad: 1e-4 * f64::from(k) - 2e-3, leans: &[] };
                 for side in Side::BOTH {
                     let pair = FlankPair { side, ..PAIR };
                     let field = flanks.local_field(pair, at);
@@ -722,7 +858,7 @@ mod tests {
         with_flanks(|flanks, fs, cs| {
             let (u, v) = (vec![0.0; 2 * fs.nodes.len()], vec![0.0; 2 * cs.nodes.len()]);
             let law = FlankLaw { stiffness: 1e6, stick_stiffness: 1e5, friction: 0.0 };
-            let at = |output_rad| Configuration { u: &u, v: &v, output_rad };
+            let at = |output_rad| Configuration { u: &u, v: &v, output_rad, leans: &[] };
             let gap = flanks.smallest_gap(PAIR, at(0.0));
             let closing = -(gap + 1e-4) / flanks.space.base_radius;
             let layout = flanks.layout(PAIR, at(closing));
@@ -740,13 +876,75 @@ mod tests {
         });
     }
 
+    /// Forces and their tangent of a pair that bears on part of its face: by its nodes, by the output angle, and by a slope along the face.
+    #[test]
+    fn the_tangent_of_an_uneven_face_is_the_slope_of_its_forces() {
+        with_flanks(|flanks, fs, cs| {
+            let law = FlankLaw { stiffness: 1e6, stick_stiffness: 1e5, friction: 0.0 };
+            let face = FaceLaw::new(&flanks.tooth, 20.0, 2e-3, 3e-5);
+            let deviations = flanks.deviations;
+            let flanks =
+                FlankContact::new(fs, cs, flanks.tooth.clone(), flanks.space.clone(), deviations).with_face(Some(face));
+            let (u, v) = (vec![0.0; 2 * fs.nodes.len()], vec![0.0; 2 * cs.nodes.len()]);
+            let lean = |slope: f64| -> Vec<Lean> { vec![[slope / face.slope([1.0, 0.0], Side::Plus), 0.0]; 1] };
+            let straight = flanks.smallest_gap(PAIR, Configuration { u: &u, v: &v, output_rad: 0.0, leans: &[] });
+            let closing = -(straight - 2e-3) / flanks.space.base_radius;
+            let slope = -1.2e-3;
+            let layout = flanks.layout(PAIR, Configuration { u: &u, v: &v, output_rad: closing, leans: &lean(slope) });
+            let of = |u: &[f64], output_rad: f64, slope: f64| {
+                let leans = lean(slope);
+                flanks
+                    .evaluate(PAIR, Configuration { u, v: &v, output_rad, leans: &leans }, law, &layout.points)
+                    .unwrap()
+            };
+            let here = of(&u, closing, slope);
+            let along = here.along_face.clone().unwrap();
+            assert!((0.1..0.9).contains(&along.share), "{}", along.share);
+            let n = here.force.len();
+            let scale = here.stiffness.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            let nodes: Vec<usize> = flanks.fs_nodes(PAIR).collect();
+            // Normals that turn on the roundings are left out of every tangent.
+            let turning = here.load / flanks.space.rounding_radius;
+            let step = 1e-8;
+            for j in 0..2 * nodes.len() {
+                let moved = |by: f64| {
+                    let mut u = u.clone();
+                    u[2 * nodes[j / 2] + j % 2] += by;
+                    of(&u, closing, slope)
+                };
+                let (after, before) = (moved(step), moved(-step));
+                for i in j..n {
+                    let found = -(after.force[i] - before.force[i]) / (2.0 * step);
+                    let expected = here.stiffness[i * n + j];
+                    assert!((found - expected).abs() < 1e-4 * scale + turning, "{i} {j}: {found} {expected}");
+                }
+                let found = -(after.torque - before.torque) / (2.0 * step);
+                assert!(
+                    (found - here.border[j]).abs() < 50.0 * (1e-4 * scale + turning),
+                    "{j}: {found} {}",
+                    here.border[j]
+                );
+                let moment = |pair: &PairContribution| pair.along_face.as_ref().unwrap().moment;
+                let found = -(moment(&after) - moment(&before)) / (2.0 * step);
+                let largest = along.by_node.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+                assert!((found - along.by_node[j]).abs() < 1e-3 * largest, "{j}: {found} {}", along.by_node[j]);
+            }
+            let (after, before) = (of(&u, closing, slope + step), of(&u, closing, slope - step));
+            let moment = |pair: &PairContribution| pair.along_face.as_ref().unwrap().moment;
+            let found = -(moment(&after) - moment(&before)) / (2.0 * step);
+            assert!((found / along.by_slope - 1.0).abs() < 1e-3, "{found} {}", along.by_slope);
+            let found = -(after.torque - before.torque) / (2.0 * step);
+            assert!((found / along.by_output - 1.0).abs() < 1e-3, "{found} {}", along.by_output);
+        });
+    }
+
     /// The weights of a layout add up to the length of the flank and of the first part of the rounding.
     #[test]
     fn the_points_of_a_layout_cover_the_flank() {
         with_flanks(|flanks, fs, cs| {
             let (u, v) = (vec![0.0; 2 * fs.nodes.len()], vec![0.0; 2 * cs.nodes.len()]);
             for output_rad in [0.0, -1e-3, 2e-3] {
-                let layout = flanks.layout(PAIR, Configuration { u: &u, v: &v, output_rad });
+                let layout = flanks.layout(PAIR, Configuration { u: &u, v: &v, output_rad, leans: &[] });
                 let tooth = &flanks.tooth;
                 let (a, b) = (tooth.start_radius, tooth.junction_radius);
                 let rounding = (tooth.rounding_radius * tooth.rounding_sweep).min(0.016);

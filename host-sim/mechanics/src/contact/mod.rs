@@ -8,12 +8,14 @@
 //! (N/mm³) so high that the answer does not depend on it; a generator bearing of finite stiffness acts in series.
 
 mod bore;
+mod face;
 mod flank;
 mod quadrature;
 
 pub use bore::{BoreContact, BoreLaw, BorePressure, OpenEdges};
+pub use face::{FaceLaw, Lean};
 pub use flank::{
-    Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPoint, FrictionHistory, PairContribution,
-    SlipPoint,
+    AlongFace, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPoint, FrictionHistory,
+    PairContribution, SlipPoint,
 };
 pub use quadrature::gauss_legendre;

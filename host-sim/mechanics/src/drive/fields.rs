@@ -2,7 +2,7 @@
 //! overriding, checking and hashing all walk this list.
 
 use super::as_built::{DamagedTooth, Harmonic};
-use super::sleeve::{Choice, SleeveKind};
+use super::sleeve::{Choice, FaceLoad, SleeveKind};
 use super::spec::Drive;
 use crate::toml_file::{Allowed, above, from};
 
@@ -42,11 +42,12 @@ pub(super) enum Value {
 }
 
 impl Value {
-    /// True for zero and for an empty list.
+    /// True for zero, for an empty list, and for a load that is even.
     pub fn is_zero(&self) -> bool {
         match self {
             Value::Number(number) => *number == 0.0,
-            Value::Rigid | Value::Word { .. } => false,
+            Value::Rigid => false,
+            Value::Word { chosen, .. } => *chosen == FaceLoad::Even.name(),
             Value::List(list) => list.is_empty(),
             Value::Harmonics(list) => list.is_empty(),
             Value::Damage(list) => list.is_empty(),
@@ -108,6 +109,9 @@ pub(super) const ALL: &[Field] = fields! {
     flexspline.width_mm: Real, above(0.0, 1000.0), "face width, mm";
     flexspline.root_fillet_mm: Real, from(0.002, 5.0), "radius of the root fillet, mm";
     flexspline.tip_rounding_mm: Real, from(0.002, 5.0), "radius of the tip rounding, mm";
+    flexspline.face: Word, NO_NUMBER, "how the load lies along the face: evenly, or by slices of teeth that lean as the rim tapers";
+    flexspline.taper_mrad: Real, from(-50.0, 50.0), "taper of the teeth along the face, mrad; positive: further in toward the open end";
+    flexspline.crowning_um: Real, from(0.0, 500.0), "how far both ends of the face stand back from its middle, µm";
     circular_spline.teeth: Count, from(22.0, 2002.0), "number of teeth, two more than the flexspline";
     circular_spline.module_mm: Real, from(0.05, 10.0), "module, mm";
     circular_spline.pressure_angle_deg: Real, from(10.0, 35.0), "pressure angle of the basic rack, degrees";
@@ -201,7 +205,7 @@ impl Field {
             "sleeve.flange_side_mm" => !sleeve.has_flange(),
             "sleeve.bottom_side_mm" => !sleeve.has_bottom(),
             "sleeve.lateral_stiffness_n_per_mm" => sleeve.kind != SleeveKind::Springs,
-            _ if self.is_of_shells() => true,
+            _ if self.is_of_shells() || self.is_of_the_face() => true,
             _ => self.is_imperfection() || matches!(self.slot(&mut Drive::hhd_95()), Slot::RealOrRigid(_)),
         }
     }
@@ -209,6 +213,11 @@ impl Field {
     /// True for what only a sleeve of shells has.
     pub fn is_of_shells(&self) -> bool {
         self.split().0 == "sleeve" && !self.path.contains("stiffness")
+    }
+
+    /// True for what teeth that are straight along the face have not.
+    pub fn is_of_the_face(&self) -> bool {
+        matches!(self.path, "flexspline.face" | "flexspline.taper_mrad" | "flexspline.crowning_um")
     }
 
     /// True for what an ideal drive has not.

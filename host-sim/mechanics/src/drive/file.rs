@@ -763,7 +763,7 @@ mod tests {
         let message = Drive::from_toml("d.toml", "base = \"HHD95\"").unwrap_err().to_string();
         assert_eq!(
             message,
-            "d.toml:1: base: found \"HHD95\", allowed: HHD-95, HHD-95-typical, CUP-95, HHD-95-plane; did you mean `HHD-95`?"
+            "d.toml:1: base: found \"HHD95\", allowed: HHD-95, HHD-95-typical, CUP-95, HHD-95-hermetic, HHD-95-plane; did you mean `HHD-95`?"
         );
         let message = Drive::from_toml("d.toml", "base = 95").unwrap_err().to_string();
         assert_eq!(message, "d.toml:1: base: found 95, allowed: a string");
@@ -783,8 +783,9 @@ mod tests {
         let empty = Drive::from_toml("f.toml", "").unwrap_err();
         let count = |of: &dyn Fn(&Field) -> bool| fields::ALL.iter().filter(|field| of(field)).count();
         let optional = count(&|field| field.is_optional(&Drive::hhd_95()));
-        // Two stiffnesses that may be rigid, and what springs have not.
-        assert_eq!(optional, 2 + count(&Field::is_imperfection) + count(&Field::is_of_shells));
+        // Two stiffnesses that may be rigid, what springs have not, and what straight teeth have not.
+        let not_there = [Field::is_imperfection, Field::is_of_shells, Field::is_of_the_face];
+        assert_eq!(optional, 2 + not_there.iter().map(|of| count(&|field| of(field))).sum::<usize>());
         assert_eq!(empty.problems.len(), fields::ALL.len() - optional);
         // a stiffness that is not there is rigid
         let text = text.replace("bearing_stiffness_n_per_mm3", "# ").replace("torsion_stiffness_n_m_per_rad", "# ");

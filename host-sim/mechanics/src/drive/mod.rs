@@ -35,7 +35,7 @@ pub use involute::{Foot, InvoluteFlank};
 pub use neutral::NeutralCurve;
 pub use placement::{FlankDeviations, Placement};
 pub use ring::{GeneratorKind, RingShape, UnknownGenerator};
-pub use sleeve::{Bottom, Flange, Sleeve, SleeveKind};
+pub use sleeve::{Bottom, FaceLoad, Flange, Sleeve, SleeveKind};
 pub use spec::{
     CircularSpline, Drive, Flanks, Flexspline, Generators, Material, OutputLoadPath, Temperature, ThermalState,
 };

@@ -83,6 +83,16 @@ choice! {
 }
 
 choice! {
+    /// How the load lies along the face of the teeth.
+    FaceLoad {
+        /// Evenly: teeth stay straight, whatever the rim does.
+        Even = "even",
+        /// Slice by slice: teeth lean along their face as the rim tapers, and by their taper and crowning.
+        Slices = "slices",
+    }
+}
+
+choice! {
     /// What closes the other tube.
     Bottom {
         /// Held in its plane, free along the axis: a bottom that is stiff as a membrane and bends without force.

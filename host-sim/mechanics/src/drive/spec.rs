@@ -5,7 +5,7 @@ use super::error::DriveError;
 use super::fields::{self, Value};
 use super::generator::GeneratorOutline;
 use super::ring::GeneratorKind;
-use super::sleeve::{Bottom, Sleeve, SleeveKind};
+use super::sleeve::{Bottom, FaceLoad, Sleeve, SleeveKind};
 use super::tooth::ToothFlank;
 use crate::toml_file::Problem;
 use serde::Serialize;
@@ -64,6 +64,13 @@ pub struct Flexspline {
     pub root_fillet_mm: f64,
     /// Radius of the tip rounding, mm.
     pub tip_rounding_mm: f64,
+    /// How the load lies along the face; `even` takes taper, crowning and the cone of a rim in its sleeve for nothing.
+    pub face: FaceLoad,
+    /// Taper of the teeth along the face, mrad; positive: they stand further in toward the open end, away from what holds the flexspline,
+    /// and further out at the other, the middle of the face being as drawn.
+    pub taper_mrad: f64,
+    /// How far both ends of the face stand back from the flank in its middle, along its normal, µm; a parabola.
+    pub crowning_um: f64,
 }
 
 /// The circular spline; profile shift and half-thickness law describe its spaces.
@@ -241,7 +248,7 @@ impl Material {
 
 impl Drive {
     /// Names of the built-in drives.
-    pub const BUILT_IN: [&'static str; 4] = ["HHD-95", "HHD-95-typical", "CUP-95", "HHD-95-plane"];
+    pub const BUILT_IN: [&'static str; 5] = ["HHD-95", "HHD-95-typical", "CUP-95", "HHD-95-hermetic", "HHD-95-plane"];
 
     /// The default drive: ratio 95, module 0.5 mm, ideal geometry, no friction, rigid sleeve and generator bearing.
     ///
@@ -262,6 +269,9 @@ impl Drive {
                 width_mm: 20.0,
                 root_fillet_mm: 0.12,
                 tip_rounding_mm: 0.03,
+                face: FaceLoad::Even,
+                taper_mrad: 0.0,
+                crowning_um: 0.0,
             },
             circular_spline: CircularSpline {
                 teeth: 190,
@@ -375,6 +385,12 @@ impl Drive {
         Drive { name: "CUP-95".to_owned(), sleeve, ..Drive::hhd_95() }
     }
 
+    /// [`Drive::hhd_95`] with its rim in the middle of a closed sleeve: wall 0.5 mm, 140 mm to either side, on a rigid flange, a bottom of 2 mm.
+    pub fn hhd_95_hermetic() -> Drive {
+        let sleeve = Sleeve { kind: SleeveKind::Hermetic, bottom: Bottom::Plate, ..Sleeve::default() };
+        Drive { name: "HHD-95-hermetic".to_owned(), sleeve, ..Drive::hhd_95() }
+    }
+
     /// The plane drive: no third dimension, nothing beside the rim but that it does not turn.
     pub fn hhd_95_plane() -> Drive {
         let sleeve = Sleeve { kind: SleeveKind::None, ..Sleeve::default() };
@@ -387,6 +403,7 @@ impl Drive {
             "HHD-95" => Some(Drive::hhd_95()),
             "HHD-95-typical" => Some(Drive::hhd_95_typical()),
             "CUP-95" => Some(Drive::cup_95()),
+            "HHD-95-hermetic" => Some(Drive::hhd_95_hermetic()),
             "HHD-95-plane" => Some(Drive::hhd_95_plane()),
             _ => None,
         }
@@ -473,8 +490,8 @@ impl Drive {
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"flexspline drive 1\n");
         fields::for_each(self, |field, value| {
-            // an imperfection that is not there leaves the hash of the ideal drive
-            if field.is_imperfection() && value.is_zero() {
+            // an imperfection that is not there leaves the hash of the ideal drive, and so does a face that is straight
+            if (field.is_imperfection() || field.is_of_the_face()) && value.is_zero() {
                 return;
             }
             // and so do the sizes of a sleeve that springs stand for
@@ -548,6 +565,13 @@ impl Drive {
             }
             holds
         };
+        let even = f.face == FaceLoad::Even;
+        for (field, value) in [("flexspline.taper_mrad", f.taper_mrad), ("flexspline.crowning_um", f.crowning_um)] {
+            let what = format!(
+                "found {value}, allowed with face = \"even\": 0 (the load along the face needs face = \"slices\")"
+            );
+            require(!even || value == 0.0, field, what);
+        }
         require(
             f.teeth % 2 == 0,
             "flexspline.teeth",

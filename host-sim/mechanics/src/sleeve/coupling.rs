@@ -27,6 +27,8 @@ pub struct Addition {
     pub around: f64,
     /// Tilt of the rim along the axis for a = 1 mm, rad/mm; positive: it grows away from what holds the flexspline.
     pub tilt_rad_per_mm: f64,
+    /// Slope of V along the axis for a = 1 mm, rad/mm, in the same direction: how far the teeth are turned askew.
+    pub skew_rad_per_mm: f64,
 }
 
 impl Flexspline3d {
@@ -36,14 +38,18 @@ impl Flexspline3d {
         let oval = [1.0, -1.0 / f64::from(n)];
         let force = self.rest(n, &whole).map(|row| row[0] * oval[0] + row[1] * oval[1]);
         let stiffness = force[0] * oval[0] + force[1] * oval[1];
-        // The tilt follows W and V freely.
-        let tilt = -(whole.at(1, 0) * oval[0] + whole.at(1, 2) * oval[1]) / whole.at(1, 1);
+        // Tilt and slope follow W and V freely.
+        let slope = |k: usize| {
+            let free = whole.condensed(&[0, k, 2], &[]);
+            -(free.at(1, 0) * oval[0] + free.at(1, 2) * oval[1]) / free.at(1, 1)
+        };
         Addition {
             n,
             stiffness_n_per_mm: stiffness,
             radial: force[0] / stiffness,
             around: force[1] / stiffness,
-            tilt_rad_per_mm: self.away() * tilt,
+            tilt_rad_per_mm: self.away() * slope(1),
+            skew_rad_per_mm: self.away() * slope(3),
         }
     }
 
@@ -98,6 +104,20 @@ mod tests {
                 assert!(stiffness_n_per_mm > 0.0);
             }
         }
+    }
+
+    /// A cup cones without stretching: `W = w0 x/L`, and V follows W as in any oval, `V = -W/n`; so do their slopes. The rim is stiff
+    /// enough for n = 2 to take the shape of the tube.
+    #[test]
+    fn the_teeth_of_a_cup_are_skewed_as_its_cone_is() {
+        let cup = Flexspline3d::of(&Drive::cup_95(), true).unwrap().addition(2);
+        let ratio = cup.skew_rad_per_mm / cup.tilt_rad_per_mm;
+        assert!((ratio + 0.5).abs() < 0.01 && cup.tilt_rad_per_mm > 0.0, "{ratio}");
+        // Two equal sides: neither tilt nor skew.
+        let mut both = Flexspline3d::of(&Drive::hhd_95().with_set("sleeve.kind=hermetic").unwrap(), true).unwrap();
+        both.bottom = both.flange;
+        let both = both.addition(2);
+        assert!(both.tilt_rad_per_mm.abs() + both.skew_rad_per_mm.abs() < 1e-9, "{both:?}");
     }
 
     /// An oval generator that holds W tilts the rim as the band under it does.

@@ -79,8 +79,44 @@ impl Symmetric {
     }
 }
 
-#[cfg(test)]
 impl Symmetric {
+    /// All unknowns where some are known and no load acts on the others.
+    pub fn solved(&self, known: &[(usize, f64)]) -> Vec<f64> {
+        let n = self.size;
+        let mut x = vec![0.0; n];
+        let mut is_known = vec![false; n];
+        for &(i, value) in known {
+            (x[i], is_known[i]) = (value, true);
+        }
+        let free: Vec<usize> = (0..n).filter(|i| !is_known[*i]).collect();
+        let mut a = self.entries.clone();
+        let mut load: Vec<f64> =
+            (0..n).map(|i| -known.iter().map(|(k, value)| self.at(i, *k) * value).sum::<f64>()).collect();
+        for (at, &p) in free.iter().enumerate() {
+            let pivot = a[p * n + p];
+            if pivot <= NO_STIFFNESS * self.at(p, p) {
+                continue;
+            }
+            for &i in &free[at + 1..] {
+                let factor = a[i * n + p] / pivot;
+                if factor != 0.0 {
+                    for &j in &free[at..] {
+                        a[i * n + j] -= factor * a[p * n + j];
+                    }
+                    load[i] -= factor * load[p];
+                }
+            }
+        }
+        for (at, &p) in free.iter().enumerate().rev() {
+            let pivot = a[p * n + p];
+            if pivot > NO_STIFFNESS * self.at(p, p) {
+                let beyond: f64 = free[at + 1..].iter().map(|&j| a[p * n + j] * x[j]).sum();
+                x[p] = (load[p] - beyond) / pivot;
+            }
+        }
+        x
+    }
+
     /// Work `f^T K^-1 f` of a load, some unknowns held.
     pub fn work_of(&self, load: &[f64], held: &[usize]) -> f64 {
         // One unknown more, that carries the load: K x = f z with z = 1 leaves -f^T K^-1 f on its diagonal.
@@ -114,6 +150,16 @@ mod tests {
     fn springs_in_a_row_add_their_compliances() {
         let end = chain().condensed(&[3], &[0]);
         assert!((end.at(0, 0) - 1.0).abs() < 1e-14, "1/2 + 1/3 + 1/6 = 1");
+    }
+
+    #[test]
+    fn what_is_pulled_moves_along() {
+        let moved = chain().solved(&[(0, 0.0), (3, 1.0)]);
+        for (found, expected) in moved.iter().zip([0.0, 0.5, 0.5 + 1.0 / 3.0, 1.0]) {
+            assert!((found - expected).abs() < 1e-14, "{moved:?}");
+        }
+        // One end alone takes all along.
+        assert!(chain().solved(&[(0, 2.0)]).iter().all(|x| (x - 2.0).abs() < 1e-14));
     }
 
     #[test]

@@ -17,11 +17,15 @@ mod model;
 mod plate;
 mod ribs;
 mod rim;
+mod shape;
 mod shell;
+mod tooth;
 mod tube;
 
 pub use coupling::Addition;
 pub use model::{Flexspline3d, Harmonic, Rollers};
 pub use plate::{Plate, PlateEdge};
+pub use shape::Station;
 pub use shell::{Ribs, Shell};
+pub use tooth::pair_compliance;
 pub use tube::{End, Tube};

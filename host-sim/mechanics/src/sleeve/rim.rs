@@ -69,19 +69,23 @@ impl Rim {
         self.matrix.condensed(&keep, &[]).in_basis(&[vec![1.0; LINES], self.places.to_vec()])
     }
 
-    /// Stiffness of the band in its W, tilt, and mean V: loads around the rim are spread evenly over the lines.
+    /// Stiffness of the band in its W, tilt, mean V, and slope of V along the axis: loads around the rim are spread evenly over the
+    /// lines.
     pub fn band_and_turn(&self) -> Symmetric {
         let of = |k: usize| self.lines.iter().map(move |first| first + k);
         let keep: Vec<usize> = of(W).chain(of(V)).collect();
         let none = vec![0.0; LINES];
         let mut basis = vec![[vec![1.0; LINES], none.clone()].concat(), [self.places.to_vec(), none.clone()].concat()];
         basis.push([none.clone(), vec![1.0; LINES]].concat());
-        // V of the single lines against their mean.
-        for k in 1..LINES {
+        basis.push([none.clone(), self.places.to_vec()].concat());
+        // V of the single lines beside mean and slope: second differences have neither, the lines being equally far apart.
+        for k in 0..LINES - 2 {
             let mut apart = vec![0.0; 2 * LINES];
-            (apart[LINES], apart[LINES + k]) = (-1.0, 1.0);
+            for (at, weight) in [1.0, -2.0, 1.0].into_iter().enumerate() {
+                apart[LINES + k + at] = weight;
+            }
             basis.push(apart);
         }
-        self.matrix.condensed(&keep, &[]).in_basis(&basis).condensed(&[0, 1, 2], &[])
+        self.matrix.condensed(&keep, &[]).in_basis(&basis).condensed(&[0, 1, 2, 3], &[])
     }
 }

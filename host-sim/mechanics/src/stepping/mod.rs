@@ -16,6 +16,6 @@ mod wheels;
 
 pub use error::SolveError;
 pub use fast::CondensedDrive;
-pub use newton::{Effort, Increment, Solver};
+pub use newton::{Effort, Face, Increment, Solver};
 pub use problem::{Holding, Method, Problem, SolverSettings};
 pub use state::State;

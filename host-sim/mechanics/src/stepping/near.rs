@@ -218,7 +218,7 @@ fn balance(torque: impl Fn(f64) -> (f64, f64), tolerance: f64, reach: f64) -> Op
 
 /// Where a state stands.
 pub(super) fn configuration(state: &State) -> Configuration<'_> {
-    Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad }
+    Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad, leans: &state.leans }
 }
 
 #[cfg(test)]

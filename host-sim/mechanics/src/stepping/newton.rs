@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-use crate::contact::{BoreLaw, Configuration, FlankContact, FlankLaw, FlankPair};
+use crate::contact::{AlongFace, BoreLaw, Configuration, FlankContact, FlankLaw, FlankPair, Lean};
 use crate::fem::{Border, BorderedSystem};
 
 use super::error::SolveError;
@@ -87,8 +87,29 @@ pub struct Increment {
     pub compliance_rad_per_n_m: f64,
     /// Force of the generator along its major axis on the half of the rim at 0°, outward, N.
     pub lobe_force_n: f64,
-    /// Largest contact pressure on a flank and on the bore, MPa.
+    /// Largest contact pressure on a flank and on the bore, MPa; on a flank where the load along the face is largest.
     pub peak_pressure_mpa: [f64; 2],
+    /// The teeth and the load along the face.
+    pub face: Face,
+}
+
+/// The teeth along their face, which a plane slice takes for straight, and how the load lies along it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Face {
+    /// Largest tilt of a tooth, outward along its face, rad; the taper is no part of it.
+    pub tilt_rad: f64,
+    /// Largest skew of a tooth, around along its face, rad.
+    pub skew_rad: f64,
+    /// Load along the face of the flank with the largest load for its width anywhere: peak over mean. 1 where nothing leans, or
+    /// nothing bears.
+    pub peak_over_mean: f64,
+    /// Share of the face of that flank that bears.
+    pub share: f64,
+}
+
+impl Face {
+    /// Straight teeth, evenly loaded.
+    pub const EVEN: Face = Face { tilt_rad: 0.0, skew_rad: 0.0, peak_over_mean: 1.0, share: 1.0 };
 }
 
 /// Time spent in the parts of the solver, by the clock.
@@ -134,6 +155,8 @@ pub struct Solver<'p> {
     patient: bool,
     /// The states passed in steady motion.
     passed: Passed,
+    /// Motion of the ends of a face for displacements of 1 mm, at most.
+    leans_within: f64,
     /// Time spent so far.
     pub effort: Effort,
 }
@@ -169,6 +192,7 @@ impl<'p> Solver<'p> {
             assembling: false,
             patient: false,
             passed: Passed::default(),
+            leans_within: problem.leans_within(),
             effort: Effort::default(),
         }
     }
@@ -314,6 +338,7 @@ impl<'p> Solver<'p> {
             history,
         };
         let mut state = self.passed.predict(self.problem, from, generator_rad, torque_n_m);
+        self.problem.lean(&mut state);
         let mut near = NearPairs::default();
         self.balance_output(&mut state, from, torque_n_m, &mut near);
         let mut residual = self.assemble(&mut state, from, torque_n_m, &mut near);
@@ -337,7 +362,7 @@ impl<'p> Solver<'p> {
                     let Some(compliance) = self.compliance(&residual) else {
                         return Err(failed(history, "the stiffness matrix is not positive definite"));
                     };
-                    let increment = self.report(&residual, compliance, history.len() - 1);
+                    let increment = self.report(&state, &residual, compliance, history.len() - 1);
                     self.wheels.complete(&mut state);
                     self.finish(&mut state, from, &near);
                     if generator_rad != from.generator_rad {
@@ -422,7 +447,7 @@ impl<'p> Solver<'p> {
     fn motion(&self, step: &Step) -> f64 {
         let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let nodes = largest(&step.u) + largest(&step.v);
-        1.25 * std::f64::consts::SQRT_2 * nodes
+        (1.25 + self.leans_within) * std::f64::consts::SQRT_2 * nodes
             + self.problem.drive.circular_spline.root_radius_mm * step.border[OUTPUT].abs()
     }
 
@@ -456,6 +481,7 @@ impl<'p> Solver<'p> {
     /// Assembles the out-of-balance forces and the tangent.
     fn assemble(&mut self, state: &mut State, from: &State, torque_n_m: f64, near: &mut NearPairs) -> Residual {
         let clock = Instant::now();
+        self.problem.lean(state);
         self.look_around(state, from, near);
         self.effort.contact += clock.elapsed();
         self.make_room(configuration(state), near);
@@ -528,14 +554,15 @@ impl<'p> Solver<'p> {
         self.slipping.clear();
         let slipping = &mut self.slipping;
         let at = configuration(state);
-        let column = self.border.column_mut(OUTPUT);
-        column.fill(0.0);
+        self.border.column_mut(OUTPUT).fill(0.0);
         let mut corner = 0.0;
+        let mut leaning = Leaning::new(problem, &mut self.border);
         near.evaluate(&self.flanks, at, flank_law, |pair, contact| {
             let cs_node = |n: usize| self.cs_index[n].expect("flank nodes are free") as usize;
             let nodes: Vec<usize> = self.flanks.fs_nodes(pair).chain(self.flanks.cs_nodes(pair).map(cs_node)).collect();
             contact.slipping.iter().for_each(|point| slipping.add(point, |i| 2 * nodes[i / 2] + i % 2));
-            for (a, node) in nodes.into_iter().enumerate() {
+            let column = self.border.column_mut(OUTPUT);
+            for (a, node) in nodes.iter().enumerate() {
                 for k in 0..2 {
                     let i = 2 * a + k;
                     residual.force[2 * node + k] += contact.force[i];
@@ -549,9 +576,17 @@ impl<'p> Solver<'p> {
             residual.torque_scale += contact.torque.abs();
             residual.flank_contacts += 1;
             residual.peak[0] = residual.peak[0].max(contact.peak);
+            if let Some(along) = &contact.along_face {
+                leaning.add(problem, &mut self.border, pair, along, |i| 2 * nodes[i / 2] + i % 2);
+                if contact.load * along.peak_over_mean > residual.line_load {
+                    residual.line_load = contact.load * along.peak_over_mean;
+                    (residual.peak_over_mean, residual.face_share) = (along.peak_over_mean, along.share);
+                }
+            }
         });
         self.border.corner.fill(0.0);
         self.border.corner[0] = corner;
+        leaning.finish(problem, &mut self.border, residual);
     }
 
     /// Load and drag on the output, sleeve on the bore, and the anchor.
@@ -594,7 +629,16 @@ impl<'p> Solver<'p> {
         }
         for (row, wave) in (problem.first_wave()..).zip(&problem.waves) {
             wave.add_force(-wave.stiffness * wave.amplitude(&state.u), &mut residual.force);
-            corner[row * width + row] = -1.0 / wave.stiffness;
+            match problem.first_amplitude() {
+                None => corner[row * width + row] = -1.0 / wave.stiffness,
+                // The amplitude is an unknown of its own, and the force what makes it that of the bore.
+                Some(first) => {
+                    let amplitude = first + row - problem.first_wave();
+                    corner[amplitude * width + amplitude] += wave.stiffness;
+                    corner[row * width + amplitude] = -1.0;
+                    corner[amplitude * width + row] = -1.0;
+                }
+            }
         }
     }
 
@@ -714,7 +758,7 @@ impl<'p> Solver<'p> {
         }
     }
 
-    fn report(&self, residual: &Residual, compliance: f64, iterations: usize) -> Increment {
+    fn report(&self, state: &State, residual: &Residual, compliance: f64, iterations: usize) -> Increment {
         let to_n_m = self.problem.drive.flexspline.width_mm / 1e3;
         Increment {
             iterations,
@@ -728,13 +772,88 @@ impl<'p> Solver<'p> {
             compliance_rad_per_n_m: compliance / to_n_m,
             lobe_force_n: residual.lobe_force * self.problem.drive.flexspline.width_mm,
             peak_pressure_mpa: residual.peak,
+            face: self.face(state, residual),
+        }
+    }
+
+    fn face(&self, state: &State, residual: &Residual) -> Face {
+        // Without taper, and whether the load along the face is even or not.
+        let mut leans: Vec<Lean> = vec![[0.0; 2]; self.problem.flexspline.teeth];
+        self.problem.waves.iter().for_each(|wave| wave.add_lean(wave.amplitude(&state.u), &mut leans));
+        let largest = |k: usize| leans.iter().map(|lean| lean[k].abs()).fold(0.0, f64::max);
+        Face {
+            tilt_rad: largest(0),
+            skew_rad: largest(1),
+            peak_over_mean: residual.peak_over_mean,
+            share: residual.face_share,
         }
     }
 }
 
-/// The border of this drive; the column of the output angle and the corner change with the contact.
+/// What leans the teeth does so by waves of the rim: a load at the end of a face works on their amplitudes.
+struct Leaning {
+    /// Row of the first amplitude, if there are any.
+    first: Option<usize>,
+    /// Forces on the amplitudes, their tangent by rows, and that with the output angle.
+    force: Vec<f64>,
+    tangent: Vec<f64>,
+    by_output: Vec<f64>,
+}
+
+impl Leaning {
+    fn new(problem: &Problem, border: &mut Border) -> Leaning {
+        let first = problem.first_amplitude();
+        let count = if first.is_some() { problem.waves.len() } else { 0 };
+        for k in 0..count {
+            border.column_mut(first.unwrap_or(0) + k).fill(0.0);
+        }
+        Leaning { first, force: vec![0.0; count], tangent: vec![0.0; count * count], by_output: vec![0.0; count] }
+    }
+
+    /// Adds a pair; `unknown` tells that of the system for each of its own.
+    fn add(
+        &mut self,
+        problem: &Problem,
+        border: &mut Border,
+        pair: FlankPair,
+        along: &AlongFace,
+        unknown: impl Fn(usize) -> usize,
+    ) {
+        let Some(first) = self.first else { return };
+        let slopes: Vec<f64> =
+            problem.waves.iter().map(|wave| problem.face_slope(wave.lean(pair.tooth), pair.side)).collect();
+        let count = slopes.len();
+        for (k, slope) in slopes.iter().enumerate() {
+            self.force[k] += along.moment * slope;
+            self.by_output[k] += along.by_output * slope;
+            for (entry, other) in self.tangent[k * count..(k + 1) * count].iter_mut().zip(&slopes) {
+                *entry += along.by_slope * slope * other;
+            }
+            let column = border.column_mut(first + k);
+            for (i, by) in along.by_node.iter().enumerate() {
+                column[unknown(i)] += by * slope;
+            }
+        }
+    }
+
+    /// Puts forces and tangent where they belong.
+    fn finish(self, problem: &Problem, border: &mut Border, residual: &mut Residual) {
+        let Some(first) = self.first else { return };
+        let (width, count) = (border.width, self.force.len());
+        for (k, wave) in problem.waves.iter().enumerate() {
+            wave.add_force(self.force[k], &mut residual.force);
+            border.corner[OUTPUT * width + first + k] = self.by_output[k];
+            border.corner[(first + k) * width + OUTPUT] = self.by_output[k];
+            for l in 0..count {
+                border.corner[(first + k) * width + first + l] = self.tangent[k * count + l];
+            }
+        }
+    }
+}
+
+/// The border of this drive; the columns of the output angle and of the amplitudes and the corner change with the contact.
 fn fixed_border(problem: &Problem, wheels: &dyn Wheels) -> Border {
-    let width = problem.first_wave() + problem.waves.len();
+    let width = problem.first_amplitude().unwrap_or(problem.first_wave()) + problem.waves.len();
     let mut border = Border::zeros(wheels.unknowns(), width);
     border.column_mut(SLEEVE)[..problem.rotation_weights.len()].copy_from_slice(&problem.rotation_weights);
     for (unknown, weight) in wheels.anchor() {

@@ -5,10 +5,13 @@ use std::f64::consts::TAU;
 use std::fmt;
 use std::str::FromStr;
 
-use crate::contact::{BoreContact, BoreLaw, FlankContact, FlankLaw};
-use crate::drive::{Drive, FlankDeviations, GeneratorKind, GeneratorOutline, InvoluteFlank, RimVariation, ToothFlank};
+use crate::contact::{BoreContact, BoreLaw, FaceLaw, FlankContact, FlankLaw, Lean};
+use crate::drive::{
+    Drive, FaceLoad, FlankDeviations, GeneratorKind, GeneratorOutline, InvoluteFlank, RimVariation, Side, ToothFlank,
+};
 use crate::fem::material::PlaneStrain;
 use crate::mesh::{MeshLevel, WheelMesh};
+use crate::sleeve::pair_compliance;
 use crate::suggest::did_you_mean;
 
 use super::error::SolveError;
@@ -171,6 +174,8 @@ pub struct Problem {
     third: Third,
     /// The waves on the bore of the meshes of this problem.
     pub(super) waves: Vec<Wave>,
+    /// The load along the face, where it is not even.
+    face: Option<FaceLaw>,
     /// Coulomb drag of the output per mm of width (N mm/mm).
     pub(super) drag: f64,
     pub(super) drag_stiffness: f64,
@@ -216,6 +221,12 @@ impl Problem {
         let (rotation_weights, mean_weights) = bore_averages(fs, &bore, settings.holding);
         let third = Third::of(&drive)?;
         let waves = third.waves(&drive, fs, &bore);
+        let wheel = &drive.flexspline;
+        let face = (wheel.face == FaceLoad::Slices)
+            .then(|| {
+                Ok::<_, SolveError>(FaceLaw::new(&tooth, width, 1e-3 * wheel.crowning_um, pair_compliance(&drive)?))
+            })
+            .transpose()?;
         let thermal = &drive.thermal_state;
         Ok(Problem {
             bore_law: BoreLaw::new(settings.bore_penalty(kind), drive.generator.bearing_stiffness_n_per_mm3),
@@ -234,6 +245,7 @@ impl Problem {
             mean_weights,
             third,
             waves,
+            face,
             held,
             condensed,
             bore,
@@ -280,11 +292,51 @@ impl Problem {
     /// Contact between the flanks as other meshes carry them, of the same sectors and flanks.
     pub fn flanks_on<'a>(&'a self, flexspline: &'a WheelMesh, circular_spline: &'a WheelMesh) -> FlankContact<'a> {
         FlankContact::new(flexspline, circular_spline, self.tooth.clone(), self.space.clone(), &self.deviations)
+            .with_face(self.face)
+    }
+
+    /// Has the teeth lean as the waves of the rim make them, less their taper.
+    pub(super) fn lean(&self, state: &mut State) {
+        if self.face.is_none() {
+            return;
+        }
+        let taper = 1e-3 * self.drive.flexspline.taper_mrad;
+        let mut leans = std::mem::take(&mut state.leans);
+        leans.clear();
+        leans.resize(self.flexspline.teeth, [-taper, 0.0]);
+        for wave in &self.waves {
+            wave.add_lean(wave.amplitude(&state.u), &mut leans);
+        }
+        state.leans = leans;
+    }
+
+    /// The waves of the rim that shells beside it hold, in a state: harmonic, and amplitude a (mm) of `cos n theta` and of `sin n theta`.
+    pub fn rim_waves(&self, state: &State) -> Vec<(u32, [f64; 2])> {
+        let pairs = self.third.additions.iter().zip(self.waves.chunks_exact(2));
+        pairs.map(|(addition, waves)| (addition.n, [0, 1].map(|k| waves[k].amplitude(&state.u)))).collect()
+    }
+
+    /// Motion of an end of the face against its middle for displacements of 1 mm, at most.
+    pub(super) fn leans_within(&self) -> f64 {
+        if self.face.is_none() {
+            return 0.0;
+        }
+        0.5 * self.drive.flexspline.width_mm * self.waves.iter().map(Wave::largest_lean).sum::<f64>()
     }
 
     /// Row of the border where the waves begin.
     pub(super) fn first_wave(&self) -> usize {
         if self.lateral_stiffness > 0.0 { LATERAL + 2 } else { LATERAL }
+    }
+
+    /// Row of the border where the amplitudes of the waves begin, by which the teeth lean; none where the load along the face is even.
+    pub(super) fn first_amplitude(&self) -> Option<usize> {
+        (self.face.is_some() && !self.waves.is_empty()).then(|| self.first_wave() + self.waves.len())
+    }
+
+    /// Slope of the offsets of a flank along its face, for a tooth that leans.
+    pub(super) fn face_slope(&self, lean: Lean, side: Side) -> f64 {
+        self.face.map_or(0.0, |face| face.slope(lean, side))
     }
 
     /// Drag torque on the output (N mm/mm) at a displacement from its anchor, and the stiffness with which it holds.
@@ -406,7 +458,7 @@ impl Problem {
         let mut v = vec![0.0; 2 * cs.nodes.len()];
         self.seat_state(&mut v);
         let output_rad = generator_rad / self.drive.ratio();
-        State {
+        let mut state = State {
             u,
             v,
             generator_rad,
@@ -416,9 +468,12 @@ impl Problem {
             sleeve_moment: 0.0,
             lateral_force: [0.0; 2],
             friction: Default::default(),
+            leans: Vec::new(),
             output_rate: 1.0 / self.drive.ratio(),
             travel: 0.0,
-        }
+        };
+        self.lean(&mut state);
+        state
     }
 }
 

@@ -3,12 +3,13 @@
 use super::state::State;
 use super::waves::MOST_WAVES;
 
-/// Rows of the border: output angle, mean rotation of the bore, anchor, then lateral x and y and waves of the bore, where there are.
+/// Rows of the border: output angle, mean rotation of the bore, anchor, then where there are any lateral x and y, forces of the waves of
+/// the bore, and where teeth lean the amplitudes of these waves.
 pub(super) const OUTPUT: usize = 0;
 pub(super) const SLEEVE: usize = 1;
 pub(super) const ANCHORED: usize = 2;
 pub(super) const LATERAL: usize = 3;
-pub(super) const BORDERS: usize = LATERAL + 2 + MOST_WAVES;
+pub(super) const BORDERS: usize = LATERAL + 2 + 2 * MOST_WAVES;
 
 /// Out-of-balance forces at a configuration.
 pub(super) struct Residual {
@@ -29,6 +30,10 @@ pub(super) struct Residual {
     /// What rounding of the output angle leaves of the torque at worst.
     pub torque_round_off: f64,
     pub peak: [f64; 2],
+    /// Largest load for the width anywhere along the face of a flank, N/mm; of that flank peak over mean, and the share that bears.
+    pub line_load: f64,
+    pub peak_over_mean: f64,
+    pub face_share: f64,
     /// Neither flank nor drag holds the output.
     pub free_output: bool,
 }
@@ -48,6 +53,9 @@ impl Residual {
             drag_torque: 0.0,
             torque_round_off: 0.0,
             peak: [0.0; 2],
+            line_load: 0.0,
+            peak_over_mean: 1.0,
+            face_share: 1.0,
             free_output: false,
         }
     }
