@@ -234,6 +234,54 @@ fn a_run_that_does_not_converge_ends_with_1_and_touches_no_file() {
     assert_eq!(names(&desk.path("out")), ["frames", "results.csv", "summary.json"]);
 }
 
+/// A drive of 12 mm under a load for one of 100 mm: how far it came is told, and what it did until then is in a file.
+#[test]
+fn a_load_beyond_the_last_stable_one_leaves_the_loads_before_it() {
+    let desk = Desk::new();
+    desk.line("new small.toml --teeth 60 --module 0.2 -q").done();
+    let base = "simulate --drive small.toml --generator cam --mesh coarse --path pitch --max-iterations 10";
+    let run = desk.line(&format!("{base} --torque-n-m 300"));
+    assert_eq!(run.code, 1, "{}", run.stderr);
+    assert_eq!(names(&desk.path("out")), ["results.partial.csv"]);
+    let (header, rows) = table(&desk.read("out/results.partial.csv"));
+    let column = |name: &str| {
+        let at = header.split(',').position(|column| column == name).unwrap();
+        rows.iter().map(|row| row[at]).collect::<Vec<f64>>()
+    };
+    let (torque, error) = (column("torque_n_m"), column("error_arcsec"));
+    assert!(torque.len() > 3 && torque[0] == 0.0, "{torque:?}");
+    assert!(torque.windows(2).all(|pair| pair[0] < pair[1]) && error.windows(2).all(|pair| pair[0] < pair[1]));
+    let last = format!("the last equilibrium is at {:.4} N.m", torque[torque.len() - 1]);
+    let wound_up = format!("wound up by {:.2} arcsec", error[error.len() - 1]);
+    for words in
+        [last.as_str(), &wound_up, "finer steps were tried", &format!("wrote the {} rows so far", torque.len())]
+    {
+        assert!(run.stderr.contains(words), "{words}: {}", run.stderr);
+    }
+    // What it bears gives all results, and nothing of the run before is left.
+    desk.line(&format!("{base} --torque-n-m 0.1")).done();
+    assert_eq!(names(&desk.path("out")), ["results.csv", "summary.json"]);
+}
+
+/// What converges as well as any other drive, and is not to be built.
+#[test]
+fn teeth_that_interfere_and_stress_that_no_steel_bears_are_said() {
+    let desk = Desk::new();
+    let base = "simulate --generator cam --mesh coarse --path pitch --torque-n-m 20";
+    assert_eq!(desk.line(&format!("{base} --json")).done().json()["cautions"].as_array().unwrap().len(), 0);
+    let binds = format!("{base} --set circular_spline.profile_shift=2.95");
+    let cautions = desk.line(&format!("{binds} --json")).done().json()["cautions"].clone();
+    let figures: Vec<&str> = cautions.as_array().unwrap().iter().map(|c| c["figure"].as_str().unwrap()).collect();
+    assert_eq!(figures, ["rigid_gap_um", "max_von_mises_mpa", "peak_flank_pressure_mpa"]);
+    let text = desk.line(&binds).done().stdout;
+    assert!(text.contains("caution: the teeth of the drawing interfere by 8.9 um"), "{text}");
+    let tables = "tables --generator cam --mesh coarse --torque-n-m 20 --most-nodes 5 --positions 4 --temperatures-c 20 \
+                  --set circular_spline.profile_shift=2.95";
+    let said = desk.line(tables).done().stdout;
+    assert!(said.contains("cam: caution: the teeth of the drawing interfere"), "{said}");
+    assert!(desk.read("out/report.html").contains("class=\"stamp caution\""));
+}
+
 #[test]
 fn the_drive_that_is_printed_reads_back_as_itself() {
     let desk = Desk::new();

@@ -9,7 +9,8 @@
 use flexspline::{Direction, GeneratorAngle, Table};
 use serde::Serialize;
 
-use crate::drive::{Drive, GeneratorKind, RigidMesh};
+use crate::cautions::{Looked, rigid_gap_um};
+use crate::drive::{Drive, GeneratorKind};
 use crate::motion::Motion;
 use crate::simulate::peak_stress;
 use crate::stepping::{Problem, SolveError, SolverSettings};
@@ -126,6 +127,18 @@ pub struct DataSheet {
     pub last_stable_n_m: Option<f64>,
 }
 
+impl DataSheet {
+    /// What cautions look at.
+    pub fn looked(&self) -> Looked {
+        Looked {
+            rigid_gap_um: self.rigid_gap_um,
+            max_von_mises_mpa: self.max_von_mises_mpa,
+            peak_flank_pressure_mpa: self.peak_flank_pressure_mpa,
+            slope_bound: None,
+        }
+    }
+}
+
 /// A figure by name.
 pub type FigureOf = (&'static str, fn(&DataSheet) -> Option<f64>);
 
@@ -232,10 +245,4 @@ fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize
     sheet.teeth_in_contact_percent = Some(100.0 * in_contact / f64::from(drive.flexspline.teeth));
     sheet.max_von_mises_mpa = Some(peak_stress(problem, motion.state()).von_mises_mpa);
     Ok(())
-}
-
-/// Least gap of the rigid teeth of the drawing.
-fn rigid_gap_um(drive: &Drive, kind: GeneratorKind) -> Option<f64> {
-    let report = RigidMesh::new(drive, kind).ok()?.report(kind)?;
-    Some(1e3 * report.least.gap_mm)
 }

@@ -43,6 +43,7 @@ pub mod bundle;
 pub mod calibrate;
 pub mod campaign;
 pub mod causes;
+pub mod cautions;
 pub mod cli;
 pub mod closed_loop;
 pub mod data_sheet;

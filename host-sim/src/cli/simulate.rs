@@ -15,12 +15,18 @@ use crate::progress::Progress;
 use crate::simulate::{
     Direction, Observation, Path, PathPoint, Phase, SimulateError, SimulationSettings, Summary, read_path, simulate,
 };
-use crate::stepping::{Method, SolverSettings};
+use crate::stepping::{Method, SolveError, SolverSettings};
+
+/// The rows of a run that ended on its way.
+const PARTIAL: &str = "results.partial.csv";
 
 /// Simulate the drive along a generator path by contact FEM
 ///
 /// Writes results.csv (one row to each increment) and summary.json (kinematic error, backlash, wind-up, stress) into the
 /// output folder, and frames/ with --frames. The drive is deformed, then loaded, then turned.
+///
+/// Where no equilibrium is found the last one is told, with its load and wind-up, and the rows so far are in results.partial.csv: those of
+/// the path, or of the loads that came on. Finer steps have been tried then.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -134,14 +140,10 @@ impl Simulate {
         if let Some(error) = lost {
             return Err(error.into());
         }
-        let mut simulation = run.map_err(|error| {
-            if let (true, SimulateError::Solve(of_solver)) = (context.verbose(), &error)
-                && let Some(residuals) = of_solver.residuals()
-            {
-                say::talk(&format!("relative residual by iteration: {residuals}"));
-            }
-            refused_or_failed(error)
-        })?;
+        let mut simulation = match run {
+            Ok(simulation) => simulation,
+            Err(error) => return Err(self.failed(context, out, error)),
+        };
         simulation.summary.command = context.command.clone();
 
         let has_frames = frames.is_some();
@@ -152,10 +154,31 @@ impl Simulate {
             outputs.folder(frames.finish()?);
         }
         outputs.finish()?;
+        // What an earlier run left when it ended on its way is not of this one.
+        let _ = std::fs::remove_file(out.join(PARTIAL));
         context.print(&simulation.summary, || {
             let next = format!("tables --generator {}", settings.generator);
             report(&simulation.summary, out, has_frames).trim_end().to_owned() + &say::next(&[context.next(&next)])
         })
+    }
+
+    /// Why there are no results; the rows so far are written.
+    fn failed(&self, context: &Context, out: &FilePath, error: SimulateError) -> Failure {
+        if let (true, Some(residuals)) = (context.verbose(), error.of_solver().and_then(SolveError::residuals)) {
+            say::talk(&format!("relative residual by iteration: {residuals}"));
+        }
+        let SimulateError::Unfinished(unfinished) = &error else { return refused_or_failed(error) };
+        let path = out.join(PARTIAL);
+        let mut outputs = Outputs::new();
+        if let Err(error) = outputs.csv(&path, &unfinished.rows).and_then(|()| outputs.finish()) {
+            return error.into();
+        }
+        let rows = unfinished.rows.len();
+        Failure::Failed(format!(
+            "{error}; wrote the {rows} row{} so far to {}",
+            if rows == 1 { "" } else { "s" },
+            path.display()
+        ))
     }
 
     fn settings(&self, drive: &Drive) -> Result<SimulationSettings, Failure> {
@@ -293,6 +316,9 @@ fn report(summary: &Summary, out: &FilePath, has_frames: bool) -> String {
     put("load along the face, peak over mean", leans.then_some(summary.load_across_face_peak_over_mean), "", 2);
     put("share of that face that bears", leans.then_some(summary.face_in_contact), "", 3);
     put("time", Some(summary.wall_s), "s", 2);
+    for caution in &summary.cautions {
+        let _ = writeln!(text, "caution: {}", caution.words);
+    }
     let _ = writeln!(
         text,
         "{} increments, {} iterations; wrote {}, {}{}",

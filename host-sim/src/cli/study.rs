@@ -223,7 +223,7 @@ fn csv(study: &Study) -> String {
     };
     let fixed = ["variant", "generator"];
     let loads = ["t1_n_m", "t2_n_m", "largest_n_m"];
-    let end = ["status", "meets", "front", "why"];
+    let end = ["status", "meets", "front", "why", "cautions"];
     let figures = FIGURES.map(|(name, _)| name);
     let fields = study.fields.iter().map(String::as_str);
     let header: Vec<&str> = fixed.into_iter().chain(fields).chain(loads).chain(figures).chain(end).collect();
@@ -238,6 +238,7 @@ fn csv(study: &Study) -> String {
         row.extend(FIGURES.iter().map(|(_, of)| number(of(&run.sheet))));
         row.extend([run.status.name().to_owned(), run.meets.to_string(), run.front.to_string()]);
         row.push(cell(run.why.as_deref().unwrap_or("")));
+        row.push(cell(&run.cautions.iter().map(|caution| caution.words.as_str()).collect::<Vec<_>>().join("; ")));
         text += &(row.join(",") + "\n");
     }
     text

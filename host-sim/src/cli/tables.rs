@@ -94,6 +94,8 @@ pub(super) struct Tables {
 struct Report<'a> {
     schema_version: u32,
     status: &'static str,
+    /// Generators without a table.
+    failed: Vec<String>,
     tables: Vec<&'a TableInfo>,
     wall_s: f64,
 }
@@ -103,10 +105,21 @@ impl Tables {
         let clock = Instant::now();
         let drive = context.drive()?;
         let generators = self.generator.0.as_slice();
-        let mut made = match &self.from_samples {
-            Some(file) => vec![self.project(&drive, generators, file)?],
+        let tried = match &self.from_samples {
+            Some(file) => vec![self.project(&drive, generators, file)],
             None => self.sweep(context, &drive, generators)?,
         };
+        // One generator that fails takes no other's table away.
+        let (mut made, mut failed) = (Vec::new(), Vec::new());
+        for (kind, table) in generators.iter().zip(tried) {
+            match table {
+                Ok(table) => made.push(table),
+                Err(failure) => failed.push((kind, failure)),
+            }
+        }
+        if made.is_empty() {
+            return Err(failed.swap_remove(0).1);
+        }
         let out = context.out()?;
         let mut outputs = Outputs::new();
         for table in &mut made {
@@ -127,6 +140,7 @@ impl Tables {
         outputs.finish()?;
         let report = Report {
             schema_version: 1,
+            failed: failed.iter().map(|(kind, _)| kind.to_string()).collect(),
             status: page.as_ref().filter(|page| page.status.is_failure()).map_or("made", |page| page.status.name()),
             tables: made.iter().map(|table| &table.info).collect(),
             wall_s: clock.elapsed().as_secs_f64(),
@@ -137,6 +151,13 @@ impl Tables {
             let next = if generators.len() == 1 { format!("{next} --generator {}", generators[0]) } else { next };
             text(&report, out, page.is_some()) + &say::next(&[context.next(&next)])
         })?;
+        if !failed.is_empty() {
+            let why = |(kind, failure): &(&GeneratorKind, Failure)| match failure {
+                Failure::BadInput(why) | Failure::Failed(why) => format!("no table of {kind}: {why}"),
+            };
+            let whys: Vec<String> = failed.iter().map(why).collect();
+            return Err(Failure::Failed(format!("{}; what was made is written", whys.join("; "))));
+        }
         page.map_or(Ok(()), |page| report::stamped(&page, out))
     }
 
@@ -216,14 +237,19 @@ impl Tables {
         Ok(settings)
     }
 
-    fn sweep(&self, context: &Context, drive: &Drive, generators: &[GeneratorKind]) -> Result<Vec<MadeTable>, Failure> {
+    fn sweep(
+        &self,
+        context: &Context,
+        drive: &Drive,
+        generators: &[GeneratorKind],
+    ) -> Result<Vec<Result<MadeTable, Failure>>, Failure> {
         let wanted = generators
             .iter()
             .map(|kind| Ok((*kind, self.settings(drive, *kind)?)))
             .collect::<Result<Vec<_>, Failure>>()?;
         // Before there is much work.
         context.out()?;
-        by_fem(context, drive, &wanted)
+        Ok(by_fem(context, drive, &wanted))
     }
 }
 
@@ -232,7 +258,7 @@ fn by_fem(
     context: &Context,
     drive: &Drive,
     wanted: &[(GeneratorKind, TableSettings)],
-) -> Result<Vec<MadeTable>, Failure> {
+) -> Vec<Result<MadeTable, Failure>> {
     let progress = Mutex::new((context.progress("tables"), vec![[0; 2]; wanted.len()]));
     wanted
         .par_iter()
@@ -255,7 +281,7 @@ fn by_fem(
             make(drive, *kind, settings, &observe).map_err(|error| match error {
                 error if error.is_stopped() => Failure::Failed("stopped; nothing was written".into()),
                 error if error.is_bad_input() => Failure::BadInput(error.to_string()),
-                error => Failure::Failed(format!("{kind}: {error}")),
+                error => Failure::Failed(error.to_string()),
             })
         })
         .collect()
@@ -270,8 +296,7 @@ pub(super) fn fresh_table(
 ) -> Result<MadeTable, Failure> {
     let mut settings = TableSettings::for_generator(drive, kind);
     settings.solver.mesh = mesh;
-    let mut made = by_fem(context, drive, &[(kind, settings)])?;
-    Ok(made.remove(0))
+    by_fem(context, drive, &[(kind, settings)]).remove(0)
 }
 
 fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
@@ -309,6 +334,11 @@ fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
             "{}: the torque nodes ran out before the table met the FEM everywhere; see --most-nodes, --torque-n-m\n",
             info.generator
         ));
+    }
+    for info in &report.tables {
+        for caution in &info.cautions {
+            text.push_str(&format!("{}: caution: {}\n", info.generator, caution.words));
+        }
     }
     for (info, turns) in report.tables.iter().filter_map(|info| Some((info, info.turns.as_ref()?))) {
         text.push_str(&format!("{}: {}\n", info.generator, turns.remark));

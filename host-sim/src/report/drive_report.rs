@@ -477,6 +477,9 @@ fn judge(known: &[Known<'_>]) -> (Status, Vec<String>) {
             let words = "the torque nodes ran out before the table met the FEM everywhere; see --most-nodes";
             remark(Status::Remark, format!("{name}: {words}."));
         }
+        for caution in k.subject.info.iter().flat_map(|info| &info.cautions) {
+            remark(Status::Caution, format!("{name}: {}.", caution.words.replace(" um", " µm")));
+        }
         if let Some(turns) = k.subject.info.and_then(|info| info.turns.as_ref()) {
             remark(Status::Remark, format!("{name}: {}.", turns.remark.replace('"', "″")));
         }

@@ -27,6 +27,8 @@ pub enum Status {
     Good,
     /// Holds, with a remark that the reader has to know.
     Remark,
+    /// A drive that is not to be built as it stands.
+    Caution,
     /// Measured data had faults, which were repaired or left out.
     DataFaults,
     /// Something is wrong with the unit, and it has a name.
@@ -47,6 +49,7 @@ impl Status {
         match self {
             Status::Good => "good",
             Status::Remark => "remark",
+            Status::Caution => "caution",
             Status::DataFaults => "data faults",
             Status::FaultFound => "fault found",
             Status::NotUnderstood => "not understood",
@@ -718,6 +721,7 @@ mod tests {
         for (status, name, failure) in [
             (Status::Good, "good", false),
             (Status::Remark, "remark", false),
+            (Status::Caution, "caution", false),
             (Status::DataFaults, "data faults", false),
             (Status::FaultFound, "fault found", false),
             (Status::NotUnderstood, "not understood", false),

@@ -19,6 +19,7 @@ use std::time::Instant;
 
 use thiserror::Error;
 
+use crate::cautions::{Looked, rigid_gap_um};
 use crate::drive::{Drive, GeneratorKind, ThermalState};
 use crate::motion::Motion;
 use crate::stepping::{Face, Increment, Problem, SolveError, Solver, SolverSettings, State};
@@ -39,6 +40,9 @@ const INCREMENTS_PER_PITCH: f64 = 8.0;
 const LIGHT_TOUCH: (f64, f64) = (0.02, 2.0);
 /// Halvings of a change of temperature before giving up.
 const TEMPERATURE_HALVINGS: usize = 5;
+/// Parts of what is tried again where the solver found no equilibrium on its own steps. A guess: steps that are eight times finer than
+/// the solver's own first ones, and a torsion curve of so many points where they do not help either.
+const SECOND_TRY_PARTS: u32 = 8;
 
 /// Which way a one-way path goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -165,9 +169,12 @@ pub enum SimulateError {
         /// What is allowed.
         allowed: String,
     },
-    /// The drive is impossible, an increment did not converge, or the drive did not settle.
+    /// The drive is impossible, or is not even deformed.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// No equilibrium, or the drive did not settle; what there was until then.
+    #[error(transparent)]
+    Unfinished(Box<Unfinished>),
     /// The observer asked to stop.
     #[error("stopped after {done} of {total} increments")]
     Stopped {
@@ -178,7 +185,44 @@ pub enum SimulateError {
     },
 }
 
+/// A run that ended on its way.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error("{error}{}", self.until_then())]
+pub struct Unfinished {
+    /// Why, after all that is tried.
+    pub error: SolveError,
+    /// The rows of the path so far. Where the load did not come on: the drive under the loads that did, its generator at rest.
+    pub rows: Vec<Row>,
+    /// Error of the last row against the middle of the backlash, arc-seconds; missing where that was not looked for.
+    pub wind_up_arcsec: Option<f64>,
+}
+
+impl Unfinished {
+    fn until_then(&self) -> String {
+        let Some(last) = self.rows.last() else { return String::new() };
+        let wind_up =
+            self.wind_up_arcsec.map_or_else(String::new, |arcsec| format!(", wound up by {arcsec:.2} arcsec"));
+        let tried = match self.error {
+            SolveError::NotConverged { .. } => "; finer steps were tried and end there too",
+            _ => "",
+        };
+        format!(
+            "; the last equilibrium is at {:.4} N.m and {:.6} rad{wind_up}{tried}",
+            last.torque_n_m, last.generator_rad
+        )
+    }
+}
+
 impl SimulateError {
+    /// What the solver says, where it is the solver's.
+    pub fn of_solver(&self) -> Option<&SolveError> {
+        match self {
+            SimulateError::Solve(error) => Some(error),
+            SimulateError::Unfinished(unfinished) => Some(&unfinished.error),
+            SimulateError::Setting { .. } | SimulateError::Stopped { .. } => None,
+        }
+    }
+
     /// Whether the input is to blame, not the run.
     pub fn is_bad_input(&self) -> bool {
         matches!(self, SimulateError::Setting { .. } | SimulateError::Solve(SolveError::Drive(_) | SolveError::Mesh(_)))
@@ -290,6 +334,19 @@ impl<'a> Run<'a> {
     }
 
     fn run(mut self) -> Result<Simulation, SimulateError> {
+        match self.along_path() {
+            Ok(()) => Ok(self.finish()),
+            Err(SimulateError::Solve(error)) if !error.is_bad_input() && !self.rows.is_empty() => {
+                let zero = self.touches.map(|touches| 0.5 * (touches.forward + touches.backward));
+                let last = self.rows.last().map(|row| row.error_arcsec);
+                let wind_up_arcsec = last.zip(zero).map(|(last, zero)| last - zero);
+                Err(SimulateError::Unfinished(Box::new(Unfinished { error, rows: self.rows, wind_up_arcsec })))
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn along_path(&mut self) -> Result<(), SimulateError> {
         match &self.settings.path {
             Path::Paper => {
                 let increment = self.settings.increment_rad.unwrap_or(PAPER_INCREMENT_RAD);
@@ -311,7 +368,7 @@ impl<'a> Run<'a> {
             Path::Pitch => self.settle_and_turn(self.pitch)?,
             Path::Turn => self.settle_and_turn(TAU)?,
         }
-        Ok(self.finish())
+        Ok(())
     }
 
     fn target(&self, generator_rad: f64) -> Target {
@@ -416,7 +473,9 @@ impl<'a> Run<'a> {
             self.touches = Some(Touches { forward, backward });
         }
         if at.torque_n_m != 0.0 {
-            motion.load(at.torque_n_m)?;
+            if let Err(error) = motion.load(at.torque_n_m) {
+                self.load_in_parts(&mut motion, at.torque_n_m, error)?;
+            }
             self.solved(Phase::Loading, &motion)?;
             let deforming = increment.iterations;
             increment = motion.last().clone();
@@ -428,14 +487,73 @@ impl<'a> Run<'a> {
     /// One increment along the path, with its row.
     fn advance(&mut self, motion: &mut Motion<'_>, to: Target) -> Result<(), SimulateError> {
         let from_rad = motion.state().generator_rad;
-        motion.to(to.generator_rad, to.torque_n_m)?;
+        if let Err(error) = motion.to(to.generator_rad, to.torque_n_m) {
+            if !matches!(error, SolveError::NotConverged { .. }) {
+                return Err(error.into());
+            }
+            in_parts(motion, to.generator_rad, to.torque_n_m)?;
+        }
         self.increments += 1;
         self.iterations += motion.last().iterations;
         self.record(motion, motion.last(), to.generator_rad - from_rad)
     }
 
+    /// A load that did not come on at once: up to the last one that had an equilibrium in parts, each a row, and on from there in finer ones by
+    /// a solver that remembers nothing. Where that helps the rows go, since they are none of the path.
+    fn load_in_parts(
+        &mut self,
+        motion: &mut Motion<'_>,
+        torque_n_m: f64,
+        error: SolveError,
+    ) -> Result<(), SimulateError> {
+        let SolveError::NotConverged { reached_n_m, .. } = error else { return Err(error.into()) };
+        self.load_row(motion)?;
+        if reached_n_m != 0.0 {
+            self.load_on(motion, reached_n_m)?;
+        }
+        motion.forget();
+        self.load_on(motion, torque_n_m)?;
+        self.rows.clear();
+        Ok(())
+    }
+
+    /// The load brought on in parts, each a row; of the part that failed as much as went.
+    fn load_on(&mut self, motion: &mut Motion<'_>, torque_n_m: f64) -> Result<(), SimulateError> {
+        let from_n_m = motion.state().torque_n_m;
+        for part in 1..=SECOND_TRY_PARTS {
+            let loaded = motion.load(part_of_way(from_n_m, torque_n_m, part));
+            if let Err(SolveError::NotConverged { reached_n_m, .. }) = loaded
+                && reached_n_m != motion.state().torque_n_m
+                && motion.load(reached_n_m).is_ok()
+            {
+                self.load_row(motion)?;
+            }
+            loaded?;
+            self.load_row(motion)?;
+        }
+        Ok(())
+    }
+
+    fn load_row(&mut self, motion: &Motion<'_>) -> Result<(), SimulateError> {
+        self.solved(Phase::Loading, motion)?;
+        let (row, _) = self.row(motion, motion.last(), 0.0);
+        self.rows.push(row);
+        Ok(())
+    }
+
     /// Adds a row and shows it.
     fn record(&mut self, motion: &Motion<'_>, increment: &Increment, turn_rad: f64) -> Result<(), SimulateError> {
+        let (row, peak) = self.row(motion, increment, turn_rad);
+        if self.peak.is_none_or(|(highest, _)| peak.von_mises_mpa > highest.von_mises_mpa) {
+            self.peak = Some((peak, row.step));
+        }
+        self.show(Phase::Following, increment.iterations, motion.problem(), motion.state(), Some(&row))?;
+        self.rows.push(row);
+        Ok(())
+    }
+
+    /// The drive as it stands, as the next row.
+    fn row(&mut self, motion: &Motion<'_>, increment: &Increment, turn_rad: f64) -> (Row, PeakStress) {
         let state = motion.state();
         let peak = peak_stress(motion.problem(), state);
         // Rows of a path that begins with the deformed drive count from 0, others from 1.
@@ -465,12 +583,7 @@ impl<'a> Run<'a> {
             lobe_force_n: increment.lobe_force_n,
             turn_rad,
         };
-        if self.peak.is_none_or(|(highest, _)| peak.von_mises_mpa > highest.von_mises_mpa) {
-            self.peak = Some((peak, step));
-        }
-        self.show(Phase::Following, increment.iterations, motion.problem(), state, Some(&row))?;
-        self.rows.push(row);
-        Ok(())
+        (row, peak)
     }
 
     /// Counts an increment that makes no row, and shows it.
@@ -550,6 +663,13 @@ impl<'a> Run<'a> {
         let uneven =
             rows.iter().map(|row| row.face).reduce(|a, b| if b.peak_over_mean > a.peak_over_mean { b } else { a });
         let uneven = uneven.unwrap_or(Face::EVEN);
+        let peak_flank_pressure_mpa = largest(rows, |row| row.peak_flank_pressure_mpa);
+        let looked = Looked {
+            rigid_gap_um: rigid_gap_um(self.drive, settings.generator),
+            max_von_mises_mpa: Some(peak.von_mises_mpa),
+            peak_flank_pressure_mpa: Some(peak_flank_pressure_mpa),
+            slope_bound: None,
+        };
         let summary = Summary {
             schema_version: SUMMARY_SCHEMA,
             tool_version: env!("CARGO_PKG_VERSION"),
@@ -580,7 +700,7 @@ impl<'a> Run<'a> {
             max_von_mises_wheel: wheel_name(&peak),
             max_von_mises_position_mm: peak.position_mm,
             max_von_mises_step: peak_step,
-            peak_flank_pressure_mpa: largest(rows, |row| row.peak_flank_pressure_mpa),
+            peak_flank_pressure_mpa,
             peak_generator_pressure_mpa: largest(rows, |row| row.peak_generator_pressure_mpa),
             lobe_force_n: largest(rows, |row| row.lobe_force_n),
             tilt_mrad: 1e3 * largest(rows, |row| row.face.tilt_rad),
@@ -591,12 +711,28 @@ impl<'a> Run<'a> {
             generator_torque_virtual_work_n_m: metrics.generator_torque_expected,
             torque_balance_worst_n_m: largest(rows, |row| row.torque_balance_n_m.abs()),
             residual_worst: largest(rows, |row| row.residual),
+            cautions: looked.cautions(),
             increments: self.increments,
             iterations: self.iterations,
             wall_s: self.begun.elapsed().as_secs_f64(),
         };
         Simulation { rows: self.rows, summary }
     }
+}
+
+/// To a place and a load once more, in parts, by a solver that remembers nothing of the way here.
+fn in_parts(motion: &mut Motion<'_>, generator_rad: f64, torque_n_m: f64) -> Result<(), SolveError> {
+    motion.forget();
+    let (from_rad, from_n_m) = (motion.state().generator_rad, motion.state().torque_n_m);
+    for part in 1..=SECOND_TRY_PARTS {
+        motion.to(part_of_way(from_rad, generator_rad, part), part_of_way(from_n_m, torque_n_m, part))?;
+    }
+    Ok(())
+}
+
+/// After so many of the parts of a second try; the end exactly.
+fn part_of_way(from: f64, to: f64, part: u32) -> f64 {
+    if part == SECOND_TRY_PARTS { to } else { from + (to - from) * f64::from(part) / f64::from(SECOND_TRY_PARTS) }
 }
 
 /// Equally spaced angles from `from` (left out) to `to` (exactly), `increment` apart or less.

@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use super::row::Row;
 use super::stress::PeakStress;
+use crate::cautions::Caution;
 use crate::mesh::WheelKind;
 use crate::units::ARCSEC_PER_RAD;
 
@@ -116,6 +117,9 @@ pub struct Summary {
     pub torque_balance_worst_n_m: f64,
     /// Largest residual of all rows, relative to the largest contact force.
     pub residual_worst: f64,
+
+    /// What has to be known before these figures are used; empty for a sound drive.
+    pub cautions: Vec<Caution>,
 
     /// Increments solved, all of them: deforming, loading, settling, light touches, path.
     pub increments: usize,

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
 
+use crate::cautions::Caution;
 use crate::data_sheet::{DataSheet, Loads, data_sheet};
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::SolverSettings;
@@ -112,6 +113,8 @@ pub struct Run {
     pub status: RunStatus,
     /// Why, where it did not converge.
     pub why: Option<String>,
+    /// What has to be known of a drive that converged before it is built.
+    pub cautions: Vec<Caution>,
     /// The loads of the sheet; missing of a drive that was refused.
     pub loads: Option<Loads>,
     /// What a catalogue would print.
@@ -231,6 +234,7 @@ fn run(
         values: values.to_vec(),
         status: RunStatus::Refused,
         why: None,
+        cautions: Vec::new(),
         loads: None,
         sheet: DataSheet::default(),
         meets: false,
@@ -243,7 +247,7 @@ fn run(
     let loads = Loads::up_to(settings.torque_n_m.unwrap_or_else(|| drive.rated_torque_n_m(generator)));
     let (sheet, done) =
         data_sheet(&drive, generator, drive.temperature.reference_c, loads, settings.positions, settings.solver);
-    (run.loads, run.sheet) = (Some(loads), sheet);
+    (run.loads, run.sheet, run.cautions) = (Some(loads), sheet, sheet.looked().cautions());
     match done {
         Ok(()) => run.status = RunStatus::Converged,
         Err(error) => {

@@ -29,6 +29,7 @@ fn made_up(variant: usize, value: f64, error: f64, stress: f64) -> Run {
         values: vec![value.to_string()],
         status: RunStatus::Converged,
         why: None,
+        cautions: Vec::new(),
         loads: None,
         sheet: DataSheet {
             rigid_gap_um: Some(1.0),

@@ -3,6 +3,7 @@
 use flexspline::make::Sample;
 use serde::Serialize;
 
+use crate::cautions::Caution;
 use crate::data_sheet::Stiffness;
 use crate::drive::GeneratorKind;
 
@@ -66,6 +67,8 @@ pub struct TableInfo {
     pub wind_up_arcsec: [f64; 2],
     /// Stiffness as catalogues tell it; null for a table that was not made by FEM of a drive.
     pub stiffness: Option<Stiffness>,
+    /// What has to be known before the table is used; empty for a sound drive.
+    pub cautions: Vec<Caution>,
     /// What is left over whole turns of a drive that does not repeat from tooth to tooth; null for one that does.
     pub turns: Option<TurnsInfo>,
     /// Command line, once known.

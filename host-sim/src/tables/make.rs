@@ -11,6 +11,7 @@ use super::project::{TableError, from_sweep};
 use super::sweep::{SweepError, SweepPlan, SweepProgress, planned_increments};
 use super::torque_nodes::{NodeChoice, choose_torque_nodes};
 use super::turns::{deviation_increments, sweep_turns};
+use crate::cautions::{Looked, rigid_gap_um};
 use crate::data_sheet::Stiffness;
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::{Method, SolveError, SolverSettings};
@@ -204,8 +205,16 @@ pub fn make(
     if let Some(chosen) = &chosen {
         swept.work.add(chosen.work);
     }
+    let peak_flank_pressure_mpa = swept.work.peak_flank_pressure_mpa;
     let mut made = from_sweep(drive, &plan, swept, settings.solver, clock.elapsed().as_secs_f64())?;
     made.info.torque_nodes_resolved = chosen.map(|chosen| chosen.resolved);
+    made.info.cautions = Looked {
+        rigid_gap_um: rigid_gap_um(drive, kind),
+        max_von_mises_mpa: None,
+        peak_flank_pressure_mpa: Some(peak_flank_pressure_mpa),
+        slope_bound: Some(f64::from(made.info.slope_bound)),
+    }
+    .cautions();
     made.info.stiffness =
         flexspline::Table::check(&made.image).ok().and_then(|table| Stiffness::of_table(drive, &table));
     Ok(made)

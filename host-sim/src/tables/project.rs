@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use super::info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
 use super::sweep::{KnownNode, Sweep, SweepPlan, mirror};
+use crate::cautions::Looked;
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::SolverSettings;
 use crate::units::ARCSEC_PER_RAD;
@@ -306,6 +307,7 @@ fn make(
         backlash_arcsec: backlash,
         wind_up_arcsec: [first, last].map(|t| 0.5 * at(t).iter().sum::<f64>()),
         stiffness: None,
+        cautions: Looked { slope_bound: Some(f64::from(table.bounds().slope)), ..Looked::default() }.cautions(),
         turns: None,
         command: String::new(),
     };

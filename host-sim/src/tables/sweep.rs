@@ -87,12 +87,19 @@ pub struct Work {
     pub iterations: usize,
     /// Largest residual, relative to the contact forces.
     pub worst_residual: f64,
+    /// Largest pressure between flanks, MPa.
+    pub peak_flank_pressure_mpa: f64,
 }
 
 impl Work {
     /// One more increment.
     pub(super) fn count(&mut self, increment: &Increment) {
-        self.add(Work { increments: 1, iterations: increment.iterations, worst_residual: increment.residual });
+        self.add(Work {
+            increments: 1,
+            iterations: increment.iterations,
+            worst_residual: increment.residual,
+            peak_flank_pressure_mpa: increment.peak_pressure_mpa[0],
+        });
     }
 
     /// Other work beside this.
@@ -100,6 +107,7 @@ impl Work {
         self.increments += other.increments;
         self.iterations += other.iterations;
         self.worst_residual = self.worst_residual.max(other.worst_residual);
+        self.peak_flank_pressure_mpa = self.peak_flank_pressure_mpa.max(other.peak_flank_pressure_mpa);
     }
 }
 

@@ -178,12 +178,9 @@ impl FewNumbers {
             like.generator.roller_diameter_mm * bore_radius_mm / like.flexspline.bore_radius_mm(),
             "0.557 bore radii, as HHD-95".to_owned(),
         );
-        put(
-            &mut drive.output.drag_torque_n_m,
-            "output.drag_torque_n_m",
-            like.output.drag_torque_n_m * scale.powi(3),
-            "0.02 N.m of HHD-95, with the cube of the diameter".to_owned(),
-        );
+        // Not rounded as sizes are: the drag of a small drive would be none, and nothing would hold its output.
+        drive.output.drag_torque_n_m = three_digits(like.output.drag_torque_n_m * scale.powi(3));
+        made.formulas.push(("output.drag_torque_n_m", "0.02 N.m of HHD-95, with the cube of the diameter".to_owned()));
         drive.circular_spline.profile_shift = self.shift(drive)?;
         made.formulas.push((
             "circular_spline.profile_shift",
@@ -235,6 +232,11 @@ fn least(mut low: f64, mut high: f64, holds: &impl Fn(f64) -> Result<bool, Drive
     Ok(rounded(high + 5e-5))
 }
 
+/// Rounded to three significant digits.
+fn three_digits(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
+}
+
 /// Rounded to a tenth of a micrometre: what a drawing has.
 fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
@@ -274,6 +276,14 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// A thousandth of the volume has a thousandth of the drag, not none.
+    #[test]
+    fn a_small_drive_has_drag() {
+        let drag = few(60, 0.1).drive("d").unwrap().drive.output.drag_torque_n_m;
+        let expected = 0.02 * (0.5 * 0.1 * 60.0 / 47.0_f64).powi(3);
+        assert!((drag / expected - 1.0).abs() < 5e-3, "{drag} N.m, expected {expected}");
     }
 
     #[test]

@@ -1,0 +1,113 @@
+//! What has to be said beside figures that converged as well as any: that they are not to be built, or not to be believed.
+//!
+//! The model is elastic and plane and does not mind teeth that interfere on the drawing, steel that yields, or an error so steep that no
+//! command undoes it. Each of these is one [`Caution`], with the value found and its limit.
+
+use serde::Serialize;
+
+use crate::drive::{Drive, GeneratorKind, RigidMesh};
+
+/// Von Mises stress above which steel of a flexspline yields, MPa. A guess in the middle: quenched and tempered nickel-chromium-molybdenum
+/// steels (34CrNiMo6, EN 10083-3: 900 to 1000 MPa of yield strength in thin sections; precipitation-hardened ones have more).
+pub const YIELD_MPA: f64 = 1000.0;
+/// Pressure between flanks that no steel bears for long, MPa. A guess below what ISO 76 allows once of rolling bearings (4000 to 4600 MPa).
+pub const MOST_FLANK_PRESSURE_MPA: f64 = 3000.0;
+/// Slope of the error over the generator's motion from which on the inverse is in doubt; at 1 there is none. A guess: half way.
+pub const MOST_SLOPE: f64 = 0.5;
+
+/// One thing to know before figures are used.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Caution {
+    /// Which figure.
+    pub figure: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Where caution begins.
+    pub limit: f64,
+    /// What it means, in words.
+    pub words: String,
+}
+
+/// The figures that are looked at, those that are known.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Looked {
+    /// Least gap of the rigid teeth of the drawing, µm.
+    pub rigid_gap_um: Option<f64>,
+    /// Largest von Mises stress at a node, MPa.
+    pub max_von_mises_mpa: Option<f64>,
+    /// Largest pressure between flanks, MPa.
+    pub peak_flank_pressure_mpa: Option<f64>,
+    /// Bound of the slope of the error over the generator's motion.
+    pub slope_bound: Option<f64>,
+}
+
+impl Looked {
+    /// What has to be said of them; nothing of a sound drive.
+    pub fn cautions(&self) -> Vec<Caution> {
+        let mut cautions = Vec::new();
+        // `wrong` is the side of the limit that asks for caution: 1 above, -1 below. What is not a number is on either.
+        let mut say = |figure, value: Option<f64>, wrong: f64, limit: f64, words: fn(f64) -> String| {
+            if let Some(value) = value.filter(|value| value.is_nan() || wrong * (value - limit) > 0.0) {
+                cautions.push(Caution { figure, value, limit, words: words(value) });
+            }
+        };
+        say("rigid_gap_um", self.rigid_gap_um, -1.0, 0.0, |gap| {
+            format!(
+                "the teeth of the drawing interfere by {:.1} um when rigid: such a drive binds; drive --check says where",
+                -gap
+            )
+        });
+        say("max_von_mises_mpa", self.max_von_mises_mpa, 1.0, YIELD_MPA, |stress| {
+            format!(
+                "a stress of {stress:.0} MPa is above {YIELD_MPA} MPa, where steel yields, which the model does not do"
+            )
+        });
+        say("peak_flank_pressure_mpa", self.peak_flank_pressure_mpa, 1.0, MOST_FLANK_PRESSURE_MPA, |pressure| {
+            format!(
+                "a flank pressure of {pressure:.0} MPa is above {MOST_FLANK_PRESSURE_MPA} MPa, which no steel bears for long"
+            )
+        });
+        say("slope_bound", self.slope_bound, 1.0, MOST_SLOPE, |slope| {
+            format!(
+                "the error changes by up to {slope:.2} of the motion; from 1 on no command undoes it, from {MOST_SLOPE} on it is in doubt"
+            )
+        });
+        cautions
+    }
+}
+
+/// Least gap between the rigid teeth of the drawing over a mesh cycle, µm; negative where they interfere. Missing where they never meet.
+pub fn rigid_gap_um(drive: &Drive, kind: GeneratorKind) -> Option<f64> {
+    let report = RigidMesh::new(drive, kind).ok()?.report(kind)?;
+    Some(1e3 * report.least.gap_mm)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_limit_is_said_and_nothing_within_them() {
+        let sound = Looked {
+            rigid_gap_um: Some(0.0),
+            max_von_mises_mpa: Some(YIELD_MPA),
+            peak_flank_pressure_mpa: Some(MOST_FLANK_PRESSURE_MPA),
+            slope_bound: Some(MOST_SLOPE),
+        };
+        assert_eq!(sound.cautions(), []);
+        let figures = |looked: Looked| looked.cautions().into_iter().map(|caution| caution.figure).collect::<Vec<_>>();
+        assert_eq!(figures(Looked { rigid_gap_um: Some(-0.1), ..sound }), ["rigid_gap_um"]);
+        assert_eq!(figures(Looked { max_von_mises_mpa: Some(f64::NAN), ..sound }), ["max_von_mises_mpa"]);
+        assert_eq!(figures(Looked { peak_flank_pressure_mpa: Some(3001.0), ..sound }), ["peak_flank_pressure_mpa"]);
+        assert_eq!(figures(Looked { slope_bound: Some(0.6), ..sound }), ["slope_bound"]);
+    }
+
+    #[test]
+    fn built_in_teeth_clear_and_teeth_without_room_do_not() {
+        let mut drive = Drive::hhd_95();
+        assert!(rigid_gap_um(&drive, GeneratorKind::Cam).unwrap() > 0.0);
+        drive.circular_spline.profile_shift -= 0.1;
+        let looked = Looked { rigid_gap_um: rigid_gap_um(&drive, GeneratorKind::Cam), ..Looked::default() };
+        assert_eq!(looked.cautions()[0].figure, "rigid_gap_um");
+    }
+}
