@@ -30,7 +30,7 @@ pub struct Limits {
     pub tick_s: f32,
     /// Fastest correction at the output, rad/s.
     pub rate_rad_s: f32,
-    /// Largest acceleration of the correction at the output, rad/s².
+    /// Largest acceleration of the correction at the output, rad/s²; it brakes with half of that.
     pub acceleration_rad_s2: f32,
     /// Fastest generator, rad/s: what moves faster from tick to tick is a glitch.
     pub generator_rate_rad_s: f32,
