@@ -372,6 +372,20 @@ fn every_damaged_file_is_refused_clearly_or_its_fault_is_named_and_no_physics_bl
             Faults(&["torque_scale"]),
         ),
         (
+            "torque whose zero is off",
+            plain(),
+            changed(|b| b.torque_n_m.as_mut().unwrap().iter_mut().for_each(|torque| *torque += 0.8)),
+            Faults(&["torque_zero"]),
+        ),
+        (
+            "torque in steps of 5 N.m",
+            plain(),
+            changed(|b| {
+                b.torque_n_m.as_mut().unwrap().iter_mut().for_each(|torque| *torque = (*torque / 5.0).round() * 5.0)
+            }),
+            Faults(&["quantisation"]),
+        ),
+        (
             "torque of another drive",
             plain(),
             changed(|b| {
@@ -504,6 +518,27 @@ fn every_damaged_file_is_refused_clearly_or_its_fault_is_named_and_no_physics_bl
             plain(),
             changed(|b| (100..5900).step_by(371).for_each(|k| b.output_rad[k] += 90.0 * ARCSEC)),
             Faults(&["outliers"]),
+        ),
+        (
+            "spikes in three rows of a hundred",
+            plain(),
+            changed(|b| {
+                let mut random = fastrand::Rng::with_seed(8);
+                for k in (5..5990).filter(|_| random.f64() < 0.03).collect::<Vec<_>>() {
+                    b.output_rad[k] += if random.bool() { 90.0 } else { -90.0 } * ARCSEC;
+                }
+            }),
+            Faults(&["outliers"]),
+        ),
+        (
+            "a torque that froze",
+            plain(),
+            changed(|b| {
+                let torque = b.torque_n_m.as_mut().unwrap();
+                let held = torque[2000];
+                torque[2000..3200].fill(held);
+            }),
+            Faults(&["frozen_channel"]),
         ),
         (
             "a coarse encoder",

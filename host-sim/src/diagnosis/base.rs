@@ -178,7 +178,7 @@ impl Base {
         }
         let (law, flank) = best.map_or((PlayLaw::Held, Vec::new()), |(_, law, flank)| (law, flank));
         let prediction: Vec<f64> = match table {
-            Some(table) => predicted_by_table(rows, table),
+            Some(table) => predicted_by_table(rows, &rows.torque, table),
             None => (0..rows.len()).map(|k| harmonics[k] + wind_up[k] + half_backlash * flank[k]).collect(),
         };
         let mut floating = vec![Floating { name: "zero".into(), values: vec![1.0; rows.len()], spread: FREE }];
@@ -252,13 +252,14 @@ fn middle_spread(rows: &Rows, left: &[f64], friction: f64) -> f64 {
     inside.iter().map(|e| (e - all).powi(2)).sum::<f64>()
 }
 
-fn predicted_by_table(rows: &Rows, table: &Table<'_>) -> Vec<f64> {
+/// What a table predicts over the rows under a torque, arcsec.
+pub(super) fn predicted_by_table(rows: &Rows, torque: &[f64], table: &Table<'_>) -> Vec<f64> {
     let mut predicted = vec![0.0; rows.len()];
     for session in &rows.sessions {
         let mut play = PlayState::unknown();
         for k in session.clone() {
             let generator = GeneratorAngle::from_rad(rows.generator[k]).unwrap_or(GeneratorAngle::ZERO);
-            let said = table.forward(&mut play, generator, rows.torque[k] as f32, rows.temperature[k] as f32);
+            let said = table.forward(&mut play, generator, torque[k] as f32, rows.temperature[k] as f32);
             predicted[k] = f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD;
         }
     }

@@ -155,7 +155,7 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal) -> Opti
     let turned = told(-1.0);
     if seen(&turned) && of_this_drive(&turned) && turned.left < EXPLAINS_TURNED * recorded.left.min(none) {
         scale(recording, -1.0);
-        recording.faults.push(fault(
+        recording.faults.push(fault_throughout(
             recording,
             FaultName::TorqueSign,
             Treatment::Repaired,
@@ -175,7 +175,7 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal) -> Opti
         .min_by(|a, b| a.1.left.total_cmp(&b.1.left));
     if let Some((factor, told)) = best {
         scale(recording, factor);
-        recording.faults.push(fault(
+        recording.faults.push(fault_throughout(
             recording,
             FaultName::TorqueScale,
             Treatment::Repaired,
@@ -198,7 +198,13 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal) -> Opti
          is not used; what the load does cannot be told from what the drive does",
         recorded.size, recorded.share, recorded.std
     );
-    recording.faults.push(fault(recording, FaultName::TorqueScale, Treatment::Masked, recorded.size, what.clone()));
+    recording.faults.push(fault_throughout(
+        recording,
+        FaultName::TorqueScale,
+        Treatment::Masked,
+        recorded.size,
+        what.clone(),
+    ));
     Some(what)
 }
 
@@ -219,7 +225,13 @@ fn scale(recording: &mut Recording, factor: f64) {
 }
 
 /// A fault of the torque in all rows.
-fn fault(recording: &Recording, name: FaultName, treatment: Treatment, size_arcsec: f64, what: String) -> Fault {
+pub(super) fn fault_throughout(
+    recording: &Recording,
+    name: FaultName,
+    treatment: Treatment,
+    size_arcsec: f64,
+    what: String,
+) -> Fault {
     let (first, last) = (recording.sessions.first(), recording.sessions.last());
     let line = |session: Option<&Session>, last: bool| {
         session.and_then(|s| if last { s.line.last() } else { s.line.first() }).copied().unwrap_or(0)

@@ -35,6 +35,7 @@ pub(crate) mod select;
 mod tests;
 mod thinned;
 pub mod thresholds;
+mod torque_zero;
 pub(crate) mod trace;
 mod uncertainty;
 mod verdict;

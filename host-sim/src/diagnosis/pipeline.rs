@@ -19,7 +19,7 @@ use thiserror::Error;
 
 use super::report::{Compensation, Diagnosis};
 use super::{DiagnosisError, Extended, Settings, diagnose_extended};
-use super::{channels, quieted};
+use super::{channels, quieted, torque_zero};
 use crate::causes::CauseName;
 use crate::drive::{Drive, DriveError, GeneratorKind};
 use crate::extension::{
@@ -264,6 +264,9 @@ fn rows_of(
     }
     recording.unusable = channels::check_torque(&mut recording, &subject.nominal);
     recording.notes.extend(quieted::torque(&mut recording.sessions, &subject.nominal));
+    if recording.unusable.is_none() {
+        torque_zero::check(&mut recording, &subject.nominal, subject.table.as_ref());
+    }
     recording.average_to(MOST_ROWS);
     Ok(recording)
 }

@@ -25,6 +25,24 @@ impl Recording {
 }
 
 impl Session {
+    /// Its first rows.
+    pub(crate) fn beginning(&self, rows: usize) -> Session {
+        let rows = rows.min(self.len());
+        let cut = |values: &Option<Vec<f64>>| values.as_ref().map(|values| values[..rows].to_vec());
+        Session {
+            line: self.line[..rows].to_vec(),
+            generator_rad: self.generator_rad[..rows].to_vec(),
+            error_rad: self.error_rad[..rows].to_vec(),
+            time_s: cut(&self.time_s),
+            torque_n_m: cut(&self.torque_n_m),
+            temperature_c: cut(&self.temperature_c),
+            orientation_rad: cut(&self.orientation_rad),
+            loudness: cut(&self.loudness),
+            own_zero: self.own_zero,
+            unsure_s: self.unsure_s,
+        }
+    }
+
     /// Takes the mean of every so many rows (at least one), of the rest at the end as well.
     fn average(&mut self, together: usize) {
         let mean = |values: &mut Vec<f64>| {

@@ -34,6 +34,8 @@ pub enum FaultName {
     TorqueSign,
     /// The torque is of another shaft, in another unit, or of something else.
     TorqueScale,
+    /// The torque reads a load where there is none.
+    TorqueZero,
     /// The count of an angle leaps by whole turns, or its zero is another one from a session on.
     PositionJump,
 }
@@ -56,6 +58,7 @@ impl FaultName {
             FaultName::CounterRestart => "counter_restart",
             FaultName::TorqueSign => "torque_sign",
             FaultName::TorqueScale => "torque_scale",
+            FaultName::TorqueZero => "torque_zero",
             FaultName::PositionJump => "position_jump",
         }
     }
@@ -74,7 +77,7 @@ impl FaultName {
             FaultName::UnitMismatch => {
                 "map the columns with their units: --columns generator=NAME:UNIT,output=NAME:UNIT"
             }
-            FaultName::Quantisation => "log the full resolution of the encoder",
+            FaultName::Quantisation => "log the full resolution of the encoder and of the torque",
             FaultName::Drift => {
                 "let bench and encoder come to a steady temperature; look after the mount of the encoder"
             }
@@ -89,6 +92,7 @@ impl FaultName {
                 "turn the sign of the torque round: it is positive where it turns the output forward"
             }
             FaultName::TorqueScale => "log the torque at the output of this drive, in N.m",
+            FaultName::TorqueZero => "set the torque sensor to zero while the output bears no load, warm as in use",
             FaultName::PositionJump => "log the position unwrapped, and keep its zero from session to session",
         }
     }
@@ -158,6 +162,15 @@ pub struct Measures {
     /// Turns of the motor, with the sign of what the generator's angle lacks; the largest of several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turns: Option<i64>,
+    /// What the torque reads without a load, N·m, …
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zero_n_m: Option<f64>,
+    /// … and its standard deviation, N·m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zero_std_n_m: Option<f64>,
+    /// Rate of a drift, arcsec/h.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub arcsec_per_hour: Option<f64>,
 }
 
 /// A lasting step of the error that is a whole number of tooth pitches: the drive has ratcheted.

@@ -26,7 +26,7 @@ pub struct MeasuredError {
 }
 
 /// Columns of the same length.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Log {
     /// Line of each row.
     pub line: Vec<u64>,

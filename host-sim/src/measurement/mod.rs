@@ -37,6 +37,7 @@ pub use log::{FEWEST_ROWS, MeasuredError};
 pub use robust::{MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, sampled, white_noise};
 
 use faults::Findings;
+use faults::drift::Stretches;
 use log::Log;
 
 /// Rows without a gap, in order of time.
@@ -230,19 +231,25 @@ fn parse_as(
     faults::leaps::check(&mut log, gear, &mut findings);
     faults::units::check(&mut log, &found.columns, gear, &mut findings).map_err(refuse)?;
     let error_recorded = log.output_or_error() == Quantity::Error;
-    let other_zeros = faults::leaps::between_sessions(&mut log, gear, &mut findings);
+    let drifts = faults::leaps::changes_with_the_gaps(&log, gear)
+        .is_some_and(|per_s| faults::drift::confirms(&into_sessions(log.clone(), gear.ratio), gear, per_s));
+    let other_zeros = if drifts { Vec::new() } else { faults::leaps::between_sessions(&mut log, gear, &mut findings) };
     faults::stalls::check(&mut log, gear, &mut findings);
     let mut sessions = into_sessions(log, gear.ratio);
     other_zeros.into_iter().for_each(|session| sessions[session].own_zero = true);
     sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= found.own_zeros);
+    if drifts {
+        faults::drift::check(&mut sessions, gear, Stretches::OfRows, &mut findings);
+    }
     faults::frozen::check(&mut sessions, gear, error_recorded, &mut findings).map_err(refuse)?;
+    faults::coarse_torque::check(&mut sessions, &mut findings);
     faults::reads::check(&mut sessions, gear, &mut findings);
     faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
     faults::resolution::check(&sessions, gear, error_recorded, &mut findings);
     let steps_are_told = faults::steps::check(&mut sessions, gear, &mut findings);
     // Steps that stay in the data look like drift.
-    if steps_are_told && findings.tooth_steps.is_empty() {
-        faults::drift::check(&mut sessions, gear, &mut findings);
+    if steps_are_told && findings.tooth_steps.is_empty() && !drifts {
+        faults::drift::check(&mut sessions, gear, Stretches::OfTime, &mut findings);
     }
     let Findings { mut faults, tooth_steps, notes } = findings;
     faults.sort_by_key(|fault| (fault.first_line, fault.name));

@@ -136,6 +136,10 @@ const fn fault_parameters(fault: FaultName) -> (&'static str, &'static [Paramete
             "the torque is in another unit, or of another shaft",
             const { &[number(Name::Factor, "of all values", -1e6, 1e6, Value(0.01))] },
         ),
+        FaultName::TorqueZero => (
+            "the torque reads a load where there is none",
+            const { &[number(Name::TorqueNM, "what it reads then", -1e6, 1e6, Value(0.8))] },
+        ),
         FaultName::PositionJump => (
             "the generator's angle leaps by whole turns",
             const { &[number(Name::Turns, "by how many", -1e5, 1e5, Value(16.0)), TIME] },
@@ -144,7 +148,7 @@ const fn fault_parameters(fault: FaultName) -> (&'static str, &'static [Paramete
 }
 
 /// Data faults in the order of lists.
-const FAULTS: [FaultName; 14] = [
+const FAULTS: [FaultName; 15] = [
     FaultName::EncoderIndexJump,
     FaultName::FrozenChannel,
     FaultName::MissingSamples,
@@ -158,6 +162,7 @@ const FAULTS: [FaultName; 14] = [
     FaultName::CounterRestart,
     FaultName::TorqueSign,
     FaultName::TorqueScale,
+    FaultName::TorqueZero,
     FaultName::PositionJump,
 ];
 

@@ -139,6 +139,7 @@ fn spoil(rows: &mut Vec<[f64; 6]>, fault: FaultName, effect: &Chosen, random: &m
         }
         FaultName::TorqueSign => rows.iter_mut().for_each(|row| row[TORQUE] = -row[TORQUE]),
         FaultName::TorqueScale => rows.iter_mut().for_each(|row| row[TORQUE] *= v(Name::Factor)),
+        FaultName::TorqueZero => rows.iter_mut().for_each(|row| row[TORQUE] += v(Name::TorqueNM)),
         FaultName::PositionJump => {
             let (time, off) = (v(Name::TimeS), TAU * v(Name::Turns).round());
             rows.iter_mut().filter(|row| row[TIME] >= time).for_each(|row| row[1] += off);
@@ -172,6 +173,15 @@ mod tests {
         let made = synthesize(&plant, sizes, &chosen, &on, (&sensors, 22), unit, &mut random).unwrap();
         let text = to_csv(&made.sessions, nominal.ratio, &made.effects, &mut random);
         read("data.csv", text.as_bytes(), &ColumnMap::default(), &Gear::of_teeth(188, 190, true)).unwrap()
+    }
+
+    #[test]
+    fn a_zero_that_drifts_over_the_breaks_is_no_other_zero_in_each_session() {
+        let faults = recording("drift:arcsec_per_hour=3000").faults;
+        let drift = faults.iter().find(|fault| fault.name == FaultName::Drift).expect("a drift");
+        let rate = drift.measures.arcsec_per_hour.unwrap();
+        assert!((rate / 3000.0 - 1.0).abs() < 0.03, "{rate}");
+        assert!(faults.iter().all(|fault| fault.name != FaultName::PositionJump));
     }
 
     #[test]

@@ -33,9 +33,16 @@ const GAP_SHARE: f64 = 2.0;
 /// Rows whose median is a level.
 const LEVEL_ROWS: usize = 12;
 
+/// How a recording is cut into stretches: evenly in time, or in rows, where long breaks would leave few of them.
+#[derive(Clone, Copy, PartialEq)]
+pub(in crate::measurement) enum Stretches {
+    OfTime,
+    OfRows,
+}
+
 /// Finds a linear drift over the whole recording, names it and takes it out.
-pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
-    let Some((per_s, from_s, std)) = slope(sessions, gear) else { return };
+pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, cut: Stretches, findings: &mut Findings) {
+    let Some((per_s, from_s, std)) = slope(sessions, gear, cut) else { return };
     let Some(last) = sessions.last().and_then(|s| s.time_s.as_ref()?.last().copied()) else { return };
     let first = sessions[0].time_s.as_ref().map_or(from_s, |time| time[0]);
     let total = per_s * (last - first);
@@ -47,9 +54,11 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     fault.rows = sessions.iter().map(|session| session.len() as u64).sum();
     (fault.channel, fault.treatment) = (Some(Quantity::Error), Treatment::Repaired);
     fault.size_arcsec = Some(total / ARCSEC);
+    let per_hour = 3600.0 * per_s / ARCSEC;
+    fault.measures.arcsec_per_hour = Some(per_hour);
     fault.what = format!(
-        "the zero of the error drifts by {:.2} arcsec in all (standard deviation {:.2}), alike on both flanks, and not with temperature or \
-         position: a straight line in time is taken out",
+        "the zero of the error drifts by {:.2} arcsec in all, {per_hour:.1} an hour (standard deviation of all {:.2}), alike on both flanks, \
+         and not with temperature or position: a straight line in time is taken out",
         total / ARCSEC,
         std * (last - first) / ARCSEC
     );
@@ -61,8 +70,16 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     }
 }
 
+/// Whether there is a drift of about so much, rad/s.
+pub(in crate::measurement) fn confirms(sessions: &[Session], gear: &Gear, per_s: f64) -> bool {
+    slope(sessions, gear, Stretches::OfRows).is_some_and(|(found, ..)| (found - per_s).abs() < ABOUT * per_s.abs())
+}
+
+/// Two rates of drift are one if they differ by less than this share. *Guess*.
+const ABOUT: f64 = 0.2;
+
 /// Drift, rad/s, the time at which it is taken as zero (the middle), and its standard deviation.
-fn slope(sessions: &[Session], gear: &Gear) -> Option<(f64, f64, f64)> {
+fn slope(sessions: &[Session], gear: &Gear, cut: Stretches) -> Option<(f64, f64, f64)> {
     if sessions.iter().any(|session| session.time_s.is_none() || session.len() < 2) {
         return None;
     }
@@ -123,20 +140,32 @@ fn slope(sessions: &[Session], gear: &Gear) -> Option<(f64, f64, f64)> {
         return None;
     }
     // Once more by stretches: the trend of their medians, which noise of a long memory does not make so certain.
-    let mut stretches: Vec<Vec<f64>> = vec![Vec::new(); STRETCHES];
+    let mut stretches: Vec<Vec<(f64, f64)>> = vec![Vec::new(); STRETCHES];
     for s in 0..sessions.len() {
         let left = state.left(&fit, s, &all);
+        if cut == Stretches::OfRows {
+            // None reaches over a break.
+            let parts = (STRETCHES * left.len()).div_ceil(rows);
+            let taus: Vec<f64> = (0..left.len()).map(|row| tau(s, row)).collect();
+            let long = left.len().div_ceil(parts.max(1)).max(1);
+            let part = |(left, tau): (&[f64], &[f64])| left.iter().zip(tau).map(|(l, t)| (*t, l + drift * t)).collect();
+            stretches.extend(left.chunks(long).zip(taus.chunks(long)).map(part));
+            continue;
+        }
         for (row, left) in left.iter().enumerate() {
             let tau = tau(s, row);
-            let place = ((tau + 1.0) / 2.0 * STRETCHES as f64) as usize;
-            stretches[place.min(STRETCHES - 1)].push(left + drift * tau);
+            let place = (((tau + 1.0) / 2.0 * STRETCHES as f64) as usize).min(STRETCHES - 1);
+            let middle = (place as f64 + 0.5) / STRETCHES as f64 * 2.0 - 1.0;
+            stretches[place].push((middle, left + drift * tau));
         }
     }
     let points: Vec<(f64, f64)> = stretches
-        .iter_mut()
-        .enumerate()
-        .filter(|(_, left)| left.len() >= 8)
-        .map(|(k, left)| ((k as f64 + 0.5) / STRETCHES as f64 * 2.0 - 1.0, median_of(left)))
+        .iter()
+        .filter(|left| left.len() >= 8)
+        .map(|left| {
+            let tau = left.iter().map(|of| of.0).sum::<f64>() / left.len() as f64;
+            (tau, median_of(&mut left.iter().map(|of| of.1).collect::<Vec<f64>>()))
+        })
         .collect();
     let (trend, std) = line(&points)?;
     let certain = (drift / formal).abs() > CERTAIN && (trend / std).abs() > CERTAIN && trend * drift > 0.0;

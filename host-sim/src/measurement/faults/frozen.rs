@@ -133,8 +133,8 @@ pub(in crate::measurement) fn check(
             rows - left
         ));
     }
-    beside(sessions, Quantity::Torque, rows, findings);
-    beside(sessions, Quantity::Temperature, rows, findings);
+    beside(sessions, Quantity::Torque, rows, &mut drop, findings);
+    beside(sessions, Quantity::Temperature, rows, &mut drop, findings);
     for (session, drop) in sessions.iter_mut().zip(&drop) {
         if drop.contains(&true) {
             session.leave_out(drop);
@@ -159,11 +159,12 @@ fn missed(generator: &[f64], stretch: &Range<usize>) -> f64 {
     missed_by(generator, stretch)
 }
 
-/// Torque or temperature: frozen stretches are filled by a straight line, the whole channel is left out if half of it is frozen.
+/// Torque or temperature: the whole channel is left out if half of it is frozen; else a temperature goes on by a straight line, and rows
+/// whose torque nobody knows are left out, since a load swings and the drive with it.
 ///
 /// A constant load, a load in steps and a soak at one temperature are not faults: only a channel with noise that lost it, or a
 /// channel that always changes, stands, and catches up at once, is frozen.
-fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, findings: &mut Findings) {
+fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, drop: &mut [Vec<bool>], findings: &mut Findings) {
     let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(channel)).collect();
     if series.is_empty() {
         return;
@@ -195,10 +196,18 @@ fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, findings: &m
     for (number, stretch) in frozen {
         let mut fault = of_rows(&sessions[number], FaultName::FrozenChannel, stretch.clone());
         fault.channel = Some(channel);
-        fault.treatment = if useless { Treatment::Masked } else { Treatment::Repaired };
-        let done = if useless { "the channel is not used" } else { "a straight line is put in its place" };
+        let (treatment, done) = match channel {
+            _ if useless => (Treatment::Masked, "the channel is not used"),
+            Quantity::Torque => (Treatment::Masked, "they are left out"),
+            _ => (Treatment::Repaired, "a straight line is put in its place"),
+        };
+        fault.treatment = treatment;
         fault.what = format!("the {channel} keeps one value over {} rows: {done}", stretch.len());
         findings.faults.push(fault);
+        if channel == Quantity::Torque && !useless {
+            drop[number][stretch].fill(true);
+            continue;
+        }
         if let Some(values) = sessions[number].beside_mut(channel) {
             let from = values[stretch.start];
             let to = values.get(stretch.end).copied().unwrap_or(from);

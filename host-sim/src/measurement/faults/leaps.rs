@@ -186,6 +186,31 @@ pub(in crate::measurement) fn between_sessions(log: &mut Log, gear: &Gear, findi
     others.into_iter().map(|(session, ..)| session).collect()
 }
 
+/// The rate, rad/s, at which the error changes over all gaps between sessions alike, if it does: then no zero is another one, but it drifts.
+pub(in crate::measurement) fn changes_with_the_gaps(log: &Log, gear: &Gear) -> Option<f64> {
+    let (generator, output, time) =
+        (log.get(Quantity::Generator)?, log.get(Quantity::Output)?, log.get(Quantity::Time)?);
+    let error = |row: usize| output[row] - generator[row] / gear.ratio;
+    let level = |rows: std::ops::Range<usize>| median_of(&mut rows.map(error).collect::<Vec<f64>>());
+    let gaps: Vec<(f64, f64)> = (1..log.len())
+        .filter(|row| !log.continues(*row))
+        .map(|row| {
+            let jump = level(row..(row + LEVEL_ROWS).min(log.len())) - level(row.saturating_sub(LEVEL_ROWS)..row);
+            (time[row] - time[row - 1], jump)
+        })
+        .collect();
+    let (square, product) = gaps.iter().fold((0.0, 0.0), |sum, gap| (sum.0 + gap.0 * gap.0, sum.1 + gap.0 * gap.1));
+    let per_s = product / square;
+    let alike = |gap: &(f64, f64)| (gap.1 - per_s * gap.0).abs() < LIKE_THE_GAP * gap.1.abs() + STATE_RAD;
+    let large = gaps.iter().any(|gap| gap.1.abs() > OTHER_ZERO_RAD);
+    (gaps.len() >= FEWEST_GAPS && large && gaps.iter().all(alike)).then_some(per_s)
+}
+
+/// Gaps that have to agree; a jump over one is of its length within this share, and what wind-up and clearance may differ by, rad. *Guess*.
+const FEWEST_GAPS: usize = 3;
+const LIKE_THE_GAP: f64 = 0.1;
+const STATE_RAD: f64 = 600.0 * ARCSEC;
+
 /// By how much the error grows with the angle within sessions, where that is beyond what a drive does; else 0.
 fn slope(generator: &[f64], error: &[f64], bounds: &[usize]) -> f64 {
     let mut slopes: Vec<f64> = bounds

@@ -14,7 +14,9 @@
 //! | clock too coarse, stamps that jitter while the motion does not | rows spaced evenly |
 //! | a unit, sign or exchange of columns that the ratio, a wrap or a limit gives away | converted |
 //! | output or generator frozen | rows left out |
-//! | torque or temperature frozen | straight line, or channel left out |
+//! | torque frozen | rows left out, or channel |
+//! | temperature frozen | straight line, or channel left out |
+//! | torque in coarse steps | read off where it goes from one to the next |
 //! | single rows out | rows left out (torque, temperature: mended) |
 //! | the logger stands still while its time counts on | time made anew from the motion |
 //! | an angle leaps by whole motor turns, in a row or between sessions | turns taken out |
@@ -25,6 +27,7 @@
 //! | coarse resolution, implausible time | named |
 
 pub(super) mod clock;
+pub(super) mod coarse_torque;
 pub(super) mod drift;
 pub(super) mod frozen;
 pub(super) mod lattice;

@@ -36,7 +36,11 @@ const BESIDE: usize = 3;
 /// Rows around, for what is usual there.
 const AROUND: usize = 15;
 /// If more rows than this are out, they are not outliers but the noise.
-const SHARE: f64 = 0.05;
+const SHARE: f64 = 0.1;
+/// Where more rows than this are out, others are out around most of them: then so many of the rows around do not count for what is usual
+/// there, which 5 % of 30 rows exceed in one case of fifty (Poisson).
+const MANY: f64 = 0.003;
+const OTHERS_OUT: usize = 4;
 /// Mean resultant length above which four or more outliers repeat with position: a damaged tooth, which is the drive.
 const REPEATS: f64 = 0.9;
 /// Rayleigh's n R² above which many outliers repeat with position: chance exp(−12).
@@ -106,8 +110,19 @@ fn steady(session: &Session, row: usize) -> bool {
 /// A row, and by how much it is out.
 type Out = (usize, f64);
 
-/// Rows that are out by more than `least`.
-fn rows_out(values: &[f64], least: f64) -> Vec<Out> {
+/// Rows that are out by more than `least`, in all sessions; looked for again with less regard for the rows around where there are many.
+fn in_sessions(sessions: &[Session], least: f64, values: fn(&Session) -> &[f64]) -> Vec<Vec<Out>> {
+    let beyond = |others: usize| -> Vec<Vec<Out>> {
+        sessions.iter().map(|session| rows_out(values(session), least, others)).collect()
+    };
+    let found = beyond(1);
+    let rows: usize = sessions.iter().map(Session::len).sum();
+    let many = found.iter().map(Vec::len).sum::<usize>() as f64 > MANY * rows as f64;
+    if many { beyond(OTHERS_OUT) } else { found }
+}
+
+/// Rows that are out by more than `least`, and by far more than all around them but so many `others`.
+fn rows_out(values: &[f64], least: f64, others: usize) -> Vec<Out> {
     let mut found = Vec::new();
     for row in BESIDE..values.len().saturating_sub(BESIDE) {
         // The cheaper bound first: it is the larger one.
@@ -121,7 +136,7 @@ fn rows_out(values: &[f64], least: f64) -> Vec<Out> {
         let around = row.saturating_sub(AROUND)..(row + AROUND + 1).min(values.len());
         let mut usual: Vec<f64> = around.filter(|k| *k != row).map(|k| out_by(values, k).abs()).collect();
         usual.sort_unstable_by(f64::total_cmp);
-        let usual = usual.iter().rev().nth(1).copied().unwrap_or(0.0);
+        let usual = usual.iter().rev().nth(others).copied().unwrap_or(0.0);
         let (mut before, mut after) = (values[row - BESIDE..row].to_vec(), values[row + 1..=row + BESIDE].to_vec());
         let step = (median_of(&mut before) - median_of(&mut after)).abs();
         if by.abs() > OUT_OF_AROUND * usual && step < 0.5 * by.abs() {
@@ -151,16 +166,19 @@ fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, finding
     let resolution = seen(sessions, gear, error_recorded).into_iter().map(|(_, step)| step).fold(0.0, f64::max);
     let least = (OUT * noise).max(LEAST_RAD).max(STEPS * resolution);
     let largest_n_m = largest_torque(sessions);
+    let out = in_sessions(sessions, least, |session| &session.error_rad);
     let (moved, found): (Vec<Vec<Out>>, Vec<Vec<Out>>) = sessions
         .iter()
-        .map(|session| {
-            let steady = rows_out(&session.error_rad, least).into_iter().filter(|(row, _)| steady(session, *row));
+        .zip(out)
+        .map(|(session, out)| {
+            let steady = out.into_iter().filter(|(row, _)| steady(session, *row));
             steady.partition(|(row, _)| load_swings(session, *row, largest_n_m))
         })
         .unzip();
     let number = |found: &[Vec<Out>]| found.iter().map(Vec::len).sum::<usize>();
     let some = |count: usize| count > 0 && count as f64 <= SHARE * rows as f64;
     let mut leave_out: Vec<&Vec<Vec<Out>>> = Vec::new();
+    let mut many = false;
     if some(number(&moved)) {
         findings.notes.push(format!(
             "{} single rows stand out where the load swings within a row, and the drive with it; they are left out",
@@ -187,6 +205,7 @@ fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, finding
         } else {
             report(sessions, &found, Quantity::Error, Treatment::Masked, "their rows are left out", findings);
             leave_out.push(&found);
+            many = count as f64 > MANY * rows as f64;
         }
     }
     for (number, session) in sessions.iter_mut().enumerate() {
@@ -196,6 +215,39 @@ fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, finding
             session.leave_out(&drop);
         }
     }
+    if many {
+        let more = leave_out_the_doubtful(sessions, least);
+        if let Some(fault) = findings.faults.iter_mut().rfind(|fault| fault.name == FaultName::Outliers) {
+            fault.rows += more;
+        }
+    }
+}
+
+/// Rows before and after whose medians bear a row out where many are out: two of them may be out as well.
+const WIDELY_BESIDE: usize = 5;
+
+/// Where many rows are out, those are as well that stand beside others, or where the drive might have moved them, at reversals and steps of
+/// the load; and nothing bears the first and last rows of a session out. Gives how many are left out.
+fn leave_out_the_doubtful(sessions: &mut [Session], least: f64) -> u64 {
+    let mut more = 0;
+    for session in sessions.iter_mut().filter(|session| session.len() > 4 * BESIDE) {
+        let (error, last) = (&session.error_rad, session.len() - BESIDE);
+        let drop: Vec<bool> = (0..error.len())
+            .map(|row| {
+                if row < BESIDE || row >= last {
+                    return true;
+                }
+                let before = median_of(&mut error[row.saturating_sub(WIDELY_BESIDE)..row].to_vec());
+                let after = median_of(&mut error[row + 1..(row + 1 + WIDELY_BESIDE).min(error.len())].to_vec());
+                let (from_before, from_after) = (error[row] - before, error[row] - after);
+                let by = from_before.abs().min(from_after.abs());
+                from_before * from_after > 0.0 && by > least && (after - before).abs() < 0.5 * by
+            })
+            .collect();
+        more += drop.iter().filter(|drop| **drop).count() as u64;
+        session.leave_out(&drop);
+    }
+    more
 }
 
 /// Outliers of torque or temperature: mended from the rows beside.
@@ -209,7 +261,7 @@ fn of_load(sessions: &mut [Session], channel: Quantity, findings: &mut Findings)
     }
     let found: Vec<Vec<Out>> = sessions
         .iter()
-        .map(|session| session.beside(channel).map_or_else(Vec::new, |values| rows_out(values, least)))
+        .map(|session| session.beside(channel).map_or_else(Vec::new, |values| rows_out(values, least, 1)))
         .collect();
     let rows: usize = sessions.iter().map(Session::len).sum();
     let count: usize = found.iter().map(Vec::len).sum();
@@ -287,10 +339,44 @@ pub(super) fn repeat_with_position(sessions: &[Session], found: &[Vec<Out>], gea
 mod tests {
     use super::*;
 
+    /// An error that swings slowly with 2 arcsec of noise, and rows off by 60 to 600 arcsec.
+    fn with_rows_out(share: f64) -> (Vec<Session>, Vec<usize>) {
+        let mut random = fastrand::Rng::with_seed(12);
+        let mut session = Session::default();
+        let mut out = Vec::new();
+        for k in 0..6000u64 {
+            let noise = 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+            let mut error = 40.0 * (2e-3 * k as f64).sin() + noise;
+            if random.f64() < share {
+                out.push(k as usize);
+                error += (60.0 + 540.0 * random.f64()) * if random.bool() { 1.0 } else { -1.0 };
+            }
+            session.line.push(k);
+            session.generator_rad.push(0.06 * k as f64);
+            session.error_rad.push(error * ARCSEC);
+        }
+        (vec![session], out)
+    }
+
+    #[test]
+    fn of_many_rows_that_are_out_hardly_any_stays() {
+        for share in [0.01, 0.05] {
+            let (mut sessions, out) = with_rows_out(share);
+            let mut findings = Findings::default();
+            check(&mut sessions, &Gear::of_ratio(95.0), false, &mut findings);
+            let stay = sessions[0].line.iter().filter(|line| out.contains(&(**line as usize))).count();
+            let left_out = 6000 - sessions[0].len();
+            assert!(stay * 100 <= out.len(), "{stay} of {} stay", out.len());
+            assert!(left_out < out.len() + 40, "{left_out} for {}", out.len());
+            let told = findings.faults.iter().find(|fault| fault.name == FaultName::Outliers).expect("outliers");
+            assert_eq!(told.rows as usize, left_out);
+        }
+    }
+
     #[test]
     fn the_tip_of_a_load_is_borne_out_by_its_sides_and_a_spike_is_not() {
         let mut load: Vec<f64> = (0..41).map(|k| 40.0 - 1.5 * (f64::from(k) - 20.0).abs()).collect();
-        let found = |load: &[f64]| rows_out(load, 1.0).iter().map(|(row, _)| *row).collect::<Vec<_>>();
+        let found = |load: &[f64]| rows_out(load, 1.0, 1).iter().map(|(row, _)| *row).collect::<Vec<_>>();
         assert!(out_by(&load, 20) > 2.0, "a tip stands above the rows beside");
         assert_eq!(found(&load), [0_usize; 0]);
         load[10] += 20.0;

@@ -109,6 +109,7 @@ pub(super) fn fault(name: FaultName) -> &'static str {
         FaultName::CounterRestart => "a counter that begins anew",
         FaultName::TorqueSign => "wrong sign of the torque",
         FaultName::TorqueScale => "torque of another shaft, unit or origin",
+        FaultName::TorqueZero => "zero of the torque sensor",
         FaultName::PositionJump => "a position that jumps",
     }
 }

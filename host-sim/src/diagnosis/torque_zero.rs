@@ -1,0 +1,388 @@
+//! A torque sensor whose zero is off: it reads a load where there is none. The drive then changes flanks, and stiffens, at other torques
+//! than its model, always by the same amount; whatever turns with an angle or follows the motion may explain a part of that, and none of it
+//! is there.
+//!
+//! The torque less a constant is tried, from a share of the load on either side: what the model leaves of the error then, with everything
+//! free that floats in any drive, tells the constant. It counts where neither an unbalanced load nor a drag, all of their sizes and phases
+//! free, leaves as little.
+
+use std::f64::consts::TAU;
+
+use flexspline::Table;
+
+use super::base::{PlayLaw, predicted_by_table};
+use super::channels::fault_throughout;
+use super::rows::{Rows, mean, rms};
+use crate::measurement::robust::least_and_most;
+use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
+use crate::nominal::Nominal;
+
+/// Rows that are followed, about: of longer recordings the beginnings of all sessions; and of these the rows that are compared.
+const FOLLOWED: usize = 200_000;
+const SAMPLE: usize = 8000;
+/// Zeros of sessions that float, at most.
+const MOST_ZEROS: usize = 24;
+/// Blocks of rows that are left out one at a time.
+const BLOCKS: usize = 24;
+
+/// The largest zero that is looked for, as a share of the load: sensors are good to some per cent of their range. *Guess*.
+const LARGEST_SHARE: f64 = 0.06;
+/// A smaller one is no matter. *Guess*.
+const LEAST_SHARE: f64 = 0.004;
+/// Step of the first look, as a share of the load, and how often it is halved then: what is left grows with the distance from the zero on
+/// either side, so that a coarse look leads there.
+const STEP_SHARE: f64 = 0.01;
+const HALVINGS: u32 = 5;
+
+// Chosen on healthy drives of the catalogue and of a table (zero of 0.3 to 2 N·m at 40 N·m: share 3 % to 65 %, 3.2 to 6.1 standard
+// deviations) against 24 unbalanced loads and drags of the examination (share below 6 %, below 1.9).
+/// A zero takes this share of what is left without it, …
+const LEAST_GAIN: f64 = 0.03;
+/// … by so many standard deviations of the blocks' means, …
+const CERTAIN: f64 = 2.5;
+/// … and is so many of its own from none.
+const TOLD_FROM_NONE: f64 = 4.0;
+/// Unbalanced loads and drags leave no less than this share of what it leaves, …
+const RIVALS_LEAVE: f64 = 0.99;
+/// … and with it no less than this: else they are there.
+const BESIDE_IT_LEAVE: f64 = 0.95;
+/// Within less of an output turn than this an unbalanced load is a constant, and a zero is named only where it leaves clearly less, by the
+/// share of [`RIVALS_LEAVE`]. *Guess*.
+const TELLS_TURNS: f64 = 0.25;
+/// First and last step of the search for such loads, as shares of the load.
+const RIVAL_STEPS: [f64; 2] = [0.04, 0.002];
+
+/// What the model leaves of the error, row by row, under a torque that is not the one recorded.
+struct Held<'a> {
+    rows: Rows,
+    nominal: &'a Nominal,
+    table: Option<&'a Table<'a>>,
+    law: PlayLaw,
+    /// The rows that are compared.
+    places: Vec<usize>,
+    /// What floats in any drive: columns of unit length, each free of those before it.
+    free: Vec<Vec<f64>>,
+}
+
+/// A load beside that of the torque column: a constant, an unbalanced load (sine and cosine), a drag. N·m.
+type Beside = [f64; 4];
+
+impl<'a> Held<'a> {
+    fn new(rows: Rows, nominal: &'a Nominal, table: Option<&'a Table<'a>>) -> Held<'a> {
+        let used: Vec<usize> = rows.sessions_used().flatten().collect();
+        let places: Vec<usize> = used.iter().copied().step_by(used.len().div_ceil(SAMPLE).max(1)).collect();
+        let mut held = Held { rows, nominal, table, law: PlayLaw::Held, places, free: Vec::new() };
+        held.float();
+        let left = |law: PlayLaw| held.of_law(law, [0.0; 4]).iter().map(|left| left.abs()).sum::<f64>();
+        let best = PlayLaw::ALL.into_iter().map(|law| (left(law), law)).min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, law)) = best {
+            held.law = law;
+        }
+        held
+    }
+
+    /// Makes the columns of what floats.
+    fn float(&mut self) {
+        let of = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { self.places.iter().map(|k| value(*k)).collect() };
+        let rows = &self.rows;
+        let mut columns =
+            vec![of(&|_| 1.0), of(&|k| rows.output[k]), of(&|k| rows.speed[k]), of(&|k| rows.direction[k])];
+        for session in rows.sessions.iter().skip(1).take(MOST_ZEROS) {
+            columns.push(of(&|k| f64::from(u8::from(k >= session.start))));
+        }
+        let mut waves = |order: f64, angle: &[f64]| {
+            columns.push(of(&|k| (order * angle[k]).sin()));
+            columns.push(of(&|k| (order * angle[k]).cos()));
+        };
+        for harmonic in &self.nominal.harmonics {
+            waves(harmonic.order_per_generator_turn, &rows.generator);
+        }
+        for order in [1.0, 2.0] {
+            waves(order, &rows.output);
+            waves(order, &rows.on_flexspline);
+            waves(order, &rows.on_circular_spline);
+        }
+        for column in columns {
+            let size = rms(&column);
+            let mut left = self.freed(column);
+            // What the others hold already is round-off.
+            let norm = left.iter().map(|v| v * v).sum::<f64>().sqrt();
+            if norm > 1e-6 * size * (left.len() as f64).sqrt() {
+                left.iter_mut().for_each(|v| *v /= norm);
+                self.free.push(left);
+            }
+        }
+    }
+
+    /// What the free columns leave of a column.
+    fn freed(&self, mut column: Vec<f64>) -> Vec<f64> {
+        for free in &self.free {
+            let share: f64 = free.iter().zip(&column).map(|(a, b)| a * b).sum();
+            column.iter_mut().zip(free).for_each(|(left, v)| *left -= share * v);
+        }
+        column
+    }
+
+    /// What is left of the error at the places with a load beside the torque, arcsec.
+    fn left(&self, beside: Beside) -> Vec<f64> {
+        self.of_law(self.law, beside)
+    }
+
+    fn of_law(&self, law: PlayLaw, [constant, sine, cosine, drag]: Beside) -> Vec<f64> {
+        let rows = &self.rows;
+        let torque: Vec<f64> = (0..rows.len())
+            .map(|k| {
+                let (sin, cos) = (rows.output[k] + rows.orientation[k]).sin_cos();
+                rows.torque[k] + constant + sine * sin + cosine * cos + drag * rows.direction[k]
+            })
+            .collect();
+        let flank = law.flanks(rows, &torque, self.nominal);
+        let half = 0.5 * self.nominal.backlash_arcsec;
+        let wind_up: Vec<f64> = self.places.iter().map(|k| self.nominal.wind_up_arcsec(torque[*k])).collect();
+        let flank: Vec<f64> = self.places.iter().map(|k| half * flank[*k]).collect();
+        let predicted: Vec<f64> = match self.table {
+            Some(table) => {
+                let all = predicted_by_table(rows, &torque, table);
+                self.places.iter().map(|k| all[*k]).collect()
+            }
+            None => (0..self.places.len())
+                .map(|j| wind_up[j] + flank[j] + self.nominal.harmonics_arcsec(rows.generator[self.places[j]]))
+                .collect(),
+        };
+        let left = self.places.iter().zip(&predicted).map(|(k, predicted)| rows.error[*k] - predicted).collect();
+        // Stiffness and backlash float as well.
+        let mut left = self.freed(left);
+        let mut before: Option<Vec<f64>> = None;
+        for column in [wind_up, flank] {
+            let mut column = self.freed(column);
+            if let Some(before) = &before {
+                take_away(&mut column, before);
+            }
+            take_away(&mut left, &column);
+            before = Some(column);
+        }
+        left
+    }
+
+    /// What is left at least, all rows together, with an unbalanced load and a drag beside `from`, and a constant where it is `free`: by steps
+    /// that are halved where none leads on.
+    fn least_beside(&self, from: Beside, free: bool, load: f64) -> f64 {
+        let left = |beside: Beside| self.left(beside).iter().map(|v| v.abs()).sum::<f64>();
+        let (mut at, mut least) = (from, left(from));
+        let mut step = RIVAL_STEPS[0] * load;
+        while step > RIVAL_STEPS[1] * load {
+            let before = least;
+            for j in usize::from(!free)..at.len() {
+                for by in [-step, step] {
+                    let mut to = at;
+                    to[j] += by;
+                    let then = left(to);
+                    if then < least {
+                        (least, at) = (then, to);
+                    }
+                }
+            }
+            if least > WORTH_A_ROUND * before {
+                step *= 0.5;
+            }
+        }
+        least
+    }
+}
+
+/// A round of steps that leaves more than this share of what the one before did leads nowhere.
+const WORTH_A_ROUND: f64 = 0.999;
+
+/// Takes from `column` what it holds of `other`.
+fn take_away(column: &mut [f64], other: &[f64]) {
+    let power: f64 = other.iter().map(|v| v * v).sum();
+    if power > 0.0 {
+        let share = column.iter().zip(other).map(|(a, b)| a * b).sum::<f64>() / power;
+        column.iter_mut().zip(other).for_each(|(left, v)| *left -= share * v);
+    }
+}
+
+/// How much is left in each block of rows: the sum of the magnitudes, which the rows of a flank turned over too early do not rule.
+fn by_block(left: &[f64]) -> Vec<f64> {
+    left.chunks(left.len().div_ceil(BLOCKS).max(1)).map(|block| block.iter().map(|v| v.abs()).sum()).collect()
+}
+
+fn sum(values: &[f64]) -> f64 {
+    values.iter().sum()
+}
+
+/// A zero that was tried, N·m, and what it leaves in each block.
+type Try = (f64, Vec<f64>);
+
+/// The zero that leaves least in the blocks but `without`.
+fn least(tries: &[Try], without: Option<usize>) -> f64 {
+    let left = |of: &Try| sum(&of.1) - without.map_or(0.0, |block| of.1[block]);
+    tries.iter().min_by(|a, b| left(a).total_cmp(&left(b))).map_or(0.0, |of| of.0)
+}
+
+/// A zero that was found, N·m, with its standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Zero {
+    n_m: f64,
+    std: f64,
+    /// What it does to the error, arcsec rms.
+    size_arcsec: f64,
+    /// Whether an unbalanced load would do the same in these rows.
+    may_be_unbalance: bool,
+}
+
+/// The zero of the torque, where it is told from none and from loads that follow the output or the motion.
+fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> Option<Zero> {
+    let rows = Rows::new(sessions, nominal);
+    let load = rows.load_scale();
+    if !rows.recorded.torque || load == 0.0 || nominal.wind_up_arcsec(1.0) == 0.0 || rows.count_used() < SAMPLE / 4 {
+        return None;
+    }
+    let held = Held::new(rows, nominal, table);
+    let left = |zero: f64| by_block(&held.left([-zero, 0.0, 0.0, 0.0]));
+    let steps = (LARGEST_SHARE / STEP_SHARE).round() as i32;
+    let mut step = STEP_SHARE * load;
+    let mut tries: Vec<Try> = (-steps..=steps).map(|k| f64::from(k) * step).map(|zero| (zero, left(zero))).collect();
+    for _ in 0..HALVINGS {
+        step *= 0.5;
+        let best = least(&tries, None);
+        tries.extend([best - step, best + step].map(|zero| (zero, left(zero))));
+    }
+    let zero = least(&tries, None);
+    let of = |zero: f64| tries.iter().find(|of| of.0 == zero).map_or(&[][..], |of| &of.1);
+    let (none, there) = (of(0.0), of(zero));
+    let gains: Vec<f64> = none.iter().zip(there).map(|(none, there)| none - there).collect();
+    let blocks = gains.len() as f64;
+    let gain = mean(&gains);
+    let spread = (gains.iter().map(|of| (of - gain).powi(2)).sum::<f64>() / (blocks - 1.0) / blocks).sqrt();
+    if zero.abs() < LEAST_SHARE * load || sum(&gains) < LEAST_GAIN * sum(none) || gain < CERTAIN * spread {
+        return None;
+    }
+    // Jackknife; no finer than the steps.
+    let without: Vec<f64> = (0..gains.len()).map(|block| least(&tries, Some(block))).collect();
+    let middle = mean(&without);
+    let variance = (blocks - 1.0) / blocks * without.iter().map(|zero| (zero - middle).powi(2)).sum::<f64>();
+    let std = variance.sqrt().max(step);
+    if zero.abs() < TOLD_FROM_NONE * std {
+        return None;
+    }
+    let least = sum(there);
+    let rivals = held.least_beside([0.0; 4], false, load);
+    if rivals < RIVALS_LEAVE * least || held.least_beside([-zero, 0.0, 0.0, 0.0], true, load) < BESIDE_IT_LEAVE * least
+    {
+        return None;
+    }
+    let (low, high) = least_and_most(held.rows.output.iter().copied());
+    let may_be_unbalance = rivals * RIVALS_LEAVE < least;
+    if may_be_unbalance && high - low < TELLS_TURNS * TAU {
+        return None;
+    }
+    let (with, without) = (held.left([-zero, 0.0, 0.0, 0.0]), held.left([0.0; 4]));
+    let moved: Vec<f64> = with.iter().zip(&without).map(|(with, without)| with - without).collect();
+    Some(Zero { n_m: zero, std, size_arcsec: rms(&moved), may_be_unbalance })
+}
+
+/// Finds a zero of the torque, names it and takes it off.
+pub(super) fn check(recording: &mut Recording, nominal: &Nominal, table: Option<&Table<'_>>) {
+    if recording.sessions.iter().any(|session| session.torque_n_m.is_none()) {
+        return;
+    }
+    let rows: usize = recording.sessions.iter().map(Session::len).sum();
+    let found = if rows > FOLLOWED {
+        let share = FOLLOWED as f64 / rows as f64;
+        let sessions: Vec<Session> =
+            recording.sessions.iter().map(|s| s.beginning((share * s.len() as f64) as usize)).collect();
+        find(&sessions, nominal, table)
+    } else {
+        find(&recording.sessions, nominal, table)
+    };
+    let Some(Zero { n_m, std, size_arcsec, may_be_unbalance }) = found else { return };
+    let torques = recording.sessions.iter_mut().flat_map(|session| &mut session.torque_n_m).flatten();
+    torques.for_each(|torque| *torque -= n_m);
+    let alike = if may_be_unbalance {
+        "; an unbalanced load of that size, which is nearly constant where the load changes its side, would do the same here"
+    } else {
+        ""
+    };
+    let what = format!(
+        "the torque reads {n_m:+.2} N·m (± {std:.2}) where there is none: the output changes its flank at that reading, wherever it stands and \
+         whichever way it turns; it was taken off{alike}"
+    );
+    let mut fault = fault_throughout(recording, FaultName::TorqueZero, Treatment::Repaired, size_arcsec, what);
+    fault.measures = Measures { zero_n_m: Some(n_m), zero_std_n_m: Some(std), ..Measures::default() };
+    recording.faults.push(fault);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurement::Fault;
+    use crate::synthesize::catalogue_drive;
+    use crate::units::ARCSEC_PER_RAD;
+
+    /// A drive as its catalogue says that goes to and fro over a third of an output turn under a load that swings, 2 arcsec of noise; with
+    /// `unseen` N·m (of output angle and direction) beside what the column of torque tells.
+    fn recording(nominal: &Nominal, unseen: impl Fn(f64, f64) -> f64) -> Recording {
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut session = Session { time_s: Some(Vec::new()), torque_n_m: Some(Vec::new()), ..Session::default() };
+        let (mut flank, mut psi) = (1.0, 0.0);
+        for k in 0..16_000 {
+            let t = 0.01 * f64::from(k);
+            let told = 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos();
+            let direction = if k / 3000 % 2 == 0 { 1.0 } else { -1.0 };
+            psi += 0.08 * direction;
+            let load = told + unseen(psi / nominal.ratio, direction);
+            if load.abs() > nominal.friction_torque_n_m {
+                flank = load.signum();
+            }
+            let noise = 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+            let play = 0.5 * nominal.backlash_arcsec * flank;
+            let error = nominal.harmonics_arcsec(psi) + nominal.wind_up_arcsec(load) + play + noise;
+            session.line.push(k as u64 + 2);
+            session.generator_rad.push(psi);
+            session.error_rad.push(error / ARCSEC_PER_RAD);
+            session.time_s.as_mut().unwrap().push(t);
+            session.torque_n_m.as_mut().unwrap().push(told);
+        }
+        Recording {
+            file: "made.csv".into(),
+            rows: session.len(),
+            sessions: vec![session],
+            faults: Vec::new(),
+            tooth_steps: Vec::new(),
+            notes: Vec::new(),
+            unusable: None,
+        }
+    }
+
+    /// The fault found, and by how much the first torque was changed.
+    fn checked(unseen: impl Fn(f64, f64) -> f64) -> (Option<Fault>, f64) {
+        let nominal = catalogue_drive();
+        let mut recording = recording(&nominal, unseen);
+        let first = |recording: &Recording| recording.sessions[0].torque_n_m.as_ref().unwrap()[0];
+        let before = first(&recording);
+        check(&mut recording, &nominal, None);
+        let by = first(&recording) - before;
+        (recording.faults.pop(), by)
+    }
+
+    #[test]
+    fn a_zero_is_named_with_its_size_and_taken_off() {
+        for zero in [-1.6, -0.5, 0.3, 0.8] {
+            // What is read less what is there is the zero.
+            let (fault, by) = checked(|_, _| -zero);
+            let fault = fault.expect("a fault");
+            let (found, std) = (fault.measures.zero_n_m.unwrap(), fault.measures.zero_std_n_m.unwrap());
+            assert_eq!((fault.name, fault.treatment), (FaultName::TorqueZero, Treatment::Repaired));
+            assert!((found - zero).abs() < 3.0 * std && std < 0.15, "{zero}: {found} ± {std}");
+            assert!((by + found).abs() < 1e-9, "{by}");
+        }
+    }
+
+    #[test]
+    fn a_right_zero_an_unbalanced_load_and_a_drag_are_left_alone() {
+        assert_eq!(checked(|_, _| 0.0).0, None);
+        assert_eq!(checked(|output, _| 3.0 * (output + 0.4).sin()).0, None);
+        assert_eq!(checked(|_, direction| -0.9 * direction).0, None);
+    }
+}
