@@ -18,7 +18,6 @@ mod cli_files;
 mod cli_terminal;
 mod closed_loop;
 mod contact_patch;
-mod convergence;
 mod docs_commands;
 mod element_patch_and_rates;
 mod fast_equals_reference;

@@ -45,8 +45,6 @@ pub struct Case {
     pub parts: usize,
     /// Contact penalties on bore and flanks, N/mm³, the same in both programs.
     pub penalties: [f64; 2],
-    /// Coulomb friction between the flanks.
-    pub friction: f64,
 }
 
 /// What came out of CalculiX.
@@ -103,14 +101,7 @@ impl Case {
     /// A name for its folder and its lines.
     pub fn name(&self) -> String {
         let parts = if self.parts > 1 { format!("-in-{}", self.parts) } else { String::new() };
-        let friction = if self.friction > 0.0 { "-friction" } else { "" };
-        format!("{}-{}{friction}{parts}", self.generator, self.mesh)
-    }
-
-    /// What is set in the drive.
-    fn sets(&self) -> Vec<String> {
-        let friction = format!("flanks.friction_coefficient={}", self.friction);
-        AS_IN_THE_DECK.iter().map(|set| (*set).to_owned()).chain([friction]).collect()
+        format!("{}-{}{parts}", self.generator, self.mesh)
     }
 
     /// The deck as the command writes it.
@@ -124,7 +115,7 @@ impl Case {
         ];
         let mut command = Command::new(flexspline);
         command.args(["export", "--format", "inp", "--quiet"]);
-        command.args(self.sets().iter().flat_map(|set| ["--set", set]));
+        command.args(AS_IN_THE_DECK.iter().flat_map(|set| ["--set", set]));
         command.args(["--generator", self.generator.name(), "--mesh", &self.mesh.to_string()]);
         command.args(["--increments", &self.increments.to_string()]);
         for (option, value) in numbers {
@@ -197,8 +188,7 @@ impl Case {
 
     /// Our model of the same drive.
     pub fn problem(&self, method: Method) -> Result<Problem, String> {
-        let drive =
-            Drive::hhd_95().with_sets(self.sets().iter().map(String::as_str)).map_err(|error| error.to_string())?;
+        let drive = Drive::hhd_95().with_sets(AS_IN_THE_DECK).map_err(|error| error.to_string())?;
         let [bore_penalty, flank_penalty] = self.penalties;
         let settings = SolverSettings {
             method,
@@ -289,7 +279,7 @@ impl Case {
         std::fs::write(&path, format!("generator_rad,torque_n_m\n{rows}")).map_err(|error| error.to_string())?;
         let mut command = Command::new(flexspline);
         command.args(["simulate", "--quiet", "--solver", &solver.to_string()]);
-        command.args(self.sets().iter().flat_map(|set| ["--set", set]));
+        command.args(AS_IN_THE_DECK.iter().flat_map(|set| ["--set", set]));
         command.args(["--generator", self.generator.name(), "--mesh", &self.mesh.to_string()]);
         for (option, value) in [("--bore-penalty", self.penalties[0]), ("--flank-penalty", self.penalties[1])] {
             command.args([option, &value.to_string()]);

@@ -36,8 +36,6 @@ const WIND_UP: f64 = 0.01;
 /// Difference of the stress that 99 % of the points along the bore keep to, relative to the largest stress: CalculiX itself
 /// moves single points by 0.5 to 2 MPa from run to run, with the last digits of the deck.
 const STRESS: f64 = 0.03;
-/// Friction of the case that has any.
-const FRICTION: f64 = 0.08;
 /// How many times less processor time than CalculiX an increment of our solver takes: from 60 000 unknowns on, and below.
 fn cpu_ratio(solver: Method, unknowns: usize) -> f64 {
     match (solver, unknowns >= LARGE) {
@@ -112,13 +110,11 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
         step_rad: 0.01,
         parts: 1,
         penalties: PENALTIES,
-        friction: 0.0,
     };
     let mut cases = vec![short];
     if options.long || options.case.is_some() {
         cases.push(Case { mesh: MeshLevel::Standard, ..short });
         cases.push(Case { parts: 2, ..short });
-        cases.push(Case { friction: FRICTION, increments: 1, ..short });
     }
     if let Some(name) = &options.case {
         let names: Vec<String> = cases.iter().map(Case::name).collect();

@@ -98,7 +98,7 @@ pub enum DeckError {
     Drag(f64),
     /// A sleeve in three dimensions.
     #[error(
-        "sleeve.kind: found \"{0}\", and a deck with contact is plane; allowed: \"springs\", \"none\" (--set sleeve.kind=springs)"
+        "sleeve.kind: found \"{0}\", and a deck is plane where it has contact; allowed: \"springs\", \"none\" (--set sleeve.kind=springs)"
     )]
     Shells(&'static str),
     /// An end of the sleeve that the deck in three dimensions has not.
@@ -761,7 +761,7 @@ mod tests {
             SETTINGS,
         );
         let error = error.unwrap_err().to_string();
-        assert!(error.starts_with("sleeve.kind: found \"cup\", and a deck is plane"), "{error}");
+        assert!(error.starts_with("sleeve.kind: found \"cup\", and a deck is plane where it has contact"), "{error}");
     }
 
     #[test]
