@@ -78,7 +78,7 @@ fn reference<M: Measurement>(group: &mut BenchmarkGroup<'_, M>, problem: &Proble
     let cs_nodes: Vec<[Option<u32>; 8]> = cs.elements.iter().map(|e| e.map(|n| number[n as usize])).collect();
     let cs_groups: Vec<Vec<u32>> = cs_nodes.iter().map(|e| e.iter().flatten().copied().collect()).collect();
     let flanks = problem.flanks_on(fs, cs);
-    let at = Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad };
+    let at = Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad, leans: &state.leans };
     let pairs: Vec<(Vec<u32>, Vec<u32>)> = flanks
         .near_pairs(at, PATTERN_REACH)
         .into_iter()
@@ -140,7 +140,7 @@ fn contact<M: Measurement>(group: &mut BenchmarkGroup<'_, M>, problem: &Problem,
         });
     });
     let flanks = problem.flanks();
-    let at = Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad };
+    let at = Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad, leans: &state.leans };
     let law = FlankLaw { stiffness: settings.flank_penalty, stick_stiffness: 0.0, friction: 0.0 };
     let torque = || -> f64 {
         let pairs = flanks.near_pairs(at, REACH).into_iter();
