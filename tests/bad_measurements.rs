@@ -378,14 +378,6 @@ fn every_damaged_file_is_refused_clearly_or_its_fault_is_named_and_no_physics_bl
             Faults(&["torque_zero"]),
         ),
         (
-            "torque in steps of 5 N.m",
-            plain(),
-            changed(|b| {
-                b.torque_n_m.as_mut().unwrap().iter_mut().for_each(|torque| *torque = (*torque / 5.0).round() * 5.0)
-            }),
-            Faults(&["quantisation"]),
-        ),
-        (
             "torque of another drive",
             plain(),
             changed(|b| {
