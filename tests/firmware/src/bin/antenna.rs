@@ -21,8 +21,8 @@ use flexspline_firmware::{MOTOR_PREDICTOR, TABLES, finish};
 
 /// Ticks of holding after the flight.
 const HELD: u32 = 100;
-/// Most that a correction may move while it is brought to rest, rad: 4″, from 0.01 rad/s at 5 rad/s².
-const MOST_MOVED_RAD: f32 = 2e-5;
+/// Most that a correction may move while it is brought to rest, rad: 10″, from 0.016 rad/s, braking with half of 5 rad/s².
+const MOST_MOVED_RAD: f32 = 5e-5;
 
 #[entry]
 fn main() -> ! {
