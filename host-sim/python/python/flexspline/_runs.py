@@ -206,6 +206,8 @@ class Study(Columns):
     meets: NDArray[np.bool_]
     front: NDArray[np.bool_]
     """What meets, and nothing that meets beats in every target."""
+    cautions: list[str]
+    """What has to be known of a drive that converged before it is built."""
     json: dict[str, Any]
     """Fields and runs as in ``study.json``."""
 
@@ -225,6 +227,7 @@ class Study(Columns):
                 "meets": np.array([run["meets"] for run in runs], dtype=np.bool_),
                 "front": np.array([run["front"] for run in runs], dtype=np.bool_),
                 "why": [run["why"] or "" for run in runs],
+                "cautions": ["; ".join(caution["words"] for caution in run["cautions"]) for run in runs],
             }
         )
         self.json = dict(json)
