@@ -37,6 +37,34 @@ const FAR_FROM_NOISE: f64 = 4.0;
 /// Residuals farther out than so many standard deviations are cut there.
 const CUT: f64 = 5.0;
 
+/// Rows that are used, about so many, spread evenly.
+pub(super) fn sample(rows: &Rows, count: usize) -> Vec<usize> {
+    let used: Vec<usize> = rows.sessions_used().flatten().collect();
+    used.iter().copied().step_by(used.len().div_ceil(count).max(1)).collect()
+}
+
+/// Sine and cosine of an angle times an order, at the places.
+pub(super) fn waves(order: f64, angle: &[f64], places: &[usize]) -> [Vec<f64>; 2] {
+    [f64::sin, f64::cos].map(|wave| places.iter().map(|k| wave(order * angle[*k])).collect())
+}
+
+/// What floats freely in every drive, column by column at the places: zeros of the error and of sessions, ratio, speed, direction, nominal
+/// harmonics, and two orders of the output.
+pub(super) fn floating(rows: &Rows, nominal: &Nominal, places: &[usize]) -> Vec<Vec<f64>> {
+    let of = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { places.iter().map(|k| value(*k)).collect() };
+    let mut columns = vec![of(&|_| 1.0), of(&|k| rows.output[k]), of(&|k| rows.speed[k]), of(&|k| rows.direction[k])];
+    for session in rows.sessions.iter().skip(1).take(MOST_ZEROS) {
+        columns.push(of(&|k| f64::from(u8::from(k >= session.start))));
+    }
+    for harmonic in &nominal.harmonics {
+        columns.extend(waves(harmonic.order_per_generator_turn, &rows.generator, places));
+    }
+    for order in [1.0, 2.0] {
+        columns.extend(waves(order, &rows.output, places));
+    }
+    columns
+}
+
 /// A sample of the rows with what floats freely taken out of their error.
 struct Freed {
     places: Vec<usize>,
@@ -46,25 +74,9 @@ struct Freed {
 
 impl Freed {
     fn new(rows: &Rows, nominal: &Nominal) -> Freed {
-        let used: Vec<usize> = rows.sessions_used().flatten().collect();
-        let places: Vec<usize> = used.iter().copied().step_by(used.len().div_ceil(SAMPLE).max(1)).collect();
-        let of = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { places.iter().map(|k| value(*k)).collect() };
-        let mut columns =
-            vec![of(&|_| 1.0), of(&|k| rows.output[k]), of(&|k| rows.speed[k]), of(&|k| rows.direction[k])];
-        for session in rows.sessions.iter().skip(1).take(MOST_ZEROS) {
-            columns.push(of(&|k| f64::from(u8::from(k >= session.start))));
-        }
-        let mut waves = |order: f64, angle: &[f64]| {
-            columns.push(of(&|k| (order * angle[k]).sin()));
-            columns.push(of(&|k| (order * angle[k]).cos()));
-        };
-        for harmonic in &nominal.harmonics {
-            waves(harmonic.order_per_generator_turn, &rows.generator);
-        }
-        for order in [1.0, 2.0] {
-            waves(order, &rows.output);
-        }
-        waves(1.0, &rows.generator);
+        let places = sample(rows, SAMPLE);
+        let mut columns = floating(rows, nominal, &places);
+        columns.extend(waves(1.0, &rows.generator, &places));
         let mut freed = Freed { error: Vec::new(), columns, places };
         freed.error = freed.freed(&rows.error);
         let spread = robust_std(freed.error.iter().copied());

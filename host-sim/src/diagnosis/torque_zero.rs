@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 use flexspline::Table;
 
 use super::base::{PlayLaw, predicted_by_table};
-use super::channels::fault_throughout;
+use super::channels::{fault_throughout, floating, sample, waves};
 use super::rows::{Rows, mean, rms};
 use crate::measurement::robust::least_and_most;
 use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
@@ -20,8 +20,6 @@ use crate::nominal::Nominal;
 /// Rows that are followed, about: of longer recordings the beginnings of all sessions; and of these the rows that are compared.
 const FOLLOWED: usize = 200_000;
 const SAMPLE: usize = 8000;
-/// Zeros of sessions that float, at most.
-const MOST_ZEROS: usize = 24;
 /// Blocks of rows that are left out one at a time.
 const BLOCKS: usize = 24;
 
@@ -69,8 +67,7 @@ type Beside = [f64; 4];
 
 impl<'a> Held<'a> {
     fn new(rows: Rows, nominal: &'a Nominal, table: Option<&'a Table<'a>>) -> Held<'a> {
-        let used: Vec<usize> = rows.sessions_used().flatten().collect();
-        let places: Vec<usize> = used.iter().copied().step_by(used.len().div_ceil(SAMPLE).max(1)).collect();
+        let places = sample(&rows, SAMPLE);
         let mut held = Held { rows, nominal, table, law: PlayLaw::Held, places, free: Vec::new() };
         held.float();
         let left = |law: PlayLaw| held.of_law(law, [0.0; 4]).iter().map(|left| left.abs()).sum::<f64>();
@@ -83,24 +80,11 @@ impl<'a> Held<'a> {
 
     /// Makes the columns of what floats.
     fn float(&mut self) {
-        let of = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { self.places.iter().map(|k| value(*k)).collect() };
         let rows = &self.rows;
-        let mut columns =
-            vec![of(&|_| 1.0), of(&|k| rows.output[k]), of(&|k| rows.speed[k]), of(&|k| rows.direction[k])];
-        for session in rows.sessions.iter().skip(1).take(MOST_ZEROS) {
-            columns.push(of(&|k| f64::from(u8::from(k >= session.start))));
-        }
-        let mut waves = |order: f64, angle: &[f64]| {
-            columns.push(of(&|k| (order * angle[k]).sin()));
-            columns.push(of(&|k| (order * angle[k]).cos()));
-        };
-        for harmonic in &self.nominal.harmonics {
-            waves(harmonic.order_per_generator_turn, &rows.generator);
-        }
+        let mut columns = floating(rows, self.nominal, &self.places);
         for order in [1.0, 2.0] {
-            waves(order, &rows.output);
-            waves(order, &rows.on_flexspline);
-            waves(order, &rows.on_circular_spline);
+            columns.extend(waves(order, &rows.on_flexspline, &self.places));
+            columns.extend(waves(order, &rows.on_circular_spline, &self.places));
         }
         for column in columns {
             let size = rms(&column);

@@ -1,5 +1,7 @@
 //! Small dense symmetric matrices, and their condensation.
 
+use crate::fem::element::packed_index;
+
 /// What is left of a pivot, relative to its diagonal entry at the start, below which the unknown carries nothing: it moves without
 /// force (a rigid body's motion). Round-off of a few hundred eliminations leaves 1e-13.
 const NO_STIFFNESS: f64 = 1e-11;
@@ -22,6 +24,20 @@ impl Symmetric {
 
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
         self.entries[i * self.size + j] += value;
+    }
+
+    /// Adds the stiffness of an element, packed, whose displacements each follow unknowns here, by weights.
+    pub fn add_following(&mut self, stiffness: &[f64], follows: &[impl AsRef<[(usize, f64)]>]) {
+        for (i, row) in follows.iter().enumerate() {
+            for (j, column) in follows.iter().enumerate() {
+                let value = stiffness[packed_index(i, j)];
+                for (a, weight) in row.as_ref() {
+                    for (b, other) in column.as_ref() {
+                        self.add(*a, *b, value * weight * other);
+                    }
+                }
+            }
+        }
     }
 
     /// Adds a smaller matrix whose unknown k is `at[k]` here.

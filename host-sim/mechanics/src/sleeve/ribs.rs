@@ -3,7 +3,7 @@
 use super::matrix::Symmetric;
 use super::shell::Ribs;
 use crate::drive::{Drive, DriveError, ToothFlank};
-use crate::fem::element::{linear_stiffness, packed_index};
+use crate::fem::element::linear_stiffness;
 use crate::fem::material::PlaneStrain;
 use crate::mesh::{MeshError, MeshLevel, WheelMesh, rotate};
 
@@ -82,16 +82,7 @@ fn bending_around(drive: &Drive) -> Result<f64, MeshError> {
                 })
             })
             .collect();
-        for (i, row) in follows.iter().enumerate() {
-            for (j, column) in follows.iter().enumerate() {
-                let value = stiffness[packed_index(i, j)];
-                for (a, weight) in row {
-                    for (b, other) in column {
-                        matrix.add(*a, *b, value * weight * other);
-                    }
-                }
-            }
-        }
+        matrix.add_following(&stiffness, &follows);
     }
     let rotation = matrix.condensed(&[rigid + 2], &[]).at(0, 0);
     let (wall, radius) = (drive.flexspline.rim_thickness_mm, drive.flexspline.neutral_radius_mm());

@@ -2,7 +2,7 @@
 
 use super::matrix::Symmetric;
 use crate::drive::{Drive, Side};
-use crate::fem::element::{linear_stiffness, packed_index};
+use crate::fem::element::linear_stiffness;
 use crate::fem::material::PlaneStrain;
 use crate::mesh::{MeshError, MeshLevel, WheelMesh, rotate};
 
@@ -47,16 +47,7 @@ fn tooth_compliance(mesh: &WheelMesh, material: &PlaneStrain, held: impl Fn(f64)
                 [0, 1].map(|k| [(near, along[k]), (near + 1, across[k])])
             })
             .collect();
-        for (i, row) in follows.iter().enumerate() {
-            for (j, column) in follows.iter().enumerate() {
-                let value = stiffness[packed_index(i, j)];
-                for (a, weight) in row {
-                    for (b, other) in column {
-                        matrix.add(*a, *b, value * weight * other);
-                    }
-                }
-            }
-        }
+        matrix.add_following(&stiffness, &follows);
     }
     let holds = |n: usize| held(mesh.nodes[n][0].hypot(mesh.nodes[n][1]));
     let fixed: Vec<usize> = (0..own).filter(|n| holds(*n)).flat_map(|n| [2 * n, 2 * n + 1]).collect();
