@@ -133,6 +133,24 @@ impl Flexspline3d {
         around * self.rim.radius_mm * self.rim.radius_mm / 1e3
     }
 
+    /// Torque over turn of the rim where the torque comes in through teeth at two lobes, each bearing evenly over `half_angle_rad` to
+    /// either side of the major axis and turning by its mean, N·m/rad; the generator lets no part of the band move in or out.
+    ///
+    /// The load is `T/(2 pi R) (1 + 2 sum s_n cos n theta)`, n = 2, 4 …, `s_n = sin(n h)/(n h)`; each harmonic is a spring in series,
+    /// `1/K = 1/K_0 + sum s_n²/(R² k_n)`, k_n the stiffness of V. Zero where nothing holds the rim.
+    pub fn torsion_at_lobes_n_m_per_rad(&self, half_angle_rad: f64) -> f64 {
+        let radius_mm = self.rim.radius_mm;
+        let evenly = self.torsion_n_m_per_rad().recip();
+        let waves = (2..=HIGHEST).step_by(2).map(|n| {
+            let reach = f64::from(n) * half_angle_rad;
+            let share = if reach == 0.0 { 1.0 } else { reach.sin() / reach };
+            // In W, tilt, V and slope of V: W stands, tilt and slope are free.
+            let around = self.at(n).band_and_turn().condensed(&[2], &[0]).at(0, 0);
+            1e3 * share * share / (radius_mm * radius_mm * around)
+        });
+        (evenly + waves.sum::<f64>()).recip()
+    }
+
     /// Force over displacement of the middle of the rim, moved sideways as a body, N/mm; zero where nothing holds it.
     pub fn lateral_n_per_mm(&self) -> f64 {
         let middle = self.at(1).middle(&[W, V]);
@@ -209,6 +227,28 @@ mod tests {
             let Rollers { w45, w90 } = flexspline.two_rollers();
             assert!((w45 - rollers[0]).abs() < 0.01 && (w90 - rollers[1]).abs() < 0.01, "{name}: {w45} {w90}");
         }
+    }
+
+    /// A load spread over all of the rim is torsion as ever; the narrower the lobes, the softer. What two lobes add is mostly the rim
+    /// between them, whose membrane alone, a ring pulled around by `cos n theta` that cannot move in or out, gives `pi E b t n²/(R (1 - nu²))`.
+    #[test]
+    fn torque_at_two_lobes_turns_the_rim_further_than_torque_all_around() {
+        let cup = cup();
+        let around = cup.torsion_n_m_per_rad();
+        let [even, wide, narrow] =
+            [0.5 * std::f64::consts::PI, 0.35, 0.1].map(|half| cup.torsion_at_lobes_n_m_per_rad(half));
+        assert!((even / around - 1.0).abs() < 1e-9, "{even} {around}");
+        assert!(narrow < wide && wide < around, "{narrow} {wide} {around}");
+        let ring = smooth(&["sleeve.kind=none"]);
+        let rim = &ring.rim;
+        let (e, nu) = (rim.youngs_modulus_mpa, rim.poissons_ratio);
+        for n in [2, 4] {
+            let found = ring.at(n).band_and_turn().condensed(&[2], &[0]).at(0, 0);
+            let membrane =
+                std::f64::consts::PI * e * ring.width_mm * rim.thickness_mm * f64::from(n * n) / rim.radius_mm;
+            assert!((0.95..1.0 / (1.0 - nu * nu) + 0.05).contains(&(found / membrane)), "n {n}: {found} {membrane}");
+        }
+        assert!(ring.torsion_at_lobes_n_m_per_rad(0.35) < 1e-3);
     }
 
     #[test]
