@@ -230,7 +230,8 @@ mod tests {
     }
 
     /// A load spread over all of the rim is torsion as ever; the narrower the lobes, the softer. What two lobes add is mostly the rim
-    /// between them, whose membrane alone, a ring pulled around by `cos n theta` that cannot move in or out, gives `pi E b t n²/(R (1 - nu²))`.
+    /// between them: pulled around by `cos n theta` it stretches as a ring that cannot move in or out, `pi E b t n²/R`, a tenth softer at
+    /// most where it bulges beside the band.
     #[test]
     fn torque_at_two_lobes_turns_the_rim_further_than_torque_all_around() {
         let cup = cup();
@@ -241,12 +242,11 @@ mod tests {
         assert!(narrow < wide && wide < around, "{narrow} {wide} {around}");
         let ring = smooth(&["sleeve.kind=none"]);
         let rim = &ring.rim;
-        let (e, nu) = (rim.youngs_modulus_mpa, rim.poissons_ratio);
         for n in [2, 4] {
             let found = ring.at(n).band_and_turn().condensed(&[2], &[0]).at(0, 0);
-            let membrane =
-                std::f64::consts::PI * e * ring.width_mm * rim.thickness_mm * f64::from(n * n) / rim.radius_mm;
-            assert!((0.95..1.0 / (1.0 - nu * nu) + 0.05).contains(&(found / membrane)), "n {n}: {found} {membrane}");
+            let area = ring.width_mm * rim.thickness_mm;
+            let stretched = std::f64::consts::PI * rim.youngs_modulus_mpa * area * f64::from(n * n) / rim.radius_mm;
+            assert!((0.9..1.05).contains(&(found / stretched)), "n {n}: {found} {stretched}");
         }
         assert!(ring.torsion_at_lobes_n_m_per_rad(0.35) < 1e-3);
     }
