@@ -36,7 +36,7 @@
 #![forbid(unsafe_code)]
 
 pub use flexspline_mechanics::{
-    condense, contact, drive, fem, mesh, motion, reference, sleeve, stepping, suggest, toml_file, units,
+    bearing, condense, contact, drive, fem, mesh, motion, reference, sleeve, stepping, suggest, toml_file, units,
 };
 
 pub mod bundle;

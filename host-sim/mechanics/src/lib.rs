@@ -4,6 +4,7 @@
 //! compiled as one unit, which makes it fast, and not again where something above it changes.
 #![forbid(unsafe_code)]
 
+pub mod bearing;
 pub mod condense;
 pub mod contact;
 pub mod drive;

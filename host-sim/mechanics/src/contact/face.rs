@@ -20,7 +20,7 @@ use crate::drive::{InvoluteFlank, Side};
 const STATIONS: usize = 33;
 /// Iterations for the level of a pair: Newton within a bracket.
 const MOST_ITERATIONS: usize = 100;
-/// Change of a level, relative to the largest offset, at which it is found.
+/// Step of a level, relative to its bracket, at which it is found.
 const LEVEL_FOUND: f64 = 1e-15;
 
 /// What decides the load along the face.
@@ -178,6 +178,7 @@ impl Across {
         let mut low = lowest;
         let mut high =
             lowest + self.compliance * most + 2.0 * self.offsets.iter().map(|o| o - lowest).fold(0.0, f64::max);
+        let reach = high - lowest;
         let mut level = lowest + (2.0 * self.compliance * most * (high - lowest)).sqrt().min(0.5 * (high - lowest));
         for _ in 0..MOST_ITERATIONS {
             let load = self.load(level);
@@ -189,13 +190,13 @@ impl Across {
                 high = level;
             }
             let slope = -stiffness * (1.0 - load.share) - load.share / self.compliance;
-            let newton = level - rest / slope;
-            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-            let found = (next - level).abs() <= LEVEL_FOUND * (high - lowest).max(level - lowest);
-            level = next;
-            if found || rest == 0.0 {
+            let step = -rest / slope;
+            // First: a step of nothing ends on the bracket, which would send the level half way to its other end.
+            if step.abs() <= LEVEL_FOUND * reach {
                 break;
             }
+            let newton = level + step;
+            level = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
         }
         let load = self.load(level);
         // All that changes at once: the level, with it d, and with that the load of the plane slice.
@@ -285,6 +286,27 @@ mod tests {
         let half = (mean * C * 20.0_f64.powi(3) * 3.0 / (16.0 * 0.02)).cbrt();
         assert!((bearing.share * 10.0 / half - 1.0).abs() < 2e-3, "{bearing:?}, {half}");
         assert!((bearing.peak_over_mean / (15.0 / half) - 1.0).abs() < 2e-3 && bearing.moment.abs() < 1e-9);
+    }
+
+    /// The mean load over the face is what the plane slice carries, of pairs that bear on a hair of their face as of those that bear on
+    /// all of it, however stiff their contact is.
+    #[test]
+    fn the_face_bears_what_the_plane_slice_carries() {
+        let face = face(0.0);
+        let mut random = fastrand::Rng::with_seed(23);
+        for _ in 0..20_000 {
+            let law = FlankLaw { stiffness: 5e7 * 10f64.powf(-3.0 * random.f64()), ..LAW };
+            let lean = 10f64.powf(-6.0 + 4.0 * random.f64());
+            let across = face.across([lean, 0.0], Side::Plus).unwrap();
+            let depth = across.early_mm() * 10f64.powf(-4.0 * random.f64());
+            let points = [(-depth, 0.2 * random.f64()), (-depth * random.f64(), 0.3 * random.f64())];
+            let Some(bearing) = across.bearing(law, &points) else { continue };
+            let carried: f64 =
+                points.iter().map(|(gap, weight)| law.stiffness * weight * (-gap - bearing.later_mm).max(0.0)).sum();
+            let level = across.lowest() + bearing.later_mm + C * carried;
+            let borne = across.load(level).mean;
+            assert!((borne / carried - 1.0).abs() < 1e-3, "{borne} of {carried}, {lean}, {depth}: {bearing:?}");
+        }
     }
 
     /// Softness is the slope of what it says, and energy has one slope: a lean that grows does the work of the moment.

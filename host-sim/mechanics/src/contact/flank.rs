@@ -551,14 +551,15 @@ impl<'a> FlankContact<'a> {
             .collect()
     }
 
-    /// Gap of every integration point, how it changes as the output alone turns (mm/rad), and its weight.
+    /// Gap of every integration point where the face is nearest, how it changes as the output alone turns (mm/rad), and its weight; with
+    /// the offsets along the face, where there are any.
     pub fn gaps(
         &self,
         pair: FlankPair,
         at: Configuration,
         points: &[FlankPoint],
         report: &mut impl FnMut(f64, f64, f64),
-    ) {
+    ) -> Option<Across> {
         let field = self.local_field(pair, at);
         for point in points {
             let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
@@ -566,6 +567,7 @@ impl<'a> FlankContact<'a> {
             let [nx, ny] = foot.normal;
             report(foot.distance, pair.side.sign() * (nx * x[1] - ny * x[0]), point.weight);
         }
+        field.across
     }
 
     /// Forces and tangent of a pair; nothing while it is open.

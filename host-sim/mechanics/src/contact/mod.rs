@@ -13,7 +13,7 @@ mod flank;
 mod quadrature;
 
 pub use bore::{BoreContact, BoreLaw, BorePressure, OpenEdges};
-pub use face::{FaceLaw, Lean};
+pub use face::{Across, Bearing, FaceLaw, Lean};
 pub use flank::{
     AlongFace, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPoint, FrictionHistory,
     PairContribution, SlipPoint,

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-use crate::contact::{Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, OpenEdges, PairContribution};
+use crate::contact::{
+    Across, Bearing, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, OpenEdges, PairContribution,
+};
 
 use super::state::State;
 
@@ -143,9 +145,13 @@ impl NearPairs {
         let mut reach = REACH;
         for _ in 0..20 {
             let at = Configuration { output_rad, ..start };
-            let mut points = Vec::new();
+            let mut pairs = Vec::new();
             let mut add = |pair, layout: &FlankLayout| {
-                flanks.gaps(pair, at, &layout.points, &mut |gap, rate, weight| points.push((gap, rate, weight)));
+                let mut points = Vec::with_capacity(layout.points.len());
+                let across = flanks.gaps(pair, at, &layout.points, &mut |gap, rate, weight| {
+                    points.push(RigidPoint { gap, rate, weight });
+                });
+                pairs.push((across, points));
             };
             if reach == REACH {
                 self.pairs.iter().for_each(|(pair, near)| add(*pair, &near.layout));
@@ -153,15 +159,8 @@ impl NearPairs {
                 flanks.near_pairs(at, reach).into_iter().for_each(|pair| add(pair, &flanks.layout(pair, at)));
             }
             let torque = |turn: f64| {
-                let (mut torque, mut slope) = others(output_rad + turn);
-                for (gap, rate, weight) in &points {
-                    let depth = -(gap + rate * turn);
-                    if depth > 0.0 {
-                        torque += law.stiffness * weight * depth * rate;
-                        slope -= law.stiffness * weight * rate * rate;
-                    }
-                }
-                (torque, slope)
+                let all = others(output_rad + turn);
+                pairs.iter().fold(all, |all, (across, points)| with_pair(all, law, across.as_ref(), points, turn))
             };
             let turn = balance(torque, tolerance, reach / radius);
             let small = turn.is_some_and(|turn| (turn * radius).abs() < SMALL);
@@ -177,6 +176,42 @@ impl NearPairs {
         }
         ((output_rad - state.output_rad).abs() < CLEARANCE_REACH / radius).then_some(output_rad)
     }
+}
+
+/// A point of a flank while the wheels keep their shape: its gap, how it changes as the output turns (mm/rad), and the length that it
+/// stands for.
+struct RigidPoint {
+    gap: f64,
+    rate: f64,
+    weight: f64,
+}
+
+/// Torque on the output and its slope (N mm/mm, and per rad), and that of a pair when the output turns by so much.
+fn with_pair(
+    (mut torque, mut slope): (f64, f64),
+    law: FlankLaw,
+    across: Option<&Across>,
+    points: &[RigidPoint],
+    turn: f64,
+) -> (f64, f64) {
+    let gap = |point: &RigidPoint| point.gap + point.rate * turn;
+    let near =
+        || points.iter().map(|point| (gap(point), point.weight)).filter(|(gap, _)| *gap < 0.0).collect::<Vec<_>>();
+    let bearing = across.map_or(Some(Bearing::EVEN), |across| across.bearing(law, &near()));
+    let Some(Bearing { later_mm, softness, .. }) = bearing else { return (torque, slope) };
+    let (mut stiffness, mut by_turn) = (0.0, 0.0);
+    for point in points {
+        let depth = -(gap(point) + later_mm);
+        if depth > 0.0 {
+            torque += law.stiffness * point.weight * depth * point.rate;
+            slope -= law.stiffness * point.weight * point.rate * point.rate;
+            stiffness += law.stiffness * point.weight;
+            by_turn += law.stiffness * point.weight * point.rate;
+        }
+    }
+    // What the slices give way by is one spring in series with all points.
+    slope += softness / (1.0 + softness * stiffness) * by_turn * by_turn;
+    (torque, slope)
 }
 
 /// Zero of a falling function (value, slope) within `reach` of zero: bracketed, then Newton safeguarded by bisection.

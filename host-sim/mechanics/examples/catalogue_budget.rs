@@ -1,0 +1,243 @@
+//! Which part of a drive gives how much of its torsion, hysteresis and loss, beside a catalogue: `catalogue_budget [SIZE …]`
+//!
+//! Sizes 25 and 40, i = 100 (Harmonic Drive CSF). Module and teeth follow from the catalogue's pitch diameter; rim, width, clearance and
+//! tooth form are those of HHD-95 in proportion, cup and balls are guesses in proportion (`CUP`, [`Balls::in_proportion`]): no maker
+//! publishes them. Nothing is fitted to the catalogue.
+//!
+//! The same drive is computed by contact FEM with one part more at a time: teeth, rim and cam alone; the cup; the balls of the generator
+//! bearing, each range of torque with the stiffness that the balls have under its mean load. A difference of compliances is the part's.
+
+use std::f64::consts::PI;
+use std::process::ExitCode;
+
+use flexspline_mechanics::bearing::{Balls, Lubricant, load_torque_n_mm, lubricant_torque_n_mm};
+use flexspline_mechanics::drive::{Drive, FewNumbers, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::motion::Motion;
+use flexspline_mechanics::sleeve::Flexspline3d;
+use flexspline_mechanics::stepping::{Method, Problem, SolveError, SolverSettings};
+use flexspline_mechanics::units::{ARCMIN_PER_RAD, ARCSEC_PER_RAD};
+
+/// What the catalogue has (Harmonic Drive CSF/CSG, i = 100; rated torque CSG over 1.3; starting, no-load torque at 2000 rpm and efficiency
+/// of Schaeffler's RT1, same sizes).
+struct Catalogue {
+    size: u32,
+    /// T1, T2 and the rated torque, N·m.
+    loads_n_m: [f64; 3],
+    k_n_m_per_rad: [f64; 3],
+    start_n_m: Option<f64>,
+    no_load_n_m: Option<f64>,
+}
+
+const CATALOGUE: [Catalogue; 2] = [
+    Catalogue {
+        size: 25,
+        loads_n_m: [14.0, 48.0, 67.0],
+        k_n_m_per_rad: [3.1e4, 5.0e4, 5.7e4],
+        start_n_m: Some(0.069),
+        no_load_n_m: Some(0.195),
+    },
+    Catalogue {
+        size: 40,
+        loads_n_m: [54.0, 196.0, 265.0],
+        k_n_m_per_rad: [1.3e5, 2.0e5, 2.3e5],
+        start_n_m: None,
+        no_load_n_m: None,
+    },
+];
+
+/// Length and wall of the cup over its pitch diameter, thickness of its bottom over the wall, hub over the pitch radius. Guesses: a cup is
+/// about half as long as wide, its wall about a hundredth.
+const CUP: [f64; 4] = [0.5, 0.011, 2.0, 0.5];
+/// Teeth carry about so far to either side of the major axis, rad: for the share of two lobes in the cup's torsion. A tenth of all teeth.
+const LOBE_RAD: f64 = 0.16;
+/// Flank friction: greased steel.
+const FRICTION: f64 = 0.08;
+/// Load at which the width of the loop is told, over the rated one: above the drag, below T1.
+const LOOP_SHARE: f64 = 0.04;
+/// Friction of the bearing: f0 for grease, f1 for balls (Harris), both from the middle of their ranges.
+const F0: f64 = 1.5;
+const F1: f64 = 5e-4;
+
+/// Torsion and generator load of a drive that is loaded step by step, its generator held.
+struct Loaded {
+    /// Secants in the three ranges, N·m/rad.
+    k: [f64; 3],
+    /// Load of one ball in the middle of each range, N; without balls what they would carry.
+    ball_n: [f64; 3],
+    /// Sum of all ball loads without load and under the rated one, N.
+    sum_n: [f64; 2],
+}
+
+fn solver() -> SolverSettings {
+    SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
+}
+
+fn loaded(drive: &Drive, loads_n_m: [f64; 3]) -> Result<Loaded, SolveError> {
+    let problem = Problem::new(drive, GeneratorKind::Cam, drive.temperature.reference_c, solver())?;
+    let edges = problem.flexspline.base_edges.len() * problem.flexspline.teeth;
+    let balls = Balls::in_proportion(2.0 * drive.flexspline.bore_radius_mm());
+    let mut motion = Motion::deformed(&problem, 0.0)?;
+    // Balls under the part of the bore that the generator touches; along the axis of the lobe a load counts by its cosine, about its mean.
+    let carried = |motion: &Motion<'_>| {
+        let last = motion.last();
+        let share = last.generator_contacts as f64 / edges as f64;
+        let half_angle = 0.5 * PI * share;
+        let mean_cosine = if half_angle > 0.0 { half_angle.sin() / half_angle } else { 1.0 };
+        let sum_n = 2.0 * last.lobe_force_n / mean_cosine;
+        (sum_n / (share * f64::from(balls.count)).max(2.0), sum_n)
+    };
+    let unloaded = carried(&motion);
+    let touch = 2.0 * drive.output.drag_torque_n_m;
+    motion.load(touch)?;
+    let mut from = (touch, motion.error_rad(), carried(&motion).0);
+    let (mut k, mut ball_n) = ([0.0; 3], [0.0; 3]);
+    for (range, torque) in loads_n_m.into_iter().enumerate() {
+        motion.load(torque)?;
+        let to = (torque, motion.error_rad(), carried(&motion).0);
+        k[range] = (to.0 - from.0) / (to.1 - from.1);
+        ball_n[range] = 0.5 * (from.2 + to.2);
+        from = to;
+    }
+    Ok(Loaded { k, ball_n, sum_n: [unloaded.1, carried(&motion).1] })
+}
+
+/// Width of the loop by flank friction, arcsec: at a light load, coming from the rated load and from the opposite one.
+fn loop_arcsec(drive: &Drive, rated_n_m: f64) -> Result<f64, SolveError> {
+    let mut rough = drive.clone();
+    rough.flanks.friction_coefficient = FRICTION;
+    let problem = Problem::new(&rough, GeneratorKind::Cam, rough.temperature.reference_c, solver())?;
+    let mut motion = Motion::deformed(&problem, 0.0)?;
+    let light = LOOP_SHARE * rated_n_m;
+    let mut told = [0.0; 2];
+    for (told, before) in told.iter_mut().zip([rated_n_m, -rated_n_m]) {
+        motion.load(before)?;
+        motion.load(light)?;
+        *told = motion.error_rad();
+    }
+    Ok((told[0] - told[1]) * ARCSEC_PER_RAD)
+}
+
+fn row(what: &str, values: [f64; 3], unit: &str) {
+    println!("  {what:<46} {:>9.3} {:>9.3} {:>9.3}  {unit}", values[0], values[1], values[2]);
+}
+
+fn budget(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
+    let pitch_mm = 2.54 * f64::from(entry.size);
+    let numbers = FewNumbers {
+        teeth: 200,
+        module_mm: pitch_mm / 200.0,
+        bore_mm: None,
+        width_mm: None,
+        generator: GeneratorKind::Cam,
+    };
+    let plane = numbers.drive(&format!("size {}", entry.size))?.drive.with_set("sleeve.kind=none")?;
+    let [length, wall, bottom, hub] = CUP;
+    let wall_mm = wall * pitch_mm;
+    let cup = plane.with_sets(
+        [
+            "sleeve.kind=cup".to_owned(),
+            "sleeve.bottom=plate".to_owned(),
+            format!("sleeve.wall_mm={wall_mm:.4}"),
+            format!("sleeve.bottom_side_mm={:.3}", length * pitch_mm - plane.flexspline.width_mm),
+            format!("sleeve.bottom_thickness_mm={:.4}", bottom * wall_mm),
+            format!("sleeve.hub_radius_mm={:.3}", 0.5 * hub * pitch_mm),
+        ]
+        .iter()
+        .map(String::as_str),
+    )?;
+    let bore_mm = 2.0 * plane.flexspline.bore_radius_mm();
+    let balls = Balls::in_proportion(bore_mm);
+    let alone = loaded(&plane, entry.loads_n_m)?;
+    let in_cup = loaded(&cup, entry.loads_n_m)?;
+    let with_bedding = |load_n: f64| {
+        let mut drive = cup.clone();
+        drive.generator.bearing_stiffness_n_per_mm3 =
+            Some(balls.bedding_n_per_mm3(load_n, bore_mm, drive.flexspline.width_mm));
+        loaded(&drive, entry.loads_n_m)
+    };
+    let mut with_balls = [0.0; 3];
+    for (range, k) in with_balls.iter_mut().enumerate() {
+        *k = with_bedding(in_cup.ball_n[range])?.k[range];
+    }
+    let shells = Flexspline3d::of(&cup, true)?;
+    let [around, lobes] = [shells.torsion_n_m_per_rad(), shells.torsion_at_lobes_n_m_per_rad(LOBE_RAD)];
+
+    println!(
+        "size {}, i = 100: 200 teeth, module {:.4} mm, cup {:.1} x {wall_mm:.2} mm (guess)",
+        entry.size,
+        plane.flexspline.module_mm,
+        length * pitch_mm
+    );
+    println!("  {:<46} {:>9} {:>9} {:>9}", "", "K1", "K2", "K3");
+    row("catalogue (single units ±30 %)", entry.k_n_m_per_rad.map(|k| 1e-4 * k), "1e4 N·m/rad");
+    row("teeth, rim, rigid cam", alone.k.map(|k| 1e-4 * k), "");
+    row("and the cup", in_cup.k.map(|k| 1e-4 * k), "");
+    row("and the balls", with_balls.map(|k| 1e-4 * k), "");
+    let part = |k: [f64; 3], before: Option<[f64; 3]>| -> [f64; 3] {
+        std::array::from_fn(|i| 100.0 * entry.k_n_m_per_rad[i] * (k[i].recip() - before.map_or(0.0, |b| b[i].recip())))
+    };
+    println!("  share of the catalogue's compliance, percent");
+    row("teeth, rim, rigid cam", part(alone.k, None), "%");
+    row("cup", part(in_cup.k, Some(alone.k)), "%");
+    row("balls", part(with_balls, Some(in_cup.k)), "%");
+    row("missing", part(entry.k_n_m_per_rad, Some(with_balls)), "%");
+    row("load of a ball, mid range", in_cup.ball_n, "N");
+    println!(
+        "  shells alone: torsion {:.3e} N·m/rad all around, {:.3e} at two lobes ({:+.0} % compliance)",
+        around,
+        lobes,
+        100.0 * (around / lobes - 1.0)
+    );
+
+    let rated = entry.loads_n_m[2];
+    let flanks = [loop_arcsec(&plane, rated)?, loop_arcsec(&cup, rated)?];
+    println!(
+        "  loop at {:.1} N·m by flank friction {FRICTION}: {:.2}″ plane, {:.2}″ in the cup; catalogue about 60″",
+        LOOP_SHARE * rated,
+        flanks[0],
+        flanks[1]
+    );
+    if let Some(start) = entry.start_n_m {
+        let reflected = 2.0 * 100.0 * start / entry.k_n_m_per_rad[2] * ARCMIN_PER_RAD;
+        println!("  loop by the catalogue's starting torque through the ratio, 2 i T_start/K3: {reflected:.2}′");
+    }
+    // Balls run between the bore and the plug of the cam: their circle is one ball and the outer race inside the bore.
+    let mean_mm = bore_mm - 2.0 * balls.diameter_mm;
+    for (name, lubricant) in [("mineral VG 32", Lubricant::MINERAL_VG_32), ("PFPE Z25", Lubricant::PFPE_Z25)] {
+        let drag = |temperature_c: f64, speed_rpm: f64| {
+            1e-3 * (lubricant_torque_n_mm(F0, lubricant.viscosity_cst(temperature_c), speed_rpm, mean_mm)
+                + load_torque_n_mm(F1, in_cup.sum_n[0], mean_mm))
+        };
+        println!(
+            "  bearing drag, {name}: at 1 rpm {:.3} N·m, 2000 rpm {:.3} N·m, 2000 rpm at −20 °C {:.3} N·m; catalogue start {}, 2000 rpm {}",
+            drag(20.0, 1.0),
+            drag(20.0, 2000.0),
+            drag(-20.0, 2000.0),
+            entry.start_n_m.map_or("—".into(), |t| format!("{t:.3}")),
+            entry.no_load_n_m.map_or("—".into(), |t| format!("{t:.3}")),
+        );
+    }
+    let by_load = 1e-3 * load_torque_n_mm(F1, in_cup.sum_n[1], mean_mm);
+    println!(
+        "  under {rated} N·m the ball loads take {by_load:.3} N·m, {:.1} % of T/i",
+        100.0 * by_load / (rated / 100.0)
+    );
+    Ok(())
+}
+
+fn main() -> ExitCode {
+    let asked: Vec<String> = std::env::args().skip(1).collect();
+    let known: Vec<String> = CATALOGUE.iter().map(|entry| entry.size.to_string()).collect();
+    if let Some(wrong) = asked.iter().find(|size| !known.contains(size)) {
+        eprintln!("catalogue_budget [SIZE …]: found {wrong}, allowed: {}", known.join(", "));
+        return ExitCode::from(2);
+    }
+    for entry in CATALOGUE.iter().filter(|entry| asked.is_empty() || asked.contains(&entry.size.to_string())) {
+        if let Err(error) = budget(entry) {
+            eprintln!("size {}: {error}", entry.size);
+            return ExitCode::from(1);
+        }
+    }
+    ExitCode::SUCCESS
+}
