@@ -154,6 +154,16 @@ impl Sampled {
         Self { pieces: pieces(&nodes, width_rad), width_rad, teeth: self.teeth }
     }
 
+    /// Its mean over the tooth pitch.
+    #[must_use]
+    pub fn without_ripple(&self) -> Self {
+        let mean = |curves: &[Piece; CURVES]| {
+            let [mean, ..] = curves;
+            core::array::from_fn(|curve| if curve == 0 { *mean } else { Piece::default() })
+        };
+        Self { pieces: self.pieces.iter().map(mean).collect(), ..*self }
+    }
+
     fn place(&self, twist: f64) -> (usize, f64) {
         let place = twist / self.width_rad;
         let index = (place as usize).min(self.pieces.len() - 1);
