@@ -12,7 +12,7 @@ use super::gear::{Gear, Line, Sampled, Spring};
 use super::loops::{TorquePath as Path, TwoMasses};
 use super::on_board::{self, Given, OnBoard};
 use super::plant::{Plant, PlantSettings};
-use super::scenario::{Load, Moment, Scenario, TableKnown, TorqueKnown};
+use super::scenario::{Moment, Scenario, TableKnown, TorqueKnown};
 use super::servo::{Asked, Noise, Servo};
 use super::table::{Sampling, image};
 
@@ -59,6 +59,10 @@ const SETTLES_S: f64 = 0.3;
 const TURNED_RAD: f64 = HOLD_RAD as f64;
 /// Part of the target's rate that a correction by the motor's current may have.
 const SLOWER: f64 = 0.3;
+/// For so long gravity pulls the same way more, s. *Guess*.
+const TURNS_S: f64 = 1.0;
+/// A bound is this many standard deviations: 95 % of normal ones, and more for what is not.
+const SURE: f64 = 2.5;
 /// Noise of the torque that the current tells, behind its low-pass, for its bound, N·m.
 const CURRENT_SURE_N_M: f64 = 0.5;
 /// Low-pass of the torque told by the motor's current, Hz: the motor's own acceleration is told by two differences of the encoder.
@@ -614,10 +618,12 @@ struct Sensing {
     before_rad_s: f64,
     friction: Friction,
     even_s: f64,
-    /// Torque on the load that the motor's current tells, N·m: behind a low-pass, what of that is believed by now, and how old it is, s.
-    heard_n_m: f64,
+    /// Torque on the load and friction beyond what is known, as the motor's current tells them, N·m.
+    likely_n_m: [f64; 2],
+    /// Their variances, and between them what they share, N²·m².
+    spread: [f64; 3],
+    /// Torque on the load that is believed by now, N·m.
     told_n_m: f64,
-    age_s: f64,
     /// The drag, with the sign of the last motion, N·m.
     drag_n_m: f64,
     /// It lies within ± this of the true one.
@@ -632,14 +638,16 @@ struct Sensing {
 
 impl Sensing {
     fn new(scenario: &Scenario) -> Self {
+        let unknown =
+            (1.0 - scenario.friction_known) * Friction::EROB80_100.times(scenario.friction).level_n_m(0.0, 0.0);
         Self {
             noise: Noise::new(scenario.seed ^ 0x9b1d),
             before_rad_s: 0.0,
             friction: Friction::EROB80_100.times(scenario.friction),
             even_s: 0.0,
-            heard_n_m: scenario.mean_n_m(),
+            likely_n_m: [scenario.mean_n_m(), 0.0],
+            spread: [scenario.load_wanders().1, 0.0, unknown * unknown],
             told_n_m: scenario.mean_n_m(),
-            age_s: 0.0,
             drag_n_m: scenario.drag_n_m,
             bound_n_m: f64::INFINITY,
             fed_n_m: f64::NAN,
@@ -669,8 +677,9 @@ impl Sensing {
         }
     }
 
-    /// The motor's current less friction and inertia, while the target moves evenly; else what it was, with a bound that grows as the load may
-    /// have changed. Kept as a torque on the load: that does not change where the target turns back, as the one in the mesh does by twice the drag.
+    /// The motor's current less friction and inertia, while the target moves evenly: torque on the load and what of the friction is not known, by a Kalman filter.
+    /// The friction turns over where the target turns back, and the load does not, so that one motion to and fro tells them apart. Kept as a torque on
+    /// the load: that does not change at a reversal, as the one in the mesh does by twice the drag.
     fn by_current(&mut self, made: &Made, servo: &mut Servo, now: &Moment) {
         let scenario = &made.scenario;
         let tick_s = scenario.servo.tick_s;
@@ -682,28 +691,39 @@ impl Sensing {
         if now.rate_rad_s != 0.0 {
             self.drag_n_m = libm::copysign(scenario.drag_n_m, now.rate_rad_s);
         }
-        let rubbing = self.rubbing_n_m(now.rate_rad_s, self.told_n_m - self.drag_n_m);
-        let share = 1.0 - libm::exp(-TAU * made.bandwidth_hz * tick_s);
-        self.age_s += tick_s;
+        let (wanders, most) = scenario.load_wanders();
+        let [load, ..] = &mut self.spread;
+        let [weight, _] = scenario.load.gravity;
+        let turned = weight * now.rate_rad_s;
+        *load = (*load + tick_s * (wanders + turned * turned * TURNS_S)).min(most);
         if self.even_s >= SETTLES_S {
-            let mesh = made.masses.motor_kg_m2 * acceleration - servo.current_n_m() + scenario.friction_known * rubbing;
-            self.heard_n_m += share * (mesh + self.drag_n_m - self.heard_n_m);
+            let way = libm::copysign(1.0, now.rate_rad_s);
+            let rubbing = scenario.friction_known * self.rubbing_n_m(now.rate_rad_s, self.told_n_m - self.drag_n_m);
+            let heard = made.masses.motor_kg_m2 * acceleration - servo.current_n_m() + rubbing + self.drag_n_m;
+            let share = 1.0 - libm::exp(-TAU * made.bandwidth_hz * tick_s);
+            let [load, shared, friction] = &mut self.spread;
+            // What is heard is load less friction by the way, with noise that this low-pass makes as small as stated.
+            let along = [*load - way * *shared, *shared - way * *friction];
+            let all = along[0] - way * along[1] + CURRENT_SURE_N_M * CURRENT_SURE_N_M / share;
+            let gain = along.map(|part| part / all);
+            let [likely, more] = &mut self.likely_n_m;
+            let missed = heard - (*likely - way * *more);
+            *likely += gain[0] * missed;
+            *more += gain[1] * missed;
+            *load -= gain[0] * along[0];
+            *shared -= gain[0] * along[1];
+            *friction -= gain[1] * along[1];
             // The friction has the sign of the target's rate only as long as the correction is slower than that.
             let most = SLOWER * now.rate_rad_s.abs() * tick_s * made.soft_n_m_per_rad;
-            self.told_n_m += (self.heard_n_m - self.told_n_m).clamp(-most, most);
-            // The mean age of what is behind the low-pass.
-            self.age_s *= 1.0 - share;
+            self.told_n_m += (*likely - self.told_n_m).clamp(-most, most);
         }
-        let Load { swing, gust, step, .. } = scenario.load;
-        let blown = 2.0 * gust[0] * (2.0 * (1.0 - libm::exp(-TAU * gust[1] * self.age_s))).sqrt();
-        let swung = swing[0].abs() * (TAU * swing[1] * self.age_s).min(2.0);
         // At rest friction may have either sign, and the drag too.
         let unknown = if now.rate_rad_s == 0.0 { 2.0 * scenario.drag_n_m } else { 0.0 };
-        let rubbed = (1.0 - scenario.friction_known) * self.friction.level_n_m(now.rate_rad_s, self.told_n_m)
-            + (1.0 - scenario.friction_known) * self.friction.viscous_n_m_s * now.rate_rad_s.abs();
         let turning = scenario.load_kg_m2 * now.acceleration_rad_s2.abs();
-        let held_back = (self.heard_n_m - self.told_n_m).abs();
-        self.bound_n_m = rubbed + unknown + turning + held_back + blown + swung + step[0].abs() + CURRENT_SURE_N_M;
+        let [likely, _] = self.likely_n_m;
+        let [load, ..] = self.spread;
+        let held_back = (likely - self.told_n_m).abs();
+        self.bound_n_m = SURE * load.sqrt() + unknown + turning + held_back + CURRENT_SURE_N_M;
     }
 
     /// What of the load the motor has to hold, N·m at the output: of a torque known on the load, less the drag of the last motion. Its
