@@ -544,6 +544,8 @@ impl Controller {
             let ahead = f64::from(AHEAD_S);
             let (slope, bent) = ((after - before) / ahead, 4.0 * (after - 2.0 * goal + before) / (ahead * ahead));
             let along = if rate_rad_s == 0.0 { 0.0 } else { slope / rate_rad_s };
+            let slowly = on_board::passes_slowly(&made.unit.drive, rate_rad_s as f32, tick_s as f32);
+            let bent = if slowly { bent } else { 0.0 };
             Commanded {
                 command,
                 rate_rad_s: (rate_rad_s - slope) * ratio,
@@ -900,6 +902,8 @@ const TIME_CONSTANTS: f64 = 8.0;
 const AT_REST_RAD_S: f64 = 2e-5;
 
 fn stable(made: &Made) -> Result<bool, String> {
-    let [without, with] = [0, COMPENSATED].map(|kind| left_of_a_knock(made, kind));
+    // What noise moves is no ringing.
+    let quiet = Made { scenario: Scenario { torque_noise_n_m: 0.0, ..made.scenario.clone() }, ..made.clone() };
+    let [without, with] = [0, COMPENSATED].map(|kind| left_of_a_knock(&quiet, kind));
     Ok(with? <= (2.0 * without?).max(AT_REST_RAD_S))
 }

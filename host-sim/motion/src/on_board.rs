@@ -58,6 +58,7 @@ pub struct OnBoard {
     pub state: JointState,
     /// The torque's way in.
     pub path: TorquePath,
+    tick_s: f32,
     ahead_s: f32,
 }
 
@@ -74,14 +75,18 @@ impl OnBoard {
         // From off that is always allowed.
         let _ = state.request(Mode::Tracking);
         let joint = Joint::new(drive, settings.limits, Overrun::SkipAndCount)?;
-        Ok(Self { joint, state, path, ahead_s: settings.ahead_s })
+        Ok(Self { joint, state, path, tick_s: settings.limits.tick_s, ahead_s: settings.ahead_s })
     }
 
     /// One tick.
     #[must_use]
     pub fn tick(&mut self, images: &Images<'_>, store: &mut Store, told: &Told) -> Given {
         let torque_n_m = self.torque_n_m(told);
-        let ahead = self.joint.motion_ahead(store, told.target, told.motion, torque_n_m, self.ahead_s);
+        let mut ahead = self.joint.motion_ahead(store, told.target, told.motion, torque_n_m, self.ahead_s);
+        let [rate, acceleration] = told.motion;
+        if !passes_slowly(self.joint.drive(), rate, self.tick_s) {
+            ahead.acceleration_rad_s2 = ahead.rate_rad_s / rate * acceleration;
+        }
         let input = Input {
             generator: Some(told.generator),
             target: told.target,
@@ -101,6 +106,15 @@ impl OnBoard {
             _ => torque_n_m,
         }
     }
+}
+
+/// Whether tooth pitches pass so slowly at a rate of the output that their acceleration may be fed forward: six ticks or more for each. What comes a tick
+/// late is then less than 60° behind, and takes off more than it adds; faster ones excite the resonance.
+#[must_use]
+pub fn passes_slowly(drive: &Drive, rate_rad_s: f32, tick_s: f32) -> bool {
+    const TICKS: f32 = 6.0;
+    let pitches = rate_rad_s.abs() * drive.ratio().abs() * f32::from(drive.ripple_order()) / core::f32::consts::TAU;
+    pitches * tick_s * TICKS <= 1.0
 }
 
 /// Bytes of the settings, and of what a tick is told, on a tape.
