@@ -488,11 +488,12 @@ typedef struct FlexsplineTorqueSettings {
   float tick_s;
   // Corner of the low-pass, Hz: of the first order.
   float bandwidth_hz;
-  // Coulomb drag of the output of this unit, N m; 0 or more.
+  // Coulomb drag of the output of this unit, N m, whichever torque is read; 0 or more.
   float drag_n_m;
   // Coulomb drag that the table was made with, N m; 0 or more.
   float table_drag_n_m;
-  // A torque in the mesh below this does not change the flank, N m: some three times the peak of the noise. 0 or more.
+  // A torque in the mesh below this changes the flank only where the direction changes, N m: some three times the peak of the noise behind the
+  // low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
   float hold_n_m;
 } FlexsplineTorqueSettings;
 
@@ -500,6 +501,14 @@ typedef struct FlexsplineTorqueSettings {
 typedef struct FlexsplineAged {
   uint64_t opaque[FLEXSPLINE_AGED_WORDS];
 } FlexsplineAged;
+
+// How the generator has to move so that the output moves as it shall.
+typedef struct FlexsplineMotionAhead {
+  // Its rate, rad/s.
+  float rate_rad_s;
+  // Its acceleration, rad/s^2.
+  float acceleration_rad_s2;
+} FlexsplineMotionAhead;
 
 // What the output is expected to do.
 typedef struct FlexsplinePrediction {
@@ -1090,6 +1099,18 @@ enum FlexsplineStatus flexspline_rate_ahead(const struct FlexsplineJoint *joint,
                                             float ahead_s,
                                             float *generator_rate_rad_s);
 
+// As `flexspline_rate_ahead`, with the acceleration that goes with it: what the error's curvature adds along the way of the target, and what a target
+// asks for that itself accelerates by `acceleration_rad_s2`. Inertia of motor and generator times it goes to the motor's current; the load's inertia times
+// `acceleration_rad_s2` over the ratio comes on top. Both are NaN where the table gives nothing. Three inverse solutions.
+enum FlexsplineStatus flexspline_motion_ahead(const struct FlexsplineJoint *joint,
+                                              const struct FlexsplineStore *store,
+                                              int64_t target_counts,
+                                              float rate_rad_s,
+                                              float acceleration_rad_s2,
+                                              float torque_n_m,
+                                              float ahead_s,
+                                              struct FlexsplineMotionAhead *ahead);
+
 // Where the output will be at a generator angle, counts of 2^-32 turn, under a torque, N m: from where the state rests, which stays as it is. A path
 // with a reversal is that of ticks.
 enum FlexsplineStatus flexspline_forward(const struct FlexsplineJoint *joint,
@@ -1384,6 +1405,7 @@ enum FlexsplineStatus flexspline_predict(const struct FlexsplinePredictor *predi
   FLEXSPLINE_AND_SIZE_(FlexsplineTorqueSettings) \
   FLEXSPLINE_AND_SIZE_(FlexsplineTorquePath) \
   FLEXSPLINE_AND_SIZE_(FlexsplineAged) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineMotionAhead) \
   FLEXSPLINE_AND_SIZE_(FlexsplineCoefficient) \
   FLEXSPLINE_AND_SIZE_(FlexsplineLearnSettings) \
   FLEXSPLINE_AND_SIZE_(FlexsplineLearner) \

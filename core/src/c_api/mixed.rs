@@ -375,6 +375,11 @@ fn questions(
     let asked = flexspline_rate_ahead(&o.joint, &*o.store, target, -0.01, torque, 4e-3, &mut rate);
     let expected = joint.rate_ahead(store, OutputAngle::from_counts(target), -0.01, torque, 4e-3);
     assert_eq!((asked, rate.to_bits()), (Done, expected.to_bits()));
+    let mut ahead = FlexsplineMotionAhead::default();
+    let asked = flexspline_motion_ahead(&o.joint, &*o.store, target, -0.01, 0.2, torque, 4e-3, &mut ahead);
+    let expected = joint.motion_ahead(store, OutputAngle::from_counts(target), [-0.01, 0.2], torque, 4e-3);
+    assert_eq!(asked, Done);
+    assert_eq!((ahead.rate_rad_s, ahead.acceleration_rad_s2), (expected.rate_rad_s, expected.acceleration_rad_s2));
     let (mut play, mut back) = (FlexsplinePlay::default(), 0);
     assert_eq!(flexspline_state_play(&o.state, &mut play), Done);
     let expected = state.play();
@@ -611,6 +616,13 @@ fn what_is_not_allowed_is_refused() {
     assert_eq!((ask(0.0, &mut rate), ask(f32::NAN, &mut rate)), (Argument, Argument));
     assert_eq!(ask(1e-3, &mut rate), Done);
     assert!(rate.is_nan(), "no table");
+    let mut ahead = FlexsplineMotionAhead::default();
+    let ask = |acceleration, ahead_s, ahead| {
+        flexspline_motion_ahead(&o.joint, &*o.store, 0, 0.01, acceleration, 1.0, ahead_s, ahead)
+    };
+    assert_eq!((ask(f32::NAN, 1e-3, &mut ahead), ask(0.1, 0.0, &mut ahead)), (Argument, Argument));
+    assert_eq!(ask(0.1, 1e-3, &mut ahead), Done);
+    assert!(ahead.rate_rad_s.is_nan() && ahead.acceleration_rad_s2.is_nan(), "no table");
     let mut command = FlexsplineCommand::default();
     assert_eq!(flexspline_inverse(&o.joint, &*o.store, &o.state, 0, 0.0, 2, &mut command), Argument);
     let mut other = made();

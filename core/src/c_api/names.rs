@@ -103,7 +103,7 @@ const _: () = {
 };
 
 /// Sizes of all that goes between C and the library: what `FLEXSPLINE_LAYOUT` of the header adds up.
-const SIZES: [usize; 45] = [
+const SIZES: [usize; 46] = [
     size_of::<FlexsplineStatus>(),
     size_of::<usize>(),
     size_of::<FlexsplineStore>(),
@@ -136,6 +136,7 @@ const SIZES: [usize; 45] = [
     size_of::<FlexsplineTorqueSettings>(),
     size_of::<FlexsplineTorquePath>(),
     size_of::<FlexsplineAged>(),
+    size_of::<FlexsplineMotionAhead>(),
     size_of::<FlexsplineCoefficient>(),
     size_of::<FlexsplineLearnSettings>(),
     size_of::<FlexsplineLearner>(),

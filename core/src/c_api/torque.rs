@@ -4,7 +4,7 @@ use super::{
     FlexsplineJoint, FlexsplineStatus, FlexsplineStore, JOINT_MARK, Marked, STORE_MARK, apart, clear, copied, get,
     get_mut, give, put, span, status, usable,
 };
-use crate::{Aged, Direction, Joint, OutputAngle, Store, TorquePath, TorqueReading, TorqueSettings};
+use crate::{Aged, Direction, Joint, MotionAhead, OutputAngle, Store, TorquePath, TorqueReading, TorqueSettings};
 use core::mem::{MaybeUninit, align_of, size_of};
 
 /// Eight-byte words of a [`FlexsplineTorquePath`].
@@ -39,11 +39,12 @@ pub struct FlexsplineTorqueSettings {
     pub tick_s: f32,
     /// Corner of the low-pass, Hz: of the first order.
     pub bandwidth_hz: f32,
-    /// Coulomb drag of the output of this unit, N m; 0 or more.
+    /// Coulomb drag of the output of this unit, N m, whichever torque is read; 0 or more.
     pub drag_n_m: f32,
     /// Coulomb drag that the table was made with, N m; 0 or more.
     pub table_drag_n_m: f32,
-    /// A torque in the mesh below this does not change the flank, N m: some three times the peak of the noise. 0 or more.
+    /// A torque in the mesh below this changes the flank only where the direction changes, N m: some three times the peak of the noise behind the
+    /// low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
     pub hold_n_m: f32,
 }
 
@@ -168,6 +169,45 @@ pub extern "C" fn flexspline_rate_ahead(
         }
         let target = OutputAngle::from_counts(target_counts);
         give(generator_rate_rad_s, joint.rate_ahead(store, target, rate_rad_s, torque_n_m, ahead_s))
+    };
+    status(tell())
+}
+
+/// How the generator has to move so that the output moves as it shall.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FlexsplineMotionAhead {
+    /// Its rate, rad/s.
+    pub rate_rad_s: f32,
+    /// Its acceleration, rad/s^2.
+    pub acceleration_rad_s2: f32,
+}
+
+/// As `flexspline_rate_ahead`, with the acceleration that goes with it: what the error's curvature adds along the way of the target, and what a target
+/// asks for that itself accelerates by `acceleration_rad_s2`. Inertia of motor and generator times it goes to the motor's current; the load's inertia times
+/// `acceleration_rad_s2` over the ratio comes on top. Both are NaN where the table gives nothing. Three inverse solutions.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_motion_ahead(
+    joint: *const FlexsplineJoint,
+    store: *const FlexsplineStore,
+    target_counts: i64,
+    rate_rad_s: f32,
+    acceleration_rad_s2: f32,
+    torque_n_m: f32,
+    ahead_s: f32,
+    ahead: *mut FlexsplineMotionAhead,
+) -> FlexsplineStatus {
+    let tell = || {
+        clear(span(ahead), [span(joint), span(store)])?;
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let store: &Store = get(store, STORE_MARK)?;
+        if !(ahead_s > 0.0 && ahead_s.is_finite() && rate_rad_s.is_finite() && acceleration_rad_s2.is_finite()) {
+            return Err(FlexsplineStatus::Argument);
+        }
+        let target = OutputAngle::from_counts(target_counts);
+        let MotionAhead { rate_rad_s, acceleration_rad_s2 } =
+            joint.motion_ahead(store, target, [rate_rad_s, acceleration_rad_s2], torque_n_m, ahead_s);
+        give(ahead, FlexsplineMotionAhead { rate_rad_s, acceleration_rad_s2 })
     };
     status(tell())
 }

@@ -1,12 +1,55 @@
-//! The rate of the corrected command, for the speed loop of a servo.
+//! Rate and acceleration of the corrected command, for the speed loop and the current of a servo.
 
 use super::runtime::Joint;
-use crate::angle::OutputAngle;
+use crate::angle::{OutputAngle, RAD_PER_COUNT};
 use crate::play::Direction;
 use crate::store::Store;
 use crate::table::{Approach, Quality};
 
+/// How the generator has to move so that the output moves as it shall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotionAhead {
+    /// Its rate, rad/s.
+    pub rate_rad_s: f32,
+    /// Its acceleration, rad/s².
+    pub acceleration_rad_s2: f32,
+}
+
 impl Joint {
+    /// As [`Self::rate_ahead`], and the acceleration that goes with it, where the target itself moves at `rate_rad_s` and with
+    /// `acceleration_rad_s2`:
+    /// ```text
+    /// dψ/dt = ψ'·v,   d²ψ/dt² = ψ''·v² + ψ'·a
+    /// ```
+    /// with the generator angle `ψ(δ)` that the table wants for an output angle `δ` under this torque. Three inverse solutions.
+    ///
+    /// Inertia of motor and generator times this acceleration is the torque to feed forward to the motor's current. What the load's inertia takes is its
+    /// own times `acceleration_rad_s2` over the ratio: the output moves as the target does. Both are NaN where the table gives nothing.
+    #[must_use]
+    pub fn motion_ahead(
+        &self,
+        store: &Store,
+        target: OutputAngle,
+        [rate_rad_s, acceleration_rad_s2]: [f32; 2],
+        torque_n_m: f32,
+        ahead_s: f32,
+    ) -> MotionAhead {
+        let direction = if rate_rad_s < 0.0 { Direction::Backward } else { Direction::Forward };
+        let half_s = 0.5 * ahead_s;
+        let way = rate_rad_s * half_s;
+        let at = |way: f32| self.inverse(store, target.offset_rad(way), torque_n_m, Approach::Moving(direction));
+        let [before, now, after] = [at(-way), at(0.0), at(way)];
+        if [before, now, after].iter().any(|command| command.quality == Quality::Disabled) {
+            return MotionAhead { rate_rad_s: f32::NAN, acceleration_rad_s2: f32::NAN };
+        }
+        let rate = after.generator.minus_rad(before.generator) / ahead_s;
+        // In counts, as their difference is small.
+        let came = now.generator.minus_counts(before.generator);
+        let bent = after.generator.minus_counts(now.generator).wrapping_sub(came) as f32 * RAD_PER_COUNT;
+        let slope = if rate_rad_s == 0.0 { self.drive().ratio() } else { rate / rate_rad_s };
+        MotionAhead { rate_rad_s: rate, acceleration_rad_s2: bent / (half_s * half_s) + slope * acceleration_rad_s2 }
+    }
+
     /// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal rate and what the error adds to it, by
     /// the table's slope along the way of the target (over `ahead_s`, some ticks).
     ///
@@ -65,5 +108,45 @@ mod tests {
         }
         // The slope of the error is there.
         assert!(differs > 1e-4, "{differs}");
+    }
+
+    /// Against differences of the inverse over longer ways, in double precision; and a target that accelerates from rest wants the ratio.
+    #[test]
+    fn the_acceleration_is_that_of_the_exact_inverse() {
+        let (one, two) = (fixture::image(true), fixture::image(true));
+        let images = Images::new(&one, &two);
+        let mut store = Store::new();
+        let joint = Joint::new(fixture::drive(), LIMITS, Overrun::HoldLast).unwrap();
+        let ask = |store: &Store, target, motion| joint.motion_ahead(store, target, motion, 5.0, 4e-3);
+        let blind = ask(&store, OutputAngle::ZERO, [0.01, 0.0]);
+        assert!(blind.rate_rad_s.is_nan() && blind.acceleration_rad_s2.is_nan());
+        store.activate(&images, &fixture::drive(), 20.0).unwrap();
+        let ratio = fixture::drive().exact_ratio();
+        let mut most = 0.0_f64;
+        for k in 0..40 {
+            for [rate, acceleration] in [[0.05_f32, 0.0], [-0.04, 0.3], [0.05, -0.2]] {
+                let target = OutputAngle::from_rad(0.003 * f64::from(k)).unwrap();
+                let direction = if rate < 0.0 { Direction::Backward } else { Direction::Forward };
+                let at = |s: f64| {
+                    let way = f64::from(rate) * s + 0.5 * f64::from(acceleration) * s * s;
+                    joint.inverse(&store, target.offset_rad(way as f32), 5.0, Approach::Moving(direction)).generator
+                };
+                let h = 2e-3;
+                let [came, goes] = [at(0.0).minus_counts(at(-h)), at(h).minus_counts(at(0.0))];
+                let exact = (goes - came) as f64 * core::f64::consts::TAU / 4_294_967_296.0 / (h * h);
+                let found = ask(&store, target, [rate, acceleration]);
+                assert_eq!(found.rate_rad_s, joint.rate_ahead(&store, target, rate, 5.0, 4e-3));
+                // Places are counts: half of one at the output is 0.03 rad/s² of the generator over 2 ms, at three places. The way of one that accelerates
+                // is not even, by which the third difference comes in.
+                let off = (f64::from(found.acceleration_rad_s2) - exact).abs();
+                assert!(off < 0.15 + 0.02 * exact.abs(), "{k} {rate} {acceleration}: {found:?} {exact}");
+                most = most.max((f64::from(found.acceleration_rad_s2) - ratio * f64::from(acceleration)).abs());
+            }
+        }
+        // The curvature of the error is there.
+        assert!(most > 0.5, "{most}");
+        let starts = ask(&store, OutputAngle::ZERO, [0.0, 0.1]);
+        assert_eq!(starts.rate_rad_s, 0.0);
+        assert!((f64::from(starts.acceleration_rad_s2) - 0.1 * ratio).abs() < 1e-4, "{starts:?}");
     }
 }

@@ -22,6 +22,7 @@ pub use adapt::{
 };
 pub use adjustment::Adjustment;
 pub use aged::Aged;
+pub use feed_forward::MotionAhead;
 pub use limits::{Limits, SettingError};
 pub use mode::{Mode, ModeError, Overrun};
 pub use predictor::{

@@ -10,8 +10,12 @@
 //! | from | is | what it needs |
 //! |---|---|---|
 //! | a model of gravity and wind, a known load | on the load | drag; take inertia times the acceleration of the *target* off it |
-//! | a torque sensor between drive and load, twist of two encoders | in the mesh | a low-pass: below |
+//! | a torque sensor between drive and load, twist of two encoders | in the mesh | drag, for where the motion turns back; a low-pass: below |
 //! | the motor's current times ratio, less friction, less inertia of the motor | in the mesh | likewise, and a model of the friction |
+//!
+//! At a reversal the drag turns over, and the torque in the mesh leaps by twice of it. A sensor behind a low-pass tells that late, and near zero load
+//! not at all, where the leap is below its noise: so what is behind the low-pass is the torque on the load, from either reading, and the drag comes
+//! off it by the direction.
 //!
 //! A torque in the mesh is moved by the compensation itself: the motor turns to make up for the wind-up, the load's inertia resists, and that is a
 //! torque in the mesh again. That loop is closed on +1, and above the resonance of the load on the held motor only the
@@ -39,23 +43,29 @@ pub struct TorqueSettings {
     pub tick_s: f32,
     /// Corner of the low-pass, Hz: of the first order.
     pub bandwidth_hz: f32,
-    /// Coulomb drag of the output of this unit, N·m; 0 or more.
+    /// Coulomb drag of the output of this unit, N·m, whichever torque is read; 0 or more.
     pub drag_n_m: f32,
     /// Coulomb drag that the table was made with, N·m; 0 or more.
     pub table_drag_n_m: f32,
-    /// A torque in the mesh below this does not change the flank, N·m: some three times the peak of the noise. 0 or more.
+    /// A torque in the mesh below this changes the flank only where the direction changes, N·m: some three times the peak of the noise behind the
+    /// low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
     pub hold_n_m: f32,
 }
 
 /// From a reading to the torque that a table is asked with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorquePath {
-    settings: TorqueSettings,
+    drag_n_m: f32,
+    table_drag_n_m: f32,
+    hold_n_m: f32,
+    /// What of a reading a tick believes.
     share: f32,
-    /// The reading behind the low-pass; NaN before the first.
+    /// Torque on the load behind the low-pass, N·m; NaN before the first.
     behind: f32,
     /// The flank that carried last: 1 or −1.
     flank: f32,
+    /// The direction of the last tick: 1 or −1; 0 before the first.
+    way: f32,
 }
 
 impl TorquePath {
@@ -83,46 +93,51 @@ impl TorquePath {
         }
         let turned = TAU * bandwidth_hz as f64 * tick_s as f64;
         let share = (turned / (1.0 + turned)) as f32;
-        Ok(Self { settings, share, behind: f32::NAN, flank: 1.0 })
+        Ok(Self { drag_n_m, table_drag_n_m, hold_n_m, share, behind: f32::NAN, flank: 1.0, way: 0.0 })
     }
 
     /// What changes from tick to tick, for a simulation that goes on from here.
     #[cfg(any(test, feature = "std"))]
     #[must_use]
-    pub const fn kept(&self) -> [f32; 2] {
-        [self.behind, self.flank]
+    pub const fn kept(&self) -> [f32; 3] {
+        [self.behind, self.flank, self.way]
     }
 
     /// Goes on from what [`Self::kept`] gave.
     #[cfg(any(test, feature = "std"))]
-    pub const fn go_on(&mut self, [behind, flank]: [f32; 2]) {
+    pub const fn go_on(&mut self, [behind, flank, way]: [f32; 3]) {
         self.behind = behind;
         self.flank = flank;
+        self.way = way;
     }
 
     /// One tick: a reading, and the direction in which the output moves or moved last; what to give to
     /// [`Input::torque_n_m`](crate::Input::torque_n_m). A reading that is not finite gives NaN and is forgotten.
     #[must_use]
     pub fn tick(&mut self, reading: TorqueReading, direction: Direction) -> f32 {
-        let TorqueSettings { drag_n_m, table_drag_n_m, hold_n_m, .. } = self.settings;
-        let (read, drag) = match reading {
-            TorqueReading::OnLoad(torque) => (torque, drag_n_m),
-            TorqueReading::InMesh(torque) => (torque, 0.0),
-        };
-        if !read.is_finite() {
-            return f32::NAN;
-        }
-        self.behind = if self.behind.is_finite() { self.behind + self.share * (read - self.behind) } else { read };
         let way = match direction {
             Direction::Forward => 1.0,
             Direction::Backward => -1.0,
         };
-        let mesh = self.behind - way * drag;
+        let drag = way * self.drag_n_m;
+        // Kept as a torque on the load, which a reversal does not change: the one in the mesh leaps there by twice the drag.
+        let on_load = match reading {
+            TorqueReading::OnLoad(torque) => torque,
+            TorqueReading::InMesh(torque) => torque + drag,
+        };
+        if !on_load.is_finite() {
+            return f32::NAN;
+        }
+        let late = self.behind + self.share * (on_load - self.behind);
+        self.behind = if self.behind.is_finite() { late } else { on_load };
+        let mesh = self.behind - drag;
         let size = if mesh < 0.0 { -mesh } else { mesh };
-        if size >= hold_n_m {
+        // Where the motion turns back the drag tells the flank, however small the torque.
+        if size >= self.hold_n_m || way != self.way {
             self.flank = if mesh < 0.0 { -1.0 } else { 1.0 };
         }
-        self.flank * size + way * table_drag_n_m
+        self.way = way;
+        self.flank * size + way * self.table_drag_n_m
     }
 }
 
@@ -153,6 +168,24 @@ mod tests {
             assert!(path.tick(TorqueReading::OnLoad(noise), Direction::Forward) < 0.0);
         }
         assert!(path.tick(TorqueReading::OnLoad(0.11), Direction::Forward) > 0.1);
+    }
+
+    /// A slow low-pass has heard nothing of the reversal yet, and the hold is wider than what is left.
+    #[test]
+    fn at_a_reversal_the_drag_tells_the_flank_of_a_torque_read_in_the_mesh() {
+        let mut path = TorquePath::new(TorqueSettings { hold_n_m: 0.3, ..SETTINGS }).unwrap();
+        // 0.3 on the load: −0.2 in the mesh forward, 0.8 backward.
+        for _ in 0..10 {
+            assert!((path.tick(TorqueReading::InMesh(-0.2), Direction::Forward) - (-0.2 + 0.02)).abs() < 1e-6);
+        }
+        assert!((path.tick(TorqueReading::InMesh(-0.2), Direction::Backward) - (0.8 - 0.02)).abs() < 0.04);
+        for _ in 0..300 {
+            let _ = path.tick(TorqueReading::InMesh(0.8), Direction::Backward);
+        }
+        let turned = path.tick(TorqueReading::InMesh(0.8), Direction::Forward);
+        assert!((turned - (-0.2 + 0.02)).abs() < 0.04, "{turned}");
+        // And then noise does not change it.
+        assert!(path.tick(TorqueReading::InMesh(10.0), Direction::Forward) < 0.0);
     }
 
     #[test]

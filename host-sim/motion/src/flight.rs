@@ -3,15 +3,16 @@
 use core::f64::consts::TAU;
 
 use flexspline::{
-    Adjustment, Approach, Direction, Drive, Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode,
-    OutputAngle, Overrun, Quality, Store, TorquePath, TorqueReading, TorqueSettings,
+    Approach, Direction, Drive, Flags, GeneratorAngle, Images, Limits, OutputAngle, Quality, Store, TorqueReading,
+    TorqueSettings,
 };
 
 use super::friction::Friction;
 use super::gear::{Gear, Line, Sampled, Spring};
 use super::loops::{TorquePath as Path, TwoMasses};
+use super::on_board::{self, Given, OnBoard};
 use super::plant::{Plant, PlantSettings};
-use super::scenario::{Load, Moment, Scenario, TableKnown, TorqueKnown};
+use super::scenario::{Moment, Scenario, TableKnown, TorqueKnown};
 use super::servo::{Asked, Noise, Servo};
 use super::table::{Sampling, image};
 
@@ -24,8 +25,13 @@ pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
 
 /// Controllers, in the order of the results.
 pub const CONTROLLERS: [&str; 5] = ["none", "fourier", "fourier_by_direction", "compensated", "ideal"];
+/// Joints that a flight has: those, and one on a drive without errors.
+pub const JOINTS: usize = CONTROLLERS.len() + 1;
 /// The core among them.
 pub const COMPENSATED: usize = 3;
+
+/// The ideal among them.
+pub const IDEAL: usize = 4;
 
 /// Beside those, for [`fly_one`]: the core's table, torque and rate, by the sign of the target's velocity instead of a play that is followed.
 pub const BY_TORQUE: usize = CONTROLLERS.len();
@@ -43,12 +49,20 @@ pub const TABLE_DRAG_N_M: f64 = 0.02;
 pub const DISTANCE: [f64; 2] = [0.5, 0.2];
 /// Widest low-pass of a torque, Hz: a tenth of the sampling frequency of usual torque sensors (guess).
 const WIDEST_HZ: f64 = 100.0;
-/// The slope along the way is taken over this time, s.
+/// Slope and curvature along the way are taken over this time, s.
 const AHEAD_S: f32 = 4e-3;
+/// A torque in the mesh that is less than this part of the drag does not change the flank: while flanks cross it passes through zero. *Guess*.
+const HELD_OF_DRAG: f64 = 0.2;
 /// After a change of the target's rate the motor's current tells no torque for so long, s: friction builds up anew.
 const SETTLES_S: f64 = 0.3;
+/// A command that comes back by more than this has turned, rad: 0.5″.
+const TURNED_RAD: f64 = HOLD_RAD as f64;
 /// Part of the target's rate that a correction by the motor's current may have.
 const SLOWER: f64 = 0.3;
+/// For so long gravity pulls the same way more, s. *Guess*.
+const TURNS_S: f64 = 1.0;
+/// A bound is this many standard deviations: 95 % of normal ones, and more for what is not.
+const SURE: f64 = 2.5;
 /// Noise of the torque that the current tells, behind its low-pass, for its bound, N·m.
 const CURRENT_SURE_N_M: f64 = 0.5;
 /// Low-pass of the torque told by the motor's current, Hz: the motor's own acceleration is told by two differences of the encoder.
@@ -95,6 +109,16 @@ impl Unit {
             nominal: Gear { ratio, lines: Vec::new(), spring: Spring::Sampled(Box::new(spring)) },
             built: Gear { ratio, lines, spring: built },
         }
+    }
+
+    /// Built without errors: no lines, no ripple of the tooth pitch. What ripples with it is encoder, servo, friction and wind.
+    #[must_use]
+    pub fn flawless(&self) -> Self {
+        let spring = match &self.built.spring {
+            Spring::Sampled(sampled) => Spring::Sampled(Box::new(sampled.without_ripple())),
+            cubic @ Spring::Cubic { .. } => cubic.clone(),
+        };
+        Self { built: Gear { lines: Vec::new(), spring, ..self.built }, ..self.clone() }
     }
 
     /// What a table is sampled from.
@@ -167,6 +191,8 @@ pub struct Flown {
 pub struct Flight {
     /// By controller.
     pub flown: Vec<Flown>,
+    /// No compensation, of a drive without errors: what of the velocity ripple is not the drive's.
+    pub flawless: Flown,
     /// Whether the compensated joint comes to rest after a knock as the one without compensation does.
     pub stable: bool,
     /// From what the torque was known: nothing, where no low-pass of the torque in the mesh keeps the margin.
@@ -184,6 +210,7 @@ pub struct Flight {
 }
 
 /// What every lane is made of.
+#[derive(Clone)]
 struct Made {
     scenario: Scenario,
     unit: Unit,
@@ -202,6 +229,36 @@ impl Made {
         let [image, twin] = &self.image;
         Images::new(image, twin)
     }
+
+    fn on_board_settings(&self) -> on_board::Settings {
+        let scenario = &self.scenario;
+        let tick_s = scenario.servo.tick_s as f32;
+        // What the low-pass leaves of white noise.
+        let turned = TAU * self.bandwidth_hz * scenario.servo.tick_s;
+        let behind = (turned / (2.0 + turned)).sqrt();
+        let on_load = matches!(self.torque, TorqueKnown::OnLoad | TorqueKnown::Not);
+        let passing = if on_load { 0.0 } else { HELD_OF_DRAG * scenario.drag_n_m };
+        on_board::Settings {
+            limits: Limits {
+                tick_s,
+                rate_rad_s: RATE_RAD_S as f32,
+                acceleration_rad_s2: ACCELERATION_RAD_S2 as f32,
+                generator_rate_rad_s: 600.0,
+                patience: 5,
+                hold_rad: HOLD_RAD,
+            },
+            torque: TorqueSettings {
+                tick_s,
+                bandwidth_hz: self.bandwidth_hz as f32,
+                drag_n_m: scenario.drag_n_m as f32,
+                table_drag_n_m: TABLE_DRAG_N_M as f32,
+                hold_n_m: (3.0 * behind * scenario.torque_noise_n_m).max(passing) as f32,
+            },
+            expected_n_m: scenario.mean_n_m() as f32,
+            ahead_s: AHEAD_S,
+            temperature_c: scenario.temperature_c as f32,
+        }
+    }
 }
 
 /// Flies a scenario.
@@ -218,18 +275,18 @@ pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, String> {
 /// What cannot be flown, in words.
 pub fn fly_told(scenario: &Scenario, unit: &Unit, told: &(dyn Fn() + Sync)) -> Result<Flight, String> {
     let made = made(scenario, unit, None)?;
+    let flawless = Made { unit: unit.flawless(), ..made.clone() };
     let flown: Vec<Result<Flown, String>> = std::thread::scope(|threads| {
-        let flying: Vec<_> = (0..CONTROLLERS.len())
-            .map(|k| {
-                let made = &made;
-                threads.spawn(move || lane(made, k, told))
-            })
-            .collect();
+        let lanes = (0..CONTROLLERS.len()).map(|kind| (&made, kind)).chain([(&flawless, 0)]);
+        let flying: Vec<_> = lanes.map(|(made, kind)| threads.spawn(move || lane(made, kind, told))).collect();
         flying.into_iter().map(|lane| lane.join().unwrap_or_else(|_| Err("a lane ended early".to_owned()))).collect()
     });
+    let mut flown = flown.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let flawless = flown.pop().ok_or("nothing was flown")?;
     let margin = made.masses.servo(&scenario.servo);
     Ok(Flight {
-        flown: flown.into_iter().collect::<Result<_, _>>()?,
+        flown,
+        flawless,
         stable: stable(&made)?,
         torque: made.torque,
         bandwidth_hz: made.bandwidth_hz,
@@ -280,7 +337,7 @@ fn made(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>) -> Result<Made
     let both = widest(&masses).zip(widest(&soft)).map(|(a, b)| a.min(b));
     // Where no low-pass keeps the margin the torque in the mesh is not used.
     let (torque, bandwidth_hz) = match (scenario.torque, both) {
-        (TorqueKnown::InMesh, Some(hz)) => (TorqueKnown::InMesh, hz),
+        (TorqueKnown::InMesh, Some(hz)) => (TorqueKnown::InMesh, hz.min(known_hz)),
         (TorqueKnown::Current, Some(hz)) => (TorqueKnown::Current, hz.min(CURRENT_HZ)),
         (TorqueKnown::OnLoad, _) => (TorqueKnown::OnLoad, known_hz),
         _ => (TorqueKnown::Not, known_hz),
@@ -339,6 +396,20 @@ struct Told {
     mesh_n_m: f64,
 }
 
+impl Told {
+    fn on_board(&self, made: &Made) -> on_board::Told {
+        let Moment { target_rad, rate_rad_s, acceleration_rad_s2, .. } = self.moment;
+        on_board::Told {
+            generator: self.generator,
+            target: OutputAngle::from_rad(target_rad).unwrap_or(OutputAngle::ZERO),
+            motion: [rate_rad_s, acceleration_rad_s2].map(|value| value as f32),
+            direction: self.direction,
+            reading: self.reading,
+            inertia_n_m: (made.scenario.load_kg_m2 * acceleration_rad_s2) as f32,
+        }
+    }
+}
+
 /// Ways to command the generator.
 enum Controller {
     Uncompensated,
@@ -348,10 +419,11 @@ enum Controller {
     ByTorque(Box<Core>, Limiter),
 }
 
-/// A command, its rate, and what the limiter and the table could not do.
+/// A command, its rate and acceleration, and what the limiter and the table could not do.
 struct Commanded {
     command: GeneratorAngle,
     rate_rad_s: f64,
+    acceleration_rad_s2: f64,
     held_back: bool,
     not_corrected: bool,
     /// How far the core trusts it; none of what commands without the core.
@@ -433,10 +505,10 @@ struct Ideal {
 
 /// The core.
 struct Core {
-    joint: Joint,
+    on_board: OnBoard,
     store: Store,
-    state: JointState,
-    path: TorquePath,
+    /// Of the last tick.
+    last: Option<(on_board::Told, Given)>,
 }
 
 fn setting(error: flexspline::SettingError) -> String {
@@ -450,36 +522,12 @@ impl Controller {
             0 => Self::Uncompensated,
             1 | 2 => Self::Fourier(Box::new(Fourier::new(made, kind == 2))),
             COMPENSATED | BY_TORQUE => {
-                let limits = Limits {
-                    tick_s: scenario.servo.tick_s as f32,
-                    rate_rad_s: RATE_RAD_S as f32,
-                    acceleration_rad_s2: ACCELERATION_RAD_S2 as f32,
-                    generator_rate_rad_s: 600.0,
-                    patience: 5,
-                    hold_rad: HOLD_RAD,
-                };
-                let joint = Joint::new(unit.drive, limits, Overrun::SkipAndCount).map_err(setting)?;
+                let on_board = OnBoard::new(unit.drive, &made.on_board_settings()).map_err(setting)?;
                 let mut store = Store::new();
                 store
                     .activate(&made.images(), &unit.drive, scenario.temperature_c as f32)
                     .map_err(|error| format!("the table cannot be flown: {error:?}"))?;
-                let mut state = JointState::new();
-                state.request(Mode::Tracking).map_err(|error| error.to_string())?;
-                let on_load = matches!(made.torque, TorqueKnown::OnLoad | TorqueKnown::Not);
-                // What the low-pass leaves of white noise.
-                let turned = TAU * made.bandwidth_hz * scenario.servo.tick_s;
-                let behind = (turned / (2.0 + turned)).sqrt();
-                let mut path = TorquePath::new(TorqueSettings {
-                    tick_s: scenario.servo.tick_s as f32,
-                    bandwidth_hz: made.bandwidth_hz as f32,
-                    drag_n_m: if on_load { scenario.drag_n_m as f32 } else { 0.0 },
-                    table_drag_n_m: TABLE_DRAG_N_M as f32,
-                    hold_n_m: (3.0 * behind * scenario.torque_noise_n_m) as f32,
-                })
-                .map_err(setting)?;
-                // A low-pass that takes minutes starts from what is expected, not from a joint that carries nothing yet.
-                let _ = path.tick(TorqueReading::InMesh(scenario.mean_n_m() as f32), Direction::Forward);
-                let core = Box::new(Core { joint, store, state, path });
+                let core = Box::new(Core { on_board, store, last: None });
                 if kind == BY_TORQUE { Self::ByTorque(core, Limiter::default()) } else { Self::Core(core) }
             }
             _ => Self::Ideal(Box::new(Ideal { gear: unit.built.clone(), limiter: Limiter::default() })),
@@ -487,23 +535,32 @@ impl Controller {
     }
 
     fn tick(&mut self, made: &Made, told: &Told) -> Commanded {
-        let Moment { target_rad, rate_rad_s, .. } = told.moment;
+        let Moment { target_rad, rate_rad_s, acceleration_rad_s2, .. } = told.moment;
         let (ratio, tick_s) = (made.unit.nominal.ratio, made.scenario.servo.tick_s);
-        let nominal_rate = rate_rad_s * ratio;
-        let corrected = |goal: f64, slope: f64, limiter: &mut Limiter| {
+        // A correction, and what it does along the way of the target.
+        let corrected = |[before, goal, after]: [f64; 3], limiter: &mut Limiter| {
             let correction = limiter.go(goal, tick_s);
             let command = GeneratorAngle::from_rad((target_rad - correction) * ratio).unwrap_or(GeneratorAngle::ZERO);
-            let held_back = (goal - correction).abs() > 5e-7;
-            let rate_rad_s = nominal_rate - slope * ratio;
-            Commanded { command, rate_rad_s, held_back, not_corrected: false, quality: None }
+            let ahead = f64::from(AHEAD_S);
+            let (slope, bent) = ((after - before) / ahead, 4.0 * (after - 2.0 * goal + before) / (ahead * ahead));
+            let along = if rate_rad_s == 0.0 { 0.0 } else { slope / rate_rad_s };
+            let slowly = on_board::passes_slowly(&made.unit.drive, rate_rad_s as f32, tick_s as f32);
+            let bent = if slowly { bent } else { 0.0 };
+            Commanded {
+                command,
+                rate_rad_s: (rate_rad_s - slope) * ratio,
+                acceleration_rad_s2: (acceleration_rad_s2 * (1.0 - along) - bent) * ratio,
+                held_back: (goal - correction).abs() > 5e-7,
+                not_corrected: false,
+                quality: None,
+            }
         };
-        let ahead = f64::from(AHEAD_S) * 0.5;
+        let times = [-0.5, 0.0, 0.5].map(|part| part * f64::from(AHEAD_S));
         match self {
-            Self::Uncompensated => corrected(0.0, 0.0, &mut Limiter::default()),
+            Self::Uncompensated => corrected([0.0; 3], &mut Limiter::default()),
             Self::Fourier(fourier) => {
                 let at = |time: f64| fourier.error(target_rad + rate_rad_s * time, told.direction);
-                let slope = (at(ahead) - at(-ahead)) / (2.0 * ahead);
-                corrected(at(0.0), slope, &mut fourier.limiter)
+                corrected(times.map(at), &mut fourier.limiter)
             }
             Self::Ideal(ideal) => {
                 let way = if told.direction == Direction::Forward { -1.0 } else { 1.0 };
@@ -515,41 +572,41 @@ impl Controller {
                     }
                     error
                 };
-                let slope = (at(ahead) - at(-ahead)) / (2.0 * ahead);
-                corrected(at(0.0), slope, &mut ideal.limiter)
+                corrected(times.map(at), &mut ideal.limiter)
             }
-            Self::Core(core) => core.tick(made, told, nominal_rate),
+            Self::Core(core) => core.tick(made, told),
             Self::ByTorque(core, limiter) => {
-                let torque_n_m = core.path.tick(told.reading, told.direction);
-                let target = OutputAngle::from_rad(target_rad).unwrap_or(OutputAngle::ZERO);
-                let approach = Approach::Moving(told.direction);
-                let error = core.joint.inverse(&core.store, target, torque_n_m, approach).predicted_error_rad;
-                let rate = core.joint.rate_ahead(&core.store, target, rate_rad_s as f32, torque_n_m, AHEAD_S);
-                let still = rate_rad_s == 0.0 || rate.is_nan();
-                let slope = if still { 0.0 } else { rate_rad_s - f64::from(rate) / ratio };
-                corrected(f64::from(error), slope, limiter)
+                let told = told.on_board(made);
+                let torque_n_m = core.on_board.torque_n_m(&told);
+                let at = |time: f64| {
+                    let target = told.target.offset_rad((rate_rad_s * time) as f32);
+                    let approach = Approach::Moving(told.direction);
+                    let command = core.on_board.joint.inverse(&core.store, target, torque_n_m, approach);
+                    f64::from(command.predicted_error_rad)
+                };
+                corrected(times.map(at), limiter)
             }
         }
     }
 }
 
 impl Core {
-    fn tick(&mut self, made: &Made, told: &Told, nominal_rate: f64) -> Commanded {
-        let Moment { target_rad, rate_rad_s, .. } = told.moment;
-        let torque_n_m = self.path.tick(told.reading, told.direction);
-        let target = OutputAngle::from_rad(target_rad).unwrap_or(OutputAngle::ZERO);
-        let input = Input {
-            generator: Some(told.generator),
-            target,
-            torque_n_m,
-            missed_ticks: 0,
-            adjustment: Adjustment::default(),
+    fn tick(&mut self, made: &Made, told: &Told) -> Commanded {
+        let Moment { rate_rad_s, acceleration_rad_s2, .. } = told.moment;
+        let told = told.on_board(made);
+        let given = self.on_board.tick(&made.images(), &mut self.store, &told);
+        self.last = Some((told, given));
+        let Given { out, ahead, .. } = given;
+        // Without a table as the ratio has it.
+        let [rate, acceleration] = if ahead.rate_rad_s.is_nan() {
+            [rate_rad_s, acceleration_rad_s2].map(|value| value * made.unit.nominal.ratio)
+        } else {
+            [ahead.rate_rad_s, ahead.acceleration_rad_s2].map(f64::from)
         };
-        let rate = self.joint.rate_ahead(&self.store, target, rate_rad_s as f32, torque_n_m, AHEAD_S);
-        let out = self.joint.tick(&made.images(), &mut self.store, &mut self.state, &input);
         Commanded {
             command: out.command,
-            rate_rad_s: if rate_rad_s == 0.0 || rate.is_nan() { nominal_rate } else { f64::from(rate) },
+            rate_rad_s: rate,
+            acceleration_rad_s2: acceleration,
             held_back: out.flags.contains(Flags::HELD_BACK),
             not_corrected: out.flags.contains(Flags::NOT_CORRECTED),
             quality: Some(out.quality),
@@ -563,31 +620,41 @@ struct Sensing {
     before_rad_s: f64,
     friction: Friction,
     even_s: f64,
-    /// Torque on the load that the motor's current tells, N·m: behind a low-pass, what of that is believed by now, and how old it is, s.
-    heard_n_m: f64,
+    /// Torque on the load and friction beyond what is known, as the motor's current tells them, N·m.
+    likely_n_m: [f64; 2],
+    /// Their variances, and between them what they share, N²·m².
+    spread: [f64; 3],
+    /// Torque on the load that is believed by now, N·m.
     told_n_m: f64,
-    age_s: f64,
     /// The drag, with the sign of the last motion, N·m.
     drag_n_m: f64,
     /// It lies within ± this of the true one.
     bound_n_m: f64,
     /// Torque known on the load behind its low-pass, for the servo, N·m; NaN before the first.
     fed_n_m: f64,
+    /// The way in which the motor was told to move last: 1, −1, or 0 before it was.
+    way: f64,
+    /// How far it was told to go that way, rad at the output.
+    furthest_rad: f64,
 }
 
 impl Sensing {
     fn new(scenario: &Scenario) -> Self {
+        let unknown =
+            (1.0 - scenario.friction_known) * Friction::EROB80_100.times(scenario.friction).level_n_m(0.0, 0.0);
         Self {
             noise: Noise::new(scenario.seed ^ 0x9b1d),
             before_rad_s: 0.0,
             friction: Friction::EROB80_100.times(scenario.friction),
             even_s: 0.0,
-            heard_n_m: scenario.mean_n_m(),
+            likely_n_m: [scenario.mean_n_m(), 0.0],
+            spread: [scenario.load_wanders().1, 0.0, unknown * unknown],
             told_n_m: scenario.mean_n_m(),
-            age_s: 0.0,
             drag_n_m: scenario.drag_n_m,
             bound_n_m: f64::INFINITY,
             fed_n_m: f64::NAN,
+            way: 0.0,
+            furthest_rad: 0.0,
         }
     }
 
@@ -595,14 +662,13 @@ impl Sensing {
         let scenario = &made.scenario;
         let noise = scenario.torque_noise_n_m * self.noise.normal();
         match made.torque {
-            // What the load's inertia asks for on the way of the target is known before, and cannot feed back.
             TorqueKnown::OnLoad => {
                 let known = on_load_n_m(scenario, now) + noise;
                 let turned = TAU * made.bandwidth_hz * scenario.servo.tick_s;
                 let share = if self.fed_n_m.is_finite() { turned / (1.0 + turned) } else { 1.0 };
                 let before = if self.fed_n_m.is_finite() { self.fed_n_m } else { 0.0 };
                 self.fed_n_m = before + share * (known - before);
-                TorqueReading::OnLoad((known - scenario.load_kg_m2 * now.acceleration_rad_s2) as f32)
+                TorqueReading::OnLoad(known as f32)
             }
             TorqueKnown::Not => TorqueReading::OnLoad(scenario.mean_n_m() as f32),
             TorqueKnown::InMesh => TorqueReading::InMesh((plant.mesh_n_m() + noise) as f32),
@@ -613,8 +679,9 @@ impl Sensing {
         }
     }
 
-    /// The motor's current less friction and inertia, while the target moves evenly; else what it was, with a bound that grows as the load may
-    /// have changed. Kept as a torque on the load: that does not change where the target turns back, as the one in the mesh does by twice the drag.
+    /// The motor's current less friction and inertia, while the target moves evenly: torque on the load and what of the friction is not known, by a Kalman filter.
+    /// The friction turns over where the target turns back, and the load does not, so that one motion to and fro tells them apart. Kept as a torque on
+    /// the load: that does not change at a reversal, as the one in the mesh does by twice the drag.
     fn by_current(&mut self, made: &Made, servo: &mut Servo, now: &Moment) {
         let scenario = &made.scenario;
         let tick_s = scenario.servo.tick_s;
@@ -626,35 +693,63 @@ impl Sensing {
         if now.rate_rad_s != 0.0 {
             self.drag_n_m = libm::copysign(scenario.drag_n_m, now.rate_rad_s);
         }
-        let rubbing = self.rubbing_n_m(now.rate_rad_s, self.told_n_m - self.drag_n_m);
-        let share = 1.0 - libm::exp(-TAU * made.bandwidth_hz * tick_s);
-        self.age_s += tick_s;
+        let (wanders, most) = scenario.load_wanders();
+        let [load, ..] = &mut self.spread;
+        let [weight, _] = scenario.load.gravity;
+        let turned = weight * now.rate_rad_s;
+        *load = (*load + tick_s * (wanders + turned * turned * TURNS_S)).min(most);
         if self.even_s >= SETTLES_S {
-            let mesh = made.masses.motor_kg_m2 * acceleration - servo.current_n_m() + scenario.friction_known * rubbing;
-            self.heard_n_m += share * (mesh + self.drag_n_m - self.heard_n_m);
+            let way = libm::copysign(1.0, now.rate_rad_s);
+            let rubbing = scenario.friction_known * self.rubbing_n_m(now.rate_rad_s, self.told_n_m - self.drag_n_m);
+            let heard = made.masses.motor_kg_m2 * acceleration - servo.current_n_m() + rubbing + self.drag_n_m;
+            let share = 1.0 - libm::exp(-TAU * made.bandwidth_hz * tick_s);
+            let [load, shared, friction] = &mut self.spread;
+            // What is heard is load less friction by the way, with noise that this low-pass makes as small as stated.
+            let along = [*load - way * *shared, *shared - way * *friction];
+            let all = along[0] - way * along[1] + CURRENT_SURE_N_M * CURRENT_SURE_N_M / share;
+            let gain = along.map(|part| part / all);
+            let [likely, more] = &mut self.likely_n_m;
+            let missed = heard - (*likely - way * *more);
+            *likely += gain[0] * missed;
+            *more += gain[1] * missed;
+            *load -= gain[0] * along[0];
+            *shared -= gain[0] * along[1];
+            *friction -= gain[1] * along[1];
             // The friction has the sign of the target's rate only as long as the correction is slower than that.
             let most = SLOWER * now.rate_rad_s.abs() * tick_s * made.soft_n_m_per_rad;
-            self.told_n_m += (self.heard_n_m - self.told_n_m).clamp(-most, most);
-            // The mean age of what is behind the low-pass.
-            self.age_s *= 1.0 - share;
+            self.told_n_m += (*likely - self.told_n_m).clamp(-most, most);
         }
-        let Load { swing, gust, step, .. } = scenario.load;
-        let blown = 2.0 * gust[0] * (2.0 * (1.0 - libm::exp(-TAU * gust[1] * self.age_s))).sqrt();
-        let swung = swing[0].abs() * (TAU * swing[1] * self.age_s).min(2.0);
         // At rest friction may have either sign, and the drag too.
         let unknown = if now.rate_rad_s == 0.0 { 2.0 * scenario.drag_n_m } else { 0.0 };
-        let rubbed = (1.0 - scenario.friction_known) * self.friction.level_n_m(now.rate_rad_s, self.told_n_m)
-            + (1.0 - scenario.friction_known) * self.friction.viscous_n_m_s * now.rate_rad_s.abs();
         let turning = scenario.load_kg_m2 * now.acceleration_rad_s2.abs();
-        let held_back = (self.heard_n_m - self.told_n_m).abs();
-        self.bound_n_m = rubbed + unknown + turning + held_back + blown + swung + step[0].abs() + CURRENT_SURE_N_M;
+        let [likely, _] = self.likely_n_m;
+        let [load, ..] = self.spread;
+        let held_back = (likely - self.told_n_m).abs();
+        self.bound_n_m = SURE * load.sqrt() + unknown + turning + held_back + CURRENT_SURE_N_M;
     }
 
-    /// What of the load the motor has to hold, N·m at the output: of a torque known on the load, less the drag while that has a sign. Its
+    /// What of the load the motor has to hold, N·m at the output: of a torque known on the load, less the drag of the last motion. Its
     /// inertia is fed forward as the target's acceleration.
-    fn held_n_m(&self, scenario: &Scenario, now: &Moment) -> f64 {
-        let drag = if now.rate_rad_s == 0.0 { 0.0 } else { libm::copysign(scenario.drag_n_m, now.rate_rad_s) };
-        if self.fed_n_m.is_finite() { self.fed_n_m - drag } else { 0.0 }
+    fn held_n_m(&self, scenario: &Scenario, way: f64) -> f64 {
+        if self.fed_n_m.is_finite() { self.fed_n_m - way * scenario.drag_n_m } else { 0.0 }
+    }
+
+    /// Friction that the servo is told before, N·m at the output: against the way in which the motor moves, and where the target stands, moved last
+    /// or was corrected to.
+    ///
+    /// At rest it stays. Taken off there, the integral part would hold the friction instead, and as the target moves on the motor would be given it twice.
+    fn rubbing_told_n_m(&mut self, scenario: &Scenario, rate_rad_s: f64, command_rad: f64, mesh_n_m: f64) -> f64 {
+        let gone = command_rad - self.furthest_rad;
+        if rate_rad_s != 0.0 {
+            self.way = libm::copysign(1.0, rate_rad_s);
+        } else if gone.abs() > TURNED_RAD {
+            self.way = libm::copysign(1.0, gone);
+        }
+        if rate_rad_s != 0.0 || gone * self.way > 0.0 {
+            self.furthest_rad = command_rad;
+        }
+        let level = self.friction.level_n_m(rate_rad_s, mesh_n_m);
+        scenario.friction_known * (self.way * level + self.friction.viscous_n_m_s * rate_rad_s)
     }
 
     /// Friction that a rate has to overcome, N·m at the output.
@@ -704,18 +799,21 @@ impl Lane {
             self.direction = if now.rate_rad_s > 0.0 { Direction::Forward } else { Direction::Backward };
         }
         let way = if self.direction == Direction::Forward { 1.0 } else { -1.0 };
-        let inertia = scenario.load_kg_m2 * now.acceleration_rad_s2;
-        let mesh_n_m = on_load_n_m(scenario, now) - way * scenario.drag_n_m - inertia;
+        // As on board: while a target speeds up the flank does not change.
+        let inertia_n_m = scenario.load_kg_m2 * now.acceleration_rad_s2;
+        let even_n_m = on_load_n_m(scenario, now) - way * scenario.drag_n_m;
+        let mesh_n_m = if even_n_m.abs() > inertia_n_m.abs() { even_n_m - inertia_n_m } else { even_n_m };
         let told = Told { generator, moment: *now, direction: self.direction, reading, mesh_n_m };
         let commanded = self.controller.tick(made, &told);
-        // The load has to be accelerated too.
-        let both = 1.0 + scenario.load_kg_m2 / made.masses.motor_kg_m2;
+        let command_rad = commanded.command.to_rad() / made.unit.nominal.ratio;
+        // The load, which moves as the target does, has to be accelerated too.
+        let load = scenario.load_kg_m2 / made.masses.motor_kg_m2 * made.unit.nominal.ratio;
         let asked = Asked {
             command: commanded.command,
             rate_rad_s: commanded.rate_rad_s,
-            acceleration_rad_s2: now.acceleration_rad_s2 * made.unit.nominal.ratio * both,
-            torque_n_m: (scenario.friction_known * self.sensing.rubbing_n_m(now.rate_rad_s, mesh_n_m)
-                - scenario.load_fed_forward * self.sensing.held_n_m(scenario, now))
+            acceleration_rad_s2: commanded.acceleration_rad_s2 + now.acceleration_rad_s2 * load,
+            torque_n_m: (self.sensing.rubbing_told_n_m(scenario, now.rate_rad_s, command_rad, mesh_n_m)
+                - scenario.load_fed_forward * self.sensing.held_n_m(scenario, way))
                 / made.unit.nominal.ratio,
         };
         if scenario.warming_k_s != 0.0 {
@@ -804,6 +902,8 @@ const TIME_CONSTANTS: f64 = 8.0;
 const AT_REST_RAD_S: f64 = 2e-5;
 
 fn stable(made: &Made) -> Result<bool, String> {
-    let [without, with] = [0, COMPENSATED].map(|kind| left_of_a_knock(made, kind));
+    // What noise moves is no ringing.
+    let quiet = Made { scenario: Scenario { torque_noise_n_m: 0.0, ..made.scenario.clone() }, ..made.clone() };
+    let [without, with] = [0, COMPENSATED].map(|kind| left_of_a_knock(&quiet, kind));
     Ok(with? <= (2.0 * without?).max(AT_REST_RAD_S))
 }

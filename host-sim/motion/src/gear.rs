@@ -28,6 +28,40 @@ pub struct Line {
     pub phase_rad: f64,
 }
 
+impl Line {
+    /// Sine and cosine at two angles.
+    fn turned(&self, generator_rad: f64, output_rad: f64) -> (f64, f64) {
+        libm::sincos(self.generator * generator_rad + self.output * output_rad + self.phase_rad)
+    }
+}
+
+/// Sines and cosines of everything that turns, at one place: near it they are found by adding angles, which costs a third of asking for each anew.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Near {
+    generator_rad: f64,
+    output_rad: f64,
+    /// Of the tooth pitch, and of each line.
+    pitch: (f64, f64),
+    lines: Vec<(f64, f64)>,
+}
+
+/// Up to this angle the series below are exact to rounding.
+const SMALL_RAD: f64 = 0.03;
+
+/// Sine and cosine, turned on by an angle.
+fn turned_on((s, c): (f64, f64), by: f64) -> (f64, f64) {
+    let (sine, cosine) = if by.abs() < SMALL_RAD {
+        let square = by * by;
+        (
+            by * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0))),
+            1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0)),
+        )
+    } else {
+        libm::sincos(by)
+    };
+    (s * cosine + c * sine, c * cosine - s * sine)
+}
+
 /// How many harmonics of the tooth pitch a sampled spring keeps.
 pub const PITCH_HARMONICS: usize = 4;
 /// Curves of a sampled spring: the mean, and cosine and sine of each harmonic.
@@ -152,6 +186,16 @@ impl Sampled {
         let width_rad = self.width_rad / stiffer + wider_rad / INTERVALS as f64;
         let nodes: Vec<[f64; CURVES]> = (0..=INTERVALS).map(|k| scaled(width_rad * k as f64)).collect();
         Self { pieces: pieces(&nodes, width_rad), width_rad, teeth: self.teeth }
+    }
+
+    /// Its mean over the tooth pitch.
+    #[must_use]
+    pub fn without_ripple(&self) -> Self {
+        let mean = |curves: &[Piece; CURVES]| {
+            let [mean, ..] = curves;
+            core::array::from_fn(|curve| if curve == 0 { *mean } else { Piece::default() })
+        };
+        Self { pieces: self.pieces.iter().map(mean).collect(), ..*self }
     }
 
     fn place(&self, twist: f64) -> (usize, f64) {
@@ -280,9 +324,13 @@ kept!(Meshed { energy_j, torque_n_m, stiffness, twist_rad, twist_by[..], energy_
 impl Gear {
     /// The kinematic error, and its slopes over generator and output angle.
     pub fn error(&self, generator_rad: f64, output_rad: f64) -> [f64; 3] {
+        self.summed(self.lines.iter().map(|line| line.turned(generator_rad, output_rad)))
+    }
+
+    /// Of sine and cosine of each line.
+    fn summed(&self, turned: impl Iterator<Item = (f64, f64)>) -> [f64; 3] {
         let mut out = [0.0; 3];
-        for Line { generator, output, amplitude_rad, phase_rad } in &self.lines {
-            let (s, c) = libm::sincos(generator * generator_rad + output * output_rad + phase_rad);
+        for (Line { generator, output, amplitude_rad, .. }, (s, c)) in self.lines.iter().zip(turned) {
             out[0] += amplitude_rad * s;
             out[1] += amplitude_rad * c * generator;
             out[2] += amplitude_rad * c * output;
@@ -347,6 +395,18 @@ impl Gear {
     }
 
     fn sprung(&self, generator_rad: f64, twist: f64) -> Sprung {
+        self.sprung_at(self.pitch(generator_rad), twist)
+    }
+
+    /// Sine and cosine of the tooth pitch.
+    fn pitch(&self, generator_rad: f64) -> (f64, f64) {
+        match &self.spring {
+            Spring::Cubic { .. } => (0.0, 1.0),
+            Spring::Sampled(sampled) => libm::sincos(sampled.teeth * generator_rad),
+        }
+    }
+
+    fn sprung_at(&self, (s, c): (f64, f64), twist: f64) -> Sprung {
         match &self.spring {
             Spring::Cubic { half_clearance_rad, stiffness, hardening } => {
                 let beyond = (twist.abs() - half_clearance_rad).max(0.0);
@@ -360,7 +420,6 @@ impl Gear {
                 }
             }
             Spring::Sampled(sampled) => {
-                let (s, c) = libm::sincos(sampled.teeth * generator_rad);
                 // A drive is its own mirror image.
                 if twist < 0.0 {
                     let mirrored = sampled.at(-twist, (c, -s));
@@ -375,9 +434,36 @@ impl Gear {
     /// What it does at a generator angle over the ratio, and an output angle.
     pub fn at(&self, motor_rad: f64, output_rad: f64) -> Meshed {
         let generator_rad = motor_rad * self.ratio;
-        let [error, by_generator, by_output] = self.error(generator_rad, output_rad);
+        let error = self.error(generator_rad, output_rad);
+        self.meshed(motor_rad, output_rad, error, self.pitch(generator_rad))
+    }
+
+    /// Makes a place to ask near of.
+    pub fn nearby(&self, near: &mut Near, motor_rad: f64, output_rad: f64) {
+        let generator_rad = motor_rad * self.ratio;
+        (near.generator_rad, near.output_rad) = (generator_rad, output_rad);
+        near.pitch = self.pitch(generator_rad);
+        near.lines.clear();
+        near.lines.extend(self.lines.iter().map(|line| line.turned(generator_rad, output_rad)));
+    }
+
+    /// As [`Self::at`], near a place.
+    pub fn at_near(&self, near: &Near, motor_rad: f64, output_rad: f64) -> Meshed {
+        let (generator, output) = (motor_rad * self.ratio - near.generator_rad, output_rad - near.output_rad);
+        let turned =
+            |(line, at): (&Line, &(f64, f64))| turned_on(*at, line.generator * generator + line.output * output);
+        let error = self.summed(self.lines.iter().zip(&near.lines).map(turned));
+        let pitch = match &self.spring {
+            Spring::Cubic { .. } => near.pitch,
+            Spring::Sampled(sampled) => turned_on(near.pitch, sampled.teeth * generator),
+        };
+        self.meshed(motor_rad, output_rad, error, pitch)
+    }
+
+    fn meshed(&self, motor_rad: f64, output_rad: f64, error: [f64; 3], pitch: (f64, f64)) -> Meshed {
+        let [error, by_generator, by_output] = error;
         let twist_rad = output_rad - motor_rad - error;
-        let Sprung { energy_j, torque_n_m, stiffness, by_generator: turning } = self.sprung(generator_rad, twist_rad);
+        let Sprung { energy_j, torque_n_m, stiffness, by_generator: turning } = self.sprung_at(pitch, twist_rad);
         let twist_by = [-(1.0 + self.ratio * by_generator), 1.0 - by_output];
         let energy_by = [torque_n_m * twist_by[0] + self.ratio * turning, torque_n_m * twist_by[1]];
         Meshed { energy_j, torque_n_m, stiffness, twist_rad, twist_by, energy_by }
@@ -455,6 +541,19 @@ mod tests {
             let mut damaged = numbers.clone();
             damaged[at] = value;
             assert_eq!(Gear::of_numbers(&damaged), None, "{at} {value}");
+        }
+    }
+
+    #[test]
+    fn near_a_place_and_far_from_it_everything_is_as_asked_for_anew() {
+        let gear = gear();
+        let mut near = Near::default();
+        gear.nearby(&mut near, 0.3, 0.3004);
+        for by in [0.0, 1e-7, 1e-6, 3e-5, 4e-4, 0.2] {
+            let [exact, found] = [gear.at(0.3 + by, 0.3003 + by), gear.at_near(&near, 0.3 + by, 0.3003 + by)];
+            assert!((found.twist_rad - exact.twist_rad).abs() < 1e-18, "{by}: {found:?} {exact:?}");
+            assert!((found.torque_n_m - exact.torque_n_m).abs() < 1e-11 * (1.0 + exact.torque_n_m.abs()), "{by}");
+            assert!((found.energy_by[0] - exact.energy_by[0]).abs() < 1e-10 * (1.0 + exact.energy_by[0].abs()), "{by}");
         }
     }
 

@@ -4,11 +4,13 @@
 //! measure, [`keep`] its state as words, [`loops`] the theory of the loops that close over all of it.
 #![forbid(unsafe_code)]
 
+pub mod dish;
 pub mod flight;
 pub mod friction;
 pub mod gear;
 pub mod keep;
 pub mod loops;
+pub mod on_board;
 pub mod plant;
 pub mod scenario;
 pub mod servo;

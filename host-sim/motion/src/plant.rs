@@ -10,7 +10,7 @@
 //! The equations are solved by repetition; the error shrinks by `(h·ω/2)²` each time, with the fastest resonance `ω`.
 
 use super::friction::{Friction, SlipElement, slipped};
-use super::gear::{Gear, Meshed};
+use super::gear::{Gear, Meshed, Near};
 use super::keep::kept;
 
 /// Coordinates: motor, load, appendage.
@@ -86,6 +86,8 @@ pub struct Plant {
     slip_n_m: Vec<f64>,
     meshed: Meshed,
     middle: Meshed,
+    /// Where the step began.
+    near: Near,
     /// Mean speeds of the last step, for a first guess.
     mean: [f64; PARTS],
     before: [f64; PARTS],
@@ -104,6 +106,7 @@ impl Plant {
             slip_n_m: vec![0.0; settings.slip.len()],
             meshed,
             middle: meshed,
+            near: Near::default(),
             settings,
             angle_rad: [0.0; PARTS],
             rate_rad_s: [0.0; PARTS],
@@ -164,12 +167,13 @@ impl Plant {
         let mut outside = 0.0;
         // As fast, and with as much in the mesh, as in the step before.
         let rubbing = self.cold * self.settings.friction.level_n_m(self.mean[0], self.middle.torque_n_m);
+        self.settings.gear.nearby(&mut self.near, start[0], start[1]);
         for _ in 0..REPETITIONS {
             let way: [f64; PARTS] = core::array::from_fn(|k| h * mean[k]);
             let middle: [f64; PARTS] = core::array::from_fn(|k| start[k] + 0.5 * way[k]);
             let gear = &self.settings.gear;
-            end = gear.at(start[0] + way[0], start[1] + way[1]);
-            self.middle = gear.at(middle[0], middle[1]);
+            end = gear.at_near(&self.near, start[0] + way[0], start[1] + way[1]);
+            self.middle = gear.at_near(&self.near, middle[0], middle[1]);
             let mut push = [motor_n_m, 0.0, 0.0];
             let twist_by = self.sloped(&end, &way, &mut push);
             let lost = self.damped(&twist_by, &end, &way, h, &mut push);

@@ -157,6 +157,16 @@ impl Scenario {
         wandering_hz.max(swinging_hz).clamp(LEAST_HZ.min(widest_hz), widest_hz)
     }
 
+    /// How fast a torque on the load wanders that nobody knows, N²·m²/s, and its variance about the mean at most, N²·m².
+    pub fn load_wanders(&self) -> (f64, f64) {
+        let Load { swing, gust, step, gravity, .. } = self.load;
+        let square = |value: f64| value * value;
+        let stepped = if step[1] > 0.0 { 8.0 * square(step[0]) / step[1] } else { 0.0 };
+        let rate = 2.0 * square(gust[0]) * TAU * gust[1] + square(swing[0]) * TAU * swing[1] + stepped;
+        // A swing spends most of its time at its ends, and steps all.
+        (rate, square(gust[0]) + square(swing[0]) + square(step[0]) + square(gravity[0]))
+    }
+
     /// Mean of the torque on the load as far as it is known before, N·m.
     pub fn mean_n_m(&self) -> f64 {
         self.load.bias_n_m

@@ -1,56 +1,12 @@
 //! Flights with drives by a law: what the core gains on a unit that its table does not know, in motion.
 
 use flexspline::{Drive, FixedMember};
-use flexspline_motion::flight::{
-    ARCSEC_PER_RAD, BY_TORQUE, COMPENSATED, CONTROLLERS, Flight, Flown, Unit, fly, fly_one,
-};
-use flexspline_motion::gear::Sampled;
+use flexspline_motion::dish::{self, scenario};
+use flexspline_motion::flight::{BY_TORQUE, COMPENSATED, CONTROLLERS, Flight, Flown, Unit, fly, fly_one};
 use flexspline_motion::scenario::{Leg, Load, Scenario, TableKnown, TorqueKnown};
-use flexspline_motion::servo::ServoSettings;
 
-/// As HHD-95 with a double disc: 31″ of clearance to each side, wind-up that hardens, a ripple of the tooth pitch.
 fn unit() -> Unit {
-    let drive = Drive::new(188, 190, FixedMember::Flexspline).unwrap();
-    let law = |phase: f64, flank: f64| {
-        (31.0 + 1.1 * flank / (1.0 + 0.006 * flank) + 0.2 * libm::cos(std::f64::consts::TAU * phase)) / ARCSEC_PER_RAD
-    };
-    Unit::of_spring(drive, Sampled::of_law(188.0, 100.0, law))
-}
-
-fn scenario() -> Scenario {
-    Scenario {
-        name: "test".to_owned(),
-        legs: [(2.0, 0.0), (3.0, 2e-3), (3.0, -2e-3), (3.0, 1e-4), (3.0, -1e-4)]
-            .map(|(seconds, rate_rad_s)| Leg { seconds, rate_rad_s })
-            .to_vec(),
-        acceleration_rad_s2: 0.05,
-        load: Load { bias_n_m: 8.0, swing: [6.0, 0.05], gust: [1.5, 0.3], step: [0.0; 2], gravity: [0.0; 2] },
-        load_kg_m2: 3.0,
-        drag_n_m: 0.5,
-        damping: 0.02,
-        temperature_c: 20.0,
-        warming_k_s: 0.0,
-        servo: ServoSettings {
-            tick_s: 1e-3,
-            steps: 5,
-            late_steps: 1,
-            inertia_kg_m2: 1.1e-4,
-            largest_n_m: 4.0,
-            position_hz: 12.0,
-            speed_hz: 50.0,
-            integral_hz: 5.0,
-            encoder_bits: 17,
-            jitter_s: 5e-6,
-            current_noise_n_m: 1e-3,
-        },
-        friction: 1.0,
-        friction_known: 0.8,
-        load_fed_forward: 1.0,
-        torque: TorqueKnown::OnLoad,
-        torque_noise_n_m: 0.05,
-        table: TableKnown::Calibrated,
-        seed: 3,
-    }
+    dish::unit(Drive::new(188, 190, FixedMember::Flexspline).unwrap())
 }
 
 fn show(what: &str, flight: &Flight) {
@@ -104,23 +60,6 @@ fn a_diagnosed_table_is_nearly_as_good_as_a_calibrated_one_and_the_nominal_is_no
         .map(|table| alone(&Scenario { table, ..scenario() }, COMPENSATED).error.rms());
     println!("left with a nominal table {nominal:.2}, extended {extended:.2}, calibrated {calibrated:.2} arcsec rms");
     assert!(extended < 1.3 * calibrated && nominal > 2.0 * extended);
-}
-
-/// Load less than the drag: on the wrong flank the core was worse than nothing.
-#[test]
-fn a_load_below_the_drag_and_noise_about_zero_are_never_worse_than_no_compensation() {
-    for (bias_n_m, torque_noise_n_m, torque) in [
-        (0.3, 0.05, TorqueKnown::OnLoad),
-        (0.0, 0.3, TorqueKnown::OnLoad),
-        (0.3, 0.3, TorqueKnown::InMesh),
-        (0.0, 0.03, TorqueKnown::InMesh),
-    ] {
-        let load = Load { bias_n_m, swing: [0.0, 0.05], gust: [0.0, 0.3], ..scenario().load };
-        let scenario = Scenario { load, torque, torque_noise_n_m, ..scenario() };
-        let [none, core] = [0, COMPENSATED].map(|kind| alone(&scenario, kind).error.rms());
-        println!("load {bias_n_m}, noise {torque_noise_n_m} N.m, {torque:?}: {none:.2} without, {core:.2} with");
-        assert!(core < none, "{bias_n_m} {torque_noise_n_m} {torque:?}: {none} {core}");
-    }
 }
 
 #[test]

@@ -6,10 +6,13 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::Args;
+use serde::Serialize;
 
 use super::context::Context;
 use super::{Failure, report};
-use crate::fly::{ByController, Flown, Results, SCENARIOS, built_in, read, results};
+use crate::fly::{
+    ByController, Flown, Results, SCENARIOS, VariedFlight, Vary, built_in, every, fly_varied, read, results,
+};
 use crate::output::Outputs;
 use crate::report::flight_report;
 use crate::suggest::did_you_mean;
@@ -18,16 +21,23 @@ use crate::suggest::did_you_mean;
 ///
 /// SCENARIO is antenna, rover, camera or telescope, or a TOML file that starts from one of them. The unit flown was built with errors; the table knows the
 /// drive as designed, with its diagnosed lines, or calibrated. Writes flight.json and report.html.
+///
+/// With --vary, or for all scenarios, flights are put side by side: a row for each, to the screen and to flights.json.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   flexspline fly antenna
   flexspline fly camera --json
+  flexspline fly all --vary table=nominal,extended,calibrated
+  flexspline fly antenna --vary generator=cam,four-roller --vary torque=on_load,current
   flexspline fly own.toml --out flight")]
 pub(super) struct Fly {
-    /// antenna, rover, camera, telescope, or a TOML file
+    /// antenna, rover, camera, telescope, a TOML file, or all (those with a name)
     #[arg(value_name = "SCENARIO")]
     scenario: String,
+    /// A field of the scenario file and its values: FIELD=VALUE,VALUE,...; repeat for more fields [default: as the scenario has it]
+    #[arg(long, value_name = "FIELD=VALUES", allow_hyphen_values = true)]
+    vary: Vec<Vary>,
     /// Write no report.html
     #[arg(long)]
     no_report: bool,
@@ -38,6 +48,9 @@ impl Fly {
         if let Some(option) = context.changes_the_drive() {
             let what = "a flight has the unit of its scenario; allowed: table, load, servo and more in a scenario file (docs/motion.md)";
             return Err(Failure::BadInput(format!("{option}: {what}")));
+        }
+        if self.scenario == "all" || !self.vary.is_empty() {
+            return self.side_by_side(context);
         }
         let flown = scenario(&self.scenario)?;
         let out = context.out()?;
@@ -62,19 +75,105 @@ impl Fly {
     }
 }
 
+/// Flights side by side.
+#[derive(Serialize)]
+struct Flights {
+    flights: Vec<VariedFlight>,
+}
+
+impl Fly {
+    /// Every combination of what varies, of one scenario or all.
+    fn side_by_side(&self, context: &Context) -> Result<(), Failure> {
+        let names = if self.scenario == "all" { SCENARIOS.to_vec() } else { vec![self.scenario.as_str()] };
+        let mut flights = Vec::new();
+        for name in names {
+            flights.extend(every(name, &text_of(name)?, &self.vary).map_err(Failure::BadInput)?);
+        }
+        let out = context.out()?;
+        let (progress, done) = (Mutex::new(context.progress("fly")), AtomicUsize::new(0));
+        let all = flights.iter().map(|(_, flown)| flown.seconds_of_all()).sum();
+        let told = || {
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            if let Ok(mut bar) = progress.lock() {
+                bar.set(done, all, "seconds of all joints");
+            }
+        };
+        let flown: Result<Vec<_>, _> =
+            flights.into_iter().map(|(varied, flown)| fly_varied(varied, &flown, &told)).collect();
+        let found = Flights { flights: flown.map_err(Failure::Failed)? };
+        drop(progress);
+        if let [VariedFlight { not_flown: Some(reason), .. }] = &found.flights[..] {
+            return Err(Failure::BadInput(reason.clone()));
+        }
+        let mut outputs = Outputs::new();
+        outputs.json(&out.join("flights.json"), &found)?;
+        outputs.finish()?;
+        context.print(&found, || table(&found.flights, out))
+    }
+}
+
+/// A row for each flight.
+fn table(flights: &[VariedFlight], out: &Path) -> String {
+    let label = |flight: &VariedFlight| {
+        let scenario = flight.results.iter().map(|results| results.scenario.clone());
+        scenario.chain(flight.varied.iter().map(|(_, value)| value.clone())).collect::<Vec<_>>().join(" ")
+    };
+    let width = flights.iter().map(|flight| label(flight).chars().count()).max().unwrap_or(0).max(8);
+    let mut text = format!(
+        "{:width$}  rms ″: none  angle  by way   core  ideal  removed  ripple ″/s: none   core  ideal  floor  settles s: none  core  bound holds  stable\n",
+        "scenario"
+    );
+    let part = |share: Option<f64>| share.map_or("–".to_owned(), |share| format!("{:.1} %", 100.0 * share));
+    let number = |value: f64| if value.is_finite() { format!("{value:.1}") } else { "–".to_owned() };
+    for flight in flights {
+        let Some(results) = &flight.results else {
+            let _ =
+                writeln!(text, "{:width$}  not flown: {}", label(flight), flight.not_flown.as_deref().unwrap_or(""));
+            continue;
+        };
+        let (rms, ripple) = (&results.rms_arcsec, &results.velocity_ripple);
+        let settles = results.settle_s.as_ref();
+        let settles = |of: fn(&ByController<f64>) -> f64| settles.map_or("–".to_owned(), |s| format!("{:.2}", of(s)));
+        let _ = writeln!(
+            text,
+            "{:width$}{:>13.2}{:>7.2}{:>8.2}{:>7.2}{:>7.2}{:>9}{:>18}{:>7}{:>7}{:>7}{:>17}{:>6}{:>13}{:>8}",
+            label(flight),
+            rms.none,
+            rms.fourier,
+            rms.fourier_by_direction,
+            rms.compensated,
+            rms.ideal,
+            part(results.removed),
+            number(ripple.none),
+            number(ripple.compensated),
+            number(ripple.ideal),
+            number(results.velocity_ripple_floor),
+            settles(|s| s.none),
+            settles(|s| s.compensated),
+            part(results.torque_within_bound),
+            if results.stable { "yes" } else { "NO" }
+        );
+    }
+    text + &format!("flights.json in {}", out.display())
+}
+
 /// The scenario of a name, or of a file.
 pub(super) fn scenario(name: &str) -> Result<Flown, Failure> {
-    if let Some(flown) = built_in(name) {
-        return Ok(flown);
+    read(name, &text_of(name)?).map_err(Failure::BadInput)
+}
+
+/// A scenario's file: of a name, one that only starts from it.
+fn text_of(name: &str) -> Result<String, Failure> {
+    if built_in(name).is_some() {
+        return Ok(format!("base = {name:?}\n"));
     }
-    let text = std::fs::read_to_string(name).map_err(|error| {
+    std::fs::read_to_string(name).map_err(|error| {
         let hint = did_you_mean("; ", name, SCENARIOS);
         Failure::BadInput(format!(
             "scenario: found {name:?}, which cannot be read as a file ({error}); allowed: {}, or a TOML file{hint}",
             SCENARIOS.join(", ")
         ))
-    })?;
-    read(name, &text).map_err(Failure::BadInput)
+    })
 }
 
 fn text(results: &Results, out: &Path, report: bool) -> String {

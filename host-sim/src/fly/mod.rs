@@ -5,8 +5,9 @@
 mod built_in;
 mod file;
 mod results;
+mod varied;
 
-use flexspline_motion::flight::{CONTROLLERS, Flight, Unit, fly_told};
+use flexspline_motion::flight::{Flight, JOINTS, Unit, fly_told};
 use flexspline_motion::gear::Sampled;
 use flexspline_motion::scenario::Scenario;
 
@@ -18,6 +19,7 @@ use crate::tables::core_drive;
 pub use built_in::{SCENARIOS, built_in};
 pub use file::read;
 pub use results::{ByController, Results, Row, results, spectrum};
+pub use varied::{Flight as VariedFlight, Vary, every, fly_varied};
 
 /// A scenario, and what flies it.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,7 +67,7 @@ impl Flown {
     /// Seconds that all its joints fly, together.
     #[must_use]
     pub fn seconds_of_all(&self) -> usize {
-        CONTROLLERS.len() * self.scenario.seconds() as usize
+        JOINTS * self.scenario.seconds() as usize
     }
 
     /// Flies it; `told` is called for each second that one of its joints flew.
@@ -73,6 +75,15 @@ impl Flown {
     /// # Errors
     /// What cannot be flown, in words.
     pub fn fly_told(&self, told: &(dyn Fn() + Sync)) -> Result<Flight, String> {
+        self.carries()?;
+        fly_told(&self.scenario, &unit(self.kind, self.scenario.temperature_c)?, told)
+    }
+
+    /// Whether its generator carries its load.
+    ///
+    /// # Errors
+    /// What was found and what is allowed.
+    pub fn carries(&self) -> Result<(), String> {
         let most = self.kind.rated_torque_n_m();
         let largest = self.scenario.largest_n_m();
         if largest > most {
@@ -81,6 +92,6 @@ impl Flown {
                 self.kind
             ));
         }
-        fly_told(&self.scenario, &unit(self.kind, self.scenario.temperature_c)?, told)
+        Ok(())
     }
 }

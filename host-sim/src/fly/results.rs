@@ -45,6 +45,8 @@ pub struct Results {
     pub max_arcsec: ByController<f64>,
     /// Speed of the output less that of the target while that moves evenly, arcsec/s rms; not a number (`null`) where it never does.
     pub velocity_ripple: ByController<f64>,
+    /// The same of a drive without errors, not compensated: what is not the drive's, but encoder, servo, friction and wind.
+    pub velocity_ripple_floor: f64,
     /// Torque in the mesh, N·m, largest.
     pub mesh_n_m: ByController<f64>,
     /// From the end of a slew until the output stays within 2″ of where it comes to rest, s, mean; none if the scenario never stands.
@@ -104,6 +106,7 @@ pub fn results(flown: &super::Flown, flight: &Flight) -> Option<Results> {
         rms_arcsec: rms,
         max_arcsec: by_controller(flight, |flown| flown.error.largest())?,
         velocity_ripple: by_controller(flight, |flown| flown.ripple.rms_if_any())?,
+        velocity_ripple_floor: flight.flawless.ripple.rms_if_any(),
         mesh_n_m: by_controller(flight, |flown| flown.mesh.largest())?,
         settle_s: if stands(scenario).next().is_some() {
             by_controller(flight, |flown| settle_s(scenario, flown))

@@ -689,7 +689,13 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             let objects = [joint, store];
             let to = memory.answer(choices, &objects);
             let (rate, torque, ahead) = (choices.wild(), choices.wild(), choices.wild());
-            let status = c::flexspline_rate_ahead(joint_at, store_at, choices.any(), rate, torque, ahead, to.pointer);
+            let target = choices.any();
+            let status = if choices.below(2) == 0 {
+                c::flexspline_rate_ahead(joint_at, store_at, target, rate, torque, ahead, to.pointer)
+            } else {
+                let faster = choices.wild();
+                c::flexspline_motion_ahead(joint_at, store_at, target, rate, faster, torque, ahead, to.pointer.cast())
+            };
             (status as u32, all(&objects) && to.usable, to.overlaps)
         }
         42 => {

@@ -2,6 +2,7 @@
 
 use super::{COMPENSATED, Commanded, Controller, Lane, Made, Sensing, Unit, made};
 use crate::keep::{Kept, kept};
+use crate::on_board::{Given, Settings, Told};
 use crate::plant::Plant;
 use crate::scenario::{Moment, Scenario};
 use flexspline::{Direction, JOINT_STATE_WORDS, JointState, Quality};
@@ -30,7 +31,19 @@ pub struct Ticked {
     pub quality: Option<Quality>,
 }
 
-kept!(Sensing { noise, before_rad_s, even_s, heard_n_m, told_n_m, age_s, drag_n_m, bound_n_m, fed_n_m });
+kept!(Sensing {
+    noise,
+    before_rad_s,
+    even_s,
+    likely_n_m[..],
+    spread[..],
+    told_n_m,
+    drag_n_m,
+    bound_n_m,
+    fed_n_m,
+    way,
+    furthest_rad
+});
 
 impl OneJoint {
     /// At rest at zero; with the image of a table that was made before, or one made for the scenario; with the core or with none.
@@ -68,6 +81,19 @@ impl OneJoint {
         }
     }
 
+    /// Settings that the core has, or would have.
+    pub fn on_board_settings(&self) -> Settings {
+        self.made.on_board_settings()
+    }
+
+    /// What the core was told and gave in the last tick; `None` without it.
+    pub fn on_board(&self) -> Option<&(Told, Given)> {
+        match &self.lane.controller {
+            Controller::Core(core) => core.last.as_ref(),
+            _ => None,
+        }
+    }
+
     /// Motor, drive and load.
     pub fn plant(&self) -> &Plant {
         &self.lane.plant
@@ -97,10 +123,8 @@ impl Kept for OneJoint {
         self.lane.sensing.keep(to);
         u32::from(self.lane.direction == Direction::Backward).keep(to);
         if let Controller::Core(core) = &self.lane.controller {
-            core.state.words()[..].keep(to);
-            let [behind, flank] = core.path.kept();
-            behind.to_bits().keep(to);
-            flank.to_bits().keep(to);
+            core.on_board.state.words()[..].keep(to);
+            core.on_board.path.kept().map(f32::to_bits)[..].keep(to);
         }
     }
 
@@ -114,10 +138,10 @@ impl Kept for OneJoint {
         if let Controller::Core(core) = &mut self.lane.controller {
             let mut words = [0_u32; JOINT_STATE_WORDS];
             words[..].take(from)?;
-            core.state = JointState::of_words(&words)?;
-            let mut bits = [0_u32; 2];
+            core.on_board.state = JointState::of_words(&words)?;
+            let mut bits = [0_u32; 3];
             bits[..].take(from)?;
-            core.path.go_on(bits.map(f32::from_bits));
+            core.on_board.path.go_on(bits.map(f32::from_bits));
         }
         Some(())
     }

@@ -1,0 +1,37 @@
+//! Flights of a joint with mass, and what its core was told in every tick as tapes for the emulated target: `tape FOLDER` writes `joint.fxt`,
+//! `on_load.tape` and `in_mesh.tape` there, and prints what the core gave.
+
+use std::path::PathBuf;
+
+use flexspline::{Drive, FixedMember};
+use flexspline_motion::dish;
+use flexspline_motion::flight::{OneJoint, table_image};
+use flexspline_motion::on_board::{HASH_START, LINE_TICKS, hashed, line};
+use flexspline_motion::scenario::{Scenario, TorqueKnown};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = PathBuf::from(std::env::args().nth(1).ok_or("tape FOLDER")?);
+    let unit = dish::unit(Drive::new(188, 190, FixedMember::Flexspline).map_err(|error| error.to_string())?);
+    let image = table_image(&dish::scenario(), &unit, |_| *b"thejoint")?;
+    std::fs::write(folder.join("joint.fxt"), &image)?;
+    let mut lines = String::new();
+    for (name, torque) in [("on_load", TorqueKnown::OnLoad), ("in_mesh", TorqueKnown::InMesh)] {
+        let scenario = Scenario { torque, ..dish::scenario() };
+        let mut joint = OneJoint::new(&scenario, &unit, Some(image.clone()), true)?;
+        let mut tape = joint.on_board_settings().to_bytes().to_vec();
+        let mut hash = HASH_START;
+        lines += &format!("{name}\n");
+        for (tick, moment) in scenario.moments().enumerate() {
+            joint.tick(&moment);
+            let (told, given) = joint.on_board().ok_or("a joint without the core")?;
+            tape.extend(told.to_bytes());
+            hash = hashed(hash, given);
+            if tick % LINE_TICKS == LINE_TICKS - 1 {
+                line(&mut lines, tick, given, hash)?;
+            }
+        }
+        std::fs::write(folder.join(format!("{name}.tape")), tape)?;
+    }
+    print!("{lines}");
+    Ok(())
+}

@@ -1,0 +1,68 @@
+//! A dish on a joint by a law: what tests, the bench and the example fly without a contact FEM.
+
+use core::f64::consts::TAU;
+
+use flexspline::Drive;
+
+use super::flight::{ARCSEC_PER_RAD, Unit};
+use super::gear::Sampled;
+use super::scenario::{Leg, Load, Scenario, TableKnown, TorqueKnown};
+use super::servo::ServoSettings;
+
+/// A unit like HHD-95 with a double disc, with these tooth counts: 31″ of clearance to each side, wind-up that hardens, a ripple of the tooth pitch.
+pub fn unit(drive: Drive) -> Unit {
+    let law = |phase: f64, flank: f64| {
+        (31.0 + 1.1 * flank / (1.0 + 0.006 * flank) + 0.2 * libm::cos(TAU * phase)) / ARCSEC_PER_RAD
+    };
+    Unit::of_spring(drive, Sampled::of_law(f64::from(drive.ripple_order()), 100.0, law))
+}
+
+/// A dish of 3 kg·m² under a load that swings and gusts, turned to and fro, quickly and slowly; the torque is known on the load, the table
+/// calibrated.
+pub fn scenario() -> Scenario {
+    Scenario {
+        name: "dish".to_owned(),
+        legs: [(2.0, 0.0), (3.0, 2e-3), (3.0, -2e-3), (3.0, 1e-4), (3.0, -1e-4)]
+            .map(|(seconds, rate_rad_s)| Leg { seconds, rate_rad_s })
+            .to_vec(),
+        acceleration_rad_s2: 0.05,
+        load: Load { bias_n_m: 8.0, swing: [6.0, 0.05], gust: [1.5, 0.3], step: [0.0; 2], gravity: [0.0; 2] },
+        load_kg_m2: 3.0,
+        drag_n_m: 0.5,
+        damping: 0.02,
+        temperature_c: 20.0,
+        warming_k_s: 0.0,
+        servo: ServoSettings {
+            tick_s: 1e-3,
+            steps: 5,
+            late_steps: 1,
+            inertia_kg_m2: 1.1e-4,
+            largest_n_m: 4.0,
+            position_hz: 12.0,
+            speed_hz: 50.0,
+            integral_hz: 5.0,
+            encoder_bits: 17,
+            jitter_s: 5e-6,
+            current_noise_n_m: 1e-3,
+        },
+        friction: 1.0,
+        friction_known: 0.8,
+        load_fed_forward: 1.0,
+        torque: TorqueKnown::OnLoad,
+        torque_noise_n_m: 0.05,
+        table: TableKnown::Calibrated,
+        seed: 3,
+    }
+}
+
+/// The dish to and fro for ten minutes, under gravity too: what the time of a flight is told of.
+pub fn ten_minutes() -> Scenario {
+    let scenario = scenario();
+    let legs = (0..60).map(|k| Leg { seconds: 10.0, rate_rad_s: if k % 2 == 0 { 2e-3 } else { -1e-4 } });
+    Scenario {
+        name: "ten minutes".to_owned(),
+        legs: legs.collect(),
+        load: Load { gravity: [2.0, 0.0], ..scenario.load },
+        ..scenario
+    }
+}

@@ -1,0 +1,152 @@
+//! Flights side by side: every combination of some values of a scenario's fields.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::Serialize;
+
+use super::{Flown, Results, read, results};
+
+/// A field of a scenario and the values that it gets, as a TOML file has them; a name needs no quotes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Vary {
+    /// Such as `table` or `load.gust`.
+    pub field: String,
+    /// Its values.
+    pub values: Vec<String>,
+}
+
+impl fmt::Display for Vary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.field, self.values.join(","))
+    }
+}
+
+impl FromStr for Vary {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (field, values) = text.split_once('=').unwrap_or((text, ""));
+        let values = apart(values);
+        if field.trim().is_empty() || values.iter().any(String::is_empty) {
+            return Err("allowed: FIELD=VALUE,VALUE,... with a field of a scenario file (docs/motion.md)".to_owned());
+        }
+        Ok(Self { field: field.trim().to_owned(), values })
+    }
+}
+
+/// Values at the commas that no bracket holds.
+fn apart(values: &str) -> Vec<String> {
+    let (mut found, mut depth) = (vec![String::new()], 0_usize);
+    for letter in values.chars() {
+        depth = match letter {
+            '[' => depth + 1,
+            ']' => depth.saturating_sub(1),
+            _ => depth,
+        };
+        match found.last_mut() {
+            Some(last) if letter != ',' || depth > 0 => last.push(letter),
+            _ => found.push(String::new()),
+        }
+    }
+    found.iter().map(|value| value.trim().to_owned()).collect()
+}
+
+/// One of the flights.
+#[derive(Debug, Clone, Serialize)]
+pub struct Flight {
+    /// Fields and values that make it this one.
+    pub varied: Vec<(String, String)>,
+    /// What was found; none where it was not flown.
+    pub results: Option<Results>,
+    /// Why it was not flown: a load that its generator does not carry.
+    pub not_flown: Option<String>,
+}
+
+/// Every combination of the values, on a scenario's file.
+///
+/// # Errors
+/// File, field, value and what is allowed.
+pub fn every(name: &str, text: &str, vary: &[Vary]) -> Result<Vec<(Vec<(String, String)>, Flown)>, String> {
+    let mut combinations: Vec<Vec<(String, String)>> = vec![Vec::new()];
+    for Vary { field, values } in vary {
+        let with = |before: &Vec<(String, String)>, value: &String| {
+            before.iter().cloned().chain([(field.clone(), value.clone())]).collect()
+        };
+        combinations =
+            combinations.iter().flat_map(|before| values.iter().map(move |value| with(before, value))).collect();
+    }
+    combinations.into_iter().map(|varied| changed(name, text, &varied).map(|flown| (varied, flown))).collect()
+}
+
+/// A scenario's file with some values changed.
+fn changed(name: &str, text: &str, varied: &[(String, String)]) -> Result<Flown, String> {
+    if varied.is_empty() {
+        return read(name, text);
+    }
+    // What is wrong with the file itself is told with its own lines.
+    read(name, text)?;
+    let mut whole: toml::Table = text.parse().map_err(|error: toml::de::Error| format!("{name}: {error}"))?;
+    for (field, value) in varied {
+        let parsed = format!("value = {value}").parse::<toml::Table>().ok().and_then(|mut table| table.remove("value"));
+        let value = parsed.unwrap_or_else(|| toml::Value::String(value.clone()));
+        let mut at = &mut whole;
+        let mut parts = field.split('.').peekable();
+        while let Some(part) = parts.next() {
+            if parts.peek().is_none() {
+                at.insert(part.to_owned(), value);
+                break;
+            }
+            let room = at.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+            let toml::Value::Table(inner) = room else {
+                return Err(format!("--vary {field}: found a field of `{part}`, allowed: fields of a scenario file"));
+            };
+            at = inner;
+        }
+    }
+    let text = toml::to_string(&whole).map_err(|error| format!("{name}: {error}"))?;
+    let values: Vec<String> = varied.iter().map(|(field, value)| format!("{field}={value}")).collect();
+    read(&format!("{name} with {}", values.join(" ")), &text)
+}
+
+/// Flies one of them; `told` is called for each second that one of its joints flew.
+///
+/// # Errors
+/// What went wrong in flight.
+pub fn fly_varied(varied: Vec<(String, String)>, flown: &Flown, told: &(dyn Fn() + Sync)) -> Result<Flight, String> {
+    if let Err(not_flown) = flown.carries() {
+        return Ok(Flight { varied, results: None, not_flown: Some(not_flown) });
+    }
+    let results = results(flown, &flown.fly_told(told)?);
+    Ok(Flight { varied, results, not_flown: None })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_combination_is_made_and_brackets_hold_their_commas() {
+        let vary: Vec<Vary> =
+            ["table=nominal,calibrated", "legs=[[2.0,0.0],[3.0,0.01]],[[4.0,0.0]]", "load.bias_n_m=2"]
+                .map(|text| text.parse().unwrap())
+                .to_vec();
+        let found = every("camera", "base = \"camera\"\n", &vary).unwrap();
+        assert_eq!(found.len(), 4);
+        let (varied, flown) = &found[2];
+        assert_eq!(varied[0], ("table".to_owned(), "calibrated".to_owned()));
+        assert_eq!((flown.scenario.legs.len(), flown.scenario.load.bias_n_m), (2, 2.0));
+        assert_eq!(found[3].1.scenario.legs.len(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_varied_is_named() {
+        let said = |text: &str| every("camera", "base = \"camera\"\n", &[text.parse().unwrap()]).unwrap_err();
+        assert!(said("tabel=nominal").contains("did you mean `table`?"), "{}", said("tabel=nominal"));
+        assert!(said("table=best").contains("camera with table=best: table: found \"best\""), "{}", said("table=best"));
+        assert!(said("seed.more=1").contains("seed"), "{}", said("seed.more=1"));
+        for wrong in ["table", "table=", "=1", "table=a,,b"] {
+            assert!(wrong.parse::<Vary>().is_err(), "{wrong}");
+        }
+    }
+}
