@@ -717,7 +717,21 @@ impl CauseName {
                 const { &[microns("along the pitch", 5.0), ARCSECONDS, HARMONIC, phase("angle of a crest of the error")] }
             }
             CauseName::GeneratorEccentricity => {
-                const { &[microns("how far", 5.0), ARCSECONDS, phase("whereto, on the generator"), HALF_LOAD] }
+                const {
+                    &[
+                        microns("once around each wheel: what the deeper lobe shows of the teeth", 5.0),
+                        ARCSECONDS,
+                        phase("whereto, on the generator"),
+                        number(
+                            Name::DeeperArcsec,
+                            "how much deeper one lobe is: what it takes of the clearance at either flank",
+                            0.0,
+                            1000.0,
+                            Value(20.0),
+                        ),
+                        HALF_LOAD,
+                    ]
+                }
             }
             CauseName::CamFormError => {
                 const { &[microns("of the error it makes", 3.0), ARCSECONDS, phase("of the form")] }
