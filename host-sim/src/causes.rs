@@ -608,6 +608,9 @@ impl CauseName {
         }
     }
 
+    /// Why a table holds no error of the output's encoder.
+    pub const OF_THE_OUTPUT_ENCODER: &'static str = "the output's encoder is wrong here, not the joint";
+
     /// Whether a table can hold it.
     #[must_use]
     pub const fn in_table(self) -> InTable {
@@ -626,11 +629,12 @@ impl CauseName {
             | CauseName::StiffnessError
             | CauseName::ThermalClearance
             | CauseName::ThermalStiffness
-            | CauseName::OutputEncoderEccentricity
             | CauseName::GeneratorEncoderEccentricity
-            | CauseName::OutputEncoderTilt
             | CauseName::GeneratorEncoderTilt
             | CauseName::EncoderSubdivision => InTable::Yes,
+            CauseName::OutputEncoderEccentricity | CauseName::OutputEncoderTilt => {
+                InTable::No(Self::OF_THE_OUTPUT_ENCODER)
+            }
             CauseName::GravityTorque | CauseName::GravitySideLoad => InTable::AtOneOrientation,
             CauseName::SensorLatency | CauseName::LubricantViscosity => {
                 InTable::No("it follows the speed, and a table knows none")
@@ -1004,11 +1008,13 @@ mod tests {
             CauseName::TorsionalHysteresis,
             CauseName::Ratcheting,
             CauseName::RatioError,
+            CauseName::OutputEncoderEccentricity,
+            CauseName::OutputEncoderTilt,
         ] {
             assert!(cause.no_place_in_a_table().is_some(), "{cause}");
         }
         for cause in
-            [CauseName::CircularSplineEccentricity, CauseName::BacklashGrowth, CauseName::OutputEncoderEccentricity]
+            [CauseName::CircularSplineEccentricity, CauseName::BacklashGrowth, CauseName::GeneratorEncoderEccentricity]
         {
             assert!(cause.no_place_in_a_table().is_none(), "{cause}");
         }
