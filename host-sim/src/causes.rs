@@ -608,6 +608,13 @@ impl CauseName {
         }
     }
 
+    /// Whether something that is no cause of the library makes just the same, whatever is recorded: a shaft that is bent or misaligned before
+    /// the encoder of the output, two waves in a turn like an encoder that is tilted.
+    #[must_use]
+    pub const fn has_a_double_outside(self) -> bool {
+        matches!(self, CauseName::OutputEncoderTilt)
+    }
+
     /// Why a table holds no error of the output's encoder.
     pub const OF_THE_OUTPUT_ENCODER: &'static str = "the output's encoder is wrong here, not the joint";
 

@@ -102,8 +102,8 @@ pub(super) fn conclude(
                 told_better.push(k);
                 continue;
             }
-            let alike: Vec<CauseName> =
-                rivals.iter().filter(|r| r.looks_alike(size, base)).map(|r| r.cause).take(3).collect();
+            let (alike, misfits): (Vec<CauseName>, Vec<f64>) =
+                rivals.iter().filter(|r| r.looks_alike(size, base)).map(|r| (r.cause, r.misfit)).take(3).unzip();
             let closest = rivals.first().map_or(50.0, |r| r.misfit);
             if !alike.is_empty() && next_experiment.is_none() {
                 let named: Vec<&Law> = alike.iter().filter_map(|a| laws.iter().find(|law| law.is(*a))).collect();
@@ -114,7 +114,7 @@ pub(super) fn conclude(
             }
             causes.push(Cause {
                 name,
-                confidence: confidence(closest, alike.len()),
+                confidence: confidence(name, &misfits, closest, known[k].told_from_zero()),
                 parameters: known[k].parameters.clone(),
                 held_out_gain: held.gains.get(k).copied().unwrap_or(0.0),
                 size_arcsec: standings[k].size,
@@ -263,7 +263,11 @@ fn understood(
         );
         let well_known = Judged::above(Gate::KnownWell, known[k].times_its_doubt, KNOWN_BESIDE);
         let beside = if hidden.passed { hidden } else { well_known };
-        let gates = vec![Judged::above(Gate::Named, size, select::least_named(noise.white)), beside];
+        let gates = vec![
+            Judged::above(Gate::Named, size, select::least_named(noise.white)),
+            beside,
+            Judged::above(Gate::ToldFromZero, known[k].told_from_zero(), TOLD_FROM_ZERO),
+        ];
         if passed(&gates) {
             named.push(k);
         }
@@ -272,9 +276,17 @@ fn understood(
     named
 }
 
-/// Probability of a cause against its closest rival, whose misfit is higher by this; halved by each look-alike.
-fn confidence(misfit: f64, alike: usize) -> f64 {
-    if alike > 0 { 1.0 / (1.0 + alike as f64) } else { 1.0 / (1.0 + (-0.5 * misfit.clamp(0.0, 40.0)).exp()) - 0.01 }
+/// Probability of a cause against its look-alikes, whose misfits are higher by these; if there is none, against the closest rival. Less where its
+/// size is `told_from_zero` by few standard deviations.
+fn confidence(name: CauseName, alike: &[f64], closest: f64, told_from_zero: f64) -> f64 {
+    let odds = |misfit: f64| (-0.5 * misfit.clamp(0.0, 40.0)).exp();
+    let among = if alike.is_empty() && !name.has_a_double_outside() {
+        1.0 / (1.0 + odds(closest)) - 0.01
+    } else {
+        let outside = if name.has_a_double_outside() { 1.0 } else { 0.0 };
+        1.0 / (1.0 + outside + alike.iter().map(|misfit| odds(*misfit).max(LEAST_WEIGHT)).sum::<f64>())
+    };
+    if told_from_zero < SIZE_KNOWN { among.min(MOST_OF_UNSURE) } else { among }
 }
 
 fn compensation(problem: &Problem<'_>, rms_extended: f64) -> Compensation {
