@@ -730,7 +730,7 @@ impl CauseName {
             CauseName::GeneratorEccentricity => {
                 const {
                     &[
-                        microns("once around each wheel: what the deeper lobe shows of the teeth", 5.0),
+                        microns("once around each wheel: what the deeper lobe shows of the teeth", 2.0),
                         ARCSECONDS,
                         phase("whereto, on the generator"),
                         number(
