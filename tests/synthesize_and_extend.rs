@@ -128,6 +128,27 @@ fn what_no_table_can_hold_is_said_and_left_alone() {
     assert!(desk.read("found/drive-extended.toml").contains("delay_s"));
 }
 
+/// The output stands where it should when its encoder reads it wrong: a table that followed the reading would move it.
+#[test]
+fn an_error_of_the_output_encoder_is_not_put_into_tables() {
+    let desk = Desk::new();
+    desk.write("nominal.toml", NOMINAL);
+    for (effect, name) in [
+        ("output_encoder_eccentricity:amplitude_arcsec=25", "output_encoder_eccentricity"),
+        ("encoder_subdivision:amplitude_arcsec=15,harmonic=16,encoder=output", "encoder_subdivision"),
+    ] {
+        desk.line(&format!("synthesize --model nominal.toml --effect {effect} --seed 3 --out made")).done();
+        let diagnosis = desk.line("diagnose made/data.csv --model nominal.toml --out found --json").done().json();
+        assert_eq!(causes(&diagnosis), [name]);
+        let [_, nominal, extended] = compensation(&diagnosis);
+        assert_eq!(nominal, extended);
+        let left = &diagnosis["extension"]["compensation"]["not_applied"][0];
+        assert_eq!(left["cause"], name);
+        assert!(left["reason"].as_str().unwrap().contains("not the joint"));
+        assert!(!names(&desk.path("found")).iter().any(|file| file.ends_with(".fxt")));
+    }
+}
+
 /// The drive of the FEM: made, diagnosed, written as a drive that the FEM runs, and its tables made again.
 #[test]
 fn a_worn_drive_is_made_again_by_the_fem() {

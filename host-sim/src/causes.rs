@@ -608,6 +608,16 @@ impl CauseName {
         }
     }
 
+    /// Whether something that is no cause of the library makes just the same, whatever is recorded: a shaft that is bent or misaligned before
+    /// the encoder of the output, two waves in a turn like an encoder that is tilted.
+    #[must_use]
+    pub const fn has_a_double_outside(self) -> bool {
+        matches!(self, CauseName::OutputEncoderTilt)
+    }
+
+    /// Why a table holds no error of the output's encoder.
+    pub const OF_THE_OUTPUT_ENCODER: &'static str = "the output's encoder is wrong here, not the joint";
+
     /// Whether a table can hold it.
     #[must_use]
     pub const fn in_table(self) -> InTable {
@@ -626,11 +636,12 @@ impl CauseName {
             | CauseName::StiffnessError
             | CauseName::ThermalClearance
             | CauseName::ThermalStiffness
-            | CauseName::OutputEncoderEccentricity
             | CauseName::GeneratorEncoderEccentricity
-            | CauseName::OutputEncoderTilt
             | CauseName::GeneratorEncoderTilt
             | CauseName::EncoderSubdivision => InTable::Yes,
+            CauseName::OutputEncoderEccentricity | CauseName::OutputEncoderTilt => {
+                InTable::No(Self::OF_THE_OUTPUT_ENCODER)
+            }
             CauseName::GravityTorque | CauseName::GravitySideLoad => InTable::AtOneOrientation,
             CauseName::SensorLatency | CauseName::LubricantViscosity => {
                 InTable::No("it follows the speed, and a table knows none")
@@ -717,7 +728,21 @@ impl CauseName {
                 const { &[microns("along the pitch", 5.0), ARCSECONDS, HARMONIC, phase("angle of a crest of the error")] }
             }
             CauseName::GeneratorEccentricity => {
-                const { &[microns("how far", 5.0), ARCSECONDS, phase("whereto, on the generator"), HALF_LOAD] }
+                const {
+                    &[
+                        microns("once around each wheel: what the deeper lobe shows of the teeth", 2.0),
+                        ARCSECONDS,
+                        phase("whereto, on the generator"),
+                        number(
+                            Name::DeeperArcsec,
+                            "how much deeper one lobe is: what it takes of the clearance at either flank",
+                            0.0,
+                            1000.0,
+                            Value(20.0),
+                        ),
+                        HALF_LOAD,
+                    ]
+                }
             }
             CauseName::CamFormError => {
                 const { &[microns("of the error it makes", 3.0), ARCSECONDS, phase("of the form")] }
@@ -990,11 +1015,13 @@ mod tests {
             CauseName::TorsionalHysteresis,
             CauseName::Ratcheting,
             CauseName::RatioError,
+            CauseName::OutputEncoderEccentricity,
+            CauseName::OutputEncoderTilt,
         ] {
             assert!(cause.no_place_in_a_table().is_some(), "{cause}");
         }
         for cause in
-            [CauseName::CircularSplineEccentricity, CauseName::BacklashGrowth, CauseName::OutputEncoderEccentricity]
+            [CauseName::CircularSplineEccentricity, CauseName::BacklashGrowth, CauseName::GeneratorEncoderEccentricity]
         {
             assert!(cause.no_place_in_a_table().is_none(), "{cause}");
         }

@@ -121,6 +121,8 @@ pub enum Gate {
     BesideUnknown,
     /// It is so many times its own uncertainty.
     KnownWell,
+    /// The best known of its sizes is so many times its standard deviation.
+    ToldFromZero,
     /// No rival lowers the misfit by this much.
     ToldBetter,
     /// Rivals raise the misfit by this much.
@@ -175,6 +177,7 @@ impl Gate {
             Gate::Named => "named",
             Gate::BesideUnknown => "beside_unknown",
             Gate::KnownWell => "known_well",
+            Gate::ToldFromZero => "told_from_zero",
             Gate::ToldBetter => "told_better",
             Gate::ToldApart => "told_apart",
             Gate::AsRival => "as_rival",
@@ -213,6 +216,7 @@ impl Gate {
             Gate::Named => "is large enough to be named (arcsec rms)",
             Gate::BesideUnknown => "is not hidden by what has no name (its size as a share of the cause)",
             Gate::KnownWell => "is known well beside what has no name (times its own uncertainty)",
+            Gate::ToldFromZero => "has a size that is told from zero (times its standard deviation)",
             Gate::ToldBetter => "is not told better by a rival (rise of the misfit with the rival in its place)",
             Gate::ToldApart => "is told apart from a rival (rise of the misfit with the rival in its place)",
             Gate::AsRival => "tells the data better in the place of a cause that was named (rise of the misfit)",
@@ -254,6 +258,7 @@ impl Gate {
             | Gate::Earns
             | Gate::Named
             | Gate::KnownWell
+            | Gate::ToldFromZero
             | Gate::ToldBetter
             | Gate::ToldApart
             | Gate::ShareNamed

@@ -8,7 +8,7 @@ use super::linear::Gram;
 use super::model::{Fit, Problem, Scaffold, Term, white_columns};
 use super::report::Parameter;
 use super::select::{Selected, blocks};
-use crate::causes::Kind;
+use crate::causes::{Kind, ParameterName};
 
 /// Step of numerical derivatives, standard deviations.
 const STEP: f64 = 0.1;
@@ -61,6 +61,39 @@ pub struct Known {
     pub parameters: BTreeMap<&'static str, Parameter>,
     /// What it adds to the prediction, in units of the uncertainty of that (both as lengths in the whitened data).
     pub times_its_doubt: f64,
+}
+
+/// Sizes by which causes are told; what else they have are places, shapes and the same in other units.
+const SIZES: [ParameterName; 14] = [
+    ParameterName::AmplitudeArcsec,
+    ParameterName::ClearanceArcsecPerK,
+    ParameterName::DeeperArcsec,
+    ParameterName::DelayS,
+    ParameterName::DragNM,
+    ParameterName::Gain,
+    ParameterName::GrowthArcsec,
+    ParameterName::HalfWidthArcsec,
+    ParameterName::HardeningArcsec,
+    ParameterName::JumpArcsec,
+    ParameterName::RatioRelativeError,
+    ParameterName::StiffnessRatio,
+    ParameterName::StiffnessRelativePerK,
+    ParameterName::TorqueNM,
+];
+/// A size that is known exactly counts as so many times its standard deviation.
+const EXACTLY: f64 = 1e3;
+
+impl Known {
+    /// The best known of its sizes, in units of its standard deviation.
+    #[must_use]
+    pub fn told_from_zero(&self) -> f64 {
+        let of = |name: &ParameterName| -> Option<f64> {
+            let found = self.parameters.get(name.as_str())?;
+            let without = if *name == ParameterName::StiffnessRatio { 1.0 } else { 0.0 };
+            Some(((found.value - without).abs() / found.std.max(1e-30)).min(EXACTLY))
+        };
+        SIZES.iter().filter_map(of).reduce(f64::max).unwrap_or(EXACTLY)
+    }
 }
 
 /// How far the coefficients and moves of one term may be off.

@@ -102,8 +102,8 @@ pub(super) fn conclude(
                 told_better.push(k);
                 continue;
             }
-            let alike: Vec<CauseName> =
-                rivals.iter().filter(|r| r.looks_alike(size, base)).map(|r| r.cause).take(3).collect();
+            let (alike, misfits): (Vec<CauseName>, Vec<f64>) =
+                rivals.iter().filter(|r| r.looks_alike(size, base)).map(|r| (r.cause, r.misfit)).take(3).unzip();
             let closest = rivals.first().map_or(50.0, |r| r.misfit);
             if !alike.is_empty() && next_experiment.is_none() {
                 let named: Vec<&Law> = alike.iter().filter_map(|a| laws.iter().find(|law| law.is(*a))).collect();
@@ -114,7 +114,12 @@ pub(super) fn conclude(
             }
             causes.push(Cause {
                 name,
-                confidence: confidence(closest, alike.len()),
+                confidence: confidence(
+                    &misfits,
+                    has_a_double_outside(name, &known[k], problem.on.output_span_rad()),
+                    closest,
+                    known[k].told_from_zero(),
+                ),
                 parameters: known[k].parameters.clone(),
                 held_out_gain: held.gains.get(k).copied().unwrap_or(0.0),
                 size_arcsec: standings[k].size,
@@ -263,7 +268,11 @@ fn understood(
         );
         let well_known = Judged::above(Gate::KnownWell, known[k].times_its_doubt, KNOWN_BESIDE);
         let beside = if hidden.passed { hidden } else { well_known };
-        let gates = vec![Judged::above(Gate::Named, size, select::least_named(noise.white)), beside];
+        let gates = vec![
+            Judged::above(Gate::Named, size, select::least_named(noise.white)),
+            beside,
+            Judged::above(Gate::ToldFromZero, known[k].told_from_zero(), TOLD_FROM_ZERO),
+        ];
         if passed(&gates) {
             named.push(k);
         }
@@ -272,9 +281,26 @@ fn understood(
     named
 }
 
-/// Probability of a cause against its closest rival, whose misfit is higher by this; halved by each look-alike.
-fn confidence(misfit: f64, alike: usize) -> f64 {
-    if alike > 0 { 1.0 / (1.0 + alike as f64) } else { 1.0 / (1.0 + (-0.5 * misfit.clamp(0.0, 40.0)).exp()) - 0.01 }
+/// Whether something that is no cause of the library makes the same. A subdivision of the output's encoder repeats in each turn; in less than
+/// one a wheel before the encoder, which turns at a ratio of its own, makes such waves as well.
+fn has_a_double_outside(name: CauseName, known: &Known, output_span_rad: f64) -> bool {
+    let at_output = known.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0);
+    let part_of_a_turn = name == CauseName::EncoderSubdivision && at_output && output_span_rad < std::f64::consts::TAU;
+    name.has_a_double_outside() || part_of_a_turn
+}
+
+/// Probability of a cause against its look-alikes, whose misfits are higher by these; if there is none, against the closest rival. Less where its
+/// size is `told_from_zero` by few standard deviations.
+fn confidence(alike: &[f64], double_outside: bool, closest: f64, told_from_zero: f64) -> f64 {
+    let odds = |misfit: f64| (-0.5 * misfit.clamp(0.0, 40.0)).exp();
+    let among = if alike.is_empty() && !double_outside {
+        1.0 / (1.0 + odds(closest)) - 0.01
+    } else {
+        1.0 / (1.0
+            + f64::from(u8::from(double_outside))
+            + alike.iter().map(|misfit| odds(*misfit).max(LEAST_WEIGHT)).sum::<f64>())
+    };
+    if told_from_zero < SIZE_KNOWN { among.min(MOST_OF_UNSURE) } else { among }
 }
 
 fn compensation(problem: &Problem<'_>, rms_extended: f64) -> Compensation {
@@ -303,4 +329,26 @@ fn recalibrated(problem: &Problem<'_>, selected: &Selected<'_>) -> BTreeMap<Stri
         );
     }
     named
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_confidence_is_that_of_a_name_among_those_alike() {
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} for {b}");
+        // Told no worse, or better: one of these.
+        near(confidence(&[0.0], false, 0.0, 20.0), 0.5);
+        near(confidence(&[-30.0, 0.0], false, -30.0, 20.0), 1.0 / 3.0);
+        // Told worse, though no law is known so well.
+        near(confidence(&[2.0], false, 2.0, 20.0), 1.0 / (1.0 + (-1.0_f64).exp()));
+        near(confidence(&[900.0], false, 900.0, 20.0), 1.0 / (1.0 + LEAST_WEIGHT));
+        // None alike.
+        assert!((0.98..0.99).contains(&confidence(&[], false, 900.0, 20.0)));
+        // A double that is no cause of the library; a size that is hardly known.
+        near(confidence(&[], true, 900.0, 20.0), 0.5);
+        near(confidence(&[], false, 900.0, 4.0), MOST_OF_UNSURE);
+        near(confidence(&[0.0], false, 0.0, 4.0), 0.5);
+    }
 }

@@ -167,9 +167,10 @@ pub fn evaluate(
     let mut applied = Vec::new();
     let mut not_applied = Vec::new();
     for cause in causes {
-        match tables.left_out(*cause) {
+        let found = fitted.causes().iter().find(|found| found.name() == *cause);
+        match tables.left_out(*cause, found) {
             Some(reason) => not_applied.push(NotApplied { cause: *cause, reason }),
-            None if fitted.causes().iter().any(|found| found.name() == *cause) => applied.push(*cause),
+            None if found.is_some() => applied.push(*cause),
             None => {
                 let reason = "the sessions learnt from do not show it";
                 not_applied.push(NotApplied { cause: *cause, reason });

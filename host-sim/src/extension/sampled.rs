@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 use flexspline::make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
 use flexspline::{Direction, Table};
 
-use crate::causes::{CauseName, InTable};
-use crate::diagnosis::Extended;
+use crate::causes::{CauseName, InTable, ParameterName};
+use crate::diagnosis::{Extended, FittedCause};
 use crate::drive::GeneratorKind;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
@@ -96,10 +96,14 @@ pub struct ExtendedTables<'a> {
 }
 
 impl ExtendedTables<'_> {
-    /// Why a cause is not in a table of this drive, if it is not.
+    /// Why a cause is not in a table of this drive, if it is not; `found` in data, if it was.
     #[must_use]
-    pub fn left_out(&self, cause: CauseName) -> Option<&'static str> {
+    pub fn left_out(&self, cause: CauseName, found: Option<&FittedCause>) -> Option<&'static str> {
+        let at_output = |found: &FittedCause| {
+            found.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0)
+        };
         match cause.in_table() {
+            InTable::Yes if found.is_some_and(at_output) => Some(CauseName::OF_THE_OUTPUT_ENCODER),
             InTable::Yes => None,
             InTable::AtOneOrientation => {
                 self.orientation_rad.is_none().then_some("the drive is turned against gravity")
@@ -202,7 +206,8 @@ impl ExtendedTables<'_> {
             }
         }
         let series = extended.predict(&sessions, self.nominal, self.table);
-        let left_out: Vec<bool> = extended.causes().iter().map(|cause| self.left_out(cause.name()).is_some()).collect();
+        let left_out: Vec<bool> =
+            extended.causes().iter().map(|cause| self.left_out(cause.name(), Some(cause)).is_some()).collect();
         let mut samples = Vec::new();
         let mut beyond = 0.0;
         for (((torque, temperature, forward), session), series) in nodes.iter().zip(&sessions).zip(&series) {

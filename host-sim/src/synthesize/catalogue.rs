@@ -147,6 +147,9 @@ const fn fault_parameters(fault: FaultName) -> (&'static str, &'static [Paramete
     }
 }
 
+/// Parameters that came to effects later, none of which is drawn: they take no number, so that a seed goes on making the same noise.
+const CAME_LATER: [ParameterName; 1] = [ParameterName::DeeperArcsec];
+
 /// Data faults in the order of lists.
 const FAULTS: [FaultName; 15] = [
     FaultName::EncoderIndexJump,
@@ -280,7 +283,7 @@ impl Chosen {
             definition.parameters.iter().position(|p| p.name == name).expect("twins are parameters")
         };
         for (k, parameter) in definition.parameters.iter().enumerate() {
-            let drawn = random.f64();
+            let drawn = if CAME_LATER.contains(&parameter.name) { 0.0 } else { random.f64() };
             if complete.values[k].is_some() {
                 continue;
             }

@@ -127,7 +127,9 @@ impl Effect {
                     if cause == CauseName::FlexsplinePitchError { Angle::Flexspline } else { Angle::CircularSpline };
                 Law::Pitch { angle, lines }
             }
-            CauseName::GeneratorEccentricity => Law::Lobes { amplitude: size, phase_rad: phase, half_load_n_m },
+            CauseName::GeneratorEccentricity => {
+                Law::Lobes { amplitude: size, phase_rad: phase, deeper: 2.0 * size, half_load_n_m }
+            }
             CauseName::CamFormError => Law::CamForm { amplitude: size, phase_rad: phase },
             CauseName::DamagedTooth => Law::Damage {
                 angle: if phase > PI { Angle::Flexspline } else { Angle::CircularSpline },

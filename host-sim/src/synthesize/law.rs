@@ -53,8 +53,9 @@ pub(super) enum Law {
     Oval { amplitude: f64, phase_rad: f64, radial: f64 },
     /// Lines `(order, amplitude, phase)`, `A cos(order angle + phase)`.
     Pitch { angle: Angle, lines: Vec<(f64, f64, f64)> },
-    /// One lobe carries more: order 1 of both wheels.
-    Lobes { amplitude: f64, phase_rad: f64, half_load_n_m: f64 },
+    /// One lobe is deeper: it takes clearance at either flank, and shows order 1 of the teeth of both wheels. A load presses it in. Wheels
+    /// without such errors (`amplitude` 0) show the clearance alone, as in contact FEM.
+    Lobes { amplitude: f64, phase_rad: f64, deeper: f64, half_load_n_m: f64 },
     /// The tooth mesh and its first overtone.
     CamForm { amplitude: f64, phase_rad: f64 },
     /// A pulse where a lobe meets the tooth.
@@ -150,11 +151,12 @@ impl Now<'_> {
     fn side(&self, k: usize) -> f64 {
         if self.torque[k] >= 0.0 { 1.0 } else { -1.0 }
     }
+}
 
-    fn fade(&self, half_load_n_m: f64, k: usize) -> f64 {
-        let x = self.torque[k].abs() / half_load_n_m;
-        if self.changed { (-0.7 * x).exp() * 0.8 + 0.2 } else { 1.0 / (1.0 + x) }
-    }
+/// What a load leaves of what one zone of teeth does alone.
+fn faded(load_n_m: f64, half_load_n_m: f64, changed: bool) -> f64 {
+    let x = load_n_m.abs() / half_load_n_m;
+    if changed { (-0.7 * x).exp() * 0.8 + 0.2 } else { 1.0 / (1.0 + x) }
 }
 
 /// Largest size, never zero.
@@ -195,6 +197,7 @@ impl Law {
             CauseName::GeneratorEccentricity => Law::Lobes {
                 amplitude: v(Name::AmplitudeArcsec),
                 phase_rad: -phase(),
+                deeper: v(Name::DeeperArcsec),
                 half_load_n_m: v(Name::HalfLoadNM),
             },
             CauseName::CamFormError => Law::CamForm { amplitude: v(Name::AmplitudeArcsec), phase_rad: phase() },
@@ -301,6 +304,11 @@ impl Law {
         let n = half.len();
         match *self {
             Law::Wider { growth } => half.iter_mut().for_each(|h| *h += 0.5 * growth),
+            Law::Lobes { deeper, half_load_n_m, .. } => {
+                for (h, load) in half.iter_mut().zip(&on.torque) {
+                    *h -= deeper * faded(*load, half_load_n_m, changed);
+                }
+            }
             Law::Wear { growth } => {
                 let mut travel = vec![0.0; n];
                 for session in &on.sessions {
@@ -338,7 +346,7 @@ impl Law {
                 let side = now.side(k);
                 let s = (now.angle(*angle, k) - direction_rad + FLANK_ANGLE_RAD * side).sin();
                 let shape = if changed { (s * s + 0.03).sqrt() } else { s.abs() };
-                error[k] -= side * amplitude * shape * now.fade(*half_load_n_m, k);
+                error[k] -= side * amplitude * shape * faded(torque[k], *half_load_n_m, changed);
             }),
             Law::Oval { amplitude, phase_rad, radial } => (0..n).for_each(|k| {
                 let more = if changed { 1.0 + 0.15 * now.side(k) } else { 1.0 };
@@ -349,11 +357,11 @@ impl Law {
                 let x = now.angle(*angle, k);
                 error[k] += lines.iter().map(|(o, a, p)| a * (o * x + p).cos()).sum::<f64>();
             }),
-            Law::Lobes { amplitude, phase_rad, half_load_n_m } => (0..n).for_each(|k| {
+            Law::Lobes { amplitude, phase_rad, half_load_n_m, .. } => (0..n).for_each(|k| {
                 let (psi, theta) = (now.angle(Angle::Flexspline, k), now.angle(Angle::CircularSpline, k));
                 let share = if changed { 0.3 } else { 0.7 };
                 let one = (psi + phase_rad).cos() + share * (theta + 2.0 * phase_rad).cos();
-                error[k] += amplitude * now.fade(*half_load_n_m, k) * one;
+                error[k] += amplitude * faded(torque[k], *half_load_n_m, changed) * one;
             }),
             Law::CamForm { amplitude, phase_rad } => {
                 // Every tooth meets the same generator: nothing repeats less often than the teeth, and the clearance is another.

@@ -46,7 +46,7 @@ impl Kind {
     }
 }
 
-/// Whose plant: three sets of laws for one plant, and two plants of their own.
+/// Whose plant: three sets of laws for one plant, and three plants of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, clap::ValueEnum)]
 pub enum Plant {
     /// The plainer textbook laws.
@@ -59,6 +59,8 @@ pub enum Plant {
     D,
     /// A slow bench for metrology: stops, weights, sessions set to zero anew.
     E,
+    /// An acceptance rig: motor against load motor, counts over a bus.
+    F,
 }
 
 impl Plant {
@@ -68,7 +70,7 @@ impl Plant {
             Self::A => Some(Family::A),
             Self::B => Some(Family::B),
             Self::C => Some(Family::C),
-            Self::D | Self::E => None,
+            Self::D | Self::E | Self::F => None,
         }
     }
 }

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::answer::Answer;
 use crate::case::{Case, Draw};
@@ -99,6 +99,21 @@ pub fn run(settings: &Settings) -> io::Result<Examination> {
     };
     fs::write(settings.out.join("exam.json"), serde_json::to_string_pretty(&examination)?)?;
     Ok(examination)
+}
+
+/// The cases of a run that was written.
+///
+/// # Errors
+/// If there is no such file, or it holds no run.
+pub fn cases(path: &Path) -> io::Result<Vec<Judged>> {
+    #[derive(Deserialize)]
+    struct Written {
+        cases: Vec<Judged>,
+    }
+    let text = fs::read_to_string(path).map_err(|error| io::Error::other(format!("{}: {error}", path.display())))?;
+    let written: Written =
+        serde_json::from_str(&text).map_err(|error| io::Error::other(format!("{}: {error}", path.display())))?;
+    Ok(written.cases)
 }
 
 fn write_truths(dir: &Path, truths: &[Truth]) -> io::Result<()> {

@@ -25,6 +25,8 @@ struct Cli {
 enum Task {
     /// Draw cases, have them diagnosed, score
     Run(Run),
+    /// Put runs together, each a directory of `run`, and score all their cases: `exam.json` and the table
+    Gather(Gather),
     /// Write one case: data, nominal model, truth, and each part of the error for plots
     Case(One),
 }
@@ -116,6 +118,18 @@ impl Demands {
 }
 
 #[derive(Args)]
+struct Gather {
+    /// Directories of runs
+    #[arg(required = true)]
+    runs: Vec<PathBuf>,
+    /// Directory for `gathered.json`
+    #[arg(long, default_value = "out/exam")]
+    out: PathBuf,
+    #[command(flatten)]
+    demands: Demands,
+}
+
+#[derive(Args)]
 struct One {
     /// Seed of the examination
     #[arg(long)]
@@ -133,6 +147,7 @@ struct One {
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Task::Run(options) => run(options),
+        Task::Gather(options) => gather(&options),
         Task::Case(options) => one(&options).map(|()| true),
     };
     match done {
@@ -191,6 +206,22 @@ fn run(options: Run) -> io::Result<bool> {
     for line in &missed {
         println!("MISSED {line}");
     }
+    Ok(missed.is_empty())
+}
+
+fn gather(options: &Gather) -> io::Result<bool> {
+    let mut cases = Vec::new();
+    for run in &options.runs {
+        cases.extend(exam::cases(&run.join("exam.json"))?);
+    }
+    let scores = Scores::of(&cases);
+    println!("{}", scores.table());
+    fs::create_dir_all(&options.out)?;
+    let told = options.out.join("gathered.json");
+    fs::write(&told, serde_json::to_string_pretty(&scores)?)?;
+    println!("all scores: {}", told.display());
+    let missed = options.demands.missed(&scores);
+    missed.iter().for_each(|line| println!("MISSED {line}"));
     Ok(missed.is_empty())
 }
 

@@ -1,6 +1,6 @@
 //! Scores: what each answer is worth beside the truth, and all of them together.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -9,8 +9,23 @@ use crate::outside::ALSO_CALLED;
 use crate::rate::Rate;
 use crate::truth::Truth;
 
+/// One name that was said.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Said {
+    /// Cause.
+    pub name: String,
+    /// As stated.
+    pub confidence: f64,
+    /// It is hidden: what a confidence promises.
+    pub right: bool,
+    /// It is hidden, or cannot be told from what is by the oracle.
+    pub alike: bool,
+    /// It is hidden, or what is hidden stands among the look-alikes that the answer lists with it.
+    pub listed: bool,
+}
+
 /// One case, judged. `None`: not asked of this case.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Judged {
     /// Directory of the data.
     pub name: String,
@@ -68,8 +83,8 @@ pub struct Judged {
     pub removed: Option<f64>,
     /// The extended model is worse than the recalibrated nominal one on held-out data.
     pub worse: Option<bool>,
-    /// (confidence, right) of each name.
-    pub confidence: Vec<(f64, bool)>,
+    /// Each name.
+    pub said: Vec<Said>,
     /// (cause, parameter, value, standard deviation, truth) of each comparable parameter.
     pub intervals: Vec<(String, String, f64, f64, f64)>,
     /// Names that were asked: (hidden, found).
@@ -111,7 +126,7 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
         false_name: None,
         removed: None,
         worse: None,
-        confidence: Vec::new(),
+        said: Vec::new(),
         intervals: Vec::new(),
         found: Vec::new(),
         seconds,
@@ -212,10 +227,17 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
     if truth.kind == "null" && is_quiet(&truth.bench) {
         judged.fault_invented = Some(!answer.data_faults.is_empty());
     }
-    judged.confidence = answer
+    let is = |name: &str| truth.kind != "outside" && truth.hidden.iter().any(|hidden| hidden.name == name);
+    judged.said = answer
         .causes
         .iter()
-        .map(|cause| (cause.confidence, is_hidden(&cause.name) && truth.kind != "outside"))
+        .map(|cause| Said {
+            name: cause.name.clone(),
+            confidence: cause.confidence,
+            right: is(&cause.name),
+            alike: is_hidden(&cause.name) && truth.kind != "outside",
+            listed: is(&cause.name) || cause.look_alikes.iter().any(|name| is(name)),
+        })
         .collect();
     if let Some(held_out) = answer.held_out {
         let (before, after) = (held_out.rms_before_arcsec.powi(2), held_out.rms_after_arcsec.powi(2));
@@ -237,42 +259,72 @@ fn is_quiet(bench: &[String]) -> bool {
     bench.iter().all(|what| what == "chamber")
 }
 
-/// Of the causes named with a confidence, how many are right.
-#[derive(Debug, Clone, Serialize)]
-pub struct Reliability {
-    /// Least and largest confidence of each bin, mean confidence of its names, and how many are right.
-    pub bins: Vec<(f64, f64, f64, Rate)>,
+/// What came of the names that were said with a confidence.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Level {
+    /// Least confidence.
+    pub from: f64,
+    /// Least confidence of the next level.
+    pub to: f64,
+    /// Mean of what was stated: what share should be right.
+    pub stated: f64,
+    /// Names that are hidden.
+    pub right: Rate,
+    /// Wilson's interval of that.
+    pub interval: (f64, f64),
+    /// Names that are hidden, or alike by the oracle.
+    pub alike: Rate,
+    /// Names that are hidden, or list what is.
+    pub listed: Rate,
 }
 
-/// Bounds of the bins. The last holds what is stated as 99 % and more.
-const CONFIDENCE: [f64; 7] = [0.0, 0.5, 0.7, 0.9, 0.97, 0.99, 1.0];
+/// Of the causes named with a confidence, how many are right.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Reliability {
+    /// From the lowest confidence to the highest.
+    pub levels: Vec<Level>,
+}
+
+/// Bounds of the levels: one of four or more, of three, of two causes alike; below and above 90 %; 99 %.
+const LEVELS: [f64; 7] = [0.0, 0.29, 0.4, 0.6, 0.895, 0.985, 1.01];
 
 impl Reliability {
-    /// From (confidence, right) of each name.
-    pub fn of(names: &[(f64, bool)]) -> Self {
-        let bins = CONFIDENCE.windows(2).map(|b| {
-            let last = b[1] == 1.0;
-            let within = names.iter().filter(|(p, _)| *p >= b[0] && (last || *p < b[1]));
-            let within: Vec<_> = within.collect();
-            let mean = within.iter().map(|(p, _)| p).sum::<f64>() / within.len().max(1) as f64;
-            (b[0], b[1], mean, Rate::over(within.iter().map(|(_, right)| Some(*right))))
+    /// From names.
+    pub fn of<'a>(names: impl IntoIterator<Item = &'a Said>) -> Self {
+        let names: Vec<_> = names.into_iter().collect();
+        let levels = LEVELS.windows(2).map(|bounds| {
+            let (from, to) = (bounds[0], bounds[1]);
+            let within: Vec<_> = names.iter().filter(|said| (from..to).contains(&said.confidence)).collect();
+            let rate = |is: &dyn Fn(&Said) -> bool| Rate::over(within.iter().map(|said| Some(is(said))));
+            let stated = within.iter().map(|said| said.confidence).sum::<f64>() / within.len().max(1) as f64;
+            let right = rate(&|said| said.right);
+            let (alike, listed) = (rate(&|said| said.alike), rate(&|said| said.listed));
+            Level { from, to, stated, right, interval: right.interval(), alike, listed }
         });
-        Self { bins: bins.collect() }
+        Self { levels: levels.filter(|level| level.right.of > 0).collect() }
     }
 
     fn write(&self, text: &mut String) {
-        for (from, to, mean, rate) in self.bins.iter().filter(|(.., rate)| rate.of > 0) {
-            let _ = writeln!(text, "  {from:.2} .. {to:.2} (mean {mean:.3}) {rate}");
+        for level in &self.levels {
+            let _ = writeln!(
+                text,
+                "  {:5.1} %   {}   alike {:>3}   listed {:>3}",
+                100.0 * level.stated,
+                level.right,
+                level.alike.right,
+                level.listed.right
+            );
         }
     }
 }
 
 /// What is told of each family.
-const OF_A_FAMILY: [&str; 13] = [
+const OF_A_FAMILY: [&str; 14] = [
     "first_name",
     "first_name_or_listed",
     "exact",
     "compound_exact",
+    "two_exact",
     "false_name",
     "null_named",
     "null_not_none",
@@ -305,11 +357,13 @@ fn rates_of(cases: &[&Judged]) -> Vec<(&'static str, Rate)> {
         ("first_name_family_c", rate(&|j| when(single(j) && j.family == "C", j.first))),
         ("first_name_family_d", rate(&|j| when(single(j) && j.family == "D", j.first))),
         ("first_name_family_e", rate(&|j| when(single(j) && j.family == "E", j.first))),
+        ("first_name_family_f", rate(&|j| when(single(j) && j.family == "F", j.first))),
         ("first_name_strict", rate(&|j| when(single(j), j.first_strict))),
         ("first_name_or_listed", rate(&|j| when(single(j), j.first_or_listed))),
         ("exact", rate(&|j| when(single(j), j.exact))),
         ("compound_first", rate(&|j| when(j.kind == "compound", j.first))),
         ("compound_exact", rate(&|j| when(j.kind == "compound", j.exact))),
+        ("two_exact", rate(&|j| when(j.kind == "compound" && j.hidden.len() == 2, j.exact))),
         ("false_name", rate(&|j| j.false_name)),
         ("null_named", rate(&|j| j.null_named)),
         ("null_not_none", rate(&|j| j.null_not_none)),
@@ -342,6 +396,8 @@ pub struct Scores {
     pub reliability: Reliability,
     /// The same of each family.
     pub reliability_by_family: Vec<(String, Reliability)>,
+    /// Names said with 90 % or more that are right, by cause.
+    pub sure_by_cause: BTreeMap<String, Rate>,
     /// Rates of each family.
     pub families: Vec<(String, Vec<(&'static str, Rate)>)>,
     /// First name right where the bench does this beside the drive, or nothing (singles that count).
@@ -381,16 +437,21 @@ impl Scores {
         let mean = removed.iter().sum::<f64>() / count;
         let spread = (removed.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count / count).sqrt();
 
-        let names: Vec<(f64, bool)> = all.iter().flat_map(|j| j.confidence.iter().copied()).collect();
+        let names: Vec<&Said> = all.iter().flat_map(|j| &j.said).collect();
+        let mut sure_by_cause: BTreeMap<String, Rate> = BTreeMap::new();
+        for said in names.iter().filter(|said| said.confidence >= 0.9) {
+            let rate = sure_by_cause.entry(said.name.clone()).or_default();
+            rate.of += 1;
+            rate.right += usize::from(said.right);
+        }
         let mut families: Vec<String> = all.iter().map(|j| j.family.clone()).collect();
         families.sort();
         families.dedup();
         let reliability_by_family = families
             .iter()
             .map(|family| {
-                let of: Vec<_> =
-                    all.iter().filter(|j| j.family == *family).flat_map(|j| j.confidence.clone()).collect();
-                (family.clone(), Reliability::of(&of))
+                let of = all.iter().filter(|j| j.family == *family).flat_map(|j| &j.said);
+                (family.clone(), Reliability::of(of))
             })
             .collect();
         let families = families
@@ -403,9 +464,9 @@ impl Scores {
                 (family, rates)
             })
             .collect();
-        let brier = names.iter().map(|(p, right)| (p - f64::from(u8::from(*right))).powi(2)).sum::<f64>()
+        let brier = names.iter().map(|said| (said.confidence - f64::from(u8::from(said.right))).powi(2)).sum::<f64>()
             / names.len().max(1) as f64;
-        let reliability = Reliability::of(&names);
+        let reliability = Reliability::of(names);
 
         let mut benches: Vec<&String> = all.iter().flat_map(|j| &j.bench).collect();
         benches.sort();
@@ -445,6 +506,7 @@ impl Scores {
             brier,
             reliability,
             reliability_by_family,
+            sure_by_cause,
             families,
             by_bench,
             by_size,
@@ -484,13 +546,21 @@ impl Scores {
                 }
             }
         }
-        text.push_str("\nnamed with a confidence: of these right\n");
+        text.push_str(
+            "\nstated (mean): of these right; right or alike by the oracle; right or listed beside the name\n",
+        );
         self.reliability.write(&mut text);
         if self.reliability_by_family.len() > 1 {
             for (family, reliability) in &self.reliability_by_family {
                 let _ = writeln!(text, "  family {family}");
                 reliability.write(&mut text);
             }
+        }
+        let wrong = self.sure_by_cause.iter().filter(|(_, rate)| rate.right < rate.of);
+        let mut wrong: Vec<_> = wrong.map(|(cause, rate)| format!("{cause} {}/{}", rate.right, rate.of)).collect();
+        if !wrong.is_empty() {
+            wrong.sort();
+            let _ = writeln!(text, "  with 90 % or more, right less than always: {}", wrong.join(", "));
         }
         if !self.by_bench.is_empty() {
             text.push_str("\nsingles by what the bench does: first name right\n");
@@ -537,10 +607,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_confidence_falls_into_one_bin() {
+    fn a_confidence_falls_into_one_level() {
+        let said =
+            |confidence: f64, right: bool| Said { name: "wear".into(), confidence, right, alike: true, listed: right };
         let names =
-            [(0.5, true), (0.69, false), (0.7, true), (0.97, true), (0.9899, false), (0.99, true), (1.0, false)];
-        let counts: Vec<_> = Reliability::of(&names).bins.iter().map(|(.., rate)| (rate.right, rate.of)).collect();
-        assert_eq!(counts, [(0, 0), (1, 2), (1, 1), (0, 0), (1, 2), (1, 2)]);
+            [(0.25, true), (1.0 / 3.0, false), (0.5, true), (0.5, false), (0.97, true), (0.9, false), (0.99, true)];
+        let names = names.map(|(confidence, right)| said(confidence, right));
+        let levels = Reliability::of(&names).levels;
+        let counts: Vec<_> =
+            levels.iter().map(|level| (level.right.right, level.right.of, level.alike.right)).collect();
+        assert_eq!(counts, [(1, 1, 1), (0, 1, 1), (1, 2, 2), (1, 2, 2), (1, 1, 1)]);
+        assert!((levels[3].stated - 0.935).abs() < 1e-12);
     }
 }

@@ -1,5 +1,6 @@
 //! The examiner examined: answers whose scores are known beforehand.
 
+use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::sync::LazyLock;
@@ -17,7 +18,7 @@ fn examine(dir: &Path, mock: &[&str], more: &[&str]) -> (Value, bool) {
         command.arg(format!("--diagnoser-arg={argument}"));
     }
     let output = command.args(more).arg("--out").arg(dir).output().unwrap();
-    let text = std::fs::read_to_string(dir.join("exam.json")).unwrap();
+    let text = fs::read_to_string(dir.join("exam.json")).unwrap();
     (serde_json::from_str(&text).unwrap(), output.status.success())
 }
 
@@ -104,16 +105,38 @@ fn a_plant_of_its_own_is_scored_by_the_same_rules() {
     for name in ["false_name", "null_named", "outside_named", "failed"] {
         none(&exam, name);
     }
-    // Its names are stated as certain and are right, so the last bin holds all of them.
-    let bins = exam["scores"]["reliability"]["bins"].as_array().unwrap();
-    let (last, others) = bins.split_last().unwrap();
-    assert!(last[3]["of"].as_u64().unwrap() >= 12 && last[3]["of"] == last[3]["right"], "{last}");
-    assert!(others.iter().all(|bin| bin[3]["of"] == 0));
+    // Its names are stated as certain and are right, so one level holds all of them.
+    let levels = exam["scores"]["reliability"]["levels"].as_array().unwrap();
+    assert_eq!(levels.len(), 1);
+    let right = &levels[0]["right"];
+    assert!(right["of"].as_u64().unwrap() >= 12 && right["of"] == right["right"], "{right}");
     assert_eq!(exam["scores"]["families"][0][0], "E");
     let (exam, _) = examine(dir.path(), &["--manner", "always"], &bench);
     all(&exam, "null_named");
     all(&exam, "outside_named");
-    assert!(exam["scores"]["reliability"]["bins"][5][3]["right"].as_u64().unwrap() < 5);
+    assert!(exam["scores"]["reliability"]["levels"][0]["right"]["right"].as_u64().unwrap() < 5);
+}
+
+#[test]
+fn runs_are_gathered_into_the_scores_of_all_their_cases() {
+    let dir = tempfile::tempdir().unwrap();
+    let parts = ["null", "outside"].map(|kind| {
+        let part = dir.path().join(kind);
+        let (exam, _) = examine(&part, &["--manner", "always"], &["--cases", "3", "--kind", kind]);
+        (part, exam["scores"]["reliability"]["levels"][0]["right"]["of"].as_u64().unwrap())
+    });
+    let out = Command::new(env!("CARGO_BIN_EXE_flexspline-exam"))
+        .arg("gather")
+        .args(parts.iter().map(|(part, _)| part))
+        .arg("--out")
+        .arg(dir.path())
+        .output()
+        .unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let scores = fs::read_to_string(dir.path().join("gathered.json")).unwrap();
+    let scores: Value = serde_json::from_str(&scores).unwrap();
+    assert_eq!(scores["cases"], 6);
+    assert_eq!(scores["reliability"]["levels"][0]["right"]["of"], parts[0].1 + parts[1].1);
 }
 
 #[test]

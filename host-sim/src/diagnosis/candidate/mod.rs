@@ -126,7 +126,7 @@ impl<'a> Excitation<'a> {
     }
 
     /// From the least output angle to the largest, rad.
-    fn output_span_rad(&self) -> f64 {
+    pub fn output_span_rad(&self) -> f64 {
         let (low, high) = least_and_most(self.rows.output.iter().copied());
         (high - low).max(0.0)
     }

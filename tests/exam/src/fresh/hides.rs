@@ -1,4 +1,4 @@
-//! What is hidden in a case of families D and E: a cause of the contract, or something that no cause of it is.
+//! What is hidden in a case of families D, E and F: a cause of the contract, or something that no cause of it is.
 
 use serde::{Serialize, Serializer};
 
@@ -34,6 +34,9 @@ strangers! {
     IndexTable "index_table_error",
     SwingingWeight "swinging_weight",
     AirConditioning "air_conditioning",
+    EncoderGear "encoder_driven_by_a_pinion",
+    SlippingClamp "slipping_clamp",
+    TorqueFilter "torque_behind_a_filter",
 }
 
 impl Stranger {
@@ -46,6 +49,8 @@ impl Stranger {
         Self::FloorVibration,
         Self::TorqueFromCurrent,
     ];
+    /// Those of an acceptance rig.
+    pub const OF_RIGS: &[Self] = &[Self::EncoderGear, Self::SlippingClamp, Self::TorqueFilter, Self::CableSpring];
     /// Those of a bench for metrology.
     pub const OF_BENCHES: &[Self] =
         &[Self::PolygonFaces, Self::SlowCreep, Self::IndexTable, Self::SwingingWeight, Self::AirConditioning];
@@ -152,6 +157,7 @@ impl Hides {
             Thing::Cause(Cause::SensorLatency) => "delay_s",
             Thing::Cause(Cause::Ratcheting) => "teeth",
             Thing::Stranger(Stranger::TorqueFromCurrent) => "share",
+            Thing::Stranger(Stranger::TorqueFilter) => "delay_ms",
             _ => "amplitude_arcsec",
         }
     }
@@ -178,6 +184,7 @@ pub fn range(thing: Thing, drive: &Drive) -> (f64, f64) {
             _ => (1.0, 70.0),
         },
         Thing::Stranger(Stranger::TorqueFromCurrent) => (0.1, 1.0),
+        Thing::Stranger(Stranger::TorqueFilter) => (2.0, 300.0),
         Thing::Stranger(_) => (1.0, 40.0),
     }
 }

@@ -1,4 +1,4 @@
-//! Families D and E, and perfect drives under faults of the logger: plants of their own that share nothing with families A to C
+//! Families D, E and F, and perfect drives under faults of the logger: plants of their own that share nothing with families A to C
 //! but the catalogue's drive, the noise of the sensors and the scores.
 
 pub mod gear;
@@ -7,6 +7,7 @@ pub mod joint;
 pub mod logger;
 pub mod metrology;
 pub mod oracle;
+pub mod rig;
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -25,6 +26,7 @@ use joint::Joint;
 use logger::LoggerFault;
 use metrology::Metrology;
 use oracle::{Oracle, residual};
+use rig::Rig;
 
 /// What the drive stands on.
 #[derive(Debug, Clone)]
@@ -33,9 +35,11 @@ pub enum Stand {
     Joint(Joint),
     /// Family E.
     Bench(Metrology),
+    /// Family F.
+    Rig(Rig),
 }
 
-/// A case of family D or E, or a perfect drive under a fault of the logger.
+/// A case of family D, E or F, or a perfect drive under a fault of the logger.
 #[derive(Debug, Clone)]
 pub struct Fresh {
     seed: u64,
@@ -89,6 +93,14 @@ impl Fresh {
             sensors.wander_s = chance.log_uniform(60.0, 600.0);
             sensors.output_step_rad = std::f64::consts::TAU / f64::from(1 << 24);
             Stand::Bench(Metrology::draw(&drive, &things, &mut chance))
+        } else if plant == Plant::F {
+            // Counts: 15 to 17 bit in a turn of the motor, 19 to 22 bit of the output.
+            sensors.white_arcsec *= 0.5;
+            sensors.wander_arcsec *= 0.5;
+            let step = |bits: usize| std::f64::consts::TAU / f64::from(1 << bits);
+            sensors.generator_step_rad = step(15 + chance.below(3));
+            sensors.output_step_rad = step(19 + chance.below(4));
+            Stand::Rig(Rig::draw(&drive, &mut chance))
         } else {
             let mut joint = Joint::draw(&drive, &mut chance);
             if let Some(fault) = fault {
@@ -117,7 +129,11 @@ impl Fresh {
     /// Sizes what is hidden through the oracle, and weighs it.
     fn hide(&mut self, things: Vec<Thing>, chance: &mut Chance) {
         let (motion, readings) = self.run(&[]);
-        let jitter_s = if let Stand::Joint(joint) = &self.stand { Some(joint.poll.jitter_s) } else { None };
+        let jitter_s = match &self.stand {
+            Stand::Joint(joint) => Some(joint.poll.jitter_s),
+            Stand::Rig(rig) => Some(rig.jitter_s),
+            Stand::Bench(_) => None,
+        };
         let zeroed = matches!(&self.stand, Stand::Bench(bench) if bench.zeroed || bench.restarted);
         let oracle = Oracle::new(&self.drive, &self.unit, &motion, &readings, &self.sensors, jitter_s, zeroed);
         self.floor_arcsec = oracle.floor_arcsec.hypot(self.sensors.wander_arcsec);
@@ -174,7 +190,7 @@ impl Fresh {
 
     fn parameters(&self, one: &Hides) -> BTreeMap<String, f64> {
         let Thing::Cause(cause) = one.thing else { return BTreeMap::new() };
-        let joint = matches!(self.stand, Stand::Joint(_));
+        let joint = !matches!(self.stand, Stand::Bench(_));
         let named = match cause {
             Cause::StiffnessError => Some(("stiffness_ratio", self.unit.stiffness * (1.0 + one.size))),
             Cause::BacklashGrowth if joint => {
@@ -197,6 +213,7 @@ impl Fresh {
         match &self.stand {
             Stand::Joint(joint) => joint.run(&self.drive, &self.unit, hidden),
             Stand::Bench(bench) => bench.run(&self.drive, &self.unit, hidden),
+            Stand::Rig(rig) => rig.run(&self.drive, &self.unit, hidden),
         }
     }
 
@@ -285,6 +302,7 @@ impl Fresh {
             (_, Kind::Logger) => "logger",
             (Stand::Joint(_), _) => "D",
             (Stand::Bench(_), _) => "E",
+            (Stand::Rig(_), _) => "F",
         };
         Truth {
             name,
@@ -318,6 +336,7 @@ fn plan(
     }
     let (causes, strangers) = match plant {
         Plant::E => (hides::OF_BENCHES, Stranger::OF_BENCHES),
+        Plant::F => (Cause::ALL, Stranger::OF_RIGS),
         _ => (Cause::ALL, Stranger::OF_JOINTS),
     };
     let mut kinds = [Kind::Single; BLOCK as usize];

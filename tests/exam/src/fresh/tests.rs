@@ -39,6 +39,23 @@ fn a_perfect_joint_returns_the_error_of_the_catalogue() {
     }
 }
 
+/// So does a perfect rig, whose catalogue is at rest in the rows in which the load crosses the clearance alone.
+#[test]
+fn a_perfect_rig_returns_the_error_of_the_catalogue() {
+    for index in 0..4 {
+        let (drive, mut chance) = drive(index);
+        let mut rig = Rig::draw(&drive, &mut chance);
+        rig.jitter_s = 0.0;
+        let (motion, readings) = rig.run(&drive, &Unit::nominal(&drive), &[]);
+        let left = residual(&drive, &motion, &readings);
+        let [half, most, nearly_all] = quantiles(&left);
+        println!("{index}: {half:.4} {most:.3} {nearly_all:.3} rms {:.3} turns {:.0}", rms(&left), motion.turns());
+        assert!(half < 0.01 && most < 0.1, "{index}: {half} {most} arcsec");
+        assert!(left.iter().all(|x| x.abs() < 1.05 * drive.backlash_arcsec), "{index}");
+        assert!(motion.turns() > 47.5, "half an output turn at ratio 95: {}", motion.turns());
+    }
+}
+
 #[test]
 fn a_perfect_bench_returns_the_error_of_the_catalogue() {
     for index in 0..6 {
@@ -94,12 +111,18 @@ fn every_effect_shows_and_vanishes_with_its_size() {
     };
     let of_benches = things(hides::OF_BENCHES, Stranger::OF_BENCHES);
     let bench = Metrology::draw(&drive, &of_benches, &mut chance);
-    let stands = [(Stand::Joint(joint), things(Cause::ALL, Stranger::OF_JOINTS)), (Stand::Bench(bench), of_benches)];
+    let rig = Rig::draw(&drive, &mut chance);
+    let stands = [
+        (Stand::Joint(joint), things(Cause::ALL, Stranger::OF_JOINTS)),
+        (Stand::Bench(bench), of_benches),
+        (Stand::Rig(rig), things(Cause::ALL, Stranger::OF_RIGS)),
+    ];
     for (stand, things) in stands {
         let run = |hidden: &[Hides]| {
             let (motion, readings) = match &stand {
                 Stand::Joint(joint) => joint.run(&drive, &unit, hidden),
                 Stand::Bench(bench) => bench.run(&drive, &unit, hidden),
+                Stand::Rig(rig) => rig.run(&drive, &unit, hidden),
             };
             residual(&drive, &motion, &readings)
         };
@@ -107,22 +130,22 @@ fn every_effect_shows_and_vanishes_with_its_size() {
         for thing in things {
             let (low, high) = range(thing, &drive);
             let mut one = Hides::draw(thing, &drive, &mut chance);
-            let added = |one: &Hides| {
+            let added = |one: &Hides, rows: f64| {
                 let with = run(std::slice::from_ref(one));
                 assert!(with.iter().all(|x| x.is_finite()), "{}", thing.name());
                 let mut sizes: Vec<f64> = with.iter().zip(&clean).map(|(a, b)| (a - b).abs()).collect();
                 sizes.sort_by(f64::total_cmp);
-                // Single rows in which a flank changes a little earlier are left out.
-                rms(&sizes[..sizes.len() * 99 / 100])
+                rms(&sizes[..(rows * sizes.len() as f64) as usize])
             };
             one.size = high.copysign(one.size);
-            let most = added(&one);
+            let most = added(&one, 0.99);
             if thing == Thing::Cause(Cause::Ratcheting) {
                 assert!(most > 100.0, "{most}");
                 continue;
             }
             one.size = (1e-4 * low).copysign(one.size);
-            let least = added(&one);
+            // While the friction of the hub holds the load, the catalogue's model may stand on either flank.
+            let least = added(&one, 0.9);
             println!("{:<36} {least:.4} {most:.2}", thing.name());
             assert!(most > 0.8 && least < 0.3 * most && least < 0.2, "{}: {least} {most}", thing.name());
         }
@@ -137,7 +160,7 @@ fn a_seed_repeats_a_case_and_the_data_hold_no_truth() {
         #[command(flatten)]
         draw: Draw,
     }
-    for options in [["--family", "d"], ["--family", "e"], ["--kind", "logger"]] {
+    for options in [["--family", "d"], ["--family", "e"], ["--family", "f"], ["--kind", "logger"]] {
         let draw = Options::parse_from(["exam"].into_iter().chain(options)).draw;
         assert!(draw.is_fresh());
         for index in [3] {
@@ -174,7 +197,7 @@ fn each_fault_of_a_logger_leaves_a_mark() {
                 let poll = Poll { late_reads: 0.0, stalls_s: (0.0, 0.0), counted: None, ..EXACT(joint.poll) };
                 Fresh { fault: None, stand: Stand::Joint(joint.polled(poll)), ..case.clone() }
             }
-            Stand::Bench(_) => unreachable!("faults of loggers are those of joints"),
+            Stand::Bench(_) | Stand::Rig(_) => unreachable!("faults of loggers are those of joints"),
         };
         assert!(with != (clean.data(), clean.nominal_toml()), "{}", fault.name());
         assert_eq!(case.unit, Unit::nominal(&case.drive), "a perfect drive");
