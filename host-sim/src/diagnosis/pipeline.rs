@@ -258,11 +258,15 @@ fn rows_of(
 ) -> Result<Recording, PipelineError> {
     let mut recording = in_radians()?;
     subject.take_away_known(&mut recording)?;
-    if subject.model.is_some() && channels::are_in_degrees(&recording, &subject.nominal) {
-        recording = in_degrees()?;
-        subject.take_away_known(&mut recording)?;
+    let (nominal, table) = subject.against();
+    if channels::may_be_in_degrees(&recording, nominal, table) {
+        let mut converted = in_degrees()?;
+        subject.take_away_known(&mut converted)?;
+        if channels::is_explained(&converted, nominal, table) {
+            recording = converted;
+        }
     }
-    recording.unusable = channels::check_torque(&mut recording, &subject.nominal);
+    recording.unusable = channels::check_torque(&mut recording, nominal, table);
     recording.notes.extend(quieted::torque(&mut recording.sessions, &subject.nominal));
     if recording.unusable.is_none() {
         torque_zero::check(&mut recording, &subject.nominal, subject.table.as_ref());

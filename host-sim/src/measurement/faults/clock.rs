@@ -27,6 +27,18 @@ const FASTEST_RAD_S: f64 = 2100.0;
 /// Rows farther apart than this (s), for longer than this altogether (s), in which the motor stays slower than this (rad/s), are milliseconds
 /// read as seconds: a bench creeps for minutes, not for days. *Guess*.
 const CREEPS: (f64, f64, f64) = (1.0, 43_200.0, 0.1);
+/// The same of a motor that goes to and fro: a telescope creeps for nights, but one way. *Guess*.
+const CREEPS_TO_AND_FRO: (f64, f64, f64) = (0.9, 3600.0, 0.15);
+/// It goes to and fro where each direction has this share of the way, of so many radians at least.
+const EACH_WAY: (f64, f64) = (0.1, 6.0);
+/// And never changes its pace by more than this share of its fastest one from row to row. *Guess*.
+const SMOOTHLY: f64 = 0.35;
+/// What milliseconds read as seconds are divided by.
+const MILLI: f64 = 1e3;
+/// Of the distance of a stamp from where it is expected the phase takes this share, and the period this one: a loop that follows a clock and
+/// averages some forty stamps.
+const PHASE_GAIN: f64 = 0.05;
+const PERIOD_GAIN: f64 = 0.5 * PHASE_GAIN * PHASE_GAIN;
 
 /// Finds faults of the clock, repairs or leaves out what they touch, and parts the rows into sessions.
 pub(in crate::measurement) fn check(log: &mut Log, findings: &mut Findings) {
@@ -186,14 +198,16 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
         let near = strays.iter().any(|line| line.abs_diff(log.line[*row]) <= 2);
         *rows > 0 && !near
     });
-    let total: u64 = lost.iter().map(|(_, rows)| *rows).sum();
-    if let (Some(&(first, _)), Some(&(last, _))) = (lost.first(), lost.last()) {
+    // Stamps that jitter make single steps long; rows are missing only where the stamps of a whole session count more periods than rows.
+    let lacking = counted(log, period).map(|count| count.lacking).sum::<u64>().saturating_sub(strays.len() as u64);
+    let total = lost.iter().map(|(_, rows)| *rows).sum::<u64>().min(lacking);
+    if let (Some(&(first, _)), Some(&(last, _)), 1..) = (lost.first(), lost.last(), total) {
         if long_steps as f64 <= UNEVEN_SHARE * rows as f64 {
             let mut fault = span(log, FaultName::MissingSamples, first, last);
             (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), total, Treatment::Kept);
             fault.what = format!(
-                "{total} rows are missing in {} places: time goes on by more than {LOST_ROW_PERIODS} of the usual {period:.6} s",
-                lost.len()
+                "{total} rows are missing, in up to {} places: time goes on by more than {LOST_ROW_PERIODS} of the usual {period:.6} s",
+                lost.len().min(total as usize)
             );
             findings.faults.push(fault);
         } else {
@@ -215,6 +229,37 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
         }
         log.session = session;
     }
+}
+
+/// The rows of a session by the periods that its stamps count.
+struct Counted {
+    rows: std::ops::Range<usize>,
+    /// Period that each row belongs to, from 0; each row has one of its own.
+    period: Vec<u64>,
+    /// Periods without a row.
+    lacking: u64,
+}
+
+/// Counts the periods of each session along its stamps with a phase-locked loop, so that their scatter does not add up.
+fn counted(log: &Log, period_s: f64) -> impl Iterator<Item = Counted> + '_ {
+    let time = log.get(Quantity::Time).unwrap_or_default();
+    let mut begin = 0;
+    let ends = (1..=time.len()).filter(|row| *row == time.len() || !log.continues(*row));
+    ends.map(move |end| {
+        let rows = std::mem::replace(&mut begin, end)..end;
+        let (mut expected, mut step_s, mut count) = (time[rows.start], period_s, 0u64);
+        let mut period = vec![0];
+        for row in rows.start + 1..rows.end {
+            let steps = ((time[row] - expected) / step_s).round().max(0.0);
+            count += steps as u64;
+            let off = time[row] - expected - steps * step_s;
+            expected += steps * step_s + PHASE_GAIN * off;
+            step_s = (step_s + PERIOD_GAIN * off / steps.max(1.0)).clamp(0.9 * period_s, 1.1 * period_s);
+            // Two stamps that scatter into one period are of two.
+            period.push(count.max(period[period.len() - 1] + 1));
+        }
+        Counted { lacking: count.saturating_sub(rows.len() as u64 - 1), rows, period }
+    })
 }
 
 /// Stamps that scatter while the motion from row to row does not.
@@ -247,20 +292,19 @@ fn jitter(log: &mut Log, period: f64, findings: &mut Findings) {
         100.0 * motion_scatter
     );
     findings.faults.push(fault);
-    let ends: Vec<usize> = (1..=log.len()).filter(|row| *row == log.len() || !log.continues(*row)).collect();
+    let sessions: Vec<Counted> = counted(log, period).collect();
     let Some(time) = log.get_mut(Quantity::Time) else { return };
-    let mut begin = 0;
-    for end in ends {
-        let (from, to, last) = (time[begin], time[end - 1], (end - 1 - begin).max(1) as f64);
-        for row in begin..end {
-            time[row] = from + (to - from) * (row - begin) as f64 / last;
+    for Counted { rows, period, .. } in sessions {
+        let (from, to) = (time[rows.start], time[rows.end - 1]);
+        let last = period[period.len() - 1].max(1) as f64;
+        for (row, period) in rows.zip(period) {
+            time[row] = from + (to - from) * period as f64 / last;
         }
-        begin = end;
     }
 }
 
 /// A period or a speed that does not exist: a unit of time taken for another.
-fn scale(log: &Log, period: f64, findings: &mut Findings) {
+fn scale(log: &mut Log, period: f64, findings: &mut Findings) {
     let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else { return };
     let mut speeds: Vec<f64> = (1..time.len())
         .filter(|row| log.continues(*row) && time[*row] > time[*row - 1])
@@ -269,14 +313,24 @@ fn scale(log: &Log, period: f64, findings: &mut Findings) {
         .collect();
     let (speed, fastest) = (median_of(&mut speeds), quantile_of(&mut speeds, 0.95));
     let lasts_s = period * time.len() as f64;
-    let creeps = period > CREEPS.0 && lasts_s > CREEPS.1 && fastest < CREEPS.2;
+    let slower = |limits: (f64, f64, f64)| period > limits.0 && lasts_s > limits.1 && fastest < limits.2;
+    let moves = || (1..time.len()).filter(|row| log.continues(*row)).map(|row| turned(generator, row));
+    let way = |sign: f64| moves().map(|by| (sign * by).max(0.0)).sum::<f64>();
+    let (there, back) = (way(1.0), way(-1.0));
+    let to_and_fro = there.min(back) > EACH_WAY.1.max(EACH_WAY.0 * (there + back));
+    // A motor that creeps starts and turns round within a row; one that takes many rows to do so is a fast one.
+    let changes = (2..time.len()).filter(|row| log.continues(*row) && log.continues(row - 1));
+    let change = changes.map(|row| (turned(generator, row) - turned(generator, row - 1)).abs()).fold(0.0, f64::max);
+    let smoothly = change < SMOOTHLY * fastest * period;
+    let in_milliseconds = to_and_fro && smoothly && slower(CREEPS_TO_AND_FRO);
+    let creeps = slower(CREEPS) || in_milliseconds;
     let what = if !(PERIODS_S[0]..=PERIODS_S[1]).contains(&period) {
         format!("a sample period of {period:e} s is not plausible")
     } else if speed > FASTEST_RAD_S {
         format!("a generator speed of {speed:.0} rad/s is not plausible")
     } else if creeps {
         format!(
-            "{} rows {period:.3} s apart, {:.0} hours in which the generator never exceeds {fastest:.3} rad/s, are milliseconds rather than \
+            "{} rows {period:.3} s apart, {:.1} hours in which the generator hardly exceeds {fastest:.3} rad/s, are milliseconds rather than \
              seconds",
             time.len(),
             lasts_s / 3600.0
@@ -286,6 +340,12 @@ fn scale(log: &Log, period: f64, findings: &mut Findings) {
     };
     let mut fault = span(log, FaultName::ClockError, 0, log.len() - 1);
     (fault.channel, fault.treatment) = (Some(Quantity::Time), Treatment::Kept);
-    fault.what = format!("{what}: is the unit of time right?");
+    if in_milliseconds {
+        fault.treatment = Treatment::Repaired;
+        fault.what = format!("{what}, as it takes its speed and turns round over many rows: time was divided by 1000");
+        log.get_mut(Quantity::Time).into_iter().flatten().for_each(|time| *time /= MILLI);
+    } else {
+        fault.what = format!("{what}: is the unit of time right?");
+    }
     findings.faults.push(fault);
 }

@@ -16,7 +16,7 @@ const STEADY: f64 = 0.25;
 const EXTRA_ROWS: f64 = 0.8;
 /// …and the output takes part in it, within this share.
 const TOGETHER: f64 = 0.3;
-/// In one row both angles move by so many times their own scatter.
+/// In one row the generator moves by so many times its own scatter, and in a leap both angles do.
 const OVER_NOISE: f64 = 8.0;
 /// So many leaps are stalls, at least…
 const FEWEST: usize = 8;
@@ -75,7 +75,8 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
         let third = values.windows(4).map(|v| (v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]).abs()).collect::<Vec<f64>>();
         median_of(&mut sampled(&third))
     };
-    let least = OVER_NOISE * scatter(generator).max(gear.ratio.abs() * scatter(output));
+    let least = OVER_NOISE * scatter(generator);
+    let least_leap = least.max(OVER_NOISE * gear.ratio.abs() * scatter(output));
     let (mut found, mut telling) = (Vec::new(), 0);
     for row in BESIDE + 1..log.len().saturating_sub(BESIDE) {
         let near = row - BESIDE..=row + BESIDE;
@@ -98,7 +99,8 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
         let dt = time[row] - time[row - 1];
         let extra_s = (generator[row] - generator[row - 1]) / usual - dt;
         let by_output = (output[row] - output[row - 1]) * gear.ratio / usual - dt;
-        if extra_s > EXTRA_ROWS * period_s && (by_output - extra_s).abs() < TOGETHER * extra_s {
+        let is_seen = extra_s * usual.abs() > least_leap;
+        if extra_s > EXTRA_ROWS * period_s && is_seen && (by_output - extra_s).abs() < TOGETHER * extra_s {
             found.push((row, extra_s));
         }
     }
