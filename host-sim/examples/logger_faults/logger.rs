@@ -146,6 +146,8 @@ pub struct Log {
     pub missing: usize,
     /// Size of the fault, in words.
     pub size: String,
+    /// Whether the rows can show it at all.
+    pub shows: bool,
 }
 
 /// Median of the size of the generator's speed while it turns, rad/s.
@@ -174,13 +176,14 @@ pub fn log(wrong: Wrong, bench: &Bench, drive: &Drive<'_>, truths: &[Truth], cha
         swapped: wrong == Wrong::SwappedColumns,
         missing: 0,
         size: String::new(),
+        shows: true,
     };
     let timing = Timing::drawn(wrong, bench, drive, truths, chance, &mut log.size);
     let values = Values::drawn(wrong, bench, drive, chance, &mut log.size);
     for (number, truth) in truths.iter().enumerate() {
         let reads = timing.reads(bench, truth, chance);
         let mut rows: Vec<Row> = reads.iter().map(|at| read(bench, truth, *at, chance)).collect();
-        values.spoil(number, bench, drive, &mut rows, chance);
+        values.spoil(number, drive, &mut rows, chance);
         if wrong == Wrong::MissingRows {
             let before = rows.len();
             let (first, last) = (rows[0], rows[before - 1]);
@@ -189,7 +192,30 @@ pub fn log(wrong: Wrong, bench: &Bench, drive: &Drive<'_>, truths: &[Truth], cha
         }
         log.sessions.push(rows);
     }
+    log.shows = shows(wrong, bench, drive, truths, &log.sessions);
     log
+}
+
+/// Whether rows can show what is wrong: where it changes nothing that is read, there is nothing to tell.
+fn shows(wrong: Wrong, bench: &Bench, drive: &Drive<'_>, truths: &[Truth], sessions: &[Vec<Row>]) -> bool {
+    let count = |of: &dyn Fn(&[Row; 2]) -> bool| {
+        sessions.iter().flat_map(|rows| rows.windows(2)).filter(|pair| of(&[pair[0], pair[1]])).count()
+    };
+    let rows = sessions.iter().map(Vec::len).sum::<usize>() as f64;
+    match wrong {
+        Wrong::RegisterWraps => count(&|[before, after]| (after[GENERATOR] - before[GENERATOR]).abs() > TAU) > 0,
+        // A load that is put on in steps may never come near the zero.
+        Wrong::TorqueZero => {
+            let other_side = |(truth, rows): (&Truth, &Vec<Row>)| {
+                rows.iter().filter(|row| truth.at(row[TIME])[2] * row[TORQUE] < 0.0).count()
+            };
+            truths.iter().zip(sessions).map(other_side).sum::<usize>() as f64 > 0.01 * rows
+        }
+        Wrong::TorqueSign | Wrong::TorqueOfMotor => {
+            drive.subject.nominal.wind_up_arcsec(bench.load_n_m) > 8.0 * bench.noise_arcsec
+        }
+        _ => true,
+    }
 }
 
 /// One row as its encoders and sensors give it.
@@ -345,7 +371,9 @@ impl Values {
                 values.share = chance.between([0.5, 0.8]);
                 values.size = values.share * bench.load_n_m;
             }
-            Wrong::CounterSlips => values.size = bench.noise_arcsec * ARCSEC * chance.by_ratio([15.0, 80.0]),
+            Wrong::CounterSlips => {
+                values.size = chance.sign() * bench.noise_arcsec * ARCSEC * chance.by_ratio([15.0, 80.0]);
+            }
             // Pole pairs of the motor, and six commutations for each.
             Wrong::MotorRipple => {
                 values.share = *chance.of(&[4.0, 5.0, 7.0, 8.0, 10.0]) * *chance.of(&[1.0, 2.0, 6.0]);
@@ -359,7 +387,7 @@ impl Values {
         values
     }
 
-    fn spoil(&self, session: usize, bench: &Bench, drive: &Drive<'_>, rows: &mut Vec<Row>, chance: &mut Chance) {
+    fn spoil(&self, session: usize, drive: &Drive<'_>, rows: &mut Vec<Row>, chance: &mut Chance) {
         let count = rows.len();
         match self.wrong {
             Wrong::CounterRestarts => {
@@ -423,10 +451,11 @@ impl Values {
                 rows.iter_mut().for_each(|row| row[TORQUE] = row[TORQUE].clamp(-self.size, self.size));
             }
             Wrong::CounterSlips => {
+                // A counter that loses counts loses them: all to one side.
                 let slips = 1 + chance.below(3);
                 for _ in 0..slips {
                     let from = count / 20 + chance.below(9 * count / 10);
-                    let by = self.size * chance.sign() * chance.between([0.7, 1.5]);
+                    let by = self.size * chance.between([0.7, 1.5]);
                     rows[from..].iter_mut().for_each(|row| row[OUTPUT] += by);
                 }
             }
@@ -437,7 +466,6 @@ impl Values {
             }),
             _ => {}
         }
-        let _ = bench;
     }
 }
 

@@ -27,7 +27,7 @@ use flexspline_sim::drive::{Drive as Drawing, GeneratorKind};
 use flexspline_sim::extension::Model;
 use flexspline_sim::kernels::Kernels;
 use flexspline_sim::measurement::ColumnMap;
-use logger::{Wrong, log};
+use logger::{Log, Wrong, log};
 use rayon::prelude::*;
 
 /// Share of the records of a fault that have to tell it.
@@ -114,16 +114,31 @@ struct Outcome {
     seconds: f64,
 }
 
+/// Drawn anew, so often at most, where the rows cannot show what is wrong.
+const DRAWS: u64 = 40;
+
+/// A drive, how it is measured, and what the logger makes of it.
+fn drawn<'d, 't>(drives: &'d [Drive<'t>], seed: u64, wrong: Wrong, number: u64) -> (&'d Drive<'t>, Bench, Log) {
+    let mut attempt = 0;
+    loop {
+        let mut chance = Chance::new(seed, &wrong.name(), number + 1000 * attempt);
+        let drive = chance.of(drives);
+        let mut bench = Bench::drawn(drive, &mut chance);
+        if matches!(wrong, Wrong::CounterRestarts | Wrong::Drift) {
+            bench.in_sessions(&mut chance);
+        }
+        let truths = bench.run(drive, wrong.ratio_off(drive), &mut chance);
+        let log = log(wrong, &bench, drive, &truths, &mut chance);
+        attempt += 1;
+        if log.shows || attempt == DRAWS {
+            return (drive, bench, log);
+        }
+    }
+}
+
 fn run(drives: &[Drive<'_>], seed: u64, wrong: Wrong, number: u64, keep: Option<&Path>) -> Outcome {
     let clock = Instant::now();
-    let mut chance = Chance::new(seed, &wrong.name(), number);
-    let drive = chance.of(drives);
-    let mut bench = Bench::drawn(drive, &mut chance);
-    if matches!(wrong, Wrong::CounterRestarts | Wrong::Drift) {
-        bench.in_sessions(&mut chance);
-    }
-    let truths = bench.run(drive, wrong.ratio_off(drive), &mut chance);
-    let log = log(wrong, &bench, drive, &truths, &mut chance);
+    let (drive, bench, log) = drawn(drives, seed, wrong, number);
     let csv = log.csv();
     if let Some(folder) = keep {
         let path = folder.join(format!("{}-{number}.csv", wrong.name()));

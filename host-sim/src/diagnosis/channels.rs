@@ -26,6 +26,8 @@ const SEEN_ARCSEC: f64 = 8.0;
 const CERTAIN: f64 = 5.0;
 /// Shares that a drive may show of its nominal wind-up and clearance: springs are softer and harder than catalogues say. *Guess*.
 const OF_THIS_DRIVE: [f64; 2] = [0.4, 2.5];
+/// No drive winds up by so many times what its model says: a torque that asks for that is in another unit. *Guess*.
+const FAR_TOO_SOFT: f64 = 8.0;
 /// A torque in another unit leaves less than this share of what is left as it stands, and without any torque. *Guess*.
 const EXPLAINS: f64 = 0.5;
 /// One of the wrong sign leaves less than this. *Guess*.
@@ -104,7 +106,9 @@ impl Freed {
         let priors: Vec<Prior> =
             self.columns.iter().map(|c| Prior { mean: 0.0, std: 1e4 * size / rms(c).max(1e-9) }).collect();
         let views: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).chain([left.as_slice()]).collect();
-        let Some(solution) = solve(&Gram::of(&views, 0..left.len()), &priors, 1.0 / (size * size)) else { return (left, vec![0.0; self.columns.len()]) };
+        let Some(solution) = solve(&Gram::of(&views, 0..left.len()), &priors, 1.0 / (size * size)) else {
+            return (left, vec![0.0; self.columns.len()]);
+        };
         for (column, c) in self.columns.iter().zip(&solution.coefficients) {
             left.iter_mut().zip(column).for_each(|(left, value)| *left -= c * value);
         }
@@ -133,6 +137,10 @@ struct Told {
     std: f64,
     /// What is left of the error where it does what it should, arcsec.
     left: f64,
+    /// Share of the wind-up alone, whatever the clearance is: that follows the sign of a torque in any unit.
+    wind_up: f64,
+    /// What is left where wind-up and clearance have the shares that suit best, arcsec.
+    left_free: f64,
 }
 
 impl Told {
@@ -141,7 +149,8 @@ impl Told {
         let torque: Vec<f64> = rows.torque.iter().map(|torque| scale * torque).collect();
         let flank = PlayLaw::Held.flanks(rows, &torque, nominal);
         let half = 0.5 * nominal.backlash_arcsec;
-        let should: Vec<f64> = (0..rows.len()).map(|k| nominal.wind_up_arcsec(torque[k]) + half * flank[k]).collect();
+        let wound: Vec<f64> = torque.iter().map(|torque| nominal.wind_up_arcsec(*torque)).collect();
+        let should: Vec<f64> = wound.iter().zip(&flank).map(|(wound, flank)| wound + half * flank).collect();
         let mut error = freed.error.clone();
         if let Some(table) = table {
             // What the table says beside them: ripple, which the load shapes.
@@ -149,6 +158,11 @@ impl Told {
             let ripple: Vec<f64> = all.iter().zip(&should).map(|(all, should)| all - should).collect();
             error.iter_mut().zip(freed.freed(&ripple)).for_each(|(error, ripple)| *error -= ripple);
         }
+        let (wound, flank) = (freed.freed(&wound), freed.freed(&flank));
+        let wind_up = share_beside(&error, &wound, &flank);
+        let clearance = share_beside(&error, &flank, &wound);
+        let of_shares = wound.iter().zip(&flank).map(|(wound, flank)| wind_up * wound + clearance * flank);
+        let left_free = robust_std(error.iter().zip(of_shares).map(|(error, said)| error - said));
         let should = freed.freed(&should);
         let products: Vec<[f64; 2]> = should
             .chunks(should.len().div_ceil(BLOCKS).max(1))
@@ -163,7 +177,7 @@ impl Told {
         let mean = without.iter().sum::<f64>() / blocks;
         let variance = (blocks - 1.0) / blocks * without.iter().map(|share| (share - mean).powi(2)).sum::<f64>();
         let left = robust_std(error.iter().zip(&should).map(|(error, should)| error - should));
-        Told { size: rms(&should), share, std: variance.sqrt(), left }
+        Told { size: rms(&should), share, std: variance.sqrt(), left, wind_up, left_free }
     }
 
     fn is_certain(&self) -> bool {
@@ -171,19 +185,25 @@ impl Told {
     }
 }
 
-/// Factors by which a torque may be wrong: the motor's side, milli and kilo, kilogram-force and pound-force inch.
+/// How much of `column` is in `of`, with `other` free.
+fn share_beside(of: &[f64], column: &[f64], other: &[f64]) -> f64 {
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let (cc, oo, co) = (product(column, column), product(other, other), product(column, other));
+    // Where the sign never changes there is one flank, which is a zero.
+    let (share, rest) = if oo > 1e-9 { (co / oo, cc - co * co / oo) } else { (0.0, cc) };
+    (product(of, column) - share * product(of, other)) / rest.max(1e-12)
+}
+
+/// Factors by which a torque may be wrong: the motor's side, by this ratio or by the hundred of a neighbour, milli and kilo, kilogram-force and pound-force inch.
 fn factors(ratio: f64) -> Vec<f64> {
-    let plain = [ratio.abs(), 1.0 / ratio.abs(), 1e3, 1e-3, 9.806_65, 1.0 / 9.806_65, 0.112_985, 1.0 / 0.112_985];
+    let plain =
+        [ratio.abs(), 1.0 / ratio.abs(), 100.0, 0.01, 1e3, 1e-3, 9.806_65, 1.0 / 9.806_65, 0.112_985, 1.0 / 0.112_985];
     plain.into_iter().flat_map(|factor| [factor, -factor]).collect()
 }
 
 /// Holds the torque against what it should do; turned round or converted where that explains it, left out where it does nothing. Gives
 /// why the data are unusable, where they are.
-pub(super) fn check_torque(
-    recording: &mut Recording,
-    nominal: &Nominal,
-    table: Option<&Table<'_>>,
-) -> Option<String> {
+pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> Option<String> {
     let rows = Rows::new(&recording.sessions, nominal);
     if !rows.recorded.torque || rows.torque.iter().all(|torque| *torque == 0.0) || nominal.wind_up_arcsec(1.0) == 0.0 {
         return None;
@@ -196,7 +216,8 @@ pub(super) fn check_torque(
     let told = |scale: f64| Told::by(&rows, (nominal, table), &freed, scale);
     let recorded = told(1.0);
     let of_this_drive = |told: &Told| (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&told.share) && told.is_certain();
-    if seen(&recorded) && recorded.share > NO_EFFECT {
+    let too_soft = recorded.wind_up > FAR_TOO_SOFT;
+    if seen(&recorded) && recorded.share > NO_EFFECT && !too_soft {
         return None;
     }
     let turned = told(-1.0);
@@ -218,6 +239,7 @@ pub(super) fn check_torque(
     let best = factors(nominal.ratio)
         .into_iter()
         .map(|factor| (factor, told(factor)))
+        .filter(|(_, told)| !too_soft || (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&told.wind_up))
         .filter(|(_, told)| seen(told) && of_this_drive(told) && told.left < EXPLAINS * recorded.left.min(none))
         .min_by(|a, b| a.1.left.total_cmp(&b.1.left));
     if let Some((factor, told)) = best {
@@ -335,12 +357,11 @@ impl Rough {
         let rows = Rows::new(sessions, nominal);
         let freed = Freed::new(&rows, nominal);
         let told = Told::by(&rows, (nominal, table), &freed, 1.0);
-        let left = if told.share > OF_THIS_DRIVE[0] { told.left } else { robust_std(freed.error.iter().copied()) };
         let white = white_level(&rows, &rows.error);
         let by_size = |a: &&Harmonic, b: &&Harmonic| a.amplitude_arcsec.total_cmp(&b.amplitude_arcsec);
         let largest = nominal.harmonics.iter().max_by(by_size).filter(|of| of.amplitude_arcsec > white);
         let harmonics = largest.map(|of| freed.amplitude(&rows, of.order_per_generator_turn) / of.amplitude_arcsec);
-        Rough { told, left: left / white, white, harmonics }
+        Rough { told, left: told.left_free / white, white, harmonics }
     }
 }
 

@@ -28,7 +28,8 @@ use crate::extension::{
 };
 use crate::kernels::Kernels;
 use crate::measurement::{
-    ColumnMap, Fault, MeasuredError, Recording, Session, parse, parse_degrees, read, read_degrees,
+    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, parse, parse_degrees, read,
+    read_degrees,
 };
 use crate::mesh::MeshLevel;
 use crate::nominal::Nominal;
@@ -260,9 +261,11 @@ fn rows_of(
     subject.take_away_known(&mut recording)?;
     let (nominal, table) = subject.against();
     if channels::may_be_in_degrees(&recording, nominal, table) {
-        let mut converted = in_degrees()?;
-        subject.take_away_known(&mut converted)?;
-        if channels::is_explained(&converted, nominal, table) {
+        // What cannot be read in degrees is none.
+        if let Ok(mut converted) = in_degrees()
+            && subject.take_away_known(&mut converted).is_ok()
+            && channels::is_explained(&converted, nominal, table)
+        {
             recording = converted;
         }
     }
@@ -298,7 +301,11 @@ pub fn diagnose_rows(
             progress(done, of + 1, what)
         })?;
     if recording.unusable.is_some() {
-        diagnosis.say_nothing_of_the_unit();
+        // What makes them unusable is a channel that had to be left out.
+        let masked = |fault: &&Fault| fault.treatment == Treatment::Masked && fault.channel == Some(Quantity::Torque);
+        let advice =
+            recording.faults.iter().rfind(masked).map_or(FaultName::TorqueScale.advice(), |fault| fault.advice);
+        diagnosis.say_nothing_of_the_unit(advice);
     }
     progress(4, 5, "compensation by the core");
     let table_subject = subject.table_subject();

@@ -124,8 +124,8 @@ fn sensor_latency() -> Law {
             main(by_row(on, |k| -on.rows.speed[k] * per_s), 5e-3).called(Role::SIZE),
             // Two clocks seldom run at the same rate.
             nuisance(by_row(on, |k| -on.rows.speed[k] * per_s * since(k)), 0.3),
-            // If it is the output, and not the generator that is read early, its error is that of the instant before as well, …
-            nuisance(rate(on, &on.base.prediction).into_iter().map(|by| -by).collect(), 1.0),
+            // If it is the output, and not the generator that is read early, the wind-up is that of the instant before as well, …
+            nuisance(rate(on, &on.base.wind_up).into_iter().map(|by| -by).collect(), 1.0),
             // … and a motor that gathers speed was slower then.
             nuisance(rate(on, &on.rows.speed).into_iter().map(|by| 0.5 * by * per_s).collect(), DELAY_S),
         ]

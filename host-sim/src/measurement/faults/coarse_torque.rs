@@ -240,6 +240,25 @@ mod tests {
     }
 
     #[test]
+    fn steps_of_a_sensor_are_named_where_the_load_is_put_on_and_weights_are_not() {
+        let mut random = fastrand::Rng::with_seed(2);
+        let mut levels = Vec::new();
+        (0..60).for_each(|_| levels.push(25.0 * (2.0 * random.f64() - 1.0)));
+        // Put on within a tenth of a second.
+        let load = |t: f64| {
+            let (at, since) = ((t as usize).min(58), (t.fract() / 0.1).min(1.0));
+            levels[at] + since * (levels[at + 1] - levels[at])
+        };
+        let mut findings = Findings::default();
+        check(&mut sessions(1.0, load, load), &mut findings);
+        let fault = findings.faults.pop().expect("a fault");
+        assert_eq!((fault.name, fault.treatment), (FaultName::Quantisation, Treatment::Kept));
+        let weights = |t: f64| levels[(t as usize).min(59)].round();
+        check(&mut sessions(1.0, weights, weights), &mut findings);
+        assert!(findings.faults.is_empty());
+    }
+
+    #[test]
     fn a_load_between_coarse_steps_is_read_off_and_one_in_steps_is_left_alone() {
         let load = |t: f64| 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos();
         let mut rounded = sessions(5.0, load, load);

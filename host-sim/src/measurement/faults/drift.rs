@@ -270,3 +270,50 @@ fn line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let std = (own / (n - 2.0) / xx * (1.0 + correlation) / (1.0 - correlation)).sqrt();
     Some((slope, std.max(1e-12)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sessions of 15 s at 100 Hz, minutes apart, on a drive with clearance and wind-up whose zero moves; `zeros` are those of the sessions.
+    fn sessions(per_hour_arcsec: f64, zeros: &[f64]) -> Vec<Session> {
+        let mut random = fastrand::Rng::with_seed(8);
+        let mut begin = 0.0;
+        let one = |(number, zero): (usize, &f64)| {
+            let time: Vec<f64> = (0..1500).map(|k| begin + 0.01 * f64::from(k)).collect();
+            let since: Vec<f64> = time.iter().map(|t| t - begin).collect();
+            begin += 15.0 + 300.0 * (1.0 + random.f64());
+            let torque: Vec<f64> = since.iter().map(|t| 20.0 * (0.9 * t + number as f64).sin()).collect();
+            let noise = |random: &mut fastrand::Rng| 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+            let error = time.iter().zip(&torque).map(|(t, torque)| {
+                let drive = 7.0 * torque + 30.0 * torque.signum() + noise(&mut random);
+                ARCSEC * (drive + zero + per_hour_arcsec * t / 3600.0)
+            });
+            Session {
+                error_rad: error.collect(),
+                line: (2..1502).collect(),
+                generator_rad: since.iter().map(|t| 30.0 * (0.6 * t).sin()).collect(),
+                torque_n_m: Some(torque),
+                time_s: Some(time),
+                ..Session::default()
+            }
+        };
+        zeros.iter().enumerate().map(one).collect()
+    }
+
+    fn found(mut sessions: Vec<Session>) -> Option<f64> {
+        let mut findings = Findings::default();
+        check(&mut sessions, &Gear::of_ratio(100.0), Stretches::OfTime, &mut findings);
+        findings.faults.first().and_then(|fault| fault.measures.arcsec_per_hour)
+    }
+
+    #[test]
+    fn a_drift_over_sessions_that_are_short_beside_their_breaks_is_told_from_zeros_that_are_set_anew() {
+        for per_hour in [-2000.0, 600.0, 5000.0] {
+            let rate = found(sessions(per_hour, &[0.0; 4])).expect("a drift");
+            assert!((rate / per_hour - 1.0).abs() < 0.05, "{rate} for {per_hour}");
+        }
+        assert_eq!(found(sessions(0.0, &[0.0; 4])), None);
+        assert_eq!(found(sessions(0.0, &[0.0, 210.0, 340.0, 690.0])), None);
+    }
+}
