@@ -270,12 +270,22 @@ fn rows_of(
         }
     }
     recording.unusable = channels::check_torque(&mut recording, nominal, table);
+    if recording.unusable.is_none() && nominal.wind_up_arcsec(1.0) != 0.0 {
+        recording.unusable = without_torque(&recording);
+    }
     recording.notes.extend(quieted::torque(&mut recording.sessions, &subject.nominal));
     if recording.unusable.is_none() {
         torque_zero::check(&mut recording, &subject.nominal, subject.table.as_ref());
     }
     recording.average_to(MOST_ROWS);
     Ok(recording)
+}
+
+/// Why nothing can be said of the unit where a torque was recorded and nearly all of it is lost.
+fn without_torque(recording: &Recording) -> Option<String> {
+    let gone = recording.sessions.iter().all(|session| session.torque_n_m.is_none());
+    let lost = |fault: &&Fault| fault.name == FaultName::FrozenChannel && fault.channel == Some(Quantity::Torque);
+    recording.faults.iter().filter(|_| gone).find(lost).map(|fault| fault.what.clone())
 }
 
 /// Diagnoses rows, and says what the core leaves of their error with tables of what was found. `progress(done, of, what)` is told how far

@@ -44,6 +44,8 @@ const TOLD_FROM_NONE: f64 = 4.0;
 const RIVALS_LEAVE: f64 = 0.99;
 /// … and with it no less than this: else they are there.
 const BESIDE_IT_LEAVE: f64 = 0.95;
+/// In either case by this share of what the zero has taken away. *Chosen* on the drives of `logger_faults`.
+const NO_TRIFLE: f64 = 0.15;
 /// Within less of an output turn than this an unbalanced load is a constant, and a zero is named only where it leaves clearly less, by the
 /// share of [`RIVALS_LEAVE`]. *Guess*.
 const TELLS_TURNS: f64 = 0.25;
@@ -245,6 +247,7 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     let (none, there) = (of(0.0), of(zero));
     let blocks = none.len() as f64;
     let gain = sum(none) - sum(there);
+    eprintln!("DBG first zero {zero} load {load} gain {gain} none {} certain {}", sum(none), is_certain(none, there));
     if zero.abs() < LEAST_SHARE * load || gain < LEAST_GAIN * sum(none) || !is_certain(none, there) {
         return None;
     }
@@ -253,16 +256,27 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     let middle = mean(&without);
     let variance = (blocks - 1.0) / blocks * without.iter().map(|zero| (zero - middle).powi(2)).sum::<f64>();
     let std = variance.sqrt().max(step);
+    eprintln!("DBG std {std}");
     if zero.abs() < TOLD_FROM_NONE * std {
         return None;
     }
     let least = sum(there);
     let by_rivals = held.least_beside([0.0; 4], false, load);
     let rivals = sum(&by_rivals);
-    // They have three numbers to its one: they are there instead of it only where they leave less, and for certain.
-    let instead = rivals < RIVALS_LEAVE * least && is_certain(there, &by_rivals);
+    // They have three numbers to its one: they are there only where they leave less, for certain, and by more than the lag of flanks and other
+    // trifles, of which three numbers always tell a part.
+    let better = |than: &[f64], share: f64| {
+        sum(than) < share * least && is_certain(there, than) && least - sum(than) > NO_TRIFLE * gain
+    };
     let beside_it = held.least_beside([-zero, 0.0, 0.0, 0.0], true, load);
-    if instead || sum(&beside_it) < BESIDE_IT_LEAVE * least && is_certain(there, &beside_it) {
+    eprintln!(
+        "DBG zero {zero} std {std} load {load} none {} least {least} rivals {rivals} beside {} certain {} {}",
+        sum(none),
+        sum(&beside_it),
+        is_certain(there, &by_rivals),
+        is_certain(there, &beside_it)
+    );
+    if better(&by_rivals, RIVALS_LEAVE) || better(&beside_it, BESIDE_IT_LEAVE) {
         return None;
     }
     let (low, high) = least_and_most(held.rows.output.iter().copied());

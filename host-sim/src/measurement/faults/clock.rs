@@ -260,7 +260,8 @@ struct Counted {
 fn counted(log: &Log, period_s: f64) -> impl Iterator<Item = Counted> + '_ {
     let time = log.get(Quantity::Time).unwrap_or_default();
     let mut begin = 0;
-    let ends = (1..=time.len()).filter(|row| *row == time.len() || !log.continues(*row));
+    let parted = move |row: usize| !log.continues(row) || time[row] - time[row - 1] > SESSION_GAP_PERIODS * period_s;
+    let ends = (1..=time.len()).filter(move |row| *row == time.len() || parted(*row));
     ends.map(move |end| {
         let rows = std::mem::replace(&mut begin, end)..end;
         let (mut expected, mut step_s, mut count) = (time[rows.start], period_s, 0.0);
