@@ -324,11 +324,12 @@ pub(super) fn fault_throughout(
     }
 }
 
-/// Whether both angles may be in degrees where radians are said: with zeros and ratio free, the nominal model leaves far more than noise.
-/// Division by 57 shrinks any misfit; so what is left counts against its own noise, and the ratio is free.
+/// Whether both angles may be in degrees where radians are said: with zeros and ratio free, the nominal model leaves far more than noise, or
+/// winds up far too little. Division by 57 shrinks any misfit; so what is left counts against its own noise, and the ratio is free.
 pub(super) fn may_be_in_degrees(recording: &Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> bool {
     let predicts = !nominal.harmonics.is_empty() || nominal.wind_up_arcsec(1.0) != 0.0;
-    predicts && Rough::of(&recording.sessions, nominal, table).left > FAR_FROM_NOISE
+    let rough = predicts.then(|| Rough::of(&recording.sessions, nominal, table));
+    rough.is_some_and(|rough| rough.left > FAR_FROM_NOISE || rough.told.wind_up > FAR_TOO_SOFT)
 }
 
 /// Whether the nominal model explains these rows to the noise, and what it explains has the size that it says.

@@ -244,9 +244,9 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(2);
         let mut levels = Vec::new();
         (0..60).for_each(|_| levels.push(25.0 * (2.0 * random.f64() - 1.0)));
-        // Put on within a tenth of a second.
+        // Put on within three rows.
         let load = |t: f64| {
-            let (at, since) = ((t as usize).min(58), (t.fract() / 0.1).min(1.0));
+            let (at, since) = ((t as usize).min(58), (t.fract() / 0.03).min(1.0));
             levels[at] + since * (levels[at + 1] - levels[at])
         };
         let mut findings = Findings::default();
