@@ -339,10 +339,6 @@ pub(super) fn is_explained(recording: &Recording, nominal: &Nominal, table: Opti
     let like_the_load = !winds_up || (rough.told.share - 1.0).abs() < AS_NOMINAL && rough.told.is_certain();
     let within = |share: f64| (HARMONICS_AS_NOMINAL[0]..=HARMONICS_AS_NOMINAL[1]).contains(&share);
     let like_the_harmonics = rough.harmonics.map_or(winds_up, within);
-    eprintln!(
-        "DBG degrees left {} told {:?} white {} harmonics {:?}",
-        rough.left, rough.told, rough.white, rough.harmonics
-    );
     rough.left < TO_THE_NOISE && like_the_load && like_the_harmonics
 }
 

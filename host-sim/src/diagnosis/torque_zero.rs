@@ -247,7 +247,6 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     let (none, there) = (of(0.0), of(zero));
     let blocks = none.len() as f64;
     let gain = sum(none) - sum(there);
-    eprintln!("DBG first zero {zero} load {load} gain {gain} none {} certain {}", sum(none), is_certain(none, there));
     if zero.abs() < LEAST_SHARE * load || gain < LEAST_GAIN * sum(none) || !is_certain(none, there) {
         return None;
     }
@@ -256,7 +255,6 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     let middle = mean(&without);
     let variance = (blocks - 1.0) / blocks * without.iter().map(|zero| (zero - middle).powi(2)).sum::<f64>();
     let std = variance.sqrt().max(step);
-    eprintln!("DBG std {std}");
     if zero.abs() < TOLD_FROM_NONE * std {
         return None;
     }
@@ -269,13 +267,6 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
         sum(than) < share * least && is_certain(there, than) && least - sum(than) > NO_TRIFLE * gain
     };
     let beside_it = held.least_beside([-zero, 0.0, 0.0, 0.0], true, load);
-    eprintln!(
-        "DBG zero {zero} std {std} load {load} none {} least {least} rivals {rivals} beside {} certain {} {}",
-        sum(none),
-        sum(&beside_it),
-        is_certain(there, &by_rivals),
-        is_certain(there, &beside_it)
-    );
     if better(&by_rivals, RIVALS_LEAVE) || better(&beside_it, BESIDE_IT_LEAVE) {
         return None;
     }
