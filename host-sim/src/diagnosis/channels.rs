@@ -4,12 +4,14 @@
 //! What floats freely in every drive is taken out first: zeros, the ratio, first orders, the nominal harmonics, speed and the direction of
 //! motion. What is left of the error is then held against what the nominal model says of the torque, as recorded and otherwise.
 
-use super::base::PlayLaw;
+use flexspline::Table;
+
+use super::base::{PlayLaw, predicted_by_table};
 use super::linear::{Gram, Prior, solve};
 use super::noise::white_level;
 use super::rows::{Rows, rms, robust_std};
 use crate::measurement::{Fault, FaultName, Measures, Quantity, Recording, Session, Treatment};
-use crate::nominal::Nominal;
+use crate::nominal::{Harmonic, Nominal};
 
 /// Rows that are looked at, about, spread evenly.
 const SAMPLE: usize = 6000;
@@ -24,16 +26,22 @@ const SEEN_ARCSEC: f64 = 8.0;
 const CERTAIN: f64 = 5.0;
 /// Shares that a drive may show of its nominal wind-up and clearance: springs are softer and harder than catalogues say. *Guess*.
 const OF_THIS_DRIVE: [f64; 2] = [0.4, 2.5];
+/// No drive winds up by so many times what its model says: a torque that asks for that is in another unit. *Guess*.
+const FAR_TOO_SOFT: f64 = 8.0;
 /// A torque in another unit leaves less than this share of what is left as it stands, and without any torque. *Guess*.
 const EXPLAINS: f64 = 0.5;
 /// One of the wrong sign leaves less than this. *Guess*.
 const EXPLAINS_TURNED: f64 = 0.8;
 /// A torque of which the error shows no more than this is none of this output. *Guess*.
 const NO_EFFECT: f64 = 0.3;
-/// What is left by degrees is noise: so many times the white noise, at most. *Guess*.
-const TO_THE_NOISE: f64 = 2.5;
-/// And radians leave so many times more. *Guess*.
+/// Both angles may be in degrees where radians leave so many times the white noise and more. *Guess*.
 const FAR_FROM_NOISE: f64 = 4.0;
+/// They are where degrees leave this at most. *Guess*.
+const TO_THE_NOISE: f64 = 4.0;
+/// And where wind-up and clearance are those of the model within this share, or, where nothing winds up, the harmonics within the factors.
+/// *Guess*: springs of drives of a type differ by some per cent, the factors of torques taken for others from 57 by more than that, except 1/60.
+const AS_NOMINAL: f64 = 0.35;
+const HARMONICS_AS_NOMINAL: [f64; 2] = [0.25, 4.0];
 /// Residuals farther out than so many standard deviations are cut there.
 const CUT: f64 = 5.0;
 
@@ -69,6 +77,8 @@ pub(super) fn floating(rows: &Rows, nominal: &Nominal, places: &[usize]) -> Vec<
 struct Freed {
     places: Vec<usize>,
     columns: Vec<Vec<f64>>,
+    /// Of the columns in the error.
+    coefficients: Vec<f64>,
     error: Vec<f64>,
 }
 
@@ -77,8 +87,8 @@ impl Freed {
         let places = sample(rows, SAMPLE);
         let mut columns = floating(rows, nominal, &places);
         columns.extend(waves(1.0, &rows.generator, &places));
-        let mut freed = Freed { error: Vec::new(), columns, places };
-        freed.error = freed.freed(&rows.error);
+        let mut freed = Freed { error: Vec::new(), coefficients: Vec::new(), columns, places };
+        (freed.error, freed.coefficients) = freed.freed_with(&rows.error);
         let spread = robust_std(freed.error.iter().copied());
         freed.error.iter_mut().for_each(|error| *error = error.clamp(-CUT * spread, CUT * spread));
         freed
@@ -86,16 +96,34 @@ impl Freed {
 
     /// What the free columns leave of a column of all rows, at the places.
     fn freed(&self, column: &[f64]) -> Vec<f64> {
+        self.freed_with(column).0
+    }
+
+    /// The same, and how much of each free column was in it.
+    fn freed_with(&self, column: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mut left: Vec<f64> = self.places.iter().map(|k| column[*k]).collect();
         let size = rms(&left).max(1e-9);
         let priors: Vec<Prior> =
             self.columns.iter().map(|c| Prior { mean: 0.0, std: 1e4 * size / rms(c).max(1e-9) }).collect();
         let views: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).chain([left.as_slice()]).collect();
-        let Some(solution) = solve(&Gram::of(&views, 0..left.len()), &priors, 1.0 / (size * size)) else { return left };
+        let Some(solution) = solve(&Gram::of(&views, 0..left.len()), &priors, 1.0 / (size * size)) else {
+            return (left, vec![0.0; self.columns.len()]);
+        };
         for (column, c) in self.columns.iter().zip(&solution.coefficients) {
             left.iter_mut().zip(column).for_each(|(left, value)| *left -= c * value);
         }
-        left
+        (left, solution.coefficients)
+    }
+}
+
+impl Freed {
+    /// Amplitude of the wave of this order of the generator, which floats freely, arcsec.
+    fn amplitude(&self, rows: &Rows, order: f64) -> f64 {
+        let [sine, cosine] = waves(order, &rows.generator, &self.places);
+        let of = |wave: &[f64]| {
+            self.columns.iter().position(|column| column == wave).map_or(0.0, |place| self.coefficients[place])
+        };
+        of(&sine).hypot(of(&cosine))
     }
 }
 
@@ -109,19 +137,36 @@ struct Told {
     std: f64,
     /// What is left of the error where it does what it should, arcsec.
     left: f64,
+    /// Share of the wind-up alone, whatever the clearance is: that follows the sign of a torque in any unit.
+    wind_up: f64,
+    /// What is left where wind-up and clearance have the shares that suit best, arcsec.
+    left_free: f64,
 }
 
 impl Told {
     /// By nominal wind-up and clearance under `scale` times the recorded torque.
-    fn by(rows: &Rows, nominal: &Nominal, freed: &Freed, scale: f64) -> Told {
+    fn by(rows: &Rows, (nominal, table): (&Nominal, Option<&Table<'_>>), freed: &Freed, scale: f64) -> Told {
         let torque: Vec<f64> = rows.torque.iter().map(|torque| scale * torque).collect();
         let flank = PlayLaw::Held.flanks(rows, &torque, nominal);
         let half = 0.5 * nominal.backlash_arcsec;
-        let should: Vec<f64> = (0..rows.len()).map(|k| nominal.wind_up_arcsec(torque[k]) + half * flank[k]).collect();
+        let wound: Vec<f64> = torque.iter().map(|torque| nominal.wind_up_arcsec(*torque)).collect();
+        let should: Vec<f64> = wound.iter().zip(&flank).map(|(wound, flank)| wound + half * flank).collect();
+        let mut error = freed.error.clone();
+        if let Some(table) = table {
+            // What the table says beside them: ripple, which the load shapes.
+            let all = predicted_by_table(rows, &torque, table);
+            let ripple: Vec<f64> = all.iter().zip(&should).map(|(all, should)| all - should).collect();
+            error.iter_mut().zip(freed.freed(&ripple)).for_each(|(error, ripple)| *error -= ripple);
+        }
+        let (wound, flank) = (freed.freed(&wound), freed.freed(&flank));
+        let wind_up = share_beside(&error, &wound, &flank);
+        let clearance = share_beside(&error, &flank, &wound);
+        let of_shares = wound.iter().zip(&flank).map(|(wound, flank)| wind_up * wound + clearance * flank);
+        let left_free = robust_std(error.iter().zip(of_shares).map(|(error, said)| error - said));
         let should = freed.freed(&should);
         let products: Vec<[f64; 2]> = should
             .chunks(should.len().div_ceil(BLOCKS).max(1))
-            .zip(freed.error.chunks(should.len().div_ceil(BLOCKS).max(1)))
+            .zip(error.chunks(should.len().div_ceil(BLOCKS).max(1)))
             .map(|(w, e)| [w.iter().map(|w| w * w).sum(), w.iter().zip(e).map(|(w, e)| w * e).sum()])
             .collect();
         let all = products.iter().fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
@@ -131,8 +176,8 @@ impl Told {
         let blocks = products.len() as f64;
         let mean = without.iter().sum::<f64>() / blocks;
         let variance = (blocks - 1.0) / blocks * without.iter().map(|share| (share - mean).powi(2)).sum::<f64>();
-        let left = robust_std(freed.error.iter().zip(&should).map(|(error, should)| error - should));
-        Told { size: rms(&should), share, std: variance.sqrt(), left }
+        let left = robust_std(error.iter().zip(&should).map(|(error, should)| error - should));
+        Told { size: rms(&should), share, std: variance.sqrt(), left, wind_up, left_free }
     }
 
     fn is_certain(&self) -> bool {
@@ -140,15 +185,25 @@ impl Told {
     }
 }
 
-/// Factors by which a torque may be wrong: the motor's side, milli and kilo, kilogram-force and pound-force inch.
+/// How much of `column` is in `of`, with `other` free.
+fn share_beside(of: &[f64], column: &[f64], other: &[f64]) -> f64 {
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let (cc, oo, co) = (product(column, column), product(other, other), product(column, other));
+    // Where the sign never changes there is one flank, which is a zero.
+    let (share, rest) = if oo > 1e-9 { (co / oo, cc - co * co / oo) } else { (0.0, cc) };
+    (product(of, column) - share * product(of, other)) / rest.max(1e-12)
+}
+
+/// Factors by which a torque may be wrong: the motor's side, by this ratio or by the hundred of a neighbour, milli and kilo, kilogram-force and pound-force inch.
 fn factors(ratio: f64) -> Vec<f64> {
-    let plain = [ratio.abs(), 1.0 / ratio.abs(), 1e3, 1e-3, 9.806_65, 1.0 / 9.806_65, 0.112_985, 1.0 / 0.112_985];
+    let plain =
+        [ratio.abs(), 1.0 / ratio.abs(), 100.0, 0.01, 1e3, 1e-3, 9.806_65, 1.0 / 9.806_65, 0.112_985, 1.0 / 0.112_985];
     plain.into_iter().flat_map(|factor| [factor, -factor]).collect()
 }
 
 /// Holds the torque against what it should do; turned round or converted where that explains it, left out where it does nothing. Gives
 /// why the data are unusable, where they are.
-pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal) -> Option<String> {
+pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> Option<String> {
     let rows = Rows::new(&recording.sessions, nominal);
     if !rows.recorded.torque || rows.torque.iter().all(|torque| *torque == 0.0) || nominal.wind_up_arcsec(1.0) == 0.0 {
         return None;
@@ -158,10 +213,11 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal) -> Opti
     let white = white_level(&rows, &rows.error).min(white_level(&rows, &plain));
     let seen = |told: &Told| told.size > SEEN_ARCSEC.max(SEEN_OF_NOISE * white);
     let none = robust_std(freed.error.iter().copied());
-    let told = |scale: f64| Told::by(&rows, nominal, &freed, scale);
+    let told = |scale: f64| Told::by(&rows, (nominal, table), &freed, scale);
     let recorded = told(1.0);
     let of_this_drive = |told: &Told| (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&told.share) && told.is_certain();
-    if seen(&recorded) && recorded.share > NO_EFFECT {
+    let too_soft = recorded.wind_up > FAR_TOO_SOFT;
+    if seen(&recorded) && recorded.share > NO_EFFECT && !too_soft {
         return None;
     }
     let turned = told(-1.0);
@@ -183,6 +239,7 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal) -> Opti
     let best = factors(nominal.ratio)
         .into_iter()
         .map(|factor| (factor, told(factor)))
+        .filter(|(_, told)| !too_soft || (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&told.wind_up))
         .filter(|(_, told)| seen(told) && of_this_drive(told) && told.left < EXPLAINS * recorded.left.min(none))
         .min_by(|a, b| a.1.left.total_cmp(&b.1.left));
     if let Some((factor, told)) = best {
@@ -267,37 +324,46 @@ pub(super) fn fault_throughout(
     }
 }
 
-/// Whether both angles are in degrees where radians are said: degrees explain the error to the noise, with zeros and ratio free, and
-/// radians leave far more. Division by 57 shrinks any misfit; so what is left counts against its own noise, and the ratio is free in both.
-pub(super) fn are_in_degrees(recording: &Recording, nominal: &Nominal) -> bool {
-    if nominal.harmonics.is_empty() && nominal.wind_up_arcsec(1.0) == 0.0 {
-        return false;
-    }
-    let rad = left_of_noise(&recording.sessions, nominal);
-    if rad < FAR_FROM_NOISE {
-        return false;
-    }
-    let radians = |degrees: &[f64]| degrees.iter().map(|angle| angle.to_radians()).collect();
-    let sessions: Vec<Session> = recording
-        .sessions
-        .iter()
-        .map(|session| Session {
-            generator_rad: radians(&session.generator_rad),
-            error_rad: radians(&session.error_rad),
-            ..session.clone()
-        })
-        .collect();
-    let deg = left_of_noise(&sessions, nominal);
-    deg < TO_THE_NOISE && rad > FAR_FROM_NOISE * deg
+/// Whether both angles may be in degrees where radians are said: with zeros and ratio free, the nominal model leaves far more than noise, or
+/// winds up far too little. Division by 57 shrinks any misfit; so what is left counts against its own noise, and the ratio is free.
+pub(super) fn may_be_in_degrees(recording: &Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> bool {
+    let predicts = !nominal.harmonics.is_empty() || nominal.wind_up_arcsec(1.0) != 0.0;
+    let rough = predicts.then(|| Rough::of(&recording.sessions, nominal, table));
+    rough.is_some_and(|rough| rough.left > FAR_FROM_NOISE || rough.told.wind_up > FAR_TOO_SOFT)
 }
 
-/// What the nominal model leaves of the error with zeros and ratio free, in standard deviations of its white noise.
-fn left_of_noise(sessions: &[Session], nominal: &Nominal) -> f64 {
-    let rows = Rows::new(sessions, nominal);
-    let freed = Freed::new(&rows, nominal);
-    let told = Told::by(&rows, nominal, &freed, 1.0);
-    let left = if told.share > OF_THIS_DRIVE[0] { told.left } else { robust_std(freed.error.iter().copied()) };
-    left / white_level(&rows, &rows.error)
+/// Whether the nominal model explains these rows to the noise, and what it explains has the size that it says.
+pub(super) fn is_explained(recording: &Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> bool {
+    let rough = Rough::of(&recording.sessions, nominal, table);
+    let winds_up = rough.told.size > SEEN_OF_NOISE * rough.white;
+    let like_the_load = !winds_up || (rough.told.share - 1.0).abs() < AS_NOMINAL && rough.told.is_certain();
+    let within = |share: f64| (HARMONICS_AS_NOMINAL[0]..=HARMONICS_AS_NOMINAL[1]).contains(&share);
+    let like_the_harmonics = rough.harmonics.map_or(winds_up, within);
+    rough.left < TO_THE_NOISE && like_the_load && like_the_harmonics
+}
+
+/// How the nominal model explains rows with zeros and ratio free.
+struct Rough {
+    told: Told,
+    /// What is left, in standard deviations of the white noise.
+    left: f64,
+    /// White noise, arcsec.
+    white: f64,
+    /// The largest nominal harmonic in the rows, over what it should be, where it should stand out of the noise.
+    harmonics: Option<f64>,
+}
+
+impl Rough {
+    fn of(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> Rough {
+        let rows = Rows::new(sessions, nominal);
+        let freed = Freed::new(&rows, nominal);
+        let told = Told::by(&rows, (nominal, table), &freed, 1.0);
+        let white = white_level(&rows, &rows.error);
+        let by_size = |a: &&Harmonic, b: &&Harmonic| a.amplitude_arcsec.total_cmp(&b.amplitude_arcsec);
+        let largest = nominal.harmonics.iter().max_by(by_size).filter(|of| of.amplitude_arcsec > white);
+        let harmonics = largest.map(|of| freed.amplitude(&rows, of.order_per_generator_turn) / of.amplitude_arcsec);
+        Rough { told, left: told.left_free / white, white, harmonics }
+    }
 }
 
 /// A ratio that the data turn by, and the whole one that it may be meant to be.
@@ -366,7 +432,7 @@ mod tests {
     fn checked(told: impl Fn(f64, f64) -> f64) -> (Option<FaultName>, bool, Option<f64>) {
         let nominal = catalogue_drive();
         let mut recording = recording(&nominal, told);
-        let unusable = check_torque(&mut recording, &nominal).is_some();
+        let unusable = check_torque(&mut recording, &nominal, None).is_some();
         let torque = recording.sessions[0].torque_n_m.as_ref().map(|torque| torque[150]);
         (recording.faults.first().map(|fault| fault.name), unusable, torque)
     }
@@ -395,19 +461,19 @@ mod tests {
     fn degrees_are_told_from_a_wrong_ratio() {
         let nominal = catalogue_drive();
         let mut recording = recording(&nominal, |_, load| load);
-        assert!(!are_in_degrees(&recording, &nominal));
+        assert!(!may_be_in_degrees(&recording, &nominal, None) && is_explained(&recording, &nominal, None));
         let right = recording.clone();
         for session in &mut recording.sessions {
             session.generator_rad.iter_mut().for_each(|angle| *angle = angle.to_degrees());
             session.error_rad.iter_mut().for_each(|angle| *angle = angle.to_degrees());
         }
-        assert!(are_in_degrees(&recording, &nominal));
+        assert!(may_be_in_degrees(&recording, &nominal, None) && !is_explained(&recording, &nominal, None));
         let mut other_ratio = right;
         for session in &mut other_ratio.sessions {
             let by = 1.0 / (nominal.ratio * 1.05) - 1.0 / nominal.ratio;
             session.error_rad.iter_mut().zip(&session.generator_rad).for_each(|(error, psi)| *error += by * psi);
         }
-        assert!(!are_in_degrees(&other_ratio, &nominal));
+        assert!(!may_be_in_degrees(&other_ratio, &nominal, None));
     }
 
     #[test]

@@ -240,5 +240,6 @@ pub fn white_level(rows: &Rows, left: &[f64]) -> f64 {
     // Their variance is six times that of a row; more where a line close to half the rate of rows swings them, but no more than is there.
     let middle = quantile(rows.sessions_used().flatten().map(|k| left[k]), 0.5);
     let there = robust_std(rows.sessions_used().flatten().map(|k| left[k] - middle));
-    (robust_std(differences.into_iter()) / 6f64.sqrt()).min(there).max(1e-3)
+    // Rows that a coarse resolution rounds to the same value differ by nothing, and are off all the same.
+    (robust_std(differences.into_iter()) / 6f64.sqrt()).min(there).max(rows.rounding).max(1e-3)
 }

@@ -28,7 +28,8 @@ use crate::extension::{
 };
 use crate::kernels::Kernels;
 use crate::measurement::{
-    ColumnMap, Fault, MeasuredError, Recording, Session, parse, parse_degrees, read, read_degrees,
+    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, parse, parse_degrees, read,
+    read_degrees,
 };
 use crate::mesh::MeshLevel;
 use crate::nominal::Nominal;
@@ -258,17 +259,33 @@ fn rows_of(
 ) -> Result<Recording, PipelineError> {
     let mut recording = in_radians()?;
     subject.take_away_known(&mut recording)?;
-    if subject.model.is_some() && channels::are_in_degrees(&recording, &subject.nominal) {
-        recording = in_degrees()?;
-        subject.take_away_known(&mut recording)?;
+    let (nominal, table) = subject.against();
+    if channels::may_be_in_degrees(&recording, nominal, table) {
+        // What cannot be read in degrees is none.
+        if let Ok(mut converted) = in_degrees()
+            && subject.take_away_known(&mut converted).is_ok()
+            && channels::is_explained(&converted, nominal, table)
+        {
+            recording = converted;
+        }
     }
-    recording.unusable = channels::check_torque(&mut recording, &subject.nominal);
+    recording.unusable = channels::check_torque(&mut recording, nominal, table);
+    if recording.unusable.is_none() && nominal.wind_up_arcsec(1.0) != 0.0 {
+        recording.unusable = without_torque(&recording);
+    }
     recording.notes.extend(quieted::torque(&mut recording.sessions, &subject.nominal));
     if recording.unusable.is_none() {
         torque_zero::check(&mut recording, &subject.nominal, subject.table.as_ref());
     }
     recording.average_to(MOST_ROWS);
     Ok(recording)
+}
+
+/// Why nothing can be said of the unit where a torque was recorded and nearly all of it is lost.
+fn without_torque(recording: &Recording) -> Option<String> {
+    let gone = recording.sessions.iter().all(|session| session.torque_n_m.is_none());
+    let lost = |fault: &&Fault| fault.name == FaultName::FrozenChannel && fault.channel == Some(Quantity::Torque);
+    recording.faults.iter().filter(|_| gone).find(lost).map(|fault| fault.what.clone())
 }
 
 /// Diagnoses rows, and says what the core leaves of their error with tables of what was found. `progress(done, of, what)` is told how far
@@ -294,7 +311,11 @@ pub fn diagnose_rows(
             progress(done, of + 1, what)
         })?;
     if recording.unusable.is_some() {
-        diagnosis.say_nothing_of_the_unit();
+        // What makes them unusable is a channel that had to be left out.
+        let masked = |fault: &&Fault| fault.treatment == Treatment::Masked && fault.channel == Some(Quantity::Torque);
+        let advice =
+            recording.faults.iter().rfind(masked).map_or(FaultName::TorqueScale.advice(), |fault| fault.advice);
+        diagnosis.say_nothing_of_the_unit(advice);
     }
     progress(4, 5, "compensation by the core");
     let table_subject = subject.table_subject();

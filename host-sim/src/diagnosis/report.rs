@@ -166,8 +166,8 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// Takes back all causes: the data do not say what the unit does.
-    pub(super) fn say_nothing_of_the_unit(&mut self) {
+    /// Takes back all causes: the data do not say what the unit does. `advice` is what to change at the bench.
+    pub(super) fn say_nothing_of_the_unit(&mut self, advice: &str) {
         let unnamed = |cause: Cause| Unexplained {
             looks_like: format!("{} (the data do not tell)", cause.name),
             size_arcsec: cause.size_arcsec,
@@ -176,7 +176,8 @@ impl Diagnosis {
         self.unexplained.extend(causes.into_iter().map(unnamed));
         (self.verdict, self.finding) = (Verdict::Unknown, Finding::DataUnusable);
         self.held_out.rms_after_arcsec = self.held_out.rms_before_arcsec;
-        (self.ratio_proposed, self.next_experiment) = (None, None);
+        self.ratio_proposed = None;
+        self.next_experiment = Some(format!("{advice}; then the same run again"));
     }
 
     /// A few lines for a terminal.

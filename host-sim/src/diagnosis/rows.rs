@@ -63,6 +63,8 @@ pub struct Rows {
     pub jitters: bool,
     /// Time by which one angle may be read before the other on the mean, for all that is known of how they are read, s.
     pub unsure_s: f64,
+    /// What rounding to a coarse resolution leaves in a row, one standard deviation, arcsec; 0 where noise blurs it.
+    pub rounding: f64,
     /// Sessions from which on the zero of the error is another one.
     pub zeros: Vec<usize>,
     /// Median sample period, s.
@@ -106,6 +108,7 @@ impl Rows {
                 None => rows.loudness.resize(from + len, 1.0),
             }
             rows.unsure_s = rows.unsure_s.max(session.unsure_s);
+            rows.rounding = rows.rounding.max(session.coarse_rad * ARCSEC_PER_RAD / 12f64.sqrt());
             if session.own_zero {
                 rows.zeros.push(rows.sessions.len());
             }
@@ -174,6 +177,7 @@ impl Rows {
             jitters: self.jitters,
             zeros: self.zeros.clone(),
             unsure_s: self.unsure_s,
+            rounding: self.rounding,
             period: self.period,
         }
     }

@@ -87,6 +87,66 @@ fn sizes_come_with_intervals_that_hold_the_truth() {
     }
 }
 
+/// The same sessions as a file in which a share of the rows is off, one by one: by far as a heavy tail has it, or to one side alone.
+fn with_bad_rows(sessions: &[Session], share: f64, one_sided: bool, seed: u64) -> Vec<Session> {
+    let nominal = catalogue_drive();
+    let mut random = fastrand::Rng::with_seed(seed);
+    let mut spoiled = sessions.to_vec();
+    for error in spoiled.iter_mut().flat_map(|session| &mut session.error_rad) {
+        if random.f64() < share {
+            let far = 30.0 * -random.f64().max(1e-9).ln();
+            let side = if one_sided || random.bool() { 1.0 } else { -1.0 };
+            *error += side * far / crate::units::ARCSEC_PER_RAD;
+        }
+    }
+    let csv = crate::synthesize::to_csv(&spoiled, nominal.ratio, &[], &mut random);
+    let read = crate::measurement::parse("bad.csv", csv.as_bytes(), &Default::default(), &nominal.gear()).unwrap();
+    let told = read.faults.iter().any(|fault| fault.name == crate::measurement::FaultName::Outliers);
+    assert!(told == (share > 0.0), "{:?}", read.faults);
+    read.sessions
+}
+
+/// Bad rows, 15 % of all, against none: by how many of its standard deviations each line moves.
+fn moved_by_bad_rows(seeds: std::ops::Range<u64>) {
+    let (mut moved, mut cases) = (Vec::new(), 0);
+    for seed in seeds {
+        for (number, (cause, size, parameter)) in [
+            (CauseName::FlexsplineRunout, 15.0, "amplitude_um"),
+            (CauseName::OutputEncoderEccentricity, 20.0, "amplitude_arcsec"),
+            (CauseName::GravityTorque, 8.0, "torque_n_m"),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let sessions = data(&[effect(cause, size, 0.7, 0.5)], Richness::Rich, 0, 100 + seed);
+            let found = |share: f64| {
+                let rows = with_bad_rows(&sessions, share, (seed as usize + number) % 2 == 0, seed);
+                let diagnosis = diagnose(&rows, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+                assert_eq!(names(&diagnosis), [cause], "seed {seed}, {share}: {}", diagnosis.text());
+                diagnosis.causes[0].parameters[parameter]
+            };
+            let (without, with) = (found(0.0), found(0.15));
+            cases += 1;
+            moved.push(((with.value - without.value) / with.std).abs());
+        }
+    }
+    moved.sort_by(f64::total_cmp);
+    eprintln!("moved by {moved:.2?} standard deviations");
+    // Intervals of 95 %: what the rows left out take away moves it as well.
+    assert!(moved[cases - 1] < 2.0, "{moved:.2?}");
+}
+
+#[test]
+fn bad_rows_move_no_line_by_more_than_its_interval() {
+    moved_by_bad_rows(0..1);
+}
+
+#[test]
+#[ignore = "minutes: twenty seeds"]
+fn bad_rows_of_twenty_seeds_move_no_line_by_more_than_its_interval() {
+    moved_by_bad_rows(0..20);
+}
+
 #[test]
 fn two_effects_at_once_are_both_named_or_said_to_look_alike() {
     let both = [CauseName::TorsionalHysteresis, CauseName::OutputEncoderEccentricity];

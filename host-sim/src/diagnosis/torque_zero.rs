@@ -44,6 +44,8 @@ const TOLD_FROM_NONE: f64 = 4.0;
 const RIVALS_LEAVE: f64 = 0.99;
 /// … and with it no less than this: else they are there.
 const BESIDE_IT_LEAVE: f64 = 0.95;
+/// In either case by this share of what the zero has taken away. *Chosen* on the drives of `logger_faults`.
+const NO_TRIFLE: f64 = 0.15;
 /// Within less of an output turn than this an unbalanced load is a constant, and a zero is named only where it leaves clearly less, by the
 /// share of [`RIVALS_LEAVE`]. *Guess*.
 const TELLS_TURNS: f64 = 0.25;
@@ -148,9 +150,9 @@ impl<'a> Held<'a> {
         left
     }
 
-    /// What is left at least, all rows together, with an unbalanced load and a drag beside `from`, and a constant where it is `free`: by steps
+    /// What is left at least, block by block, with an unbalanced load and a drag beside `from`, and a constant where it is `free`: by steps
     /// that are halved where none leads on.
-    fn least_beside(&self, from: Beside, free: bool, load: f64) -> f64 {
+    fn least_beside(&self, from: Beside, free: bool, load: f64) -> Vec<f64> {
         let left = |beside: Beside| self.left(beside).iter().map(|v| v.abs()).sum::<f64>();
         let (mut at, mut least) = (from, left(from));
         let mut step = RIVAL_STEPS[0] * load;
@@ -170,7 +172,7 @@ impl<'a> Held<'a> {
                 step *= 0.5;
             }
         }
-        least
+        by_block(&self.left(at))
     }
 }
 
@@ -193,6 +195,14 @@ fn by_block(left: &[f64]) -> Vec<f64> {
 
 fn sum(values: &[f64]) -> f64 {
     values.iter().sum()
+}
+
+/// Whether less is left in the second than in the first, by [`CERTAIN`] standard deviations of the blocks' mean.
+fn is_certain(first: &[f64], second: &[f64]) -> bool {
+    let gains: Vec<f64> = first.iter().zip(second).map(|(first, second)| first - second).collect();
+    let (gain, blocks) = (mean(&gains), gains.len() as f64);
+    let spread = (gains.iter().map(|of| (of - gain).powi(2)).sum::<f64>() / (blocks - 1.0) / blocks).sqrt();
+    gain > CERTAIN * spread
 }
 
 /// A zero that was tried, N·m, and what it leaves in each block.
@@ -235,15 +245,13 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     let zero = least(&tries, None);
     let of = |zero: f64| tries.iter().find(|of| of.0 == zero).map_or(&[][..], |of| &of.1);
     let (none, there) = (of(0.0), of(zero));
-    let gains: Vec<f64> = none.iter().zip(there).map(|(none, there)| none - there).collect();
-    let blocks = gains.len() as f64;
-    let gain = mean(&gains);
-    let spread = (gains.iter().map(|of| (of - gain).powi(2)).sum::<f64>() / (blocks - 1.0) / blocks).sqrt();
-    if zero.abs() < LEAST_SHARE * load || sum(&gains) < LEAST_GAIN * sum(none) || gain < CERTAIN * spread {
+    let blocks = none.len() as f64;
+    let gain = sum(none) - sum(there);
+    if zero.abs() < LEAST_SHARE * load || gain < LEAST_GAIN * sum(none) || !is_certain(none, there) {
         return None;
     }
     // Jackknife; no finer than the steps.
-    let without: Vec<f64> = (0..gains.len()).map(|block| least(&tries, Some(block))).collect();
+    let without: Vec<f64> = (0..none.len()).map(|block| least(&tries, Some(block))).collect();
     let middle = mean(&without);
     let variance = (blocks - 1.0) / blocks * without.iter().map(|zero| (zero - middle).powi(2)).sum::<f64>();
     let std = variance.sqrt().max(step);
@@ -251,9 +259,15 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
         return None;
     }
     let least = sum(there);
-    let rivals = held.least_beside([0.0; 4], false, load);
-    if rivals < RIVALS_LEAVE * least || held.least_beside([-zero, 0.0, 0.0, 0.0], true, load) < BESIDE_IT_LEAVE * least
-    {
+    let by_rivals = held.least_beside([0.0; 4], false, load);
+    let rivals = sum(&by_rivals);
+    // They have three numbers to its one: they are there only where they leave less, for certain, and by more than the lag of flanks and other
+    // trifles, of which three numbers always tell a part.
+    let better = |than: &[f64], share: f64| {
+        sum(than) < share * least && is_certain(there, than) && least - sum(than) > NO_TRIFLE * gain
+    };
+    let beside_it = held.least_beside([-zero, 0.0, 0.0, 0.0], true, load);
+    if better(&by_rivals, RIVALS_LEAVE) || better(&beside_it, BESIDE_IT_LEAVE) {
         return None;
     }
     let (low, high) = least_and_most(held.rows.output.iter().copied());

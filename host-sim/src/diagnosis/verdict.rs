@@ -173,7 +173,8 @@ pub(super) fn conclude(
         residual: Residual {
             rms_before_arcsec: rms_before,
             rms_after_arcsec: rms_after,
-            noise_floor_arcsec: floor,
+            // A wander that is looked for before the causes may hold a part of them: noise is no more than what is left.
+            noise_floor_arcsec: floor.min(rms_after),
             unexplained_fraction: if explainable > 0.0 { (unexplained / explainable).min(1.0) } else { 0.0 },
         },
         held_out,

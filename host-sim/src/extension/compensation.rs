@@ -106,6 +106,7 @@ pub fn split(sessions: &[Session]) -> (Vec<Session>, Vec<bool>) {
                 loudness: of(&session.loudness),
                 own_zero: session.own_zero && from == 0,
                 unsure_s: session.unsure_s,
+                coarse_rad: session.coarse_rad,
             }
         };
         parts.extend([cut(0, at), cut(at, session.len())]);

@@ -40,6 +40,7 @@ impl Session {
             loudness: cut(&self.loudness),
             own_zero: self.own_zero,
             unsure_s: self.unsure_s,
+            coarse_rad: self.coarse_rad,
         }
     }
 

@@ -63,6 +63,8 @@ pub struct Session {
     pub own_zero: bool,
     /// Time by which one angle may be read before the other on the mean, for all that is known of how they are read, s.
     pub unsure_s: f64,
+    /// Step of the resolution at the output where no noise blurs it, rad; else 0.
+    pub coarse_rad: f64,
 }
 
 impl Session {
@@ -245,7 +247,7 @@ fn parse_as(
     faults::coarse_torque::check(&mut sessions, &mut findings);
     faults::reads::check(&mut sessions, gear, &mut findings);
     faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
-    faults::resolution::check(&sessions, gear, error_recorded, &mut findings);
+    faults::resolution::check(&mut sessions, gear, error_recorded, &mut findings);
     let steps_are_told = faults::steps::check(&mut sessions, gear, &mut findings);
     // Steps that stay in the data look like drift.
     if steps_are_told && findings.tooth_steps.is_empty() && !drifts {
@@ -290,6 +292,7 @@ fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
         loudness: None,
         own_zero: false,
         unsure_s: 0.0,
+        coarse_rad: 0.0,
     };
     let starts: Vec<usize> = (1..log.session.len()).filter(|row| log.session[*row] != log.session[*row - 1]).collect();
     // From the last session to the first, so that each is cut off the end.

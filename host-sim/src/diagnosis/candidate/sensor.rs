@@ -98,6 +98,28 @@ fn encoder_subdivision(of_output: bool, order: f64) -> Law {
     if of_output { law } else { law.after_wheels() }
 }
 
+/// Delays of loggers are some milliseconds.
+const DELAY_S: f64 = 5e-3;
+
+/// The nominal prediction without changes of the flank, which take a time of their own.
+fn on_its_flank(on: &Excitation<'_>) -> Vec<f64> {
+    let of = |(said, flank): (&f64, &f64)| said - on.base.half_backlash * flank;
+    on.base.prediction.iter().zip(&on.base.flank).map(of).collect()
+}
+
+/// Change in a second of a column, row by row; none over a break.
+fn rate(on: &Excitation<'_>, values: &[f64]) -> Vec<f64> {
+    let mut rates = vec![0.0; values.len()];
+    for session in &on.rows.sessions {
+        for k in session.clone() {
+            let (from, to) = (k.max(session.start + 1) - 1, (k + 1).min(session.end - 1));
+            let passed = on.rows.time[to] - on.rows.time[from];
+            rates[k] = if passed > 0.0 { (values[to] - values[from]) / passed } else { 0.0 };
+        }
+    }
+    rates
+}
+
 /// The output is read later than the generator.
 fn sensor_latency() -> Law {
     Law::new(CauseName::SensorLatency, |on, _| {
@@ -108,6 +130,10 @@ fn sensor_latency() -> Law {
             main(by_row(on, |k| -on.rows.speed[k] * per_s), 5e-3).called(Role::SIZE),
             // Two clocks seldom run at the same rate.
             nuisance(by_row(on, |k| -on.rows.speed[k] * per_s * since(k)), 0.3),
+            // If it is the output, and not the generator that is read early, its error is that of the instant before as well, …
+            nuisance(rate(on, &on_its_flank(on)).into_iter().map(|by| -by).collect(), 1.0),
+            // … and a motor that gathers speed was slower then.
+            nuisance(rate(on, &on.rows.speed).into_iter().map(|by| 0.5 * by * per_s).collect(), DELAY_S),
         ]
     })
     .parameters_by(|_, _, c| vec![(Name::DelayS, c.of(Role::SIZE))])

@@ -4,16 +4,22 @@
 //! Where the column goes from one step to the next the load is halfway between them: a curve through these points, within half a step of
 //! what is written, stands in. A load that is put on in steps moves the error within the row, too, and is left alone.
 
+use std::collections::HashSet;
+
 use super::lattice::lattice;
 use super::steps::largest_torque;
 use super::{Findings, of_rows};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::robust::median_of;
 
-/// Steps of less than this share of the largest load are no matter. *Guess*.
-const LEAST_STEP: f64 = 0.01;
+/// Steps of less than this share of the largest load are no matter: those of eight bits are. *Guess*.
+const LEAST_STEP: f64 = 0.004;
+/// Steps are a sensor's, and not weights that somebody put on and wrote down, where there are so many of them, and this share of the runs of one
+/// value is shorter than [`LEAST_ROWS`]: noise and changes tear them. *Guess*.
+const MANY_STEPS: usize = 12;
+const TORN: f64 = 0.2;
 /// Rows to a step at least on either side of a change that is looked at, and changes that say something.
 const LEAST_ROWS: usize = 3;
 const LEAST_CHANGES: usize = 12;
@@ -38,7 +44,11 @@ pub(in crate::measurement) fn check(sessions: &mut Vec<Session>, findings: &mut 
     // A session of few loads shows a multiple of the step.
     let steps = sessions.iter().filter_map(|session| lattice(session.torque_n_m.as_deref()?));
     let Some(step) = steps.min_by(f64::total_cmp) else { return };
-    if step < LEAST_STEP * largest_torque(sessions) || !goes_on_between(sessions, step) {
+    if step < LEAST_STEP * largest_torque(sessions) {
+        return;
+    }
+    if !goes_on_between(sessions, step) {
+        findings.faults.extend(kept(sessions, step));
         return;
     }
     let of = |session: &Session| session.torque_n_m.as_deref().map_or_else(Vec::new, |torque| stretches(torque, step));
@@ -46,10 +56,7 @@ pub(in crate::measurement) fn check(sessions: &mut Vec<Session>, findings: &mut 
     let pairs = known.iter().flatten().flat_map(|known| known.windows(2));
     let mut lasting: Vec<f64> = pairs.map(|pair| pair[1].0 - pair[0].0).collect();
     let long = LONG * median_of(&mut lasting);
-    let (Some(first), Some(last)) = (sessions.first(), sessions.last()) else { return };
-    let mut fault = of_rows(first, FaultName::Quantisation, 0..first.len());
-    (fault.last_line, fault.rows) = (last.line[last.len() - 1], sessions.iter().map(|s| s.len() as u64).sum());
-    fault.until_s = last.time_s.as_ref().and_then(|time| time.last().copied());
+    let Some(mut fault) = throughout(sessions) else { return };
     let mut drop: Vec<Vec<bool>> = sessions.iter().map(|s| vec![s.torque_n_m.is_some(); s.len()]).collect();
     for ((session, known), drop) in sessions.iter_mut().zip(&known).zip(&mut drop) {
         if let Some(torque) = &mut session.torque_n_m {
@@ -64,13 +71,39 @@ pub(in crate::measurement) fn check(sessions: &mut Vec<Session>, findings: &mut 
         }
         sessions.retain(|session| !session.is_empty());
     }
-    (fault.channel, fault.treatment) = (Some(Quantity::Torque), Treatment::Repaired);
+    fault.treatment = Treatment::Repaired;
     fault.what = format!(
         "the torque is written in steps of {step:.3} N·m, and the load goes on between them: where it goes from one to the next it is halfway, \
          and a curve through these points stands in{}",
         if leave_out && out > 0 { format!("; {out} rows far from any such point are left out") } else { String::new() }
     );
     findings.faults.push(fault);
+}
+
+/// A coarse torque in all rows.
+fn throughout(sessions: &[Session]) -> Option<Fault> {
+    let (first, last) = (sessions.first()?, sessions.last()?);
+    let mut fault = of_rows(first, FaultName::Quantisation, 0..first.len());
+    (fault.last_line, fault.rows) = (last.line[last.len() - 1], sessions.iter().map(|s| s.len() as u64).sum());
+    fault.until_s = last.time_s.as_ref().and_then(|time| time.last().copied());
+    fault.channel = Some(Quantity::Torque);
+    Some(fault)
+}
+
+/// Names steps of a sensor between which nothing tells where the load is.
+fn kept(sessions: &[Session], step: f64) -> Option<Fault> {
+    let torques = || sessions.iter().filter_map(|session| session.torque_n_m.as_deref());
+    let runs: Vec<usize> = torques().flat_map(runs).map(|run| run.len()).collect();
+    let torn = runs.iter().filter(|rows| **rows < LEAST_ROWS).count();
+    let steps: HashSet<i64> = torques().flatten().map(|torque| (torque / step).round() as i64).collect();
+    if steps.len() < MANY_STEPS || (torn as f64) < TORN * runs.len() as f64 {
+        return None;
+    }
+    let mut fault = throughout(sessions)?;
+    fault.what = format!(
+        "the torque is written in steps of {step:.3} N·m: what the load does within a step is not seen, and nothing in the rows tells it"
+    );
+    Some(fault)
 }
 
 /// Runs of rows with one value.
@@ -204,6 +237,25 @@ mod tests {
             torque_n_m: Some(times().map(|t| (load(t) / step).round() * step).collect()),
             ..Session::default()
         }]
+    }
+
+    #[test]
+    fn steps_of_a_sensor_are_named_where_the_load_is_put_on_and_weights_are_not() {
+        let mut random = fastrand::Rng::with_seed(2);
+        let mut levels = Vec::new();
+        (0..60).for_each(|_| levels.push(25.0 * (2.0 * random.f64() - 1.0)));
+        // Put on within three rows.
+        let load = |t: f64| {
+            let (at, since) = ((t as usize).min(58), (t.fract() / 0.03).min(1.0));
+            levels[at] + since * (levels[at + 1] - levels[at])
+        };
+        let mut findings = Findings::default();
+        check(&mut sessions(1.0, load, load), &mut findings);
+        let fault = findings.faults.pop().expect("a fault");
+        assert_eq!((fault.name, fault.treatment), (FaultName::Quantisation, Treatment::Kept));
+        let weights = |t: f64| levels[(t as usize).min(59)].round();
+        check(&mut sessions(1.0, weights, weights), &mut findings);
+        assert!(findings.faults.is_empty());
     }
 
     #[test]

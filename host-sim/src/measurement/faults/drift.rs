@@ -17,6 +17,13 @@ const LEAST_RAD: f64 = 10.0 * ARCSEC;
 const CERTAIN: f64 = 6.0;
 /// Stretches of the recording that a trend is judged by.
 const STRETCHES: usize = 24;
+/// Fewest stretches that show a trend, and rows of a stretch.
+const FEWEST_STRETCHES: usize = 8;
+const STRETCH_ROWS: usize = 8;
+/// Fewest gaps between sessions that tell a drift from zeros that are set anew, and how far a session may lie off the line, as a share of all
+/// the drift. *Guess*: two gaps agree to a twentieth by chance in one recording of twenty.
+const FEWEST_GAPS: usize = 2;
+const OFF_THE_LINE: f64 = 0.05;
 /// What is the same on both flanks: the part that differs is below this share.
 const ALIKE: f64 = 0.35;
 /// A trend whose standard deviation grows by more than this when position, load and temperature are considered may be one of them.
@@ -139,38 +146,78 @@ fn slope(sessions: &[Session], gear: &Gear, cut: Stretches) -> Option<(f64, f64,
     if formal > CONFUSED * 3.0_f64.sqrt() * fit.unit_std {
         return None;
     }
-    // Once more by stretches: the trend of their medians, which noise of a long memory does not make so certain.
-    let mut stretches: Vec<Vec<(f64, f64)>> = vec![Vec::new(); STRETCHES];
-    for s in 0..sessions.len() {
-        let left = state.left(&fit, s, &all);
-        if cut == Stretches::OfRows {
-            // None reaches over a break.
-            let parts = (STRETCHES * left.len()).div_ceil(rows);
-            let taus: Vec<f64> = (0..left.len()).map(|row| tau(s, row)).collect();
-            let long = left.len().div_ceil(parts.max(1)).max(1);
-            let part = |(left, tau): (&[f64], &[f64])| left.iter().zip(tau).map(|(l, t)| (*t, l + drift * t)).collect();
-            stretches.extend(left.chunks(long).zip(taus.chunks(long)).map(part));
-            continue;
-        }
-        for (row, left) in left.iter().enumerate() {
-            let tau = tau(s, row);
-            let place = (((tau + 1.0) / 2.0 * STRETCHES as f64) as usize).min(STRETCHES - 1);
-            let middle = (place as f64 + 0.5) / STRETCHES as f64 * 2.0 - 1.0;
-            stretches[place].push((middle, left + drift * tau));
-        }
-    }
-    let points: Vec<(f64, f64)> = stretches
-        .iter()
-        .filter(|left| left.len() >= 8)
-        .map(|left| {
-            let tau = left.iter().map(|of| of.0).sum::<f64>() / left.len() as f64;
-            (tau, median_of(&mut left.iter().map(|of| of.1).collect::<Vec<f64>>()))
+    // Once more by stretches: the trend of their medians, which noise of a long memory does not make so certain. A bench that rests for longer
+    // than it runs fills few stretches of time: then they are of rows, and what each session says by itself must not contradict.
+    let lefts: Vec<Vec<(f64, f64)>> = (0..sessions.len())
+        .map(|s| {
+            let left = state.left(&fit, s, &all);
+            left.iter().enumerate().map(|(row, left)| (tau(s, row), left + drift * tau(s, row))).collect()
         })
         .collect();
+    let mut points: Vec<(f64, f64)> = if cut == Stretches::OfTime { of_time(&lefts) } else { Vec::new() };
+    if points.len() < FEWEST_STRETCHES {
+        if cut == Stretches::OfTime && !alike_in_sessions(&lefts, drift) {
+            return None;
+        }
+        points = of_rows_alone(&lefts);
+    }
     let (trend, std) = line(&points)?;
     let certain = (drift / formal).abs() > CERTAIN && (trend / std).abs() > CERTAIN && trend * drift > 0.0;
     let steady = (trend - drift).abs() < 0.5 * drift.abs();
     (certain && steady).then_some((drift * per_s, 0.5 * (begin + end), std.max(formal) * per_s))
+}
+
+/// A time in units of the recording, from -1 to 1, and what is left of the error there, rad.
+type Point = (f64, f64);
+
+/// Medians of stretches of time with a few rows at least.
+fn of_time(lefts: &[Vec<Point>]) -> Vec<Point> {
+    let mut stretches: Vec<Vec<f64>> = vec![Vec::new(); STRETCHES];
+    for (tau, left) in lefts.iter().flatten() {
+        stretches[(((tau + 1.0) / 2.0 * STRETCHES as f64) as usize).min(STRETCHES - 1)].push(*left);
+    }
+    let middle = |place: usize| (place as f64 + 0.5) / STRETCHES as f64 * 2.0 - 1.0;
+    let some = stretches.iter_mut().enumerate().filter(|(_, left)| left.len() >= STRETCH_ROWS);
+    some.map(|(place, left)| (middle(place), median_of(left))).collect()
+}
+
+/// Medians of stretches of rows, none over a break.
+fn of_rows_alone(lefts: &[Vec<Point>]) -> Vec<Point> {
+    let rows: usize = lefts.iter().map(Vec::len).sum();
+    let stretches = |left: &Vec<Point>| {
+        let long = left.len().div_ceil((STRETCHES * left.len()).div_ceil(rows).max(1)).max(1);
+        left.chunks(long).filter(|part| part.len() >= STRETCH_ROWS).map(middle_of).collect::<Vec<Point>>()
+    };
+    lefts.iter().flat_map(stretches).collect()
+}
+
+/// Mean time and median error.
+fn middle_of(part: &[Point]) -> Point {
+    let tau = part.iter().map(|of| of.0).sum::<f64>() / part.len() as f64;
+    (tau, median_of(&mut part.iter().map(|of| of.1).collect::<Vec<f64>>()))
+}
+
+/// Whether sessions lie on a line of this slope, and no session by itself has another slope.
+fn alike_in_sessions(lefts: &[Vec<Point>], drift: f64) -> bool {
+    let middles: Vec<Point> = lefts.iter().map(|left| middle_of(left)).collect();
+    let Some((low, high)) = middles.first().zip(middles.last()) else { return false };
+    let zero = median_of(&mut middles.iter().map(|of| of.1 - drift * of.0).collect::<Vec<f64>>());
+    let off = |of: &Point| (of.1 - drift * of.0 - zero).abs();
+    let on_the_line = middles.iter().all(|of| off(of) < OFF_THE_LINE * (drift * (high.0 - low.0)).abs());
+    // Slopes within sessions, all together, from the medians of their stretches.
+    let (mut xx, mut xy, mut left_over) = (0.0, 0.0, Vec::new());
+    for left in lefts {
+        let parts: Vec<Point> = left.chunks(left.len().div_ceil(STRETCHES).max(1)).map(middle_of).collect();
+        let count = parts.len() as f64;
+        let mean = parts.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / count, m.1 + p.1 / count));
+        for (x, y) in parts.iter().map(|of| (of.0 - mean.0, of.1 - mean.1)) {
+            (xx, xy) = (xx + x * x, xy + x * y);
+            left_over.push((y - drift * x).powi(2));
+        }
+    }
+    let variance = left_over.iter().sum::<f64>() / left_over.len().max(1) as f64 / xx.max(1e-300);
+    let contradicted = (xy / xx.max(1e-300) - drift).abs() > 0.5 * drift.abs() + CERTAIN * variance.sqrt();
+    lefts.len() > FEWEST_GAPS && on_the_line && !contradicted
 }
 
 /// Median of a few rows from this one on, rad.
@@ -210,7 +257,7 @@ fn largest_leap_between(sessions: &[Session], per_s: f64) -> f64 {
 /// Slope of a straight line and its standard deviation, neighbours being correlated as their residuals are.
 fn line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let n = points.len() as f64;
-    if points.len() < 8 {
+    if points.len() < FEWEST_STRETCHES {
         return None;
     }
     let (mx, my) = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
@@ -222,4 +269,51 @@ fn line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let correlation = if own > 0.0 { (next / own).clamp(0.0, 0.9) } else { 0.0 };
     let std = (own / (n - 2.0) / xx * (1.0 + correlation) / (1.0 - correlation)).sqrt();
     Some((slope, std.max(1e-12)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sessions of 15 s at 100 Hz, minutes apart, on a drive with clearance and wind-up whose zero moves; `zeros` are those of the sessions.
+    fn sessions(per_hour_arcsec: f64, zeros: &[f64]) -> Vec<Session> {
+        let mut random = fastrand::Rng::with_seed(8);
+        let mut begin = 0.0;
+        let one = |(number, zero): (usize, &f64)| {
+            let time: Vec<f64> = (0..1500).map(|k| begin + 0.01 * f64::from(k)).collect();
+            let since: Vec<f64> = time.iter().map(|t| t - begin).collect();
+            begin += 15.0 + 300.0 * (1.0 + random.f64());
+            let torque: Vec<f64> = since.iter().map(|t| 20.0 * (0.9 * t + number as f64).sin()).collect();
+            let noise = |random: &mut fastrand::Rng| 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+            let error = time.iter().zip(&torque).map(|(t, torque)| {
+                let drive = 7.0 * torque + 30.0 * torque.signum() + noise(&mut random);
+                ARCSEC * (drive + zero + per_hour_arcsec * t / 3600.0)
+            });
+            Session {
+                error_rad: error.collect(),
+                line: (2..1502).collect(),
+                generator_rad: since.iter().map(|t| 30.0 * (0.6 * t).sin()).collect(),
+                torque_n_m: Some(torque),
+                time_s: Some(time),
+                ..Session::default()
+            }
+        };
+        zeros.iter().enumerate().map(one).collect()
+    }
+
+    fn found(mut sessions: Vec<Session>) -> Option<f64> {
+        let mut findings = Findings::default();
+        check(&mut sessions, &Gear::of_ratio(100.0), Stretches::OfTime, &mut findings);
+        findings.faults.first().and_then(|fault| fault.measures.arcsec_per_hour)
+    }
+
+    #[test]
+    fn a_drift_over_sessions_that_are_short_beside_their_breaks_is_told_from_zeros_that_are_set_anew() {
+        for per_hour in [-2000.0, 600.0, 5000.0] {
+            let rate = found(sessions(per_hour, &[0.0; 4])).expect("a drift");
+            assert!((rate / per_hour - 1.0).abs() < 0.05, "{rate} for {per_hour}");
+        }
+        assert_eq!(found(sessions(0.0, &[0.0; 4])), None);
+        assert_eq!(found(sessions(0.0, &[0.0, 210.0, 340.0, 690.0])), None);
+    }
 }

@@ -9,7 +9,7 @@ use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
-use crate::measurement::robust::{quantile_of, sampled, white_noise};
+use crate::measurement::robust::{least_and_most, quantile_of, sampled, white_noise};
 
 /// Chance of one false alarm in a file, for a channel with noise.
 const CHANCE: f64 = 1e-6;
@@ -133,6 +133,7 @@ pub(in crate::measurement) fn check(
             rows - left
         ));
     }
+    saturated(sessions, rows, &mut drop, findings);
     beside(sessions, Quantity::Torque, rows, &mut drop, findings);
     beside(sessions, Quantity::Temperature, rows, &mut drop, findings);
     for (session, drop) in sessions.iter_mut().zip(&drop) {
@@ -159,6 +160,49 @@ fn missed(generator: &[f64], stretch: &Range<usize>) -> f64 {
     missed_by(generator, stretch)
 }
 
+/// A limit that the torque stands at: in so many rows of stretches as long as this, and this share of all.
+const AT_LIMIT_ROWS: usize = 3;
+const AT_LIMIT_SHARE: f64 = 0.005;
+
+/// Leaves out rows in which the torque stands at its largest or its least value, though it has noise elsewhere: the sensor or its amplifier
+/// is at its end, and nobody knows the load.
+fn saturated(sessions: &[Session], rows: usize, drop: &mut [Vec<bool>], findings: &mut Findings) {
+    let torques: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(Quantity::Torque)).collect();
+    if torques.len() < sessions.len() || torques.is_empty() {
+        return;
+    }
+    let (least, most) = least_and_most(torques.iter().copied().flatten().copied());
+    let at_end = |torque: &f64| *torque == least || *torque == most;
+    let between: Vec<&[f64]> =
+        torques.iter().flat_map(|torque| torque.split(at_end)).filter(|part| part.len() > 8).collect();
+    let (noise, step) = noise_and_step(&between);
+    if most <= least || noise <= BLURRED * step || noise <= 0.0 {
+        return;
+    }
+    for limit in [least, most] {
+        let at_limit = |values: &[f64]| stretches(values, AT_LIMIT_ROWS, |a, b| a == limit && b == limit);
+        let found: Vec<Vec<Range<usize>>> = torques.iter().map(|torque| at_limit(torque)).collect();
+        let count: usize = found.iter().flatten().map(Range::len).sum();
+        let places =
+            || found.iter().enumerate().flat_map(|(number, of)| of.iter().map(move |stretch| (number, stretch)));
+        let (Some((first, from)), Some((last, to))) = (places().next(), places().last()) else { continue };
+        if limit == 0.0 || (count as f64) < AT_LIMIT_SHARE * rows as f64 || count < SHORTEST {
+            continue;
+        }
+        let mut fault = of_rows(&sessions[first], FaultName::FrozenChannel, from.clone());
+        let end = of_rows(&sessions[last], FaultName::FrozenChannel, to.clone());
+        (fault.last_line, fault.until_s, fault.rows) = (end.last_line, end.until_s, count as u64);
+        (fault.channel, fault.treatment) = (Some(Quantity::Torque), Treatment::Masked);
+        fault.advice = "take a torque sensor, or a gain of its amplifier, with room for the largest load";
+        fault.what = format!(
+            "the torque never passes {limit:.3} N·m, and stands there in {count} rows, though it has noise elsewhere: it saturates, and these \
+             rows are left out"
+        );
+        findings.faults.push(fault);
+        places().for_each(|(number, stretch)| drop[number][stretch.clone()].fill(true));
+    }
+}
+
 /// Torque or temperature: the whole channel is left out if half of it is frozen; else a temperature goes on by a straight line, and rows
 /// whose torque nobody knows are left out, since a load swings and the drive with it.
 ///
@@ -174,11 +218,11 @@ fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, drop: &mut [
     let standing = steps.iter().filter(|step| **step == 0.0).count();
     let usual = quantile_of(&mut sampled(&steps), 0.99);
     let longest = beyond_chance(rows);
-    let mut frozen = Vec::new();
+    let mut frozen: Vec<(usize, Range<usize>)> = Vec::new();
     for (number, values) in sessions.iter().enumerate().filter_map(|(k, session)| Some((k, session.beside(channel)?))) {
         for stretch in stretches(values, longest, |a, b| a == b) {
-            // No load at all is a load, and may be written as exactly nothing.
-            if values[stretch.start] == 0.0 {
+            // No load at all is a load, and may be written as exactly nothing; what saturates is known already.
+            if values[stretch.start] == 0.0 || drop[number][stretch.start] {
                 continue;
             }
             // Without this stretch the channel stands in so many of its steps.
@@ -218,5 +262,39 @@ fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, drop: &mut [
     }
     if useless {
         sessions.iter_mut().for_each(|session| session.forget(channel));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows left of a torque, and what is told.
+    fn left(torque: impl Iterator<Item = f64>) -> (usize, Vec<FaultName>) {
+        let mut sessions = vec![Session {
+            torque_n_m: Some(torque.collect()),
+            line: (2..4002).collect(),
+            generator_rad: (0..4000).map(|k| 0.02 * f64::from(k)).collect(),
+            error_rad: (0..4000).map(|k| 1e-5 * f64::from(k % 7)).collect(),
+            ..Session::default()
+        }];
+        let mut findings = Findings::default();
+        check(&mut sessions, &Gear::of_ratio(100.0), false, &mut findings).unwrap();
+        (sessions[0].len(), findings.faults.iter().map(|fault| fault.name).collect())
+    }
+
+    #[test]
+    fn a_torque_that_saturates_is_told_once_for_each_end_and_its_rows_are_left_out() {
+        let mut random = fastrand::Rng::with_seed(4);
+        let noisy: Vec<f64> =
+            (0..4000).map(|k| 40.0 * (0.01 * f64::from(k)).sin() + 0.1 * (random.f64() - 0.5)).collect();
+        let (rows, names) = left(noisy.iter().map(|load| load.clamp(-20.0, 20.0)));
+        // Beyond half of the amplitude of a sine are two thirds of its time.
+        assert!((1200..1500).contains(&rows), "{rows}");
+        assert_eq!(names, [FaultName::FrozenChannel; 2]);
+        assert_eq!(left(noisy.iter().copied()), (4000, vec![]));
+        // Ramps between two loads that are held, as they were asked for.
+        let ramps = |k: i32| (80.0 * ((0.002 * f64::from(k)).fract() - 0.5).abs() - 20.0).clamp(-10.0, 10.0);
+        assert_eq!(left((0..4000).map(ramps)), (4000, vec![]));
     }
 }

@@ -216,7 +216,9 @@ fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, finding
         }
     }
     if many {
-        let more = leave_out_the_doubtful(sessions, least);
+        let tail = (TAIL * noise).max(STEPS * resolution);
+        let mut more = leave_out_the_doubtful(sessions, tail, BESIDE);
+        more += (1..TAIL_ROUNDS).map(|_| leave_out_the_doubtful(sessions, tail, 0)).sum::<u64>();
         if let Some(fault) = findings.faults.iter_mut().rfind(|fault| fault.name == FaultName::Outliers) {
             fault.rows += more;
         }
@@ -225,17 +227,26 @@ fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, finding
 
 /// Rows before and after whose medians bear a row out where many are out: two of them may be out as well.
 const WIDELY_BESIDE: usize = 5;
+/// Where many rows are far out, others are out by less: the tail of the same fault, mostly to one side, which would move means. What is off by
+/// more than so many standard deviations of the white noise is left out as well, of sound rows one in thousands. *Source*: Hampel's
+/// identifier rejects from 3 on (Davies and Gather 1993); medians of five rows have a noise of their own.
+const TAIL: f64 = 4.0;
+/// So often, as rows that are out hide others.
+const TAIL_ROUNDS: usize = 3;
 
 /// Where many rows are out, those are as well that stand beside others, or where the drive might have moved them, at reversals and steps of
-/// the load; and nothing bears the first and last rows of a session out. Gives how many are left out.
-fn leave_out_the_doubtful(sessions: &mut [Session], least: f64) -> u64 {
+/// the load; and nothing bears the first and last rows of a session out, `ends` of them. Gives how many are left out.
+fn leave_out_the_doubtful(sessions: &mut [Session], least: f64, ends: usize) -> u64 {
     let mut more = 0;
     for session in sessions.iter_mut().filter(|session| session.len() > 4 * BESIDE) {
-        let (error, last) = (&session.error_rad, session.len() - BESIDE);
+        let (error, last) = (&session.error_rad, session.len() - ends);
         let drop: Vec<bool> = (0..error.len())
             .map(|row| {
-                if row < BESIDE || row >= last {
+                if row < ends || row >= last {
                     return true;
+                }
+                if row < BESIDE || row + BESIDE >= error.len() {
+                    return false;
                 }
                 let before = median_of(&mut error[row.saturating_sub(WIDELY_BESIDE)..row].to_vec());
                 let after = median_of(&mut error[row + 1..(row + 1 + WIDELY_BESIDE).min(error.len())].to_vec());

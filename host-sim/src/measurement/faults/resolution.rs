@@ -60,14 +60,21 @@ pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> V
     found
 }
 
-/// Names a resolution of output or generator that is coarse at the output; nothing can be done about it.
-pub(in crate::measurement) fn check(sessions: &[Session], gear: &Gear, error_recorded: bool, findings: &mut Findings) {
+/// Names a resolution of output or generator that is coarse at the output; nothing can be done about it but to know that rounding is a noise.
+pub(in crate::measurement) fn check(
+    sessions: &mut [Session],
+    gear: &Gear,
+    error_recorded: bool,
+    findings: &mut Findings,
+) {
+    let mut coarsest = 0.0f64;
     let Some(session) = sessions.iter().max_by_key(|session| session.len()) else { return };
     let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
     for (channel, step) in seen(sessions, gear, error_recorded) {
         if step < COARSE_RAD || noise > BLURRED * step {
             continue;
         }
+        coarsest = coarsest.max(step);
         let mut fault = of_rows(session, FaultName::Quantisation, 0..session.len());
         (fault.channel, fault.treatment) = (Some(channel), Treatment::Kept);
         fault.size_arcsec = Some(step / ARCSEC);
@@ -78,4 +85,5 @@ pub(in crate::measurement) fn check(sessions: &[Session], gear: &Gear, error_rec
         );
         findings.faults.push(fault);
     }
+    sessions.iter_mut().for_each(|session| session.coarse_rad = coarsest);
 }

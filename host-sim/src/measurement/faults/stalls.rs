@@ -16,7 +16,7 @@ const STEADY: f64 = 0.25;
 const EXTRA_ROWS: f64 = 0.8;
 /// …and the output takes part in it, within this share.
 const TOGETHER: f64 = 0.3;
-/// In one row both angles move by so many times their own scatter.
+/// In one row the generator moves by so many times its own scatter, and in a leap both angles do.
 const OVER_NOISE: f64 = 8.0;
 /// So many leaps are stalls, at least…
 const FEWEST: usize = 8;
@@ -75,7 +75,8 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
         let third = values.windows(4).map(|v| (v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]).abs()).collect::<Vec<f64>>();
         median_of(&mut sampled(&third))
     };
-    let least = OVER_NOISE * scatter(generator).max(gear.ratio.abs() * scatter(output));
+    let least = OVER_NOISE * scatter(generator);
+    let least_leap = least.max(OVER_NOISE * gear.ratio.abs() * scatter(output));
     let (mut found, mut telling) = (Vec::new(), 0);
     for row in BESIDE + 1..log.len().saturating_sub(BESIDE) {
         let near = row - BESIDE..=row + BESIDE;
@@ -98,7 +99,8 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
         let dt = time[row] - time[row - 1];
         let extra_s = (generator[row] - generator[row - 1]) / usual - dt;
         let by_output = (output[row] - output[row - 1]) * gear.ratio / usual - dt;
-        if extra_s > EXTRA_ROWS * period_s && (by_output - extra_s).abs() < TOGETHER * extra_s {
+        let is_seen = extra_s * usual.abs() > least_leap;
+        if extra_s > EXTRA_ROWS * period_s && is_seen && (by_output - extra_s).abs() < TOGETHER * extra_s {
             found.push((row, extra_s));
         }
     }
@@ -144,7 +146,7 @@ mod tests {
     use super::*;
 
     /// Rows of a drive at an even pace with a stop; the logger stands still for `stall_s` after every 50 rows, and counts `counted`.
-    fn log(stall_s: f64, counted: bool) -> Log {
+    fn log(stall_s: f64, counted: bool, noise_rad: f64) -> Log {
         let mut log = Log::default();
         log.line = (2..3002).collect();
         let (mut told, mut time, mut psi) = (Vec::new(), 0.0, 0.0);
@@ -155,7 +157,7 @@ mod tests {
             psi += dt * if (1000..1200).contains(&k) { 0.0 } else { 8.0 };
             told.push(if counted { 0.01 * f64::from(k) } else { time });
             generator.push(psi);
-            output.push(psi / 100.0 + 5e-6 * f64::from(k % 3));
+            output.push(psi / 100.0 + noise_rad * f64::from(k % 3));
         }
         log.put(Quantity::Time, told);
         log.put(Quantity::Generator, generator);
@@ -164,8 +166,15 @@ mod tests {
     }
 
     #[test]
+    fn rows_may_be_so_close_that_one_moves_the_output_by_less_than_its_noise() {
+        let (mut log, mut findings) = (log(0.04, true, 1e-4), Findings::default());
+        check(&mut log, &Gear::of_ratio(100.0), &mut findings);
+        assert_eq!(findings.faults.first().map(|fault| fault.measures.every_rows), Some(Some(50)));
+    }
+
+    #[test]
     fn stalls_are_told_with_rhythm_and_size_and_time_is_made_anew() {
-        let (mut log, mut findings) = (log(0.04, true), Findings::default());
+        let (mut log, mut findings) = (log(0.04, true, 5e-6), Findings::default());
         check(&mut log, &Gear::of_ratio(100.0), &mut findings);
         let fault = &findings.faults[0];
         assert_eq!((fault.name, fault.measures.every_rows), (FaultName::Stalls, Some(50)));
@@ -177,7 +186,7 @@ mod tests {
 
     #[test]
     fn a_clock_that_shows_them_and_a_logger_without_any_are_left_alone() {
-        for mut log in [log(0.04, false), log(0.0, true)] {
+        for mut log in [log(0.04, false, 5e-6), log(0.0, true, 5e-6)] {
             let mut findings = Findings::default();
             check(&mut log, &Gear::of_ratio(100.0), &mut findings);
             assert!(findings.faults.is_empty(), "{:?}", findings.faults);

@@ -164,6 +164,7 @@ fn thinned(session: &Session, every: usize) -> Session {
         loudness: column(&session.loudness),
         own_zero: session.own_zero,
         unsure_s: session.unsure_s,
+        coarse_rad: session.coarse_rad,
     }
 }
 
