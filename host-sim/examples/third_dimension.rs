@@ -2,9 +2,11 @@
 //!
 //! The figures of each drive as a catalogue would print them ([`flexspline_sim::data_sheet`]), one row for each drive and generator, with
 //! the load even along the face and with the face in slices, as a Markdown table. Torque 50 N·m and coarse mesh by default; a LEVEL is
-//! coarse, standard or fine. It ends with 1 if any drive finds no equilibrium; its row then has the figures until there.
+//! coarse, standard or fine. Where a drive finds no equilibrium its row has the figures until there, and
+//! it ends with 1.
 
 use std::process::ExitCode;
+use std::time::Instant;
 
 use flexspline_sim::data_sheet::{DataSheet, Loads, data_sheet};
 use flexspline_sim::drive::{Drive, GeneratorKind};
@@ -80,11 +82,10 @@ fn main() -> ExitCode {
         .into_par_iter()
         .with_max_len(1)
         .map(|(Variant { drive, face }, kind)| {
-            let temperature = drive.temperature.reference_c;
+            let (clock, temperature) = (Instant::now(), drive.temperature.reference_c);
             let (sheet, done) = data_sheet(drive, kind, temperature, Loads::up_to(torque_n_m), POSITIONS, solver);
-            if let Err(error) = &done {
-                eprintln!("{} {face}, {kind}: {error}", drive.name);
-            }
+            let ended = done.as_ref().err().map_or_else(String::new, |error| format!(": {error}"));
+            eprintln!("{} {face}, {kind}, {:.1} s{ended}", drive.name, clock.elapsed().as_secs_f64());
             let cells = COLUMNS.map(|(_, of)| of(&sheet).unwrap_or_else(|| "—".into()));
             (format!("| `{}`, {face} | {kind} | {} |", drive.name, cells.join(" | ")), done.is_ok())
         })
