@@ -63,14 +63,14 @@ pub struct Known {
     pub times_its_doubt: f64,
 }
 
-/// Sizes by which causes are told; what else they have are places, shapes and the same in other units.
-const SIZES: [ParameterName; 14] = [
+/// Sizes by which causes are told; what else they have are places, shapes and the same in other units. The gain of a resonance is none: it trades
+/// with the damping, while what it adds is known.
+const SIZES: [ParameterName; 13] = [
     ParameterName::AmplitudeArcsec,
     ParameterName::ClearanceArcsecPerK,
     ParameterName::DeeperArcsec,
     ParameterName::DelayS,
     ParameterName::DragNM,
-    ParameterName::Gain,
     ParameterName::GrowthArcsec,
     ParameterName::HalfWidthArcsec,
     ParameterName::HardeningArcsec,
