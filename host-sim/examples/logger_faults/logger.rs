@@ -110,6 +110,8 @@ impl Wrong {
         match self {
             Wrong::Ratio => "ratio_error",
             Wrong::Skew => "sensor_latency",
+            // Of the generator, whose encoder this is.
+            Wrong::MotorRipple => "encoder_subdivision",
             _ => "",
         }
     }
