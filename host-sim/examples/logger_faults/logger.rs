@@ -419,7 +419,7 @@ impl Values {
             }
             // Encoders and cables mostly err to one side.
             Wrong::Outliers => {
-                let side = if session % 2 == 0 { 1.0 } else { -1.0 };
+                let side = if session.is_multiple_of(2) { 1.0 } else { -1.0 };
                 for row in rows.iter_mut() {
                     if chance.is(self.share) {
                         row[OUTPUT] +=

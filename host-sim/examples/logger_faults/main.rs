@@ -62,8 +62,11 @@ fn model_text((flexspline, circular, fixed, stiffness, backlash, friction, harmo
     text
 }
 
+/// The image of a table, and the kernels beside it.
+type Image = (GeneratorKind, Vec<u8>, Option<Kernels>);
+
 /// Images of the tables of a folder, with their kernels where they stand beside them.
-fn tables(folder: &Path) -> Result<Vec<(GeneratorKind, Vec<u8>, Option<Kernels>)>, String> {
+fn tables(folder: &Path) -> Result<Vec<Image>, String> {
     let mut found = Vec::new();
     for kind in GeneratorKind::ALL {
         let Ok(image) = std::fs::read(folder.join(format!("{kind}.fxt"))) else { continue };
@@ -79,7 +82,7 @@ fn tables(folder: &Path) -> Result<Vec<(GeneratorKind, Vec<u8>, Option<Kernels>)
     Ok(found)
 }
 
-fn drives(images: &[(GeneratorKind, Vec<u8>, Option<Kernels>)]) -> Result<Vec<Drive<'_>>, String> {
+fn drives(images: &[Image]) -> Result<Vec<Drive<'_>>, String> {
     let mut drives = Vec::new();
     for of in CATALOGUE {
         let name = format!("{}-{}-{}", of.0, of.1, of.2);
