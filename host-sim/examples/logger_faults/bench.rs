@@ -29,6 +29,10 @@ const FLANK_S: f64 = 0.004;
 /// A unit is within so many standard deviations of its drawing.
 const WORST_UNIT: f64 = 1.5;
 
+/// How benches move and load.
+const MOTIONS: [&str; 3] = ["there and back", "swings", "moves"];
+const LOADS: [&str; 4] = ["ramps", "sine", "steps", "friction"];
+
 /// A drive with what it is held against.
 pub struct Drive<'a> {
     pub name: String,
@@ -93,8 +97,8 @@ impl Bench {
             torque_noise_n_m: load_n_m * chance.by_ratio(TORQUE_NOISE),
             bits: [*chance.of(&[16, 18, 20]), *chance.of(&[22, 24, 26])],
             with_temperature: chance.is(0.7),
-            motion: *chance.of(&["there and back", "swings", "moves"]),
-            load: *chance.of(&["ramps", "sine", "steps", "friction"]),
+            motion: MOTIONS[chance.below(MOTIONS.len())],
+            load: LOADS[chance.below(LOADS.len())],
         }
     }
 

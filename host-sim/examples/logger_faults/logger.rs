@@ -110,6 +110,8 @@ impl Wrong {
         match self {
             Wrong::Ratio => "ratio_error",
             Wrong::Skew => "sensor_latency",
+            // Of the generator, whose encoder this is.
+            Wrong::MotorRipple => "encoder_subdivision",
             _ => "",
         }
     }
@@ -417,7 +419,7 @@ impl Values {
             }
             // Encoders and cables mostly err to one side.
             Wrong::Outliers => {
-                let side = if session % 2 == 0 { 1.0 } else { -1.0 };
+                let side = if session.is_multiple_of(2) { 1.0 } else { -1.0 };
                 for row in rows.iter_mut() {
                     if chance.is(self.share) {
                         row[OUTPUT] +=

@@ -10,6 +10,8 @@ use crate::measurement::robust::{least_and_most, quantile_of};
 
 /// A column that stays within one turn, and begins anew, covers at least this share of the turn.
 const COVERED: f64 = 0.75;
+/// Share of what an exchange of the two columns gives that tells one.
+const EXCHANGED: f64 = 0.75;
 /// Times it must begin anew before a unit other than the one given is believed.
 const OFTEN: usize = 3;
 /// Steps up to this share of a turn are told from a wrap without help.
@@ -30,6 +32,11 @@ pub(in crate::measurement) fn unwrap(log: &mut Log, columns: &[Column], ratio: f
             .get(Quantity::Output)
             .filter(|_| channel == Quantity::Generator)
             .map_or(0.0, |output| span_of(output) * ratio.abs());
+        // An output that turns by the ratio times as much is the generator: columns taken for each other, and not an angle that began anew.
+        let leaps = values.windows(2).any(|pair| (pair[1] - pair[0]).abs() > 0.5 * TAU);
+        if !leaps && travel > EXCHANGED * ratio.powi(2) * span_of(values) {
+            continue;
+        }
         let Some(unit) = wrapped_at(values, column.unit, travel, log) else { continue };
         let scale = unit.factor() / column.unit.factor();
         if unit != column.unit {
