@@ -634,6 +634,8 @@ struct Sensing {
     fed_n_m: f64,
     /// The way in which the motor was told to move last: 1, −1, or 0 before it was.
     way: f64,
+    /// Whether the target stood in the tick before: 1 or 0.
+    stood: f64,
     /// How far it was told to go that way, rad at the output.
     furthest_rad: f64,
 }
@@ -654,6 +656,7 @@ impl Sensing {
             bound_n_m: f64::INFINITY,
             fed_n_m: f64::NAN,
             way: 0.0,
+            stood: 1.0,
             furthest_rad: 0.0,
         }
     }
@@ -795,6 +798,8 @@ impl Lane {
         let scenario = &made.scenario;
         let generator = self.servo.read(&self.plant);
         let reading = self.sensing.read(made, &self.plant, &mut self.servo, now);
+        let stood = self.sensing.stood;
+        self.sensing.stood = f64::from(u8::from(now.rate_rad_s == 0.0));
         if now.rate_rad_s != 0.0 {
             self.direction = if now.rate_rad_s > 0.0 { Direction::Forward } else { Direction::Backward };
         }
@@ -806,6 +811,7 @@ impl Lane {
         let told = Told { generator, moment: *now, direction: self.direction, reading, mesh_n_m };
         let commanded = self.controller.tick(made, &told);
         let command_rad = commanded.command.to_rad() / made.unit.nominal.ratio;
+        let fed = made.torque == TorqueKnown::OnLoad && scenario.load_fed_forward > 0.0;
         // The load, which moves as the target does, has to be accelerated too.
         let load = scenario.load_kg_m2 / made.masses.motor_kg_m2 * made.unit.nominal.ratio;
         let asked = Asked {
@@ -815,6 +821,7 @@ impl Lane {
             torque_n_m: (self.sensing.rubbing_told_n_m(scenario, now.rate_rad_s, command_rad, mesh_n_m)
                 - scenario.load_fed_forward * self.sensing.held_n_m(scenario, way))
                 / made.unit.nominal.ratio,
+            starts: if fed && stood != 0.0 && now.rate_rad_s != 0.0 { way } else { 0.0 },
         };
         if scenario.warming_k_s != 0.0 {
             self.plant.set_temperature(scenario.temperature_c + scenario.warming_k_s * now.time_s);
@@ -900,6 +907,17 @@ const TIME_CONSTANTS: f64 = 8.0;
 
 /// Speed below which a joint counts as at rest, rad/s: 4″/s, with an encoder that steps.
 const AT_REST_RAD_S: f64 = 2e-5;
+
+/// Whether the compensated joint comes to rest after a knock as the one without compensation does, with all that flies: limiter, hold, rate and
+/// acceleration fed forward, the torque's path. And the low-pass that the torque got, Hz; none where a torque in the mesh may not be used.
+///
+/// # Errors
+/// As [`fly`].
+pub fn comes_to_rest(scenario: &Scenario, unit: &Unit) -> Result<(bool, Option<f64>), String> {
+    let made = made(scenario, unit, None)?;
+    let used = made.torque == scenario.torque;
+    Ok((stable(&made)?, used.then_some(made.bandwidth_hz)))
+}
 
 fn stable(made: &Made) -> Result<bool, String> {
     // What noise moves is no ringing.
