@@ -741,11 +741,14 @@ impl Sensing {
     /// or was corrected to.
     ///
     /// At rest it stays. Taken off there, the integral part would hold the friction instead, and as the target moves on the motor would be given it twice.
-    fn rubbing_told_n_m(&mut self, scenario: &Scenario, rate_rad_s: f64, command_rad: f64, mesh_n_m: f64) -> f64 {
+    /// Where the torque comes from the mesh or the motor the correction tells the way but once: else it would be a relay in a loop.
+    fn rubbing_told_n_m(&mut self, made: &Made, rate_rad_s: f64, command_rad: f64, mesh_n_m: f64) -> f64 {
+        let scenario = &made.scenario;
+        let loops = matches!(made.torque, TorqueKnown::InMesh | TorqueKnown::Current);
         let gone = command_rad - self.furthest_rad;
         if rate_rad_s != 0.0 {
             self.way = libm::copysign(1.0, rate_rad_s);
-        } else if gone.abs() > TURNED_RAD {
+        } else if gone.abs() > TURNED_RAD && !(loops && self.way != 0.0) {
             self.way = libm::copysign(1.0, gone);
         }
         if rate_rad_s != 0.0 || gone * self.way > 0.0 {
@@ -818,7 +821,7 @@ impl Lane {
             command: commanded.command,
             rate_rad_s: commanded.rate_rad_s,
             acceleration_rad_s2: commanded.acceleration_rad_s2 + now.acceleration_rad_s2 * load,
-            torque_n_m: (self.sensing.rubbing_told_n_m(scenario, now.rate_rad_s, command_rad, mesh_n_m)
+            torque_n_m: (self.sensing.rubbing_told_n_m(made, now.rate_rad_s, command_rad, mesh_n_m)
                 - scenario.load_fed_forward * self.sensing.held_n_m(scenario, way))
                 / made.unit.nominal.ratio,
             starts: if fed && stood != 0.0 && now.rate_rad_s != 0.0 { way } else { 0.0 },
