@@ -60,7 +60,11 @@ fn about_zero_load_the_core_is_never_worse_than_no_compensation_and_near_the_ide
                     || noise_n_m > 2.0 * drag_n_m
                     || torque == TorqueKnown::Current;
                 let of_ideal = if unknown { 0.0 } else { core / ideal.max(0.1 * none) };
-                for (worst, ratio) in worst.iter_mut().zip([core / none, of_ideal]) {
+                // Both at once: the flank is a guess, and a guess may be wrong.
+                let guessed = (load_n_m.abs() - drag_n_m).abs() <= FLOATS_N_M && noise_n_m > 2.0 * drag_n_m;
+                assert!(core < 1.5 * none, "{what}");
+                let of_none = if guessed { 0.0 } else { core / none };
+                for (worst, ratio) in worst.iter_mut().zip([of_none, of_ideal]) {
                     if ratio > worst.0 {
                         *worst = (ratio, what.clone());
                     }
