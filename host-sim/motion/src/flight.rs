@@ -634,6 +634,8 @@ struct Sensing {
     fed_n_m: f64,
     /// The way in which the motor was told to move last: 1, −1, or 0 before it was.
     way: f64,
+    /// Whether the target stood in the tick before: 1 or 0.
+    stood: f64,
     /// How far it was told to go that way, rad at the output.
     furthest_rad: f64,
 }
@@ -654,6 +656,7 @@ impl Sensing {
             bound_n_m: f64::INFINITY,
             fed_n_m: f64::NAN,
             way: 0.0,
+            stood: 1.0,
             furthest_rad: 0.0,
         }
     }
@@ -738,11 +741,14 @@ impl Sensing {
     /// or was corrected to.
     ///
     /// At rest it stays. Taken off there, the integral part would hold the friction instead, and as the target moves on the motor would be given it twice.
-    fn rubbing_told_n_m(&mut self, scenario: &Scenario, rate_rad_s: f64, command_rad: f64, mesh_n_m: f64) -> f64 {
+    /// Where the torque comes from the mesh or the motor the correction tells the way but once: else it would be a relay in a loop.
+    fn rubbing_told_n_m(&mut self, made: &Made, rate_rad_s: f64, command_rad: f64, mesh_n_m: f64) -> f64 {
+        let scenario = &made.scenario;
+        let loops = matches!(made.torque, TorqueKnown::InMesh | TorqueKnown::Current);
         let gone = command_rad - self.furthest_rad;
         if rate_rad_s != 0.0 {
             self.way = libm::copysign(1.0, rate_rad_s);
-        } else if gone.abs() > TURNED_RAD {
+        } else if gone.abs() > TURNED_RAD && !(loops && self.way != 0.0) {
             self.way = libm::copysign(1.0, gone);
         }
         if rate_rad_s != 0.0 || gone * self.way > 0.0 {
@@ -795,6 +801,8 @@ impl Lane {
         let scenario = &made.scenario;
         let generator = self.servo.read(&self.plant);
         let reading = self.sensing.read(made, &self.plant, &mut self.servo, now);
+        let stood = self.sensing.stood;
+        self.sensing.stood = f64::from(u8::from(now.rate_rad_s == 0.0));
         if now.rate_rad_s != 0.0 {
             self.direction = if now.rate_rad_s > 0.0 { Direction::Forward } else { Direction::Backward };
         }
@@ -806,15 +814,17 @@ impl Lane {
         let told = Told { generator, moment: *now, direction: self.direction, reading, mesh_n_m };
         let commanded = self.controller.tick(made, &told);
         let command_rad = commanded.command.to_rad() / made.unit.nominal.ratio;
+        let fed = made.torque == TorqueKnown::OnLoad && scenario.load_fed_forward > 0.0;
         // The load, which moves as the target does, has to be accelerated too.
         let load = scenario.load_kg_m2 / made.masses.motor_kg_m2 * made.unit.nominal.ratio;
         let asked = Asked {
             command: commanded.command,
             rate_rad_s: commanded.rate_rad_s,
             acceleration_rad_s2: commanded.acceleration_rad_s2 + now.acceleration_rad_s2 * load,
-            torque_n_m: (self.sensing.rubbing_told_n_m(scenario, now.rate_rad_s, command_rad, mesh_n_m)
+            torque_n_m: (self.sensing.rubbing_told_n_m(made, now.rate_rad_s, command_rad, mesh_n_m)
                 - scenario.load_fed_forward * self.sensing.held_n_m(scenario, way))
                 / made.unit.nominal.ratio,
+            starts: if fed && stood != 0.0 && now.rate_rad_s != 0.0 { way } else { 0.0 },
         };
         if scenario.warming_k_s != 0.0 {
             self.plant.set_temperature(scenario.temperature_c + scenario.warming_k_s * now.time_s);
@@ -900,6 +910,17 @@ const TIME_CONSTANTS: f64 = 8.0;
 
 /// Speed below which a joint counts as at rest, rad/s: 4″/s, with an encoder that steps.
 const AT_REST_RAD_S: f64 = 2e-5;
+
+/// Whether the compensated joint comes to rest after a knock as the one without compensation does, with all that flies: limiter, hold, rate and
+/// acceleration fed forward, the torque's path. And the low-pass that the torque got, Hz; none where a torque in the mesh may not be used.
+///
+/// # Errors
+/// As [`fly`].
+pub fn comes_to_rest(scenario: &Scenario, unit: &Unit) -> Result<(bool, Option<f64>), String> {
+    let made = made(scenario, unit, None)?;
+    let used = made.torque == scenario.torque;
+    Ok((stable(&made)?, used.then_some(made.bandwidth_hz)))
+}
 
 fn stable(made: &Made) -> Result<bool, String> {
     // What noise moves is no ringing.

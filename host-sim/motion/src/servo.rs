@@ -45,6 +45,9 @@ pub struct Asked {
     pub acceleration_rad_s2: f64,
     /// Torque that friction and load are expected to take, fed forward, N·m at the motor.
     pub torque_n_m: f64,
+    /// The way (1 or −1) in which the target starts to move in this tick, where the load is in that torque; else 0. The integral part is made anew then:
+    /// at rest it may hold the friction either way.
+    pub starts: f64,
 }
 
 /// A motor with its servo and its encoder.
@@ -128,6 +131,11 @@ impl Servo {
             self.settings;
         // What was asked for before and has not come is late by a tick.
         self.torque_n_m = self.next_n_m;
+        if asked.starts != 0.0 {
+            // The motor gives what is expected, or what it gave at rest if that is more.
+            let more = asked.starts * (self.next_n_m - asked.torque_n_m);
+            self.integral_n_m = asked.starts * more.max(0.0);
+        }
         let speed = self.rate_rad_s() * self.ratio;
         let wanted = asked.rate_rad_s + TAU * position_hz * angle_rad(asked.command.minus_counts(self.shown));
         let gain = TAU * speed_hz * inertia_kg_m2;

@@ -86,6 +86,7 @@ fn knocked(joint: &TwoMasses, servo: &ServoSettings, path: Option<&TorquePath>, 
                 rate_rad_s: if fed { (correction - before) / TICK_S } else { 0.0 },
                 acceleration_rad_s2: 0.0,
                 torque_n_m: 0.0,
+                starts: 0.0,
             };
             before = correction;
             if split {

@@ -42,6 +42,7 @@ kept!(Sensing {
     bound_n_m,
     fed_n_m,
     way,
+    stood,
     furthest_rad
 });
 
