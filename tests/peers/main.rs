@@ -5,7 +5,7 @@
 //! load. Compared are the output angle, the wind-up between the two loads, the displacements of the bore, the stress along
 //! it, and what both cost. The short form is the cam on the coarse mesh; `--long` adds the standard mesh and what CalculiX
 //! itself leaves open (each increment in two parts). A cup and a closed sleeve in solid elements stand beside our shells, a fine mesh of one root fillet
-//! beside the stress that we extrapolate. Rollers are not compared: see the header of `export/inp.rs`.
+//! beside the stress that `simulate --stress` tells. Rollers are not compared: see the header of `export/inp.rs`.
 //!
 //! Prints what it finds, a line for each claim, and one line of ratios at the end; ends with 1 if a claim fails.
 

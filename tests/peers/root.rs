@@ -1,4 +1,4 @@
-//! Stress in a root fillet: extrapolated over our meshes, and by CalculiX on a fine mesh of one tooth of the flexspline.
+//! Stress in a root fillet: over our meshes with its interval, and by CalculiX on a fine mesh of one tooth of the flexspline.
 //!
 //! The tooth is the one with the most stressed fillet. Its cell is cut out of the loaded drive; bore, flanks and the faces to its neighbours are
 //! displaced as our finest mesh of the whole drive has them, interpolated along its edges; fillet, root land and tip are free. CalculiX
@@ -21,7 +21,7 @@ use crate::Claims;
 use crate::dat::{at_step, tables};
 use crate::program::{Limits, run};
 
-/// Largest relative difference of the extrapolated stress.
+/// Largest relative difference of the stress. Found: 3.0 and 2.5 %.
 const STRESS: f64 = 0.03;
 /// Where a run stops being worth waiting for; it takes two seconds.
 const LIMITS: Limits = Limits { cpu_s: 120.0, memory_mb: 2000.0 };
@@ -72,7 +72,7 @@ fn told(
     let [low, high] = ours.interval_mpa;
     println!("== root fillet, {kind} at {torque_n_m} N.m; CalculiX {cpu_s:.1} s");
     println!(
-        "  extrapolated {:.1} MPa ({low:.1} to {high:.1}), by mesh {:.1?}; CalculiX {theirs:.1} MPa",
+        "  ours {:.1} MPa ({low:.1} to {high:.1}), by mesh {:.1?}; CalculiX {theirs:.1} MPa",
         ours.von_mises_mpa, ours.by_mesh_mpa
     );
     let apart = ours.von_mises_mpa / theirs - 1.0;

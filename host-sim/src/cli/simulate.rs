@@ -55,7 +55,7 @@ pub(super) struct Simulate {
     /// Which way pitch and turn go [default: forward]
     #[arg(long, value_enum)]
     direction: Option<DirectionOption>,
-    /// Stress in root fillet, on bore and flank, extrapolated over three meshes, with its interval; some seconds more
+    /// Stress in root fillet, on bore and flank over three meshes, with its interval; some seconds more
     #[arg(long)]
     stress: bool,
     /// Write the deformed mesh of every row to frames/, for ParaView
@@ -333,7 +333,7 @@ fn report(summary: &Summary, out: &FilePath, has_frames: bool) -> String {
     put("wind-up, elastic part", summary.wind_up_elastic_arcsec, "arcsec", 3);
     put("largest von Mises stress at a node", Some(summary.max_von_mises_mpa), "MPa, which grows with the mesh", 1);
     if summary.stress.is_empty() {
-        put("stress in the root fillets", Some(summary.root_fillet_mpa), "MPa on this mesh; --stress extrapolates", 1);
+        put("stress in the root fillets", Some(summary.root_fillet_mpa), "MPa on this mesh; --stress takes three", 1);
         put("stress on the bore, at a node", Some(summary.nodal_bore_mpa), "MPa", 1);
     }
     for stress in &summary.stress {

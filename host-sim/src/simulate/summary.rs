@@ -102,7 +102,7 @@ pub struct Summary {
     pub nodal_bore_mpa: f64,
     /// On its flanks.
     pub nodal_flank_mpa: f64,
-    /// Stress of the flexspline at these places where and under what the nodal one is largest, extrapolated over three meshes, with its
+    /// Stress of the flexspline at these places where and under what the nodal one is largest, over three meshes, with its
     /// interval; left out where it was not asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stress: Vec<PlaceStress>,
