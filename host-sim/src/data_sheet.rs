@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
 use crate::drive::{Drive, GeneratorKind};
-use crate::motion::{Motion, Trail};
+use crate::motion::Motion;
 use crate::simulate::peak_stress;
 use crate::stepping::{Problem, SolveError, SolverSettings};
 use crate::units::ARCSEC_PER_RAD;
@@ -173,17 +173,6 @@ pub const FIGURES: [FigureOf; 19] = [
     ("last_stable_n_m", |s| s.last_stable_n_m),
 ];
 
-/// Where the iterations of a sheet begin.
-#[derive(Debug, Clone, Copy)]
-pub enum Way<'a> {
-    /// Every increment from what the drive itself did before.
-    Alone,
-    /// The same, and a trail is kept for drives that are nearly the same.
-    Leading,
-    /// Where such a drive shows. Every equilibrium is the drive's own, to the tolerance of the solver.
-    Following(&'a Trail),
-}
-
 /// The sheet of a drive with one generator at a temperature. `positions` over the tooth pitch, 4 or more.
 ///
 /// Where no equilibrium is found the sheet has what was found until then, and the error says where it ended.
@@ -195,46 +184,22 @@ pub fn data_sheet(
     positions: usize,
     settings: SolverSettings,
 ) -> (DataSheet, Result<(), SolveError>) {
-    let (sheet, done) = data_sheet_on(Way::Alone, drive, kind, temperature_c, loads, positions, settings);
-    (sheet, done.map(|_| ()))
-}
-
-/// [`data_sheet()`] on the trail of another drive, or with one for others.
-pub fn data_sheet_on(
-    way: Way<'_>,
-    drive: &Drive,
-    kind: GeneratorKind,
-    temperature_c: f64,
-    loads: Loads,
-    positions: usize,
-    settings: SolverSettings,
-) -> (DataSheet, Result<Trail, SolveError>) {
     let mut sheet = DataSheet {
         rigid_gap_um: rigid_gap_um(drive, kind),
         room_as_built_arcsec: room_as_built_arcsec(drive, kind),
         ..DataSheet::default()
     };
     let done = Problem::new(drive, kind, temperature_c, settings)
-        .and_then(|problem| fill(&mut sheet, &problem, way, loads, positions));
+        .and_then(|problem| fill(&mut sheet, &problem, loads, positions));
     if let (Err(SolveError::NotConverged { reached_n_m, .. }), Some(last)) = (&done, &mut sheet.last_stable_n_m) {
         *last = last.max(*reached_n_m);
     }
     (sheet, done)
 }
 
-fn fill(
-    sheet: &mut DataSheet,
-    problem: &Problem,
-    way: Way<'_>,
-    loads: Loads,
-    positions: usize,
-) -> Result<Trail, SolveError> {
+fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize) -> Result<(), SolveError> {
     let drive = &problem.drive;
-    let mut motion = match way {
-        Way::Alone => Motion::deformed(problem, 0.0)?,
-        Way::Leading => Motion::deformed_with_trail(problem, 0.0)?,
-        Way::Following(trail) => Motion::deformed_on(problem, 0.0, trail)?,
-    };
+    let mut motion = Motion::deformed(problem, 0.0)?;
     sheet.last_stable_n_m = Some(0.0);
     let unloaded = motion.state().clone();
     let touch = touch_n_m(drive, loads);
@@ -297,5 +262,5 @@ fn fill(
     let [root_fillet, bore, _] = peak.by_place_mpa;
     sheet.max_von_mises_mpa = Some(peak.von_mises_mpa);
     (sheet.root_fillet_mpa, sheet.bore_mpa) = (Some(root_fillet), Some(bore));
-    Ok(motion.into_trail())
+    Ok(())
 }

@@ -2,7 +2,6 @@
 //! constraints, which are best, and what each field does.
 
 mod effects;
-mod groups;
 mod judge;
 mod vary;
 
@@ -14,9 +13,8 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::cautions::Caution;
-use crate::data_sheet::{DataSheet, Loads, Way, data_sheet_on};
+use crate::data_sheet::{DataSheet, Loads, data_sheet};
 use crate::drive::{Drive, GeneratorKind};
-use crate::motion::Trail;
 use crate::stepping::SolverSettings;
 
 pub use effects::{Effect, effects};
@@ -158,48 +156,27 @@ pub type Observer<'a> = dyn Fn(usize, usize, &Run) -> ControlFlow<()> + Sync + '
 pub fn study(drive: &Drive, settings: &StudySettings, observer: &Observer<'_>) -> Result<Study, StudyError> {
     let variants = variants(drive, settings)?;
     let paths: Vec<&str> = settings.vary.iter().map(|field| field.path.as_str()).collect();
-    let count = variants.len() * settings.generators.len();
+    let jobs: Vec<(usize, GeneratorKind)> =
+        (0..variants.len()).flat_map(|variant| settings.generators.iter().map(move |kind| (variant, *kind))).collect();
     let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
-    let one = |place: usize, variant: usize, way: Way<'_>| -> Option<(usize, Run, Option<Trail>)> {
-        if stopped.load(Ordering::Relaxed) {
-            return None;
-        }
-        let (run, trail) = run(drive, settings, &paths, variant, &variants[variant], settings.generators[place], way);
-        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-        if observer(done, count, &run).is_break() {
-            stopped.store(true, Ordering::Relaxed);
-        }
-        Some((variant * settings.generators.len() + place, run, trail))
-    };
-    // Those that lead from nothing, the others from where those around them show.
-    let places = groups::Places::new(&paths, &variants);
-    let leaders = places.leaders();
-    let others: Vec<usize> = (0..variants.len()).filter(|variant| !leaders.contains(variant)).collect();
-    let of_generator = |place: usize| -> Vec<(usize, Run)> {
-        let led: Vec<_> =
-            leaders.par_iter().with_max_len(1).filter_map(|leader| one(place, *leader, Way::Leading)).collect();
-        if led.len() < leaders.len() {
-            return Vec::new();
-        }
-        let trails: Vec<(usize, &Trail)> =
-            leaders.iter().zip(&led).filter_map(|(leader, (_, _, trail))| Some((*leader, trail.as_ref()?))).collect();
-        let with_trails: Vec<usize> = trails.iter().map(|(leader, _)| *leader).collect();
-        let follow = |variant: &usize| {
-            let weights = places.weights(&with_trails, *variant);
-            let parts: Vec<(f64, &Trail)> = weights.iter().map(|(k, weight)| (*weight, trails[*k].1)).collect();
-            one(place, *variant, Way::Following(&Trail::mixed(&parts))).map(|(number, run, _)| (number, run))
-        };
-        let mut runs: Vec<(usize, Run)> = others.par_iter().with_max_len(1).filter_map(follow).collect();
-        runs.extend(led.into_iter().map(|(number, run, _)| (number, run)));
-        runs
-    };
-    let mut numbered: Vec<(usize, Run)> =
-        (0..settings.generators.len()).into_par_iter().with_max_len(1).flat_map(of_generator).collect();
-    if numbered.len() < count {
+    let mut runs: Vec<Run> = jobs
+        .par_iter()
+        .with_max_len(1)
+        .filter_map(|&(variant, generator)| {
+            if stopped.load(Ordering::Relaxed) {
+                return None;
+            }
+            let run = run(drive, settings, &paths, variant, &variants[variant], generator);
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            if observer(done, jobs.len(), &run).is_break() {
+                stopped.store(true, Ordering::Relaxed);
+            }
+            Some(run)
+        })
+        .collect();
+    if runs.len() < jobs.len() {
         return Err(StudyError::Stopped);
     }
-    numbered.sort_by_key(|(number, _)| *number);
-    let mut runs: Vec<Run> = numbered.into_iter().map(|(_, run)| run).collect();
     judge::judge(&mut runs, &settings.constraints, &settings.targets);
     Ok(Study { fields: paths.into_iter().map(str::to_owned).collect(), runs })
 }
@@ -250,8 +227,7 @@ fn run(
     variant: usize,
     values: &[String],
     generator: GeneratorKind,
-    way: Way<'_>,
-) -> (Run, Option<Trail>) {
+) -> Run {
     let mut run = Run {
         variant: variant + 1,
         generator,
@@ -266,23 +242,20 @@ fn run(
     };
     let drive = match varied(drive, paths, values) {
         Ok(drive) => drive,
-        Err(error) => return (Run { why: Some(error.to_string()), ..run }, None),
+        Err(error) => return Run { why: Some(error.to_string()), ..run },
     };
     let loads = Loads::up_to(settings.torque_n_m.unwrap_or_else(|| drive.rated_torque_n_m(generator)));
-    let reference_c = drive.temperature.reference_c;
-    let (sheet, done) = data_sheet_on(way, &drive, generator, reference_c, loads, settings.positions, settings.solver);
+    let (sheet, done) =
+        data_sheet(&drive, generator, drive.temperature.reference_c, loads, settings.positions, settings.solver);
     (run.loads, run.sheet, run.cautions) = (Some(loads), sheet, sheet.looked().cautions());
     match done {
-        Ok(trail) => {
-            run.status = RunStatus::Converged;
-            (run, Some(trail))
-        }
+        Ok(()) => run.status = RunStatus::Converged,
         Err(error) => {
             run.status = if error.is_bad_input() { RunStatus::Refused } else { RunStatus::Failed };
             run.why = Some(error.to_string());
-            (run, None)
         }
     }
+    run
 }
 
 #[cfg(test)]

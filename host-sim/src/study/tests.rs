@@ -56,26 +56,6 @@ fn a_thicker_rim_is_stiffer_under_two_rollers() {
     assert!(thick.peak_generator_pressure_mpa.unwrap() > thin.peak_generator_pressure_mpa.unwrap());
 }
 
-/// A variant that began where others show has the figures that it has alone.
-#[test]
-fn variants_that_follow_have_the_figures_that_they_have_alone() {
-    let mut settings = settings(&["flexspline.rim_thickness_mm=1.0..1.5:4"]);
-    settings.torque_n_m = Some(120.0);
-    let study = quietly(&settings).unwrap();
-    // Two of four lead: the ends.
-    for run in &study.runs[1..3] {
-        let drive = Drive::hhd_95().with_set(&format!("flexspline.rim_thickness_mm={}", run.values[0])).unwrap();
-        let loads = Loads::up_to(120.0);
-        let (alone, done) =
-            crate::data_sheet::data_sheet(&drive, GeneratorKind::Cam, 20.0, loads, settings.positions, settings.solver);
-        done.unwrap();
-        for (name, of) in FIGURES {
-            let (Some(here), Some(there)) = (of(&run.sheet), of(&alone)) else { continue };
-            assert!((here - there).abs() <= 2e-4 * there.abs().max(0.01), "{name}: {here} in the study, {there} alone");
-        }
-    }
-}
-
 #[test]
 fn a_field_that_is_not_there_is_told_before_anything_runs() {
     let error = quietly(&settings(&["flexspline.rim_thicknes_mm=1..2"])).unwrap_err().to_string();
