@@ -194,6 +194,9 @@ pub struct SheetBeside {
     pub why: Option<String>,
 }
 
+/// Name, stated, computed, scatter of units in percent, what is computed.
+type Figure = (&'static str, Option<f64>, Option<f64>, Option<f64>, &'static str);
+
 /// Computes what is stated, at a temperature.
 pub fn beside(
     drive: &Drive,
@@ -215,7 +218,7 @@ pub fn beside(
     let starting_n_m = further(stated.starting_torque_n_m, &|problem, _| starting_n_m(problem));
     let arcmin = |arcsec: Option<f64>| arcsec.map(|x| x / 60.0);
     let scatter = stated.unit_scatter_percent;
-    let figures: [(&'static str, Option<f64>, Option<f64>, Option<f64>, &'static str); 8] = [
+    let figures: [Figure; 8] = [
         ("k1_n_m_per_rad", stated.k1_n_m_per_rad, sheet.k1_n_m_per_rad, scatter, "secant from first contact to T1"),
         ("k2_n_m_per_rad", stated.k2_n_m_per_rad, sheet.k2_n_m_per_rad, scatter, "secant from T1 to T2"),
         ("k3_n_m_per_rad", stated.k3_n_m_per_rad, sheet.k3_n_m_per_rad, scatter, "secant from T2 to the rated torque"),
