@@ -9,7 +9,7 @@
 use flexspline::{Direction, GeneratorAngle, Table};
 use serde::Serialize;
 
-use crate::cautions::{Looked, rigid_gap_um};
+use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
 use crate::drive::{Drive, GeneratorKind};
 use crate::motion::Motion;
 use crate::simulate::peak_stress;
@@ -86,7 +86,7 @@ impl Stiffness {
 }
 
 /// A light touch, N·m.
-fn touch_n_m(drive: &Drive, loads: Loads) -> f64 {
+pub(crate) fn touch_n_m(drive: &Drive, loads: Loads) -> f64 {
     (TOUCH_SHARE * loads.largest_n_m).max(TOUCH_OVER_DRAG * drive.output.drag_torque_n_m)
 }
 
@@ -95,6 +95,8 @@ fn touch_n_m(drive: &Drive, loads: Loads) -> f64 {
 pub struct DataSheet {
     /// Least gap between the rigid teeth of the drawing over a mesh cycle, µm; negative where they interfere. Missing where they never meet.
     pub rigid_gap_um: Option<f64>,
+    /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; missing of a drive as drawn.
+    pub room_as_built_arcsec: Option<f64>,
     /// Turn of the output between light touches either way, arcsec.
     pub backlash_arcsec: Option<f64>,
     /// Turn of the output between 4 % of the largest load either way, arcsec; the clearance is part of it.
@@ -111,6 +113,11 @@ pub struct DataSheet {
     pub kinematic_error_pp_arcsec: Option<f64>,
     /// Largest von Mises stress under the largest load, MPa: a nodal value, which grows with the mesh at roots and contacts.
     pub max_von_mises_mpa: Option<f64>,
+    /// Largest von Mises stress in the root fillets of the flexspline, MPa, by the strain of their surface: `simulate --stress` says what it tends
+    /// to with the mesh.
+    pub root_fillet_mpa: Option<f64>,
+    /// The largest on the bore, MPa, nodal.
+    pub bore_mpa: Option<f64>,
     /// Largest pressure between flanks, MPa.
     pub peak_flank_pressure_mpa: Option<f64>,
     /// Largest pressure between generator and bore, MPa.
@@ -132,6 +139,7 @@ impl DataSheet {
     pub fn looked(&self) -> Looked {
         Looked {
             rigid_gap_um: self.rigid_gap_um,
+            room_as_built_arcsec: self.room_as_built_arcsec,
             max_von_mises_mpa: self.max_von_mises_mpa,
             peak_flank_pressure_mpa: self.peak_flank_pressure_mpa,
             slope_bound: None,
@@ -143,8 +151,9 @@ impl DataSheet {
 pub type FigureOf = (&'static str, fn(&DataSheet) -> Option<f64>);
 
 /// The figures that can be asked for by name, as the fields are called.
-pub const FIGURES: [FigureOf; 16] = [
+pub const FIGURES: [FigureOf; 19] = [
     ("rigid_gap_um", |s| s.rigid_gap_um),
+    ("room_as_built_arcsec", |s| s.room_as_built_arcsec),
     ("backlash_arcsec", |s| s.backlash_arcsec),
     ("lost_motion_arcsec", |s| s.lost_motion_arcsec),
     ("k1_n_m_per_rad", |s| s.k1_n_m_per_rad),
@@ -153,6 +162,8 @@ pub const FIGURES: [FigureOf; 16] = [
     ("wind_up_arcsec", |s| s.wind_up_arcsec),
     ("kinematic_error_pp_arcsec", |s| s.kinematic_error_pp_arcsec),
     ("max_von_mises_mpa", |s| s.max_von_mises_mpa),
+    ("root_fillet_mpa", |s| s.root_fillet_mpa),
+    ("bore_mpa", |s| s.bore_mpa),
     ("peak_flank_pressure_mpa", |s| s.peak_flank_pressure_mpa),
     ("peak_generator_pressure_mpa", |s| s.peak_generator_pressure_mpa),
     ("lobe_force_n", |s| s.lobe_force_n),
@@ -173,7 +184,11 @@ pub fn data_sheet(
     positions: usize,
     settings: SolverSettings,
 ) -> (DataSheet, Result<(), SolveError>) {
-    let mut sheet = DataSheet { rigid_gap_um: rigid_gap_um(drive, kind), ..DataSheet::default() };
+    let mut sheet = DataSheet {
+        rigid_gap_um: rigid_gap_um(drive, kind),
+        room_as_built_arcsec: room_as_built_arcsec(drive, kind),
+        ..DataSheet::default()
+    };
     let done = Problem::new(drive, kind, temperature_c, settings)
         .and_then(|problem| fill(&mut sheet, &problem, loads, positions));
     if let (Err(SolveError::NotConverged { reached_n_m, .. }), Some(last)) = (&done, &mut sheet.last_stable_n_m) {
@@ -243,6 +258,9 @@ fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize
     sheet.load_across_face_peak_over_mean = Some(most(|increment| increment.face.peak_over_mean));
     let in_contact = most(|increment| increment.flank_contacts as f64);
     sheet.teeth_in_contact_percent = Some(100.0 * in_contact / f64::from(drive.flexspline.teeth));
-    sheet.max_von_mises_mpa = Some(peak_stress(problem, motion.state()).von_mises_mpa);
+    let peak = peak_stress(problem, motion.state());
+    let [root_fillet, bore, _] = peak.by_place_mpa;
+    sheet.max_von_mises_mpa = Some(peak.von_mises_mpa);
+    (sheet.root_fillet_mpa, sheet.bore_mpa) = (Some(root_fillet), Some(bore));
     Ok(())
 }

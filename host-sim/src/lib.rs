@@ -61,6 +61,7 @@ pub mod report;
 pub mod reproduce;
 pub mod residual;
 pub mod simulate;
+pub mod stated;
 pub mod study;
 pub mod synthesize;
 pub mod tables;

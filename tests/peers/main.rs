@@ -4,7 +4,8 @@
 //! solvers goes the same way on the same mesh: deformed, loaded, turned in increments, and at the end brought to another
 //! load. Compared are the output angle, the wind-up between the two loads, the displacements of the bore, the stress along
 //! it, and what both cost. The short form is the cam on the coarse mesh; `--long` adds the standard mesh and what CalculiX
-//! itself leaves open (each increment in two parts). A cup and a closed sleeve in solid elements stand beside our shells. Rollers are not compared: see the header of `export/inp.rs`.
+//! itself leaves open (each increment in two parts). A cup and a closed sleeve in solid elements stand beside our shells, a fine mesh of one root fillet
+//! beside the stress that `simulate --stress` tells. Rollers are not compared: see the header of `export/inp.rs`.
 //!
 //! Prints what it finds, a line for each claim, and one line of ratios at the end; ends with 1 if a claim fails.
 
@@ -12,6 +13,7 @@ mod case;
 mod dat;
 mod ours;
 mod program;
+mod root;
 mod sleeve;
 
 use std::path::{Path, PathBuf};
@@ -54,7 +56,7 @@ struct Options {
     /// Standard mesh and CalculiX's own scatter too
     #[arg(long)]
     long: bool,
-    /// Only this case, by its name
+    /// Only this case, by its name; "root" for the root fillets alone
     #[arg(long)]
     case: Option<String>,
     /// Folder for decks and outputs
@@ -116,6 +118,9 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
         cases.push(Case { mesh: MeshLevel::Standard, ..short });
         cases.push(Case { parts: 2, ..short });
     }
+    if options.case.as_deref() == Some("root") {
+        return root::fillets(&options.ccx, &options.out, claims);
+    }
     if let Some(name) = &options.case {
         let names: Vec<String> = cases.iter().map(Case::name).collect();
         cases.retain(|case| case.name() == *name);
@@ -126,6 +131,7 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
     let mut lines = Vec::new();
     if options.case.is_none() {
         lines.push(sleeve::sleeves(&options.ccx, &flexspline, &options.out, claims)?);
+        lines.push(root::fillets(&options.ccx, &options.out, claims)?);
     }
     let mut whole: Option<Vec<f64>> = None;
     for case in cases {

@@ -144,6 +144,12 @@ pub struct Controlled {
     pub figure: &'static str,
     /// Correlation of kernels and FEM.
     pub correlation: f64,
+    /// Kernels less FEM, mean over the drives, arcsec: what kernels of first order get wrong of every drive.
+    pub off_mean_arcsec: f64,
+    /// Kernels less FEM, root mean square over the drives, arcsec.
+    pub off_rms_arcsec: f64,
+    /// Kernels less FEM, the largest of any drive, arcsec.
+    pub off_most_arcsec: f64,
     /// FEM for a change of 1 by kernels.
     pub slope: f64,
     /// Mean by kernels of all drives.
@@ -423,8 +429,12 @@ pub(super) fn comparison(of: &[(&'static str, &Vec<f64>, &Vec<f64>)], limits: &[
         .map(|(figure, kernels, fem)| {
             let (some, by_fem) = pairs(kernels, fem);
             let (slope, controlled) = controlled(kernels, &some, &by_fem);
+            let off: Vec<f64> = some.iter().zip(&by_fem).map(|(kernels, fem)| kernels - fem).collect();
             Controlled {
                 figure,
+                off_mean_arcsec: mean(&off),
+                off_rms_arcsec: (off.iter().map(|x| x * x).sum::<f64>() / off.len() as f64).sqrt(),
+                off_most_arcsec: off.iter().fold(0.0, |most, x| x.abs().max(most)),
                 correlation: correlation(&some, &by_fem).unwrap_or(0.0),
                 slope,
                 kernels_mean: mean(kernels),

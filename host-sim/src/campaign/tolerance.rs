@@ -280,7 +280,10 @@ impl Tolerances {
         if let Some(field) = drive.as_built.first_not_uniform() {
             file.refuse_whole(
                 "drive",
-                format!("{field} is not zero: give the drive as drawn; its deviations are the tolerances"),
+                format!(
+                    "{field} is not zero: give the drive as drawn; kernels are of first order about a drive that repeats from tooth to \
+                     tooth, and about one unit there would be as many of them as teeth"
+                ),
             );
         }
         let generators = match value("generator") {

@@ -11,6 +11,7 @@ use super::{Common, Failure, say};
 use crate::drive::{Drive, GeneratorKind};
 use crate::output::prepare_folder;
 use crate::progress::Progress;
+use crate::stated::Stated;
 use crate::suggest::{likeliest, question};
 
 /// Folder for output files where none is given.
@@ -59,7 +60,9 @@ impl Context {
                          of the built-in drives {known}{hint}"
                     ))
                 })?;
-                Drive::from_toml(name, &text).map_err(|error| Failure::BadInput(error.to_string()))?
+                let drive = Drive::from_toml(name, &text).map_err(|error| Failure::BadInput(error.to_string()))?;
+                Stated::of_file(name, &text).map_err(|error| Failure::BadInput(error.to_string()))?;
+                drive
             }
         };
         self.with_sets(drive)
@@ -108,6 +111,12 @@ impl Context {
             return None;
         }
         std::fs::read_to_string(name).ok().map(|text| (name, text))
+    }
+
+    /// What a data sheet says of the drive of `--drive`, where its file has it.
+    pub(super) fn stated(&self) -> Result<Option<Stated>, Failure> {
+        let Some((name, text)) = self.drive_file() else { return Ok(None) };
+        Stated::of_file(name, &text).map_err(|error| Failure::BadInput(error.to_string()))
     }
 
     /// The output folder, which can be written to.

@@ -10,6 +10,7 @@ use super::{Context, Failure, names, say};
 use crate::drive::{Drive, DriveError, FewNumbers, GeneratorKind, MadeDrive};
 use crate::nominal::Nominal;
 use crate::output::write_whole;
+use crate::stated::TEMPLATE;
 
 /// Write a commented drive file, or a catalogue model, to edit
 ///
@@ -113,7 +114,8 @@ impl New {
                 let hash = blake3::Hash::from_bytes(drive.hash()).to_hex().to_string();
                 let next =
                     [format!("flexspline drive --check --drive {file}"), format!("flexspline tables --drive {file}")];
-                (made.as_ref().map_or_else(|| drive.to_toml(), |made| with_formulas(made, &drive)), Some(hash), next)
+                let text = made.as_ref().map_or_else(|| drive.to_toml(), |made| with_formulas(made, &drive));
+                (text + TEMPLATE, Some(hash), next)
             }
             Kind::Nominal => {
                 let next = [

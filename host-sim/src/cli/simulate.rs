@@ -13,8 +13,10 @@ use crate::mesh::MeshLevel;
 use crate::output::{OutputError, Outputs, WholeFolder, write_whole};
 use crate::progress::Progress;
 use crate::simulate::{
-    Direction, Observation, Path, PathPoint, Phase, SimulateError, SimulationSettings, Summary, read_path, simulate,
+    Direction, Observation, Path, PathPoint, Phase, PlaceStress, SimulateError, Simulation, SimulationSettings,
+    Summary, read_path, simulate, stress_by_place,
 };
+use crate::stated::{SheetBeside, beside};
 use crate::stepping::{Method, SolveError, SolverSettings};
 
 /// The rows of a run that ended on its way.
@@ -27,11 +29,14 @@ const PARTIAL: &str = "results.partial.csv";
 ///
 /// Where no equilibrium is found the last one is told, with its load and wind-up, and the rows so far are in results.partial.csv: those of
 /// the path, or of the loads that came on. Finer steps have been tried then.
+///
+/// Where the drive's file has a [data_sheet] its figures stand beside those computed, with their ratio (docs/design.md).
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   flexspline simulate --generator cam --path pitch --torque-n-m 50
   flexspline simulate --generator double-disc --path paper --mesh coarse --out disc
+  flexspline simulate --generator cam --path pitch --torque-n-m 50 --stress
   flexspline simulate --generator cam --path pitch --set flanks.friction_coefficient=0.08 --json
 
 A path FILE is a CSV with a column generator_rad and, if wanted, torque_n_m and temperature_c: one
@@ -50,6 +55,9 @@ pub(super) struct Simulate {
     /// Which way pitch and turn go [default: forward]
     #[arg(long, value_enum)]
     direction: Option<DirectionOption>,
+    /// Stress in root fillet, on bore and flank over three meshes, with its interval; some seconds more
+    #[arg(long)]
+    stress: bool,
     /// Write the deformed mesh of every row to frames/, for ParaView
     #[arg(long)]
     frames: bool,
@@ -145,6 +153,13 @@ impl Simulate {
             Err(error) => return Err(self.failed(context, out, error)),
         };
         simulation.summary.command = context.command.clone();
+        if self.stress {
+            simulation.summary.stress = stress(&drive, &settings, &simulation)?;
+        }
+        simulation.summary.data_sheet = context.stated()?.map(|stated| {
+            let temperature_c = settings.temperature_c.unwrap_or(drive.temperature.reference_c);
+            beside(&drive, settings.generator, temperature_c, &stated, settings.solver)
+        });
 
         let has_frames = frames.is_some();
         let mut outputs = Outputs::new();
@@ -220,6 +235,15 @@ impl Simulate {
         }
         Ok(points)
     }
+}
+
+/// Stress by place where and under what the nodal one of the run was largest.
+fn stress(drive: &Drive, settings: &SimulationSettings, simulation: &Simulation) -> Result<Vec<PlaceStress>, Failure> {
+    let step = simulation.summary.max_von_mises_step;
+    let Some(row) = simulation.rows.iter().find(|row| row.step == step) else { return Ok(Vec::new()) };
+    let at = (row.generator_rad, row.torque_n_m);
+    stress_by_place(drive, settings.generator, row.temperature_c, at, settings.solver)
+        .map_err(|error| Failure::Failed(format!("--stress: {error}")))
 }
 
 /// Bad input or failed run.
@@ -307,7 +331,16 @@ fn report(summary: &Summary, out: &FilePath, has_frames: bool) -> String {
     put("dwell of the output at the reversal", summary.dwell_generator_rad, "rad of generator", 6);
     put("wind-up from mid-backlash", summary.wind_up_arcsec, "arcsec", 3);
     put("wind-up, elastic part", summary.wind_up_elastic_arcsec, "arcsec", 3);
-    put("largest von Mises stress", Some(summary.max_von_mises_mpa), "MPa", 1);
+    put("largest von Mises stress at a node", Some(summary.max_von_mises_mpa), "MPa, which grows with the mesh", 1);
+    if summary.stress.is_empty() {
+        put("stress in the root fillets", Some(summary.root_fillet_mpa), "MPa on this mesh; --stress takes three", 1);
+        put("stress on the bore, at a node", Some(summary.nodal_bore_mpa), "MPa", 1);
+    }
+    for stress in &summary.stress {
+        let [low, high] = stress.interval_mpa;
+        let name = format!("stress, {}", stress.place.in_words());
+        put(&name, Some(stress.von_mises_mpa), &format!("MPa, {low:.0} to {high:.0}, over three meshes"), 1);
+    }
     put("largest flank pressure", Some(summary.peak_flank_pressure_mpa), "MPa", 1);
     put("largest generator pressure", Some(summary.peak_generator_pressure_mpa), "MPa", 1);
     put("largest force of a lobe", Some(summary.lobe_force_n), "N", 1);
@@ -315,7 +348,9 @@ fn report(summary: &Summary, out: &FilePath, has_frames: bool) -> String {
     put("largest tilt of the teeth", leans.then_some(summary.tilt_mrad), "mrad", 3);
     put("load along the face, peak over mean", leans.then_some(summary.load_across_face_peak_over_mean), "", 2);
     put("share of that face that bears", leans.then_some(summary.face_in_contact), "", 3);
+    put("room of rigid teeth as built", summary.room_as_built_arcsec, "arcsec, least of a turn", 1);
     put("time", Some(summary.wall_s), "s", 2);
+    text += &summary.data_sheet.as_ref().map(SheetBeside::text).unwrap_or_default();
     for caution in &summary.cautions {
         let _ = writeln!(text, "caution: {}", caution.words);
     }

@@ -18,6 +18,7 @@ use crate::mesh::MeshLevel;
 use crate::output::Outputs;
 use crate::report::page::Page;
 use crate::report::{Sources, Subject, drive_report};
+use crate::stated::beside;
 use crate::stepping::{Method, SolverSettings};
 use crate::tables::sweep::SweepProgress;
 use crate::tables::{
@@ -119,6 +120,13 @@ impl Tables {
         }
         if made.is_empty() {
             return Err(failed.swap_remove(0).1);
+        }
+        if let (Some(stated), None) = (context.stated()?, &self.from_samples) {
+            let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
+            let reference_c = drive.temperature.reference_c;
+            made.par_iter_mut().for_each(|table| {
+                table.info.data_sheet = Some(beside(&drive, table.kind, reference_c, &stated, settings));
+            });
         }
         let out = context.out()?;
         let mut outputs = Outputs::new();
@@ -334,6 +342,9 @@ fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
             "{}: the torque nodes ran out before the table met the FEM everywhere; see --most-nodes, --torque-n-m\n",
             info.generator
         ));
+    }
+    for sheet in report.tables.iter().filter_map(|info| info.data_sheet.as_ref()) {
+        text += &sheet.text();
     }
     for info in &report.tables {
         for caution in &info.cautions {

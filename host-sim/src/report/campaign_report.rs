@@ -338,6 +338,8 @@ fn by_fem(of: &Sources<'_>) -> Option<Section> {
             "Figure",
             "drives",
             "correlation",
+            "off, rms",
+            "off, most",
             "kernels",
             "FEM alone",
             "from",
@@ -357,6 +359,8 @@ fn by_fem(of: &Sources<'_>) -> Option<Section> {
                         Text::new(significant(f.correlation, 4)),
                     ];
                     let numbers = [
+                        f.off_rms_arcsec,
+                        f.off_most_arcsec,
                         f.kernels_mean,
                         f.plain.value,
                         f.plain.low,

@@ -9,9 +9,10 @@ use serde_json::{Map, Value, json};
 use super::animation::{Animation, AnimationError, FRAMES};
 use super::page::{
     Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity, Section,
-    Series, Status, Table as PageTable, Text,
+    Series, Status, Table as PageTable, Text, significant,
 };
 use crate::drive::{Drive, GeneratorKind};
+use crate::stated::{Beside, SheetBeside};
 use crate::tables::validate::{MAX_BOUND_ARCSEC, Point, Validation};
 use crate::tables::{Source, TableInfo};
 use crate::units::ARCSEC_PER_RAD;
@@ -409,6 +410,7 @@ pub fn drive_report(sources: Sources<'_>) -> Page {
     if validated {
         sections.push(validation_section(&known));
     }
+    sections.extend(sheet_section(&known));
     sections.push(table_section(&known));
     sections.push(load_section(&known));
     sections.push(reading_section());
@@ -533,6 +535,43 @@ fn result_of(k: &Known<'_>) -> Value {
             "uncompensated_rms_arcsec": v.uncompensated_rms_arcsec,
         })),
     })
+}
+
+/// The data sheet beside what is computed, where the drive has one.
+fn sheet_section(known: &[Known<'_>]) -> Option<Section> {
+    let of = |k: &Known<'_>| Some((k.id(), k.subject.info?.data_sheet.clone()?));
+    let sheets: Vec<(String, SheetBeside)> = known.iter().filter_map(of).collect();
+    let source = sheets.first()?.1.stated.source.clone().unwrap_or_else(|| "the data sheet".to_owned());
+    let mut blocks = Vec::new();
+    for (id, sheet) in sheets {
+        let number =
+            |value: Option<f64>| Text::new(value.map_or_else(|| "–".to_owned(), |value| significant(value, 3)));
+        let row = |row: &Beside| {
+            let (name, unit) = row.in_words();
+            let remark = Text::new(row.remark(&sheet));
+            vec![
+                Text::new(format!("{name}, {unit}")),
+                number(Some(row.stated)),
+                number(row.computed),
+                number(row.ratio),
+                remark,
+            ]
+        };
+        let caption = format!(
+            "{source} and contact FEM; T1 {}, T2 {}, rated torque {} N·m",
+            significant(sheet.loads.t1_n_m, 3),
+            significant(sheet.loads.t2_n_m, 3),
+            significant(sheet.loads.largest_n_m, 3)
+        );
+        let header = ["Figure", "stated", "computed", "ratio", "what is computed"].map(str::to_owned).into();
+        let table = PageTable { caption, header, rows: sheet.beside.iter().map(row).collect() };
+        blocks.push(Block::Table { choice: Some(id.clone()), table });
+        if let Some(why) = &sheet.why {
+            let text = Text::new(format!("Not all of it was computed: {why}."));
+            blocks.push(Block::Paragraph { choice: Some(id), text });
+        }
+    }
+    Some(Section { id: "data-sheet".into(), title: "Beside its data sheet".into(), detail: Detail::Summary, blocks })
 }
 
 fn comparison(known: &[Known<'_>], validated: bool) -> Section {

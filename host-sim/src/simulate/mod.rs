@@ -9,6 +9,7 @@
 //! What comes out is quasi-static and two-dimensional: no inertia, no viscosity, no speed.
 
 mod path;
+pub(crate) mod places;
 mod row;
 pub(crate) mod stress;
 mod summary;
@@ -19,12 +20,15 @@ use std::time::Instant;
 
 use thiserror::Error;
 
-use crate::cautions::{Looked, rigid_gap_um};
+use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
 use crate::drive::{Drive, GeneratorKind, ThermalState};
 use crate::motion::Motion;
 use crate::stepping::{Face, Increment, Problem, SolveError, Solver, SolverSettings, State};
 
 pub use path::{Path, PathError, PathPoint, read_path};
+pub use places::{
+    MESHES, Place, PlaceStress, SurfaceEdge, edge_stress, fillet_edges, largest_by_place, on_mesh, stress_by_place,
+};
 pub use row::Row;
 pub use stress::{PeakStress, peak_stress};
 pub use summary::{SUMMARY_SCHEMA, Summary};
@@ -300,6 +304,7 @@ struct Run<'a> {
     temperature_c: f64,
     rows: Vec<Row>,
     peak: Option<(PeakStress, usize)>,
+    by_place_mpa: [f64; 3],
     touches: Option<Touches>,
     degrees_of_freedom: usize,
     increments: usize,
@@ -324,6 +329,7 @@ impl<'a> Run<'a> {
             temperature_c: settings.temperature_c.unwrap_or(drive.temperature.reference_c),
             rows: Vec::new(),
             peak: None,
+            by_place_mpa: [0.0; 3],
             touches: None,
             degrees_of_freedom: 0,
             increments: 0,
@@ -544,6 +550,9 @@ impl<'a> Run<'a> {
     /// Adds a row and shows it.
     fn record(&mut self, motion: &Motion<'_>, increment: &Increment, turn_rad: f64) -> Result<(), SimulateError> {
         let (row, peak) = self.row(motion, increment, turn_rad);
+        for (largest, here) in self.by_place_mpa.iter_mut().zip(peak.by_place_mpa) {
+            *largest = largest.max(here);
+        }
         if self.peak.is_none_or(|(highest, _)| peak.von_mises_mpa > highest.von_mises_mpa) {
             self.peak = Some((peak, row.step));
         }
@@ -666,6 +675,7 @@ impl<'a> Run<'a> {
         let peak_flank_pressure_mpa = largest(rows, |row| row.peak_flank_pressure_mpa);
         let looked = Looked {
             rigid_gap_um: rigid_gap_um(self.drive, settings.generator),
+            room_as_built_arcsec: room_as_built_arcsec(self.drive, settings.generator),
             max_von_mises_mpa: Some(peak.von_mises_mpa),
             peak_flank_pressure_mpa: Some(peak_flank_pressure_mpa),
             slope_bound: None,
@@ -700,6 +710,10 @@ impl<'a> Run<'a> {
             max_von_mises_wheel: wheel_name(&peak),
             max_von_mises_position_mm: peak.position_mm,
             max_von_mises_step: peak_step,
+            root_fillet_mpa: self.by_place_mpa[0],
+            nodal_bore_mpa: self.by_place_mpa[1],
+            nodal_flank_mpa: self.by_place_mpa[2],
+            stress: Vec::new(),
             peak_flank_pressure_mpa,
             peak_generator_pressure_mpa: largest(rows, |row| row.peak_generator_pressure_mpa),
             lobe_force_n: largest(rows, |row| row.lobe_force_n),
@@ -711,7 +725,9 @@ impl<'a> Run<'a> {
             generator_torque_virtual_work_n_m: metrics.generator_torque_expected,
             torque_balance_worst_n_m: largest(rows, |row| row.torque_balance_n_m.abs()),
             residual_worst: largest(rows, |row| row.residual),
+            room_as_built_arcsec: looked.room_as_built_arcsec,
             cautions: looked.cautions(),
+            data_sheet: None,
             increments: self.increments,
             iterations: self.iterations,
             wall_s: self.begun.elapsed().as_secs_f64(),

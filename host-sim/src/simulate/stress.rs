@@ -12,6 +12,7 @@
 
 use rayon::prelude::*;
 
+use super::places::largest_of;
 use crate::fem::element::{cauchy_stress, extrapolate_to_nodes};
 use crate::fem::material::PlaneStrain;
 use crate::mesh::{WheelKind, WheelMesh};
@@ -69,20 +70,21 @@ pub struct PeakStress {
     pub position_mm: [f64; 2],
     /// Von Mises stress, MPa.
     pub von_mises_mpa: f64,
+    /// Largest stress of the flexspline in the root fillets (by the strain of their surface), on the bore and on the flanks (nodal), MPa.
+    pub by_place_mpa: [f64; 3],
 }
 
 /// The most stressed node of the whole drive.
 pub fn peak_stress(problem: &Problem, state: &State) -> PeakStress {
     let state = &*problem.whole_state(state);
-    let most = |mesh: &WheelMesh, field: &[f64]| {
-        nodal_von_mises(mesh, &problem.material, field)
-            .into_iter()
-            .enumerate()
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .expect("a mesh has nodes")
-    };
-    let (fs, fs_stress) = most(&problem.flexspline, &state.u);
-    let (cs, cs_stress) = most(&problem.circular_spline, &state.v);
+    let nodal = |mesh: &WheelMesh, field: &[f64]| nodal_von_mises(mesh, &problem.material, field);
+    let most =
+        |nodal: &[f64]| nodal.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).expect("a mesh has nodes");
+    let of_flexspline = nodal(&problem.flexspline, &state.u);
+    let (fs, fs_stress) = most(&of_flexspline);
+    let (cs, cs_stress) = most(&nodal(&problem.circular_spline, &state.v));
+    let by_place_mpa =
+        largest_of(&problem.flexspline, &problem.material, &state.u, &of_flexspline).map(|(stress, _)| stress);
     if fs_stress >= cs_stress {
         let [x, y] = problem.flexspline.nodes[fs];
         PeakStress {
@@ -90,6 +92,7 @@ pub fn peak_stress(problem: &Problem, state: &State) -> PeakStress {
             node: fs,
             position_mm: [x + state.u[2 * fs], y + state.u[2 * fs + 1]],
             von_mises_mpa: fs_stress,
+            by_place_mpa,
         }
     } else {
         let [x, y] = problem.circular_spline.nodes[cs];
@@ -100,6 +103,7 @@ pub fn peak_stress(problem: &Problem, state: &State) -> PeakStress {
             node: cs,
             position_mm: [cos * x - sin * y, sin * x + cos * y],
             von_mises_mpa: cs_stress,
+            by_place_mpa,
         }
     }
 }

@@ -5,10 +5,12 @@
 use serde::Serialize;
 use std::ops::Range;
 
+use super::places::PlaceStress;
 use super::row::Row;
 use super::stress::PeakStress;
 use crate::cautions::Caution;
 use crate::mesh::WheelKind;
+use crate::stated::SheetBeside;
 use crate::units::ARCSEC_PER_RAD;
 
 /// Version of the layout of `summary.json`; grows when a field changes its meaning or goes.
@@ -86,7 +88,7 @@ pub struct Summary {
     /// Middle of the backlash at zero load on which `wind_up_arcsec` rests.
     pub backlash_middle_arcsec: Option<f64>,
 
-    /// Largest von Mises stress of all rows.
+    /// Largest von Mises stress of all rows at a node of the mesh, MPa. It grows with the mesh where stress is steep; `stress` is what it tends to.
     pub max_von_mises_mpa: f64,
     /// Where: `flexspline` or `circular_spline`.
     pub max_von_mises_wheel: &'static str,
@@ -94,6 +96,16 @@ pub struct Summary {
     pub max_von_mises_position_mm: [f64; 2],
     /// When: step of the results.
     pub max_von_mises_step: usize,
+    /// The largest in the root fillets of the flexspline, of all rows, MPa: by the strain of their surface, which needs no such fine mesh.
+    pub root_fillet_mpa: f64,
+    /// The largest at a node on its bore.
+    pub nodal_bore_mpa: f64,
+    /// On its flanks.
+    pub nodal_flank_mpa: f64,
+    /// Stress of the flexspline at these places where and under what the nodal one is largest, over three meshes, with its
+    /// interval; left out where it was not asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stress: Vec<PlaceStress>,
     /// Largest pressure between flanks; where they do not bear evenly along the face, the mean pressure times
     /// `load_across_face_peak_over_mean`.
     pub peak_flank_pressure_mpa: f64,
@@ -118,8 +130,13 @@ pub struct Summary {
     /// Largest residual of all rows, relative to the largest contact force.
     pub residual_worst: f64,
 
+    /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; `null` of a drive as drawn.
+    pub room_as_built_arcsec: Option<f64>,
     /// What has to be known before these figures are used; empty for a sound drive.
     pub cautions: Vec<Caution>,
+    /// What the data sheet in the drive's file says, beside what is computed; left out where the file has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub data_sheet: Option<SheetBeside>,
 
     /// Increments solved, all of them: deforming, loading, settling, light touches, path.
     pub increments: usize,

@@ -73,7 +73,12 @@ fn a_variant_that_makes_no_drive_is_refused_with_its_reason_and_the_rest_runs() 
     assert_eq!(study.runs[0].status, RunStatus::Refused);
     assert!(study.runs[0].why.as_ref().unwrap().contains("rim_thickness_mm"));
     assert_eq!(study.runs[1].status, RunStatus::Converged);
-    assert!(FIGURES.iter().all(|(name, of)| of(&study.runs[1].sheet).is_some_and(f64::is_finite) || panic!("{name}")));
+    // A drive as drawn has no room of its own as built.
+    let told = |name: &str| name != "room_as_built_arcsec";
+    let known = FIGURES.iter().filter(|(name, _)| told(name));
+    assert!(
+        known.into_iter().all(|(name, of)| of(&study.runs[1].sheet).is_some_and(f64::is_finite) || panic!("{name}"))
+    );
 }
 
 #[test]

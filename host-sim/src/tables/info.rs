@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::cautions::Caution;
 use crate::data_sheet::Stiffness;
 use crate::drive::GeneratorKind;
+use crate::stated::SheetBeside;
 
 /// A finished table.
 #[derive(Debug, Clone)]
@@ -69,6 +70,9 @@ pub struct TableInfo {
     pub stiffness: Option<Stiffness>,
     /// What has to be known before the table is used; empty for a sound drive.
     pub cautions: Vec<Caution>,
+    /// What the data sheet in the drive's file says, beside what is computed; left out where the file has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub data_sheet: Option<SheetBeside>,
     /// What is left over whole turns of a drive that does not repeat from tooth to tooth; null for one that does.
     pub turns: Option<TurnsInfo>,
     /// Command line, once known.

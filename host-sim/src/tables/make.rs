@@ -11,7 +11,7 @@ use super::project::{TableError, from_sweep};
 use super::sweep::{SweepError, SweepPlan, SweepProgress, planned_increments};
 use super::torque_nodes::{NodeChoice, choose_torque_nodes};
 use super::turns::{deviation_increments, sweep_turns};
-use crate::cautions::{Looked, rigid_gap_um};
+use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
 use crate::data_sheet::Stiffness;
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::{Method, SolveError, SolverSettings};
@@ -210,6 +210,7 @@ pub fn make(
     made.info.torque_nodes_resolved = chosen.map(|chosen| chosen.resolved);
     made.info.cautions = Looked {
         rigid_gap_um: rigid_gap_um(drive, kind),
+        room_as_built_arcsec: room_as_built_arcsec(drive, kind),
         max_von_mises_mpa: None,
         peak_flank_pressure_mpa: Some(peak_flank_pressure_mpa),
         slope_bound: Some(f64::from(made.info.slope_bound)),

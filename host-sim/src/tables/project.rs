@@ -308,6 +308,7 @@ fn make(
         wind_up_arcsec: [first, last].map(|t| 0.5 * at(t).iter().sum::<f64>()),
         stiffness: None,
         cautions: Looked { slope_bound: Some(f64::from(table.bounds().slope)), ..Looked::default() }.cautions(),
+        data_sheet: None,
         turns: None,
         command: String::new(),
     };

@@ -240,12 +240,12 @@ impl Reader<'_> {
         };
         for (key, value) in table {
             let section = key.get_ref().as_ref();
-            // What a diagnosis found that no field holds stands in [extension], which `crate::extension` reads.
-            if ["base", "name", "extension"].contains(&section) {
+            // What a diagnosis found that no field holds stands in [extension], what a catalogue says in [data_sheet]: others read them.
+            if ["base", "name", "extension", "data_sheet"].contains(&section) {
                 continue;
             }
             if !sections().any(|known| known == section) {
-                let known = || sections().chain(["base", "name"]);
+                let known = || sections().chain(["base", "name", "data_sheet"]);
                 let keys: Vec<&str> = fields::ALL.iter().map(|field| field.path).collect();
                 let meant = likeliest(section, known()).or_else(|| likeliest_path(section, &keys));
                 let hint = meant.map_or_else(String::new, |name| format!("; {}", question(name)));

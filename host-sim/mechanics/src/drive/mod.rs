@@ -30,7 +30,7 @@ pub use as_built::{AsBuilt, DamagedFlank, DamagedTooth, Harmonic, RimVariation, 
 pub use error::DriveError;
 pub use few::{FewNumbers, MadeDrive};
 pub use generator::{GeneratorOutline, OutlineFoot};
-pub use interference::{FlankGap, MeshReport, RigidMesh, Side};
+pub use interference::{FlankGap, MeshReport, RigidMesh, Room, Side};
 pub use involute::{Foot, InvoluteFlank};
 pub use neutral::NeutralCurve;
 pub use placement::{FlankDeviations, Placement};

@@ -34,6 +34,20 @@ pub struct MeshDensity {
     pub flank_elements: usize,
 }
 
+impl MeshDensity {
+    /// So many times the elements in each direction.
+    pub fn times(self, factor: usize) -> MeshDensity {
+        MeshDensity {
+            tooth_columns: factor * self.tooth_columns,
+            space_columns: factor * self.space_columns,
+            rim_rows: factor * self.rim_rows,
+            root_rows: factor * self.root_rows,
+            fillet_elements: factor * self.fillet_elements,
+            flank_elements: factor * self.flank_elements,
+        }
+    }
+}
+
 /// A named pair of densities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum MeshLevel {

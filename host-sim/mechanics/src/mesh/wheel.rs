@@ -88,6 +88,11 @@ pub struct WheelMesh {
 impl WheelMesh {
     /// Meshes the flexspline.
     pub fn flexspline(drive: &Drive, level: MeshLevel) -> Result<WheelMesh, MeshError> {
+        WheelMesh::flexspline_as_fine_as(drive, &level.flexspline())
+    }
+
+    /// Meshes the flexspline with so many elements; meshes of which one has twice as many in each direction have the coarser's nodes.
+    pub fn flexspline_as_fine_as(drive: &Drive, density: &MeshDensity) -> Result<WheelMesh, MeshError> {
         let wheel = &drive.flexspline;
         let interface_radius = wheel.root_radius_mm - 0.3 * wheel.rim_thickness_mm;
         WheelMesh::new(
@@ -96,13 +101,18 @@ impl WheelMesh {
             wheel.base_radius_mm(),
             wheel.bore_radius_mm(),
             interface_radius,
-            &level.flexspline(),
+            density,
         )?
         .with_rim(RimVariation::of(drive), interface_radius)
     }
 
     /// Meshes the circular spline.
     pub fn circular_spline(drive: &Drive, level: MeshLevel) -> Result<WheelMesh, MeshError> {
+        WheelMesh::circular_spline_as_fine_as(drive, &level.circular_spline())
+    }
+
+    /// Meshes the circular spline with so many elements.
+    pub fn circular_spline_as_fine_as(drive: &Drive, density: &MeshDensity) -> Result<WheelMesh, MeshError> {
         let wheel = &drive.circular_spline;
         let tooth_height = wheel.root_radius_mm - wheel.tip_radius_mm;
         let rim = wheel.outer_radius_mm - wheel.root_radius_mm;
@@ -112,7 +122,7 @@ impl WheelMesh {
             wheel.base_radius_mm(),
             wheel.outer_radius_mm,
             wheel.root_radius_mm + (0.5 * tooth_height).min(0.4 * rim),
-            &level.circular_spline(),
+            density,
         )
     }
 
