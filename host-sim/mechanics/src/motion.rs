@@ -13,7 +13,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::stepping::{Change, Effort, Increment, Problem, SolveError, Solver, State};
+use crate::stepping::{Effort, Increment, Problem, SolveError, Solver, State};
 use crate::units::ARCSEC_PER_RAD;
 
 /// Share of its nominal rate at which an output follows: it stands while clearance is crossed, then moves on at about the whole.
@@ -38,30 +38,6 @@ pub struct Motion<'p> {
     state: State,
     last: Increment,
     travel: Travel,
-    trail: Trail,
-    followed: Option<&'p Trail>,
-}
-
-/// The way of a drive, for drives that are nearly the same to follow: each finds its own equilibria, in fewer iterations.
-#[derive(Debug, Clone, Default)]
-pub struct Trail {
-    /// One to each increment from the deforming on; empty unless it was asked for.
-    changes: Vec<Change>,
-    kept: bool,
-    /// Increments made.
-    made: usize,
-}
-
-impl Trail {
-    /// What several drives show together, each with its weight; the weights of drives around one add up to 1. As far as all made the same
-    /// increments.
-    pub fn mixed(parts: &[(f64, &Trail)]) -> Trail {
-        let steps = parts.iter().map(|(_, trail)| trail.changes.len()).min().unwrap_or(0);
-        let at = |k: usize| -> Option<Change> {
-            Change::mixed(&parts.iter().map(|(weight, trail)| (*weight, &trail.changes[k])).collect::<Vec<_>>())
-        };
-        Trail { changes: (0..steps).map_while(at).collect(), kept: false, made: 0 }
-    }
 }
 
 /// One place on the way.
@@ -94,48 +70,7 @@ impl<'p> Motion<'p> {
     pub fn deformed(problem: &'p Problem, generator_rad: f64) -> Result<Motion<'p>, SolveError> {
         let mut solver = Solver::new(problem);
         let (state, last) = solver.deform(generator_rad)?;
-        Ok(Motion::taken_over_by(solver, problem, state, last))
-    }
-
-    /// [`Motion::deformed`] on the trail of drives that are nearly the same: as long as all make the same increments this one begins each
-    /// where the others show.
-    ///
-    /// # Errors
-    /// No equilibrium.
-    pub fn deformed_on(
-        problem: &'p Problem,
-        generator_rad: f64,
-        followed: &'p Trail,
-    ) -> Result<Motion<'p>, SolveError> {
-        let mut solver = Solver::new(problem);
-        let (state, last) = match followed.changes.first() {
-            Some(shown) => solver.deform_as(generator_rad, shown)?,
-            None => solver.deform(generator_rad)?,
-        };
-        let mut motion = Motion::taken_over_by(solver, problem, state, last);
-        motion.trail.made = 1;
-        motion.followed = Some(followed);
-        Ok(motion)
-    }
-
-    /// [`Motion::deformed`] with a trail for others.
-    ///
-    /// # Errors
-    /// No equilibrium.
-    pub fn deformed_with_trail(problem: &'p Problem, generator_rad: f64) -> Result<Motion<'p>, SolveError> {
-        let mut motion = Motion::deformed(problem, generator_rad)?;
-        let start = problem.starting_shape(generator_rad);
-        motion.trail = Trail { changes: vec![Change::between(&start, &motion.state)], kept: true, made: 1 };
-        Ok(motion)
-    }
-
-    /// The trail so far.
-    pub fn into_trail(self) -> Trail {
-        self.trail
-    }
-
-    fn taken_over_by(solver: Solver<'p>, problem: &'p Problem, state: State, last: Increment) -> Motion<'p> {
-        Motion { problem, solver, state, last, travel: Travel::default(), trail: Trail::default(), followed: None }
+        Ok(Motion { problem, solver, state, last, travel: Travel::default() })
     }
 
     /// The drive deformed at an angle where both flanks may come to bear at once, as they do of an eccentric drive: there Newton may go
@@ -158,7 +93,7 @@ impl<'p> Motion<'p> {
 
     /// A state that was reached otherwise, by the increment `last`, and goes on from there.
     pub fn taken_over(problem: &'p Problem, state: State, last: Increment) -> Motion<'p> {
-        Motion::taken_over_by(Solver::new(problem), problem, state, last)
+        Motion { problem, solver: Solver::new(problem), state, last, travel: Travel::default() }
     }
 
     /// The mechanical problem.
@@ -231,14 +166,7 @@ impl<'p> Motion<'p> {
     /// # Errors
     /// No equilibrium; the drive stays where it was.
     pub fn to(&mut self, generator_rad: f64, torque_n_m: f64) -> Result<(), SolveError> {
-        let shown = self.followed.and_then(|trail| trail.changes.get(self.trail.made));
-        let predicted = self.trail.kept.then(|| self.solver.predicted(&self.state, generator_rad, torque_n_m));
-        let (state, increment) = match shown {
-            Some(shown) => self.solver.increment_as(&self.state, generator_rad, torque_n_m, shown)?,
-            None => self.solver.increment(&self.state, generator_rad, torque_n_m)?,
-        };
-        self.trail.made += 1;
-        self.trail.changes.extend(predicted.map(|predicted| Change::between(&predicted, &state)));
+        let (state, increment) = self.solver.increment(&self.state, generator_rad, torque_n_m)?;
         let turned = [state.generator_rad - self.state.generator_rad, state.output_rad - self.state.output_rad];
         let same_load = state.torque_n_m == self.state.torque_n_m;
         self.travel = self.travel.on(turned, same_load, self.problem.drive.ratio());
@@ -368,39 +296,6 @@ mod tests {
     use crate::drive::{Drive, GeneratorKind};
     use crate::mesh::MeshLevel;
     use crate::stepping::{Method, SolverSettings};
-
-    /// A drive between two others finds its own equilibria from theirs, in fewer iterations, and they are those it finds alone.
-    #[test]
-    fn a_drive_on_the_trail_of_others_comes_to_its_own_equilibria() {
-        let of = |rim_mm: f64| problem(|drive| drive.flexspline.rim_thickness_mm = rim_mm);
-        let loads = [0.05, 8.0, 42.0];
-        let go = |mut motion: Motion<'_>| -> (Vec<f64>, usize, Trail) {
-            let mut iterations = motion.last().iterations;
-            let mut errors = Vec::new();
-            for load in loads {
-                motion.load(load).unwrap();
-                iterations += motion.last().iterations;
-                errors.push(motion.error_arcsec());
-            }
-            for place in motion.turn_in(motion.pitch(), 4).unwrap() {
-                iterations += place.increment.iterations;
-                errors.push(place.error_arcsec);
-            }
-            (errors, iterations, motion.into_trail())
-        };
-        let [thin, thick, between] = [1.1, 1.3, 1.18].map(of);
-        let trails = [&thin, &thick].map(|problem| go(Motion::deformed_with_trail(problem, 0.0).unwrap()).2);
-        let (alone, usual, _) = go(Motion::deformed(&between, 0.0).unwrap());
-        let mixed = Trail::mixed(&[(0.6, &trails[0]), (0.4, &trails[1])]);
-        let (shown, fewer, _) = go(Motion::deformed_on(&between, 0.0, &mixed).unwrap());
-        println!("{usual} iterations alone, {fewer} on the trail");
-        let off = alone.iter().zip(&shown).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(off < 1e-4 && 2 * fewer < usual, "{off} arcsec, {fewer} of {usual}");
-        // The trail of a drive with other teeth leads nowhere, and does no harm.
-        let other = problem(|drive| drive.flexspline.width_mm = 20.0);
-        let (errors, _, _) = go(Motion::deformed_on(&other, 0.0, &Trail::default()).unwrap());
-        assert_eq!(errors, go(Motion::deformed(&other, 0.0).unwrap()).0);
-    }
 
     fn problem(change: impl FnOnce(&mut Drive)) -> Problem {
         let mut drive = Drive::hhd_95();

@@ -18,4 +18,4 @@ pub use error::SolveError;
 pub use fast::CondensedDrive;
 pub use newton::{Effort, Face, Increment, Solver};
 pub use problem::{Holding, Method, Problem, SolverSettings};
-pub use state::{Change, State};
+pub use state::State;

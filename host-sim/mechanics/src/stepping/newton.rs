@@ -19,7 +19,7 @@ use super::passed::Passed;
 use super::problem::Problem;
 use super::reference::SparseWheels;
 use super::slip::{Field, Slipping};
-use super::state::{Change, State};
+use super::state::State;
 use super::step::{ANCHORED, BORDERS, LATERAL, OUTPUT, Residual, SLEEVE, Step, improve};
 use super::wheels::Wheels;
 
@@ -54,14 +54,6 @@ const PATIENCE: usize = 4;
 const RETURNS: f64 = 0.9;
 const RETURNS_LITTLE: f64 = 0.3;
 const GOES_ROUND_AFTER: usize = 25;
-/// Iterations from a state that similar drives have shown, and after how many of them the relative residual must be below what; then
-/// from there with contact so soft first; then the ordinary way is gone. Guesses: where it helps at all 4 to 12 iterations do, where it
-/// does not the residual stays near 1 for ten.
-const SHOWN_ITERATIONS: usize = 16;
-const SHOWN_LOOK: usize = 6;
-const SHOWN_HOPE: f64 = 0.5;
-const SHOWN_SOFTNESS: f64 = 0.03;
-
 /// Relative residual below which steps are taken whole: what is left is near round-off.
 const ROUND_OFF: f64 = 1e-6;
 
@@ -166,11 +158,6 @@ pub struct Solver<'p> {
     assembling: bool,
     /// Newton has [`PATIENCE`].
     patient: bool,
-    /// Newton begins where other drives have shown the way, and has [`SHOWN_ITERATIONS`].
-    shown: bool,
-    /// Under a load that way led nowhere with hard contact; nor with soft contact first.
-    misled: bool,
-    lost: bool,
     /// The states passed in steady motion.
     passed: Passed,
     /// Motion of the ends of a face for displacements of 1 mm, at most.
@@ -209,9 +196,6 @@ impl<'p> Solver<'p> {
             softening: 1.0,
             assembling: false,
             patient: false,
-            shown: false,
-            misled: false,
-            lost: false,
             passed: Passed::default(),
             leans_within: problem.leans_within(),
             effort: Effort::default(),
@@ -249,70 +233,6 @@ impl<'p> Solver<'p> {
         let solved = self.in_parts(from, generator_rad, torque_n_m);
         self.patient = false;
         solved
-    }
-
-    /// What is predicted of an increment before it is made.
-    pub fn predicted(&self, from: &State, generator_rad: f64, torque_n_m: f64) -> State {
-        self.passed.predict(self.problem, from, generator_rad, torque_n_m)
-    }
-
-    /// [`Solver::deform`], where a similar drive has shown how far its own is from [`Problem::starting_shape`].
-    ///
-    /// # Errors
-    /// No equilibrium, neither from there nor in the ordinary way.
-    pub fn deform_as(&mut self, generator_rad: f64, shown: &Change) -> Result<(State, Increment), SolveError> {
-        let start = self.problem.starting_shape(generator_rad);
-        let Some(guess) = shown.added_to(&start) else { return self.deform(generator_rad) };
-        (self.assembling, self.shown) = (true, true);
-        let solved = self.newton_at(&start, guess, generator_rad, 0.0);
-        (self.assembling, self.shown) = (false, false);
-        solved.or_else(|_| self.deform(generator_rad))
-    }
-
-    /// [`Solver::increment`], where a similar drive has shown how far it came from what was predicted of it in the same increment. The
-    /// equilibrium is that of this drive; where Newton does not find it from there it is looked for in the ordinary way.
-    ///
-    /// # Errors
-    /// No equilibrium.
-    pub fn increment_as(
-        &mut self,
-        from: &State,
-        generator_rad: f64,
-        torque_n_m: f64,
-        shown: &Change,
-    ) -> Result<(State, Increment), SolveError> {
-        let predicted = self.passed.predict(self.problem, from, generator_rad, torque_n_m);
-        let Some(guess) = shown.added_to(&predicted) else {
-            return self.increment(from, generator_rad, torque_n_m);
-        };
-        let loading = torque_n_m != from.torque_n_m;
-        if loading && self.lost {
-            return self.increment(from, generator_rad, torque_n_m);
-        }
-        // What led astray once under a load does so under the next.
-        if !(loading && self.misled) {
-            self.shown = true;
-            let solved = self.newton_at(from, guess.clone(), generator_rad, torque_n_m);
-            self.shown = false;
-            if let Ok((state, increment)) = solved {
-                return self.problem.check_range(&state).map(|()| (state, increment));
-            }
-        }
-        if loading {
-            self.misled = true;
-            self.softening = SHOWN_SOFTNESS;
-            let softly = self.newton_at(from, guess, generator_rad, torque_n_m);
-            self.softening = 1.0;
-            let solved = softly.and_then(|(state, _)| {
-                let (drag_anchor_rad, friction) = (from.drag_anchor_rad, from.friction.clone());
-                self.newton_at(from, State { drag_anchor_rad, friction, ..state }, generator_rad, torque_n_m)
-            });
-            if let Ok((state, increment)) = solved {
-                return self.problem.check_range(&state).map(|()| (state, increment));
-            }
-            self.lost = true;
-        }
-        self.increment(from, generator_rad, torque_n_m)
     }
 
     fn in_parts(
@@ -414,18 +334,6 @@ impl<'p> Solver<'p> {
     }
 
     fn newton(&mut self, from: &State, generator_rad: f64, torque_n_m: f64) -> Result<(State, Increment), SolveError> {
-        let predicted = self.passed.predict(self.problem, from, generator_rad, torque_n_m);
-        self.newton_at(from, predicted, generator_rad, torque_n_m)
-    }
-
-    /// Newton from a predicted state.
-    fn newton_at(
-        &mut self,
-        from: &State,
-        mut state: State,
-        generator_rad: f64,
-        torque_n_m: f64,
-    ) -> Result<(State, Increment), SolveError> {
         let settings = self.problem.settings;
         let failed = |history: Vec<f64>, reason| SolveError::NotConverged {
             generator_rad,
@@ -434,6 +342,7 @@ impl<'p> Solver<'p> {
             reason,
             history,
         };
+        let mut state = self.passed.predict(self.problem, from, generator_rad, torque_n_m);
         self.problem.lean(&mut state);
         let mut near = NearPairs::default();
         self.balance_output(&mut state, from, torque_n_m, &mut near);
@@ -444,19 +353,13 @@ impl<'p> Solver<'p> {
         let steady = self.softening == 1.0 && self.passed.go_on(from, torque_n_m);
         let mut recalled = steady && generator_rad != from.generator_rad && self.recall(generator_rad);
         // A new layout of the contact is a new start, up to a few times.
-        let most_iterations = match self.shown {
-            true => SHOWN_ITERATIONS.min(settings.max_iterations),
-            false => settings.max_iterations * if self.patient { PATIENCE } else { 1 },
-        };
+        let most_iterations = settings.max_iterations * if self.patient { PATIENCE } else { 1 };
         let (mut last_iteration, mut layouts) = (most_iterations, 0);
         while history.len() <= last_iteration {
             let relative = residual.relative();
             history.push(relative);
             if !relative.is_finite() {
                 return Err(failed(history, "the residual is not finite"));
-            }
-            if self.shown && history.len() > SHOWN_LOOK && relative > SHOWN_HOPE {
-                return Err(failed(history, "another drive's way leads nowhere"));
             }
             if relative <= settings.tolerance {
                 // The contact was laid out for the predicted state; where the corner of a space ended elsewhere, again.
