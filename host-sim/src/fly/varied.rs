@@ -52,11 +52,14 @@ fn apart(values: &str) -> Vec<String> {
     found.iter().map(|value| value.trim().to_owned()).collect()
 }
 
+/// Fields of a scenario, each with the value it got.
+pub type Varied = Vec<(String, String)>;
+
 /// One of the flights.
 #[derive(Debug, Clone, Serialize)]
 pub struct Flight {
-    /// Fields and values that make it this one.
-    pub varied: Vec<(String, String)>,
+    /// What makes it this one.
+    pub varied: Varied,
     /// What was found; none where it was not flown.
     pub results: Option<Results>,
     /// Why it was not flown: a load that its generator does not carry.
@@ -67,12 +70,11 @@ pub struct Flight {
 ///
 /// # Errors
 /// File, field, value and what is allowed.
-pub fn every(name: &str, text: &str, vary: &[Vary]) -> Result<Vec<(Vec<(String, String)>, Flown)>, String> {
-    let mut combinations: Vec<Vec<(String, String)>> = vec![Vec::new()];
+pub fn every(name: &str, text: &str, vary: &[Vary]) -> Result<Vec<(Varied, Flown)>, String> {
+    let mut combinations: Vec<Varied> = vec![Vec::new()];
     for Vary { field, values } in vary {
-        let with = |before: &Vec<(String, String)>, value: &String| {
-            before.iter().cloned().chain([(field.clone(), value.clone())]).collect()
-        };
+        let with =
+            |before: &Varied, value: &String| before.iter().cloned().chain([(field.clone(), value.clone())]).collect();
         combinations =
             combinations.iter().flat_map(|before| values.iter().map(move |value| with(before, value))).collect();
     }
