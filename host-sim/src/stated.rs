@@ -466,7 +466,9 @@ mod tests {
         assert_eq!(smooth.beside[0].within_scatter, Some(false));
         let rough = of(&Drive::hhd_95().with_set("flanks.friction_coefficient=0.1").unwrap());
         println!("{}", rough.text());
-        assert!(get(&rough, "hysteresis_loss_arcmin") > clearance + 0.01);
+        // Some hundredths of an arc-second.
+        let wider = get(&rough, "hysteresis_loss_arcmin") - clearance;
+        assert!((1e-4..2e-3).contains(&wider), "{wider}");
         assert!(get(&rough, "starting_torque_n_m") > get(&smooth, "starting_torque_n_m"));
     }
 }

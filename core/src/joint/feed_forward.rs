@@ -136,10 +136,13 @@ mod tests {
                 let exact = (goes - came) as f64 * core::f64::consts::TAU / 4_294_967_296.0 / (h * h);
                 let found = ask(&store, target, [rate, acceleration]);
                 assert_eq!(found.rate_rad_s, joint.rate_ahead(&store, target, rate, 5.0, 4e-3));
-                // Places are counts: half of one at the output is 0.03 rad/s² of the generator over 2 ms, at three places. The way of one that accelerates
-                // is not even, by which the third difference comes in.
+                // Places are counts: half of one at the output is 0.02 rad/s² of the generator over 2 ms. The way of one that accelerates is not even:
+                // where the slope (91 to 97 here) bends within 2 ms, part of its change comes in, times the target's acceleration.
                 let off = (f64::from(found.acceleration_rad_s2) - exact).abs();
-                assert!(off < 0.15 + 0.02 * exact.abs(), "{k} {rate} {acceleration}: {found:?} {exact}");
+                assert!(
+                    off < 0.1 + 2.5 * f64::from(acceleration.abs()),
+                    "{k} {rate} {acceleration}: {found:?} {exact}"
+                );
                 most = most.max((f64::from(found.acceleration_rad_s2) - ratio * f64::from(acceleration)).abs());
             }
         }
