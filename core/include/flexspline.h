@@ -1372,7 +1372,7 @@ enum FlexsplineStatus flexspline_predict(const struct FlexsplinePredictor *predi
 // What `flexspline_layout` says where program and library agree on the size of all types above: `if (flexspline_layout() != FLEXSPLINE_LAYOUT) stop();`
 #define FLEXSPLINE_AND_SIZE_(type) * 31u + (uint32_t)sizeof(type))
 #define FLEXSPLINE_LAYOUT \
-  (((((((((((((((((((((((((((((((((((((((((((((0u \
+  ((((((((((((((((((((((((((((((((((((((((((((((0u \
   FLEXSPLINE_AND_SIZE_(FlexsplineStatus) \
   FLEXSPLINE_AND_SIZE_(size_t) \
   FLEXSPLINE_AND_SIZE_(FlexsplineStore) \

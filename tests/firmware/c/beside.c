@@ -116,17 +116,17 @@ static int ask(int64_t generator, int64_t target, float torque)
 {
     FlexsplinePrediction prediction;
     FlexsplinePlay play;
-    FlexsplineMotionAhead ahead;
+    FlexsplineMotionAhead motion;
     float rate;
     if (flexspline_forward(&joint, &store, &state, generator, torque, &prediction) ||
         flexspline_rate_ahead(&joint, &store, target, 0.01f, torque, 4e-3f, &rate) || flexspline_state_play(&state, &play) ||
-        flexspline_motion_ahead(&joint, &store, target, 0.01f, 0.1f, torque, 4e-3f, &ahead))
+        flexspline_motion_ahead(&joint, &store, target, 0.01f, 0.1f, torque, 4e-3f, &motion))
         return 1;
     take((uint64_t)prediction.output_counts);
     take_float(prediction.transmission_error_rad);
     take_float(rate);
-    take_float(ahead.rate_rad_s);
-    take_float(ahead.acceleration_rad_s2);
+    take_float(motion.rate_rad_s);
+    take_float(motion.acceleration_rad_s2);
     take((uint64_t)play.output_counts);
     for (int8_t direction = -1; direction <= 1; direction++) {
         FlexsplineCommand command;
