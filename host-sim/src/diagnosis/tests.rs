@@ -120,7 +120,7 @@ fn moved_by_bad_rows(seeds: std::ops::Range<u64>) {
         {
             let sessions = data(&[effect(cause, size, 0.7, 0.5)], Richness::Rich, 0, 100 + seed);
             let found = |share: f64| {
-                let rows = with_bad_rows(&sessions, share, (seed as usize + number) % 2 == 0, seed);
+                let rows = with_bad_rows(&sessions, share, (seed as usize + number).is_multiple_of(2), seed);
                 let diagnosis = diagnose(&rows, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
                 assert_eq!(names(&diagnosis), [cause], "seed {seed}, {share}: {}", diagnosis.text());
                 diagnosis.causes[0].parameters[parameter]
