@@ -107,9 +107,9 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
         mesh: MeshLevel::Coarse,
         torque_n_m: 50.0,
         last_torque_n_m: 25.0,
-        // An increment of CalculiX takes more than a minute: the short form turns once.
+        // An increment of CalculiX takes more than a minute: the short form turns once, and by a third of it.
         increments: if options.long { 2 } else { 1 },
-        step_rad: 0.01,
+        step_rad: if options.long { 0.01 } else { 0.003 },
         parts: 1,
         penalties: PENALTIES,
     };

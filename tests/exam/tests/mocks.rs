@@ -29,7 +29,7 @@ const OPEN: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/open");
 static KNOWING: LazyLock<(Value, bool)> = LazyLock::new(|| {
     let dir = tempfile::tempdir().unwrap();
     let bounds = ["--at-least", "first_name=0.97", "--at-most", "null_named=0.01", "--removed", "0.97", "--strict"];
-    let more = [&["--cases", "50", "--reveal", OPEN], &bounds[..]].concat();
+    let more = [&["--cases", "30", "--reveal", OPEN], &bounds[..]].concat();
     examine(dir.path(), &["--manner", "truth", "--truth", OPEN], &more)
 });
 
