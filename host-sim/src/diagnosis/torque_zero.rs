@@ -267,8 +267,9 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     let better = |than: &[f64], share: f64| {
         sum(than) < share * least && is_certain(there, than) && least - sum(than) > NO_TRIFLE * gain
     };
-    let beside_it = held.least_beside([-zero, 0.0, 0.0, 0.0], true, load);
-    if better(&by_rivals, RIVALS_LEAVE) || better(&beside_it, BESIDE_IT_LEAVE) {
+    if better(&by_rivals, RIVALS_LEAVE)
+        || better(&held.least_beside([-zero, 0.0, 0.0, 0.0], true, load), BESIDE_IT_LEAVE)
+    {
         return None;
     }
     let (low, high) = least_and_most(held.rows.output.iter().copied());

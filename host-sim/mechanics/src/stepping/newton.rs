@@ -54,6 +54,7 @@ const PATIENCE: usize = 4;
 const RETURNS: f64 = 0.9;
 const RETURNS_LITTLE: f64 = 0.3;
 const GOES_ROUND_AFTER: usize = 25;
+
 /// Relative residual below which steps are taken whole: what is left is near round-off.
 const ROUND_OFF: f64 = 1e-6;
 

@@ -74,8 +74,8 @@ pub struct SolverSettings {
     pub method: Method,
     /// Mesh of both wheels.
     pub mesh: MeshLevel,
-    /// So many times the elements of that mesh in each direction. A finer mesh of the same level has its nodes, and more: what stresses are
-    /// extrapolated over.
+    /// So many times the elements of that mesh in each direction. A finer mesh of the same level has its nodes, and more: what the
+    /// interval of a stress is taken from.
     pub refine: usize,
     /// Contact penalty on the bore, N/mm³; `None` chooses by generator: 1e7 under rollers, whose contact is narrow and hard
     /// pressed, 1e6 under discs and cam, which conform to the bore. Ten times more moves the output of HHD-95 at 50 N.m by
