@@ -4,6 +4,7 @@ use flexspline::{Drive, FixedMember};
 use flexspline_motion::dish;
 use flexspline_motion::flight::{COMPENSATED, fly_one};
 use flexspline_motion::scenario::{Leg, Load, Scenario, TorqueKnown};
+use flexspline_motion::servo::ServoSettings;
 
 fn flights() -> Vec<(&'static str, Scenario)> {
     let base = Scenario { torque: TorqueKnown::Current, ..dish::scenario() };
@@ -37,6 +38,22 @@ fn flights() -> Vec<(&'static str, Scenario)> {
                 load_kg_m2: 0.3,
                 acceleration_rad_s2: 0.3,
                 ..flown(&slews, Load { gravity: [6.0, 0.4], gust: [0.1, 1.0], ..still })
+            },
+        ),
+        (
+            // The motor sticks and slips, and while it sticks its friction may be anything.
+            "the stars",
+            Scenario {
+                load_kg_m2: 6.0,
+                acceleration_rad_s2: 1e-3,
+                servo: ServoSettings {
+                    position_hz: 3.0,
+                    speed_hz: 25.0,
+                    integral_hz: 1.5,
+                    encoder_bits: 20,
+                    ..base.servo
+                },
+                ..flown(&[(2.0, 0.0), (20.0, 7.29e-5)], Load { gravity: [25.0, 0.8], gust: [2.0, 0.1], ..still })
             },
         ),
         ("light", flown(&to_and_fro, Load { bias_n_m: -0.75, ..still })),
