@@ -79,9 +79,14 @@ impl Friction {
 
     /// Coulomb friction at a speed, with a torque in the mesh, N·m.
     pub fn level_n_m(&self, rate_rad_s: f64, mesh_n_m: f64) -> f64 {
-        let load = mesh_n_m.abs();
+        let [idle, by_load] = self.parts(rate_rad_s);
+        idle + by_load * mesh_n_m.abs()
+    }
+
+    /// Coulomb friction at a speed: without load, N·m, and what each N·m in the mesh adds.
+    pub fn parts(&self, rate_rad_s: f64) -> [f64; 2] {
         let slow = libm::exp(-libm::pow((rate_rad_s / self.stribeck_rad_s).abs(), self.stribeck_exponent));
-        self.base_n_m + self.load_base * load + slow * (self.stribeck_n_m + self.load_stribeck * load)
+        [self.base_n_m + slow * self.stribeck_n_m, self.load_base + slow * self.load_stribeck]
     }
 }
 

@@ -168,8 +168,8 @@ impl Plant {
         let mut end = self.meshed;
         let mut loss = 0.0;
         let mut outside = 0.0;
-        // As fast, and with as much in the mesh, as in the step before.
-        let rubbing = self.cold * self.settings.friction.level_n_m(self.mean[0], self.middle.torque_n_m);
+        // As fast as in the step before. With as much in the mesh as in that, its friction would come late, and pull a joint that gives way to its load on.
+        let [idle, by_load] = self.settings.friction.parts(self.mean[0]).map(|part| self.cold * part);
         self.settings.gear.nearby(&mut self.near, start[0], start[1]);
         for repetition in 0..REPETITIONS {
             let way: [f64; PARTS] = core::array::from_fn(|k| h * mean[k]);
@@ -182,6 +182,7 @@ impl Plant {
             let [weight_n_m, most_at] = self.settings.gravity;
             outside = outside_n_m + weight_n_m * libm::cos(start[1] + 0.5 * way[1] - most_at);
             push[1] += outside;
+            let rubbing = idle + by_load * self.middle.torque_n_m.abs();
             let (next, heat) = self.rubbed(h, &inertias, &push, rubbing);
             loss = lost + heat;
             let same = (0..PARTS).all(|k| (next[k] - mean[k]).abs() <= SAME[0] * next[k].abs() + SAME[1]);

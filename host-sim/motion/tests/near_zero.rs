@@ -73,5 +73,5 @@ fn about_zero_load_the_core_is_never_worse_than_no_compensation_and_near_the_ide
         }
     }
     println!("{flights} flights; most of none and of the ideal: {worst:#?}");
-    assert!(worst[0].0 < 1.0 && worst[1].0 < 2.0, "{worst:?}");
+    assert!(worst[0].0 < 1.0 && worst[1].0 < 2.2, "{worst:?}");
 }

@@ -246,3 +246,35 @@ fn a_joint_at_rest_under_less_than_its_drag_stays_there() {
     // Through the clearance, to the flank that carries it.
     assert!(plant.angle_rad[1] > 1.4e-4 && plant.rate_rad_s[1].abs() < 1e-6, "{plant:?}");
 }
+
+/// Friction that grows with the load changes the frequency, and takes or gives nothing: `d²x/dt² = −(K·x + c·dx/dt)/J_l − ((1 + μ)·K·x + c·dx/dt)/J_m` of the twist
+/// `x`, where the motor lifts the load. If it followed the load a step late it would be a damper of −µ·K·h, here three times the damping there is.
+#[test]
+fn friction_by_load_neither_damps_nor_drives_a_swing_whatever_the_step() {
+    let (stiffness, damping, share, load_n_m) = (1e5, 1.0, 0.166, 6.0);
+    let [motor, load] = [1.0, 0.3];
+    let settings = PlantSettings {
+        load_kg_m2: load,
+        damping_s: damping / stiffness,
+        friction: Friction { load_base: share, ..Friction::NONE },
+        ..bare(spring(0.0, stiffness, 0.0), Vec::new())
+    };
+    let decay = 0.5 * damping * (1.0 / load + 1.0 / motor);
+    for (step_s, way) in [(2e-4, -1.0), (2e-4, 1.0), (2e-5, -1.0)] {
+        let mut plant = Plant::new(settings.clone(), 20.0);
+        let (still, swing) = (load_n_m / stiffness, 1e-5);
+        plant.set_motion([0.0, still + swing, 0.0], [0.1 * way, 0.1 * way, 0.0]);
+        let steps = |seconds: f64| (seconds / step_s).round() as usize;
+        let mut left = 0.0_f64;
+        for step in 0..steps(0.5) {
+            plant.step(step_s, -load_n_m * (1.0 - share * way), load_n_m);
+            // Over more than a period at the end.
+            if step >= steps(0.49) {
+                left = left.max((plant.meshed().twist_rad - still).abs());
+            }
+        }
+        let theory = (-0.5 * decay).exp();
+        println!("{step_s} s, {way}: {:.3} of the swing left, theory {theory:.3}", left / swing);
+        assert!((left / swing / theory - 1.0).abs() < 0.05, "{step_s} {way}: {left} {theory}");
+    }
+}
