@@ -70,8 +70,15 @@ fn banks() -> (SlipBank<3>, SlipBank<2, LoadTorque>) {
     (SlipBank::new(SPRINGS.map(spring)).unwrap(), SlipBank::of_torque(TORQUE_SPRINGS.map(torque)).unwrap())
 }
 
-const TORQUE: FlexsplineTorqueSettings =
-    FlexsplineTorqueSettings { tick_s: 1e-3, bandwidth_hz: 20.0, drag_n_m: 0.4, table_drag_n_m: 0.05, hold_n_m: 0.1 };
+const TORQUE: FlexsplineTorqueSettings = FlexsplineTorqueSettings {
+    tick_s: 1e-3,
+    bandwidth_hz: 20.0,
+    drag_n_m: 0.4,
+    table_drag_n_m: 0.05,
+    hold_n_m: 0.1,
+    settle_s: 0.05,
+    largest_n_m: 50.0,
+};
 
 const ENCODER: FlexsplineEncoderSettings =
     FlexsplineEncoderSettings { zero_counts: 1234, counts_per_turn: 20_000, wrap_bits: 16, reversed: 1 };
@@ -146,6 +153,8 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
         drag_n_m: TORQUE.drag_n_m,
         table_drag_n_m: TORQUE.table_drag_n_m,
         hold_n_m: TORQUE.hold_n_m,
+        settle_s: TORQUE.settle_s,
+        largest_n_m: TORQUE.largest_n_m,
     })
     .unwrap();
     let (mut aged, mut learnt, mut observer) = (Aged::new(4), adapter.start(), PredictorState::new());

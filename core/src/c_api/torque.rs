@@ -8,11 +8,12 @@ use crate::{Aged, Direction, Joint, MotionAhead, OutputAngle, Store, TorquePath,
 use core::mem::{MaybeUninit, align_of, size_of};
 
 /// Eight-byte words of a [`FlexsplineTorquePath`].
-pub const FLEXSPLINE_TORQUE_PATH_WORDS: usize = 5;
+pub const FLEXSPLINE_TORQUE_PATH_WORDS: usize = 11;
 /// Eight-byte words of a [`FlexsplineAged`].
 pub const FLEXSPLINE_AGED_WORDS: usize = 4;
 
-/// The torque is that on the load: what gravity, wind and the like do to it, less inertia times the acceleration of the target.
+/// The torque is that on the load: what gravity, wind and the like do to it. Inertia times the acceleration of the target comes off what the tick gives,
+/// unless that inertia torque is the larger: while a target speeds up from a light load the flank does not change.
 pub const FLEXSPLINE_TORQUE_ON_LOAD: u8 = 0;
 /// The torque is that in the mesh: of a sensor between drive and load, of the twist, or of the motor's current less its friction.
 pub const FLEXSPLINE_TORQUE_IN_MESH: u8 = 1;
@@ -46,6 +47,10 @@ pub struct FlexsplineTorqueSettings {
     /// A torque in the mesh below this changes the flank only where the direction changes, N m: some three times the peak of the noise behind the
     /// low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
     pub hold_n_m: f32,
+    /// After a torque read in the mesh has changed the flank it does not change it again for so long, s: some periods of the servo's position loop; 0 or more.
+    pub settle_s: f32,
+    /// Largest reading that the sensor can have, N m; a larger one is forgotten. Above 0.
+    pub largest_n_m: f32,
 }
 
 const TORQUE_PATH_MARK: u32 = 0x7854_5446;
@@ -67,8 +72,8 @@ fn direction_of(sign: i8) -> Result<Direction, FlexsplineStatus> {
     }
 }
 
-/// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time or bandwidth is not finite and positive, or a drag or hold not
-/// finite or below 0.
+/// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time, bandwidth or largest reading is not finite and positive, or a drag, hold
+/// or time to settle not finite or below 0.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_torque_init(
     path: *mut FlexsplineTorquePath,
@@ -82,6 +87,8 @@ pub extern "C" fn flexspline_torque_init(
             drag_n_m: s.drag_n_m,
             table_drag_n_m: s.table_drag_n_m,
             hold_n_m: s.hold_n_m,
+            settle_s: s.settle_s,
+            largest_n_m: s.largest_n_m,
         };
         put(path, TORQUE_PATH_MARK, TorquePath::new(settings).map_err(|_| FlexsplineStatus::Argument)?)
     };
@@ -89,7 +96,8 @@ pub extern "C" fn flexspline_torque_init(
 }
 
 /// One tick: a reading, N m, positive where it turns the output forward, where it was measured (`FLEXSPLINE_TORQUE_...`), and the direction in which
-/// the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite gives NaN, and is forgotten.
+/// the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite, or larger than the sensor's largest, gives NaN
+/// and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit what was set: make the path anew.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_torque_tick(
     path: *mut FlexsplineTorquePath,
@@ -107,7 +115,11 @@ pub extern "C" fn flexspline_torque_tick(
             FLEXSPLINE_TORQUE_IN_MESH => TorqueReading::InMesh(reading_n_m),
             _ => return Err(FlexsplineStatus::Argument),
         };
-        give(torque_n_m, path.tick(reading, direction_of(direction)?))
+        let direction = direction_of(direction)?;
+        if path.is_damaged() {
+            return Err(FlexsplineStatus::NotInitialised);
+        }
+        give(torque_n_m, path.tick(reading, direction))
     };
     status(tick())
 }

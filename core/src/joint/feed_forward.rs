@@ -6,6 +6,9 @@ use crate::play::Direction;
 use crate::store::Store;
 use crate::table::{Approach, Quality};
 
+/// Over a shorter way than this slopes are rounding of counts, rad of the output: 34 counts.
+const SHORTEST_WAY_RAD: f32 = 5e-8;
+
 /// How the generator has to move so that the output moves as it shall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionAhead {
@@ -24,7 +27,7 @@ impl Joint {
     /// with the generator angle `ψ(δ)` that the table wants for an output angle `δ` under this torque. Three inverse solutions.
     ///
     /// Inertia of motor and generator times this acceleration is the torque to feed forward to the motor's current. What the load's inertia takes is its
-    /// own times `acceleration_rad_s2` over the ratio: the output moves as the target does. Both are NaN where the table gives nothing.
+    /// own times `acceleration_rad_s2` over the ratio: the output moves as the target does. Both are NaN where the table gives nothing, or a number is not finite.
     #[must_use]
     pub fn motion_ahead(
         &self,
@@ -35,19 +38,39 @@ impl Joint {
         ahead_s: f32,
     ) -> MotionAhead {
         let direction = if rate_rad_s < 0.0 { Direction::Backward } else { Direction::Forward };
-        let half_s = 0.5 * ahead_s;
-        let way = rate_rad_s * half_s;
+        let way = self.way_rad(rate_rad_s, ahead_s);
         let at = |way: f32| self.inverse(store, target.offset_rad(way), torque_n_m, Approach::Moving(direction));
         let [before, now, after] = [at(-way), at(0.0), at(way)];
+        let nothing = MotionAhead { rate_rad_s: f32::NAN, acceleration_rad_s2: f32::NAN };
         if [before, now, after].iter().any(|command| command.quality == Quality::Disabled) {
-            return MotionAhead { rate_rad_s: f32::NAN, acceleration_rad_s2: f32::NAN };
+            return nothing;
         }
-        let rate = after.generator.minus_rad(before.generator) / ahead_s;
+        let slope = after.generator.minus_rad(before.generator) / (2.0 * way);
         // In counts, as their difference is small.
         let came = now.generator.minus_counts(before.generator);
         let bent = after.generator.minus_counts(now.generator).wrapping_sub(came) as f32 * RAD_PER_COUNT;
-        let slope = if rate_rad_s == 0.0 { self.drive().ratio() } else { rate / rate_rad_s };
-        MotionAhead { rate_rad_s: rate, acceleration_rad_s2: bent / (half_s * half_s) + slope * acceleration_rad_s2 }
+        let per_way = rate_rad_s / way;
+        let along = if rate_rad_s == 0.0 { self.drive().ratio() } else { slope };
+        let ahead = MotionAhead {
+            rate_rad_s: slope * rate_rad_s,
+            acceleration_rad_s2: bent * per_way * per_way + along * acceleration_rad_s2,
+        };
+        if ahead.rate_rad_s.is_finite() && ahead.acceleration_rad_s2.is_finite() { ahead } else { nothing }
+    }
+
+    /// Half of the way over which slopes are taken, rad: that of the target in half of `ahead_s`, but no less than counts of both angles resolve, and
+    /// no more than a quarter of the generator's turn.
+    fn way_rad(&self, rate_rad_s: f32, ahead_s: f32) -> f32 {
+        let ratio = self.drive().ratio();
+        let most = core::f32::consts::FRAC_PI_2 / if ratio < 0.0 { -ratio } else { ratio };
+        let way = 0.5 * ahead_s * if rate_rad_s < 0.0 { -rate_rad_s } else { rate_rad_s };
+        if way < SHORTEST_WAY_RAD {
+            SHORTEST_WAY_RAD
+        } else if way > most {
+            most
+        } else {
+            way
+        }
     }
 
     /// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal rate and what the error adds to it, by
@@ -66,13 +89,14 @@ impl Joint {
         ahead_s: f32,
     ) -> f32 {
         let direction = if rate_rad_s < 0.0 { Direction::Backward } else { Direction::Forward };
-        let half = rate_rad_s * ahead_s * 0.5;
+        let way = self.way_rad(rate_rad_s, ahead_s);
         let at = |way: f32| self.inverse(store, target.offset_rad(way), torque_n_m, Approach::Moving(direction));
-        let (before, after) = (at(-half), at(half));
+        let (before, after) = (at(-way), at(way));
         if before.quality == Quality::Disabled || after.quality == Quality::Disabled {
             return f32::NAN;
         }
-        after.generator.minus_rad(before.generator) / ahead_s
+        let rate = after.generator.minus_rad(before.generator) / (2.0 * way) * rate_rad_s;
+        if rate.is_finite() { rate } else { f32::NAN }
     }
 }
 
@@ -108,6 +132,34 @@ mod tests {
         }
         // The slope of the error is there.
         assert!(differs > 1e-4, "{differs}");
+    }
+
+    #[test]
+    fn whatever_the_way_ahead_the_rate_is_near_the_ratio_or_not_a_number() {
+        let (one, two) = (fixture::image(true), fixture::image(true));
+        let mut store = Store::new();
+        let joint = Joint::new(fixture::drive(), LIMITS, Overrun::HoldLast).unwrap();
+        store.activate(&Images::new(&one, &two), &fixture::drive(), 20.0).unwrap();
+        let ratio = fixture::drive().ratio();
+        for rate in [1e-30_f32, 1e-9, -1e-7, 1e-4, 0.1, -5.0, 10.0, 1e30] {
+            for ahead_s in [1e-30_f32, 1e-9, 1e-3, 4e-3, 0.1, 1e3, 1e30] {
+                let motion = joint.motion_ahead(&store, OutputAngle::ZERO, [rate, 0.1], 5.0, ahead_s);
+                let off = motion.rate_rad_s / (rate * ratio) - 1.0;
+                assert!(
+                    off.abs() < 0.2 || (rate.abs() > 1e29 && motion.rate_rad_s.is_nan()),
+                    "{rate} {ahead_s}: {motion:?}"
+                );
+                assert_eq!(motion.rate_rad_s.is_nan(), motion.acceleration_rad_s2.is_nan());
+                let alone = joint.rate_ahead(&store, OutputAngle::ZERO, rate, 5.0, ahead_s);
+                assert!(alone == motion.rate_rad_s || motion.rate_rad_s.is_nan(), "{rate} {ahead_s}");
+            }
+        }
+        for [rate, acceleration, ahead_s] in
+            [[f32::NAN, 0.0, 1e-3], [0.1, f32::INFINITY, 1e-3], [0.1, f32::MAX, 1e-3], [0.1, 0.0, f32::NAN]]
+        {
+            let motion = joint.motion_ahead(&store, OutputAngle::ZERO, [rate, acceleration], 5.0, ahead_s);
+            assert!(motion.rate_rad_s.is_nan() && motion.acceleration_rad_s2.is_nan(), "{motion:?}");
+        }
     }
 
     /// Against differences of the inverse over longer ways, in double precision; and a target that accelerates from rest wants the ratio.

@@ -50,31 +50,53 @@ pub struct TorqueSettings {
     /// A torque in the mesh below this changes the flank only where the direction changes, N·m: some three times the peak of the noise behind the
     /// low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
     pub hold_n_m: f32,
+    /// After a torque read in the mesh has changed the flank it does not change it again for so long, s: the correction crosses the play then, and
+    /// what its own motion makes of the torque has to die away. Some periods of the servo's position loop; 0 or more.
+    pub settle_s: f32,
+    /// Largest reading that the sensor can have, N·m; a larger one is forgotten as one that is not finite. Above 0.
+    pub largest_n_m: f32,
 }
 
 /// From a reading to the torque that a table is asked with.
-#[derive(Clone, Copy, Debug, PartialEq)]
+///
+/// All of it is kept twice, the second time with each bit turned. Where what changes from tick to tick was hit by an upset it begins anew with the
+/// tick's reading; where what was set was hit every tick gives NaN, until the path is made anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TorquePath {
-    drag_n_m: f32,
-    table_drag_n_m: f32,
-    hold_n_m: f32,
-    /// What of a reading a tick believes.
-    share: f32,
-    /// Torque on the load behind the low-pass, N·m; NaN before the first.
-    behind: f32,
-    /// The flank that carried last: 1 or −1.
-    flank: f32,
-    /// The direction of the last tick: 1 or −1; 0 before the first.
-    way: f32,
+    set: [u32; SET],
+    set_again: [u32; SET],
+    now: [u32; NOW],
+    now_again: [u32; NOW],
+}
+
+/// Drag, drag of the table, hold, largest reading, share of a reading that a tick believes, ticks between changes of the flank.
+const SET: usize = 6;
+/// Torque on the load behind the low-pass (NaN before the first), flank that carried last (1 or −1), direction of the last tick (1, −1; 0 before the
+/// first), ticks since the flank changed.
+const NOW: usize = 4;
+
+/// Nothing seen yet; long enough ago that the flank may change.
+const BEGUN: [u32; NOW] = [f32::NAN.to_bits(), 1.0_f32.to_bits(), 0, u32::MAX];
+
+const fn turned<const N: usize>(words: [u32; N]) -> [u32; N] {
+    let mut turned = words;
+    let mut rest: &mut [u32] = &mut turned;
+    while let [word, more @ ..] = rest {
+        *word = !*word;
+        rest = more;
+    }
+    turned
 }
 
 impl TorquePath {
     /// A path that has seen nothing yet.
     ///
     /// # Errors
-    /// [`SettingError`]: a time or bandwidth that is not finite and positive, a drag or a hold that is not finite or below 0.
+    /// [`SettingError`]: a time, bandwidth or largest reading that is not finite and positive, a drag, a hold or a time to settle that is not finite or
+    /// below 0.
     pub const fn new(settings: TorqueSettings) -> Result<Self, SettingError> {
-        let TorqueSettings { tick_s, bandwidth_hz, drag_n_m, table_drag_n_m, hold_n_m } = settings;
+        let TorqueSettings { tick_s, bandwidth_hz, drag_n_m, table_drag_n_m, hold_n_m, settle_s, largest_n_m } =
+            settings;
         if let Err(error) = checked("tick_s", tick_s, tick_s as f64, [0.0, 1e3]) {
             return Err(error);
         }
@@ -91,62 +113,102 @@ impl TorquePath {
         if let Err(error) = checked("hold_n_m", hold_n_m, hold_n_m as f64 + 1.0, [1.0, 1e9]) {
             return Err(error);
         }
-        let turned = TAU * bandwidth_hz as f64 * tick_s as f64;
-        let share = (turned / (1.0 + turned)) as f32;
-        Ok(Self { drag_n_m, table_drag_n_m, hold_n_m, share, behind: f32::NAN, flank: 1.0, way: 0.0 })
+        if let Err(error) = checked("settle_s", settle_s, settle_s as f64 + 1.0, [1.0, 1e6]) {
+            return Err(error);
+        }
+        if let Err(error) = checked("largest_n_m", largest_n_m, largest_n_m as f64, [0.0, 1e9]) {
+            return Err(error);
+        }
+        let along = TAU * bandwidth_hz as f64 * tick_s as f64;
+        let share = (along / (1.0 + along)) as f32;
+        // Beyond what a count holds it is as good as for ever.
+        let ticks = (settle_s as f64 / tick_s as f64) as u32;
+        let numbers = [drag_n_m.to_bits(), table_drag_n_m.to_bits(), hold_n_m.to_bits(), largest_n_m.to_bits()];
+        let [drag, table_drag, hold, largest] = numbers;
+        let set = [drag, table_drag, hold, largest, share.to_bits(), ticks];
+        Ok(Self { set, set_again: turned(set), now: BEGUN, now_again: turned(BEGUN) })
     }
 
     /// What changes from tick to tick, for a simulation that goes on from here.
     #[cfg(any(test, feature = "std"))]
     #[must_use]
-    pub const fn kept(&self) -> [f32; 3] {
-        [self.behind, self.flank, self.way]
+    pub const fn kept(&self) -> [u32; 4] {
+        self.now
     }
 
     /// Goes on from what [`Self::kept`] gave.
     #[cfg(any(test, feature = "std"))]
-    pub const fn go_on(&mut self, [behind, flank, way]: [f32; 3]) {
-        self.behind = behind;
-        self.flank = flank;
-        self.way = way;
+    pub const fn go_on(&mut self, now: [u32; 4]) {
+        self.now = now;
+        self.now_again = turned(now);
+    }
+
+    /// Whether what was set was hit by an upset: make the path anew.
+    #[must_use]
+    pub fn is_damaged(&self) -> bool {
+        self.set != turned(self.set_again)
     }
 
     /// One tick: a reading, and the direction in which the output moves or moved last; what to give to
-    /// [`Input::torque_n_m`](crate::Input::torque_n_m). A reading that is not finite gives NaN and is forgotten.
+    /// [`Input::torque_n_m`](crate::Input::torque_n_m). A reading that is not finite, or larger than the sensor's largest, gives NaN and is forgotten.
     #[must_use]
     pub fn tick(&mut self, reading: TorqueReading, direction: Direction) -> f32 {
+        if self.is_damaged() {
+            return f32::NAN;
+        }
+        let [drag, table_drag, hold, largest, share, settle_ticks] = self.set;
+        let [drag_n_m, table_drag_n_m, hold_n_m, largest_n_m, share] =
+            [drag, table_drag, hold, largest, share].map(f32::from_bits);
+        let [behind, flank, way_before, since] = if self.now == turned(self.now_again) { self.now } else { BEGUN };
+        let [behind, flank, way_before] = [behind, flank, way_before].map(f32::from_bits);
         let way = match direction {
             Direction::Forward => 1.0,
             Direction::Backward => -1.0,
         };
-        let drag = way * self.drag_n_m;
+        let drag = way * drag_n_m;
         // Kept as a torque on the load, which a reversal does not change: the one in the mesh leaps there by twice the drag.
-        let on_load = match reading {
-            TorqueReading::OnLoad(torque) => torque,
-            TorqueReading::InMesh(torque) => torque + drag,
+        let (read, on_load, in_mesh) = match reading {
+            TorqueReading::OnLoad(torque) => (torque, torque, false),
+            TorqueReading::InMesh(torque) => (torque, torque + drag, true),
         };
-        if !on_load.is_finite() {
+        // Nothing that is not a number is within.
+        if !(-largest_n_m..=largest_n_m).contains(&read) {
             return f32::NAN;
         }
-        let late = self.behind + self.share * (on_load - self.behind);
-        self.behind = if self.behind.is_finite() { late } else { on_load };
-        let mesh = self.behind - drag;
+        let late = behind + share * (on_load - behind);
+        let behind = if behind.is_finite() { late } else { on_load };
+        let mesh = behind - drag;
         let size = if mesh < 0.0 { -mesh } else { mesh };
+        let carries = if mesh < 0.0 { -1.0 } else { 1.0 };
+        let turned_back = way != way_before;
         // Where the motion turns back the drag tells the flank, however small the torque.
-        if size >= self.hold_n_m || way != self.way {
-            self.flank = if mesh < 0.0 { -1.0 } else { 1.0 };
-        }
-        self.way = way;
-        self.flank * size + way * self.table_drag_n_m
+        let told = turned_back || (size >= hold_n_m && (!in_mesh || since >= settle_ticks));
+        let changes = told && carries != flank;
+        let flank = if changes { carries } else { flank };
+        let since = if changes && !turned_back { 0 } else { since.saturating_add(1) };
+        let now = [behind.to_bits(), flank.to_bits(), way.to_bits(), since];
+        self.now = now;
+        self.now_again = turned(now);
+        flank * size + way * table_drag_n_m
     }
 }
+
+#[cfg(test)]
+crate::upset::upsets!(TorquePath { set, set_again, now, now_again });
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const SETTINGS: TorqueSettings =
-        TorqueSettings { tick_s: 1e-3, bandwidth_hz: 5.0, drag_n_m: 0.5, table_drag_n_m: 0.02, hold_n_m: 0.1 };
+    const SETTINGS: TorqueSettings = TorqueSettings {
+        tick_s: 1e-3,
+        bandwidth_hz: 5.0,
+        drag_n_m: 0.5,
+        table_drag_n_m: 0.02,
+        hold_n_m: 0.1,
+        settle_s: 0.25,
+        largest_n_m: 100.0,
+    };
 
     #[test]
     fn a_load_below_the_drag_rests_on_the_flank_that_carries() {
@@ -208,6 +270,51 @@ mod tests {
         assert_eq!(named(TorqueSettings { bandwidth_hz: 0.0, ..SETTINGS }), "bandwidth_hz");
         assert_eq!(named(TorqueSettings { drag_n_m: -0.1, ..SETTINGS }), "drag_n_m");
         assert_eq!(named(TorqueSettings { hold_n_m: f32::NAN, ..SETTINGS }), "hold_n_m");
+        assert_eq!(named(TorqueSettings { settle_s: -1.0, ..SETTINGS }), "settle_s");
+        assert_eq!(named(TorqueSettings { largest_n_m: 0.0, ..SETTINGS }), "largest_n_m");
         assert!(TorquePath::new(TorqueSettings { hold_n_m: 0.0, ..SETTINGS }).is_ok());
+    }
+
+    /// What the correction's own way across the play makes of the torque does not turn it back; a reversal of the motion does.
+    #[test]
+    fn a_flank_that_a_reading_changed_stays_until_its_correction_has_settled() {
+        let mut path = TorquePath::new(TorqueSettings { bandwidth_hz: 1e6, ..SETTINGS }).unwrap();
+        let mut flank = |torque: f32, direction| path.tick(TorqueReading::InMesh(torque), direction).signum();
+        assert_eq!(flank(-0.4, Direction::Forward), -1.0);
+        assert_eq!(flank(3.0, Direction::Forward), 1.0);
+        for _ in 0..249 {
+            assert_eq!(flank(-3.0, Direction::Forward), 1.0);
+        }
+        assert_eq!(flank(-3.0, Direction::Forward), -1.0);
+        assert_eq!(flank(3.0, Direction::Forward), -1.0);
+        assert_eq!(flank(3.0, Direction::Backward), 1.0);
+    }
+
+    #[test]
+    fn a_reading_beyond_the_sensor_is_forgotten() {
+        let mut path = TorquePath::new(SETTINGS).unwrap();
+        let before = path.tick(TorqueReading::OnLoad(2.0), Direction::Forward);
+        for wrong in [100.1, -1e6, f32::MAX, f32::INFINITY, f32::NAN] {
+            assert!(path.tick(TorqueReading::OnLoad(wrong), Direction::Forward).is_nan());
+            assert_eq!(path.tick(TorqueReading::OnLoad(2.0), Direction::Forward), before);
+        }
+    }
+
+    #[test]
+    fn no_single_bit_turned_gives_a_wrong_torque() {
+        use crate::upset::Upset;
+        let mut sound = TorquePath::new(TorqueSettings { bandwidth_hz: 1.0, ..SETTINGS }).unwrap();
+        for _ in 0..10 {
+            let _ = sound.tick(TorqueReading::OnLoad(2.0), Direction::Forward);
+        }
+        for bit in 0..sound.bits() {
+            let (mut hit, mut wanted, mut name) = (sound, sound, std::string::String::new());
+            hit.flip(bit, &mut name);
+            for _ in 0..3 {
+                let [found, right] =
+                    [&mut hit, &mut wanted].map(|path| path.tick(TorqueReading::OnLoad(2.0), Direction::Forward));
+                assert!(found == right || found.is_nan() && hit.is_damaged(), "{name} {bit}: {found} for {right}");
+            }
+        }
     }
 }

@@ -46,6 +46,8 @@ pub static READINGS: Choices = Choices {
 
 const POSITIVE: [f64; 2] = [1e-9, 1e9];
 const NOT_NEGATIVE: [f64; 2] = [0.0, 1e9];
+/// A simulation's torque has no sensor whose range it could leave.
+const LARGEST_READING_N_M: f32 = 1e9;
 
 variables! {
     OUTPUT_COMMAND => Variable::input("output_command", "rad", 0.0, "where the output shall be");
@@ -80,6 +82,7 @@ variables! {
     MODE_NOW => Variable::output("mode_now", Kind::Choice(&MODES), "mode of the joint");
     RATIO => Variable::constant("ratio", Kind::Real("rad/rad"), "generator over output");
     TABLE_ID => Variable::constant("table_id", Kind::Text, "id of the table");
+    TORQUE_SETTLE => Variable::parameter("torque_settle", Kind::Real("s"), 0.25, NOT_NEGATIVE, "after a torque in the mesh has changed the flank it does not change it again for so long");
 }
 
 /// The outputs before the first tick where they are not zero: the command without a correction.
@@ -154,6 +157,8 @@ impl Compensation {
             drag_n_m: values[DRAG] as f32,
             table_drag_n_m: values[TABLE_DRAG] as f32,
             hold_n_m: values[TORQUE_HOLD] as f32,
+            settle_s: values[TORQUE_SETTLE] as f32,
+            largest_n_m: LARGEST_READING_N_M,
         })
         .map_err(|error| error.to_string())?;
         let image = [resources.image.clone(), resources.image.clone()];
@@ -252,7 +257,7 @@ impl Model for Compensation {
 
     fn keep(&self, to: &mut Vec<u64>) {
         self.state.words()[..].keep(to);
-        self.path.kept().map(f32::to_bits)[..].keep(to);
+        self.path.kept()[..].keep(to);
         self.temperature_c.to_bits().keep(to);
         self.asked.keep(to);
         self.command.keep(to);
@@ -264,9 +269,9 @@ impl Model for Compensation {
         let mut words = [0_u32; JOINT_STATE_WORDS];
         words[..].take(from)?;
         self.state = JointState::of_words(&words)?;
-        let mut bits = [0_u32; 3];
+        let mut bits = [0_u32; 4];
         bits[..].take(from)?;
-        self.path.go_on(bits.map(f32::from_bits));
+        self.path.go_on(bits);
         let mut temperature = 0_u32;
         temperature.take(from)?;
         self.follow(f32::from_bits(temperature));

@@ -118,7 +118,7 @@ pub fn passes_slowly(drive: &Drive, rate_rad_s: f32, tick_s: f32) -> bool {
 }
 
 /// Bytes of the settings, and of what a tick is told, on a tape.
-pub const SETTINGS_BYTES: usize = 4 * 13;
+pub const SETTINGS_BYTES: usize = 4 * 15;
 /// See there.
 pub const TOLD_BYTES: usize = 8 + 8 + 4 * 4 + 4;
 
@@ -138,6 +138,8 @@ impl Settings {
             t.drag_n_m,
             t.table_drag_n_m,
             t.hold_n_m,
+            t.settle_s,
+            t.largest_n_m,
             self.expected_n_m,
             self.ahead_s,
             self.temperature_c,
@@ -167,6 +169,8 @@ impl Settings {
             drag,
             table_drag,
             hold,
+            settle,
+            largest,
             expected,
             ahead_s,
             warm,
@@ -186,6 +190,8 @@ impl Settings {
                 drag_n_m: drag,
                 table_drag_n_m: table_drag,
                 hold_n_m: hold,
+                settle_s: settle,
+                largest_n_m: largest,
             },
             expected_n_m: expected,
             ahead_s,

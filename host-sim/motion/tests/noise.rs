@@ -34,7 +34,15 @@ fn through(acceleration_rad_s2: f32, bandwidth_hz: Option<f32>) -> [f64; 2] {
     };
     let joint = Joint::new(drive, limits, Overrun::SkipAndCount).unwrap();
     let mut path = bandwidth_hz.map(|bandwidth_hz| {
-        let settings = TorqueSettings { tick_s: 1e-3, bandwidth_hz, drag_n_m: 0.0, table_drag_n_m: 0.0, hold_n_m: 0.0 };
+        let settings = TorqueSettings {
+            tick_s: 1e-3,
+            bandwidth_hz,
+            drag_n_m: 0.0,
+            table_drag_n_m: 0.0,
+            hold_n_m: 0.0,
+            settle_s: 0.0,
+            largest_n_m: 1e6,
+        };
         TorquePath::new(settings).unwrap()
     });
     let mut noise = Noise::new(11);

@@ -53,6 +53,7 @@ impl Fly {
             return self.side_by_side(context);
         }
         let flown = scenario(&self.scenario)?;
+        flown.carries().map_err(|why| Failure::BadInput(format!("{}: {why}", self.scenario)))?;
         let out = context.out()?;
         let (progress, done) = (Mutex::new(context.progress("fly")), AtomicUsize::new(0));
         let told = || {
@@ -61,7 +62,7 @@ impl Fly {
                 bar.set(done, flown.seconds_of_all(), "seconds of all joints");
             }
         };
-        let flight = flown.fly_told(&told).map_err(Failure::Failed)?;
+        let flight = flown.fly_told(&told).map_err(|why| Failure::Failed(format!("{}: {why}", self.scenario)))?;
         drop(progress);
         let results = results(&flown, &flight).ok_or_else(|| Failure::Failed("a controller is missing".to_owned()))?;
         let mut outputs = Outputs::new();
@@ -98,12 +99,11 @@ impl Fly {
                 bar.set(done, all, "seconds of all joints");
             }
         };
-        let flown: Result<Vec<_>, _> =
-            flights.into_iter().map(|(varied, flown)| fly_varied(varied, &flown, &told)).collect();
-        let found = Flights { flights: flown.map_err(Failure::Failed)? };
+        let found =
+            Flights { flights: flights.into_iter().map(|(varied, flown)| fly_varied(varied, &flown, &told)).collect() };
         drop(progress);
         if let [VariedFlight { not_flown: Some(reason), .. }] = &found.flights[..] {
-            return Err(Failure::BadInput(reason.clone()));
+            return Err(Failure::BadInput(format!("{}: {reason}", self.scenario)));
         }
         let mut outputs = Outputs::new();
         outputs.json(&out.join("flights.json"), &found)?;
@@ -136,7 +136,7 @@ fn table(flights: &[VariedFlight], out: &Path) -> String {
         let settles = |of: fn(&ByController<f64>) -> f64| settles.map_or("–".to_owned(), |s| format!("{:.2}", of(s)));
         let _ = writeln!(
             text,
-            "{:width$}{:>13.2}{:>7.2}{:>8.2}{:>7.2}{:>7.2}{:>9}{:>18}{:>7}{:>7}{:>7}{:>17}{:>6}{:>13}{:>8}",
+            "{:width$} {:>12.2} {:>6.2} {:>7.2} {:>6.2} {:>6.2} {:>8} {:>17} {:>6} {:>6} {:>6} {:>16} {:>5} {:>12} {:>7}",
             label(flight),
             rms.none,
             rms.fourier,
@@ -204,11 +204,24 @@ fn text(results: &Results, out: &Path, report: bool) -> String {
         Some(share) => format!("removed {:.1} % of what an ideal inverse removes", 100.0 * share),
         None => "an ideal inverse removes next to nothing here".to_owned(),
     };
-    let _ = writeln!(
-        text,
-        "{removed}; {}; servo's phase margin {margin:.0}° at {at_hz:.0} Hz",
-        if results.stable { "stable" } else { "NOT stable" }
-    );
+    let stability = if results.servo_distance == 0.0 {
+        "NOT stable: the servo itself is not, with this load, whatever is compensated".to_owned()
+    } else {
+        let stable = if results.stable { "stable" } else { "NOT stable" };
+        format!("{stable}; servo's phase margin {margin:.0}° at {at_hz:.0} Hz")
+    };
+    let _ = writeln!(text, "{removed}; {stability}");
+    if let Some(share) = results.torque_within_bound {
+        let _ = writeln!(
+            text,
+            "the torque by the motor's current is within its bound in {:.1} % of the ticks",
+            100.0 * share
+        );
+    }
+    let rms = &results.rms_arcsec;
+    if rms.compensated > rms.none {
+        let _ = writeln!(text, "compensation makes this flight worse");
+    }
     let written = if report { "report.html and flight.json" } else { "flight.json" };
     let _ = write!(text, "{written} in {}", out.display());
     text

@@ -15,7 +15,7 @@ struct File {
     base: String,
     name: Option<String>,
     generator: Option<String>,
-    legs: Option<Vec<[f64; 2]>>,
+    legs: Option<Vec<Vec<f64>>>,
     acceleration_rad_s2: Option<f64>,
     load_kg_m2: Option<f64>,
     drag_n_m: Option<f64>,
@@ -100,6 +100,8 @@ const KEYS: [&str; 30] = [
     "servo.encoder_bits",
     "servo.jitter_s",
 ];
+/// Slower gusts than this are none within a flight, Hz.
+const SLOWEST_GUST_HZ: f64 = 1e-3;
 /// Longest flight, s.
 const LONGEST_S: f64 = 3600.0;
 
@@ -178,13 +180,22 @@ pub fn read(name: &str, text: &str) -> Result<Flown, String> {
         scenario.name.clone_from(own);
     }
     if let Some(legs) = &file.legs {
-        let seconds: f64 = legs.iter().map(|leg| leg[0]).sum();
-        let sound = legs.iter().all(|[time, rate]| *time > 0.0 && rate.abs() <= 1.0);
-        if !sound || !(3.0..=LONGEST_S).contains(&seconds) {
-            let allowed = format!("[seconds, rad/s] each, 3 to {LONGEST_S} s in all, rates up to 1 rad/s");
-            return Err(set.refused("legs", format!("{} legs of {seconds} s", legs.len()), &allowed));
+        scenario.legs.clear();
+        for (at, leg) in legs.iter().enumerate() {
+            match leg[..] {
+                [seconds, rate_rad_s] if seconds > 0.0 && rate_rad_s.abs() <= 1.0 => {
+                    scenario.legs.push(Leg { seconds, rate_rad_s });
+                }
+                _ => {
+                    let allowed = "[seconds, rad/s] with seconds above 0 and a rate of -1 to 1 rad/s";
+                    return Err(set.refused(&format!("legs[{at}]"), format!("{leg:?}"), allowed));
+                }
+            }
         }
-        scenario.legs = legs.iter().map(|&[seconds, rate_rad_s]| Leg { seconds, rate_rad_s }).collect();
+        let seconds = scenario.seconds();
+        if !(3.0..=LONGEST_S).contains(&seconds) {
+            return Err(set.refused("legs", format!("{seconds} s in all"), &format!("3 to {LONGEST_S} s")));
+        }
     }
     set.number("acceleration_rad_s2", &mut scenario.acceleration_rad_s2, file.acceleration_rad_s2, [1e-6, 10.0])?;
     set.number("load_kg_m2", &mut scenario.load_kg_m2, file.load_kg_m2, [0.01, 1e3])?;
@@ -210,6 +221,10 @@ pub fn read(name: &str, text: &str) -> Result<Flown, String> {
         set.number("load.bias_n_m", &mut to.bias_n_m, load.bias_n_m, torque)?;
         set.pair("load.swing", &mut to.swing, load.swing, [torque, hz])?;
         set.pair("load.gust", &mut to.gust, load.gust, [[0.0, 100.0], hz])?;
+        if to.gust[0] > 0.0 && to.gust[1] < SLOWEST_GUST_HZ {
+            let allowed = format!("{SLOWEST_GUST_HZ} to 50 for gusts above 0 N.m");
+            return Err(set.refused("load.gust[1]", to.gust[1], &allowed));
+        }
         set.pair("load.step", &mut to.step, load.step, [torque, [0.0, 1e3]])?;
         set.pair("load.gravity", &mut to.gravity, load.gravity, [torque, [-10.0, 10.0]])?;
     }
@@ -288,6 +303,18 @@ mod tests {
         assert!(misspelt.starts_with("own.toml:3: servo.encoder_bit: unknown key"), "{misspelt}");
         assert!(misspelt.contains("did you mean `servo.encoder_bits`?"), "{misspelt}");
         let hot = read("own.toml", "base = \"telescope\"\nwarming_k_s = 1.0").unwrap_err();
+        for (text, said) in [
+            (
+                "legs = [[2.0, 0.0], [2.0, 0.0, 9.0]]",
+                "own.toml: legs[1]: found [2.0, 0.0, 9.0], allowed: [seconds, rad/s]",
+            ),
+            ("legs = [[2.0, 0.0], [2.0, 1e6]]", "own.toml: legs[1]: found [2.0, 1000000.0], allowed: "),
+            ("legs = []", "own.toml: legs: found 0 s in all, allowed: 3 to 3600 s"),
+            ("load.gust = [1.0, 0.0]", "own.toml: load.gust[1]: found 0, allowed: 0.001 to 50 for gusts above 0 N.m"),
+        ] {
+            let found = read("own.toml", &format!("base = \"camera\"\n{text}\n")).unwrap_err();
+            assert!(found.starts_with(said), "{found}");
+        }
         assert!(hot.starts_with("own.toml: warming_k_s: found an end at 82 °C, allowed: "), "{hot}");
     }
 }

@@ -53,11 +53,11 @@ pub struct Results {
     pub settle_s: Option<ByController<f64>>,
     /// Share of what the ideal removes that the core removes; none where the ideal removes next to nothing.
     pub removed: Option<f64>,
-    /// Whether the compensated joint comes to rest after a knock as the one without compensation does.
+    /// Whether the servo is stable with this load, and the compensated joint comes to rest after a knock as the one without compensation does.
     pub stable: bool,
     /// Low-pass of a torque in the mesh that keeps the margin, Hz.
     pub bandwidth_hz: f64,
-    /// Phase margin of the servo, degrees, at Hz; its least distance from −1.
+    /// Phase margin of the servo, degrees, at Hz; the least distance of its open loop from −1, 0 where it is not stable.
     pub phase_margin_deg: [f64; 2],
     /// See there.
     pub servo_distance: f64,

@@ -62,7 +62,7 @@ pub struct Flight {
     pub varied: Varied,
     /// What was found; none where it was not flown.
     pub results: Option<Results>,
-    /// Why it was not flown: a load that its generator does not carry.
+    /// Why it was not flown: a load that its generator does not carry, a joint that runs away.
     pub not_flown: Option<String>,
 }
 
@@ -71,6 +71,11 @@ pub struct Flight {
 /// # Errors
 /// File, field, value and what is allowed.
 pub fn every(name: &str, text: &str, vary: &[Vary]) -> Result<Vec<(Varied, Flown)>, String> {
+    for (at, Vary { field, .. }) in vary.iter().enumerate() {
+        if vary[..at].iter().any(|before| before.field == *field) {
+            return Err(format!("--vary {field}: found twice, allowed: once, its values with commas"));
+        }
+    }
     let mut combinations: Vec<Varied> = vec![Vec::new()];
     for Vary { field, values } in vary {
         let with =
@@ -113,14 +118,12 @@ fn changed(name: &str, text: &str, varied: &[(String, String)]) -> Result<Flown,
 
 /// Flies one of them; `told` is called for each second that one of its joints flew.
 ///
-/// # Errors
-/// What went wrong in flight.
-pub fn fly_varied(varied: Vec<(String, String)>, flown: &Flown, told: &(dyn Fn() + Sync)) -> Result<Flight, String> {
-    if let Err(not_flown) = flown.carries() {
-        return Ok(Flight { varied, results: None, not_flown: Some(not_flown) });
+/// What cannot be flown, or runs away, says why and takes no other flight with it.
+pub fn fly_varied(varied: Vec<(String, String)>, flown: &Flown, told: &(dyn Fn() + Sync)) -> Flight {
+    match flown.carries().and_then(|()| flown.fly_told(told)) {
+        Ok(flight) => Flight { varied, results: results(flown, &flight), not_flown: None },
+        Err(why) => Flight { varied, results: None, not_flown: Some(why) },
     }
-    let results = results(flown, &flown.fly_told(told)?);
-    Ok(Flight { varied, results, not_flown: None })
 }
 
 #[cfg(test)]
@@ -144,6 +147,9 @@ mod tests {
     #[test]
     fn what_cannot_be_varied_is_named() {
         let said = |text: &str| every("camera", "base = \"camera\"\n", &[text.parse().unwrap()]).unwrap_err();
+        let twice = every("camera", "base = \"camera\"\n", &["seed=1", "seed=2"].map(|text| text.parse().unwrap()))
+            .unwrap_err();
+        assert!(twice.starts_with("--vary seed: found twice"), "{twice}");
         assert!(said("tabel=nominal").contains("did you mean `table`?"), "{}", said("tabel=nominal"));
         assert!(said("table=best").contains("camera with table=best: table: found \"best\""), "{}", said("table=best"));
         assert!(said("seed.more=1").contains("seed"), "{}", said("seed.more=1"));

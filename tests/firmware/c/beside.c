@@ -54,6 +54,8 @@ static const FlexsplineTorqueSettings torque_settings = {
     .drag_n_m = 0.4f,
     .table_drag_n_m = 0.05f,
     .hold_n_m = 0.1f,
+    .settle_s = 0.05f,
+    .largest_n_m = 50.0f,
 };
 
 static const FlexsplineEncoderSettings encoder_settings = {

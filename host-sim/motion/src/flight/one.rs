@@ -125,7 +125,7 @@ impl Kept for OneJoint {
         u32::from(self.lane.direction == Direction::Backward).keep(to);
         if let Controller::Core(core) = &self.lane.controller {
             core.on_board.state.words()[..].keep(to);
-            core.on_board.path.kept().map(f32::to_bits)[..].keep(to);
+            core.on_board.path.kept()[..].keep(to);
         }
     }
 
@@ -140,9 +140,9 @@ impl Kept for OneJoint {
             let mut words = [0_u32; JOINT_STATE_WORDS];
             words[..].take(from)?;
             core.on_board.state = JointState::of_words(&words)?;
-            let mut bits = [0_u32; 3];
+            let mut bits = [0_u32; 4];
             bits[..].take(from)?;
-            core.on_board.path.go_on(bits.map(f32::from_bits));
+            core.on_board.path.go_on(bits);
         }
         Some(())
     }
