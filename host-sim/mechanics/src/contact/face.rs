@@ -13,7 +13,7 @@
 //! `mean of q x`, which acts on what makes the teeth lean.
 
 use super::flank::FlankLaw;
-use crate::drive::{InvoluteFlank, Side};
+use crate::drive::{ActiveFlank, Side};
 
 /// Stations along the face between which offsets are straight: exact for tilt; 8 times as many move the load of a crowned pair by
 /// less than 1e-3 (a test).
@@ -81,7 +81,7 @@ impl Bearing {
 
 impl FaceLaw {
     /// For the plus flank of a flexspline tooth.
-    pub fn new(flank: &InvoluteFlank, width_mm: f64, crowning_mm: f64, compliance: f64) -> FaceLaw {
+    pub fn new(flank: &ActiveFlank, width_mm: f64, crowning_mm: f64, compliance: f64) -> FaceLaw {
         let [a, b] = [flank.start_radius, flank.junction_radius].map(|radius| flank.point(radius));
         let along = [b[0] - a[0], b[1] - a[1]];
         let length = along[0].hypot(along[1]);
@@ -225,8 +225,8 @@ mod tests {
 
     fn face(crowning_mm: f64) -> FaceLaw {
         let drive = Drive::hhd_95();
-        let flank = ToothFlank::external(&drive.flexspline).unwrap();
-        FaceLaw::new(&InvoluteFlank::new(&flank, drive.flexspline.base_radius_mm()), 20.0, crowning_mm, C)
+        let flank = ToothFlank::external(&drive).unwrap();
+        FaceLaw::new(&ActiveFlank::new(&flank), 20.0, crowning_mm, C)
     }
 
     /// A single point, so stiff that its depth is nothing beside the offsets.
