@@ -64,6 +64,8 @@ pub struct Bearing {
     pub later_by_slope: f64,
     /// How much less moment for that, N.
     pub moment_by_slope: f64,
+    /// What has an offset below this bears, mm.
+    pub level_mm: f64,
 }
 
 impl Bearing {
@@ -76,6 +78,7 @@ impl Bearing {
         moment: 0.0,
         later_by_slope: 0.0,
         moment_by_slope: 0.0,
+        level_mm: 0.0,
     };
 }
 
@@ -126,6 +129,12 @@ impl Across {
     /// How much nearer than the plane slice the face comes somewhere, mm.
     pub fn early_mm(&self) -> f64 {
         -self.lowest()
+    }
+
+    /// Load over its mean at equal steps along the face, at a bearing of this pair.
+    pub fn load_over_mean(&self, bearing: &Bearing) -> Vec<f64> {
+        let mean = self.load(bearing.level_mm).mean * self.compliance;
+        self.offsets.iter().map(|offset| (bearing.level_mm - offset).max(0.0) / mean).collect()
     }
 
     fn lowest(&self) -> f64 {
@@ -211,6 +220,7 @@ impl Across {
             peak_over_mean: (level - lowest) / (self.compliance * load.mean),
             share: load.share,
             moment: load.moment,
+            level_mm: level,
         })
     }
 }

@@ -394,6 +394,17 @@ impl<'a> FlankContact<'a> {
         across.bearing(law, &near.collect::<Vec<_>>())
     }
 
+    /// Load of a pair over its mean, at equal steps along the face and growing away from what holds the flexspline; nothing where the pair is
+    /// open or its load is even.
+    pub fn load_over_mean(&self, pair: FlankPair, at: Configuration, law: FlankLaw, points: &[FlankPoint]) -> Vec<f64> {
+        let field = self.local_field(pair, at);
+        let bearing = self.bearing(pair, &field, law, points);
+        match (&field.across, bearing) {
+            (Some(across), Some(bearing)) => across.load_over_mean(&bearing),
+            _ => Vec::new(),
+        }
+    }
+
     /// Foot, on the deformed circular spline, of a point given in the space frame, whose origin lies on the axis of the output.
     #[inline]
     fn foot(&self, pair: FlankPair, field: &LocalField, x: [f64; 2]) -> Foot {
