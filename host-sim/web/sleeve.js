@@ -174,7 +174,9 @@ export function sleeveViewer(place, animations) {
     const [left, base] = [width - w - 14, height - 22];
     const most = Math.max(...load);
     ctx.strokeRect(left, base - h, w, h);
-    ctx.fillText(`load along the face: peak ${most.toFixed(1)} × mean`, left, base - h - 6);
+    ctx.textAlign = "right";
+    ctx.fillText(`load along the face: peak ${most.toFixed(1)} × mean`, left + w, base - h - 6);
+    ctx.textAlign = "left";
     ctx.beginPath();
     ctx.moveTo(left, base);
     load.forEach((q, k) => ctx.lineTo(left + (w * k) / (load.length - 1), base - (h * q) / most));

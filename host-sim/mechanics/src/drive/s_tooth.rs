@@ -6,7 +6,7 @@
 //!
 //! `theta` twice the angle from the major axis, m the pitch over pi, k = w0/m. A flank that is this path made half as large, and its
 //! counterpart turned by half a turn, touch at every `theta`: tooth and space have the path's own direction where they meet. This is
-//! the tooth of S. Ishikawa (US patent 4 823 638, 1989).
+//! the tooth of S. Ishikawa ("Tooth profile of spline of strain wave gearing", European patent 0 266 972, 1993).
 //!
 //! Here the addendum of the flexspline tooth is that half path, laid around its pitch circle. It begins where the path is steepest;
 //! below, the flank goes straight on. Teeth on a ring also tilt, by 1.5 w0/R, and their tips go a little further around than their feet:
