@@ -21,7 +21,10 @@ use crate::mesh::{FlankMesh, WheelMesh, rotate};
 
 use super::face::{Across, Bearing, FaceLaw, Lean};
 use super::quadrature::gauss_legendre;
-use crate::drive::{ActiveFlank, FlankDeviations, Foot, Placement, Side};
+use crate::drive::{ActiveFlank, FlankDeviations, Foot, Placement, Side, golden};
+
+/// Flanks further apart than this do not touch within an increment that a layout is made for, mm: the reach of the search for pairs.
+const NEAR_ENOUGH_MM: f64 = 0.02;
 
 /// Law of the flanks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -450,6 +453,13 @@ impl<'a> FlankContact<'a> {
             breaks.push(corner);
             breaks.extend(REFINEMENT.iter().flat_map(|d| [corner - d, corner + d]));
         }
+        // Curved flanks bear on a few micrometres in their middle, between the points of a panel.
+        if self.tooth.is_s_shaped() {
+            for nearest in self.nearest_radii(pair, &field) {
+                breaks.push(nearest);
+                breaks.extend(REFINEMENT.iter().flat_map(|d| [nearest - d, nearest + d]));
+            }
+        }
         breaks.retain(|r| (start..=end).contains(r));
         breaks.push(start);
         breaks.sort_by(f64::total_cmp);
@@ -500,6 +510,23 @@ impl<'a> FlankContact<'a> {
             from = to;
         }
         FlankLayout { corner, points }
+    }
+
+    /// Radii on the tooth where its flank comes nearest to that of the space, each against its neighbourhood.
+    fn nearest_radii(&self, pair: FlankPair, field: &LocalField) -> Vec<f64> {
+        const PLACES: usize = 32;
+        let flank = self.fs_flank(pair);
+        let gap = |r: f64| {
+            let (edge, xi) = flank.locate(r);
+            self.foot(pair, field, self.seen_from_space(field, self.tooth.point(r), edge, &edge_shape(xi))).distance
+        };
+        let (start, end) = (self.tooth.start_radius, self.tooth.junction_radius);
+        let at = |k: usize| start + (end - start) * k as f64 / PLACES as f64;
+        let gaps: Vec<f64> = (0..=PLACES).map(|k| gap(at(k))).collect();
+        (1..PLACES)
+            .filter(|&k| gaps[k] < NEAR_ENOUGH_MM && gaps[k] <= gaps[k - 1] && gaps[k] < gaps[k + 1])
+            .map(|k| golden(gap, at(k - 1), at(k + 1)))
+            .collect()
     }
 
     /// Radius on the tooth that faces the corner of the space in this configuration.

@@ -219,6 +219,11 @@ impl ActiveFlank {
         self
     }
 
+    /// Whether both wheels have curved flanks that meet in their middle, not at their tips.
+    pub fn is_s_shaped(&self) -> bool {
+        matches!(self.curve, Curve::Chain(_))
+    }
+
     /// Arc length of the flank at a radius, as [`Foot::arc`] counts it, mm.
     pub fn arc_at(&self, radius: f64) -> f64 {
         match &self.curve {

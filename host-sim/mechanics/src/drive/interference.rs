@@ -389,7 +389,7 @@ fn at_phase(cycle: &[Option<Nearest>], phi: f64) -> Option<Nearest> {
 }
 
 /// Argument of the least value of a function with one valley between `low` and `high`.
-pub(super) fn golden(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+pub(crate) fn golden(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let section = 0.5 * (5f64.sqrt() - 1.0);
     let mut left = high - section * (high - low);
     let mut right = low + section * (high - low);

@@ -33,6 +33,7 @@ pub use error::DriveError;
 pub use few::{FewNumbers, MadeDrive};
 pub use flank::{ActiveFlank, Foot};
 pub use generator::{GeneratorOutline, OutlineFoot};
+pub(crate) use interference::golden;
 pub use interference::{FlankGap, MeshReport, RigidMesh, Room, Side};
 pub use neutral::NeutralCurve;
 pub use placement::{FlankDeviations, Placement};

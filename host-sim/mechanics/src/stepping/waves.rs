@@ -403,7 +403,7 @@ mod tests {
     #[test]
     fn s_shaped_teeth_lose_nothing_and_a_quarter_of_them_bears() {
         let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
-        for (kind, least, most) in [(GeneratorKind::Cam, 0.2, 0.4), (GeneratorKind::DoubleDisc, 0.1, 0.5)] {
+        for (kind, least, most) in [(GeneratorKind::Cam, 0.2, 0.5), (GeneratorKind::DoubleDisc, 0.1, 0.5)] {
             let drive = Drive::s_95();
             let problem = Problem::new(&drive, kind, 20.0, settings).unwrap();
             let mut motion = Motion::deformed(&problem, 0.0).unwrap();
@@ -420,7 +420,7 @@ mod tests {
             let mean = finely.iter().map(|place| place.increment.generator_torque_n_m).sum::<f64>() / 40.0;
             let expected = (drive.output.drag_torque_n_m - 200.0) / drive.ratio();
             println!("{kind}: {mean} {expected} N.m, {} flanks", places[8].increment.flank_contacts);
-            assert!((mean / expected - 1.0).abs() < 1e-3, "{kind}: {mean} N.m, expected {expected}");
+            assert!((mean / expected - 1.0).abs() < 2e-4, "{kind}: {mean} N.m, expected {expected}");
             let share = places[8].increment.flank_contacts as f64 / 188.0;
             assert!((least..most).contains(&share), "{kind}: {share}");
         }
