@@ -421,7 +421,9 @@ impl Drive {
         let f = &mut self.flexspline;
         let meshes_from = self.circular_spline.tip_radius_mm - self.generator.w0_mm;
         f.profile = Profile::S;
-        f.profile_shift = (0.5 * (f.tip_radius_mm + meshes_from) - f.pitch_radius_mm()) / f.module_mm;
+        let shift = (0.5 * (f.tip_radius_mm + meshes_from) - f.pitch_radius_mm()) / f.module_mm;
+        // As a file has it.
+        f.profile_shift = (1e6 * shift).round() / 1e6;
         self.flanks.preload_um = preload_um;
         self
     }
