@@ -709,7 +709,10 @@ impl Drive {
             );
         }
         for refused in [ToothFlank::external(self).err(), ToothFlank::internal(self).err()].into_iter().flatten() {
-            problems.extend(refused.problems);
+            // An S-shaped tooth that is none makes no space either, for the same reason.
+            let new: Vec<Problem> =
+                refused.problems.into_iter().filter(|problem| !problems.contains(problem)).collect();
+            problems.extend(new);
         }
         for kind in GeneratorKind::ALL {
             if let Err(refused) = GeneratorOutline::new(self, kind) {
