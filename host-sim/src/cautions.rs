@@ -58,7 +58,7 @@ impl Looked {
                 cautions.push(Caution { figure, value, limit, words: words(value) });
             }
         };
-        say("rigid_gap_um", self.rigid_gap_um, -1.0, 0.0, |gap| {
+        say("rigid_gap_um", self.rigid_gap_um, -1.0, -1e3 * RigidMesh::TOUCHES_MM, |gap| {
             format!(
                 "the teeth of the drawing interfere by {:.1} um when rigid: such a drive binds; drive --check says where",
                 -gap
@@ -118,7 +118,7 @@ mod tests {
         };
         assert_eq!(sound.cautions(), []);
         let figures = |looked: Looked| looked.cautions().into_iter().map(|caution| caution.figure).collect::<Vec<_>>();
-        assert_eq!(figures(Looked { rigid_gap_um: Some(-0.1), ..sound }), ["rigid_gap_um"]);
+        assert_eq!(figures(Looked { rigid_gap_um: Some(-0.11), ..sound }), ["rigid_gap_um"]);
         assert_eq!(figures(Looked { room_as_built_arcsec: Some(-301.0), ..sound }), ["room_as_built_arcsec"]);
         assert_eq!(figures(Looked { max_von_mises_mpa: Some(f64::NAN), ..sound }), ["max_von_mises_mpa"]);
         assert_eq!(figures(Looked { peak_flank_pressure_mpa: Some(3001.0), ..sound }), ["peak_flank_pressure_mpa"]);

@@ -4,6 +4,7 @@ import { driveViewer } from "./drive.js";
 import { fieldMap } from "./fields.js";
 import { canInflate } from "./pack.js";
 import { setUnits } from "./quantities.js";
+import { sleeveViewer } from "./sleeve.js";
 
 const report = JSON.parse(document.getElementById("flexspline-report").textContent);
 const root = document.documentElement;
@@ -28,6 +29,7 @@ async function start() {
     const id = place.dataset.figure;
     const spec = report.figures[id];
     if (spec.kind === "drive") views.push(driveViewer(place, report.animations));
+    if (spec.kind === "sleeve") views.push(sleeveViewer(place, report.animations));
     if (spec.kind === "lines") views.push(lineChart(place, id, spec));
     if (spec.kind === "field") views.push(fieldMap(place, id, spec));
   }

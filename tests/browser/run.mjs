@@ -297,6 +297,78 @@ await check("the page of reproduce answers, shows each generator and turns the d
   return `${claims.length} claims`;
 });
 
+// ---- The sleeve in three dimensions
+
+await check(
+  "the sleeve is shown deformed, by a factor that is told, turns, plays and stops, in light and dark",
+  async () => {
+    const grounds = [];
+    for (const dark of [false, true]) {
+      const { page, noise, close } = await open("sleeve/report.html", { dark });
+      const report = JSON.parse(await page.locator("#flexspline-report").textContent());
+      const { sleeve } = report.animations.cam;
+      const stage = page.locator("#sleeve .stage");
+      await stage.scrollIntoViewIfNeeded();
+      const canvas = "#sleeve .stage canvas";
+      assert((await picture(page, canvas)).colours > 100, "it is not drawn");
+      // The amplitude that the FEM has of the wave is what stands on the page: a cam of w0 = 0.5 mm.
+      const oval = sleeve.waves.find((wave) => wave.n === 2);
+      near(Math.hypot(...oval.amplitudes_mm), 0.5, 0.03, "amplitude of the oval, mm");
+      near(oval.amplitudes_mm[0] / Math.hypot(...oval.amplitudes_mm), 1, 0.01, "along the major axis");
+      const middle = sleeve.stations_mm.indexOf(0);
+      near(oval.outward[middle], 1, 1e-3, "outward in the middle of the rim");
+      const drawing = page.locator("#sleeve .drawing");
+      const state = async () => {
+        const { angle, factor } = await drawing.evaluate((e) => ({ ...e.dataset }));
+        return [Number(angle), Number(factor)];
+      };
+      const told = await page.locator("#sleeve .readout").textContent();
+      assert(told.includes(`Displacements ${(await page.locator("#sleeve .times").textContent()).trim()} times`), told);
+      assert(told.includes(`tilt by up to ${sleeve.tilt_mrad.toFixed(2)} mrad`) && told.includes("peak"), told);
+      const [, factor] = await state();
+      await stage.focus();
+      let before = await picture(page, canvas);
+      for (const key of ["ArrowLeft", "ArrowUp", "+", "PageUp"]) {
+        await page.keyboard.press(key);
+        await settled(page);
+        const after = await picture(page, canvas);
+        assert(after.sum !== before.sum, `${key} changes nothing`);
+        before = after;
+      }
+      near((await state())[1] / factor, 1.25, 0.01, "plus");
+      near((await state())[0], Math.PI / 24, 1e-3, "page up");
+      await page.keyboard.press(" ");
+      await settled(page);
+      const [playing] = await state();
+      await settled(page);
+      assert((await state())[0] > playing, "it does not play");
+      await page.locator("#sleeve .play").click();
+      const [stopped] = await state();
+      await settled(page);
+      assert((await state())[0] === stopped, "it does not stop");
+      grounds.push(
+        await page
+          .locator(canvas)
+          .evaluate((e) => [...e.getContext("2d").getImageData(2, e.height - 2, 1, 1).data].join()),
+      );
+      await page.locator("#sleeve").screenshot({ path: path.join(shots, `sleeve-${dark ? "dark" : "light"}.png`) });
+      await page.evaluate(axe);
+      const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ["violations"] }));
+      assert(!violations.length, violations.map((v) => v.id).join());
+      assert(!noise.length, noise.join(" | "));
+      await close();
+    }
+    assert(grounds[0] !== grounds[1], `dark as light: ${grounds}`);
+    const bytes = statSync(path.join(folder, "sleeve/report.html")).size;
+    assert(bytes < MOST_BYTES, `${bytes} bytes`);
+    return `${bytes} bytes`;
+  },
+);
+
+await check("a drive without a sleeve has no such figure", async () => {
+  assert((await page.locator("#sleeve").count()) === 0, "it has one");
+});
+
 // ---- Words and numbers
 
 {

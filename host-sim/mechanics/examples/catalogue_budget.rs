@@ -1,11 +1,14 @@
 //! Which part of a drive gives how much of its torsion, hysteresis and loss, beside a catalogue: `catalogue_budget [SIZE …]`
 //!
-//! Sizes 25 and 40, i = 100 (Harmonic Drive CSF). Module and teeth follow from the catalogue's pitch diameter; rim, width, clearance and
+//! Sizes 17, 25 and 40, i = 100 (Harmonic Drive CSF). Module and teeth follow from the catalogue's pitch diameter; rim, width, clearance and
 //! tooth form are those of HHD-95 in proportion, cup and balls are guesses in proportion (`CUP`, [`Balls::in_proportion`]): no maker
 //! publishes them. Nothing is fitted to the catalogue.
 //!
 //! The same drive is computed by contact FEM with one part more at a time: teeth, rim and cam alone; the cup; the balls of the generator
 //! bearing, each range of torque with the stiffness that the balls have under its mean load. A difference of compliances is the part's.
+//!
+//! Once more with S-shaped teeth in place of the involutes, and then the loop: what flank friction makes of it by contact FEM, with and
+//! without preload, and bounds in closed form of what is not in the FEM (`race_on_bore`, `seal`).
 
 use std::f64::consts::PI;
 use std::process::ExitCode;
@@ -29,7 +32,14 @@ struct Catalogue {
     no_load_n_m: Option<f64>,
 }
 
-const CATALOGUE: [Catalogue; 2] = [
+const CATALOGUE: [Catalogue; 3] = [
+    Catalogue {
+        size: 17,
+        loads_n_m: [3.9, 12.0, 24.0],
+        k_n_m_per_rad: [1.0e4, 1.4e4, 1.6e4],
+        start_n_m: Some(0.029),
+        no_load_n_m: Some(0.051),
+    },
     Catalogue {
         size: 25,
         loads_n_m: [14.0, 48.0, 67.0],
@@ -59,12 +69,34 @@ const LOOP_SHARE: f64 = 0.04;
 const F0: f64 = 1.5;
 const F1: f64 = 5e-4;
 
+/// Preloads of S-shaped teeth, µm: drives of the catalogue have no play, and how much deeper their teeth mesh is not published.
+const PRELOADS_UM: [f64; 2] = [1.0, 3.0];
+/// Friction of the bearing's outer race in the bore: greased steel, as on the flanks.
+const RACE_FRICTION: f64 = 0.08;
+/// Friction of a seal's lip for each mm around, N: a lip pressed on with 0.1 N/mm (radial shaft seals: DIN 3760 sizes, maker's charts of lip
+/// loads reach from 0.05 to 0.15) and rubber on greased steel, 0.3. A guess; component sets have no seal at all.
+const SEAL_N_PER_MM: f64 = 0.03;
+
+/// Widest loop, arcsec at the output, that the outer race can make by slipping in the bore. All its normal force held by friction is a
+/// torque `mu F r` on the rim. It stays behind on the rim when the load goes, which gives it up over the torsional stiffness of what holds
+/// it; both ways, twice. A bound: the race may turn with the rim, since nothing but its balls holds it back.
+fn race_on_bore(force_n: f64, bore_mm: f64, k_n_m_per_rad: f64) -> f64 {
+    2.0 * 1e-3 * RACE_FRICTION * force_n * 0.5 * bore_mm / k_n_m_per_rad * ARCSEC_PER_RAD
+}
+
+/// Loop by the lip of an output seal as wide as the pitch circle, arcsec: its torque holds back a wind-up either way.
+fn seal(pitch_mm: f64, k_n_m_per_rad: f64) -> f64 {
+    2.0 * 1e-3 * SEAL_N_PER_MM * PI * pitch_mm * 0.5 * pitch_mm / k_n_m_per_rad * ARCSEC_PER_RAD
+}
+
 /// Torsion and generator load of a drive that is loaded step by step, its generator held.
 struct Loaded {
     /// Secants in the three ranges, N·m/rad.
     k: [f64; 3],
     /// Load of one ball in the middle of each range, N; without balls what they would carry.
     ball_n: [f64; 3],
+    /// Flanks in contact at the end of each range, over the number of teeth.
+    share_in_contact: [f64; 3],
     /// Sum of all ball loads without load and under the rated one, N.
     sum_n: [f64; 2],
 }
@@ -91,24 +123,25 @@ fn loaded(drive: &Drive, loads_n_m: [f64; 3]) -> Result<Loaded, SolveError> {
     let touch = 2.0 * drive.output.drag_torque_n_m;
     motion.load(touch)?;
     let mut from = (touch, motion.error_rad(), carried(&motion).0);
-    let (mut k, mut ball_n) = ([0.0; 3], [0.0; 3]);
+    let (mut k, mut ball_n, mut share_in_contact) = ([0.0; 3], [0.0; 3], [0.0; 3]);
     for (range, torque) in loads_n_m.into_iter().enumerate() {
         motion.load(torque)?;
         let to = (torque, motion.error_rad(), carried(&motion).0);
         k[range] = (to.0 - from.0) / (to.1 - from.1);
         ball_n[range] = 0.5 * (from.2 + to.2);
+        share_in_contact[range] = motion.last().flank_contacts as f64 / f64::from(drive.flexspline.teeth);
         from = to;
     }
-    Ok(Loaded { k, ball_n, sum_n: [unloaded.1, carried(&motion).1] })
+    Ok(Loaded { k, ball_n, share_in_contact, sum_n: [unloaded.1, carried(&motion).1] })
 }
 
-/// Width of the loop by flank friction, arcsec: at a light load, coming from the rated load and from the opposite one.
-fn loop_arcsec(drive: &Drive, rated_n_m: f64) -> Result<f64, SolveError> {
+/// Width of the loop by flank friction, arcsec: at a light load, or none, coming from the rated load and from the opposite one.
+fn loop_arcsec(drive: &Drive, rated_n_m: f64, share: f64) -> Result<f64, SolveError> {
     let mut rough = drive.clone();
     rough.flanks.friction_coefficient = FRICTION;
     let problem = Problem::new(&rough, GeneratorKind::Cam, rough.temperature.reference_c, solver())?;
     let mut motion = Motion::deformed(&problem, 0.0)?;
-    let light = LOOP_SHARE * rated_n_m;
+    let light = share * rated_n_m;
     let mut told = [0.0; 2];
     for (told, before) in told.iter_mut().zip([rated_n_m, -rated_n_m]) {
         motion.load(before)?;
@@ -160,6 +193,20 @@ fn budget(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
     for (range, k) in with_balls.iter_mut().enumerate() {
         *k = with_bedding(in_cup.ball_n[range])?.k[range];
     }
+    // S-shaped teeth in the same cup, on balls as stiff as they are in the lowest range.
+    let s_shaped = |preload_um: f64, load_n: f64| {
+        let mut drive = cup.clone().with_s_teeth(preload_um);
+        drive.generator.bearing_stiffness_n_per_mm3 =
+            Some(balls.bedding_n_per_mm3(load_n, bore_mm, drive.flexspline.width_mm));
+        drive
+    };
+    let mut with_s = [0.0; 3];
+    let mut contacts = [0.0; 3];
+    for range in 0..3 {
+        let found = loaded(&s_shaped(PRELOADS_UM[0], in_cup.ball_n[range]), entry.loads_n_m)?;
+        with_s[range] = found.k[range];
+        contacts[range] = found.share_in_contact[range];
+    }
     let shells = Flexspline3d::of(&cup, true)?;
     let [around, lobes] = [shells.torsion_n_m_per_rad(), shells.torsion_at_lobes_n_m_per_rad(LOBE_RAD)];
 
@@ -183,6 +230,15 @@ fn budget(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
     row("balls", part(with_balls, Some(in_cup.k)), "%");
     row("missing", part(entry.k_n_m_per_rad, Some(with_balls)), "%");
     row("load of a ball, mid range", in_cup.ball_n, "N");
+    row(
+        "flanks in contact, involutes, end of range",
+        in_cup.share_in_contact.map(|share| 100.0 * share),
+        "% of the teeth",
+    );
+    println!("  S-shaped teeth, preloaded by {} µm, cup and balls", PRELOADS_UM[0]);
+    row("", with_s.map(|k| 1e-4 * k), "1e4 N·m/rad");
+    row("missing", part(entry.k_n_m_per_rad, Some(with_s)), "%");
+    row("flanks in contact, end of range", contacts.map(|share| 100.0 * share), "% of the teeth");
     println!(
         "  shells alone: torsion {:.3e} N·m/rad all around, {:.3e} at two lobes ({:+.0} % compliance)",
         around,
@@ -191,12 +247,26 @@ fn budget(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
     );
 
     let rated = entry.loads_n_m[2];
-    let flanks = [loop_arcsec(&plane, rated)?, loop_arcsec(&cup, rated)?];
+    let flanks = [loop_arcsec(&plane, rated, LOOP_SHARE)?, loop_arcsec(&cup, rated, LOOP_SHARE)?];
     println!(
         "  loop at {:.1} N·m by flank friction {FRICTION}: {:.2}″ plane, {:.2}″ in the cup; catalogue about 60″",
         LOOP_SHARE * rated,
         flanks[0],
         flanks[1]
+    );
+    for preload_um in PRELOADS_UM {
+        let drive = s_shaped(preload_um, in_cup.ball_n[0]);
+        println!(
+            "  the same of S-shaped teeth preloaded by {preload_um} µm, on balls: {:.2}″, without load {:.2}″",
+            loop_arcsec(&drive, rated, LOOP_SHARE)?,
+            loop_arcsec(&drive, rated, 0.0)?
+        );
+    }
+    println!(
+        "  at most by the race in the bore, {:.0} N on it: {:.1}″; by an output seal: {:.1}″",
+        in_cup.sum_n[0],
+        race_on_bore(in_cup.sum_n[0], bore_mm, in_cup.k[0]),
+        seal(pitch_mm, in_cup.k[0])
     );
     if let Some(start) = entry.start_n_m {
         let reflected = 2.0 * 100.0 * start / entry.k_n_m_per_rad[2] * ARCMIN_PER_RAD;

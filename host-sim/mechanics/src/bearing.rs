@@ -91,6 +91,9 @@ mod tests {
         let bedding = balls.bedding_n_per_mm3(300.0, 93.35, 20.0);
         assert!((bedding / 170.0 - 1.0).abs() < 0.03, "{bedding}");
         assert_eq!(Balls::in_proportion(93.35), balls);
+        assert!((Balls::in_proportion(0.5 * 93.35).diameter_mm - 3.55).abs() < 1e-12);
+        // Palmgren turned around, (delta d^(1/3) / 4.37e-4)^1.5: 10 µm of this ball are 291.7 N.
+        assert!((balls.approach_mm(291.7) / 0.010 - 1.0).abs() < 1e-3, "{}", balls.approach_mm(291.7));
         // Tangent of a load that grows with the 3/2 power of the approach.
         let (q, step) = (200.0, 1e-3);
         let secant = 2.0 * step / (balls.approach_mm(q + step) - balls.approach_mm(q - step));
@@ -104,6 +107,9 @@ mod tests {
             let found = Lubricant::PFPE_Z25.viscosity_cst(temperature_c);
             assert!((found / expected - 1.0).abs() < 0.05, "{temperature_c}: {found}");
         }
+        // What VG 32 means (ISO 3448): 32 cSt at 40 °C.
+        let named = Lubricant::MINERAL_VG_32.viscosity_cst(40.0);
+        assert!((named / 32.0 - 1.0).abs() < 0.01, "{named}");
         for (temperature_c, expected) in [(20.0, 86.0), (-20.0, 2300.0)] {
             let found = Lubricant::MINERAL_VG_32.viscosity_cst(temperature_c);
             assert!((found / expected - 1.0).abs() < 0.05, "{temperature_c}: {found}");
@@ -117,6 +123,7 @@ mod tests {
         assert!((slow / (160e-7 * 50_f64.powi(3)) - 1.0).abs() < 0.01, "{slow}");
         let [once, eightfold] = [500.0, 4000.0].map(|speed| lubricant_torque_n_mm(1.0, 100.0, speed, 50.0));
         assert!((eightfold / once - 4.0).abs() < 1e-9);
+        assert!((lubricant_torque_n_mm(2.5, 100.0, 500.0, 50.0) / once - 2.5).abs() < 1e-12);
         assert!((load_torque_n_mm(5e-4, 2000.0, 50.0) - 50.0).abs() < 1e-12);
     }
 }

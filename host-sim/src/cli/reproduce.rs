@@ -28,8 +28,8 @@ Examples:
   flexspline reproduce --quick --out quick
   flexspline reproduce --json > claims.json
 
-A claim that is not reproduced is a result, not a failure: the exit code is 1 only if some run found
-no equilibrium.")]
+A claim that is not reproduced is a result, not a failure, and so is a changed model without
+equilibrium. Exit code 1: a run of the drive as it is found none, or the page is not sound; 2: bad input.")]
 pub(super) struct Reproduce {
     /// Coarse mesh, one other discretisation and few changes of the model: about a minute on two cores instead of some minutes
     #[arg(long, conflicts_with = "mesh")]
@@ -83,6 +83,9 @@ fn text(result: &Reproduction, out: &std::path::Path) -> String {
     let counts: Vec<String> =
         Verdict::ALL.into_iter().map(|verdict| format!("{} {}", result.count(verdict), verdict.name())).collect();
     text.push_str(&format!("{} claims: {}\n", result.claims.len(), counts.join(", ")));
+    for told in &result.changes_without_equilibrium {
+        text.push_str(&format!("changed model without equilibrium, a result: {told}\n"));
+    }
     if let Some(nearest) = result.nearest() {
         text.push_str(&format!("{}\n", nearest.takeaway));
     }

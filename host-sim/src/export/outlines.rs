@@ -22,10 +22,9 @@ pub struct OutlinePoint {
 /// generator, `per_piece` intervals to a piece. Joints appear in both pieces that meet there.
 pub fn outlines(drive: &Drive, kind: GeneratorKind, per_piece: usize) -> Result<Vec<OutlinePoint>, DriveError> {
     let mut points = Vec::new();
-    for (part, profile) in [
-        ("flexspline_tooth", ToothFlank::external(&drive.flexspline)?),
-        ("circular_spline_space", ToothFlank::internal(&drive.circular_spline)?),
-    ] {
+    for (part, profile) in
+        [("flexspline_tooth", ToothFlank::external(drive)?), ("circular_spline_space", ToothFlank::internal(drive)?)]
+    {
         let pieces = profile.pieces();
         // The half outline is given on the positive side, from root to tip. A tooth is walked root, tip, root; a space,
         // whose tips are at its ends, tip, root, tip.

@@ -11,12 +11,13 @@
 //! angle: a whole turn, and more, from eight frames. Exact for drives that are alike from tooth to tooth; others are refused.
 
 use super::pack::Packed;
+use super::sleeve_view::SleeveView;
 use crate::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
 use crate::drive::{Drive, GeneratorKind, Side};
 use crate::mesh::{WheelMesh, rotate};
 use crate::simulate::stress::nodal_von_mises;
 use crate::simulate::{Direction, Path, Row, SimulateError, SimulationSettings, simulate};
-use crate::stepping::{Problem, SolverSettings, State};
+use crate::stepping::{Problem, SolveError, SolverSettings, State};
 use std::ops::ControlFlow;
 
 /// Frames to a flexspline pitch, which are also the increments of [`Path::Pitch`].
@@ -78,6 +79,8 @@ pub struct Animation {
     pub colour_end_mpa: f64,
     /// Largest stress anywhere, MPa.
     pub peak_mpa: f64,
+    /// The flexspline in three dimensions, of a drive whose sleeve is shells.
+    pub sleeve: Option<SleeveView>,
 }
 
 /// Why there is no animation.
@@ -112,13 +115,17 @@ pub fn animate(
         ..SimulationSettings::new(kind, Path::Pitch)
     };
     let mut taken: Option<Taken> = None;
+    let mut sleeve = None;
     let run = simulate(drive, &settings, &mut |now| {
-        if now.row.is_some() {
+        if let Some(row) = now.row {
+            sleeve.get_or_insert_with(|| SleeveView::of(now.problem, now.state, &row.face));
             taken.get_or_insert_with(|| Taken::new(now.problem)).add(now.problem, now.state);
         }
         observe()
     })?;
-    let taken = taken.expect("a pitch has rows");
+    let mut taken = taken.expect("a pitch has rows");
+    let sleeve = sleeve.transpose().map_err(|error| SimulateError::from(SolveError::from(error)))?;
+    taken.animation.sleeve = sleeve.flatten();
     Ok(taken.finish(kind, torque_n_m, run.summary.temperature_c.unwrap_or(drive.temperature.reference_c), run.rows))
 }
 
@@ -201,6 +208,7 @@ impl Taken {
             rows: Vec::new(),
             colour_end_mpa: 0.0,
             peak_mpa: 0.0,
+            sleeve: None,
         };
         let bore = BoreContact::new(problem.wheels().0, problem.settings.bore_points(problem.kind));
         Taken { animation, bore }

@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 use crate::export::base64;
 
 /// Modules, each after those that it imports.
-const MODULES: [(&str, &str); 9] = [
+const MODULES: [(&str, &str); 10] = [
     ("pack.js", include_str!("../../web/pack.js")),
     ("quantities.js", include_str!("../../web/quantities.js")),
     ("theme.js", include_str!("../../web/theme.js")),
@@ -20,6 +20,7 @@ const MODULES: [(&str, &str); 9] = [
     ("motion.js", include_str!("../../web/motion.js")),
     ("paint.js", include_str!("../../web/paint.js")),
     ("drive.js", include_str!("../../web/drive.js")),
+    ("sleeve.js", include_str!("../../web/sleeve.js")),
     ("page.js", include_str!("../../web/page.js")),
 ];
 const UPLOT: &str = include_str!("../../web/vendor/uPlot.iife.min.js");

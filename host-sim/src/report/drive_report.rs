@@ -707,11 +707,26 @@ fn motion_section(known: &[Known<'_>]) -> Section {
             charts: charts(known, |k| Some(k.wind_up())),
         },
     };
-    Section {
-        id: "motion".into(),
-        title: "The drive at work".into(),
-        detail: Detail::Summary,
-        blocks: vec![Block::Figure(drive), Block::Figure(ripple), Block::Figure(wind_up)],
+    let mut blocks = vec![Block::Figure(drive), Block::Figure(ripple), Block::Figure(wind_up)];
+    if known.iter().any(|k| k.subject.animation.as_ref().is_ok_and(|a| a.sleeve.is_some())) {
+        blocks.push(Block::Figure(sleeve_figure()));
+    }
+    Section { id: "motion".into(), title: "The drive at work".into(), detail: Detail::Summary, blocks }
+}
+
+/// The flexspline with its sleeve.
+pub(super) fn sleeve_figure() -> Figure {
+    Figure {
+        id: "sleeve".into(),
+        title: "The flexspline in three dimensions".into(),
+        caption: Text::new(
+            "Its middle surface, the wave of the generator in the state of the figure above: each harmonic of the rim by contact FEM, extended \
+             along rim and tubes by the theory of shells. Displacements are drawn larger than they are, by the factor that is told; colours are \
+             their outward part as it is. The toothed rim is outlined. The sleeve stands, the wave turns with the generator. In the corner, where \
+             the drive is computed with face = \"slices\": how the load lies along the face of the flank that bears most.",
+        ),
+        alt: "The flexspline as a tube in perspective, deformed by the wave generator, coloured by its outward displacement".into(),
+        body: FigureBody::Sleeve,
     }
 }
 

@@ -15,6 +15,7 @@ pub(crate) mod flight_report;
 pub(crate) mod pack;
 pub mod page;
 pub(crate) mod reproduction_report;
+mod sleeve_view;
 pub(crate) mod study_report;
 mod svg;
 

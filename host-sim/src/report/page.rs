@@ -277,6 +277,8 @@ pub struct Figure {
 pub enum FigureBody {
     /// The drive, to scale, in motion: the page's animations.
     Drive,
+    /// The flexspline with its sleeve, in three dimensions: what the page's animations have of it.
+    Sleeve,
     /// Curves and points over an axis, one chart to each choice.
     Lines {
         /// Across.
@@ -532,7 +534,7 @@ impl PageTemplate<'_> {
             FigureBody::Drive => {
                 self.page.animations.iter().take(1).map(|a| (named(a.kind.name()), svg::drive(a))).collect()
             }
-            FigureBody::Field { .. } => Vec::new(),
+            FigureBody::Field { .. } | FigureBody::Sleeve => Vec::new(),
         }
     }
 }
@@ -589,6 +591,7 @@ fn describe(number: usize, figure: &Figure) -> (Value, Vec<Packed>) {
     let name = |choice: &str| format!("{choice}/{}", figure.id);
     match &figure.body {
         FigureBody::Drive => (json!({ "number": number, "kind": "drive", "title": figure.title }), Vec::new()),
+        FigureBody::Sleeve => (json!({ "number": number, "kind": "sleeve", "title": figure.title }), Vec::new()),
         FigureBody::Lines { x, y, charts } => {
             let arrays = charts.iter().map(|(choice, chart)| {
                 let columns = chart.columns();
@@ -637,6 +640,7 @@ fn animation_json(a: &Animation) -> Value {
         "temperature_c": a.temperature_c,
         "ratio": a.ratio,
         "frames": super::animation::FRAMES,
+        "sleeve": a.sleeve,
         "flexspline": wheel(&a.flexspline),
         "circular_spline": wheel(&a.circular_spline),
         "bore_radius_mm": a.bore_radius_mm,

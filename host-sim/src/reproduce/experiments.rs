@@ -232,6 +232,9 @@ pub struct Experiment {
     pub distance: Option<f64>,
     /// Whether the largest error lies within the paper's 10.3′ to 21.4′ for every generator that has a number.
     pub reaches: bool,
+    /// The drive as it is, or a reading of its run: here a run without equilibrium is a failure.
+    #[serde(skip)]
+    pub is_unchanged: bool,
     /// What is changed, as the subject of a sentence.
     #[serde(skip)]
     pub subject: &'static str,
@@ -360,6 +363,7 @@ fn experiment(change: Change, effects: Vec<Effect>) -> Experiment {
         effects,
         distance,
         reaches,
+        is_unchanged: matches!(change, Change::None | Change::StartUp),
         subject: change.subject(),
         takeaway,
     }
@@ -447,7 +451,8 @@ mod tests {
         let mut failed = of(GeneratorKind::Cam, 900.0);
         failed.largest_arcmin = None;
         let failed = experiment(Change::Drag, vec![of(GeneratorKind::FourRoller, 900.0), failed]);
-        assert!(!failed.reaches && failed.distance.is_none());
+        assert!(!failed.reaches && failed.distance.is_none() && !failed.is_unchanged);
+        assert!(experiment(Change::None, both(40.0, 40.0)).is_unchanged);
     }
 
     #[test]

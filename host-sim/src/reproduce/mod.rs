@@ -84,8 +84,10 @@ pub struct Reproduction {
     pub rankings: Vec<Ranking>,
     /// Changes of the model and what they do.
     pub experiments: Vec<Experiment>,
-    /// Runs that found no equilibrium, in words.
+    /// Runs of the drive itself that found no equilibrium, in words.
     pub not_converged: Vec<String>,
+    /// Changed models that have none, in words: what comes of the change, and no failure. A changed model need not be one that stands.
+    pub changes_without_equilibrium: Vec<String>,
     /// Time, s.
     pub wall_s: f64,
 }
@@ -99,7 +101,7 @@ pub struct Record<'a> {
     pub tool_version: &'static str,
     /// The command line.
     pub command: &'a str,
-    /// `converged`, or `not converged` when some run found no equilibrium.
+    /// `converged`, or `not converged` when some run of the drive as it is found no equilibrium.
     pub status: &'static str,
     /// Name of the drive.
     pub drive: &'a str,
@@ -121,8 +123,10 @@ pub struct Record<'a> {
     pub nearest: Option<&'static str>,
     /// Every run of the protocol.
     pub runs: Vec<RunRecord>,
-    /// Runs that found no equilibrium.
+    /// Runs of the drive as it is that found no equilibrium.
     pub not_converged: &'a [String],
+    /// Changed models that have no equilibrium: a result of the change.
+    pub changes_without_equilibrium: &'a [String],
     /// Time, s.
     pub wall_s: f64,
 }
@@ -171,10 +175,11 @@ pub fn reproduce(
             ))
         })
         .collect();
+    let mut changes_without_equilibrium = Vec::new();
     for experiment in &experiments {
+        let told = if experiment.is_unchanged { &mut not_converged } else { &mut changes_without_equilibrium };
         let failed = experiment.effects.iter().filter(|effect| effect.metrics.is_none());
-        not_converged
-            .extend(failed.map(|e| format!("experiment “{}”, {}: {}", experiment.name, e.generator, e.status)));
+        told.extend(failed.map(|e| format!("“{}”, {}: {}", experiment.name, e.generator, without_history(&e.status))));
     }
     Ok(Reproduction {
         drive: drive.clone(),
@@ -184,6 +189,7 @@ pub fn reproduce(
         rankings,
         experiments,
         not_converged,
+        changes_without_equilibrium,
         wall_s: begun.elapsed().as_secs_f64(),
     })
 }
@@ -252,6 +258,7 @@ impl Reproduction {
             nearest: self.nearest().map(|e| e.id),
             runs: self.runs.0.iter().map(ProtocolRun::record).collect(),
             not_converged: &self.not_converged,
+            changes_without_equilibrium: &self.changes_without_equilibrium,
             wall_s: self.wall_s,
         }
     }

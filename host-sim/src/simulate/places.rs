@@ -36,7 +36,7 @@ pub enum Place {
     RootFillet,
     /// The bore.
     Bore,
-    /// The involute flanks.
+    /// The flanks.
     Flank,
 }
 

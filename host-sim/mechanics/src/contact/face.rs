@@ -13,7 +13,7 @@
 //! `mean of q x`, which acts on what makes the teeth lean.
 
 use super::flank::FlankLaw;
-use crate::drive::{InvoluteFlank, Side};
+use crate::drive::{ActiveFlank, Side};
 
 /// Stations along the face between which offsets are straight: exact for tilt; 8 times as many move the load of a crowned pair by
 /// less than 1e-3 (a test).
@@ -64,6 +64,8 @@ pub struct Bearing {
     pub later_by_slope: f64,
     /// How much less moment for that, N.
     pub moment_by_slope: f64,
+    /// What has an offset below this bears, mm.
+    pub level_mm: f64,
 }
 
 impl Bearing {
@@ -76,12 +78,13 @@ impl Bearing {
         moment: 0.0,
         later_by_slope: 0.0,
         moment_by_slope: 0.0,
+        level_mm: 0.0,
     };
 }
 
 impl FaceLaw {
     /// For the plus flank of a flexspline tooth.
-    pub fn new(flank: &InvoluteFlank, width_mm: f64, crowning_mm: f64, compliance: f64) -> FaceLaw {
+    pub fn new(flank: &ActiveFlank, width_mm: f64, crowning_mm: f64, compliance: f64) -> FaceLaw {
         let [a, b] = [flank.start_radius, flank.junction_radius].map(|radius| flank.point(radius));
         let along = [b[0] - a[0], b[1] - a[1]];
         let length = along[0].hypot(along[1]);
@@ -126,6 +129,12 @@ impl Across {
     /// How much nearer than the plane slice the face comes somewhere, mm.
     pub fn early_mm(&self) -> f64 {
         -self.lowest()
+    }
+
+    /// Load over its mean at equal steps along the face, at a bearing of this pair.
+    pub fn load_over_mean(&self, bearing: &Bearing) -> Vec<f64> {
+        let mean = self.load(bearing.level_mm).mean * self.compliance;
+        self.offsets.iter().map(|offset| (bearing.level_mm - offset).max(0.0) / mean).collect()
     }
 
     fn lowest(&self) -> f64 {
@@ -211,6 +220,7 @@ impl Across {
             peak_over_mean: (level - lowest) / (self.compliance * load.mean),
             share: load.share,
             moment: load.moment,
+            level_mm: level,
         })
     }
 }
@@ -225,8 +235,8 @@ mod tests {
 
     fn face(crowning_mm: f64) -> FaceLaw {
         let drive = Drive::hhd_95();
-        let flank = ToothFlank::external(&drive.flexspline).unwrap();
-        FaceLaw::new(&InvoluteFlank::new(&flank, drive.flexspline.base_radius_mm()), 20.0, crowning_mm, C)
+        let flank = ToothFlank::external(&drive).unwrap();
+        FaceLaw::new(&ActiveFlank::new(&flank), 20.0, crowning_mm, C)
     }
 
     /// A single point, so stiff that its depth is nothing beside the offsets.

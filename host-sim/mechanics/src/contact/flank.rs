@@ -5,7 +5,7 @@
 //!
 //! `g = n(s) . (x - V(s) - P(s))`,
 //!
-//! with P(s) the exact outline of the circular spline (involute and tip rounding), V its interpolated displacement, and s
+//! with P(s) the exact outline of the circular spline (flank and tip rounding), V its interpolated displacement, and s
 //! the foot of `x - V`. To first order in the slope of V (1e-3; the neglected second order is below 1e-6 of the gap) all
 //! derivatives of g are those of one vector `c = n - (n . dV/ds) t`: +c on the flexspline, −c on the circular spline, so
 //! that action equals reaction and the moment on the output is that of the forces themselves.
@@ -21,7 +21,10 @@ use crate::mesh::{FlankMesh, WheelMesh, rotate};
 
 use super::face::{Across, Bearing, FaceLaw, Lean};
 use super::quadrature::gauss_legendre;
-use crate::drive::{FlankDeviations, Foot, InvoluteFlank, Placement, Side};
+use crate::drive::{ActiveFlank, FlankDeviations, Foot, Placement, Side, golden};
+
+/// Flanks further apart than this do not touch within an increment that a layout is made for, mm: the reach of the search for pairs.
+const NEAR_ENOUGH_MM: f64 = 0.02;
 
 /// Law of the flanks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,9 +84,9 @@ pub struct FlankContact<'a> {
     fs_mesh: &'a WheelMesh,
     cs_mesh: &'a WheelMesh,
     /// The flexspline flank.
-    pub tooth: InvoluteFlank,
+    pub tooth: ActiveFlank,
     /// The circular-spline flank.
-    pub space: InvoluteFlank,
+    pub space: ActiveFlank,
     deviations: &'a FlankDeviations,
     /// A few points of the plus and of the minus flank of a tooth.
     coarse: [Vec<CoarsePoint>; 2],
@@ -214,8 +217,8 @@ impl<'a> FlankContact<'a> {
     pub fn new(
         fs_mesh: &'a WheelMesh,
         cs_mesh: &'a WheelMesh,
-        tooth: InvoluteFlank,
-        space: InvoluteFlank,
+        tooth: ActiveFlank,
+        space: ActiveFlank,
         deviations: &'a FlankDeviations,
     ) -> Self {
         let (a, b) = (tooth.start_radius, tooth.junction_radius);
@@ -332,7 +335,7 @@ impl<'a> FlankContact<'a> {
     /// brings the flank nearer than its own length.
     #[inline]
     fn least_distance(&self, field: &LocalField, x: [f64; 2]) -> f64 {
-        self.space.involute_distance(field.space.recover(x)).1 + field.depth - field.largest_cs - self.deepest_facet
+        self.space.least_distance(field.space.recover(x)) + field.depth - field.largest_cs - self.deepest_facet
     }
 
     fn local_field(&self, pair: FlankPair, at: Configuration) -> LocalField {
@@ -394,6 +397,17 @@ impl<'a> FlankContact<'a> {
         across.bearing(law, &near.collect::<Vec<_>>())
     }
 
+    /// Load of a pair over its mean, at equal steps along the face and growing away from what holds the flexspline; nothing where the pair is
+    /// open or its load is even.
+    pub fn load_over_mean(&self, pair: FlankPair, at: Configuration, law: FlankLaw, points: &[FlankPoint]) -> Vec<f64> {
+        let field = self.local_field(pair, at);
+        let bearing = self.bearing(pair, &field, law, points);
+        match (&field.across, bearing) {
+            (Some(across), Some(bearing)) => across.load_over_mean(&bearing),
+            _ => Vec::new(),
+        }
+    }
+
     /// Foot, on the deformed circular spline, of a point given in the space frame, whose origin lies on the axis of the output.
     #[inline]
     fn foot(&self, pair: FlankPair, field: &LocalField, x: [f64; 2]) -> Foot {
@@ -439,6 +453,13 @@ impl<'a> FlankContact<'a> {
             breaks.push(corner);
             breaks.extend(REFINEMENT.iter().flat_map(|d| [corner - d, corner + d]));
         }
+        // Curved flanks bear on a few micrometres in their middle, between the points of a panel.
+        if self.tooth.is_s_shaped() {
+            for nearest in self.nearest_radii(pair, &field) {
+                breaks.push(nearest);
+                breaks.extend(REFINEMENT.iter().flat_map(|d| [nearest - d, nearest + d]));
+            }
+        }
         breaks.retain(|r| (start..=end).contains(r));
         breaks.push(start);
         breaks.sort_by(f64::total_cmp);
@@ -447,7 +468,7 @@ impl<'a> FlankContact<'a> {
             *last = end;
         }
         let mut points = Vec::with_capacity(4 * (breaks.len() + 3));
-        let arc_of = |r: f64| 0.5 * (r * r - self.tooth.base_radius * self.tooth.base_radius) / self.tooth.base_radius;
+        let arc_of = |r: f64| self.tooth.arc_at(r);
         for panel in breaks.windows(2) {
             let (middle, half) = (0.5 * (panel[0] + panel[1]), 0.5 * (panel[1] - panel[0]));
             for (xi, w) in &self.rule {
@@ -491,19 +512,36 @@ impl<'a> FlankContact<'a> {
         FlankLayout { corner, points }
     }
 
+    /// Radii on the tooth where its flank comes nearest to that of the space, each against its neighbourhood.
+    fn nearest_radii(&self, pair: FlankPair, field: &LocalField) -> Vec<f64> {
+        const PLACES: usize = 32;
+        let flank = self.fs_flank(pair);
+        let gap = |r: f64| {
+            let (edge, xi) = flank.locate(r);
+            self.foot(pair, field, self.seen_from_space(field, self.tooth.point(r), edge, &edge_shape(xi))).distance
+        };
+        let (start, end) = (self.tooth.start_radius, self.tooth.junction_radius);
+        let at = |k: usize| start + (end - start) * k as f64 / PLACES as f64;
+        let gaps: Vec<f64> = (0..=PLACES).map(|k| gap(at(k))).collect();
+        (1..PLACES)
+            .filter(|&k| gaps[k] < NEAR_ENOUGH_MM && gaps[k] <= gaps[k - 1] && gaps[k] < gaps[k + 1])
+            .map(|k| golden(gap, at(k - 1), at(k + 1)))
+            .collect()
+    }
+
     /// Radius on the tooth that faces the corner of the space in this configuration.
     pub fn corner(&self, pair: FlankPair, at: Configuration) -> Option<f64> {
         self.radius_facing_corner(pair, &self.local_field(pair, at))
     }
 
-    /// Radius on the tooth that faces the joint of involute and tip rounding of the space.
+    /// Radius on the tooth that faces the joint of flank and tip rounding of the space.
     fn radius_facing_corner(&self, pair: FlankPair, field: &LocalField) -> Option<f64> {
         let flank = self.fs_flank(pair);
         let corner = self.space.junction_radius;
         let facing = |r: f64| {
             let (edge, xi) = flank.locate(r);
             let x = self.seen_from_space(field, self.tooth.point(r), edge, &edge_shape(xi));
-            self.space.involute_foot_radius(field.space.recover(x))
+            self.space.foot_radius(field.space.recover(x))
         };
         let mut r = corner - (facing(self.tooth.junction_radius) - self.tooth.junction_radius);
         for _ in 0..4 {
@@ -795,10 +833,8 @@ mod tests {
         let drive = Drive::hhd_95();
         let fs = WheelMesh::flexspline(&drive, MeshLevel::Coarse).unwrap();
         let cs = WheelMesh::circular_spline(&drive, MeshLevel::Coarse).unwrap();
-        let tooth = ToothFlank::external(&drive.flexspline).unwrap();
-        let space = ToothFlank::internal(&drive.circular_spline).unwrap();
-        let tooth = InvoluteFlank::new(&tooth, drive.flexspline.base_radius_mm());
-        let space = InvoluteFlank::new(&space, drive.circular_spline.base_radius_mm());
+        let tooth = ActiveFlank::new(&ToothFlank::external(&drive).unwrap());
+        let space = ActiveFlank::new(&ToothFlank::internal(&drive).unwrap());
         let deviations = FlankDeviations::new(&drive);
         test(&FlankContact::new(&fs, &cs, tooth, space, &deviations), &fs, &cs);
     }
@@ -817,7 +853,7 @@ mod tests {
             assert!(start > 0.0 && start < 0.5, "tooth 0 stands in space 0 with {start} mm");
             for turn in [1e-5, 1e-4, -1e-4] {
                 let change = gap(Side::Plus, turn) - start;
-                assert!((change - turn * flanks.space.base_radius).abs() < 1e-9, "{turn}: {change}");
+                assert!((change - turn * flanks.space.lever()).abs() < 1e-9, "{turn}: {change}");
                 assert!((gap(Side::Minus, -turn) - gap(Side::Plus, turn)).abs() < 1e-12, "not mirrored at {turn}");
             }
         });
@@ -862,7 +898,7 @@ mod tests {
             let law = FlankLaw { stiffness: 1e6, stick_stiffness: 1e5, friction: 0.0 };
             let at = |output_rad| Configuration { u: &u, v: &v, output_rad, leans: &[] };
             let gap = flanks.smallest_gap(PAIR, at(0.0));
-            let closing = -(gap + 1e-4) / flanks.space.base_radius;
+            let closing = -(gap + 1e-4) / flanks.space.lever();
             let layout = flanks.layout(PAIR, at(closing));
             assert!(flanks.evaluate(PAIR, at(0.0), law, &layout.points).is_none());
             let pressed = flanks.evaluate(PAIR, at(closing), law, &layout.points).unwrap();
@@ -890,7 +926,7 @@ mod tests {
             let (u, v) = (vec![0.0; 2 * fs.nodes.len()], vec![0.0; 2 * cs.nodes.len()]);
             let lean = |slope: f64| -> Vec<Lean> { vec![[slope / face.slope([1.0, 0.0], Side::Plus), 0.0]; 1] };
             let straight = flanks.smallest_gap(PAIR, Configuration { u: &u, v: &v, output_rad: 0.0, leans: &[] });
-            let closing = -(straight - 2e-3) / flanks.space.base_radius;
+            let closing = -(straight - 2e-3) / flanks.space.lever();
             let slope = -1.2e-3;
             let layout = flanks.layout(PAIR, Configuration { u: &u, v: &v, output_rad: closing, leans: &lean(slope) });
             let of = |u: &[f64], output_rad: f64, slope: f64| {
@@ -950,7 +986,7 @@ mod tests {
                 let tooth = &flanks.tooth;
                 let (a, b) = (tooth.start_radius, tooth.junction_radius);
                 let rounding = (tooth.rounding_radius * tooth.rounding_sweep).min(0.016);
-                let expected = 0.5 * (b * b - a * a) / tooth.base_radius + rounding;
+                let expected = tooth.arc_at(b) - tooth.arc_at(a) + rounding;
                 let found: f64 = layout.points.iter().map(|p| p.weight).sum();
                 assert!((found - expected).abs() < 1e-12, "{found} mm of {expected} mm");
                 assert!(layout.points.windows(2).all(|p| p[0].arc < p[1].arc), "not from root to tip");

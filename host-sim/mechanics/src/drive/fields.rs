@@ -2,7 +2,7 @@
 //! overriding, checking and hashing all walk this list.
 
 use super::as_built::{DamagedTooth, Harmonic};
-use super::sleeve::{Choice, FaceLoad, SleeveKind};
+use super::sleeve::{Choice, FaceLoad, Profile, SleeveKind};
 use super::spec::Drive;
 use crate::toml_file::{Allowed, above, from};
 
@@ -42,12 +42,12 @@ pub(super) enum Value {
 }
 
 impl Value {
-    /// True for zero, for an empty list, and for a load that is even.
+    /// True for zero, for an empty list, for a load that is even and for involutes.
     pub fn is_zero(&self) -> bool {
         match self {
             Value::Number(number) => *number == 0.0,
             Value::Rigid => false,
-            Value::Word { chosen, .. } => *chosen == FaceLoad::Even.name(),
+            Value::Word { chosen, .. } => *chosen == FaceLoad::Even.name() || *chosen == Profile::Involute.name(),
             Value::List(list) => list.is_empty(),
             Value::Harmonics(list) => list.is_empty(),
             Value::Damage(list) => list.is_empty(),
@@ -101,6 +101,7 @@ pub(super) const SECTIONS: &[(&str, &str)] = &[
 pub(super) const ALL: &[Field] = fields! {
     flexspline.teeth: Count, from(20.0, 2000.0), "number of teeth, even";
     flexspline.module_mm: Real, from(0.05, 10.0), "module, mm";
+    flexspline.profile: Word, NO_NUMBER, "flanks of both wheels: involutes, or S-shaped for more teeth in contact (no pressure angle, a space made by its tooth)";
     flexspline.pressure_angle_deg: Real, from(10.0, 35.0), "pressure angle of the basic rack, degrees";
     flexspline.profile_shift: Real, from(-2.0, 10.0), "profile shift, modules; positive: teeth stand further out";
     flexspline.root_radius_mm: Real, above(0.0, 1000.0), "radius of the root circle, mm";
@@ -143,6 +144,7 @@ pub(super) const ALL: &[Field] = fields! {
     sleeve.torsion_stiffness_n_m_per_rad: RealOrRigid, above(0.0, 1.0e12), "torsional stiffness of springs, or of what holds shells, N.m/rad";
     sleeve.lateral_stiffness_n_per_mm: Real, from(0.0, 1.0e9), "lateral stiffness of springs, rim to flange, N/mm";
     flanks.friction_coefficient: Real, from(0.0, 0.5), "Coulomb friction between the flanks";
+    flanks.preload_um: Real, from(-50.0, 50.0), "how much deeper the flanks mesh than drawn, along their normal, µm; positive: preloaded, negative: clearance";
     temperature.reference_c: Real, from(-200.0, 300.0), "temperature at which the sizes hold, degrees C";
     temperature.minimum_c: Real, from(-200.0, 300.0), "lowest operating temperature, degrees C";
     temperature.maximum_c: Real, from(-200.0, 300.0), "highest operating temperature, degrees C";
@@ -205,7 +207,10 @@ impl Field {
             "sleeve.flange_side_mm" => !sleeve.has_flange(),
             "sleeve.bottom_side_mm" => !sleeve.has_bottom(),
             "sleeve.lateral_stiffness_n_per_mm" => sleeve.kind != SleeveKind::Springs,
-            _ if self.is_of_shells() || self.is_of_the_face() => true,
+            "flexspline.pressure_angle_deg"
+            | "circular_spline.pressure_angle_deg"
+            | "circular_spline.profile_shift" => drive.flexspline.profile == Profile::S,
+            _ if self.is_of_shells() || self.is_of_the_face() || self.is_of_the_profile() => true,
             _ => self.is_imperfection() || matches!(self.slot(&mut Drive::hhd_95()), Slot::RealOrRigid(_)),
         }
     }
@@ -218,6 +223,11 @@ impl Field {
     /// True for what teeth that are straight along the face have not.
     pub fn is_of_the_face(&self) -> bool {
         matches!(self.path, "flexspline.face" | "flexspline.taper_mrad" | "flexspline.crowning_um")
+    }
+
+    /// True for what involutes without preload have not.
+    pub fn is_of_the_profile(&self) -> bool {
+        matches!(self.path, "flexspline.profile" | "flanks.preload_um")
     }
 
     /// True for what an ideal drive has not.

@@ -763,7 +763,7 @@ mod tests {
         let message = Drive::from_toml("d.toml", "base = \"HHD95\"").unwrap_err().to_string();
         assert_eq!(
             message,
-            "d.toml:1: base: found \"HHD95\", allowed: HHD-95, HHD-95-typical, CUP-95, HHD-95-hermetic, HHD-95-plane; did you mean `HHD-95`?"
+            "d.toml:1: base: found \"HHD95\", allowed: HHD-95, HHD-95-typical, CUP-95, HHD-95-hermetic, HHD-95-plane, S-95; did you mean `HHD-95`?"
         );
         let message = Drive::from_toml("d.toml", "base = 95").unwrap_err().to_string();
         assert_eq!(message, "d.toml:1: base: found 95, allowed: a string");
@@ -783,8 +783,8 @@ mod tests {
         let empty = Drive::from_toml("f.toml", "").unwrap_err();
         let count = |of: &dyn Fn(&Field) -> bool| fields::ALL.iter().filter(|field| of(field)).count();
         let optional = count(&|field| field.is_optional(&Drive::hhd_95()));
-        // Two stiffnesses that may be rigid, what springs have not, and what straight teeth have not.
-        let not_there = [Field::is_imperfection, Field::is_of_shells, Field::is_of_the_face];
+        // Two stiffnesses that may be rigid, what springs have not, what straight teeth have not, and what involutes have not.
+        let not_there = [Field::is_imperfection, Field::is_of_shells, Field::is_of_the_face, Field::is_of_the_profile];
         assert_eq!(optional, 2 + not_there.iter().map(|of| count(&|field| of(field))).sum::<usize>());
         assert_eq!(empty.problems.len(), fields::ALL.len() - optional);
         // a stiffness that is not there is rigid

@@ -9,7 +9,7 @@
 //! radius, fillets and roundings of both wheels included; positive is open. Turning the circular spline by `e` changes
 //! every gap by exactly `e`, so the least gap on each side is what it can turn: their sum is the rigid backlash.
 //!
-//! Not covered: elastic deflection, imperfections ([`super::AsBuilt`]; these are the nominal teeth), and tips meeting roots
+//! Not covered: a preload of the flanks ([`super::Flanks::preload_um`]), elastic deflection, imperfections ([`super::AsBuilt`]; these are the nominal teeth), and tips meeting roots
 //! radially ([`super::Drive::check`] asks for clearance there).
 
 use super::as_built::{direction, sum_at};
@@ -160,6 +160,10 @@ pub struct MeshReport {
 }
 
 impl RigidMesh {
+    /// Overlap that is none, mm: S-shaped flanks are drawn to touch without clearance, and are kept to some nanometres. A guess, far above
+    /// these and far below what an error of manufacture is.
+    pub const TOUCHES_MM: f64 = 1e-4;
+
     /// The mesh of `drive` with the generator of `kind`.
     ///
     /// At another than reference temperature the deflection grows with the flexspline; a generator that expands
@@ -168,8 +172,8 @@ impl RigidMesh {
         let mut warm = drive.generator.clone();
         warm.w0_mm *= drive.thermal_state.flexspline_scale;
         Ok(RigidMesh {
-            tooth: ToothFlank::external(&drive.flexspline)?,
-            space: ToothFlank::internal(&drive.circular_spline)?,
+            tooth: ToothFlank::external(drive)?,
+            space: ToothFlank::internal(drive)?,
             curve: NeutralCurve::new(warm.shape(kind), drive.flexspline.neutral_radius_mm()),
             flexspline_teeth: f64::from(drive.flexspline.teeth),
             circular_spline_teeth: f64::from(drive.circular_spline.teeth),
@@ -245,6 +249,7 @@ impl RigidMesh {
             let cycle: Vec<Option<FlankGap>> =
                 (0..=CYCLE_STEPS).map(|k| self.gap(-FRAC_PI_2 + step * k as f64, side)).collect();
             let value = |k: usize| cycle[k].map_or(f64::INFINITY, |gap| gap.gap_rad);
+            let overlap = |k: usize| cycle[k].map_or(0.0, |gap| -gap.gap_mm);
             let lowest = |stretch: std::ops::Range<usize>| -> Option<FlankGap> {
                 let k = stretch.min_by(|&i, &j| value(i).total_cmp(&value(j)))?;
                 let coarse = cycle[k]?;
@@ -258,7 +263,7 @@ impl RigidMesh {
             }
             let mut k = 0;
             while k < cycle.len() {
-                let end = (k..cycle.len()).find(|&j| value(j) >= 0.0).unwrap_or(cycle.len());
+                let end = (k..cycle.len()).find(|&j| overlap(j) <= Self::TOUCHES_MM).unwrap_or(cycle.len());
                 interferences.extend(lowest(k..end));
                 k = end + 1;
             }
@@ -384,7 +389,7 @@ fn at_phase(cycle: &[Option<Nearest>], phi: f64) -> Option<Nearest> {
 }
 
 /// Argument of the least value of a function with one valley between `low` and `high`.
-fn golden(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+pub(crate) fn golden(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let section = 0.5 * (5f64.sqrt() - 1.0);
     let mut left = high - section * (high - low);
     let mut right = low + section * (high - low);

@@ -11,17 +11,19 @@
 //!
 //! Angles count counter-clockwise.
 
+mod arcs;
 mod as_built;
 mod error;
 mod few;
 mod fields;
 mod file;
+mod flank;
 mod generator;
 mod interference;
-mod involute;
 mod neutral;
 mod placement;
 mod ring;
+mod s_tooth;
 mod sleeve;
 mod spec;
 mod tooth;
@@ -29,13 +31,14 @@ mod tooth;
 pub use as_built::{AsBuilt, DamagedFlank, DamagedTooth, Harmonic, RimVariation, Wheel};
 pub use error::DriveError;
 pub use few::{FewNumbers, MadeDrive};
+pub use flank::{ActiveFlank, Foot};
 pub use generator::{GeneratorOutline, OutlineFoot};
+pub(crate) use interference::golden;
 pub use interference::{FlankGap, MeshReport, RigidMesh, Room, Side};
-pub use involute::{Foot, InvoluteFlank};
 pub use neutral::NeutralCurve;
 pub use placement::{FlankDeviations, Placement};
 pub use ring::{GeneratorKind, RingShape, UnknownGenerator};
-pub use sleeve::{Bottom, FaceLoad, Flange, Sleeve, SleeveKind};
+pub use sleeve::{Bottom, FaceLoad, Flange, Profile, Sleeve, SleeveKind};
 pub use spec::{
     CircularSpline, Drive, Flanks, Flexspline, Generators, Material, OutputLoadPath, Temperature, ThermalState,
 };

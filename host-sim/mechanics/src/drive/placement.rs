@@ -66,7 +66,7 @@ pub struct FlankDeviations {
     pub spaces: Vec<Placement>,
     /// Depth missing on the plus and the minus flank of each flexspline tooth, mm.
     pub tooth_depth: Vec<[f64; 2]>,
-    /// Depth missing on the plus and the minus flank of each circular-spline space, mm.
+    /// Depth missing on the plus and the minus flank of each circular-spline space, mm; a preload is depth too much.
     pub space_depth: Vec<[f64; 2]>,
     /// Axis that the circular spline turns about, in the housing, mm. Its torque is the moment about this axis: that of its own
     /// bearing.
@@ -111,7 +111,7 @@ impl FlankDeviations {
             .collect();
 
         let mut tooth_depth = vec![[1e-3 * built.flexspline_wear_um; 2]; teeth.len()];
-        let mut space_depth = vec![[1e-3 * built.circular_spline_wear_um; 2]; spaces.len()];
+        let mut space_depth = vec![[1e-3 * (built.circular_spline_wear_um - drive.flanks.preload_um); 2]; spaces.len()];
         for damaged in &built.damaged_teeth {
             for side in Side::BOTH {
                 let hit = match damaged.flank {

@@ -83,6 +83,16 @@ choice! {
 }
 
 choice! {
+    /// The form of the flanks of both wheels.
+    Profile {
+        /// Involutes.
+        Involute = "involute",
+        /// S-shaped: the path of a tooth made half as large, and the space that it leaves free on its way under the cam.
+        S = "s",
+    }
+}
+
+choice! {
     /// How the load lies along the face of the teeth.
     FaceLoad {
         /// Evenly: teeth stay straight, whatever the rim does.

@@ -1,7 +1,7 @@
-//! Outlines of the teeth: five analytic pieces from the middle of the root land to the middle of the tip land.
+//! Outlines of the teeth: five pieces from the middle of the root land to the middle of the tip land.
 //!
 //! In the tooth frame (axis of the flexspline tooth, or of the circular-spline *space*, along +x) the half outline on the
-//! positive-angle side is, in this order, an arc of the root circle, a root fillet, the involute, a tip rounding and an
+//! positive-angle side is, in this order, an arc of the root circle, a root fillet, the flank, a tip rounding and an
 //! arc of the tip circle. The negative side is its mirror image about the x axis.
 //!
 //! ```text
@@ -19,23 +19,27 @@
 //! Involute: at radius `r` the half angle of the flexspline tooth, and of the circular-spline space, is
 //! `(pi/2 + 2 x tan a)/z + inv a - inv a_r` with `cos a_r = r_b/r`. Written by the roll angle `u = tan a_r`, the point
 //! is `r_b e(beta) + r_b u e'(beta)` with `beta = half angle at the base - u`, which makes offset curves, and so the
-//! centres of fillets and roundings, closed forms.
+//! centres of fillets and roundings, closed forms. S-shaped flanks are chains of arcs (`s_tooth`).
 
+use super::arcs::ArcChain;
 use super::error::DriveError;
-use super::spec::{CircularSpline, Flexspline};
+use super::s_tooth;
+use super::sleeve::Profile;
+use super::spec::Drive;
 use crate::toml_file::Problem;
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::Arc;
 
 /// What a piece of the outline is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum PieceKind {
     /// Arc of the root circle.
     RootLand,
-    /// Arc between root circle and involute.
+    /// Arc between root circle and flank.
     RootFillet,
-    /// The involute flank.
-    Involute,
-    /// Arc between involute and tip circle.
+    /// The flank that bears: involute, or S-shaped.
+    Flank,
+    /// Arc between flank and tip circle.
     TipRounding,
     /// Arc of the tip circle.
     TipLand,
@@ -47,7 +51,7 @@ impl PieceKind {
         match self {
             PieceKind::RootLand => "root land",
             PieceKind::RootFillet => "root fillet",
-            PieceKind::Involute => "involute",
+            PieceKind::Flank => "flank",
             PieceKind::TipRounding => "tip rounding",
             PieceKind::TipLand => "tip land",
         }
@@ -55,14 +59,14 @@ impl PieceKind {
 }
 
 /// One analytic piece; its parameter `t` runs over `0..=1` from the root side to the tip side, uniform in arc length.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct OutlinePiece {
     /// What it is.
     pub kind: PieceKind,
     curve: Curve,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 enum Curve {
     Arc {
         centre: [f64; 2],
@@ -77,12 +81,19 @@ enum Curve {
         from: f64,
         to: f64,
     },
+    /// Arc length of the chain from `from` to `to`.
+    Chain {
+        chain: Arc<ArcChain>,
+        from: f64,
+        to: f64,
+    },
 }
 
 impl OutlinePiece {
     /// Point, mm.
     pub fn point(&self, t: f64) -> [f64; 2] {
         match self.curve {
+            Curve::Chain { ref chain, from, to } => chain.point(from + t * (to - from)),
             Curve::Arc { centre, radius, start, sweep } => {
                 let (s, c) = (start + t * sweep).sin_cos();
                 [centre[0] + radius * c, centre[1] + radius * s]
@@ -98,6 +109,9 @@ impl OutlinePiece {
     /// Unit tangent in the direction of growing `t`.
     pub fn tangent(&self, t: f64) -> [f64; 2] {
         match self.curve {
+            Curve::Chain { ref chain, from, to } => {
+                chain.tangent(from + t * (to - from)).map(|x| (to - from).signum() * x)
+            }
             Curve::Arc { start, sweep, .. } => {
                 let (s, c) = (start + t * sweep).sin_cos();
                 let sign = sweep.signum();
@@ -120,6 +134,7 @@ impl OutlinePiece {
     /// Curvature, 1/mm, positive where the material is convex.
     pub fn curvature(&self, t: f64) -> f64 {
         match self.curve {
+            Curve::Chain { ref chain, from, to } => -(to - from).signum() * chain.curvature(from + t * (to - from)),
             Curve::Arc { radius, sweep, .. } => -sweep.signum() / radius,
             Curve::Involute { base_radius, from, to, .. } => (to - from).signum() / (base_radius * self.roll(t)),
         }
@@ -128,6 +143,7 @@ impl OutlinePiece {
     /// Length, mm.
     pub fn length(&self) -> f64 {
         match self.curve {
+            Curve::Chain { from, to, .. } => (to - from).abs(),
             Curve::Arc { radius, sweep, .. } => radius * sweep.abs(),
             Curve::Involute { base_radius, from, to, .. } => 0.5 * base_radius * (to * to - from * from).abs(),
         }
@@ -136,7 +152,7 @@ impl OutlinePiece {
     fn roll(&self, t: f64) -> f64 {
         match self.curve {
             Curve::Involute { from, to, .. } => (from * from + t * (to * to - from * from)).sqrt(),
-            Curve::Arc { .. } => 0.0,
+            Curve::Arc { .. } | Curve::Chain { .. } => 0.0,
         }
     }
 }
@@ -145,19 +161,30 @@ impl OutlinePiece {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ToothFlank {
     pieces: [OutlinePiece; 5],
+    shape: FlankShape,
+    /// Radius of the root circle and of the tip circle, mm.
+    circles: (f64, f64),
     internal: bool,
     teeth: u32,
 }
 
 impl ToothFlank {
     /// The flexspline tooth.
-    pub fn external(wheel: &Flexspline) -> Result<Self, DriveError> {
+    pub fn external(drive: &Drive) -> Result<Self, DriveError> {
+        let wheel = &drive.flexspline;
+        let half_base = half_angle_at_base(wheel.teeth, wheel.profile_shift, wheel.pressure_angle_rad());
+        let shape = match wheel.profile {
+            Profile::Involute => FlankShape::Involute { base_radius: wheel.base_radius_mm(), half_base },
+            Profile::S => {
+                let chain = s_tooth::tooth(&drive.as_dimensioned())?;
+                FlankShape::Chain(Arc::new(chain.scaled(drive.thermal_state.flexspline_scale)))
+            }
+        };
         Self::new(&Wheel {
             section: "flexspline",
             internal: false,
             teeth: wheel.teeth,
-            base_radius: wheel.base_radius_mm(),
-            half_base: half_angle_at_base(wheel.teeth, wheel.profile_shift, wheel.pressure_angle_rad()),
+            shape,
             root_radius: wheel.root_radius_mm,
             tip_radius: wheel.tip_radius_mm,
             fillet: wheel.root_fillet_mm,
@@ -166,13 +193,21 @@ impl ToothFlank {
     }
 
     /// The circular-spline space.
-    pub fn internal(wheel: &CircularSpline) -> Result<Self, DriveError> {
+    pub fn internal(drive: &Drive) -> Result<Self, DriveError> {
+        let wheel = &drive.circular_spline;
+        let half_base = half_angle_at_base(wheel.teeth, wheel.profile_shift, wheel.pressure_angle_rad());
+        let shape = match drive.flexspline.profile {
+            Profile::Involute => FlankShape::Involute { base_radius: wheel.base_radius_mm(), half_base },
+            Profile::S => {
+                let chain = s_tooth::space(&drive.as_dimensioned())?;
+                FlankShape::Chain(Arc::new(chain.scaled(drive.thermal_state.circular_spline_scale)))
+            }
+        };
         Self::new(&Wheel {
             section: "circular_spline",
             internal: true,
             teeth: wheel.teeth,
-            base_radius: wheel.base_radius_mm(),
-            half_base: half_angle_at_base(wheel.teeth, wheel.profile_shift, wheel.pressure_angle_rad()),
+            shape,
             root_radius: wheel.root_radius_mm,
             tip_radius: wheel.tip_radius_mm,
             fillet: wheel.root_fillet_mm,
@@ -181,18 +216,18 @@ impl ToothFlank {
     }
 
     fn new(wheel: &Wheel) -> Result<Self, DriveError> {
-        let &Wheel { internal, base_radius: rb, half_base, root_radius, tip_radius, fillet, rounding, .. } = wheel;
+        let &Wheel { internal, root_radius, tip_radius, fillet, rounding, .. } = wheel;
         let half_pitch = PI / f64::from(wheel.teeth);
         // seen from the free side a fillet centre, from the material a rounding centre; both are one offset of the
         // involute and of a circle, on the higher-angle side (+1) or the lower one (-1)
         let side = if internal { -1.0 } else { 1.0 };
         let root = wheel.corner("root_fillet_mm", root_radius, fillet, side)?;
         let tip = wheel.corner("tip_rounding_mm", tip_radius, rounding, -side)?;
-        if (tip.roll - root.roll) * side <= 0.0 {
+        if (tip.along - root.along) * side <= 0.0 {
             return Err(wheel.refuse(
                 "root_fillet_mm",
                 fillet,
-                &format!("leaves no involute below the tip rounding of {rounding} mm; a smaller radius is needed"),
+                &format!("leaves no flank below the tip rounding of {rounding} mm; a smaller radius is needed"),
             ));
         }
         // where the lands meet the corners, measured from the tooth or space axis
@@ -223,17 +258,19 @@ impl ToothFlank {
             kind,
             curve: Curve::Arc { centre, radius, start, sweep: end - start },
         };
-        let involute = OutlinePiece {
-            kind: PieceKind::Involute,
-            curve: Curve::Involute { base_radius: rb, half_base, from: root.roll, to: tip.roll },
+        let (from, to) = (root.along, tip.along);
+        let curve = match &wheel.shape {
+            &FlankShape::Involute { base_radius, half_base } => Curve::Involute { base_radius, half_base, from, to },
+            FlankShape::Chain(chain) => Curve::Chain { chain: Arc::clone(chain), from, to },
         };
-        let (root_beta, tip_beta) = (half_base - root.roll, half_base - tip.roll);
+        let flank = OutlinePiece { kind: PieceKind::Flank, curve };
+        let (root_beta, tip_beta) = (root.direction, tip.direction);
         let origin = [0.0, 0.0];
         let pieces = if internal {
             [
                 arc(PieceKind::RootLand, origin, root_radius, 0.0, root.angle),
                 arc(PieceKind::RootFillet, root.centre, fillet, root.angle, root_beta + FRAC_PI_2),
-                involute,
+                flank,
                 arc(PieceKind::TipRounding, tip.centre, rounding, tip_beta - FRAC_PI_2, tip.angle - PI),
                 arc(PieceKind::TipLand, origin, tip_radius, tip.angle, half_pitch),
             ]
@@ -241,17 +278,23 @@ impl ToothFlank {
             [
                 arc(PieceKind::RootLand, origin, root_radius, half_pitch, root.angle),
                 arc(PieceKind::RootFillet, root.centre, fillet, root.angle - PI, root_beta - FRAC_PI_2),
-                involute,
+                flank,
                 arc(PieceKind::TipRounding, tip.centre, rounding, tip_beta + FRAC_PI_2, tip.angle),
                 arc(PieceKind::TipLand, origin, tip_radius, tip.angle, 0.0),
             ]
         };
-        Ok(ToothFlank { pieces, internal, teeth: wheel.teeth })
+        let circles = (root_radius, tip_radius);
+        Ok(ToothFlank { pieces, shape: wheel.shape.clone(), circles, internal, teeth: wheel.teeth })
     }
 
     /// The five pieces, root to tip; each starts where the one before ends, with the same tangent.
     pub fn pieces(&self) -> &[OutlinePiece] {
         &self.pieces
+    }
+
+    /// The curve of the flank, without its ends.
+    pub(super) fn shape(&self) -> &FlankShape {
+        &self.shape
     }
 
     /// The piece of one kind.
@@ -276,11 +319,7 @@ impl ToothFlank {
 
     /// Radius, mm, of the root circle and of the tip circle.
     pub fn root_and_tip_radius(&self) -> (f64, f64) {
-        let radius = |piece: &OutlinePiece| match piece.curve {
-            Curve::Arc { radius, .. } => radius,
-            Curve::Involute { base_radius, .. } => base_radius,
-        };
-        (radius(&self.pieces[0]), radius(&self.pieces[4]))
+        self.circles
     }
 
     /// Polar angle of the outline at `radius`, fillet and rounding included; `None` beyond root or tip circle.
@@ -298,6 +337,10 @@ impl ToothFlank {
             })
             .unwrap_or(&self.pieces[3]);
         Some(match piece.curve {
+            Curve::Chain { ref chain, .. } => {
+                let [x, y] = chain.point(chain.arc_at_radius(radius));
+                y.atan2(x)
+            }
             Curve::Involute { base_radius, half_base, .. } => {
                 let u = ((radius / base_radius).powi(2) - 1.0).max(0.0).sqrt();
                 half_base - (u - u.atan())
@@ -313,26 +356,38 @@ impl ToothFlank {
     }
 }
 
+/// The curve of a flank, in growing radius.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum FlankShape {
+    /// Half angle at the base circle, rad.
+    Involute {
+        base_radius: f64,
+        half_base: f64,
+    },
+    Chain(Arc<ArcChain>),
+}
+
 /// The numbers of one wheel that its outline needs.
 struct Wheel {
     section: &'static str,
     internal: bool,
     teeth: u32,
-    base_radius: f64,
-    half_base: f64,
+    shape: FlankShape,
     root_radius: f64,
     tip_radius: f64,
     fillet: f64,
     rounding: f64,
 }
 
-/// A corner arc tangent to the involute and to a circle about the wheel centre.
+/// A corner arc tangent to the flank and to a circle about the wheel centre.
 struct Corner {
     centre: [f64; 2],
     /// polar angle of the centre, and of the point of tangency with the circle
     angle: f64,
-    /// roll angle of the point of tangency with the involute
-    roll: f64,
+    /// where it is tangent to the flank: roll angle of an involute, arc length of a chain
+    along: f64,
+    /// direction of the flank there, in growing radius
+    direction: f64,
 }
 
 impl Wheel {
@@ -340,21 +395,49 @@ impl Wheel {
     /// (`side` = 1) or on the lower (-1), and beyond the circle on the same count for an external root or an internal
     /// tip, within it for the others.
     fn corner(&self, field: &str, radius: f64, rho: f64, side: f64) -> Result<Corner, DriveError> {
-        // offset involute: |C|^2 = r_b^2 + (r_b u + side rho)^2 = (radius + side rho)^2
-        let rb = self.base_radius;
         let distance = radius + side * rho;
-        let along = distance * distance - rb * rb;
-        let roll = (along.max(0.0).sqrt() - side * rho) / rb;
-        if along <= 0.0 || roll <= 0.0 {
-            return Err(self.refuse(
-                field,
-                rho,
-                &format!("meets no involute: base circle radius {rb:.4} mm, circle radius {radius:.4} mm"),
-            ));
+        match &self.shape {
+            &FlankShape::Involute { base_radius: rb, half_base } => {
+                // offset involute: |C|^2 = r_b^2 + (r_b u + side rho)^2 = (radius + side rho)^2
+                let square = distance * distance - rb * rb;
+                let roll = (square.max(0.0).sqrt() - side * rho) / rb;
+                if square <= 0.0 || roll <= 0.0 {
+                    return Err(self.refuse(
+                        field,
+                        rho,
+                        &format!("meets no involute: base circle radius {rb:.4} mm, circle radius {radius:.4} mm"),
+                    ));
+                }
+                let direction = half_base - roll;
+                let angle = direction + square.sqrt().atan2(rb);
+                Ok(Corner { centre: [distance * angle.cos(), distance * angle.sin()], angle, along: roll, direction })
+            }
+            FlankShape::Chain(chain) => {
+                let offset = |s: f64| {
+                    let ([x, y], t) = (chain.point(s), chain.tangent(s));
+                    [x - side * rho * t[1], y + side * rho * t[0]]
+                };
+                let beyond = |s: f64| {
+                    let [x, y] = offset(s);
+                    x.hypot(y) - distance
+                };
+                // The parallel curve grows in radius where the flank does, unless the corner is rounder than the flank.
+                let (mut low, mut high) = (-rho, chain.length() + rho);
+                if beyond(low) >= 0.0 || beyond(high) <= 0.0 {
+                    return Err(self.refuse(field, rho, &format!("meets no flank at the circle of {radius:.4} mm")));
+                }
+                for _ in 0..60 {
+                    let middle = 0.5 * (low + high);
+                    if beyond(middle) > 0.0 {
+                        high = middle;
+                    } else {
+                        low = middle;
+                    }
+                }
+                let (centre, t) = (offset(low), chain.tangent(low));
+                Ok(Corner { centre, angle: centre[1].atan2(centre[0]), along: low, direction: t[1].atan2(t[0]) })
+            }
         }
-        let beta = self.half_base - roll;
-        let angle = beta + along.sqrt().atan2(rb);
-        Ok(Corner { centre: [distance * angle.cos(), distance * angle.sin()], angle, roll })
     }
 
     fn refuse(&self, field: &str, value: f64, what: &str) -> DriveError {
@@ -375,7 +458,7 @@ mod tests {
 
     fn flanks() -> [ToothFlank; 2] {
         let drive = Drive::hhd_95();
-        [ToothFlank::external(&drive.flexspline).unwrap(), ToothFlank::internal(&drive.circular_spline).unwrap()]
+        [ToothFlank::external(&drive).unwrap(), ToothFlank::internal(&drive).unwrap()]
     }
 
     fn polar([x, y]: [f64; 2]) -> (f64, f64) {
@@ -481,16 +564,14 @@ mod tests {
         drive.flexspline.tip_rounding_mm = 0.005;
         drive.circular_spline.tip_rounding_mm = 0.005;
         assert!(
-            (ToothFlank::external(&drive.flexspline).unwrap().piece(PieceKind::TipRounding).curvature(0.5) - 200.0)
-                .abs()
-                < 1e-9
+            (ToothFlank::external(&drive).unwrap().piece(PieceKind::TipRounding).curvature(0.5) - 200.0).abs() < 1e-9
         );
-        assert!(ToothFlank::internal(&drive.circular_spline).is_ok());
+        assert!(ToothFlank::internal(&drive).is_ok());
         drive.flexspline.tip_rounding_mm = 0.4;
-        let message = ToothFlank::external(&drive.flexspline).unwrap_err().to_string();
+        let message = ToothFlank::external(&drive).unwrap_err().to_string();
         assert!(message.starts_with("flexspline.tip_rounding_mm: 0.4 mm does not fit"), "{message}");
         drive.circular_spline.root_fillet_mm = 0.3;
-        let message = ToothFlank::internal(&drive.circular_spline).unwrap_err().to_string();
+        let message = ToothFlank::internal(&drive).unwrap_err().to_string();
         assert!(message.starts_with("circular_spline.root_fillet_mm: 0.3 mm does not fit"), "{message}");
     }
 }

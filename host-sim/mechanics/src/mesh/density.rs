@@ -30,7 +30,7 @@ pub struct MeshDensity {
     pub root_rows: usize,
     /// Elements on the upper half of the fillet.
     pub fillet_elements: usize,
-    /// Elements on the involute flank.
+    /// Elements on the flank.
     pub flank_elements: usize,
 }
 

@@ -19,11 +19,11 @@ pub struct HalfOutline<'a> {
     pub base_radius: f64,
     /// Interface circle between rim and teeth.
     pub interface_radius: f64,
-    /// Root land and fillet, from the space axis (0) over the foot of the fillet (1) to its end at the involute (2).
+    /// Root land and fillet, from the space axis (0) over the foot of the fillet (1) to its end at the flank (2).
     pub root: &'a dyn Fn(f64) -> Point,
-    /// Involute flank by radius, valid from the end of the fillet to the tip circle.
+    /// Flank by radius, valid from the end of the fillet to the tip circle.
     pub flank: &'a dyn Fn(f64) -> Point,
-    /// Radius at which the fillet ends and the involute begins.
+    /// Radius at which the fillet ends and the flank begins.
     pub flank_start_radius: f64,
     /// Radius of the tip circle.
     pub tip_radius: f64,
@@ -55,7 +55,7 @@ pub enum MeshError {
 pub enum EdgeTag {
     /// Bore or outer circle, numbered from the tooth axis.
     Base(usize),
-    /// Involute flank, numbered from the root.
+    /// Flank, numbered from the root.
     Flank(usize),
 }
 

@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 
 use super::density::{MeshDensity, MeshLevel};
 use super::sector::{EdgeTag, HalfOutline, HalfSector, MeshError, Point};
-use crate::drive::{Drive, InvoluteFlank, RimVariation, Side, ToothFlank};
+use crate::drive::{ActiveFlank, Drive, RimVariation, Side, ToothFlank};
 use crate::fem::element::{GaussPoint, gauss_points};
 
 /// Which wheel a mesh is of.
@@ -97,8 +97,7 @@ impl WheelMesh {
         let interface_radius = wheel.root_radius_mm - 0.3 * wheel.rim_thickness_mm;
         WheelMesh::new(
             WheelKind::Flexspline,
-            &ToothFlank::external(wheel)?,
-            wheel.base_radius_mm(),
+            &ToothFlank::external(drive)?,
             wheel.bore_radius_mm(),
             interface_radius,
             density,
@@ -118,8 +117,7 @@ impl WheelMesh {
         let rim = wheel.outer_radius_mm - wheel.root_radius_mm;
         WheelMesh::new(
             WheelKind::CircularSpline,
-            &ToothFlank::internal(wheel)?,
-            wheel.base_radius_mm(),
+            &ToothFlank::internal(drive)?,
             wheel.outer_radius_mm,
             wheel.root_radius_mm + (0.5 * tooth_height).min(0.4 * rim),
             density,
@@ -171,14 +169,13 @@ impl WheelMesh {
     fn new(
         kind: WheelKind,
         profile: &ToothFlank,
-        base_circle_radius: f64,
         base_radius: f64,
         interface_radius: f64,
         density: &MeshDensity,
     ) -> Result<WheelMesh, MeshError> {
         let half_pitch = profile.half_pitch();
         let teeth = (std::f64::consts::PI / half_pitch).round() as usize;
-        let involute = InvoluteFlank::new(profile, base_circle_radius);
+        let active = ActiveFlank::new(profile);
         // Profiles are given about the tooth (external) or the space (internal); the half sector wants the tooth axis.
         let to_tooth_frame = |p: Point| match kind {
             WheelKind::Flexspline => p,
@@ -188,10 +185,10 @@ impl WheelMesh {
             }
         };
         let root = |t: f64| {
-            let [land, fillet] = [profile.pieces()[0], profile.pieces()[1]];
+            let [land, fillet] = [&profile.pieces()[0], &profile.pieces()[1]];
             to_tooth_frame(if t < 1.0 { land.point(t) } else { fillet.point(t - 1.0) })
         };
-        let flank = |r: f64| to_tooth_frame(involute.point(r));
+        let flank = |r: f64| to_tooth_frame(active.point(r));
         let half = HalfSector::new(
             &HalfOutline {
                 half_pitch,
@@ -199,8 +196,8 @@ impl WheelMesh {
                 interface_radius,
                 root: &root,
                 flank: &flank,
-                flank_start_radius: involute.start_radius,
-                tip_radius: involute.tip_radius,
+                flank_start_radius: active.start_radius,
+                tip_radius: active.tip_radius,
             },
             density,
         );
@@ -430,18 +427,15 @@ mod tests {
         [WheelMesh::flexspline(&drive, level).unwrap(), WheelMesh::circular_spline(&drive, level).unwrap()]
     }
 
-    fn profile(kind: WheelKind) -> (ToothFlank, InvoluteFlank) {
+    fn profile(kind: WheelKind) -> (ToothFlank, ActiveFlank) {
         let drive = Drive::hhd_95();
-        let (profile, base) = match kind {
-            WheelKind::Flexspline => {
-                (ToothFlank::external(&drive.flexspline).unwrap(), drive.flexspline.base_radius_mm())
-            }
-            WheelKind::CircularSpline => {
-                (ToothFlank::internal(&drive.circular_spline).unwrap(), drive.circular_spline.base_radius_mm())
-            }
-        };
-        let involute = InvoluteFlank::new(&profile, base);
-        (profile, involute)
+        let profile = match kind {
+            WheelKind::Flexspline => ToothFlank::external(&drive),
+            WheelKind::CircularSpline => ToothFlank::internal(&drive),
+        }
+        .unwrap();
+        let flank = ActiveFlank::new(&profile);
+        (profile, flank)
     }
 
     /// Area between the base circle and the outline: root land, fillet, involute, and the tip circle, half a pitch of it by

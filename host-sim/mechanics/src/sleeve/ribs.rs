@@ -35,7 +35,7 @@ impl Ribs {
 /// Area of a tooth above the root circle (mm²) and its first and second moments about the middle of the rim.
 fn tooth_moments(drive: &Drive) -> Result<[f64; 3], DriveError> {
     let wheel = &drive.flexspline;
-    let outline = ToothFlank::external(wheel)?;
+    let outline = ToothFlank::external(drive)?;
     let (root, tip) = outline.root_and_tip_radius();
     let slice = (tip - root) / SLICES as f64;
     let mut moments = [0.0; 3];
@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn moments_are_those_of_the_outline() {
         let drive = Drive::hhd_95();
-        let outline = ToothFlank::external(&drive.flexspline).unwrap();
+        let outline = ToothFlank::external(&drive).unwrap();
         let (root, middle) = (drive.flexspline.root_radius_mm, drive.flexspline.neutral_radius_mm());
         // In polar coordinates the wall is straight: x is r angle, y is r - R.
         let mut corners: Vec<[f64; 2]> = outline.pieces()[1..]

@@ -138,7 +138,7 @@ impl NearPairs {
         others: impl Fn(f64) -> (f64, f64),
     ) -> Option<f64> {
         const SMALL: f64 = 2e-3;
-        let radius = flanks.space.base_radius;
+        let radius = flanks.space.lever();
         let start = configuration(state);
         let mut output_rad = state.output_rad;
         // The pairs that are looked after anyway mostly suffice.

@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use crate::contact::{BoreContact, BoreLaw, FaceLaw, FlankContact, FlankLaw, Lean};
 use crate::drive::{
-    Drive, FaceLoad, FlankDeviations, GeneratorKind, GeneratorOutline, InvoluteFlank, RimVariation, Side, ToothFlank,
+    ActiveFlank, Drive, FaceLoad, FlankDeviations, GeneratorKind, GeneratorOutline, RimVariation, Side, ToothFlank,
 };
 use crate::fem::material::PlaneStrain;
 use crate::mesh::{MeshLevel, WheelMesh};
@@ -163,8 +163,8 @@ pub struct Problem {
     pub(super) bore: BoreContact,
     pub(super) bore_law: BoreLaw,
     pub(super) flank_law: FlankLaw,
-    tooth: InvoluteFlank,
-    space: InvoluteFlank,
+    tooth: ActiveFlank,
+    space: ActiveFlank,
     deviations: FlankDeviations,
     /// Weights of the mean rotation of the bore: rotation = rotation_weights . u.
     pub(super) rotation_weights: Vec<f64>,
@@ -207,9 +207,8 @@ impl Problem {
         let circular_spline = WheelMesh::circular_spline_as_fine_as(&drive, &of_circular_spline)?;
         let material = PlaneStrain::new(drive.material.youngs_modulus_mpa, drive.material.poissons_ratio);
         let width = drive.flexspline.width_mm;
-        let tooth = InvoluteFlank::new(&ToothFlank::external(&drive.flexspline)?, drive.flexspline.base_radius_mm());
-        let space =
-            InvoluteFlank::new(&ToothFlank::internal(&drive.circular_spline)?, drive.circular_spline.base_radius_mm());
+        let tooth = ActiveFlank::new(&ToothFlank::external(&drive)?);
+        let space = ActiveFlank::new(&ToothFlank::internal(&drive)?);
         let [tooth, space] = [tooth, space].map(|flank| flank.with_facets(settings.flank_facets));
         let deviations = FlankDeviations::new(&drive);
         let outer = drive.circular_spline.outer_radius_mm;

@@ -25,7 +25,7 @@ class Drive:
     95.0
 
     Built in are ``HHD-95`` (ideal), ``HHD-95-typical`` (friction, compliances, tolerances), ``CUP-95`` (a cup), ``HHD-95-hermetic``
-    (a closed sleeve) and ``HHD-95-plane`` (no third dimension). Lengths are mm, angles as the names of the fields say; `to_toml` has every field with its unit.
+    (a closed sleeve), ``HHD-95-plane`` (no third dimension) and ``S-95`` (S-shaped teeth). Lengths are mm, angles as the names of the fields say; `to_toml` has every field with its unit.
     """
 
     BUILT_IN: tuple[str, ...] = tuple(_native.Drive.built_in())

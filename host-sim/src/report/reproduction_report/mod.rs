@@ -120,6 +120,11 @@ pub fn page(sources: Sources<'_>) -> Page {
 fn judge(r: &Reproduction, animations: &[Result<Animation, AnimationError>]) -> (Status, Vec<String>) {
     let mut status = if r.not_converged.is_empty() { Status::Good } else { Status::NotConverged };
     let mut remarks: Vec<String> = r.not_converged.iter().map(|what| format!("No equilibrium: {what}.")).collect();
+    if !r.changes_without_equilibrium.is_empty() {
+        status = status.max(Status::Remark);
+        let told = r.changes_without_equilibrium.iter();
+        remarks.extend(told.map(|what| format!("A changed model has no equilibrium, which is its result: {what}.")));
+    }
     for error in animations.iter().filter_map(|a| a.as_ref().err()) {
         let worse = match error {
             AnimationError::NotPeriodic { .. } => Status::Remark,
@@ -243,6 +248,9 @@ fn motion(r: &Reproduction, animations: &[Animation]) -> Section {
         Axis::new("Output angle", Quantity::Error),
         by_generator(|kind| charts::travel(r, kind)),
     ));
+    if animations.iter().any(|a| a.sleeve.is_some()) {
+        blocks.push(Block::Figure(super::drive_report::sleeve_figure()));
+    }
     Section { id: "motion".into(), title: "The protocol".into(), detail: Detail::Summary, blocks }
 }
 
