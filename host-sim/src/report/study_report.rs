@@ -8,7 +8,7 @@ use super::page::{
 };
 use crate::data_sheet::FIGURES;
 use crate::drive::{Drive, GeneratorKind};
-use crate::study::{Effect, Run, RunStatus, Sense, Study, StudySettings, figure};
+use crate::study::{Basis, Effect, Run, RunStatus, Sense, Study, StudySettings, figure};
 
 /// Rows of the table of the best.
 const MOST_ROWS: usize = 25;
@@ -49,6 +49,7 @@ pub fn page(of: Sources<'_>) -> Page {
     let mut sections = vec![best(&of)];
     sections.extend(does(&of));
     sections.push(trade(&of));
+    sections.extend(off(&of));
     sections.push(curves(&of));
     sections.push(reading());
     Page {
@@ -144,7 +145,7 @@ fn headline(of: &Sources<'_>, kind: GeneratorKind) -> Headline {
 }
 
 fn best(of: &Sources<'_>) -> Section {
-    let header: Vec<String> = ["Variant".to_owned()]
+    let header: Vec<String> = ["Variant".to_owned(), "basis".to_owned()]
         .into_iter()
         .chain(of.study.fields.iter().cloned())
         .chain(FIGURES.iter().map(|(name, _)| heading(name)))
@@ -158,7 +159,8 @@ fn best(of: &Sources<'_>) -> Section {
             let rows = front.iter().take(MOST_ROWS).map(|run| {
                 let fields = run.values.iter().map(|value| Text::new(value.clone()));
                 let figures = FIGURES.iter().map(|(name, figure)| value(name, figure(&run.sheet)));
-                [Text::new(run.variant.to_string())].into_iter().chain(fields).chain(figures).collect()
+                let variant = [run.variant.to_string(), run.basis.name().to_owned()].map(Text::new);
+                variant.into_iter().chain(fields).chain(figures).collect()
             });
             let rows: Vec<Vec<Text>> = rows.collect();
             let caption = if front.len() > MOST_ROWS {
@@ -202,6 +204,41 @@ fn does(of: &Sources<'_>) -> Option<Section> {
         })
         .collect();
     let (id, title) = ("does".to_owned(), "What each field does".to_owned());
+    (!blocks.is_empty()).then_some(Section { id, title, detail: Detail::Summary, blocks })
+}
+
+/// What estimated figures are off by; nothing where all are computed.
+fn off(of: &Sources<'_>) -> Option<Section> {
+    let header = ["Figure", "variants computed", "off, rms", "off, rms, %", "off, most"];
+    let blocks: Vec<Block> = of
+        .settings
+        .generators
+        .iter()
+        .filter_map(|kind| {
+            let estimated = of_kind(of.study, *kind).filter(|run| run.basis == Basis::Estimated).count();
+            let rows: Vec<Vec<Text>> = of
+                .study
+                .off
+                .iter()
+                .filter(|off| off.generator == *kind)
+                .map(|off| {
+                    vec![
+                        Text::new(heading(off.figure)),
+                        Text::new(off.runs.to_string()),
+                        value(off.figure, Some(off.rms)),
+                        Text::new(significant(off.rms_percent, 2)),
+                        value(off.figure, Some(off.largest)),
+                    ]
+                })
+                .collect();
+            let caption = format!(
+                "{estimated} variants are estimated by a surface through the others. What it is off by where a computed variant is left out of it"
+            );
+            let table = Table { caption, header: header.map(str::to_owned).to_vec(), rows };
+            (!table.rows.is_empty()).then(|| Block::Table { choice: Some(kind.to_string()), table })
+        })
+        .collect();
+    let (id, title) = ("off".to_owned(), "How far to trust estimates".to_owned());
     (!blocks.is_empty()).then_some(Section { id, title, detail: Detail::Summary, blocks })
 }
 
