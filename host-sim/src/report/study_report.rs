@@ -6,7 +6,7 @@ use super::page::{
     Axis, Block, Choice, Detail, EVERY_CHOICE, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity,
     Section, Series, Status, Table, Text, significant,
 };
-use crate::data_sheet::FIGURES;
+use crate::data_sheet::{FIGURES, FigureOf};
 use crate::drive::{Drive, GeneratorKind};
 use crate::study::{Basis, Effect, Run, RunStatus, Sense, Study, StudySettings, figure};
 
@@ -145,11 +145,18 @@ fn headline(of: &Sources<'_>, kind: GeneratorKind) -> Headline {
 }
 
 fn best(of: &Sources<'_>) -> Section {
-    let header: Vec<String> = ["Variant".to_owned(), "basis".to_owned()]
-        .into_iter()
-        .chain(of.study.fields.iter().cloned())
-        .chain(FIGURES.iter().map(|(name, _)| heading(name)))
-        .collect();
+    // What decides comes first: a phone shows three columns.
+    let decides = |name: &str| of.settings.targets.iter().any(|target| target.figure == name);
+    let (first, others): (Vec<FigureOf>, Vec<FigureOf>) = FIGURES.iter().copied().partition(|(name, _)| decides(name));
+    let headings = |figures: &[FigureOf]| figures.iter().map(|(name, _)| heading(name)).collect::<Vec<_>>();
+    let header = [
+        vec!["Variant".to_owned()],
+        headings(&first),
+        of.study.fields.clone(),
+        vec!["basis".to_owned()],
+        headings(&others),
+    ]
+    .concat();
     let blocks = of
         .settings
         .generators
@@ -157,10 +164,16 @@ fn best(of: &Sources<'_>) -> Section {
         .map(|kind| {
             let front = of.study.front(*kind, &of.settings.targets);
             let rows = front.iter().take(MOST_ROWS).map(|run| {
-                let fields = run.values.iter().map(|value| Text::new(value.clone()));
-                let figures = FIGURES.iter().map(|(name, figure)| value(name, figure(&run.sheet)));
-                let variant = [run.variant.to_string(), run.basis.name().to_owned()].map(Text::new);
-                variant.into_iter().chain(fields).chain(figures).collect()
+                let figures =
+                    |all: &[FigureOf]| all.iter().map(|(name, of)| value(name, of(&run.sheet))).collect::<Vec<_>>();
+                [
+                    vec![Text::new(run.variant.to_string())],
+                    figures(&first),
+                    run.values.iter().cloned().map(Text::new).collect(),
+                    vec![Text::new(run.basis.name())],
+                    figures(&others),
+                ]
+                .concat()
             });
             let rows: Vec<Vec<Text>> = rows.collect();
             let caption = if front.len() > MOST_ROWS {
