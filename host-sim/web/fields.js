@@ -4,7 +4,7 @@ import { numbers } from "./pack.js";
 import { factor, onUnits, titled, written } from "./quantities.js";
 import { colour, css, diverging, FONT, onTheme, viridis } from "./theme.js";
 
-const MARGIN = { left: 70, right: 78, top: 10, bottom: 42 };
+const MARGIN = { left: 70, right: 96, top: 10, bottom: 42 };
 
 /** Edges of the cells around nodes: half way between them, and as far beyond the ends. */
 function edges(nodes) {
