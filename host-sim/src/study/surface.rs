@@ -141,11 +141,10 @@ mod tests {
         let values: Vec<f64> = points.iter().map(|p| curved(p)).collect();
         let surface = Surface::through(points, &values).unwrap();
         let most = grid(11).iter().map(|p| (surface.at(p) - curved(p)).abs()).fold(0.0, f64::max);
-        // Of a range of 1.8.
+        // Of a range of 1.8. On a grid leaving out tells a third of it: what is left out has neighbours in its row.
         assert!(most < 0.05, "{most}");
-        // At the corners, where least is known, leaving out is worst.
         let told = surface.left_out.iter().map(|x| x.abs()).fold(0.0, f64::max);
-        assert!((0.5 * most..0.5).contains(&told), "{told}, {most}");
+        assert!((0.2 * most..0.5).contains(&told), "{told}, {most}");
     }
 
     /// Leaving out in closed form is leaving out.
