@@ -10,11 +10,13 @@
 //! - failed, with the reason and the last stable load;
 //! - was silently wrong: whole, but it cannot be true, and nothing was said.
 //!
-//! The rows go to the file, the sums to the screen. It ends with 1 if any drive is silently wrong, or if more than 1 % failed.
+//! The rows go to the file as they come, the sums to the screen. It ends with 1 if any drive is silently wrong, or if more than 1 % failed.
 
-use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Write as _;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use flexspline_sim::data_sheet::{DataSheet, Loads, data_sheet};
@@ -150,28 +152,24 @@ fn impossible(sheet: &DataSheet) -> Option<String> {
     None
 }
 
-fn csv(rows: &[Row], first: usize) -> String {
-    let mut text =
-        "drive,teeth,module_mm,generator,sleeve,load_share,largest_n_m,verdict,seconds,last_stable_n_m,sets,why\n"
-            .to_owned();
-    let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
-    for (k, row) in rows.iter().enumerate() {
-        let Drawn { kind, load_share, sleeve, few, sets } = &row.drawn;
-        let _ = writeln!(
-            text,
-            "{},{},{},{kind},{sleeve},{load_share:.3},{},{},{:.2},{},{},\"{}\"",
-            first + k,
-            few.teeth,
-            few.module_mm,
-            number(row.loads.map(|loads| loads.largest_n_m)),
-            row.verdict,
-            row.seconds,
-            number(row.sheet.last_stable_n_m),
-            sets.join(" "),
-            row.why.replace('"', "'"),
-        );
-    }
-    text
+const HEADER: &str =
+    "drive,teeth,module_mm,generator,sleeve,load_share,largest_n_m,verdict,seconds,last_stable_n_m,sets,why";
+
+/// A row of the file.
+fn line(number: usize, row: &Row) -> String {
+    let of = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
+    let Drawn { kind, load_share, sleeve, few, sets } = &row.drawn;
+    format!(
+        "{number},{},{},{kind},{sleeve},{load_share:.3},{},{},{:.2},{},{},\"{}\"",
+        few.teeth,
+        few.module_mm,
+        of(row.loads.map(|loads| loads.largest_n_m)),
+        row.verdict,
+        row.seconds,
+        of(row.sheet.last_stable_n_m),
+        sets.join(" "),
+        row.why.replace('"', "'"),
+    )
 }
 
 fn main() -> ExitCode {
@@ -182,19 +180,30 @@ fn main() -> ExitCode {
         return ExitCode::from(2);
     };
     let first: usize = arguments.get(3).and_then(|first| first.parse().ok()).unwrap_or(0);
-    let done = AtomicUsize::new(0);
+    let out = match File::create(file).and_then(|mut out| writeln!(out, "{HEADER}").map(|()| out)) {
+        Ok(out) => Mutex::new(out),
+        Err(error) => {
+            eprintln!("{file}: {error}");
+            return ExitCode::from(2);
+        }
+    };
+    let (done, lost) = (AtomicUsize::new(0), AtomicBool::new(false));
     let rows: Vec<Row> = (first..first + count)
         .into_par_iter()
         .with_max_len(1)
         .map(|number| {
             let row = run(seed, number);
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            let mut out = out.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Err(error) = writeln!(out, "{}", line(number, &row)) {
+                eprintln!("{file}: {error}");
+                lost.store(true, Ordering::Relaxed);
+            }
             eprintln!("{done}/{count} drive {number}: {} in {:.1} s {}", row.verdict, row.seconds, row.why);
             row
         })
         .collect();
-    if let Err(error) = std::fs::write(file, csv(&rows, first)) {
-        eprintln!("{file}: {error}");
+    if lost.into_inner() {
         return ExitCode::from(2);
     }
     let of = |verdict: &str| rows.iter().filter(|row| row.verdict == verdict).count();

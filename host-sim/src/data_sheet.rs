@@ -135,6 +135,52 @@ pub struct DataSheet {
 }
 
 impl DataSheet {
+    /// A sheet of figures in the order of [`FIGURES`].
+    pub fn of_figures(figures: [Option<f64>; FIGURES.len()]) -> DataSheet {
+        let [
+            rigid_gap_um,
+            room_as_built_arcsec,
+            backlash_arcsec,
+            lost_motion_arcsec,
+            k1_n_m_per_rad,
+            k2_n_m_per_rad,
+            k3_n_m_per_rad,
+            wind_up_arcsec,
+            kinematic_error_pp_arcsec,
+            max_von_mises_mpa,
+            root_fillet_mpa,
+            bore_mpa,
+            peak_flank_pressure_mpa,
+            peak_generator_pressure_mpa,
+            lobe_force_n,
+            tilt_mrad,
+            load_across_face_peak_over_mean,
+            teeth_in_contact_percent,
+            last_stable_n_m,
+        ] = figures;
+        DataSheet {
+            rigid_gap_um,
+            room_as_built_arcsec,
+            backlash_arcsec,
+            lost_motion_arcsec,
+            k1_n_m_per_rad,
+            k2_n_m_per_rad,
+            k3_n_m_per_rad,
+            wind_up_arcsec,
+            kinematic_error_pp_arcsec,
+            max_von_mises_mpa,
+            root_fillet_mpa,
+            bore_mpa,
+            peak_flank_pressure_mpa,
+            peak_generator_pressure_mpa,
+            lobe_force_n,
+            tilt_mrad,
+            load_across_face_peak_over_mean,
+            teeth_in_contact_percent,
+            last_stable_n_m,
+        }
+    }
+
     /// What cautions look at.
     pub fn looked(&self) -> Looked {
         Looked {
@@ -263,4 +309,19 @@ fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize
     sheet.max_von_mises_mpa = Some(peak.von_mises_mpa);
     (sheet.root_fillet_mpa, sheet.bore_mpa) = (Some(root_fillet), Some(bore));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sheet_of_figures_has_each_under_its_name() {
+        let sheet = DataSheet::of_figures(std::array::from_fn(|k| Some(k as f64)));
+        for (k, (name, of)) in FIGURES.iter().enumerate() {
+            assert_eq!(of(&sheet), Some(k as f64), "{name}");
+            let told = serde_json::to_value(sheet).unwrap();
+            assert_eq!(told[name], k as f64, "{name}");
+        }
+    }
 }

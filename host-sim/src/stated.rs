@@ -342,7 +342,9 @@ impl SheetBeside {
         );
         for row in &self.beside {
             let computed = row.computed.map_or_else(|| "-".to_owned(), short);
-            let ratio = row.ratio.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.2}"));
+            // A ratio far below 1 is a number, too.
+            let digits = |ratio: f64| if ratio.abs() < 0.1 { 4 } else { 2 };
+            let ratio = row.ratio.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.0$}", digits(ratio)));
             lines += &format!(
                 "  {:<24}{:>12}{computed:>12}{ratio:>8}  {}\n",
                 row.figure,

@@ -184,7 +184,17 @@ export function lineChart(place, id, spec) {
         axis(spec.y, (u, texts) => Math.max(48, 20 + 7 * Math.max(0, ...(texts ?? []).map((t) => t.length)))),
       ],
       series: [{ label: spec.x.label, value: (u, v) => say(u, v, spec.x.quantity, fx) }, ...series],
-      legend: { live: true, markers: { width: 3, stroke: (u, k) => series[k - 1]?.stroke } },
+      legend: {
+        live: true,
+        // A line is solid or dashed as it is drawn; what has points alone is filled.
+        markers: {
+          width: 3,
+          stroke: (u, k) => series[k - 1]?.stroke,
+          dash: (u, k) => (series[k - 1]?.dash ? "dashed" : series[k - 1]?.paths ? "dotted" : "solid"),
+          fill: (u, k) =>
+            series[k - 1]?.paths && series[k - 1].points.size > 3 ? series[k - 1].stroke : "transparent",
+        },
+      },
       cursor: { drag: { x: true, y: true, uni: 20 }, focus: { prox: 24 } },
       hooks: {
         draw: [

@@ -2,9 +2,9 @@
 import { addTools, watchWidth } from "./charts.js";
 import { numbers } from "./pack.js";
 import { factor, onUnits, titled, written } from "./quantities.js";
-import { colour, css, FONT, onTheme, viridis } from "./theme.js";
+import { colour, css, diverging, FONT, onTheme, viridis } from "./theme.js";
 
-const MARGIN = { left: 70, right: 78, top: 10, bottom: 42 };
+const MARGIN = { left: 70, right: 96, top: 10, bottom: 42 };
 
 /** Edges of the cells around nodes: half way between them, and as far beyond the ends. */
 function edges(nodes) {
@@ -24,6 +24,11 @@ function ticks(low, high, most) {
   return all;
 }
 
+/** Which of the values a scale ends before: the lowest, the highest, both or none. */
+function clippedWords([below, above]) {
+  return [below && "lowest", above && "highest"].filter(Boolean).join(" and the ");
+}
+
 /** A field in `place`. */
 export function fieldMap(place, id, spec) {
   const canvas = document.createElement("canvas");
@@ -35,6 +40,7 @@ export function fieldMap(place, id, spec) {
   place.append(canvas, readout);
   let choice = null;
   let field = null;
+  let note = "";
 
   function draw() {
     const width = Math.floor(place.clientWidth);
@@ -49,7 +55,8 @@ export function fieldMap(place, id, spec) {
     ctx.scale(ratio, ratio);
     ctx.font = FONT;
     const [w, h] = [width - MARGIN.left - MARGIN.right, height - MARGIN.top - MARGIN.bottom];
-    const { x, y, z, low, high } = field;
+    const { x, y, z, low, high, clipped } = field;
+    const coloured = low === -high ? diverging : viridis;
     // Rows are equally high: torque nodes crowd near zero, where most happens.
     const ex = edges(x);
     const px = (v) => MARGIN.left + ((v - ex[0]) / (ex.at(-1) - ex[0])) * w;
@@ -58,7 +65,7 @@ export function fieldMap(place, id, spec) {
       for (let c = 0; c < x.length; c++) {
         const value = z[row * x.length + c];
         if (Number.isNaN(value)) continue;
-        ctx.fillStyle = css(viridis((value - low) / (high - low)));
+        ctx.fillStyle = css(coloured((value - low) / (high - low)));
         const [left, right] = [px(ex[c]), px(ex[c + 1])];
         ctx.fillRect(left, py(row + 1), right - left + 0.5, h / y.length + 0.5);
       }
@@ -82,7 +89,7 @@ export function fieldMap(place, id, spec) {
     ctx.restore();
     const bar = MARGIN.left + w + 14;
     for (let k = 0; k < h; k++) {
-      ctx.fillStyle = css(viridis(1 - k / h));
+      ctx.fillStyle = css(coloured(1 - k / h));
       ctx.fillRect(bar, MARGIN.top + k, 12, 1.5);
     }
     ctx.fillStyle = colour("text");
@@ -91,9 +98,10 @@ export function fieldMap(place, id, spec) {
       const value = low + share * (high - low);
       // The middle of a symmetric scale is zero but for rounding.
       const text = written(Math.abs(value) < 1e-6 * (high - low) ? 0 : value, spec.z.quantity, 3, false);
-      ctx.fillText(text, bar + 16, MARGIN.top + h * (1 - share) + (share === 1 ? 10 : share === 0 ? 0 : 4));
+      const beyond = share === 0 && clipped[0] ? "≤ " : share === 1 && clipped[1] ? "≥ " : "";
+      ctx.fillText(beyond + text, bar + 16, MARGIN.top + h * (1 - share) + (share === 1 ? 10 : share === 0 ? 0 : 4));
     }
-    readout.textContent = `Colour: ${titled(spec.z.label, spec.z.quantity)}. Point at the map to read it.`;
+    readout.textContent = `Colour: ${titled(spec.z.label, spec.z.quantity)}. Point at the map to read it.${note}`;
     place.dataset.drawn = choice;
   }
 
@@ -138,8 +146,13 @@ export function fieldMap(place, id, spec) {
       // A few cells that stand out do not take the colours of all others.
       const there = z.filter((v) => !Number.isNaN(v)).sort((a, b) => a - b);
       const beside = Math.floor(0.004 * there.length);
-      field = { x, y, z, low: there[beside], high: there[there.length - 1 - beside] };
-      if (field.high - field.low < 1e-12) field.high = field.low + 1;
+      let [low, high] = [there[beside], there[there.length - 1 - beside]];
+      // What has a sign is as far from zero either way.
+      if (low < 0 && high > 0) [low, high] = [-Math.max(-low, high), Math.max(-low, high)];
+      if (high - low < 1e-12) high = low + 1;
+      field = { x, y, z, low, high, clipped: [there[0] < low, there.at(-1) > high] };
+      const ends = clippedWords(field.clipped);
+      note = ends && ` The colours end before the ${ends}.`;
       draw();
       place.refreshTable?.();
     },

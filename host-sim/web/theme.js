@@ -20,14 +20,24 @@ export function onTheme(listener) {
 
 /** Anchors of the map viridis, dark to light; equal steps look equal, to colour-blind eyes too. */
 const VIRIDIS = ["440154", "472d7b", "3b528b", "2c728e", "21918c", "28ae80", "5ec962", "addc30", "fde725"];
-const ANCHORS = VIRIDIS.map((hex) => [0, 2, 4].map((k) => parseInt(hex.slice(k, k + 2), 16)));
+/** Anchors of a map that is pale in the middle, blue below and red above (ColorBrewer's RdBu, safe for colour-blind eyes). */
+const BLUE_RED = ["053061", "2166ac", "4393c3", "92c5de", "f7f7f7", "f4a582", "d6604d", "b2182b", "67001f"];
+const bytes = (all) => all.map((hex) => [0, 2, 4].map((k) => parseInt(hex.slice(k, k + 2), 16)));
 
-/** Colour of the map at 0 to 1, as three bytes. */
-export function viridis(x) {
-  const place = Math.min(Math.max(x, 0), 1) * (ANCHORS.length - 1);
-  const k = Math.min(Math.floor(place), ANCHORS.length - 2);
-  return ANCHORS[k].map((from, c) => Math.round(from + (ANCHORS[k + 1][c] - from) * (place - k)));
+/** Colour of a map with these anchors at 0 to 1, as three bytes. */
+function between(anchors, x) {
+  const place = Math.min(Math.max(x, 0), 1) * (anchors.length - 1);
+  const k = Math.min(Math.floor(place), anchors.length - 2);
+  return anchors[k].map((from, c) => Math.round(from + (anchors[k + 1][c] - from) * (place - k)));
 }
+
+const [SEQUENTIAL, DIVERGING] = [VIRIDIS, BLUE_RED].map(bytes);
+
+/** For sizes. */
+export const viridis = (x) => between(SEQUENTIAL, x);
+
+/** For what has a sign: 0.5 is zero. */
+export const diverging = (x) => between(DIVERGING, x);
 
 export function css([r, g, b]) {
   return `rgb(${r} ${g} ${b})`;

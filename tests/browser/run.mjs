@@ -765,6 +765,24 @@ await check("WebGL2 and a plain canvas draw the same", async () => {
   return `${(100 * differ).toFixed(2)} % of the pixels differ; ${rates.join(", ")}`;
 });
 
+await check("a legend tells marks apart", async () => {
+  const { page, close } = await open("study/report.html");
+  await page.waitForSelector("#trade .u-legend .u-marker");
+  const marks = await page.$$eval("#trade .u-legend .u-marker", (all) =>
+    all.map((mark) => {
+      const { borderTopStyle, borderTopColor, backgroundColor } = getComputedStyle(mark);
+      return [borderTopStyle, borderTopColor, backgroundColor].join(" ");
+    }),
+  );
+  await close();
+  const series = marks.slice(-3);
+  assert(new Set(series).size === 3, series.join(" | "));
+  assert(
+    series.every((mark) => mark.startsWith("dotted")),
+    series.join(" | "),
+  );
+});
+
 await check("without DecompressionStream it says so", async () => {
   const old = await open("tables/report.html", {
     before: () => delete globalThis.DecompressionStream,

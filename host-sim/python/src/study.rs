@@ -11,7 +11,7 @@ use crate::run::run;
 
 /// Runs every variant with every generator; the fields and runs of `study.json`.
 #[pyfunction]
-#[pyo3(signature = (drive, vary, generators, *, variants, seed, torque_n_m, keep, least, most, positions, mesh, threads, progress))]
+#[pyo3(signature = (drive, vary, generators, *, variants, seed, torque_n_m, keep, least, most, positions, compute_all, mesh, threads, progress))]
 #[expect(clippy::too_many_arguments, reason = "each is an option of the run")]
 pub fn study(
     py: Python<'_>,
@@ -25,6 +25,7 @@ pub fn study(
     least: Vec<String>,
     most: Vec<String>,
     positions: usize,
+    compute_all: bool,
     mesh: &str,
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -48,6 +49,7 @@ pub fn study(
         positions,
         constraints: keep.iter().map(|text| text.parse::<Constraint>().map_err(bad)).collect::<PyResult<_>>()?,
         targets: least.chain(most).collect::<PyResult<_>>()?,
+        compute_all,
         solver: SolverSettings { method: Method::Fast, mesh, ..SolverSettings::default() },
     };
     let made = run(py, threads, progress, move |watch| {

@@ -79,9 +79,13 @@ pub(super) fn diagnosis<'p>(
 
 /// Writes the page; a failure that it is stamped with is that of the command.
 pub(super) fn write(page: &Page, out: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
-    let path = out.join("report.html");
+    write_to(page, &out.join("report.html"), outputs)
+}
+
+/// Writes the page to a file.
+pub(super) fn write_to(page: &Page, path: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
     let html = page.html().map_err(|error| Failure::Failed(format!("{}: {error}", path.display())))?;
-    outputs.file(&path, |file| file.write_all(html.as_bytes()))?;
+    outputs.file(path, |file| file.write_all(html.as_bytes()))?;
     Ok(())
 }
 

@@ -16,7 +16,7 @@ use crate::output::Outputs;
 use crate::report::study_report;
 use crate::stepping::{Method, SolverSettings};
 use crate::study::{
-    Constraint, Effect, Run, RunStatus, Sense, Study, StudyError, StudySettings, Target, Vary, effects, study,
+    Basis, Constraint, Effect, Run, RunStatus, Sense, Study, StudyError, StudySettings, Target, Vary, effects, study,
 };
 
 /// Targets where none are given: an exact drive, a stiff one, one that lasts.
@@ -32,6 +32,10 @@ const SHOWN: usize = 5;
 /// study.json and report.html: curves or maps, the front of what nothing beats, what each field does.
 ///
 /// A drive with imperfections is looked at in one place of its turns, and the gap of its rigid teeth is that of the drawing.
+///
+/// Of many variants (more than 48; with four fields or more, 12 for each and 12) so many are computed that cover all ranges, and what
+/// nothing beats; a surface through them estimates the others. The column `basis` says which a row is, and what estimates are off by is
+/// measured, leaving out each computed variant in turn, and told. --compute-all computes every one.
 ///
 /// A variant that finds no equilibrium has the figures until then, its last stable load and the reason; one whose fields make no
 /// drive has the reason.
@@ -74,6 +78,9 @@ pub(super) struct StudyCommand {
     /// Positions over the tooth pitch
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u8).range(4..=32))]
     positions: u8,
+    /// Compute every variant, however many there are [default: estimate most of many]
+    #[arg(long)]
+    compute_all: bool,
     /// Mesh: coarse, standard or fine
     #[arg(long, value_name = "LEVEL", default_value = "coarse", value_parser = names::mesh(), hide_possible_values = true)]
     mesh: MeshLevel,
@@ -97,6 +104,8 @@ struct Told<'a> {
     converged: usize,
     failed: usize,
     refused: usize,
+    /// Runs whose figures are estimated.
+    estimated: usize,
     /// Runs that meet every constraint.
     meet: usize,
     effects: &'a [Effect],
@@ -148,6 +157,7 @@ impl StudyCommand {
             converged: count(RunStatus::Converged),
             failed: count(RunStatus::Failed),
             refused: count(RunStatus::Refused),
+            estimated: made.runs.iter().filter(|run| run.basis == Basis::Estimated).count(),
             meet: made.runs.iter().filter(|run| run.meets).count(),
             effects: &fields_do,
             study: &made,
@@ -208,6 +218,7 @@ impl StudyCommand {
             positions: usize::from(self.positions),
             constraints: self.keep.clone(),
             targets,
+            compute_all: self.compute_all,
             solver: SolverSettings { method: Method::Fast, mesh: self.mesh, ..SolverSettings::default() },
         })
     }
@@ -223,7 +234,7 @@ fn csv(study: &Study) -> String {
     };
     let fixed = ["variant", "generator"];
     let loads = ["t1_n_m", "t2_n_m", "largest_n_m"];
-    let end = ["status", "meets", "front", "why", "cautions"];
+    let end = ["status", "basis", "meets", "front", "why", "cautions"];
     let figures = FIGURES.map(|(name, _)| name);
     let fields = study.fields.iter().map(String::as_str);
     let header: Vec<&str> = fixed.into_iter().chain(fields).chain(loads).chain(figures).chain(end).collect();
@@ -236,7 +247,12 @@ fn csv(study: &Study) -> String {
             [run.loads.map(|l| l.t1_n_m), run.loads.map(|l| l.t2_n_m), run.loads.map(|l| l.largest_n_m)].map(number),
         );
         row.extend(FIGURES.iter().map(|(_, of)| number(of(&run.sheet))));
-        row.extend([run.status.name().to_owned(), run.meets.to_string(), run.front.to_string()]);
+        row.extend([
+            run.status.name().to_owned(),
+            run.basis.name().to_owned(),
+            run.meets.to_string(),
+            run.front.to_string(),
+        ]);
         row.push(cell(run.why.as_deref().unwrap_or("")));
         row.push(cell(&run.cautions.iter().map(|caution| caution.words.as_str()).collect::<Vec<_>>().join("; ")));
         text += &(row.join(",") + "\n");
@@ -261,9 +277,10 @@ fn line(run: &Run) -> String {
 fn text(told: &Told<'_>, settings: &StudySettings) -> String {
     let study = told.study;
     let mut text = format!(
-        "{}: {} runs; {} converged, {} failed, {} refused; {} meet what has to be kept\n",
+        "{}: {} runs, {} of them estimated; {} converged, {} failed, {} refused; {} meet what has to be kept\n",
         told.drive,
         study.runs.len(),
+        told.estimated,
         told.converged,
         told.failed,
         told.refused,
@@ -283,7 +300,8 @@ fn text(told: &Told<'_>, settings: &StudySettings) -> String {
                     format!("{} {:.4}", target.figure, if target.sense == Sense::Most { -cost } else { cost })
                 })
                 .collect();
-            let _ = writeln!(text, "  {:>4}  {}: {}", run.variant, values.join(" "), figures.join(", "));
+            let basis = if run.basis == Basis::Estimated { " (estimated)" } else { "" };
+            let _ = writeln!(text, "  {:>4}  {}: {}{basis}", run.variant, values.join(" "), figures.join(", "));
         }
         let more = front.len().saturating_sub(SHOWN);
         if more > 0 {
@@ -292,6 +310,15 @@ fn text(told: &Told<'_>, settings: &StudySettings) -> String {
         let why = study.runs.iter().filter(|run| run.generator == *kind).find_map(|run| run.why.as_deref());
         if let Some(why) = why {
             let _ = writeln!(text, "  the first that did not converge: {why}");
+        }
+        let off: Vec<String> = settings
+            .targets
+            .iter()
+            .filter_map(|target| study.off.iter().find(|off| off.generator == *kind && off.figure == target.figure))
+            .map(|off| format!("{} {:.2} %", off.figure, off.rms_percent))
+            .collect();
+        if !off.is_empty() {
+            let _ = writeln!(text, "  estimates are off by, root mean square: {}", off.join(", "));
         }
     }
     text

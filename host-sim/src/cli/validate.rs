@@ -1,7 +1,7 @@
 //! `flexspline validate`: tables against fresh FEM, through the core.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use clap::{Args, ValueHint};
@@ -59,7 +59,7 @@ pub(super) struct Validate {
     /// Solver of the fresh FEM: reference or fast
     #[arg(long, value_name = "SOLVER", default_value = "reference", value_parser = names::solver(), hide_possible_values = true)]
     solver: Method,
-    /// Do not write report.html, which takes a FEM run over one more tooth pitch for each generator
+    /// Do not write report.html (validation.html beside the page of the tables), which takes a FEM run over one more tooth pitch for each generator
     #[arg(long)]
     no_report: bool,
 }
@@ -138,14 +138,19 @@ impl Validate {
         let mut outputs = Outputs::new();
         outputs.json(&out.join("validation.json"), &report)?;
         if !self.no_report {
-            report::write(&self.page(context, &drive, &images, &report)?, out, &mut outputs)?;
+            report::write_to(
+                &self.page(context, &drive, &images, &report)?,
+                &page_path(out, &self.tables),
+                &mut outputs,
+            )?;
         }
         outputs.finish()?;
         context.print(&report, || {
             let tables = quoted(&self.tables.display().to_string());
             let next = format!("diagnose DATA.csv --tables {tables} --generator {}", report.tables[0].generator);
             let next = if passed { say::next(&[context.next(&next)]) } else { String::new() };
-            text(&report, out, !self.no_report) + &next
+            let page = (!self.no_report).then(|| page_path(out, &self.tables));
+            text(&report, out, page.as_deref()) + &next
         })?;
         if passed {
             Ok(())
@@ -208,7 +213,13 @@ impl Validate {
     }
 }
 
-fn text(report: &Report, out: &std::path::Path, with_page: bool) -> String {
+/// Where the page goes: not over that of the tables, where both have one folder.
+fn page_path(out: &Path, tables: &Path) -> PathBuf {
+    let same = || Some(out.canonicalize().ok()? == tables.canonicalize().ok()?);
+    out.join(if same() == Some(true) { "validation.html" } else { "report.html" })
+}
+
+fn text(report: &Report, out: &Path, page: Option<&Path>) -> String {
     let mut text = String::from(
         "generator    table_id          points  rms\"    max\"    reversal rms\"  max\"    without table, rms\"\n",
     );
@@ -227,8 +238,24 @@ fn text(report: &Report, out: &std::path::Path, with_page: bool) -> String {
         ));
     }
     text.push_str(&format!("wrote {}", out.join("validation.json").display()));
-    if with_page {
-        text.push_str(&format!(" and {}, for any browser", out.join("report.html").display()));
+    if let Some(page) = page {
+        text.push_str(&format!(" and {}, for any browser", page.display()));
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_of_the_tables_is_not_written_over() {
+        let folder = std::env::temp_dir().join(format!("flexspline-validate-{}", std::process::id()));
+        std::fs::create_dir_all(folder.join("tables")).unwrap();
+        let tables = folder.join("tables");
+        assert_eq!(page_path(&tables.join("../tables"), &tables).file_name().unwrap(), "validation.html");
+        assert_eq!(page_path(&folder, &tables), folder.join("report.html"));
+        assert_eq!(page_path(&folder, &folder.join("nowhere")), folder.join("report.html"));
+        std::fs::remove_dir_all(folder).unwrap();
+    }
 }

@@ -6,9 +6,9 @@ use super::page::{
     Axis, Block, Choice, Detail, EVERY_CHOICE, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity,
     Section, Series, Status, Table, Text, significant,
 };
-use crate::data_sheet::FIGURES;
+use crate::data_sheet::{FIGURES, FigureOf};
 use crate::drive::{Drive, GeneratorKind};
-use crate::study::{Effect, Run, RunStatus, Sense, Study, StudySettings, figure};
+use crate::study::{Basis, Effect, Run, RunStatus, Sense, Study, StudySettings, figure};
 
 /// Rows of the table of the best.
 const MOST_ROWS: usize = 25;
@@ -49,6 +49,7 @@ pub fn page(of: Sources<'_>) -> Page {
     let mut sections = vec![best(&of)];
     sections.extend(does(&of));
     sections.push(trade(&of));
+    sections.extend(off(&of));
     sections.push(curves(&of));
     sections.push(reading());
     Page {
@@ -144,11 +145,18 @@ fn headline(of: &Sources<'_>, kind: GeneratorKind) -> Headline {
 }
 
 fn best(of: &Sources<'_>) -> Section {
-    let header: Vec<String> = ["Variant".to_owned()]
-        .into_iter()
-        .chain(of.study.fields.iter().cloned())
-        .chain(FIGURES.iter().map(|(name, _)| heading(name)))
-        .collect();
+    // What decides comes first: a phone shows three columns.
+    let decides = |name: &str| of.settings.targets.iter().any(|target| target.figure == name);
+    let (first, others): (Vec<FigureOf>, Vec<FigureOf>) = FIGURES.iter().copied().partition(|(name, _)| decides(name));
+    let headings = |figures: &[FigureOf]| figures.iter().map(|(name, _)| heading(name)).collect::<Vec<_>>();
+    let header = [
+        vec!["Variant".to_owned()],
+        headings(&first),
+        of.study.fields.clone(),
+        vec!["basis".to_owned()],
+        headings(&others),
+    ]
+    .concat();
     let blocks = of
         .settings
         .generators
@@ -156,9 +164,16 @@ fn best(of: &Sources<'_>) -> Section {
         .map(|kind| {
             let front = of.study.front(*kind, &of.settings.targets);
             let rows = front.iter().take(MOST_ROWS).map(|run| {
-                let fields = run.values.iter().map(|value| Text::new(value.clone()));
-                let figures = FIGURES.iter().map(|(name, figure)| value(name, figure(&run.sheet)));
-                [Text::new(run.variant.to_string())].into_iter().chain(fields).chain(figures).collect()
+                let figures =
+                    |all: &[FigureOf]| all.iter().map(|(name, of)| value(name, of(&run.sheet))).collect::<Vec<_>>();
+                [
+                    vec![Text::new(run.variant.to_string())],
+                    figures(&first),
+                    run.values.iter().cloned().map(Text::new).collect(),
+                    vec![Text::new(run.basis.name())],
+                    figures(&others),
+                ]
+                .concat()
             });
             let rows: Vec<Vec<Text>> = rows.collect();
             let caption = if front.len() > MOST_ROWS {
@@ -202,6 +217,41 @@ fn does(of: &Sources<'_>) -> Option<Section> {
         })
         .collect();
     let (id, title) = ("does".to_owned(), "What each field does".to_owned());
+    (!blocks.is_empty()).then_some(Section { id, title, detail: Detail::Summary, blocks })
+}
+
+/// What estimated figures are off by; nothing where all are computed.
+fn off(of: &Sources<'_>) -> Option<Section> {
+    let header = ["Figure", "variants computed", "off, rms", "off, rms, %", "off, most"];
+    let blocks: Vec<Block> = of
+        .settings
+        .generators
+        .iter()
+        .filter_map(|kind| {
+            let estimated = of_kind(of.study, *kind).filter(|run| run.basis == Basis::Estimated).count();
+            let rows: Vec<Vec<Text>> = of
+                .study
+                .off
+                .iter()
+                .filter(|off| off.generator == *kind)
+                .map(|off| {
+                    vec![
+                        Text::new(heading(off.figure)),
+                        Text::new(off.runs.to_string()),
+                        value(off.figure, Some(off.rms)),
+                        Text::new(significant(off.rms_percent, 2)),
+                        value(off.figure, Some(off.largest)),
+                    ]
+                })
+                .collect();
+            let caption = format!(
+                "{estimated} variants are estimated by a surface through the others. What it is off by where a computed variant is left out of it"
+            );
+            let table = Table { caption, header: header.map(str::to_owned).to_vec(), rows };
+            (!table.rows.is_empty()).then(|| Block::Table { choice: Some(kind.to_string()), table })
+        })
+        .collect();
+    let (id, title) = ("off".to_owned(), "How far to trust estimates".to_owned());
     (!blocks.is_empty()).then_some(Section { id, title, detail: Detail::Summary, blocks })
 }
 

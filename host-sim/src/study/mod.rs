@@ -2,7 +2,9 @@
 //! constraints, which are best, and what each field does.
 
 mod effects;
+mod estimate;
 mod judge;
+mod surface;
 mod vary;
 
 use std::ops::ControlFlow;
@@ -12,12 +14,13 @@ use rayon::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::cautions::Caution;
+use crate::cautions::{Caution, rigid_gap_um, room_as_built_arcsec};
 use crate::data_sheet::{DataSheet, Loads, data_sheet};
 use crate::drive::{Drive, GeneratorKind};
 use crate::stepping::SolverSettings;
 
 pub use effects::{Effect, effects};
+pub use estimate::{Off, computed_first};
 pub use judge::{Constraint, JudgeError, Sense, Target, figure};
 pub use vary::{Values, Vary, VaryError};
 
@@ -45,6 +48,8 @@ pub struct StudySettings {
     pub constraints: Vec<Constraint>,
     /// What makes a variant better than another.
     pub targets: Vec<Target>,
+    /// Every variant is computed, however many there are.
+    pub compute_all: bool,
     /// The numerical method.
     pub solver: SolverSettings,
 }
@@ -100,6 +105,26 @@ impl RunStatus {
     }
 }
 
+/// Where the figures of a run are from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Basis {
+    /// Contact FEM of this variant.
+    Computed,
+    /// The drawing of this variant and, for all that takes FEM, a surface through the variants that were computed ([`Off`]).
+    Estimated,
+}
+
+impl Basis {
+    /// As in the files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Basis::Computed => "computed",
+            Basis::Estimated => "estimated",
+        }
+    }
+}
+
 /// A variant with one generator.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Run {
@@ -111,6 +136,8 @@ pub struct Run {
     pub values: Vec<String>,
     /// How the run ended.
     pub status: RunStatus,
+    /// Where its figures are from. What is estimated counts as converged as the computed variant nearest to it did.
+    pub basis: Basis,
     /// Why, where it did not converge.
     pub why: Option<String>,
     /// What has to be known of a drive that converged before it is built.
@@ -132,6 +159,8 @@ pub struct Study {
     pub fields: Vec<String>,
     /// Every variant with every generator, by variant, then by generator.
     pub runs: Vec<Run>,
+    /// What estimated figures are off by; nothing where all are computed.
+    pub off: Vec<Off>,
 }
 
 impl Study {
@@ -156,29 +185,102 @@ pub type Observer<'a> = dyn Fn(usize, usize, &Run) -> ControlFlow<()> + Sync + '
 pub fn study(drive: &Drive, settings: &StudySettings, observer: &Observer<'_>) -> Result<Study, StudyError> {
     let variants = variants(drive, settings)?;
     let paths: Vec<&str> = settings.vary.iter().map(|field| field.path.as_str()).collect();
-    let jobs: Vec<(usize, GeneratorKind)> =
+    let jobs: Vec<Job> =
         (0..variants.len()).flat_map(|variant| settings.generators.iter().map(move |kind| (variant, *kind))).collect();
-    let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
-    let mut runs: Vec<Run> = jobs
-        .par_iter()
-        .with_max_len(1)
-        .filter_map(|&(variant, generator)| {
-            if stopped.load(Ordering::Relaxed) {
-                return None;
-            }
-            let run = run(drive, settings, &paths, variant, &variants[variant], generator);
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            if observer(done, jobs.len(), &run).is_break() {
-                stopped.store(true, Ordering::Relaxed);
-            }
-            Some(run)
-        })
-        .collect();
-    if runs.len() < jobs.len() {
-        return Err(StudyError::Stopped);
+    let several = Several { drive, settings, paths: &paths, variants: &variants, observer, done: AtomicUsize::new(0) };
+    let (runs, off) = if settings.compute_all || variants.len() <= computed_first(paths.len()) {
+        (several.run(&jobs, jobs.len(), Several::computed)?, Vec::new())
+    } else {
+        estimate::some_computed(&several, &jobs)?
+    };
+    let mut study = Study { fields: paths.iter().map(|path| (*path).to_owned()).collect(), runs, off };
+    judge::judge(&mut study.runs, &settings.constraints, &settings.targets);
+    Ok(study)
+}
+
+/// A variant, by its number from 0, with a generator.
+type Job = (usize, GeneratorKind);
+
+/// Many runs of one study.
+struct Several<'a> {
+    drive: &'a Drive,
+    settings: &'a StudySettings,
+    paths: &'a [&'a str],
+    variants: &'a [Vec<String>],
+    observer: &'a Observer<'a>,
+    done: AtomicUsize,
+}
+
+impl Several<'_> {
+    /// Runs these, in their order, as `one` does; the observer is told that there will be about `of` in all.
+    fn run(&self, jobs: &[Job], of: usize, one: fn(&Self, Job) -> Run) -> Result<Vec<Run>, StudyError> {
+        let stopped = AtomicBool::new(false);
+        let runs: Vec<Run> = jobs
+            .par_iter()
+            .with_max_len(1)
+            .filter_map(|&job| {
+                if stopped.load(Ordering::Relaxed) {
+                    return None;
+                }
+                let run = one(self, job);
+                let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+                if (self.observer)(done, of.max(done), &run).is_break() {
+                    stopped.store(true, Ordering::Relaxed);
+                }
+                Some(run)
+            })
+            .collect();
+        if runs.len() < jobs.len() { Err(StudyError::Stopped) } else { Ok(runs) }
     }
-    judge::judge(&mut runs, &settings.constraints, &settings.targets);
-    Ok(Study { fields: paths.into_iter().map(str::to_owned).collect(), runs })
+
+    /// A variant as its fields make it, or refused, without figures.
+    fn begun(&self, (variant, generator): Job) -> (Run, Option<Drive>) {
+        let values = &self.variants[variant];
+        let made = varied(self.drive, self.paths, values);
+        let load = |drive: &Drive| self.settings.torque_n_m.unwrap_or_else(|| drive.rated_torque_n_m(generator));
+        let run = Run {
+            variant: variant + 1,
+            generator,
+            values: values.clone(),
+            status: RunStatus::Refused,
+            basis: Basis::Computed,
+            why: made.as_ref().err().map(ToString::to_string),
+            cautions: Vec::new(),
+            loads: made.as_ref().ok().map(|drive| Loads::up_to(load(drive))),
+            sheet: DataSheet::default(),
+            meets: false,
+            front: false,
+        };
+        (run, made.ok())
+    }
+
+    /// A variant by contact FEM.
+    fn computed(&self, job: Job) -> Run {
+        let (mut run, drive) = self.begun(job);
+        let (Some(drive), Some(loads)) = (drive, run.loads) else { return run };
+        let StudySettings { positions, solver, .. } = *self.settings;
+        let (sheet, done) = data_sheet(&drive, job.1, drive.temperature.reference_c, loads, positions, solver);
+        (run.sheet, run.cautions) = (sheet, sheet.looked().cautions());
+        match done {
+            Ok(()) => run.status = RunStatus::Converged,
+            Err(error) => {
+                run.status = if error.is_bad_input() { RunStatus::Refused } else { RunStatus::Failed };
+                run.why = Some(error.to_string());
+            }
+        }
+        run
+    }
+
+    /// A variant by its drawing alone.
+    fn drawn(&self, job: Job) -> Run {
+        let (mut run, drive) = self.begun(job);
+        if let Some(drive) = drive {
+            (run.status, run.basis) = (RunStatus::Converged, Basis::Estimated);
+            run.sheet.rigid_gap_um = rigid_gap_um(&drive, job.1);
+            run.sheet.room_as_built_arcsec = room_as_built_arcsec(&drive, job.1);
+        }
+        run
+    }
 }
 
 fn variants(drive: &Drive, settings: &StudySettings) -> Result<Vec<Vec<String>>, StudyError> {
@@ -218,44 +320,6 @@ fn variants(drive: &Drive, settings: &StudySettings) -> Result<Vec<Vec<String>>,
 fn varied(drive: &Drive, paths: &[&str], values: &[String]) -> Result<Drive, crate::drive::DriveError> {
     let sets: Vec<String> = paths.iter().zip(values).map(|(path, value)| format!("{path}={value}")).collect();
     drive.with_sets(sets.iter().map(String::as_str))
-}
-
-fn run(
-    drive: &Drive,
-    settings: &StudySettings,
-    paths: &[&str],
-    variant: usize,
-    values: &[String],
-    generator: GeneratorKind,
-) -> Run {
-    let mut run = Run {
-        variant: variant + 1,
-        generator,
-        values: values.to_vec(),
-        status: RunStatus::Refused,
-        why: None,
-        cautions: Vec::new(),
-        loads: None,
-        sheet: DataSheet::default(),
-        meets: false,
-        front: false,
-    };
-    let drive = match varied(drive, paths, values) {
-        Ok(drive) => drive,
-        Err(error) => return Run { why: Some(error.to_string()), ..run },
-    };
-    let loads = Loads::up_to(settings.torque_n_m.unwrap_or_else(|| drive.rated_torque_n_m(generator)));
-    let (sheet, done) =
-        data_sheet(&drive, generator, drive.temperature.reference_c, loads, settings.positions, settings.solver);
-    (run.loads, run.sheet, run.cautions) = (Some(loads), sheet, sheet.looked().cautions());
-    match done {
-        Ok(()) => run.status = RunStatus::Converged,
-        Err(error) => {
-            run.status = if error.is_bad_input() { RunStatus::Refused } else { RunStatus::Failed };
-            run.why = Some(error.to_string());
-        }
-    }
-    run
 }
 
 #[cfg(test)]

@@ -150,6 +150,7 @@ def study(
     least: list[str],
     most: list[str],
     positions: int,
+    compute_all: bool,
     mesh: str,
     threads: int | None,
     progress: _Teller,

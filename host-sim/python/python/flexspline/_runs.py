@@ -203,6 +203,8 @@ class Study(Columns):
     generator: list[str]
     status: list[str]
     """``converged``, ``failed`` (no equilibrium from some load on) or ``refused`` (its fields make no drive)."""
+    basis: list[str]
+    """``computed``, or ``estimated`` by a surface through those that were; ``json["off"]`` says what that is off by."""
     meets: NDArray[np.bool_]
     front: NDArray[np.bool_]
     """What meets, and nothing that meets beats in every target."""
@@ -224,6 +226,7 @@ class Study(Columns):
                 **{name: _column([(run["loads"] or {}).get(name) for run in runs]) for name in loads},
                 **{name: _column([run["sheet"].get(name) for run in runs]) for name in figures},
                 "status": [run["status"] for run in runs],
+                "basis": [run["basis"] for run in runs],
                 "meets": np.array([run["meets"] for run in runs], dtype=np.bool_),
                 "front": np.array([run["front"] for run in runs], dtype=np.bool_),
                 "why": [run["why"] or "" for run in runs],
@@ -264,6 +267,7 @@ def study(
     least: Sequence[str] = (),
     most: Sequence[str] = (),
     positions: int = 6,
+    compute_all: bool = False,
     mesh: Mesh = "coarse",
     threads: int | None = None,
     progress: Progress = None,
@@ -272,7 +276,9 @@ def study(
 
     ``vary`` says fields and values: ``{"flexspline.rim_thickness_mm": "1.2..2.6:8"}`` (from, to, how many) or a list. Every combination runs, or
     with ``variants`` so many spread over all ranges. ``keep`` holds constraints (``backlash_arcsec=30..70``); ``least`` and ``most`` name
-    figures that decide what nothing beats (by default kinematic error and stress, and K2).
+    figures that decide what nothing beats (by default kinematic error and stress, and K2). Of many variants (more than 48, with
+    four fields or more 12 for each and 12) so many are computed, and those that nothing beats; the others are estimated by a surface through them:
+    ``basis`` says which, ``json["off"]`` what estimates are off by. ``compute_all=True`` computes every one.
     """
     if not (least or most):
         least, most = ("kinematic_error_pp_arcsec", "max_von_mises_mpa"), ("k2_n_m_per_rad",)
@@ -292,6 +298,7 @@ def study(
             least=list(least),
             most=list(most),
             positions=positions,
+            compute_all=compute_all,
             mesh=mesh,
             threads=threads,
             progress=tell,
