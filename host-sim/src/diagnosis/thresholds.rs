@@ -108,6 +108,8 @@ pub mod verdict {
     /// The size of a cause is told from zero from so many of its standard deviations on. *Chosen*: of 6 causes named below it at 99 % one was
     /// there.
     pub const TOLD_FROM_ZERO: f64 = 3.0;
+    /// Noise is known to this factor: what is left within it is noise. *Guess*.
+    pub const NOISE_KNOWN_TO: f64 = 1.25;
     /// The size of a cause is well known from so many on …
     pub const SIZE_KNOWN: f64 = 5.0;
     /// … and below, a name is stated with no more than this. *Chosen*: of 21 between the two 16 were there, of 183 beyond 177.

@@ -6,14 +6,11 @@
 //! free that floats in any drive, tells the constant. It counts where neither an unbalanced load nor a drag, all of their sizes and phases
 //! free, leaves as little.
 
-use std::f64::consts::TAU;
-
 use flexspline::Table;
 
 use super::base::{PlayLaw, predicted_by_table};
 use super::channels::{fault_throughout, floating, sample, waves};
 use super::rows::{Rows, mean, rms};
-use crate::measurement::robust::least_and_most;
 use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
 use crate::nominal::Nominal;
 
@@ -47,9 +44,6 @@ const BESIDE_IT_LEAVE: f64 = 0.95;
 /// In either case by this share of what the zero has taken away. *Chosen* between what they take of a zero in the tests below, at most 0.09, and
 /// of an unbalanced load there, 0.149; on the drives of `logger_faults` more is trifles.
 const NO_TRIFLE: f64 = 0.12;
-/// Within less of an output turn than this an unbalanced load is a constant, and a zero is named only where it leaves clearly less, by the
-/// share of [`RIVALS_LEAVE`]. *Guess*.
-const TELLS_TURNS: f64 = 0.25;
 /// First and last step of the search for such loads, as shares of the load.
 const RIVAL_STEPS: [f64; 2] = [0.04, 0.002];
 
@@ -272,11 +266,7 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     {
         return None;
     }
-    let (low, high) = least_and_most(held.rows.output.iter().copied());
     let may_be_unbalance = rivals * RIVALS_LEAVE < least;
-    if may_be_unbalance && high - low < TELLS_TURNS * TAU {
-        return None;
-    }
     let (with, without) = (held.left([-zero, 0.0, 0.0, 0.0]), held.left([0.0; 4]));
     let moved: Vec<f64> = with.iter().zip(&without).map(|(with, without)| with - without).collect();
     Some(Zero { n_m: zero, std, size_arcsec: rms(&moved), may_be_unbalance })

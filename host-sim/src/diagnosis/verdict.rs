@@ -50,7 +50,9 @@ pub(super) fn conclude(
     let unexplained = (rms_after * rms_after - floor * floor).max(0.0);
 
     let known = uncertainty::known(problem, &selected);
-    let named = understood(&selected, &standings, &known, &left_over, noise, &mut trace);
+    let beyond_noise = beyond_noise(rms_after, floor);
+    let told_from_zero: Vec<f64> = known.iter().map(|known| known.told_from_zero() / beyond_noise).collect();
+    let named = understood(&selected, &standings, &known, &told_from_zero, &left_over, noise, &mut trace);
     let size = |k: &usize| standings[*k].size.powi(2);
     let (by_name, without_name) = (
         named.iter().map(size).sum::<f64>(),
@@ -68,7 +70,7 @@ pub(super) fn conclude(
     let significant_left = without_name > 0.0 || zeros_alone;
     let held = held_out::evaluate(problem, &all);
     let abstained = Abstention { by_name, without_name, described, unexplained, explainable };
-    let gates = if named.is_empty() { Vec::new() } else { abstained.gates(significant_left, held.total, noise.white) };
+    let gates = if named.is_empty() { Vec::new() } else { abstained.gates(significant_left, held.total) };
     let verdict = match (named.is_empty(), significant_left) {
         (true, false) => Verdict::None,
         (true, true) => Verdict::Unknown,
@@ -118,7 +120,7 @@ pub(super) fn conclude(
                     &misfits,
                     has_a_double_outside(name, &known[k], problem.on.output_span_rad()),
                     closest,
-                    known[k].told_from_zero(),
+                    told_from_zero[k],
                 ),
                 parameters: known[k].parameters.clone(),
                 held_out_gain: held.gains.get(k).copied().unwrap_or(0.0),
@@ -220,7 +222,7 @@ struct Abstention {
 
 impl Abstention {
     /// What the causes have to pass together, or none of them is named.
-    fn gates(&self, significant_left: bool, held_out: HeldOut, white: f64) -> Vec<Judged> {
+    fn gates(&self, significant_left: bool, held_out: HeldOut) -> Vec<Judged> {
         let mut gates = Vec::new();
         let share = |gate: Gate, all: f64, least: f64| {
             Judged::number(gate, self.by_name / all, least, self.by_name >= least * all)
@@ -232,8 +234,7 @@ impl Abstention {
             gates.push(share(Gate::ShareDescribed, self.by_name + self.described, LEAST_BESIDE_DESCRIBED));
         }
         // Names for a small part of what is there, with the rest in the dark, are no understanding.
-        let dark = self.unexplained.sqrt() > select::least_size(white)
-            && self.unexplained > MOST_UNEXPLAINED * self.explainable;
+        let dark = self.unexplained > MOST_UNEXPLAINED * self.explainable;
         let in_the_dark = if self.explainable > 0.0 { self.unexplained / self.explainable } else { 0.0 };
         gates.push(Judged::number(Gate::InTheDark, in_the_dark, MOST_UNEXPLAINED, !dark));
         // What does not predict sessions it was not fitted to is no explanation.
@@ -249,6 +250,7 @@ fn understood(
     selected: &Selected<'_>,
     standings: &[Standing],
     known: &[Known],
+    told_from_zero: &[f64],
     left_over: &[Unexplained],
     noise: Noise,
     trace: &mut Trace,
@@ -268,11 +270,13 @@ fn understood(
             not_understood <= LARGE_BESIDE * size,
         );
         let well_known = Judged::above(Gate::KnownWell, known[k].times_its_doubt, KNOWN_BESIDE);
-        let beside = if hidden.passed { hidden } else { well_known };
+        // A straight line is a piece of whatever bends, however well it is known.
+        let straight = selected.terms[k].law.is(CauseName::RatioError);
+        let beside = if hidden.passed || straight { hidden } else { well_known };
         let gates = vec![
             Judged::above(Gate::Named, size, select::least_named(noise.white)),
             beside,
-            Judged::above(Gate::ToldFromZero, known[k].told_from_zero(), TOLD_FROM_ZERO),
+            Judged::above(Gate::ToldFromZero, told_from_zero[k], TOLD_FROM_ZERO),
         ];
         if passed(&gates) {
             named.push(k);
@@ -280,6 +284,13 @@ fn understood(
         trace.decided(Stage::Understood, selected.terms[k].law.label, None, gates);
     }
     named
+}
+
+/// By what standard deviations grow where more is left than noise (Birge 1932): the laws are not right to the noise then, and what they err by is
+/// in no covariance.
+fn beyond_noise(rms_after: f64, floor: f64) -> f64 {
+    let ratio = rms_after / floor.max(1e-30);
+    if ratio > NOISE_KNOWN_TO { ratio } else { 1.0 }
 }
 
 /// Whether something that is no cause of the library makes the same. A subdivision of the output's encoder repeats in each turn; in less than
