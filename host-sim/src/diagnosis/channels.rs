@@ -410,13 +410,23 @@ mod tests {
 
     /// A drive as its catalogue says under a load that swings, 2 arcsec of noise; `told` is what the column of torque says of the load.
     fn recording(nominal: &Nominal, told: impl Fn(f64, f64) -> f64) -> Recording {
+        recording_under(nominal, |t| 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos(), 0.05, told)
+    }
+
+    /// The same under a load of time, with a generator that turns by so much from row to row.
+    fn recording_under(
+        nominal: &Nominal,
+        load: impl Fn(f64) -> f64,
+        turned: f64,
+        told: impl Fn(f64, f64) -> f64,
+    ) -> Recording {
         let mut random = fastrand::Rng::with_seed(3);
         let mut session = Session { time_s: Some(Vec::new()), torque_n_m: Some(Vec::new()), ..Session::default() };
         let mut flank = 1.0;
         for k in 0..12_000 {
             let t = 0.01 * f64::from(k);
-            let load = 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos();
-            let psi = 0.05 * f64::from(k);
+            let load = load(t);
+            let psi = turned * f64::from(k);
             if load.abs() > nominal.friction_torque_n_m {
                 flank = load.signum();
             }
@@ -488,6 +498,16 @@ mod tests {
             session.error_rad.iter_mut().zip(&session.generator_rad).for_each(|(error, psi)| *error += by * psi);
         }
         assert!(!may_be_in_degrees(&other_ratio, &nominal, None));
+    }
+
+    #[test]
+    fn a_load_in_steps_over_few_turns_is_no_wave_of_the_wheels() {
+        let nominal = catalogue_drive();
+        let levels = [21.0, -14.0, 30.0, 8.0, -25.0, 17.0, -9.0];
+        let steps = recording_under(&nominal, |t| levels[(t / 18.0) as usize % 7], 1e-3, |_, load| load);
+        let rough = Rough::of(&steps.sessions, &nominal, None);
+        assert!((0.8..1.25).contains(&rough.harmonics.unwrap()), "{:?}", rough.harmonics);
+        assert!(is_explained(&steps, &nominal, None));
     }
 
     #[test]

@@ -310,9 +310,9 @@ mod tests {
     use crate::synthesize::catalogue_drive;
     use crate::units::ARCSEC_PER_RAD;
 
-    /// A drive as its catalogue says that goes to and fro over a third of an output turn under a load that swings, 2 arcsec of noise; with
+    /// A drive as its catalogue says that turns to and fro by so much from row to row under a load that swings, 2 arcsec of noise; with
     /// `unseen` N·m (of output angle and direction) beside what the column of torque tells.
-    fn recording(nominal: &Nominal, unseen: impl Fn(f64, f64) -> f64) -> Recording {
+    fn recording(nominal: &Nominal, turned: f64, unseen: impl Fn(f64, f64) -> f64) -> Recording {
         let mut random = fastrand::Rng::with_seed(3);
         let mut session = Session { time_s: Some(Vec::new()), torque_n_m: Some(Vec::new()), ..Session::default() };
         let (mut flank, mut psi) = (1.0, 0.0);
@@ -320,7 +320,7 @@ mod tests {
             let t = 0.01 * f64::from(k);
             let told = 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos();
             let direction = if k / 3000 % 2 == 0 { 1.0 } else { -1.0 };
-            psi += 0.08 * direction;
+            psi += turned * direction;
             let load = told + unseen(psi / nominal.ratio, direction);
             if load.abs() > nominal.friction_torque_n_m {
                 flank = load.signum();
@@ -347,8 +347,13 @@ mod tests {
 
     /// The fault found, and by how much the first torque was changed.
     fn checked(unseen: impl Fn(f64, f64) -> f64) -> (Option<Fault>, f64) {
+        // A third of an output turn.
+        checked_turning(0.08, unseen)
+    }
+
+    fn checked_turning(turned: f64, unseen: impl Fn(f64, f64) -> f64) -> (Option<Fault>, f64) {
         let nominal = catalogue_drive();
-        let mut recording = recording(&nominal, unseen);
+        let mut recording = recording(&nominal, turned, unseen);
         let first = |recording: &Recording| recording.sessions[0].torque_n_m.as_ref().unwrap()[0];
         let before = first(&recording);
         check(&mut recording, &nominal, None);
@@ -367,6 +372,13 @@ mod tests {
             assert!((found - zero).abs() < 3.0 * std && std < 0.15, "{zero}: {found} ± {std}");
             assert!((by + found).abs() < 1e-9, "{by}");
         }
+    }
+
+    #[test]
+    fn in_a_small_part_of_a_turn_a_zero_goes_before_an_unbalanced_load_that_would_do_the_same() {
+        let (fault, _) = checked_turning(0.01, |_, _| -1.2);
+        let fault = fault.expect("a fault");
+        assert!(fault.what.contains("an unbalanced load of that size"), "{}", fault.what);
     }
 
     #[test]

@@ -348,6 +348,12 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_laws_leave_beyond_the_noise_widens_what_is_told_from_zero() {
+        assert_eq!(beyond_noise(5.0, 4.5), 1.0);
+        assert_eq!(beyond_noise(6.0, 4.0), 1.5);
+    }
+
+    #[test]
     fn a_confidence_is_that_of_a_name_among_those_alike() {
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} for {b}");
         // Told no worse, or better: one of these.

@@ -342,6 +342,10 @@ mod tests {
             let rate = found(sessions(per_hour, &[0.0; 4])).expect("a drift");
             assert!((rate / per_hour - 1.0).abs() < 0.05, "{rate} for {per_hour}");
         }
+        // Two breaks are enough where the zeros of both agree.
+        let rate = found(sessions(2600.0, &[0.0; 3])).expect("a drift");
+        assert!((rate / 2600.0 - 1.0).abs() < 0.05, "{rate}");
+        assert_eq!(found(sessions(0.0, &[0.0, 260.0, -340.0])), None);
         assert_eq!(found(sessions(0.0, &[0.0; 4])), None);
         assert_eq!(found(sessions(0.0, &[0.0, 210.0, 340.0, 690.0])), None);
     }

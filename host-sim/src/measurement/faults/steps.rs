@@ -559,6 +559,33 @@ mod tests {
     }
 
     #[test]
+    fn a_counter_that_is_set_right_between_sessions_is_told_and_put_right() {
+        let mut random = fastrand::Rng::with_seed(4);
+        let one = |number: usize, random: &mut fastrand::Rng| {
+            let time = || (0..2000).map(|k| 0.01 * f64::from(k));
+            let torque: Vec<f64> = time().map(|t| 20.0 * (0.8 * t + number as f64).sin()).collect();
+            let mut noise = || 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+            let error = torque.iter().map(|torque| ARCSEC * (7.0 * torque + 30.0 * torque.signum() + noise()));
+            let mut one = session(error.collect(), torque.clone());
+            one.generator_rad = time().map(|t| 30.0 * (0.6 * t).sin()).collect();
+            one.time_s = Some(time().collect());
+            one
+        };
+        let right: Vec<Session> = (0..3).map(|number| one(number, &mut random)).collect();
+        let mut slipped = right.clone();
+        for (session, row, by) in [(0, 700, 90.0), (1, 450, 120.0), (1, 1500, 80.0), (2, 900, 100.0)] {
+            slipped[session].error_rad[row..].iter_mut().for_each(|error| *error += by * ARCSEC);
+        }
+        let mut findings = Findings::default();
+        check(&mut slipped, &Gear::of_ratio(100.0), &mut findings);
+        let told = findings.faults.iter().filter(|fault| fault.name == FaultName::EncoderIndexJump).count();
+        assert_eq!(told, 4, "{:?}", findings.faults);
+        let pairs = right.iter().zip(&slipped).flat_map(|(a, b)| a.error_rad.iter().zip(&b.error_rad));
+        let off = pairs.map(|(a, b)| (a - b).abs() / ARCSEC).fold(0.0, f64::max);
+        assert!(off < 5.0, "{off}");
+    }
+
+    #[test]
     fn between_loads_of_either_sign_a_flank_is_changed() {
         let ramp: Vec<f64> = (0..400).map(|k| 0.1 * f64::from(k) - 20.0).collect();
         let there_and_back: Vec<f64> = (0..400).map(|k| 20.0 - (0.2 * f64::from(k) - 40.0).abs()).collect();
