@@ -103,6 +103,9 @@ pub mod verdict {
     pub const NEAR_NOISE: f64 = 1.6;
     /// Something without a name is large beside a cause from this share of its size on: what is not understood may reach into it. *Chosen*.
     pub const LARGE_BESIDE: f64 = 0.7;
+    /// A line of the output angle that is straight or of a whole order is a piece of a broken order where a line of another order has this share of
+    /// it. *Guess*: beside a wheel before the encoder it had 0.3 and more.
+    pub const BROKEN_BESIDE: f64 = 0.25;
     /// Then what the cause adds has to be so many times the uncertainty of that. *Chosen*.
     pub const KNOWN_BESIDE: f64 = 5.0;
     /// The size of a cause is told from zero from so many of its standard deviations on. *Chosen*: of 6 causes named below it at 99 % one was

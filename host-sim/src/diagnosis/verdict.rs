@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::candidate::Law;
+use super::candidate::{Deviation, Label, Law, Per};
 use super::channels::{RatioProposal, proposed_ratio};
 use super::model::{Fit, Problem, Term};
 use super::noise::Noise;
@@ -260,6 +260,15 @@ fn understood(
         .filter(|k| !is_named(k) && !selected.terms[*k].law.is_zero_of_sessions())
         .map(|k| standings[k].size);
     let not_understood = unnamed.chain(left_over.iter().map(|l| l.size_arcsec)).fold(0.0, f64::max);
+    // A broken order of the output leaks into whole ones beside it, and into a straight line.
+    let of_a_line = |k: &usize| {
+        matches!(selected.terms[*k].law.label, Label::Deviation(Deviation::Line { per: Per::OutputTurn, .. }))
+    };
+    let broken = (0..selected.terms.len()).filter(of_a_line).map(|k| standings[k].size).fold(0.0, f64::max);
+    let whole = |k: usize| {
+        let (size, of_angle) = (standings[k].size, of_output_angle(selected.terms[k].law, &known[k]));
+        Judged::number(Gate::BesideUnknown, broken / size, BROKEN_BESIDE, !of_angle || broken <= BROKEN_BESIDE * size)
+    };
     let mut named = Vec::new();
     for k in (0..selected.terms.len()).filter(is_named) {
         let size = standings[k].size;
@@ -270,12 +279,12 @@ fn understood(
             not_understood <= LARGE_BESIDE * size,
         );
         let well_known = Judged::above(Gate::KnownWell, known[k].times_its_doubt, KNOWN_BESIDE);
-        // A straight line is a piece of whatever bends, however well it is known.
-        let straight = selected.terms[k].law.is(CauseName::RatioError);
-        let beside = if hidden.passed || straight { hidden } else { well_known };
+        let beside =
+            if hidden.passed || of_output_angle(selected.terms[k].law, &known[k]) { hidden } else { well_known };
         let gates = vec![
             Judged::above(Gate::Named, size, select::least_named(noise.white)),
             beside,
+            whole(k),
             Judged::above(Gate::ToldFromZero, told_from_zero[k], TOLD_FROM_ZERO),
         ];
         if passed(&gates) {
@@ -284,6 +293,18 @@ fn understood(
         trace.decided(Stage::Understood, selected.terms[k].law.label, None, gates);
     }
     named
+}
+
+/// Whether a law is a line of the output angle and nothing else, straight or of a whole order: a piece of whatever bends, however well it is known.
+fn of_output_angle(law: &Law, known: &Known) -> bool {
+    law.is(CauseName::RatioError)
+        || law.is(CauseName::OutputEncoderTilt)
+        || is_subdivision_of_output(law.cause(), known)
+}
+
+fn is_subdivision_of_output(cause: Option<CauseName>, known: &Known) -> bool {
+    let at_output = known.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0);
+    cause == Some(CauseName::EncoderSubdivision) && at_output
 }
 
 /// By what standard deviations grow where more is left than noise (Birge 1932): the laws are not right to the noise then, and what they err by is
@@ -296,8 +317,7 @@ fn beyond_noise(rms_after: f64, floor: f64) -> f64 {
 /// Whether something that is no cause of the library makes the same. A subdivision of the output's encoder repeats in each turn; in less than
 /// one a wheel before the encoder, which turns at a ratio of its own, makes such waves as well.
 fn has_a_double_outside(name: CauseName, known: &Known, output_span_rad: f64) -> bool {
-    let at_output = known.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0);
-    let part_of_a_turn = name == CauseName::EncoderSubdivision && at_output && output_span_rad < std::f64::consts::TAU;
+    let part_of_a_turn = is_subdivision_of_output(Some(name), known) && output_span_rad < std::f64::consts::TAU;
     name.has_a_double_outside() || part_of_a_turn
 }
 

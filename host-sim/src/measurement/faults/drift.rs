@@ -330,6 +330,21 @@ mod tests {
         zeros.iter().enumerate().map(one).collect()
     }
 
+    #[test]
+    fn what_warms_with_time_is_told_by_its_span_and_its_trend() {
+        let warmed = |by_k: f64, late: f64| {
+            let mut sessions = sessions(0.0, &[0.0; 3]);
+            for (number, session) in sessions.iter_mut().enumerate() {
+                session.temperature_c = Some(vec![20.0 + by_k * (number as f64 - late).abs(); session.len()]);
+            }
+            let tau = |s: usize, _: usize| s as f64 - 1.0;
+            warms_with_time(&sessions, &tau)
+        };
+        assert!(warmed(4.0, 0.0));
+        assert!(!warmed(0.5, 0.0), "within what counts");
+        assert!(!warmed(4.0, 1.0), "cold again at the end");
+    }
+
     fn found(mut sessions: Vec<Session>) -> Option<f64> {
         let mut findings = Findings::default();
         check(&mut sessions, &Gear::of_ratio(100.0), Stretches::OfTime, &mut findings);
