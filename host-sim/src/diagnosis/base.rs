@@ -130,6 +130,10 @@ pub struct Base {
 
 /// What floats where angles are read at other instants than is known, s.
 pub(crate) const BETWEEN_READINGS: &str = "time between the readings";
+/// What floats as the output takes a time to go to its other flank: by how much longer than none, in [`FLANK_S`].
+pub(crate) const CHANGE_OF_FLANK: &str = "time of a change of flank";
+/// The output goes from one flank to the other in some milliseconds. *Guess*.
+const FLANK_S: f64 = 5e-3;
 /// Standard deviation of what no drawing fixes, arcsec: the zero of the output encoder.
 pub(super) const FREE: f64 = 1e4;
 /// Least spread of a phase, over that of the amplitude.
@@ -195,6 +199,10 @@ impl Base {
         // Where angles are read at other instants than is known, their mean may be off, too: that is the logger's.
         let late = rows.speed.iter().map(|speed| -speed * ARCSEC_PER_RAD / nominal.ratio);
         add(BETWEEN_READINGS, late.collect(), rows.unsure_s);
+        // No output is on its other flank at once.
+        if rows.recorded.time {
+            add(CHANGE_OF_FLANK, behind(rows, &flank, half_backlash), 1.0);
+        }
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
         add("backlash", flank.iter().map(|p| half_backlash * p).collect(), nominal.spread.backlash);
         for harmonic in &nominal.harmonics {
@@ -242,6 +250,20 @@ impl Base {
         }
         self.flank = flank;
     }
+}
+
+/// What the error lacks as the output follows a change of flank with a lag of [`FLANK_S`], arcsec.
+fn behind(rows: &Rows, flank: &[f64], half_backlash: f64) -> Vec<f64> {
+    let mut behind = vec![0.0; rows.len()];
+    for session in rows.sessions.iter().filter(|session| !session.is_empty()) {
+        let mut reached = flank[session.start];
+        for k in session.start + 1..session.end {
+            let passed = (rows.time[k] - rows.time[k - 1]).max(0.0);
+            reached += (flank[k] - reached) * (1.0 - (-passed / FLANK_S).exp());
+            behind[k] = half_backlash * (reached - flank[k]);
+        }
+    }
+    behind
 }
 
 /// Mean square left where the torque is around friction, after what varies slowly over those rows is taken out.

@@ -42,6 +42,8 @@ const TO_THE_NOISE: f64 = 4.0;
 /// *Guess*: springs of drives of a type differ by some per cent, the factors of torques taken for others from 57 by more than that, except 1/60.
 const AS_NOMINAL: f64 = 0.35;
 const HARMONICS_AS_NOMINAL: [f64; 2] = [0.25, 4.0];
+/// What is left is next to nothing below this share of what the load does. *Guess*.
+const NEXT_TO_NOTHING: f64 = 0.1;
 /// Residuals farther out than so many standard deviations are cut there.
 const CUT: f64 = 5.0;
 
@@ -77,8 +79,6 @@ pub(super) fn floating(rows: &Rows, nominal: &Nominal, places: &[usize]) -> Vec<
 struct Freed {
     places: Vec<usize>,
     columns: Vec<Vec<f64>>,
-    /// Of the columns in the error.
-    coefficients: Vec<f64>,
     error: Vec<f64>,
 }
 
@@ -87,8 +87,8 @@ impl Freed {
         let places = sample(rows, SAMPLE);
         let mut columns = floating(rows, nominal, &places);
         columns.extend(waves(1.0, &rows.generator, &places));
-        let mut freed = Freed { error: Vec::new(), coefficients: Vec::new(), columns, places };
-        (freed.error, freed.coefficients) = freed.freed_with(&rows.error);
+        let mut freed = Freed { error: Vec::new(), columns, places };
+        freed.error = freed.freed(&rows.error);
         let spread = robust_std(freed.error.iter().copied());
         freed.error.iter_mut().for_each(|error| *error = error.clamp(-CUT * spread, CUT * spread));
         freed
@@ -117,11 +117,13 @@ impl Freed {
 }
 
 impl Freed {
-    /// Amplitude of the wave of this order of the generator, which floats freely, arcsec.
-    fn amplitude(&self, rows: &Rows, order: f64) -> f64 {
+    /// Amplitude of the wave of this order of the generator, which floats freely, in the error less what is `said` of the load, arcsec.
+    fn amplitude(&self, rows: &Rows, said: &[f64], order: f64) -> f64 {
         let [sine, cosine] = waves(order, &rows.generator, &self.places);
+        let unsaid: Vec<f64> = rows.error.iter().zip(said).map(|(error, said)| error - said).collect();
+        let (_, coefficients) = self.freed_with(&unsaid);
         let of = |wave: &[f64]| {
-            self.columns.iter().position(|column| column == wave).map_or(0.0, |place| self.coefficients[place])
+            self.columns.iter().position(|column| column == wave).map_or(0.0, |place| coefficients[place])
         };
         of(&sine).hypot(of(&cosine))
     }
@@ -139,6 +141,8 @@ struct Told {
     left: f64,
     /// Share of the wind-up alone, whatever the clearance is: that follows the sign of a torque in any unit.
     wind_up: f64,
+    /// Half the clearance alone, arcsec.
+    clearance: f64,
     /// What is left where wind-up and clearance have the shares that suit best, arcsec.
     left_free: f64,
 }
@@ -158,7 +162,7 @@ impl Told {
             let ripple: Vec<f64> = all.iter().zip(&should).map(|(all, should)| all - should).collect();
             error.iter_mut().zip(freed.freed(&ripple)).for_each(|(error, ripple)| *error -= ripple);
         }
-        let (wound, flank) = (freed.freed(&wound), freed.freed(&flank));
+        let [wound, flank] = [wound, flank].map(|column| freed.freed(&column));
         let wind_up = share_beside(&error, &wound, &flank);
         let clearance = share_beside(&error, &flank, &wound);
         let of_shares = wound.iter().zip(&flank).map(|(wound, flank)| wind_up * wound + clearance * flank);
@@ -177,7 +181,7 @@ impl Told {
         let mean = without.iter().sum::<f64>() / blocks;
         let variance = (blocks - 1.0) / blocks * without.iter().map(|share| (share - mean).powi(2)).sum::<f64>();
         let left = robust_std(error.iter().zip(&should).map(|(error, should)| error - should));
-        Told { size: rms(&should), share, std: variance.sqrt(), left, wind_up, left_free }
+        Told { size: rms(&should), share, std: variance.sqrt(), left, wind_up, clearance, left_free }
     }
 
     fn is_certain(&self) -> bool {
@@ -339,7 +343,10 @@ pub(super) fn is_explained(recording: &Recording, nominal: &Nominal, table: Opti
     let like_the_load = !winds_up || (rough.told.share - 1.0).abs() < AS_NOMINAL && rough.told.is_certain();
     let within = |share: f64| (HARMONICS_AS_NOMINAL[0]..=HARMONICS_AS_NOMINAL[1]).contains(&share);
     let like_the_harmonics = rough.harmonics.map_or(winds_up, within);
-    rough.left < TO_THE_NOISE && like_the_load && like_the_harmonics
+    // Where a spring and the wheels both have their size, what is left may be a flank that friction holds otherwise than the model says.
+    let near_the_noise = rough.left < TO_THE_NOISE;
+    let next_to_nothing = rough.harmonics.is_some() && rough.left * rough.white < NEXT_TO_NOTHING * rough.told.size;
+    (near_the_noise || next_to_nothing) && like_the_load && like_the_harmonics
 }
 
 /// How the nominal model explains rows with zeros and ratio free.
@@ -361,7 +368,14 @@ impl Rough {
         let white = white_level(&rows, &rows.error);
         let by_size = |a: &&Harmonic, b: &&Harmonic| a.amplitude_arcsec.total_cmp(&b.amplitude_arcsec);
         let largest = nominal.harmonics.iter().max_by(by_size).filter(|of| of.amplitude_arcsec > white);
-        let harmonics = largest.map(|of| freed.amplitude(&rows, of.order_per_generator_turn) / of.amplitude_arcsec);
+        let harmonics = largest.map(|of| {
+            // A load that is put on in steps while the generator turns a little looks like a wave: it goes first.
+            let flank = PlayLaw::Held.flanks(&rows, &rows.torque, nominal);
+            let said: Vec<f64> = (rows.torque.iter().zip(&flank))
+                .map(|(torque, flank)| told.wind_up * nominal.wind_up_arcsec(*torque) + told.clearance * flank)
+                .collect();
+            freed.amplitude(&rows, &said, of.order_per_generator_turn) / of.amplitude_arcsec
+        });
         Rough { told, left: told.left_free / white, white, harmonics }
     }
 }
@@ -396,13 +410,23 @@ mod tests {
 
     /// A drive as its catalogue says under a load that swings, 2 arcsec of noise; `told` is what the column of torque says of the load.
     fn recording(nominal: &Nominal, told: impl Fn(f64, f64) -> f64) -> Recording {
+        recording_under(nominal, |t| 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos(), 0.05, told)
+    }
+
+    /// The same under a load of time, with a generator that turns by so much from row to row.
+    fn recording_under(
+        nominal: &Nominal,
+        load: impl Fn(f64) -> f64,
+        turned: f64,
+        told: impl Fn(f64, f64) -> f64,
+    ) -> Recording {
         let mut random = fastrand::Rng::with_seed(3);
         let mut session = Session { time_s: Some(Vec::new()), torque_n_m: Some(Vec::new()), ..Session::default() };
         let mut flank = 1.0;
         for k in 0..12_000 {
             let t = 0.01 * f64::from(k);
-            let load = 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos();
-            let psi = 0.05 * f64::from(k);
+            let load = load(t);
+            let psi = turned * f64::from(k);
             if load.abs() > nominal.friction_torque_n_m {
                 flank = load.signum();
             }
@@ -474,6 +498,16 @@ mod tests {
             session.error_rad.iter_mut().zip(&session.generator_rad).for_each(|(error, psi)| *error += by * psi);
         }
         assert!(!may_be_in_degrees(&other_ratio, &nominal, None));
+    }
+
+    #[test]
+    fn a_load_in_steps_over_few_turns_is_no_wave_of_the_wheels() {
+        let nominal = catalogue_drive();
+        let levels = [21.0, -14.0, 30.0, 8.0, -25.0, 17.0, -9.0];
+        let steps = recording_under(&nominal, |t| levels[(t / 18.0) as usize % 7], 1e-3, |_, load| load);
+        let rough = Rough::of(&steps.sessions, &nominal, None);
+        assert!((0.8..1.25).contains(&rough.harmonics.unwrap()), "{:?}", rough.harmonics);
+        assert!(is_explained(&steps, &nominal, None));
     }
 
     #[test]

@@ -87,6 +87,61 @@ fn sizes_come_with_intervals_that_hold_the_truth() {
     }
 }
 
+/// Sessions with something more in the error, arcsec, of generator (rad), torque (N·m) and the row.
+fn with_more(mut sessions: Vec<Session>, more: impl Fn(f64, f64, usize) -> f64) -> Vec<Session> {
+    for session in &mut sessions {
+        let torque = session.torque_n_m.clone().unwrap();
+        for (k, error) in session.error_rad.iter_mut().enumerate() {
+            *error += more(session.generator_rad[k], torque[k], k) / crate::units::ARCSEC_PER_RAD;
+        }
+    }
+    sessions
+}
+
+#[test]
+fn an_output_that_takes_milliseconds_to_its_other_flank_is_a_perfect_drive() {
+    let nominal = catalogue_drive();
+    let mut random = fastrand::Rng::with_seed(12);
+    let sessions: Vec<Session> = (0..3)
+        .map(|number| {
+            let mut session = Session { time_s: Some(Vec::new()), torque_n_m: Some(Vec::new()), ..Session::default() };
+            let (mut side, mut flank) = (1.0, 1.0);
+            for k in 0..6000 {
+                let t = 2e-3 * f64::from(k);
+                // So near to friction that no row can be set aside.
+                let load = 3.5 * (9.0 * t + f64::from(number)).sin();
+                if load.abs() > nominal.friction_torque_n_m {
+                    flank = load.signum();
+                }
+                side += (flank - side) * (1.0 - f64::exp(-2e-3 / 5e-3));
+                let psi = 40.0 * (0.5 * t).sin();
+                let noise = 1.5 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+                let play = 0.5 * nominal.backlash_arcsec * side;
+                let error = nominal.harmonics_arcsec(psi) + nominal.wind_up_arcsec(load) + play + noise;
+                session.line.push(k as u64 + 2);
+                session.generator_rad.push(psi);
+                session.error_rad.push(error / crate::units::ARCSEC_PER_RAD);
+                session.time_s.as_mut().unwrap().push(t + 600.0 * f64::from(number));
+                session.torque_n_m.as_mut().unwrap().push(load);
+            }
+            session
+        })
+        .collect();
+    let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::None, vec![]), "{}", diagnosis.text());
+}
+
+#[test]
+fn a_wheel_before_the_encoder_is_no_whole_order_of_it() {
+    let ratio = catalogue_drive().ratio;
+    for (order, phase) in [(2.8, 0.3), (3.3, 1.2), (3.5, 2.6)] {
+        let waves = |psi: f64, _: f64, _: usize| 12.0 * (order * psi / ratio + phase).sin();
+        let sessions = with_more(recorded(&[], 5, 3000, 100.0, 1.0, 51), waves);
+        let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+        assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::Unknown, vec![]), "{order}: {}", diagnosis.text());
+    }
+}
+
 /// The same sessions as a file in which a share of the rows is off, one by one: by far as a heavy tail has it, or to one side alone.
 fn with_bad_rows(sessions: &[Session], share: f64, one_sided: bool, seed: u64) -> Vec<Session> {
     let nominal = catalogue_drive();

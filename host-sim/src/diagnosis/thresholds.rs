@@ -103,11 +103,16 @@ pub mod verdict {
     pub const NEAR_NOISE: f64 = 1.6;
     /// Something without a name is large beside a cause from this share of its size on: what is not understood may reach into it. *Chosen*.
     pub const LARGE_BESIDE: f64 = 0.7;
+    /// A line of the output angle that is straight or of a whole order is a piece of a broken order where a line of another order has this share of
+    /// it. *Guess*: beside a wheel before the encoder it had 0.3 and more.
+    pub const BROKEN_BESIDE: f64 = 0.25;
     /// Then what the cause adds has to be so many times the uncertainty of that. *Chosen*.
     pub const KNOWN_BESIDE: f64 = 5.0;
     /// The size of a cause is told from zero from so many of its standard deviations on. *Chosen*: of 6 causes named below it at 99 % one was
     /// there.
     pub const TOLD_FROM_ZERO: f64 = 3.0;
+    /// Noise is known to this factor: what is left within it is noise. *Guess*.
+    pub const NOISE_KNOWN_TO: f64 = 1.25;
     /// The size of a cause is well known from so many on …
     pub const SIZE_KNOWN: f64 = 5.0;
     /// … and below, a name is stated with no more than this. *Chosen*: of 21 between the two 16 were there, of 183 beyond 177.

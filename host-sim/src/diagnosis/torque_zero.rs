@@ -6,14 +6,11 @@
 //! free that floats in any drive, tells the constant. It counts where neither an unbalanced load nor a drag, all of their sizes and phases
 //! free, leaves as little.
 
-use std::f64::consts::TAU;
-
 use flexspline::Table;
 
 use super::base::{PlayLaw, predicted_by_table};
 use super::channels::{fault_throughout, floating, sample, waves};
 use super::rows::{Rows, mean, rms};
-use crate::measurement::robust::least_and_most;
 use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
 use crate::nominal::Nominal;
 
@@ -47,9 +44,6 @@ const BESIDE_IT_LEAVE: f64 = 0.95;
 /// In either case by this share of what the zero has taken away. *Chosen* between what they take of a zero in the tests below, at most 0.09, and
 /// of an unbalanced load there, 0.149; on the drives of `logger_faults` more is trifles.
 const NO_TRIFLE: f64 = 0.12;
-/// Within less of an output turn than this an unbalanced load is a constant, and a zero is named only where it leaves clearly less, by the
-/// share of [`RIVALS_LEAVE`]. *Guess*.
-const TELLS_TURNS: f64 = 0.25;
 /// First and last step of the search for such loads, as shares of the load.
 const RIVAL_STEPS: [f64; 2] = [0.04, 0.002];
 
@@ -272,11 +266,7 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     {
         return None;
     }
-    let (low, high) = least_and_most(held.rows.output.iter().copied());
     let may_be_unbalance = rivals * RIVALS_LEAVE < least;
-    if may_be_unbalance && high - low < TELLS_TURNS * TAU {
-        return None;
-    }
     let (with, without) = (held.left([-zero, 0.0, 0.0, 0.0]), held.left([0.0; 4]));
     let moved: Vec<f64> = with.iter().zip(&without).map(|(with, without)| with - without).collect();
     Some(Zero { n_m: zero, std, size_arcsec: rms(&moved), may_be_unbalance })
@@ -320,9 +310,9 @@ mod tests {
     use crate::synthesize::catalogue_drive;
     use crate::units::ARCSEC_PER_RAD;
 
-    /// A drive as its catalogue says that goes to and fro over a third of an output turn under a load that swings, 2 arcsec of noise; with
+    /// A drive as its catalogue says that turns to and fro by so much from row to row under a load that swings, 2 arcsec of noise; with
     /// `unseen` N·m (of output angle and direction) beside what the column of torque tells.
-    fn recording(nominal: &Nominal, unseen: impl Fn(f64, f64) -> f64) -> Recording {
+    fn recording(nominal: &Nominal, turned: f64, unseen: impl Fn(f64, f64) -> f64) -> Recording {
         let mut random = fastrand::Rng::with_seed(3);
         let mut session = Session { time_s: Some(Vec::new()), torque_n_m: Some(Vec::new()), ..Session::default() };
         let (mut flank, mut psi) = (1.0, 0.0);
@@ -330,7 +320,7 @@ mod tests {
             let t = 0.01 * f64::from(k);
             let told = 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos();
             let direction = if k / 3000 % 2 == 0 { 1.0 } else { -1.0 };
-            psi += 0.08 * direction;
+            psi += turned * direction;
             let load = told + unseen(psi / nominal.ratio, direction);
             if load.abs() > nominal.friction_torque_n_m {
                 flank = load.signum();
@@ -357,8 +347,13 @@ mod tests {
 
     /// The fault found, and by how much the first torque was changed.
     fn checked(unseen: impl Fn(f64, f64) -> f64) -> (Option<Fault>, f64) {
+        // A third of an output turn.
+        checked_turning(0.08, unseen)
+    }
+
+    fn checked_turning(turned: f64, unseen: impl Fn(f64, f64) -> f64) -> (Option<Fault>, f64) {
         let nominal = catalogue_drive();
-        let mut recording = recording(&nominal, unseen);
+        let mut recording = recording(&nominal, turned, unseen);
         let first = |recording: &Recording| recording.sessions[0].torque_n_m.as_ref().unwrap()[0];
         let before = first(&recording);
         check(&mut recording, &nominal, None);
@@ -377,6 +372,13 @@ mod tests {
             assert!((found - zero).abs() < 3.0 * std && std < 0.15, "{zero}: {found} ± {std}");
             assert!((by + found).abs() < 1e-9, "{by}");
         }
+    }
+
+    #[test]
+    fn in_a_small_part_of_a_turn_a_zero_goes_before_an_unbalanced_load_that_would_do_the_same() {
+        let (fault, _) = checked_turning(0.01, |_, _| -1.2);
+        let fault = fault.expect("a fault");
+        assert!(fault.what.contains("an unbalanced load of that size"), "{}", fault.what);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::candidate::Law;
+use super::candidate::{Deviation, Label, Law, Per};
 use super::channels::{RatioProposal, proposed_ratio};
 use super::model::{Fit, Problem, Term};
 use super::noise::Noise;
@@ -50,7 +50,9 @@ pub(super) fn conclude(
     let unexplained = (rms_after * rms_after - floor * floor).max(0.0);
 
     let known = uncertainty::known(problem, &selected);
-    let named = understood(&selected, &standings, &known, &left_over, noise, &mut trace);
+    let beyond_noise = beyond_noise(rms_after, floor);
+    let told_from_zero: Vec<f64> = known.iter().map(|known| known.told_from_zero() / beyond_noise).collect();
+    let named = understood(&selected, &standings, &known, &told_from_zero, &left_over, noise, &mut trace);
     let size = |k: &usize| standings[*k].size.powi(2);
     let (by_name, without_name) = (
         named.iter().map(size).sum::<f64>(),
@@ -68,7 +70,7 @@ pub(super) fn conclude(
     let significant_left = without_name > 0.0 || zeros_alone;
     let held = held_out::evaluate(problem, &all);
     let abstained = Abstention { by_name, without_name, described, unexplained, explainable };
-    let gates = if named.is_empty() { Vec::new() } else { abstained.gates(significant_left, held.total, noise.white) };
+    let gates = if named.is_empty() { Vec::new() } else { abstained.gates(significant_left, held.total) };
     let verdict = match (named.is_empty(), significant_left) {
         (true, false) => Verdict::None,
         (true, true) => Verdict::Unknown,
@@ -118,7 +120,7 @@ pub(super) fn conclude(
                     &misfits,
                     has_a_double_outside(name, &known[k], problem.on.output_span_rad()),
                     closest,
-                    known[k].told_from_zero(),
+                    told_from_zero[k],
                 ),
                 parameters: known[k].parameters.clone(),
                 held_out_gain: held.gains.get(k).copied().unwrap_or(0.0),
@@ -220,7 +222,7 @@ struct Abstention {
 
 impl Abstention {
     /// What the causes have to pass together, or none of them is named.
-    fn gates(&self, significant_left: bool, held_out: HeldOut, white: f64) -> Vec<Judged> {
+    fn gates(&self, significant_left: bool, held_out: HeldOut) -> Vec<Judged> {
         let mut gates = Vec::new();
         let share = |gate: Gate, all: f64, least: f64| {
             Judged::number(gate, self.by_name / all, least, self.by_name >= least * all)
@@ -232,8 +234,7 @@ impl Abstention {
             gates.push(share(Gate::ShareDescribed, self.by_name + self.described, LEAST_BESIDE_DESCRIBED));
         }
         // Names for a small part of what is there, with the rest in the dark, are no understanding.
-        let dark = self.unexplained.sqrt() > select::least_size(white)
-            && self.unexplained > MOST_UNEXPLAINED * self.explainable;
+        let dark = self.unexplained > MOST_UNEXPLAINED * self.explainable;
         let in_the_dark = if self.explainable > 0.0 { self.unexplained / self.explainable } else { 0.0 };
         gates.push(Judged::number(Gate::InTheDark, in_the_dark, MOST_UNEXPLAINED, !dark));
         // What does not predict sessions it was not fitted to is no explanation.
@@ -249,6 +250,7 @@ fn understood(
     selected: &Selected<'_>,
     standings: &[Standing],
     known: &[Known],
+    told_from_zero: &[f64],
     left_over: &[Unexplained],
     noise: Noise,
     trace: &mut Trace,
@@ -258,6 +260,15 @@ fn understood(
         .filter(|k| !is_named(k) && !selected.terms[*k].law.is_zero_of_sessions())
         .map(|k| standings[k].size);
     let not_understood = unnamed.chain(left_over.iter().map(|l| l.size_arcsec)).fold(0.0, f64::max);
+    // A broken order of the output leaks into whole ones beside it, and into a straight line.
+    let of_a_line = |k: &usize| {
+        matches!(selected.terms[*k].law.label, Label::Deviation(Deviation::Line { per: Per::OutputTurn, .. }))
+    };
+    let broken = (0..selected.terms.len()).filter(of_a_line).map(|k| standings[k].size).fold(0.0, f64::max);
+    let whole = |k: usize| {
+        let (size, of_angle) = (standings[k].size, of_output_angle(selected.terms[k].law, &known[k]));
+        Judged::number(Gate::BesideUnknown, broken / size, BROKEN_BESIDE, !of_angle || broken <= BROKEN_BESIDE * size)
+    };
     let mut named = Vec::new();
     for k in (0..selected.terms.len()).filter(is_named) {
         let size = standings[k].size;
@@ -268,11 +279,13 @@ fn understood(
             not_understood <= LARGE_BESIDE * size,
         );
         let well_known = Judged::above(Gate::KnownWell, known[k].times_its_doubt, KNOWN_BESIDE);
-        let beside = if hidden.passed { hidden } else { well_known };
+        let beside =
+            if hidden.passed || of_output_angle(selected.terms[k].law, &known[k]) { hidden } else { well_known };
         let gates = vec![
             Judged::above(Gate::Named, size, select::least_named(noise.white)),
             beside,
-            Judged::above(Gate::ToldFromZero, known[k].told_from_zero(), TOLD_FROM_ZERO),
+            whole(k),
+            Judged::above(Gate::ToldFromZero, told_from_zero[k], TOLD_FROM_ZERO),
         ];
         if passed(&gates) {
             named.push(k);
@@ -282,11 +295,29 @@ fn understood(
     named
 }
 
+/// Whether a law is a line of the output angle and nothing else, straight or of a whole order: a piece of whatever bends, however well it is known.
+fn of_output_angle(law: &Law, known: &Known) -> bool {
+    law.is(CauseName::RatioError)
+        || law.is(CauseName::OutputEncoderTilt)
+        || is_subdivision_of_output(law.cause(), known)
+}
+
+fn is_subdivision_of_output(cause: Option<CauseName>, known: &Known) -> bool {
+    let at_output = known.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0);
+    cause == Some(CauseName::EncoderSubdivision) && at_output
+}
+
+/// By what standard deviations grow where more is left than noise (Birge 1932): the laws are not right to the noise then, and what they err by is
+/// in no covariance.
+fn beyond_noise(rms_after: f64, floor: f64) -> f64 {
+    let ratio = rms_after / floor.max(1e-30);
+    if ratio > NOISE_KNOWN_TO { ratio } else { 1.0 }
+}
+
 /// Whether something that is no cause of the library makes the same. A subdivision of the output's encoder repeats in each turn; in less than
 /// one a wheel before the encoder, which turns at a ratio of its own, makes such waves as well.
 fn has_a_double_outside(name: CauseName, known: &Known, output_span_rad: f64) -> bool {
-    let at_output = known.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0);
-    let part_of_a_turn = name == CauseName::EncoderSubdivision && at_output && output_span_rad < std::f64::consts::TAU;
+    let part_of_a_turn = is_subdivision_of_output(Some(name), known) && output_span_rad < std::f64::consts::TAU;
     name.has_a_double_outside() || part_of_a_turn
 }
 
@@ -335,6 +366,12 @@ fn recalibrated(problem: &Problem<'_>, selected: &Selected<'_>) -> BTreeMap<Stri
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_laws_leave_beyond_the_noise_widens_what_is_told_from_zero() {
+        assert_eq!(beyond_noise(5.0, 4.5), 1.0);
+        assert_eq!(beyond_noise(6.0, 4.0), 1.5);
+    }
 
     #[test]
     fn a_confidence_is_that_of_a_name_among_those_alike() {

@@ -249,8 +249,8 @@ fn parse_as(
     faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
     faults::resolution::check(&mut sessions, gear, error_recorded, &mut findings);
     let steps_are_told = faults::steps::check(&mut sessions, gear, &mut findings);
-    // Steps that stay in the data look like drift.
-    if steps_are_told && findings.tooth_steps.is_empty() && !drifts {
+    // Steps that stay in the data look like drift; what may be one between two sessions may be drift as well.
+    if (steps_are_told || sessions.len() > 1) && findings.tooth_steps.is_empty() && !drifts {
         faults::drift::check(&mut sessions, gear, Stretches::OfTime, &mut findings);
     }
     let Findings { mut faults, tooth_steps, notes } = findings;

@@ -9,7 +9,7 @@ use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
-use crate::measurement::robust::median_of;
+use crate::measurement::robust::{least_and_most, median_of};
 
 /// Drift of less than this over the whole recording is not looked for, rad.
 const LEAST_RAD: f64 = 10.0 * ARCSEC;
@@ -28,6 +28,11 @@ const OFF_THE_LINE: f64 = 0.05;
 const ALIKE: f64 = 0.35;
 /// A trend whose standard deviation grows by more than this when position, load and temperature are considered may be one of them.
 const CONFUSED: f64 = 4.0;
+/// And is none of them where it is so many standard deviations, and the temperature does not go with time: correlation, from a span in K on.
+/// *Guess*.
+const BEYOND_CONFUSION: f64 = 50.0;
+const WITH_TIME: f64 = 0.8;
+const COUNTS_K: f64 = 2.0;
 /// Share of rows that each flank must have.
 const BOTH_FLANKS: f64 = 0.1;
 
@@ -142,8 +147,10 @@ fn slope(sessions: &[Session], gear: &Gear, cut: Stretches) -> Option<(f64, f64,
     if plus + minus > 0 && (plus.min(minus) as f64) < BOTH_FLANKS * (plus + minus) as f64 {
         return None;
     }
-    // Time over the recording, alone, has the size 1/√3.
-    if formal > CONFUSED * 3.0_f64.sqrt() * fit.unit_std {
+    // Time over the recording, alone, has the size 1/√3. Few sessions look like many a state of a drive: then it must not
+    // warm with time, and the sessions have to say it with one voice.
+    let confused = formal > CONFUSED * 3.0_f64.sqrt() * fit.unit_std;
+    if confused && (warms_with_time(sessions, &tau) || drift.abs() < BEYOND_CONFUSION * formal) {
         return None;
     }
     // Once more by stretches: the trend of their medians, which noise of a long memory does not make so certain. A bench that rests for longer
@@ -161,10 +168,32 @@ fn slope(sessions: &[Session], gear: &Gear, cut: Stretches) -> Option<(f64, f64,
         }
         points = of_rows_alone(&lefts);
     }
+    if confused && !alike_in_sessions(&lefts, drift) {
+        return None;
+    }
     let (trend, std) = line(&points)?;
     let certain = (drift / formal).abs() > CERTAIN && (trend / std).abs() > CERTAIN && trend * drift > 0.0;
     let steady = (trend - drift).abs() < 0.5 * drift.abs();
     (certain && steady).then_some((drift * per_s, 0.5 * (begin + end), std.max(formal) * per_s))
+}
+
+/// Whether the temperature changes by what counts, and goes with time: then what bends with it looks like a drift.
+fn warms_with_time(sessions: &[Session], tau: Extra) -> bool {
+    let rows: Vec<Point> = (sessions.iter().enumerate())
+        .filter_map(|(s, session)| Some((s, session.temperature_c.as_ref()?)))
+        .flat_map(|(s, values)| values.iter().enumerate().map(move |(row, value)| (tau(s, row), *value)))
+        .collect();
+    let (low, high) = least_and_most(rows.iter().map(|of| of.1));
+    high - low > COUNTS_K && correlation(&rows).abs() > WITH_TIME
+}
+
+fn correlation(points: &[Point]) -> f64 {
+    let n = points.len() as f64;
+    let (mx, my) = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
+    let sums = points.iter().fold([0.0; 3], |[xx, xy, yy], (x, y)| {
+        [xx + (x - mx).powi(2), xy + (x - mx) * (y - my), yy + (y - my).powi(2)]
+    });
+    sums[1] / (sums[0] * sums[2]).sqrt().max(1e-300)
 }
 
 /// A time in units of the recording, from -1 to 1, and what is left of the error there, rad.
@@ -301,6 +330,21 @@ mod tests {
         zeros.iter().enumerate().map(one).collect()
     }
 
+    #[test]
+    fn what_warms_with_time_is_told_by_its_span_and_its_trend() {
+        let warmed = |by_k: f64, late: f64| {
+            let mut sessions = sessions(0.0, &[0.0; 3]);
+            for (number, session) in sessions.iter_mut().enumerate() {
+                session.temperature_c = Some(vec![20.0 + by_k * (number as f64 - late).abs(); session.len()]);
+            }
+            let tau = |s: usize, _: usize| s as f64 - 1.0;
+            warms_with_time(&sessions, &tau)
+        };
+        assert!(warmed(4.0, 0.0));
+        assert!(!warmed(0.5, 0.0), "within what counts");
+        assert!(!warmed(4.0, 1.0), "cold again at the end");
+    }
+
     fn found(mut sessions: Vec<Session>) -> Option<f64> {
         let mut findings = Findings::default();
         check(&mut sessions, &Gear::of_ratio(100.0), Stretches::OfTime, &mut findings);
@@ -313,6 +357,10 @@ mod tests {
             let rate = found(sessions(per_hour, &[0.0; 4])).expect("a drift");
             assert!((rate / per_hour - 1.0).abs() < 0.05, "{rate} for {per_hour}");
         }
+        // Two breaks are enough where the zeros of both agree.
+        let rate = found(sessions(2600.0, &[0.0; 3])).expect("a drift");
+        assert!((rate / 2600.0 - 1.0).abs() < 0.05, "{rate}");
+        assert_eq!(found(sessions(0.0, &[0.0, 260.0, -340.0])), None);
         assert_eq!(found(sessions(0.0, &[0.0; 4])), None);
         assert_eq!(found(sessions(0.0, &[0.0, 210.0, 340.0, 690.0])), None);
     }

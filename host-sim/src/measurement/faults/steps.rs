@@ -2,7 +2,8 @@
 //!
 //! A step is made within one row, faster than an output at rest could give it (a dwell in the clearance changes the error by no more
 //! than the generator moves), and it stays, through reversals and at any load. Clearance that is thrown over, wind-up and
-//! damaged teeth do not: they come back with the state of the drive.
+//! damaged teeth do not: they come back with the state of the drive. A counter that loses counts may be set right before the next session:
+//! then its steps stay until their session ends.
 
 use super::state::{Extra, Fit, State};
 use super::{ARCSEC, Findings, of_rows};
@@ -36,6 +37,8 @@ const LEAST_RAD: f64 = 5.0 * ARCSEC;
 const SEEN: f64 = 6.0;
 /// Steps looked for at a time, and rounds of looking.
 const AT_ONCE: usize = 8;
+/// The same in all sessions, where each has steps of its own.
+const AT_ONCE_IN_ALL: usize = 16;
 const ROUNDS: usize = 4;
 /// A step is that many whole tooth pitches if it differs by less than this share of one.
 const WHOLE_PITCH: f64 = 0.01;
@@ -53,6 +56,8 @@ const LOAD_NOISE: f64 = 8.0;
 const LOAD_PACE: f64 = 6.0;
 /// A step that leaves less than this share of the misfit of what it might be instead is told from it.
 const TELLS: f64 = 0.95;
+/// Steps that leave less than this share of the misfit without them are no changes of flank. *Guess*.
+const DECIDES: f64 = 0.25;
 /// Medians of six rows before and after differ by no more than so many standard deviations of the white noise.
 const LOCAL_NOISE: f64 = 2.2;
 /// A jump stands alone: so many rows before and after it change the error by less than half as much.
@@ -62,11 +67,21 @@ const APART: usize = 12;
 struct Place {
     session: usize,
     row: usize,
+    stays: Stays,
+}
+
+/// How long steps stay.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stays {
+    ForGood,
+    /// Until their session ends: the counter is set right before the next one.
+    ToTheEnd,
 }
 
 impl Place {
     fn reached(self, session: usize, row: usize) -> f64 {
-        f64::from(u8::from((session, row) >= (self.session, self.row)))
+        let stays = self.stays == Stays::ForGood || session == self.session;
+        f64::from(u8::from(stays && (session, row) >= (self.session, self.row)))
     }
 }
 
@@ -77,7 +92,7 @@ fn column(place: Place) -> impl Fn(usize, usize) -> f64 {
 
 /// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Gives whether all steps found are told apart.
 pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> bool {
-    let Some((steps, doubtful)) = find(sessions, gear) else { return true };
+    let Some(Found { sure, doubtful, stays, .. }) = likelier(sessions, gear) else { return true };
     for (place, size, _) in &doubtful {
         let line = sessions[place.session].line[place.row];
         findings.notes.push(format!(
@@ -85,10 +100,10 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             size / ARCSEC
         ));
     }
-    for (place, size, std) in steps {
+    for (place, size, std) in sure {
         let session = &sessions[place.session];
         let fault = of_rows(session, FaultName::EncoderIndexJump, place.row..place.row + 1);
-        if let Some(pitch) = gear.tooth_pitch_rad {
+        if let Some(pitch) = gear.tooth_pitch_rad.filter(|_| stays == Stays::ForGood) {
             let pitches = (size / pitch).round();
             if pitches != 0.0 && (size - pitches * pitch).abs() < (5.0 * std).max(WHOLE_PITCH * pitch) {
                 findings.tooth_steps.push(ToothStep {
@@ -106,17 +121,22 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
         fault.channel = Some(Quantity::Error);
         fault.size_arcsec = Some(size / ARCSEC);
         fault.treatment = Treatment::Repaired;
+        let lasting = match stays {
+            Stays::ForGood => "there: an encoder has lost its index",
+            Stays::ToTheEnd => {
+                "until the session ends: a counter has lost counts, and was set right before the next one"
+            }
+        };
         fault.what = format!(
-            "the error steps by {:.1} arcsec (standard deviation {:.1}) within one row and stays there: an encoder has lost its index; the \
-             step is taken out",
+            "the error steps by {:.1} arcsec (standard deviation {:.1}) within one row and stays {lasting}; the step is taken out",
             size / ARCSEC,
             std / ARCSEC
         );
         fault.until_s = None;
         findings.faults.push(fault);
-        for (number, session) in sessions.iter_mut().enumerate().skip(place.session) {
-            let from = if number == place.session { place.row } else { 0 };
-            session.error_rad[from..].iter_mut().for_each(|error| *error -= size);
+        for (number, session) in sessions.iter_mut().enumerate() {
+            let rows = session.error_rad.iter_mut().enumerate();
+            rows.for_each(|(row, error)| *error -= size * place.reached(number, row));
         }
     }
     doubtful.is_empty()
@@ -125,14 +145,45 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
 /// A step with its size and standard deviation.
 type Step = (Place, f64, f64);
 
-/// Lasting steps, and those that may be a change of flank.
-fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<Step>)> {
+/// Steps of a recording.
+struct Found {
+    /// Lasting ones.
+    sure: Vec<Step>,
+    /// Those that may be a change of flank.
+    doubtful: Vec<Step>,
+    stays: Stays,
+    /// What is left with them: sum of squared, weighted residuals.
+    misfit: f64,
+    /// Whether any row was suspected.
+    suspected: bool,
+}
+
+/// Steps that stay for good or to the end of their session, whichever leaves less.
+fn likelier(sessions: &[Session], gear: &Gear) -> Option<Found> {
     let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
     let state = State::new(sessions, gear);
+    let for_good = find(sessions, gear, noise, &state, Stays::ForGood)?;
+    if sessions.len() == 1 || !for_good.suspected {
+        return Some(for_good);
+    }
+    let to_the_end = find(sessions, gear, noise, &state, Stays::ToTheEnd);
+    let mut better = to_the_end.filter(|found| found.misfit < TELLS * for_good.misfit);
+    if let Some(found) = better.as_mut().filter(|found| found.misfit < DECIDES * for_good.misfit) {
+        // No change of flank explains that much.
+        found.sure.append(&mut found.doubtful);
+        found.sure.sort_by_key(|(place, ..)| (place.session, place.row));
+    }
+    Some(better.filter(|found| !found.sure.is_empty()).unwrap_or(for_good))
+}
+
+fn find(sessions: &[Session], gear: &Gear, noise: f64, state: &State, stays: Stays) -> Option<Found> {
     let settled = state.settled();
-    let mut places = sudden(sessions, gear, noise, &settled);
+    let most = if stays == Stays::ForGood { AT_ONCE } else { AT_ONCE_IN_ALL };
+    let mut places = sudden(sessions, gear, noise, &settled, most);
+    places.iter_mut().for_each(|place| place.stays = stays);
+    let mut suspected = !places.is_empty();
     let mut rejected: Vec<Place> = Vec::new();
-    let mut steps: Vec<Step> = Vec::new();
+    let (mut steps, mut misfit): (Vec<Step>, f64) = (Vec::new(), f64::INFINITY);
     for round in 0..ROUNDS {
         // Drop one by one what does not last, the weakest first.
         let fit = loop {
@@ -153,29 +204,37 @@ fn find(sessions: &[Session], gear: &Gear) -> Option<(Vec<Step>, Vec<Step>)> {
         };
         let first = fit.value.len() - places.len();
         steps = places.iter().enumerate().map(|(k, p)| (*p, fit.value[first + k], fit.std[first + k])).collect();
+        misfit = fit.misfit;
         if round + 1 == ROUNDS {
             break;
         }
         let known: Vec<Place> = places.iter().chain(&rejected).copied().collect();
-        let more = standing_out(sessions, gear, noise, &state, &settled, &fit, &places, &known);
+        let more = standing_out(sessions, gear, noise, state, &settled, &fit, &places, &known);
         if more.is_empty() {
             break;
         }
-        places.extend(more);
+        suspected = true;
+        places.extend(more.into_iter().map(|place| Place { stays, ..place }));
         places.sort_by_key(|place| (place.session, place.row));
     }
-    steps = lasting(steps);
+    steps = match stays {
+        Stays::ForGood => lasting(steps),
+        // What is set right between sessions takes nothing back.
+        Stays::ToTheEnd => {
+            steps.chunk_by(|a, b| a.0.session == b.0.session).flat_map(|of| lasting(of.to_vec())).collect()
+        }
+    };
     let unsaid = !steps.is_empty() && !says_flank(sessions);
     let turned_over = |place: Place, size: f64| unsaid && comes_elsewhere(sessions, &settled, place, size);
     let (sure, doubtful): (Vec<Step>, Vec<Step>) = steps.iter().copied().partition(|(place, size, _)| {
-        !turned_over(*place, *size) && no_flank_was_changed(sessions, &state, &steps, *place, *size)
+        !turned_over(*place, *size) && no_flank_was_changed(sessions, state, &steps, *place, *size)
     });
     // Where one step may be a change of flank, one of the other sign may be its way back.
     let way_back = |(_, size, _): &Step| {
         size.abs() <= WIDER_THAN_CLEARANCE_RAD && doubtful.iter().any(|(_, other, _)| size * other < 0.0)
     };
     let (back, sure): (Vec<Step>, Vec<Step>) = sure.into_iter().partition(way_back);
-    Some((sure, [doubtful, back].concat()))
+    Some(Found { sure, doubtful: [doubtful, back].concat(), stays, misfit, suspected })
 }
 
 /// The steps without those that come and go by the same amount, which do not last: teeth and clearance that fast motion samples once, a
@@ -213,7 +272,7 @@ fn beyond_dwell(session: &Session, row: usize, settled: &[bool], gear: &Gear) ->
 }
 
 /// Rows into which the error changes more than anything smooth explains, the largest changes first.
-fn sudden(sessions: &[Session], gear: &Gear, noise: f64, settled: &[Vec<bool>]) -> Vec<Place> {
+fn sudden(sessions: &[Session], gear: &Gear, noise: f64, settled: &[Vec<bool>], most: usize) -> Vec<Place> {
     let changes: Vec<f64> =
         sessions.iter().flat_map(|session| session.error_rad.windows(2).map(|error| error[1] - error[0])).collect();
     let usual = median_and_std(&mut sampled(&changes)).1;
@@ -223,22 +282,22 @@ fn sudden(sessions: &[Session], gear: &Gear, noise: f64, settled: &[Vec<bool>]) 
         for row in 1..session.len() {
             let by = beyond_dwell(session, row, &settled[number], gear).abs();
             if by > least {
-                found.push((Place { session: number, row }, by));
+                found.push((Place { session: number, row, stays: Stays::ForGood }, by));
             }
         }
     }
-    largest(found, &[])
+    largest(found, &[], most)
 }
 
 /// The places of the largest values, apart from each other and from those known.
-fn largest(mut found: Vec<(Place, f64)>, known: &[Place]) -> Vec<Place> {
+fn largest(mut found: Vec<(Place, f64)>, known: &[Place], most: usize) -> Vec<Place> {
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut places: Vec<Place> = Vec::new();
     for (place, _) in found {
         let near = |other: &Place| other.session == place.session && other.row.abs_diff(place.row) < WINDOW / 2;
         if !places.iter().chain(known).any(near) {
             places.push(place);
-            if places.len() == AT_ONCE {
+            if places.len() == most {
                 break;
             }
         }
@@ -287,12 +346,12 @@ fn standing_out(
                 // Of the rows around, the one where it happens.
                 let sharp = beyond_dwell(session, row, &settled[number], gear) * size.signum();
                 if sharp > (1.0 - AGREES) * size.abs() - 4.0 * noise {
-                    found.push((Place { session: number, row }, size.abs()));
+                    found.push((Place { session: number, row, stays: Stays::ForGood }, size.abs()));
                 }
             }
         }
     }
-    largest(found, known)
+    largest(found, known, AT_ONCE)
 }
 
 /// At least 1 for a step that lasts, is sudden, and is the same in both views.
@@ -475,7 +534,7 @@ mod tests {
 
     /// What is left of steps in some rows.
     fn left(steps: &[(usize, f64)]) -> Vec<f64> {
-        let step = |(row, size): &(usize, f64)| (Place { session: 0, row: *row }, *size, 0.1);
+        let step = |(row, size): &(usize, f64)| (Place { session: 0, row: *row, stays: Stays::ForGood }, *size, 0.1);
         lasting(steps.iter().map(step).collect()).into_iter().map(|(_, size, _)| size).collect()
     }
 
@@ -500,6 +559,33 @@ mod tests {
     }
 
     #[test]
+    fn a_counter_that_is_set_right_between_sessions_is_told_and_put_right() {
+        let mut random = fastrand::Rng::with_seed(4);
+        let one = |number: usize, random: &mut fastrand::Rng| {
+            let time = || (0..2000).map(|k| 0.01 * f64::from(k));
+            let torque: Vec<f64> = time().map(|t| 20.0 * (0.8 * t + number as f64).sin()).collect();
+            let mut noise = || 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+            let error = torque.iter().map(|torque| ARCSEC * (7.0 * torque + 30.0 * torque.signum() + noise()));
+            let mut one = session(error.collect(), torque.clone());
+            one.generator_rad = time().map(|t| 30.0 * (0.6 * t).sin()).collect();
+            one.time_s = Some(time().collect());
+            one
+        };
+        let right: Vec<Session> = (0..3).map(|number| one(number, &mut random)).collect();
+        let mut slipped = right.clone();
+        for (session, row, by) in [(0, 700, 90.0), (1, 450, 120.0), (1, 1500, 80.0), (2, 900, 100.0)] {
+            slipped[session].error_rad[row..].iter_mut().for_each(|error| *error += by * ARCSEC);
+        }
+        let mut findings = Findings::default();
+        check(&mut slipped, &Gear::of_ratio(100.0), &mut findings);
+        let told = findings.faults.iter().filter(|fault| fault.name == FaultName::EncoderIndexJump).count();
+        assert_eq!(told, 4, "{:?}", findings.faults);
+        let pairs = right.iter().zip(&slipped).flat_map(|(a, b)| a.error_rad.iter().zip(&b.error_rad));
+        let off = pairs.map(|(a, b)| (a - b).abs() / ARCSEC).fold(0.0, f64::max);
+        assert!(off < 5.0, "{off}");
+    }
+
+    #[test]
     fn between_loads_of_either_sign_a_flank_is_changed() {
         let ramp: Vec<f64> = (0..400).map(|k| 0.1 * f64::from(k) - 20.0).collect();
         let there_and_back: Vec<f64> = (0..400).map(|k| 20.0 - (0.2 * f64::from(k) - 40.0).abs()).collect();
@@ -516,7 +602,7 @@ mod tests {
         error[200..].iter_mut().for_each(|e| *e += step);
         error[400..].iter_mut().for_each(|e| *e -= step);
         let settled = vec![vec![true; 900]];
-        let place = Place { session: 0, row: 600 };
+        let place = Place { session: 0, row: 600, stays: Stays::ForGood };
         let elsewhere =
             |error: &[f64]| comes_elsewhere(&[session(error.to_vec(), vec![0.0; 900])], &settled, place, step);
         error[600..].iter_mut().for_each(|e| *e += step);
