@@ -149,12 +149,13 @@
 #define FLEXSPLINE_ENCODER_WORDS 7
 
 // Eight-byte words of a [`FlexsplineTorquePath`].
-#define FLEXSPLINE_TORQUE_PATH_WORDS 5
+#define FLEXSPLINE_TORQUE_PATH_WORDS 11
 
 // Eight-byte words of a [`FlexsplineAged`].
 #define FLEXSPLINE_AGED_WORDS 4
 
-// The torque is that on the load: what gravity, wind and the like do to it, less inertia times the acceleration of the target.
+// The torque is that on the load: what gravity, wind and the like do to it. Inertia times the acceleration of the target comes off what the tick gives,
+// unless that inertia torque is the larger: while a target speeds up from a light load the flank does not change.
 #define FLEXSPLINE_TORQUE_ON_LOAD 0
 
 // The torque is that in the mesh: of a sensor between drive and load, of the twist, or of the motor's current less its friction.
@@ -495,6 +496,10 @@ typedef struct FlexsplineTorqueSettings {
   // A torque in the mesh below this changes the flank only where the direction changes, N m: some three times the peak of the noise behind the
   // low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
   float hold_n_m;
+  // After a torque read in the mesh has changed the flank it does not change it again for so long, s: some periods of the servo's position loop; 0 or more.
+  float settle_s;
+  // Largest reading that the sensor can have, N m; a larger one is forgotten. Above 0.
+  float largest_n_m;
 } FlexsplineTorqueSettings;
 
 // A measurement with its age.
@@ -1061,13 +1066,14 @@ uint8_t flexspline_is_due(uint32_t tick,
                           uint32_t divisor,
                           uint32_t offset);
 
-// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time or bandwidth is not finite and positive, or a drag or hold not
-// finite or below 0.
+// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time, bandwidth or largest reading is not finite and positive, or a drag, hold
+// or time to settle not finite or below 0.
 enum FlexsplineStatus flexspline_torque_init(struct FlexsplineTorquePath *path,
                                              const struct FlexsplineTorqueSettings *settings);
 
 // One tick: a reading, N m, positive where it turns the output forward, where it was measured (`FLEXSPLINE_TORQUE_...`), and the direction in which
-// the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite gives NaN, and is forgotten.
+// the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite, or larger than the sensor's largest, gives NaN
+// and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit what was set: make the path anew.
 enum FlexsplineStatus flexspline_torque_tick(struct FlexsplineTorquePath *path,
                                              uint8_t place,
                                              float reading_n_m,

@@ -202,10 +202,9 @@ fn budget(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
     };
     let mut with_s = [0.0; 3];
     let mut contacts = [0.0; 3];
-    for range in 0..3 {
+    for (range, (k, contact)) in with_s.iter_mut().zip(&mut contacts).enumerate() {
         let found = loaded(&s_shaped(PRELOADS_UM[0], in_cup.ball_n[range]), entry.loads_n_m)?;
-        with_s[range] = found.k[range];
-        contacts[range] = found.share_in_contact[range];
+        (*k, *contact) = (found.k[range], found.share_in_contact[range]);
     }
     let shells = Flexspline3d::of(&cup, true)?;
     let [around, lobes] = [shells.torsion_n_m_per_rad(), shells.torsion_at_lobes_n_m_per_rad(LOBE_RAD)];
