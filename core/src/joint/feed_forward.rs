@@ -1,7 +1,7 @@
 //! Rate and acceleration of the corrected command, for the speed loop and the current of a servo.
 
 use super::runtime::Joint;
-use crate::angle::{OutputAngle, RAD_PER_COUNT};
+use crate::angle::{OutputAngle, RAD_PER_COUNT, counts_from_rad};
 use crate::play::Direction;
 use crate::store::Store;
 use crate::table::{Approach, Quality};
@@ -64,13 +64,15 @@ impl Joint {
         let ratio = self.drive().ratio();
         let most = core::f32::consts::FRAC_PI_2 / if ratio < 0.0 { -ratio } else { ratio };
         let way = 0.5 * ahead_s * if rate_rad_s < 0.0 { -rate_rad_s } else { rate_rad_s };
-        if way < SHORTEST_WAY_RAD {
+        let way = if way < SHORTEST_WAY_RAD {
             SHORTEST_WAY_RAD
         } else if way > most {
             most
         } else {
             way
-        }
+        };
+        // In whole counts, as the target moves.
+        counts_from_rad(way) as f32 * RAD_PER_COUNT
     }
 
     /// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal rate and what the error adds to it, by
@@ -146,7 +148,7 @@ mod tests {
                 let motion = joint.motion_ahead(&store, OutputAngle::ZERO, [rate, 0.1], 5.0, ahead_s);
                 let off = motion.rate_rad_s / (rate * ratio) - 1.0;
                 assert!(
-                    off.abs() < 0.2 || (rate.abs() > 1e29 && motion.rate_rad_s.is_nan()),
+                    off.abs() < 0.1 || (rate.abs() > 1e29 && motion.rate_rad_s.is_nan()),
                     "{rate} {ahead_s}: {motion:?}"
                 );
                 assert_eq!(motion.rate_rad_s.is_nan(), motion.acceleration_rad_s2.is_nan());

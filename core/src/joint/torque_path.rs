@@ -121,8 +121,8 @@ impl TorquePath {
         }
         let along = TAU * bandwidth_hz as f64 * tick_s as f64;
         let share = (along / (1.0 + along)) as f32;
-        // Beyond what a count holds it is as good as for ever.
-        let ticks = (settle_s as f64 / tick_s as f64) as u32;
+        // To the next whole tick (but for rounding); beyond what a count holds it is as good as for ever.
+        let ticks = (settle_s as f64 / tick_s as f64 + 0.999) as u32;
         let numbers = [drag_n_m.to_bits(), table_drag_n_m.to_bits(), hold_n_m.to_bits(), largest_n_m.to_bits()];
         let [drag, table_drag, hold, largest] = numbers;
         let set = [drag, table_drag, hold, largest, share.to_bits(), ticks];
@@ -282,7 +282,7 @@ mod tests {
         let mut flank = |torque: f32, direction| path.tick(TorqueReading::InMesh(torque), direction).signum();
         assert_eq!(flank(-0.4, Direction::Forward), -1.0);
         assert_eq!(flank(3.0, Direction::Forward), 1.0);
-        for _ in 0..249 {
+        for _ in 0..250 {
             assert_eq!(flank(-3.0, Direction::Forward), 1.0);
         }
         assert_eq!(flank(-3.0, Direction::Forward), -1.0);

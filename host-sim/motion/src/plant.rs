@@ -16,7 +16,7 @@ use super::keep::kept;
 
 /// Coordinates: motor, load, appendage.
 pub const PARTS: usize = 3;
-/// Most repetitions in a step; three are usual.
+/// Most repetitions in a step; four are usual.
 const REPETITIONS: usize = 40;
 /// After so many the spring is no longer taken along: where flanks touch and part in one step the plain repetition ends surely.
 const TAKEN_ALONG: usize = 8;
