@@ -29,7 +29,8 @@ Examples:
   flexspline reproduce --json > claims.json
 
 A claim that is not reproduced is a result, not a failure, and so is a changed model without
-equilibrium. Exit code 1: a run of the drive as it is found none, or the page is not sound; 2: bad input.")]
+equilibrium. Exit code 1: a run of the drive as it is found none, or the page is not sound;
+2: bad input.")]
 pub(super) struct Reproduce {
     /// Coarse mesh, one other discretisation and few changes of the model: about a minute on two cores instead of some minutes
     #[arg(long, conflicts_with = "mesh")]
