@@ -53,7 +53,7 @@ static const FlexsplineCoefficient coefficients[] = {
 
 static const FlexsplineSpring springs[] = {{.width = 1.0f, .gain = 8e-6f}, {.width = 3.0f, .gain = 4e-6f}};
 
-static const FlexsplineTorqueSettings torque_settings = {.tick_s = 1e-3f, .bandwidth_hz = 50.0f, .largest_n_m = 200.0f};
+static const FlexsplineTorqueSettings torque_settings = {.tick_s = 1e-3f, .bandwidth_hz = 50.0f};
 
 static const FlexsplineInertias inertias = {
     .motor_kg_m2 = 1.0,

@@ -70,15 +70,8 @@ fn banks() -> (SlipBank<3>, SlipBank<2, LoadTorque>) {
     (SlipBank::new(SPRINGS.map(spring)).unwrap(), SlipBank::of_torque(TORQUE_SPRINGS.map(torque)).unwrap())
 }
 
-const TORQUE: FlexsplineTorqueSettings = FlexsplineTorqueSettings {
-    tick_s: 1e-3,
-    bandwidth_hz: 20.0,
-    drag_n_m: 0.4,
-    table_drag_n_m: 0.05,
-    hold_n_m: 0.1,
-    settle_s: 0.05,
-    largest_n_m: 50.0,
-};
+const TORQUE: FlexsplineTorqueSettings =
+    FlexsplineTorqueSettings { tick_s: 1e-3, bandwidth_hz: 20.0, drag_n_m: 0.4, table_drag_n_m: 0.05, hold_n_m: 0.1 };
 
 const ENCODER: FlexsplineEncoderSettings =
     FlexsplineEncoderSettings { zero_counts: 1234, counts_per_turn: 20_000, wrap_bits: 16, reversed: 1 };
@@ -134,7 +127,7 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
     let (mut c_predictor, mut c_observer, mut c_recorder) =
         (room!(FlexsplinePredictor), room!(FlexsplineObserver), room!(FlexsplineRecorder));
     assert_eq!(flexspline_encoder_init(&mut c_encoder, &ENCODER), Done);
-    assert_eq!(flexspline_torque_init(&mut c_path, &TORQUE), Done);
+    assert_eq!(flexspline_torque_init_sensor(&mut c_path, &TORQUE, 0.05, 50.0), Done);
     assert_eq!(flexspline_aged_init(&mut c_aged, 4), Done);
     assert_eq!(flexspline_learner_init(&mut c_learner, &LEARN, COEFFICIENTS.as_ptr(), 5), Done);
     assert_eq!(flexspline_learner_set(&mut c_learner, FLEXSPLINE_LEARNING_ON), Done);
@@ -153,8 +146,8 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
         drag_n_m: TORQUE.drag_n_m,
         table_drag_n_m: TORQUE.table_drag_n_m,
         hold_n_m: TORQUE.hold_n_m,
-        settle_s: TORQUE.settle_s,
-        largest_n_m: TORQUE.largest_n_m,
+        settle_s: 0.05,
+        largest_n_m: 50.0,
     })
     .unwrap();
     let (mut aged, mut learnt, mut observer) = (Aged::new(4), adapter.start(), PredictorState::new());
@@ -597,6 +590,8 @@ fn what_is_not_allowed_is_refused() {
     let mut torque = 0.0;
     assert_eq!(flexspline_torque_init(&mut path, &FlexsplineTorqueSettings { tick_s: 0.0, ..TORQUE }), Argument);
     assert_eq!(flexspline_torque_tick(&mut path, 0, 1.0, 1, &mut torque), NotInitialised);
+    assert_eq!(flexspline_torque_init_sensor(&mut path, &TORQUE, -1.0, 50.0), Argument);
+    assert_eq!(flexspline_torque_init_sensor(&mut path, &TORQUE, 0.1, f32::NAN), Argument);
     assert_eq!(flexspline_torque_init(&mut path, &TORQUE), Done);
     assert_eq!(flexspline_torque_tick(&mut path, 0, 1.0, 0, &mut torque), Argument);
     assert_eq!(flexspline_torque_tick(&mut path, 2, 1.0, 1, &mut torque), Argument);

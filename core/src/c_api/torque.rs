@@ -8,7 +8,7 @@ use crate::{Aged, Direction, Joint, MotionAhead, OutputAngle, Store, TorquePath,
 use core::mem::{MaybeUninit, align_of, size_of};
 
 /// Eight-byte words of a [`FlexsplineTorquePath`].
-pub const FLEXSPLINE_TORQUE_PATH_WORDS: usize = 11;
+pub const FLEXSPLINE_TORQUE_PATH_WORDS: usize = 5;
 /// Eight-byte words of a [`FlexsplineAged`].
 pub const FLEXSPLINE_AGED_WORDS: usize = 4;
 
@@ -47,10 +47,6 @@ pub struct FlexsplineTorqueSettings {
     /// A torque in the mesh below this changes the flank only where the direction changes, N m: some three times the peak of the noise behind the
     /// low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
     pub hold_n_m: f32,
-    /// After a torque read in the mesh has changed the flank it does not change it again for so long, s: some periods of the servo's position loop; 0 or more.
-    pub settle_s: f32,
-    /// Largest reading that the sensor can have, N m; a larger one is forgotten. Above 0.
-    pub largest_n_m: f32,
 }
 
 const TORQUE_PATH_MARK: u32 = 0x7854_5446;
@@ -72,12 +68,28 @@ fn direction_of(sign: i8) -> Result<Direction, FlexsplineStatus> {
     }
 }
 
-/// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time, bandwidth or largest reading is not finite and positive, or a drag, hold
-/// or time to settle not finite or below 0.
+/// Largest reading that is believed where none is told, N m.
+const ANY_N_M: f32 = 1e9;
+
+/// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time or bandwidth is not finite and positive, or a drag or hold not
+/// finite or below 0. A torque in the mesh may change the flank in any tick, and any reading is believed: `flexspline_torque_init_sensor` says more.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_torque_init(
     path: *mut FlexsplineTorquePath,
     settings: *const FlexsplineTorqueSettings,
+) -> FlexsplineStatus {
+    flexspline_torque_init_sensor(path, settings, 0.0, ANY_N_M)
+}
+
+/// As `flexspline_torque_init`, with what is known of sensor and servo. After a torque read in the mesh has changed the flank it does not change it
+/// again for `settle_s`, s (some periods of the servo's position loop, 0 or more): the correction crosses the play then, and what its own motion makes of the
+/// torque has to die away. A reading beyond `largest_n_m`, N m (above 0), is forgotten as one that is not finite.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_torque_init_sensor(
+    path: *mut FlexsplineTorquePath,
+    settings: *const FlexsplineTorqueSettings,
+    settle_s: f32,
+    largest_n_m: f32,
 ) -> FlexsplineStatus {
     let make = || {
         let s = copied(settings)?;
@@ -87,8 +99,8 @@ pub extern "C" fn flexspline_torque_init(
             drag_n_m: s.drag_n_m,
             table_drag_n_m: s.table_drag_n_m,
             hold_n_m: s.hold_n_m,
-            settle_s: s.settle_s,
-            largest_n_m: s.largest_n_m,
+            settle_s,
+            largest_n_m,
         };
         put(path, TORQUE_PATH_MARK, TorquePath::new(settings).map_err(|_| FlexsplineStatus::Argument)?)
     };
@@ -97,7 +109,7 @@ pub extern "C" fn flexspline_torque_init(
 
 /// One tick: a reading, N m, positive where it turns the output forward, where it was measured (`FLEXSPLINE_TORQUE_...`), and the direction in which
 /// the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite, or larger than the sensor's largest, gives NaN
-/// and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit what was set: make the path anew.
+/// and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit it: make the path anew.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_torque_tick(
     path: *mut FlexsplineTorquePath,

@@ -99,6 +99,13 @@ fn table(drive: &Drive, reports: &[MeshReport]) -> String {
             report.ripple_rad * ARCSEC_PER_RAD,
         );
     }
+    if drive.flanks.preload_um != 0.0 {
+        let _ = writeln!(
+            text,
+            "without flanks.preload_um = {}, by which flanks overlap on purpose",
+            drive.flanks.preload_um
+        );
+    }
     for report in reports {
         for place in &report.interferences {
             let _ = writeln!(text, "{}: {place}", report.generator);

@@ -44,7 +44,7 @@ pub(super) struct New {
     #[arg(long, value_name = "MM", conflicts_with_all = ["from", "like"])]
     module: Option<f64>,
     /// Ratio, instead of --teeth (twice the ratio: circular spline held) or to check them
-    #[arg(long, value_name = "N", requires = "module", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     ratio: Option<f64>,
     /// Diameter of the flexspline's bore, undeformed, mm [default: 1.97 times the pitch radius]
     #[arg(long, value_name = "MM")]
@@ -161,12 +161,18 @@ impl New {
                      with --from"
                 ));
             };
+            if self.ratio.is_some_and(|asked| asked.abs() != f64::from(ratio)) {
+                return bad(format!(
+                    "--ratio: found {:?}, allowed: {ratio}, as {name} has it",
+                    self.ratio.unwrap_or_default()
+                ));
+            }
             return Ok(Some((name.clone(), few(2 * ratio, CATALOGUE_MM_PER_SIZE * size / f64::from(2 * ratio)))));
         }
         let Some(module_mm) = self.module else {
-            if self.bore.is_some() || self.width.is_some() {
+            if self.bore.is_some() || self.width.is_some() || self.ratio.is_some() {
                 return bad(
-                    "--bore, --width: found without a drive to make; add --teeth and --module, or --like".to_owned()
+                    "--bore, --width, --ratio: found without a drive to make; add --module and --teeth or --ratio, or --like".to_owned()
                 );
             }
             return Ok(None);

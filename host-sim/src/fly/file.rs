@@ -192,7 +192,8 @@ pub fn read(name: &str, text: &str) -> Result<Flown, String> {
                 }
             }
         }
-        let seconds = scenario.seconds();
+        // No legs are 0 s, and not -0.
+        let seconds = scenario.seconds() + 0.0;
         if !(3.0..=LONGEST_S).contains(&seconds) {
             return Err(set.refused("legs", format!("{seconds} s in all"), &format!("3 to {LONGEST_S} s")));
         }

@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use super::{Run, RunStatus};
 use crate::data_sheet::{DataSheet, FIGURES, FigureOf};
+use crate::drive::RigidMesh;
 use crate::suggest::did_you_mean;
 
 /// A figure by name.
@@ -114,7 +115,7 @@ impl Target {
 /// Marks what meets the constraints, and of each generator what nothing that meets them beats (Pareto's front).
 pub(super) fn judge(runs: &mut [Run], constraints: &[Constraint], targets: &[Target]) {
     for run in runs.iter_mut() {
-        let clear = run.sheet.rigid_gap_um.is_some_and(|gap| gap >= 0.0);
+        let clear = run.sheet.rigid_gap_um.is_some_and(|gap| gap >= -1e3 * RigidMesh::TOUCHES_MM);
         run.meets = run.status == RunStatus::Converged
             && clear
             && constraints.iter().all(|constraint| constraint.keeps(&run.sheet));

@@ -54,8 +54,6 @@ static const FlexsplineTorqueSettings torque_settings = {
     .drag_n_m = 0.4f,
     .table_drag_n_m = 0.05f,
     .hold_n_m = 0.1f,
-    .settle_s = 0.05f,
-    .largest_n_m = 50.0f,
 };
 
 static const FlexsplineEncoderSettings encoder_settings = {
@@ -203,7 +201,7 @@ int beside(const FlexsplineImages *table, int ticks, uint32_t *found)
     if (flexspline_learner_init(&learner, &learn, coefficients, 4) || flexspline_learner_set(&learner, FLEXSPLINE_LEARNING_ON) ||
         flexspline_slip_init(&slip, FLEXSPLINE_SLIP_OF_OUTPUT, springs, 2) ||
         flexspline_slip_init(&torque_slip, FLEXSPLINE_SLIP_OF_TORQUE, torque_springs, 3) ||
-        flexspline_torque_init(&path, &torque_settings) || flexspline_aged_init(&aged, 4) ||
+        flexspline_torque_init(&path, &torque_settings) || flexspline_torque_init_sensor(&path, &torque_settings, 0.05f, 50.0f) || flexspline_aged_init(&aged, 4) ||
         flexspline_encoder_init(&encoder, &encoder_settings) || flexspline_encoder_start(&encoder, 1234, 0) ||
         flexspline_predictor_of(&predictor, &inertias, &noise, 1e-3) || flexspline_observer_init(&observer) ||
         flexspline_recorder_init(&recorder, 8, 10, 3, FLEXSPLINE_FULL_LOSE_OLDEST))

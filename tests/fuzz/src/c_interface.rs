@@ -353,8 +353,6 @@ fn begin_beside(memory: &Memory) {
         drag_n_m: 0.5,
         table_drag_n_m: 0.1,
         hold_n_m: 0.1,
-        settle_s: 0.05,
-        largest_n_m: 100.0,
     };
     let counts = c::FlexsplineEncoderSettings { zero_counts: 0, counts_per_turn: 20_000, wrap_bits: 16, reversed: 0 };
     let begun = [
@@ -515,11 +513,16 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 drag_n_m: if choices.below(4) == 0 { choices.wild() } else { 0.5 },
                 table_drag_n_m: 0.1,
                 hold_n_m: 0.1,
-                settle_s: if choices.below(4) == 0 { choices.wild() } else { 0.05 },
-                largest_n_m: if choices.below(4) == 0 { choices.wild() } else { 100.0 },
             }; 2];
             let (settings, told) = plain(choices, &settings);
-            (c::flexspline_torque_init(path.pointer.cast(), settings) as u32, path.usable && told, false)
+            let [settle, largest] =
+                [0.05, 100.0].map(|usual| if choices.below(4) == 0 { choices.wild() } else { usual });
+            let made = if choices.below(2) == 0 {
+                c::flexspline_torque_init(path.pointer.cast(), settings)
+            } else {
+                c::flexspline_torque_init_sensor(path.pointer.cast(), settings, settle, largest)
+            };
+            (made as u32, path.usable && told, false)
         }
         18 => {
             let to = memory.answer(choices, &[path]);
