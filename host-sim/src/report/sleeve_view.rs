@@ -63,8 +63,8 @@ impl SleeveView {
             return Ok(None);
         }
         let shells = Flexspline3d::of(&problem.drive, true)?;
-        let (first, last) = (shells.shape(2), 0.5 * shells.width_mm);
-        let stations_mm = stations(&first, last);
+        let half_face_mm = 0.5 * shells.width_mm;
+        let stations_mm = stations(&shells.shape(2), half_face_mm);
         let largest = rim.iter().map(|(_, [a, b])| a.hypot(*b)).fold(0.0, f64::max);
         let waves = rim
             .into_iter()
@@ -87,7 +87,7 @@ impl SleeveView {
         let sleeve = &problem.drive.sleeve;
         Ok(Some(SleeveView {
             radius_mm: rounded(shells.rim.radius_mm),
-            half_face_mm: last,
+            half_face_mm,
             teeth: problem.drive.flexspline.teeth,
             stations_mm: stations_mm.iter().map(|x| rounded(*x)).collect(),
             ends: [

@@ -191,7 +191,11 @@ pub fn study(drive: &Drive, settings: &StudySettings, observer: &Observer<'_>) -
     let (runs, off) = if settings.compute_all || variants.len() <= computed_first(paths.len()) {
         (several.run(&jobs, jobs.len(), Several::computed)?, Vec::new())
     } else {
-        estimate::some_computed(&several, &jobs)?
+        let run = |jobs: &[Job], of: usize, basis: Basis| match basis {
+            Basis::Computed => several.run(jobs, of, Several::computed),
+            Basis::Estimated => several.run(jobs, of, Several::drawn),
+        };
+        estimate::some_computed(settings, &variants, &jobs, &run)?
     };
     let mut study = Study { fields: paths.iter().map(|path| (*path).to_owned()).collect(), runs, off };
     judge::judge(&mut study.runs, &settings.constraints, &settings.targets);

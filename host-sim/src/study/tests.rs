@@ -3,7 +3,7 @@ use crate::data_sheet::FIGURES;
 use crate::mesh::MeshLevel;
 use crate::stepping::Method;
 
-fn settings(vary: &[&str]) -> StudySettings {
+pub(super) fn settings(vary: &[&str]) -> StudySettings {
     StudySettings {
         vary: vary.iter().map(|text| text.parse().unwrap()).collect(),
         spread: None,
