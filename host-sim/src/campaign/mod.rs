@@ -18,7 +18,7 @@ mod model;
 mod plan;
 mod reduce;
 mod shard;
-mod statistics;
+pub(crate) mod statistics;
 mod tolerance;
 mod variance;
 

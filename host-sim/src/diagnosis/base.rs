@@ -130,7 +130,8 @@ pub struct Base {
 
 /// What floats where angles are read at other instants than is known, s.
 pub(crate) const BETWEEN_READINGS: &str = "time between the readings";
-/// What floats as the output takes a time to go to its other flank: by how much longer than none, in [`FLANK_S`].
+/// What floats as the output takes a time to go to its other flank, s: that of a lag which does as much to the error as this time says. Beside
+/// [`FLANK_S`] it is that lag to first order.
 pub(crate) const CHANGE_OF_FLANK: &str = "time of a change of flank";
 /// The output goes from one flank to the other in some milliseconds. *Guess*.
 const FLANK_S: f64 = 5e-3;
@@ -201,7 +202,8 @@ impl Base {
         add(BETWEEN_READINGS, late.collect(), rows.unsure_s);
         // No output is on its other flank at once.
         if rows.recorded.time {
-            add(CHANGE_OF_FLANK, behind(rows, &flank, half_backlash), 1.0);
+            let per_s = behind(rows, &flank, half_backlash).into_iter().map(|arcsec| arcsec / FLANK_S);
+            add(CHANGE_OF_FLANK, per_s.collect(), FLANK_S);
         }
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
         add("backlash", flank.iter().map(|p| half_backlash * p).collect(), nominal.spread.backlash);

@@ -103,10 +103,18 @@ pub mod verdict {
     pub const NEAR_NOISE: f64 = 1.6;
     /// Something without a name is large beside a cause from this share of its size on: what is not understood may reach into it. *Chosen*.
     pub const LARGE_BESIDE: f64 = 0.7;
-    /// A line of the output angle that is straight or of a whole order is a piece of a broken order where a line of another order has this share of
-    /// it. *Guess*: beside a wheel before the encoder it had 0.3 and more.
-    pub const BROKEN_BESIDE: f64 = 0.25;
-    /// Then what the cause adds has to be so many times the uncertainty of that. *Chosen*.
+    /// A line of the output angle that is straight or of a whole order is told from a piece of a line of broken order beside it where the misfit
+    /// rises by this without it, that line being of any order: five standard deviations, as between rivals. *Source*.
+    pub const NO_PIECE: f64 = super::rivals::TOLD_APART;
+    /// The order of a line is broken where a line of the nearest whole order raises the misfit by this: three standard deviations. *Source*.
+    pub const BROKEN: f64 = 9.0;
+    /// A resonance rings that may be damped by less than this, all of its interval considered. Beyond, a third (0.34) of the swing or less is
+    /// left after a period: it lags, and so does a flank or a reading that takes some milliseconds. *Guess*: drives of the examinations have
+    /// 0.01 to 0.15.
+    pub const RINGS: f64 = 0.17;
+    /// Standard deviations from a value to the ends of its interval of 95 %. *Source*.
+    pub const INTERVAL: f64 = 1.96;
+    /// Beside what has no name and is large, a cause adds has to be so many times the uncertainty of that. *Chosen*.
     pub const KNOWN_BESIDE: f64 = 5.0;
     /// The size of a cause is told from zero from so many of its standard deviations on. *Chosen*: of 6 causes named below it at 99 % one was
     /// there.

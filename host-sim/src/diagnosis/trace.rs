@@ -119,6 +119,10 @@ pub enum Gate {
     Named,
     /// What has no name is no larger than this against it.
     BesideUnknown,
+    /// It is no piece of a line beside it whose order is not whole: without it, and with that line of any order, the misfit rises by this much.
+    NoPiece,
+    /// The lower end of its damping's interval is below this.
+    Rings,
     /// It is so many times its own uncertainty.
     KnownWell,
     /// The best known of its sizes is so many times its standard deviation.
@@ -176,6 +180,8 @@ impl Gate {
             Gate::Predicts => "predicts",
             Gate::Named => "named",
             Gate::BesideUnknown => "beside_unknown",
+            Gate::NoPiece => "no_piece",
+            Gate::Rings => "rings",
             Gate::KnownWell => "known_well",
             Gate::ToldFromZero => "told_from_zero",
             Gate::ToldBetter => "told_better",
@@ -215,6 +221,8 @@ impl Gate {
             Gate::Predicts => "keeps the causes together better than none in sessions left out (arcsec rms)",
             Gate::Named => "is large enough to be named (arcsec rms)",
             Gate::BesideUnknown => "is not hidden by what has no name (its size as a share of the cause)",
+            Gate::NoPiece => "is no piece of a line beside it whose order is not whole (rise of the misfit without it)",
+            Gate::Rings => "may ring (lower end of the interval of its damping ratio)",
             Gate::KnownWell => "is known well beside what has no name (times its own uncertainty)",
             Gate::ToldFromZero => "has a size that is told from zero (times its standard deviation)",
             Gate::ToldBetter => "is not told better by a rival (rise of the misfit with the rival in its place)",
@@ -238,6 +246,7 @@ impl Gate {
             | Gate::SamePlace
             | Gate::Predicts
             | Gate::BesideUnknown
+            | Gate::Rings
             | Gate::InTheDark
             | Gate::NoWorse
             | Gate::AsRival => true,
@@ -257,6 +266,7 @@ impl Gate {
             | Gate::Ahead
             | Gate::Earns
             | Gate::Named
+            | Gate::NoPiece
             | Gate::KnownWell
             | Gate::ToldFromZero
             | Gate::ToldBetter

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::candidate::{Deviation, Label, Law, Per};
+use super::candidate::{Deviation, Label, Law, Per, line};
 use super::channels::{RatioProposal, proposed_ratio};
-use super::model::{Fit, Problem, Term};
+use super::model::{Fit, Problem, Scaffold, Term};
 use super::noise::Noise;
 use super::report::{Cause, Compensation, Diagnosis, Finding, HeldOut, Parameter, Residual, Unexplained, Verdict};
 use super::select::{self, Selected, Standing, fit, predicted, standings};
@@ -48,11 +48,12 @@ pub(super) fn conclude(
     let (rms_before, rms_after) = (problem.certain_rms(&before), problem.certain_rms(&after));
     let explainable = (rms_before * rms_before - floor * floor).max(0.0);
     let unexplained = (rms_after * rms_after - floor * floor).max(0.0);
+    let as_noise = rms_after <= NOISE_KNOWN_TO * floor;
 
     let known = uncertainty::known(problem, &selected);
     let beyond_noise = beyond_noise(rms_after, floor);
     let told_from_zero: Vec<f64> = known.iter().map(|known| known.told_from_zero() / beyond_noise).collect();
-    let named = understood(&selected, &standings, &known, &told_from_zero, &left_over, noise, &mut trace);
+    let named = understood(problem, &selected, &standings, &known, &told_from_zero, &left_over, noise, &mut trace);
     let size = |k: &usize| standings[*k].size.powi(2);
     let (by_name, without_name) = (
         named.iter().map(size).sum::<f64>(),
@@ -69,7 +70,7 @@ pub(super) fn conclude(
     let without_name = without_name + left_over.iter().map(|l| l.size_arcsec.powi(2)).fold(0.0, f64::max);
     let significant_left = without_name > 0.0 || zeros_alone;
     let held = held_out::evaluate(problem, &all);
-    let abstained = Abstention { by_name, without_name, described, unexplained, explainable };
+    let abstained = Abstention { by_name, without_name, described, unexplained, explainable, as_noise };
     let gates = if named.is_empty() { Vec::new() } else { abstained.gates(significant_left, held.total) };
     let verdict = match (named.is_empty(), significant_left) {
         (true, false) => Verdict::None,
@@ -218,6 +219,8 @@ struct Abstention {
     unexplained: f64,
     /// Beyond noise at all.
     explainable: f64,
+    /// What is left is noise, as well as that is known.
+    as_noise: bool,
 }
 
 impl Abstention {
@@ -234,7 +237,7 @@ impl Abstention {
             gates.push(share(Gate::ShareDescribed, self.by_name + self.described, LEAST_BESIDE_DESCRIBED));
         }
         // Names for a small part of what is there, with the rest in the dark, are no understanding.
-        let dark = self.unexplained > MOST_UNEXPLAINED * self.explainable;
+        let dark = !self.as_noise && self.unexplained > MOST_UNEXPLAINED * self.explainable;
         let in_the_dark = if self.explainable > 0.0 { self.unexplained / self.explainable } else { 0.0 };
         gates.push(Judged::number(Gate::InTheDark, in_the_dark, MOST_UNEXPLAINED, !dark));
         // What does not predict sessions it was not fitted to is no explanation.
@@ -246,7 +249,9 @@ impl Abstention {
 }
 
 /// Which terms are causes that may be named.
+#[allow(clippy::too_many_arguments, reason = "all that a search has found")]
 fn understood(
+    problem: &Problem<'_>,
     selected: &Selected<'_>,
     standings: &[Standing],
     known: &[Known],
@@ -256,43 +261,115 @@ fn understood(
     trace: &mut Trace,
 ) -> Vec<usize> {
     let is_named = |k: &usize| selected.terms[*k].law.named();
-    let unnamed = (0..selected.terms.len())
-        .filter(|k| !is_named(k) && !selected.terms[*k].law.is_zero_of_sessions())
-        .map(|k| standings[k].size);
-    let not_understood = unnamed.chain(left_over.iter().map(|l| l.size_arcsec)).fold(0.0, f64::max);
-    // A broken order of the output leaks into whole ones beside it, and into a straight line.
-    let of_a_line = |k: &usize| {
-        matches!(selected.terms[*k].law.label, Label::Deviation(Deviation::Line { per: Per::OutputTurn, .. }))
+    let unnamed = || {
+        let terms = (0..selected.terms.len())
+            .filter(|k| !is_named(k) && !selected.terms[*k].law.is_zero_of_sessions())
+            .map(|k| (follows_output(selected.terms[k].law.label), standings[k].size));
+        terms.chain(left_over.iter().map(|l| (l.looks_like == OF_OUTPUT_ANGLE, l.size_arcsec)))
     };
-    let broken = (0..selected.terms.len()).filter(of_a_line).map(|k| standings[k].size).fold(0.0, f64::max);
-    let whole = |k: usize| {
-        let (size, of_angle) = (standings[k].size, of_output_angle(selected.terms[k].law, &known[k]));
-        Judged::number(Gate::BesideUnknown, broken / size, BROKEN_BESIDE, !of_angle || broken <= BROKEN_BESIDE * size)
-    };
+    let largest = |sizes: &mut dyn Iterator<Item = f64>| sizes.fold(0.0, f64::max);
+    let not_understood = largest(&mut unnamed().map(|(_, size)| size));
+    let of_output = largest(&mut unnamed().filter(|(of_output, _)| *of_output).map(|(_, size)| size));
     let mut named = Vec::new();
     for k in (0..selected.terms.len()).filter(is_named) {
         let size = standings[k].size;
-        let hidden = Judged::number(
-            Gate::BesideUnknown,
-            not_understood / size,
-            LARGE_BESIDE,
-            not_understood <= LARGE_BESIDE * size,
-        );
+        let beside = |unnamed: f64| {
+            Judged::number(Gate::BesideUnknown, unnamed / size, LARGE_BESIDE, unnamed <= LARGE_BESIDE * size)
+        };
         let well_known = Judged::above(Gate::KnownWell, known[k].times_its_doubt, KNOWN_BESIDE);
-        let beside =
-            if hidden.passed || of_output_angle(selected.terms[k].law, &known[k]) { hidden } else { well_known };
-        let gates = vec![
+        let hidden = beside(not_understood);
+        let mut gates = vec![
             Judged::above(Gate::Named, size, select::least_named(noise.white)),
-            beside,
-            whole(k),
+            if hidden.passed { hidden } else { well_known },
             Judged::above(Gate::ToldFromZero, told_from_zero[k], TOLD_FROM_ZERO),
         ];
+        if of_output_angle(selected.terms[k].law, &known[k]) {
+            // However well it is known, what follows the same angle and has no name may be the whole of which it is a piece.
+            gates.push(beside(of_output));
+            gates.extend(
+                rise_without_a_piece(problem, selected, k).map(|rise| Judged::above(Gate::NoPiece, rise, NO_PIECE)),
+            );
+        }
+        gates.extend(least_damping(&known[k]).map(|least| Judged::number(Gate::Rings, least, RINGS, least < RINGS)));
         if passed(&gates) {
             named.push(k);
         }
         trace.decided(Stage::Understood, selected.terms[k].law.label, None, gates);
     }
     named
+}
+
+/// What a free function of the output angle that is left is called.
+const OF_OUTPUT_ANGLE: &str = "a function of the output angle";
+
+/// Whether what has no name follows the output angle: it is counted in turns of it, or in less than one wave to a turn of the generator, where
+/// nothing repeats that the generator does.
+fn follows_output(label: Label) -> bool {
+    match label {
+        Label::Deviation(Deviation::Line { per, order }) => waves_per_output_turn(per, order, 1.0).is_some(),
+        Label::Cause(_) | Label::Deviation(Deviation::Like(_)) => false,
+    }
+}
+
+/// Waves of a line in a turn of the output, if it follows the output angle.
+fn waves_per_output_turn(per: Per, order: f64, ratio: f64) -> Option<f64> {
+    match per {
+        Per::OutputTurn => Some(order),
+        Per::GeneratorTurn if order < 1.0 => Some(order * ratio.abs()),
+        Per::GeneratorTurn | Per::Second => None,
+    }
+}
+
+/// Farthest that the order of a line is looked for from where it was found, waves in a turn of the output: over less than a turn whole orders
+/// stand in for all between. Smallest order of a line, and steps at first; each time finer by this factor, so many times.
+const ORDERS: f64 = 1.0;
+const SLOWEST: f64 = 0.1;
+const ORDER_STEPS: usize = 20;
+const FINER: f64 = 4.0;
+const TIMES_FINER: usize = 5;
+
+/// Rise of the misfit where a cause is left out and a line of the output angle that was found beside it may have any order near its own: what is a
+/// piece of that line is not missed then. The least of all such lines whose order is not whole; nothing where there is none.
+fn rise_without_a_piece(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Option<f64> {
+    let at = |label: Label| match label {
+        Label::Deviation(Deviation::Line { per, order }) => waves_per_output_turn(per, order, problem.on.nominal.ratio),
+        Label::Cause(_) | Label::Deviation(Deviation::Like(_)) => None,
+    };
+    let of_line = |j: usize| -> Option<f64> {
+        let found = at(selected.terms[j].law.label)?;
+        let others = (0..selected.terms.len()).filter(|other| *other != j && *other != k);
+        let scaffold = Scaffold::new(problem, others.map(|other| &selected.terms[other]).collect());
+        let misfit = |order: f64| {
+            let law = line(Per::OutputTurn, order);
+            scaffold.fit(Some(&Term::new(problem, &law, Vec::new()))).map_or(f64::INFINITY, |fit| fit.solution.misfit)
+        };
+        let (order, least) = least_near(found, misfit);
+        let is_broken = misfit(order.round()) > least + BROKEN;
+        is_broken.then(|| least - selected.fit.solution.misfit)
+    };
+    (0..selected.terms.len()).filter(|j| *j != k).filter_map(of_line).reduce(f64::min)
+}
+
+/// The order near one at which the misfit is least, and that misfit.
+fn least_near(order: f64, misfit: impl Fn(f64) -> f64 + Sync) -> (f64, f64) {
+    let mut best = (order, misfit(order));
+    let mut reach = ORDERS;
+    for _ in 0..=TIMES_FINER {
+        let step = 2.0 * reach / ORDER_STEPS as f64;
+        let from = best.0 - reach;
+        let tried = (0..=ORDER_STEPS)
+            .into_par_iter()
+            .map(|k| (from + step * k as f64).max(SLOWEST))
+            .map(|order| (order, misfit(order)));
+        best = tried.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|tried| tried.1 < best.1).unwrap_or(best);
+        reach /= FINER;
+    }
+    best
+}
+
+/// The lower end of the interval of a damping ratio, of a cause that has one.
+fn least_damping(known: &Known) -> Option<f64> {
+    known.parameters.get(ParameterName::DampingRatio.as_str()).map(|damping| damping.value - INTERVAL * damping.std)
 }
 
 /// Whether a law is a line of the output angle and nothing else, straight or of a whole order: a piece of whatever bends, however well it is known.
@@ -366,6 +443,55 @@ fn recalibrated(problem: &Problem<'_>, selected: &Selected<'_>) -> BTreeMap<Stri
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_left_is_in_the_dark_only_beyond_what_the_noise_is_known_to() {
+        let in_the_dark = |as_noise: bool| {
+            let of = Abstention {
+                by_name: 1.0,
+                without_name: 0.0,
+                described: 0.0,
+                unexplained: 2.0,
+                explainable: 3.0,
+                as_noise,
+            };
+            of.gates(false, HeldOut::default())
+                .into_iter()
+                .any(|judged| judged.gate == Gate::InTheDark && !judged.passed)
+        };
+        assert!(in_the_dark(false));
+        assert!(!in_the_dark(true));
+    }
+
+    #[test]
+    fn a_damping_whose_interval_reaches_below_what_rings_is_that_of_a_resonance() {
+        let known = |value: f64, std: f64| Known {
+            parameters: [(ParameterName::DampingRatio.as_str(), Parameter { value, std })].into(),
+            times_its_doubt: 9.0,
+        };
+        let rings = |known: &Known| least_damping(known).is_some_and(|least| least < RINGS);
+        assert!(rings(&known(0.18, 0.02)), "0.15, fitted as 0.18");
+        assert!(rings(&known(0.3, 0.1)));
+        assert!(!rings(&known(0.3, 0.02)));
+        assert_eq!(least_damping(&Known::default()), None);
+    }
+
+    #[test]
+    fn what_follows_the_output_is_counted_in_turns_of_it_or_slower_than_the_generator() {
+        let line = |per, order| follows_output(Label::Deviation(Deviation::Line { per, order }));
+        assert!(line(Per::OutputTurn, 3.0) && line(Per::GeneratorTurn, 0.028));
+        assert!(!line(Per::GeneratorTurn, 3.0) && !line(Per::Second, 0.3));
+        assert!(!follows_output("offset with time".into()) && !follows_output(CauseName::RatioError.into()));
+        assert_eq!(waves_per_output_turn(Per::GeneratorTurn, 0.03125, -100.0), Some(3.125));
+    }
+
+    #[test]
+    fn the_order_of_a_line_is_found_near_where_the_line_was() {
+        let (order, least) = least_near(3.0, |order| 7.0 + (order - 2.7183).powi(2));
+        assert!((order - 2.7183).abs() < 1e-3 && (least - 7.0).abs() < 1e-6, "{order}, {least}");
+        // Where nothing is better it stays.
+        assert_eq!(least_near(3.0, |order| (order - 3.0).abs()), (3.0, 0.0));
+    }
 
     #[test]
     fn what_laws_leave_beyond_the_noise_widens_what_is_told_from_zero() {

@@ -38,6 +38,7 @@ pub use robust::{MAD_TO_STD, least_and_most, median_and_std, median_of, quantile
 
 use faults::Findings;
 use faults::drift::Stretches;
+use faults::steps::Untold;
 use log::Log;
 
 /// Rows without a gap, in order of time.
@@ -248,9 +249,9 @@ fn parse_as(
     faults::reads::check(&mut sessions, gear, &mut findings);
     faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
     faults::resolution::check(&mut sessions, gear, error_recorded, &mut findings);
-    let steps_are_told = faults::steps::check(&mut sessions, gear, &mut findings);
+    let untold = faults::steps::check(&mut sessions, gear, &mut findings);
     // Steps that stay in the data look like drift; what may be one between two sessions may be drift as well.
-    if (steps_are_told || sessions.len() > 1) && findings.tooth_steps.is_empty() && !drifts {
+    if untold != Untold::Inside && findings.tooth_steps.is_empty() && !drifts {
         faults::drift::check(&mut sessions, gear, Stretches::OfTime, &mut findings);
     }
     let Findings { mut faults, tooth_steps, notes } = findings;

@@ -131,9 +131,9 @@ const TURNING: Role = Role("turning");
 
 /// A load that is damped more than this does not swing.
 const MOST_DAMPING: f64 = 0.5;
-/// What is damped more than this has less than a third of its swing left after one period: it lags rather than rings, and so does a flank or a
-/// reading that takes some milliseconds. *Guess*: drives of the examinations have 0.01 to 0.15.
-const RINGS: f64 = 0.17;
+/// A damping beyond this share of the largest stands on the bound, or as good as: what is fitted hardly swings, and a flank or a reading that
+/// takes some milliseconds looks like it.
+const ON_THE_BOUND: f64 = 0.8;
 
 /// Spread of the share of a jump that makes the load ring, beside that of a step of the torque.
 const SLIDING: f64 = 0.3;
@@ -258,7 +258,7 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
         vec![shape(Name::FrequencyHz), shape(Name::DampingRatio), (Name::Gain, gain)]
     })
     .physical_if(|shape, c| {
-        let swings = shape.of(Name::DampingRatio) < RINGS;
+        let swings = shape.of(Name::DampingRatio) < ON_THE_BOUND * MOST_DAMPING;
         swings && [WIND_UP, KINEMATIC, TURNING].into_iter().any(|role| c.of(role) > 0.0)
     });
     // It rings most when the load turns over.

@@ -5,6 +5,7 @@
 
 use super::state::{Extra, State};
 use super::{ARCSEC, Findings, of_rows};
+use crate::campaign::statistics::correlation;
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
@@ -179,21 +180,12 @@ fn slope(sessions: &[Session], gear: &Gear, cut: Stretches) -> Option<(f64, f64,
 
 /// Whether the temperature changes by what counts, and goes with time: then what bends with it looks like a drift.
 fn warms_with_time(sessions: &[Session], tau: Extra) -> bool {
-    let rows: Vec<Point> = (sessions.iter().enumerate())
+    let (times, temperatures): (Vec<f64>, Vec<f64>) = (sessions.iter().enumerate())
         .filter_map(|(s, session)| Some((s, session.temperature_c.as_ref()?)))
         .flat_map(|(s, values)| values.iter().enumerate().map(move |(row, value)| (tau(s, row), *value)))
-        .collect();
-    let (low, high) = least_and_most(rows.iter().map(|of| of.1));
-    high - low > COUNTS_K && correlation(&rows).abs() > WITH_TIME
-}
-
-fn correlation(points: &[Point]) -> f64 {
-    let n = points.len() as f64;
-    let (mx, my) = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
-    let sums = points.iter().fold([0.0; 3], |[xx, xy, yy], (x, y)| {
-        [xx + (x - mx).powi(2), xy + (x - mx) * (y - my), yy + (y - my).powi(2)]
-    });
-    sums[1] / (sums[0] * sums[2]).sqrt().max(1e-300)
+        .unzip();
+    let (low, high) = least_and_most(temperatures.iter().copied());
+    high - low > COUNTS_K && correlation(&times, &temperatures).is_some_and(|with| with.abs() > WITH_TIME)
 }
 
 /// A time in units of the recording, from -1 to 1, and what is left of the error there, rad.

@@ -56,7 +56,7 @@ const LOAD_NOISE: f64 = 8.0;
 const LOAD_PACE: f64 = 6.0;
 /// A step that leaves less than this share of the misfit of what it might be instead is told from it.
 const TELLS: f64 = 0.95;
-/// Steps that leave less than this share of the misfit without them are no changes of flank. *Guess*.
+/// A step that leaves less than this share of the misfit of a change of flank in its place is none. *Guess*.
 const DECIDES: f64 = 0.25;
 /// Medians of six rows before and after differ by no more than so many standard deviations of the white noise.
 const LOCAL_NOISE: f64 = 2.2;
@@ -90,9 +90,25 @@ fn column(place: Place) -> impl Fn(usize, usize) -> f64 {
     move |session, row| place.reached(session, row)
 }
 
-/// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Gives whether all steps found are told apart.
-pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> bool {
-    let Some(Found { sure, doubtful, stays, .. }) = likelier(sessions, gear) else { return true };
+/// Which steps stay in the data as nobody knows what they are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::measurement) enum Untold {
+    /// None.
+    Nowhere,
+    /// Only such as stand where a session begins or ends: they may as well be between two.
+    AtTheEnds,
+    /// Some inside a session.
+    Inside,
+}
+
+/// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Gives where steps are that are not told apart.
+pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> Untold {
+    let Some(Found { sure, doubtful, stays, .. }) = likelier(sessions, gear) else { return Untold::Nowhere };
+    let untold = match doubtful.as_slice() {
+        [] => Untold::Nowhere,
+        steps if steps.iter().any(|(place, ..)| is_inside(&sessions[place.session], place.row)) => Untold::Inside,
+        _ => Untold::AtTheEnds,
+    };
     for (place, size, _) in &doubtful {
         let line = sessions[place.session].line[place.row];
         findings.notes.push(format!(
@@ -139,7 +155,12 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             rows.for_each(|(row, error)| *error -= size * place.reached(number, row));
         }
     }
-    doubtful.is_empty()
+    untold
+}
+
+/// Whether so many rows of its session are before and after a row that means over them are compared.
+fn is_inside(session: &Session, row: usize) -> bool {
+    row >= WINDOW && row + WINDOW <= session.len()
 }
 
 /// A step with its size and standard deviation.
@@ -168,12 +189,52 @@ fn likelier(sessions: &[Session], gear: &Gear) -> Option<Found> {
     }
     let to_the_end = find(sessions, gear, noise, &state, Stays::ToTheEnd);
     let mut better = to_the_end.filter(|found| found.misfit < TELLS * for_good.misfit);
-    if let Some(found) = better.as_mut().filter(|found| found.misfit < DECIDES * for_good.misfit) {
-        // No change of flank explains that much.
-        found.sure.append(&mut found.doubtful);
+    if let Some(found) = &mut better {
+        let steps = [found.sure.as_slice(), &found.doubtful].concat();
+        let (told, doubtful): (Vec<Step>, Vec<Step>) = found
+            .doubtful
+            .iter()
+            .copied()
+            .partition(|(place, ..)| beyond_a_change_of_flank(sessions, &state, &steps, *place));
+        (found.sure, found.doubtful) = ([found.sure.as_slice(), told.as_slice()].concat(), doubtful);
         found.sure.sort_by_key(|(place, ..)| (place.session, place.row));
     }
     Some(better.filter(|found| !found.sure.is_empty()).unwrap_or(for_good))
+}
+
+/// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps are: the model without the
+/// step, to which the flank that the load holds is given instead.
+fn beyond_a_change_of_flank(sessions: &[Session], state: &State, steps: &[Step], place: Place) -> bool {
+    let held_by: Vec<Vec<f64>> =
+        sessions.iter().map(|session| held_flanks(session, largest_torque(sessions))).collect();
+    let others: Vec<_> = steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
+    let with = |this: Extra| {
+        let mut extras: Vec<Extra> = others.iter().map(|column| column as Extra).collect();
+        extras.push(this);
+        state.fit(&extras)
+    };
+    let flank = |session: usize, row: usize| held_by[session][row];
+    let (Some(step), Some(flank)) = (with(&column(place)), with(&flank)) else { return false };
+    step.misfit < DECIDES * flank.misfit
+}
+
+/// The flank, ±1, that the last load held which was large enough to hold one; 0 before there was one, and without loads.
+fn held_flanks(session: &Session, largest: f64) -> Vec<f64> {
+    let Some(torque) = session.torque_n_m.as_ref().filter(|_| largest > 0.0) else { return vec![0.0; session.len()] };
+    let held = least_that_holds(torque, largest);
+    let mut flank = 0.0;
+    let of = |torque: &f64| {
+        if torque.abs() >= held {
+            flank = torque.signum();
+        }
+        flank
+    };
+    torque.iter().map(of).collect()
+}
+
+/// The least load that holds a flank, N·m, noise considered.
+fn least_that_holds(torque: &[f64], largest: f64) -> f64 {
+    (HELD * largest).max(LOAD_NOISE * white_noise([torque]))
 }
 
 fn find(sessions: &[Session], gear: &Gear, noise: f64, state: &State, stays: Stays) -> Option<Found> {
@@ -330,8 +391,11 @@ fn standing_out(
             let mean = |from: usize, to: usize| (sums[to] - sums[from]) / (to - from) as f64;
             (0..left.len())
                 .map(|row| {
-                    let inside = row >= WINDOW && row + WINDOW <= left.len();
-                    if inside { mean(row, row + WINDOW) - mean(row - WINDOW, row) } else { 0.0 }
+                    if is_inside(&sessions[number], row) {
+                        mean(row, row + WINDOW) - mean(row - WINDOW, row)
+                    } else {
+                        0.0
+                    }
                 })
                 .collect()
         })
@@ -453,7 +517,7 @@ fn others_change_as_much(session: &Session, row: usize, size: f64) -> bool {
 /// Whether a row lies between a load that holds one flank and one that holds the other: there a flank is changed.
 fn load_turns_over(session: &Session, row: usize, largest: f64) -> bool {
     let Some(torque) = session.torque_n_m.as_ref().filter(|_| largest > 0.0) else { return false };
-    let held = (HELD * largest).max(LOAD_NOISE * white_noise([torque.as_slice()]));
+    let held = least_that_holds(torque, largest);
     let holds = |torque: &&f64| torque.abs() >= held;
     let before = torque[..row].iter().rev().find(holds);
     let after = torque[row..].iter().find(holds);
@@ -583,6 +647,56 @@ mod tests {
         let pairs = right.iter().zip(&slipped).flat_map(|(a, b)| a.error_rad.iter().zip(&b.error_rad));
         let off = pairs.map(|(a, b)| (a - b).abs() / ARCSEC).fold(0.0, f64::max);
         assert!(off < 5.0, "{off}");
+    }
+
+    /// Sessions at rest but for slow waves of the generator, under a torque each. A light load leaves the flank where it is (friction); the
+    /// first session has a counter that slips once under load and is set right after it.
+    fn flanks_that_friction_holds(slip_arcsec: f64) -> Vec<Session> {
+        let mut random = fastrand::Rng::with_seed(11);
+        let torques: [fn(f64) -> f64; 3] =
+            [|x| 8.0 + 6.0 * (9.0 * x).sin(), |x| 2.4 * (x - 0.45) / 0.45, |x| 8.0 + 6.0 * (7.0 * x).cos()];
+        let one = |(number, torque): (usize, &fn(f64) -> f64)| {
+            let mut noise = || 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+            let mut flank = 0.0;
+            let torque: Vec<f64> = (0..2000).map(|k| torque(f64::from(k) / 2000.0)).collect();
+            let error = torque.iter().enumerate().map(|(k, torque)| {
+                if torque.abs() > 0.9 || flank == 0.0 {
+                    flank = torque.signum();
+                }
+                let slipped = if number == 0 && k >= 700 { slip_arcsec } else { 0.0 };
+                ARCSEC * (7.0 * torque + 40.0 * flank + slipped + noise())
+            });
+            let mut one = session(error.collect(), torque.clone());
+            one.generator_rad = (0..2000).map(|k| 30.0 * (6e-3 * f64::from(k)).sin()).collect();
+            one.time_s = Some((0..2000).map(|k| 0.01 * f64::from(k)).collect());
+            one
+        };
+        torques.iter().enumerate().map(one).collect()
+    }
+
+    #[test]
+    fn a_large_slip_makes_no_slip_of_a_change_of_flank() {
+        for slip_arcsec in [400.0, 3000.0] {
+            let sessions = flanks_that_friction_holds(slip_arcsec);
+            let change = (1..2000).find(|row| sessions[1].torque_n_m.as_ref().unwrap()[*row] > 0.9).unwrap();
+            let at = |session: usize, row: usize| Place { session, row, stays: Stays::ToTheEnd };
+            let gear = Gear::of_ratio(100.0);
+            let state = State::new(&sessions, &gear);
+            let steps = [(at(0, 700), slip_arcsec * ARCSEC, ARCSEC), (at(1, change), 80.0 * ARCSEC, ARCSEC)];
+            assert!(beyond_a_change_of_flank(&sessions, &state, &steps, at(0, 700)));
+            assert!(!beyond_a_change_of_flank(&sessions, &state, &steps, at(1, change)));
+            let mut findings = Findings::default();
+            check(&mut sessions.clone(), &gear, &mut findings);
+            let told: Vec<u64> = findings.faults.iter().map(|fault| fault.first_line).collect();
+            assert_eq!(told, [700], "{:?} {:?}", findings.faults, findings.notes);
+        }
+    }
+
+    #[test]
+    fn what_stands_at_the_ends_of_a_session_may_be_between_two() {
+        let session = session(vec![0.0; 400], vec![0.0; 400]);
+        let inside = |row: usize| is_inside(&session, row);
+        assert!(!inside(3) && !inside(395) && inside(WINDOW) && inside(200));
     }
 
     #[test]

@@ -20,8 +20,8 @@ use super::page::{
     Status, Table as PageTable, Text, significant,
 };
 use crate::causes::CauseName;
-use crate::diagnosis::base::BETWEEN_READINGS;
-use crate::diagnosis::report::{Diagnosis, Finding, Verdict};
+use crate::diagnosis::base::{BETWEEN_READINGS, CHANGE_OF_FLANK};
+use crate::diagnosis::report::{Diagnosis, Finding, Parameter, Verdict};
 use crate::diagnosis::rows::Rows;
 use crate::diagnosis::{Extended, Series};
 use crate::measurement::{Gear, Recording, Session};
@@ -617,16 +617,7 @@ impl Known<'_> {
         let mut rows: Vec<(usize, Vec<Text>)> = recalibrated
             .iter()
             .map(|(name, p)| {
-                let value = if name.starts_with("zero") {
-                    Text::default().error(p.value, 3).plain("\u{a0}±\u{a0}").error(p.std, 2)
-                } else if name == BETWEEN_READINGS {
-                    let ms = |seconds: f64| significant(1e3 * seconds, 2);
-                    Text::new(format!("{}\u{a0}±\u{a0}{}\u{a0}ms", ms(p.value), ms(p.std)).replace('-', "−"))
-                } else {
-                    Text::new(
-                        format!("{:+.1}\u{a0}±\u{a0}{:.1}\u{a0}%", 100.0 * p.value, 100.0 * p.std).replace('-', "−"),
-                    )
-                };
+                let value = recalibrated_value(name, *p);
                 let plain = if name == "stiffness" { "wind-up".to_owned() } else { name.replace('_', " ") };
                 let (place, name) = wave(name).map_or((0, words::begun(&plain)), |(place, text)| (1 + place, text));
                 (place, vec![Text::new(name), value])
@@ -779,6 +770,20 @@ impl Known<'_> {
     }
 }
 
+/// What floats in the nominal model, in its unit: the zero as an error, times in milliseconds, the rest as a share.
+fn recalibrated_value(name: &str, p: Parameter) -> Text {
+    if name.starts_with("zero") {
+        return Text::default().error(p.value, 3).plain("\u{a0}±\u{a0}").error(p.std, 2);
+    }
+    let words = if [BETWEEN_READINGS, CHANGE_OF_FLANK].contains(&name) {
+        let ms = |seconds: f64| significant(1e3 * seconds, 2);
+        format!("{}\u{a0}±\u{a0}{}\u{a0}ms", ms(p.value), ms(p.std))
+    } else {
+        format!("{:+.1}\u{a0}±\u{a0}{:.1}\u{a0}%", 100.0 * p.value, 100.0 * p.std)
+    };
+    Text::new(words.replace('-', "−"))
+}
+
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
@@ -789,6 +794,14 @@ mod tests {
     use crate::measurement::{Fault, FaultName, Measures, Treatment};
     use crate::report::page::Span;
     use crate::synthesize::catalogue_drive;
+
+    #[test]
+    fn times_that_float_are_shown_in_milliseconds_and_the_rest_as_shares() {
+        let shown = |name: &str| recalibrated_value(name, Parameter { value: -4.2e-3, std: 1.1e-3 });
+        assert_eq!(shown(CHANGE_OF_FLANK), Text::new("−4.2\u{a0}±\u{a0}1.1\u{a0}ms"));
+        assert_eq!(shown(BETWEEN_READINGS), shown(CHANGE_OF_FLANK));
+        assert_eq!(shown("backlash"), Text::new("−0.4\u{a0}±\u{a0}0.1\u{a0}%"));
+    }
 
     /// Two short sessions with an error of one wave in a generator turn.
     fn recording(faults: Vec<Fault>) -> Recording {
