@@ -149,7 +149,7 @@
 #define FLEXSPLINE_ENCODER_WORDS 7
 
 // Eight-byte words of a [`FlexsplineTorquePath`].
-#define FLEXSPLINE_TORQUE_PATH_WORDS 11
+#define FLEXSPLINE_TORQUE_PATH_WORDS 5
 
 // Eight-byte words of a [`FlexsplineAged`].
 #define FLEXSPLINE_AGED_WORDS 4
@@ -496,10 +496,6 @@ typedef struct FlexsplineTorqueSettings {
   // A torque in the mesh below this changes the flank only where the direction changes, N m: some three times the peak of the noise behind the
   // low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
   float hold_n_m;
-  // After a torque read in the mesh has changed the flank it does not change it again for so long, s: some periods of the servo's position loop; 0 or more.
-  float settle_s;
-  // Largest reading that the sensor can have, N m; a larger one is forgotten. Above 0.
-  float largest_n_m;
 } FlexsplineTorqueSettings;
 
 // A measurement with its age.
@@ -1066,14 +1062,22 @@ uint8_t flexspline_is_due(uint32_t tick,
                           uint32_t divisor,
                           uint32_t offset);
 
-// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time, bandwidth or largest reading is not finite and positive, or a drag, hold
-// or time to settle not finite or below 0.
+// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time or bandwidth is not finite and positive, or a drag or hold not
+// finite or below 0. A torque in the mesh may change the flank in any tick, and any reading is believed: `flexspline_torque_init_sensor` says more.
 enum FlexsplineStatus flexspline_torque_init(struct FlexsplineTorquePath *path,
                                              const struct FlexsplineTorqueSettings *settings);
 
+// As `flexspline_torque_init`, with what is known of sensor and servo. After a torque read in the mesh has changed the flank it does not change it
+// again for `settle_s`, s (some periods of the servo's position loop, 0 or more): the correction crosses the play then, and what its own motion makes of the
+// torque has to die away. A reading beyond `largest_n_m`, N m (above 0), is forgotten as one that is not finite.
+enum FlexsplineStatus flexspline_torque_init_sensor(struct FlexsplineTorquePath *path,
+                                                    const struct FlexsplineTorqueSettings *settings,
+                                                    float settle_s,
+                                                    float largest_n_m);
+
 // One tick: a reading, N m, positive where it turns the output forward, where it was measured (`FLEXSPLINE_TORQUE_...`), and the direction in which
 // the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite, or larger than the sensor's largest, gives NaN
-// and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit what was set: make the path anew.
+// and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit it: make the path anew.
 enum FlexsplineStatus flexspline_torque_tick(struct FlexsplineTorquePath *path,
                                              uint8_t place,
                                              float reading_n_m,
