@@ -48,8 +48,8 @@ const BACK: usize = 3;
 const PARTS: usize = 8;
 /// Largest relative difference of the torque on the output. Found: 0.22 %.
 const TORQUE: f64 = 0.005;
-/// Of the force along the flank over that across it: half of its change from forth to back, and its change where the way turns. Found: 0.2
-/// and 0.3 %.
+/// Of the change of the force along the flank over that across it: from forth to back, and where the way turns. Found: 0.21 and 0.25 %. A
+/// difference of 0.0004 to 0.0016 that is the same forth and back, its cause not found, falls out of it.
 const ALONG: f64 = 0.01;
 /// Of the torque by which forth and back differ. Found: 1.8 %: the difference of two torques that are 25 times as large.
 const LOST: f64 = 0.03;
@@ -376,9 +376,12 @@ fn told(coefficient: f64, ours: &[Borne], theirs: &[Borne], claims: &mut Claims)
     let sticks = largest(&mut [FORTH, BACK].into_iter().map(|k| ours[k + 1].sticks - theirs[k + 1].sticks));
     let percent = |part: f64| 100.0 * part;
     claims.check(&format!("torque within {:.1} %", percent(TORQUE)), torque <= TORQUE);
-    claims.check(&format!("slipping, force along over across within {:.0} %", percent(ALONG)), slipping.abs() <= ALONG);
+    claims.check(
+        &format!("slipping, change of force along over across within {:.0} %", percent(ALONG)),
+        slipping.abs() <= ALONG,
+    );
     claims.check(&format!("what sliding turns round of the torque within {:.0} %", percent(LOST)), lost.abs() <= LOST);
-    claims.check(&format!("turned back, change of that force within {:.0} %", percent(ALONG)), turned <= ALONG);
+    claims.check(&format!("turned back, change of the same within {:.0} %", percent(ALONG)), turned <= ALONG);
     claims.check(&format!("share that sticks within {:.0} % of the contact", percent(STICKS)), sticks <= STICKS);
     format!(
         "friction {coefficient}: torque {:.2} %, slipping {:+.2} %, torque turned round {:+.2} %, partly stuck {:.2} %, share that sticks {:.3}",
