@@ -17,7 +17,7 @@ use crate::program::{Limits, Used, run};
 const ARCSEC: f64 = 180.0 * 3600.0 / PI;
 /// What a deck cannot say is taken out of the drive, for both programs: the drag of the output, and the rounding of the tips,
 /// which our contact knows and the mesh does not (0.03 mm of it softens the load curve by 0.1″).
-const AS_IN_THE_DECK: [&str; 3] =
+pub const AS_IN_THE_DECK: [&str; 3] =
     ["output.drag_torque_n_m=0", "flexspline.tip_rounding_mm=0.002", "circular_spline.tip_rounding_mm=0.002"];
 /// The step of a deck that ends with the load on. One follows for each rotation increment, then one to the last load.
 const LOAD_STEP: usize = 3;

@@ -5,12 +5,14 @@
 //! load. Compared are the output angle, the wind-up between the two loads, the displacements of the bore, the stress along
 //! it, and what both cost. The short form is the cam on the coarse mesh; `--long` adds the standard mesh and what CalculiX
 //! itself leaves open (each increment in two parts). A cup and a closed sleeve in solid elements stand beside our shells, a fine mesh of one root fillet
-//! beside the stress that `simulate --stress` tells. Rollers are not compared: see the header of `export/inp.rs`.
+//! beside the stress that `simulate --stress` tells. A tooth slid along its space
+//! with friction stands beside our flank contact. Rollers are not compared: see the header of `export/inp.rs`.
 //!
 //! Prints what it finds, a line for each claim, and one line of ratios at the end; ends with 1 if a claim fails.
 
 mod case;
 mod dat;
+mod friction;
 mod ours;
 mod program;
 mod root;
@@ -56,7 +58,7 @@ struct Options {
     /// Standard mesh and CalculiX's own scatter too
     #[arg(long)]
     long: bool,
-    /// Only this case, by its name; "root" for the root fillets alone
+    /// Only this case, by its name; "root" for the root fillets, "friction" for the sliding tooth alone
     #[arg(long)]
     case: Option<String>,
     /// Folder for decks and outputs
@@ -121,6 +123,9 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
     if options.case.as_deref() == Some("root") {
         return root::fillets(&options.ccx, &options.out, claims);
     }
+    if options.case.as_deref() == Some("friction") {
+        return friction::friction(&options.ccx, &options.out, claims);
+    }
     if let Some(name) = &options.case {
         let names: Vec<String> = cases.iter().map(Case::name).collect();
         cases.retain(|case| case.name() == *name);
@@ -132,6 +137,7 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
     if options.case.is_none() {
         lines.push(sleeve::sleeves(&options.ccx, &flexspline, &options.out, claims)?);
         lines.push(root::fillets(&options.ccx, &options.out, claims)?);
+        lines.push(friction::friction(&options.ccx, &options.out, claims)?);
     }
     let mut whole: Option<Vec<f64>> = None;
     for case in cases {
