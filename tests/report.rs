@@ -51,7 +51,7 @@ fn a_missed_bound_is_stamped_and_fails_the_command() {
         .done();
     let run = desk.line("validate --tables made --mesh coarse --solver fast --temperatures 1 --torques 8 --out made");
     assert_eq!(run.code, 1, "{}", run.stderr);
-    let (html, json) = page(&desk, "made/report.html");
+    let (html, json) = page(&desk, "made/validation.html");
     assert_eq!(json["status"], "bound missed");
     assert!(html.contains(r#"<span class="stamp bound-missed">bound missed</span>"#));
     let validation: Value = serde_json::from_str(&desk.read("made/validation.json")).unwrap();

@@ -18,7 +18,7 @@ use crate::data_sheet::{DataSheet, FIGURES};
 use crate::drive::GeneratorKind;
 
 /// Variants of each generator that are computed first, at least, and for each field and one more. Guesses. With these a study of 200 variants
-/// of two fields and four generators takes 171 s of processor (docs/commands.md, "200 variants"); each of its 800 runs takes 0.5 to 1.1 s.
+/// of two fields and four generators computes 227 of 800 runs (docs/commands.md, "200 variants"); each takes 0.5 to 1.1 s of processor.
 const COMPUTED: usize = 48;
 const COMPUTED_PER_FIELD: usize = 12;
 /// Variants of each generator that are computed because nothing beats them, at most. A guess: more than a designer looks at.

@@ -57,7 +57,7 @@ const LOAD_PACE: f64 = 6.0;
 /// A step that leaves less than this share of the misfit of what it might be instead is told from it.
 const TELLS: f64 = 0.95;
 /// A step that leaves less than this share of the misfit of a change of flank in its place is none. *Guess*.
-const DECIDES: f64 = 0.25;
+const DECIDES: f64 = 0.05;
 /// Medians of six rows before and after differ by no more than so many standard deviations of the white noise.
 const LOCAL_NOISE: f64 = 2.2;
 /// A jump stands alone: so many rows before and after it change the error by less than half as much.
@@ -214,6 +214,13 @@ fn beyond_a_change_of_flank(sessions: &[Session], state: &State, steps: &[Step],
         state.fit(&extras)
     };
     let flank = |session: usize, row: usize| held_by[session][row];
+    // Where the load holds no flank friction may have let go of one.
+    let torque = sessions[place.session].torque_n_m.as_ref();
+    let may_let_go =
+        torque.is_some_and(|torque| torque[place.row].abs() < least_that_holds(torque, largest_torque(sessions)));
+    if may_let_go {
+        return false;
+    }
     let (Some(step), Some(flank)) = (with(&column(place)), with(&flank)) else { return false };
     step.misfit < DECIDES * flank.misfit
 }
