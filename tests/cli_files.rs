@@ -121,7 +121,8 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
         ("--teeth 201 --module 0.32", "--teeth: found 201, allowed: an even number"),
         ("--module 0.32", "--module: found alone"),
         ("--like CSF25", "--like: found \"CSF25\""),
-        ("--bore 62", "add --teeth and --module, or --like"),
+        ("--like CSF-25-100 --ratio 80", "--ratio: found 80.0, allowed: 100, as CSF-25-100 has it"),
+        ("--bore 62", "add --module and --teeth or --ratio, or --like"),
         ("--teeth 200 --module 0.32 --bore 66", "--bore: found 66: the root circle has the diameter 65.12"),
         ("--teeth 200 --module 0.32 --drive HHD-95-typical", "--drive: found it beside --teeth"),
     ] {
