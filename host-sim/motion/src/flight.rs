@@ -918,7 +918,7 @@ fn lane(made: &Made, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown, Str
 }
 
 /// A target that stands, a knock, and what is left of it 2.5 s later: speed of the load (rad/s rms) about its mean, which a slow low-pass moves, in
-/// all of six half seconds but one. What rings does so in each of them; a servo that unwinds its integral part while the motor sticks lets it slip
+/// three of six half seconds. What rings does so in each of them; a servo that unwinds its integral part while the motor sticks lets it slip
 /// once, at any time.
 fn left_of_a_knock(made: &Made, kind: usize) -> Result<f64, String> {
     let mut lane = Lane::new(made, kind)?;
@@ -949,10 +949,10 @@ fn left_of_a_knock(made: &Made, kind: usize) -> Result<f64, String> {
     let mut left = [0.0; HALF_SECONDS];
     left.fill_with(|| fly(&mut lane, ticks(0.5)));
     left.sort_by(f64::total_cmp);
-    Ok(left[HALF_SECONDS - 2])
+    Ok(left[HALF_SECONDS / 2 - 1])
 }
 
-/// Half seconds after a knock in which a joint is quiet that comes to rest, but in one: a single slip takes some tenths of a second.
+/// Half seconds after a knock in half of which a joint is quiet that comes to rest: a slip, and what it leaves ringing, takes up to a second.
 const HALF_SECONDS: usize = 6;
 
 /// Time constants of the torque's low-pass before the knock: what is left of a step of it is 3e-4.

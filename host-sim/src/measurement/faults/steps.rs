@@ -196,10 +196,19 @@ fn likelier(sessions: &[Session], gear: &Gear) -> Option<Found> {
             .iter()
             .copied()
             .partition(|(place, ..)| beyond_a_change_of_flank(sessions, &state, &steps, *place));
-        (found.sure, found.doubtful) = ([found.sure.as_slice(), told.as_slice()].concat(), doubtful);
+        // A flank that friction lets go stays to the end of a session, too, where the load is small.
+        let (loose, sure): (Vec<Step>, Vec<Step>) =
+            found.sure.iter().copied().partition(|(place, ..)| may_let_go(sessions, *place));
+        (found.sure, found.doubtful) = ([sure, told].concat(), [doubtful, loose].concat());
         found.sure.sort_by_key(|(place, ..)| (place.session, place.row));
     }
     Some(better.filter(|found| !found.sure.is_empty()).unwrap_or(for_good))
+}
+
+/// Whether the load at a step holds no flank, so that friction may have let go of one.
+fn may_let_go(sessions: &[Session], place: Place) -> bool {
+    let torque = sessions[place.session].torque_n_m.as_ref();
+    torque.is_some_and(|torque| torque[place.row].abs() < least_that_holds(torque, largest_torque(sessions)))
 }
 
 /// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps are: the model without the
@@ -214,11 +223,7 @@ fn beyond_a_change_of_flank(sessions: &[Session], state: &State, steps: &[Step],
         state.fit(&extras)
     };
     let flank = |session: usize, row: usize| held_by[session][row];
-    // Where the load holds no flank friction may have let go of one.
-    let torque = sessions[place.session].torque_n_m.as_ref();
-    let may_let_go =
-        torque.is_some_and(|torque| torque[place.row].abs() < least_that_holds(torque, largest_torque(sessions)));
-    if may_let_go {
+    if may_let_go(sessions, place) {
         return false;
     }
     let (Some(step), Some(flank)) = (with(&column(place)), with(&flank)) else { return false };
