@@ -673,7 +673,7 @@ impl Sensing {
         let scenario = &made.scenario;
         let noise = scenario.torque_noise_n_m * self.noise.normal();
         if scenario.warming_k_s != 0.0 {
-            self.friction = known_friction(scenario, scenario.temperature_c + scenario.warming_k_s * now.time_s);
+            self.friction = known_friction(scenario, scenario.temperature_at_c(now.time_s));
         }
         match made.torque {
             TorqueKnown::OnLoad => {
@@ -869,7 +869,7 @@ impl Lane {
             starts: if fed && stood != 0.0 && now.rate_rad_s != 0.0 { way } else { 0.0 },
         };
         if scenario.warming_k_s != 0.0 {
-            self.plant.set_temperature(scenario.temperature_c + scenario.warming_k_s * now.time_s);
+            self.plant.set_temperature(scenario.temperature_at_c(now.time_s));
         }
         let [first, last] = now.outside_n_m;
         let tick_s = scenario.servo.tick_s;

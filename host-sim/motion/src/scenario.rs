@@ -120,6 +120,11 @@ impl Scenario {
         self.legs.iter().map(|leg| leg.seconds).sum()
     }
 
+    /// Temperature of the drive at a time, °C.
+    pub fn temperature_at_c(&self, time_s: f64) -> f64 {
+        self.temperature_c + self.warming_k_s * time_s
+    }
+
     /// Largest torque on the load that is to be expected, N·m.
     pub fn largest_n_m(&self) -> f64 {
         let Load { bias_n_m, swing, gust, step, gravity } = self.load;

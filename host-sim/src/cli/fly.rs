@@ -204,13 +204,14 @@ fn text(results: &Results, out: &Path, report: bool) -> String {
         Some(share) => format!("removed {:.1} % of what an ideal inverse removes", 100.0 * share),
         None => "an ideal inverse removes next to nothing here".to_owned(),
     };
-    let stability = if results.servo_distance == 0.0 {
-        "NOT stable: the servo itself is not, with this load, whatever is compensated".to_owned()
+    let stable = if results.stable { "stable" } else { "NOT stable" };
+    // A servo that is not stable has no margin.
+    let margin = if results.servo_distance > 0.0 {
+        format!("; servo's phase margin {margin:.0}° at {at_hz:.0} Hz")
     } else {
-        let stable = if results.stable { "stable" } else { "NOT stable" };
-        format!("{stable}; servo's phase margin {margin:.0}° at {at_hz:.0} Hz")
+        String::new()
     };
-    let _ = writeln!(text, "{removed}; {stability}");
+    let _ = writeln!(text, "{removed}; {stable}{margin}");
     if let Some(share) = results.torque_within_bound {
         let _ = writeln!(
             text,
@@ -218,9 +219,8 @@ fn text(results: &Results, out: &Path, report: bool) -> String {
             100.0 * share
         );
     }
-    let rms = &results.rms_arcsec;
-    if rms.compensated > rms.none {
-        let _ = writeln!(text, "compensation makes this flight worse");
+    for remark in results.remarks() {
+        let _ = writeln!(text, "{remark}");
     }
     let written = if report { "report.html and flight.json" } else { "flight.json" };
     let _ = write!(text, "{written} in {}", out.display());

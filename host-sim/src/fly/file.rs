@@ -204,7 +204,7 @@ pub fn read(name: &str, text: &str) -> Result<Flown, String> {
     set.number("damping", &mut scenario.damping, file.damping, [1e-4, 0.5])?;
     set.number("temperature_c", &mut scenario.temperature_c, file.temperature_c, [COLDEST_C, WARMEST_C])?;
     set.number("warming_k_s", &mut scenario.warming_k_s, file.warming_k_s, [-1.0, 1.0])?;
-    let ends_c = scenario.temperature_c + scenario.warming_k_s * scenario.seconds();
+    let ends_c = scenario.temperature_at_c(scenario.seconds());
     if !(COLDEST_C..=WARMEST_C).contains(&ends_c) {
         let allowed = format!("a flight that ends at {COLDEST_C} to {WARMEST_C} °C");
         return Err(set.refused("warming_k_s", format!("an end at {ends_c:.0} °C"), &allowed));

@@ -71,6 +71,23 @@ pub struct Results {
     pub digest: String,
 }
 
+impl Results {
+    /// What speaks against the flight, in sentences.
+    #[must_use]
+    pub fn remarks(&self) -> Vec<&'static str> {
+        let servo_is_stable = self.servo_distance > 0.0;
+        let remarks = [
+            (!servo_is_stable, "The servo itself is not stable with this load, whatever is compensated."),
+            (
+                servo_is_stable && !self.stable,
+                "With compensation the joint does not come to rest after a knock as it does without.",
+            ),
+            (self.rms_arcsec.compensated > self.rms_arcsec.none, "Compensation makes this flight worse."),
+        ];
+        remarks.into_iter().filter(|(there, _)| *there).map(|(_, remark)| remark).collect()
+    }
+}
+
 /// A point of a curve.
 pub type Row = [f64; 2];
 

@@ -14,13 +14,7 @@ use crate::fly::{ByController, Flown, Results, spectrum};
 pub fn page(flown: &Flown, flight: &Flight, results: &Results, command: &str) -> Page {
     let mut named = Map::new();
     named.insert("flight".to_owned(), json!(results));
-    let mut remarks = Vec::new();
-    if !results.stable {
-        remarks.push("With compensation the joint does not come to rest after a knock as it does without.".to_owned());
-    }
-    if results.rms_arcsec.compensated > results.rms_arcsec.none {
-        remarks.push("Compensation makes this flight worse.".to_owned());
-    }
+    let remarks: Vec<String> = results.remarks().into_iter().map(str::to_owned).collect();
     Page {
         title: format!("Flight {}, {} generator", results.scenario, results.generator),
         command_name: "fly",

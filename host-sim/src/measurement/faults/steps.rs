@@ -197,25 +197,28 @@ fn likelier(sessions: &[Session], gear: &Gear) -> Option<Found> {
             .copied()
             .partition(|(place, ..)| beyond_a_change_of_flank(sessions, &state, &steps, *place));
         // A flank that friction lets go stays to the end of a session, too, where the load is small.
-        let (loose, sure): (Vec<Step>, Vec<Step>) =
-            found.sure.iter().copied().partition(|(place, ..)| may_let_go(sessions, *place));
+        let largest = largest_torque(sessions);
+        let (loose, sure): (Vec<Step>, Vec<Step>) = (found.sure.iter().copied())
+            .partition(|(place, ..)| may_let_go(&sessions[place.session], place.row, largest));
         (found.sure, found.doubtful) = ([sure, told].concat(), [doubtful, loose].concat());
         found.sure.sort_by_key(|(place, ..)| (place.session, place.row));
     }
     Some(better.filter(|found| !found.sure.is_empty()).unwrap_or(for_good))
 }
 
-/// Whether the load at a step holds no flank, so that friction may have let go of one.
-fn may_let_go(sessions: &[Session], place: Place) -> bool {
-    let torque = sessions[place.session].torque_n_m.as_ref();
-    torque.is_some_and(|torque| torque[place.row].abs() < least_that_holds(torque, largest_torque(sessions)))
+/// Whether the load at a row holds no flank, so that friction may have let go of one.
+fn may_let_go(session: &Session, row: usize, largest: f64) -> bool {
+    session.torque_n_m.as_ref().is_some_and(|torque| torque[row].abs() < least_that_holds(torque, largest))
 }
 
 /// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps are: the model without the
 /// step, to which the flank that the load holds is given instead.
 fn beyond_a_change_of_flank(sessions: &[Session], state: &State, steps: &[Step], place: Place) -> bool {
-    let held_by: Vec<Vec<f64>> =
-        sessions.iter().map(|session| held_flanks(session, largest_torque(sessions))).collect();
+    let largest = largest_torque(sessions);
+    if may_let_go(&sessions[place.session], place.row, largest) {
+        return false;
+    }
+    let held_by: Vec<Vec<f64>> = sessions.iter().map(|session| held_flanks(session, largest)).collect();
     let others: Vec<_> = steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
     let with = |this: Extra| {
         let mut extras: Vec<Extra> = others.iter().map(|column| column as Extra).collect();
@@ -223,9 +226,6 @@ fn beyond_a_change_of_flank(sessions: &[Session], state: &State, steps: &[Step],
         state.fit(&extras)
     };
     let flank = |session: usize, row: usize| held_by[session][row];
-    if may_let_go(sessions, place) {
-        return false;
-    }
     let (Some(step), Some(flank)) = (with(&column(place)), with(&flank)) else { return false };
     step.misfit < DECIDES * flank.misfit
 }
@@ -533,7 +533,7 @@ fn load_turns_over(session: &Session, row: usize, largest: f64) -> bool {
     let holds = |torque: &&f64| torque.abs() >= held;
     let before = torque[..row].iter().rev().find(holds);
     let after = torque[row..].iter().find(holds);
-    torque[row].abs() < held && before.zip(after).is_some_and(|(before, after)| before * after < 0.0)
+    may_let_go(session, row, largest) && before.zip(after).is_some_and(|(before, after)| before * after < 0.0)
 }
 
 /// Whether a step that happens under light load, where friction alone holds a flank, is seen under loads that hold one: a change of
