@@ -184,6 +184,8 @@ pub(super) struct CondensedWheels<'p> {
     kernels: Kernels,
     /// Cells with a flank that touches or may soon; the flank nodes of the others follow when all is done.
     live: Vec<bool>,
+    /// Those whose flank nodes took part in the last solution.
+    solved: Vec<bool>,
     /// The flexspline cells of this state, and their forces before balancing.
     states: Vec<CellState>,
     forces: Vec<Vec<f64>>,
@@ -208,6 +210,7 @@ impl<'p> CondensedWheels<'p> {
             model,
             kernels: Kernels::default(),
             live: vec![false; cells],
+            solved: vec![false; cells],
             states: vec![CellState::default(); teeth],
             forces: vec![Vec::new(); teeth],
             generator_rad: 0.0,
@@ -332,6 +335,27 @@ impl<'p> CondensedWheels<'p> {
         tangent.reduce(self.kernels, cell, place, tractions, None, |_, _| false)
     }
 
+    /// Places the flank nodes of these cells where they stand while no force acts on them.
+    fn place_flanks(&self, state: &mut State, of: impl Fn(usize) -> bool) {
+        let (fs, cs) = (&self.model.flexspline, &self.model.circular_spline);
+        let (mut d, mut inner) = (Vec::new(), CellState::default());
+        for j in (0..fs.count()).filter(|j| of(*j)) {
+            self.model.flexspline_cell(j, false, &state.u, &mut d, &mut inner);
+            let (cell, all) = fs.cell(j, true);
+            let q = cell.free_flanks(self.kernels, &inner.q, 0.0);
+            let mut flanks = CoRotation::join(&inner, cell.frame.positions(), &q);
+            rotate_pairs(&mut flanks, self.model.frames[0][j]);
+            all.iter().zip(&flanks).for_each(|(u, x)| state.u[*u as usize] = *x);
+        }
+        for t in (0..cs.count()).filter(|t| of(fs.count() + t)) {
+            self.model.circular_spline_cell(t, false, &state.v, &mut d);
+            let (cell, all) = cs.cell(t, true);
+            let mut flanks = cell.free_flanks(self.kernels, &d, self.problem.seat_displacement);
+            rotate_pairs(&mut flanks, self.model.frames[1][t]);
+            all.iter().zip(&flanks).for_each(|(u, x)| state.v[*u as usize - cs.first_unknown] = *x);
+        }
+    }
+
     /// Blocks around the rings, ordered by their angle from the minor axis of the generator, where no flanks touch.
     fn blocks(&self, ranks: &[(FlankPair, usize)]) -> Vec<Block> {
         let cut = self.generator_rad + FRAC_PI_2;
@@ -391,6 +415,7 @@ fn low_rank(stiffness: &[f64]) -> (usize, Vec<f64>) {
 impl Factor for CondensedWheels<'_> {
     fn solve(&mut self, columns: &mut [f64], count: usize) {
         let n = columns.len() / count;
+        self.solved.clone_from(&self.live);
         let CondensedWheels { model, kernels, factor, locals, live, turned, .. } = self;
         let factor = factor.as_ref();
         let (fs, cs) = (&model.flexspline, &model.circular_spline);
@@ -452,25 +477,12 @@ impl Wheels for CondensedWheels<'_> {
         false
     }
 
-    /// Places the flank nodes that no force acts on.
     fn complete(&self, state: &mut State) {
-        let (fs, cs) = (&self.model.flexspline, &self.model.circular_spline);
-        let (mut d, mut inner) = (Vec::new(), CellState::default());
-        for j in (0..fs.count()).filter(|j| !self.live[*j]) {
-            self.model.flexspline_cell(j, false, &state.u, &mut d, &mut inner);
-            let (cell, all) = fs.cell(j, true);
-            let q = cell.free_flanks(self.kernels, &inner.q, 0.0);
-            let mut flanks = CoRotation::join(&inner, cell.frame.positions(), &q);
-            rotate_pairs(&mut flanks, self.model.frames[0][j]);
-            all.iter().zip(&flanks).for_each(|(u, x)| state.u[*u as usize] = *x);
-        }
-        for t in (0..cs.count()).filter(|t| !self.live[fs.count() + t]) {
-            self.model.circular_spline_cell(t, false, &state.v, &mut d);
-            let (cell, all) = cs.cell(t, true);
-            let mut flanks = cell.free_flanks(self.kernels, &d, self.problem.seat_displacement);
-            rotate_pairs(&mut flanks, self.model.frames[1][t]);
-            all.iter().zip(&flanks).for_each(|(u, x)| state.v[*u as usize - cs.first_unknown] = *x);
-        }
+        self.place_flanks(state, |cell| !self.live[cell]);
+    }
+
+    fn follow(&self, state: &mut State) {
+        self.place_flanks(state, |cell| self.live[cell] && !self.solved[cell]);
     }
 
     fn assemble(&mut self, state: &State, force: &mut [f64]) {

@@ -50,6 +50,11 @@ impl NearPairs {
         self.searched_until = self.moved;
     }
 
+    /// Takes no pair for open any more.
+    pub fn look_again(&mut self) {
+        self.pairs.values_mut().for_each(|near| near.open_until = 0.0);
+    }
+
     /// Whether pairs that were out of reach may have come near.
     pub fn must_search(&self) -> bool {
         self.moved >= self.searched_until

@@ -30,8 +30,8 @@ const PATTERN_REACH: f64 = 0.04;
 pub(super) const ANCHOR: f64 = 1e5;
 /// Springs (N/mm per mm) that are tried in turn when the tangent is not positive definite.
 const GROUNDED_SPRINGS: [f64; 4] = [1e-3, 1e-1, 1e1, 1e3];
-/// Largest change of a displacement that an undamped Newton step may make, mm.
-const LARGEST_STEP: f64 = 0.1;
+/// Largest change of a displacement that an undamped Newton step may make, modules: a drive twice as large goes the same way.
+const LARGEST_STEP: f64 = 0.2;
 /// Largest first step of a changing load, N m.
 const LARGEST_LOAD_STEP: f64 = 100.0;
 /// Factors on the penalties while the way to a new load is found.
@@ -54,6 +54,10 @@ const PATIENCE: usize = 4;
 const RETURNS: f64 = 0.9;
 const RETURNS_LITTLE: f64 = 0.3;
 const GOES_ROUND_AFTER: usize = 25;
+
+/// Halvings of a step after which the pairs that were open are looked at again before it is made shorter still: far from equilibrium a flank may
+/// come past the tip of a space, where its gap changes by more than it moves, and bear in a state that took it for open.
+const LOOKS_BACK_AT: usize = 5;
 
 /// Relative residual below which steps are taken whole: what is left is near round-off.
 const ROUND_OFF: f64 = 1e-6;
@@ -336,6 +340,7 @@ impl<'p> Solver<'p> {
 
     fn newton(&mut self, from: &State, generator_rad: f64, torque_n_m: f64) -> Result<(State, Increment), SolveError> {
         let settings = self.problem.settings;
+        let largest_step = LARGEST_STEP * self.problem.drive.flexspline.module_mm;
         let failed = |history: Vec<f64>, reason| SolveError::NotConverged {
             generator_rad,
             torque_n_m,
@@ -350,6 +355,7 @@ impl<'p> Solver<'p> {
         let mut residual = self.assemble(&mut state, from, torque_n_m, &mut near);
         let mut history = Vec::new();
         let mut last_length = 1.0;
+        let mut looked_back = false;
         let mut chords: Vec<Step> = Vec::new();
         let steady = self.softening == 1.0 && self.passed.go_on(from, torque_n_m);
         let mut recalled = steady && generator_rad != from.generator_rad && self.recall(generator_rad);
@@ -407,7 +413,7 @@ impl<'p> Solver<'p> {
             }
             // The force along the step falls from `before` to nothing at the end of a perfect step; far beyond, halve it.
             let before = step.work(&residual);
-            let mut length = (LARGEST_STEP / step.largest()).min(1.0).min(8.0 * last_length);
+            let mut length = (largest_step / step.largest()).min(1.0).min(8.0 * last_length);
             let motion = self.motion(&step);
             near.advance(length * motion);
             let mut mistaken = false;
@@ -417,6 +423,7 @@ impl<'p> Solver<'p> {
                     self.wheels.complete(&mut state);
                 }
                 let mut candidate = step.applied_to(&state, length);
+                self.wheels.follow(&mut candidate);
                 residual = self.assemble(&mut candidate, from, torque_n_m, &mut near);
                 let may_return = if history.len() > GOES_ROUND_AFTER { RETURNS_LITTLE } else { RETURNS };
                 let overshoot = before > 0.0 && step.work(&residual) < -may_return * before;
@@ -424,7 +431,7 @@ impl<'p> Solver<'p> {
                     state = candidate;
                     break;
                 }
-                if recalled {
+                if recalled || (trial == LOOKS_BACK_AT && !looked_back) {
                     mistaken = true;
                     break;
                 }
@@ -432,11 +439,16 @@ impl<'p> Solver<'p> {
                 near.advance(length * motion);
             }
             if mistaken {
+                looked_back = !recalled;
                 recalled = false;
                 near.advance(length * motion);
+                if looked_back {
+                    near.look_again();
+                }
                 residual = self.assemble(&mut state, from, torque_n_m, &mut near);
                 continue;
             }
+            looked_back = false;
             last_length = length;
             // A shortened step says nothing about the tangent.
             if length == 1.0 {

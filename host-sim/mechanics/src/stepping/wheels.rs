@@ -20,6 +20,9 @@ pub(super) trait Wheels: Factor {
     /// Places the nodes of a state that [`Wheels::assemble`] leaves aside, being far from any contact.
     fn complete(&self, state: &mut State);
 
+    /// Places the nodes that have come near contact since the last solution, which a step of it therefore leaves behind.
+    fn follow(&self, _state: &mut State) {}
+
     /// Begins anew at this state: subtracts the internal forces of both wheels from `force`. The tangent that
     /// [`Wheels::factorise`] factorises is the one of this state and of the contact added since.
     fn assemble(&mut self, state: &State, force: &mut [f64]);
