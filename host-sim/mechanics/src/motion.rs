@@ -293,7 +293,7 @@ impl Travel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drive::{Drive, GeneratorKind};
+    use crate::drive::{Drive, FewNumbers, GeneratorKind};
     use crate::mesh::MeshLevel;
     use crate::stepping::{Method, SolverSettings};
 
@@ -373,5 +373,33 @@ mod tests {
         let SolveError::NotSettled { generator_rad, torque_n_m, pitches, rate } = error else { panic!("{error}") };
         assert!((pitches - 40.5).abs() < 1e-6 && torque_n_m == 0.0 && rate.abs() < 0.01);
         assert!((generator_rad - from - 81.0 * step).abs() < 1e-9);
+    }
+
+    /// Two rollers in a hat leave the teeth of this drive no play: they bear before there is a load. Softened they would wedge.
+    #[test]
+    fn teeth_that_bind_without_load_take_a_light_touch() {
+        let kind = GeneratorKind::TwoRoller;
+        let few = FewNumbers { teeth: 164, module_mm: 0.186, bore_mm: None, width_mm: None, generator: kind };
+        let sets = [
+            "flexspline.rim_thickness_mm=0.2926",
+            "sleeve.kind=hat",
+            "sleeve.wall_mm=0.1623",
+            "sleeve.flange_side_mm=19.4706",
+            "sleeve.bottom_side_mm=19.4706",
+            "sleeve.bottom_thickness_mm=0.649",
+            "sleeve.hub_radius_mm=6.4902",
+        ];
+        let drive = few.drive("binds").unwrap().drive.with_sets(sets).unwrap();
+        let settings = SolverSettings {
+            method: Method::Fast,
+            mesh: MeshLevel::Coarse,
+            max_halvings: 0,
+            ..SolverSettings::default()
+        };
+        let problem = Problem::new(&drive, kind, drive.temperature.reference_c, settings).unwrap();
+        let mut motion = Motion::deformed(&problem, 0.0).unwrap();
+        assert_eq!(motion.last().flank_contacts, 4);
+        motion.load(2.0 * drive.output.drag_torque_n_m).unwrap();
+        assert!((0.01..0.5).contains(&motion.error_arcsec()), "{}", motion.error_arcsec());
     }
 }
