@@ -236,9 +236,10 @@ impl<'p> Solver<'p> {
         // All of a conforming generator touches at once; a soft contact first finds which part stays.
         let mut iterations = 0;
         for softening in [1e-3, 1.0] {
-            (self.softening, self.assembling) = (softening, true);
+            // Nothing but drag holds the output: what has to be found here is where it stands, so no stage ends early.
+            (self.softening, self.assembling, self.careful) = (softening, true, true);
             let solved = self.newton(&state, generator_rad, 0.0);
-            (self.softening, self.assembling) = (1.0, false);
+            (self.softening, self.assembling, self.careful) = (1.0, false, false);
             let (next, mut increment) = solved?;
             iterations += increment.iterations;
             increment.iterations = iterations;
