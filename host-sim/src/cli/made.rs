@@ -202,7 +202,10 @@ mod tests {
             let said = clearance.text();
             assert!(said.contains("clear one another under cam; they interfere under two-roller (by"), "{said}");
             let file = with_formulas(&s, &s.drive);
-            assert!(!file.contains("all four") && file.contains("# a guess, as S-95: teeth that touch"), "{file}");
+            assert!(
+                !file.contains("under all four") && file.contains("# a guess, as S-95: teeth that touch"),
+                "{file}"
+            );
             // What is set otherwise has no formula.
             let other = s.drive.with_set("flanks.preload_um=2").unwrap();
             assert!(!with_formulas(&s, &other).contains("# a guess, as S-95: teeth that touch"));

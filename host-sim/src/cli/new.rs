@@ -196,7 +196,10 @@ impl New {
         let mut lines: Vec<String> = written.teeth.iter().map(Clearance::text).collect();
         match (&self.like, &written.data_sheet) {
             (Some(_), Some(sheet)) => {
-                let missing = sheet.assumed();
+                let missing: Vec<&str> = match sheet.rated_torque_n_m {
+                    Some(_) => Vec::new(),
+                    None => sheet.assumed(),
+                };
                 let without = if missing.is_empty() {
                     String::new()
                 } else {

@@ -165,7 +165,7 @@ impl<'a> Known<'a> {
             .error(self.largest_error, 3)
             .plain(format!(" at {} N·m; ", torque_text(self.subject.table.torque_range_n_m()[1])));
         if let Some([_, worst]) = self.fresh {
-            let torque = shown_torque_n_m(&self.subject.table);
+            let torque = torque_text(shown_torque_n_m(&self.subject.table) as f32);
             return Headline {
                 choice,
                 answer: uncorrected
@@ -215,7 +215,7 @@ impl<'a> Known<'a> {
             let mean = e.iter().sum::<f64>() / e.len() as f64;
             let angle = |k: usize| (self.pitch() * k as f64 / FRAMES as f64).to_degrees();
             lines.series.push(Series {
-                name: format!("{} N·m forward, fresh FEM", animation.torque_n_m),
+                name: format!("{} N·m forward, fresh FEM", torque_text(animation.torque_n_m as f32)),
                 mark: Mark::Points,
                 colour: 1,
                 points: (0..=FRAMES).map(|k| [angle(k), e[k % FRAMES] - mean]).collect(),
@@ -563,7 +563,7 @@ fn sheet_section(known: &[Known<'_>]) -> Option<Section> {
         let table = PageTable { caption, header, rows: sheet.beside.iter().map(row).collect() };
         blocks.push(Block::Table { choice: Some(id.clone()), table });
         if let Some(what) = sheet.assumed_in_words() {
-            let text = Text::new(format!("Loads {what}."));
+            let text = Text::new(format!("Loads: {what}."));
             blocks.push(Block::Paragraph { choice: Some(id.clone()), text });
         }
         if let Some(why) = &sheet.why {

@@ -51,6 +51,13 @@ pub fn page(of: Sources<'_>) -> Page {
     .into_iter()
     .filter(|(count, _)| *count > 0)
     .map(|(count, what)| format!("{count} of {} runs {what}.", study.runs.len()))
+    .chain(
+        settings
+            .generators
+            .iter()
+            .filter(|kind| !of_kind(study, **kind).any(|run| run.meets))
+            .map(|kind| format!("No variant with the {} generator meets what has to be kept.", kind.in_words())),
+    )
     .chain(of.remarks.iter().map(|remark| format!("{remark}.")))
     .collect();
     let kinds = &settings.generators;
