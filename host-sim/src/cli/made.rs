@@ -195,7 +195,7 @@ mod tests {
         assert_eq!(Clearance::of(&involutes.drive).unwrap().clear, GeneratorKind::ALL);
         let Err(Failure::BadInput(why)) = with_s_teeth(made(60, 1.0)) else { panic!("60 teeth have room") };
         assert!(why.contains("of 60 teeth") && why.contains("allowed: more teeth, 100"), "{why}");
-        for (teeth, module_mm) in [(S_TEETH, 0.7), (160, 0.254), (200, 0.3175), (320, 0.3)] {
+        for (teeth, module_mm) in [(S_TEETH, 0.7), (200, 0.3175)] {
             let s = with_s_teeth(made(teeth, module_mm)).unwrap();
             let clearance = Clearance::of(&s.drive).unwrap();
             assert!(clearance.check_s_teeth().is_ok() && clearance.clear == [GeneratorKind::Cam], "{clearance:?}");
