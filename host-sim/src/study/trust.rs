@@ -4,7 +4,7 @@
 //! where it leaves out a computed variant, and of how far the computed variants lie from the one in their middle. Where the first is
 //! as large as the second an estimate says no more than "as the middle one".
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -84,9 +84,9 @@ fn places(runs: &[Run]) -> Vec<Vec<f64>> {
             places.iter_mut().zip(&numbers).for_each(|(place, number)| place.push(scale * (number - low)));
             continue;
         }
-        let words: BTreeMap<&str, ()> = runs.iter().map(|run| (run.values[field].as_str(), ())).collect();
+        let words: BTreeSet<&str> = runs.iter().map(|run| run.values[field].as_str()).collect();
         for (place, run) in places.iter_mut().zip(runs) {
-            place.extend(words.keys().map(|word| f64::from(u8::from(*word == run.values[field]))));
+            place.extend(words.iter().map(|word| f64::from(u8::from(*word == run.values[field]))));
         }
     }
     places
