@@ -88,8 +88,8 @@ pub(super) struct Tables {
     /// Solver: fast or reference
     #[arg(long, value_name = "SOLVER", default_value = "fast", conflicts_with = "from_samples", value_parser = names::solver(), hide_possible_values = true)]
     solver: Method,
-    /// Stress in root fillet, on bore and flank under the largest load, over three meshes, with its interval; half a minute more
-    /// for each generator
+    /// Stress in root fillet, on bore and flank under the largest load, over three meshes, with its interval; takes one more pitch
+    /// and three meshes for each generator
     #[arg(long, conflicts_with = "from_samples")]
     stress: bool,
     /// Do not write report.html, which takes a FEM run over one more tooth pitch for each generator
