@@ -357,7 +357,10 @@ fn a_study_agrees_with_the_table_of_the_same_drive_and_tells_every_variant() {
     );
     assert!(json["runs"][1]["why"].as_str().unwrap().contains("generator.w0_mm"));
     assert_eq!(names(&desk.path("out")), ["report.html", "study.csv", "study.json"]);
+    let asked: Vec<_> = json["asked"].as_array().unwrap().iter().map(|asked| asked["meet_alone"].as_u64()).collect();
+    assert_eq!(asked, [Some(1); 3], "{}", json["asked"]);
     let rows = desk.read("out/study.csv");
+    assert!(rows.contains(",200,at_least,converged,"), "{rows}");
     assert!(rows.starts_with("variant,generator,generator.w0_mm,t1_n_m,"), "{rows}");
     assert_eq!(rows.lines().count(), 3);
 
@@ -377,6 +380,13 @@ fn a_study_agrees_with_the_table_of_the_same_drive_and_tells_every_variant() {
         ("study --vary generator.w0_mm=0.5 --keep backlash=..3", "did you mean `backlash_arcsec`?"),
         ("study --vary generator.w0_mm=0.5 --least stress", "max_von_mises_mpa"),
         ("study --vary generator.w0_mm=0.5 --torque-n-m -3", "allowed: above 0"),
+        ("study --vary generator.w0_mm=0.5,0.49,0.50", "found the value 0.50 twice"),
+        ("study --vary generator.w0_mm=0.5..0.5", "found the value 0.5 twice"),
+        ("study --vary generator.w0_mm=0.5 --least bore_mpa --most bore_mpa", "found bore_mpa twice"),
+        (
+            "study -g cam --vary generator.w0_mm=0.5 --keep last_stable_n_m=300..",
+            "is 200 N.m, where the search for it ends",
+        ),
     ] {
         let run = desk.line(&format!("{wrong} --out nothing"));
         assert!(run.code == 2 && run.stderr.contains(due), "{wrong}: {}", run.stderr);

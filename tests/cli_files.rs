@@ -114,6 +114,24 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
         assert!(!bore || (wheel["root_radius_mm"].as_f64().unwrap() - rim_mm - 31.0).abs() < 1e-3, "{line}");
         assert_eq!(text.contains("as HHD-95\nrim_thickness_mm"), !bore && !line.contains("--set"), "{line}");
     }
+    // A size that is at hand brings its data sheet, and the command that adds guesses of what no catalogue prints works as it is told.
+    let made = desk.line("new like.toml --like CSG-25-80 --json").done().json();
+    assert_eq!(made["data_sheet"]["k2_n_m_per_rad"], 50e3);
+    assert_eq!(made["left_out"].as_array().unwrap().len(), 4);
+    assert_eq!(made["teeth"]["clear"].as_array().unwrap().len(), 4);
+    assert!(desk.read("like.toml").contains("\nratcheting_torque_n_m = 880.0\n"), "{}", desk.read("like.toml"));
+    let guesses = made["next"][2].as_str().unwrap().strip_prefix("flexspline ").unwrap();
+    let with_cup = desk.line(&format!("{guesses} --json")).done().json();
+    assert_eq!(with_cup["left_out"].as_array().unwrap().len(), 2);
+    // The rated torque of a CSF is not at hand, nor is anything of a ratio that is not in the catalogue.
+    assert!(desk.line("new csf.toml --like CSF-25-80").done().stdout.contains("to be filled in: rated_torque_n_m"));
+    assert!(desk.line("new odd.toml --like CSF-25-90").done().stdout.contains("figures of CSF-25-90 are not at hand"));
+    // S-shaped teeth are drawn for the cam.
+    let s = desk.line("new s.toml --like CSG-25-80 --set flexspline.profile=s --json").done().json();
+    assert_eq!(s["teeth"]["clear"], serde_json::json!(["cam"]));
+    assert!(s["teeth"]["interfere_um"]["double-disc"].as_f64().unwrap() > 0.5, "{s}");
+    assert!(s["next"][0].as_str().unwrap().ends_with("--generator cam"), "{s}");
+
     // It can be solved, and its load is that of its size.
     desk.line("tables --generator cam --mesh coarse --temperatures-c=20 --drive own.toml").done();
     for (line, said) in [
@@ -122,6 +140,11 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
         ("--module 0.32", "--module: found alone"),
         ("--like CSF25", "--like: found \"CSF25\""),
         ("--like CSF-25-100 --ratio 80", "--ratio: found 80.0, allowed: 100, as CSF-25-100 has it"),
+        (
+            "--teeth 160 --module 0.3 --generator double-disc --set flexspline.profile=s",
+            "--generator: found double-disc",
+        ),
+        ("--teeth 60 --module 1 --set flexspline.profile=s", "S-shaped teeth have no room in this drive of 60 teeth"),
         ("--bore 62", "add --module and --teeth or --ratio, or --like"),
         ("--teeth 200 --module 0.32 --bore 66", "--bore: found 66: the root circle has the diameter 65.12"),
         ("--teeth 200 --module 0.32 --drive HHD-95-typical", "--drive: found it beside --teeth"),

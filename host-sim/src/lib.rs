@@ -42,6 +42,7 @@ pub use flexspline_mechanics::{
 pub mod bundle;
 pub mod calibrate;
 pub mod campaign;
+pub mod catalogue;
 pub mod causes;
 pub mod cautions;
 pub mod cli;

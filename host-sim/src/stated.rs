@@ -117,6 +117,32 @@ impl Stated {
         }
     }
 
+    /// The section as a drive file has it; what is not stated is a comment, to be filled in.
+    pub fn to_toml(&self) -> String {
+        let numbers = [
+            ("rated_torque_n_m", self.rated_torque_n_m),
+            ("t1_n_m", self.t1_n_m),
+            ("t2_n_m", self.t2_n_m),
+            ("k1_n_m_per_rad", self.k1_n_m_per_rad),
+            ("k2_n_m_per_rad", self.k2_n_m_per_rad),
+            ("k3_n_m_per_rad", self.k3_n_m_per_rad),
+            ("hysteresis_loss_arcmin", self.hysteresis_loss_arcmin),
+            ("lost_motion_arcmin", self.lost_motion_arcmin),
+            ("ratcheting_torque_n_m", self.ratcheting_torque_n_m),
+            ("starting_torque_n_m", self.starting_torque_n_m),
+            ("accuracy_arcmin", self.accuracy_arcmin),
+            ("unit_scatter_percent", self.unit_scatter_percent),
+        ];
+        let source = self.source.as_ref().map(|source| format!("{source:?}"));
+        let values = numbers.map(|(key, value)| (key, value.map(|value| format!("{value:?}"))));
+        let lines = [("source", source)].into_iter().chain(values).map(|(key, value)| match value {
+            Some(value) => format!("{key} = {value}\n"),
+            None => format!("# {key} = \n"),
+        });
+        let head = "\n[data_sheet]  # what a catalogue prints; simulate and tables show what is computed beside it; any line may be left out\n";
+        head.to_owned() + &lines.collect::<String>()
+    }
+
     fn read(file: &mut TomlFile<'_>, table: &toml::de::DeTable<'_>) -> Option<Stated> {
         let section = file.section(table, "data_sheet")?;
         let known: Vec<String> = KEYS.iter().map(|key| section.path(key)).collect();
@@ -140,11 +166,14 @@ impl Stated {
             unit_scatter_percent: number("unit_scatter_percent", &PERCENT),
         };
         stated.source = section.given(file, "source", text);
-        let loads = [stated.t1_n_m, stated.t2_n_m, stated.rated_torque_n_m];
-        let known: Vec<f64> = loads.into_iter().flatten().collect();
-        if known.windows(2).any(|pair| pair[0] >= pair[1]) {
-            let what = format!("found t1, t2 and rated torque {known:?}, allowed: each above the one before");
-            file.refuse_whole("data_sheet", what);
+        // The rated torque may be below T2: catalogues have it so at ratio 50.
+        for (name, above) in [("t2", stated.t2_n_m), ("rated torque", stated.rated_torque_n_m)] {
+            if let (Some(t1), Some(above)) = (stated.t1_n_m, above)
+                && t1 >= above
+            {
+                let what = format!("found t1 {t1:?} and {name} {above:?}, allowed: t1 below the {name}");
+                file.refuse_whole("data_sheet", what);
+            }
         }
         Some(stated)
     }
@@ -153,10 +182,32 @@ impl Stated {
     pub fn loads(&self, rated_n_m: f64) -> Loads {
         let usual = Loads::up_to(1.0);
         let by_t2 = self.t2_n_m.map(|t2| t2 / usual.t2_n_m);
-        let largest_n_m = self.rated_torque_n_m.or(by_t2).unwrap_or(rated_n_m);
-        let all = Loads::up_to(largest_n_m);
-        let t2_n_m = self.t2_n_m.unwrap_or(all.t2_n_m);
-        Loads { t1_n_m: self.t1_n_m.unwrap_or(all.t1_n_m).min(0.9 * t2_n_m), t2_n_m, largest_n_m }
+        let by_t1 = self.t1_n_m.map(|t1| t1 / usual.t1_n_m);
+        let rated = self.rated_torque_n_m.filter(|_| !self.is_rated_below_t2());
+        let largest_n_m = rated.or(by_t2).or(by_t1).unwrap_or(rated_n_m);
+        let t2_n_m = match (self.t2_n_m, self.t1_n_m) {
+            (Some(t2), _) => t2,
+            // What is stated stays: the other end is put where there is room.
+            (None, Some(t1)) if t1 >= usual.t2_n_m * largest_n_m => 0.5 * (t1 + largest_n_m),
+            (None, _) => usual.t2_n_m * largest_n_m,
+        };
+        let t1_n_m = self.t1_n_m.unwrap_or_else(|| {
+            let t1 = usual.t1_n_m * largest_n_m;
+            if t1 < t2_n_m { t1 } else { usual.t1_n_m / usual.t2_n_m * t2_n_m }
+        });
+        Loads { t1_n_m, t2_n_m, largest_n_m }
+    }
+
+    /// Whether the rated torque ends below T2: K3 then takes a larger load.
+    fn is_rated_below_t2(&self) -> bool {
+        self.rated_torque_n_m.zip(self.t2_n_m).is_some_and(|(rated, t2)| rated <= t2)
+    }
+
+    /// The loads that it does not state, by their keys; the rated torque, too, if it is below T2 and the largest load is another.
+    pub fn assumed(&self) -> Vec<&'static str> {
+        let rated = self.rated_torque_n_m.filter(|_| !self.is_rated_below_t2());
+        let loads = [("t1_n_m", self.t1_n_m), ("t2_n_m", self.t2_n_m), ("rated_torque_n_m", rated)];
+        loads.into_iter().filter(|(_, stated)| stated.is_none()).map(|(key, _)| key).collect()
     }
 }
 
@@ -186,6 +237,8 @@ pub struct SheetBeside {
     pub stated: Stated,
     /// The loads of the computed figures.
     pub loads: Loads,
+    /// Those of the loads that the sheet does not state, by their keys: they are guesses.
+    pub assumed: Vec<&'static str>,
     /// Everything that a catalogue prints, computed.
     pub sheet: DataSheet,
     /// Figure by figure, those that are stated.
@@ -271,6 +324,7 @@ pub fn beside(
         generator: kind,
         stated: stated.clone(),
         loads,
+        assumed: stated.assumed(),
         sheet,
         beside,
         why: why.map(|error| error.to_string()),
@@ -331,11 +385,10 @@ impl SheetBeside {
     pub fn text(&self) -> String {
         let of = self.stated.source.as_deref().map_or_else(String::new, |source| format!(" ({source})"));
         let mut lines = format!(
-            "data sheet{of}, {} generator, T1 {} T2 {} rated {} N.m{:>13}{:>12}{:>8}\n",
+            "data sheet{of}, {} generator, {} N.m\n  {:<24}{:>12}{:>12}{:>8}\n",
             self.generator,
-            short(self.loads.t1_n_m),
-            short(self.loads.t2_n_m),
-            short(self.loads.largest_n_m),
+            self.loads_in_words(),
+            "",
             "stated",
             "computed",
             "ratio"
@@ -352,10 +405,45 @@ impl SheetBeside {
                 row.remark(self)
             );
         }
+        if let Some(what) = self.assumed_in_words() {
+            lines += &format!("  {what}\n");
+        }
         if let Some(why) = &self.why {
             lines += &format!("  not all of it was computed: {why}\n");
         }
         lines
+    }
+
+    /// The three loads in N·m, each that is not of the sheet marked as assumed.
+    pub fn loads_in_words(&self) -> String {
+        let Loads { t1_n_m, t2_n_m, largest_n_m } = self.loads;
+        let largest = if self.stated.is_rated_below_t2() { "largest" } else { "rated" };
+        let loads = [("T1", "t1_n_m", t1_n_m), ("T2", "t2_n_m", t2_n_m), (largest, "rated_torque_n_m", largest_n_m)];
+        let word = |(name, key, load): (&str, &str, f64)| {
+            let assumed = if self.assumed.contains(&key) { " (assumed)" } else { "" };
+            format!("{name} {}{assumed}", short(load))
+        };
+        loads.map(word).join(" ")
+    }
+
+    /// Where assumed loads come from; nothing where all are stated.
+    pub fn assumed_in_words(&self) -> Option<String> {
+        let keys = self.assumed.join(", ");
+        let usual = Loads::up_to(100.0);
+        let proportion = format!("T1 : T2 : rated = {} : {} : 100, as of a CSF-25-100", usual.t1_n_m, usual.t2_n_m);
+        if self.stated.is_rated_below_t2() {
+            let rated = short(self.stated.rated_torque_n_m.unwrap_or_default());
+            return Some(format!(
+                "the rated torque of {rated} N.m is below T2, so the largest load, which K3 takes, is guessed: {proportion}"
+            ));
+        }
+        match self.assumed.len() {
+            0 => None,
+            3 => Some(format!(
+                "not stated, so guessed: {keys}. The rated torque is what a table of this generator spans by default; {proportion}"
+            )),
+            _ => Some(format!("not stated, so guessed: {keys}, from those that are; {proportion}")),
+        }
     }
 }
 
@@ -375,19 +463,28 @@ impl Beside {
         }
     }
 
-    /// What the figure is, and whether it is within what units scatter.
+    /// What the figure is, whether it hangs on loads that are assumed, and whether it is within what units scatter.
     pub fn remark(&self, of: &SheetBeside) -> String {
         let percent = of.stated.unit_scatter_percent.unwrap_or(0.0);
-        match self.within_scatter {
-            Some(true) => format!("{}; within the ±{percent:.0} % that units scatter", self.words),
-            Some(false) => format!("{}; outside the ±{percent:.0} % that units scatter", self.words),
-            None => self.words.to_owned(),
-        }
+        let hangs_on = match self.figure {
+            "k1_n_m_per_rad" => &["t1_n_m"][..],
+            "k2_n_m_per_rad" => &["t1_n_m", "t2_n_m"],
+            "k3_n_m_per_rad" => &["t2_n_m", "rated_torque_n_m"],
+            "hysteresis_loss_arcmin" | "lost_motion_arcmin" | "accuracy_arcmin" => &["rated_torque_n_m"],
+            _ => &[],
+        };
+        let assumed = if hangs_on.iter().any(|key| of.assumed.contains(key)) { "at assumed loads; " } else { "" };
+        let scatter = match self.within_scatter {
+            Some(true) => format!("; within the ±{percent:.0} % that units scatter"),
+            Some(false) => format!("; outside the ±{percent:.0} % that units scatter"),
+            None => String::new(),
+        };
+        format!("{assumed}{}{scatter}", self.words)
     }
 }
 
 /// Four digits that count.
-fn short(value: f64) -> String {
+pub(crate) fn short(value: f64) -> String {
     if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
         return format!("{value:.3e}");
     }
@@ -425,7 +522,7 @@ mod tests {
             "{error}"
         );
         let error = refused("t1_n_m = 25\nt2_n_m = 7");
-        assert!(error.contains("each above the one before"), "{error}");
+        assert!(error.contains("found t1 25.0 and t2 7.0, allowed: t1 below the t2"), "{error}");
     }
 
     #[test]
@@ -442,6 +539,69 @@ mod tests {
         assert_eq!(Stated::default().loads(50.0), usual);
         let stated = Stated { t2_n_m: Some(36.0), ..Stated::default() };
         assert!((stated.loads(1.0).largest_n_m - 50.0).abs() < 1e-9);
+    }
+
+    /// Whatever is stated alone is used as it is, and each load is above the one before.
+    #[test]
+    fn a_stated_load_is_never_moved_and_an_assumed_one_is_marked() {
+        for (t1, t2, rated) in [(29.0, 108.0, 153.0), (90.0, 95.0, 100.0), (0.1, 0.2, 100.0)] {
+            for given in 0..8 {
+                let stated = Stated {
+                    t1_n_m: (given & 1 > 0).then_some(t1),
+                    t2_n_m: (given & 2 > 0).then_some(t2),
+                    rated_torque_n_m: (given & 4 > 0).then_some(rated),
+                    k1_n_m_per_rad: Some(1e4),
+                    ..Stated::default()
+                };
+                let loads = stated.loads(20.0);
+                let kept = |stated: Option<f64>, load: f64| stated.is_none_or(|stated| stated == load);
+                assert!(kept(stated.t1_n_m, loads.t1_n_m) && kept(stated.t2_n_m, loads.t2_n_m), "{given}: {loads:?}");
+                assert!(kept(stated.rated_torque_n_m, loads.largest_n_m), "{given}: {loads:?}");
+                assert!(0.0 < loads.t1_n_m && loads.t1_n_m < loads.t2_n_m, "{given}: {loads:?}");
+                assert!(loads.t2_n_m < loads.largest_n_m, "{given}: {loads:?}");
+                let assumed = stated.assumed();
+                assert_eq!(assumed.len(), 3 - (given as u32).count_ones() as usize);
+                let sheet = SheetBeside {
+                    generator: GeneratorKind::Cam,
+                    stated,
+                    loads,
+                    assumed,
+                    sheet: DataSheet::default(),
+                    beside: Vec::new(),
+                    why: None,
+                };
+                assert_eq!(sheet.text().matches("(assumed)").count(), sheet.assumed.len(), "{}", sheet.text());
+                assert_eq!(sheet.assumed_in_words().is_some(), given < 7);
+                let k1 = Beside {
+                    figure: "k1_n_m_per_rad",
+                    stated: 1e4,
+                    computed: None,
+                    ratio: None,
+                    within_scatter: None,
+                    words: "secant",
+                };
+                assert_eq!(k1.remark(&sheet).contains("at assumed loads"), given & 1 == 0);
+            }
+        }
+    }
+
+    /// CSG-32-50 is rated at 99 N·m, and its T2 is 108 N·m.
+    #[test]
+    fn a_rated_torque_below_t2_is_taken_and_k3_has_a_larger_load() {
+        let text = "base = \"HHD-95\"\n[data_sheet]\nt1_n_m = 29\nt2_n_m = 108\nrated_torque_n_m = 99\n";
+        let stated = Stated::of_file("d.toml", text).unwrap().unwrap();
+        let loads = stated.loads(20.0);
+        assert_eq!((loads.t1_n_m, loads.t2_n_m, loads.largest_n_m.round()), (29.0, 108.0, 150.0));
+        assert_eq!(stated.assumed(), ["rated_torque_n_m"]);
+        let assumed = stated.assumed();
+        let sheet = DataSheet::default();
+        let told =
+            SheetBeside { generator: GeneratorKind::Cam, stated, loads, assumed, sheet, beside: Vec::new(), why: None };
+        let text = told.text();
+        assert!(
+            text.contains("T2 108 largest 150 (assumed) N.m") && text.contains("rated torque of 99 N.m is below T2"),
+            "{text}"
+        );
     }
 
     /// Friction of the flanks widens the loop; without it the loop is the clearance. A torque that the drive bears is held.

@@ -102,6 +102,13 @@ function drawUprights(uprights) {
 /** Stands for every choice where a figure is the same for all of them. */
 export const EVERY = "every";
 
+/** Points of a series with nothing on either side, which no line shows. */
+function alone(u, k) {
+  const column = u.data[k];
+  const there = (at) => column[at] !== null && column[at] !== undefined;
+  return Array.from(column.keys()).filter((at) => there(at) && !there(at - 1) && !there(at + 1));
+}
+
 /** A chart in `place`; returns { choose(choice) } to show another choice. */
 export function lineChart(place, id, spec) {
   const frame = document.createElement("div");
@@ -159,7 +166,9 @@ export function lineChart(place, id, spec) {
         dash: s.mark === "dashed" ? [6, 4] : undefined,
         spanGaps: s.mark !== "broken",
         paths: points ? () => null : undefined,
-        points: points ? { show: true, size, width: 0, fill: stroke, stroke } : { show: false },
+        points: points
+          ? { show: true, size, width: 0, fill: stroke, stroke }
+          : { show: s.mark === "broken", size: 5, width: 0, fill: stroke, stroke, filter: alone },
         value: (u, v) => say(u, v, spec.y.quantity, fy),
       };
     });

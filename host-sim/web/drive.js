@@ -3,7 +3,7 @@ import { onPointing, pointAt, watchWidth } from "./charts.js";
 import { modulo, motion, rotated } from "./motion.js";
 import { painter, rgb, toScreen } from "./paint.js";
 import { onUnits, written } from "./quantities.js";
-import { colour, css, FONT, onTheme, viridis } from "./theme.js";
+import { colour, css, FONT, onTheme, strained } from "./theme.js";
 
 const DEGREE = Math.PI / 180;
 /** Teeth across the close view. */
@@ -365,13 +365,21 @@ export function driveViewer(place, animations) {
     draw();
   }
   watchWidth(stage, resize);
-  onTheme(() => draw());
-  onUnits(write);
   const bar = find(".legend canvas").getContext("2d");
-  for (let k = 0; k < 180; k++) {
-    bar.fillStyle = css(viridis(k / 179));
-    bar.fillRect(k, 0, 1, 12);
+  function drawBar() {
+    const coloured = strained();
+    for (let k = 0; k < 180; k++) {
+      bar.fillStyle = css(coloured(k / 179));
+      bar.fillRect(k, 0, 1, 12);
+    }
   }
+  onTheme(() => {
+    paint.recolour();
+    drawBar();
+    draw();
+  });
+  onUnits(write);
+  drawBar();
 
   return {
     async choose(choice) {

@@ -53,6 +53,23 @@ async function start() {
     root.dataset.ready = id;
   }
 
+  /** Paper holds every choice: words and tables under its name, and a sketch beside each chart that is drawn for another one. */
+  function onPaper(printing) {
+    for (const element of document.querySelectorAll("[data-choice]")) {
+      element.hidden = !printing && element.dataset.choice !== root.dataset.chosen;
+    }
+    for (const box of document.querySelectorAll(".on-paper")) box.remove();
+    if (!printing) return;
+    for (const figure of document.querySelectorAll("figure")) {
+      const sketches = figure.querySelector("noscript");
+      const box = document.createElement("div");
+      box.className = "on-paper";
+      box.innerHTML = sketches.textContent;
+      for (const sketch of box.children) sketch.hidden = [root.dataset.chosen, EVERY].includes(sketch.dataset.sketch);
+      if ([...box.children].some((sketch) => !sketch.hidden)) sketches.before(box);
+    }
+  }
+
   function setDetail(level) {
     const levels = ["summary", "engineering", "full"];
     for (const section of document.querySelectorAll("section[data-detail]")) {
@@ -80,6 +97,13 @@ async function start() {
     goTo(anchor);
   });
 
+  if (report.choices.length > 1) {
+    for (const element of document.querySelectorAll("[data-choice]")) {
+      element.dataset.of = report.choices.find((c) => c.id === element.dataset.choice).name;
+    }
+    addEventListener("beforeprint", () => onPaper(true));
+    addEventListener("afterprint", () => onPaper(false));
+  }
   // A browser that remembers forms may come back with another unit than the text has.
   setUnits(units.value);
   const { choice, anchor } = asked();

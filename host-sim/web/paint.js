@@ -1,7 +1,7 @@
 // Both wheels in colour: by WebGL2, where every sector is one instance of the first and the vertex shader looks up where it
 // stands, or, where there is no WebGL2, on a plain canvas.
 import { rotated } from "./motion.js";
-import { colour, css, viridis } from "./theme.js";
+import { colour, css, strained } from "./theme.js";
 
 const VERTEX = `#version 300 es
 precision highp float;
@@ -72,8 +72,16 @@ class WebGLPainter {
     this.program = this.link();
     this.at = (name) => gl.getUniformLocation(this.program, name);
     this.wheels = new Map();
+    this.recolour();
+  }
+
+  /** Takes the colours of the theme. */
+  recolour() {
+    const { gl } = this;
     const map = new Uint8Array(256 * 4);
-    for (let k = 0; k < 256; k++) map.set([...viridis(k / 255), 255], 4 * k);
+    const coloured = strained();
+    for (let k = 0; k < 256; k++) map.set([...coloured(k / 255), 255], 4 * k);
+    if (this.map) gl.deleteTexture(this.map);
     this.map = this.texture(gl.RGBA8, 256, 1, gl.RGBA, gl.UNSIGNED_BYTE, map, gl.LINEAR);
   }
 
@@ -237,6 +245,12 @@ class CanvasPainter {
   constructor(canvas) {
     this.context = canvas.getContext("2d");
     this.name = "canvas";
+    this.recolour();
+  }
+
+  /** Takes the colours of the theme. */
+  recolour() {
+    this.coloured = strained();
   }
 
   load(motion) {
@@ -297,7 +311,7 @@ class CanvasPainter {
     ctx.clip();
     ctx.globalAlpha = alpha;
     fills.forEach((path, k) => {
-      ctx.fillStyle = ctx.strokeStyle = css(viridis((k + 0.5) / BUCKETS));
+      ctx.fillStyle = ctx.strokeStyle = css(this.coloured((k + 0.5) / BUCKETS));
       ctx.fill(path);
       // Without this the seams between elements shine through; in the small view nobody sees them.
       ctx.lineWidth = mesh ? 0.2 : 0.6;

@@ -36,6 +36,18 @@ const [SEQUENTIAL, DIVERGING] = [VIRIDIS, BLUE_RED].map(bytes);
 /** For sizes. */
 export const viridis = (x) => between(SEQUENTIAL, x);
 
+/** Shares of a scale of stress between which bare metal turns into the map. Guesses: a ring that bears little is grey, the foot of a tooth is not. */
+const BARE = [0.04, 0.16];
+
+/** For stress on a wheel: what bears nothing is the metal of the style sheet and leaves the eye to the teeth. */
+export function strained() {
+  const [, ...metal] = /^#(..)(..)(..)$/.exec(colour("unstressed")).map((hex) => parseInt(hex, 16));
+  return (x) => {
+    const share = Math.min(Math.max((x - BARE[0]) / (BARE[1] - BARE[0]), 0), 1);
+    return viridis(x).map((v, c) => Math.round(metal[c] + share * (v - metal[c])));
+  };
+}
+
 /** For what has a sign: 0.5 is zero. */
 export const diverging = (x) => between(DIVERGING, x);
 

@@ -784,6 +784,82 @@ await check("a legend tells marks apart", async () => {
   );
 });
 
+await check("paper holds every generator", async () => {
+  const { page, close } = await open("tables/report.html");
+  const seen = () =>
+    page.evaluate(() => ({
+      headlines: [...document.querySelectorAll(".headline")].filter((e) => e.offsetParent).length,
+      sketches: [...document.querySelectorAll(".on-paper .sketch")].filter((e) => e.offsetParent).length,
+      named: getComputedStyle(document.querySelector(".headline"), "::before").content,
+    }));
+  const before = await seen();
+  assert(before.headlines === 1 && before.sketches === 0, `on the screen ${JSON.stringify(before)}`);
+  await page.emulateMedia({ media: "print" });
+  await page.evaluate(() => dispatchEvent(new Event("beforeprint")));
+  const paper = await seen();
+  assert(paper.headlines === choices.length, `${paper.headlines} headlines on paper`);
+  assert(paper.sketches >= 3 * (choices.length - 1), `${paper.sketches} sketches on paper`);
+  assert(paper.named.includes("roller"), `a headline is called ${paper.named}`);
+  await page.evaluate(() => dispatchEvent(new Event("afterprint")));
+  await page.emulateMedia({ media: "screen" });
+  const after = await seen();
+  await close();
+  assert(after.headlines === 1 && after.sketches === 0, `afterwards ${JSON.stringify(after)}`);
+  return `${paper.sketches} sketches beside what is drawn`;
+});
+
+await check("metal without stress stands out from what is between teeth", async () => {
+  const notes = [];
+  for (const dark of [false, true]) {
+    const { page, close } = await open("tables/report.html", { dark });
+    const contrast = await page.evaluate(() => {
+      const style = getComputedStyle(document.documentElement);
+      const light = (name) => {
+        const hex = style.getPropertyValue(name).trim();
+        const [r, g, b] = [1, 3, 5]
+          .map((k) => parseInt(hex.slice(k, k + 2), 16) / 255)
+          .map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05;
+      };
+      const [a, b] = [light("--unstressed"), light("--card")];
+      return Math.max(a, b) / Math.min(a, b);
+    });
+    // The ring at the top of the whole drive bears nothing: it is drawn in that colour.
+    const shown = await page.evaluate(() => {
+      const wheels = document.querySelector(".stage canvas");
+      const copy = document.createElement("canvas");
+      [copy.width, copy.height] = [wheels.width, wheels.height];
+      const ctx = copy.getContext("2d");
+      ctx.drawImage(wheels, 0, 0);
+      const hex = getComputedStyle(document.documentElement).getPropertyValue("--unstressed").trim();
+      const due = [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
+      const { data } = ctx.getImageData(0, 0, copy.width, copy.height);
+      let near = 0;
+      for (let k = 0; k < data.length; k += 4) {
+        if (due.every((v, c) => Math.abs(v - data[k + c]) < 12) && data[k + 3] > 200) near += 1;
+      }
+      return (4 * near) / data.length;
+    });
+    await close();
+    assert(contrast >= 3, `contrast ${contrast.toFixed(2)}`);
+    assert(shown > 0.05, `${(100 * shown).toFixed(1)} % of the picture is bare metal`);
+    notes.push(`${contrast.toFixed(1)} : 1`);
+  }
+  return notes.join(" light, ") + " dark";
+});
+
+await check("a phone shows whole captions and what a table leaves", async () => {
+  const { page, close } = await open("tables/report.html", { width: 375 });
+  const [caption, left] = await page.evaluate(() => {
+    const box = document.querySelector("#comparison .table");
+    const column = [...box.querySelectorAll("thead th")].find((th) => th.textContent.startsWith("Left with table"));
+    return [box.querySelector("caption span"), column].map((e) => e.getBoundingClientRect().right);
+  });
+  await close();
+  assert(caption <= 375, `a caption ends at ${caption} px`);
+  assert(left <= 375, `the column that matters ends at ${left} px`);
+});
+
 await check("without DecompressionStream it says so", async () => {
   const old = await open("tables/report.html", {
     before: () => delete globalThis.DecompressionStream,

@@ -46,6 +46,7 @@ pub fn study(
         seed,
         generators: generators.iter().map(|name| generator(name)).collect::<Result<_, Failure>>()?,
         torque_n_m,
+        stated: None,
         positions,
         constraints: keep.iter().map(|text| text.parse::<Constraint>().map_err(bad)).collect::<PyResult<_>>()?,
         targets: least.chain(most).collect::<PyResult<_>>()?,

@@ -88,8 +88,14 @@ impl Context {
 
     /// Whether `--set` sets this field.
     pub(super) fn sets_field(&self, path: &str) -> bool {
+        self.set_to(path).is_some()
+    }
+
+    /// What `--set` sets this field to, the last time it does.
+    pub(super) fn set_to(&self, path: &str) -> Option<&str> {
         let assignments = self.common.sets.iter().flat_map(|set| set.split(','));
-        assignments.filter_map(|set| set.split_once('=')).any(|(set, _)| set.trim() == path)
+        let values = assignments.filter_map(|set| set.split_once('=')).filter(|(set, _)| set.trim() == path);
+        values.map(|(_, value)| value.trim().trim_matches('"')).last()
     }
 
     /// A command to type next, of the same drive.

@@ -17,6 +17,7 @@ mod fly;
 mod kernels;
 mod logs;
 mod look;
+mod made;
 mod man;
 mod names;
 mod new;

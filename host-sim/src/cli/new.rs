@@ -6,17 +6,22 @@ use clap::{Args, ValueEnum, ValueHint};
 use serde::Serialize;
 
 use super::context::quoted;
+use super::made::{Clearance, cup_and_balls, left_out, with_formulas, with_s_teeth};
 use super::{Context, Failure, names, say};
-use crate::drive::{Drive, DriveError, FewNumbers, GeneratorKind, MadeDrive};
+use crate::catalogue;
+use crate::drive::{Drive, DriveError, FewNumbers, GeneratorKind, Profile};
 use crate::nominal::Nominal;
 use crate::output::write_whole;
-use crate::stated::TEMPLATE;
+use crate::stated::{Stated, TEMPLATE};
 
 /// Write a commented drive file, or a catalogue model, to edit
 ///
 /// A drive file (the default) has every size, stiffness and imperfection of a drive for the FEM, each with its unit, meaning, sign and
 /// allowed range; as it stands it is the drive that it was made from. --teeth and --module (or --like, the name of a catalogue's size)
-/// make a drive of one's own, whose teeth clear one another; what follows from them has its formula in the file. A catalogue model
+/// make a drive of one's own, whose teeth clear one another; what follows from them has its formula in the file. With --like its
+/// [data_sheet] is filled in where the catalogue's figures are at hand. What is left out because no catalogue prints it (cup, balls,
+/// friction, errors) is told in the file and here, with a command that adds guesses of cup and balls. --set flexspline.profile=s makes
+/// S-shaped teeth for the cam. A catalogue model
 /// (a file with "nominal" in its name, or --kind nominal) has the few numbers that a catalogue gives, for `diagnose --model` and
 /// `synthesize --model`.
 #[derive(Debug, Args)]
@@ -24,7 +29,8 @@ use crate::stated::TEMPLATE;
 Examples:
   flexspline new drive.toml
   flexspline new drive.toml --teeth 200 --module 0.32 --bore 62 --generator cam
-  flexspline new drive.toml --like CSF-25-100
+  flexspline new drive.toml --like CSG-25-80
+  flexspline new drive.toml --like CSG-25-80 --set flexspline.profile=s
   flexspline new drive.toml --from HHD-95-typical --set generator.w0_mm=0.49
   flexspline new nominal.toml")]
 pub(super) struct New {
@@ -81,6 +87,14 @@ struct Written {
     /// Of the drive that a drive file holds.
     #[serde(skip_serializing_if = "Option::is_none")]
     drive_hash: Option<String>,
+    /// Of a drive of one's own: under which generators its teeth clear.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    teeth: Option<Clearance>,
+    /// Of a drive of one's own: what catalogue drives have and do not print.
+    left_out: Vec<&'static str>,
+    /// What the catalogue prints of a drive that is like one of its sizes, if it is at hand.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    data_sheet: Option<Stated>,
     /// Commands to type next.
     next: Vec<String>,
 }
@@ -93,7 +107,10 @@ impl New {
                 let what = "--drive: found it beside --teeth, --module or --like; give one of them";
                 return Err(Failure::BadInput(what.to_owned()));
             }
-            Some((name, few)) => Some(few.drive(&name).map_err(|error| refused(&error, self.like.is_some()))?),
+            Some((name, few)) => {
+                let made = few.drive(&name).map_err(|error| refused(&error, self.like.is_some()))?;
+                Some(if self.asks_for_s_teeth(context)? { with_s_teeth(made)? } else { made })
+            }
             None => None,
         };
         let drive = match (&made, &self.from) {
@@ -109,16 +126,38 @@ impl New {
         let shown = self.file.display().to_string();
         let file = quoted(&shown);
         let kind = self.kind.unwrap_or_else(|| self.kind_by_name());
+        let own = made.as_ref().filter(|_| kind == Kind::Drive);
+        let teeth = own.map(|_| Clearance::of(&drive)).transpose();
+        let teeth = teeth.map_err(|error| Failure::BadInput(error.to_string()))?;
+        if let Some(teeth) = teeth.as_ref().filter(|_| drive.flexspline.profile == Profile::S) {
+            teeth.check_s_teeth()?;
+        }
+        let left_out = own.map_or_else(Vec::new, |_| left_out(&drive));
+        let sized = self.like.as_deref().and_then(size_and_ratio).filter(|_| kind == Kind::Drive);
+        let data_sheet = sized.and_then(|(series, size, ratio)| catalogue::sheet(series, size, ratio));
         let (text, drive_hash, next) = match kind {
             Kind::Drive => {
                 let hash = blake3::Hash::from_bytes(drive.hash()).to_hex().to_string();
-                let next =
-                    [format!("flexspline drive --check --drive {file}"), format!("flexspline tables --drive {file}")];
-                let text = made.as_ref().map_or_else(|| drive.to_toml(), |made| with_formulas(made, &drive));
-                (text + TEMPLATE, Some(hash), next)
+                // Where teeth bind under a generator nobody wants its table.
+                let of = match teeth.as_ref().map(|teeth| teeth.clear.as_slice()) {
+                    Some([only]) => format!(" --generator {only}"),
+                    _ => String::new(),
+                };
+                let check = format!("flexspline drive --check --drive {file}");
+                let tables = format!("flexspline tables --drive {file}{of}");
+                let mut next = if of.is_empty() { vec![check, tables] } else { vec![tables] };
+                let text = match own {
+                    Some(made) => head(teeth.as_ref(), &left_out) + &with_formulas(made, &drive),
+                    None => drive.to_toml(),
+                };
+                if self.like.is_some() && !drive.sleeve.is_shell() {
+                    next.push(self.with_guesses(context, &file, &drive));
+                }
+                let sheet = data_sheet.as_ref().map_or_else(|| TEMPLATE.to_owned(), Stated::to_toml);
+                (text + &sheet, Some(hash), next)
             }
             Kind::Nominal => {
-                let next = [
+                let next = vec![
                     format!("flexspline synthesize --model {file} --effect circular_spline_eccentricity --out try"),
                     format!("flexspline diagnose try/data.csv --model {file} --out try"),
                 ];
@@ -127,8 +166,16 @@ impl New {
         };
         write_whole(&self.file, |out| out.write_all(text.as_bytes()))
             .map_err(|error| Failure::BadInput(error.to_string()))?;
-        let written =
-            Written { schema_version: 1, kind, written: vec![self.file.clone()], drive_hash, next: next.to_vec() };
+        let written = Written {
+            schema_version: 1,
+            kind,
+            written: vec![self.file.clone()],
+            drive_hash,
+            teeth,
+            left_out,
+            data_sheet,
+            next,
+        };
         context.print(&written, || {
             let what = match kind {
                 Kind::Drive => format!(
@@ -140,8 +187,61 @@ impl New {
                 ),
                 Kind::Nominal => "a catalogue model: put in the numbers of your drive".to_owned(),
             };
-            format!("wrote {shown}: {what}{}", say::next(&written.next))
+            format!("wrote {shown}: {what}{}{}", self.more(&written), say::next(&written.next))
         })
+    }
+
+    /// Teeth, data sheet and what is left out of a drive of one's own, a line each.
+    fn more(&self, written: &Written) -> String {
+        let mut lines: Vec<String> = written.teeth.iter().map(Clearance::text).collect();
+        match (&self.like, &written.data_sheet) {
+            (Some(_), Some(sheet)) => {
+                let missing: Vec<&str> = match sheet.rated_torque_n_m {
+                    Some(_) => Vec::new(),
+                    None => sheet.assumed(),
+                };
+                let without = if missing.is_empty() {
+                    String::new()
+                } else {
+                    format!("; not at hand, to be filled in: {}", missing.join(", "))
+                };
+                lines.push(format!(
+                    "[data_sheet] filled in: {}{without}",
+                    sheet.source.as_deref().unwrap_or("the catalogue")
+                ));
+            }
+            (Some(name), None) if written.kind == Kind::Drive => lines.push(format!(
+                "[data_sheet] is empty, fill it in: the figures of {name} are not at hand; those of {} are",
+                catalogue::sizes_in_words()
+            )),
+            _ => {}
+        }
+        lines.extend(written.left_out.iter().map(|what| format!("left out: {what}")));
+        lines.iter().map(|line| format!("\n{line}")).collect()
+    }
+
+    /// The command that makes this drive with guesses of cup and balls.
+    fn with_guesses(&self, context: &Context, file: &str, drive: &Drive) -> String {
+        let name = self.like.as_deref().map_or_else(String::new, quoted);
+        let generator = if self.generator == GeneratorKind::Cam {
+            String::new()
+        } else {
+            format!(" --generator {}", self.generator)
+        };
+        let command = context.next(&format!("new {file} --force --like {name}{generator}"));
+        format!("{command} --set {}", cup_and_balls(drive))
+    }
+
+    /// Whether S-shaped teeth are asked for, which are drawn for the cam.
+    fn asks_for_s_teeth(&self, context: &Context) -> Result<bool, Failure> {
+        let asked = context.set_to(PROFILE).is_some_and(|profile| profile.eq_ignore_ascii_case("s"));
+        if asked && self.generator != GeneratorKind::Cam {
+            return Err(Failure::BadInput(format!(
+                "--generator: found {}, allowed with --set {PROFILE}=s: cam, whose way through the teeth their space is cut by",
+                self.generator
+            )));
+        }
+        Ok(asked)
     }
 
     /// Name and numbers of a drive of one's own, if it is asked for.
@@ -155,7 +255,7 @@ impl New {
             generator: self.generator,
         };
         if let Some(name) = &self.like {
-            let Some((size, ratio)) = size_and_ratio(name) else {
+            let Some((_, size, ratio)) = size_and_ratio(name) else {
                 return bad(format!(
                     "--like: found {name:?}, allowed: SERIES-SIZE-RATIO as CSF-25-100, size 5 to 100, ratio 30 to 320; a built-in drive goes \
                      with --from"
@@ -228,14 +328,28 @@ impl New {
 /// Pitch diameter for each size, mm: 63.5 of size 25, as the catalogues of Harmonic Drive have it.
 const CATALOGUE_MM_PER_SIZE: f64 = 2.54;
 
-/// Size and ratio of `CSF-25-100`: the last two numbers.
-fn size_and_ratio(name: &str) -> Option<(f64, u32)> {
+/// The field that says which teeth.
+const PROFILE: &str = "flexspline.profile";
+
+/// What a file begins with: how its teeth clear, and what it leaves out.
+fn head(teeth: Option<&Clearance>, left_out: &[&str]) -> String {
+    let mut text: String = teeth.map(|teeth| format!("# As made here, {}.\n", teeth.text())).unwrap_or_default();
+    if !left_out.is_empty() {
+        text +=
+            "# Left out, since no catalogue prints it; docs/hermetic.md, \"Beside a catalogue\", has what each does:\n";
+        text.extend(left_out.iter().map(|what| format!("# - {what}\n")));
+    }
+    text
+}
+
+/// Series, size and ratio of `CSF-25-100`: the last two are numbers.
+fn size_and_ratio(name: &str) -> Option<(&str, f64, u32)> {
     let mut parts = name.rsplit('-');
     let ratio: u32 = parts.next()?.parse().ok()?;
     let size: f64 = parts.next()?.parse().ok()?;
     let series = parts.next()?;
     let named = series.starts_with(|first: char| first.is_ascii_alphabetic());
-    (named && (30..=320).contains(&ratio) && (5.0..=100.0).contains(&size)).then_some((size, ratio))
+    (named && (30..=320).contains(&ratio) && (5.0..=100.0).contains(&size)).then_some((series, size, ratio))
 }
 
 /// A drive that cannot be, by the options that asked for it.
@@ -246,23 +360,4 @@ fn refused(error: &DriveError, like: bool) -> Failure {
         _ => problem.to_string(),
     });
     Failure::BadInput(says.collect::<Vec<_>>().join("\n"))
-}
-
-/// The drive's file with a formula above every field that was derived and not set to something else.
-fn with_formulas(made: &MadeDrive, drive: &Drive) -> String {
-    let mut section = String::new();
-    let mut text = String::new();
-    for (derived, line) in made.drive.to_toml().lines().zip(drive.to_toml().lines()) {
-        if let Some((name, _)) = line.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
-            section = name.to_owned();
-        }
-        let path = line.split_once(" = ").map(|(key, _)| format!("{section}.{key}"));
-        let formula = made.formulas.iter().find(|(of, _)| path.as_deref() == Some(of));
-        if let Some((_, formula)) = formula.filter(|_| line == derived) {
-            text += &format!("# {formula}\n");
-        }
-        text += line;
-        text.push('\n');
-    }
-    text
 }

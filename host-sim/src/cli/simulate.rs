@@ -238,7 +238,11 @@ impl Simulate {
 }
 
 /// Stress by place where and under what the nodal one of the run was largest.
-fn stress(drive: &Drive, settings: &SimulationSettings, simulation: &Simulation) -> Result<Vec<PlaceStress>, Failure> {
+pub(super) fn stress(
+    drive: &Drive,
+    settings: &SimulationSettings,
+    simulation: &Simulation,
+) -> Result<Vec<PlaceStress>, Failure> {
     let step = simulation.summary.max_von_mises_step;
     let Some(row) = simulation.rows.iter().find(|row| row.step == step) else { return Ok(Vec::new()) };
     let at = (row.generator_rad, row.torque_n_m);

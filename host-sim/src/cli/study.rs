@@ -11,12 +11,15 @@ use serde::Serialize;
 use super::names::{self, Generators};
 use super::{Context, Failure, report, say};
 use crate::data_sheet::{FIGURES, FigureOf};
+use crate::drive::GeneratorKind;
 use crate::mesh::MeshLevel;
 use crate::output::Outputs;
 use crate::report::study_report;
+use crate::stated::short;
 use crate::stepping::{Method, SolverSettings};
 use crate::study::{
-    Basis, Constraint, Effect, Run, RunStatus, Sense, Study, StudyError, StudySettings, Target, Vary, effects, study,
+    Asked, Basis, Constraint, Effect, LAST_STABLE, Nearest, Run, RunStatus, Sense, Study, StudyError, StudySettings,
+    Target, Trust, Vary, asked, effects, figure, nearest, study,
 };
 
 /// Targets where none are given: an exact drive, a stiff one, one that lasts.
@@ -49,7 +52,8 @@ Examples:
 
 Figures:
 {}
-T1 and T2, where the ranges of stiffness end, are 21 and 72 % of the largest load.", figures()))]
+T1 and T2, where the ranges of stiffness end, are those of the drive's [data_sheet], or 21 and 72 %
+of the largest load.", figures()))]
 pub(super) struct StudyCommand {
     /// A field and its values: PATH=FROM..TO (5 values), PATH=FROM..TO:N, or PATH=VALUE,VALUE,...; repeat for more fields
     #[arg(long, value_name = "PATH=VALUES", required = true, allow_hyphen_values = true)]
@@ -63,7 +67,8 @@ pub(super) struct StudyCommand {
     /// Wave generator: two-roller, four-roller, double-disc, cam, or all
     #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
     generator: Generators,
-    /// Largest load, N.m [default: what a table of that generator spans: 200; four-roller 100, two-roller 20; by the size of the drive]
+    /// Largest load, N.m [default: the rated torque of the drive's [data_sheet]; else what a table of that generator spans: 200;
+    /// four-roller 100, two-roller 20; by the size of the drive]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     torque_n_m: Option<f64>,
     /// What a variant has to keep to, FIGURE=LEAST..MOST, either end may be left out [default: teeth that clear one another]
@@ -75,7 +80,7 @@ pub(super) struct StudyCommand {
     /// A figure of which more is better [default: k2_n_m_per_rad]
     #[arg(long, value_name = "FIGURE")]
     most: Vec<String>,
-    /// Positions over the tooth pitch
+    /// Positions over the tooth pitch, 4 to 32
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u8).range(4..=32))]
     positions: u8,
     /// Compute every variant, however many there are [default: estimate most of many]
@@ -108,6 +113,14 @@ struct Told<'a> {
     estimated: usize,
     /// Runs that meet every constraint.
     meet: usize,
+    /// How far estimates can be trusted.
+    trust: &'a [Trust],
+    /// What is asked, each alone.
+    asked: &'a [Asked],
+    /// The variant that comes nearest, of generators where none meets.
+    nearest: &'a [Nearest],
+    /// What else has to be known.
+    remarks: &'a [String],
     effects: &'a [Effect],
     #[serde(flatten)]
     study: &'a Study,
@@ -118,7 +131,7 @@ impl StudyCommand {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let clock = Instant::now();
         let drive = context.drive()?;
-        let settings = self.settings()?;
+        let settings = self.settings(context)?;
         if let Some(field) = settings.vary.iter().find(|field| context.sets_field(&field.path)) {
             return Err(Failure::BadInput(format!(
                 "--set {0}: found it beside --vary {0}, which says otherwise; give one of the two",
@@ -147,6 +160,12 @@ impl StudyCommand {
             .iter()
             .flat_map(|kind| FIGURES.iter().filter_map(|(name, _)| effects(&made, *kind, name)))
             .collect();
+        let keep = &settings.constraints;
+        let asked_of: Vec<Asked> = settings.generators.iter().flat_map(|kind| asked(&made.runs, keep, *kind)).collect();
+        let nearest_of: Vec<Nearest> =
+            settings.generators.iter().filter_map(|kind| nearest(&made.runs, keep, *kind)).collect();
+        let trust = made.trust();
+        let remarks = remarks(&settings, &made, &fields_do);
         let count = |status| made.runs.iter().filter(|run| run.status == status).count();
         let told = Told {
             schema_version: 1,
@@ -159,6 +178,10 @@ impl StudyCommand {
             refused: count(RunStatus::Refused),
             estimated: made.runs.iter().filter(|run| run.basis == Basis::Estimated).count(),
             meet: made.runs.iter().filter(|run| run.meets).count(),
+            trust: &trust,
+            asked: &asked_of,
+            nearest: &nearest_of,
+            remarks: &remarks,
             effects: &fields_do,
             study: &made,
             wall_s: clock.elapsed().as_secs_f64(),
@@ -169,6 +192,10 @@ impl StudyCommand {
             settings: &settings,
             study: &made,
             effects: &fields_do,
+            trust: &trust,
+            asked: &asked_of,
+            nearest: &nearest_of,
+            remarks: &remarks,
         });
         let mut outputs = Outputs::new();
         outputs.file(&out.join("study.csv"), |file| file.write_all(csv(&made).as_bytes()))?;
@@ -192,7 +219,7 @@ impl StudyCommand {
         Ok(())
     }
 
-    fn settings(&self) -> Result<StudySettings, Failure> {
+    fn settings(&self, context: &Context) -> Result<StudySettings, Failure> {
         if let Some(torque) = self.torque_n_m
             && !(torque > 0.0 && torque.is_finite())
         {
@@ -206,6 +233,12 @@ impl StudyCommand {
         };
         let mut targets = named("--least", &self.least, Sense::Least)?;
         targets.extend(named("--most", &self.most, Sense::Most)?);
+        if let Some(k) = (1..targets.len()).find(|k| targets[..*k].iter().any(|t| t.figure == targets[*k].figure)) {
+            return Err(Failure::BadInput(format!(
+                "--least, --most: found {} twice, allowed: each figure once",
+                targets[k].figure
+            )));
+        }
         if targets.is_empty() {
             targets.extend(USUAL_TARGETS.iter().filter_map(|(name, sense)| Target::new(name, *sense).ok()));
         }
@@ -215,6 +248,7 @@ impl StudyCommand {
             seed: self.seed,
             generators: self.generator.0.clone(),
             torque_n_m: self.torque_n_m,
+            stated: context.stated()?,
             positions: usize::from(self.positions),
             constraints: self.keep.clone(),
             targets,
@@ -234,7 +268,7 @@ fn csv(study: &Study) -> String {
     };
     let fixed = ["variant", "generator"];
     let loads = ["t1_n_m", "t2_n_m", "largest_n_m"];
-    let end = ["status", "basis", "meets", "front", "why", "cautions"];
+    let end = ["last_stable_is", "status", "basis", "meets", "front", "why", "cautions"];
     let figures = FIGURES.map(|(name, _)| name);
     let fields = study.fields.iter().map(String::as_str);
     let header: Vec<&str> = fixed.into_iter().chain(fields).chain(loads).chain(figures).chain(end).collect();
@@ -247,7 +281,13 @@ fn csv(study: &Study) -> String {
             [run.loads.map(|l| l.t1_n_m), run.loads.map(|l| l.t2_n_m), run.loads.map(|l| l.largest_n_m)].map(number),
         );
         row.extend(FIGURES.iter().map(|(_, of)| number(of(&run.sheet))));
+        let bound = match run.sheet.last_stable_n_m {
+            None => "",
+            Some(_) if run.bears_all() => "at_least",
+            Some(_) => "found",
+        };
         row.extend([
+            bound.to_owned(),
             run.status.name().to_owned(),
             run.basis.name().to_owned(),
             run.meets.to_string(),
@@ -286,19 +326,22 @@ fn text(told: &Told<'_>, settings: &StudySettings) -> String {
         told.refused,
         told.meet
     );
+    for remark in told.remarks {
+        let _ = writeln!(text, "remark: {remark}");
+    }
     for kind in &settings.generators {
         let front = study.front(*kind, &settings.targets);
-        let _ = writeln!(text, "{kind}: {} that nothing beats", front.len());
+        let _ = match front.len() {
+            0 => writeln!(text, "{kind}: no variant meets what has to be kept"),
+            count => writeln!(text, "{kind}: {count} that nothing beats"),
+        };
         for run in front.iter().take(SHOWN) {
             let values: Vec<String> =
                 study.fields.iter().zip(&run.values).map(|(path, value)| format!("{path}={value}")).collect();
             let figures: Vec<String> = settings
                 .targets
                 .iter()
-                .map(|target| {
-                    let cost = target.cost(&run.sheet);
-                    format!("{} {:.4}", target.figure, if target.sense == Sense::Most { -cost } else { cost })
-                })
+                .map(|target| format!("{} {}", target.figure, figure_of(run, target.figure)))
                 .collect();
             let basis = if run.basis == Basis::Estimated { " (estimated)" } else { "" };
             let _ = writeln!(text, "  {:>4}  {}: {}{basis}", run.variant, values.join(" "), figures.join(", "));
@@ -307,21 +350,113 @@ fn text(told: &Told<'_>, settings: &StudySettings) -> String {
         if more > 0 {
             let _ = writeln!(text, "  and {more} more in study.csv");
         }
+        text += &what_is_asked(told, settings, *kind);
         let why = study.runs.iter().filter(|run| run.generator == *kind).find_map(|run| run.why.as_deref());
         if let Some(why) = why {
             let _ = writeln!(text, "  the first that did not converge: {why}");
         }
-        let off: Vec<String> = settings
-            .targets
-            .iter()
-            .filter_map(|target| study.off.iter().find(|off| off.generator == *kind && off.figure == target.figure))
-            .map(|off| format!("{} {:.2} %", off.figure, off.rms_percent))
-            .collect();
-        if !off.is_empty() {
-            let _ = writeln!(text, "  estimates are off by, root mean square: {}", off.join(", "));
-        }
+        text += &how_far_to_trust(told, settings, *kind);
     }
     text
+}
+
+/// What estimates of the targets are off by, and which rank nothing.
+fn how_far_to_trust(told: &Told<'_>, settings: &StudySettings, kind: GeneratorKind) -> String {
+    let of = |target: &Target| told.trust.iter().find(|trust| trust.generator == kind && trust.figure == target.figure);
+    let of_targets: Vec<&Trust> = settings.targets.iter().filter_map(of).collect();
+    if of_targets.is_empty() {
+        return String::new();
+    }
+    let words = of_targets.iter().map(|trust| {
+        let share = trust.share_of_spread_percent.map_or_else(String::new, |share| format!(" ({} %)", short(share)));
+        format!("{} {}{share}", trust.figure, short(trust.median_off))
+    });
+    let words = words.collect::<Vec<_>>().join(", ");
+    let mut text = format!("  estimates are off by, median (share of how far variants differ): {words}\n");
+    for trust in of_targets.iter().filter(|trust| trust.useless) {
+        let _ = writeln!(
+            text,
+            "  estimates of {} rank nothing: the middle value of all variants is as good; --compute-all computes it",
+            trust.figure
+        );
+    }
+    text
+}
+
+/// A figure of a run as it is told; a bound with its sign.
+fn figure_of(run: &Run, name: &str) -> String {
+    let value = figure(name).ok().and_then(|(_, of)| of(&run.sheet));
+    let bound = if name == LAST_STABLE && run.bears_all() { ">= " } else { "" };
+    value.map_or_else(|| "-".to_owned(), |value| format!("{bound}{}", short(value)))
+}
+
+/// Where not every variant has all that is asked: how many have each thing alone, and the variant that comes nearest if none has all.
+fn what_is_asked(told: &Told<'_>, settings: &StudySettings, kind: GeneratorKind) -> String {
+    let of_kind = || told.asked.iter().filter(|asked| asked.generator == kind);
+    if settings.constraints.is_empty() && of_kind().all(|asked| asked.meet_alone == asked.of) {
+        return String::new();
+    }
+    let each = of_kind().map(|asked| {
+        let found =
+            asked.found.map_or_else(String::new, |[low, high]| format!(" (found {} to {})", short(low), short(high)));
+        format!("{} {}{found}", asked.what, asked.meet_alone)
+    });
+    let of = of_kind().next().map_or(0, |asked| asked.of);
+    let mut text = format!("  of {of}, each alone: {}\n", each.collect::<Vec<_>>().join(", "));
+    if let Some(nearest) = told.nearest.iter().find(|nearest| nearest.generator == kind) {
+        let run = told.study.runs.iter().find(|run| run.generator == kind && run.variant == nearest.variant);
+        let values: Vec<String> = run.map_or_else(Vec::new, |run| {
+            told.study.fields.iter().zip(&run.values).map(|(path, value)| format!("{path}={value}")).collect()
+        });
+        let misses: Vec<String> = nearest
+            .misses
+            .iter()
+            .map(|miss| {
+                let value = miss.value.map_or_else(|| "-".to_owned(), short);
+                format!("{} {value}, asked is {} {}", miss.figure, miss.side(), short(miss.limit))
+            })
+            .collect();
+        let basis = if run.is_some_and(|run| run.basis == Basis::Estimated) { " (estimated)" } else { "" };
+        let _ = writeln!(
+            text,
+            "  nearest is variant {}, {}: {}{basis}",
+            nearest.variant,
+            values.join(" "),
+            misses.join("; ")
+        );
+    }
+    text
+}
+
+/// A change of a figure below this share of its largest size is none: round-off of the straight lines.
+const NO_CHANGE: f64 = 1e-9;
+
+/// What has to be known beside the figures: fields that have one value, and fields that do nothing with a generator.
+fn remarks(settings: &StudySettings, study: &Study, effects: &[Effect]) -> Vec<String> {
+    let mut remarks = Vec::new();
+    for (k, field) in settings.vary.iter().enumerate() {
+        if field.is_constant(settings.spread.is_some()) {
+            remarks.push(format!("{} has one value, so nothing is said of what it does; --set would do", field.path));
+            continue;
+        }
+        let idle = settings.generators.iter().filter(|kind| {
+            let mut lines = effects.iter().filter(|effect| effect.generator == **kind).peekable();
+            lines.peek().is_some() && lines.all(|effect| is_no_change(study, effect, k))
+        });
+        let idle: Vec<&str> = idle.map(|kind| kind.name()).collect();
+        if !idle.is_empty() {
+            remarks.push(format!("{} changes no figure with {}", field.path, idle.join(", ")));
+        }
+    }
+    remarks
+}
+
+/// Whether the field number `k` has no effect on a figure.
+fn is_no_change(study: &Study, effect: &Effect, k: usize) -> bool {
+    let Ok((_, of)) = figure(effect.figure) else { return false };
+    let runs = study.runs.iter().filter(|run| run.generator == effect.generator);
+    let size = runs.filter_map(|run| of(&run.sheet)).fold(0.0, |size: f64, value| size.max(value.abs()));
+    effect.change[k].is_some_and(|change| change.abs() <= NO_CHANGE * size)
 }
 
 /// Tables of the best variant of all generators, in the first target.

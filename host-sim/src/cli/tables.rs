@@ -12,12 +12,14 @@ use serde::Serialize;
 
 use super::context::{Context, quoted};
 use super::names::{self, Generators};
+use super::simulate::{refused_or_failed, stress};
 use super::{Failure, report, say};
 use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
 use crate::output::Outputs;
 use crate::report::page::Page;
 use crate::report::{Sources, Subject, drive_report};
+use crate::simulate::{Path, PlaceStress, SimulationSettings, simulate};
 use crate::stated::beside;
 use crate::stepping::{Method, SolverSettings};
 use crate::tables::sweep::SweepProgress;
@@ -40,6 +42,7 @@ Examples:
   flexspline tables
   flexspline tables --generator cam --drive my-drive.toml --out tables
   flexspline tables --generator cam --from-samples bench.csv
+  flexspline tables --generator cam --mesh coarse --stress
   flexspline tables --generator double-disc --positions 12 --node-tolerance-arcsec 0.2
 
 Sample files have the columns generator_rad, torque_n_m, temperature_c, direction (1 or -1) and
@@ -60,14 +63,14 @@ pub(super) struct Tables {
     /// Largest torque, N.m [default: 200; four-roller 100, two-roller 20; by the size of the drive]
     #[arg(long, value_name = "T", conflicts_with = "from_samples", allow_negative_numbers = true)]
     torque_n_m: Option<f64>,
-    /// Torque nodes on each side of zero, at most, beside the pair at the drag torque
+    /// Torque nodes on each side of zero, at most, beside the pair at the drag torque; 5 to 30
     /// [default: 28; with imperfections 12]
     #[arg(long, value_name = "N", conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(5..=30))]
     most_nodes: Option<u8>,
     /// Add a torque node where the table misses the FEM by more than this, arcsec [default: 0.6; with imperfections 2]
     #[arg(long, value_name = "ARCSEC", conflicts_with = "from_samples", allow_negative_numbers = true)]
     node_tolerance_arcsec: Option<f64>,
-    /// Samples over one tooth pitch
+    /// Samples over one tooth pitch, 4 to 32
     #[arg(long, value_name = "N", default_value_t = 8, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(4..=32))]
     positions: u8,
     /// Temperature nodes, degrees C [default: the ends of the operating range]
@@ -85,6 +88,10 @@ pub(super) struct Tables {
     /// Solver: fast or reference
     #[arg(long, value_name = "SOLVER", default_value = "fast", conflicts_with = "from_samples", value_parser = names::solver(), hide_possible_values = true)]
     solver: Method,
+    /// Stress in root fillet, on bore and flank under the largest load, over three meshes, with its interval; takes one more pitch
+    /// and three meshes for each generator
+    #[arg(long, conflicts_with = "from_samples")]
+    stress: bool,
     /// Do not write report.html, which takes a FEM run over one more tooth pitch for each generator
     #[arg(long)]
     no_report: bool,
@@ -128,6 +135,12 @@ impl Tables {
                 table.info.data_sheet = Some(beside(&drive, table.kind, reference_c, &stated, settings));
             });
         }
+        if self.stress {
+            made.par_iter_mut().try_for_each(|table| {
+                table.info.stress = self.stress_of(&drive, table)?;
+                Ok::<(), Failure>(())
+            })?;
+        }
         let out = context.out()?;
         let mut outputs = Outputs::new();
         for table in &mut made {
@@ -167,6 +180,17 @@ impl Tables {
             return Err(Failure::Failed(format!("{}; what was made is written", whys.join("; "))));
         }
         page.map_or(Ok(()), |page| report::stamped(&page, out))
+    }
+
+    /// Stress by place where the nodal one is largest over a tooth pitch under the largest load of the table.
+    fn stress_of(&self, drive: &Drive, table: &MadeTable) -> Result<Vec<PlaceStress>, Failure> {
+        let settings = SimulationSettings {
+            torque_n_m: table.info.torque_nodes_n_m.iter().copied().map(f64::from).fold(0.0, f64::max),
+            solver: SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() },
+            ..SimulationSettings::new(table.kind, Path::Pitch)
+        };
+        let run = simulate(drive, &settings, &mut |_| ControlFlow::Continue(())).map_err(refused_or_failed)?;
+        stress(drive, &settings, &run)
     }
 
     /// The report.
@@ -345,6 +369,17 @@ fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
     }
     for sheet in report.tables.iter().filter_map(|info| info.data_sheet.as_ref()) {
         text += &sheet.text();
+    }
+    for info in &report.tables {
+        for stress in &info.stress {
+            let [low, high] = stress.interval_mpa;
+            text.push_str(&format!(
+                "{:<12} stress under the largest load, {:<14} {:>8.1} MPa, {low:.0} to {high:.0}, over three meshes\n",
+                info.generator,
+                stress.place.in_words(),
+                stress.von_mises_mpa
+            ));
+        }
     }
     for info in &report.tables {
         for caution in &info.cautions {

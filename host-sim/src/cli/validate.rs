@@ -41,13 +41,13 @@ pub(super) struct Validate {
     /// Wave generator: two-roller, four-roller, double-disc, cam, or all that are in the folder
     #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
     generator: Generators,
-    /// Torques drawn for each table
+    /// Torques drawn for each table, 2 to 1000
     #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(2..=1000))]
     torques: u16,
-    /// Positions at each torque
+    /// Positions at each torque, 1 to 100
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     positions: u16,
-    /// Temperatures drawn for each table
+    /// Temperatures drawn for each table, 1 to 100
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=100))]
     temperatures: u16,
     /// Seed of the draw

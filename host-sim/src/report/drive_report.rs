@@ -165,7 +165,7 @@ impl<'a> Known<'a> {
             .error(self.largest_error, 3)
             .plain(format!(" at {} N·m; ", torque_text(self.subject.table.torque_range_n_m()[1])));
         if let Some([_, worst]) = self.fresh {
-            let torque = shown_torque_n_m(&self.subject.table);
+            let torque = torque_text(shown_torque_n_m(&self.subject.table) as f32);
             return Headline {
                 choice,
                 answer: uncorrected
@@ -215,7 +215,7 @@ impl<'a> Known<'a> {
             let mean = e.iter().sum::<f64>() / e.len() as f64;
             let angle = |k: usize| (self.pitch() * k as f64 / FRAMES as f64).to_degrees();
             lines.series.push(Series {
-                name: format!("{} N·m forward, fresh FEM", animation.torque_n_m),
+                name: format!("{} N·m forward, fresh FEM", torque_text(animation.torque_n_m as f32)),
                 mark: Mark::Points,
                 colour: 1,
                 points: (0..=FRAMES).map(|k| [angle(k), e[k % FRAMES] - mean]).collect(),
@@ -411,6 +411,7 @@ pub fn drive_report(sources: Sources<'_>) -> Page {
         sections.push(validation_section(&known));
     }
     sections.extend(sheet_section(&known));
+    sections.extend(stress_section(&known));
     sections.push(table_section(&known));
     sections.push(load_section(&known));
     sections.push(reading_section());
@@ -557,21 +558,42 @@ fn sheet_section(known: &[Known<'_>]) -> Option<Section> {
                 remark,
             ]
         };
-        let caption = format!(
-            "{source} and contact FEM; T1 {}, T2 {}, rated torque {} N·m",
-            significant(sheet.loads.t1_n_m, 3),
-            significant(sheet.loads.t2_n_m, 3),
-            significant(sheet.loads.largest_n_m, 3)
-        );
+        let caption = format!("{source} and contact FEM; {} N·m", sheet.loads_in_words());
         let header = ["Figure", "stated", "computed", "ratio", "what is computed"].map(str::to_owned).into();
         let table = PageTable { caption, header, rows: sheet.beside.iter().map(row).collect() };
         blocks.push(Block::Table { choice: Some(id.clone()), table });
+        if let Some(what) = sheet.assumed_in_words() {
+            let text = Text::new(format!("Loads: {what}."));
+            blocks.push(Block::Paragraph { choice: Some(id.clone()), text });
+        }
         if let Some(why) = &sheet.why {
             let text = Text::new(format!("Not all of it was computed: {why}."));
             blocks.push(Block::Paragraph { choice: Some(id), text });
         }
     }
     Some(Section { id: "data-sheet".into(), title: "Beside its data sheet".into(), detail: Detail::Summary, blocks })
+}
+
+/// Stress over three meshes, where it was asked for.
+fn stress_section(known: &[Known<'_>]) -> Option<Section> {
+    let block = |k: &Known<'_>| {
+        let info = k.subject.info.filter(|info| !info.stress.is_empty())?;
+        let number = |value: f64| Text::new(significant(value, 3));
+        let rows = info.stress.iter().map(|stress| {
+            let [low, high] = stress.interval_mpa;
+            vec![Text::new(stress.place.in_words()), number(stress.von_mises_mpa), number(low), number(high)]
+        });
+        let [_, highest] = k.subject.table.torque_range_n_m();
+        let table = PageTable {
+            caption: format!("Largest von Mises stress under {} N·m, over three meshes", torque_text(highest)),
+            header: ["Place", "stress, MPa", "from, MPa", "to, MPa"].map(str::to_owned).into(),
+            rows: rows.collect(),
+        };
+        Some(Block::Table { choice: Some(k.id()), table })
+    };
+    let blocks: Vec<Block> = known.iter().filter_map(block).collect();
+    let (id, title) = ("stress-by-place".to_owned(), "Stress, over three meshes".to_owned());
+    (!blocks.is_empty()).then_some(Section { id, title, detail: Detail::Summary, blocks })
 }
 
 fn comparison(known: &[Known<'_>], validated: bool) -> Section {
@@ -605,24 +627,25 @@ fn comparison(known: &[Known<'_>], validated: bool) -> Section {
         };
         vec![
             Text::new(k.subject.kind.in_words()),
-            Text::new(torque_text(highest)),
             error(k.largest_error, 3),
+            left,
             error(backlash, 3),
             error(wind_up, 3),
             error(span(Direction::Forward), 2),
-            left,
+            Text::new(torque_text(highest)),
             Text::new(k.subject.table.id().to_string()),
         ]
     });
     let left = if validated { "Left with table, rms / largest" } else { "Left with table, rms / largest*" };
     let header = [
+        // What a table is for comes first: a phone shows three columns.
         "Generator",
-        "Load up to, N·m",
         "Largest error",
+        left,
         "Backlash",
         "Elastic wind-up",
         "Ripple at half load",
-        left,
+        "Load up to, N·m",
         "table_id",
     ];
     let table = PageTable {
@@ -633,7 +656,7 @@ fn comparison(known: &[Known<'_>], validated: bool) -> Section {
     let words = if validated {
         Text::new(
             "The table_id is what firmware returns for the table it carries: it matches this page with a device in the \
-             field. Without a table the first columns are what the output is off by; with it, the last but one.",
+             field. Without a table the output is off by up to the second column; with it, by the third.",
         )
     } else {
         Text::new(format!(

@@ -523,16 +523,18 @@ impl PageTemplate<'_> {
         self.numbered.iter().find(|(_, f)| f.id == figure.id).map_or(0, |(number, _)| *number)
     }
 
-    fn sketches(&self, figure: &Figure) -> Vec<(String, String)> {
+    /// Choice, its name and the sketch.
+    fn sketches(&self, figure: &Figure) -> Vec<(String, String, String)> {
         let named = |choice: &str| {
             self.page.choices.iter().find(|c| c.id == choice).map_or_else(String::new, |c| c.name.clone())
         };
         match &figure.body {
             FigureBody::Lines { x, y, charts } => {
-                charts.iter().map(|(choice, chart)| (named(choice), svg::lines(x, y, chart))).collect()
+                charts.iter().map(|(choice, chart)| (choice.clone(), named(choice), svg::lines(x, y, chart))).collect()
             }
             FigureBody::Drive => {
-                self.page.animations.iter().take(1).map(|a| (named(a.kind.name()), svg::drive(a))).collect()
+                let of = |a: &Animation| (a.kind.name().to_owned(), named(a.kind.name()), svg::drive(a));
+                self.page.animations.iter().take(1).map(of).collect()
             }
             FigureBody::Field { .. } | FigureBody::Sleeve => Vec::new(),
         }

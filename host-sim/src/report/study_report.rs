@@ -6,9 +6,11 @@ use super::page::{
     Axis, Block, Choice, Detail, EVERY_CHOICE, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity,
     Section, Series, Status, Table, Text, significant,
 };
-use crate::data_sheet::{FIGURES, FigureOf};
+use crate::data_sheet::{DataSheet, FIGURES, FigureOf};
 use crate::drive::{Drive, GeneratorKind};
-use crate::study::{Basis, Effect, Run, RunStatus, Sense, Study, StudySettings, figure};
+use crate::study::{
+    Asked, Basis, Effect, LAST_STABLE, Nearest, Run, RunStatus, Sense, Study, StudySettings, Trust, figure,
+};
 
 /// Rows of the table of the best.
 const MOST_ROWS: usize = 25;
@@ -25,6 +27,14 @@ pub struct Sources<'a> {
     pub study: &'a Study,
     /// What the fields do.
     pub effects: &'a [Effect],
+    /// How far estimates can be trusted.
+    pub trust: &'a [Trust],
+    /// What is asked, each alone.
+    pub asked: &'a [Asked],
+    /// What comes nearest, of generators where nothing meets.
+    pub nearest: &'a [Nearest],
+    /// What else has to be known.
+    pub remarks: &'a [String],
 }
 
 /// The page.
@@ -41,11 +51,21 @@ pub fn page(of: Sources<'_>) -> Page {
     .into_iter()
     .filter(|(count, _)| *count > 0)
     .map(|(count, what)| format!("{count} of {} runs {what}.", study.runs.len()))
+    .chain(
+        settings
+            .generators
+            .iter()
+            .filter(|kind| !of_kind(study, **kind).any(|run| run.meets))
+            .map(|kind| format!("No variant with the {} generator meets what has to be kept.", kind.in_words())),
+    )
+    .chain(of.remarks.iter().map(|remark| format!("{remark}.")))
     .collect();
     let kinds = &settings.generators;
     let mut results = Map::new();
     results.insert("effects".to_owned(), json!(of.effects));
     results.insert("runs".to_owned(), json!(study.runs));
+    results.insert("asked".to_owned(), json!(of.asked));
+    results.insert("nearest".to_owned(), json!(of.nearest));
     let mut sections = vec![best(&of)];
     sections.extend(does(&of));
     sections.push(trade(&of));
@@ -79,32 +99,54 @@ fn better(settings: &StudySettings) -> String {
     each.collect::<Vec<_>>().join(", ")
 }
 
-/// A figure as a reader takes it: what it is, its quantity, and its value in the unit of that quantity.
-fn shown(name: &str) -> (String, Quantity) {
-    let (words, quantity) = if let Some(words) = name.strip_suffix("_arcsec") {
-        (words, Quantity::Error)
-    } else if let Some(words) = name.strip_suffix("_mpa") {
-        (words, Quantity::Stress)
-    } else if let Some(words) = name.strip_suffix("_n_m_per_rad") {
-        return (format!("{}, N·m/rad", words.to_uppercase()), Quantity::Count);
-    } else if let Some(words) = name.strip_suffix("_n_m") {
-        (words, Quantity::Torque)
-    } else if let Some(words) = name.strip_suffix("_um") {
-        return (format!("{}, µm", words.replace('_', " ")), Quantity::Count);
-    } else if let Some(words) = name.strip_suffix("_percent") {
-        return (format!("{}, %", words.replace('_', " ")), Quantity::Count);
-    } else {
-        (name, Quantity::Count)
-    };
-    (words.replace('_', " ").replace("pp", "peak to peak"), quantity)
+/// Endings of names that say a unit, longest first, the unit, and what a page takes it for.
+const UNITS: [(&str, &str, Quantity); 16] = [
+    ("_n_m_per_rad", "N·m/rad", Quantity::Count),
+    ("_n_per_mm3", "N/mm³", Quantity::Count),
+    ("_n_per_mm", "N/mm", Quantity::Count),
+    ("_kg_m3", "kg/m³", Quantity::Count),
+    ("_percent", "%", Quantity::Count),
+    ("_arcsec", "arcsec", Quantity::Error),
+    ("_per_k", "1/K", Quantity::Count),
+    ("_mrad", "mrad", Quantity::Count),
+    ("_n_m", "N·m", Quantity::Torque),
+    ("_mpa", "MPa", Quantity::Stress),
+    ("_deg", "degrees", Quantity::Count),
+    ("_mm", "mm", Quantity::Count),
+    ("_um", "µm", Quantity::Count),
+    ("_n", "N", Quantity::Force),
+    ("_c", "°C", Quantity::Count),
+    ("_k", "K", Quantity::Count),
+];
+
+/// A name in words, and its unit: that of its ending, or `modules` of a profile shift.
+fn in_words(name: &str) -> (String, Option<&'static str>, Quantity) {
+    let words = |stem: &str| stem.replace("_pp", " peak to peak").replace(['_', '.'], " ");
+    if name.ends_with("profile_shift") {
+        return (words(name), Some("modules"), Quantity::Count);
+    }
+    let found = UNITS.iter().find_map(|(ending, unit, quantity)| Some((name.strip_suffix(ending)?, *unit, *quantity)));
+    match found {
+        Some((stem @ ("k1" | "k2" | "k3"), unit, quantity)) => (stem.to_uppercase(), Some(unit), quantity),
+        Some((stem, unit, quantity)) => (words(stem), Some(unit), quantity),
+        None => (words(name), None, Quantity::Count),
+    }
 }
 
+/// A figure as a reader takes it: what it is with its unit, and its quantity. A unit that the page adds or changes is left to it.
+fn shown(name: &str) -> (String, Quantity) {
+    match in_words(name) {
+        (words, Some(unit), Quantity::Count) => (format!("{words}, {unit}"), Quantity::Count),
+        (words, _, quantity) => (words, quantity),
+    }
+}
+
+/// A figure or field at the head of a column. Errors have their unit in every cell, where the reader changes it.
 pub(super) fn heading(name: &str) -> String {
-    let (words, quantity) = shown(name);
-    match quantity {
-        Quantity::Stress => format!("{words}, MPa"),
-        Quantity::Torque => format!("{words}, N·m"),
-        _ => words,
+    match in_words(name) {
+        (words, _, Quantity::Error) => words,
+        (words, Some(unit), _) => format!("{words}, {unit}"),
+        (words, None, _) => words,
     }
 }
 
@@ -113,6 +155,14 @@ pub(super) fn value(name: &str, value: Option<f64>) -> Text {
         None => Text::new("–"),
         Some(value) if shown(name).1 == Quantity::Error => Text::default().error(value, 3),
         Some(value) => Text::new(significant(value, 3)),
+    }
+}
+
+/// A figure of a run; a last stable load that is a bound says so.
+fn of_run(name: &str, of: fn(&DataSheet) -> Option<f64>, run: &Run) -> Text {
+    match of(&run.sheet) {
+        Some(load) if name == LAST_STABLE && run.bears_all() => Text::new(format!("≥ {}", significant(load, 3))),
+        figure => value(name, figure),
     }
 }
 
@@ -134,7 +184,7 @@ fn headline(of: &Sources<'_>, kind: GeneratorKind) -> Headline {
                 number,
             )
         }
-        _ => (format!("None of {count} variants meets what has to be kept."), Text::new("–")),
+        _ => return nothing_meets(of, kind, count),
     };
     Headline {
         choice: Some(kind.to_string()),
@@ -142,6 +192,49 @@ fn headline(of: &Sources<'_>, kind: GeneratorKind) -> Headline {
         number,
         number_is: format!("{}, of the best", heading(name)),
     }
+}
+
+/// Where no variant meets what has to be kept: the nearest one, and what it misses first.
+fn nothing_meets(of: &Sources<'_>, kind: GeneratorKind, count: usize) -> Headline {
+    let mut answer = Text::new(format!("None of {count} variants meets what has to be kept."));
+    let (mut number, mut number_is) = (Text::new("–"), String::new());
+    if let Some(nearest) = of.nearest.iter().find(|nearest| nearest.generator == kind) {
+        answer = answer.plain(format!(" Variant {} comes nearest", nearest.variant));
+        let mut before = ": ";
+        for miss in &nearest.misses {
+            answer = answer.plain(format!("{before}{} ", heading(miss.figure)));
+            answer.0.extend(value(miss.figure, miss.value).0);
+            answer = answer.plain(format!(", asked is {} ", miss.side()));
+            answer.0.extend(value(miss.figure, Some(miss.limit)).0);
+            before = "; ";
+        }
+        answer = answer.plain(".");
+        if let Some(miss) = nearest.misses.first() {
+            (number, number_is) = (value(miss.figure, miss.value), format!("{}, of the nearest", heading(miss.figure)));
+        }
+    }
+    Headline { choice: Some(kind.to_string()), answer, number, number_is }
+}
+
+/// What is asked, each thing alone, of every generator; nothing where nothing is asked and every variant is sound.
+fn asked(of: &Sources<'_>) -> Vec<Block> {
+    let lacking = |asked: &&Asked| asked.meet_alone < asked.of;
+    if of.settings.constraints.is_empty() && !of.asked.iter().any(|asked| lacking(&asked)) {
+        return Vec::new();
+    }
+    let header = ["Asked", "variants that have it", "of", "found from", "to"].map(str::to_owned).to_vec();
+    let block = |kind: &GeneratorKind| {
+        let row = |asked: &Asked| {
+            let figure = asked.what.split_once('=').map_or("", |(figure, _)| figure);
+            let end = |k: usize| value(figure, asked.found.map(|found| found[k]));
+            let [meet, all] = [asked.meet_alone, asked.of].map(|count| Text::new(count.to_string()));
+            vec![Text::new(asked.what.clone()), meet, all, end(0), end(1)]
+        };
+        let rows = of.asked.iter().filter(|asked| asked.generator == *kind).map(row).collect();
+        let caption = "What is asked of a variant, each thing alone".to_owned();
+        Block::Table { choice: Some(kind.to_string()), table: Table { caption, header: header.clone(), rows } }
+    };
+    of.settings.generators.iter().map(block).collect()
 }
 
 fn best(of: &Sources<'_>) -> Section {
@@ -152,12 +245,12 @@ fn best(of: &Sources<'_>) -> Section {
     let header = [
         vec!["Variant".to_owned()],
         headings(&first),
-        of.study.fields.clone(),
+        of.study.fields.iter().map(|path| heading(path)).collect(),
         vec!["basis".to_owned()],
         headings(&others),
     ]
     .concat();
-    let blocks = of
+    let tables = of
         .settings
         .generators
         .iter()
@@ -165,7 +258,7 @@ fn best(of: &Sources<'_>) -> Section {
             let front = of.study.front(*kind, &of.settings.targets);
             let rows = front.iter().take(MOST_ROWS).map(|run| {
                 let figures =
-                    |all: &[FigureOf]| all.iter().map(|(name, of)| value(name, of(&run.sheet))).collect::<Vec<_>>();
+                    |all: &[FigureOf]| all.iter().map(|(name, of)| of_run(name, *of, run)).collect::<Vec<_>>();
                 [
                     vec![Text::new(run.variant.to_string())],
                     figures(&first),
@@ -184,7 +277,8 @@ fn best(of: &Sources<'_>) -> Section {
             let table = Table { caption, header: header.clone(), rows };
             Block::Table { choice: Some(kind.to_string()), table }
         })
-        .collect();
+        .collect::<Vec<Block>>();
+    let blocks = tables.into_iter().chain(asked(of)).collect();
     Section { id: "best".to_owned(), title: "The best".to_owned(), detail: Detail::Summary, blocks }
 }
 
@@ -192,7 +286,7 @@ fn best(of: &Sources<'_>) -> Section {
 fn does(of: &Sources<'_>) -> Option<Section> {
     let header: Vec<String> = ["Figure".to_owned()]
         .into_iter()
-        .chain(of.study.fields.iter().cloned())
+        .chain(of.study.fields.iter().map(|path| heading(path)))
         .chain(["straight, %".to_owned()])
         .collect();
     let blocks: Vec<Block> = of
@@ -222,28 +316,26 @@ fn does(of: &Sources<'_>) -> Option<Section> {
 
 /// What estimated figures are off by; nothing where all are computed.
 fn off(of: &Sources<'_>) -> Option<Section> {
-    let header = ["Figure", "variants computed", "off, rms", "off, rms, %", "off, most"];
+    let header = ["Figure", "off, median", "of how far variants differ, %", "ranks", "off, rms", "off, most"];
     let blocks: Vec<Block> = of
         .settings
         .generators
         .iter()
         .filter_map(|kind| {
             let estimated = of_kind(of.study, *kind).filter(|run| run.basis == Basis::Estimated).count();
-            let rows: Vec<Vec<Text>> = of
-                .study
-                .off
-                .iter()
-                .filter(|off| off.generator == *kind)
-                .map(|off| {
-                    vec![
-                        Text::new(heading(off.figure)),
-                        Text::new(off.runs.to_string()),
-                        value(off.figure, Some(off.rms)),
-                        Text::new(significant(off.rms_percent, 2)),
-                        value(off.figure, Some(off.largest)),
-                    ]
-                })
-                .collect();
+            let row = |trust: &Trust| {
+                let off = of.study.off.iter().find(|off| off.generator == *kind && off.figure == trust.figure);
+                let share = trust.share_of_spread_percent.map_or_else(|| "–".to_owned(), |share| significant(share, 2));
+                vec![
+                    Text::new(heading(trust.figure)),
+                    value(trust.figure, Some(trust.median_off)),
+                    Text::new(share),
+                    Text::new(if trust.useless { "no: the middle value is as good" } else { "yes" }),
+                    value(trust.figure, off.map(|off| off.rms)),
+                    value(trust.figure, off.map(|off| off.largest)),
+                ]
+            };
+            let rows: Vec<Vec<Text>> = of.trust.iter().filter(|trust| trust.generator == *kind).map(row).collect();
             let caption = format!(
                 "{estimated} variants are estimated by a surface through the others. What it is off by where a computed variant is left out of it"
             );
@@ -335,11 +427,22 @@ fn place(of: &Sources<'_>, field: usize, value: &str) -> f64 {
     })
 }
 
+/// What the data sheet says of a figure, where it was computed at the loads of the sheet.
+fn stated(of: &Sources<'_>, name: &str) -> Option<f64> {
+    let stated = of.settings.stated.as_ref().filter(|_| of.settings.torque_n_m.is_none())?;
+    match name {
+        "k1_n_m_per_rad" => stated.k1_n_m_per_rad,
+        "k2_n_m_per_rad" => stated.k2_n_m_per_rad,
+        "k3_n_m_per_rad" => stated.k3_n_m_per_rad,
+        _ => None,
+    }
+}
+
 fn curve(of: &Sources<'_>, name: &'static str, field: usize, alone: bool) -> Figure {
     let figure = figure(name).ok().map(|(_, figure)| figure);
     let points = |kind: GeneratorKind| {
         let mut points: Vec<[f64; 2]> = of_kind(of.study, kind)
-            .filter_map(|run| Some([place(of, field, &run.values[field]), figure?(&run.sheet)?]))
+            .map(|run| [place(of, field, &run.values[field]), figure.and_then(|of| of(&run.sheet)).unwrap_or(f64::NAN)])
             .collect();
         points.sort_by(|a, b| a[0].total_cmp(&b[0]));
         points
@@ -348,6 +451,7 @@ fn curve(of: &Sources<'_>, name: &'static str, field: usize, alone: bool) -> Fig
         let kept = of.settings.constraints.iter().filter(|kept| kept.figure == name);
         kept.flat_map(|kept| [("at least", kept.least), ("at most", kept.most)])
             .filter(|(_, y)| y.is_finite())
+            .chain(stated(of, name).map(|y| ("data sheet", y)))
             .map(|(name, y)| Limit { name: name.to_owned(), y })
             .collect()
     };
@@ -357,7 +461,7 @@ fn curve(of: &Sources<'_>, name: &'static str, field: usize, alone: bool) -> Fig
         let series = kinds
             .iter()
             .enumerate()
-            .map(|(colour, kind)| Series { name: kind.to_string(), mark: Mark::Line, colour, points: points(*kind) })
+            .map(|(colour, kind)| Series { name: kind.to_string(), mark: Mark::Broken, colour, points: points(*kind) })
             .collect();
         vec![(EVERY_CHOICE.to_owned(), Lines { series, limits: limits(), ..Lines::default() })]
     } else {
@@ -369,13 +473,13 @@ fn curve(of: &Sources<'_>, name: &'static str, field: usize, alone: bool) -> Fig
         kinds.iter().map(chart).collect()
     };
     let (words, quantity) = shown(name);
-    let path = &of.study.fields[field];
+    let over = heading(&of.study.fields[field]);
     Figure {
         id: format!("{}-{field}", name.replace('_', "-")),
-        title: format!("{words} over {path}"),
+        title: format!("{words} over {over}"),
         caption: Text::default(),
-        alt: format!("{words} of every variant over {path}"),
-        body: FigureBody::Lines { x: Axis::new(path.clone(), Quantity::Count), y: Axis::new(words, quantity), charts },
+        alt: format!("{words} of every variant over {over}"),
+        body: FigureBody::Lines { x: Axis::new(over, Quantity::Count), y: Axis::new(words, quantity), charts },
     }
 }
 
@@ -411,12 +515,12 @@ fn map(of: &Sources<'_>, name: &'static str) -> Option<Figure> {
         })
         .collect();
     let (words, quantity) = shown(name);
-    let [across, up] = [0, 1].map(|field| Axis::new(of.study.fields[field].clone(), Quantity::Count));
+    let [across, up] = [0, 1].map(|field| Axis::new(heading(&of.study.fields[field]), Quantity::Count));
     Some(Figure {
         id: name.replace('_', "-"),
         title: format!("{words} over both fields"),
         caption: Text::default(),
-        alt: format!("{words} in colour over {} and {}", of.study.fields[0], of.study.fields[1]),
+        alt: format!("{words} in colour over {} and {}", heading(&of.study.fields[0]), heading(&of.study.fields[1])),
         body: FigureBody::Field { x: across, y: up, z: Axis::new(words, quantity), fields },
     })
 }
@@ -427,4 +531,33 @@ fn reading() -> Section {
          secant of its torsion up to T1, K2 from T1 to T2, K3 above; the clearance of the teeth is no part of them. Stress is the largest nodal \
          value and grows with the mesh at roots and contacts: compare it between variants, not with a yield strength.",
     )])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of what a study can be asked, all but a ratio, and every field of a drive that ends in a unit, have it in the heading of a column.
+    #[test]
+    fn figures_and_fields_say_their_units() {
+        for (name, due) in [
+            ("k1_n_m_per_rad", "K1, N·m/rad"),
+            ("max_von_mises_mpa", "max von mises, MPa"),
+            ("kinematic_error_pp_arcsec", "kinematic error peak to peak"),
+            ("lobe_force_n", "lobe force, N"),
+            ("tilt_mrad", "tilt, mrad"),
+            ("last_stable_n_m", "last stable, N·m"),
+            ("teeth_in_contact_percent", "teeth in contact, %"),
+            ("load_across_face_peak_over_mean", "load across face peak over mean"),
+            ("flexspline.rim_thickness_mm", "flexspline rim thickness, mm"),
+            ("circular_spline.profile_shift", "circular spline profile shift, modules"),
+            ("generator.bearing_stiffness_n_per_mm3", "generator bearing stiffness, N/mm³"),
+            ("as_built.generator_warmer_k", "as built generator warmer, K"),
+        ] {
+            assert_eq!(heading(name), due);
+        }
+        let without: Vec<&str> =
+            FIGURES.iter().filter(|(name, _)| in_words(name).1.is_none()).map(|(name, _)| *name).collect();
+        assert_eq!(without, ["load_across_face_peak_over_mean"]);
+    }
 }

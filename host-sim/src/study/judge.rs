@@ -1,5 +1,6 @@
 //! Which variants keep to the constraints, and which of those nothing beats.
 
+use std::fmt;
 use std::str::FromStr;
 
 use thiserror::Error;
@@ -69,12 +70,27 @@ impl FromStr for Constraint {
     }
 }
 
+/// As `--keep` takes it.
+impl fmt::Display for Constraint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let end = |value: f64| if value.is_finite() { value.to_string() } else { String::new() };
+        write!(f, "{}={}..{}", self.figure, end(self.least), end(self.most))
+    }
+}
+
 impl Constraint {
-    fn keeps(&self, sheet: &DataSheet) -> bool {
-        figure(self.figure)
-            .ok()
-            .and_then(|(_, of)| of(sheet))
-            .is_some_and(|value| (self.least..=self.most).contains(&value))
+    /// The figure of a sheet.
+    pub(super) fn value(&self, sheet: &DataSheet) -> Option<f64> {
+        figure(self.figure).ok().and_then(|(_, of)| of(sheet))
+    }
+
+    /// By how much a sheet misses the range, in the unit of the figure, 0 within it; none where it does not have the figure.
+    pub(super) fn lacks(&self, sheet: &DataSheet) -> Option<f64> {
+        self.value(sheet).map(|value| (self.least - value).max(value - self.most).max(0.0))
+    }
+
+    pub(super) fn keeps(&self, sheet: &DataSheet) -> bool {
+        self.lacks(sheet) == Some(0.0)
     }
 }
 
@@ -112,12 +128,21 @@ impl Target {
     }
 }
 
+/// Whether the rigid teeth of a sheet clear one another.
+pub(super) fn clears(sheet: &DataSheet) -> bool {
+    sheet.rigid_gap_um.is_some_and(|gap| gap >= -1e3 * RigidMesh::TOUCHES_MM)
+}
+
 /// Marks what meets the constraints, and of each generator what nothing that meets them beats (Pareto's front).
+///
+/// What converged bears the largest load of the study. That is where the search ends, known of every such run, and nothing to estimate.
 pub(super) fn judge(runs: &mut [Run], constraints: &[Constraint], targets: &[Target]) {
     for run in runs.iter_mut() {
-        let clear = run.sheet.rigid_gap_um.is_some_and(|gap| gap >= -1e3 * RigidMesh::TOUCHES_MM);
+        if let (true, Some(loads)) = (run.bears_all(), run.loads) {
+            run.sheet.last_stable_n_m = Some(loads.largest_n_m);
+        }
         run.meets = run.status == RunStatus::Converged
-            && clear
+            && clears(&run.sheet)
             && constraints.iter().all(|constraint| constraint.keeps(&run.sheet));
     }
     let costs: Vec<Option<Vec<f64>>> = runs

@@ -1,10 +1,12 @@
 //! Variants of a drive side by side: which fields vary, what a catalogue would print of each variant, which of them meet the
 //! constraints, which are best, and what each field does.
 
+mod asked;
 mod effects;
 mod estimate;
 mod judge;
 mod surface;
+mod trust;
 mod vary;
 
 use std::ops::ControlFlow;
@@ -17,17 +19,23 @@ use thiserror::Error;
 use crate::cautions::{Caution, rigid_gap_um, room_as_built_arcsec};
 use crate::data_sheet::{DataSheet, Loads, data_sheet};
 use crate::drive::{Drive, GeneratorKind};
+use crate::stated::Stated;
 use crate::stepping::SolverSettings;
 
+pub use asked::{Asked, Miss, Nearest, asked, nearest};
 pub use effects::{Effect, effects};
 pub use estimate::{Off, computed_first};
 pub use judge::{Constraint, JudgeError, Sense, Target, figure};
+pub use trust::Trust;
 pub use vary::{Values, Vary, VaryError};
 
 /// Fields that vary at once, at most.
 pub const MOST_FIELDS: usize = 32;
 /// Variants of a study, at most.
 pub const MOST_VARIANTS: usize = 100_000;
+
+/// The figure whose search ends at the largest load.
+pub const LAST_STABLE: &str = "last_stable_n_m";
 
 /// What to study.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,8 +48,10 @@ pub struct StudySettings {
     pub seed: u32,
     /// The generators.
     pub generators: Vec<GeneratorKind>,
-    /// Largest load, N·m; by default what a table of that generator spans.
+    /// Largest load, N·m; by default that of the data sheet, or what a table of that generator spans.
     pub torque_n_m: Option<f64>,
+    /// What a data sheet says of the drive: without a largest load its T1, T2 and rated torque are the loads.
+    pub stated: Option<Stated>,
     /// Positions over a tooth pitch, 4 or more.
     pub positions: usize,
     /// What a variant has to keep to.
@@ -54,8 +64,20 @@ pub struct StudySettings {
     pub solver: SolverSettings,
 }
 
+impl StudySettings {
+    /// The loads of a variant.
+    fn loads(&self, drive: &Drive, kind: GeneratorKind) -> Loads {
+        let spanned_n_m = drive.rated_torque_n_m(kind);
+        match (self.torque_n_m, &self.stated) {
+            (Some(largest_n_m), _) => Loads::up_to(largest_n_m),
+            (None, Some(stated)) => stated.loads(spanned_n_m),
+            (None, None) => Loads::up_to(spanned_n_m),
+        }
+    }
+}
+
 /// A study that cannot be begun, or was stopped.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Error)]
 pub enum StudyError {
     /// Nothing varies, or too much.
     #[error("--vary: found {found}, allowed: 1 to {MOST_FIELDS} different fields")]
@@ -68,6 +90,29 @@ pub enum StudyError {
     Variants {
         /// How many.
         found: usize,
+    },
+    /// A value that a field takes twice.
+    #[error(
+        "--vary {path}: found the value {value} twice, allowed: each once; a field that does not vary goes with --set {path}={value}"
+    )]
+    Twice {
+        /// The field.
+        path: String,
+        /// The value.
+        value: String,
+    },
+    /// A last stable load beyond the largest load.
+    #[error(
+        "--keep {constraint}: the largest load of the {generator} generator is {largest_n_m} N.m, where the search for it ends; allowed: a \
+         least value up to that, or a larger --torque-n-m"
+    )]
+    BeyondLoad {
+        /// The constraint.
+        constraint: String,
+        /// The generator.
+        generator: GeneratorKind,
+        /// Where the search ends.
+        largest_n_m: f64,
     },
     /// No value of a field makes a drive, whatever the others are.
     #[error("--vary {path}: no value of it makes a drive: {why}")]
@@ -144,12 +189,19 @@ pub struct Run {
     pub cautions: Vec<Caution>,
     /// The loads of the sheet; missing of a drive that was refused.
     pub loads: Option<Loads>,
-    /// What a catalogue would print.
+    /// What a catalogue would print. The last stable load of a run that converged is the largest of the study, a bound: it may bear more.
     pub sheet: DataSheet,
     /// Whether it converged, its teeth clear one another, and every constraint is kept.
     pub meets: bool,
     /// Whether it meets, and nothing that meets beats it in every target, of this generator.
     pub front: bool,
+}
+
+impl Run {
+    /// Whether it bears the largest load of the study: its last stable load is a bound, and no figure of its own.
+    pub fn bears_all(&self) -> bool {
+        self.status == RunStatus::Converged
+    }
 }
 
 /// What a study gives.
@@ -164,6 +216,11 @@ pub struct Study {
 }
 
 impl Study {
+    /// How far its estimates can be trusted, by generator and figure; nothing where all is computed.
+    pub fn trust(&self) -> Vec<Trust> {
+        trust::trust(self)
+    }
+
     /// What nothing beats of a generator, best in the first target first.
     pub fn front(&self, generator: GeneratorKind, targets: &[Target]) -> Vec<&Run> {
         let mut front: Vec<&Run> = self.runs.iter().filter(|run| run.generator == generator && run.front).collect();
@@ -197,6 +254,8 @@ pub fn study(drive: &Drive, settings: &StudySettings, observer: &Observer<'_>) -
         };
         estimate::some_computed(settings, &variants, &jobs, &run)?
     };
+    // A bound is no estimate.
+    let off = off.into_iter().filter(|off| off.figure != LAST_STABLE).collect();
     let mut study = Study { fields: paths.iter().map(|path| (*path).to_owned()).collect(), runs, off };
     judge::judge(&mut study.runs, &settings.constraints, &settings.targets);
     Ok(study)
@@ -241,7 +300,6 @@ impl Several<'_> {
     fn begun(&self, (variant, generator): Job) -> (Run, Option<Drive>) {
         let values = &self.variants[variant];
         let made = varied(self.drive, self.paths, values);
-        let load = |drive: &Drive| self.settings.torque_n_m.unwrap_or_else(|| drive.rated_torque_n_m(generator));
         let run = Run {
             variant: variant + 1,
             generator,
@@ -250,7 +308,7 @@ impl Several<'_> {
             basis: Basis::Computed,
             why: made.as_ref().err().map(ToString::to_string),
             cautions: Vec::new(),
-            loads: made.as_ref().ok().map(|drive| Loads::up_to(load(drive))),
+            loads: made.as_ref().ok().map(|drive| self.settings.loads(drive, generator)),
             sheet: DataSheet::default(),
             meets: false,
             front: false,
@@ -294,6 +352,16 @@ fn variants(drive: &Drive, settings: &StudySettings) -> Result<Vec<Vec<String>>,
     }
     if let Some(twice) = vary.iter().enumerate().find_map(|(k, a)| vary[..k].iter().find(|b| a.path == b.path)) {
         return Err(StudyError::Fields { found: format!("{} twice", twice.path) });
+    }
+    if let Some((field, value)) = vary.iter().find_map(|field| Some((field, field.repeated()?))) {
+        return Err(StudyError::Twice { path: field.path.clone(), value });
+    }
+    for kept in settings.constraints.iter().filter(|kept| kept.figure == LAST_STABLE) {
+        let largest = |kind: &GeneratorKind| settings.loads(drive, *kind).largest_n_m;
+        if let Some(kind) = settings.generators.iter().find(|kind| largest(kind) < kept.least) {
+            let (constraint, largest_n_m) = (kept.to_string(), largest(kind));
+            return Err(StudyError::BeyondLoad { constraint, generator: *kind, largest_n_m });
+        }
     }
     let count = match settings.spread {
         Some(count) => count as usize,

@@ -10,6 +10,7 @@ pub(super) fn settings(vary: &[&str]) -> StudySettings {
         seed: 1,
         generators: vec![GeneratorKind::Cam],
         torque_n_m: None,
+        stated: None,
         positions: 4,
         constraints: Vec::new(),
         targets: vec![Target::new("kinematic_error_pp_arcsec", Sense::Least).unwrap()],
@@ -120,6 +121,20 @@ fn effects_are_the_slopes_of_what_is_straight() {
     let effect = effects(&study, GeneratorKind::Cam, "kinematic_error_pp_arcsec").unwrap();
     assert!((effect.change[0].unwrap() + 7.5).abs() < 1e-9 && (effect.straight - 1.0).abs() < 1e-12);
     assert!(effects(&study, GeneratorKind::Cam, "backlash_arcsec").is_none());
+}
+
+/// K1, K2 and K3 stand beside those of the catalogue at its own loads, unless another largest load is asked for.
+#[test]
+fn the_loads_are_those_of_the_data_sheet() {
+    let (drive, mut settings) = (Drive::hhd_95(), settings(&["generator.w0_mm=0.5"]));
+    let largest = drive.rated_torque_n_m(GeneratorKind::Cam);
+    assert_eq!(settings.loads(&drive, GeneratorKind::Cam), Loads::up_to(largest));
+    let (t1_n_m, t2_n_m) = (Some(29.0), Some(108.0));
+    settings.stated = Some(Stated { t1_n_m, t2_n_m, rated_torque_n_m: Some(153.0), ..Stated::default() });
+    let stated = Loads { t1_n_m: 29.0, t2_n_m: 108.0, largest_n_m: 153.0 };
+    assert_eq!(settings.loads(&drive, GeneratorKind::Cam), stated);
+    settings.torque_n_m = Some(50.0);
+    assert_eq!(settings.loads(&drive, GeneratorKind::Cam), Loads::up_to(50.0));
 }
 
 #[test]

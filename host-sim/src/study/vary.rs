@@ -99,6 +99,28 @@ impl Vary {
         }
     }
 
+    /// A value that it takes more than once, as numbers are the same.
+    pub fn repeated(&self) -> Option<String> {
+        let values = match &self.values {
+            Values::Range { from, to, .. } if from == to => return Some(written(*from)),
+            Values::Range { .. } => return None,
+            Values::List(list) => list,
+        };
+        let same = |a: &String, b: &String| match (a.parse::<f64>(), b.parse::<f64>()) {
+            (Ok(a), Ok(b)) => a == b,
+            _ => a == b,
+        };
+        (1..values.len()).find(|k| values[..*k].iter().any(|other| same(other, &values[*k]))).map(|k| values[k].clone())
+    }
+
+    /// Whether it has one value alone, on a grid or spread.
+    pub fn is_constant(&self, spread: bool) -> bool {
+        match &self.values {
+            Values::Range { count, .. } => *count == 1 && !spread,
+            Values::List(list) => list.len() == 1,
+        }
+    }
+
     /// Its value at a place of 0 (first) to 1 (excluded).
     pub fn at(&self, place: f64) -> String {
         match &self.values {
@@ -168,6 +190,20 @@ mod tests {
             let error = text.parse::<Vary>().unwrap_err().to_string();
             assert!(error.contains(text) && error.contains("allowed: PATH=FROM..TO"), "{error}");
         }
+    }
+
+    #[test]
+    fn a_value_that_comes_twice_is_found_however_it_is_written() {
+        let repeated = |text: &str| read(text).repeated();
+        assert_eq!(repeated("a=1..1").as_deref(), Some("1"));
+        assert_eq!(repeated("a=1,2,1.0").as_deref(), Some("1.0"));
+        assert_eq!(repeated("a=cup,hat,cup").as_deref(), Some("cup"));
+        assert_eq!((repeated("a=1..2:9"), repeated("a=1,10"), repeated("a=cup")), (None, None, None));
+        let constant = |text: &str| [false, true].map(|spread| read(text).is_constant(spread));
+        assert_eq!(
+            (constant("a=1..2:1"), constant("a=cup"), constant("a=1,2")),
+            ([true, false], [true; 2], [false; 2])
+        );
     }
 
     #[test]

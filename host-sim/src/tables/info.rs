@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::cautions::Caution;
 use crate::data_sheet::Stiffness;
 use crate::drive::GeneratorKind;
+use crate::simulate::PlaceStress;
 use crate::stated::SheetBeside;
 
 /// A finished table.
@@ -73,6 +74,9 @@ pub struct TableInfo {
     /// What the data sheet in the drive's file says, beside what is computed; left out where the file has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub data_sheet: Option<SheetBeside>,
+    /// Stress in root fillets, on bore and flanks under the largest load of the table, over three meshes; left out unless it was asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stress: Vec<PlaceStress>,
     /// What is left over whole turns of a drive that does not repeat from tooth to tooth; null for one that does.
     pub turns: Option<TurnsInfo>,
     /// Command line, once known.

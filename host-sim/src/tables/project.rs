@@ -309,6 +309,7 @@ fn make(
         stiffness: None,
         cautions: Looked { slope_bound: Some(f64::from(table.bounds().slope)), ..Looked::default() }.cautions(),
         data_sheet: None,
+        stress: Vec::new(),
         turns: None,
         command: String::new(),
     };

@@ -1,0 +1,117 @@
+//! What a catalogue prints of its sizes, for the `[data_sheet]` of a drive that is made like one of them.
+//!
+//! The figures are those of Harmonic Drive's CSF and CSG cups (Harmonic Drive LLC, CSF/CSG catalogue, pages 14 and 49; Harmonic Drive AG,
+//! HFUS-2A 1019658, 11/2014): stiffness and its ranges, which both series share, ratcheting torque and accuracy of each, rated torque
+//! of the CSG. That of the CSF is not in these sources. They also say that a single unit may be 30 % off the stiffness.
+
+use crate::stated::Stated;
+
+/// One line for each size and ratio; an empty cell is not printed.
+const SIZES: &str = include_str!("catalogue.csv");
+/// How far single units are off the printed stiffness, ± percent.
+const UNIT_SCATTER_PERCENT: f64 = 30.0;
+
+/// A series of cups.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Series {
+    Csf,
+    Csg,
+}
+
+/// What the catalogue prints of a size and ratio: none of a series, size or ratio that is not at hand.
+pub fn sheet(series: &str, size: f64, ratio: u32) -> Option<Stated> {
+    let which = match series.to_ascii_uppercase().as_str() {
+        "CSF" => Series::Csf,
+        "CSG" => Series::Csg,
+        _ => return None,
+    };
+    let line = rows().find(|row| row.number("size") == Some(size) && row.number("ratio") == Some(f64::from(ratio)))?;
+    let [rated_n_m, ratcheting_n_m] = match which {
+        Series::Csf => [None, line.number("ratcheting_csf_n_m")],
+        Series::Csg => [line.number("rated_csg_n_m"), line.number("ratcheting_csg_n_m")],
+    };
+    Some(Stated {
+        source: Some(format!("Harmonic Drive {}-{size}-{ratio}", series.to_ascii_uppercase())),
+        rated_torque_n_m: rated_n_m,
+        t1_n_m: line.number("t1_n_m"),
+        t2_n_m: line.number("t2_n_m"),
+        k1_n_m_per_rad: line.number("k1_n_m_per_rad"),
+        k2_n_m_per_rad: line.number("k2_n_m_per_rad"),
+        k3_n_m_per_rad: line.number("k3_n_m_per_rad"),
+        ratcheting_torque_n_m: ratcheting_n_m,
+        accuracy_arcmin: line.number("accuracy_arcmin"),
+        unit_scatter_percent: Some(UNIT_SCATTER_PERCENT),
+        ..Stated::default()
+    })
+}
+
+/// The sizes and ratios that are at hand, in words.
+pub fn sizes_in_words() -> String {
+    let mut all = [Vec::new(), Vec::new()];
+    for row in rows() {
+        for (values, name) in all.iter_mut().zip(["size", "ratio"]) {
+            if let Some(value) = row.number(name).filter(|value| !values.contains(value)) {
+                values.push(value);
+            }
+        }
+    }
+    let [sizes, ratios] = all.map(|mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")
+    });
+    format!("CSF and CSG, sizes {sizes}, most of the ratios {ratios}")
+}
+
+/// A line with the names of its cells.
+struct Row {
+    names: &'static str,
+    cells: &'static str,
+}
+
+impl Row {
+    fn number(&self, name: &str) -> Option<f64> {
+        let at = self.names.split(',').position(|known| known == name)?;
+        self.cells.split(',').nth(at)?.parse().ok()
+    }
+}
+
+fn rows() -> impl Iterator<Item = Row> {
+    let mut lines = SIZES.lines();
+    let names = lines.next().unwrap_or_default();
+    lines.map(move |cells| Row { names, cells })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As the catalogue's page has them; both series share the stiffness, and neither has what the other alone is sold with.
+    #[test]
+    fn a_size_has_its_own_figures() {
+        let csg = sheet("CSG", 32.0, 80).unwrap();
+        let told = [csg.rated_torque_n_m, csg.t1_n_m, csg.t2_n_m, csg.k1_n_m_per_rad, csg.k2_n_m_per_rad];
+        assert_eq!(told, [153.0, 29.0, 108.0, 67e3, 110e3].map(Some));
+        assert_eq!((csg.k3_n_m_per_rad, csg.ratcheting_torque_n_m), (Some(120e3), Some(1800.0)));
+        let csf = sheet("csf", 32.0, 80).unwrap();
+        assert_eq!((csf.rated_torque_n_m, csf.ratcheting_torque_n_m), (None, Some(1400.0)));
+        assert_eq!(csf.k3_n_m_per_rad, csg.k3_n_m_per_rad);
+        assert_eq!(csf.source.as_deref(), Some("Harmonic Drive CSF-32-80"));
+        for (series, size, ratio) in [("SHG", 32.0, 80), ("CSG", 33.0, 80), ("CSG", 32.0, 81)] {
+            assert_eq!(sheet(series, size, ratio), None);
+        }
+    }
+
+    /// Every line gives all of a sheet, its loads in their order and its stiffness growing.
+    #[test]
+    fn every_line_makes_a_sheet_that_a_file_takes() {
+        for row in rows() {
+            let (size, ratio) = (row.number("size").unwrap(), row.number("ratio").unwrap() as u32);
+            let stated = sheet("CSG", size, ratio).unwrap();
+            let read = Stated::of_file("d.toml", &stated.to_toml()).unwrap().unwrap();
+            assert_eq!(read, stated, "{size} {ratio}");
+            assert!(stated.k1_n_m_per_rad < stated.k2_n_m_per_rad && stated.k2_n_m_per_rad < stated.k3_n_m_per_rad);
+            assert!(stated.ratcheting_torque_n_m > stated.rated_torque_n_m);
+        }
+        assert!(sizes_in_words().contains("sizes 14, 17, 20, 25, 32, 40, most of the ratios 50, 80, 100, 160"));
+    }
+}
