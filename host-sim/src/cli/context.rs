@@ -95,7 +95,7 @@ impl Context {
     pub(super) fn set_to(&self, path: &str) -> Option<&str> {
         let assignments = self.common.sets.iter().flat_map(|set| set.split(','));
         let values = assignments.filter_map(|set| set.split_once('=')).filter(|(set, _)| set.trim() == path);
-        values.map(|(_, value)| value.trim().trim_matches('"')).last()
+        values.map(|(_, value)| value.trim().trim_matches('"')).next_back()
     }
 
     /// A command to type next, of the same drive.

@@ -113,8 +113,6 @@ struct Told<'a> {
     estimated: usize,
     /// Runs that meet every constraint.
     meet: usize,
-    /// How far estimates can be trusted.
-    trust: &'a [Trust],
     /// What is asked, each alone.
     asked: &'a [Asked],
     /// The variant that comes nearest, of generators where none meets.
@@ -164,7 +162,6 @@ impl StudyCommand {
         let asked_of: Vec<Asked> = settings.generators.iter().flat_map(|kind| asked(&made.runs, keep, *kind)).collect();
         let nearest_of: Vec<Nearest> =
             settings.generators.iter().filter_map(|kind| nearest(&made.runs, keep, *kind)).collect();
-        let trust = made.trust();
         let remarks = remarks(&settings, &made, &fields_do);
         let count = |status| made.runs.iter().filter(|run| run.status == status).count();
         let told = Told {
@@ -178,7 +175,6 @@ impl StudyCommand {
             refused: count(RunStatus::Refused),
             estimated: made.runs.iter().filter(|run| run.basis == Basis::Estimated).count(),
             meet: made.runs.iter().filter(|run| run.meets).count(),
-            trust: &trust,
             asked: &asked_of,
             nearest: &nearest_of,
             remarks: &remarks,
@@ -192,7 +188,6 @@ impl StudyCommand {
             settings: &settings,
             study: &made,
             effects: &fields_do,
-            trust: &trust,
             asked: &asked_of,
             nearest: &nearest_of,
             remarks: &remarks,
@@ -362,7 +357,9 @@ fn text(told: &Told<'_>, settings: &StudySettings) -> String {
 
 /// What estimates of the targets are off by, and which rank nothing.
 fn how_far_to_trust(told: &Told<'_>, settings: &StudySettings, kind: GeneratorKind) -> String {
-    let of = |target: &Target| told.trust.iter().find(|trust| trust.generator == kind && trust.figure == target.figure);
+    let of = |target: &Target| {
+        told.study.trust.iter().find(|trust| trust.generator == kind && trust.figure == target.figure)
+    };
     let of_targets: Vec<&Trust> = settings.targets.iter().filter_map(of).collect();
     if of_targets.is_empty() {
         return String::new();

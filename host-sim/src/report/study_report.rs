@@ -27,8 +27,6 @@ pub struct Sources<'a> {
     pub study: &'a Study,
     /// What the fields do.
     pub effects: &'a [Effect],
-    /// How far estimates can be trusted.
-    pub trust: &'a [Trust],
     /// What is asked, each alone.
     pub asked: &'a [Asked],
     /// What comes nearest, of generators where nothing meets.
@@ -324,18 +322,17 @@ fn off(of: &Sources<'_>) -> Option<Section> {
         .filter_map(|kind| {
             let estimated = of_kind(of.study, *kind).filter(|run| run.basis == Basis::Estimated).count();
             let row = |trust: &Trust| {
-                let off = of.study.off.iter().find(|off| off.generator == *kind && off.figure == trust.figure);
                 let share = trust.share_of_spread_percent.map_or_else(|| "–".to_owned(), |share| significant(share, 2));
                 vec![
                     Text::new(heading(trust.figure)),
                     value(trust.figure, Some(trust.median_off)),
                     Text::new(share),
                     Text::new(if trust.useless { "no: the middle value is as good" } else { "yes" }),
-                    value(trust.figure, off.map(|off| off.rms)),
-                    value(trust.figure, off.map(|off| off.largest)),
+                    value(trust.figure, Some(trust.rms)),
+                    value(trust.figure, Some(trust.largest)),
                 ]
             };
-            let rows: Vec<Vec<Text>> = of.trust.iter().filter(|trust| trust.generator == *kind).map(row).collect();
+            let rows: Vec<Vec<Text>> = of.study.trust.iter().filter(|trust| trust.generator == *kind).map(row).collect();
             let caption = format!(
                 "{estimated} variants are estimated by a surface through the others. What it is off by where a computed variant is left out of it"
             );

@@ -10,9 +10,8 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
-
 use super::surface::Surface;
+use super::trust::Trust;
 use super::{Basis, Job, Run, RunStatus, StudyError, StudySettings, Target, judge};
 use crate::data_sheet::{DataSheet, FIGURES};
 use crate::drive::GeneratorKind;
@@ -37,23 +36,6 @@ pub fn computed_first(fields: usize) -> usize {
     COMPUTED.max(COMPUTED_PER_FIELD * (1 + fields))
 }
 
-/// What estimated figures of a generator are off by.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Off {
-    /// The generator.
-    pub generator: GeneratorKind,
-    /// The figure.
-    pub figure: &'static str,
-    /// Computed variants that the surface goes through, each left out in turn.
-    pub runs: usize,
-    /// Root mean square of computed less estimated, in the unit of the figure.
-    pub rms: f64,
-    /// The largest such difference.
-    pub largest: f64,
-    /// `rms` over the mean size of the figure, percent.
-    pub rms_percent: f64,
-}
-
 /// Makes these runs, in their order, by contact FEM or by the drawing alone; it is told how many there will be in all, about.
 pub(super) type Make<'a> = dyn Fn(&[Job], usize, Basis) -> Result<Vec<Run>, StudyError> + 'a;
 
@@ -63,7 +45,7 @@ pub(super) fn some_computed(
     variants: &[Vec<String>],
     jobs: &[Job],
     make: &Make<'_>,
-) -> Result<(Vec<Run>, Vec<Off>), StudyError> {
+) -> Result<(Vec<Run>, Vec<Trust>), StudyError> {
     let StudySettings { generators, targets, .. } = settings;
     let places = places(variants);
     let first = computed_first(settings.vary.len());
@@ -87,7 +69,7 @@ pub(super) fn some_computed(
     compute(&mut runs, &doubtful)?;
 
     let mut spent: BTreeMap<GeneratorKind, usize> = BTreeMap::new();
-    let mut off = estimate(generators, &mut runs, jobs, &places);
+    let mut trust = estimate(generators, &mut runs, jobs, &places);
     for _ in 0..ROUNDS {
         judge::judge(&mut runs, &settings.constraints, targets);
         let on_front = |kind: &GeneratorKind| {
@@ -103,9 +85,9 @@ pub(super) fn some_computed(
         }
         next.iter().for_each(|k| *spent.entry(runs[*k].generator).or_default() += 1);
         compute(&mut runs, &next)?;
-        off = estimate(generators, &mut runs, jobs, &places);
+        trust = estimate(generators, &mut runs, jobs, &places);
     }
-    Ok((runs, off))
+    Ok((runs, trust))
 }
 
 fn is_estimated(run: &Run) -> bool {
@@ -197,8 +179,8 @@ fn thinned(known: Vec<usize>, jobs: &[Job], places: &[Vec<f64>]) -> Vec<usize> {
 }
 
 /// Fills in what is estimated; what that is off by.
-fn estimate(generators: &[GeneratorKind], runs: &mut [Run], jobs: &[Job], places: &[Vec<f64>]) -> Vec<Off> {
-    let mut off = Vec::new();
+fn estimate(generators: &[GeneratorKind], runs: &mut [Run], jobs: &[Job], places: &[Vec<f64>]) -> Vec<Trust> {
+    let mut trust = Vec::new();
     for kind in generators {
         let known = (0..runs.len()).filter(|k| runs[*k].generator == *kind && is_known(&runs[*k])).collect();
         let known = thinned(known, jobs, places);
@@ -209,7 +191,7 @@ fn estimate(generators: &[GeneratorKind], runs: &mut [Run], jobs: &[Job], places
             let points = |k: &usize| Some((places[jobs[*k].0].clone(), of(&runs[*k].sheet)?));
             let (points, values): (Vec<Vec<f64>>, Vec<f64>) = known.iter().filter_map(points).unzip();
             let surface = Surface::through(points, &values)?;
-            off.push(told(*kind, name, &values, &surface.left_out));
+            trust.push(Trust::new(*kind, name, &values, &surface.left_out));
             Some(surface)
         });
         let estimated = |run: &Run| run.generator == *kind && is_estimated(run);
@@ -223,21 +205,7 @@ fn estimate(generators: &[GeneratorKind], runs: &mut [Run], jobs: &[Job], places
             run.cautions = run.sheet.looked().cautions();
         }
     }
-    off
-}
-
-fn told(generator: GeneratorKind, figure: &'static str, values: &[f64], left_out: &[f64]) -> Off {
-    let count = values.len() as f64;
-    let rms = (left_out.iter().map(|x| x * x).sum::<f64>() / count).sqrt();
-    let size = values.iter().map(|value| value.abs()).sum::<f64>() / count;
-    Off {
-        generator,
-        figure,
-        runs: values.len(),
-        rms,
-        largest: left_out.iter().fold(0.0, |most: f64, x| if x.abs() > most.abs() { *x } else { most }),
-        rms_percent: if size > 0.0 { 100.0 * rms / size } else { 0.0 },
-    }
+    trust
 }
 
 #[cfg(test)]
@@ -345,18 +313,18 @@ mod tests {
         }
 
         /// All runs, judged.
-        fn studied(&self) -> (Vec<Run>, Vec<Off>) {
+        fn studied(&self) -> (Vec<Run>, Vec<Trust>) {
             let make = |jobs: &[Job], _, basis| Ok(self.make(jobs, basis));
-            let (mut runs, off) = some_computed(&self.settings, &self.variants, &self.jobs, &make).unwrap();
+            let (mut runs, trust) = some_computed(&self.settings, &self.variants, &self.jobs, &make).unwrap();
             judge::judge(&mut runs, &[], &self.settings.targets);
-            (runs, off)
+            (runs, trust)
         }
     }
 
     #[test]
     fn runs_stand_in_the_order_of_the_jobs_and_none_is_computed_twice() {
         let of = MadeUp::new();
-        let (runs, off) = of.studied();
+        let (runs, trust) = of.studied();
         assert!(runs.iter().map(|run| (run.variant - 1, run.generator)).eq(of.jobs.iter().copied()));
         let mut computed = of.computed.borrow().clone();
         let basis_computed = of.jobs.iter().zip(&runs).filter(|(_, run)| !is_estimated(run)).map(|(job, _)| *job);
@@ -365,7 +333,7 @@ mod tests {
         told.sort_unstable();
         assert_eq!(computed, told);
         // Error and stress of each generator, off by little, and no figure of the drawing.
-        let names: Vec<&str> = off.iter().map(|off| off.figure).collect();
+        let names: Vec<&str> = trust.iter().map(|trust| trust.figure).collect();
         assert_eq!(names, ["kinematic_error_pp_arcsec", "max_von_mises_mpa"].repeat(3));
         for (job, run) in of.jobs.iter().zip(&runs).filter(|(_, run)| is_estimated(run)) {
             let [error, stress] = MadeUp::figures(*job);
@@ -421,8 +389,8 @@ mod tests {
         for run in &mut runs[100..200] {
             (run.basis, run.sheet) = (Basis::Estimated, DataSheet::default());
         }
-        let off = estimate(&[GeneratorKind::Cam], &mut runs, &jobs, &places);
-        assert!(off.len() == 2 && off.iter().all(|off| off.runs == MOST_POINTS), "{off:?}");
+        let trust = estimate(&[GeneratorKind::Cam], &mut runs, &jobs, &places);
+        assert!(trust.len() == 2 && trust.iter().all(|trust| trust.runs == MOST_POINTS), "{trust:?}");
         let worst = |k: usize| (runs[k].sheet.kinematic_error_pp_arcsec.unwrap() - error(k)).abs();
         let worst = (100..200).map(worst).fold(0.0, f64::max);
         assert!(worst < 0.01, "{worst}");
@@ -437,12 +405,5 @@ mod tests {
             ["kinematic_error_pp_arcsec", "max_von_mises_mpa"].map(|name| Target::new(name, Sense::Least).unwrap());
         assert_eq!(best_first(&[0, 1, 2, 3], &runs, &targets), [0, 3, 1, 2]);
         assert_eq!(best_first(&[2, 1], &runs, &targets), [1, 2]);
-    }
-
-    #[test]
-    fn what_is_left_out_is_told_by_its_root_mean_square_and_its_largest() {
-        let off = told(GeneratorKind::Cam, "backlash_arcsec", &[10.0, 20.0, -30.0], &[1.0, -2.0, 2.0]);
-        assert_eq!((off.runs, off.rms, off.largest), (3, 3.0f64.sqrt(), -2.0));
-        assert!((off.rms_percent - 100.0 * 3f64.sqrt() / 20.0).abs() < 1e-12);
     }
 }

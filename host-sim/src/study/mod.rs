@@ -24,7 +24,7 @@ use crate::stepping::SolverSettings;
 
 pub use asked::{Asked, Miss, Nearest, asked, nearest};
 pub use effects::{Effect, effects};
-pub use estimate::{Off, computed_first};
+pub use estimate::computed_first;
 pub use judge::{Constraint, JudgeError, Sense, Target, figure};
 pub use trust::Trust;
 pub use vary::{Values, Vary, VaryError};
@@ -156,7 +156,7 @@ impl RunStatus {
 pub enum Basis {
     /// Contact FEM of this variant.
     Computed,
-    /// The drawing of this variant and, for all that takes FEM, a surface through the variants that were computed ([`Off`]).
+    /// The drawing of this variant and, for all that takes FEM, a surface through the variants that were computed ([`Trust`]).
     Estimated,
 }
 
@@ -211,16 +211,11 @@ pub struct Study {
     pub fields: Vec<String>,
     /// Every variant with every generator, by variant, then by generator.
     pub runs: Vec<Run>,
-    /// What estimated figures are off by; nothing where all are computed.
-    pub off: Vec<Off>,
+    /// How far estimated figures can be trusted, by generator and figure; nothing where all are computed.
+    pub trust: Vec<Trust>,
 }
 
 impl Study {
-    /// How far its estimates can be trusted, by generator and figure; nothing where all is computed.
-    pub fn trust(&self) -> Vec<Trust> {
-        trust::trust(self)
-    }
-
     /// What nothing beats of a generator, best in the first target first.
     pub fn front(&self, generator: GeneratorKind, targets: &[Target]) -> Vec<&Run> {
         let mut front: Vec<&Run> = self.runs.iter().filter(|run| run.generator == generator && run.front).collect();
@@ -245,7 +240,7 @@ pub fn study(drive: &Drive, settings: &StudySettings, observer: &Observer<'_>) -
     let jobs: Vec<Job> =
         (0..variants.len()).flat_map(|variant| settings.generators.iter().map(move |kind| (variant, *kind))).collect();
     let several = Several { drive, settings, paths: &paths, variants: &variants, observer, done: AtomicUsize::new(0) };
-    let (runs, off) = if settings.compute_all || variants.len() <= computed_first(paths.len()) {
+    let (runs, trust) = if settings.compute_all || variants.len() <= computed_first(paths.len()) {
         (several.run(&jobs, jobs.len(), Several::computed)?, Vec::new())
     } else {
         let run = |jobs: &[Job], of: usize, basis: Basis| match basis {
@@ -255,8 +250,8 @@ pub fn study(drive: &Drive, settings: &StudySettings, observer: &Observer<'_>) -
         estimate::some_computed(settings, &variants, &jobs, &run)?
     };
     // A bound is no estimate.
-    let off = off.into_iter().filter(|off| off.figure != LAST_STABLE).collect();
-    let mut study = Study { fields: paths.iter().map(|path| (*path).to_owned()).collect(), runs, off };
+    let trust = trust.into_iter().filter(|trust| trust.figure != LAST_STABLE).collect();
+    let mut study = Study { fields: paths.iter().map(|path| (*path).to_owned()).collect(), runs, trust };
     judge::judge(&mut study.runs, &settings.constraints, &settings.targets);
     Ok(study)
 }

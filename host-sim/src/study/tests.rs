@@ -117,7 +117,7 @@ fn a_constraint_that_cannot_be_read_says_what_is_allowed() {
 #[test]
 fn effects_are_the_slopes_of_what_is_straight() {
     let runs: Vec<Run> = (0..6).map(|k| made_up(k, f64::from(k as u32), 10.0 - 1.5 * k as f64, 7.0)).collect();
-    let study = Study { fields: vec!["a".into()], runs, off: Vec::new() };
+    let study = Study { fields: vec!["a".into()], runs, trust: Vec::new() };
     let effect = effects(&study, GeneratorKind::Cam, "kinematic_error_pp_arcsec").unwrap();
     assert!((effect.change[0].unwrap() + 7.5).abs() < 1e-9 && (effect.straight - 1.0).abs() < 1e-12);
     assert!(effects(&study, GeneratorKind::Cam, "backlash_arcsec").is_none());
