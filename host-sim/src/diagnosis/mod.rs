@@ -18,6 +18,7 @@ pub(crate) mod channels;
 mod experiment;
 pub(crate) mod explain;
 mod extended;
+mod flank_lag;
 mod held_out;
 pub(crate) mod linear;
 pub(crate) mod model;
