@@ -13,7 +13,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use flexspline::{GeneratorAngle, PlayState, Table};
 
 use super::flank_lag::{behind, flank_lag};
-use super::rows::Rows;
+use super::linear::{Gram, Prior, solve};
+use super::rows::{Rows, combined, rms};
 use crate::nominal::Nominal;
 use crate::units::ARCSEC_PER_RAD;
 
@@ -143,7 +144,7 @@ const LEAST_TURN: f64 = 1e-3;
 /// A play law that leaves this much less (relative) than the first is taken instead.
 const CLEARLY_BETTER: f64 = 0.995;
 /// A play law is taken that leaves less than the first by this factor though it leaves the flank in doubt far beyond friction.
-const FAR_BETTER: f64 = 0.8;
+pub(super) const FAR_BETTER: f64 = 0.8;
 /// Rows are uncertain where the torque is below this multiple of friction.
 pub(super) const NEAR_FRICTION: f64 = 1.25;
 /// A clearance is crossed within this time, s.
@@ -258,12 +259,24 @@ impl Base {
     }
 }
 
-/// Mean square left where the torque is around friction, after what varies slowly over those rows is taken out.
+/// Sum of squares left where the torque is around friction, without what a late reading and a ratio add, and a zero: the largest of what may
+/// be there whatever the play does.
 fn middle_spread(rows: &Rows, left: &[f64], friction: f64) -> f64 {
-    let used = || rows.sessions_used().flatten();
-    let inside: Vec<f64> = used().filter(|k| rows.torque[*k].abs() <= friction).map(|k| left[k]).collect();
-    let all: f64 = used().map(|k| left[k]).sum::<f64>() / rows.count_used().max(1) as f64;
-    inside.iter().map(|e| (e - all).powi(2)).sum::<f64>()
+    let used: Vec<usize> = rows.sessions_used().flatten().collect();
+    let of = |column: &[f64]| -> Vec<f64> {
+        let values: Vec<f64> = used.iter().map(|k| column[*k]).collect();
+        let size = rms(&values).max(1e-9);
+        values.into_iter().map(|value| value / size).collect()
+    };
+    let columns = [vec![1.0; used.len()], of(&rows.speed), of(&rows.output)];
+    let data: Vec<f64> = used.iter().map(|k| left[*k]).collect();
+    let views: Vec<&[f64]> = columns.iter().chain([&data]).map(Vec::as_slice).collect();
+    let priors = [Prior { mean: 0.0, std: 1e3 * rms(&data).max(1e-9) }; 3];
+    let free =
+        solve(&Gram::of(&views, 0..used.len()), &priors, 1.0).map_or(vec![0.0; 3], |solution| solution.coefficients);
+    let explained = combined(used.len(), columns.iter().map(Vec::as_slice), &free);
+    let inside = (0..used.len()).filter(|j| rows.torque[used[*j]].abs() <= friction);
+    inside.map(|j| (data[j] - explained[j]).powi(2)).sum()
 }
 
 /// What a table predicts over the rows under a torque, arcsec.
@@ -285,9 +298,24 @@ fn uncertain(rows: &Rows, nominal: &Nominal, law: PlayLaw, flank: &[f64]) -> Vec
     if few(&by_load) {
         return by_load;
     }
-    // Where hardly any load says which flank carries, the motion does.
+    // Where hardly any load says which flank carries, the motion does, …
     let by_motion = (law == PlayLaw::Pushed).then(|| uncertain_by_motion(rows, nominal));
-    by_motion.filter(|uncertain| few(uncertain)).unwrap_or_else(|| vec![false; rows.len()])
+    if let Some(by_motion) = by_motion.filter(|uncertain| few(uncertain)) {
+        return by_motion;
+    }
+    // … or nothing says it but at the beginning.
+    let at_first = uncertain_at_first(rows, nominal);
+    if few(&at_first) { at_first } else { vec![false; rows.len()] }
+}
+
+/// Rows of a session before the first load that says which flank carries: nobody knows where the drive was left.
+fn uncertain_at_first(rows: &Rows, nominal: &Nominal) -> Vec<bool> {
+    let mut uncertain = vec![false; rows.len()];
+    for session in &rows.sessions {
+        let loaded = session.clone().find(|k| rows.torque[*k].abs() > nominal.friction_torque_n_m);
+        uncertain[session.start..loaded.unwrap_or(session.start)].fill(true);
+    }
+    uncertain
 }
 
 /// Whether so few rows are uncertain that they can be set aside.

@@ -9,16 +9,16 @@ use super::rows::Rows;
 /// Lags that are tried beyond [`FLANK_S`], and the longest, s. *Guess*: a load behind a clearance takes some milliseconds, and what takes
 /// longer swings.
 const LONGER: f64 = std::f64::consts::SQRT_2;
-const LONGEST_S: f64 = 0.03;
+const LONGEST_S: f64 = 0.06;
 /// Rows this long before a change of flank and after it tell of the lag, s. *Guess*: five of the longest lags.
 const BEFORE_S: f64 = 0.05;
-const AFTER_S: f64 = 0.15;
+const AFTER_S: f64 = 0.3;
 /// A lag is another one where it lowers the misfit by this: five standard deviations, as between rivals. *Source*.
 const TOLD_APART: f64 = 25.0;
 /// What the lag explains is the way through the clearance, as wide as drives have it, … *Guess*.
 const WAY: Range<f64> = 0.5..1.6;
-/// … and this share of all that moves there beyond noise: a load that swings leaves more. *Guess*.
-const LEAST_SHARE: f64 = 0.7;
+/// … and this share of all that moves there beyond noise: a load that swings to and fro leaves most of it. *Guess*.
+const LEAST_SHARE: f64 = 0.5;
 
 /// The lag, s, with which the output follows a change of flank; [`FLANK_S`] where the rows tell no other. `left` is the error less what is
 /// predicted with `flank`, arcsec.

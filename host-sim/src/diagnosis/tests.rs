@@ -170,6 +170,43 @@ fn a_wheel_before_the_encoder_is_no_whole_order_of_it() {
     }
 }
 
+#[test]
+fn a_line_that_grows_with_the_speed_is_no_encoder_and_one_that_does_not_is() {
+    let order = 8.0;
+    // Torque of a motor's poles turns a load on its spring, of 8 Hz: the nearer its frequency comes to that, the more. Speeds of the generator
+    // come with its angle: rows are a hundredth of a second apart.
+    let swinging = |sessions: Vec<Session>| -> Vec<Session> {
+        let mut sessions = sessions;
+        for session in &mut sessions {
+            let (mut off, mut rate) = (0.0_f64, 0.0_f64);
+            let natural = std::f64::consts::TAU * 8.0;
+            for k in 1..session.len() {
+                let (from, to) = (session.generator_rad[k - 1], session.generator_rad[k]);
+                for part in 0..20 {
+                    let psi = from + (to - from) * f64::from(part) / 20.0;
+                    let driven = 2.5 * (order * psi).sin();
+                    rate += 5e-4 * (natural * natural * (driven - off) - 2.0 * 0.1 * natural * rate);
+                    off += 5e-4 * rate;
+                }
+                session.error_rad[k] += off / crate::units::ARCSEC_PER_RAD;
+            }
+        }
+        sessions
+    };
+    let plain = recorded(&[], 5, 3000, 100.0, 1.0, 61);
+    let with_encoder = with_more(plain.clone(), |psi, _, _| 4.0 * (order * psi + 0.3).sin());
+    let of = |sessions: &[Session]| {
+        diagnose(sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap()
+    };
+    let diagnosis = of(&with_encoder);
+    assert_eq!(names(&diagnosis), [CauseName::EncoderSubdivision], "{}", diagnosis.text());
+    let diagnosis = of(&swinging(plain));
+    assert!(!names(&diagnosis).contains(&CauseName::EncoderSubdivision), "{}", diagnosis.text());
+    assert_eq!(diagnosis.verdict, Verdict::Unknown, "{}", diagnosis.text());
+    let grows = |left: &super::Unexplained| left.looks_like.contains("grows with the speed");
+    assert!(diagnosis.unexplained.iter().any(grows), "{}", diagnosis.text());
+}
+
 /// The same sessions as a file in which a share of the rows is off, one by one: by far as a heavy tail has it, or to one side alone.
 fn with_bad_rows(sessions: &[Session], share: f64, one_sided: bool, seed: u64) -> Vec<Session> {
     let nominal = catalogue_drive();
@@ -509,7 +546,7 @@ fn a_clearance_that_shuts_is_found_beside_a_runout_that_binds_in_it() {
     assert!(beside.look_alikes.iter().any(|other| either.iter().any(|pair| pair[0] == *other)), "{}", diagnosis.text());
     let width = diagnosis.causes.iter().find(|cause| cause.name == CauseName::ThermalClearance).unwrap();
     let per_k = width.parameters["clearance_arcsec_per_k"];
-    assert!((per_k.value - 1.7).abs() < 2.0 * per_k.std && per_k.std < 0.6, "{per_k:?}");
+    assert!((per_k.value - 1.7).abs() < 3.0 * per_k.std && per_k.std < 0.3, "{per_k:?}");
 }
 
 /// A drive brought into the cold minutes before it is recorded has not cooled down: its teeth lag behind the sensor for as long as they do
