@@ -171,6 +171,50 @@ fn a_wheel_before_the_encoder_is_no_whole_order_of_it() {
 }
 
 #[test]
+fn wear_goes_on_while_nobody_records() {
+    let friction = catalogue_drive().friction_torque_n_m;
+    let mut sessions = recorded(&[], 5, 3000, 100.0, 1.0, 71);
+    for (session, wider) in sessions.iter_mut().zip([0.0, 4.0, 22.0, 25.0, 40.0]) {
+        let torque = session.torque_n_m.clone().unwrap();
+        let mut flank = 0.0;
+        for (error, load) in session.error_rad.iter_mut().zip(torque) {
+            if load.abs() > friction {
+                flank = load.signum();
+            }
+            *error += 0.5 * wider * flank / crate::units::ARCSEC_PER_RAD;
+        }
+    }
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!(names(&diagnosis), [CauseName::Wear], "{}", diagnosis.text());
+    let growth = diagnosis.causes[0].parameters[ParameterName::GrowthArcsec.as_str()];
+    assert!((growth.value - 40.0).abs() < 3.0 * growth.std + 2.0 && growth.std < 8.0, "{growth:?}");
+}
+
+#[test]
+fn what_swings_short_of_where_it_is_driven_is_no_resonance() {
+    let nominal = catalogue_drive();
+    for (gain, resonates) in [(0.6, true), (-0.6, false)] {
+        let mut sessions = recorded(&[], 5, 3000, 100.0, 1.0, 73);
+        for session in &mut sessions {
+            let torque = session.torque_n_m.clone().unwrap();
+            let natural = std::f64::consts::TAU * 1.4;
+            let (mut off, mut rate) = (nominal.wind_up_arcsec(torque[0]), 0.0_f64);
+            for (error, load) in session.error_rad.iter_mut().zip(torque) {
+                let driven = nominal.wind_up_arcsec(load);
+                for _ in 0..20 {
+                    rate += 5e-4 * (natural * natural * (driven - off) - 2.0 * 0.03 * natural * rate);
+                    off += 5e-4 * rate;
+                }
+                *error += gain * (off - driven) / crate::units::ARCSEC_PER_RAD;
+            }
+        }
+        let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
+        let named = names(&diagnosis).contains(&CauseName::TorsionalResonance);
+        assert_eq!(named, resonates, "{gain}: {}", diagnosis.text());
+    }
+}
+
+#[test]
 fn a_line_that_grows_with_the_speed_is_no_encoder_and_one_that_does_not_is() {
     let order = 8.0;
     // Torque of a motor's poles turns a load on its spring, of 8 Hz: the nearer its frequency comes to that, the more. Speeds of the generator

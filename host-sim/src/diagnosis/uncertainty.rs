@@ -108,6 +108,18 @@ impl Spread {
     /// Variance of a quadratic form, row by row: the largest of Laplace's, that by stretches, and that of a jackknife, as far as the
     /// blocks that it leaves out tell alike much.
     fn of(&self, form: &[f64]) -> f64 {
+        let (within, jackknife, lacking) = self.parts(form);
+        within.max(jackknife.min(lacking))
+    }
+
+    /// The same with all of the jackknife: for what stands beside something that is not understood.
+    fn at_worst(&self, form: &[f64]) -> f64 {
+        let (within, jackknife, _) = self.parts(form);
+        within.max(jackknife)
+    }
+
+    /// Variances: within the blocks, by the jackknife, and what Laplace's lacks.
+    fn parts(&self, form: &[f64]) -> (f64, f64, f64) {
         let trace = |covariance: &[f64]| -> f64 { form.iter().zip(covariance).map(|(a, b)| a * b).sum() };
         let [laplace, stretched] = &self.covariances;
         let within = trace(laplace).max(trace(stretched)).max(0.0);
@@ -125,7 +137,7 @@ impl Spread {
         // what may is what Laplace's variance lacks. Of blocks that were driven alike both come to the same.
         let may_shift: f64 = repeated().map(|(_, without)| (trace(without) - trace(laplace)).max(0.0)).sum();
         let lacking = if may_shift > 0.0 { trace(laplace) * shifted / may_shift } else { jackknife };
-        within.max(jackknife.min(lacking))
+        (within, jackknife, lacking)
     }
 }
 
@@ -175,7 +187,7 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Known> {
         let adds: f64 = outer(&adds).iter().zip(&products).map(|(a, b)| a * b).sum();
         all.push(Known {
             parameters: parameters(problem, term, coefficients, &spread),
-            times_its_doubt: (adds / spread.of(&products).max(1e-30)).sqrt(),
+            times_its_doubt: (adds / spread.at_worst(&products).max(1e-30)).sqrt(),
         });
     }
     all
