@@ -24,8 +24,9 @@ const LOAD: [f64; 2] = [0.3, 0.9];
 /// Noise of the output's encoder, arcsec; that of the torque as a share of its range.
 const NOISE_ARCSEC: [f64; 2] = [0.5, 4.0];
 const TORQUE_NOISE: [f64; 2] = [2e-4, 2e-3];
-/// Time in which the output goes from one flank to the other where nothing holds it, s.
+/// Time in which the output goes from one flank to the other where nothing holds it, s: of most benches, and of those with a large load.
 const FLANK_S: f64 = 0.004;
+const SLOW_FLANK_S: [f64; 2] = [0.006, 0.03];
 /// A unit is within so many standard deviations of its drawing.
 const WORST_UNIT: f64 = 1.5;
 
@@ -55,6 +56,8 @@ pub struct Bench {
     pub with_temperature: bool,
     pub motion: &'static str,
     pub load: &'static str,
+    /// Time in which the output goes from one flank to the other where nothing holds it, s.
+    pub flank_s: f64,
 }
 
 /// What happens in a session.
@@ -99,7 +102,13 @@ impl Bench {
             with_temperature: chance.is(0.7),
             motion: MOTIONS[chance.below(MOTIONS.len())],
             load: LOADS[chance.below(LOADS.len())],
+            flank_s: FLANK_S,
         }
+    }
+
+    /// With a load that is slow to go to its other flank.
+    pub fn with_slow_flanks(&mut self, chance: &mut Chance) {
+        self.flank_s = chance.by_ratio(SLOW_FLANK_S);
     }
 
     /// With several sessions, which some faults need.
@@ -138,7 +147,7 @@ impl Bench {
         let lasts_s = count as f64 * step_s;
         let generator = self.motion(count, step_s, lasts_s, from_rad, chance);
         let torque = self.torque(&generator, step_s, lasts_s, chance);
-        let error = unit.error(drive, &generator, &torque, step_s);
+        let error = unit.error(drive, &generator, &torque, step_s, self.flank_s);
         let ratio = drive.subject.nominal.ratio + ratio_off;
         let output = generator.iter().zip(&error).map(|(psi, error)| psi / ratio + error * ARCSEC).collect();
         Truth { begin_s, step_s, generator, output, torque }
@@ -233,7 +242,7 @@ impl Unit {
     }
 
     /// Error of the output, arcsec.
-    fn error(&self, drive: &Drive<'_>, generator: &[f64], torque: &[f64], step_s: f64) -> Vec<f64> {
+    fn error(&self, drive: &Drive<'_>, generator: &[f64], torque: &[f64], step_s: f64, flank_s: f64) -> Vec<f64> {
         let (nominal, table) = (&drive.subject.nominal, drive.subject.table.as_ref());
         let half = 0.5 * nominal.backlash_arcsec;
         let friction = table.map_or(nominal.friction_torque_n_m, dead_zone_n_m);
@@ -250,7 +259,7 @@ impl Unit {
                     wanted = (wanted - turned / half).clamp(-1.0, 1.0);
                 }
                 let lag = wanted - side;
-                side += lag * (step_s / FLANK_S).min(1.0);
+                side += lag * (step_s / flank_s).min(1.0);
                 let wind_up = nominal.wind_up_arcsec(load);
                 let drawn = match table {
                     Some(table) => {

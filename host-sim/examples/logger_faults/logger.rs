@@ -35,10 +35,11 @@ pub enum Wrong {
     TorqueSaturates,
     CounterSlips,
     MotorRipple,
+    SlowFlanks,
 }
 
 impl Wrong {
-    pub const ALL: [Wrong; 26] = [
+    pub const ALL: [Wrong; 27] = [
         Wrong::Nothing,
         Wrong::JitterOfReads,
         Wrong::LateRows,
@@ -65,6 +66,7 @@ impl Wrong {
         Wrong::TorqueSaturates,
         Wrong::CounterSlips,
         Wrong::MotorRipple,
+        Wrong::SlowFlanks,
     ];
 
     pub fn name(self) -> String {
@@ -81,8 +83,8 @@ impl Wrong {
     /// Faults of the data by which it is told rightly; empty where no record can show it, or where it is none of the logger.
     pub fn told_as(self) -> &'static [&'static str] {
         match self {
-            // One angle against the other says nothing of a clock that is fast; nor is it wrong.
-            Wrong::Nothing | Wrong::FastClock | Wrong::MotorRipple => &[],
+            // One angle against the other says nothing of a clock that is fast; nor is it wrong. Slow flanks are the bench's.
+            Wrong::Nothing | Wrong::FastClock | Wrong::MotorRipple | Wrong::SlowFlanks => &[],
             Wrong::JitterOfReads => &["read_jitter"],
             Wrong::LateRows => &["read_jitter", "outliers"],
             Wrong::Stalls => &["stalls"],

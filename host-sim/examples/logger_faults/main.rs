@@ -121,7 +121,7 @@ struct Outcome {
 }
 
 /// Drawn anew, so often at most, where the rows cannot show what is wrong.
-const DRAWS: u64 = 40;
+const DRAWS: u64 = 400;
 
 /// A drive, how it is measured, and what the logger makes of it.
 fn drawn<'d, 't>(drives: &'d [Drive<'t>], seed: u64, wrong: Wrong, number: u64) -> (&'d Drive<'t>, Bench, Log) {
@@ -132,6 +132,9 @@ fn drawn<'d, 't>(drives: &'d [Drive<'t>], seed: u64, wrong: Wrong, number: u64) 
         let mut bench = Bench::drawn(drive, &mut chance);
         if matches!(wrong, Wrong::CounterRestarts | Wrong::Drift) {
             bench.in_sessions(&mut chance);
+        }
+        if wrong == Wrong::SlowFlanks {
+            bench.with_slow_flanks(&mut chance);
         }
         let truths = bench.run(drive, wrong.ratio_off(drive), &mut chance);
         let log = log(wrong, &bench, drive, &truths, &mut chance);

@@ -12,7 +12,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use flexspline::{GeneratorAngle, PlayState, Table};
 
-use super::rows::Rows;
+use super::flank_lag::{behind, flank_lag};
+use super::linear::{Gram, Prior, solve};
+use super::rows::{Rows, combined, rms};
 use crate::nominal::Nominal;
 use crate::units::ARCSEC_PER_RAD;
 
@@ -131,10 +133,10 @@ pub struct Base {
 /// What floats where angles are read at other instants than is known, s.
 pub(crate) const BETWEEN_READINGS: &str = "time between the readings";
 /// What floats as the output takes a time to go to its other flank, s: that of a lag which does as much to the error as this time says. Beside
-/// [`FLANK_S`] it is that lag to first order.
+/// the lag that the rows tell best ([`flank_lag`]) it is that lag to first order.
 pub(crate) const CHANGE_OF_FLANK: &str = "time of a change of flank";
 /// The output goes from one flank to the other in some milliseconds. *Guess*.
-const FLANK_S: f64 = 5e-3;
+pub(super) const FLANK_S: f64 = 5e-3;
 /// Standard deviation of what no drawing fixes, arcsec: the zero of the output encoder.
 pub(super) const FREE: f64 = 1e4;
 /// Least spread of a phase, over that of the amplitude.
@@ -142,7 +144,7 @@ const LEAST_TURN: f64 = 1e-3;
 /// A play law that leaves this much less (relative) than the first is taken instead.
 const CLEARLY_BETTER: f64 = 0.995;
 /// A play law is taken that leaves less than the first by this factor though it leaves the flank in doubt far beyond friction.
-const FAR_BETTER: f64 = 0.8;
+pub(super) const FAR_BETTER: f64 = 0.8;
 /// Rows are uncertain where the torque is below this multiple of friction.
 pub(super) const NEAR_FRICTION: f64 = 1.25;
 /// A clearance is crossed within this time, s.
@@ -202,8 +204,11 @@ impl Base {
         add(BETWEEN_READINGS, late.collect(), rows.unsure_s);
         // No output is on its other flank at once.
         if rows.recorded.time {
-            let per_s = behind(rows, &flank, half_backlash).into_iter().map(|arcsec| arcsec / FLANK_S);
-            add(CHANGE_OF_FLANK, per_s.collect(), FLANK_S);
+            let left: Vec<f64> =
+                rows.error.iter().zip(&prediction).map(|(error, predicted)| error - predicted).collect();
+            let lag_s = flank_lag(rows, &left, &flank, half_backlash);
+            let per_s = behind(rows, &flank, half_backlash, lag_s).into_iter().map(|arcsec| arcsec / lag_s);
+            add(CHANGE_OF_FLANK, per_s.collect(), lag_s);
         }
         add("stiffness", wind_up.clone(), nominal.spread.stiffness);
         add("backlash", flank.iter().map(|p| half_backlash * p).collect(), nominal.spread.backlash);
@@ -254,26 +259,24 @@ impl Base {
     }
 }
 
-/// What the error lacks as the output follows a change of flank with a lag of [`FLANK_S`], arcsec.
-fn behind(rows: &Rows, flank: &[f64], half_backlash: f64) -> Vec<f64> {
-    let mut behind = vec![0.0; rows.len()];
-    for session in rows.sessions.iter().filter(|session| !session.is_empty()) {
-        let mut reached = flank[session.start];
-        for k in session.start + 1..session.end {
-            let passed = (rows.time[k] - rows.time[k - 1]).max(0.0);
-            reached += (flank[k] - reached) * (1.0 - (-passed / FLANK_S).exp());
-            behind[k] = half_backlash * (reached - flank[k]);
-        }
-    }
-    behind
-}
-
-/// Mean square left where the torque is around friction, after what varies slowly over those rows is taken out.
+/// Sum of squares left where the torque is around friction, without what a late reading and a ratio add, and a zero: the largest of what may
+/// be there whatever the play does.
 fn middle_spread(rows: &Rows, left: &[f64], friction: f64) -> f64 {
-    let used = || rows.sessions_used().flatten();
-    let inside: Vec<f64> = used().filter(|k| rows.torque[*k].abs() <= friction).map(|k| left[k]).collect();
-    let all: f64 = used().map(|k| left[k]).sum::<f64>() / rows.count_used().max(1) as f64;
-    inside.iter().map(|e| (e - all).powi(2)).sum::<f64>()
+    let used: Vec<usize> = rows.sessions_used().flatten().collect();
+    let of = |column: &[f64]| -> Vec<f64> {
+        let values: Vec<f64> = used.iter().map(|k| column[*k]).collect();
+        let size = rms(&values).max(1e-9);
+        values.into_iter().map(|value| value / size).collect()
+    };
+    let columns = [vec![1.0; used.len()], of(&rows.speed), of(&rows.output)];
+    let data: Vec<f64> = used.iter().map(|k| left[*k]).collect();
+    let views: Vec<&[f64]> = columns.iter().chain([&data]).map(Vec::as_slice).collect();
+    let priors = [Prior { mean: 0.0, std: 1e3 * rms(&data).max(1e-9) }; 3];
+    let free =
+        solve(&Gram::of(&views, 0..used.len()), &priors, 1.0).map_or(vec![0.0; 3], |solution| solution.coefficients);
+    let explained = combined(used.len(), columns.iter().map(Vec::as_slice), &free);
+    let inside = (0..used.len()).filter(|j| rows.torque[used[*j]].abs() <= friction);
+    inside.map(|j| (data[j] - explained[j]).powi(2)).sum()
 }
 
 /// What a table predicts over the rows under a torque, arcsec.
@@ -295,9 +298,24 @@ fn uncertain(rows: &Rows, nominal: &Nominal, law: PlayLaw, flank: &[f64]) -> Vec
     if few(&by_load) {
         return by_load;
     }
-    // Where hardly any load says which flank carries, the motion does.
+    // Where hardly any load says which flank carries, the motion does, …
     let by_motion = (law == PlayLaw::Pushed).then(|| uncertain_by_motion(rows, nominal));
-    by_motion.filter(|uncertain| few(uncertain)).unwrap_or_else(|| vec![false; rows.len()])
+    if let Some(by_motion) = by_motion.filter(|uncertain| few(uncertain)) {
+        return by_motion;
+    }
+    // … or nothing says it but at the beginning.
+    let at_first = uncertain_at_first(rows, nominal);
+    if few(&at_first) { at_first } else { vec![false; rows.len()] }
+}
+
+/// Rows of a session before the first load that says which flank carries: nobody knows where the drive was left.
+fn uncertain_at_first(rows: &Rows, nominal: &Nominal) -> Vec<bool> {
+    let mut uncertain = vec![false; rows.len()];
+    for session in &rows.sessions {
+        let loaded = session.clone().find(|k| rows.torque[*k].abs() > nominal.friction_torque_n_m);
+        uncertain[session.start..loaded.unwrap_or(session.start)].fill(true);
+    }
+    uncertain
 }
 
 /// Whether so few rows are uncertain that they can be set aside.

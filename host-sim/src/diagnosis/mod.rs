@@ -18,6 +18,7 @@ pub(crate) mod channels;
 mod experiment;
 pub(crate) mod explain;
 mod extended;
+mod flank_lag;
 mod held_out;
 pub(crate) mod linear;
 pub(crate) mod model;
@@ -39,6 +40,7 @@ mod torque_zero;
 pub(crate) mod trace;
 mod uncertainty;
 mod verdict;
+mod with_speed;
 
 use std::sync::Arc;
 
@@ -161,10 +163,14 @@ pub fn diagnose_extended(
     let terms = terms_at(&problem, &laws, &start);
     let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
     let (selected, mut unproved) = held_out::proved(&problem, selected, &mut trace);
+    let (selected, hides) = verdict::told_apart(&problem, selected, noise, &mut trace);
+    unproved.extend(hides);
     let start = remembered(&laws, &selected.terms);
     let maps = candidate::maps(&on);
     let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);
-    left.extend(fast.into_iter().filter(|f| f.size_arcsec > select::least_size(noise.white)));
+    let hidden_lines: Vec<Label> = fast.iter().map(|(label, _)| *label).collect();
+    let fast = fast.into_iter().map(|(label, size_arcsec)| Unexplained { looks_like: label.to_string(), size_arcsec });
+    left.extend(fast.filter(|line| line.size_arcsec > select::least_size(noise.white)));
     left.extend(remainder::beyond_noise(&problem, &selected, noise));
     for (k, term) in selected.terms.iter().enumerate() {
         trace.say(&trace::Found::Parts(term.law.label, select::parts(term, selected.fit.of(k))));
@@ -177,7 +183,8 @@ pub fn diagnose_extended(
     let sample = thinned.as_ref().map(|thinned| Sample::new(&on, thinned, &problem.uncertain, stride));
     let on_sample = sample.as_ref().map(|sample| sample.problem(noise, problem.worth));
     let on_sample = on_sample.as_ref().zip(thinned.as_ref().map(|thinned| thinned.share));
-    let diagnosis = verdict::conclude(&problem, on_sample, &laws, selected, &bests, left, noise, settings, trace);
+    let diagnosis =
+        verdict::conclude(&problem, on_sample, &laws, selected, &bests, left, &hidden_lines, noise, settings, trace);
     let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
     drop((problem, sample));
     Ok((diagnosis, found.extended(laws, &base, &scales, fineness)))
@@ -208,8 +215,8 @@ struct Search<'a> {
     start: Vec<(usize, Vec<f64>)>,
     /// Where each law was at its best.
     bests: Bests,
-    /// Lines too fast for averages.
-    fast: Vec<Unexplained>,
+    /// Lines too fast for averages, with their sizes, arcsec.
+    fast: Vec<(Label, f64)>,
     /// Every decision on the way.
     trace: Trace,
 }
@@ -232,7 +239,7 @@ impl<'a> Search<'a> {
         let (mut noise, mut worth) = prepare::noise(on, &free, &at_first, &uncertain, None);
         trace.say(&trace::Found::Noise(noise, worth));
         let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
-        let mut fast: Vec<Unexplained> = Vec::new();
+        let mut fast: Vec<(Label, f64)> = Vec::new();
         let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
         let mut bests = Bests::default();
         let mut thinned = Thinned::of(on, stride);
@@ -260,10 +267,9 @@ impl<'a> Search<'a> {
                 lines.into_iter().partition(|(line, _)| !remainder::averaged_away(&problem, line));
             for (line, size) in found {
                 let label = Label::Deviation(Deviation::Line { per: line.per, order: line.order });
-                let looks_like = label.to_string();
-                if fast.iter().all(|f| f.looks_like != looks_like) {
+                if fast.iter().all(|(known, _)| known.to_string() != label.to_string()) {
                     trace.say(&trace::Found::FastLine(label, size));
-                    fast.push(Unexplained { looks_like, size_arcsec: size });
+                    fast.push((label, size));
                 }
             }
             let mut explained = remainder::explained(&problem, &selected);

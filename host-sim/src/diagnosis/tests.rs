@@ -131,11 +131,10 @@ fn slow_to_its_other_flank(nominal: &Nominal, lag_s: f64) -> Vec<Session> {
 #[test]
 fn an_output_that_takes_milliseconds_to_its_other_flank_is_a_perfect_drive() {
     let nominal = catalogue_drive();
-    for lag_s in [2e-3, 5e-3] {
+    for lag_s in [2e-3, 5e-3, 10e-3, 20e-3] {
         let sessions = slow_to_its_other_flank(&nominal, lag_s);
         let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
         assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::None, vec![]), "{lag_s}: {}", diagnosis.text());
-        // To first order about 5 ms; 10 ms are beyond that, and pass for a hysteresis.
         let said = diagnosis.recalibrated[super::base::CHANGE_OF_FLANK];
         assert!((said.value - lag_s).abs() < 3.0 * said.std + 0.3 * lag_s, "{said:?} for {lag_s}");
     }
@@ -169,6 +168,87 @@ fn a_wheel_before_the_encoder_is_no_whole_order_of_it() {
         let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
         assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::Unknown, vec![]), "{order}: {}", diagnosis.text());
     }
+}
+
+#[test]
+fn wear_goes_on_while_nobody_records() {
+    let friction = catalogue_drive().friction_torque_n_m;
+    let mut sessions = recorded(&[], 5, 3000, 100.0, 1.0, 71);
+    for (session, wider) in sessions.iter_mut().zip([0.0, 4.0, 22.0, 25.0, 40.0]) {
+        let torque = session.torque_n_m.clone().unwrap();
+        let mut flank = 0.0;
+        for (error, load) in session.error_rad.iter_mut().zip(torque) {
+            if load.abs() > friction {
+                flank = load.signum();
+            }
+            *error += 0.5 * wider * flank / crate::units::ARCSEC_PER_RAD;
+        }
+    }
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!(names(&diagnosis), [CauseName::Wear], "{}", diagnosis.text());
+    let growth = diagnosis.causes[0].parameters[ParameterName::GrowthArcsec.as_str()];
+    assert!((growth.value - 40.0).abs() < 3.0 * growth.std + 2.0 && growth.std < 8.0, "{growth:?}");
+}
+
+#[test]
+fn what_swings_short_of_where_it_is_driven_is_no_resonance() {
+    let nominal = catalogue_drive();
+    for (gain, resonates) in [(0.6, true), (-0.6, false)] {
+        let mut sessions = recorded(&[], 5, 3000, 100.0, 1.0, 73);
+        for session in &mut sessions {
+            let torque = session.torque_n_m.clone().unwrap();
+            let natural = std::f64::consts::TAU * 1.4;
+            let (mut off, mut rate) = (nominal.wind_up_arcsec(torque[0]), 0.0_f64);
+            for (error, load) in session.error_rad.iter_mut().zip(torque) {
+                let driven = nominal.wind_up_arcsec(load);
+                for _ in 0..20 {
+                    rate += 5e-4 * (natural * natural * (driven - off) - 2.0 * 0.03 * natural * rate);
+                    off += 5e-4 * rate;
+                }
+                *error += gain * (off - driven) / crate::units::ARCSEC_PER_RAD;
+            }
+        }
+        let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
+        let named = names(&diagnosis).contains(&CauseName::TorsionalResonance);
+        assert_eq!(named, resonates, "{gain}: {}", diagnosis.text());
+    }
+}
+
+#[test]
+fn a_line_that_grows_with_the_speed_is_no_encoder_and_one_that_does_not_is() {
+    let order = 8.0;
+    // Torque of a motor's poles turns a load on its spring, of 8 Hz: the nearer its frequency comes to that, the more. Speeds of the generator
+    // come with its angle: rows are a hundredth of a second apart.
+    let swinging = |sessions: Vec<Session>| -> Vec<Session> {
+        let mut sessions = sessions;
+        for session in &mut sessions {
+            let (mut off, mut rate) = (0.0_f64, 0.0_f64);
+            let natural = std::f64::consts::TAU * 8.0;
+            for k in 1..session.len() {
+                let (from, to) = (session.generator_rad[k - 1], session.generator_rad[k]);
+                for part in 0..20 {
+                    let psi = from + (to - from) * f64::from(part) / 20.0;
+                    let driven = 2.5 * (order * psi).sin();
+                    rate += 5e-4 * (natural * natural * (driven - off) - 2.0 * 0.1 * natural * rate);
+                    off += 5e-4 * rate;
+                }
+                session.error_rad[k] += off / crate::units::ARCSEC_PER_RAD;
+            }
+        }
+        sessions
+    };
+    let plain = recorded(&[], 5, 3000, 100.0, 1.0, 61);
+    let with_encoder = with_more(plain.clone(), |psi, _, _| 4.0 * (order * psi + 0.3).sin());
+    let of = |sessions: &[Session]| {
+        diagnose(sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap()
+    };
+    let diagnosis = of(&with_encoder);
+    assert_eq!(names(&diagnosis), [CauseName::EncoderSubdivision], "{}", diagnosis.text());
+    let diagnosis = of(&swinging(plain));
+    assert!(!names(&diagnosis).contains(&CauseName::EncoderSubdivision), "{}", diagnosis.text());
+    assert_eq!(diagnosis.verdict, Verdict::Unknown, "{}", diagnosis.text());
+    let grows = |left: &super::Unexplained| left.looks_like.contains("grows with the speed");
+    assert!(diagnosis.unexplained.iter().any(grows), "{}", diagnosis.text());
 }
 
 /// The same sessions as a file in which a share of the rows is off, one by one: by far as a heavy tail has it, or to one side alone.
@@ -510,7 +590,7 @@ fn a_clearance_that_shuts_is_found_beside_a_runout_that_binds_in_it() {
     assert!(beside.look_alikes.iter().any(|other| either.iter().any(|pair| pair[0] == *other)), "{}", diagnosis.text());
     let width = diagnosis.causes.iter().find(|cause| cause.name == CauseName::ThermalClearance).unwrap();
     let per_k = width.parameters["clearance_arcsec_per_k"];
-    assert!((per_k.value - 1.7).abs() < 2.0 * per_k.std && per_k.std < 0.6, "{per_k:?}");
+    assert!((per_k.value - 1.7).abs() < 3.0 * per_k.std && per_k.std < 0.3, "{per_k:?}");
 }
 
 /// A drive brought into the cold minutes before it is recorded has not cooled down: its teeth lag behind the sensor for as long as they do

@@ -8,7 +8,7 @@
 
 use flexspline::Table;
 
-use super::base::{PlayLaw, predicted_by_table};
+use super::base::{FAR_BETTER, PlayLaw, predicted_by_table};
 use super::channels::{fault_throughout, floating, sample, waves};
 use super::rows::{Rows, mean, rms};
 use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
@@ -67,12 +67,28 @@ impl<'a> Held<'a> {
         let places = sample(&rows, SAMPLE);
         let mut held = Held { rows, nominal, table, law: PlayLaw::Held, places, free: Vec::new() };
         held.float();
-        let left = |law: PlayLaw| held.of_law(law, [0.0; 4]).iter().map(|left| left.abs()).sum::<f64>();
-        let best = PlayLaw::ALL.into_iter().map(|law| (left(law), law)).min_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((_, law)) = best {
-            held.law = law;
-        }
         held
+    }
+
+    /// Takes the law of the play that leaves least at any of some zeros, and gives what each of them leaves by it, block by block; and what is
+    /// left at least without a zero, by any law. A zero turns flanks over too early, which by itself looks like a play that goes over slowly.
+    fn with_zeros(&mut self, zeros: &[f64]) -> (Vec<Try>, f64) {
+        let of_law = |law: PlayLaw| -> (PlayLaw, Vec<Try>) {
+            let left = |zero: &f64| (*zero, by_block(&self.of_law(law, [-zero, 0.0, 0.0, 0.0])));
+            (law, zeros.iter().map(left).collect())
+        };
+        let all: Vec<(PlayLaw, Vec<Try>)> = PlayLaw::ALL.into_iter().map(of_law).collect();
+        let without = all.iter().flat_map(|(_, tries)| tries).filter(|of| of.0 == 0.0).map(|of| sum(&of.1));
+        let without = without.fold(f64::INFINITY, f64::min);
+        let least = |(law, tries): &(PlayLaw, Vec<Try>)| {
+            let least = tries.iter().map(|of| sum(&of.1)).fold(f64::INFINITY, f64::min);
+            if *law == PlayLaw::Smooth { least / FAR_BETTER } else { least }
+        };
+        let Some((law, tries)) = all.into_iter().min_by(|a, b| least(a).total_cmp(&least(b))) else {
+            return (Vec::new(), without);
+        };
+        self.law = law;
+        (tries, without)
     }
 
     /// Makes the columns of what floats.
@@ -227,11 +243,12 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     if !rows.recorded.torque || load == 0.0 || nominal.wind_up_arcsec(1.0) == 0.0 || rows.count_used() < SAMPLE / 4 {
         return None;
     }
-    let held = Held::new(rows, nominal, table);
-    let left = |zero: f64| by_block(&held.left([-zero, 0.0, 0.0, 0.0]));
+    let mut held = Held::new(rows, nominal, table);
     let steps = (LARGEST_SHARE / STEP_SHARE).round() as i32;
     let mut step = STEP_SHARE * load;
-    let mut tries: Vec<Try> = (-steps..=steps).map(|k| f64::from(k) * step).map(|zero| (zero, left(zero))).collect();
+    let zeros: Vec<f64> = (-steps..=steps).map(|k| f64::from(k) * step).collect();
+    let (mut tries, without_any) = held.with_zeros(&zeros);
+    let left = |zero: f64| by_block(&held.left([-zero, 0.0, 0.0, 0.0]));
     for _ in 0..HALVINGS {
         step *= 0.5;
         let best = least(&tries, None);
@@ -242,7 +259,8 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     let (none, there) = (of(0.0), of(zero));
     let blocks = none.len() as f64;
     let gain = sum(none) - sum(there);
-    if zero.abs() < LEAST_SHARE * load || gain < LEAST_GAIN * sum(none) || !is_certain(none, there) {
+    let gains = gain >= LEAST_GAIN * sum(none) && sum(there) <= (1.0 - LEAST_GAIN) * without_any;
+    if zero.abs() < LEAST_SHARE * load || !gains || !is_certain(none, there) {
         return None;
     }
     // Jackknife; no finer than the steps.

@@ -105,27 +105,39 @@ struct Spread {
 }
 
 impl Spread {
-    /// Variance of a quadratic form, row by row: the largest of Laplace's, that by stretches, and that of a jackknife.
+    /// Variance of a quadratic form, row by row: the largest of Laplace's, that by stretches, and that of a jackknife, as far as the
+    /// blocks that it leaves out tell alike much.
     fn of(&self, form: &[f64]) -> f64 {
+        let (within, jackknife, lacking) = self.parts(form);
+        within.max(jackknife.min(lacking))
+    }
+
+    /// The same with all of the jackknife: for what stands beside something that is not understood.
+    fn at_worst(&self, form: &[f64]) -> f64 {
+        let (within, jackknife, _) = self.parts(form);
+        within.max(jackknife)
+    }
+
+    /// Variances: within the blocks, by the jackknife, and what Laplace's lacks.
+    fn parts(&self, form: &[f64]) -> (f64, f64, f64) {
         let trace = |covariance: &[f64]| -> f64 { form.iter().zip(covariance).map(|(a, b)| a * b).sum() };
         let [laplace, stretched] = &self.covariances;
         let within = trace(laplace).max(trace(stretched)).max(0.0);
         // A session without which the rest says nothing of it, such as the one after a jump, is no repetition.
-        let repeated: Vec<&Vec<f64>> = self
-            .shifts
-            .iter()
-            .filter(|(_, without)| trace(without) < UNDETERMINED * UNDETERMINED * within)
-            .map(|(shift, _)| shift)
-            .collect();
-        let count = repeated.len().max(1) as f64;
-        let dimension = form.len().isqrt();
-        let mean: Vec<f64> = (0..dimension).map(|i| repeated.iter().map(|s| s[i]).sum::<f64>() / count).collect();
-        let square = |shift: &[f64]| -> f64 {
-            let from_mean: Vec<f64> = shift.iter().zip(&mean).map(|(s, m)| s - m).collect();
-            trace(&outer(&from_mean))
-        };
-        let jackknife = (count - 1.0) / count * repeated.iter().map(|s| square(s)).sum::<f64>();
-        within.max(jackknife)
+        let repeated =
+            || self.shifts.iter().filter(|(_, without)| trace(without) < UNDETERMINED * UNDETERMINED * within);
+        let shifts: Vec<&Vec<f64>> = repeated().map(|(shift, _)| shift).collect();
+        let count = shifts.len().max(1) as f64;
+        let mean: Vec<f64> =
+            (0..form.len().isqrt()).map(|i| shifts.iter().map(|s| s[i]).sum::<f64>() / count).collect();
+        let from_mean = |shift: &[f64]| -> Vec<f64> { shift.iter().zip(&mean).map(|(s, m)| s - m).collect() };
+        let shifted: f64 = shifts.iter().map(|shift| trace(&outer(&from_mean(shift)))).sum();
+        let jackknife = (count - 1.0) / count * shifted;
+        // Where one block tells more than the others, the rest is less sure without it, and may shift by as much as that: what shifts against
+        // what may is what Laplace's variance lacks. Of blocks that were driven alike both come to the same.
+        let may_shift: f64 = repeated().map(|(_, without)| (trace(without) - trace(laplace)).max(0.0)).sum();
+        let lacking = if may_shift > 0.0 { trace(laplace) * shifted / may_shift } else { jackknife };
+        (within, jackknife, lacking)
     }
 }
 
@@ -175,7 +187,7 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Known> {
         let adds: f64 = outer(&adds).iter().zip(&products).map(|(a, b)| a * b).sum();
         all.push(Known {
             parameters: parameters(problem, term, coefficients, &spread),
-            times_its_doubt: (adds / spread.of(&products).max(1e-30)).sqrt(),
+            times_its_doubt: (adds / spread.at_worst(&products).max(1e-30)).sqrt(),
         });
     }
     all

@@ -13,7 +13,7 @@ use super::select::{self, Selected, Standing, fit, predicted, standings};
 use super::thresholds::verdict::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
 use super::uncertainty::{self, Known};
-use super::{Settings, experiment, held_out, rivals};
+use super::{Settings, experiment, held_out, remainder, rivals, with_speed};
 use crate::causes::{CauseName, ParameterName};
 
 /// The verdict, with its causes and what is left.
@@ -25,6 +25,7 @@ pub(super) fn conclude(
     selected: Selected<'_>,
     bests: &select::Bests,
     mut left_over: Vec<Unexplained>,
+    hidden_lines: &[Label],
     noise: Noise,
     settings: &Settings,
     mut trace: Trace,
@@ -42,17 +43,14 @@ pub(super) fn conclude(
     };
     let before = none.as_ref().map_or(Vec::new(), |fit| left(&[], fit));
     let after = left(&all, &selected.fit);
-    let stride_floor = noise.white * problem.on.rows.loudness_rms()
-        / (problem.on.rows.count_used() as f64 / problem.data.len() as f64).sqrt();
-    let floor = stride_floor.hypot(noise.wander);
+    let floor = floor(problem, noise);
     let (rms_before, rms_after) = (problem.certain_rms(&before), problem.certain_rms(&after));
     let explainable = (rms_before * rms_before - floor * floor).max(0.0);
     let unexplained = (rms_after * rms_after - floor * floor).max(0.0);
     let as_noise = rms_after <= NOISE_KNOWN_TO * floor;
 
     let known = uncertainty::known(problem, &selected);
-    let beyond_noise = beyond_noise(rms_after, floor);
-    let told_from_zero: Vec<f64> = known.iter().map(|known| known.told_from_zero() / beyond_noise).collect();
+    let told_from_zero = told_from_zero(problem, &selected, &known, noise);
     let named = understood(problem, &selected, &standings, &known, &told_from_zero, &left_over, noise, &mut trace);
     let size = |k: &usize| standings[*k].size.powi(2);
     let (by_name, without_name) = (
@@ -167,6 +165,9 @@ pub(super) fn conclude(
         .map(|k| Unexplained { looks_like: selected.terms[k].law.label.to_string(), size_arcsec: standings[k].size })
         .collect();
     unexplained_list.extend(left_over);
+    for (line, words) in with_speed::words(problem, &selected, &known, hidden_lines) {
+        unexplained_list.iter_mut().filter(|left| left.looks_like == line).for_each(|left| left.looks_like += &words);
+    }
     Diagnosis {
         schema_version: 1,
         verdict,
@@ -290,6 +291,7 @@ fn understood(
                 rise_without_a_piece(problem, selected, k).map(|rise| Judged::above(Gate::NoPiece, rise, NO_PIECE)),
             );
         }
+        gates.extend(change_with_speed(problem, selected, &known[k], k));
         gates.extend(least_damping(&known[k]).map(|least| Judged::number(Gate::Rings, least, RINGS, least < RINGS)));
         if passed(&gates) {
             named.push(k);
@@ -297,6 +299,14 @@ fn understood(
         trace.decided(Stage::Understood, selected.terms[k].law.label, None, gates);
     }
     named
+}
+
+/// Whether a cause that is one line of the generator's angle is as large at every speed: a wheel and an encoder are, and what the motor's torque
+/// shakes is not.
+fn change_with_speed(problem: &Problem<'_>, selected: &Selected<'_>, known: &Known, k: usize) -> Option<Judged> {
+    let order = with_speed::order_of(selected.terms[k].law.label, Some(known))?;
+    let change = with_speed::with_speed(problem, selected, Some(k), order)?.changes_by();
+    Some(Judged::number(Gate::SameAtEverySpeed, change, with_speed::UNCHANGED, change <= with_speed::UNCHANGED))
 }
 
 /// What a free function of the output angle that is left is called.
@@ -382,6 +392,57 @@ fn of_output_angle(law: &Law, known: &Known) -> bool {
 fn is_subdivision_of_output(cause: Option<CauseName>, known: &Known) -> bool {
     let at_output = known.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0);
     cause == Some(CauseName::EncoderSubdivision) && at_output
+}
+
+/// Noise of an average, wander with it, arcsec.
+fn floor(problem: &Problem<'_>, noise: Noise) -> f64 {
+    let rows_of_an_average = problem.on.rows.count_used() as f64 / problem.data.len() as f64;
+    (noise.white * problem.on.rows.loudness_rms() / rows_of_an_average.sqrt()).hypot(noise.wander)
+}
+
+/// By how many standard deviations the size of each term is told from zero.
+fn told_from_zero(problem: &Problem<'_>, selected: &Selected<'_>, known: &[Known], noise: Noise) -> Vec<f64> {
+    let beyond_noise = beyond_noise(problem.certain_rms(&remainder::left(problem, selected)), floor(problem, noise));
+    known.iter().map(|known| known.told_from_zero() / beyond_noise).collect()
+}
+
+/// The terms without those that hide others: where two causes do so nearly the same that the size of neither is told from zero, and that of one
+/// is where the other is left out, the smaller is set aside. It is what the law of the larger leaves, as often as not; what else may stand in
+/// the place of the larger, rivals and look-alikes say. Also what was set aside.
+#[must_use]
+pub(super) fn told_apart<'l>(
+    problem: &Problem<'_>,
+    mut selected: Selected<'l>,
+    noise: Noise,
+    trace: &mut Trace,
+) -> (Selected<'l>, Vec<Unexplained>) {
+    let told = |selected: &Selected<'l>| -> Vec<f64> {
+        told_from_zero(problem, selected, &uncertainty::known(problem, selected), noise)
+    };
+    let mut aside = Vec::new();
+    while selected.terms.iter().filter(|term| term.law.named()).count() > 1 {
+        let now = told(&selected);
+        let standings = standings(problem, &selected);
+        let mut doubtful: Vec<usize> =
+            (0..selected.terms.len()).filter(|k| selected.terms[*k].law.named() && now[*k] < TOLD_FROM_ZERO).collect();
+        doubtful.sort_by(|a, b| standings[*a].size.total_cmp(&standings[*b].size));
+        let without = |k: usize| -> Option<Selected<'l>> {
+            let mut terms = selected.terms.clone();
+            terms.remove(k);
+            let less = select::settle(problem, Selected { fit: fit(problem, &terms)?, terms })?;
+            let then = told(&less);
+            let is_told = |j: usize| then[j - usize::from(j > k)] >= TOLD_FROM_ZERO;
+            let larger = doubtful.iter().skip_while(|j| **j != k).skip(1);
+            larger.copied().any(is_told).then_some(less)
+        };
+        let Some((k, less)) = doubtful.iter().find_map(|k| Some((*k, without(*k)?))) else { break };
+        let gone = &selected.terms[k];
+        let gates = vec![Judged::above(Gate::ToldFromZero, now[k], TOLD_FROM_ZERO)];
+        trace.judged(Stage::Understood, gone.law, &gone.values(), gates);
+        aside.push(Unexplained { looks_like: gone.law.label.to_string(), size_arcsec: standings[k].size });
+        selected = less;
+    }
+    (selected, aside)
 }
 
 /// By what standard deviations grow where more is left than noise (Birge 1932): the laws are not right to the noise then, and what they err by is

@@ -122,21 +122,29 @@ fn rate(on: &Excitation<'_>, values: &[f64]) -> Vec<f64> {
 
 /// The output is read later than the generator.
 fn sensor_latency() -> Law {
-    Law::new(CauseName::SensorLatency, |on, _| {
+    let mut law = Law::new(CauseName::SensorLatency, |on, _| {
         let per_s = crate::units::ARCSEC_PER_RAD / on.nominal.ratio;
         let begun = on.scales.begin_s + 0.5 * on.scales.duration_s;
+        let behind = |values: &[f64]| rate(on, values).into_iter().map(|by| -by).collect::<Vec<f64>>();
+        let of_angle: Vec<f64> =
+            on_its_flank(on).iter().zip(&on.base.wind_up).map(|(all, wind_up)| all - wind_up).collect();
         let since = |k: usize| 2.0 * (on.rows.time[k] - begun) / on.scales.duration_s.max(1e-9);
         vec![
             main(by_row(on, |k| -on.rows.speed[k] * per_s), 5e-3).called(Role::SIZE),
             // Two clocks seldom run at the same rate.
             nuisance(by_row(on, |k| -on.rows.speed[k] * per_s * since(k)), 0.3),
-            // If it is the output, and not the generator that is read early, its error is that of the instant before as well, …
-            nuisance(rate(on, &on_its_flank(on)).into_iter().map(|by| -by).collect(), 1.0),
-            // … and a motor that gathers speed was slower then.
+            // The error is that of the instant at which the output was read: its waves are where the generator was then, …
+            nuisance(behind(&of_angle), 1.0),
+            // … and so is its wind-up, if it is the output that is read early, and not the generator; …
+            nuisance(behind(&on.base.wind_up), 1.0),
+            // … a motor that gathers speed was slower then.
             nuisance(rate(on, &on.rows.speed).into_iter().map(|by| 0.5 * by * per_s).collect(), DELAY_S),
         ]
     })
-    .parameters_by(|_, _, c| vec![(Name::DelayS, c.of(Role::SIZE))])
+    .parameters_by(|_, _, c| vec![(Name::DelayS, c.of(Role::SIZE))]);
+    // Of a long delay in fast motion what comes with it is more than noise.
+    law.search.free_form = true;
+    law
 }
 
 /// The error grows with the angle: the ratio is not what the nominal model says.

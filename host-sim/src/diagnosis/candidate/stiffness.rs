@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::super::prepare::Jump;
 use super::super::rows::rms;
 use super::geometry::{Angle, angle, pulse, weighted_waves};
-use super::{Excitation, Law, Role, Shape, by_row, history, main, nuisance};
+use super::{Coefficients, Excitation, Law, Role, Shape, Shaped, by_row, history, main, nuisance};
 use crate::causes::{CauseName, ParameterName as Name};
 use crate::units::ARCSEC_PER_TURN;
 
@@ -74,6 +74,15 @@ const FASTER: Role = Role("faster");
 /// A jump by whole teeth.
 const JUMP: Role = Role("jump");
 
+/// Half the opening of a loop at no torque, arcsec: on the way back from the full load an element holds this share of what it can when the torque
+/// passes zero.
+fn half_width(full: f64, shape: Shaped<'_>, c: Coefficients<'_>) -> f64 {
+    let slips = shape.of(Name::SlipTorqueNM);
+    let held = |slip: f64| ((full - slip) / slip).clamp(0.0, 1.0);
+    let springs = [(1.0, SPRING), (EARLIER, EARLIER_SPRING), (LATER, LATER_SPRING)];
+    springs.iter().map(|(factor, role)| c.of(*role) * held(factor * slips)).sum()
+}
+
 /// Springs that slip one after the other (Maxwell slip, Prandtl-Ishlinskii): the output lags the torque by what they hold.
 fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     let load = on.scales.load;
@@ -99,16 +108,11 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     .whole()
     .evaluated_on_averages()
     .shapes([Shape::by_factors(Name::SlipTorqueNM, 0.03 * load, 1.0 * load, 6)])
-    .parameters_by(|on, shape, c| {
-        let slips = shape.of(Name::SlipTorqueNM);
-        // On the way back from the full load an element holds this share of what it can when the torque passes zero.
-        let full = on.scales.load;
-        let held = |slip: f64| ((full - slip) / slip).clamp(0.0, 1.0);
-        let springs = [(1.0, SPRING), (EARLIER, EARLIER_SPRING), (LATER, LATER_SPRING)];
-        let half_width: f64 = springs.iter().map(|(factor, role)| c.of(*role) * held(factor * slips)).sum();
-        vec![(Name::HalfWidthArcsec, half_width), (Name::SlipTorqueNM, slips)]
+    .parameters_by(move |_, shape, c| {
+        vec![(Name::HalfWidthArcsec, half_width(load, shape, c)), (Name::SlipTorqueNM, shape.of(Name::SlipTorqueNM))]
     })
-    .physical_if(|_, c| c.of(SPRING) > 0.0);
+    // All springs together take work; of three that stand for many one may be too much.
+    .physical_if(move |shape, c| half_width(load, shape, c) > 0.0);
     // Three elements stand for the many of a real drive: where the load passes zero they hold about, not exactly, as much (a fifth to a
     // quarter less than springs that give way smoothly, hidden in made-up data).
     law.wrong.doubt = 0.15;
@@ -269,6 +273,38 @@ fn wear(by: Progress) -> Law {
     .evaluated_on_averages()
 }
 
+/// What the clearance has widened by between two sessions.
+const STEP: Role = Role("step between sessions");
+/// A clearance that is narrower in a session than before does not wear; nor does one that is by less than this share of all its growth. *Guess*.
+const NOT_NARROWER: f64 = 0.1;
+/// Fewest sessions and most in which wear may go on between them.
+const SESSIONS: std::ops::RangeInclusive<usize> = 3..=12;
+
+/// A clearance that widens with travel, and while nobody records: the drive works on between the sessions.
+fn wear_between_sessions(on: &Excitation<'_>) -> Option<Law> {
+    let sessions: Vec<std::ops::Range<usize>> = on.rows.sessions_used().collect();
+    if !SESSIONS.contains(&sessions.len()) {
+        return None;
+    }
+    let law = Law::new(CauseName::Wear, move |on, _| {
+        let travel = on.scales.travel.max(1e-12);
+        let of_path = by_row(on, |k| on.base.flank[k] * on.rows.travel[k] / travel);
+        let from =
+            |session: &std::ops::Range<usize>| by_row(on, |k| if k >= session.start { on.base.flank[k] } else { 0.0 });
+        let mut columns = vec![main(of_path, 30.0).called(STEP)];
+        columns.extend(on.rows.sessions_used().skip(1).map(|session| main(from(&session), 30.0).called(STEP)));
+        columns
+    })
+    .parameters_by(|_, _, c| vec![(Name::GrowthArcsec, 2.0 * c.all(STEP).sum::<f64>())])
+    .physical_if(|_, c| {
+        let growth: f64 = c.all(STEP).sum();
+        growth > 0.0 && c.all(STEP).all(|step| step > -NOT_NARROWER * growth)
+    })
+    .well_known()
+    .evaluated_on_averages();
+    Some(law)
+}
+
 /// Teeth that skipped: the output is off by whole teeth from then on.
 fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
     let pitch = ARCSEC_PER_TURN / f64::from(on.nominal.teeth?.circular_spline);
@@ -308,6 +344,7 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     if on.scales.load > 0.0 {
         laws.push(wear(Progress::Work));
     }
+    laws.extend(wear_between_sessions(on).filter(|_| on.rows.recorded.time));
     laws.extend(ratcheting(on));
     laws
 }

@@ -54,6 +54,9 @@ const MOST_LATE: f64 = 0.35;
 const UNTOLD: f64 = 2.0;
 /// Rows in which the generator turns by more do not follow the waves of a drive, rad. *Guess*.
 const FOLLOWED_RAD: f64 = 0.25;
+/// A step of the time by more than so many usual ones is a pause: rows on both sides of it, as of a bench that goes from stop to stop, tell
+/// nothing of how they are read. *Guess*: a missing row is a step of two.
+const PAUSE: f64 = 2.5;
 /// Scatter of readings is white: of the scatter of a row and of the next, -56/70 is common, within this. What swings has more or less.
 const WHITE: f64 = 0.08;
 /// Rows that are late one after another, at most.
@@ -76,6 +79,8 @@ struct Reads<'a> {
     speed: Vec<f64>,
     /// Faster rows are too far apart to tell their scatter from waves of the drive.
     fastest: f64,
+    /// Pauses before each row.
+    pauses: Vec<usize>,
     /// Rows, in order.
     good: Vec<usize>,
 }
@@ -91,7 +96,13 @@ impl<'a> Reads<'a> {
             })
             .collect();
         let fastest = FOLLOWED_RAD / gear.ratio.abs();
-        Reads { error: Cow::Borrowed(&session.error_rad), speed, fastest, good: (0..rows).collect() }
+        let pauses = pauses(session);
+        Reads { error: Cow::Borrowed(&session.error_rad), speed, fastest, pauses, good: (0..rows).collect() }
+    }
+
+    /// Whether there is no pause from one row to another.
+    fn goes_on(&self, from: usize, to: usize) -> bool {
+        self.pauses[from] == self.pauses[to]
     }
 
     /// By how much some good rows (a run from place `from` among them) are off the cubic through the two good rows before and after,
@@ -100,7 +111,7 @@ impl<'a> Reads<'a> {
         let at = |place: usize| self.good.get(place).copied();
         let beside = [at(from.checked_sub(2)?)?, at(from - 1)?, at(from + run)?, at(from + run + 1)?];
         // Neighbours in time, not across what was left out.
-        if beside[3] - beside[0] > 2 * (run + 4) {
+        if beside[3] - beside[0] > 2 * (run + 4) || !self.goes_on(beside[0], beside[3]) {
             return None;
         }
         let x: [f64; 4] = std::array::from_fn(|k| (beside[k] - beside[0]) as f64);
@@ -122,11 +133,25 @@ impl<'a> Reads<'a> {
     /// Row and scatter of each good row whose four neighbours are good: (-1, 4, -6, 4, -1) / 6 of the errors.
     fn scatter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         let slow = |row: usize| self.speed[row].abs() <= self.fastest;
-        self.good.windows(5).filter(move |rows| rows[4] - rows[0] == 4 && slow(rows[2])).map(|rows| {
+        let beside = move |rows: &&[usize]| rows[4] - rows[0] == 4 && slow(rows[2]) && self.goes_on(rows[0], rows[4]);
+        self.good.windows(5).filter(beside).map(|rows| {
             let e = |k: usize| self.error[rows[k]];
             (rows[2], (6.0 * e(2) - 4.0 * (e(1) + e(3)) + e(0) + e(4)) / 6.0)
         })
     }
+}
+
+/// How many pauses there are before each row; none without time.
+fn pauses(session: &Session) -> Vec<usize> {
+    let Some(time) = &session.time_s else { return vec![0; session.len()] };
+    let steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let longest = PAUSE * median_of(&mut steps.clone());
+    let mut pauses = 0;
+    let after = steps.iter().map(|step| {
+        pauses += usize::from(*step > longest);
+        pauses
+    });
+    [0].into_iter().chain(after).take(time.len()).collect()
 }
 
 /// Variance of the scatter of a row against that of its error.
@@ -543,5 +568,23 @@ mod tests {
             let (session, measures) = checked(jitter_s, 0.0);
             assert!(measures.is_none() && session.loudness.is_none(), "{jitter_s}: {measures:?}");
         }
+    }
+
+    #[test]
+    fn a_bench_that_goes_from_stop_to_stop_tells_nothing_of_its_reads_while_it_moves_on() {
+        let mut random = fastrand::Rng::with_seed(5);
+        let mut session = Session { time_s: Some(Vec::new()), ..Session::default() };
+        for k in 0..20_000u32 {
+            let (stop, read) = (f64::from(k / 7), f64::from(k % 7));
+            let psi = 0.9 * stop;
+            let error = 12.0 * (2.0 * psi).sin() + 2.0 * normal(&mut random);
+            session.line.push(u64::from(k) + 2);
+            session.time_s.as_mut().unwrap().push(1.625 * stop + 0.125 * read);
+            session.generator_rad.push(psi);
+            session.error_rad.push(error * ARCSEC);
+        }
+        let mut findings = Findings::default();
+        check(std::slice::from_mut(&mut session), &Gear::of_ratio(RATIO), &mut findings);
+        assert!(findings.faults.is_empty() && session.loudness.is_none(), "{:?}", findings.faults);
     }
 }

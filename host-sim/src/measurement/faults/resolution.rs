@@ -6,7 +6,7 @@ use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
-use crate::measurement::robust::white_noise;
+use crate::measurement::robust::{median_of, white_noise};
 
 /// Steps at the output below this are those of good encoders (19 bits a turn), and below what a drive repeats.
 const COARSE_RAD: f64 = 2.5 * ARCSEC;
@@ -17,9 +17,11 @@ const BLURRED: f64 = 0.7;
 const SEEN: f64 = 0.15;
 /// …or the channel stands in this share of the rows while the other one moves…
 const STANDS: f64 = 0.3;
-/// …or, in even motion, its changes from row to row are uneven by a step in this share. A generator that is commanded from one round number
-/// to the next lies on a lattice too, and is exact.
+/// …or, in even motion, its changes from row to row are uneven by a step in this share.
 const UNEVEN: f64 = 0.1;
+/// A generator that goes from stop to stop by the same angle lies on a lattice too, and is exact. What is rounded is in the error, which differs
+/// by 0.4 steps on the mean from one reading to another: where half of them differ by less than this share, nothing is. *Guess*.
+const ROUNDED: f64 = 0.1;
 
 /// Resolutions that show in the data, in rad at the output.
 pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> Vec<(Quantity, f64)> {
@@ -54,10 +56,17 @@ pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> V
     }
     if let Some(step) = lattice(generator)
         && (uneven(generator, step) >= UNEVEN || stands(generator, &output, 1e-3 * step) >= STANDS)
+        && differs(generator, &session.error_rad, step) >= ROUNDED * step / gear.ratio.abs()
     {
         found.push((Quantity::Generator, step / gear.ratio.abs()));
     }
     found
+}
+
+/// By how much the error differs, at the median, from one row to the next where a channel has moved by a step or more, rad.
+fn differs(channel: &[f64], error: &[f64], step: f64) -> f64 {
+    let moved = (1..channel.len()).filter(|row| (channel[*row] - channel[row - 1]).abs() > 0.5 * step);
+    median_of(&mut moved.map(|row| (error[row] - error[row - 1]).abs()).collect::<Vec<f64>>())
 }
 
 /// Names a resolution of output or generator that is coarse at the output; nothing can be done about it but to know that rounding is a noise.
@@ -86,4 +95,44 @@ pub(in crate::measurement) fn check(
         findings.faults.push(fault);
     }
     sessions.iter_mut().for_each(|session| session.coarse_rad = coarsest);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATIO: f64 = 100.0;
+
+    fn session(rows: u32, generator: impl Fn(f64) -> f64, read_as: impl Fn(f64) -> f64) -> Session {
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut session = Session::default();
+        for k in 0..rows {
+            let psi = generator(f64::from(k));
+            let noise = (random.f64() + random.f64() + random.f64() - 1.5) * 2.0;
+            let output = psi / RATIO + (15.0 * (2.0 * psi).sin() + 1.7 * noise) * ARCSEC;
+            session.line.push(u64::from(k) + 2);
+            session.generator_rad.push(read_as(psi));
+            session.error_rad.push(output - read_as(psi) / RATIO);
+        }
+        session
+    }
+
+    fn of_generator(session: Session) -> Option<f64> {
+        let found = seen(&[session], &Gear::of_ratio(RATIO), false);
+        found.into_iter().find(|(channel, _)| *channel == Quantity::Generator).map(|(_, step)| step)
+    }
+
+    #[test]
+    fn stops_at_even_distances_are_no_resolution() {
+        // Seven readings at each stop.
+        let stops = |k: f64| 1.1 * (k / 7.0).floor();
+        assert_eq!(of_generator(session(6000, stops, |psi| psi)), None);
+    }
+
+    #[test]
+    fn a_coarse_encoder_of_a_generator_that_turns_on_is_one() {
+        // Steps of 0.1 rad of the generator are 206 arcsec at the output.
+        let found = of_generator(session(6000, |k| 0.037 * k, |psi| 0.1 * (psi / 0.1).floor()));
+        assert!((found.expect("coarse") * RATIO - 0.1).abs() < 1e-3, "{found:?}");
+    }
 }

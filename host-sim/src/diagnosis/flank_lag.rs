@@ -1,0 +1,95 @@
+//! How long the output takes to its other flank, found where the flank changes and nowhere else: a lag that is known to first order alone
+//! leaves of one of 10 ms what passes for a hysteresis.
+
+use std::ops::Range;
+
+use super::base::FLANK_S;
+use super::rows::Rows;
+
+/// Lags that are tried beyond [`FLANK_S`], and the longest, s. *Guess*: a load behind a clearance takes some milliseconds, and what takes
+/// longer swings.
+const LONGER: f64 = std::f64::consts::SQRT_2;
+const LONGEST_S: f64 = 0.06;
+/// Rows this long before a change of flank and after it tell of the lag, s. *Guess*: five of the longest lags.
+const BEFORE_S: f64 = 0.05;
+const AFTER_S: f64 = 0.3;
+/// A lag is another one where it lowers the misfit by this: five standard deviations, as between rivals. *Source*.
+const TOLD_APART: f64 = 25.0;
+/// What the lag explains is the way through the clearance, as wide as drives have it, … *Guess*.
+const WAY: Range<f64> = 0.5..1.6;
+/// … and this share of all that moves there beyond noise: a load that swings to and fro leaves most of it. *Guess*.
+const LEAST_SHARE: f64 = 0.5;
+
+/// The lag, s, with which the output follows a change of flank; [`FLANK_S`] where the rows tell no other. `left` is the error less what is
+/// predicted with `flank`, arcsec.
+pub(super) fn flank_lag(rows: &Rows, left: &[f64], flank: &[f64], half_backlash: f64) -> f64 {
+    let windows = windows(rows, flank);
+    let data = straightened(left, &windows);
+    let all = dot(&data, &data);
+    let gain = |lag_s: f64| -> (f64, f64) {
+        let column = straightened(&behind(rows, flank, half_backlash, lag_s), &windows);
+        let (along, square) = (dot(&column, &data), dot(&column, &column).max(f64::MIN_POSITIVE));
+        (along * along / square, along / square)
+    };
+    let (usual, _) = gain(FLANK_S);
+    let longer = std::iter::successors(Some(FLANK_S * LONGER), |lag| Some(lag * LONGER));
+    let tried = longer.take_while(|lag| *lag <= LONGEST_S * LONGER).map(|lag| (lag, gain(lag)));
+    let Some((lag_s, (best, way))) = tried.max_by(|a, b| a.1.0.total_cmp(&b.1.0)) else { return FLANK_S };
+    // From row to row the lag hardly moves: there the noise is.
+    let noise = 0.5 * data.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum::<f64>();
+    let variance = (all - best) / data.len().max(1) as f64;
+    let clear = best - usual > TOLD_APART * variance && best > LEAST_SHARE * (all - noise);
+    if clear && WAY.contains(&way) { lag_s } else { FLANK_S }
+}
+
+/// What the error lacks as the output follows a change of flank with a lag, arcsec.
+pub(super) fn behind(rows: &Rows, flank: &[f64], half_backlash: f64, lag_s: f64) -> Vec<f64> {
+    let mut behind = vec![0.0; rows.len()];
+    for session in rows.sessions.iter().filter(|session| !session.is_empty()) {
+        let mut reached = flank[session.start];
+        for k in session.start + 1..session.end {
+            let passed = (rows.time[k] - rows.time[k - 1]).max(0.0);
+            reached += (flank[k] - reached) * (1.0 - (-passed / lag_s).exp());
+            behind[k] = half_backlash * (reached - flank[k]);
+        }
+    }
+    behind
+}
+
+/// Rows about each change from one flank to the other, none of them twice.
+fn windows(rows: &Rows, flank: &[f64]) -> Vec<Range<usize>> {
+    let mut windows: Vec<Range<usize>> = Vec::new();
+    for session in rows.sessions_used() {
+        let mut from = session.start;
+        let mut changes =
+            (session.start + 1..session.end).filter(|k| flank[*k] * flank[*k - 1] < 0.0).collect::<Vec<usize>>();
+        changes.push(session.end);
+        for pair in changes.windows(2) {
+            let (change, next) = (pair[0], pair[1]);
+            let begins = (from..change).find(|k| rows.time[change] - rows.time[*k] <= BEFORE_S).unwrap_or(change);
+            let ends = (change..next).find(|k| rows.time[*k] - rows.time[change] > AFTER_S).unwrap_or(next);
+            windows.push(begins..ends);
+            from = ends;
+        }
+    }
+    windows
+}
+
+/// Values of windows less the straight line in each.
+fn straightened(values: &[f64], windows: &[Range<usize>]) -> Vec<f64> {
+    windows.iter().flat_map(|window| straight(&values[window.clone()])).collect()
+}
+
+fn straight(values: &[f64]) -> Vec<f64> {
+    let middle = 0.5 * (values.len() as f64 - 1.0);
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let at = |k: usize| k as f64 - middle;
+    let square: f64 = (0..values.len()).map(|k| at(k).powi(2)).sum();
+    let along: f64 = values.iter().enumerate().map(|(k, value)| at(k) * value).sum();
+    let slope = if square > 0.0 { along / square } else { 0.0 };
+    values.iter().enumerate().map(|(k, value)| value - mean - slope * at(k)).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
