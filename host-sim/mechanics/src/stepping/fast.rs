@@ -599,3 +599,48 @@ impl Wheels for CondensedWheels<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drive::{Drive, GeneratorKind};
+    use crate::mesh::MeshLevel;
+    use crate::stepping::near::configuration;
+    use crate::stepping::{Method, SolverSettings};
+
+    /// A step that was solved without a tooth's flanks moves the tooth alone; following it, the flanks bear no force, as before.
+    #[test]
+    fn flanks_that_come_near_after_a_step_was_solved_stay_with_their_teeth() {
+        let drive = Drive::hhd_95();
+        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
+        let problem = Problem::new(&drive, GeneratorKind::Cam, drive.temperature.reference_c, settings).unwrap();
+        let mut wheels = CondensedWheels::new(&problem, problem.condensed.as_ref().unwrap());
+        let mut state = problem.starting_shape(0.0);
+        wheels.complete(&mut state);
+        let mut step = vec![0.0; wheels.unknowns()];
+        wheels.assemble(&state, &mut step);
+        assert!(wheels.factorise(1.0));
+        wheels.solve(&mut step, 1);
+
+        let near = problem.flanks().near_pairs(configuration(&state), 0.1);
+        wheels.prepare(&near, &Vec::new);
+        state.u.iter_mut().zip(&step).for_each(|(u, d)| *u += d);
+        let left_behind = largest_on_flanks(&mut wheels, &near, &state);
+        wheels.follow(&mut state);
+        let followed = largest_on_flanks(&mut wheels, &near, &state);
+        assert!(
+            near.len() > 20 && left_behind > 1e6 * followed,
+            "{} pairs: {left_behind} and {followed} N",
+            near.len()
+        );
+    }
+
+    /// Largest force of the elements on a flank node of these teeth, N/mm.
+    fn largest_on_flanks(wheels: &mut CondensedWheels<'_>, near: &[FlankPair], state: &State) -> f64 {
+        let mut force = vec![0.0; wheels.unknowns()];
+        wheels.assemble(state, &mut force);
+        let flanks = wheels.problem.flanks();
+        let nodes = near.iter().flat_map(|pair| flanks.fs_nodes(*pair));
+        nodes.flat_map(|n| [force[2 * n], force[2 * n + 1]]).fold(0.0, |most, f| most.max(f.abs()))
+    }
+}

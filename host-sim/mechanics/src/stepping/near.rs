@@ -50,6 +50,12 @@ impl NearPairs {
         self.searched_until = self.moved;
     }
 
+    /// Whether a pair that was taken for open bears in this state.
+    pub fn missed(&self, flanks: &FlankContact, at: Configuration) -> bool {
+        let taken_for_open = self.pairs.iter().filter(|(_, near)| self.moved < near.open_until);
+        taken_for_open.map(|(pair, _)| flanks.smallest_gap(*pair, at)).any(|gap| gap < 0.0)
+    }
+
     /// Takes no pair for open any more.
     pub fn look_again(&mut self) {
         self.pairs.values_mut().for_each(|near| near.open_until = 0.0);

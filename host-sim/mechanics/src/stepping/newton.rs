@@ -238,7 +238,7 @@ impl<'p> Solver<'p> {
         for softening in [1e-3, 1.0] {
             // Nothing but drag holds the output: what has to be found here is where it stands, so no stage ends early.
             (self.softening, self.assembling, self.careful) = (softening, true, true);
-            let solved = self.newton(&state, generator_rad, 0.0);
+            let solved = self.newton(&state, &state, generator_rad, 0.0);
             (self.softening, self.assembling, self.careful) = (1.0, false, false);
             let (next, mut increment) = solved?;
             iterations += increment.iterations;
@@ -318,9 +318,12 @@ impl<'p> Solver<'p> {
     pub fn jump(&mut self, from: &State, generator_rad: f64) -> Result<(State, Increment), SolveError> {
         // The output goes on at its mean rate, whatever it did last.
         let from = &State { output_rate: 1.0 / self.problem.drive.ratio(), ..from.clone() };
-        let solved = self.newton_softly(from, generator_rad, from.torque_n_m, &JUMPING_SOFTNESS)?;
-        self.problem.check_range(&solved.0)?;
-        Ok(solved)
+        self.careful = true;
+        let solved = self.newton_softly(from, generator_rad, from.torque_n_m, &JUMPING_SOFTNESS);
+        self.careful = false;
+        let (state, increment) = solved?;
+        self.problem.check_range(&state)?;
+        Ok((state, increment))
     }
 
     /// One part of an increment. A load that changes has no predictor: unless the load that there is shows the way, a soft contact finds it
@@ -333,16 +336,17 @@ impl<'p> Solver<'p> {
         torque_n_m: f64,
     ) -> Result<(State, Increment), SolveError> {
         if torque_n_m == from.torque_n_m {
-            return self.newton(from, generator_rad, torque_n_m);
+            return self.newton(from, from, generator_rad, torque_n_m);
         }
         let share = from.torque_n_m / torque_n_m;
         let shows_the_way = (SHOWS_THE_WAY..=SHOWS_THE_WAY.recip()).contains(&share);
         let mut last = None;
-        for way in if shows_the_way {
+        let ways = if shows_the_way {
             [Way::Directly, Way::Softly, Way::Carefully]
         } else {
             [Way::Softly, Way::Directly, Way::Carefully]
-        } {
+        };
+        for way in ways {
             self.careful = way == Way::Carefully;
             let softness = if way == Way::Directly { &DIRECTLY[..] } else { &LOADING_SOFTNESS };
             let solved = self.newton_softly(from, generator_rad, torque_n_m, softness);
@@ -367,7 +371,7 @@ impl<'p> Solver<'p> {
         let mut iterations = 0;
         for &softening in softness {
             self.softening = softening;
-            let solved = self.newton(&guess, generator_rad, torque_n_m);
+            let solved = self.newton(from, &guess, generator_rad, torque_n_m);
             self.softening = 1.0;
             let (state, mut increment) = solved?;
             iterations += increment.iterations;
@@ -375,13 +379,19 @@ impl<'p> Solver<'p> {
                 increment.iterations = iterations;
                 return Ok((state, increment));
             }
-            // History is that of the start, not of the guess.
-            guess = State { drag_anchor_rad: from.drag_anchor_rad, friction: from.friction.clone(), ..state };
+            guess = state;
         }
         unreachable!("the last softening is 1")
     }
 
-    fn newton(&mut self, from: &State, generator_rad: f64, torque_n_m: f64) -> Result<(State, Increment), SolveError> {
+    /// Equilibrium at this angle and load, looked for from `guess`; slip and drag are counted from the state `from`.
+    fn newton(
+        &mut self,
+        from: &State,
+        guess: &State,
+        generator_rad: f64,
+        torque_n_m: f64,
+    ) -> Result<(State, Increment), SolveError> {
         let settings = self.problem.settings;
         let largest_step = LARGEST_STEP * self.problem.drive.flexspline.module_mm;
         let hurries = self.softening < 1.0 && !self.careful;
@@ -393,17 +403,18 @@ impl<'p> Solver<'p> {
             reason,
             history,
         };
-        let mut state = self.passed.predict(self.problem, from, generator_rad, torque_n_m);
+        let predicted = self.passed.predict(self.problem, guess, generator_rad, torque_n_m);
+        let mut state = State { drag_anchor_rad: from.drag_anchor_rad, friction: from.friction.clone(), ..predicted };
         self.problem.lean(&mut state);
         let mut near = NearPairs::default();
         self.balance_output(&mut state, from, torque_n_m, &mut near);
         let mut residual = self.assemble(&mut state, from, torque_n_m, &mut near);
         let mut history = Vec::new();
         let mut last_length = 1.0;
-        let mut looked_back = false;
+        let (mut looked_back, mut looked_at_all) = (false, false);
         let mut chords: Vec<Step> = Vec::new();
-        let steady = self.softening == 1.0 && self.passed.go_on(from, torque_n_m);
-        let mut recalled = steady && generator_rad != from.generator_rad && self.recall(generator_rad);
+        let steady = self.softening == 1.0 && self.passed.go_on(guess, torque_n_m);
+        let mut recalled = steady && generator_rad != guess.generator_rad && self.recall(generator_rad);
         // A new layout of the contact is a new start, up to a few times.
         let most_iterations = settings.max_iterations * if self.patient { PATIENCE } else { 1 };
         let (mut last_iteration, mut layouts) = (most_iterations, 0);
@@ -414,6 +425,12 @@ impl<'p> Solver<'p> {
                 return Err(failed(history, "the residual is not finite"));
             }
             if relative <= tolerance {
+                if !looked_at_all && near.missed(&self.flanks, configuration(&state)) {
+                    looked_at_all = true;
+                    near.look_again();
+                    residual = self.assemble(&mut state, from, torque_n_m, &mut near);
+                    continue;
+                }
                 // The contact was laid out for the predicted state; where the corner of a space ended elsewhere, again.
                 if near.layouts_fit(&self.flanks, configuration(&state)) {
                     let Some(compliance) = self.compliance(&residual) else {
@@ -422,7 +439,7 @@ impl<'p> Solver<'p> {
                     let increment = self.report(&state, &residual, compliance, history.len() - 1);
                     self.wheels.complete(&mut state);
                     self.finish(&mut state, from, &near);
-                    if generator_rad != from.generator_rad {
+                    if generator_rad != from.generator_rad && self.softening == 1.0 {
                         if !self.passed.remember(self.problem, &state) {
                             self.tangents.clear();
                         }
