@@ -276,8 +276,9 @@ fn teeth_that_interfere_and_stress_that_no_steel_bears_are_said() {
     let text = desk.line(&binds).done().stdout;
     assert!(text.contains("caution: the teeth of the drawing interfere by 8.9 um"), "{text}");
     let tables = "tables --generator cam --mesh coarse --torque-n-m 20 --most-nodes 5 --positions 4 --temperatures-c 20 \
-                  --set circular_spline.profile_shift=2.95";
+                  --stress --set circular_spline.profile_shift=2.95";
     let said = desk.line(tables).done().stdout;
+    assert_eq!(said.matches("cam          stress under the largest load").count(), 3, "{said}");
     assert!(said.contains("cam: caution: the teeth of the drawing interfere"), "{said}");
     assert!(desk.read("out/report.html").contains("class=\"stamp caution\""));
 }
@@ -385,7 +386,7 @@ fn a_study_agrees_with_the_table_of_the_same_drive_and_tells_every_variant() {
         ("study --vary generator.w0_mm=0.5 --least bore_mpa --most bore_mpa", "found bore_mpa twice"),
         (
             "study -g cam --vary generator.w0_mm=0.5 --keep last_stable_n_m=300..",
-            "is 200 N.m, where the search for it ends",
+            "with the cam generator is 200 N.m, where the search for it ends",
         ),
     ] {
         let run = desk.line(&format!("{wrong} --out nothing"));

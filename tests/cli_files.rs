@@ -123,6 +123,16 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
     let guesses = made["next"][2].as_str().unwrap().strip_prefix("flexspline ").unwrap();
     let with_cup = desk.line(&format!("{guesses} --json")).done().json();
     assert_eq!(with_cup["left_out"].as_array().unwrap().len(), 2);
+    // What was asked for stays in that command, and what was set is not guessed.
+    let own =
+        "new wide.toml --like CSG-25-80 --bore 62.4 --width 40 --set generator.bearing_stiffness_n_per_mm3=5000 --json";
+    let guesses = desk.line(own).done().json()["next"][2].as_str().unwrap().to_owned();
+    let with_cup = desk.line(&format!("{} --json", guesses.strip_prefix("flexspline ").unwrap())).done().json();
+    assert_eq!(with_cup["left_out"].as_array().unwrap().len(), 2, "{guesses}");
+    let wide = desk.line("drive --drive wide.toml --json").done().json();
+    assert_eq!(wide["drive"]["flexspline"]["width_mm"], 40.0, "{guesses}");
+    assert_eq!(wide["drive"]["generator"]["bearing_stiffness_n_per_mm3"], 5000.0, "{guesses}");
+    assert!(desk.read("wide.toml").contains("half the bore of 62.4"), "{guesses}");
     // The rated torque of a CSF is not at hand, nor is anything of a ratio that is not in the catalogue.
     assert!(desk.line("new csf.toml --like CSF-25-80").done().stdout.contains("to be filled in: rated_torque_n_m"));
     assert!(desk.line("new odd.toml --like CSF-25-90").done().stdout.contains("figures of CSF-25-90 are not at hand"));

@@ -166,12 +166,12 @@ impl Stated {
             unit_scatter_percent: number("unit_scatter_percent", &PERCENT),
         };
         stated.source = section.given(file, "source", text);
-        // The rated torque may be below T2: catalogues have it so at ratio 50.
-        for (name, above) in [("t2", stated.t2_n_m), ("rated torque", stated.rated_torque_n_m)] {
+        // The rated torque may be below T2: catalogues have it so for some sizes at ratio 50 (CSG-32-50 and CSG-40-50).
+        for (name, above) in [("t2", stated.t2_n_m), ("rated_torque", stated.rated_torque_n_m)] {
             if let (Some(t1), Some(above)) = (stated.t1_n_m, above)
                 && t1 >= above
             {
-                let what = format!("found t1 {t1:?} and {name} {above:?}, allowed: t1 below the {name}");
+                let what = format!("found t1 {t1:?} and {name} {above:?}, allowed: t1 below {name}");
                 file.refuse_whole("data_sheet", what);
             }
         }
@@ -183,7 +183,7 @@ impl Stated {
         let usual = Loads::up_to(1.0);
         let by_t2 = self.t2_n_m.map(|t2| t2 / usual.t2_n_m);
         let by_t1 = self.t1_n_m.map(|t1| t1 / usual.t1_n_m);
-        let rated = self.rated_torque_n_m.filter(|_| !self.is_rated_below_t2());
+        let rated = self.rated_torque_n_m.filter(|_| !self.is_rated_within_t2());
         let largest_n_m = rated.or(by_t2).or(by_t1).unwrap_or(rated_n_m);
         let t2_n_m = match (self.t2_n_m, self.t1_n_m) {
             (Some(t2), _) => t2,
@@ -198,14 +198,19 @@ impl Stated {
         Loads { t1_n_m, t2_n_m, largest_n_m }
     }
 
-    /// Whether the rated torque ends below T2: K3 then takes a larger load.
-    fn is_rated_below_t2(&self) -> bool {
+    /// Whether the rated torque leaves no range above T2: K3 then takes a larger load.
+    fn is_rated_within_t2(&self) -> bool {
         self.rated_torque_n_m.zip(self.t2_n_m).is_some_and(|(rated, t2)| rated <= t2)
     }
 
-    /// The loads that it does not state, by their keys; the rated torque, too, if it is below T2 and the largest load is another.
+    /// Whether any of its loads is stated: the others then follow from it, whatever the size of the drive.
+    pub fn has_loads(&self) -> bool {
+        [self.t1_n_m, self.t2_n_m, self.rated_torque_n_m].iter().any(Option::is_some)
+    }
+
+    /// The loads that it does not state, by their keys; the rated torque, too, if it is not above T2 and the largest load is another.
     pub fn assumed(&self) -> Vec<&'static str> {
-        let rated = self.rated_torque_n_m.filter(|_| !self.is_rated_below_t2());
+        let rated = self.rated_torque_n_m.filter(|_| !self.is_rated_within_t2());
         let loads = [("t1_n_m", self.t1_n_m), ("t2_n_m", self.t2_n_m), ("rated_torque_n_m", rated)];
         loads.into_iter().filter(|(_, stated)| stated.is_none()).map(|(key, _)| key).collect()
     }
@@ -417,7 +422,7 @@ impl SheetBeside {
     /// The three loads in N·m, each that is not of the sheet marked as assumed.
     pub fn loads_in_words(&self) -> String {
         let Loads { t1_n_m, t2_n_m, largest_n_m } = self.loads;
-        let largest = if self.stated.is_rated_below_t2() { "largest" } else { "rated" };
+        let largest = if self.stated.is_rated_within_t2() { "largest" } else { "rated" };
         let loads = [("T1", "t1_n_m", t1_n_m), ("T2", "t2_n_m", t2_n_m), (largest, "rated_torque_n_m", largest_n_m)];
         let word = |(name, key, load): (&str, &str, f64)| {
             let assumed = if self.assumed.contains(&key) { " (assumed)" } else { "" };
@@ -431,11 +436,14 @@ impl SheetBeside {
         let keys = self.assumed.join(", ");
         let usual = Loads::up_to(100.0);
         let proportion = format!("T1 : T2 : rated = {} : {} : 100, as of a CSF-25-100", usual.t1_n_m, usual.t2_n_m);
-        if self.stated.is_rated_below_t2() {
+        if self.stated.is_rated_within_t2() {
             let rated = short(self.stated.rated_torque_n_m.unwrap_or_default());
-            return Some(format!(
-                "the rated torque of {rated} N.m is below T2, so the largest load, which K3 takes, is guessed: {proportion}"
-            ));
+            let guessed = if self.assumed.contains(&"t1_n_m") {
+                "t1_n_m, and the largest load, which K3 takes, are guessed"
+            } else {
+                "the largest load, which K3 takes, is guessed"
+            };
+            return Some(format!("the rated torque of {rated} N.m is not above T2, so {guessed}: {proportion}"));
         }
         match self.assumed.len() {
             0 => None,
@@ -522,7 +530,7 @@ mod tests {
             "{error}"
         );
         let error = refused("t1_n_m = 25\nt2_n_m = 7");
-        assert!(error.contains("found t1 25.0 and t2 7.0, allowed: t1 below the t2"), "{error}");
+        assert!(error.contains("found t1 25.0 and t2 7.0, allowed: t1 below t2"), "{error}");
     }
 
     #[test]
@@ -585,7 +593,7 @@ mod tests {
         }
     }
 
-    /// CSG-32-50 is rated at 99 N·m, and its T2 is 108 N·m.
+    /// CSG-32-50 is rated at 99 N·m, and its T2 is 108 N·m. A rated torque of T2 leaves nothing for K3 either.
     #[test]
     fn a_rated_torque_below_t2_is_taken_and_k3_has_a_larger_load() {
         let text = "base = \"HHD-95\"\n[data_sheet]\nt1_n_m = 29\nt2_n_m = 108\nrated_torque_n_m = 99\n";
@@ -599,9 +607,15 @@ mod tests {
             SheetBeside { generator: GeneratorKind::Cam, stated, loads, assumed, sheet, beside: Vec::new(), why: None };
         let text = told.text();
         assert!(
-            text.contains("T2 108 largest 150 (assumed) N.m") && text.contains("rated torque of 99 N.m is below T2"),
+            text.contains("T2 108 largest 150 (assumed) N.m")
+                && text.contains("rated torque of 99 N.m is not above T2, so the largest load, which K3 takes, is"),
             "{text}"
         );
+        let stated = Stated { t1_n_m: None, rated_torque_n_m: Some(108.0), ..told.stated };
+        let (loads, assumed) = (stated.loads(20.0), stated.assumed());
+        assert_eq!((loads.largest_n_m, &assumed[..]), (150.0, &["t1_n_m", "rated_torque_n_m"][..]));
+        let said = SheetBeside { stated, loads, assumed, ..told }.assumed_in_words().unwrap();
+        assert!(said.contains("108 N.m is not above T2, so t1_n_m, and the largest load"), "{said}");
     }
 
     /// Friction of the flanks widens the loop; without it the loop is the clearance. A torque that the drive bears is held.

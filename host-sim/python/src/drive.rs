@@ -2,14 +2,15 @@
 
 use flexspline_sim::drive::{Drive as Inner, GeneratorKind};
 use flexspline_sim::mesh::MeshLevel;
+use flexspline_sim::stated::Stated;
 use flexspline_sim::stepping::Method;
 use pyo3::prelude::*;
 
 use crate::failure::{Failure, bad};
 
-/// A drive that has passed every check.
+/// A drive that has passed every check, and what the `[data_sheet]` of its file says.
 #[pyclass(frozen, module = "flexspline._native")]
-pub struct Drive(pub Inner);
+pub struct Drive(pub Inner, pub Option<Stated>);
 
 #[pymethods]
 impl Drive {
@@ -22,22 +23,25 @@ impl Drive {
     /// The built-in drive of that name, if there is one.
     #[staticmethod]
     fn named(name: &str) -> Option<Drive> {
-        Inner::built_in(name).map(Drive)
+        Inner::built_in(name).map(|drive| Drive(drive, None))
     }
 
     /// The drive in the text of a file.
     #[staticmethod]
     fn from_toml(file_name: &str, text: &str) -> PyResult<Drive> {
-        Inner::from_toml(file_name, text).map(Drive).map_err(bad)
+        let drive = Inner::from_toml(file_name, text).map_err(bad)?;
+        Ok(Drive(drive, Stated::of_file(file_name, text).map_err(bad)?))
     }
 
     /// With fields changed, each `path=value`.
     fn with_sets(&self, sets: Vec<String>) -> PyResult<Drive> {
-        self.0.with_sets(sets.iter().map(String::as_str)).map(Drive).map_err(bad)
+        let drive = self.0.with_sets(sets.iter().map(String::as_str)).map_err(bad)?;
+        Ok(Drive(drive, self.1.clone()))
     }
 
+    /// The whole file, with the data sheet.
     fn to_toml(&self) -> String {
-        self.0.to_toml()
+        self.0.to_toml() + &self.1.as_ref().map_or_else(String::new, Stated::to_toml)
     }
 
     #[getter]

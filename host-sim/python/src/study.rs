@@ -30,7 +30,7 @@ pub fn study(
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<String> {
-    let drive = drive.0.clone();
+    let (drive, stated) = (drive.0.clone(), drive.1.clone());
     let mesh: MeshLevel = mesh.parse().map_err(bad)?;
     if torque_n_m.is_some_and(|torque| !(torque > 0.0 && torque.is_finite())) {
         return Err(bad(format!("torque_n_m: found {}, allowed: above 0", torque_n_m.unwrap_or_default())));
@@ -46,7 +46,7 @@ pub fn study(
         seed,
         generators: generators.iter().map(|name| generator(name)).collect::<Result<_, Failure>>()?,
         torque_n_m,
-        stated: None,
+        stated,
         positions,
         constraints: keep.iter().map(|text| text.parse::<Constraint>().map_err(bad)).collect::<PyResult<_>>()?,
         targets: least.chain(most).collect::<PyResult<_>>()?,

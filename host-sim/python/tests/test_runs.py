@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -169,6 +170,18 @@ def test_study_is_the_command(tmp_path: Path) -> None:
     theirs = read_json(tmp_path / "study.json")
     assert made.json["runs"] == theirs["runs"]
     assert flexspline.study("HHD-95", {"generator.w0_mm": "0.47..0.48"}, "cam", positions=4, variants=1).rows == 1
+
+
+def test_a_study_takes_the_loads_of_the_data_sheet_as_the_command_does(tmp_path: Path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text('base = "HHD-95"\n[data_sheet]\nt1_n_m = 7.0\nt2_n_m = 25.0\nrated_torque_n_m = 40.0\n', encoding="utf-8")
+    vary = "generator.w0_mm=0.48"
+    command("study", "--drive", file, "--vary", vary, "-g", "cam", "--positions", 4, "--out", tmp_path)
+    theirs = read_json(tmp_path / "study.json")
+    assert theirs["runs"][0]["loads"] == {"t1_n_m": 7.0, "t2_n_m": 25.0, "largest_n_m": 40.0}
+    # The sheet stays with a drive that is changed, and with one that is sent to another process.
+    for drive in (Drive(file), pickle.loads(pickle.dumps(Drive(file).set("generator.w0_mm=0.48")))):
+        assert flexspline.study(drive, {"generator.w0_mm": [0.48]}, "cam", positions=4).json["runs"] == theirs["runs"]
 
 
 def test_a_drive_is_what_its_file_says(tmp_path: Path) -> None:

@@ -13,6 +13,8 @@ use crate::drive::{Drive, DriveError, GeneratorKind, MadeDrive, RigidMesh};
 /// Length of a cup and its wall over the pitch diameter, thickness of its bottom over the wall, hub over the pitch radius: guesses, as in
 /// `catalogue_budget`. A cup is about half as long as wide, its wall about a hundredth.
 const CUP: [f64; 4] = [0.5, 0.011, 2.0, 0.5];
+/// Shortest tube of a cup, over the pitch diameter: a guess. Of a face wider than usual the cup is longer, not without a tube.
+const SHORTEST_TUBE: f64 = 0.1;
 /// Load of a ball for its stiffness, N, of a drive with a pitch diameter of 63.5 mm (size 25): between the 46 N below T1 and the 154 N above T2
 /// that contact FEM has there (docs/hermetic.md). Forces go with the square of the size.
 const BALL_N: f64 = 100.0;
@@ -62,19 +64,21 @@ pub(super) fn with_s_teeth(made: MadeDrive) -> Result<MadeDrive, Failure> {
     Ok(MadeDrive { drive, formulas })
 }
 
-/// Guesses of cup and balls in proportion, as `--set` takes them.
-pub(super) fn cup_and_balls(drive: &Drive) -> String {
+/// Guesses of cup and balls in proportion: fields and their values.
+pub(super) fn cup_and_balls(drive: &Drive) -> [(&'static str, String); 7] {
     let [length, wall, bottom, hub] = CUP;
     let pitch_mm = 2.0 * drive.flexspline.pitch_radius_mm();
     let wall_mm = wall * pitch_mm;
-    format!(
-        "sleeve.kind=cup,sleeve.bottom=plate,sleeve.wall_mm={wall_mm:.3},sleeve.bottom_side_mm={:.1},sleeve.bottom_thickness_mm={:.3},\
-         sleeve.hub_radius_mm={:.1},generator.bearing_stiffness_n_per_mm3={}",
-        length * pitch_mm - drive.flexspline.width_mm,
-        bottom * wall_mm,
-        0.5 * hub * pitch_mm,
-        balls_n_per_mm3(drive),
-    )
+    let tube_mm = (length * pitch_mm - drive.flexspline.width_mm).max(SHORTEST_TUBE * pitch_mm);
+    [
+        ("sleeve.kind", "cup".to_owned()),
+        ("sleeve.bottom", "plate".to_owned()),
+        ("sleeve.wall_mm", format!("{wall_mm:.3}")),
+        ("sleeve.bottom_side_mm", format!("{tube_mm:.1}")),
+        ("sleeve.bottom_thickness_mm", format!("{:.3}", bottom * wall_mm)),
+        ("sleeve.hub_radius_mm", format!("{:.1}", 0.5 * hub * pitch_mm)),
+        ("generator.bearing_stiffness_n_per_mm3", balls_n_per_mm3(drive).to_string()),
+    ]
 }
 
 /// What a drive leaves out that catalogue drives have and do not print, a few words each.
@@ -214,13 +218,17 @@ mod tests {
 
     #[test]
     fn cup_and_balls_can_be_added_as_they_are_told_and_are_then_not_left_out() {
-        let plain = made(160, 0.508).drive;
-        assert_eq!(left_out(&plain).len(), 4);
-        let whole = plain.with_set(&cup_and_balls(&plain)).unwrap();
-        whole.check().unwrap();
-        assert_eq!(left_out(&whole).len(), 2);
+        let sets = |drive: &Drive| cup_and_balls(drive).map(|(path, value)| format!("{path}={value}"));
+        // A face of the usual width, and one that is wider than a cup is long.
+        for width in ["flexspline.width_mm=17.5", "flexspline.width_mm=60"] {
+            let plain = made(160, 0.508).drive.with_set(width).unwrap();
+            assert_eq!(left_out(&plain).len(), 4);
+            let whole = plain.with_sets(sets(&plain).iter().map(String::as_str)).unwrap();
+            whole.check().unwrap();
+            assert_eq!(left_out(&whole).len(), 2);
+        }
         // Size 25, as its parts were taken one by one in hermetic.md: a wall of 0.7 mm.
         let size_25 = made(200, 0.3175).drive;
-        assert!(cup_and_balls(&size_25).contains("sleeve.wall_mm=0.699,"), "{}", cup_and_balls(&size_25));
+        assert!(sets(&size_25).contains(&"sleeve.wall_mm=0.699".to_owned()), "{:?}", sets(&size_25));
     }
 }

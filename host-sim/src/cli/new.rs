@@ -220,16 +220,22 @@ impl New {
         lines.iter().map(|line| format!("\n{line}")).collect()
     }
 
-    /// The command that makes this drive with guesses of cup and balls.
+    /// The command that makes this drive with guesses of cup and balls, of what is not set.
     fn with_guesses(&self, context: &Context, file: &str, drive: &Drive) -> String {
         let name = self.like.as_deref().map_or_else(String::new, quoted);
-        let generator = if self.generator == GeneratorKind::Cam {
-            String::new()
-        } else {
-            format!(" --generator {}", self.generator)
-        };
-        let command = context.next(&format!("new {file} --force --like {name}{generator}"));
-        format!("{command} --set {}", cup_and_balls(drive))
+        let mut words = format!("new {file} --force --like {name}");
+        for (option, size) in [("--bore", self.bore), ("--width", self.width)] {
+            words += &size.map_or_else(String::new, |size| format!(" {option} {size}"));
+        }
+        if self.generator != GeneratorKind::Cam {
+            words += &format!(" --generator {}", self.generator);
+        }
+        if self.kind.is_some() {
+            words += " --kind drive";
+        }
+        let guesses = cup_and_balls(drive).into_iter().filter(|(path, _)| !context.sets_field(path));
+        let sets: Vec<String> = guesses.map(|(path, value)| format!("{path}={value}")).collect();
+        format!("{} --set {}", context.next(&words), sets.join(","))
     }
 
     /// Whether S-shaped teeth are asked for, which are drawn for the cam.

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::names::{self, Generators};
 use super::{Context, Failure, report, say};
 use crate::data_sheet::{FIGURES, FigureOf};
-use crate::drive::GeneratorKind;
+use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
 use crate::output::Outputs;
 use crate::report::study_report;
@@ -19,7 +19,7 @@ use crate::stated::short;
 use crate::stepping::{Method, SolverSettings};
 use crate::study::{
     Asked, Basis, Constraint, Effect, LAST_STABLE, Nearest, Run, RunStatus, Sense, Study, StudyError, StudySettings,
-    Target, Trust, Vary, asked, effects, figure, nearest, study,
+    Target, Trust, Vary, asked, effects, figure, is_idle, nearest, study,
 };
 
 /// Targets where none are given: an exact drive, a stiff one, one that lasts.
@@ -162,7 +162,7 @@ impl StudyCommand {
         let asked_of: Vec<Asked> = settings.generators.iter().flat_map(|kind| asked(&made.runs, keep, *kind)).collect();
         let nearest_of: Vec<Nearest> =
             settings.generators.iter().filter_map(|kind| nearest(&made.runs, keep, *kind)).collect();
-        let remarks = remarks(&settings, &made, &fields_do);
+        let remarks = remarks(&drive, &settings, &made);
         let count = |status| made.runs.iter().filter(|run| run.status == status).count();
         let told = Told {
             schema_version: 1,
@@ -425,35 +425,31 @@ fn what_is_asked(told: &Told<'_>, settings: &StudySettings, kind: GeneratorKind)
     text
 }
 
-/// A change of a figure below this share of its largest size is none: round-off of the straight lines.
-const NO_CHANGE: f64 = 1e-9;
-
-/// What has to be known beside the figures: fields that have one value, and fields that do nothing with a generator.
-fn remarks(settings: &StudySettings, study: &Study, effects: &[Effect]) -> Vec<String> {
-    let mut remarks = Vec::new();
+/// What has to be known beside the figures: loads of the data sheet that are beyond what a table of a generator spans, fields that have
+/// one value, and fields that do nothing with a generator.
+fn remarks(drive: &Drive, settings: &StudySettings, study: &Study) -> Vec<String> {
+    let beyond = settings.generators.iter().filter_map(|kind| {
+        let sheet_n_m = settings.sheet_beyond_table_n_m(drive, *kind)?;
+        Some(format!(
+            "{kind} is loaded to the {} N.m of the data sheet, and a table of it spans {} N.m by default: it may find no equilibrium \
+             there; --torque-n-m says otherwise",
+            short(sheet_n_m),
+            short(drive.rated_torque_n_m(*kind))
+        ))
+    });
+    let mut remarks: Vec<String> = beyond.collect();
     for (k, field) in settings.vary.iter().enumerate() {
         if field.is_constant(settings.spread.is_some()) {
             remarks.push(format!("{} has one value, so nothing is said of what it does; --set would do", field.path));
             continue;
         }
-        let idle = settings.generators.iter().filter(|kind| {
-            let mut lines = effects.iter().filter(|effect| effect.generator == **kind).peekable();
-            lines.peek().is_some() && lines.all(|effect| is_no_change(study, effect, k))
-        });
+        let idle = settings.generators.iter().filter(|kind| is_idle(study, **kind, k));
         let idle: Vec<&str> = idle.map(|kind| kind.name()).collect();
         if !idle.is_empty() {
             remarks.push(format!("{} changes no figure with {}", field.path, idle.join(", ")));
         }
     }
     remarks
-}
-
-/// Whether the field number `k` has no effect on a figure.
-fn is_no_change(study: &Study, effect: &Effect, k: usize) -> bool {
-    let Ok((_, of)) = figure(effect.figure) else { return false };
-    let runs = study.runs.iter().filter(|run| run.generator == effect.generator);
-    let size = runs.filter_map(|run| of(&run.sheet)).fold(0.0, |size: f64, value| size.max(value.abs()));
-    effect.change[k].is_some_and(|change| change.abs() <= NO_CHANGE * size)
 }
 
 /// Tables of the best variant of all generators, in the first target.

@@ -136,10 +136,11 @@ impl Tables {
             });
         }
         if self.stress {
-            made.par_iter_mut().try_for_each(|table| {
-                table.info.stress = self.stress_of(&drive, table)?;
-                Ok::<(), Failure>(())
-            })?;
+            // Stress that is not found takes no table away.
+            made.par_iter_mut().for_each(|table| match self.stress_of(&drive, table) {
+                Ok(stress) => table.info.stress = stress,
+                Err(Failure::BadInput(why) | Failure::Failed(why)) => table.info.no_stress = Some(why),
+            });
         }
         let out = context.out()?;
         let mut outputs = Outputs::new();
@@ -384,6 +385,9 @@ fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
     for info in &report.tables {
         for caution in &info.cautions {
             text.push_str(&format!("{}: caution: {}\n", info.generator, caution.words));
+        }
+        if let Some(why) = &info.no_stress {
+            text.push_str(&format!("{}: caution: no stress over three meshes: {why}\n", info.generator));
         }
     }
     for (info, turns) in report.tables.iter().filter_map(|info| Some((info, info.turns.as_ref()?))) {

@@ -483,6 +483,9 @@ fn judge(known: &[Known<'_>]) -> (Status, Vec<String>) {
         for caution in k.subject.info.iter().flat_map(|info| &info.cautions) {
             remark(Status::Caution, format!("{name}: {}.", caution.words.replace(" um", " µm")));
         }
+        if let Some(why) = k.subject.info.and_then(|info| info.no_stress.as_ref()) {
+            remark(Status::Caution, format!("{name}: no stress over three meshes: {why}."));
+        }
         if let Some(turns) = k.subject.info.and_then(|info| info.turns.as_ref()) {
             remark(Status::Remark, format!("{name}: {}.", turns.remark.replace('"', "″")));
         }

@@ -39,14 +39,16 @@ pub struct Miss {
     pub figure: &'static str,
     /// Its value; missing where the variant has none.
     pub value: Option<f64>,
-    /// The end of the range that it misses.
+    /// The end of the range that it misses; of a value that is missing the least one, where there is one.
     pub limit: f64,
+    /// Whether the value should be at most the limit; otherwise at least.
+    pub at_most: bool,
 }
 
 impl Miss {
     /// On which side of the limit the value should be.
     pub fn side(&self) -> &'static str {
-        if self.value.is_some_and(|value| value > self.limit) { "at most" } else { "at least" }
+        if self.at_most { "at most" } else { "at least" }
     }
 }
 
@@ -72,7 +74,8 @@ pub fn asked(runs: &[Run], constraints: &[Constraint], generator: GeneratorKind)
 }
 
 /// Of the variants of a generator that converge and whose teeth clear, the one that misses the constraints by least: by the sum of
-/// what is missing, each over the range in which the figure was found. None where there is no such variant, or where one meets.
+/// what is missing, each over the range in which the figure was found. A figure that a variant does not have, or that is missed where
+/// it has no range, counts as missed by a whole one. None where there is no such variant, or where one meets.
 pub fn nearest(runs: &[Run], constraints: &[Constraint], generator: GeneratorKind) -> Option<Nearest> {
     let all = || runs.iter().filter(|run| run.generator == generator);
     if all().any(|run| run.meets) {
@@ -88,9 +91,9 @@ pub fn nearest(runs: &[Run], constraints: &[Constraint], generator: GeneratorKin
         .collect();
     let distance = |run: &Run| -> f64 {
         let each = constraints.iter().zip(&spans).map(|(constraint, span)| match constraint.lacks(&run.sheet) {
-            None => f64::INFINITY,
             Some(0.0) => 0.0,
-            Some(lack) => lack / span,
+            Some(lack) if *span > 0.0 => lack / span,
+            _ => 1.0,
         });
         each.sum()
     };
@@ -98,9 +101,9 @@ pub fn nearest(runs: &[Run], constraints: &[Constraint], generator: GeneratorKin
     let best = sound.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
     let misses = constraints.iter().filter(|constraint| !constraint.keeps(&best.sheet)).map(|constraint| {
         let value = constraint.value(&best.sheet);
-        let below = value.is_none_or(|value| value < constraint.least);
-        let limit = if below && constraint.least.is_finite() { constraint.least } else { constraint.most };
-        Miss { figure: constraint.figure, value, limit }
+        let at_most = value.map_or(!constraint.least.is_finite(), |value| value > constraint.most);
+        let limit = if at_most { constraint.most } else { constraint.least };
+        Miss { figure: constraint.figure, value, limit, at_most }
     });
     Some(Nearest { generator, variant: best.variant, misses: misses.collect() })
 }
@@ -148,8 +151,41 @@ mod tests {
         );
         assert_eq!((told[2].of, told[2].found), (4, Some([1.0, 2.0])));
         let nearest = nearest(&runs, &keep, CAM).unwrap();
-        let miss = Miss { figure: "max_von_mises_mpa", value: Some(270.0), limit: 250.0 };
+        let miss = Miss { figure: "max_von_mises_mpa", value: Some(270.0), limit: 250.0, at_most: true };
         assert_eq!((nearest.variant, nearest.misses), (2, vec![miss]));
+    }
+
+    /// A value that is there, and none, each against a range that is open at either end or at none.
+    #[test]
+    fn a_miss_says_on_which_side_of_the_limit_the_value_should_be() {
+        for (value, range, due) in [
+            (Some(270.0), "..250", "at most 250"),
+            (Some(270.0), "100..250", "at most 250"),
+            (Some(50.0), "100..250", "at least 100"),
+            (Some(50.0), "100..", "at least 100"),
+            (None, "..250", "at most 250"),
+            (None, "100..250", "at least 100"),
+            (None, "100..", "at least 100"),
+        ] {
+            let keep = constraints(&[&format!("max_von_mises_mpa={range}")]);
+            let mut runs = vec![made_up(1, 1.0, 1.0, 0.0)];
+            runs[0].sheet.max_von_mises_mpa = value;
+            judge(&mut runs, &keep, &[]);
+            let miss = nearest(&runs, &keep, CAM).unwrap().misses.remove(0);
+            assert_eq!(format!("{} {}", miss.side(), miss.limit), due, "{value:?} {range}");
+        }
+    }
+
+    /// A figure that no variant has does not hide which of them is nearer in another, nor does one that is 0 everywhere.
+    #[test]
+    fn what_no_variant_has_leaves_the_nearest_to_the_other_figures() {
+        let mut runs = [3.0, 2.0, 4.0].map(|e| made_up(1, 1.0, e, 0.0)).to_vec();
+        (0..).zip(&mut runs).for_each(|(k, run)| run.variant = k + 1);
+        for other in ["wind_up_arcsec=..10", "max_von_mises_mpa=1.."] {
+            let keep = constraints(&[other, "kinematic_error_pp_arcsec=..1"]);
+            judge(&mut runs, &keep, &[]);
+            assert_eq!(nearest(&runs, &keep, CAM).unwrap().variant, 2, "{other}");
+        }
     }
 
     #[test]

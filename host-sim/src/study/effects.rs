@@ -1,13 +1,18 @@
 //! What each field does to a figure: a straight line through all variants at once.
 
+use std::collections::BTreeMap;
+
 use flexspline_algebra::{Mat, cholesky};
 use serde::Serialize;
 
-use super::{Run, Study, figure};
+use super::{Basis, Run, Study, figure};
+use crate::data_sheet::{DataSheet, FIGURES};
 use crate::drive::GeneratorKind;
 
 /// Least variants for each coefficient of the line.
 const VARIANTS_PER_COEFFICIENT: usize = 2;
+/// A change of a figure below this share of its largest size is none: round-off.
+const NO_CHANGE: f64 = 1e-9;
 
 /// What the fields do to a figure, of one generator.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -49,6 +54,40 @@ pub fn effects(study: &Study, generator: GeneratorKind, name: &'static str) -> O
     let mut slopes = slopes.into_iter();
     let change = columns.iter().map(|column| column.as_ref().and_then(|_| slopes.next())).collect();
     Some(Effect { generator, figure: name, change, straight })
+}
+
+/// Whether the field number `field` changes no figure of a generator: of computed runs that differ in this field alone, all figures are
+/// the same, and so is how the runs ended. Where none differ in it alone, as when variants are spread, all runs have to be the same. A
+/// slope would not do: a figure that is even in a field that varies about zero has none.
+pub fn is_idle(study: &Study, generator: GeneratorKind, field: usize) -> bool {
+    let computed = |run: &&Run| run.generator == generator && run.basis == Basis::Computed;
+    let runs: Vec<&Run> = study.runs.iter().filter(computed).collect();
+    let mut alike: BTreeMap<Vec<&str>, Vec<&Run>> = BTreeMap::new();
+    for run in &runs {
+        let others = run.values.iter().enumerate().filter(|(k, _)| *k != field).map(|(_, value)| value.as_str());
+        alike.entry(others.collect()).or_default().push(run);
+    }
+    let mut groups: Vec<Vec<&Run>> = alike.into_values().filter(|group| group.len() > 1).collect();
+    if groups.is_empty() {
+        groups.push(runs);
+    }
+    // Runs without figures say nothing of what a field does.
+    let tells = |run: &&Run| FIGURES.iter().any(|(_, of)| of(&run.sheet).is_some());
+    groups.iter().any(|group| group.len() > 1 && group.iter().all(tells))
+        && groups.iter().all(|group| are_the_same(group))
+}
+
+/// Whether all of these ended in the same way with the same figures.
+fn are_the_same(runs: &[&Run]) -> bool {
+    let same = |of: fn(&DataSheet) -> Option<f64>| {
+        let values: Vec<f64> = runs.iter().filter_map(|run| of(&run.sheet)).collect();
+        let [low, high] = [
+            values.iter().copied().fold(f64::INFINITY, f64::min),
+            values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        ];
+        values.is_empty() || (values.len() == runs.len() && high - low <= NO_CHANGE * high.abs().max(low.abs()))
+    };
+    runs.iter().all(|run| run.status == runs[0].status) && FIGURES.iter().all(|(_, of)| same(*of))
 }
 
 /// Slopes of `y` over the columns, with a constant beside them, and the share of its scatter that they explain.

@@ -23,7 +23,7 @@ use crate::stated::Stated;
 use crate::stepping::SolverSettings;
 
 pub use asked::{Asked, Miss, Nearest, asked, nearest};
-pub use effects::{Effect, effects};
+pub use effects::{Effect, effects, is_idle};
 pub use estimate::computed_first;
 pub use judge::{Constraint, JudgeError, Sense, Target, figure};
 pub use trust::Trust;
@@ -65,6 +65,19 @@ pub struct StudySettings {
 }
 
 impl StudySettings {
+    /// Whether every variant has the same loads; those that a table spans by default go with the size of the drive.
+    fn has_fixed_loads(&self) -> bool {
+        self.torque_n_m.is_some() || self.stated.as_ref().is_some_and(Stated::has_loads)
+    }
+
+    /// The largest load of the data sheet, N·m, where it is beyond what a table of this generator spans by default. A catalogue rates
+    /// its own generator, a cam: rollers, which leave the rim unsupported, may find no equilibrium there.
+    pub fn sheet_beyond_table_n_m(&self, drive: &Drive, kind: GeneratorKind) -> Option<f64> {
+        let by_sheet = self.torque_n_m.is_none() && self.has_fixed_loads();
+        let largest_n_m = self.loads(drive, kind).largest_n_m;
+        (by_sheet && largest_n_m > drive.rated_torque_n_m(kind)).then_some(largest_n_m)
+    }
+
     /// The loads of a variant.
     fn loads(&self, drive: &Drive, kind: GeneratorKind) -> Loads {
         let spanned_n_m = drive.rated_torque_n_m(kind);
@@ -103,8 +116,8 @@ pub enum StudyError {
     },
     /// A last stable load beyond the largest load.
     #[error(
-        "--keep {constraint}: the largest load of the {generator} generator is {largest_n_m} N.m, where the search for it ends; allowed: a \
-         least value up to that, or a larger --torque-n-m"
+        "--keep {constraint}: the largest load of any variant with the {generator} generator is {largest_n_m} N.m, where the search for it \
+         ends; allowed: a least value up to that, or a larger --torque-n-m"
     )]
     BeyondLoad {
         /// The constraint.
@@ -189,7 +202,7 @@ pub struct Run {
     pub cautions: Vec<Caution>,
     /// The loads of the sheet; missing of a drive that was refused.
     pub loads: Option<Loads>,
-    /// What a catalogue would print. The last stable load of a run that converged is the largest of the study, a bound: it may bear more.
+    /// What a catalogue would print. A last stable load that is the largest of the study is a bound: it may bear more.
     pub sheet: DataSheet,
     /// Whether it converged, its teeth clear one another, and every constraint is kept.
     pub meets: bool,
@@ -198,9 +211,15 @@ pub struct Run {
 }
 
 impl Run {
-    /// Whether it bears the largest load of the study: its last stable load is a bound, and no figure of its own.
+    /// Whether it bears the largest load of the study: its last stable load is a bound, and no figure of its own. A run that failed may
+    /// have borne it, too, before the turn over a tooth pitch; an estimate of one that failed does not say.
     pub fn bears_all(&self) -> bool {
-        self.status == RunStatus::Converged
+        let bears = |last: f64| self.loads.is_some_and(|loads| last >= loads.largest_n_m);
+        match self.status {
+            RunStatus::Converged => true,
+            RunStatus::Failed => self.basis == Basis::Computed && self.sheet.last_stable_n_m.is_some_and(bears),
+            RunStatus::Refused => false,
+        }
     }
 }
 
@@ -351,13 +370,6 @@ fn variants(drive: &Drive, settings: &StudySettings) -> Result<Vec<Vec<String>>,
     if let Some((field, value)) = vary.iter().find_map(|field| Some((field, field.repeated()?))) {
         return Err(StudyError::Twice { path: field.path.clone(), value });
     }
-    for kept in settings.constraints.iter().filter(|kept| kept.figure == LAST_STABLE) {
-        let largest = |kind: &GeneratorKind| settings.loads(drive, *kind).largest_n_m;
-        if let Some(kind) = settings.generators.iter().find(|kind| largest(kind) < kept.least) {
-            let (constraint, largest_n_m) = (kept.to_string(), largest(kind));
-            return Err(StudyError::BeyondLoad { constraint, generator: *kind, largest_n_m });
-        }
-    }
     let count = match settings.spread {
         Some(count) => count as usize,
         None => vary.iter().map(|field| field.grid().len()).fold(1, usize::saturating_mul),
@@ -381,7 +393,31 @@ fn variants(drive: &Drive, settings: &StudySettings) -> Result<Vec<Vec<String>>,
             }
         }
     }
+    for kept in settings.constraints.iter().filter(|kept| kept.figure == LAST_STABLE) {
+        for kind in &settings.generators {
+            let largest_n_m = largest_of_all(drive, settings, &paths, &variants, *kind);
+            if let Some(largest_n_m) = largest_n_m.filter(|largest| *largest < kept.least) {
+                return Err(StudyError::BeyondLoad { constraint: kept.to_string(), generator: *kind, largest_n_m });
+            }
+        }
+    }
     Ok(variants)
+}
+
+/// The largest load of any variant that makes a drive, N·m.
+fn largest_of_all(
+    drive: &Drive,
+    settings: &StudySettings,
+    paths: &[&str],
+    variants: &[Vec<String>],
+    kind: GeneratorKind,
+) -> Option<f64> {
+    let largest_n_m = |drive: &Drive| settings.loads(drive, kind).largest_n_m;
+    if settings.has_fixed_loads() {
+        return Some(largest_n_m(drive));
+    }
+    let made = variants.par_iter().filter_map(|values| varied(drive, paths, values).ok());
+    made.map(|drive| largest_n_m(&drive)).reduce_with(f64::max)
 }
 
 fn varied(drive: &Drive, paths: &[&str], values: &[String]) -> Result<Drive, crate::drive::DriveError> {

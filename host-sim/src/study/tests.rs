@@ -137,6 +137,91 @@ fn the_loads_are_those_of_the_data_sheet() {
     assert_eq!(settings.loads(&drive, GeneratorKind::Cam), Loads::up_to(50.0));
 }
 
+/// The largest load goes with the size of a variant: HHD-95 twice as wide is loaded twice as far.
+#[test]
+fn a_last_stable_load_is_refused_where_no_variant_is_loaded_so_far() {
+    let (drive, kind) = (Drive::hhd_95(), GeneratorKind::Cam);
+    let width = drive.flexspline.width_mm;
+    let mut settings = settings(&[&format!("flexspline.width_mm={width},{}", 2.0 * width)]);
+    let largest = drive.rated_torque_n_m(kind);
+    let begins = |settings: &StudySettings| match variants(&drive, settings) {
+        Ok(_) => None,
+        Err(StudyError::BeyondLoad { largest_n_m, .. }) => Some(largest_n_m),
+        Err(other) => panic!("{other}"),
+    };
+    let keep = |times: f64| vec![format!("{LAST_STABLE}={}..", times * largest).parse().unwrap()];
+    settings.constraints = keep(1.5);
+    assert_eq!(begins(&settings), None);
+    settings.constraints = keep(2.5);
+    assert_eq!(begins(&settings), Some(2.0 * largest));
+    // A load that is asked for, and one that is stated, are those of every variant.
+    settings.constraints = keep(1.5);
+    settings.torque_n_m = Some(largest);
+    assert_eq!(begins(&settings), Some(largest));
+    settings.torque_n_m = None;
+    settings.stated = Some(Stated { rated_torque_n_m: Some(largest), ..Stated::default() });
+    assert_eq!(begins(&settings), Some(largest));
+}
+
+/// Two rollers bear a tenth of what a cam does, and a catalogue rates the cam.
+#[test]
+fn a_sheet_that_loads_a_generator_beyond_its_table_is_told() {
+    let (drive, mut settings) = (Drive::hhd_95(), settings(&["generator.w0_mm=0.5"]));
+    let beyond = |settings: &StudySettings| {
+        [GeneratorKind::TwoRoller, GeneratorKind::Cam].map(|kind| settings.sheet_beyond_table_n_m(&drive, kind))
+    };
+    assert_eq!(beyond(&settings), [None; 2]);
+    settings.stated = Some(Stated { k1_n_m_per_rad: Some(1e4), ..Stated::default() });
+    assert_eq!(beyond(&settings), [None; 2]);
+    settings.stated = Some(Stated { rated_torque_n_m: Some(153.0), ..Stated::default() });
+    assert_eq!(beyond(&settings), [Some(153.0), None]);
+    settings.torque_n_m = Some(153.0);
+    assert_eq!(beyond(&settings), [None; 2]);
+}
+
+/// A run may bear the largest load and fail in the turn after it.
+#[test]
+fn a_last_stable_load_that_is_the_largest_is_a_bound_however_the_run_ended() {
+    let mut run = made_up(1, 1.0, 1.0, 200.0);
+    run.loads = Some(Loads::up_to(10.0));
+    assert!(run.bears_all());
+    run.status = RunStatus::Failed;
+    for (last, basis, bears) in [
+        (None, Basis::Computed, false),
+        (Some(9.9), Basis::Computed, false),
+        (Some(10.0), Basis::Computed, true),
+        (Some(10.0), Basis::Estimated, false),
+    ] {
+        (run.sheet.last_stable_n_m, run.basis) = (last, basis);
+        assert_eq!(run.bears_all(), bears, "{last:?} {basis:?}");
+    }
+}
+
+/// The stress is even in `a`, which varies about zero; nothing depends on `b`.
+#[test]
+fn a_field_is_idle_where_no_figure_changes_with_it_and_not_where_a_line_has_no_slope() {
+    let run = |k: usize, a: f64, b: f64| {
+        let mut run = made_up(k, a, 1.0, 200.0 + a * a);
+        run.values.push(b.to_string());
+        run
+    };
+    let places = [-5.0, 0.0, 5.0].into_iter().flat_map(|a| [1.0, 2.0, 3.0].map(|b| (a, b)));
+    let runs: Vec<Run> = places.enumerate().map(|(k, (a, b))| run(k + 1, a, b)).collect();
+    let mut study = Study { fields: vec!["a".into(), "b".into()], runs, trust: Vec::new() };
+    let slope = effects(&study, GeneratorKind::Cam, "max_von_mises_mpa").unwrap().change[0].unwrap();
+    assert!(slope.abs() < 1e-9, "{slope}");
+    let idle = |study: &Study| [0, 1].map(|field| is_idle(study, GeneratorKind::Cam, field));
+    assert_eq!(idle(&study), [false, true]);
+    // A variant that fails where its neighbours do not is a change, too.
+    study.runs[4].status = RunStatus::Failed;
+    assert_eq!(idle(&study), [false; 2]);
+    // Spread variants that differ in every field tell a field that does nothing where all are the same alone.
+    study.runs = [(1.0, 1.0), (2.0, 3.0)].map(|(a, b)| run(1, a, b)).to_vec();
+    assert_eq!(idle(&study), [false; 2]);
+    study.runs.truncate(1);
+    assert_eq!(idle(&study), [false; 2]);
+}
+
 #[test]
 fn a_study_that_is_stopped_gives_nothing() {
     let stopped =

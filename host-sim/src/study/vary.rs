@@ -99,10 +99,10 @@ impl Vary {
         }
     }
 
-    /// A value that it takes more than once, as numbers are the same.
+    /// A value that it takes more than once, as numbers are the same. A range that asks for one value has it once.
     pub fn repeated(&self) -> Option<String> {
         let values = match &self.values {
-            Values::Range { from, to, .. } if from == to => return Some(written(*from)),
+            Values::Range { from, to, count } if from == to && *count > 1 => return Some(written(*from)),
             Values::Range { .. } => return None,
             Values::List(list) => list,
         };
@@ -116,7 +116,7 @@ impl Vary {
     /// Whether it has one value alone, on a grid or spread.
     pub fn is_constant(&self, spread: bool) -> bool {
         match &self.values {
-            Values::Range { count, .. } => *count == 1 && !spread,
+            Values::Range { from, to, count } => *count == 1 && (!spread || from == to),
             Values::List(list) => list.len() == 1,
         }
     }
@@ -198,11 +198,12 @@ mod tests {
         assert_eq!(repeated("a=1..1").as_deref(), Some("1"));
         assert_eq!(repeated("a=1,2,1.0").as_deref(), Some("1.0"));
         assert_eq!(repeated("a=cup,hat,cup").as_deref(), Some("cup"));
+        assert_eq!((repeated("a=1..1:1"), repeated("a=1..1:2").as_deref()), (None, Some("1")));
         assert_eq!((repeated("a=1..2:9"), repeated("a=1,10"), repeated("a=cup")), (None, None, None));
         let constant = |text: &str| [false, true].map(|spread| read(text).is_constant(spread));
         assert_eq!(
-            (constant("a=1..2:1"), constant("a=cup"), constant("a=1,2")),
-            ([true, false], [true; 2], [false; 2])
+            (constant("a=1..2:1"), constant("a=1..1:1"), constant("a=cup"), constant("a=1,2")),
+            ([true, false], [true; 2], [true; 2], [false; 2])
         );
     }
 

@@ -77,6 +77,9 @@ pub struct TableInfo {
     /// Stress in root fillets, on bore and flanks under the largest load of the table, over three meshes; left out unless it was asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stress: Vec<PlaceStress>,
+    /// Why there is no stress although it was asked for; left out where there is, or where it was not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub no_stress: Option<String>,
     /// What is left over whole turns of a drive that does not repeat from tooth to tooth; null for one that does.
     pub turns: Option<TurnsInfo>,
     /// Command line, once known.

@@ -310,6 +310,7 @@ fn make(
         cautions: Looked { slope_bound: Some(f64::from(table.bounds().slope)), ..Looked::default() }.cautions(),
         data_sheet: None,
         stress: Vec::new(),
+        no_stress: None,
         turns: None,
         command: String::new(),
     };

@@ -204,7 +204,7 @@ class Study(Columns):
     status: list[str]
     """``converged``, ``failed`` (no equilibrium from some load on) or ``refused`` (its fields make no drive)."""
     basis: list[str]
-    """``computed``, or ``estimated`` by a surface through those that were; ``json["off"]`` says what that is off by."""
+    """``computed``, or ``estimated`` by a surface through those that were; ``json["trust"]`` says what that is off by."""
     meets: NDArray[np.bool_]
     front: NDArray[np.bool_]
     """What meets, and nothing that meets beats in every target."""
@@ -278,7 +278,7 @@ def study(
     with ``variants`` so many spread over all ranges. ``keep`` holds constraints (``backlash_arcsec=30..70``); ``least`` and ``most`` name
     figures that decide what nothing beats (by default kinematic error and stress, and K2). Of many variants (more than 48, with
     four fields or more 12 for each and 12) so many are computed, and those that nothing beats; the others are estimated by a surface through them:
-    ``basis`` says which, ``json["off"]`` what estimates are off by. ``compute_all=True`` computes every one.
+    ``basis`` says which, ``json["trust"]`` what estimates are off by. ``compute_all=True`` computes every one.
     """
     if not (least or most):
         least, most = ("kinematic_error_pp_arcsec", "max_von_mises_mpa"), ("k2_n_m_per_rad",)
