@@ -291,7 +291,7 @@ fn understood(
                 rise_without_a_piece(problem, selected, k).map(|rise| Judged::above(Gate::NoPiece, rise, NO_PIECE)),
             );
         }
-        gates.extend(change_with_speed(problem, selected, &known[k], k));
+        gates.extend(growth_with_speed(problem, selected, &known[k], k));
         gates.extend(least_damping(&known[k]).map(|least| Judged::number(Gate::Rings, least, RINGS, least < RINGS)));
         if passed(&gates) {
             named.push(k);
@@ -301,12 +301,12 @@ fn understood(
     named
 }
 
-/// Whether a cause that is one line of the generator's angle is as large at every speed: a wheel and an encoder are, and what the motor's torque
-/// shakes is not.
-fn change_with_speed(problem: &Problem<'_>, selected: &Selected<'_>, known: &Known, k: usize) -> Option<Judged> {
+/// Whether a cause that is one line of the generator's angle is no larger in fast motion than in slow: what the motor's torque shakes is. Lines of
+/// an encoder may fade where its reading is averaged, or scatters in time.
+fn growth_with_speed(problem: &Problem<'_>, selected: &Selected<'_>, known: &Known, k: usize) -> Option<Judged> {
     let order = with_speed::order_of(selected.terms[k].law.label, Some(known))?;
-    let change = with_speed::with_speed(problem, selected, Some(k), order)?.changes_by();
-    Some(Judged::number(Gate::SameAtEverySpeed, change, with_speed::UNCHANGED, change <= with_speed::UNCHANGED))
+    let growth = with_speed::with_speed(problem, selected, Some(k), order)?.grows_by();
+    Some(Judged::number(Gate::NoGrowthWithSpeed, growth, with_speed::NO_GROWTH, growth <= with_speed::NO_GROWTH))
 }
 
 /// What a free function of the output angle that is left is called.
