@@ -144,13 +144,13 @@ const LEAST_TURN: f64 = 1e-3;
 /// A play law that leaves this much less (relative) than the first is taken instead.
 const CLEARLY_BETTER: f64 = 0.995;
 /// A play law is taken that leaves less than the first by this factor though it leaves the flank in doubt far beyond friction.
-pub(super) const FAR_BETTER: f64 = 0.8;
+const FAR_BETTER: f64 = 0.8;
 /// Rows are uncertain where the torque is below this multiple of friction.
 pub(super) const NEAR_FRICTION: f64 = 1.25;
 /// A clearance is crossed within this time, s.
 const CROSSING_S: f64 = 0.08;
 /// A clearance may be this many times as wide as the nominal one before anything else is known.
-const WIDER: f64 = 1.6;
+pub(super) const WIDER: f64 = 1.6;
 /// If more of the rows than this are uncertain, none is set aside: then they are what the data are about.
 const UNCERTAIN_AT_MOST: f64 = 0.35;
 
@@ -259,8 +259,8 @@ impl Base {
     }
 }
 
-/// Sum of squares left where the torque is around friction, without what a late reading and a ratio add, and a zero: the largest of what may
-/// be there whatever the play does.
+/// Sum of squares that a law of the play leaves where the torque is around friction. A zero, a late reading and a wrong ratio are taken out before:
+/// any drive may have them, whatever its play does, and they would decide between the laws.
 fn middle_spread(rows: &Rows, left: &[f64], friction: f64) -> f64 {
     let used: Vec<usize> = rows.sessions_used().flatten().collect();
     let of = |column: &[f64]| -> Vec<f64> {
@@ -303,17 +303,22 @@ fn uncertain(rows: &Rows, nominal: &Nominal, law: PlayLaw, flank: &[f64]) -> Vec
     if let Some(by_motion) = by_motion.filter(|uncertain| few(uncertain)) {
         return by_motion;
     }
-    // … or nothing says it but at the beginning.
-    let at_first = uncertain_at_first(rows, nominal);
-    if few(&at_first) { at_first } else { vec![false; rows.len()] }
+    // … or nothing says it but at the beginning. Sessions without a load are set aside as a whole, unless too little is left then.
+    [true, false]
+        .into_iter()
+        .map(|unloaded_too| uncertain_at_first(rows, nominal, unloaded_too))
+        .find(|at_first| few(at_first))
+        .unwrap_or_else(|| vec![false; rows.len()])
 }
 
-/// Rows of a session before the first load that says which flank carries: nobody knows where the drive was left.
-fn uncertain_at_first(rows: &Rows, nominal: &Nominal) -> Vec<bool> {
+/// Rows of a session before the first load that says which flank carries: nobody knows where the drive was left. Of a session that nothing loads
+/// these are all, if such sessions count.
+fn uncertain_at_first(rows: &Rows, nominal: &Nominal, unloaded_too: bool) -> Vec<bool> {
     let mut uncertain = vec![false; rows.len()];
     for session in &rows.sessions {
         let loaded = session.clone().find(|k| rows.torque[*k].abs() > nominal.friction_torque_n_m);
-        uncertain[session.start..loaded.unwrap_or(session.start)].fill(true);
+        let never = if unloaded_too { session.end } else { session.start };
+        uncertain[session.start..loaded.unwrap_or(never)].fill(true);
     }
     uncertain
 }
@@ -352,4 +357,33 @@ fn uncertain_by_load(rows: &Rows, nominal: &Nominal, flank: &[f64]) -> Vec<bool>
         }
     }
     uncertain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurement::Session;
+
+    #[test]
+    fn nobody_knows_the_flank_before_the_first_load_or_without_one() {
+        let nominal = crate::synthesize::catalogue_drive();
+        let rows = 10;
+        let session = |torque: Vec<f64>| Session {
+            line: (0..rows as u64).collect(),
+            generator_rad: (0..rows).map(|k| 0.1 * k as f64).collect(),
+            error_rad: vec![0.0; rows],
+            time_s: Some((0..rows).map(|k| 0.01 * k as f64).collect()),
+            torque_n_m: Some(torque),
+            ..Session::default()
+        };
+        let load = 3.0 * nominal.friction_torque_n_m;
+        let late = (0..rows).map(|k| if k < 4 { 0.0 } else { -load }).collect();
+        let rows = Rows::new(&[session(late), session(vec![0.0; rows]), session(vec![load; rows])], &nominal);
+        let first = |unloaded_too: bool| -> Vec<usize> {
+            let uncertain = uncertain_at_first(&rows, &nominal, unloaded_too);
+            rows.sessions.iter().map(|session| uncertain[session.clone()].iter().filter(|u| **u).count()).collect()
+        };
+        assert_eq!(first(true), [4, 10, 0]);
+        assert_eq!(first(false), [4, 0, 0]);
+    }
 }

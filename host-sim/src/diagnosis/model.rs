@@ -171,7 +171,7 @@ impl White {
 
     /// Coefficients of these columns by what the columns are.
     fn by_role<'c>(&'c self, coefficients: &'c [f64]) -> Coefficients<'c> {
-        Coefficients::new(&self.roles, coefficients)
+        Coefficients::new(&self.roles, coefficients).of_sizes(&self.size)
     }
 
     /// Which columns are main ones.

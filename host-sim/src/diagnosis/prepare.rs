@@ -341,7 +341,7 @@ fn free_columns(on: &Excitation<'_>, laws: &[Law], plain: &Whitener, grain: &Gra
         let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
         let on = grain.excitation(law.smooth(), on);
         let all = tried.iter().step_by(spread).flat_map(|places| law.lead_columns(&on, &law.values(places)));
-        let counts = |column: &Column| law.search.free_form || matches!(column.tolerance, Tolerance::Main(_));
+        let counts = |column: &Column| law.search.whole_beside_noise || matches!(column.tolerance, Tolerance::Main(_));
         all.filter(counts)
             .map(|column| {
                 let averaged = grain.average(law.smooth(), plain, &column.values);

@@ -121,8 +121,8 @@ pub enum Gate {
     BesideUnknown,
     /// It is no piece of a line beside it whose order is not whole: without it, and with that line of any order, the misfit rises by this much.
     NoPiece,
-    /// A line of the generator's angle is the same at every speed.
-    SameAtEverySpeed,
+    /// A line of the generator's angle does not grow with the speed.
+    NoGrowthWithSpeed,
     /// The lower end of its damping's interval is below this.
     Rings,
     /// It is so many times its own uncertainty.
@@ -183,7 +183,7 @@ impl Gate {
             Gate::Named => "named",
             Gate::BesideUnknown => "beside_unknown",
             Gate::NoPiece => "no_piece",
-            Gate::SameAtEverySpeed => "same_at_every_speed",
+            Gate::NoGrowthWithSpeed => "no_growth_with_speed",
             Gate::Rings => "rings",
             Gate::KnownWell => "known_well",
             Gate::ToldFromZero => "told_from_zero",
@@ -225,8 +225,8 @@ impl Gate {
             Gate::Named => "is large enough to be named (arcsec rms)",
             Gate::BesideUnknown => "is not hidden by what has no name (its size as a share of the cause)",
             Gate::NoPiece => "is no piece of a line beside it whose order is not whole (rise of the misfit without it)",
-            Gate::SameAtEverySpeed => {
-                "is as large in fast motion as in slow (change of its amplitude, standard deviations)"
+            Gate::NoGrowthWithSpeed => {
+                "does not grow with the speed (growth of its amplitude, standard deviations; negative where it fades)"
             }
             Gate::Rings => "may ring (lower end of the interval of its damping ratio)",
             Gate::KnownWell => "is known well beside what has no name (times its own uncertainty)",
@@ -253,7 +253,7 @@ impl Gate {
             | Gate::Predicts
             | Gate::BesideUnknown
             | Gate::Rings
-            | Gate::SameAtEverySpeed
+            | Gate::NoGrowthWithSpeed
             | Gate::InTheDark
             | Gate::NoWorse
             | Gate::AsRival => true,

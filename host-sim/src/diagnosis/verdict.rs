@@ -291,7 +291,7 @@ fn understood(
                 rise_without_a_piece(problem, selected, k).map(|rise| Judged::above(Gate::NoPiece, rise, NO_PIECE)),
             );
         }
-        gates.extend(change_with_speed(problem, selected, &known[k], k));
+        gates.extend(growth_with_speed(problem, selected, &known[k], k));
         gates.extend(least_damping(&known[k]).map(|least| Judged::number(Gate::Rings, least, RINGS, least < RINGS)));
         if passed(&gates) {
             named.push(k);
@@ -301,12 +301,12 @@ fn understood(
     named
 }
 
-/// Whether a cause that is one line of the generator's angle is as large at every speed: a wheel and an encoder are, and what the motor's torque
-/// shakes is not.
-fn change_with_speed(problem: &Problem<'_>, selected: &Selected<'_>, known: &Known, k: usize) -> Option<Judged> {
+/// Whether a cause that is one line of the generator's angle is no larger in fast motion than in slow: what the motor's torque shakes is. Lines of
+/// an encoder may fade where its reading is averaged, or scatters in time.
+fn growth_with_speed(problem: &Problem<'_>, selected: &Selected<'_>, known: &Known, k: usize) -> Option<Judged> {
     let order = with_speed::order_of(selected.terms[k].law.label, Some(known))?;
-    let change = with_speed::with_speed(problem, selected, Some(k), order)?.changes_by();
-    Some(Judged::number(Gate::SameAtEverySpeed, change, with_speed::UNCHANGED, change <= with_speed::UNCHANGED))
+    let growth = with_speed::with_speed(problem, selected, Some(k), order)?.grows_by();
+    Some(Judged::number(Gate::NoGrowthWithSpeed, growth, with_speed::NO_GROWTH, growth <= with_speed::NO_GROWTH))
 }
 
 /// What a free function of the output angle that is left is called.
@@ -407,8 +407,8 @@ fn told_from_zero(problem: &Problem<'_>, selected: &Selected<'_>, known: &[Known
 }
 
 /// The terms without those that hide others: where two causes do so nearly the same that the size of neither is told from zero, and that of one
-/// is where the other is left out, the smaller is set aside. It is what the law of the larger leaves, as often as not; what else may stand in
-/// the place of the larger, rivals and look-alikes say. Also what was set aside.
+/// is where the other is left out, the smaller is set aside. As often as not the smaller is what the law of the larger leaves; what else may stand
+/// in the place of the larger, rivals and look-alikes say. Also what was set aside, with as much of it as the others do not take over.
 #[must_use]
 pub(super) fn told_apart<'l>(
     problem: &Problem<'_>,
@@ -439,10 +439,19 @@ pub(super) fn told_apart<'l>(
         let gone = &selected.terms[k];
         let gates = vec![Judged::above(Gate::ToldFromZero, now[k], TOLD_FROM_ZERO)];
         trace.judged(Stage::Understood, gone.law, &gone.values(), gates);
-        aside.push(Unexplained { looks_like: gone.law.label.to_string(), size_arcsec: standings[k].size });
+        let size_arcsec = not_taken_over(problem, &selected, &less);
+        if size_arcsec > select::least_size(noise.white) {
+            aside.push(Unexplained { looks_like: gone.law.label.to_string(), size_arcsec });
+        }
         selected = less;
     }
     (selected, aside)
+}
+
+/// What the terms explain and fewer of them, fitted anew, do not, arcsec: what is left without the others.
+fn not_taken_over(problem: &Problem<'_>, all: &Selected<'_>, fewer: &Selected<'_>) -> f64 {
+    let (left, then) = (remainder::left(problem, all), remainder::left(problem, fewer));
+    problem.certain_rms(&then.iter().zip(&left).map(|(then, left)| then - left).collect::<Vec<f64>>())
 }
 
 /// By what standard deviations grow where more is left than noise (Birge 1932): the laws are not right to the noise then, and what they err by is

@@ -1,5 +1,6 @@
 //! How the amplitude of a line of the generator's angle goes with the speed. Wheels and encoders make the same wave at every speed; what a
-//! torque of the motor shakes, or a load that swings, makes more of it the nearer its frequency comes to that of the load on its spring.
+//! torque of the motor shakes, or a load that swings, makes more of it the nearer its frequency comes to that of the load on its spring. Less of it
+//! in fast motion speaks against no encoder: a reading that is averaged, or whose instant scatters, smears its lines.
 
 use super::candidate::{Deviation, Label, Per};
 use super::model::Problem;
@@ -16,6 +17,8 @@ const FAST: f64 = 0.65;
 const IN_MOTION: f64 = 0.05;
 /// … and these have to turn so many times as fast as those, on the median. *Guess*.
 const APART: f64 = 1.5;
+/// Blocks of neighbouring rows whose misfits are taken as independent. *Guess*: as many as where shares of a torque are looked for.
+const BLOCKS: usize = 24;
 /// Fewest rows of either.
 const FEWEST: usize = 200;
 /// Amplitudes are told apart from so many of their standard deviations on, five as between rivals, … *Source*.
@@ -35,22 +38,22 @@ pub(super) struct WithSpeed {
 }
 
 impl WithSpeed {
-    /// By how many standard deviations the amplitude changes; 0 where it does so by less than laws hold to.
-    pub fn changes_by(&self) -> f64 {
+    /// By how many standard deviations the amplitude grows, negative where it fades; 0 where it changes by less than laws hold to.
+    pub fn grows_by(&self) -> f64 {
         let [slow, fast] = self.amplitudes;
         let clear = slow.max(fast) > CLEARLY * slow.min(fast);
-        if clear { (fast - slow).abs() / self.stds[0].hypot(self.stds[1]).max(1e-30) } else { 0.0 }
+        if clear { (fast - slow) / self.stds[0].hypot(self.stds[1]).max(1e-30) } else { 0.0 }
     }
 
     fn changes(&self) -> bool {
-        self.changes_by() > CERTAIN
+        self.grows_by().abs() > CERTAIN
     }
 
     /// In words, for a line that has no name.
     fn words(&self) -> String {
         let ([slow, fast], [at_slow, at_fast]) = (self.speeds, self.amplitudes);
         let sizes = format!("{at_slow:.1} arcsec at {slow:.1} rad/s of the generator, {at_fast:.1} at {fast:.1}");
-        match (self.changes(), at_fast > at_slow) {
+        match (self.changes(), self.grows_by() > 0.0) {
             (true, true) => format!(
                 ", which grows with the speed ({sizes}): what the motor's torque or the load shakes, not what is out of shape"
             ),
@@ -60,8 +63,8 @@ impl WithSpeed {
     }
 }
 
-/// Largest change that is none, in standard deviations.
-pub(super) const UNCHANGED: f64 = CERTAIN;
+/// Largest growth that is none, in standard deviations.
+pub(super) const NO_GROWTH: f64 = CERTAIN;
 
 /// The order of the generator's angle that a term without a name, or a cause that is one line of it, stands for.
 pub(super) fn order_of(label: Label, known: Option<&Known>) -> Option<f64> {
@@ -109,7 +112,8 @@ pub(super) fn with_speed(
     Some(WithSpeed { speeds, amplitudes: [slow, fast], stds: [slow_std, fast_std] })
 }
 
-/// Amplitude of the wave of an angle in values of some rows, with its standard deviation: least squares beside a mean.
+/// Amplitude of the wave of an angle in values of some rows, with its standard deviation: least squares beside a mean. The deviation is that of white
+/// noise, or that by blocks of neighbouring rows (a sandwich), whichever is larger: wander and other lines are alike from row to row.
 fn amplitude(rows: &[usize], angle: impl Fn(usize) -> f64, value: impl Fn(usize) -> f64) -> Option<(f64, f64)> {
     let count = rows.len() as f64;
     let waves: Vec<[f64; 3]> = rows.iter().map(|k| [angle(*k).cos(), angle(*k).sin(), value(*k)]).collect();
@@ -122,11 +126,20 @@ fn amplitude(rows: &[usize], angle: impl Fn(usize) -> f64, value: impl Fn(usize)
     if determinant < 1e-2 * count * count * 0.25 {
         return None;
     }
-    let (c, s) = (product(0, 2), product(1, 2));
-    let [cosine, sine] = [(ss * c - cs * s) / determinant, (cc * s - cs * c) / determinant];
+    let solved = |c: f64, s: f64| [(ss * c - cs * s) / determinant, (cc * s - cs * c) / determinant];
+    let [cosine, sine] = solved(product(0, 2), product(1, 2));
+    let amplitude = cosine.hypot(sine);
     let left = |w: &[f64; 3]| w[2] - means[2] - cosine * (w[0] - means[0]) - sine * (w[1] - means[1]);
-    let noise = robust_std(waves.iter().map(left));
-    Some((cosine.hypot(sine), noise * (2.0 / count).sqrt()))
+    let white = robust_std(waves.iter().map(left)) * (2.0 / count).sqrt();
+    // What a block adds to the amplitude that was found.
+    let added = |block: &[[f64; 3]]| -> f64 {
+        let score = |of: usize| block.iter().map(|w| (w[of] - means[of]) * left(w)).sum::<f64>();
+        let [c, s] = solved(score(0), score(1));
+        (c * cosine + s * sine) / amplitude.max(1e-30)
+    };
+    let blocks = waves.chunks(waves.len().div_ceil(BLOCKS));
+    let by_blocks = blocks.map(|block| added(block).powi(2)).sum::<f64>().sqrt();
+    Some((amplitude, white.max(by_blocks)))
 }
 
 /// What is said of lines of the generator's angle beside their name: of terms of a model, and of lines that averages hide.
@@ -161,9 +174,21 @@ mod tests {
     }
 
     #[test]
+    fn a_line_close_by_counts_as_doubt() {
+        let rows: Vec<usize> = (0..24_000).collect();
+        let angle = |k: usize| 0.37 * k as f64;
+        // Out of step with the wave by four turns over all rows.
+        let beside = |k: usize| (angle(k) + std::f64::consts::TAU * 4.0 * k as f64 / 24_000.0).sin();
+        let (found, std) = amplitude(&rows, angle, |k| 3.0 * angle(k).sin() + beside(k)).unwrap();
+        // White noise of that size would leave 0.007.
+        assert!((found - 3.0).abs() < 3.0 * std && (0.05..0.3).contains(&std), "{found} ± {std}");
+    }
+
+    #[test]
     fn a_change_counts_beyond_what_laws_hold_to() {
         let of = |amplitudes| WithSpeed { speeds: [1.0, 9.0], amplitudes, stds: [0.1, 0.1] };
         assert!(of([1.0, 4.0]).changes() && of([4.0, 1.0]).changes());
+        assert!(of([1.0, 4.0]).grows_by() > NO_GROWTH && of([4.0, 1.0]).grows_by() < 0.0, "fading refuses no encoder");
         assert!(!of([4.0, 5.0]).changes() && !of([0.1, 0.4]).changes());
         assert!(of([1.0, 4.0]).words().contains("grows") && of([4.0, 1.0]).words().contains("fades"));
     }

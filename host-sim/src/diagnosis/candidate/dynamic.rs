@@ -220,9 +220,10 @@ fn transition(omega: f64, damping: f64, dt: f64) -> [f64; 4] {
     ]
 }
 
-/// How far the load swings beyond what drives it: the larger of the gains of wind-up and kinematic error.
+/// How far the load swings beyond what drives it: the gain of wind-up or of kinematic error, whichever adds more. The other may have any gain, as
+/// badly known as it is.
 fn gain_of(c: Coefficients<'_>) -> f64 {
-    [WIND_UP, KINEMATIC].map(|role| c.of(role)).into_iter().fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m })
+    c.of(if c.adds(KINEMATIC) > c.adds(WIND_UP) { KINEMATIC } else { WIND_UP })
 }
 
 /// A load on a spring swings beyond where it is driven to, and not short of it as what hangs on a string may: its gain is not below none by
@@ -294,4 +295,19 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     }
     laws.push(torsional_resonance(on));
     laws
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_gain_of_a_resonance_is_that_of_what_adds_most() {
+        let roles = [WIND_UP, KINEMATIC];
+        // A kinematic error of next to nothing says nothing of its gain.
+        let c = Coefficients::new(&roles, &[0.6, -1.1]);
+        assert_eq!(gain_of(c.of_sizes(&[30.0, 0.4])), 0.6);
+        assert_eq!(gain_of(c.of_sizes(&[0.0, 0.4])), -1.1);
+        assert_eq!(gain_of(c), -1.1, "columns that are not known count alike");
+    }
 }

@@ -148,7 +148,7 @@ fn pitch(cause: CauseName, of: Angle) -> Law {
         let (taken, light) = (c.of(TAKEN), c.of(TAKEN_UNDER_LIGHT_LOAD));
         taken.abs().max((taken + light).abs()) < MOST_CLEARANCE_TAKEN * of_wave(c, WAVE).0
     });
-    law.search.free_form = true;
+    law.search.whole_beside_noise = true;
     law
 }
 

@@ -132,7 +132,7 @@ fn pitch(cause: CauseName, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
             (Name::PhaseRad, 0.5 * phase),
         ]
     });
-    law.search.free_form = true;
+    law.search.whole_beside_noise = true;
     law
 }
 

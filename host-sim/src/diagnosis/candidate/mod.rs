@@ -391,8 +391,9 @@ pub struct Search {
     pub whole: bool,
     /// Natural logarithm of the odds against it before any data, beside the other laws.
     pub odds_against: f64,
-    /// It is a free profile: what it may hold has to be taken out before the noise is measured, the finest detail too.
-    pub free_form: bool,
+    /// All its columns are taken out before the noise is measured, those of its deviations too: a free profile has its finest detail in them, a long
+    /// delay what comes with it.
+    pub whole_beside_noise: bool,
 }
 
 /// What a law does to other causes, and they to it.

@@ -19,13 +19,20 @@ impl Role {
 pub struct Coefficients<'c> {
     roles: &'c [Role],
     values: &'c [f64],
+    sizes: Option<&'c [f64]>,
 }
 
 impl<'c> Coefficients<'c> {
     /// Coefficients of columns of these roles.
     #[must_use]
     pub fn new(roles: &'c [Role], values: &'c [f64]) -> Coefficients<'c> {
-        Coefficients { roles, values }
+        Coefficients { roles, values, sizes: None }
+    }
+
+    /// With the root mean squares of the columns, as many as there are roles.
+    #[must_use]
+    pub fn of_sizes(self, sizes: &'c [f64]) -> Coefficients<'c> {
+        Coefficients { sizes: Some(sizes), ..self }
     }
 
     /// Those of all columns of a role, in their order.
@@ -43,6 +50,15 @@ impl<'c> Coefficients<'c> {
     #[must_use]
     pub fn of(self, role: Role) -> f64 {
         self.get(role).unwrap_or(0.0)
+    }
+
+    /// What the first column of a role adds, root mean square, without a sign: 0 where the law has no such column here. Where the columns are
+    /// not known all are taken to be alike.
+    #[must_use]
+    pub fn adds(self, role: Role) -> f64 {
+        let Some(at) = self.roles.iter().position(|of| *of == role) else { return 0.0 };
+        let size = self.sizes.and_then(|sizes| sizes.get(at)).copied().unwrap_or(1.0);
+        self.values.get(at).map_or(0.0, |coefficient| (coefficient * size).abs())
     }
 
     /// Those of the cosine and the sine of a wave; 0 where the law has no such wave here.

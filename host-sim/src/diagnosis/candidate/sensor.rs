@@ -143,7 +143,7 @@ fn sensor_latency() -> Law {
     })
     .parameters_by(|_, _, c| vec![(Name::DelayS, c.of(Role::SIZE))]);
     // Of a long delay in fast motion what comes with it is more than noise.
-    law.search.free_form = true;
+    law.search.whole_beside_noise = true;
     law
 }
 

@@ -277,7 +277,8 @@ fn wear(by: Progress) -> Law {
 const STEP: Role = Role("step between sessions");
 /// A clearance that is narrower in a session than before does not wear; nor does one that is by less than this share of all its growth. *Guess*.
 const NOT_NARROWER: f64 = 0.1;
-/// Fewest sessions and most in which wear may go on between them.
+/// Fewest sessions and most in which wear may go on between them. Of two any change of the clearance would be a growth, as it has one step and no
+/// order; and each session has a step of its own, so that of many the law follows what it likes. *Guess*.
 const SESSIONS: std::ops::RangeInclusive<usize> = 3..=12;
 
 /// A clearance that widens with travel, and while nobody records: the drive works on between the sessions.
