@@ -431,7 +431,7 @@ fn remarks(drive: &Drive, settings: &StudySettings, study: &Study) -> Vec<String
     let beyond = settings.generators.iter().filter_map(|kind| {
         let sheet_n_m = settings.sheet_beyond_table_n_m(drive, *kind)?;
         Some(format!(
-            "{kind} is loaded to the {} N.m of the data sheet, and a table of it spans {} N.m by default: it may find no equilibrium \
+            "{kind} is loaded to {} N.m by the data sheet, and a table of it spans {} N.m by default: it may find no equilibrium \
              there; --torque-n-m says otherwise",
             short(sheet_n_m),
             short(drive.rated_torque_n_m(*kind))
