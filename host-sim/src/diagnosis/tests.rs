@@ -612,7 +612,7 @@ fn a_clearance_that_shuts_is_found_beside_a_runout_that_binds_in_it() {
     assert!(beside.look_alikes.iter().any(|other| either.iter().any(|pair| pair[0] == *other)), "{}", diagnosis.text());
     let width = diagnosis.causes.iter().find(|cause| cause.name == CauseName::ThermalClearance).unwrap();
     let per_k = width.parameters["clearance_arcsec_per_k"];
-    assert!((per_k.value - 1.7).abs() < 2.0 * per_k.std && per_k.std < 0.3, "{per_k:?}");
+    assert!((per_k.value - 1.7).abs() < 3.0 * per_k.std && per_k.std < 0.3, "{per_k:?}");
 }
 
 /// A drive brought into the cold minutes before it is recorded has not cooled down: its teeth lag behind the sensor for as long as they do
