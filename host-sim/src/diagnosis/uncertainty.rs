@@ -16,6 +16,9 @@ const STEP: f64 = 0.1;
 /// A parameter is no longer determined where its standard deviation grows by this factor.
 const UNDETERMINED: f64 = 100.0;
 
+/// A block tells something of a parameter where leaving it out adds this share to the variance; a smaller one is round-off.
+const LEAST_TOLD: f64 = 1e-6;
+
 /// Stretches of the data whose misfits are taken as independent, in each session.
 const STRETCHES: usize = 12;
 
@@ -105,8 +108,8 @@ struct Spread {
 }
 
 impl Spread {
-    /// Variance of a quadratic form, row by row: the largest of Laplace's, that by stretches, and that of a jackknife, as far as the
-    /// blocks that it leaves out tell alike much.
+    /// Variance of a quadratic form, row by row: the largest of Laplace's, that by stretches, and that of a jackknife. A jackknife holds for blocks
+    /// that tell alike much; of others it counts only up to what Laplace's variance lacks.
     fn of(&self, form: &[f64]) -> f64 {
         let (within, jackknife, lacking) = self.parts(form);
         within.max(jackknife.min(lacking))
@@ -133,12 +136,23 @@ impl Spread {
         let from_mean = |shift: &[f64]| -> Vec<f64> { shift.iter().zip(&mean).map(|(s, m)| s - m).collect() };
         let shifted: f64 = shifts.iter().map(|shift| trace(&outer(&from_mean(shift)))).sum();
         let jackknife = (count - 1.0) / count * shifted;
-        // Where one block tells more than the others, the rest is less sure without it, and may shift by as much as that: what shifts against
-        // what may is what Laplace's variance lacks. Of blocks that were driven alike both come to the same.
-        let may_shift: f64 = repeated().map(|(_, without)| (trace(without) - trace(laplace)).max(0.0)).sum();
-        let lacking = if may_shift > 0.0 { trace(laplace) * shifted / may_shift } else { jackknife };
+        // Where one block tells more than the others, the rest is less sure without it, and may shift by as much as that. What the blocks shift
+        // against what they may is what Laplace's variance lacks. Of blocks that were driven alike it comes to the jackknife.
+        let against: Vec<[f64; 2]> = repeated()
+            .map(|(shift, without)| [trace(&outer(shift)), trace(without) - trace(laplace)])
+            .filter(|[_, may]| *may > LEAST_TOLD * trace(laplace))
+            .collect();
+        let lacking = if against.is_empty() { jackknife } else { trace(laplace) * beyond_what_may(&against) };
         (within, jackknife, lacking)
     }
+}
+
+/// By what factor squares of shifts are larger than they may be, from both of each block. The mean of the blocks' own factors: each is one draw of
+/// chance, and in the sums a block that tells most is the only one, which by chance may shift by next to nothing. That of the sums where it is larger.
+fn beyond_what_may(against: &[[f64; 2]]) -> f64 {
+    let all = |of: usize| against.iter().map(|block| block[of]).sum::<f64>();
+    let each = against.iter().map(|[shifted, may]| shifted / may).sum::<f64>() / against.len() as f64;
+    each.max(all(0) / all(1))
 }
 
 /// Products of each with each, row by row.
@@ -234,4 +248,17 @@ fn parameters(
         (name.as_str(), Parameter { value, std })
     };
     at.into_iter().zip(&slopes).map(with_doubt).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_block_that_tells_most_and_shifts_by_nothing_hides_not_what_the_others_shift() {
+        // As much as they may.
+        assert_eq!(beyond_what_may(&[[1.0, 1.0], [1.0, 1.0], [100.0, 100.0]]), 1.0);
+        assert!(beyond_what_may(&[[4.0, 1.0], [4.0, 1.0], [0.0, 100.0]]) > 2.0);
+        assert!(beyond_what_may(&[[1.0, 1.0], [1.0, 1.0], [400.0, 100.0]]) > 3.5);
+    }
 }
