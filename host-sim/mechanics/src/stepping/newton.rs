@@ -65,7 +65,8 @@ const RETURNS_LITTLE: f64 = 0.3;
 const GOES_ROUND_AFTER: usize = 25;
 
 /// Halvings of a step after which the pairs that were open are looked at again before it is made shorter still: far from equilibrium a flank may
-/// come past the tip of a space, where its gap changes by more than it moves, and bear in a state that took it for open.
+/// come past the tip of a space, where its gap changes by more than it moves, and bear in a state that took it for open. Not while the drive is
+/// assembled: from so far off a step that took in all that bears may carry every flank out of reach, and then nothing holds an output without drag.
 const LOOKS_BACK_AT: usize = 5;
 
 /// Relative residual below which steps are taken whole: what is left is near round-off.
@@ -80,6 +81,8 @@ const RECALL_GAIN: f64 = 0.3;
 const KEEP_BELOW: f64 = 0.1;
 /// Layouts of the contact in one increment.
 const MOST_LAYOUTS: usize = 3;
+/// Stiffness (N mm/mm per rad) of an output that nothing holds and nothing turns, so that the wheels have a step. Of any size: no torque acts on it.
+const HOLDS_A_FREE_OUTPUT: f64 = 1.0;
 /// Why Newton finds no place for an output that nothing holds.
 const FLOATS: &str = "without load and without drag nothing holds the output within its clearance; give it a load, or output.drag_torque_n_m";
 /// Tangents remembered.
@@ -411,7 +414,7 @@ impl<'p> Solver<'p> {
         let mut residual = self.assemble(&mut state, from, torque_n_m, &mut near);
         let mut history = Vec::new();
         let mut last_length = 1.0;
-        let (mut looked_back, mut looked_at_all) = (false, false);
+        let (mut looked_back, mut looked_at_all, mut held) = (false, false, false);
         let mut chords: Vec<Step> = Vec::new();
         let steady = self.softening == 1.0 && self.passed.go_on(guess, torque_n_m);
         let mut recalled = steady && generator_rad != guess.generator_rad && self.recall(generator_rad);
@@ -424,7 +427,8 @@ impl<'p> Solver<'p> {
             if !relative.is_finite() {
                 return Err(failed(history, "the residual is not finite"));
             }
-            if relative <= tolerance {
+            // While contact is soft it may touch nothing: that only shows the way.
+            if relative <= tolerance && (!residual.free_output || self.softening < 1.0) {
                 if !looked_at_all && near.missed(&self.flanks, configuration(&state)) {
                     looked_at_all = true;
                     near.look_again();
@@ -455,11 +459,15 @@ impl<'p> Solver<'p> {
                 residual = self.assemble(&mut state, from, torque_n_m, &mut near);
                 continue;
             }
-            if residual.free_output {
+            if residual.free_output && !held {
+                let stood = state.output_rad;
                 self.balance_output(&mut state, from, torque_n_m, &mut near);
                 residual = self.assemble(&mut state, from, torque_n_m, &mut near);
+                // No flank in reach, and no load that turns it: it stays while the wheels go on.
+                held = residual.free_output && state.output_rad == stood && residual.border[OUTPUT] == 0.0;
                 continue;
             }
+            held = false;
             // While it makes good progress an old factor serves again: a step with it costs a tenth.
             let gain = last_gain(&history);
             recalled &= history.len() == 1 || gain < RECALL_GAIN;
@@ -493,7 +501,7 @@ impl<'p> Solver<'p> {
                     state = candidate;
                     break;
                 }
-                if recalled || (trial == LOOKS_BACK_AT && !looked_back) {
+                if recalled || (trial == LOOKS_BACK_AT && !looked_back && !self.assembling) {
                     mistaken = true;
                     break;
                 }
@@ -684,7 +692,7 @@ impl<'p> Solver<'p> {
         residual.torque_scale += load.abs() + problem.drag;
         residual.free_output = residual.flank_contacts == 0 && drag_stiffness == 0.0;
         let corner = &mut self.border.corner;
-        corner[OUTPUT * width + OUTPUT] += drag_stiffness;
+        corner[OUTPUT * width + OUTPUT] += if residual.free_output { HOLDS_A_FREE_OUTPUT } else { drag_stiffness };
 
         for (f, w) in residual.force.iter_mut().zip(&problem.rotation_weights) {
             *f -= state.sleeve_moment * w;
