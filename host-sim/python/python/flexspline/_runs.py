@@ -201,6 +201,8 @@ class Study(Columns):
 
     variant: NDArray[np.int64]
     generator: list[str]
+    last_stable_is: list[str]
+    """Whether ``last_stable_n_m`` is a bound (``at_least``: all loads of the study are borne) or ``found``; empty where there is none."""
     status: list[str]
     """``converged``, ``failed`` (no equilibrium from some load on) or ``refused`` (its fields make no drive)."""
     basis: list[str]
@@ -225,6 +227,7 @@ class Study(Columns):
                 **{path: _column(values) for path, values in fields.items()},
                 **{name: _column([(run["loads"] or {}).get(name) for run in runs]) for name in loads},
                 **{name: _column([run["sheet"].get(name) for run in runs]) for name in figures},
+                "last_stable_is": [_last_stable_is(run) for run in runs],
                 "status": [run["status"] for run in runs],
                 "basis": [run["basis"] for run in runs],
                 "meets": np.array([run["meets"] for run in runs], dtype=np.bool_),
@@ -240,6 +243,15 @@ class Study(Columns):
         from . import _plots
 
         return _plots.study(self, x, y, ax)
+
+
+def _last_stable_is(run: Mapping[str, Any]) -> str:
+    last = run["sheet"].get("last_stable_n_m")
+    if last is None:
+        return ""
+    borne = run["basis"] == "computed" and run["loads"] is not None and last >= run["loads"]["largest_n_m"]
+    bears_all = run["status"] == "converged" or (run["status"] == "failed" and borne)
+    return "at_least" if bears_all else "found"
 
 
 def _number(text: str) -> float | str:
