@@ -111,7 +111,7 @@ mod tests {
         let count = 8000;
         let time: Vec<f64> = (0..count).map(|k| 1e-3 * k as f64).collect();
         let rows = Rows {
-            sessions: vec![0..count],
+            sessions: std::iter::once(0..count).collect(),
             used: vec![true],
             error: vec![0.0; count],
             generator: vec![0.0; count],
