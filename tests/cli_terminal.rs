@@ -183,7 +183,7 @@ fn a_folder_that_cannot_be_written_is_found_out_before_the_work() {
         let run = desk.line(&format!("{line} --out /proc/flexspline"));
         assert_eq!(run.code, 2, "{line}: {}", run.stderr);
         assert!(run.stderr.starts_with("error: --out: cannot write /proc/flexspline: "), "{line}: {}", run.stderr);
-        assert!(clock.elapsed() < Duration::from_secs(10), "{line} worked {:?} before it said so", clock.elapsed());
+        assert!(clock.elapsed() < Duration::from_secs(2), "{line} worked {:?} before it said so", clock.elapsed());
     }
     assert!(before == contents(&desk.path(".")));
 }
