@@ -4,6 +4,8 @@
 //! HFUS-2A 1019658, 11/2014): stiffness and its ranges, which both series share, ratcheting torque and accuracy of each, rated torque
 //! of the CSG. That of the CSF is not in these sources. They also say that a single unit may be 30 % off the stiffness.
 
+use serde::Deserialize;
+
 use crate::stated::Stated;
 
 /// One line for each size and ratio; an empty cell is not printed.
@@ -25,21 +27,21 @@ pub fn sheet(series: &str, size: f64, ratio: u32) -> Option<Stated> {
         "CSG" => Series::Csg,
         _ => return None,
     };
-    let line = rows().find(|row| row.number("size") == Some(size) && row.number("ratio") == Some(f64::from(ratio)))?;
+    let line = rows().into_iter().find(|row| row.size == size && row.ratio == ratio)?;
     let [rated_n_m, ratcheting_n_m] = match which {
-        Series::Csf => [None, line.number("ratcheting_csf_n_m")],
-        Series::Csg => [line.number("rated_csg_n_m"), line.number("ratcheting_csg_n_m")],
+        Series::Csf => [None, line.ratcheting_csf_n_m],
+        Series::Csg => [line.rated_csg_n_m, line.ratcheting_csg_n_m],
     };
     Some(Stated {
         source: Some(format!("Harmonic Drive {}-{size}-{ratio}", series.to_ascii_uppercase())),
         rated_torque_n_m: rated_n_m,
-        t1_n_m: line.number("t1_n_m"),
-        t2_n_m: line.number("t2_n_m"),
-        k1_n_m_per_rad: line.number("k1_n_m_per_rad"),
-        k2_n_m_per_rad: line.number("k2_n_m_per_rad"),
-        k3_n_m_per_rad: line.number("k3_n_m_per_rad"),
+        t1_n_m: line.t1_n_m,
+        t2_n_m: line.t2_n_m,
+        k1_n_m_per_rad: line.k1_n_m_per_rad,
+        k2_n_m_per_rad: line.k2_n_m_per_rad,
+        k3_n_m_per_rad: line.k3_n_m_per_rad,
         ratcheting_torque_n_m: ratcheting_n_m,
-        accuracy_arcmin: line.number("accuracy_arcmin"),
+        accuracy_arcmin: line.accuracy_arcmin,
         unit_scatter_percent: Some(UNIT_SCATTER_PERCENT),
         ..Stated::default()
     })
@@ -47,38 +49,34 @@ pub fn sheet(series: &str, size: f64, ratio: u32) -> Option<Stated> {
 
 /// The sizes and ratios that are at hand, in words.
 pub fn sizes_in_words() -> String {
-    let mut all = [Vec::new(), Vec::new()];
-    for row in rows() {
-        for (values, name) in all.iter_mut().zip(["size", "ratio"]) {
-            if let Some(value) = row.number(name).filter(|value| !values.contains(value)) {
-                values.push(value);
-            }
-        }
-    }
-    let [sizes, ratios] = all.map(|mut values: Vec<f64>| {
+    let of = |value: fn(&Row) -> f64| {
+        let mut values: Vec<f64> = rows().iter().map(value).collect();
         values.sort_by(f64::total_cmp);
+        values.dedup();
         values.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")
-    });
+    };
+    let (sizes, ratios) = (of(|row| row.size), of(|row| f64::from(row.ratio)));
     format!("CSF and CSG, sizes {sizes}, most of the ratios {ratios}")
 }
 
-/// A line with the names of its cells.
+/// A line.
+#[derive(Debug, Deserialize)]
 struct Row {
-    names: &'static str,
-    cells: &'static str,
+    size: f64,
+    ratio: u32,
+    rated_csg_n_m: Option<f64>,
+    t1_n_m: Option<f64>,
+    t2_n_m: Option<f64>,
+    k1_n_m_per_rad: Option<f64>,
+    k2_n_m_per_rad: Option<f64>,
+    k3_n_m_per_rad: Option<f64>,
+    ratcheting_csf_n_m: Option<f64>,
+    ratcheting_csg_n_m: Option<f64>,
+    accuracy_arcmin: Option<f64>,
 }
 
-impl Row {
-    fn number(&self, name: &str) -> Option<f64> {
-        let at = self.names.split(',').position(|known| known == name)?;
-        self.cells.split(',').nth(at)?.parse().ok()
-    }
-}
-
-fn rows() -> impl Iterator<Item = Row> {
-    let mut lines = SIZES.lines();
-    let names = lines.next().unwrap_or_default();
-    lines.map(move |cells| Row { names, cells })
+fn rows() -> Vec<Row> {
+    csv::Reader::from_reader(SIZES.as_bytes()).into_deserialize().collect::<Result<_, _>>().expect("the file is ours")
 }
 
 #[cfg(test)]
@@ -105,7 +103,7 @@ mod tests {
     #[test]
     fn every_line_makes_a_sheet_that_a_file_takes() {
         for row in rows() {
-            let (size, ratio) = (row.number("size").unwrap(), row.number("ratio").unwrap() as u32);
+            let (size, ratio) = (row.size, row.ratio);
             let stated = sheet("CSG", size, ratio).unwrap();
             let read = Stated::of_file("d.toml", &stated.to_toml()).unwrap().unwrap();
             assert_eq!(read, stated, "{size} {ratio}");

@@ -119,28 +119,14 @@ impl Stated {
 
     /// The section as a drive file has it; what is not stated is a comment, to be filled in.
     pub fn to_toml(&self) -> String {
-        let numbers = [
-            ("rated_torque_n_m", self.rated_torque_n_m),
-            ("t1_n_m", self.t1_n_m),
-            ("t2_n_m", self.t2_n_m),
-            ("k1_n_m_per_rad", self.k1_n_m_per_rad),
-            ("k2_n_m_per_rad", self.k2_n_m_per_rad),
-            ("k3_n_m_per_rad", self.k3_n_m_per_rad),
-            ("hysteresis_loss_arcmin", self.hysteresis_loss_arcmin),
-            ("lost_motion_arcmin", self.lost_motion_arcmin),
-            ("ratcheting_torque_n_m", self.ratcheting_torque_n_m),
-            ("starting_torque_n_m", self.starting_torque_n_m),
-            ("accuracy_arcmin", self.accuracy_arcmin),
-            ("unit_scatter_percent", self.unit_scatter_percent),
-        ];
-        let source = self.source.as_ref().map(|source| format!("{source:?}"));
-        let values = numbers.map(|(key, value)| (key, value.map(|value| format!("{value:?}"))));
-        let lines = [("source", source)].into_iter().chain(values).map(|(key, value)| match value {
-            Some(value) => format!("{key} = {value}\n"),
-            None => format!("# {key} = \n"),
-        });
+        let stated = serde_json::json!(self);
+        let line = |key: &&str| match &stated[*key] {
+            serde_json::Value::Null => format!("# {key} = \n"),
+            // Numbers and texts are written as in TOML.
+            value => format!("{key} = {value}\n"),
+        };
         let head = "\n[data_sheet]  # what a catalogue prints; simulate and tables show what is computed beside it; any line may be left out\n";
-        head.to_owned() + &lines.collect::<String>()
+        head.to_owned() + &KEYS.iter().map(line).collect::<String>()
     }
 
     fn read(file: &mut TomlFile<'_>, table: &toml::de::DeTable<'_>) -> Option<Stated> {

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::judge::{Constraint, clears};
 use super::{Run, RunStatus};
 use crate::drive::GeneratorKind;
+use crate::measurement::robust::least_and_most;
 
 /// One thing that is asked of a variant, and how many of a generator have it, whatever else they lack.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -108,12 +109,10 @@ pub fn nearest(runs: &[Run], constraints: &[Constraint], generator: GeneratorKin
     Some(Nearest { generator, variant: best.variant, misses: misses.collect() })
 }
 
-/// Least and largest of these.
+/// Least and largest of these; none of none.
 fn range(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
-    values.fold(None, |range, value| {
-        let [low, high] = range.unwrap_or([value, value]);
-        Some([value.min(low), value.max(high)])
-    })
+    let (low, high) = least_and_most(values);
+    (low <= high).then_some([low, high])
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 use serde::Serialize;
 
 use crate::drive::GeneratorKind;
+use crate::measurement::robust::median_of;
 
 /// How far estimates of a figure can be trusted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -34,9 +35,9 @@ pub struct Trust {
 impl Trust {
     /// Of the values of computed variants, and what each is off by where it is left out.
     pub(super) fn new(generator: GeneratorKind, figure: &'static str, values: &[f64], left_out: &[f64]) -> Trust {
-        let median_off = median(left_out.iter().map(|off| off.abs()).collect());
-        let middle = median(values.to_vec());
-        let spread = median(values.iter().map(|value| (value - middle).abs()).collect());
+        let median_off = median_of(&mut left_out.iter().map(|off| off.abs()).collect::<Vec<f64>>());
+        let middle = median_of(&mut values.to_vec());
+        let spread = median_of(&mut values.iter().map(|value| (value - middle).abs()).collect::<Vec<f64>>());
         let share = match (spread > 0.0, median_off > 0.0) {
             (true, _) => Some(100.0 * median_off / spread),
             (false, false) => Some(0.0),
@@ -47,16 +48,6 @@ impl Trust {
         let largest = left_out.iter().fold(0.0, |most: f64, off| if off.abs() > most.abs() { *off } else { most });
         let runs = values.len();
         Trust { generator, figure, runs, rms, largest, median_off, spread, share_of_spread_percent: share, useless }
-    }
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => 0.0,
-        n if n.is_multiple_of(2) => 0.5 * (values[middle - 1] + values[middle]),
-        _ => values[middle],
     }
 }
 

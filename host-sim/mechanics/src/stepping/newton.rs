@@ -184,8 +184,8 @@ pub struct Solver<'p> {
     softening: f64,
     /// While the drive is assembled its flanks slip freely.
     assembling: bool,
-    /// Soft stages are brought to their end.
-    careful: bool,
+    /// Soft stages only find the way, and end early.
+    hurries: bool,
     /// Newton has [`PATIENCE`].
     patient: bool,
     /// The states passed in steady motion.
@@ -225,7 +225,7 @@ impl<'p> Solver<'p> {
             slipping: Slipping::default(),
             softening: 1.0,
             assembling: false,
-            careful: false,
+            hurries: false,
             patient: false,
             passed: Passed::default(),
             leans_within: problem.leans_within(),
@@ -239,10 +239,9 @@ impl<'p> Solver<'p> {
         // All of a conforming generator touches at once; a soft contact first finds which part stays.
         let mut iterations = 0;
         for softening in [1e-3, 1.0] {
-            // Nothing but drag holds the output: what has to be found here is where it stands, so no stage ends early.
-            (self.softening, self.assembling, self.careful) = (softening, true, true);
+            (self.softening, self.assembling) = (softening, true);
             let solved = self.newton(&state, &state, generator_rad, 0.0);
-            (self.softening, self.assembling, self.careful) = (1.0, false, false);
+            (self.softening, self.assembling) = (1.0, false);
             let (next, mut increment) = solved?;
             iterations += increment.iterations;
             increment.iterations = iterations;
@@ -321,12 +320,9 @@ impl<'p> Solver<'p> {
     pub fn jump(&mut self, from: &State, generator_rad: f64) -> Result<(State, Increment), SolveError> {
         // The output goes on at its mean rate, whatever it did last.
         let from = &State { output_rate: 1.0 / self.problem.drive.ratio(), ..from.clone() };
-        self.careful = true;
-        let solved = self.newton_softly(from, generator_rad, from.torque_n_m, &JUMPING_SOFTNESS);
-        self.careful = false;
-        let (state, increment) = solved?;
-        self.problem.check_range(&state)?;
-        Ok((state, increment))
+        let solved = self.newton_softly(from, generator_rad, from.torque_n_m, &JUMPING_SOFTNESS)?;
+        self.problem.check_range(&solved.0)?;
+        Ok(solved)
     }
 
     /// One part of an increment. A load that changes has no predictor: unless the load that there is shows the way, a soft contact finds it
@@ -350,10 +346,10 @@ impl<'p> Solver<'p> {
             [Way::Softly, Way::Directly, Way::Carefully]
         };
         for way in ways {
-            self.careful = way == Way::Carefully;
+            self.hurries = way == Way::Softly;
             let softness = if way == Way::Directly { &DIRECTLY[..] } else { &LOADING_SOFTNESS };
             let solved = self.newton_softly(from, generator_rad, torque_n_m, softness);
-            self.careful = false;
+            self.hurries = false;
             match solved {
                 Err(SolveError::NotConverged { .. }) => last = Some(solved),
                 solved => return solved,
@@ -397,8 +393,11 @@ impl<'p> Solver<'p> {
     ) -> Result<(State, Increment), SolveError> {
         let settings = self.problem.settings;
         let largest_step = LARGEST_STEP * self.problem.drive.flexspline.module_mm;
-        let hurries = self.softening < 1.0 && !self.careful;
-        let tolerance = if hurries { FOUND_THE_WAY.max(settings.tolerance) } else { settings.tolerance };
+        let tolerance = if self.hurries && self.softening < 1.0 {
+            FOUND_THE_WAY.max(settings.tolerance)
+        } else {
+            settings.tolerance
+        };
         let failed = |history: Vec<f64>, reason| SolveError::NotConverged {
             generator_rad,
             torque_n_m,
