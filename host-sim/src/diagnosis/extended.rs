@@ -245,7 +245,7 @@ impl Found {
         let terms = terms_at(problem, laws, start);
         let alone = Scaffold::new(problem, Vec::new()).fit(None)?;
         let selected = Selected { fit: fit(problem, &terms)?, terms };
-        let known = uncertainty::known(problem, &selected);
+        let known = uncertainty::known(problem, &selected, 1.0);
         Some(Found {
             recalibrated: alone.solution.coefficients,
             base: selected.fit.base().to_vec(),

@@ -3,7 +3,6 @@
 
 use std::collections::BTreeMap;
 
-use super::candidate::Named;
 use super::linear::Gram;
 use super::model::{Fit, Problem, Scaffold, Term, white_columns};
 use super::report::Parameter;
@@ -64,6 +63,8 @@ pub struct Known {
     pub parameters: BTreeMap<&'static str, Parameter>,
     /// What it adds to the prediction, in units of the uncertainty of that (both as lengths in the whitened data).
     pub times_its_doubt: f64,
+    /// The best known of its sizes, in units of its standard deviation, which counts noise by what is left beyond it.
+    pub told_from_zero: f64,
 }
 
 /// Sizes by which causes are told; what else they have are places, shapes and the same in other units. The gain of a resonance is none: it trades
@@ -86,23 +87,22 @@ const SIZES: [ParameterName; 13] = [
 /// A size that is known exactly counts as so many times its standard deviation.
 const EXACTLY: f64 = 1e3;
 
-impl Known {
-    /// The best known of its sizes, in units of its standard deviation.
-    #[must_use]
-    pub fn told_from_zero(&self) -> f64 {
-        let of = |name: &ParameterName| -> Option<f64> {
-            let found = self.parameters.get(name.as_str())?;
-            let without = if *name == ParameterName::StiffnessRatio { 1.0 } else { 0.0 };
-            Some(((found.value - without).abs() / found.std.max(1e-30)).min(EXACTLY))
-        };
-        SIZES.iter().filter_map(of).reduce(f64::max).unwrap_or(EXACTLY)
-    }
+/// The best known of the sizes among `parameters`, in units of `standard_deviations`.
+fn told_from_zero(parameters: &BTreeMap<&'static str, Parameter>, standard_deviations: &BTreeMap<&str, f64>) -> f64 {
+    let of = |name: &ParameterName| -> Option<f64> {
+        let (found, std) = (parameters.get(name.as_str())?, standard_deviations.get(name.as_str())?);
+        let without = if *name == ParameterName::StiffnessRatio { 1.0 } else { 0.0 };
+        Some(((found.value - without).abs() / std.max(1e-30)).min(EXACTLY))
+    };
+    SIZES.iter().filter_map(of).reduce(f64::max).unwrap_or(EXACTLY)
 }
 
 /// How far the coefficients and moves of one term may be off.
 struct Spread {
     /// Covariance by Laplace's approximation, and by stretches of the data; row by row.
     covariances: [Vec<f64>; 2],
+    /// What of Laplace's covariance noise makes; the rest is the spread between units and what laws may be wrong by.
+    by_noise: Vec<f64>,
     /// Shift of each when a block of the data is left out, and the covariance then.
     shifts: Vec<(Vec<f64>, Vec<f64>)>,
 }
@@ -113,6 +113,14 @@ impl Spread {
     fn of(&self, form: &[f64]) -> f64 {
         let (within, jackknife, lacking) = self.parts(form);
         within.max(jackknife.min(lacking))
+    }
+
+    /// The same where the noise is `beyond` times what it was taken for. What blocks of the data tell of themselves holds as it is: they have
+    /// what is beyond noise in them.
+    fn beyond_noise(&self, form: &[f64], beyond: f64) -> f64 {
+        let trace = |covariance: &[f64]| -> f64 { form.iter().zip(covariance).map(|(a, b)| a * b).sum() };
+        let laplace = trace(&self.covariances[0]) + (beyond * beyond - 1.0) * trace(&self.by_noise).max(0.0);
+        self.of(form).max(laplace)
     }
 
     /// The same with all of the jackknife: for what stands beside something that is not understood.
@@ -160,9 +168,25 @@ fn outer(values: &[f64]) -> Vec<f64> {
     values.iter().flat_map(|a| values.iter().map(move |b| a * b)).collect()
 }
 
-/// How well each term is known.
+/// What noise makes of Laplace's covariance C: C − C P C, with the information P that the priors hold.
+fn by_noise(fit: &Fit, covariance: &[f64]) -> Vec<f64> {
+    let n = fit.priors.len();
+    let mut of_noise = covariance.to_vec();
+    for (k, prior) in fit.priors.iter().enumerate() {
+        let column = &covariance[k * n..(k + 1) * n];
+        let information = prior.std.powi(-2);
+        for (i, a) in column.iter().enumerate() {
+            for (j, b) in column.iter().enumerate() {
+                of_noise[i * n + j] -= information * a * b;
+            }
+        }
+    }
+    of_noise
+}
+
+/// How well each term is known, where `beyond` times the noise is left.
 #[must_use]
-pub fn known(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Known> {
+pub fn known(problem: &Problem<'_>, selected: &Selected<'_>, beyond: f64) -> Vec<Known> {
     let terms: Vec<&Term<'_>> = selected.terms.iter().collect();
     let scaffold = Scaffold::new(problem, terms.clone());
     let Some((fit, moves)) = scaffold.linearised() else { return vec![Known::default(); terms.len()] };
@@ -177,6 +201,7 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Known> {
         })
         .collect();
     let covariance = fit.solution.covariance();
+    let of_noise = by_noise(&fit, &covariance);
     let by_stretches = stretched(problem, &fit, &white);
     let mut place = n - moves.len();
     let mut all = Vec::new();
@@ -190,6 +215,7 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Known> {
         };
         let spread = Spread {
             covariances: [block(&covariance), block(&by_stretches)],
+            by_noise: block(&of_noise),
             shifts: left_out
                 .iter()
                 .map(|(shift, without)| (index.iter().map(|i| shift[*i]).collect(), block(without)))
@@ -199,21 +225,21 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Known> {
         let mut adds = coefficients.to_vec();
         adds.resize(index.len(), 0.0);
         let adds: f64 = outer(&adds).iter().zip(&products).map(|(a, b)| a * b).sum();
-        all.push(Known {
-            parameters: parameters(problem, term, coefficients, &spread),
-            times_its_doubt: (adds / spread.at_worst(&products).max(1e-30)).sqrt(),
-        });
+        let (parameters, told_from_zero) = parameters(problem, term, coefficients, &spread, beyond);
+        let times_its_doubt = (adds / spread.at_worst(&products).max(1e-30)).sqrt();
+        all.push(Known { parameters, times_its_doubt, told_from_zero });
     }
     all
 }
 
-/// Parameters of a term with their standard deviations.
+/// Parameters of a term with their standard deviations, and how well it is told from zero where `beyond` times the noise is left.
 fn parameters(
     problem: &Problem<'_>,
     term: &Term<'_>,
     coefficients: &[f64],
     spread: &Spread,
-) -> BTreeMap<&'static str, Parameter> {
+    beyond: f64,
+) -> (BTreeMap<&'static str, Parameter>, f64) {
     let value = |c: &[f64], places: &[f64]| term.law.parameters(problem.on, &term.law.values(places), term.by_role(c));
     let at = value(coefficients, &term.places);
     let dimension = coefficients.len() + term.places.len();
@@ -238,16 +264,20 @@ fn parameters(
             slope[j] = sign * change / step;
         }
     }
-    let with_doubt = |((name, value), slope): (Named, &Vec<f64>)| {
+    let (mut parameters, mut beyond_noise) = (BTreeMap::new(), BTreeMap::new());
+    for ((name, value), slope) in at.into_iter().zip(&slopes) {
         let scale = match name.kind() {
             Kind::Angle => 1.0,
             Kind::Count => 0.0,
             Kind::Size => value.abs(),
         };
-        let std = spread.of(&outer(slope)).sqrt().hypot(term.law.wrong.doubt * scale);
-        (name.as_str(), Parameter { value, std })
-    };
-    at.into_iter().zip(&slopes).map(with_doubt).collect()
+        let with_doubt = |variance: f64| variance.sqrt().hypot(term.law.wrong.doubt * scale);
+        let form = outer(slope);
+        parameters.insert(name.as_str(), Parameter { value, std: with_doubt(spread.of(&form)) });
+        beyond_noise.insert(name.as_str(), with_doubt(spread.beyond_noise(&form, beyond)));
+    }
+    let told = told_from_zero(&parameters, &beyond_noise);
+    (parameters, told)
 }
 
 #[cfg(test)]

@@ -49,9 +49,8 @@ pub(super) fn conclude(
     let unexplained = (rms_after * rms_after - floor * floor).max(0.0);
     let as_noise = rms_after <= NOISE_KNOWN_TO * floor;
 
-    let known = uncertainty::known(problem, &selected);
-    let told_from_zero = told_from_zero(problem, &selected, &known, noise);
-    let named = understood(problem, &selected, &standings, &known, &told_from_zero, &left_over, noise, &mut trace);
+    let known = known(problem, &selected, noise);
+    let named = understood(problem, &selected, &standings, &known, &left_over, noise, &mut trace);
     let size = |k: &usize| standings[*k].size.powi(2);
     let (by_name, without_name) = (
         named.iter().map(size).sum::<f64>(),
@@ -119,7 +118,7 @@ pub(super) fn conclude(
                     &misfits,
                     has_a_double_outside(name, &known[k], problem.on.output_span_rad()),
                     closest,
-                    told_from_zero[k],
+                    known[k].told_from_zero,
                 ),
                 parameters: known[k].parameters.clone(),
                 held_out_gain: held.gains.get(k).copied().unwrap_or(0.0),
@@ -256,7 +255,6 @@ fn understood(
     selected: &Selected<'_>,
     standings: &[Standing],
     known: &[Known],
-    told_from_zero: &[f64],
     left_over: &[Unexplained],
     noise: Noise,
     trace: &mut Trace,
@@ -282,7 +280,7 @@ fn understood(
         let mut gates = vec![
             Judged::above(Gate::Named, size, select::least_named(noise.white)),
             if hidden.passed { hidden } else { well_known },
-            Judged::above(Gate::ToldFromZero, told_from_zero[k], TOLD_FROM_ZERO),
+            Judged::above(Gate::ToldFromZero, known[k].told_from_zero, TOLD_FROM_ZERO),
         ];
         if of_output_angle(selected.terms[k].law, &known[k]) {
             // However well it is known, what follows the same angle and has no name may be the whole of which it is a piece.
@@ -400,10 +398,10 @@ fn floor(problem: &Problem<'_>, noise: Noise) -> f64 {
     (noise.white * problem.on.rows.loudness_rms() / rows_of_an_average.sqrt()).hypot(noise.wander)
 }
 
-/// By how many standard deviations the size of each term is told from zero.
-fn told_from_zero(problem: &Problem<'_>, selected: &Selected<'_>, known: &[Known], noise: Noise) -> Vec<f64> {
-    let beyond_noise = beyond_noise(problem.certain_rms(&remainder::left(problem, selected)), floor(problem, noise));
-    known.iter().map(|known| known.told_from_zero() / beyond_noise).collect()
+/// How well each term is known beside the others.
+fn known(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<Known> {
+    let left = problem.certain_rms(&remainder::left(problem, selected));
+    uncertainty::known(problem, selected, beyond_noise(left, floor(problem, noise)))
 }
 
 /// The terms without those that hide others: where two causes do so nearly the same that the size of neither is told from zero, and that of one
@@ -417,7 +415,7 @@ pub(super) fn told_apart<'l>(
     trace: &mut Trace,
 ) -> (Selected<'l>, Vec<Unexplained>) {
     let told = |selected: &Selected<'l>| -> Vec<f64> {
-        told_from_zero(problem, selected, &uncertainty::known(problem, selected), noise)
+        known(problem, selected, noise).iter().map(|known| known.told_from_zero).collect()
     };
     let mut aside = Vec::new();
     while selected.terms.iter().filter(|term| term.law.named()).count() > 1 {
@@ -454,8 +452,7 @@ fn not_taken_over(problem: &Problem<'_>, all: &Selected<'_>, fewer: &Selected<'_
     problem.certain_rms(&then.iter().zip(&left).map(|(then, left)| then - left).collect::<Vec<f64>>())
 }
 
-/// By what standard deviations grow where more is left than noise (Birge 1932): the laws are not right to the noise then, and what they err by is
-/// in no covariance.
+/// By what noise counts more where more is left than that (Birge 1932): the laws are not right to the noise then.
 fn beyond_noise(rms_after: f64, floor: f64) -> f64 {
     let ratio = rms_after / floor.max(1e-30);
     if ratio > NOISE_KNOWN_TO { ratio } else { 1.0 }
