@@ -715,6 +715,18 @@ fn a_moment_that_turns_flanks_over_without_a_load_is_found_and_measured() {
 }
 
 #[test]
+fn a_small_moment_beside_a_load_is_found_where_the_load_crosses_none() {
+    let drive = catalogue_drive();
+    // 0.3 % of the load: it winds the drive up by a part of an arc-second, and turns its play over a little earlier or later.
+    let small = [effect(CauseName::GravityTorque, 0.12, 1.0, 0.0)];
+    let sessions = recorded(&small, 5, 12000, 100.0, 1.0, 3);
+    let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!(names(&diagnosis), [CauseName::GravityTorque], "{}", diagnosis.text());
+    let found = diagnosis.causes[0].parameters["torque_n_m"];
+    assert!((found.value - 0.12).abs() < 3.0 * found.std, "{found:?}");
+}
+
+#[test]
 fn without_a_load_only_rows_that_cross_the_clearance_are_uncertain() {
     // Friction holds the output until the generator pushes it.
     let drive = catalogue_drive();

@@ -63,7 +63,10 @@ pub struct Known {
     pub parameters: BTreeMap<&'static str, Parameter>,
     /// What it adds to the prediction, in units of the uncertainty of that (both as lengths in the whitened data).
     pub times_its_doubt: f64,
-    /// The best known of its sizes, in units of its standard deviation, which counts noise by what is left beyond it.
+    /// The best known of its sizes, in standard deviations, which count noise by what is left beyond it.
+    pub size_told: f64,
+    /// How well it is told from zero: that, or all that it adds where this is known better. What its own columns make of one another, as where a
+    /// wave with the load and one without are the same at one load, is no doubt that it is there.
     pub told_from_zero: f64,
 }
 
@@ -225,14 +228,20 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>, beyond: f64) -> Vec
         let mut adds = coefficients.to_vec();
         adds.resize(index.len(), 0.0);
         let adds: f64 = outer(&adds).iter().zip(&products).map(|(a, b)| a * b).sum();
-        let (parameters, told_from_zero) = parameters(problem, term, coefficients, &spread, beyond);
-        let times_its_doubt = (adds / spread.at_worst(&products).max(1e-30)).sqrt();
-        all.push(Known { parameters, times_its_doubt, told_from_zero });
+        let (parameters, size_told) = parameters(problem, term, coefficients, &spread, beyond);
+        let times = |variance: f64| (adds / variance.max(1e-30)).sqrt();
+        let all_told = times(spread.beyond_noise(&products, beyond));
+        all.push(Known {
+            parameters,
+            times_its_doubt: times(spread.at_worst(&products)),
+            size_told,
+            told_from_zero: size_told.max(all_told),
+        });
     }
     all
 }
 
-/// Parameters of a term with their standard deviations, and how well it is told from zero where `beyond` times the noise is left.
+/// Parameters of a term with their standard deviations, and how well its best known size is told from zero where `beyond` times the noise is left.
 fn parameters(
     problem: &Problem<'_>,
     term: &Term<'_>,
@@ -283,6 +292,22 @@ fn parameters(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_left_beyond_noise_widens_what_noise_makes_and_not_what_units_differ_by() {
+        let spread = |noise: f64, units: f64| Spread {
+            covariances: [vec![noise * noise + units * units], vec![0.0]],
+            by_noise: vec![noise * noise],
+            shifts: Vec::new(),
+        };
+        let widened = |noise: f64, units: f64| spread(noise, units).beyond_noise(&[1.0], 3.0);
+        assert!((widened(0.0, 2.0) - 4.0).abs() < 1e-12);
+        assert!((widened(2.0, 0.0) - 36.0).abs() < 1e-12);
+        assert!((widened(1.0, 2.0) - 13.0).abs() < 1e-12);
+        // What stretches of the data tell of themselves has it in already.
+        let stretched = Spread { covariances: [vec![1.0], vec![25.0]], by_noise: vec![1.0], shifts: Vec::new() };
+        assert!((stretched.beyond_noise(&[1.0], 3.0) - 25.0).abs() < 1e-12);
+    }
 
     #[test]
     fn a_block_that_tells_most_and_shifts_by_nothing_hides_not_what_the_others_shift() {

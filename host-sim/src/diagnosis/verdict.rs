@@ -118,7 +118,7 @@ pub(super) fn conclude(
                     &misfits,
                     has_a_double_outside(name, &known[k], problem.on.output_span_rad()),
                     closest,
-                    known[k].told_from_zero,
+                    known[k].size_told,
                 ),
                 parameters: known[k].parameters.clone(),
                 held_out_gain: held.gains.get(k).copied().unwrap_or(0.0),
@@ -466,8 +466,8 @@ fn has_a_double_outside(name: CauseName, known: &Known, output_span_rad: f64) ->
 }
 
 /// Probability of a cause against its look-alikes, whose misfits are higher by these; if there is none, against the closest rival. Less where its
-/// size is `told_from_zero` by few standard deviations.
-fn confidence(alike: &[f64], double_outside: bool, closest: f64, told_from_zero: f64) -> f64 {
+/// size is told from zero by few standard deviations (`size_told`).
+fn confidence(alike: &[f64], double_outside: bool, closest: f64, size_told: f64) -> f64 {
     let odds = |misfit: f64| (-0.5 * misfit.clamp(0.0, 40.0)).exp();
     let among = if alike.is_empty() && !double_outside {
         1.0 / (1.0 + odds(closest)) - 0.01
@@ -476,7 +476,7 @@ fn confidence(alike: &[f64], double_outside: bool, closest: f64, told_from_zero:
             + f64::from(u8::from(double_outside))
             + alike.iter().map(|misfit| odds(*misfit).max(LEAST_WEIGHT)).sum::<f64>())
     };
-    if told_from_zero < SIZE_KNOWN { among.min(MOST_OF_UNSURE) } else { among }
+    if size_told < SIZE_KNOWN { among.min(MOST_OF_UNSURE) } else { among }
 }
 
 fn compensation(problem: &Problem<'_>, rms_extended: f64) -> Compensation {
@@ -535,6 +535,7 @@ mod tests {
         let known = |value: f64, std: f64| Known {
             parameters: [(ParameterName::DampingRatio.as_str(), Parameter { value, std })].into(),
             times_its_doubt: 9.0,
+            ..Known::default()
         };
         let rings = |known: &Known| least_damping(known).is_some_and(|least| least < RINGS);
         assert!(rings(&known(0.18, 0.02)), "0.15, fitted as 0.18");
