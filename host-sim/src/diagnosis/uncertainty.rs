@@ -7,6 +7,7 @@ use super::linear::Gram;
 use super::model::{Fit, Problem, Scaffold, Term, white_columns};
 use super::report::Parameter;
 use super::select::{Selected, blocks};
+use super::thresholds::verdict::{INTERVAL, KNOWN_BESIDE};
 use crate::causes::{Kind, ParameterName};
 
 /// Step of numerical derivatives, standard deviations.
@@ -65,8 +66,8 @@ pub struct Known {
     pub times_its_doubt: f64,
     /// The best known of its sizes, in standard deviations, which count noise by what is left beyond it.
     pub size_told: f64,
-    /// How well it is told from zero: that, or all that it adds where this is known better. What its own columns make of one another, as where a
-    /// wave with the load and one without are the same at one load, is no doubt that it is there.
+    /// How well it is told from zero: that, or all that it adds where this is known well and zero is outside the interval of the size. What its own
+    /// columns make of one another, as where a wave with the load and one without are the same at one load, is no doubt that it is there.
     pub told_from_zero: f64,
 }
 
@@ -235,7 +236,11 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>, beyond: f64) -> Vec
             parameters,
             times_its_doubt: times(spread.at_worst(&products)),
             size_told,
-            told_from_zero: size_told.max(all_told),
+            told_from_zero: if size_told > INTERVAL && all_told > KNOWN_BESIDE {
+                all_told.max(size_told)
+            } else {
+                size_told
+            },
         });
     }
     all
