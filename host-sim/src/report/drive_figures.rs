@@ -11,8 +11,11 @@ use crate::cautions::Caution;
 use crate::simulate::Row;
 use crate::stated::{Beside, SheetBeside};
 
-/// Stress and pressures of a row, MPa, by what a legend calls them.
-pub(super) const STRESSES: [(&str, fn(&Row) -> f64); 3] = [
+/// A value of a row, by what a legend calls it.
+pub(super) type OfRow = (&'static str, fn(&Row) -> f64);
+
+/// Stress and pressures of a row, MPa.
+pub(super) const STRESSES: [OfRow; 3] = [
     ("von Mises stress, both wheels", |row| row.max_von_mises_mpa),
     ("pressure between flanks", |row| row.peak_flank_pressure_mpa),
     ("pressure of generator on bore", |row| row.peak_generator_pressure_mpa),
@@ -97,7 +100,7 @@ pub(super) fn stress_lines(animation: &Animation) -> Lines {
     };
     let mut rows: Vec<(usize, &Row)> = animation.rows.iter().map(|row| (frame(row), row)).collect();
     rows.sort_by_key(|(frame, _)| *frame);
-    let series = |(colour, (name, of)): (usize, (&str, fn(&Row) -> f64))| Series {
+    let series = |(colour, (name, of)): (usize, OfRow)| Series {
         name: name.into(),
         mark: Mark::Line,
         colour,

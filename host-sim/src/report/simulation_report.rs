@@ -8,7 +8,7 @@ use serde_json::{Map, json};
 
 use super::animation::{Animation, FRAMES, Passing, bore_forces, flank_forces};
 use super::drive_figures::{
-    BEARS, STRESSES, STRESSES_ARE, apart, caution_words, drive_figure, less_mean, sharing_figure, sharing_lines,
+    BEARS, OfRow, STRESSES, STRESSES_ARE, apart, caution_words, drive_figure, less_mean, sharing_figure, sharing_lines,
     sheet_section, sleeve_figure, stress_figure, stress_lines,
 };
 use super::page::{
@@ -301,7 +301,7 @@ impl Known<'_> {
         }
         if self.rows.len() > 1 {
             let (axis, places) = self.along();
-            let curves = |id: &str, title: &str, caption: &str, y: Axis, of: &[(&str, fn(&Row) -> f64)]| {
+            let curves = |id: &str, title: &str, caption: &str, y: Axis, of: &[OfRow]| {
                 let series = of.iter().enumerate().map(|(colour, (name, of))| Series {
                     name: (*name).to_owned(),
                     mark: Mark::Line,
@@ -359,7 +359,7 @@ impl Known<'_> {
     }
 
     /// Of every tooth its angle from the major axis, degrees, ascending from -90 so that no lobe is cut, and the tooth, at a row.
-    fn from_major_axis(&self, row: &Row) -> Vec<(f64, usize)> {
+    fn around_major_axis(&self, row: &Row) -> Vec<(f64, usize)> {
         let teeth = i64::from(self.drive.flexspline.teeth);
         let pitch = TAU / teeth as f64;
         let nearest = (row.generator_rad / pitch).round() as i64;
@@ -383,7 +383,7 @@ impl Known<'_> {
     fn sharing_at_a_row(&self) -> Figure {
         let (_, at, bore) = self.highest;
         let row = &self.rows[*at];
-        let places = self.from_major_axis(row);
+        let places = self.around_major_axis(row);
         let series = |colour: usize, mark, of: &dyn Fn(usize) -> f64| Series {
             name: BEARS[colour].into(),
             mark,
@@ -429,7 +429,7 @@ impl Known<'_> {
         for (column, (_, k)) in
             groups.iter().enumerate().flat_map(|(column, group)| group.iter().map(move |at| (column, at)))
         {
-            for ((_, tooth), line) in self.from_major_axis(&self.rows[*k]).into_iter().zip(&mut forces) {
+            for ((_, tooth), line) in self.around_major_axis(&self.rows[*k]).into_iter().zip(&mut forces) {
                 let [plus, minus] = [0, 1].map(|side| self.teeth[*k][side][tooth]);
                 // Of a group of rows the largest: single rows of it would beat with the teeth.
                 let (force, known) = (plus - minus, line[column]);
