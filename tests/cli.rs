@@ -44,7 +44,7 @@ fn a_run_writes_the_columns_and_fields_that_others_rely_on() {
     desk.write("path.csv", SHORT_PATH);
     let run = desk.line("simulate --generator cam --mesh coarse --path path.csv --json --frames").done();
     assert_eq!(run.stderr, "");
-    assert_eq!(names(&desk.path("out")), ["frames", "results.csv", "summary.json"]);
+    assert_eq!(names(&desk.path("out")), ["frames", "report.html", "results.csv", "summary.json"]);
 
     let (header, rows) = table(&desk.read("out/results.csv"));
     assert!(header.starts_with(&format!("{COLUMNS},")), "{header}");
@@ -231,7 +231,7 @@ fn a_run_that_does_not_converge_ends_with_1_and_touches_no_file() {
     assert!(told.stderr.contains("relative residual by iteration: "), "{}", told.stderr);
     let after = (desk.read("out/results.csv"), desk.read("out/summary.json"), names(&desk.path("out/frames")));
     assert_eq!(before, after);
-    assert_eq!(names(&desk.path("out")), ["frames", "results.csv", "summary.json"]);
+    assert_eq!(names(&desk.path("out")), ["frames", "report.html", "results.csv", "summary.json"]);
 }
 
 /// A drive of 12 mm under a load for one of 100 mm: how far it came is told, and what it did until then is in a file.
@@ -259,7 +259,7 @@ fn a_load_beyond_the_last_stable_one_leaves_the_loads_before_it() {
         assert!(run.stderr.contains(words), "{words}: {}", run.stderr);
     }
     // What it bears gives all results, and nothing of the run before is left.
-    desk.line(&format!("{base} --torque-n-m 0.1")).done();
+    desk.line(&format!("{base} --torque-n-m 0.1 --no-report")).done();
     assert_eq!(names(&desk.path("out")), ["results.csv", "summary.json"]);
 }
 

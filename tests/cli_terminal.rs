@@ -61,7 +61,7 @@ fn a_stopped_simulation_leaves_the_folder_as_it_was() {
     stopped(&desk, "simulate --generator cam --mesh fine --solver reference --frames", WORKING, &["-INT"]);
     desk.write("path.csv", "generator_rad\n0\n0.01\n");
     desk.line("simulate --generator cam --mesh coarse --path path.csv --frames").done();
-    assert_eq!(names(&desk.path("out")), ["frames", "results.csv", "summary.json"]);
+    assert_eq!(names(&desk.path("out")), ["frames", "report.html", "results.csv", "summary.json"]);
     // With frames in a hidden folder.
     let run = "simulate --generator double-disc --mesh coarse --frames --path paper";
     stopped(&desk, run, Duration::from_millis(1500), &["-INT"]);
@@ -115,7 +115,7 @@ fn a_run_that_was_started_to_outlive_its_terminal_does() {
     };
     // As `nohup` starts it.
     assert_eq!(started("trap '' HUP;"), Some(0));
-    assert_eq!(names(&desk.path("out")), ["results.csv", "summary.json"]);
+    assert_eq!(names(&desk.path("out")), ["report.html", "results.csv", "summary.json"]);
     // And one that was not, unless this very test was started so.
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).unwrap_or("0");
@@ -136,7 +136,7 @@ fn a_closed_pipe_is_no_error() {
         drop((child.stdout.take(), child.stderr.take()));
         assert_eq!(child.wait().unwrap().code(), Some(0), "{line}");
     }
-    assert_eq!(names(&desk.path("out")), ["results.csv", "summary.json"]);
+    assert_eq!(names(&desk.path("out")), ["report.html", "results.csv", "summary.json"]);
 }
 
 #[test]

@@ -43,6 +43,113 @@ fn the_page_of_tables_agrees_with_their_files() {
     assert_eq!(image("bare"), image("made"));
 }
 
+/// One pitch under load: the page has the figures of the summary, and the rows of the run are the drive in motion.
+#[test]
+fn the_page_of_a_settled_pitch_shows_its_rows_in_motion() {
+    let desk = Desk::new();
+    let line = "simulate --generator cam --mesh coarse --path pitch --torque-n-m 20 --stress";
+    let run = desk.line(&format!("{line} --out made")).done();
+    assert!(run.stdout.contains("made/report.html"), "{}", run.stdout);
+    let (html, json) = page(&desk, "made/report.html");
+    let summary: Value = serde_json::from_str(&desk.read("made/summary.json")).unwrap();
+    assert_eq!(json["status"], "good");
+    assert_eq!(json["results"]["simulate"], summary);
+    assert_eq!(json["provenance"]["Command"], summary["command"]);
+    assert_eq!(json["provenance"]["BLAKE3 of the drive"], summary["drive_hash"]);
+    let wind_up = summary["wind_up_arcsec"].as_f64().unwrap();
+    assert!(html.contains(&format!("<strong><data class=\"error\" value=\"{wind_up}\"")), "no headline of {wind_up}");
+    // What the terminal tells is in the table, with its unit: a stress over three meshes, a torque.
+    let stress = summary["stress"][0]["von_mises_mpa"].as_f64().unwrap();
+    assert!(html.contains(&format!("Stress, root fillet</th><td>{stress:.1}\u{a0}MPa</td>")), "no {stress} MPa");
+    assert!(html.contains("<td>20.00\u{a0}N·m</td>") && html.contains("over three meshes"));
+    // The states that are shown are the rows of this run.
+    let motion = &json["animations"]["cam"];
+    let column = |name: &str| -> Vec<f64> {
+        let text = desk.read("made/results.csv");
+        let at = text.lines().next().unwrap().split(',').position(|column| column == name).unwrap();
+        text.lines().skip(1).map(|line| line.split(',').nth(at).unwrap().parse().unwrap()).collect()
+    };
+    for name in ["error_arcsec", "generator_rad", "max_von_mises_mpa"] {
+        let shown: Vec<f64> =
+            motion["rows"].as_array().unwrap().iter().map(|row| row[name].as_f64().unwrap()).collect();
+        assert_eq!(shown, column(name), "{name}");
+    }
+    for figure in ["drive", "ripple", "stress", "sharing", "contacts", "generator-torque"] {
+        assert!(json["figures"][figure]["number"].as_u64().is_some_and(|n| n > 0), "{figure}");
+    }
+    // The same pitch once more along a path would say nothing new.
+    assert!(json["figures"]["error"].is_null() && json["figures"]["map"].is_null());
+    assert!(html.len() < 1_500_000);
+
+    desk.line(&format!("{line} --no-report --out bare")).done();
+    assert_eq!(names(&desk.path("bare")), ["results.csv", "summary.json"]);
+}
+
+/// A path that turns back and one whose torque comes and goes: a line to each way, solid and dashed, and what the teeth bear.
+#[test]
+fn the_page_of_a_path_tells_its_ways_apart() {
+    let desk = Desk::new();
+    let rows = |points: &[(f64, f64)]| -> String {
+        let lines = points.iter().map(|(angle, torque)| format!("{angle},{torque}\n"));
+        format!("generator_rad,torque_n_m\n{}", lines.collect::<String>())
+    };
+    desk.write("there_and_back.csv", &rows(&[(0.0, 0.0), (0.02, 0.0), (0.04, 0.0), (0.02, 0.0), (0.0, 0.0)]));
+    desk.write("loop.csv", &rows(&[(0.1, 0.0), (0.1, 5.0), (0.1, 10.0), (0.1, 5.0), (0.1, 0.0), (0.1, -5.0)]));
+    let page_of = |path: &str| {
+        desk.line(&format!("simulate --generator cam --mesh coarse --path {path}.csv --out {path}")).done();
+        page(&desk, &format!("{path}/report.html")).1
+    };
+    let series = |json: &Value, figure: &str| -> Vec<(String, String)> {
+        let series = json["figures"][figure]["charts"]["cam"]["series"].as_array().cloned().unwrap_or_default();
+        let text = |of: &Value, key: &str| of[key].as_str().unwrap().to_owned();
+        series.iter().map(|series| (text(series, "name"), text(series, "mark"))).collect()
+    };
+    let pair = |name: &str, mark: &str| (name.to_owned(), mark.to_owned());
+    let there = page_of("there_and_back");
+    assert_eq!(series(&there, "error"), [pair("forward", "line"), pair("backward", "dashed")]);
+    assert!(there["figures"]["torsion"].is_null(), "its torque stands");
+    let torsion = page_of("loop");
+    assert_eq!(series(&torsion, "torsion"), [pair("torque growing", "line"), pair("torque falling", "dashed")]);
+    assert!(torsion["figures"]["error"].is_null(), "its generator stands");
+    for json in [&there, &torsion] {
+        assert!(json["animations"].as_object().unwrap().is_empty());
+        assert_eq!(json["figures"]["path-stress"]["x"]["quantity"], "whole", "{}", json["figures"]["path-stress"]["x"]);
+        for figure in ["sharing", "map", "path-stress", "contacts"] {
+            assert!(json["figures"][figure]["number"].as_u64().is_some_and(|n| n > 0), "{figure}");
+        }
+    }
+}
+
+/// A drive with a data sheet, and one whose teeth interfere: both are on the page.
+#[test]
+fn the_page_of_a_simulation_has_data_sheet_and_cautions() {
+    let desk = Desk::new();
+    desk.write(
+        "drive.toml",
+        "base = \"HHD-95\"\n[data_sheet]\nsource = \"a catalogue\"\nt1_n_m = 5.0\nt2_n_m = 10.0\nrated_torque_n_m = 20.0\nk1_n_m_per_rad = 30e3\n",
+    );
+    let line = "simulate --drive drive.toml --generator cam --mesh coarse --path pitch --torque-n-m 20 --out made";
+    desk.line(line).done();
+    let (html, json) = page(&desk, "made/report.html");
+    let sheet = &json["results"]["simulate"]["data_sheet"];
+    let (stated, computed) = (&sheet["beside"][0]["stated"], sheet["sheet"]["k1_n_m_per_rad"].as_f64().unwrap());
+    assert_eq!(stated.as_f64(), Some(30e3));
+    assert!(html.contains("a catalogue and contact FEM; T1 5 T2 10 rated 20 N·m"));
+    assert!(html.contains(&format!("K1, N·m/rad</th><td>30000</td><td>{computed:.0}</td>")), "{computed}");
+    assert!(
+        html.contains(&format!("K1, N·m/rad</th><td>{computed:.0}</td>")),
+        "not in the table of all that is computed"
+    );
+    let lost = sheet["sheet"]["lost_motion_arcsec"].as_f64().unwrap();
+    assert!(html.contains(&format!("value=\"{lost}\"")), "no lost motion of {lost}");
+
+    let binds = "simulate --generator cam --mesh coarse --path pitch --torque-n-m 20 --set circular_spline.profile_shift=2.95 --out binds";
+    desk.line(binds).done();
+    let (html, json) = page(&desk, "binds/report.html");
+    assert_eq!(json["status"], "caution");
+    assert!(html.contains("the teeth of the drawing interfere by 8.9 µm"), "{}", json["remarks"]);
+}
+
 /// Five torque nodes are too few for two rollers: the table is made, misses, and page, JSON and exit code say so.
 #[test]
 fn a_missed_bound_is_stamped_and_fails_the_command() {

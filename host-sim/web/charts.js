@@ -153,6 +153,7 @@ export function lineChart(place, id, spec) {
       size,
       grid: { stroke: colour("grid"), width: 1 },
       ticks: { stroke: colour("grid"), width: 1 },
+      ...(a.quantity === "whole" ? { incrs: WHOLE_STEPS } : {}),
       values: (u, splits) => splits.map((v) => (v === null ? "" : String(Number(v.toPrecision(4))).replace("-", "−"))),
     });
     const series = description.series.map((s) => {
@@ -188,7 +189,7 @@ export function lineChart(place, id, spec) {
         },
       },
       axes: [
-        { ...axis(spec.x, 44), ...(spec.x.quantity === "whole" ? { incrs: WHOLE_STEPS } : {}) },
+        axis(spec.x, 44),
         // As wide as the longest number wants.
         axis(spec.y, (u, texts) => Math.max(48, 20 + 7 * Math.max(0, ...(texts ?? []).map((t) => t.length)))),
       ],

@@ -199,6 +199,8 @@ for (const file of [
   "faults/report.html",
   "reproduce/report.html",
   "study/report.html",
+  "simulate/report.html",
+  "path/report.html",
   "hostile.html",
 ]) {
   const title = file.replace("/report.html", "");
@@ -295,6 +297,87 @@ await check("the page of reproduce answers, shows each generator and turns the d
   assert(!noise.length, noise.join(" | "));
   await close();
   return `${claims.length} claims`;
+});
+
+// ---- A run along a path
+
+await check(
+  "the page of a settled pitch answers, turns the drive along its error, and its numbers are those of the run",
+  async () => {
+    const { page, noise, close } = await open("simulate/report.html");
+    const report = JSON.parse(await page.locator("#flexspline-report").textContent());
+    const { wind_up_arcsec: windUp } = report.results.simulate;
+    const number = (await page.locator(".number strong").textContent()).trim();
+    assert(number === `${windUp.toFixed(1)}″`, `${number} instead of ${windUp}`);
+    await page.locator("#units").selectOption("arcmin");
+    const row = page.locator("#found tbody tr", { hasText: "Wind-up from mid-backlash" });
+    near(parseFloat(await row.locator("td").first().textContent()), windUp / 60, 5e-4, "wind-up in the table, arcmin");
+    await page.locator("#units").selectOption("arcsec");
+    await page.locator("#ripple").scrollIntoViewIfNeeded();
+    const box = await page.locator("#ripple .u-over").boundingBox();
+    await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.5 * box.height);
+    await settled(page);
+    near(((await psi(page)) / PITCH) % 1, 0.5, 0.02, "pitches");
+    const rows = report.animations.cam.rows;
+    const results = readFileSync(path.join(folder, "simulate/results.csv"), "utf8").trim().split("\n");
+    assert(rows.length === results.length - 1, `${rows.length} rows of ${results.length - 1}`);
+    assert(!noise.length, noise.join(" | "));
+    await close();
+    return number;
+  },
+);
+
+await check("the page of a path tells its ways apart, reads its map and prints", async () => {
+  const { page, noise, close } = await open("path/report.html");
+  for (const [figure, names] of [
+    ["error", ["forward", "backward"]],
+    ["torsion", ["torque growing", "torque falling", "torque growing (2)"]],
+  ]) {
+    await page.waitForSelector(`#${figure} .u-legend .u-marker`);
+    const marks = await page.$$eval(`#${figure} .u-legend .u-series`, (all) =>
+      all.slice(1).map((series) => {
+        const { borderTopStyle, borderTopColor } = getComputedStyle(series.querySelector(".u-marker"));
+        return [series.querySelector(".u-label").textContent, borderTopStyle, borderTopColor];
+      }),
+    );
+    const found = marks.map(([name]) => name);
+    assert(names.every((name, k) => found[k].startsWith(name)) && found.length === names.length, found.join(" | "));
+    assert(marks[0][1] === "solid" && marks[1][1] === "dashed", JSON.stringify(marks));
+    assert(new Set(marks.map((mark) => mark[2])).size === marks.length, "two ways have one colour");
+  }
+  const [download] = await Promise.all([
+    page.waitForEvent("download"),
+    page
+      .locator("#map")
+      .getByRole("button", { name: /as CSV/ })
+      .click(),
+  ]);
+  const cells = readFileSync(await download.path(), "utf8")
+    .trim()
+    .split("\r\n")
+    .slice(1);
+  const forces = cells
+    .map((line) => line.split(",")[2])
+    .filter((cell) => cell !== "")
+    .map(Number);
+  // Flanks of both sides bear in turn, and what bears nothing has no colour.
+  assert(forces.some((n) => n > 1) && forces.some((n) => n < -1), `${Math.min(...forces)} to ${Math.max(...forces)} N`);
+  assert(forces.length < cells.length, "every tooth bears all the time");
+  const pdf = await page.pdf({ format: "A4", path: path.join(shots, "path.pdf") });
+  const pages = (pdf.toString("latin1").match(/\/Type\s*\/Page[^s]/g) ?? []).length;
+  assert(pages >= 3 && pages <= 10, `${pages} pages`);
+  assert(!noise.length, noise.join(" | "));
+  await close();
+  const still = await open("path/report.html", { script: false });
+  const entries = await still.page.locator("#error noscript svg text, #torsion noscript svg text").allTextContents();
+  for (const name of ["forward", "backward", "torque falling"]) {
+    assert(
+      entries.some((entry) => entry.startsWith(name)),
+      `a sketch does not name ${name}: ${entries.join(" | ")}`,
+    );
+  }
+  await still.close();
+  return `${forces.length} forces, ${pages} pages`;
 });
 
 // ---- The sleeve in three dimensions

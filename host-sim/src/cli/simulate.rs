@@ -6,15 +6,16 @@ use std::path::Path as FilePath;
 
 use clap::{Args, ValueEnum, ValueHint};
 
-use super::{Context, Failure, names, say};
+use super::{Context, Failure, names, report, say};
 use crate::drive::{Drive, GeneratorKind};
 use crate::export::{Frame, write_pvd, write_vtu};
 use crate::mesh::MeshLevel;
 use crate::output::{OutputError, Outputs, WholeFolder, write_whole};
 use crate::progress::Progress;
+use crate::report::{Seen, simulation_report};
 use crate::simulate::{
     Direction, Observation, Path, PathPoint, Phase, PlaceStress, SimulateError, Simulation, SimulationSettings,
-    Summary, read_path, simulate, stress_by_place,
+    Summary, Told, read_path, simulate, stress_by_place,
 };
 use crate::stated::{SheetBeside, beside};
 use crate::stepping::{Method, SolveError, SolverSettings};
@@ -24,8 +25,9 @@ const PARTIAL: &str = "results.partial.csv";
 
 /// Simulate the drive along a generator path by contact FEM
 ///
-/// Writes results.csv (one row to each increment) and summary.json (kinematic error, backlash, wind-up, stress) into the
-/// output folder, and frames/ with --frames. The drive is deformed, then loaded, then turned.
+/// Writes results.csv (one row to each increment), summary.json (kinematic error, backlash, wind-up, stress) and report.html, a page with
+/// these figures, the error along the path, how the teeth share the load and, where the path settles for a tooth pitch, the drive in motion,
+/// into the output folder, and frames/ with --frames. The drive is deformed, then loaded, then turned.
 ///
 /// Where no equilibrium is found the last one is told, with its load and wind-up, and the rows so far are in results.partial.csv: those of
 /// the path, or of the loads that came on. Finer steps have been tried then.
@@ -61,6 +63,9 @@ pub(super) struct Simulate {
     /// Write the deformed mesh of every row to frames/, for ParaView
     #[arg(long)]
     frames: bool,
+    /// Do not write report.html
+    #[arg(long)]
+    no_report: bool,
 }
 
 /// What is solved and how, for every command that solves.
@@ -131,11 +136,15 @@ impl Simulate {
         let mut frames = if self.frames { Some(Frames::new(&out.join("frames"))?) } else { None };
         let mut progress = context.progress(settings.generator.name());
         let mut lost: Option<OutputError> = None;
+        let mut seen = (!self.no_report).then(|| Seen::new(&drive));
         let run = simulate(&drive, &settings, &mut |now| {
             if context.verbose() {
                 progress.line(&line(now));
             }
             show(&mut progress, now);
+            if let Some(seen) = &mut seen {
+                seen.add(now);
+            }
             if let (Some(frames), Some(row)) = (&mut frames, now.row)
                 && let Err(error) = frames.add(row.step, now)
             {
@@ -161,10 +170,15 @@ impl Simulate {
             beside(&drive, settings.generator, temperature_c, &stated, settings.solver)
         });
 
-        let has_frames = frames.is_some();
+        let (has_frames, has_page) = (frames.is_some(), seen.is_some());
         let mut outputs = Outputs::new();
         outputs.csv(&out.join("results.csv"), &simulation.rows)?;
         outputs.json(&out.join("summary.json"), &simulation.summary)?;
+        if let Some(seen) = seen {
+            let page = simulation_report(&drive, settings.generator, &simulation, seen)
+                .map_err(|error| Failure::Failed(format!("report.html: {error}")))?;
+            report::write(&page, out, &mut outputs)?;
+        }
         if let Some(frames) = frames {
             outputs.folder(frames.finish()?);
         }
@@ -173,7 +187,8 @@ impl Simulate {
         let _ = std::fs::remove_file(out.join(PARTIAL));
         context.print(&simulation.summary, || {
             let next = format!("tables --generator {}", settings.generator);
-            report(&simulation.summary, out, has_frames).trim_end().to_owned() + &say::next(&[context.next(&next)])
+            text(&simulation.summary, out, has_frames, has_page).trim_end().to_owned()
+                + &say::next(&[context.next(&next)])
         })
     }
 
@@ -316,56 +331,28 @@ impl Frames {
 }
 
 /// The summary for reading.
-fn report(summary: &Summary, out: &FilePath, has_frames: bool) -> String {
+fn text(summary: &Summary, out: &FilePath, has_frames: bool, has_page: bool) -> String {
     let mut text = format!(
         "{} with {} generator, path {}, {} mesh, {} degrees of freedom\n",
         summary.drive, summary.generator, summary.path, summary.mesh, summary.degrees_of_freedom
     );
-    let mut put = |name: &str, value: Option<f64>, unit: &str, digits: usize| {
-        if let Some(value) = value {
-            let _ = writeln!(text, "  {name:<36} {value:>12.digits$} {unit}");
-        }
-    };
-    put("load torque", summary.torque_n_m, "N.m", 3);
-    put("kinematic error, peak to peak", summary.kinematic_error_pp_arcsec, "arcsec", 3);
-    put("mean error forward", summary.mean_error_forward_arcsec, "arcsec", 3);
-    put("mean error backward", summary.mean_error_backward_arcsec, "arcsec", 3);
-    put("backlash", summary.backlash_arcsec, "arcsec", 3);
-    put("lost motion at the reversal", summary.reversal_lost_motion_arcsec, "arcsec", 3);
-    put("dwell of the output at the reversal", summary.dwell_generator_rad, "rad of generator", 6);
-    put("wind-up from mid-backlash", summary.wind_up_arcsec, "arcsec", 3);
-    put("wind-up, elastic part", summary.wind_up_elastic_arcsec, "arcsec", 3);
-    put("largest von Mises stress at a node", Some(summary.max_von_mises_mpa), "MPa, which grows with the mesh", 1);
-    if summary.stress.is_empty() {
-        put("stress in the root fillets", Some(summary.root_fillet_mpa), "MPa on this mesh; --stress takes three", 1);
-        put("stress on the bore, at a node", Some(summary.nodal_bore_mpa), "MPa", 1);
+    for Told { name, value, unit, decimals, caveat, .. } in summary.told() {
+        let comma = if unit.is_empty() || caveat.is_empty() { "" } else { ", " };
+        let _ = writeln!(text, "  {name:<36} {value:>12.decimals$} {unit}{comma}{caveat}");
     }
-    for stress in &summary.stress {
-        let [low, high] = stress.interval_mpa;
-        let name = format!("stress, {}", stress.place.in_words());
-        put(&name, Some(stress.von_mises_mpa), &format!("MPa, {low:.0} to {high:.0}, over three meshes"), 1);
-    }
-    put("largest flank pressure", Some(summary.peak_flank_pressure_mpa), "MPa", 1);
-    put("largest generator pressure", Some(summary.peak_generator_pressure_mpa), "MPa", 1);
-    put("largest force of a lobe", Some(summary.lobe_force_n), "N", 1);
-    let leans = summary.tilt_mrad != 0.0 || summary.load_across_face_peak_over_mean != 1.0;
-    put("largest tilt of the teeth", leans.then_some(summary.tilt_mrad), "mrad", 3);
-    put("load along the face, peak over mean", leans.then_some(summary.load_across_face_peak_over_mean), "", 2);
-    put("share of that face that bears", leans.then_some(summary.face_in_contact), "", 3);
-    put("room of rigid teeth as built", summary.room_as_built_arcsec, "arcsec, least of a turn", 1);
-    put("time", Some(summary.wall_s), "s", 2);
     text += &summary.data_sheet.as_ref().map(SheetBeside::text).unwrap_or_default();
     for caution in &summary.cautions {
         let _ = writeln!(text, "caution: {}", caution.words);
     }
     let _ = writeln!(
         text,
-        "{} increments, {} iterations; wrote {}, {}{}",
+        "{} increments, {} iterations; wrote {}, {}{}{}",
         summary.increments,
         summary.iterations,
         out.join("results.csv").display(),
         out.join("summary.json").display(),
-        if has_frames { format!(", {}", out.join("frames/frames.pvd").display()) } else { String::new() }
+        if has_frames { format!(", {}", out.join("frames/frames.pvd").display()) } else { String::new() },
+        if has_page { format!(", {} (for any browser)", out.join("report.html").display()) } else { String::new() }
     );
     text
 }

@@ -12,11 +12,11 @@
 
 use super::pack::Packed;
 use super::sleeve_view::SleeveView;
-use crate::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
+use crate::contact::{BoreContact, BoreLaw, Configuration, FlankLaw, FlankPair};
 use crate::drive::{Drive, GeneratorKind, Side};
-use crate::mesh::{WheelMesh, rotate};
+use crate::mesh::{MeshError, WheelMesh, rotate};
 use crate::simulate::stress::nodal_von_mises;
-use crate::simulate::{Direction, Path, Row, SimulateError, SimulationSettings, simulate};
+use crate::simulate::{Direction, Observation, Path, Row, SimulateError, SimulationSettings, simulate};
 use crate::stepping::{Problem, SolveError, SolverSettings, State};
 use std::ops::ControlFlow;
 
@@ -114,25 +114,70 @@ pub fn animate(
         direction: Direction::Forward,
         ..SimulationSettings::new(kind, Path::Pitch)
     };
-    let mut taken: Option<Taken> = None;
-    let mut sleeve = None;
-    let run = simulate(drive, &settings, &mut |now| {
-        if let Some(row) = now.row {
-            sleeve.get_or_insert_with(|| SleeveView::of(now.problem, now.state, &row.face));
-            taken.get_or_insert_with(|| Taken::new(now.problem)).add(now.problem, now.state);
-        }
+    let mut passing = Passing::new(drive);
+    simulate(drive, &settings, &mut |now| {
+        passing.see(now);
         observe()
     })?;
-    let mut taken = taken.expect("a pitch has rows");
-    let sleeve = sleeve.transpose().map_err(|error| SimulateError::from(SolveError::from(error)))?;
-    taken.animation.sleeve = sleeve.flatten();
-    Ok(taken.finish(kind, torque_n_m, run.summary.temperature_c.unwrap_or(drive.temperature.reference_c), run.rows))
+    let made = passing.finish().map_err(|error| SimulateError::from(SolveError::from(error)))?;
+    Ok(made.expect("a pitch has all frames"))
+}
+
+/// How near to a frame, in frames, a generator angle has to be: what rounding leaves of an angle of a thousand turns is less.
+const AT_A_FRAME: f64 = 1e-6;
+
+/// A run that is watched for a pitch of steady motion: where its rows pass all frames one after the other, they are an animation.
+pub struct Passing {
+    uniform: bool,
+    taken: Option<Taken>,
+    sleeve: Option<Result<Option<SleeveView>, MeshError>>,
+    /// The rows at the frames so far, one after the other.
+    rows: Vec<Row>,
+}
+
+impl Passing {
+    /// Before the run.
+    pub fn new(drive: &Drive) -> Passing {
+        let uniform = drive.as_built.first_not_uniform().is_none();
+        Passing { uniform, taken: None, sleeve: None, rows: Vec::new() }
+    }
+
+    /// Looks at an increment of the run.
+    pub fn see(&mut self, now: &Observation<'_>) {
+        let Some(row) = now.row.filter(|row| self.uniform && row.settled && self.rows.len() < FRAMES) else { return };
+        let at = frames(now.problem, row.generator_rad);
+        if (at - at.round()).abs() > AT_A_FRAME {
+            return;
+        }
+        let goes_on = self.rows.last().is_none_or(|last| {
+            let step = at - frames(now.problem, last.generator_rad);
+            (step.abs() - 1.0).abs() < 2.0 * AT_A_FRAME
+                && row.turn_rad * last.turn_rad > 0.0
+                && (row.torque_n_m, row.temperature_c) == (last.torque_n_m, last.temperature_c)
+        });
+        if !goes_on {
+            (self.taken, self.sleeve) = (None, None);
+            self.rows.clear();
+        }
+        self.sleeve.get_or_insert_with(|| SleeveView::of(now.problem, now.state, &row.face));
+        self.taken.get_or_insert_with(|| Taken::new(now.problem)).add(now.problem, now.state);
+        self.rows.push(row.clone());
+    }
+
+    /// The animation; none where the run passed no whole pitch.
+    ///
+    /// # Errors
+    /// The drive has no sleeve that can be shown.
+    pub fn finish(self) -> Result<Option<Animation>, MeshError> {
+        let Some(mut taken) = self.taken.filter(|_| self.rows.len() == FRAMES) else { return Ok(None) };
+        taken.animation.sleeve = self.sleeve.transpose()?.flatten();
+        Ok(Some(taken.finish(self.rows)))
+    }
 }
 
 /// Samples as they come in.
 struct Taken {
     animation: Animation,
-    bore: BoreContact,
 }
 
 impl WheelMotion {
@@ -185,9 +230,67 @@ impl WheelMotion {
     }
 }
 
+/// Forces of the generator on the first teeth (N), added up over the piece of the bore under each, in the frame of the tooth.
+pub(super) fn bore_forces(problem: &Problem, state: &State, teeth: usize) -> Vec<[f64; 2]> {
+    let bore = BoreContact::new(problem.wheels().0, problem.settings.bore_points(problem.kind));
+    let law =
+        BoreLaw::new(problem.settings.bore_penalty(problem.kind), problem.drive.generator.bearing_stiffness_n_per_mm3);
+    let width = problem.drive.flexspline.width_mm;
+    let per_sector = bore.edges.len() / problem.flexspline.teeth;
+    let mut forces = vec![[0.0; 2]; teeth];
+    bore.evaluate(law, &problem.outline, state.generator_rad, &state.u, |edge| {
+        if let Some(sum) = forces.get_mut(edge.edge / per_sector) {
+            for (k, force) in edge.force.iter().enumerate() {
+                sum[k % 2] += force * width;
+            }
+        }
+    });
+    for (sector, force) in forces.iter_mut().enumerate() {
+        *force = rotate(*force, (-problem.flexspline.sector_angle(sector)).sin_cos());
+    }
+    forces
+}
+
+/// A generator angle, counted in frames.
+fn frames(problem: &Problem, generator_rad: f64) -> f64 {
+    generator_rad * FRAMES as f64 / problem.flexspline.pitch()
+}
+
 /// Which eighth of a pitch a generator angle is.
 fn frame_of(problem: &Problem, state: &State) -> i64 {
-    (state.generator_rad * FRAMES as f64 / problem.flexspline.pitch()).round() as i64
+    frames(problem, state.generator_rad).round() as i64
+}
+
+/// The force of a flank of the circular spline on a tooth of the flexspline, in the frame of the tooth.
+pub(super) struct FlankForce {
+    /// The tooth, from 0.
+    pub(super) tooth: usize,
+    /// Which of its flanks.
+    pub(super) side: Side,
+    /// Force on the tooth, N.
+    pub(super) force_n: [f64; 2],
+    /// Where the resultant attacks, mm.
+    point_mm: [f64; 2],
+}
+
+/// The normal forces of the flanks that bear on the teeth that are `wanted`, as resultants.
+pub(super) fn flank_forces(problem: &Problem, state: &State, wanted: impl Fn(usize) -> bool) -> Vec<FlankForce> {
+    let flanks = problem.flanks();
+    let at = Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad, leans: &state.leans };
+    let law = FlankLaw { stiffness: problem.settings.flank_penalty, stick_stiffness: 0.0, friction: 0.0 };
+    let width = problem.drive.flexspline.width_mm;
+    let of_pair = |pair: FlankPair| {
+        let layout = flanks.layout(pair, at);
+        let contact = flanks.evaluate(pair, at, law, &layout.points)?;
+        let [fx, fy] = contact.resultant;
+        let force = fx.hypot(fy);
+        // From the frame of the output to that of the tooth; the force on the tooth is the reaction.
+        let turn = (state.output_rad - problem.flexspline.sector_angle(pair.tooth)).sin_cos();
+        let force_n = rotate([-fx * width, -fy * width], turn);
+        let point_mm = rotate(contact.attack.map(|x| x / force), turn);
+        Some(FlankForce { tooth: pair.tooth, side: pair.side, force_n, point_mm })
+    };
+    flanks.near_pairs(at, NEAR_MM).into_iter().filter(|pair| wanted(pair.tooth)).filter_map(of_pair).collect()
 }
 
 impl Taken {
@@ -210,8 +313,7 @@ impl Taken {
             peak_mpa: 0.0,
             sleeve: None,
         };
-        let bore = BoreContact::new(problem.wheels().0, problem.settings.bore_points(problem.kind));
-        Taken { animation, bore }
+        Taken { animation }
     }
 
     fn add(&mut self, problem: &Problem, state: &State) {
@@ -235,53 +337,23 @@ impl Taken {
         }
     }
 
-    /// Normal forces of the flanks, as resultants at their points of attack.
     fn add_flank_forces(&mut self, problem: &Problem, state: &State, frame: i64) {
-        let flanks = problem.flanks();
-        let at = Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad, leans: &state.leans };
-        let law = FlankLaw { stiffness: problem.settings.flank_penalty, stick_stiffness: 0.0, friction: 0.0 };
-        let width = problem.drive.flexspline.width_mm;
-        for pair in flanks.near_pairs(at, NEAR_MM) {
-            if !self.animation.flexspline.sampled().contains(&pair.tooth) {
-                continue;
-            }
-            let layout = flanks.layout(pair, at);
-            let Some(contact) = flanks.evaluate(pair, at, law, &layout.points) else { continue };
-            let [fx, fy] = contact.resultant;
-            let force = fx.hypot(fy);
-            // From the frame of the output to that of the tooth; the force on the tooth is the reaction.
-            let turn = state.output_rad - problem.flexspline.sector_angle(pair.tooth);
-            let on_tooth = rotate([-fx * width, -fy * width], turn.sin_cos());
-            let point = rotate(contact.attack.map(|x| x / force), turn.sin_cos());
-            let row = if pair.side == Side::Plus { 0 } else { 4 };
-            self.put(row, pair.tooth, frame, on_tooth);
-            self.put(row + 2, pair.tooth, frame, point);
+        let sampled = self.animation.flexspline.sampled();
+        for found in flank_forces(problem, state, |tooth| sampled.contains(&tooth)) {
+            let row = if found.side == Side::Plus { 0 } else { 4 };
+            self.put(row, found.tooth, frame, found.force_n);
+            self.put(row + 2, found.tooth, frame, found.point_mm);
         }
     }
 
-    /// Forces of the generator, added up over the piece of the bore under each tooth.
     fn add_bore_forces(&mut self, problem: &Problem, state: &State, frame: i64) {
-        let law = BoreLaw::new(
-            problem.settings.bore_penalty(problem.kind),
-            problem.drive.generator.bearing_stiffness_n_per_mm3,
-        );
-        let width = problem.drive.flexspline.width_mm;
-        let per_sector = self.bore.edges.len() / problem.flexspline.teeth;
-        let mut on_sector = vec![[0.0; 2]; self.animation.flexspline.sampled().len()];
-        self.bore.evaluate(law, &problem.outline, state.generator_rad, &state.u, |edge| {
-            if let Some(sum) = on_sector.get_mut(edge.edge / per_sector) {
-                for (k, force) in edge.force.iter().enumerate() {
-                    sum[k % 2] += force * width;
-                }
-            }
-        });
-        for (sector, force) in on_sector.into_iter().enumerate() {
-            let turn = -problem.flexspline.sector_angle(sector);
-            self.put(8, sector, frame, rotate(force, turn.sin_cos()));
+        let sampled = self.animation.flexspline.sampled().len();
+        for (sector, force) in bore_forces(problem, state, sampled).into_iter().enumerate() {
+            self.put(8, sector, frame, force);
         }
     }
 
-    fn finish(self, kind: GeneratorKind, torque_n_m: f64, temperature_c: f64, rows: Vec<Row>) -> Animation {
+    fn finish(self, rows: Vec<Row>) -> Animation {
         let mut animation = self.animation;
         let mut all: Vec<f64> = [&animation.flexspline, &animation.circular_spline]
             .iter()
@@ -291,7 +363,8 @@ impl Taken {
         let last = all.len() - 1;
         animation.peak_mpa = all[last];
         animation.colour_end_mpa = round_up(all[(last as f64 * COLOUR_SHARE) as usize]);
-        Animation { kind, torque_n_m, temperature_c, rows, ..animation }
+        let Row { torque_n_m, temperature_c, .. } = rows[0];
+        Animation { torque_n_m, temperature_c, rows, ..animation }
     }
 }
 
@@ -391,7 +464,9 @@ mod tests {
             }
             worst
         };
+        let mut passing = Passing::new(&drive);
         simulate(&drive, &settings, &mut |now| {
+            passing.see(now);
             if now.row.is_some_and(|row| row.settled && row.step > 16) {
                 let frame = frame_of(now.problem, now.state);
                 let whole = now.problem.whole_state(now.state);
@@ -404,6 +479,12 @@ mod tests {
         })
         .unwrap();
         assert_eq!(checked, 8);
+        // What passes a pitch on its way is the same animation.
+        let passed = passing.finish().unwrap().expect("a pitch of steady motion");
+        let differ = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(differ(&passed.flexspline.displacement_mm, &animation.flexspline.displacement_mm) < 1e-5);
+        assert!(differ(&passed.error_arcsec, &animation.error_arcsec) < 0.02);
+        assert_eq!(passed.torque_n_m, torque);
         assert!(animation.peak_mpa > 100.0 && animation.colour_end_mpa <= animation.peak_mpa * 1.5);
     }
 
@@ -429,6 +510,33 @@ mod tests {
             let found = 2e-3 * moment;
             assert!((found / (torque - drive.output.drag_torque_n_m) - 1.0).abs() < 0.01, "{found} N.m");
             assert!(inward > 0.0 && outward > inward, "{inward} N inwards, {outward} N outwards");
+        }
+    }
+
+    /// A pitch that is passed under another load half way, or in steps that are no eighths, is none.
+    #[test]
+    fn what_is_no_steady_pitch_is_not_shown() {
+        let drive = Drive::hhd_95();
+        let pitch = std::f64::consts::TAU / 188.0;
+        for (parts, half_way_n_m, shown) in [(8, 10.0, true), (8, 12.0, false), (7, 10.0, false)] {
+            // A little less than two pitches: after a change at the first there is no second whole one.
+            let points = (0..=2 * parts - 2).map(|k| crate::simulate::PathPoint {
+                generator_rad: pitch * f64::from(k) / f64::from(parts),
+                torque_n_m: Some(if k < parts { 10.0 } else { half_way_n_m }),
+                temperature_c: None,
+            });
+            let path = Path::Points(points.collect());
+            let settings = SimulationSettings { solver: coarse(), ..SimulationSettings::new(GeneratorKind::Cam, path) };
+            let mut passing = Passing::new(&drive);
+            let mut settled = 0;
+            simulate(&drive, &settings, &mut |now| {
+                passing.see(now);
+                settled += usize::from(now.row.is_some_and(|row| row.settled));
+                ControlFlow::Continue(())
+            })
+            .unwrap();
+            assert_eq!(passing.finish().unwrap().is_some(), shown, "{parts} parts, {half_way_n_m} N m");
+            assert!(settled >= FRAMES, "{settled} settled rows of {parts} parts, {half_way_n_m} N m");
         }
     }
 

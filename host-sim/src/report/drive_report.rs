@@ -7,12 +7,15 @@ use flexspline::{Direction, GeneratorAngle, Table};
 use serde_json::{Map, Value, json};
 
 use super::animation::{Animation, AnimationError, FRAMES};
+use super::drive_figures::{
+    apart, caution_words, drive_figure, less_mean, sharing_figure, sharing_lines, sheet_section, sleeve_figure,
+    stress_figure, stress_lines,
+};
 use super::page::{
     Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity, Section,
     Series, Status, Table as PageTable, Text, significant,
 };
 use crate::drive::{Drive, GeneratorKind};
-use crate::stated::{Beside, SheetBeside};
 use crate::tables::validate::{MAX_BOUND_ARCSEC, Point, Validation};
 use crate::tables::{Source, TableInfo};
 use crate::units::ARCSEC_PER_RAD;
@@ -211,14 +214,11 @@ impl<'a> Known<'a> {
             }
         }
         if let Ok(animation) = &self.subject.animation {
-            let e = &animation.error_arcsec;
-            let mean = e.iter().sum::<f64>() / e.len() as f64;
-            let angle = |k: usize| (self.pitch() * k as f64 / FRAMES as f64).to_degrees();
             lines.series.push(Series {
                 name: format!("{} N·m forward, fresh FEM", torque_text(animation.torque_n_m as f32)),
                 mark: Mark::Points,
                 colour: 1,
-                points: (0..=FRAMES).map(|k| [angle(k), e[k % FRAMES] - mean]).collect(),
+                points: less_mean(animation),
             });
         }
         lines
@@ -300,61 +300,6 @@ impl<'a> Known<'a> {
         );
         Some(Lines { series: series.collect(), ..Lines::default() })
     }
-
-    fn stress(&self) -> Option<Lines> {
-        let animation = self.subject.animation.as_ref().ok()?;
-        let mut rows: Vec<(usize, &crate::simulate::Row)> = animation
-            .rows
-            .iter()
-            .map(|row| {
-                let frame = (row.generator_rad * FRAMES as f64 / self.pitch()).round() as i64;
-                (frame.rem_euclid(FRAMES as i64) as usize, row)
-            })
-            .collect();
-        rows.sort_by_key(|(frame, _)| *frame);
-        let series = |name: &str, colour, of: fn(&crate::simulate::Row) -> f64| Series {
-            name: name.into(),
-            mark: Mark::Line,
-            colour,
-            points: (0..=FRAMES)
-                .filter_map(|k| {
-                    let (_, row) = rows.iter().find(|(frame, _)| *frame == k % FRAMES)?;
-                    Some([(self.pitch() * k as f64 / FRAMES as f64).to_degrees(), of(row)])
-                })
-                .collect(),
-        };
-        Some(Lines {
-            series: vec![
-                series("von Mises stress, both wheels", 0, |row| row.max_von_mises_mpa),
-                series("pressure between flanks", 1, |row| row.peak_flank_pressure_mpa),
-                series("pressure of generator on bore", 2, |row| row.peak_generator_pressure_mpa),
-            ],
-            ..Lines::default()
-        })
-    }
-
-    /// How the load is shared among the teeth.
-    fn sharing(&self) -> Option<Lines> {
-        let a = self.subject.animation.as_ref().ok()?;
-        let samples = a.flexspline.samples;
-        let force = |row: usize, s: usize| a.forces[row * samples + s].hypot(a.forces[(row + 1) * samples + s]);
-        let half = samples as i64 / 2;
-        let series = |name: &str, colour, mark, row: usize| {
-            let points = (-half..half).map(|k| {
-                let angle = self.pitch() * k as f64 / FRAMES as f64;
-                [angle.to_degrees(), force(row, k.rem_euclid(samples as i64) as usize)]
-            });
-            Series { name: name.into(), mark, colour, points: points.collect() }
-        };
-        Some(Lines {
-            series: vec![
-                series("flank towards growing angles", 0, Mark::Line, 0),
-                series("flank towards falling angles", 1, Mark::Line, 4),
-                series("generator on bore, per tooth", 2, Mark::Dashed, 8),
-            ],
-            ..Lines::default()
-        })
-    }
 }
 
 /// Points of a validation as series: misses of the table over something, by direction.
@@ -367,13 +312,7 @@ fn misses(v: &Validation, kind: &str, over: fn(&Point) -> f64) -> Lines {
             .map(|p| [over(p), p.table_arcsec - p.fem_arcsec])
             .collect();
         points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        // Points at one place would hide one another in a table: a hair apart they do not.
-        for k in 1..points.len() {
-            if points[k][0] <= points[k - 1][0] {
-                points[k][0] = points[k - 1][0] + 1e-5 * points[k - 1][0].abs().max(1e-3);
-            }
-        }
-        Series { name: name.into(), mark: Mark::Points, colour, points }
+        Series { name: name.into(), mark: Mark::Points, colour, points: apart(points) }
     });
     let limits = [v.max_bound_arcsec, -v.max_bound_arcsec].map(|y| Limit { name: "bound of any point".into(), y });
     Lines { series: series.collect(), limits: limits.into(), ..Lines::default() }
@@ -410,7 +349,8 @@ pub fn drive_report(sources: Sources<'_>) -> Page {
     if validated {
         sections.push(validation_section(&known));
     }
-    sections.extend(sheet_section(&known));
+    let sheet = |k: &Known<'_>| k.subject.info.and_then(|info| Some((k.id(), info.data_sheet.clone()?)));
+    sections.extend(sheet_section(known.iter().filter_map(sheet).collect()));
     sections.extend(stress_section(&known));
     sections.push(table_section(&known));
     sections.push(load_section(&known));
@@ -481,7 +421,7 @@ fn judge(known: &[Known<'_>]) -> (Status, Vec<String>) {
             remark(Status::Remark, format!("{name}: {words}."));
         }
         for caution in k.subject.info.iter().flat_map(|info| &info.cautions) {
-            remark(Status::Caution, format!("{name}: {}.", caution.words.replace(" um", " µm")));
+            remark(Status::Caution, format!("{name}: {}.", caution_words(caution)));
         }
         if let Some(why) = k.subject.info.and_then(|info| info.no_stress.as_ref()) {
             remark(Status::Caution, format!("{name}: no stress over three meshes: {why}."));
@@ -539,42 +479,6 @@ fn result_of(k: &Known<'_>) -> Value {
             "uncompensated_rms_arcsec": v.uncompensated_rms_arcsec,
         })),
     })
-}
-
-/// The data sheet beside what is computed, where the drive has one.
-fn sheet_section(known: &[Known<'_>]) -> Option<Section> {
-    let of = |k: &Known<'_>| Some((k.id(), k.subject.info?.data_sheet.clone()?));
-    let sheets: Vec<(String, SheetBeside)> = known.iter().filter_map(of).collect();
-    let source = sheets.first()?.1.stated.source.clone().unwrap_or_else(|| "the data sheet".to_owned());
-    let mut blocks = Vec::new();
-    for (id, sheet) in sheets {
-        let number =
-            |value: Option<f64>| Text::new(value.map_or_else(|| "–".to_owned(), |value| significant(value, 3)));
-        let row = |row: &Beside| {
-            let (name, unit) = row.in_words();
-            let remark = Text::new(row.remark(&sheet));
-            vec![
-                Text::new(format!("{name}, {unit}")),
-                number(Some(row.stated)),
-                number(row.computed),
-                number(row.ratio),
-                remark,
-            ]
-        };
-        let caption = format!("{source} and contact FEM; {} N·m", sheet.loads_in_words());
-        let header = ["Figure", "stated", "computed", "ratio", "what is computed"].map(str::to_owned).into();
-        let table = PageTable { caption, header, rows: sheet.beside.iter().map(row).collect() };
-        blocks.push(Block::Table { choice: Some(id.clone()), table });
-        if let Some(what) = sheet.assumed_in_words() {
-            let text = Text::new(format!("Loads: {what}."));
-            blocks.push(Block::Paragraph { choice: Some(id.clone()), text });
-        }
-        if let Some(why) = &sheet.why {
-            let text = Text::new(format!("Not all of it was computed: {why}."));
-            blocks.push(Block::Paragraph { choice: Some(id), text });
-        }
-    }
-    Some(Section { id: "data-sheet".into(), title: "Beside its data sheet".into(), detail: Detail::Summary, blocks })
 }
 
 /// Stress over three meshes, where it was asked for.
@@ -688,22 +592,6 @@ fn charts(known: &[Known<'_>], of: impl Fn(&Known<'_>) -> Option<Lines>) -> Vec<
 }
 
 fn motion_section(known: &[Known<'_>]) -> Section {
-    let drive = Figure {
-        id: "drive".into(),
-        title: "The drive to scale".into(),
-        caption: Text::new(
-            "Contact FEM, plane strain, at half the largest load of the table, turning forward; both wheels meshed as \
-             computed. The flexspline stands and is deformed by the generator (grey); the circular spline turns: the red dot is \
-             on tooth 0, the blue one on space 0, which meet on the major axis at generator angle 0. Arrows push on the \
-             flexspline: red from the circular spline, at the flanks, blue from the generator. What is seen at one angle is \
-             seen again a tooth pitch later, one tooth on; between computed positions, an eighth of a pitch apart, the picture \
-             interpolates. Move along figure 2 to turn the generator.",
-        ),
-        alt: "Cross section of the drive: circular spline outside, deformed flexspline inside it, wave generator in the middle, \
-              coloured by von Mises stress, and an enlargement of the teeth at the major axis"
-            .into(),
-        body: FigureBody::Drive,
-    };
     let ripple = Figure {
         id: "ripple".into(),
         title: "Error over one tooth pitch, less its mean".into(),
@@ -733,27 +621,12 @@ fn motion_section(known: &[Known<'_>]) -> Section {
             charts: charts(known, |k| Some(k.wind_up())),
         },
     };
+    let drive = drive_figure("at half the largest load of the table, turning forward");
     let mut blocks = vec![Block::Figure(drive), Block::Figure(ripple), Block::Figure(wind_up)];
     if known.iter().any(|k| k.subject.animation.as_ref().is_ok_and(|a| a.sleeve.is_some())) {
         blocks.push(Block::Figure(sleeve_figure()));
     }
     Section { id: "motion".into(), title: "The drive at work".into(), detail: Detail::Summary, blocks }
-}
-
-/// The flexspline with its sleeve.
-pub(super) fn sleeve_figure() -> Figure {
-    Figure {
-        id: "sleeve".into(),
-        title: "The flexspline in three dimensions".into(),
-        caption: Text::new(
-            "Its middle surface, the wave of the generator in the state of the figure above: each harmonic of the rim by contact FEM, extended \
-             along rim and tubes by the theory of shells. Displacements are drawn larger than they are, by the factor that is told; colours are \
-             their outward part as it is. The toothed rim is outlined. The sleeve stands, the wave turns with the generator. In the corner, where \
-             the drive is computed with face = \"slices\": how the load lies along the face of the flank that bears most.",
-        ),
-        alt: "The flexspline as a tube in perspective, deformed by the wave generator, coloured by its outward displacement".into(),
-        body: FigureBody::Sleeve,
-    }
 }
 
 fn validation_section(known: &[Known<'_>]) -> Section {
@@ -908,39 +781,14 @@ fn table_section(known: &[Known<'_>]) -> Section {
 }
 
 fn load_section(known: &[Known<'_>]) -> Section {
-    let stress = Figure {
-        id: "stress".into(),
-        title: "Largest stress and pressures over a pitch".into(),
-        caption: Text::new(
-            "At the load of figure 1. Von Mises stress is averaged at nodes; pressures are those of the contact. Plane strain: \
-             no bending over the length of the sleeve, and no stress raiser finer than the mesh.",
-        ),
-        alt: "Curves of the largest stress and contact pressures over one tooth pitch".into(),
-        body: FigureBody::Lines {
-            x: Axis::linked("Generator from the beginning of a pitch"),
-            y: Axis::new("Stress, pressure", Quantity::Stress),
-            charts: charts(known, |k| k.stress()),
-        },
-    };
-    let sharing = Figure {
-        id: "sharing".into(),
-        title: "How the teeth share the load".into(),
-        caption: Text::new(
-            "Force on a flexspline tooth by its angle from the major axis, at the load of figure 1: of each flank, and of the \
-             generator on the piece of bore under the tooth. The other lobe carries the same.",
-        ),
-        alt: "Curves of the force on a tooth over its angle from the major axis".into(),
-        body: FigureBody::Lines {
-            x: Axis::new("Tooth from the major axis", Quantity::Degree),
-            y: Axis::new("Force", Quantity::Force),
-            charts: charts(known, |k| k.sharing()),
-        },
-    };
     Section {
         id: "load".into(),
         title: "Load and stress".into(),
         detail: Detail::Engineering,
-        blocks: vec![Block::Figure(stress), Block::Figure(sharing)],
+        blocks: vec![
+            Block::Figure(stress_figure(charts(known, |k| Some(stress_lines(k.subject.animation.as_ref().ok()?))))),
+            Block::Figure(sharing_figure(charts(known, |k| Some(sharing_lines(k.subject.animation.as_ref().ok()?))))),
+        ],
     }
 }
 

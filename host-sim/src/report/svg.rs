@@ -8,14 +8,20 @@ use super::page::{Axis, Lines, Mark, significant};
 
 const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 300.0;
-const LEFT: f64 = 70.0;
+const LEFT: f64 = 84.0;
 const BOTTOM: f64 = 45.0;
 const TOP: f64 = 12.0;
 const RIGHT: f64 = 12.0;
 /// Points of a line at most; a sketch has no use for more.
-const MOST_POINTS: usize = 60;
-/// Points at most of a line that is drawn from least to largest, and of a cloud.
+const MOST_POINTS: usize = 100;
+/// Points at most of a line that values which are not finite break, and of a cloud.
 const MOST_DOTS: usize = 150;
+/// Height of a line of the legend.
+const LEGEND: f64 = 18.0;
+/// Width of a letter of it, about.
+const LETTER: f64 = 6.6;
+/// Width of a mark of it with the space around it.
+const MARK: f64 = 40.0;
 const COLOURS: [&str; 6] = ["#0063a6", "#b3470c", "#00725a", "#8a3f8f", "#6b5b00", "#555555"];
 
 fn escape(text: &str) -> String {
@@ -34,6 +40,41 @@ fn span(values: impl Iterator<Item = f64>) -> (f64, f64) {
     }
 }
 
+/// Points of a line, thinned to about `most`: of each group the least and the largest, so that no peak is lost, and a place that is not finite
+/// where it has one.
+fn thinned(points: &[[f64; 2]], most: usize) -> Vec<[f64; 2]> {
+    if points.len() <= most {
+        return points.to_vec();
+    }
+    let of_group = |group: &[[f64; 2]]| {
+        let finite = || group.iter().enumerate().filter(|(_, point)| point[1].is_finite());
+        let by_y = |a: &(usize, &[f64; 2]), b: &(usize, &[f64; 2])| a.1[1].total_cmp(&b.1[1]);
+        let mut kept: Vec<usize> =
+            [finite().min_by(by_y), finite().max_by(by_y)].into_iter().flatten().map(|(k, _)| k).collect();
+        kept.extend(group.iter().position(|point| !point[1].is_finite()));
+        kept.sort_unstable();
+        kept.dedup();
+        kept.into_iter().map(|k| group[k]).collect::<Vec<_>>()
+    };
+    points.chunks(2 * points.len().div_ceil(most)).flat_map(of_group).collect()
+}
+
+/// Where the entries of a legend stand: from the left, and in which line.
+fn legend_places(names: &[&str]) -> Vec<(f64, usize)> {
+    let (mut x, mut line) = (0.0, 0);
+    names
+        .iter()
+        .map(|name| {
+            let width = MARK + LETTER * name.chars().count() as f64;
+            if x > 0.0 && x + width > WIDTH - LEFT {
+                (x, line) = (0.0, line + 1);
+            }
+            x += width;
+            (x - width, line)
+        })
+        .collect()
+}
+
 /// A chart.
 pub(super) fn lines(x: &Axis, y: &Axis, chart: &Lines) -> String {
     let points = || chart.series.iter().flat_map(|s| s.points.iter());
@@ -41,12 +82,18 @@ pub(super) fn lines(x: &Axis, y: &Axis, chart: &Lines) -> String {
     let (y0, y1) = span(points().map(|p| p[1]).chain(chart.limits.iter().map(|l| l.y)));
     let px = |v: f64| LEFT + (v - x0) / (x1 - x0) * (WIDTH - LEFT - RIGHT);
     let py = |v: f64| HEIGHT - BOTTOM - (v - y0) / (y1 - y0) * (HEIGHT - BOTTOM - TOP);
+    let names: Vec<&str> =
+        if chart.series.len() > 1 { chart.series.iter().map(|s| s.name.as_str()).collect() } else { vec![] };
+    let legend = legend_places(&names);
+    let height = HEIGHT + legend.last().map_or(0.0, |(_, line)| LEGEND * (line + 1) as f64);
     let mut svg = format!(
-        r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" role="img" font-size="12" fill="currentColor">"##
+        r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" role="img" font-size="12" fill="currentColor">"##
     );
     for k in 0..=4 {
         let share = f64::from(k) / 4.0;
-        let (vx, vy) = (x0 + share * (x1 - x0), y0 + share * (y1 - y0));
+        // What rounding leaves of zero is zero.
+        let at = |a: f64, b: f64| Some(a + share * (b - a)).filter(|v| v.abs() > 1e-9 * (b - a)).unwrap_or(0.0);
+        let (vx, vy) = (at(x0, x1), at(y0, y1));
         let _ = write!(
             svg,
             r##"<path d="M{LEFT} {1:.1}H{2}" stroke="#8884"/><text x="{3}" y="{1:.1}" text-anchor="end" dy="4">{4}</text><text x="{0:.1}" y="{5}" text-anchor="middle">{6}</text>"##,
@@ -88,14 +135,11 @@ pub(super) fn lines(x: &Axis, y: &Axis, chart: &Lines) -> String {
             continue;
         }
         let broken = series.mark == Mark::Broken;
-        let step = series.points.len().div_ceil(if broken { MOST_DOTS } else { MOST_POINTS }).max(1);
-        // An odd step meets least and largest in turn.
-        let step = if broken { step | 1 } else { step };
         let mut d = String::new();
         let mut pen_is_up = true;
-        for [vx, vy] in series.points.iter().step_by(step).chain(series.points.last()) {
+        for [vx, vy] in thinned(&series.points, if broken { MOST_DOTS } else { MOST_POINTS }) {
             if vy.is_finite() {
-                let _ = write!(d, "{}{:.1} {:.1}", if pen_is_up { "M" } else { "L" }, px(*vx), py(*vy));
+                let _ = write!(d, "{}{:.1} {:.1}", if pen_is_up { "M" } else { "L" }, px(vx), py(vy));
                 pen_is_up = false;
             } else {
                 pen_is_up |= broken;
@@ -107,6 +151,19 @@ pub(super) fn lines(x: &Axis, y: &Axis, chart: &Lines) -> String {
             r##"<path d="{d}" fill="none" stroke="{colour}" stroke-width="1.5"{dash}><title>{}</title></path>"##,
             escape(&series.name)
         );
+    }
+    for (series, (x, line)) in chart.series.iter().zip(&legend) {
+        let colour = COLOURS[series.colour % COLOURS.len()];
+        let (x, y) = (LEFT + x, HEIGHT + LEGEND * *line as f64 + 4.0);
+        let mark = match series.mark {
+            Mark::Points => format!(r##"<circle cx="{:.1}" cy="{y}" r="2.5" fill="{colour}"/>"##, x + 12.0),
+            Mark::Dots => format!(r##"<circle cx="{:.1}" cy="{y}" r="1.2" fill="{colour}"/>"##, x + 12.0),
+            of_line => {
+                let dash = if of_line == Mark::Dashed { r#" stroke-dasharray="6 4""# } else { "" };
+                format!(r##"<path d="M{x:.1} {y}h24" stroke="{colour}" stroke-width="1.5"{dash}/>"##)
+            }
+        };
+        let _ = write!(svg, r##"{mark}<text x="{:.1}" y="{}">{}</text>"##, x + 29.0, y + 4.0, escape(&series.name));
     }
     let _ = write!(
         svg,
@@ -157,4 +214,40 @@ fn outline(wheel: &WheelMotion) -> String {
         }
     }
     d
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::page::{Quantity, Series};
+
+    /// One high point of a thousand, and one place where nothing is.
+    #[test]
+    fn a_sketch_loses_neither_peak_nor_gap() {
+        let mut points: Vec<[f64; 2]> = (0..1000).map(|k| [f64::from(k), 0.0]).collect();
+        points[537][1] = 7.0;
+        points[700][1] = f64::NAN;
+        let kept = thinned(&points, MOST_POINTS);
+        assert!(kept.contains(&[537.0, 7.0]) && kept.iter().any(|point| point[1].is_nan()), "{kept:?}");
+        assert!(kept.len() <= MOST_POINTS + 1 && kept.windows(2).all(|pair| pair[0][0] < pair[1][0]), "{}", kept.len());
+        assert_eq!(thinned(&points[..50], MOST_POINTS), points[..50], "few stay as they are");
+    }
+
+    #[test]
+    fn a_sketch_of_several_series_names_them_with_their_marks() {
+        let series =
+            |name: &str, mark, colour| Series { name: name.into(), mark, colour, points: vec![[0.0, 0.0], [1.0, 1.0]] };
+        let of = |series: Vec<Series>| {
+            let axis = Axis::new("x", Quantity::Count);
+            lines(&axis, &axis, &Lines { series, ..Lines::default() })
+        };
+        let both = of(vec![series("there & on", Mark::Line, 0), series("back", Mark::Dashed, 1)]);
+        assert!(both.contains(">there &amp; on</text>") && both.contains(">back</text>"), "{both}");
+        assert_eq!(both.matches(r#"stroke-dasharray="6 4""#).count(), 2, "the dashed line, and its entry");
+        assert!(!of(vec![series("alone", Mark::Line, 0)]).contains(">alone</text>"), "its axis says what it is");
+        // As many lines as the names need, and none beyond the right end.
+        let long = "a name that is rather long, as some are";
+        let places = legend_places(&[long, long, "short"]);
+        assert_eq!(places.iter().map(|(_, line)| *line).collect::<Vec<_>>(), [0, 1, 1]);
+    }
 }

@@ -31,7 +31,7 @@ pub use places::{
 };
 pub use row::Row;
 pub use stress::{PeakStress, peak_stress};
-pub use summary::{SUMMARY_SCHEMA, Summary};
+pub use summary::{SUMMARY_SCHEMA, Summary, Told};
 
 use path::LARGEST_TORQUE_N_M;
 use summary::{Metrics, Touches, largest, shared, wheel_name};

@@ -146,6 +146,88 @@ pub struct Summary {
     pub wall_s: f64,
 }
 
+/// A figure of a run in words, as the terminal and the page tell it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Told {
+    /// Its name.
+    pub name: String,
+    /// Its value, in `unit`.
+    pub value: f64,
+    /// Its unit, `arcsec` or as the terminal prints it; empty of a number alone.
+    pub unit: &'static str,
+    /// Decimals that the terminal prints.
+    pub decimals: usize,
+    /// What has to be known where it is read; may be empty.
+    pub caveat: String,
+    /// What it is.
+    pub what: String,
+}
+
+impl Summary {
+    /// Its figures in words, in the order in which they are told; those that the path cannot give are left out.
+    pub fn told(&self) -> Vec<Told> {
+        let mut all = Vec::new();
+        let mut put =
+            |name: &str, value: Option<f64>, (unit, decimals): (&'static str, usize), caveat: &str, what: &str| {
+                let [name, caveat, what] = [name, caveat, what].map(str::to_owned);
+                all.extend(value.map(|value| Told { name, value, unit, decimals, caveat, what }));
+            };
+        let (arcsec, mpa) = (("arcsec", 3), ("MPa", 1));
+        put("load torque", self.torque_n_m, ("N.m", 3), "", "on the output, positive turns it forward");
+        let ripple = "largest less smallest error of a settled stretch one way under one load";
+        put("kinematic error, peak to peak", self.kinematic_error_pp_arcsec, arcsec, "", ripple);
+        let mean = "output less generator over the ratio, over whole tooth pitches";
+        put("mean error forward", self.mean_error_forward_arcsec, arcsec, "", mean);
+        put("mean error backward", self.mean_error_backward_arcsec, arcsec, "", mean);
+        put("backlash", self.backlash_arcsec, arcsec, "", "mean error backward less forward, without load");
+        let lost = "mean error backward less forward, under a load that holds the flanks together";
+        put("lost motion at the reversal", self.reversal_lost_motion_arcsec, arcsec, "", lost);
+        let dwell = "what the generator turns before the output follows";
+        put("dwell of the output at the reversal", self.dwell_generator_rad, ("rad of generator", 6), "", dwell);
+        let wind_up = "mean error under load from the middle of the backlash, half of which is part of it";
+        put("wind-up from mid-backlash", self.wind_up_arcsec, arcsec, "", wind_up);
+        let elastic = "the same from a light touch on the side that the load pushes to";
+        put("wind-up, elastic part", self.wind_up_elastic_arcsec, arcsec, "", elastic);
+        let place = self.max_von_mises_wheel.replace('_', " ");
+        let place = format!("of the {place}, at step {}", self.max_von_mises_step);
+        let grows = "which grows with the mesh";
+        put("largest von Mises stress at a node", Some(self.max_von_mises_mpa), mpa, grows, &place);
+        if self.stress.is_empty() {
+            let (caveat, surface) =
+                ("on this mesh; --stress takes three", "of the flexspline, by the strain of their surface");
+            put("stress in the root fillets", Some(self.root_fillet_mpa), mpa, caveat, surface);
+            put("stress on the bore, at a node", Some(self.nodal_bore_mpa), mpa, "", "of the flexspline");
+        }
+        for stress in &self.stress {
+            let [low, high] = stress.interval_mpa;
+            let (name, caveat) =
+                (format!("stress, {}", stress.place.in_words()), format!("{low:.0} to {high:.0}, over three meshes"));
+            let tooth = format!("of the flexspline, at tooth {}", stress.tooth);
+            put(&name, Some(stress.von_mises_mpa), mpa, &caveat, &tooth);
+        }
+        put("largest flank pressure", Some(self.peak_flank_pressure_mpa), mpa, "", "of any tooth, of all rows");
+        let bore = "of generator on bore, of all rows";
+        put("largest generator pressure", Some(self.peak_generator_pressure_mpa), mpa, "", bore);
+        let lobe = "of the generator along its major axis on one half of the rim";
+        put("largest force of a lobe", Some(self.lobe_force_n), ("N", 1), "", lobe);
+        let virtual_work = self.generator_torque_virtual_work_n_m;
+        let without =
+            virtual_work.map_or_else(String::new, |torque| format!("without friction it would be {torque:.4}"));
+        let mean = "on the flexspline, positive turns it forward; over whole tooth pitches";
+        put("mean torque of the generator", self.generator_torque_mean_n_m, ("N.m", 4), &without, mean);
+        let leans = self.tilt_mrad != 0.0 || self.load_across_face_peak_over_mean != 1.0;
+        let of_leaning = |value: f64| leans.then_some(value);
+        put("largest tilt of the teeth", of_leaning(self.tilt_mrad), ("mrad", 3), "", "along their face, outward");
+        let peak = "of the flank that bears most anywhere; 1 is even";
+        put("load along the face, peak over mean", of_leaning(self.load_across_face_peak_over_mean), ("", 2), "", peak);
+        put("share of that face that bears", of_leaning(self.face_in_contact), ("", 3), "", "1 is all of it");
+        let room = "what rigid teeth leave the output to turn; below 0 rim and bearing have to give way";
+        put("room of rigid teeth as built", self.room_as_built_arcsec, ("arcsec", 1), "least of a turn", room);
+        put("time", Some(self.wall_s), ("s", 2), "", "from start to end");
+        all
+    }
+}
+
 /// Light touches on the freshly deformed drive, error in arc-seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Touches {

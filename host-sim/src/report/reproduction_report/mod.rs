@@ -249,7 +249,7 @@ fn motion(r: &Reproduction, animations: &[Animation]) -> Section {
         by_generator(|kind| charts::travel(r, kind)),
     ));
     if animations.iter().any(|a| a.sleeve.is_some()) {
-        blocks.push(Block::Figure(super::drive_report::sleeve_figure()));
+        blocks.push(Block::Figure(super::drive_figures::sleeve_figure()));
     }
     Section { id: "motion".into(), title: "The protocol".into(), detail: Detail::Summary, blocks }
 }
