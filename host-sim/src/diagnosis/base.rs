@@ -149,12 +149,6 @@ const FAR_BETTER: f64 = 0.8;
 pub(super) const NEAR_FRICTION: f64 = 1.25;
 /// A clearance is crossed within this time, s.
 const CROSSING_S: f64 = 0.08;
-/// The load has changed its side, and the flank with it, once it was this many times friction there: until then the output may hang in the
-/// clearance, as what hardly exceeds friction hardly moves a load behind it. *Chosen*: of joints in motion, one clean and one worn, hung at 1.36
-/// and 1.45 times.
-const CARRIES: f64 = 2.0;
-/// Or once it is beyond friction for so long, s. *Guess*: those hung for 0.3 and 1.3 s.
-const HANGS_S: f64 = 3.0;
 /// A clearance may be this many times as wide as the nominal one before anything else is known.
 pub(super) const WIDER: f64 = 1.6;
 /// If more of the rows than this are uncertain, none is set aside: then they are what the data are about.
@@ -302,8 +296,7 @@ pub(super) fn predicted_by_table(rows: &Rows, torque: &[f64], table: &Table<'_>)
 fn uncertain(rows: &Rows, nominal: &Nominal, law: PlayLaw, flank: &[f64]) -> Vec<bool> {
     let by_load = uncertain_by_load(rows, nominal, flank);
     if few(&by_load) {
-        let hanging = hanging(rows, nominal, flank, &by_load);
-        return if few(&hanging) { hanging } else { by_load };
+        return by_load;
     }
     // Where hardly any load says which flank carries, the motion does, …
     let by_motion = (law == PlayLaw::Pushed).then(|| uncertain_by_motion(rows, nominal));
@@ -366,70 +359,10 @@ fn uncertain_by_load(rows: &Rows, nominal: &Nominal, flank: &[f64]) -> Vec<bool>
     uncertain
 }
 
-/// Uncertain rows, and those after them in which a load of the other side has not been so large yet that it must have moved the output.
-fn hanging(rows: &Rows, nominal: &Nominal, flank: &[f64], uncertain: &[bool]) -> Vec<bool> {
-    let carries = CARRIES * nominal.friction_torque_n_m;
-    let mut hanging = uncertain.to_vec();
-    for session in &rows.sessions {
-        // The side of the load that carried last, 0 if the output has left it, and since when the load is on another one.
-        let mut side = rows.torque.get(session.start).map_or(0.0, |torque| torque.signum());
-        let mut since: Option<f64> = None;
-        for k in session.clone() {
-            let torque = rows.torque[k];
-            if torque.abs() <= nominal.friction_torque_n_m {
-                // Without a load the motion may push it off.
-                side = if flank[k] * side < 0.999 { 0.0 } else { side };
-                since = None;
-                continue;
-            }
-            if torque * side > 0.0 {
-                since = None;
-                continue;
-            }
-            let changed = *since.get_or_insert(rows.time[k]);
-            if torque.abs() >= carries || rows.time[k] - changed >= HANGS_S {
-                (side, since) = (torque.signum(), None);
-            } else {
-                hanging[k] = true;
-            }
-        }
-    }
-    hanging
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::measurement::Session;
-
-    #[test]
-    fn a_load_that_hardly_exceeds_friction_leaves_the_output_in_the_clearance() {
-        let nominal = crate::synthesize::catalogue_drive();
-        let friction = nominal.friction_torque_n_m;
-        let session = |times_friction: &[f64], period_s: f64| Session {
-            line: (0..times_friction.len() as u64).collect(),
-            generator_rad: (0..times_friction.len()).map(|k| 0.1 * k as f64).collect(),
-            error_rad: vec![0.0; times_friction.len()],
-            time_s: Some((0..times_friction.len()).map(|k| period_s * k as f64).collect()),
-            torque_n_m: Some(times_friction.iter().map(|times| times * friction).collect()),
-            ..Session::default()
-        };
-        let hangs = |times_friction: &[f64], period_s: f64| -> Vec<bool> {
-            let rows = Rows::new(&[session(times_friction, period_s)], &nominal);
-            let flank = PlayLaw::Held.flanks(&rows, &rows.torque, &nominal);
-            hanging(&rows, &nominal, &flank, &vec![false; rows.len()])
-        };
-        let (no, yes) = (false, true);
-        assert_eq!(hangs(&[9.0, 1.5, -0.5, -1.5, -1.5, -2.5, -1.5], 0.01), [no, no, no, yes, yes, no, no]);
-        // Back to the side that it never left.
-        assert_eq!(hangs(&[9.0, -1.5, 1.5, 9.0, -9.0], 0.01), [no, yes, no, no, no]);
-        // Beyond friction for long.
-        assert_eq!(hangs(&[9.0, -1.5, -1.5, -1.5], 2.0), [no, yes, yes, no]);
-        assert_eq!(hangs(&[1.5, 1.5, 1.5, 1.5], 0.01), [no; 4]);
-        // Pushed off without a load, and back.
-        let rows = Rows::new(&[session(&[-9.0, -0.5, -0.5, -1.5, -2.5], 0.01)], &nominal);
-        assert_eq!(hanging(&rows, &nominal, &[-1.0, 0.0, 1.0, -1.0, -1.0], &[no; 5]), [no, no, no, yes, no]);
-    }
 
     #[test]
     fn nobody_knows_the_flank_before_the_first_load_or_without_one() {
