@@ -114,7 +114,8 @@ pub mod verdict {
     pub const RINGS: f64 = 0.17;
     /// Standard deviations from a value to the ends of its interval of 95 %. *Source*.
     pub const INTERVAL: f64 = 1.96;
-    /// Beside what has no name and is large, a cause adds has to be so many times the uncertainty of that. *Chosen*.
+    /// What a cause adds is known well from so many times the uncertainty of that on: beside what has no name and is large, and where its columns
+    /// trade its size among one another. *Chosen*.
     pub const KNOWN_BESIDE: f64 = 5.0;
     /// The size of a cause is told from zero from so many of its standard deviations on. *Chosen*: of 6 causes named below it at 99 % one was
     /// there.

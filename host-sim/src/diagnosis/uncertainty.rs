@@ -91,16 +91,6 @@ const SIZES: [ParameterName; 13] = [
 /// A size that is known exactly counts as so many times its standard deviation.
 const EXACTLY: f64 = 1e3;
 
-/// The best known of the sizes among `parameters`, in units of `standard_deviations`.
-fn told_from_zero(parameters: &BTreeMap<&'static str, Parameter>, standard_deviations: &BTreeMap<&str, f64>) -> f64 {
-    let of = |name: &ParameterName| -> Option<f64> {
-        let (found, std) = (parameters.get(name.as_str())?, standard_deviations.get(name.as_str())?);
-        let without = if *name == ParameterName::StiffnessRatio { 1.0 } else { 0.0 };
-        Some(((found.value - without).abs() / std.max(1e-30)).min(EXACTLY))
-    };
-    SIZES.iter().filter_map(of).reduce(f64::max).unwrap_or(EXACTLY)
-}
-
 /// How far the coefficients and moves of one term may be off.
 struct Spread {
     /// Covariance by Laplace's approximation, and by stretches of the data; row by row.
@@ -122,8 +112,8 @@ impl Spread {
     /// The same where the noise is `beyond` times what it was taken for. What blocks of the data tell of themselves holds as it is: they have
     /// what is beyond noise in them.
     fn beyond_noise(&self, form: &[f64], beyond: f64) -> f64 {
-        let trace = |covariance: &[f64]| -> f64 { form.iter().zip(covariance).map(|(a, b)| a * b).sum() };
-        let laplace = trace(&self.covariances[0]) + (beyond * beyond - 1.0) * trace(&self.by_noise).max(0.0);
+        let laplace =
+            trace(form, &self.covariances[0]) + (beyond * beyond - 1.0) * trace(form, &self.by_noise).max(0.0);
         self.of(form).max(laplace)
     }
 
@@ -135,7 +125,7 @@ impl Spread {
 
     /// Variances: within the blocks, by the jackknife, and what Laplace's lacks.
     fn parts(&self, form: &[f64]) -> (f64, f64, f64) {
-        let trace = |covariance: &[f64]| -> f64 { form.iter().zip(covariance).map(|(a, b)| a * b).sum() };
+        let trace = |covariance: &[f64]| trace(form, covariance);
         let [laplace, stretched] = &self.covariances;
         let within = trace(laplace).max(trace(stretched)).max(0.0);
         // A session without which the rest says nothing of it, such as the one after a jump, is no repetition.
@@ -157,6 +147,11 @@ impl Spread {
         let lacking = if against.is_empty() { jackknife } else { trace(laplace) * beyond_what_may(&against) };
         (within, jackknife, lacking)
     }
+}
+
+/// Variance of a quadratic form, row by row, under a covariance.
+fn trace(form: &[f64], covariance: &[f64]) -> f64 {
+    form.iter().zip(covariance).map(|(a, b)| a * b).sum()
 }
 
 /// By what factor squares of shifts are larger than they may be, from both of each block. The mean of the blocks' own factors: each is one draw of
@@ -278,7 +273,7 @@ fn parameters(
             slope[j] = sign * change / step;
         }
     }
-    let (mut parameters, mut beyond_noise) = (BTreeMap::new(), BTreeMap::new());
+    let (mut parameters, mut told): (_, Option<f64>) = (BTreeMap::new(), None);
     for ((name, value), slope) in at.into_iter().zip(&slopes) {
         let scale = match name.kind() {
             Kind::Angle => 1.0,
@@ -288,10 +283,13 @@ fn parameters(
         let with_doubt = |variance: f64| variance.sqrt().hypot(term.law.wrong.doubt * scale);
         let form = outer(slope);
         parameters.insert(name.as_str(), Parameter { value, std: with_doubt(spread.of(&form)) });
-        beyond_noise.insert(name.as_str(), with_doubt(spread.beyond_noise(&form, beyond)));
+        if SIZES.contains(&name) {
+            let without = if name == ParameterName::StiffnessRatio { 1.0 } else { 0.0 };
+            let times = (value - without).abs() / with_doubt(spread.beyond_noise(&form, beyond)).max(1e-30);
+            told = Some(told.map_or(times, |told| told.max(times)));
+        }
     }
-    let told = told_from_zero(&parameters, &beyond_noise);
-    (parameters, told)
+    (parameters, told.map_or(EXACTLY, |told| told.min(EXACTLY)))
 }
 
 #[cfg(test)]

@@ -122,10 +122,11 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>, on_sample: &Exc
     law
 }
 
-/// Least moments, as shares of the load. The smaller one turns over the play of a drive with 60″ of it, which steps through no load, in so many rows
-/// that 1″ rms is there. *Guesses*.
+/// Least moment, as a share of the load. *Guess*: moments of 0.09 and 0.13 N·m of examinations, 2.1 and 2.6″ rms, were below the one of another play.
 const LEAST_MOMENT: f64 = 0.001;
+/// The same where the law of the play is another one than that found before. *Guess*.
 const LEAST_MOMENT_OF_ANOTHER_PLAY: f64 = 0.004;
+
 /// In the lead: parts of the moment.
 const SINE: Role = Role("sine");
 const COSINE: Role = Role("cosine");
