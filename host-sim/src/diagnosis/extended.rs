@@ -136,7 +136,7 @@ impl Extended {
         let scales = Scales::new(&rows, settings.pitch_radius_mm, jumps);
         let on = Excitation::new(&rows, nominal, &base, &scales);
         let laws = library(&on);
-        let uncertain = prepare::uncertain(&on, &[]);
+        let uncertain = prepare::uncertain(&on, &[], &[]);
         let Fineness { mut stride, noise, worth } =
             settings.fineness.unwrap_or_else(|| fineness(&on, &laws, &uncertain, settings.averages));
         if averages_hide(&on, &laws, causes, &uncertain, stride) {

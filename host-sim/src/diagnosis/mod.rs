@@ -19,6 +19,7 @@ mod experiment;
 pub(crate) mod explain;
 mod extended;
 mod flank_lag;
+mod hanging;
 mod held_out;
 pub(crate) mod linear;
 pub(crate) mod model;
@@ -231,7 +232,8 @@ impl<'a> Search<'a> {
                 trace.decided(Stage::Data, (*cause).into(), None, vec![Judged::plain(Gate::Needs(need), false)]);
             }
         }
-        let mut uncertain = prepare::uncertain(on, &[]);
+        let mut hung = vec![false; on.rows.len()];
+        let mut uncertain = prepare::uncertain(on, &[], &hung);
         let Resolution { mut stride, fast: at_first } = resolution(on, &laws, &uncertain, settings.averages, &[]);
         let whiten = |noise, uncertain: &[bool], stride| Whitener::new(on.rows, uncertain, stride, noise);
         let mut averaged = Averaged::of(on, stride).map(Arc::new);
@@ -273,7 +275,13 @@ impl<'a> Search<'a> {
                 }
             }
             let mut explained = remainder::explained(&problem, &selected);
-            let doubtful = prepare::uncertain(on, &selected.terms);
+            // What hung once hung, whatever is taken for it later.
+            for (hung, hangs) in hung.iter_mut().zip(hanging::hanging(on, &explained)) {
+                *hung |= hangs;
+            }
+            let doubtful = prepare::uncertain(on, &selected.terms, &hung);
+            let hangs =
+                doubtful.iter().zip(&uncertain).zip(&hung).any(|((after, before), hung)| *hung && *after && !before);
             drop(selected);
             let known = laws.len();
             for (found, size) in slow {
@@ -285,7 +293,7 @@ impl<'a> Search<'a> {
             }
             let new_line = laws.len() > known;
             let changed = doubtful.iter().zip(&uncertain).filter(|(a, b)| a != b).count();
-            let other_rows = changed > on.rows.len() / 200;
+            let other_rows = changed > on.rows.len() / 200 || hangs;
             uncertain = doubtful;
             // What was large may have hidden what is fast.
             let finer = resolution(on, &laws, &uncertain, settings.averages, &explained);

@@ -153,9 +153,9 @@ fn jumps_within(rows: &Rows, left: &[f64], turned_rad: f64, level_s: f64) -> Vec
         .collect()
 }
 
-/// Rows whose flank is not known well, with what the causes chosen add to the load.
+/// Rows whose flank is not known well, with what the causes chosen add to the load, and those in which the output `hung` in the clearance.
 #[must_use]
-pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>]) -> Vec<bool> {
+pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>], hung: &[bool]) -> Vec<bool> {
     let mut uncertain = on.base.uncertain.clone();
     // A jump passes over some rows, and the output swings out.
     for jump in &on.scales.jumps {
@@ -163,6 +163,11 @@ pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>]) -> Vec<bool> {
         for (doubtful, time) in uncertain.iter_mut().zip(&on.rows.time) {
             *doubtful |= (begins - beside..over + beside).contains(time);
         }
+    }
+    let mut with = uncertain.clone();
+    with.iter_mut().zip(hung).for_each(|(doubtful, hung)| *doubtful |= hung);
+    if few(&with) {
+        uncertain = with;
     }
     let without = uncertain.clone();
     for term in terms {

@@ -6,6 +6,7 @@ use crate::causes::{CauseName, ParameterName};
 use crate::measurement::Session;
 use crate::nominal::{Harmonic, Nominal};
 use crate::synthesize::{Effect, Plan, Richness, Sensors, Strange, What, catalogue_drive, measure};
+use crate::units::ARCSEC_PER_RAD;
 
 /// A flank meets the tooth behind a zone's centre by this angle, rad.
 const FLANK_AHEAD_RAD: f64 = 0.35;
@@ -92,7 +93,7 @@ fn with_more(mut sessions: Vec<Session>, more: impl Fn(f64, f64, usize) -> f64) 
     for session in &mut sessions {
         let torque = session.torque_n_m.clone().unwrap();
         for (k, error) in session.error_rad.iter_mut().enumerate() {
-            *error += more(session.generator_rad[k], torque[k], k) / crate::units::ARCSEC_PER_RAD;
+            *error += more(session.generator_rad[k], torque[k], k) / ARCSEC_PER_RAD;
         }
     }
     sessions
@@ -119,7 +120,7 @@ fn slow_to_its_other_flank(nominal: &Nominal, lag_s: f64) -> Vec<Session> {
                 let error = nominal.harmonics_arcsec(psi) + nominal.wind_up_arcsec(load) + play + noise;
                 session.line.push(k as u64 + 2);
                 session.generator_rad.push(psi);
-                session.error_rad.push(error / crate::units::ARCSEC_PER_RAD);
+                session.error_rad.push(error / ARCSEC_PER_RAD);
                 session.time_s.as_mut().unwrap().push(t + 600.0 * f64::from(number));
                 session.torque_n_m.as_mut().unwrap().push(load);
             }
@@ -181,7 +182,7 @@ fn wear_goes_on_while_nobody_records() {
             if load.abs() > friction {
                 flank = load.signum();
             }
-            *error += 0.5 * wider * flank / crate::units::ARCSEC_PER_RAD;
+            *error += 0.5 * wider * flank / ARCSEC_PER_RAD;
         }
     }
     let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
@@ -205,7 +206,7 @@ fn what_swings_short_of_where_it_is_driven_is_no_resonance() {
                     rate += 5e-4 * (natural * natural * (driven - off) - 2.0 * 0.03 * natural * rate);
                     off += 5e-4 * rate;
                 }
-                *error += gain * (off - driven) / crate::units::ARCSEC_PER_RAD;
+                *error += gain * (off - driven) / ARCSEC_PER_RAD;
             }
         }
         let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
@@ -232,7 +233,7 @@ fn a_line_that_grows_with_the_speed_is_no_encoder_and_one_that_does_not_is() {
                     rate += 5e-4 * (natural * natural * (driven - off) - 2.0 * 0.1 * natural * rate);
                     off += 5e-4 * rate;
                 }
-                session.error_rad[k] += off / crate::units::ARCSEC_PER_RAD;
+                session.error_rad[k] += off / ARCSEC_PER_RAD;
             }
         }
         sessions
@@ -260,7 +261,7 @@ fn with_bad_rows(sessions: &[Session], share: f64, one_sided: bool, seed: u64) -
         if random.f64() < share {
             let far = 30.0 * -random.f64().max(1e-9).ln();
             let side = if one_sided || random.bool() { 1.0 } else { -1.0 };
-            *error += side * far / crate::units::ARCSEC_PER_RAD;
+            *error += side * far / ARCSEC_PER_RAD;
         }
     }
     let csv = crate::synthesize::to_csv(&spoiled, nominal.ratio, &[], &mut random);
@@ -472,7 +473,7 @@ fn a_form_error_of_the_cam_that_averages_would_hide_is_found_and_costs_nothing_w
         let settings = Settings::default();
         let scales = super::Scales::new(&rows, settings.pitch_radius_mm, jumps);
         let on = super::Excitation::new(&rows, &drive, &base, &scales);
-        let uncertain = super::prepare::uncertain(&on, &[]);
+        let uncertain = super::prepare::uncertain(&on, &[], &[]);
         super::resolution(&on, &super::library(&on), &uncertain, settings.averages, &[]).stride
     };
     let measured = |effects: &[Effect]| recorded(effects, 5, 6000, 100.0, 2.0, 5);
@@ -676,7 +677,7 @@ fn a_line_of_the_mains_close_to_half_the_rate_of_rows_is_seen() {
         let time = session.time_s.as_ref().unwrap();
         for (error, t) in session.error_rad.iter_mut().zip(time) {
             let hum = 27.0 * (std::f64::consts::TAU * 49.82 * t).sin();
-            *error += hum / crate::units::ARCSEC_PER_RAD;
+            *error += hum / ARCSEC_PER_RAD;
         }
     }
     let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
@@ -732,14 +733,14 @@ fn without_a_load_only_rows_that_cross_the_clearance_are_uncertain() {
     let drive = catalogue_drive();
     let mut sessions = unloaded(&[], 4);
     let mut random = fastrand::Rng::with_seed(5);
-    let half = 0.5 * drive.backlash_arcsec / crate::units::ARCSEC_PER_RAD;
+    let half = 0.5 * drive.backlash_arcsec / ARCSEC_PER_RAD;
     for session in &mut sessions {
         let (mut stands, mut before) = (0.0f64, session.generator_rad[0]);
         for (error, psi) in session.error_rad.iter_mut().zip(&session.generator_rad) {
             stands = (stands - (psi - before) / drive.ratio).clamp(-half, half);
             before = *psi;
             let noise = (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
-            *error = stands + (drive.harmonics_arcsec(*psi) + noise) / crate::units::ARCSEC_PER_RAD;
+            *error = stands + (drive.harmonics_arcsec(*psi) + noise) / ARCSEC_PER_RAD;
         }
     }
     excited_by(&sessions, &drive, |on| {
@@ -750,7 +751,7 @@ fn without_a_load_only_rows_that_cross_the_clearance_are_uncertain() {
         for session in &on.rows.sessions {
             assert!(uncertain[session.start], "nobody knows where the output was before");
             // After any motion one way by several clearances the flank is known.
-            let far = 6.0 * on.base.half_backlash / crate::units::ARCSEC_PER_RAD;
+            let far = 6.0 * on.base.half_backlash / ARCSEC_PER_RAD;
             for k in session.clone().skip(300) {
                 let before = &on.rows.output[k - 300..=k];
                 let steady = before.windows(2).all(|o| (o[1] - o[0]) * (before[300] - before[0]) > 0.0);
@@ -772,7 +773,7 @@ fn noise_of(sessions: &[Session]) -> super::Noise {
                 on,
                 &super::FreeColumns::of(on, &laws, None),
                 &[],
-                &super::prepare::uncertain(on, &[]),
+                &super::prepare::uncertain(on, &[], &[]),
                 None,
             )
             .0,
@@ -789,7 +790,7 @@ fn rows_thrown_out_make_no_fast_wander_of_the_noise() {
     // As where a flank is turned over some rows too late, now and then.
     for session in &mut sessions {
         for from in (700..5900).step_by(2500) {
-            session.error_rad[from..from + 24].iter_mut().for_each(|e| *e += 90.0 / crate::units::ARCSEC_PER_RAD);
+            session.error_rad[from..from + 24].iter_mut().for_each(|e| *e += 90.0 / ARCSEC_PER_RAD);
         }
     }
     let thrown = noise_of(&sessions);
@@ -972,7 +973,7 @@ fn a_wheel_so_far_off_that_no_clearance_is_left_is_begun_with_its_own_size() {
     let (phase, size) = (0.3, 5.0 * 0.5 * drive.backlash_arcsec);
     for session in &mut sessions {
         for (error, psi) in session.error_rad.iter_mut().zip(&session.generator_rad) {
-            *error += 5.0 * of_wheel(*psi).cos() / crate::units::ARCSEC_PER_RAD;
+            *error += 5.0 * of_wheel(*psi).cos() / ARCSEC_PER_RAD;
         }
     }
     drive.harmonics.push(Harmonic { order_per_generator_turn: of_wheel(1.0), amplitude_arcsec: 5.0, phase_rad: 0.0 });
@@ -980,7 +981,7 @@ fn a_wheel_so_far_off_that_no_clearance_is_left_is_begun_with_its_own_size() {
         let law = law(laws, CauseName::CircularSplineEccentricity);
         let pattern = &law.columns(on, &[phase, size, 1e9, 3.0])[0].values;
         let errors = sessions.iter_mut().flat_map(|session| &mut session.error_rad);
-        errors.zip(pattern).for_each(|(error, arcsec)| *error += arcsec / crate::units::ARCSEC_PER_RAD);
+        errors.zip(pattern).for_each(|(error, arcsec)| *error += arcsec / ARCSEC_PER_RAD);
     });
     excited_by(&sessions, &drive, |on| {
         let search = super::Search::new(on, &Settings::default()).unwrap();
@@ -1146,7 +1147,7 @@ fn half_a_minute_wears_nothing_and_a_part_of_a_turn_shows_no_second_order() {
 fn a_zero_that_is_set_in_each_session_hides_no_cause() {
     let mut sessions = data(&[effect(CauseName::CircularSplineEccentricity, 8.0, 0.8, 0.5)], Richness::Rich, 0, 71);
     for (k, session) in sessions.iter_mut().enumerate() {
-        let zero = [0.0, 90.0, -60.0, 130.0, -110.0, 40.0][k % 6] / crate::units::ARCSEC_PER_RAD;
+        let zero = [0.0, 90.0, -60.0, 130.0, -110.0, 40.0][k % 6] / ARCSEC_PER_RAD;
         session.error_rad.iter_mut().for_each(|error| *error += zero);
     }
     let found =
@@ -1154,4 +1155,41 @@ fn a_zero_that_is_set_in_each_session_hides_no_cause() {
     assert_eq!(names(&found), [CauseName::CircularSplineEccentricity]);
     assert!(found.unexplained.iter().any(|left| left.looks_like == "another zero in each session"));
     assert!(found.held_out.rms_after_arcsec < 0.5 * found.held_out.rms_before_arcsec, "{:?}", found.held_out);
+}
+
+/// Data in which the output hangs on the flank that it left, for 0.1 to 0.3 s, at every third change of the load's side.
+fn hanging(mut sessions: Vec<Session>, drive: &Nominal) -> Vec<Session> {
+    let friction = drive.friction_torque_n_m;
+    let across_rad = drive.backlash_arcsec / ARCSEC_PER_RAD;
+    for session in &mut sessions {
+        let torque = session.torque_n_m.as_mut().unwrap();
+        let begins: Vec<usize> =
+            (1..torque.len() - 20).filter(|k| torque[k - 1].abs() <= friction && torque[*k].abs() > friction).collect();
+        let mut changes = 0;
+        for k in begins {
+            let before = (0..k).rev().map(|j| torque[j]).find(|t| t.abs() > friction).unwrap_or(0.0).signum();
+            let now = torque[k].signum();
+            changes += usize::from(before * now < 0.0);
+            if before * now < 0.0 && changes % 3 == 0 {
+                for j in k..(k + 10 + 7 * (changes % 4)).min(torque.len()) {
+                    session.error_rad[j] +=
+                        before * across_rad + drive.wind_up_arcsec(1.4 * friction * now - torque[j]) / ARCSEC_PER_RAD;
+                    torque[j] = 1.4 * friction * now;
+                }
+            }
+        }
+    }
+    sessions
+}
+
+#[test]
+fn an_output_that_hangs_in_the_clearance_is_no_cause() {
+    let drive = catalogue_drive();
+    let effects = [effect(CauseName::OutputEncoderEccentricity, 15.0, 0.7, 0.0)];
+    for effects in [&effects[..], &[]] {
+        let sessions = hanging(recorded(effects, 5, 6000, 100.0, 2.0, 5), &drive);
+        let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
+        let expected: Vec<CauseName> = effects.iter().map(|_| CauseName::OutputEncoderEccentricity).collect();
+        assert_eq!(names(&diagnosis), expected, "{}", diagnosis.text());
+    }
 }

@@ -15,11 +15,9 @@ use crate::causes::{CauseName, ParameterName as Name};
 /// Plausible differences between the lobes, arcsec at the output.
 const DEEPER_ARCSEC: [f64; 2] = [2.0, 200.0];
 /// Errors of the teeth over the difference of the lobes, at most. Well above one, the other lobe is the deeper one for part of a turn,
-/// which the law does not tell. *Chosen* on plants in which the teeth are out by up to 1.75 times that difference.
-const MOST_TEETH: f64 = 2.0;
-/// Where the teeth are out by more than the lobe is deeper, the other lobe stops the output for part of a turn, later on either flank: order 2
-/// over order 1 of that. *Chosen* on the same plants.
-const RECTIFIED: f64 = 0.15;
+/// which the law does not tell. *Chosen* on plants in which the teeth are out by 1.43 times that difference; at 2, waves of
+/// a wheel passed for a lobe.
+const MOST_TEETH: f64 = 1.5;
 /// Where the full load hides at least this share of the teeth's errors, a lobe that is pressed in has been seen. *Chosen*.
 const HIDDEN_BY_LOAD: f64 = 0.5;
 /// What the deeper lobe takes of the clearance, under a load and without one.
@@ -78,7 +76,6 @@ pub(super) fn generator_eccentricity(on: &Excitation<'_>) -> Law {
         for of in [Angle::Flexspline, Angle::CircularSpline] {
             columns.extend(weighted_waves(on, of, 1.0, &shows_by_flank).map(|v| nuisance(v, 0.12)));
             columns.extend(weighted_waves(on, of, 2.0, shows).map(|v| nuisance(v, 0.05)));
-            columns.extend(weighted_waves(on, of, 2.0, &shows_by_flank).map(|v| nuisance(v, RECTIFIED)));
             columns.extend(weighted_waves(on, of, 3.0, shows).map(|v| nuisance(v, 0.1)));
             if loaded {
                 columns.extend(waves(on, of, 1.0).map(|v| nuisance(v, 0.03)));
