@@ -178,12 +178,17 @@ fn a_folder_that_cannot_be_written_is_found_out_before_the_work() {
         "diagnose data/data.csv --model nominal.toml",
         "export --generator cam --format vtu --mesh fine",
     ] {
-        let clock = Instant::now();
-        // Not even root makes a folder there.
-        let run = desk.line(&format!("{line} --out /proc/flexspline"));
-        assert_eq!(run.code, 2, "{line}: {}", run.stderr);
-        assert!(run.stderr.starts_with("error: --out: cannot write /proc/flexspline: "), "{line}: {}", run.stderr);
-        assert!(clock.elapsed() < Duration::from_secs(2), "{line} worked {:?} before it said so", clock.elapsed());
+        // On a busy machine one of three is not late.
+        let shortest = (0..3).map(|_| {
+            let clock = Instant::now();
+            // Not even root makes a folder there.
+            let run = desk.line(&format!("{line} --out /proc/flexspline"));
+            assert_eq!(run.code, 2, "{line}: {}", run.stderr);
+            assert!(run.stderr.starts_with("error: --out: cannot write /proc/flexspline: "), "{line}: {}", run.stderr);
+            clock.elapsed()
+        });
+        let shortest = shortest.min().unwrap_or(Duration::MAX);
+        assert!(shortest < Duration::from_secs(2), "{line} worked {shortest:?} before it said so");
     }
     assert!(before == contents(&desk.path(".")));
 }
@@ -248,7 +253,7 @@ fn a_terminal_sees_colour_and_how_long_it_will_take() {
     ] {
         let mut shown = String::new();
         // A busy machine needs longer before it can say.
-        for seconds in ["2.2", "8", "30"] {
+        for seconds in ["2.2", "3", "4.5", "6", "8", "12", "30"] {
             shown = on_a_terminal(&desk, &format!("timeout -s INT {seconds} {program} {line}"), &[]).unwrap();
             if shown.contains(time) {
                 break;
