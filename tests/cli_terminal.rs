@@ -179,15 +179,18 @@ fn a_folder_that_cannot_be_written_is_found_out_before_the_work() {
         "export --generator cam --format vtu --mesh fine",
     ] {
         // On a busy machine one of three is not late.
-        let shortest = (0..3).map(|_| {
+        let mut shortest = Duration::MAX;
+        for _ in 0..3 {
             let clock = Instant::now();
             // Not even root makes a folder there.
             let run = desk.line(&format!("{line} --out /proc/flexspline"));
+            shortest = shortest.min(clock.elapsed());
             assert_eq!(run.code, 2, "{line}: {}", run.stderr);
             assert!(run.stderr.starts_with("error: --out: cannot write /proc/flexspline: "), "{line}: {}", run.stderr);
-            clock.elapsed()
-        });
-        let shortest = shortest.min().unwrap_or(Duration::MAX);
+            if shortest < Duration::from_secs(2) {
+                break;
+            }
+        }
         assert!(shortest < Duration::from_secs(2), "{line} worked {shortest:?} before it said so");
     }
     assert!(before == contents(&desk.path(".")));
