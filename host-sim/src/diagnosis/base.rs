@@ -342,6 +342,11 @@ fn uncertain_by_motion(rows: &Rows, nominal: &Nominal) -> Vec<bool> {
         .collect()
 }
 
+/// Rows after which a clearance is crossed.
+pub(super) fn rows_of_crossing(rows: &Rows) -> usize {
+    (CROSSING_S / rows.period).ceil().clamp(2.0, 50.0) as usize
+}
+
 /// Rows with a torque around friction, and those while the clearance is crossed.
 fn uncertain_by_load(rows: &Rows, nominal: &Nominal, flank: &[f64]) -> Vec<bool> {
     let near = NEAR_FRICTION * nominal.friction_torque_n_m;
@@ -350,8 +355,7 @@ fn uncertain_by_load(rows: &Rows, nominal: &Nominal, flank: &[f64]) -> Vec<bool>
     for session in &rows.sessions {
         for k in session.start + 1..session.end {
             if flank[k] * flank[k - 1] < 0.0 {
-                let settled = (CROSSING_S / rows.period).ceil().clamp(2.0, 50.0) as usize;
-                let around = k.saturating_sub(2).max(session.start)..(k + 1 + settled).min(session.end);
+                let around = k.saturating_sub(2).max(session.start)..(k + 1 + rows_of_crossing(rows)).min(session.end);
                 uncertain[around].fill(true);
             }
         }

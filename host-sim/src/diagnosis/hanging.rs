@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use super::base::rows_of_crossing;
 use super::candidate::Excitation;
 use super::rows::Rows;
 
@@ -15,26 +16,28 @@ const HANGS_S: f64 = 3.0;
 /// The output is this share of half the clearance short of the flank, at least, where it hangs. *Chosen*: those joints hung at 0.9 to 2 times, by
 /// what was explained when other causes still stood in for it.
 const SHORT: f64 = 0.6;
+/// A clearance shows where that is at least so many times the noise of a row. *Guess*.
+const BEYOND_NOISE: f64 = 3.0;
 
-/// What it has left to go then takes it this long, s. *Guess*: those arrived within 0.04 s.
-const ARRIVES_S: f64 = 0.05;
-
-/// Rows in which the output hangs in the clearance, as it stays far short of what causes and base explain beside the nominal prediction.
+/// Rows in which the output hangs in the clearance, as it stays far short of what causes and base explain beside the nominal prediction. The
+/// noise of a row is `white`, arcsec.
 #[must_use]
-pub fn hanging(on: &Excitation<'_>, explained: &[f64]) -> Vec<bool> {
+pub fn hanging(on: &Excitation<'_>, explained: &[f64], white: f64) -> Vec<bool> {
     let rows = on.rows;
     let mut hanging = vec![false; rows.len()];
-    for Event { rows: event, side } in may_hang(rows, &on.base.flank, on.nominal.friction_torque_n_m) {
-        let short = |k: &usize| {
-            (rows.error[*k] - on.base.prediction[*k] - explained[*k]) * side > SHORT * on.base.half_backlash
-        };
-        // A single row that was read wrong is no clearance that the output crosses.
-        let last = event.clone().rev().find(short);
-        if let Some(over) = last.map(|last| event.start..last + 1)
-            && 2 * over.clone().filter(short).count() > over.len()
-        {
-            let arrives = (ARRIVES_S / rows.period).ceil().max(2.0) as usize;
-            hanging[over.start..(over.end + arrives).min(rows.len())].fill(true);
+    let least = SHORT * on.base.half_backlash;
+    if least < BEYOND_NOISE * white {
+        return hanging;
+    }
+    for session in &rows.sessions {
+        for Event { rows: event, side } in may_hang(rows, session, &on.base.flank, on.nominal.friction_torque_n_m) {
+            let short = |k: &usize| (rows.error[*k] - on.base.prediction[*k] - explained[*k]) * side > least;
+            let Some(last) = event.clone().rev().find(short) else { continue };
+            let over = event.start..last + 1;
+            // Most of them: a row far behind that was read wrong is no output that hangs so long.
+            if 2 * over.clone().filter(short).count() > over.len() {
+                hanging[over.start..(over.end + rows_of_crossing(rows)).min(session.end)].fill(true);
+            }
         }
     }
     hanging
@@ -48,33 +51,31 @@ struct Event {
     side: f64,
 }
 
-/// Rows in which a load of the other side has not been so large yet that it must have moved the output.
-fn may_hang(rows: &Rows, flank: &[f64], friction_n_m: f64) -> Vec<Event> {
+/// Rows of a session in which a load of the other side has not been so large yet that it must have moved the output.
+fn may_hang(rows: &Rows, session: &Range<usize>, flank: &[f64], friction_n_m: f64) -> Vec<Event> {
     let mut events: Vec<Event> = Vec::new();
-    for session in &rows.sessions {
-        // The side of the load that carried last, 0 if the output has left it, and since when the load is on another one.
-        let mut side = rows.torque.get(session.start).map_or(0.0, |torque| torque.signum());
-        let mut since: Option<f64> = None;
-        for k in session.clone() {
-            let torque = rows.torque[k];
-            if torque.abs() <= friction_n_m {
-                // Without a load the motion may push it off.
-                side = if flank[k] * side < 0.999 { 0.0 } else { side };
-                since = None;
-                continue;
-            }
-            if torque * side > 0.0 {
-                since = None;
-                continue;
-            }
-            let changed = *since.get_or_insert(rows.time[k]);
-            if torque.abs() >= CARRIES * friction_n_m || rows.time[k] - changed >= HANGS_S {
-                (side, since) = (torque.signum(), None);
-            } else if side != 0.0 {
-                match events.last_mut() {
-                    Some(event) if event.rows.end == k && event.side == side => event.rows.end = k + 1,
-                    _ => events.push(Event { rows: k..k + 1, side }),
-                }
+    // The side of the load that carried last, 0 if the output has left it, and since when the load is on another one.
+    let mut side = rows.torque.get(session.start).map_or(0.0, |torque| torque.signum());
+    let mut since: Option<f64> = None;
+    for k in session.clone() {
+        let torque = rows.torque[k];
+        if torque.abs() <= friction_n_m {
+            // Without a load the motion may push it off.
+            side = if flank[k] * side < 0.999 { 0.0 } else { side };
+            since = None;
+            continue;
+        }
+        if torque * side > 0.0 {
+            since = None;
+            continue;
+        }
+        let changed = *since.get_or_insert(rows.time[k]);
+        if torque.abs() >= CARRIES * friction_n_m || rows.time[k] - changed >= HANGS_S {
+            (side, since) = (torque.signum(), None);
+        } else if side != 0.0 {
+            match events.last_mut() {
+                Some(event) if event.rows.end == k && event.side == side => event.rows.end = k + 1,
+                _ => events.push(Event { rows: k..k + 1, side }),
             }
         }
     }
@@ -107,7 +108,7 @@ mod tests {
         let events = |times_friction: &[f64], period_s: f64| {
             let rows = rows_of(times_friction, period_s);
             let flank = PlayLaw::Held.flanks(&rows, &rows.torque, &nominal);
-            may_hang(&rows, &flank, nominal.friction_torque_n_m)
+            may_hang(&rows, &rows.sessions[0], &flank, nominal.friction_torque_n_m)
         };
         let event = |rows: Range<usize>, side: f64| Event { rows, side };
         assert_eq!(events(&[9.0, 1.5, -0.5, -1.5, -1.5, -2.5, -1.5], 0.01), [event(3..5, 1.0)]);
@@ -118,6 +119,6 @@ mod tests {
         assert_eq!(events(&[1.5, 1.5, 1.5, 1.5], 0.01), []);
         // Pushed off without a load, and back.
         let rows = rows_of(&[-9.0, -0.5, -0.5, -1.5, -2.5], 0.01);
-        assert_eq!(may_hang(&rows, &[-1.0, 0.0, 1.0, -1.0, -1.0], nominal.friction_torque_n_m), []);
+        assert_eq!(may_hang(&rows, &rows.sessions[0], &[-1.0, 0.0, 1.0, -1.0, -1.0], nominal.friction_torque_n_m), []);
     }
 }

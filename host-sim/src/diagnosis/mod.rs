@@ -276,7 +276,7 @@ impl<'a> Search<'a> {
             }
             let mut explained = remainder::explained(&problem, &selected);
             // What hung once hung, whatever is taken for it later.
-            for (hung, hangs) in hung.iter_mut().zip(hanging::hanging(on, &explained)) {
+            for (hung, hangs) in hung.iter_mut().zip(hanging::hanging(on, &explained, noise.white)) {
                 *hung |= hangs;
             }
             let doubtful = prepare::uncertain(on, &selected.terms, &hung);

@@ -1190,3 +1190,21 @@ fn an_output_that_hangs_in_the_clearance_is_no_cause() {
     let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
     assert_eq!(names(&diagnosis), [CauseName::OutputEncoderEccentricity], "{}", diagnosis.text());
 }
+
+#[test]
+fn a_clearance_that_noise_hides_sets_no_row_aside() {
+    let mut drive = catalogue_drive();
+    let sessions = hanging(recorded(&[], 5, 6000, 100.0, 2.0, 5), &drive);
+    let hung = |drive: &Nominal, white_arcsec: f64| {
+        let mut hung = 0;
+        excited_by(&sessions, drive, |on| {
+            let rows = super::hanging::hanging(on, &vec![0.0; on.rows.len()], white_arcsec);
+            hung = rows.iter().filter(|row| **row).count();
+        });
+        hung
+    };
+    assert!(hung(&drive, 2.0) > 100);
+    assert_eq!(hung(&drive, drive.backlash_arcsec), 0);
+    drive.backlash_arcsec = 0.0;
+    assert_eq!(hung(&drive, 2.0), 0);
+}

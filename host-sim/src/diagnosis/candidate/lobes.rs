@@ -18,8 +18,8 @@ const DEEPER_ARCSEC: [f64; 2] = [2.0, 200.0];
 /// which the law does not tell. *Chosen* on plants in which the teeth are out by 1.43 times that difference; at 2, waves of
 /// a wheel passed for a lobe.
 const MOST_TEETH: f64 = 1.5;
-/// Where the full load hides at least this share of the teeth's errors, a lobe that is pressed in has been seen. *Chosen*.
-const HIDDEN_BY_LOAD: f64 = 0.5;
+/// Where the full load leaves less than this share of the teeth's errors, a lobe that is pressed in has been seen. *Guess*.
+const LEFT_BY_LOAD: f64 = 0.5;
 /// What the deeper lobe takes of the clearance, under a load and without one.
 const TAKEN: Role = Role("clearance taken");
 const TAKEN_UNLOADED: Role = Role("clearance taken without a load");
@@ -112,11 +112,12 @@ pub(super) fn generator_eccentricity(on: &Excitation<'_>) -> Law {
     .physical_if(|shape, c| {
         // Teeth farther out than the lobe is deep would make the other lobe the deeper one, once a turn.
         let [on_flexspline, on_ring] = TEETH.map(|(_, role)| of_wave(c, role).0);
-        let Some(deeper) = shape.get(Name::DeeperArcsec) else { return true };
-        let taken = c.get(TAKEN).unwrap_or(1.0);
+        let (Some(deeper), Some(pressed)) = (shape.get(Name::DeeperArcsec), shape.get(Name::PressedArcsec)) else {
+            return true;
+        };
+        let taken = c.of(TAKEN);
         // A lobe that the load presses in shows itself by that, however little of the clearance it takes.
-        let shows_loaded = shape.get(Name::PressedArcsec).map_or(1.0, |pressed| still_shows(deeper, pressed));
-        let lobe = if taken > 0.0 && shows_loaded < 1.0 - HIDDEN_BY_LOAD { deeper } else { deeper * taken };
+        let lobe = if taken > 0.0 && still_shows(deeper, pressed) < LEFT_BY_LOAD { deeper } else { deeper * taken };
         on_flexspline + on_ring < MOST_TEETH * lobe
     })
     .parts_zones(|on, shape, c| {
