@@ -126,7 +126,7 @@ pub fn products(a: &[&[f64]], b: &[&[f64]], range: Range<usize>, lower: bool) ->
 
 /// Rows of a block: 2 KiB of each column.
 const BLOCK_ROWS: usize = 256;
-/// Columns that meet one column at a time.
+/// Columns of `b` that a few of `a` meet at a time.
 const ABREAST: usize = 4;
 
 struct Block<'c> {
@@ -137,30 +137,60 @@ struct Block<'c> {
     sums: &'c mut [f64],
 }
 
+impl Block<'_> {
+    /// Products of `FEW` columns of `a`, from one on, with all of `b`: what is loaded of `b` serves each of them.
+    #[inline(always)]
+    fn meet<const FEW: usize, S: Simd>(&mut self, simd: S, from: usize) {
+        let width = self.b.len();
+        let eights = S::as_simd_f64s(&self.a[from][self.rows.clone()]).0.len();
+        let mine: [_; FEW] = std::array::from_fn(|i| S::as_simd_f64s(&self.a[from + i][self.rows.clone()]));
+        let x = mine.map(|(x, _)| &x[..eights]);
+        let upto = if self.lower { (from + FEW).min(width) } else { width };
+        for (at, others) in self.b[..upto].chunks(ABREAST).enumerate() {
+            // Fewer than four: the first one stands in, and is not written.
+            let other = |j: usize| &others.get(j).unwrap_or(&others[0])[self.rows.clone()];
+            let split: [_; ABREAST] = std::array::from_fn(|j| S::as_simd_f64s(other(j)));
+            let y = split.map(|(y, _)| &y[..eights]);
+            let mut sums = [[simd.splat_f64s(0.0); ABREAST]; FEW];
+            for k in 0..eights {
+                for i in 0..FEW {
+                    for j in 0..ABREAST {
+                        sums[i][j] = simd.mul_add_f64s(x[i][k], y[j][k], sums[i][j]);
+                    }
+                }
+            }
+            for i in 0..FEW {
+                let wanted = if self.lower { (from + i + 1).min(width) } else { width };
+                for j in (0..others.len()).take_while(|j| at * ABREAST + j < wanted) {
+                    let rest: f64 = mine[i].1.iter().zip(split[j].1).map(|(x, y)| x * y).sum();
+                    self.sums[(from + i) * width + at * ABREAST + j] += simd.reduce_sum_f64s(sums[i][j]) + rest;
+                }
+            }
+        }
+    }
+}
+
 impl WithSimd for Block<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let width = self.b.len();
-        for (i, column) in self.a.iter().enumerate() {
-            let (x, x_rest) = S::as_simd_f64s(&column[self.rows.clone()]);
-            let upto = if self.lower { (i + 1).min(width) } else { width };
-            for (at, others) in self.b[..upto].chunks(ABREAST).enumerate() {
-                // Fewer than four: the first one stands in, and is not written.
-                let other = |j: usize| &others.get(j).unwrap_or(&others[0])[self.rows.clone()];
-                let split: [_; ABREAST] = std::array::from_fn(|j| S::as_simd_f64s(other(j)));
-                let mut sums = [simd.splat_f64s(0.0); ABREAST];
-                for (k, x) in x.iter().enumerate() {
-                    for (sum, (y, _)) in sums.iter_mut().zip(&split) {
-                        *sum = simd.mul_add_f64s(*x, y[k], *sum);
-                    }
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let mut from = 0;
+        while from < self.a.len() {
+            from += match self.a.len() - from {
+                4.. => {
+                    self.meet::<4, S>(simd, from);
+                    4
                 }
-                for j in 0..others.len() {
-                    let rest: f64 = x_rest.iter().zip(split[j].1).map(|(x, y)| x * y).sum();
-                    self.sums[i * width + at * ABREAST + j] += simd.reduce_sum_f64s(sums[j]) + rest;
+                2.. => {
+                    self.meet::<2, S>(simd, from);
+                    2
                 }
-            }
+                _ => {
+                    self.meet::<1, S>(simd, from);
+                    1
+                }
+            };
         }
     }
 }
