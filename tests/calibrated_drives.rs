@@ -580,11 +580,11 @@ fn judged(seeds: impl Iterator<Item = u64>) {
 
 #[test]
 fn a_planned_hour_corrects_an_as_built_drive_on_other_days() {
-    judged(1..=2);
+    judged(1..=1);
 }
 
 #[test]
-#[ignore = "ten drives: minutes"]
+#[ignore = "nine more drives: minutes"]
 fn ten_as_built_drives_are_corrected_on_other_days() {
-    judged(1..=10);
+    judged(2..=10);
 }

@@ -143,7 +143,8 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
     assert!(s["next"][0].as_str().unwrap().ends_with("--generator cam"), "{s}");
 
     // It can be solved, and its load is that of its size.
-    desk.line("tables --generator cam --mesh coarse --temperatures-c=20 --drive own.toml").done();
+    desk.line("tables --generator cam --mesh coarse --temperatures-c=20 --positions 4 --most-nodes 8 --drive own.toml")
+        .done();
     for (line, said) in [
         ("--teeth 200 --module 0.32 --ratio 90", "--ratio: found 90, allowed: 100 (circular spline held) or 101"),
         ("--teeth 201 --module 0.32", "--teeth: found 201, allowed: an even number"),

@@ -3,6 +3,7 @@
 
 use crate::bench_data::{ARCSEC, Bench, RATIO, normal};
 use flexspline_sim::measurement::{ColumnMap, FaultName, Gear, MeasuredError, Recording, Treatment, parse};
+use flexspline_tests::seeds;
 
 fn gear() -> Gear {
     Gear::of_teeth(188, 190, true)
@@ -38,7 +39,7 @@ fn clean_data_has_no_fault() {
 /// False alarms over many drives with backlash, hysteresis, resonance, damaged teeth, wear, heat, latency, gravity and the rest.
 #[test]
 fn physics_is_not_taken_for_a_fault_of_the_data() {
-    let seeds = std::env::var("FLEXSPLINE_SEEDS").ok().and_then(|n| n.parse().ok()).unwrap_or(300);
+    let seeds = seeds(100, 300);
     let mut alarms = Vec::new();
     for seed in 0..seeds {
         let (bench, said) = Bench::drawn(5000, seed);

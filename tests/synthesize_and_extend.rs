@@ -153,7 +153,10 @@ fn an_error_of_the_output_encoder_is_not_put_into_tables() {
 #[test]
 fn a_worn_drive_is_made_again_by_the_fem() {
     let desk = Desk::new();
-    desk.line("tables --generator cam --mesh coarse --no-report --out t").done();
+    desk.line(
+        "tables --generator cam --mesh coarse --temperatures-c=20 --positions 8 --most-nodes 14 --no-report --out t",
+    )
+    .done();
     let effect = "backlash_growth:growth_arcsec=50";
     let line = format!("synthesize --tables t --effect {effect} --noise-arcsec 1 --seed 8 --no-spread --out made");
     desk.line(&line).done();
