@@ -460,8 +460,10 @@ impl Deck {
     fn write_step(&self, out: &mut dyn Write, k: usize, step: &Step) -> io::Result<()> {
         let [_, fs_flanks, cs_flanks, _] = SURFACES;
         writeln!(out, "** step {}: generator at {} rad", k + 1, short(step.generator_rad))?;
-        // One increment to a step; the program halves it where it has to.
-        writeln!(out, "*STEP, NLGEOM, INC=200\n*STATIC\n1., 1.")?;
+        // One increment to a step; the program halves it where it has to. Where flanks meet it finds its way in less than half the
+        // iterations from a first step of half the way: 22 for 55 with the cam on the coarse mesh.
+        let first = if step.flanks == Flanks::Added { "0.5" } else { "1." };
+        writeln!(out, "*STEP, NLGEOM, INC=200\n*STATIC\n{first}, 1.")?;
         let change = match step.flanks {
             Flanks::On => None,
             Flanks::Removed => Some("REMOVE"),
@@ -501,7 +503,7 @@ impl Deck {
 /// Names of [`Deck::surfaces`].
 const SURFACES: [&str; 4] = ["BORE_FACE", "FLEXSPLINE_FLANKS", "CIRCULAR_SPLINE_FLANKS", "GENERATOR_FACE"];
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 enum Flanks {
     On,
     Removed,
