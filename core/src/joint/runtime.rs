@@ -517,7 +517,12 @@ mod tests {
         /// One tick; no correction may jump.
         fn tick(&mut self, input: &Input) -> Output {
             let out = self.joint.tick(&images(), &mut self.store, &mut self.state, input);
-            let now = out.correction_rad as f64;
+            // As it is kept: what is told is rounded to 24 bits, and a large one to more than the change of a tick may be off.
+            let now = self.state.open().0.correction as f64 * (RAD_PER_COUNT as f64 / FINE as f64);
+            assert!(
+                (out.correction_rad as f64 - now).abs() <= f32::EPSILON as f64 * now.abs(),
+                "told {out:?}, kept {now}"
+            );
             let [last, before] = self.before;
             assert!((now - last).abs() <= 1.0001 * RATE_RAD + 2e-9, "rate {}", now - last);
             let change = (now - last) - (last - before);
@@ -992,6 +997,12 @@ mod tests {
         for correction in [most, -most, 0] {
             assert!(changed(CORRECTION, correction.to_le_bytes()).is_ok(), "{correction}");
         }
+        // A flank before any sample.
+        let mut bytes = JointState::new().save(&run.joint, &run.store);
+        bytes[64] = 16;
+        let (before, sum) = bytes.split_last_chunk_mut::<4>().unwrap();
+        *sum = crc32(before).to_le_bytes();
+        assert_eq!(JointState::restore(&bytes, &run.joint, &run.store), Err(RestoreError::Impossible));
     }
 
     proptest! {

@@ -368,7 +368,9 @@ impl JointState {
         let play = PlayState::of(long(5), [7, 8, 9, 10].map(signed)).ok_or(RestoreError::Impossible)?;
         let (adjusted, correction, speed, flank) = (signed(11), signed(14), signed(15), number(16));
         let small = [correction, speed].iter().all(|fine| fine.unsigned_abs() <= MOST_FINE);
-        if !small || flank & !FLANK != 0 || flank == FLANK || adjusted.unsigned_abs() > MOST_ERROR_COUNTS {
+        // A side is rested on once there was a sample, and forgotten with the play.
+        let one_flank = flank & !FLANK == 0 && flank != FLANK && (flank == 0 || play.is_started());
+        if !small || !one_flank || adjusted.unsigned_abs() > MOST_ERROR_COUNTS {
             return Err(RestoreError::Impossible);
         }
         let kept = Kept {
