@@ -615,6 +615,22 @@ impl CauseName {
         matches!(self, CauseName::OutputEncoderTilt)
     }
 
+    /// Whether a load on the output makes much the same: an error that goes with the speed, the direction or the angle of the output.
+    #[must_use]
+    pub const fn is_made_by_loads(self) -> bool {
+        matches!(
+            self,
+            CauseName::SensorLatency
+                | CauseName::LubricantViscosity
+                | CauseName::TorsionalHysteresis
+                | CauseName::TorsionalResonance
+                | CauseName::BacklashGrowth
+                | CauseName::GravityTorque
+                | CauseName::OutputEncoderEccentricity
+                | CauseName::RatioError
+        )
+    }
+
     /// Why a table holds no error of the output's encoder.
     pub const OF_THE_OUTPUT_ENCODER: &'static str = "the output's encoder is wrong here, not the joint";
 

@@ -165,6 +165,16 @@ pub struct Diagnosis {
     pub trace: Trace,
 }
 
+/// A value and its standard deviation as text: four decimals, or powers of ten where these would show nothing of either.
+fn digits(parameter: &Parameter) -> [String; 2] {
+    let all = [parameter.value, parameter.std];
+    if all.iter().any(|v| *v != 0.0 && v.abs() < 5e-4) {
+        all.map(|v| if v == 0.0 { "0".into() } else { format!("{v:.3e}") })
+    } else {
+        all.map(|v| format!("{v:.4}"))
+    }
+}
+
 impl Diagnosis {
     /// Takes back all causes: the data do not say what the unit does. `advice` is what to change at the bench.
     pub(super) fn say_nothing_of_the_unit(&mut self, advice: &str) {
@@ -202,7 +212,8 @@ impl Diagnosis {
                 cause.size_arcsec
             );
             for (name, p) in &cause.parameters {
-                let _ = writeln!(text, "    {name:<32} {:>12.4} +- {:.4}", p.value, p.std);
+                let [value, std] = digits(p);
+                let _ = writeln!(text, "    {name:<32} {value:>12} +- {std}");
             }
             if !cause.look_alikes.is_empty() {
                 let _ = writeln!(
@@ -237,5 +248,17 @@ impl Diagnosis {
             let _ = writeln!(text, "next: {next}");
         }
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_sizes_are_told_in_powers_of_ten() {
+        assert_eq!(digits(&Parameter { value: -1.234e-5, std: 2e-7 }), ["-1.234e-5", "2.000e-7"]);
+        assert_eq!(digits(&Parameter { value: 1.0, std: 0.0 }), ["1.0000", "0.0000"]);
+        assert_eq!(digits(&Parameter { value: 3.25, std: 1e-4 }), ["3.250e0", "1.000e-4"]);
     }
 }

@@ -108,6 +108,8 @@ pub mod verdict {
     pub const NO_PIECE: f64 = super::rivals::TOLD_APART;
     /// The order of a line is broken where a line of the nearest whole order raises the misfit by this: three standard deviations. *Source*.
     pub const BROKEN: f64 = 9.0;
+    /// A line in time is near the frequency of a resonance within this share of it: neighbours of a spring with this much more or less mass. *Guess*.
+    pub const SWINGS_NEAR: f64 = 0.2;
     /// A resonance rings that may be damped by less than this, all of its interval considered. Beyond, a third (0.34) of the swing or less is
     /// left after a period: it lags, and so does a flank or a reading that takes some milliseconds. *Guess*: drives of the examinations have
     /// 0.01 to 0.15.

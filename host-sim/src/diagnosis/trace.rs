@@ -123,6 +123,10 @@ pub enum Gate {
     NoPiece,
     /// A line of the generator's angle does not grow with the speed.
     NoGrowthWithSpeed,
+    /// A load that was not recorded may make it: no more is left than so many times the noise.
+    LoadKnown,
+    /// No line in time that has no name, near its frequency, is as large as this against it.
+    NoLineBeside,
     /// The lower end of its damping's interval is below this.
     Rings,
     /// It is so many times its own uncertainty.
@@ -184,6 +188,8 @@ impl Gate {
             Gate::BesideUnknown => "beside_unknown",
             Gate::NoPiece => "no_piece",
             Gate::NoGrowthWithSpeed => "no_growth_with_speed",
+            Gate::LoadKnown => "load_known",
+            Gate::NoLineBeside => "no_line_beside",
             Gate::Rings => "rings",
             Gate::KnownWell => "known_well",
             Gate::ToldFromZero => "told_from_zero",
@@ -228,6 +234,12 @@ impl Gate {
             Gate::NoGrowthWithSpeed => {
                 "does not grow with the speed (growth of its amplitude, standard deviations; negative where it fades)"
             }
+            Gate::LoadKnown => {
+                "leaves no more than noise, as a load that was not recorded may make it (times the noise)"
+            }
+            Gate::NoLineBeside => {
+                "does not stand beside a line in time near its frequency that nothing in the drive drives (its size as a share of the cause)"
+            }
             Gate::Rings => "may ring (lower end of the interval of its damping ratio)",
             Gate::KnownWell => "is known well beside what has no name (times its own uncertainty)",
             Gate::ToldFromZero => "has a size that is told from zero (times its standard deviation)",
@@ -252,6 +264,8 @@ impl Gate {
             | Gate::SamePlace
             | Gate::Predicts
             | Gate::BesideUnknown
+            | Gate::LoadKnown
+            | Gate::NoLineBeside
             | Gate::Rings
             | Gate::NoGrowthWithSpeed
             | Gate::InTheDark

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::candidate::{Deviation, Label, Law, Per, line};
+use super::candidate::{Deviation, Label, Law, Per, follows_speed, line, standing_pitch_error};
 use super::channels::{RatioProposal, proposed_ratio};
 use super::model::{Fit, Problem, Scaffold, Term};
 use super::noise::Noise;
@@ -50,7 +50,9 @@ pub(super) fn conclude(
     let as_noise = rms_after <= NOISE_KNOWN_TO * floor;
 
     let known = known(problem, &selected, noise);
-    let named = understood(problem, &selected, &standings, &known, &left_over, noise, &mut trace);
+    let unnamed = Unnamed::beside(&selected, &standings, &left_over, hidden_lines);
+    let left_of_noise = rms_after / floor.max(1e-30);
+    let named = understood(problem, &selected, &standings, &known, &unnamed, [noise.white, left_of_noise], &mut trace);
     let size = |k: &usize| standings[*k].size.powi(2);
     let (by_name, without_name) = (
         named.iter().map(size).sum::<f64>(),
@@ -116,7 +118,7 @@ pub(super) fn conclude(
                 name,
                 confidence: confidence(
                     &misfits,
-                    has_a_double_outside(name, &known[k], problem.on.output_span_rad()),
+                    has_a_double_outside(k, name, &known[k], &selected, problem),
                     closest,
                     known[k].size_told,
                 ),
@@ -248,46 +250,100 @@ impl Abstention {
     }
 }
 
-/// Which terms are causes that may be named.
-#[allow(clippy::too_many_arguments, reason = "all that a search has found")]
+/// Sizes of what has no name, arcsec: the largest at all, all together, the largest that follows the output angle, the largest that follows how fast the
+/// generator turns and which way, and lines in time with their frequencies, Hz. A zero that the bench sets in each session is none of it.
+struct Unnamed {
+    largest: f64,
+    together: f64,
+    of_output: f64,
+    of_speed: f64,
+    in_time: Vec<(f64, f64)>,
+}
+
+impl Unnamed {
+    fn beside(
+        selected: &Selected<'_>,
+        standings: &[Standing],
+        left_over: &[Unexplained],
+        hidden_lines: &[Label],
+    ) -> Unnamed {
+        let terms = selected
+            .terms
+            .iter()
+            .zip(standings)
+            .filter(|(term, _)| !term.law.named() && !term.law.is_zero_of_sessions())
+            .map(|(term, standing)| (Some(term.law.label), term.law.label.to_string(), standing.size));
+        let left = left_over.iter().map(|left| {
+            let line = hidden_lines.iter().find(|line| line.to_string() == left.looks_like);
+            (line.copied(), left.looks_like.clone(), left.size_arcsec)
+        });
+        let all: Vec<(Option<Label>, String, f64)> = terms.chain(left).collect();
+        let largest = |of: &dyn Fn(&Option<Label>, &str) -> bool| {
+            all.iter().filter(|(label, called, _)| of(label, called)).map(|(.., size)| *size).fold(0.0, f64::max)
+        };
+        let in_time = |label: &Option<Label>| match label {
+            Some(Label::Deviation(Deviation::Line { per: Per::Second, order })) => Some(*order),
+            _ => None,
+        };
+        Unnamed {
+            largest: largest(&|_, _| true),
+            together: all.iter().map(|(.., size)| *size).fold(0.0, f64::hypot),
+            of_output: largest(&|label, called| label.is_some_and(follows_output) || called == OF_OUTPUT_ANGLE),
+            of_speed: largest(&|_, called| follows_speed(called)),
+            in_time: all.iter().filter_map(|(label, _, size)| Some((in_time(label)?, *size))).collect(),
+        }
+    }
+
+    /// The largest line in time near a frequency, arcsec.
+    fn swinging_near(&self, frequency_hz: f64) -> f64 {
+        let near = |line: &&(f64, f64)| (line.0 - frequency_hz).abs() < SWINGS_NEAR * frequency_hz;
+        self.in_time.iter().filter(near).map(|(_, size)| *size).fold(0.0, f64::max)
+    }
+}
+
+/// Which terms are causes that may be named. Of what is left: the white noise, arcsec, and how much of noise it is.
 fn understood(
     problem: &Problem<'_>,
     selected: &Selected<'_>,
     standings: &[Standing],
     known: &[Known],
-    left_over: &[Unexplained],
-    noise: Noise,
+    unnamed: &Unnamed,
+    [white, left_of_noise]: [f64; 2],
     trace: &mut Trace,
 ) -> Vec<usize> {
     let is_named = |k: &usize| selected.terms[*k].law.named();
-    let unnamed = || {
-        let terms = (0..selected.terms.len())
-            .filter(|k| !is_named(k) && !selected.terms[*k].law.is_zero_of_sessions())
-            .map(|k| (follows_output(selected.terms[k].law.label), standings[k].size));
-        terms.chain(left_over.iter().map(|l| (l.looks_like == OF_OUTPUT_ANGLE, l.size_arcsec)))
-    };
-    let largest = |sizes: &mut dyn Iterator<Item = f64>| sizes.fold(0.0, f64::max);
-    let not_understood = largest(&mut unnamed().map(|(_, size)| size));
-    let of_output = largest(&mut unnamed().filter(|(of_output, _)| *of_output).map(|(_, size)| size));
     let mut named = Vec::new();
     for k in (0..selected.terms.len()).filter(is_named) {
         let size = standings[k].size;
-        let beside = |unnamed: f64| {
-            Judged::number(Gate::BesideUnknown, unnamed / size, LARGE_BESIDE, unnamed <= LARGE_BESIDE * size)
+        let no_larger = |gate: Gate, unnamed: f64| {
+            Judged::number(gate, unnamed / size, LARGE_BESIDE, unnamed <= LARGE_BESIDE * size)
         };
+        let beside = |unnamed: f64| no_larger(Gate::BesideUnknown, unnamed);
         let well_known = Judged::above(Gate::KnownWell, known[k].times_its_doubt, KNOWN_BESIDE);
-        let hidden = beside(not_understood);
+        let hidden = beside(unnamed.largest);
         let mut gates = vec![
-            Judged::above(Gate::Named, size, select::least_named(noise.white)),
+            Judged::above(Gate::Named, size, select::least_named(white)),
             if hidden.passed { hidden } else { well_known },
             Judged::above(Gate::ToldFromZero, known[k].told_from_zero, TOLD_FROM_ZERO),
         ];
         if of_output_angle(selected.terms[k].law, &known[k]) {
             // However well it is known, what follows the same angle and has no name may be the whole of which it is a piece.
-            gates.push(beside(of_output));
+            gates.push(beside(unnamed.of_output));
             gates.extend(
                 rise_without_a_piece(problem, selected, k).map(|rise| Judged::above(Gate::NoPiece, rise, NO_PIECE)),
             );
+        }
+        if load_makes_it(selected.terms[k].law.cause(), problem) {
+            let left = left_of_noise.hypot(unnamed.together / white);
+            gates.push(Judged::number(Gate::LoadKnown, left, NEAR_NOISE, left <= NEAR_NOISE));
+        }
+        if selected.terms[k].law.is(CauseName::SensorLatency) {
+            // It grows with the speed and does nothing else: so does a piece of whatever goes with the speed.
+            gates.push(beside(unnamed.of_speed));
+        }
+        if let Some(frequency) = known[k].parameters.get(ParameterName::FrequencyHz.as_str()) {
+            // What swings on at its own frequency, whatever the drive does, is driven by something else.
+            gates.push(no_larger(Gate::NoLineBeside, unnamed.swinging_near(frequency.value)));
         }
         gates.extend(growth_with_speed(problem, selected, &known[k], k));
         gates.extend(least_damping(&known[k]).map(|least| Judged::number(Gate::Rings, least, RINGS, least < RINGS)));
@@ -458,11 +514,34 @@ fn beyond_noise(rms_after: f64, floor: f64) -> f64 {
     if ratio > NOISE_KNOWN_TO { ratio } else { 1.0 }
 }
 
-/// Whether something that is no cause of the library makes the same. A subdivision of the output's encoder repeats in each turn; in less than
-/// one a wheel before the encoder, which turns at a ratio of its own, makes such waves as well.
-fn has_a_double_outside(name: CauseName, known: &Known, output_span_rad: f64) -> bool {
-    let part_of_a_turn = is_subdivision_of_output(Some(name), known) && output_span_rad < std::f64::consts::TAU;
-    name.has_a_double_outside() || part_of_a_turn
+/// Whether something that is no cause of the library, or none that could be held against it, makes the same: a wheel before the encoder, where its
+/// subdivision repeats in less than a turn; a load that nobody recorded; and once in a turn of the generator the motor's torque, a subdivision
+/// of its encoder, and the pitch of the wheel that stands.
+fn has_a_double_outside(
+    k: usize,
+    name: CauseName,
+    known: &Known,
+    selected: &Selected<'_>,
+    problem: &Problem<'_>,
+) -> bool {
+    let nominal = problem.on.nominal;
+    let standing = standing_pitch_error(nominal);
+    let part_of_a_turn =
+        is_subdivision_of_output(Some(name), known) && problem.on.output_span_rad() < std::f64::consts::TAU;
+    let line_of_generator = with_speed::order_of(name.into(), Some(known)).is_some();
+    let not_held_against_it = nominal.teeth.is_none() || selected.others(k).iter().any(|other| other.law.is(standing));
+    let harmonic = known.parameters.get(ParameterName::Harmonic.as_str()).map_or(0.0, |harmonic| harmonic.value);
+    name.has_a_double_outside()
+        || part_of_a_turn
+        || load_makes_it(Some(name), problem)
+        || line_of_generator && not_held_against_it
+        || name == standing && harmonic > 2.0
+}
+
+/// Whether a load that nobody recorded, a brake, a bearing, an arm, would make what a cause makes: an error that goes with speed, direction or the
+/// output's angle.
+fn load_makes_it(cause: Option<CauseName>, problem: &Problem<'_>) -> bool {
+    !problem.on.rows.recorded.torque && cause.is_some_and(CauseName::is_made_by_loads)
 }
 
 /// Probability of a cause against its look-alikes, whose misfits are higher by these; if there is none, against the closest rival. Less where its

@@ -335,7 +335,14 @@ impl<'p> Solver<'p> {
         torque_n_m: f64,
     ) -> Result<(State, Increment), SolveError> {
         if torque_n_m == from.torque_n_m {
-            return self.newton(from, from, generator_rad, torque_n_m);
+            let turned = self.newton(from, from, generator_rad, torque_n_m);
+            return match turned {
+                // Halved as often as this, the way is not too long but blocked: with two rollers in a hat, teeth that wedge.
+                Err(SolveError::NotConverged { .. }) if self.patient => {
+                    self.newton_softly(from, generator_rad, torque_n_m, &LOADING_SOFTNESS)
+                }
+                turned => turned,
+            };
         }
         let share = from.torque_n_m / torque_n_m;
         let shows_the_way = (SHOWS_THE_WAY..=SHOWS_THE_WAY.recip()).contains(&share);

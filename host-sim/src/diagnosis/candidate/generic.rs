@@ -6,6 +6,30 @@ use super::{Deviation, Excitation, Label, Law, Per, Role, Shape, by_row, lagged,
 use crate::causes::ParameterName as Name;
 use crate::units::ARCSEC_PER_RAD;
 
+/// Lost motion and the coupling, as they are called.
+const LASH_BEFORE_THE_GENERATOR: &str = "lost motion before the generator";
+const COUPLING_BEFORE_THE_GENERATOR: &str = "a coupling before the generator that gives way";
+/// Offsets that go with the speed or the direction alone.
+const WITH_SPEED_MAGNITUDE: &str = "offset with the magnitude of speed";
+const WITH_SPEED_SQUARED: &str = "offset with speed squared";
+const WITH_SPEED_SQUARED_BY_DIRECTION: &str = "offset with speed squared, by direction";
+const BY_DIRECTION: &str = "offset by direction";
+const OF_SPEED: &str = "a function of speed";
+
+/// Whether what has no name, called so, follows how fast the generator turns and which way, and nothing else.
+#[must_use]
+pub fn follows_speed(called: &str) -> bool {
+    const ALL: [&str; 6] = [
+        LASH_BEFORE_THE_GENERATOR,
+        WITH_SPEED_MAGNITUDE,
+        WITH_SPEED_SQUARED,
+        WITH_SPEED_SQUARED_BY_DIRECTION,
+        BY_DIRECTION,
+        OF_SPEED,
+    ];
+    ALL.contains(&called)
+}
+
 fn law(name: &'static str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send + Sync + 'static) -> Law {
     Law::new(name, move |on, _| {
         let column = by_row(on, |k| values(on, k));
@@ -25,7 +49,7 @@ fn wave(label: Deviation, angle: fn(&Excitation<'_>, usize) -> f64, order: f64) 
 
 /// Lost motion before the generator, as of an Oldham coupling: whatever the load, the output lags by half of it either way.
 fn lash_before_the_generator() -> Law {
-    Law::new("lost motion before the generator", |on, shape| {
+    Law::new(LASH_BEFORE_THE_GENERATOR, |on, shape| {
         let half_rad = shape.of(Name::HalfLashArcsec) * on.nominal.ratio.abs() / ARCSEC_PER_RAD;
         let mut held = vec![0.0; on.rows.len()];
         for session in &on.rows.sessions {
@@ -35,6 +59,30 @@ fn lash_before_the_generator() -> Law {
     })
     .shapes([Shape::by_factors(Name::HalfLashArcsec, 0.5, 60.0, 5)])
     .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
+}
+
+/// A coupling between the motor's encoder and the generator that gives way: it is wound up by what the load, friction, oil and inertia of the
+/// generator ask of the motor, a ratio-th of which is seen at the output. Softer under load and late in motion, at once.
+fn coupling_before_the_generator() -> Law {
+    const LOAD: Role = Role("load");
+    const FRICTION: Role = Role("friction");
+    Law::new(COUPLING_BEFORE_THE_GENERATOR, |on, _| {
+        let forward = on.nominal.ratio.signum();
+        let unit = |column: Vec<f64>| -> Vec<f64> {
+            let size = super::super::rows::rms(&column).max(1e-12);
+            column.into_iter().map(|v| v / size).collect()
+        };
+        // Of the generator, it holds back what the output is turned on by.
+        let held_back = |values: &dyn Fn(usize) -> f64| unit(by_row(on, |k| -forward * values(k)));
+        let gathers = super::sensor::rate(on, &on.rows.speed);
+        vec![
+            main(unit(by_row(on, |k| on.rows.torque[k])), 20.0).called(LOAD),
+            main(held_back(&|k| on.rows.direction[k]), 10.0).called(FRICTION),
+            main(held_back(&|k| on.rows.speed[k]), 10.0),
+            main(held_back(&|k| gathers[k]), 5.0),
+        ]
+    })
+    .physical_if(|_, c| c.of(LOAD) > 0.0 && c.of(FRICTION) > 0.0)
 }
 
 /// Wind-up that comes late: what relaxes within about a second, ten, a hundred and a thousand, from rest under the first load.
@@ -99,16 +147,14 @@ pub fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
         laws.push(law("settling since the session began (exponential, 20 s)", |on, k| {
             (-on.rows.since[k] / 20.0).exp()
         }));
-        laws.push(law("offset with the magnitude of speed", |on, k| on.rows.speed[k].abs()));
-        laws.push(law("offset with speed squared", |on, k| on.rows.speed[k].powi(2)));
-        laws.push(law("offset with speed squared, by direction", |on, k| {
-            on.rows.speed[k].powi(2) * on.rows.direction[k]
-        }));
+        laws.push(law(WITH_SPEED_MAGNITUDE, |on, k| on.rows.speed[k].abs()));
+        laws.push(law(WITH_SPEED_SQUARED, |on, k| on.rows.speed[k].powi(2)));
+        laws.push(law(WITH_SPEED_SQUARED_BY_DIRECTION, |on, k| on.rows.speed[k].powi(2) * on.rows.direction[k]));
     }
     if rows.sessions_used().count() > 2 {
         laws.push(zero_of_each_session());
     }
-    laws.push(law("offset by direction", |on, k| on.rows.direction[k]));
+    laws.push(law(BY_DIRECTION, |on, k| on.rows.direction[k]));
     laws.push(lash_before_the_generator());
     if on.scales.load > 0.0 {
         laws.push(law("offset with the magnitude of torque", |on, k| on.rows.torque[k].abs()));
@@ -116,6 +162,7 @@ pub fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
         laws.push(law("torque by direction", |on, k| on.rows.torque[k].abs() * on.rows.direction[k]));
         if rows.recorded.time {
             laws.push(creep_under_load());
+            laws.push(coupling_before_the_generator());
             laws.push(law("wind-up with time", |on, k| on.base.wind_up[k] * (on.rows.time[k] - on.rows.time[0])));
         }
     }
@@ -182,7 +229,7 @@ pub fn maps(on: &Excitation<'_>) -> Vec<Law> {
         }
     }
     if rows.recorded.time {
-        maps.push(map("a function of speed", vec![(rows.speed.clone(), 12)]));
+        maps.push(map(OF_SPEED, vec![(rows.speed.clone(), 12)]));
         if on.scales.load > 0.0 {
             let both = vec![(rows.torque.clone(), 6), (rows.time.clone(), 4)];
             maps.push(map("a function of torque and time", both));

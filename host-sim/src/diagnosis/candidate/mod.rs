@@ -31,7 +31,8 @@ use crate::measurement::robust::least_and_most;
 use crate::nominal::Nominal;
 
 pub use among::{Acting, Among, Zones, left_by, together};
-pub use generic::{line, maps, unnamed};
+pub use generic::{follows_speed, line, maps, unnamed};
+pub use geometry::standing_pitch_error;
 pub use label::{Deviation, Label, Per};
 pub use named::{Coefficients, Role, Shaped};
 

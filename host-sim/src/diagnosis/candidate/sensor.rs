@@ -84,6 +84,11 @@ fn encoder_tilt() -> [Law; 2] {
 /// that loggers of such encoders resolve.
 const SUBDIVISIONS: [f64; 5] = [4.0, 8.0, 16.0, 32.0, 64.0];
 
+/// Whether an encoder may leave this many waves in a turn.
+pub(super) fn is_subdivision(order: f64) -> bool {
+    SUBDIVISIONS.contains(&order)
+}
+
 /// An encoder that divides the periods of its signals unevenly.
 fn encoder_subdivision(of_output: bool, order: f64) -> Law {
     let angle = if of_output { OUTPUT } else { GENERATOR };
@@ -108,7 +113,7 @@ fn on_its_flank(on: &Excitation<'_>) -> Vec<f64> {
 }
 
 /// Change in a second of a column, row by row; none over a break.
-fn rate(on: &Excitation<'_>, values: &[f64]) -> Vec<f64> {
+pub(super) fn rate(on: &Excitation<'_>, values: &[f64]) -> Vec<f64> {
     let mut rates = vec![0.0; values.len()];
     for session in &on.rows.sessions {
         for k in session.clone() {
