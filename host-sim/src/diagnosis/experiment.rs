@@ -129,6 +129,16 @@ pub fn anyhow(on: &Excitation<'_>, not_understood: bool) -> String {
     asked.join("; ")
 }
 
+/// What tells so many waves of the generator's encoder in a turn from those of a wheel or of the motor: half a period turns them over.
+#[must_use]
+pub fn turn_the_encoder(waves: f64) -> String {
+    format!(
+        "the same run with the generator's encoder turned on its shaft by {:.1} degrees, or with another one: an encoder's waves turn over \
+         with it, those of a wheel and of the motor stay",
+        180.0 / waves
+    )
+}
+
 /// The run of the menu that tells `term` from each of `alike` best, with how far the closest then stands off.
 #[must_use]
 pub fn next(

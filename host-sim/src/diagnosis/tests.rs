@@ -252,6 +252,54 @@ fn a_line_that_grows_with_the_speed_is_no_encoder_and_one_that_does_not_is() {
     assert!(diagnosis.unexplained.iter().any(grows), "{}", diagnosis.text());
 }
 
+/// Sessions with something more in the error, arcsec, of torque (N·m) and the generator's speed (rad/s).
+fn with_more_by_speed(mut sessions: Vec<Session>, more: impl Fn(f64, f64) -> f64) -> Vec<Session> {
+    for session in &mut sessions {
+        let (time, torque) = (session.time_s.clone().unwrap(), session.torque_n_m.clone().unwrap());
+        for k in 1..session.len() {
+            let speed = (session.generator_rad[k] - session.generator_rad[k - 1]) / (time[k] - time[k - 1]);
+            session.error_rad[k] += more(torque[k], speed) / ARCSEC_PER_RAD;
+        }
+    }
+    sessions
+}
+
+#[test]
+fn a_coupling_before_the_generator_that_gives_way_is_no_soft_spring_with_a_late_sensor() {
+    let still = |speed: f64| if speed.abs() < 0.05 { 0.0 } else { speed.signum() };
+    let sessions = with_more_by_speed(recorded(&[], 5, 3000, 100.0, 1.5, 71), |torque, speed| {
+        0.5 * torque - 4.0 * still(speed) - 0.7 * speed
+    });
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::Unknown, vec![]), "{}", diagnosis.text());
+    let coupling = |left: &super::Unexplained| left.looks_like.contains("a coupling before the generator");
+    assert!(diagnosis.unexplained.iter().any(coupling), "{}", diagnosis.text());
+}
+
+/// The wheel that stands makes the wave of an encoder's subdivision, and of a motor's ripple: one of two, with the run that tells.
+#[test]
+fn a_higher_harmonic_of_the_pitch_is_found_and_not_sure_where_the_wheel_stands() {
+    for order in [4.0, 6.0] {
+        let wave = |psi: f64, _: f64, _: usize| 9.0 * (order * psi + 0.4).sin();
+        let sessions = with_more(recorded(&[], 5, 3000, 100.0, 1.5, 72), wave);
+        let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+        let pitch = CauseName::FlexsplinePitchError;
+        let [cause] = &diagnosis.causes[..] else { panic!("{}", diagnosis.text()) };
+        assert!(cause.name == pitch || cause.look_alikes == [pitch], "{}", diagnosis.text());
+        assert_eq!(cause.parameters["harmonic"].value, order);
+        assert!(cause.confidence <= 0.5, "{}", diagnosis.text());
+        assert!(diagnosis.next_experiment.as_ref().unwrap().contains("turned on its shaft"), "{}", diagnosis.text());
+    }
+}
+
+#[test]
+fn what_a_load_makes_that_nobody_recorded_has_no_name() {
+    let mut sessions = with_more_by_speed(recorded(&[], 5, 3000, 100.0, 1.5, 73), |_, speed| -12.0 * speed.signum());
+    sessions.iter_mut().for_each(|session| session.torque_n_m = None);
+    let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert!(names(&diagnosis).iter().all(|name| !name.is_made_by_loads()), "{}", diagnosis.text());
+}
+
 /// The same sessions as a file in which a share of the rows is off, one by one: by far as a heavy tail has it, or to one side alone.
 fn with_bad_rows(sessions: &[Session], share: f64, one_sided: bool, seed: u64) -> Vec<Session> {
     let nominal = catalogue_drive();

@@ -15,6 +15,7 @@ use super::trace::{Gate, Judged, Stage, Trace, passed};
 use super::uncertainty::{self, Known};
 use super::{Settings, experiment, held_out, remainder, rivals, with_speed};
 use crate::causes::{CauseName, ParameterName};
+use crate::nominal::Nominal;
 
 /// The verdict, with its causes and what is left.
 #[allow(clippy::too_many_arguments, reason = "all that a search has found")]
@@ -125,7 +126,7 @@ pub(super) fn conclude(
                 parameters: known[k].parameters.clone(),
                 held_out_gain: held.gains.get(k).copied().unwrap_or(0.0),
                 size_arcsec: standings[k].size,
-                look_alikes: alike,
+                look_alikes: alike_with_wheel(name, alike, &known[k], problem.on.nominal),
             });
         }
         causes.sort_by(|a, b| b.size_arcsec.total_cmp(&a.size_arcsec));
@@ -153,6 +154,13 @@ pub(super) fn conclude(
         }
         other => other,
     };
+    let once_in_a_turn = |cause: &Cause| {
+        let k = (0..known.len()).find(|k| selected.terms[*k].law.is(cause.name))?;
+        waves_per_generator_turn(cause.name, &known[k], problem.on.nominal)
+    };
+    if next_experiment.is_none() {
+        next_experiment = causes.iter().find_map(once_in_a_turn).map(experiment::turn_the_encoder);
+    }
     if verdict != Verdict::None && next_experiment.is_none() {
         next_experiment = Some(experiment::anyhow(problem.on, verdict == Verdict::Unknown));
     }
@@ -358,7 +366,7 @@ fn understood(
 /// Whether a cause that is one line of the generator's angle is no larger in fast motion than in slow: what the motor's torque shakes is. Lines of
 /// an encoder may fade where its reading is averaged, or scatters in time.
 fn growth_with_speed(problem: &Problem<'_>, selected: &Selected<'_>, known: &Known, k: usize) -> Option<Judged> {
-    let order = with_speed::order_of(selected.terms[k].law.label, Some(known))?;
+    let order = waves_per_generator_turn(selected.terms[k].law.cause()?, known, problem.on.nominal)?;
     let growth = with_speed::with_speed(problem, selected, Some(k), order)?.grows_by();
     Some(Judged::number(Gate::NoGrowthWithSpeed, growth, with_speed::NO_GROWTH, growth <= with_speed::NO_GROWTH))
 }
@@ -528,14 +536,32 @@ fn has_a_double_outside(
     let standing = standing_pitch_error(nominal);
     let part_of_a_turn =
         is_subdivision_of_output(Some(name), known) && problem.on.output_span_rad() < std::f64::consts::TAU;
-    let line_of_generator = with_speed::order_of(name.into(), Some(known)).is_some();
-    let not_held_against_it = nominal.teeth.is_none() || selected.others(k).iter().any(|other| other.law.is(standing));
-    let harmonic = known.parameters.get(ParameterName::Harmonic.as_str()).map_or(0.0, |harmonic| harmonic.value);
+    let not_held_against_it = nominal.teeth.is_none()
+        || name == CauseName::EncoderSubdivision
+        || selected.others(k).iter().any(|other| other.law.is(standing));
+    let line_of_generator = waves_per_generator_turn(name, known, nominal).is_some();
     name.has_a_double_outside()
         || part_of_a_turn
         || load_makes_it(Some(name), problem)
-        || line_of_generator && not_held_against_it
-        || name == standing && harmonic > 2.0
+        || line_of_generator && (name == standing || not_held_against_it)
+}
+
+/// The look-alikes of a cause; of a subdivision of the generator's encoder the pitch error of the wheel that stands is one always, though no law of
+/// its is tried.
+fn alike_with_wheel(name: CauseName, mut alike: Vec<CauseName>, known: &Known, nominal: &Nominal) -> Vec<CauseName> {
+    let standing = standing_pitch_error(nominal);
+    let at_generator = waves_per_generator_turn(name, known, nominal).is_some();
+    if name == CauseName::EncoderSubdivision && at_generator && nominal.teeth.is_some() && !alike.contains(&standing) {
+        alike.push(standing);
+    }
+    alike
+}
+
+/// Waves in a turn of the generator of a cause that is nothing but such a line: an encoder's, or a higher harmonic of the wheel that stands.
+fn waves_per_generator_turn(name: CauseName, known: &Known, nominal: &Nominal) -> Option<f64> {
+    let harmonic = || known.parameters.get(ParameterName::Harmonic.as_str()).map(|harmonic| harmonic.value);
+    let of_standing_wheel = || harmonic().filter(|harmonic| name == standing_pitch_error(nominal) && *harmonic > 2.0);
+    with_speed::order_of(name.into(), Some(known)).or_else(of_standing_wheel)
 }
 
 /// Whether a load that nobody recorded, a brake, a bearing, an arm, would make what a cause makes: an error that goes with speed, direction or the
@@ -644,6 +670,19 @@ mod tests {
     fn what_laws_leave_beyond_the_noise_widens_what_is_told_from_zero() {
         assert_eq!(beyond_noise(5.0, 4.5), 1.0);
         assert_eq!(beyond_noise(6.0, 4.0), 1.5);
+    }
+
+    #[test]
+    fn a_line_in_time_near_a_resonance_is_counted_against_it_and_one_elsewhere_is_not() {
+        let unnamed = Unnamed {
+            largest: 4.0,
+            together: 5.0,
+            of_output: 0.0,
+            of_speed: 0.0,
+            in_time: vec![(1.33, 4.0), (50.0, 3.0)],
+        };
+        assert_eq!(unnamed.swinging_near(1.37), 4.0);
+        assert_eq!(unnamed.swinging_near(9.0), 0.0);
     }
 
     #[test]

@@ -188,10 +188,18 @@ fn wave_parameters(on: &Excitation<'_>, c: Coefficients<'_>, harmonic: f64) -> V
 /// Further harmonics that both lobes see alike, as jaws, screws or an indexing head with so many places leave them; odd ones cancel.
 const HIGHER_HARMONICS: [f64; 5] = [4.0, 6.0, 8.0, 10.0, 12.0];
 
-/// Pitch error that is one wave of a higher harmonic, with little of the second. Rarer than one that the second leads; at the wheel that stands
-/// a subdivision of the generator's encoder makes the very same wave, and is the rule there.
-fn higher_pitch(cause: CauseName, of: Angle, harmonic: f64, on: &Excitation<'_>) -> Law {
-    let mut law = Law::new(cause, move |on, _| {
+/// Pitch errors that are one wave of a higher harmonic, with little of the second: rarer than those that the second leads. At the wheel that
+/// stands a subdivision of the generator's encoder makes the very same wave, and is the rule: it has the name there.
+fn higher_pitch(cause: CauseName, of: Angle, nominal: &Nominal) -> impl Iterator<Item = Law> {
+    let of_encoder = is_standing(nominal, of);
+    HIGHER_HARMONICS
+        .into_iter()
+        .filter(move |harmonic| !(of_encoder && super::sensor::is_subdivision(*harmonic)))
+        .map(move |harmonic| higher_harmonic(cause, of, harmonic))
+}
+
+fn higher_harmonic(cause: CauseName, of: Angle, harmonic: f64) -> Law {
+    Law::new(cause, move |on, _| {
         let (flank, light) = (&on.base.flank, light(on));
         let mut columns: Vec<Column> = Vec::new();
         columns.extend(waves(on, of, harmonic).map(|v| main(v, USUAL_ARCSEC).called(WAVE)));
@@ -202,11 +210,7 @@ fn higher_pitch(cause: CauseName, of: Angle, harmonic: f64, on: &Excitation<'_>)
         columns
     })
     .parameters_by(move |on, _, c| wave_parameters(on, c, harmonic))
-    .after_wheels();
-    if is_standing(on.nominal, of) && super::sensor::is_subdivision(harmonic) {
-        law.search.odds_against *= 2.0;
-    }
-    law
+    .after_wheels()
 }
 
 /// Whether a wheel does not turn: what is cut into it comes back once in each turn of the generator.
@@ -372,13 +376,8 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         damaged_tooth(Angle::Flexspline),
         damaged_tooth(Angle::CircularSpline),
     ];
-    let wheels = [
-        (CauseName::FlexsplinePitchError, Angle::Flexspline),
-        (CauseName::CircularSplinePitchError, Angle::CircularSpline),
-    ];
-    laws.extend(
-        wheels.iter().flat_map(|(cause, of)| HIGHER_HARMONICS.map(|harmonic| higher_pitch(*cause, *of, harmonic, on))),
-    );
+    laws.extend(higher_pitch(CauseName::FlexsplinePitchError, Angle::Flexspline, on.nominal));
+    laws.extend(higher_pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline, on.nominal));
     if on.is_turned_about() {
         laws.push(displaced(CauseName::GravitySideLoad, Angle::Gravity(-1.0), on));
     }
