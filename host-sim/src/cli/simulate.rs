@@ -7,6 +7,7 @@ use std::path::Path as FilePath;
 use clap::{Args, ValueEnum, ValueHint};
 
 use super::{Context, Failure, names, report, say};
+use crate::cautions::add_stress;
 use crate::drive::{Drive, GeneratorKind};
 use crate::export::{Frame, write_pvd, write_vtu};
 use crate::mesh::MeshLevel;
@@ -164,6 +165,7 @@ impl Simulate {
         simulation.summary.command = context.command.clone();
         if self.stress {
             simulation.summary.stress = stress(&drive, &settings, &simulation)?;
+            add_stress(&mut simulation.summary.cautions, &simulation.summary.stress);
         }
         simulation.summary.data_sheet = context.stated()?.map(|stated| {
             let temperature_c = settings.temperature_c.unwrap_or(drive.temperature.reference_c);

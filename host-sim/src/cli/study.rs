@@ -24,7 +24,7 @@ use crate::study::{
 
 /// Targets where none are given: an exact drive, a stiff one, one that lasts.
 const USUAL_TARGETS: [(&str, Sense); 3] =
-    [("kinematic_error_pp_arcsec", Sense::Least), ("k2_n_m_per_rad", Sense::Most), ("max_von_mises_mpa", Sense::Least)];
+    [("kinematic_error_pp_arcsec", Sense::Least), ("k2_n_m_per_rad", Sense::Most), ("root_fillet_mpa", Sense::Least)];
 /// Lines of the text for one generator.
 const SHOWN: usize = 5;
 
@@ -48,7 +48,7 @@ Examples:
   flexspline study --vary flexspline.rim_thickness_mm=1.2..2.6:8
   flexspline study -g cam --vary flexspline.rim_thickness_mm=1.2..2 --vary generator.w0_mm=0.46..0.5
   flexspline study --vary generator.w0_mm=0.46..0.5 --variants 50 --keep backlash_arcsec=30..70
-  flexspline study --vary generator.w0_mm=0.46..0.5 --least max_von_mises_mpa --most k2_n_m_per_rad
+  flexspline study --vary generator.w0_mm=0.46..0.5 --least root_fillet_mpa --most k2_n_m_per_rad
 
 Figures:
 {}
@@ -74,7 +74,7 @@ pub(super) struct StudyCommand {
     /// What a variant has to keep to, FIGURE=LEAST..MOST, either end may be left out [default: teeth that clear one another]
     #[arg(long, value_name = "FIGURE=RANGE", allow_hyphen_values = true)]
     keep: Vec<Constraint>,
-    /// A figure of which less is better [default: kinematic_error_pp_arcsec, max_von_mises_mpa]
+    /// A figure of which less is better [default: kinematic_error_pp_arcsec, root_fillet_mpa]
     #[arg(long, value_name = "FIGURE")]
     least: Vec<String>,
     /// A figure of which more is better [default: k2_n_m_per_rad]
@@ -339,7 +339,9 @@ fn text(told: &Told<'_>, settings: &StudySettings) -> String {
                 .map(|target| format!("{} {}", target.figure, figure_of(run, target.figure)))
                 .collect();
             let basis = if run.basis == Basis::Estimated { " (estimated)" } else { "" };
-            let _ = writeln!(text, "  {:>4}  {}: {}{basis}", run.variant, values.join(" "), figures.join(", "));
+            let caution = if run.cautions.is_empty() { "" } else { " (caution)" };
+            let _ =
+                writeln!(text, "  {:>4}  {}: {}{basis}{caution}", run.variant, values.join(" "), figures.join(", "));
         }
         let more = front.len().saturating_sub(SHOWN);
         if more > 0 {
@@ -438,6 +440,7 @@ fn remarks(drive: &Drive, settings: &StudySettings, study: &Study) -> Vec<String
         ))
     });
     let mut remarks: Vec<String> = beyond.collect();
+    remarks.extend(settings.generators.iter().filter_map(|kind| cautioned(&study.runs, *kind)));
     for (k, field) in settings.vary.iter().enumerate() {
         if field.is_constant(settings.spread.is_some()) {
             remarks.push(format!("{} has one value, so nothing is said of what it does; --set would do", field.path));
@@ -452,6 +455,27 @@ fn remarks(drive: &Drive, settings: &StudySettings, study: &Study) -> Vec<String
     remarks
 }
 
+/// How many of the variants that meet what has to be kept are not to be built for all that, and why.
+fn cautioned(runs: &[Run], kind: GeneratorKind) -> Option<String> {
+    let meet = || runs.iter().filter(|run| run.generator == kind && run.meets);
+    let with = meet().filter(|run| !run.cautions.is_empty()).count();
+    let mut counts: Vec<(&'static str, f64, usize)> = Vec::new();
+    for caution in meet().flat_map(|run| &run.cautions) {
+        match counts.iter_mut().find(|(figure, ..)| *figure == caution.figure) {
+            Some((_, _, count)) => *count += 1,
+            None => counts.push((caution.figure, caution.limit, 1)),
+        }
+    }
+    let each = counts.iter().map(|(figure, limit, count)| format!("{figure} beyond {} ({count})", short(*limit)));
+    (with > 0).then(|| {
+        format!(
+            "{kind}: of {} variants that meet what has to be kept, {with} have a caution: {}",
+            meet().count(),
+            each.collect::<Vec<_>>().join(", ")
+        )
+    })
+}
+
 /// Tables of the best variant of all generators, in the first target.
 fn best_next(context: &Context, settings: &StudySettings, study: &Study) -> Vec<String> {
     let cost = |run: &Run| settings.targets.first().map_or(0.0, |first| first.cost(&run.sheet));
@@ -460,4 +484,50 @@ fn best_next(context: &Context, settings: &StudySettings, study: &Study) -> Vec<
     let sets: String =
         study.fields.iter().zip(&run.values).map(|(path, value)| format!(" --set {path}={value}")).collect();
     vec![context.next(&format!("tables --generator {}{sets}", run.generator))]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data_sheet::DataSheet;
+
+    /// A variant under the cam that meets all that is asked, with this stress in its root fillets.
+    pub(super) fn variant(number: usize, values: &[&str], root_fillet_mpa: f64) -> Run {
+        let sheet = DataSheet {
+            kinematic_error_pp_arcsec: Some(1.0),
+            root_fillet_mpa: Some(root_fillet_mpa),
+            ..DataSheet::default()
+        };
+        Run {
+            variant: number,
+            generator: GeneratorKind::Cam,
+            values: values.iter().map(|value| (*value).to_owned()).collect(),
+            status: RunStatus::Converged,
+            basis: Basis::Computed,
+            why: None,
+            cautions: sheet.looked().cautions(),
+            loads: None,
+            sheet,
+            meets: true,
+            front: true,
+        }
+    }
+
+    #[test]
+    fn variants_that_meet_and_are_not_to_be_built_are_counted_by_what_is_wrong() {
+        let mut runs = vec![variant(1, &[], 1313.0), variant(2, &[], 900.0), variant(3, &[], 1204.0)];
+        assert_eq!(
+            cautioned(&runs, GeneratorKind::Cam).as_deref(),
+            Some("cam: of 3 variants that meet what has to be kept, 2 have a caution: root_fillet_mpa beyond 1000 (2)")
+        );
+        assert_eq!(cautioned(&runs, GeneratorKind::TwoRoller), None);
+        runs.retain(|run| run.variant == 2);
+        assert_eq!(cautioned(&runs, GeneratorKind::Cam), None);
+    }
+
+    #[test]
+    fn by_default_the_stress_in_root_fillets_is_to_be_small() {
+        assert!(USUAL_TARGETS.contains(&("root_fillet_mpa", Sense::Least)));
+        assert!(USUAL_TARGETS.iter().all(|(name, _)| figure(name).is_ok()));
+    }
 }

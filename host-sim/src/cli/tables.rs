@@ -14,6 +14,7 @@ use super::context::{Context, quoted};
 use super::names::{self, Generators};
 use super::simulate::{refused_or_failed, stress};
 use super::{Failure, report, say};
+use crate::cautions::add_stress;
 use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
 use crate::output::Outputs;
@@ -138,7 +139,10 @@ impl Tables {
         if self.stress {
             // Stress that is not found takes no table away.
             made.par_iter_mut().for_each(|table| match self.stress_of(&drive, table) {
-                Ok(stress) => table.info.stress = stress,
+                Ok(stress) => {
+                    add_stress(&mut table.info.cautions, &stress);
+                    table.info.stress = stress;
+                }
                 Err(Failure::BadInput(why) | Failure::Failed(why)) => table.info.no_stress = Some(why),
             });
         }
