@@ -147,6 +147,10 @@ impl Context {
         Progress::new(title, self.common.quiet)
     }
 
+    pub(super) fn quiet(&self) -> bool {
+        self.common.quiet
+    }
+
     pub(super) fn verbose(&self) -> bool {
         self.common.verbose
     }

@@ -76,6 +76,9 @@ impl Diagnose {
         let recording = read_rows(&self.data, &map, &subject).map_err(failed)?;
         // Before there is much work.
         let out = context.out()?;
+        if !self.no_report {
+            report::before(context, out, "diagnose", None);
+        }
         let by_fem = |drive: &Drive, kind, mesh| match fresh_table(context, drive, kind, mesh) {
             Err(Failure::BadInput(what) | Failure::Failed(what)) => Err(what),
             Ok(made) => Ok(made),

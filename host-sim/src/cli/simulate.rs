@@ -133,6 +133,9 @@ impl Simulate {
         let settings = self.settings(&drive)?;
         settings.check(&drive).map_err(|error| Failure::BadInput(error.to_string()))?;
         let out = context.out()?;
+        if !self.no_report {
+            report::before(context, out, "simulate", Some(&drive));
+        }
 
         let mut frames = if self.frames { Some(Frames::new(&out.join("frames"))?) } else { None };
         let mut progress = context.progress(settings.generator.name());

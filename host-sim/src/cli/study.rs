@@ -138,6 +138,7 @@ impl StudyCommand {
             )));
         }
         let out = context.out()?;
+        report::before(context, out, "study", Some(&drive));
         let progress = Mutex::new(context.progress("study"));
         let made = study(&drive, &settings, &|done, of, run| {
             if let Ok(mut bar) = progress.lock() {

@@ -89,6 +89,9 @@ impl Validate {
             check_drive(&drive, &table).map_err(|error| refuse(error.to_string()))?;
         }
         let out = context.out()?;
+        if !self.no_report && page_path(out, &self.tables).ends_with("report.html") {
+            report::before(context, out, "validate", Some(&drive));
+        }
         let settings = ValidationSettings {
             torques: usize::from(self.torques),
             temperatures: usize::from(self.temperatures),
