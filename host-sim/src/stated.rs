@@ -371,6 +371,10 @@ fn starting_n_m(problem: &Problem) -> Result<f64, SolveError> {
     Ok(places.iter().map(|place| place.increment.generator_torque_n_m.abs()).fold(0.0, f64::max))
 }
 
+/// Why the stiffness of a table and that of a data sheet are told with other figures.
+pub const TWO_SETS_OF_K: &str = "K of a table is read off its nodes, with ranges that end at 21, 72 and 100 % of its largest torque, in the middle of both \
+                                 directions; K beside the data sheet is by secants of the FEM to the torques of the sheet";
+
 impl SheetBeside {
     /// In lines, as the commands print it.
     pub fn text(&self) -> String {

@@ -1,5 +1,6 @@
 //! `flexspline tables`: FEM sweeps, or samples from elsewhere, to compensation tables.
 
+use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -21,7 +22,7 @@ use crate::output::Outputs;
 use crate::report::page::Page;
 use crate::report::{Sources, Subject, drive_report};
 use crate::simulate::{Path, PlaceStress, SimulationSettings, simulate};
-use crate::stated::beside;
+use crate::stated::{TWO_SETS_OF_K, beside};
 use crate::stepping::{Method, SolverSettings};
 use crate::tables::sweep::SweepProgress;
 use crate::tables::{
@@ -114,6 +115,9 @@ impl Tables {
         let clock = Instant::now();
         let drive = context.drive()?;
         let generators = self.generator.0.as_slice();
+        if !self.no_report {
+            report::before(context, context.out_path(), "tables", Some(&drive));
+        }
         let tried = match &self.from_samples {
             Some(file) => vec![self.project(&drive, generators, file)],
             None => self.sweep(context, &drive, generators)?,
@@ -129,12 +133,16 @@ impl Tables {
         if made.is_empty() {
             return Err(failed.swap_remove(0).1);
         }
-        if let (Some(stated), None) = (context.stated()?, &self.from_samples) {
+        let stated = context.stated()?;
+        if let (Some(stated), None) = (&stated, &self.from_samples) {
             let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
             let reference_c = drive.temperature.reference_c;
             made.par_iter_mut().for_each(|table| {
-                table.info.data_sheet = Some(beside(&drive, table.kind, reference_c, &stated, settings));
+                table.info.data_sheet = Some(beside(&drive, table.kind, reference_c, stated, settings));
             });
+        }
+        if let Some(stated) = &stated {
+            made.iter_mut().for_each(|table| table.info.remarks.extend(table.info.short_of_sheet(stated)));
         }
         if self.stress {
             // Stress that is not found takes no table away.
@@ -374,6 +382,14 @@ fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
     }
     for sheet in report.tables.iter().filter_map(|info| info.data_sheet.as_ref()) {
         text += &sheet.text();
+    }
+    if report.tables.iter().any(|info| info.stiffness.is_some() && info.data_sheet.is_some()) {
+        let _ = writeln!(text, "  {TWO_SETS_OF_K}");
+    }
+    for info in &report.tables {
+        for remark in &info.remarks {
+            let _ = writeln!(text, "{}: remark: {remark}", info.generator);
+        }
     }
     for info in &report.tables {
         for stress in &info.stress {
