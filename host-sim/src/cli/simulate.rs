@@ -13,6 +13,7 @@ use crate::export::{Frame, write_pvd, write_vtu};
 use crate::mesh::MeshLevel;
 use crate::output::{OutputError, Outputs, WholeFolder, write_whole};
 use crate::progress::Progress;
+use crate::report::page::Page;
 use crate::report::{Seen, simulation_report};
 use crate::simulate::{
     Direction, Observation, Path, PathPoint, Phase, PlaceStress, SimulateError, Simulation, SimulationSettings,
@@ -182,6 +183,7 @@ impl Simulate {
         if let Some(seen) = seen {
             let page = simulation_report(&drive, settings.generator, &simulation, seen)
                 .map_err(|error| Failure::Failed(format!("report.html: {error}")))?;
+            let page = Page { title: context.titled(&page.title), ..page };
             report::write(&page, out, &mut outputs)?;
         }
         if let Some(frames) = frames {

@@ -14,6 +14,7 @@ use crate::data_sheet::{FIGURES, FigureOf};
 use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
 use crate::output::Outputs;
+use crate::report::page::Page;
 use crate::report::study_report;
 use crate::stated::short;
 use crate::stepping::{Method, SolverSettings};
@@ -194,6 +195,7 @@ impl StudyCommand {
             nearest: &nearest_of,
             remarks: &remarks,
         });
+        let page = Page { title: context.titled(&page.title), ..page };
         let mut outputs = Outputs::new();
         outputs.file(&out.join("study.csv"), |file| file.write_all(csv(&made).as_bytes()))?;
         outputs.json(&out.join("study.json"), &told)?;
@@ -350,13 +352,23 @@ fn text(told: &Told<'_>, settings: &StudySettings) -> String {
             let _ = writeln!(text, "  and {more} more in study.csv");
         }
         text += &what_is_asked(told, settings, *kind);
-        let why = study.runs.iter().filter(|run| run.generator == *kind).find_map(|run| run.why.as_deref());
-        if let Some(why) = why {
-            let _ = writeln!(text, "  the first that did not converge: {why}");
-        }
+        text += &firsts(&study.runs, *kind);
         text += &how_far_to_trust(told, settings, *kind);
     }
     text
+}
+
+/// The first variant that did not converge, and the first whose fields make no drive, each with its reason.
+fn firsts(runs: &[Run], kind: GeneratorKind) -> String {
+    let first = |status, what: &str| {
+        let run = runs.iter().find(|run| run.generator == kind && run.status == status)?;
+        Some(format!("  {what}, variant {}: {}\n", run.variant, run.why.as_ref()?))
+    };
+    let ends = [
+        first(RunStatus::Failed, "the first that did not converge"),
+        first(RunStatus::Refused, "the first that makes no drive"),
+    ];
+    ends.into_iter().flatten().collect()
 }
 
 /// What estimates of the targets are off by, and which rank nothing.
@@ -580,6 +592,18 @@ mod tests {
         assert_eq!(cautioned(&runs, GeneratorKind::TwoRoller), None);
         runs.retain(|run| run.variant == 2);
         assert_eq!(cautioned(&runs, GeneratorKind::Cam), None);
+    }
+
+    #[test]
+    fn what_makes_no_drive_is_not_told_as_what_did_not_converge() {
+        let mut runs = vec![variant(1, &[], 900.0), variant(2, &[], 900.0)];
+        assert_eq!(firsts(&runs, GeneratorKind::Cam), "");
+        (runs[0].status, runs[0].why) = (RunStatus::Refused, Some("a shorter tooth".to_owned()));
+        assert_eq!(firsts(&runs, GeneratorKind::Cam), "  the first that makes no drive, variant 1: a shorter tooth\n");
+        (runs[1].status, runs[1].why) = (RunStatus::Failed, Some("no equilibrium".to_owned()));
+        assert!(
+            firsts(&runs, GeneratorKind::Cam).starts_with("  the first that did not converge, variant 2: no equil")
+        );
     }
 
     #[test]

@@ -226,13 +226,14 @@ impl Tables {
             validation: None,
             animation,
         });
-        Ok(drive_report(Sources {
+        let page = drive_report(Sources {
             drive,
             command_name: "tables",
             command: &context.command,
             inputs: inputs.collect(),
             subjects: subjects.collect(),
-        }))
+        });
+        Ok(Page { title: context.titled(&page.title), ..page })
     }
 
     fn project(&self, drive: &Drive, generators: &[GeneratorKind], file: &PathBuf) -> Result<MadeTable, Failure> {

@@ -192,13 +192,14 @@ impl Validate {
         let subjects = tables.into_iter().zip(&report.tables).zip(animations).map(|(((kind, table), v), animation)| {
             Subject { kind, table, info: None, samples: None, validation: Some(v), animation }
         });
-        Ok(drive_report(Sources {
+        let page = drive_report(Sources {
             drive,
             command_name: "validate",
             command: &context.command,
             inputs,
             subjects: subjects.collect(),
-        }))
+        });
+        Ok(Page { title: context.titled(&page.title), ..page })
     }
 
     /// The images in the folder.
