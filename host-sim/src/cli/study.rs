@@ -491,7 +491,7 @@ fn cautioned(runs: &[Run], kind: GeneratorKind) -> Option<String> {
     let each = counts.iter().map(|(figure, limit, count)| format!("{figure} beyond {} ({count})", short(*limit)));
     (with > 0).then(|| {
         format!(
-            "{kind}: of {} variants that meet what has to be kept, {with} have a caution: {}",
+            "{kind}: of {} that meet what has to be kept, {with} with a caution: {}",
             meet().count(),
             each.collect::<Vec<_>>().join(", ")
         )
@@ -587,7 +587,7 @@ mod tests {
         let mut runs = vec![variant(1, &[], 1313.0), variant(2, &[], 900.0), variant(3, &[], 1204.0)];
         assert_eq!(
             cautioned(&runs, GeneratorKind::Cam).as_deref(),
-            Some("cam: of 3 variants that meet what has to be kept, 2 have a caution: root_fillet_mpa beyond 1000 (2)")
+            Some("cam: of 3 that meet what has to be kept, 2 with a caution: root_fillet_mpa beyond 1000 (2)")
         );
         assert_eq!(cautioned(&runs, GeneratorKind::TwoRoller), None);
         runs.retain(|run| run.variant == 2);

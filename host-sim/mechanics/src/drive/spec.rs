@@ -632,10 +632,10 @@ impl Drive {
         );
         let mut radii = teeth
             & require(
-            f.root_radius_mm < f.tip_radius_mm,
-            "flexspline.tip_radius_mm",
-            format!("found {}, allowed: above root_radius_mm = {}", f.tip_radius_mm, f.root_radius_mm),
-        );
+                f.root_radius_mm < f.tip_radius_mm,
+                "flexspline.tip_radius_mm",
+                format!("found {}, allowed: above root_radius_mm = {}", f.tip_radius_mm, f.root_radius_mm),
+            );
         radii &= require(
             f.rim_thickness_mm <= 0.2 * f.root_radius_mm,
             "flexspline.rim_thickness_mm",
