@@ -104,9 +104,8 @@ fn a_cause_is_explained_on_one_screen() {
     assert!(named.contains("It is named") && named.lines().count() <= 40, "{named}");
     // Several at once, the one that was dropped first.
     let both = explained(&format!("gravity_side_load,{HIDDEN}"));
-    let (dropped, after) = both.split_once("It is named").unwrap_or_else(|| panic!("{both}"));
+    let (dropped, _) = both.split_once("It is named").unwrap_or_else(|| panic!("{both}"));
     assert!(dropped.contains("It is not named") && dropped.contains("asked for"), "{dropped}");
-    assert!(named.ends_with(after.trim_end()) || after.contains("confidence"), "{after}");
 
     // Without the torque nobody can speak of springs, and that is the reason given.
     let data = desk.read("made/data.csv");
