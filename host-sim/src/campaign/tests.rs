@@ -148,11 +148,11 @@ fn the_example_is_read_and_mistakes_are_named_by_line_field_value_and_what_is_al
         ),
         (
             "[[tolerance]]\nfield = \"generator.w0_mm\"\ndistribution = \"normal\"\nmean = 0.8\nstd = 0.001\n",
-            "t.toml:4: tolerance[0].mean: \"generator.w0_mm\" is 0.5 in the drive, and the tolerance scatters about 0.8, 300 standard deviations",
+            "t.toml:4: tolerance[0]: mean: \"generator.w0_mm\" is 0.5 in the drive, and the tolerance scatters about 0.8, 300 standard deviations",
         ),
         (
             "[[tolerance]]\nfield = \"generator.w0_mm\"\ndistribution = \"uniform\"\nlimits = [0.8, 0.81]\n",
-            "t.toml:4: tolerance[0].limits: \"generator.w0_mm\" is 0.5 in the drive",
+            "t.toml:4: tolerance[0]: limits: \"generator.w0_mm\" is 0.5 in the drive",
         ),
     ] {
         let told = refused(text);

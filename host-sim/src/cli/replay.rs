@@ -52,13 +52,13 @@ impl Replay {
         let bytes = std::fs::read(&self.data)
             .map_err(|error| Failure::BadInput(format!("{}: {error}", self.data.display())))?;
         let rows_of = RowsOf::beside(&self.data, &bytes);
-        let remark = self.whose(rows_of.as_ref(), &table)?;
+        self.check_rows(rows_of.as_ref(), &table)?;
         // Found out before the rows are read.
         context.out()?;
         let rows = measured(&self.data, &self.logs, &table, self.temperature_c)?;
         let (replayed, mut summary) = replay(&table, &rows);
         summary.command.clone_from(&context.command);
-        (summary.rows_of, summary.remarks) = (rows_of, remark.into_iter().collect());
+        summary.of_rows(rows_of, &table);
         let out = context.out()?;
         let mut outputs = Outputs::new();
         outputs.csv(&out.join("replay.csv"), &replayed)?;
@@ -69,21 +69,14 @@ impl Replay {
 }
 
 impl Replay {
-    /// That the rows are of the drive and the generator of the table, or what has to be said of it.
-    fn whose(&self, rows_of: Option<&RowsOf>, table: &Table<'_>) -> Result<Option<String>, Failure> {
-        let Some(rows) = rows_of else {
-            return Ok(Some(
-                "nothing beside the rows says of which drive and generator they are: that they are the table's could not be checked"
-                    .to_owned(),
-            ));
-        };
-        match rows.check(table) {
-            Ok(()) => Ok(None),
-            Err(other) if self.other_drive => Ok(Some(other.to_string())),
-            Err(other) => Err(Failure::BadInput(format!(
+    /// That the rows are of the drive and the generator of the table, as far as anybody says.
+    fn check_rows(&self, rows_of: Option<&RowsOf>, table: &Table<'_>) -> Result<(), Failure> {
+        match rows_of.map(|rows| rows.check(table)) {
+            Some(Err(other)) if !self.other_drive => Err(Failure::BadInput(format!(
                 "{}: {other}; allowed: the table of that drive, or --other-drive if this is meant",
                 self.data.display()
             ))),
+            _ => Ok(()),
         }
     }
 

@@ -72,7 +72,7 @@ pub struct ReplaySummary {
     pub rows_by_quality: [usize; 4],
     /// Whose rows they are, where that is known.
     pub rows_of: Option<RowsOf>,
-    /// What could not be checked.
+    /// What has to be known of them: that they are another drive's, or nobody's.
     pub remarks: Vec<String>,
     /// Command line, once known.
     pub command: String,
@@ -122,6 +122,21 @@ impl RowsOf {
             return Ok(());
         }
         Err(OtherRows { rows: self.clone(), hash, generator, ratio: table.drive().exact_ratio() })
+    }
+}
+
+/// What is said of rows that nothing speaks for.
+const OF_NOBODY: &str =
+    "nothing beside the rows says of which drive and generator they are: that they are the table's was not checked";
+
+impl ReplaySummary {
+    /// Puts in whose rows they are, and what has to be said of that.
+    pub fn of_rows(&mut self, rows_of: Option<RowsOf>, table: &Table<'_>) {
+        self.remarks = match &rows_of {
+            None => vec![OF_NOBODY.to_owned()],
+            Some(rows) => rows.check(table).err().iter().map(ToString::to_string).collect(),
+        };
+        self.rows_of = rows_of;
     }
 }
 
@@ -255,7 +270,7 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
         mean_residual_arcsec: mean_residual,
         rows_by_quality: by_quality,
         rows_of: None,
-        remarks: Vec::new(),
+        remarks: vec![OF_NOBODY.to_owned()],
         command: String::new(),
     };
     (replayed, summary)
