@@ -277,8 +277,18 @@ fn teeth_that_interfere_and_stress_that_no_steel_bears_are_said() {
     assert!(text.contains("caution: the teeth of the drawing interfere by 8.9 um"), "{text}");
     let tables = "tables --generator cam --mesh coarse --torque-n-m 20 --most-nodes 5 --positions 4 --temperatures-c 20 \
                   --set circular_spline.profile_shift=2.95";
-    let said = desk.line(tables).done().stdout;
+    let page = desk.read("out/report.html");
+    let run = desk.line(tables).done();
+    let said = &run.stdout;
     assert!(said.contains("cam: caution: the teeth of the drawing interfere"), "{said}");
+    // The page of another command is kept, and that is said.
+    let kept = desk.read("out/report-simulate.html");
+    assert!(kept == page && kept.contains("HHD-95 along a path, with 1 field changed"), "another page is kept");
+    assert!(
+        run.stderr.contains("the page of `simulate`") && run.stderr.contains("report-simulate.html"),
+        "{}",
+        run.stderr
+    );
     assert!(desk.read("out/report.html").contains("class=\"stamp caution\""));
     // A sound drive, in root fillets, on bore and flanks, over three meshes.
     let sound = "tables --generator cam --mesh coarse --torque-n-m 20 --most-nodes 5 --positions 4 --temperatures-c 20 --stress --no-report";
@@ -385,6 +395,7 @@ fn a_study_agrees_with_the_table_of_the_same_drive_and_tells_every_variant() {
         ("study --vary generator.w0_mm=0.5 --keep backlash=..3", "did you mean `backlash_arcsec`?"),
         ("study --vary generator.w0_mm=0.5 --least stress", "max_von_mises_mpa"),
         ("study --vary generator.w0_mm=0.5 --torque-n-m -3", "allowed: above 0"),
+        ("new own.toml --teeth 200 --module -0.32", "--module: found -0.32, allowed"),
         ("study --vary generator.w0_mm=0.5,0.49,0.50", "found the value 0.50 twice"),
         ("study --vary generator.w0_mm=0.5..0.5", "found the value 0.5 twice"),
         ("study --vary generator.w0_mm=0.5 --least bore_mpa --most bore_mpa", "found bore_mpa twice"),

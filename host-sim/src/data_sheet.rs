@@ -187,6 +187,7 @@ impl DataSheet {
             rigid_gap_um: self.rigid_gap_um,
             room_as_built_arcsec: self.room_as_built_arcsec,
             max_von_mises_mpa: self.max_von_mises_mpa,
+            root_fillet_mpa: self.root_fillet_mpa,
             peak_flank_pressure_mpa: self.peak_flank_pressure_mpa,
             slope_bound: None,
         }
@@ -314,6 +315,12 @@ fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cautions_look_at_the_stress_in_root_fillets_too() {
+        let sheet = DataSheet { max_von_mises_mpa: Some(664.0), root_fillet_mpa: Some(1204.0), ..DataSheet::default() };
+        assert_eq!(sheet.looked().cautions()[0].figure, "root_fillet_mpa");
+    }
 
     #[test]
     fn a_sheet_of_figures_has_each_under_its_name() {

@@ -371,12 +371,16 @@ fn starting_n_m(problem: &Problem) -> Result<f64, SolveError> {
     Ok(places.iter().map(|place| place.increment.generator_torque_n_m.abs()).fold(0.0, f64::max))
 }
 
+/// Why the stiffness of a table and that of a data sheet are told with other figures.
+pub const TWO_SETS_OF_K: &str = "K of a table is read off its nodes, with ranges that end at 21, 72 and 100 % of its largest torque, in the middle of both \
+                                 directions; K beside the data sheet is by secants of the FEM to the torques of the sheet";
+
 impl SheetBeside {
     /// In lines, as the commands print it.
     pub fn text(&self) -> String {
         let of = self.stated.source.as_deref().map_or_else(String::new, |source| format!(" ({source})"));
         let mut lines = format!(
-            "data sheet{of}, {} generator, {} N.m\n  {:<24}{:>12}{:>12}{:>8}\n",
+            "data sheet{of}, {} generator, {} N.m\n  {:<24}{:>12}{:>12}{:>11}\n",
             self.generator,
             self.loads_in_words(),
             "",
@@ -388,9 +392,11 @@ impl SheetBeside {
             let computed = row.computed.map_or_else(|| "-".to_owned(), short);
             // A ratio far below 1 is a number, too.
             let digits = |ratio: f64| if ratio.abs() < 0.1 { 4 } else { 2 };
-            let ratio = row.ratio.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.0$}", digits(ratio)));
+            let told =
+                |ratio: f64| if ratio < 1e4 { format!("{ratio:.0$}", digits(ratio)) } else { format!("{ratio:.2e}") };
+            let ratio = row.ratio.map_or_else(|| "-".to_owned(), told);
             lines += &format!(
-                "  {:<24}{:>12}{computed:>12}{ratio:>8}  {}\n",
+                "  {:<24}{:>12}{computed:>12}{ratio:>11}  {}\n",
                 row.figure,
                 short(row.stated),
                 row.remark(self)
@@ -605,6 +611,28 @@ mod tests {
     }
 
     /// Friction of the flanks widens the loop; without it the loop is the clearance. A torque that the drive bears is held.
+    /// A sheet filled in with a figure in a wrong unit: every column is a word of its own.
+    #[test]
+    fn columns_stand_apart_whatever_the_ratio() {
+        let stated = Stated { k1_n_m_per_rad: Some(3.1), ..Stated::default() };
+        let (loads, assumed, sheet) = (stated.loads(20.0), stated.assumed(), DataSheet::default());
+        let row = |ratio: f64| Beside {
+            figure: "k1_n_m_per_rad",
+            stated: 3.1,
+            computed: Some(3.1 * ratio),
+            ratio: Some(ratio),
+            within_scatter: None,
+            words: "secant",
+        };
+        let beside = vec![row(244_747.3), row(2.447e11), row(0.98)];
+        let told = SheetBeside { generator: GeneratorKind::Cam, stated, loads, assumed, sheet, beside, why: None };
+        let text = told.text();
+        let rows: Vec<Vec<&str>> =
+            text.lines().filter(|line| line.contains("k1_")).map(|line| line.split_whitespace().collect()).collect();
+        assert!(rows.iter().all(|row| row.len() >= 4 && row[1] == "3.1" && row[3].parse::<f64>().is_ok()), "{text}");
+        assert_eq!(rows[2][3], "0.98");
+    }
+
     #[test]
     fn the_loop_is_the_clearance_and_what_friction_adds() {
         let stated = Stated {

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use flexspline::{
     Approach, Direction, GeneratorAngle, OutputAngle, PlayState as CoreState, SAVED_STATE_BYTES, Table as CoreTable,
 };
-use flexspline_sim::tables::{MeasuredRow, dead_zone_n_m, parse_measured, replay};
+use flexspline_sim::tables::{MeasuredRow, RowsOf, dead_zone_n_m, parse_measured, replay};
 use flexspline_sim::units::ARCSEC_PER_RAD;
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
@@ -329,10 +329,10 @@ impl Table {
                 temperature_c: temperature.at(row),
             })
             .collect();
-        self.replayed(py, &rows)
+        self.replayed(py, &rows, None)
     }
 
-    /// The same of a CSV.
+    /// The same of a CSV. Rows of a run of another drive are a remark here.
     fn replay_file<'py>(
         &self,
         py: Python<'py>,
@@ -341,7 +341,7 @@ impl Table {
     ) -> PyResult<(Bound<'py, PyDict>, String)> {
         let bytes = std::fs::read(file).map_err(|error| bad(format!("{file}: {error}")))?;
         let rows = parse_measured(file, &bytes, self.table().drive().exact_ratio(), temperature_c).map_err(bad)?;
-        self.replayed(py, &rows)
+        self.replayed(py, &rows, RowsOf::beside(std::path::Path::new(file), &bytes))
     }
 
     /// Arc-seconds in a radian, as every number here is converted.
@@ -351,8 +351,14 @@ impl Table {
 }
 
 impl Table {
-    fn replayed<'py>(&self, py: Python<'py>, rows: &[MeasuredRow]) -> PyResult<(Bound<'py, PyDict>, String)> {
-        let (replayed, summary) = py.detach(|| replay(self.table(), rows));
+    fn replayed<'py>(
+        &self,
+        py: Python<'py>,
+        rows: &[MeasuredRow],
+        rows_of: Option<RowsOf>,
+    ) -> PyResult<(Bound<'py, PyDict>, String)> {
+        let (replayed, mut summary) = py.detach(|| replay(self.table(), rows));
+        summary.of_rows(rows_of, self.table());
         let columns = PyDict::new(py);
         let numbers = |of: fn(&flexspline_sim::tables::ReplayedRow) -> f64| {
             replayed.iter().map(of).collect::<Vec<f64>>().into_pyarray(py)

@@ -146,6 +146,14 @@ fn the_example_is_read_and_mistakes_are_named_by_line_field_value_and_what_is_al
             "[[tolerance]]\nfield = \"generator.w0_mm\"\ndistribution = \"normal\"\nstd = -1\n",
             "tolerance[0].std: found -1, allowed: above 0",
         ),
+        (
+            "[[tolerance]]\nfield = \"generator.w0_mm\"\ndistribution = \"normal\"\nmean = 0.8\nstd = 0.001\n",
+            "t.toml:4: tolerance[0]: mean: \"generator.w0_mm\" is 0.5 in the drive, and the tolerance scatters about 0.8, 300 standard deviations",
+        ),
+        (
+            "[[tolerance]]\nfield = \"generator.w0_mm\"\ndistribution = \"uniform\"\nlimits = [0.8, 0.81]\n",
+            "t.toml:4: tolerance[0]: limits: \"generator.w0_mm\" is 0.5 in the drive",
+        ),
     ] {
         let told = refused(text);
         assert!(told.contains(said) && told.contains("t.toml"), "{told}");
@@ -154,6 +162,14 @@ fn the_example_is_read_and_mistakes_are_named_by_line_field_value_and_what_is_al
     for (name, column) in [("drive", "drive"), ("generator", "generator"), ("error_pp_arcsec", "error_pp_arcsec")] {
         let told = refused(&format!("{ECCENTRIC}{THICK}name = \"{name}\"\n"));
         assert!(told.starts_with("t.toml:5: tolerance[1].name: found") && told.contains(column), "{told}");
+    }
+    // What is near, or wide, or of nothing as drawn is as good a tolerance as any.
+    for (field, law) in [
+        ("generator.w0_mm", "\"normal\"\nmean = 0.51\nstd = 0.0005"),
+        ("generator.w0_mm", "\"normal\"\nmean = 0.56\nstd = 0.01\nlimits = [0.49, 0.51]"),
+        ("as_built.flexspline_wear_um", "\"normal\"\nmean = 10\nstd = 0.5"),
+    ] {
+        tolerances(&format!("[[tolerance]]\nfield = \"{field}\"\ndistribution = {law}\n"));
     }
     let phase = "as_built.circular_spline_eccentricity_um, phase_deg";
     assert!(refused(&format!("{ECCENTRIC}{THICK}name = \"{phase}\"\n")).contains(phase));

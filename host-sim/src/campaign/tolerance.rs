@@ -25,6 +25,10 @@ const SIGMAS: f64 = 3.0;
 /// Limits of a normal or Rayleigh law that is given none, standard deviations: one drive in millions lies outside.
 const FAR: f64 = 5.5;
 
+/// The middle of a tolerance is refused if it is more than so many standard deviations, and more than this share, away from the value of the
+/// drive: guesses beyond what any drawing means.
+const FAR_OFF: (f64, f64) = (10.0, 0.1);
+
 /// What a file of tolerances says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tolerances {
@@ -156,6 +160,27 @@ impl Distribution {
             Law::Rayleigh { std } => std * (-2.0 * libm::log1p(-share)).sqrt(),
         };
         value.clamp(low, high)
+    }
+
+    /// What is wrong with a distribution that scatters about another value than the drive has: nothing within so many standard deviations, or
+    /// so small a share of the value. Of a field that is 0 as drawn, such as a wear, nobody knows.
+    fn beside_drive(&self, nominal: f64) -> Option<String> {
+        let [low, high] = self.limits;
+        let (middle, std) = match self.law {
+            Law::Normal { mean, std } => (mean, std),
+            Law::Uniform => (0.5 * (low + high), (high - low) / 12f64.sqrt()),
+            Law::Rayleigh { .. } => return None,
+        };
+        let off = (middle - nominal).abs();
+        (nominal != 0.0 && off > FAR_OFF.0 * std && off > FAR_OFF.1 * nominal.abs()).then(|| {
+            format!(
+                "the tolerance scatters about {}, {:.0} standard deviations of {} away; allowed: about the value of the drive, which its file or \
+                 --set changes",
+                told(middle),
+                off / std,
+                told(std)
+            )
+        })
     }
 
     /// The same tolerance, half as wide: about the middle, and a size about nothing.
@@ -480,6 +505,10 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
     let [least, most] = distribution.limits.map(|end| distribution.below(end));
     if most - least < LEAST_INSIDE {
         return Err(beside("limits", "found limits that the distribution hardly ever keeps, allowed: wider ones"));
+    }
+    if let Some(what) = distribution.beside_drive(nominal).filter(|_| matches!(acts, Acts::Alike)) {
+        let key = if mean.is_some() { "mean" } else { "limits" };
+        return Err(beside(key, &format!("{field:?} is {nominal} in the drive, and {what}")));
     }
     let name = table.given("name", text)?.unwrap_or_else(|| match acts {
         Acts::Harmonic { order, .. } => format!("{field}, order {order}"),

@@ -152,6 +152,9 @@ impl Calibrate {
         let files = self.logs.iter().map(|file| read(file, &map, &gear)).collect::<Result<Vec<_>, _>>();
         let files = files.map_err(|error| Failure::BadInput(error.to_string()))?;
         let out = context.out()?;
+        if !self.no_report {
+            report::before(context, out, "calibrate", None);
+        }
         let mut made = calibrate(&files, &prior).map_err(|error| self.failed(&error))?;
         made.calibration.command.clone_from(&context.command);
         made.table.info.command.clone_from(&context.command);

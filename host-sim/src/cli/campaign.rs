@@ -354,6 +354,7 @@ impl ReduceCommand {
     fn run(&self, context: &Context) -> Result<(), Failure> {
         let (plan, hash) = opened(context, &self.folder)?;
         let out = if context.has_out() { context.out()?.to_owned() } else { self.folder.clone() };
+        report::before(context, &out, "campaign", None);
         let campaign = reduce(&plan, &hash, &self.folder, self.partial).map_err(|error| match error {
             ReduceError::Incomplete(what) => Failure::Failed(what),
             ReduceError::Foreign(what) => Failure::BadInput(what),

@@ -86,6 +86,15 @@ impl Context {
         if self.has_drive() { Some("--drive") } else { by_set() }
     }
 
+    /// A title of the drive, and that it is not as its file or its name has it.
+    pub(super) fn titled(&self, title: &str) -> String {
+        match Drive::fields_set(self.common.sets.iter().map(String::as_str)) {
+            0 => title.to_owned(),
+            1 => format!("{title}, with 1 field changed"),
+            count => format!("{title}, with {count} fields changed"),
+        }
+    }
+
     /// Whether `--set` sets this field.
     pub(super) fn sets_field(&self, path: &str) -> bool {
         self.set_to(path).is_some()
@@ -145,6 +154,10 @@ impl Context {
     /// A progress bar for work called `title`.
     pub(super) fn progress(&self, title: &str) -> Progress {
         Progress::new(title, self.common.quiet)
+    }
+
+    pub(super) fn quiet(&self) -> bool {
+        self.common.quiet
     }
 
     pub(super) fn verbose(&self) -> bool {

@@ -57,9 +57,10 @@ pub(super) struct Diagnose {
     mesh: Option<MeshLevel>,
     #[command(flatten)]
     logs: LogOptions,
-    /// Say why this cause was named or not (snake case, for instance flexspline_runout); with --json the gates that it came to
-    #[arg(long, value_name = "CAUSE")]
-    explain: Option<String>,
+    /// Say why this cause was named or not (snake case, for instance flexspline_runout); with --json the gates that it came to. Several with
+    /// commas, or repeated: a list in JSON, and without what to record to tell them apart
+    #[arg(long, value_name = "CAUSE", value_delimiter = ',')]
+    explain: Vec<String>,
     /// Do not write report.html
     #[arg(long)]
     no_report: bool,
@@ -68,19 +69,24 @@ pub(super) struct Diagnose {
 impl Diagnose {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let map = self.logs.map()?;
-        let asked = self.explain.as_deref().map(str::parse::<CauseName>).transpose();
-        let asked = asked.map_err(|error| Failure::BadInput(format!("--explain: {error}")))?;
+        let explained = self.explain.iter().map(|name| name.trim().parse::<CauseName>()).collect::<Result<Vec<_>, _>>();
+        let explained = explained.map_err(|error| Failure::BadInput(format!("--explain: {error}")))?;
         let image = self.image()?;
         let subject = self.subject(context, image.as_deref())?;
         let failed = |error: PipelineError| self.failed(&error);
         let recording = read_rows(&self.data, &map, &subject).map_err(failed)?;
         // Before there is much work.
         let out = context.out()?;
+        if !self.no_report {
+            report::before(context, out, "diagnose", None);
+        }
         let by_fem = |drive: &Drive, kind, mesh| match fresh_table(context, drive, kind, mesh) {
             Err(Failure::BadInput(what) | Failure::Failed(what)) => Err(what),
             Ok(made) => Ok(made),
         };
         let remake: Option<&MakeTable<'_>> = if self.remake_tables { Some(&by_fem) } else { None };
+        // What tells a cause from the strongest that was named is looked for of one.
+        let asked = explained.first().copied().filter(|_| explained.len() == 1);
         let options = Options { verbose: context.verbose(), asked, remake, mesh: self.mesh };
         let mut progress = context.progress("diagnose");
         let done = diagnose_rows(recording, &subject, &options, |done, of, what| progress.set(done, of, what))
@@ -106,9 +112,15 @@ impl Diagnose {
             report::write(&page, out, &mut outputs)?;
         }
         outputs.finish()?;
-        if let Some(cause) = asked {
-            let explanation = Explanation::of(diagnosis, cause);
-            return context.print(&explanation, || explanation.text().trim_end().to_owned());
+        let explanations: Vec<Explanation<'_>> =
+            explained.iter().map(|cause| Explanation::of(diagnosis, *cause)).collect();
+        match explanations.as_slice() {
+            [] => {}
+            [one] => return context.print(one, || one.text().trim_end().to_owned()),
+            several => {
+                let texts = || several.iter().map(|one| one.text().trim_end().to_owned()).collect::<Vec<_>>();
+                return context.print(&serde_json::json!({ "explanations": several }), || texts().join("\n\n"));
+            }
         }
         context.print(&written, || {
             let next = say::next(&self.next(diagnosis, extension, out));

@@ -55,6 +55,9 @@ impl Fly {
         let flown = scenario(&self.scenario)?;
         flown.carries().map_err(|why| Failure::BadInput(format!("{}: {why}", self.scenario)))?;
         let out = context.out()?;
+        if !self.no_report {
+            report::before(context, out, "fly", None);
+        }
         let (progress, done) = (Mutex::new(context.progress("fly")), AtomicUsize::new(0));
         let told = || {
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;

@@ -21,7 +21,8 @@ const BALL_N: f64 = 100.0;
 const BALL_N_AT_MM: f64 = 63.5;
 /// Preload of S-shaped teeth, µm, as of S-95. A guess: drives of catalogues have no play, and how much deeper their teeth mesh is not published.
 const PRELOAD_UM: f64 = 1.0;
-/// Teeth that have room for the S shape (tested): of fewer they are made lower, until they do not reach into one another.
+/// Teeth that have room for the S shape (tested): of fewer they are made lower, until they do not reach into one another. Those that still fit are
+/// taken.
 const S_TEETH: u32 = 100;
 /// Tip roundings of S-shaped teeth, modules, as of S-95.
 const S_TIP_ROUNDING: f64 = 0.1;
@@ -132,7 +133,7 @@ impl Clearance {
         let binds: Vec<String> = self.interfere_um.iter().map(|(kind, um)| format!("{kind} (by {um:.1} um)")).collect();
         match (clear.as_slice(), binds.as_slice()) {
             (clear, []) => format!("teeth clear one another under {}", clear.join(", ")),
-            ([], binds) => format!("teeth interfere under {}", binds.join(", ")),
+            ([], binds) => format!("teeth interfere under {}, all four: this drive binds", binds.join(", ")),
             (clear, binds) => {
                 format!("teeth clear one another under {}; they interfere under {}", clear.join(", "), binds.join(", "))
             }

@@ -44,19 +44,19 @@ pub(super) struct New {
     #[arg(long, value_name = "FILE|NAME", value_hint = ValueHint::FilePath)]
     from: Option<String>,
     /// Teeth of the flexspline, even; the circular spline has two more
-    #[arg(long, value_name = "Z", requires = "module", conflicts_with_all = ["from", "like"])]
+    #[arg(long, value_name = "Z", requires = "module", allow_negative_numbers = true, conflicts_with_all = ["from", "like"])]
     teeth: Option<u32>,
     /// Module, mm
-    #[arg(long, value_name = "MM", conflicts_with_all = ["from", "like"])]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, conflicts_with_all = ["from", "like"])]
     module: Option<f64>,
     /// Ratio, instead of --teeth (twice the ratio: circular spline held) or to check them
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     ratio: Option<f64>,
     /// Diameter of the flexspline's bore, undeformed, mm [default: 1.97 times the pitch radius]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     bore: Option<f64>,
     /// Face width, mm [default: 0.43 times the pitch radius]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     width: Option<f64>,
     /// Generator under which the rigid backlash is made one arc-minute
     #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true)]
@@ -138,19 +138,12 @@ impl New {
         let (text, drive_hash, next) = match kind {
             Kind::Drive => {
                 let hash = blake3::Hash::from_bytes(drive.hash()).to_hex().to_string();
-                // Where teeth bind under a generator nobody wants its table.
-                let of = match teeth.as_ref().map(|teeth| teeth.clear.as_slice()) {
-                    Some([only]) => format!(" --generator {only}"),
-                    _ => String::new(),
-                };
-                let check = format!("flexspline drive --check --drive {file}");
-                let tables = format!("flexspline tables --drive {file}{of}");
-                let mut next = if of.is_empty() { vec![check, tables] } else { vec![tables] };
+                let mut next = next_of(&file, teeth.as_ref(), self.generator);
                 let text = match own {
                     Some(made) => head(teeth.as_ref(), &left_out) + &with_formulas(made, &drive),
                     None => drive.to_toml(),
                 };
-                if self.like.is_some() && !drive.sleeve.is_shell() {
+                if self.like.is_some() && !drive.sleeve.is_shell() && !next.is_empty() {
                     next.push(self.with_guesses(context, &file, &drive));
                 }
                 let sheet = data_sheet.as_ref().map_or_else(|| TEMPLATE.to_owned(), Stated::to_toml);
@@ -348,6 +341,23 @@ fn head(teeth: Option<&Clearance>, left_out: &[&str]) -> String {
     text
 }
 
+/// What to type next of a drive file: nothing that fails. Where teeth bind under a generator nobody wants its table, and where they bind under
+/// all of them nobody wants the drive.
+fn next_of(file: &str, teeth: Option<&Clearance>, drawn_for: GeneratorKind) -> Vec<String> {
+    let tables = format!("flexspline tables --drive {file}");
+    let clear = teeth.map_or(&GeneratorKind::ALL[..], |teeth| &teeth.clear);
+    match clear {
+        [] => Vec::new(),
+        all if all.len() == GeneratorKind::ALL.len() => {
+            vec![format!("flexspline drive --check --drive {file}"), tables]
+        }
+        some => {
+            let kind = some.iter().find(|kind| **kind == drawn_for).unwrap_or(&some[0]);
+            vec![format!("{tables} --generator {kind}")]
+        }
+    }
+}
+
 /// Series, size and ratio of `CSF-25-100`: the last two are numbers.
 fn size_and_ratio(name: &str) -> Option<(&str, f64, u32)> {
     let mut parts = name.rsplit('-');
@@ -366,4 +376,30 @@ fn refused(error: &DriveError, like: bool) -> Failure {
         _ => problem.to_string(),
     });
     Failure::BadInput(says.collect::<Vec<_>>().join("\n"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rim of 5 mm under teeth of 120 x 0.5 mm: they bind under every generator, and no command is proposed that would fail.
+    #[test]
+    fn teeth_that_bind_under_every_generator_have_no_next_command() {
+        let few =
+            FewNumbers { teeth: 120, module_mm: 0.5, bore_mm: None, width_mm: None, generator: GeneratorKind::Cam };
+        let sound = few.drive("d").unwrap().drive;
+        let thick = sound.with_set("flexspline.rim_thickness_mm=5").unwrap();
+        let clearance = Clearance::of(&thick).unwrap();
+        assert_eq!(next_of("d.toml", Some(&clearance), GeneratorKind::Cam), [""; 0]);
+        assert!(clearance.text().ends_with("all four: this drive binds"), "{}", clearance.text());
+        let clears = Clearance::of(&sound).unwrap();
+        assert_eq!(next_of("d.toml", Some(&clears), GeneratorKind::Cam).len(), 2);
+        assert_eq!(next_of("d.toml", None, GeneratorKind::Cam).len(), 2);
+        let some = |clear: &[GeneratorKind]| Clearance { clear: clear.to_vec(), ..clearance.clone() };
+        let (disc, rollers) = (GeneratorKind::DoubleDisc, GeneratorKind::TwoRoller);
+        for (drawn_for, due) in [(disc, "double-disc"), (GeneratorKind::Cam, "two-roller")] {
+            let next = next_of("d.toml", Some(&some(&[rollers, disc])), drawn_for);
+            assert_eq!(next, [format!("flexspline tables --drive d.toml --generator {due}")]);
+        }
+    }
 }

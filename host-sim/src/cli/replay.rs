@@ -12,13 +12,16 @@ use crate::drive::GeneratorKind;
 use crate::measurement::{self, ColumnMap};
 use crate::nominal::Nominal;
 use crate::output::Outputs;
-use crate::tables::replay::{MeasuredRow, ReplaySummary, parse, replay};
+use crate::tables::replay::{MeasuredRow, ReplaySummary, RowsOf, parse, replay};
 use crate::units::ARCSEC_PER_RAD;
 
 /// Run the core over measured rows, open loop, and show what it leaves
 ///
 /// Reads a table image and a CSV with generator_rad and output_rad (or error_arcsec), optionally torque_n_m and
 /// temperature_c, or a log with columns of its own (--columns); writes replay.csv, one row for each with the prediction, the residual and its quality, and summary.json.
+///
+/// Rows of `simulate` (results.csv, with its summary.json beside it) have to be of the drive and the generator of the table. Of other rows nobody
+/// knows, which is said.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -31,6 +34,9 @@ pub(super) struct Replay {
     /// Measured rows: CSV with generator_rad (rad), output_rad (rad) or error_arcsec, and if wanted torque_n_m, temperature_c
     #[arg(value_name = "DATA.csv", value_hint = ValueHint::FilePath)]
     data: PathBuf,
+    /// Take rows of a run of another drive or generator than the table's: of one as built, for instance
+    #[arg(long)]
+    other_drive: bool,
     #[command(flatten)]
     logs: LogOptions,
     /// Temperature where the data has none, degrees C
@@ -43,11 +49,16 @@ impl Replay {
         let image = image_file(&self.tables)?;
         let table =
             Table::check(&image).map_err(|error| Failure::BadInput(format!("{}: {error}", self.tables.display())))?;
+        let bytes = std::fs::read(&self.data)
+            .map_err(|error| Failure::BadInput(format!("{}: {error}", self.data.display())))?;
+        let rows_of = RowsOf::beside(&self.data, &bytes);
+        self.check_rows(rows_of.as_ref(), &table)?;
         // Found out before the rows are read.
         context.out()?;
         let rows = measured(&self.data, &self.logs, &table, self.temperature_c)?;
         let (replayed, mut summary) = replay(&table, &rows);
         summary.command.clone_from(&context.command);
+        summary.of_rows(rows_of, &table);
         let out = context.out()?;
         let mut outputs = Outputs::new();
         outputs.csv(&out.join("replay.csv"), &replayed)?;
@@ -58,6 +69,17 @@ impl Replay {
 }
 
 impl Replay {
+    /// That the rows are of the drive and the generator of the table, as far as anybody says.
+    fn check_rows(&self, rows_of: Option<&RowsOf>, table: &Table<'_>) -> Result<(), Failure> {
+        match rows_of.map(|rows| rows.check(table)) {
+            Some(Err(other)) if !self.other_drive => Err(Failure::BadInput(format!(
+                "{}: {other}; allowed: the table of that drive, or --other-drive if this is meant",
+                self.data.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
     /// Where a diagnosis of the same data begins, if the image lies as `tables` writes it.
     fn next(&self, context: &Context) -> Vec<String> {
         let generator =
@@ -102,8 +124,9 @@ fn of_log(data: &Path, map: &ColumnMap, table: &Table<'_>, temperature_c: f64) -
 }
 
 fn text(summary: &ReplaySummary, out: &std::path::Path) -> String {
+    let remarks: String = summary.remarks.iter().map(|remark| format!("remark: {remark}\n")).collect();
     format!(
-        "table {}, {} rows, {}\n  error as measured, rms              {:>12.3} arcsec\n  left by the table, rms             {:>12.3} \
+        "table {}, {} rows, {}\n{remarks}  error as measured, rms              {:>12.3} arcsec\n  left by the table, rms             {:>12.3} \
          arcsec\n  left by the table, largest         {:>12.3} arcsec\n  zero of the output, taken out      {:>12.3} arcsec\nwrote {} \
          and {}",
         summary.table_id,

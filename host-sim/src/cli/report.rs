@@ -1,13 +1,13 @@
-//! `report.html`, for the commands that write one.
+//! `report.html`, for the commands that write one. The page of another command that stands in the folder is kept under another name.
 
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use flexspline::Table;
 use rayon::prelude::*;
 
-use super::{Context, Failure};
+use super::{Context, Failure, say};
 use crate::diagnosis::Extended;
 use crate::diagnosis::report::Diagnosis;
 use crate::drive::{Drive, GeneratorKind};
@@ -16,7 +16,7 @@ use crate::nominal::Nominal;
 use crate::output::Outputs;
 use crate::report::animation::{Animation, AnimationError, animate};
 use crate::report::diagnosis_report::{self, Sources};
-use crate::report::page::Page;
+use crate::report::page::{Page, Written};
 use crate::report::shown_torque_n_m;
 use crate::stepping::{Method, SolverSettings};
 
@@ -77,14 +77,56 @@ pub(super) fn diagnosis<'p>(
     diagnosis_report::page(Sources { recording, nominal, diagnosis, levels, parts, command, inputs })
 }
 
-/// Writes the page; a failure that it is stamped with is that of the command.
-pub(super) fn write(page: &Page, out: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
-    write_to(page, &out.join("report.html"), outputs)
+/// The page of every command.
+const PAGE: &str = "report.html";
+
+/// Says, before there is much work, what becomes of a page that stands where the command `name` is to write one: that of another command is
+/// kept under another name, that of the same command is replaced. Of another drive than this that is said, too.
+pub(super) fn before(context: &Context, out: &Path, name: &str, drive: Option<&Drive>) {
+    if let Some(words) = fate(&out.join(PAGE), name, drive).filter(|_| !context.quiet()) {
+        say::talk(&format!("remark: {words}"));
+    }
 }
 
-/// Writes the page to a file.
+/// What becomes of a page, where that has to be said.
+fn fate(path: &Path, name: &str, drive: Option<&Drive>) -> Option<String> {
+    let html = std::fs::read_to_string(path).ok()?;
+    let found = path.display();
+    let Some(written) = Written::of(&html) else {
+        return Some(format!("{found} is none of our pages; it is kept as {}", kept(path, None).display()));
+    };
+    if written.command != name {
+        let kept = kept(path, Some(&written));
+        let Written { command, title, .. } = written;
+        return Some(format!("{found} is the page of `{command}` ({title}); it is kept as {}", kept.display()));
+    }
+    let other = drive.is_some_and(|drive| !written.names(&blake3::Hash::from(drive.hash()).to_hex()));
+    other.then(|| {
+        format!("{found} is the page of another drive ({}); it is replaced: --out names another folder", written.title)
+    })
+}
+
+/// Where the page of another command, or a page that is none of ours, is kept.
+fn kept(path: &Path, written: Option<&Written>) -> PathBuf {
+    let of = written.map_or("other", |written| written.command.as_str());
+    let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or("report");
+    path.with_file_name(format!("{stem}-{of}.html"))
+}
+
+/// Writes the page; a failure that it is stamped with is that of the command.
+pub(super) fn write(page: &Page, out: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
+    write_to(page, &out.join(PAGE), outputs)
+}
+
+/// Writes the page to a file. One of another command that stands there is kept.
 pub(super) fn write_to(page: &Page, path: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
     let html = page.html().map_err(|error| Failure::Failed(format!("{}: {error}", path.display())))?;
+    if let Ok(standing) = std::fs::read(path) {
+        let written = Written::of(&String::from_utf8_lossy(&standing));
+        if written.as_ref().is_none_or(|written| written.command != page.command_name) {
+            outputs.file(&kept(path, written.as_ref()), |file| file.write_all(&standing))?;
+        }
+    }
     outputs.file(path, |file| file.write_all(html.as_bytes()))?;
     Ok(())
 }
@@ -100,4 +142,33 @@ pub(super) fn stamped(page: &Page, out: &Path) -> Result<(), Failure> {
         page.remarks.join(" "),
         out.join("report.html").display()
     )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A page as far as it says whose it is.
+    fn of(command: &str, drive: &Drive) -> String {
+        let hash = blake3::Hash::from(drive.hash()).to_hex();
+        let json = serde_json::json!({ "report": command, "title": format!("Page of {}", drive.name), "provenance": { "drive_hash": *hash } });
+        format!("<script type=\"application/json\" id=\"flexspline-report\">{json}</script>")
+    }
+
+    #[test]
+    fn a_page_of_another_command_or_drive_is_not_replaced_without_a_word() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(PAGE);
+        let (drive, other) = (Drive::hhd_95(), Drive::built_in("CUP-95").unwrap());
+        assert_eq!(fate(&path, "study", Some(&drive)), None);
+        std::fs::write(&path, of("study", &drive)).unwrap();
+        assert_eq!(fate(&path, "study", Some(&drive)), None);
+        assert_eq!(fate(&path, "study", None), None);
+        let replaced = fate(&path, "study", Some(&other)).unwrap();
+        assert!(replaced.contains("of another drive (Page of HHD-95); it is replaced"), "{replaced}");
+        let kept = fate(&path, "simulate", Some(&drive)).unwrap();
+        assert!(kept.contains("the page of `study` (Page of HHD-95)") && kept.ends_with("report-study.html"), "{kept}");
+        std::fs::write(&path, "<p>mine").unwrap();
+        assert!(fate(&path, "study", Some(&drive)).unwrap().ends_with("report-other.html"));
+    }
 }

@@ -44,6 +44,7 @@ impl Reproduce {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let drive = context.drive()?;
         let out = context.out()?;
+        report::before(context, out, "reproduce", Some(&drive));
         let mesh = if self.quick { MeshLevel::Coarse } else { self.mesh.unwrap_or(MeshLevel::Standard) };
         let settings = ReproduceSettings { mesh, quick: self.quick };
         let progress = Mutex::new(context.progress("reproduce"));

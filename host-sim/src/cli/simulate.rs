@@ -7,11 +7,13 @@ use std::path::Path as FilePath;
 use clap::{Args, ValueEnum, ValueHint};
 
 use super::{Context, Failure, names, report, say};
+use crate::cautions::add_stress;
 use crate::drive::{Drive, GeneratorKind};
 use crate::export::{Frame, write_pvd, write_vtu};
 use crate::mesh::MeshLevel;
 use crate::output::{OutputError, Outputs, WholeFolder, write_whole};
 use crate::progress::Progress;
+use crate::report::page::Page;
 use crate::report::{Seen, simulation_report};
 use crate::simulate::{
     Direction, Observation, Path, PathPoint, Phase, PlaceStress, SimulateError, Simulation, SimulationSettings,
@@ -132,6 +134,9 @@ impl Simulate {
         let settings = self.settings(&drive)?;
         settings.check(&drive).map_err(|error| Failure::BadInput(error.to_string()))?;
         let out = context.out()?;
+        if !self.no_report {
+            report::before(context, out, "simulate", Some(&drive));
+        }
 
         let mut frames = if self.frames { Some(Frames::new(&out.join("frames"))?) } else { None };
         let mut progress = context.progress(settings.generator.name());
@@ -164,6 +169,7 @@ impl Simulate {
         simulation.summary.command = context.command.clone();
         if self.stress {
             simulation.summary.stress = stress(&drive, &settings, &simulation)?;
+            add_stress(&mut simulation.summary.cautions, &simulation.summary.stress);
         }
         simulation.summary.data_sheet = context.stated()?.map(|stated| {
             let temperature_c = settings.temperature_c.unwrap_or(drive.temperature.reference_c);
@@ -177,6 +183,7 @@ impl Simulate {
         if let Some(seen) = seen {
             let page = simulation_report(&drive, settings.generator, &simulation, seen)
                 .map_err(|error| Failure::Failed(format!("report.html: {error}")))?;
+            let page = Page { title: context.titled(&page.title), ..page };
             report::write(&page, out, &mut outputs)?;
         }
         if let Some(frames) = frames {

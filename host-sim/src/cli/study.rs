@@ -14,17 +14,18 @@ use crate::data_sheet::{FIGURES, FigureOf};
 use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
 use crate::output::Outputs;
+use crate::report::page::Page;
 use crate::report::study_report;
 use crate::stated::short;
 use crate::stepping::{Method, SolverSettings};
 use crate::study::{
     Asked, Basis, Constraint, Effect, LAST_STABLE, Nearest, Run, RunStatus, Sense, Study, StudyError, StudySettings,
-    Target, Trust, Vary, asked, effects, figure, is_idle, nearest, study,
+    Target, Trust, Vary, asked, effects, errors_of_making, figure, is_error_of_making, is_idle, nearest, study,
 };
 
 /// Targets where none are given: an exact drive, a stiff one, one that lasts.
 const USUAL_TARGETS: [(&str, Sense); 3] =
-    [("kinematic_error_pp_arcsec", Sense::Least), ("k2_n_m_per_rad", Sense::Most), ("max_von_mises_mpa", Sense::Least)];
+    [("kinematic_error_pp_arcsec", Sense::Least), ("k2_n_m_per_rad", Sense::Most), ("root_fillet_mpa", Sense::Least)];
 /// Lines of the text for one generator.
 const SHOWN: usize = 5;
 
@@ -34,7 +35,8 @@ const SHOWN: usize = 5;
 /// K1, K2, K3, wind-up, transmission error, stresses, teeth in contact. Written are study.csv (a row for each variant and generator),
 /// study.json and report.html: curves or maps, the front of what nothing beats, what each field does.
 ///
-/// A drive with imperfections is looked at in one place of its turns, and the gap of its rigid teeth is that of the drawing.
+/// A drive with imperfections is looked at in one place of its turns, and the gap of its rigid teeth is that of the drawing. A field of
+/// as_built that varies is an error of making and no choice: variants are compared with those made alike.
 ///
 /// Of many variants (more than 48; with four fields or more, 12 for each and 12) so many are computed that cover all ranges, and what
 /// nothing beats; a surface through them estimates the others. The column `basis` says which a row is, and what estimates are off by is
@@ -48,7 +50,7 @@ Examples:
   flexspline study --vary flexspline.rim_thickness_mm=1.2..2.6:8
   flexspline study -g cam --vary flexspline.rim_thickness_mm=1.2..2 --vary generator.w0_mm=0.46..0.5
   flexspline study --vary generator.w0_mm=0.46..0.5 --variants 50 --keep backlash_arcsec=30..70
-  flexspline study --vary generator.w0_mm=0.46..0.5 --least max_von_mises_mpa --most k2_n_m_per_rad
+  flexspline study --vary generator.w0_mm=0.46..0.5 --least root_fillet_mpa --most k2_n_m_per_rad
 
 Figures:
 {}
@@ -74,7 +76,7 @@ pub(super) struct StudyCommand {
     /// What a variant has to keep to, FIGURE=LEAST..MOST, either end may be left out [default: teeth that clear one another]
     #[arg(long, value_name = "FIGURE=RANGE", allow_hyphen_values = true)]
     keep: Vec<Constraint>,
-    /// A figure of which less is better [default: kinematic_error_pp_arcsec, max_von_mises_mpa]
+    /// A figure of which less is better [default: kinematic_error_pp_arcsec, root_fillet_mpa]
     #[arg(long, value_name = "FIGURE")]
     least: Vec<String>,
     /// A figure of which more is better [default: k2_n_m_per_rad]
@@ -137,6 +139,7 @@ impl StudyCommand {
             )));
         }
         let out = context.out()?;
+        report::before(context, out, "study", Some(&drive));
         let progress = Mutex::new(context.progress("study"));
         let made = study(&drive, &settings, &|done, of, run| {
             if let Ok(mut bar) = progress.lock() {
@@ -192,6 +195,7 @@ impl StudyCommand {
             nearest: &nearest_of,
             remarks: &remarks,
         });
+        let page = Page { title: context.titled(&page.title), ..page };
         let mut outputs = Outputs::new();
         outputs.file(&out.join("study.csv"), |file| file.write_all(csv(&made).as_bytes()))?;
         outputs.json(&out.join("study.json"), &told)?;
@@ -205,7 +209,7 @@ impl StudyCommand {
                 out.display(),
                 told.wall_s
             );
-            text + &say::next(&best_next(context, &settings, &made))
+            text + &say::next(&best_next(context, &drive, &settings, &made))
         })?;
         if told.converged == 0 {
             let why = made.runs.iter().find_map(|run| run.why.as_deref()).unwrap_or_default();
@@ -339,20 +343,32 @@ fn text(told: &Told<'_>, settings: &StudySettings) -> String {
                 .map(|target| format!("{} {}", target.figure, figure_of(run, target.figure)))
                 .collect();
             let basis = if run.basis == Basis::Estimated { " (estimated)" } else { "" };
-            let _ = writeln!(text, "  {:>4}  {}: {}{basis}", run.variant, values.join(" "), figures.join(", "));
+            let caution = if run.cautions.is_empty() { "" } else { " (caution)" };
+            let _ =
+                writeln!(text, "  {:>4}  {}: {}{basis}{caution}", run.variant, values.join(" "), figures.join(", "));
         }
         let more = front.len().saturating_sub(SHOWN);
         if more > 0 {
             let _ = writeln!(text, "  and {more} more in study.csv");
         }
         text += &what_is_asked(told, settings, *kind);
-        let why = study.runs.iter().filter(|run| run.generator == *kind).find_map(|run| run.why.as_deref());
-        if let Some(why) = why {
-            let _ = writeln!(text, "  the first that did not converge: {why}");
-        }
+        text += &firsts(&study.runs, *kind);
         text += &how_far_to_trust(told, settings, *kind);
     }
     text
+}
+
+/// The first variant that did not converge, and the first whose fields make no drive, each with its reason.
+fn firsts(runs: &[Run], kind: GeneratorKind) -> String {
+    let first = |status, what: &str| {
+        let run = runs.iter().find(|run| run.generator == kind && run.status == status)?;
+        Some(format!("  {what}, variant {}: {}\n", run.variant, run.why.as_ref()?))
+    };
+    let ends = [
+        first(RunStatus::Failed, "the first that did not converge"),
+        first(RunStatus::Refused, "the first that makes no drive"),
+    ];
+    ends.into_iter().flatten().collect()
 }
 
 /// What estimates of the targets are off by, and which rank nothing.
@@ -430,14 +446,23 @@ fn what_is_asked(told: &Told<'_>, settings: &StudySettings, kind: GeneratorKind)
 fn remarks(drive: &Drive, settings: &StudySettings, study: &Study) -> Vec<String> {
     let beyond = settings.generators.iter().filter_map(|kind| {
         let sheet_n_m = settings.sheet_beyond_table_n_m(drive, *kind)?;
+        let computed = || study.runs.iter().filter(|run| run.generator == *kind && run.basis == Basis::Computed);
+        let bear = computed().filter(|run| run.bears_all()).count();
+        let found = match computed().count() - bear {
+            0 => format!("every variant computed bears it; tables --torque-n-m {sheet_n_m} spans it"),
+            fewer => {
+                format!("{fewer} of {} variants computed do not come to it; --torque-n-m says otherwise", bear + fewer)
+            }
+        };
         Some(format!(
-            "{kind} is loaded to {} N.m by the data sheet, and a table of it spans {} N.m by default: it may find no equilibrium \
-             there; --torque-n-m says otherwise",
+            "{kind} is loaded to {} N.m by the data sheet, and a table of it spans {} N.m by default: {found}",
             short(sheet_n_m),
             short(drive.rated_torque_n_m(*kind))
         ))
     });
     let mut remarks: Vec<String> = beyond.collect();
+    remarks.extend(as_made(drive, settings));
+    remarks.extend(settings.generators.iter().filter_map(|kind| cautioned(&study.runs, *kind)));
     for (k, field) in settings.vary.iter().enumerate() {
         if field.is_constant(settings.spread.is_some()) {
             remarks.push(format!("{} has one value, so nothing is said of what it does; --set would do", field.path));
@@ -452,12 +477,198 @@ fn remarks(drive: &Drive, settings: &StudySettings, study: &Study) -> Vec<String
     remarks
 }
 
-/// Tables of the best variant of all generators, in the first target.
-fn best_next(context: &Context, settings: &StudySettings, study: &Study) -> Vec<String> {
+/// How many of the variants that meet what has to be kept are not to be built for all that, and why.
+fn cautioned(runs: &[Run], kind: GeneratorKind) -> Option<String> {
+    let meet = || runs.iter().filter(|run| run.generator == kind && run.meets);
+    let with = meet().filter(|run| !run.cautions.is_empty()).count();
+    let mut counts: Vec<(&'static str, f64, usize)> = Vec::new();
+    for caution in meet().flat_map(|run| &run.cautions) {
+        match counts.iter_mut().find(|(figure, ..)| *figure == caution.figure) {
+            Some((_, _, count)) => *count += 1,
+            None => counts.push((caution.figure, caution.limit, 1)),
+        }
+    }
+    let each = counts.iter().map(|(figure, limit, count)| format!("{figure} beyond {} ({count})", short(*limit)));
+    (with > 0).then(|| {
+        format!(
+            "{kind}: of {} that meet what has to be kept, {with} with a caution: {}",
+            meet().count(),
+            each.collect::<Vec<_>>().join(", ")
+        )
+    })
+}
+
+/// What has to be known of errors of making: that they are no choice, and that one place of a turn does not say what they do.
+fn as_made(drive: &Drive, settings: &StudySettings) -> Vec<String> {
+    let errors: Vec<&Vary> = settings.vary.iter().filter(|field| is_error_of_making(&field.path)).collect();
+    let mut remarks: Vec<String> = errors
+        .iter()
+        .map(|field| {
+            format!(
+                "{} is an error of making and no choice: variants are compared with those made alike, and the next command leaves it out",
+                field.path
+            )
+        })
+        .collect();
+    let uneven = |drive: &Drive| drive.as_built.first_not_uniform().is_some();
+    let made = |field: &&Vary| {
+        let sets = field.grid().into_iter().map(|value| format!("{}={value}", field.path));
+        sets.into_iter().any(|set| drive.with_set(&set).is_ok_and(|made| uneven(&made)))
+    };
+    if uneven(drive) || errors.iter().any(made) {
+        remarks.push(
+            "a drive with errors of teeth, axes or generator is looked at in one place of its turns, which does not say what they do: \
+             tables looks at whole turns, and campaign at what tolerances do"
+                .to_owned(),
+        );
+    }
+    remarks
+}
+
+/// Tables of the best variant of all generators, in the first target, under the loads that were studied. Errors of making are no part of it:
+/// of variants that differ in them those count that are made as the drive is.
+fn best_next(context: &Context, drive: &Drive, settings: &StudySettings, study: &Study) -> Vec<String> {
+    let Some((run, words)) = best(drive, settings, study) else { return Vec::new() };
+    let torque = match (settings.torque_n_m, settings.sheet_beyond_table_n_m(drive, run.generator)) {
+        (Some(largest_n_m), _) | (None, Some(largest_n_m)) => format!(" --torque-n-m {largest_n_m}"),
+        (None, None) => String::new(),
+    };
+    vec![context.next(&format!("tables --generator {}{torque}{words}", run.generator))]
+}
+
+/// The best variant to make tables of, and the fields that it sets.
+fn best<'a>(drive: &Drive, settings: &StudySettings, study: &'a Study) -> Option<(&'a Run, String)> {
+    let errors = errors_of_making(&study.fields);
+    let set = |run: &Run, k: usize| format!("{}={}", study.fields[k], run.values[k]);
+    let as_given = |run: &&Run| {
+        let sets: Vec<String> = errors.iter().map(|k| set(run, *k)).collect();
+        drive.with_sets(sets.iter().map(String::as_str)).is_ok_and(|made| made.as_built == drive.as_built)
+    };
     let cost = |run: &Run| settings.targets.first().map_or(0.0, |first| first.cost(&run.sheet));
-    let best = study.runs.iter().filter(|run| run.front).min_by(|a, b| cost(a).total_cmp(&cost(b)));
-    let Some(run) = best else { return Vec::new() };
-    let sets: String =
-        study.fields.iter().zip(&run.values).map(|(path, value)| format!(" --set {path}={value}")).collect();
-    vec![context.next(&format!("tables --generator {}{sets}", run.generator))]
+    let front = || study.runs.iter().filter(|run| run.front);
+    let cheapest = |a: &&Run, b: &&Run| cost(a).total_cmp(&cost(b));
+    let choices: Vec<usize> = (0..study.fields.len()).filter(|k| !errors.contains(k)).collect();
+    // Where nothing but errors varies every variant is the same design.
+    let any = || choices.is_empty().then(|| front().min_by(cheapest)).flatten();
+    let run = front().filter(as_given).min_by(cheapest).or_else(any)?;
+    Some((run, choices.iter().map(|k| format!(" --set {}", set(run, *k))).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data_sheet::DataSheet;
+    use crate::stated::Stated;
+
+    /// A variant under the cam that meets all that is asked, with this stress in its root fillets.
+    pub(super) fn variant(number: usize, values: &[&str], root_fillet_mpa: f64) -> Run {
+        let sheet = DataSheet {
+            kinematic_error_pp_arcsec: Some(1.0),
+            root_fillet_mpa: Some(root_fillet_mpa),
+            ..DataSheet::default()
+        };
+        Run {
+            variant: number,
+            generator: GeneratorKind::Cam,
+            values: values.iter().map(|value| (*value).to_owned()).collect(),
+            status: RunStatus::Converged,
+            basis: Basis::Computed,
+            why: None,
+            cautions: sheet.looked().cautions(),
+            loads: None,
+            sheet,
+            meets: true,
+            front: true,
+        }
+    }
+
+    #[test]
+    fn variants_that_meet_and_are_not_to_be_built_are_counted_by_what_is_wrong() {
+        let mut runs = vec![variant(1, &[], 1313.0), variant(2, &[], 900.0), variant(3, &[], 1204.0)];
+        assert_eq!(
+            cautioned(&runs, GeneratorKind::Cam).as_deref(),
+            Some("cam: of 3 that meet what has to be kept, 2 with a caution: root_fillet_mpa beyond 1000 (2)")
+        );
+        assert_eq!(cautioned(&runs, GeneratorKind::TwoRoller), None);
+        runs.retain(|run| run.variant == 2);
+        assert_eq!(cautioned(&runs, GeneratorKind::Cam), None);
+    }
+
+    #[test]
+    fn what_makes_no_drive_is_not_told_as_what_did_not_converge() {
+        let mut runs = vec![variant(1, &[], 900.0), variant(2, &[], 900.0)];
+        assert_eq!(firsts(&runs, GeneratorKind::Cam), "");
+        (runs[0].status, runs[0].why) = (RunStatus::Refused, Some("a shorter tooth".to_owned()));
+        assert_eq!(firsts(&runs, GeneratorKind::Cam), "  the first that makes no drive, variant 1: a shorter tooth\n");
+        (runs[1].status, runs[1].why) = (RunStatus::Failed, Some("no equilibrium".to_owned()));
+        assert!(
+            firsts(&runs, GeneratorKind::Cam).starts_with("  the first that did not converge, variant 2: no equil")
+        );
+    }
+
+    #[test]
+    fn by_default_the_stress_in_root_fillets_is_to_be_small() {
+        assert!(USUAL_TARGETS.contains(&("root_fillet_mpa", Sense::Least)));
+        assert!(USUAL_TARGETS.iter().all(|(name, _)| figure(name).is_ok()));
+    }
+
+    fn studied(vary: &[&str], runs: Vec<Run>) -> (StudySettings, Study) {
+        let vary: Vec<Vary> = vary.iter().map(|text| text.parse().unwrap()).collect();
+        let fields = vary.iter().map(|field| field.path.clone()).collect();
+        let settings = StudySettings {
+            vary,
+            spread: None,
+            seed: 1,
+            generators: vec![GeneratorKind::Cam],
+            torque_n_m: None,
+            stated: None,
+            positions: 4,
+            constraints: Vec::new(),
+            targets: vec![Target::new("root_fillet_mpa", Sense::Least).unwrap()],
+            compute_all: false,
+            solver: SolverSettings::default(),
+        };
+        (settings, Study { fields, runs, trust: Vec::new() })
+    }
+
+    /// The variant made worse looks better, and is not what is recommended: the drive as drawn is.
+    #[test]
+    fn a_drive_made_worse_is_not_recommended_and_one_place_of_a_turn_is_said() {
+        let drive = Drive::hhd_95();
+        let eccentricity = "as_built.circular_spline_eccentricity_um=0,10";
+        let (settings, study) = studied(&[eccentricity], vec![variant(1, &["0"], 380.0), variant(2, &["10"], 324.0)]);
+        let (run, sets) = best(&drive, &settings, &study).unwrap();
+        assert_eq!((run.variant, sets.as_str()), (1, ""));
+        let remarks = as_made(&drive, &settings);
+        assert!(remarks[0].contains("no choice") && remarks[1].contains("one place of its turns"), "{remarks:?}");
+
+        let rims = ["flexspline.rim_thickness_mm=1.0,1.2", eccentricity];
+        let runs =
+            vec![variant(1, &["1.0", "0"], 380.0), variant(2, &["1.0", "10"], 300.0), variant(3, &["1.2", "0"], 350.0)];
+        let (settings, study) = studied(&rims, runs);
+        let (run, sets) = best(&drive, &settings, &study).unwrap();
+        assert_eq!((run.variant, sets.as_str()), (3, " --set flexspline.rim_thickness_mm=1.2"));
+
+        // Worn evenly, all places are alike.
+        let (settings, _) = studied(&["as_built.flexspline_wear_um=0,10"], Vec::new());
+        assert_eq!(as_made(&drive, &settings).len(), 1);
+        let (settings, _) = studied(&["flexspline.rim_thickness_mm=1.0,1.2"], Vec::new());
+        assert_eq!(as_made(&drive, &settings), [""; 0]);
+        assert_eq!(as_made(&Drive::built_in("HHD-95-typical").unwrap(), &settings).len(), 1);
+    }
+
+    /// What a sheet loads beyond the span of a table is told with what was found there.
+    #[test]
+    fn loads_beyond_the_span_of_a_table_are_told_with_what_was_found() {
+        let drive = Drive::hhd_95();
+        let runs = vec![variant(1, &["1.0"], 300.0), variant(2, &["1.2"], 300.0)];
+        let (mut settings, mut study) = studied(&["flexspline.rim_thickness_mm=1.0,1.2"], runs);
+        settings.stated = Some(Stated { rated_torque_n_m: Some(250.0), ..Stated::default() });
+        let told = |study: &Study| remarks(&drive, &settings, study)[0].clone();
+        let all = told(&study);
+        assert!(all.contains("250 N.m") && all.contains("every variant computed bears it"), "{all}");
+        study.runs[1].status = RunStatus::Failed;
+        let fewer = told(&study);
+        assert!(fewer.contains("1 of 2 variants computed do not come to it"), "{fewer}");
+    }
 }

@@ -1,5 +1,6 @@
 //! `flexspline tables`: FEM sweeps, or samples from elsewhere, to compensation tables.
 
+use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -14,13 +15,14 @@ use super::context::{Context, quoted};
 use super::names::{self, Generators};
 use super::simulate::{refused_or_failed, stress};
 use super::{Failure, report, say};
+use crate::cautions::add_stress;
 use crate::drive::{Drive, GeneratorKind};
 use crate::mesh::MeshLevel;
 use crate::output::Outputs;
 use crate::report::page::Page;
 use crate::report::{Sources, Subject, drive_report};
 use crate::simulate::{Path, PlaceStress, SimulationSettings, simulate};
-use crate::stated::beside;
+use crate::stated::{TWO_SETS_OF_K, beside};
 use crate::stepping::{Method, SolverSettings};
 use crate::tables::sweep::SweepProgress;
 use crate::tables::{
@@ -113,6 +115,9 @@ impl Tables {
         let clock = Instant::now();
         let drive = context.drive()?;
         let generators = self.generator.0.as_slice();
+        if !self.no_report {
+            report::before(context, context.out_path(), "tables", Some(&drive));
+        }
         let tried = match &self.from_samples {
             Some(file) => vec![self.project(&drive, generators, file)],
             None => self.sweep(context, &drive, generators)?,
@@ -128,17 +133,24 @@ impl Tables {
         if made.is_empty() {
             return Err(failed.swap_remove(0).1);
         }
-        if let (Some(stated), None) = (context.stated()?, &self.from_samples) {
+        let stated = context.stated()?;
+        if let (Some(stated), None) = (&stated, &self.from_samples) {
             let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
             let reference_c = drive.temperature.reference_c;
             made.par_iter_mut().for_each(|table| {
-                table.info.data_sheet = Some(beside(&drive, table.kind, reference_c, &stated, settings));
+                table.info.data_sheet = Some(beside(&drive, table.kind, reference_c, stated, settings));
             });
+        }
+        if let Some(stated) = &stated {
+            made.iter_mut().for_each(|table| table.info.remarks.extend(table.info.short_of_sheet(stated)));
         }
         if self.stress {
             // Stress that is not found takes no table away.
             made.par_iter_mut().for_each(|table| match self.stress_of(&drive, table) {
-                Ok(stress) => table.info.stress = stress,
+                Ok(stress) => {
+                    add_stress(&mut table.info.cautions, &stress);
+                    table.info.stress = stress;
+                }
                 Err(Failure::BadInput(why) | Failure::Failed(why)) => table.info.no_stress = Some(why),
             });
         }
@@ -214,13 +226,14 @@ impl Tables {
             validation: None,
             animation,
         });
-        Ok(drive_report(Sources {
+        let page = drive_report(Sources {
             drive,
             command_name: "tables",
             command: &context.command,
             inputs: inputs.collect(),
             subjects: subjects.collect(),
-        }))
+        });
+        Ok(Page { title: context.titled(&page.title), ..page })
     }
 
     fn project(&self, drive: &Drive, generators: &[GeneratorKind], file: &PathBuf) -> Result<MadeTable, Failure> {
@@ -370,6 +383,14 @@ fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
     }
     for sheet in report.tables.iter().filter_map(|info| info.data_sheet.as_ref()) {
         text += &sheet.text();
+    }
+    if report.tables.iter().any(|info| info.stiffness.is_some() && info.data_sheet.is_some()) {
+        let _ = writeln!(text, "  {TWO_SETS_OF_K}");
+    }
+    for info in &report.tables {
+        for remark in &info.remarks {
+            let _ = writeln!(text, "{}: remark: {remark}", info.generator);
+        }
     }
     for info in &report.tables {
         for stress in &info.stress {

@@ -89,6 +89,9 @@ impl Validate {
             check_drive(&drive, &table).map_err(|error| refuse(error.to_string()))?;
         }
         let out = context.out()?;
+        if !self.no_report && page_path(out, &self.tables).ends_with("report.html") {
+            report::before(context, out, "validate", Some(&drive));
+        }
         let settings = ValidationSettings {
             torques: usize::from(self.torques),
             temperatures: usize::from(self.temperatures),
@@ -189,13 +192,14 @@ impl Validate {
         let subjects = tables.into_iter().zip(&report.tables).zip(animations).map(|(((kind, table), v), animation)| {
             Subject { kind, table, info: None, samples: None, validation: Some(v), animation }
         });
-        Ok(drive_report(Sources {
+        let page = drive_report(Sources {
             drive,
             command_name: "validate",
             command: &context.command,
             inputs,
             subjects: subjects.collect(),
-        }))
+        });
+        Ok(Page { title: context.titled(&page.title), ..page })
     }
 
     /// The images in the folder.

@@ -16,6 +16,7 @@ use super::page::{
     Series, Status, Table as PageTable, Text, significant,
 };
 use crate::drive::{Drive, GeneratorKind};
+use crate::stated::TWO_SETS_OF_K;
 use crate::tables::validate::{MAX_BOUND_ARCSEC, Point, Validation};
 use crate::tables::{Source, TableInfo};
 use crate::units::ARCSEC_PER_RAD;
@@ -350,7 +351,11 @@ pub fn drive_report(sources: Sources<'_>) -> Page {
         sections.push(validation_section(&known));
     }
     let sheet = |k: &Known<'_>| k.subject.info.and_then(|info| Some((k.id(), info.data_sheet.clone()?)));
-    sections.extend(sheet_section(known.iter().filter_map(sheet).collect()));
+    let mut sheets = sheet_section(known.iter().filter_map(sheet).collect());
+    if let Some(section) = &mut sheets {
+        section.blocks.push(Block::paragraph(format!("The JSON of a table has stiffness, too: {TWO_SETS_OF_K}.")));
+    }
+    sections.extend(sheets);
     sections.extend(stress_section(&known));
     sections.push(table_section(&known));
     sections.push(load_section(&known));
@@ -419,6 +424,9 @@ fn judge(known: &[Known<'_>]) -> (Status, Vec<String>) {
         if k.subject.info.is_some_and(|info| info.torque_nodes_resolved == Some(false)) {
             let words = "the torque nodes ran out before the table met the FEM everywhere; see --most-nodes";
             remark(Status::Remark, format!("{name}: {words}."));
+        }
+        for words in k.subject.info.iter().flat_map(|info| &info.remarks) {
+            remark(Status::Remark, format!("{name}: {}.", words.replace("N.m", "N·m")));
         }
         for caution in k.subject.info.iter().flat_map(|info| &info.cautions) {
             remark(Status::Caution, format!("{name}: {}.", caution_words(caution)));

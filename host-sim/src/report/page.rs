@@ -505,6 +505,38 @@ pub struct Page {
 /// Version of the JSON block.
 pub const PAGE_SCHEMA: u32 = 1;
 
+/// What marks the JSON block of a page.
+const BLOCK: &str = "id=\"flexspline-report\">";
+
+/// What a page that was written says of itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Written {
+    /// Which command wrote it.
+    pub command: String,
+    /// What it is about.
+    pub title: String,
+    /// The values of what made it.
+    provenance: Vec<String>,
+}
+
+impl Written {
+    /// Of the text of a page; nothing of what is none of ours.
+    pub fn of(html: &str) -> Option<Written> {
+        let (_, block) = html.split_once(BLOCK)?;
+        let json: Value = serde_json::from_str(block.split_once("</script")?.0).ok()?;
+        let word = |name: &str| json[name].as_str().map(str::to_owned);
+        let command = word("report").filter(|name| name.bytes().all(|letter| letter.is_ascii_lowercase()))?;
+        let provenance = json["provenance"].as_object()?.values();
+        let provenance = provenance.filter_map(|value| value.as_str().map(str::to_owned)).collect();
+        Some(Written { command, title: word("title")?, provenance })
+    }
+
+    /// Whether a value is among what made it, such as the hash of a drive.
+    pub fn names(&self, value: &str) -> bool {
+        self.provenance.iter().any(|made| made == value)
+    }
+}
+
 #[derive(Template)]
 #[template(path = "report.html")]
 struct PageTemplate<'a> {
@@ -720,6 +752,15 @@ mod tests {
         assert_eq!(json["title"], HOSTILE);
         assert_eq!(json["figures"]["figure"]["charts"]["one"]["series"][0]["name"], HOSTILE);
         assert_eq!(json["results"][HOSTILE], HOSTILE);
+    }
+
+    #[test]
+    fn a_page_says_of_itself_which_command_wrote_it_and_of_what() {
+        let written = Written::of(&page(Status::Good).html().unwrap()).unwrap();
+        assert_eq!((written.command.as_str(), written.title.as_str()), ("tables", HOSTILE));
+        assert!(written.names(HOSTILE) && !written.names("tables"));
+        assert_eq!(Written::of("<!doctype html><p>another page"), None);
+        assert_eq!(Written::of("id=\"flexspline-report\">{\"report\":\"../x\"}</script>"), None);
     }
 
     #[test]

@@ -525,8 +525,9 @@ fn map(of: &Sources<'_>, name: &'static str) -> Option<Figure> {
 fn reading() -> Section {
     Section::reading(vec![Block::paragraph(
         "Each variant is loaded from first contact with its generator held, and then turned by a tooth pitch under the largest load. K1 is the \
-         secant of its torsion up to T1, K2 from T1 to T2, K3 above; the clearance of the teeth is no part of them. Stress is the largest nodal \
-         value and grows with the mesh at roots and contacts: compare it between variants, not with a yield strength.",
+         secant of its torsion up to T1, K2 from T1 to T2, K3 above; the clearance of the teeth is no part of them. Stress in root fillets \
+         (root fillet) is found by the strain of their surface. The largest nodal value (max von mises) grows with the mesh, and is too low in \
+         fillets. A caution judges the larger of both; simulate --stress tells the stress of one variant over three meshes.",
     )])
 }
 

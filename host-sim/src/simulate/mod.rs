@@ -677,6 +677,7 @@ impl<'a> Run<'a> {
             rigid_gap_um: rigid_gap_um(self.drive, settings.generator),
             room_as_built_arcsec: room_as_built_arcsec(self.drive, settings.generator),
             max_von_mises_mpa: Some(peak.von_mises_mpa),
+            root_fillet_mpa: Some(self.by_place_mpa[0]),
             peak_flank_pressure_mpa: Some(peak_flank_pressure_mpa),
             slope_bound: None,
         };

@@ -136,7 +136,7 @@ mod tests {
         (0..).zip(&mut runs).for_each(|(k, run)| run.variant = k + 1);
         // The fourth would meet all of it, but its teeth interfere.
         runs[3].sheet.rigid_gap_um = Some(-5.0);
-        judge(&mut runs, &keep, &[]);
+        judge(&mut runs, &keep, &[], &[]);
         let told = asked(&runs, &keep, CAM);
         let counts: Vec<(&str, usize)> = told.iter().map(|asked| (asked.what.as_str(), asked.meet_alone)).collect();
         assert_eq!(
@@ -169,7 +169,7 @@ mod tests {
             let keep = constraints(&[&format!("max_von_mises_mpa={range}")]);
             let mut runs = vec![made_up(1, 1.0, 1.0, 0.0)];
             runs[0].sheet.max_von_mises_mpa = value;
-            judge(&mut runs, &keep, &[]);
+            judge(&mut runs, &keep, &[], &[]);
             let miss = nearest(&runs, &keep, CAM).unwrap().misses.remove(0);
             assert_eq!(format!("{} {}", miss.side(), miss.limit), due, "{value:?} {range}");
         }
@@ -182,7 +182,7 @@ mod tests {
         (0..).zip(&mut runs).for_each(|(k, run)| run.variant = k + 1);
         for other in ["wind_up_arcsec=..10", "max_von_mises_mpa=1.."] {
             let keep = constraints(&[other, "kinematic_error_pp_arcsec=..1"]);
-            judge(&mut runs, &keep, &[]);
+            judge(&mut runs, &keep, &[], &[]);
             assert_eq!(nearest(&runs, &keep, CAM).unwrap().variant, 2, "{other}");
         }
     }
@@ -191,10 +191,10 @@ mod tests {
     fn where_one_meets_or_none_is_sound_none_is_nearest() {
         let keep = constraints(&["max_von_mises_mpa=..250"]);
         let mut runs = vec![made_up(1, 1.0, 1.0, 200.0)];
-        judge(&mut runs, &keep, &[]);
+        judge(&mut runs, &keep, &[], &[]);
         assert_eq!(nearest(&runs, &keep, CAM), None);
         runs[0].status = RunStatus::Failed;
-        judge(&mut runs, &keep, &[]);
+        judge(&mut runs, &keep, &[], &[]);
         assert!(!runs[0].meets);
         assert_eq!(nearest(&runs, &keep, CAM), None);
     }

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 use super::surface::Surface;
 use super::trust::Trust;
-use super::{Basis, Job, Run, RunStatus, StudyError, StudySettings, Target, judge};
+use super::{Basis, Job, Run, RunStatus, StudyError, StudySettings, Target, is_error_of_making, judge};
 use crate::data_sheet::{DataSheet, FIGURES};
 use crate::drive::GeneratorKind;
 
@@ -48,6 +48,7 @@ pub(super) fn some_computed(
 ) -> Result<(Vec<Run>, Vec<Trust>), StudyError> {
     let StudySettings { generators, targets, .. } = settings;
     let places = places(variants);
+    let errors: Vec<usize> = (0..settings.vary.len()).filter(|k| is_error_of_making(&settings.vary[*k].path)).collect();
     let first = computed_first(settings.vary.len());
     let expected = jobs.len() + generators.len() * (first + MOST_OF_FRONT);
     // Computes these, in their places.
@@ -71,7 +72,7 @@ pub(super) fn some_computed(
     let mut spent: BTreeMap<GeneratorKind, usize> = BTreeMap::new();
     let mut trust = estimate(generators, &mut runs, jobs, &places);
     for _ in 0..ROUNDS {
-        judge::judge(&mut runs, &settings.constraints, targets);
+        judge::judge(&mut runs, &settings.constraints, targets, &errors);
         let on_front = |kind: &GeneratorKind| {
             let front: Vec<usize> = (0..runs.len())
                 .filter(|k| runs[*k].generator == *kind && runs[*k].front && is_estimated(&runs[*k]))
@@ -316,7 +317,7 @@ mod tests {
         fn studied(&self) -> (Vec<Run>, Vec<Trust>) {
             let make = |jobs: &[Job], _, basis| Ok(self.make(jobs, basis));
             let (mut runs, trust) = some_computed(&self.settings, &self.variants, &self.jobs, &make).unwrap();
-            judge::judge(&mut runs, &[], &self.settings.targets);
+            judge::judge(&mut runs, &[], &self.settings.targets, &[]);
             (runs, trust)
         }
     }

@@ -135,8 +135,11 @@ pub(super) fn clears(sheet: &DataSheet) -> bool {
 
 /// Marks what meets the constraints, and of each generator what nothing that meets them beats (Pareto's front).
 ///
+/// Variants are compared with those made alike: `errors` are the places of the fields that are errors of making among the values. A variant is no better
+/// for what was made worse of it.
+///
 /// What converged bears the largest load of the study. That is where the search ends, known of every such run, and nothing to estimate.
-pub(super) fn judge(runs: &mut [Run], constraints: &[Constraint], targets: &[Target]) {
+pub(super) fn judge(runs: &mut [Run], constraints: &[Constraint], targets: &[Target], errors: &[usize]) {
     for run in runs.iter_mut() {
         if let (true, Some(loads)) = (run.bears_all(), run.loads) {
             run.sheet.last_stable_n_m = Some(loads.largest_n_m);
@@ -154,6 +157,7 @@ pub(super) fn judge(runs: &mut [Run], constraints: &[Constraint], targets: &[Tar
         let Some(mine) = &costs[k] else { continue };
         let beaten = (0..runs.len()).any(|other| {
             runs[other].generator == runs[k].generator
+                && runs[other].made_as(&runs[k], errors)
                 && costs[other].as_ref().is_some_and(|theirs| beats(theirs, mine))
         });
         runs[k].front = !beaten;

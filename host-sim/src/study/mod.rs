@@ -9,6 +9,7 @@ mod surface;
 mod trust;
 mod vary;
 
+use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -27,7 +28,7 @@ pub use effects::{Effect, effects, is_idle};
 pub use estimate::computed_first;
 pub use judge::{Constraint, JudgeError, Sense, Target, figure};
 pub use trust::Trust;
-pub use vary::{Values, Vary, VaryError};
+pub use vary::{Values, Vary, VaryError, is_error_of_making};
 
 /// Fields that vary at once, at most.
 pub const MOST_FIELDS: usize = 32;
@@ -211,6 +212,11 @@ pub struct Run {
 }
 
 impl Run {
+    /// Whether another variant has the same errors of making, at these places among the values.
+    pub(crate) fn made_as(&self, other: &Run, errors: &[usize]) -> bool {
+        errors.iter().all(|k| self.values[*k] == other.values[*k])
+    }
+
     /// Whether it bears the largest load of the study: its last stable load is a bound, and no figure of its own. A run that failed may
     /// have borne it, too, before the turn over a tooth pitch; an estimate of one that failed does not say.
     pub fn bears_all(&self) -> bool {
@@ -235,14 +241,26 @@ pub struct Study {
 }
 
 impl Study {
-    /// What nothing beats of a generator, best in the first target first.
+    /// What nothing beats of a generator, best in the first target first. Where errors of making vary, those made as the first variant come
+    /// first, then those made as the next: between them there is no better.
     pub fn front(&self, generator: GeneratorKind, targets: &[Target]) -> Vec<&Run> {
         let mut front: Vec<&Run> = self.runs.iter().filter(|run| run.generator == generator && run.front).collect();
-        if let Some(first) = targets.first() {
-            front.sort_by(|a, b| first.cost(&a.sheet).total_cmp(&first.cost(&b.sheet)));
+        let errors = errors_of_making(&self.fields);
+        let made = |run: &Run| errors.iter().map(|k| run.values[*k].clone()).collect::<Vec<String>>();
+        let mut first_made = HashMap::new();
+        for (k, run) in self.runs.iter().enumerate() {
+            first_made.entry(made(run)).or_insert(k);
         }
+        let cost = |run: &Run| targets.first().map_or(0.0, |first| first.cost(&run.sheet));
+        front.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+        front.sort_by_cached_key(|run| first_made.get(&made(run)));
         front
     }
+}
+
+/// The places of the fields that are errors of making.
+pub fn errors_of_making(fields: &[impl AsRef<str>]) -> Vec<usize> {
+    (0..fields.len()).filter(|k| is_error_of_making(fields[*k].as_ref())).collect()
 }
 
 /// Told after every run: how many are done, of how many, and the last. May ask to stop.
@@ -271,7 +289,7 @@ pub fn study(drive: &Drive, settings: &StudySettings, observer: &Observer<'_>) -
     // A bound is no estimate.
     let trust = trust.into_iter().filter(|trust| trust.figure != LAST_STABLE).collect();
     let mut study = Study { fields: paths.iter().map(|path| (*path).to_owned()).collect(), runs, trust };
-    judge::judge(&mut study.runs, &settings.constraints, &settings.targets);
+    judge::judge(&mut study.runs, &settings.constraints, &settings.targets, &errors_of_making(&paths));
     Ok(study)
 }
 

@@ -92,10 +92,30 @@ fn constraints_leave_out_and_the_front_is_what_nothing_beats() {
         .map(|(e, s)| made_up(1, 1.0, e, s))
         .to_vec();
     runs[1].sheet.rigid_gap_um = Some(-1.0);
-    judge::judge(&mut runs, &["max_von_mises_mpa=..400".parse().unwrap()], &targets);
+    judge::judge(&mut runs, &["max_von_mises_mpa=..400".parse().unwrap()], &targets, &[]);
     let told: Vec<(bool, bool)> = runs.iter().map(|run| (run.meets, run.front)).collect();
     // The second interferes, the third is beaten by the fifth, the fourth breaks the constraint.
     assert_eq!(told, [(true, true), (false, false), (true, false), (false, false), (true, true)]);
+}
+
+/// The one made worse has the smaller error where it was looked at. It is no better for that, and the one as drawn comes first.
+#[test]
+fn variants_are_compared_with_those_made_alike() {
+    let targets = [Target::new("kinematic_error_pp_arcsec", Sense::Least).unwrap()];
+    let mut runs: Vec<Run> = Vec::new();
+    for (rim, off, error) in [("1.0", "0", 0.380), ("1.0", "10", 0.324), ("1.2", "0", 0.5), ("1.2", "10", 0.3)] {
+        let mut run = made_up(runs.len() + 1, 1.0, error, 100.0);
+        run.values = vec![rim.to_owned(), off.to_owned()];
+        runs.push(run);
+    }
+    let fields =
+        ["flexspline.rim_thickness_mm", "as_built.circular_spline_eccentricity_um"].map(str::to_owned).to_vec();
+    let errors = errors_of_making(&fields);
+    assert_eq!(errors, [1]);
+    judge::judge(&mut runs, &[], &targets, &errors);
+    let study = Study { fields, runs, trust: Vec::new() };
+    let front: Vec<usize> = study.front(GeneratorKind::Cam, &targets).iter().map(|run| run.variant).collect();
+    assert_eq!(front, [1, 4]);
 }
 
 #[test]

@@ -86,6 +86,11 @@ impl FromStr for Vary {
     }
 }
 
+/// Whether a field of the drive is an error of its making, and no choice of who designs it.
+pub fn is_error_of_making(path: &str) -> bool {
+    path.starts_with("as_built.")
+}
+
 impl Vary {
     /// Its values on a grid, as a drive file would have them.
     pub fn grid(&self) -> Vec<String> {

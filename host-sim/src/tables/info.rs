@@ -7,7 +7,7 @@ use crate::cautions::Caution;
 use crate::data_sheet::Stiffness;
 use crate::drive::GeneratorKind;
 use crate::simulate::PlaceStress;
-use crate::stated::SheetBeside;
+use crate::stated::{SheetBeside, Stated, short};
 
 /// A finished table.
 #[derive(Debug, Clone)]
@@ -71,6 +71,9 @@ pub struct TableInfo {
     pub stiffness: Option<Stiffness>,
     /// What has to be known before the table is used; empty for a sound drive.
     pub cautions: Vec<Caution>,
+    /// What else has to be known of it, in words; left out where there is nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
     /// What the data sheet in the drive's file says, beside what is computed; left out where the file has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub data_sheet: Option<SheetBeside>,
@@ -84,6 +87,35 @@ pub struct TableInfo {
     pub turns: Option<TurnsInfo>,
     /// Command line, once known.
     pub command: String,
+}
+
+impl TableInfo {
+    /// Where the table ends short of the rated torque of a data sheet, that it does, and whether the drive bears that torque as far as the sheet
+    /// was computed.
+    pub fn short_of_sheet(&self, stated: &Stated) -> Option<String> {
+        let ends_n_m = self.torque_nodes_n_m.last().copied().map(f64::from)?;
+        let last_n_m = self.data_sheet.as_ref().and_then(|beside| beside.sheet.last_stable_n_m);
+        short_of_sheet(ends_n_m, stated.rated_torque_n_m?, last_n_m)
+    }
+}
+
+/// That a table ends short of a rated torque, and what is known of that torque: the last load that was borne, where it was looked for.
+fn short_of_sheet(ends_n_m: f64, rated_n_m: f64, last_n_m: Option<f64>) -> Option<String> {
+    // Nodes are of single precision.
+    if rated_n_m <= ends_n_m * (1.0 + 1e-6) {
+        return None;
+    }
+    let found = match last_n_m {
+        Some(last_n_m) if last_n_m < rated_n_m => {
+            format!("the last load with an equilibrium under this generator was {} N.m", short(last_n_m))
+        }
+        _ => format!("--torque-n-m {rated_n_m} spans it"),
+    };
+    Some(format!(
+        "the table ends at {} N.m, and the data sheet rates the drive {} N.m: beyond its end a table extrapolates; {found}",
+        short(ends_n_m),
+        short(rated_n_m)
+    ))
 }
 
 /// A drive that does not repeat from tooth to tooth, and what its table has no room for: one curve for each of the angles, the
@@ -144,4 +176,22 @@ pub enum Source {
         /// BLAKE3 of its bytes, hex.
         blake3: String,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A table that ends at 32 N.m beside a sheet that rates the drive 52: said, with what was found of that load.
+    #[test]
+    fn a_table_that_ends_short_of_the_rated_torque_says_so() {
+        assert_eq!(short_of_sheet(52.0, 52.0, None), None);
+        assert_eq!(short_of_sheet(f64::from(52.1_f32), 52.1, None), None);
+        for last_n_m in [None, Some(52.0)] {
+            let words = short_of_sheet(32.0, 52.0, last_n_m).unwrap();
+            assert!(words.contains("ends at 32 N.m") && words.ends_with("--torque-n-m 52 spans it"), "{words}");
+        }
+        let words = short_of_sheet(3.2, 52.0, Some(20.5)).unwrap();
+        assert!(words.ends_with("under this generator was 20.5 N.m") && !words.contains("spans"), "{words}");
+    }
 }

@@ -212,6 +212,7 @@ pub fn make(
         rigid_gap_um: rigid_gap_um(drive, kind),
         room_as_built_arcsec: room_as_built_arcsec(drive, kind),
         max_von_mises_mpa: None,
+        root_fillet_mpa: None,
         peak_flank_pressure_mpa: Some(peak_flank_pressure_mpa),
         slope_bound: Some(f64::from(made.info.slope_bound)),
     }

@@ -23,7 +23,9 @@ pub use make::{MakeError, TableObserver, TableProgress, TableSettings, TorqueNod
 pub(crate) use positions::places_that_tell_apart;
 pub(crate) use project::from_plan;
 pub use project::{SampleOptions, TableError, core_drive, core_kind, from_samples, from_sweep};
-pub use replay::{MeasuredRow, MeasurementError, ReplaySummary, ReplayedRow, parse as parse_measured, replay};
+pub use replay::{
+    MeasuredRow, MeasurementError, OtherRows, ReplaySummary, ReplayedRow, RowsOf, parse as parse_measured, replay,
+};
 pub(crate) use source_files::put_bytes;
 pub use source_files::{c_header, rust_source};
 pub use sweep::{SweepError, SweepPlan, SweepProgress, symmetric_nodes};

@@ -311,6 +311,7 @@ fn make(
         data_sheet: None,
         stress: Vec::new(),
         no_stress: None,
+        remarks: Vec::new(),
         turns: None,
         command: String::new(),
     };

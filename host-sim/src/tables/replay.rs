@@ -3,10 +3,14 @@
 //! CSV with a header, columns in any order, further columns ignored, `#` lines comments. Needed are `generator_rad` and one of
 //! `output_rad` and `error_arcsec`; `torque_n_m` (else 0) and `temperature_c` (else that given) are used where present.
 
+use std::path::Path;
+
 use flexspline::{GeneratorAngle, PlayState, Quality, Table};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use thiserror::Error;
 
+use super::validate::generator_of;
 use crate::measurement::{CsvRows, NotANumber, TableProblem};
 use crate::suggest::question;
 use crate::units::ARCSEC_PER_RAD;
@@ -66,8 +70,87 @@ pub struct ReplaySummary {
     pub mean_residual_arcsec: f64,
     /// Rows by quality: in range, uncertain, extrapolated, disabled.
     pub rows_by_quality: [usize; 4],
+    /// Whose rows they are, where that is known.
+    pub rows_of: Option<RowsOf>,
+    /// What has to be known of them: that they are another drive's, or nobody's.
+    pub remarks: Vec<String>,
     /// Command line, once known.
     pub command: String,
+}
+
+/// File of results as `simulate` names it, and what lies beside it.
+const RESULTS: [&str; 2] = ["results.csv", "summary.json"];
+
+/// Whose rows a file holds, as the run says that wrote them.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RowsOf {
+    /// Name of the drive.
+    pub drive: String,
+    /// Its BLAKE3, hex.
+    pub drive_hash: String,
+    /// Generator.
+    pub generator: String,
+    /// BLAKE3 of the file, hex: the summary of a replay, which may take the place of that of the run, says of which file it is.
+    #[serde(default)]
+    pub rows_blake3: String,
+}
+
+impl RowsOf {
+    /// What `summary.json` beside the results of `simulate` says of them; nothing of any other file, or where there is none.
+    pub fn beside(data: &Path, bytes: &[u8]) -> Option<RowsOf> {
+        let [results, summary] = RESULTS;
+        if data.file_name()?.to_str()? != results {
+            return None;
+        }
+        let text = std::fs::read_to_string(data.with_file_name(summary)).ok()?;
+        let of: Value = serde_json::from_str(&text).ok()?;
+        let rows_blake3 = blake3::hash(bytes).to_hex().to_string();
+        let replayed = of.get("rows_of");
+        let rows = serde_json::from_value::<RowsOf>(replayed.unwrap_or(&of).clone()).ok()?;
+        let of_these = replayed.is_none() || rows.rows_blake3 == rows_blake3;
+        of_these.then_some(RowsOf { rows_blake3, ..rows })
+    }
+
+    /// That these rows are of the drive and the generator that a table was made of.
+    ///
+    /// # Errors
+    /// They are not, or the table names no generator that is simulated.
+    pub fn check(&self, table: &Table<'_>) -> Result<(), OtherRows> {
+        let hash = blake3::Hash::from(table.drive_hash()).to_hex().to_string();
+        let generator = generator_of(table).map_or_else(|| "an unknown generator".to_owned(), |kind| kind.to_string());
+        if (hash.as_str(), generator.as_str()) == (self.drive_hash.as_str(), self.generator.as_str()) {
+            return Ok(());
+        }
+        Err(OtherRows { rows: self.clone(), hash, generator, ratio: table.drive().exact_ratio() })
+    }
+}
+
+/// What is said of rows that nothing speaks for.
+const OF_NOBODY: &str =
+    "nothing beside the rows says of which drive and generator they are: that they are the table's was not checked";
+
+impl ReplaySummary {
+    /// Puts in whose rows they are, and what has to be said of that.
+    pub fn of_rows(&mut self, rows_of: Option<RowsOf>, table: &Table<'_>) {
+        self.remarks = match &rows_of {
+            None => vec![OF_NOBODY.to_owned()],
+            Some(rows) => rows.check(table).err().iter().map(ToString::to_string).collect(),
+        };
+        self.rows_of = rows_of;
+    }
+}
+
+/// Rows and a table that do not belong together.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error(
+    "the rows are of the drive {} (BLAKE3 {}) under {}, says {} beside them; the table is of a drive with ratio {ratio} and BLAKE3 {hash} \
+     under {generator}", rows.drive, rows.drive_hash, rows.generator, RESULTS[1]
+)]
+pub struct OtherRows {
+    rows: RowsOf,
+    hash: String,
+    generator: String,
+    ratio: f64,
 }
 
 /// Rows that cannot be used.
@@ -186,6 +269,8 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
             .fold(0.0, |m, row| f64::max(m, (row.residual_arcsec - mean_residual).abs())),
         mean_residual_arcsec: mean_residual,
         rows_by_quality: by_quality,
+        rows_of: None,
+        remarks: vec![OF_NOBODY.to_owned()],
         command: String::new(),
     };
     (replayed, summary)
@@ -194,6 +279,24 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The summary of a run speaks of its results alone, and that of a replay, which may have taken its place, of the rows replayed.
+    #[test]
+    fn a_run_says_whose_rows_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let data = folder.path().join("results.csv");
+        let say = |text: &str| std::fs::write(folder.path().join("summary.json"), text).unwrap();
+        assert_eq!(RowsOf::beside(&data, b"rows"), None);
+        say(r#"{ "drive": "sc0.5", "drive_hash": "c28a", "generator": "cam", "rows": 8 }"#);
+        let run = RowsOf::beside(&data, b"rows").unwrap();
+        assert_eq!((run.drive.as_str(), run.drive_hash.as_str(), run.generator.as_str()), ("sc0.5", "c28a", "cam"));
+        assert_eq!(RowsOf::beside(&folder.path().join("measured.csv"), b"rows"), None);
+        say(&serde_json::json!({ "table_id": "1", "rows_of": run }).to_string());
+        assert_eq!(RowsOf::beside(&data, b"rows").as_ref(), Some(&run));
+        assert_eq!(RowsOf::beside(&data, b"other rows"), None);
+        say(r#"{ "table_id": "1", "rows_of": null }"#);
+        assert_eq!(RowsOf::beside(&data, b"rows"), None);
+    }
 
     #[test]
     fn error_and_output_columns_say_the_same() {

@@ -19,7 +19,7 @@ use super::fields::{self, DEPTH, Field, ORDER, PHASE, Slot, TOOTH, Value};
 use super::spec::{Drive, ThermalState};
 use crate::suggest::{did_you_mean, likeliest, likeliest_path, question};
 use crate::toml_file::{Entries, Problem, Refused, TomlFile, each_of, number, one_of, real, shown, text, whole};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write as _;
 use std::ops::Range;
 use toml::Spanned;
@@ -68,6 +68,12 @@ impl Drive {
             refused
         })?;
         Ok(drive)
+    }
+
+    /// How many fields such assignments set, each counted once.
+    pub fn fields_set<'a>(assignments: impl IntoIterator<Item = &'a str>) -> usize {
+        let path = |assignment: &'a str| assignment.split('=').next().unwrap_or_default().trim();
+        assignments.into_iter().flat_map(apart).map(path).collect::<BTreeSet<_>>().len()
     }
 
     fn set(&mut self, assignment: &str) -> Result<(), Problem> {
@@ -448,6 +454,22 @@ mod tests {
         let warm = uneven.at_temperature(60.0);
         let again = Drive::from_toml("d.toml", &warm.to_toml()).unwrap();
         assert!((again.circular_spline.tip_radius_mm - 48.65).abs() < 1e-12);
+    }
+
+    #[test]
+    fn fields_that_are_set_are_counted_each_once() {
+        let count = |sets: &[&str]| Drive::fields_set(sets.iter().copied());
+        assert_eq!(count(&[]), 0);
+        let pitch = "as_built.flexspline_pitch_harmonics=[{order=2,amplitude_um=5},{order=1,amplitude_um=3}]";
+        assert_eq!(count(&["generator.w0_mm=0.5,flexspline.rim_thickness_mm=1", pitch, "generator.w0_mm = 0.49"]), 3);
+    }
+
+    /// Of the wrong number of teeth is told, and nothing of fillets, which the radii were not drawn for.
+    #[test]
+    fn teeth_that_are_not_two_apart_are_all_that_is_told() {
+        let refused = Drive::hhd_95().with_set("flexspline.teeth=122").unwrap_err();
+        let fields: Vec<&str> = refused.problems.iter().map(|problem| problem.field.as_str()).collect();
+        assert_eq!(fields, ["circular_spline.teeth"], "{refused}");
     }
 
     #[test]

@@ -609,7 +609,8 @@ impl Drive {
             "flexspline.teeth",
             format!("found {}, allowed: an even number (two waves)", f.teeth),
         );
-        require(
+        // Teeth of another number than the radii were drawn for say nothing of fillets and roundings.
+        let teeth = require(
             c.teeth == f.teeth + 2,
             "circular_spline.teeth",
             format!("found {}, allowed: {}, two more than the flexspline (two waves)", c.teeth, f.teeth + 2),
@@ -629,11 +630,12 @@ impl Drive {
             "temperature.reference_c",
             format!("found {}, allowed: {} to {}, the operating range", t.reference_c, t.minimum_c, t.maximum_c),
         );
-        let mut radii = require(
-            f.root_radius_mm < f.tip_radius_mm,
-            "flexspline.tip_radius_mm",
-            format!("found {}, allowed: above root_radius_mm = {}", f.tip_radius_mm, f.root_radius_mm),
-        );
+        let mut radii = teeth
+            & require(
+                f.root_radius_mm < f.tip_radius_mm,
+                "flexspline.tip_radius_mm",
+                format!("found {}, allowed: above root_radius_mm = {}", f.tip_radius_mm, f.root_radius_mm),
+            );
         radii &= require(
             f.rim_thickness_mm <= 0.2 * f.root_radius_mm,
             "flexspline.rim_thickness_mm",

@@ -288,12 +288,12 @@ def study(
 
     ``vary`` says fields and values: ``{"flexspline.rim_thickness_mm": "1.2..2.6:8"}`` (from, to, how many) or a list. Every combination runs, or
     with ``variants`` so many spread over all ranges. ``keep`` holds constraints (``backlash_arcsec=30..70``); ``least`` and ``most`` name
-    figures that decide what nothing beats (by default kinematic error and stress, and K2). Of many variants (more than 48, with
+    figures that decide what nothing beats (by default kinematic error, stress in the root fillets, and K2). Of many variants (more than 48, with
     four fields or more 12 for each and 12) so many are computed, and those that nothing beats; the others are estimated by a surface through them:
     ``basis`` says which, ``json["trust"]`` what estimates are off by. ``compute_all=True`` computes every one.
     """
     if not (least or most):
-        least, most = ("kinematic_error_pp_arcsec", "max_von_mises_mpa"), ("k2_n_m_per_rad",)
+        least, most = ("kinematic_error_pp_arcsec", "root_fillet_mpa"), ("k2_n_m_per_rad",)
     ranges = [
         f"{path}={values}" if isinstance(values, str) else f"{path}={','.join(repr(value) for value in numbers(path, values).tolist())}"
         for path, values in vary.items()
