@@ -19,7 +19,7 @@ pub struct Evaluated {
 /// Leaves out one session after another.
 #[must_use]
 pub fn evaluate(problem: &Problem<'_>, terms: &[&Term<'_>]) -> Evaluated {
-    let zero = Zero::of(terms);
+    let zero = Zero::of(problem, terms);
     let square = |terms: &[&Term<'_>], linearised: bool| left_out(problem, terms, linearised, zero).unwrap_or(f64::NAN);
     let before = square(&[], false);
     let after = if terms.is_empty() { before } else { square(terms, true) };
@@ -41,7 +41,7 @@ pub fn proved<'l>(
     mut selected: Selected<'l>,
     trace: &mut Trace,
 ) -> (Selected<'l>, Vec<Unexplained>) {
-    let zero = Zero::of(&selected.terms.iter().collect::<Vec<_>>());
+    let zero = Zero::of(problem, &selected.terms.iter().collect::<Vec<_>>());
     let square = |terms: &[&Term<'l>]| left_out(problem, terms, true, zero).unwrap_or(f64::INFINITY);
     let none = square(&[]);
     let mut aside = Vec::new();
@@ -79,10 +79,11 @@ pub enum Zero {
 }
 
 impl Zero {
-    /// Of a model with these terms.
+    /// Of a model with these terms; where sessions are known to have a zero of their own, it is in any case.
     #[must_use]
-    pub fn of(terms: &[&Term<'_>]) -> Zero {
-        if terms.iter().any(|term| term.law.is_zero_of_sessions()) { Zero::Own } else { Zero::Shared }
+    pub fn of(problem: &Problem<'_>, terms: &[&Term<'_>]) -> Zero {
+        let own = !problem.on.rows.zeros.is_empty() || terms.iter().any(|term| term.law.is_zero_of_sessions());
+        if own { Zero::Own } else { Zero::Shared }
     }
 }
 

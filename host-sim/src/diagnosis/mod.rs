@@ -42,6 +42,7 @@ pub(crate) mod trace;
 mod uncertainty;
 mod verdict;
 mod with_speed;
+mod zeros;
 
 use std::sync::Arc;
 

@@ -19,7 +19,7 @@ use thiserror::Error;
 
 use super::report::{Compensation, Diagnosis};
 use super::{DiagnosisError, Extended, Settings, diagnose_extended};
-use super::{channels, quieted, torque_zero};
+use super::{channels, quieted, torque_zero, zeros};
 use crate::causes::CauseName;
 use crate::drive::{Drive, DriveError, GeneratorKind};
 use crate::extension::{
@@ -294,7 +294,7 @@ fn without_torque(recording: &Recording) -> Option<String> {
 /// # Errors
 /// The rows cannot be diagnosed; a table that was to be made by FEM was not.
 pub fn diagnose_rows(
-    recording: Recording,
+    mut recording: Recording,
     subject: &Subject<'_>,
     options: &Options<'_>,
     mut progress: impl FnMut(usize, usize, &str),
@@ -310,6 +310,7 @@ pub fn diagnose_rows(
         diagnose_extended(&recording.sessions, nominal, table, &settings, |done, of, what| {
             progress(done, of + 1, what)
         })?;
+    zeros::tell(&mut recording, &diagnosis.zeros);
     if recording.unusable.is_some() {
         // What makes them unusable is a channel that had to be left out.
         let masked = |fault: &&Fault| fault.treatment == Treatment::Masked && fault.channel == Some(Quantity::Torque);

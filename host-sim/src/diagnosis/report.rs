@@ -161,6 +161,9 @@ pub struct Diagnosis {
     /// Of the cause that was asked about, if it is not named: what to record to tell it from those that are.
     #[serde(skip)]
     pub experiment_for_asked: Option<String>,
+    /// Where the bench sets its zero anew in each session: that of every session less that of the first. Told as a fault of the data.
+    #[serde(skip)]
+    pub zeros: Vec<Parameter>,
     /// Every decision: why these causes, and not others.
     pub trace: Trace,
 }

@@ -405,7 +405,7 @@ pub fn blocks(problem: &Problem<'_>) -> Vec<std::ops::Range<usize>> {
 /// Relative gain of squared innovations in blocks left out, by having all `terms` instead of `fewer`.
 fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]) -> f64 {
     // Nobody foretells a zero that the bench sets in each session: there it is found in the block itself. The first column is the zero.
-    let own_zero = Zero::of(terms) == Zero::Own;
+    let own_zero = Zero::of(problem, terms) == Zero::Own;
     let misfit = |terms: &[&Term<'_>]| -> Option<f64> {
         let columns = white_columns(problem, terms, &[]);
         let fit = Scaffold::new(problem, terms.to_vec()).fit(None)?;

@@ -114,6 +114,8 @@ pub mod verdict {
     /// left after a period: it lags, and so does a flank or a reading that takes some milliseconds. *Guess*: drives of the examinations have
     /// 0.01 to 0.15.
     pub const RINGS: f64 = 0.17;
+    /// A zero that moves from one session to the next by whole tooth pitches, but for this share of one, may be teeth that have skipped. *Guess*.
+    pub const BESIDE_PITCHES: f64 = 0.02;
     /// Standard deviations from a value to the ends of its interval of 95 %. *Source*.
     pub const INTERVAL: f64 = 1.96;
     /// What a cause adds is known well from so many times the uncertainty of that on: beside what has no name and is large, and where its columns

@@ -4,7 +4,7 @@
 //!
 //! The torque less a constant is tried, from a share of the load on either side: what the model leaves of the error then, with everything
 //! free that floats in any drive, tells the constant. It counts where neither an unbalanced load nor a drag, all of their sizes and phases
-//! free, leaves as little.
+//! free, leaves as little, nor a spring that is stiffer one way than the other: a spring that stiffens makes of a zero just about that.
 
 use flexspline::Table;
 
@@ -20,7 +20,8 @@ const SAMPLE: usize = 8000;
 /// Blocks of rows that are left out one at a time.
 const BLOCKS: usize = 24;
 
-/// The largest zero that is looked for, as a share of the load: sensors are good to some per cent of their range. *Guess*.
+/// The largest zero that is looked for, as a share of the load: sensors are good to some per cent of their range. One from there on is none that was
+/// found, but the end of what was tried: something else goes on as far as one lets it. *Guess*.
 const LARGEST_SHARE: f64 = 0.06;
 /// A smaller one is no matter. *Guess*.
 const LEAST_SHARE: f64 = 0.004;
@@ -60,6 +61,8 @@ struct Held<'a> {
     places: Vec<usize>,
     /// What floats in any drive: columns of unit length, each free of those before it.
     free: Vec<Vec<f64>>,
+    /// Whether the spring may be stiffer one way than the other.
+    by_sign: bool,
 }
 
 /// A load beside that of the torque column: a constant, an unbalanced load (sine and cosine), a drag. N·m.
@@ -68,7 +71,7 @@ type Beside = [f64; 4];
 impl<'a> Held<'a> {
     fn new(rows: Rows, nominal: &'a Nominal, table: Option<&'a Table<'a>>) -> Held<'a> {
         let places = sample(&rows, SAMPLE);
-        let mut held = Held { rows, nominal, table, law: PlayLaw::Held, places, free: Vec::new() };
+        let mut held = Held { rows, nominal, table, law: PlayLaw::Held, places, free: Vec::new(), by_sign: false };
         held.float();
         held
     }
@@ -152,15 +155,22 @@ impl<'a> Held<'a> {
         let left = self.places.iter().zip(&predicted).map(|(k, predicted)| rows.error[*k] - predicted).collect();
         // Stiffness and backlash float as well.
         let mut left = self.freed(left);
-        let mut before: Option<Vec<f64>> = None;
-        for column in [wind_up, flank] {
+        let mut before: Vec<Vec<f64>> = Vec::new();
+        let by_sign = self.by_sign.then(|| wind_up.iter().map(|arcsec| arcsec.abs()).collect());
+        for column in [wind_up, flank].into_iter().chain(by_sign) {
             let mut column = self.freed(column);
-            if let Some(before) = &before {
-                take_away(&mut column, before);
-            }
+            before.iter().for_each(|before| take_away(&mut column, before));
             take_away(&mut left, &column);
-            before = Some(column);
+            before.push(column);
         }
+        left
+    }
+
+    /// What is left, block by block, under a torque less `zero` where the spring may be stiffer one way than the other.
+    fn by_sign(&mut self, zero: f64) -> Vec<f64> {
+        self.by_sign = true;
+        let left = by_block(&self.left([-zero, 0.0, 0.0, 0.0]));
+        self.by_sign = false;
         left
     }
 
@@ -263,7 +273,8 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     let blocks = none.len() as f64;
     let gain = sum(none) - sum(there);
     let gains = gain >= LEAST_GAIN * sum(none) && sum(there) <= (1.0 - LEAST_GAIN) * without_any;
-    if zero.abs() < LEAST_SHARE * load || !gains || !is_certain(none, there) {
+    let tried = LEAST_SHARE * load..LARGEST_SHARE * load;
+    if !tried.contains(&zero.abs()) || !gains || !is_certain(none, there) {
         return None;
     }
     // Jackknife; no finer than the steps.
@@ -283,6 +294,8 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
         sum(than) < share * least && is_certain(there, than) && least - sum(than) > NO_TRIFLE * gain
     };
     if better(&by_rivals, RIVALS_LEAVE)
+        || better(&held.by_sign(0.0), RIVALS_LEAVE)
+        || better(&held.by_sign(zero), BESIDE_IT_LEAVE)
         || better(&held.least_beside([-zero, 0.0, 0.0, 0.0], true, load), BESIDE_IT_LEAVE)
     {
         return None;
@@ -334,6 +347,16 @@ mod tests {
     /// A drive as its catalogue says that turns to and fro by so much from row to row under a load that swings, 2 arcsec of noise; with
     /// `unseen` N·m (of output angle and direction) beside what the column of torque tells.
     fn recording(nominal: &Nominal, turned: f64, unseen: impl Fn(f64, f64) -> f64) -> Recording {
+        with_spring(nominal, turned, unseen, |load| nominal.wind_up_arcsec(load))
+    }
+
+    /// The same with a spring of its own, arcsec.
+    fn with_spring(
+        nominal: &Nominal,
+        turned: f64,
+        unseen: impl Fn(f64, f64) -> f64,
+        wind_up: impl Fn(f64) -> f64,
+    ) -> Recording {
         let mut random = fastrand::Rng::with_seed(3);
         let mut session = Session { time_s: Some(Vec::new()), torque_n_m: Some(Vec::new()), ..Session::default() };
         let (mut flank, mut psi) = (1.0, 0.0);
@@ -348,7 +371,7 @@ mod tests {
             }
             let noise = 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
             let play = 0.5 * nominal.backlash_arcsec * flank;
-            let error = nominal.harmonics_arcsec(psi) + nominal.wind_up_arcsec(load) + play + noise;
+            let error = nominal.harmonics_arcsec(psi) + wind_up(load) + play + noise;
             session.line.push(k as u64 + 2);
             session.generator_rad.push(psi);
             session.error_rad.push(error / ARCSEC_PER_RAD);
@@ -400,6 +423,21 @@ mod tests {
         let (fault, _) = checked_turning(0.01, |_, _| -1.2);
         let fault = fault.expect("a fault");
         assert!(fault.what.contains("an unbalanced load of that size"), "{}", fault.what);
+    }
+
+    #[test]
+    fn a_spring_that_is_stiffer_one_way_than_the_other_is_no_zero_nor_is_what_ends_where_the_search_does() {
+        let nominal = catalogue_drive();
+        for (forward, back) in [(1.1, 0.93), (1.03, 0.98), (0.92, 1.1), (1.15, 0.95)] {
+            let spring = |load: f64| nominal.wind_up_arcsec(load) * if load > 0.0 { forward } else { back };
+            let mut recording = with_spring(&nominal, 0.08, |_, _| 0.0, spring);
+            let before = recording.clone();
+            check(&mut recording, &nominal, None);
+            assert_eq!(recording, before, "{forward} and {back}");
+        }
+        // A load nobody reads that pulls ever harder, as a cable that winds up.
+        let (fault, _) = checked(|output, _| -2.0 - 0.2 * output);
+        assert_eq!(fault, None);
     }
 
     #[test]

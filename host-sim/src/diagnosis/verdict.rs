@@ -16,6 +16,7 @@ use super::uncertainty::{self, Known};
 use super::{Settings, experiment, held_out, remainder, rivals, with_speed};
 use crate::causes::{CauseName, ParameterName};
 use crate::nominal::Nominal;
+use crate::units::ARCSEC_PER_RAD;
 
 /// The verdict, with its causes and what is left.
 #[allow(clippy::too_many_arguments, reason = "all that a search has found")]
@@ -38,11 +39,15 @@ pub(super) fn conclude(
         trace.judged(Stage::Settled, term.law, &term.values(), gates);
     }
     let all: Vec<&Term<'_>> = selected.terms.iter().collect();
-    let none = fit(problem, &[]);
+    // A zero that the bench sets in each session is told of the data: it is no discrepancy of the drive, with or without a cause.
+    let zeros = zeros_of_sessions(problem, &selected);
+    let of_the_bench = |term: &Term<'_>| term.law.is_zero_of_sessions() && !zeros.is_empty();
+    let given: Vec<Term<'_>> = selected.terms.iter().filter(|term| of_the_bench(term)).cloned().collect();
+    let none = fit(problem, &given);
     let left = |terms: &[&Term<'_>], fit: &Fit| -> Vec<f64> {
         problem.data.iter().zip(predicted(problem, terms, fit)).map(|(d, p)| d - p).collect()
     };
-    let before = none.as_ref().map_or(Vec::new(), |fit| left(&[], fit));
+    let before = none.as_ref().map_or(Vec::new(), |fit| left(&given.iter().collect::<Vec<_>>(), fit));
     let after = left(&all, &selected.fit);
     let floor = floor(problem, noise);
     let (rms_before, rms_after) = (problem.certain_rms(&before), problem.certain_rms(&after));
@@ -62,8 +67,9 @@ pub(super) fn conclude(
             .map(|k| size(&k))
             .sum::<f64>(),
     );
-    // A zero that the bench sets in each session hides nothing of what goes on within one; with nothing else found it is not understood.
-    let zeros_alone = named.is_empty() && all.iter().any(|term| term.law.is_zero_of_sessions());
+    // A zero of each session hides nothing of what goes on within one. One that may be teeth that have skipped is not understood with nothing else
+    // found.
+    let zeros_alone = named.is_empty() && all.iter().any(|term| term.law.is_zero_of_sessions() && !of_the_bench(term));
     let strongest = named.iter().map(|k| standings[*k].size).fold(0.0, f64::max);
     left_over.retain(|l| l.size_arcsec > LEAST_LEFT_OF_STRONGEST * strongest);
     let described = without_name;
@@ -171,6 +177,7 @@ pub(super) fn conclude(
     }
     let mut unexplained_list: Vec<Unexplained> = (0..selected.terms.len())
         .filter(|k| !named.contains(k) || told_better.contains(k) || verdict == Verdict::Unknown)
+        .filter(|k| !of_the_bench(&selected.terms[*k]))
         .map(|k| Unexplained { looks_like: selected.terms[k].law.label.to_string(), size_arcsec: standings[k].size })
         .collect();
     unexplained_list.extend(left_over);
@@ -198,8 +205,54 @@ pub(super) fn conclude(
         wander_correlation_s: noise.correlation_s,
         next_experiment,
         experiment_for_asked,
+        zeros,
         trace,
     }
+}
+
+/// The zero of every session less that of the first, where the bench sets it anew: a law of it was chosen, or sessions are known to have their
+/// own. None where from one session to the next it moves by whole tooth pitches: teeth may have skipped.
+fn zeros_of_sessions(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Parameter> {
+    let rows = problem.on.rows;
+    let term = selected.terms.iter().position(|term| term.law.is_zero_of_sessions());
+    if term.is_none() && rows.zeros.is_empty() {
+        return Vec::new();
+    }
+    let coefficients = &selected.fit.solution.coefficients;
+    let covariance = selected.fit.solution.covariance();
+    let n = coefficients.len();
+    let at_term = term.map(|k| selected.fit.starts[k]);
+    let pitch_arcsec = problem.on.nominal.gear().tooth_pitch_rad.map_or(0.0, |pitch| pitch * ARCSEC_PER_RAD);
+    let mut zeros: Vec<Parameter> = Vec::new();
+    let (mut place, mut before) = (0, 0.0);
+    for session in 0..rows.sessions.len() {
+        // Those that are known to be own ones count from their session on, and float first among the base, after the one zero of all.
+        let known = (1..=rows.zeros.len()).filter(|j| rows.zeros[j - 1] <= session);
+        let learnt = rows.used.get(session).copied().unwrap_or(false);
+        let of_law = at_term.filter(|_| learnt).and_then(|at| {
+            place += 1;
+            (place > 1).then(|| at + place - 2)
+        });
+        let parts: Vec<usize> = known.chain(of_law).collect();
+        let value = parts.iter().map(|i| coefficients[*i]).sum::<f64>();
+        let of_row = |i: &usize| parts.iter().map(|j| covariance[i * n + j]).sum::<f64>();
+        let variance: f64 = parts.iter().map(of_row).sum();
+        let zero = Parameter { value, std: variance.max(0.0).sqrt() };
+        let jump = of_law.map_or(0.0, |i| coefficients[i]) - before;
+        before = of_law.map_or(before, |i| coefficients[i]);
+        if session > 0 && !rows.zeros.contains(&session) && is_whole_pitches(jump, zero.std, pitch_arcsec) {
+            return Vec::new();
+        }
+        zeros.push(zero);
+    }
+    zeros
+}
+
+/// Whether a zero moves by one tooth pitch or several, as well as it is known: then teeth may have skipped while nobody recorded.
+fn is_whole_pitches(jump_arcsec: f64, std_arcsec: f64, pitch_arcsec: f64) -> bool {
+    let pitches = (jump_arcsec / pitch_arcsec.max(f64::MIN_POSITIVE)).round();
+    let off = (jump_arcsec - pitches * pitch_arcsec).abs();
+    pitch_arcsec > 0.0 && pitches != 0.0 && off < (BESIDE_PITCHES * pitch_arcsec).max(INTERVAL * std_arcsec)
 }
 
 /// Whether causes explain the error: what is left is near the noise, and in sessions left out the model with them beats the nominal one and
@@ -633,6 +686,13 @@ mod tests {
         };
         assert!(in_the_dark(false));
         assert!(!in_the_dark(true));
+    }
+
+    #[test]
+    fn a_zero_that_moves_by_whole_pitches_may_be_teeth_that_skipped() {
+        assert!(is_whole_pitches(6416.0, 2.0, 6416.2) && is_whole_pitches(-12_810.0, 2.0, 6416.2));
+        assert!(!is_whole_pitches(0.4, 2.0, 6416.2) && !is_whole_pitches(5900.0, 2.0, 6416.2));
+        assert!(!is_whole_pitches(300.0, 2.0, 0.0), "teeth that nobody knows");
     }
 
     #[test]

@@ -2,7 +2,8 @@
 //! part in the fit.
 //!
 //! The core itself predicts each row from generator angle, torque and temperature, as it does on board. The zero of the encoder is
-//! found over the sessions of the fit, once, and taken from the others.
+//! found over the sessions of the fit, once, and taken from the others; where the bench sets it anew, over those that share it, or in the
+//! session held out itself.
 
 use flexspline::{GeneratorAngle, PlayState, Table};
 use serde::Serialize;
@@ -105,6 +106,7 @@ pub fn split(sessions: &[Session]) -> (Vec<Session>, Vec<bool>) {
                 orientation_rad: of(&session.orientation_rad),
                 loudness: of(&session.loudness),
                 own_zero: session.own_zero && from == 0,
+                zero_off_rad: session.zero_off_rad,
                 unsure_s: session.unsure_s,
                 coarse_rad: session.coarse_rad,
             }
@@ -198,7 +200,8 @@ pub fn evaluate(
         (None, None) => none.clone(),
     };
     let by_extended = check(&extended_image)?.unwrap_or_else(|| by_nominal.clone());
-    let [none, by_nominal, by_extended] = [none, by_nominal, by_extended].map(|left| without_zero(left, &used));
+    let own: Vec<bool> = sessions.iter().map(|session| session.own_zero).collect();
+    let [none, by_nominal, by_extended] = [none, by_nominal, by_extended].map(|left| without_zero(left, &used, &own));
     let held: Vec<usize> = (0..sessions.len()).filter(|k| !used[*k] && !sessions[*k].is_empty()).collect();
     let sessions: Vec<Compensated> = held
         .iter()
@@ -222,11 +225,16 @@ pub fn evaluate(
     })
 }
 
-/// Takes the mean over the sessions learnt from away from all.
-fn without_zero(mut left: Vec<Vec<f64>>, used: &[bool]) -> Vec<Vec<f64>> {
-    let learnt = || left.iter().zip(used).filter(|(_, used)| **used).flat_map(|(values, _)| values);
-    let zero = learnt().sum::<f64>() / learnt().count().max(1) as f64;
-    left.iter_mut().flatten().for_each(|value| *value -= zero);
+/// Takes the zero away: of sessions that share one, from each that has its `own` on, the mean over those learnt from, or over all of them where
+/// nothing was learnt from any.
+fn without_zero(mut left: Vec<Vec<f64>>, used: &[bool], own: &[bool]) -> Vec<Vec<f64>> {
+    let starts = (0..left.len()).filter(|k| *k == 0 || own[*k]).chain([left.len()]).collect::<Vec<usize>>();
+    for sharing in starts.windows(2).map(|at| at[0]..at[1]) {
+        let learns = used[sharing.clone()].contains(&true);
+        let of = || sharing.clone().filter(|k| used[*k] || !learns).flat_map(|k| &left[k]);
+        let zero = of().sum::<f64>() / of().count().max(1) as f64;
+        left[sharing].iter_mut().flatten().for_each(|value| *value -= zero);
+    }
     left
 }
 
@@ -259,8 +267,16 @@ mod tests {
 
     #[test]
     fn the_zero_is_that_of_the_sessions_learnt_from() {
-        let left = without_zero(vec![vec![1.0, 3.0], vec![10.0, 12.0]], &[true, false]);
+        let left = without_zero(vec![vec![1.0, 3.0], vec![10.0, 12.0]], &[true, false], &[false; 2]);
         assert_eq!(left, [[-1.0, 1.0], [8.0, 10.0]]);
+    }
+
+    #[test]
+    fn a_zero_that_the_bench_sets_anew_is_that_of_the_session_itself_or_of_those_that_share_it() {
+        let left = || vec![vec![1.0, 3.0], vec![310.0, 312.0], vec![20.0, 22.0], vec![25.0, 27.0]];
+        let used = [true, false, true, false];
+        assert_eq!(without_zero(left(), &used, &[false, true, true, false])[1], [-1.0, 1.0]);
+        assert_eq!(without_zero(left(), &used, &[false, true, true, false])[3], [4.0, 6.0], "shares the third's");
     }
 
     #[test]

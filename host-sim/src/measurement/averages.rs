@@ -39,6 +39,7 @@ impl Session {
             orientation_rad: cut(&self.orientation_rad),
             loudness: cut(&self.loudness),
             own_zero: self.own_zero,
+            zero_off_rad: self.zero_off_rad,
             unsure_s: self.unsure_s,
             coarse_rad: self.coarse_rad,
         }

@@ -62,6 +62,8 @@ pub struct Session {
     pub loudness: Option<Vec<f64>>,
     /// Whether the zero of the error is not that of the session before.
     pub own_zero: bool,
+    /// What was taken off the error, as its zero is that much off the zero of the first session, rad.
+    pub zero_off_rad: f64,
     /// Time by which one angle may be read before the other on the mean, for all that is known of how they are read, s.
     pub unsure_s: f64,
     /// Step of the resolution at the output where no noise blurs it, rad; else 0.
@@ -239,11 +241,15 @@ fn parse_as(
     let other_zeros = if drifts { Vec::new() } else { faults::leaps::between_sessions(&mut log, gear, &mut findings) };
     faults::stalls::check(&mut log, gear, &mut findings);
     let mut sessions = into_sessions(log, gear.ratio);
-    other_zeros.into_iter().for_each(|session| sessions[session].own_zero = true);
+    for (session, off_rad) in other_zeros.iter().copied() {
+        sessions[session].own_zero = true;
+        sessions[session..].iter_mut().for_each(|later| later.zero_off_rad = off_rad);
+    }
     sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= found.own_zeros);
     if drifts {
         faults::drift::check(&mut sessions, gear, Stretches::OfRows, &mut findings);
     }
+    faults::held::check(&mut sessions, &mut findings);
     faults::frozen::check(&mut sessions, gear, error_recorded, &mut findings).map_err(refuse)?;
     faults::coarse_torque::check(&mut sessions, &mut findings);
     faults::reads::check(&mut sessions, gear, &mut findings);
@@ -292,6 +298,7 @@ fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
         line: std::mem::take(&mut log.line),
         loudness: None,
         own_zero: false,
+        zero_off_rad: 0.0,
         unsure_s: 0.0,
         coarse_rad: 0.0,
     };

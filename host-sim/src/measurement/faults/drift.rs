@@ -25,6 +25,13 @@ const STRETCH_ROWS: usize = 8;
 /// the drift. *Guess*: two gaps agree to a twentieth by chance in one recording of twenty.
 const FEWEST_GAPS: usize = 2;
 const OFF_THE_LINE: f64 = 0.05;
+/// Within sessions the zero moves as over all of them: the slope there is off by this share at most, but for so many of its standard deviations. *Guess*.
+const WITHIN: f64 = 0.5;
+const WITHIN_STDS: f64 = 3.0;
+/// Sessions whose zeros are free at once, at most.
+const MOST_ZEROS: usize = 64;
+/// Sessions in which a drift of this share would not show by so many standard deviations have to lie on its line, by [`OFF_THE_LINE`]. *Guess*.
+const SHOWS: f64 = 0.5;
 /// What is the same on both flanks: the part that differs is below this share.
 const ALIKE: f64 = 0.35;
 /// A trend whose standard deviation grows by more than this when position, load and temperature are considered may be one of them.
@@ -172,6 +179,10 @@ fn slope(sessions: &[Session], gear: &Gear, cut: Stretches) -> Option<(f64, f64,
     if confused && !alike_in_sessions(&lefts, drift) {
         return None;
     }
+    // A zero that is set anew in each session may lie anywhere, also about a line; within the sessions it stands then.
+    if (2..=MOST_ZEROS).contains(&lefts.len()) && !goes_on_within(&state, &all, place, drift, &lefts) {
+        return None;
+    }
     let (trend, std) = line(&points)?;
     let certain = (drift / formal).abs() > CERTAIN && (trend / std).abs() > CERTAIN && trend * drift > 0.0;
     let steady = (trend - drift).abs() < 0.5 * drift.abs();
@@ -220,12 +231,37 @@ fn middle_of(part: &[Point]) -> Point {
 
 /// Whether sessions lie on a line of this slope, and no session by itself has another slope.
 fn alike_in_sessions(lefts: &[Vec<Point>], drift: f64) -> bool {
+    let (within, std) = within_sessions(lefts, drift);
+    let contradicted = (within - drift).abs() > WITHIN * drift.abs() + CERTAIN * std;
+    lefts.len() > FEWEST_GAPS && on_the_line(lefts, drift) && !contradicted
+}
+
+/// Whether the zero moves within sessions, a zero of each free, as it does over all of them; where that does not show, whether the sessions lie on
+/// one line. `place` is where the first of the columns of `drifts` stands.
+fn goes_on_within(state: &State, drifts: &[Extra], place: usize, drift: f64, lefts: &[Vec<Point>]) -> bool {
+    let zeros: Vec<_> = (1..lefts.len()).map(|of| move |s: usize, _: usize| f64::from(u8::from(s == of))).collect();
+    let mut columns: Vec<Extra> = drifts.to_vec();
+    columns.extend(zeros.iter().map(|zero| zero as Extra));
+    let Some(fit) = state.fit(&columns) else { return true };
+    let (within, std) = (fit.value[place], fit.std[place]);
+    if (within - drift).abs() > WITHIN * drift.abs() + WITHIN_STDS * std {
+        return false;
+    }
+    let shows = WITHIN_STDS * std < SHOWS * drift.abs();
+    shows || on_the_line(lefts, drift)
+}
+
+/// Whether the middles of sessions lie on a line of this slope.
+fn on_the_line(lefts: &[Vec<Point>], drift: f64) -> bool {
     let middles: Vec<Point> = lefts.iter().map(|left| middle_of(left)).collect();
     let Some((low, high)) = middles.first().zip(middles.last()) else { return false };
     let zero = median_of(&mut middles.iter().map(|of| of.1 - drift * of.0).collect::<Vec<f64>>());
     let off = |of: &Point| (of.1 - drift * of.0 - zero).abs();
-    let on_the_line = middles.iter().all(|of| off(of) < OFF_THE_LINE * (drift * (high.0 - low.0)).abs());
-    // Slopes within sessions, all together, from the medians of their stretches.
+    middles.iter().all(|of| off(of) < OFF_THE_LINE * (drift * (high.0 - low.0)).abs())
+}
+
+/// The slope within sessions, all together, from the medians of their stretches, and its standard deviation about `drift`.
+fn within_sessions(lefts: &[Vec<Point>], drift: f64) -> (f64, f64) {
     let (mut xx, mut xy, mut left_over) = (0.0, 0.0, Vec::new());
     for left in lefts {
         let parts: Vec<Point> = left.chunks(left.len().div_ceil(STRETCHES).max(1)).map(middle_of).collect();
@@ -237,8 +273,7 @@ fn alike_in_sessions(lefts: &[Vec<Point>], drift: f64) -> bool {
         }
     }
     let variance = left_over.iter().sum::<f64>() / left_over.len().max(1) as f64 / xx.max(1e-300);
-    let contradicted = (xy / xx.max(1e-300) - drift).abs() > 0.5 * drift.abs() + CERTAIN * variance.sqrt();
-    lefts.len() > FEWEST_GAPS && on_the_line && !contradicted
+    (xy / xx.max(1e-300), variance.sqrt())
 }
 
 /// Median of a few rows from this one on, rad.
@@ -298,12 +333,17 @@ mod tests {
 
     /// Sessions of 15 s at 100 Hz, minutes apart, on a drive with clearance and wind-up whose zero moves; `zeros` are those of the sessions.
     fn sessions(per_hour_arcsec: f64, zeros: &[f64]) -> Vec<Session> {
+        sessions_apart(300.0, per_hour_arcsec, zeros)
+    }
+
+    /// The same, once to twice so many seconds apart.
+    fn sessions_apart(apart_s: f64, per_hour_arcsec: f64, zeros: &[f64]) -> Vec<Session> {
         let mut random = fastrand::Rng::with_seed(8);
         let mut begin = 0.0;
         let one = |(number, zero): (usize, &f64)| {
             let time: Vec<f64> = (0..1500).map(|k| begin + 0.01 * f64::from(k)).collect();
             let since: Vec<f64> = time.iter().map(|t| t - begin).collect();
-            begin += 15.0 + 300.0 * (1.0 + random.f64());
+            begin += 15.0 + apart_s * (1.0 + random.f64());
             let torque: Vec<f64> = since.iter().map(|t| 20.0 * (0.9 * t + number as f64).sin()).collect();
             let noise = |random: &mut fastrand::Rng| 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
             let error = time.iter().zip(&torque).map(|(t, torque)| {
@@ -335,6 +375,17 @@ mod tests {
         assert!(warmed(4.0, 0.0));
         assert!(!warmed(0.5, 0.0), "within what counts");
         assert!(!warmed(4.0, 1.0), "cold again at the end");
+    }
+
+    #[test]
+    fn zeros_that_are_set_anew_are_no_drift_as_they_stand_within_the_sessions() {
+        for zeros in [[0.0, 130.0, 180.0, 370.0], [0.0, -150.0, -120.0, -400.0], [0.0, 60.0, 140.0, 190.0]] {
+            assert_eq!(found(sessions_apart(5.0, 0.0, &zeros)), None, "{zeros:?}");
+        }
+        for per_hour in [-9000.0, 3000.0] {
+            let rate = found(sessions_apart(5.0, per_hour, &[0.0; 4])).expect("a drift");
+            assert!((rate / per_hour - 1.0).abs() < 0.1, "{rate} for {per_hour}");
+        }
     }
 
     fn found(mut sessions: Vec<Session>) -> Option<f64> {

@@ -103,8 +103,12 @@ fn take_turns_out(log: &mut Log, leaps: &[(usize, f64)]) {
 }
 
 /// Finds sessions before which the generator's counter began anew, and puts the turns back; gives those sessions whose zero is another
-/// one, by no whole turns or pitches.
-pub(in crate::measurement) fn between_sessions(log: &mut Log, gear: &Gear, findings: &mut Findings) -> Vec<usize> {
+/// one, by no whole turns or pitches, with what was taken off them, rad.
+pub(in crate::measurement) fn between_sessions(
+    log: &mut Log,
+    gear: &Gear,
+    findings: &mut Findings,
+) -> Vec<(usize, f64)> {
     let (Some(generator), Some(output)) = (log.get(Quantity::Generator), log.get(Quantity::Output)) else {
         return Vec::new();
     };
@@ -183,7 +187,12 @@ pub(in crate::measurement) fn between_sessions(log: &mut Log, gear: &Gear, findi
         }
     }
     take_turns_out(log, &restarts);
-    others.into_iter().map(|(session, ..)| session).collect()
+    let mut off = 0.0;
+    let taken_off = |(session, _, jump)| {
+        off += jump;
+        (session, off)
+    };
+    others.into_iter().map(taken_off).collect()
 }
 
 /// The rate, rad/s, at which the error changes over all gaps between sessions alike, if it does: then no zero is another one, but it drifts.
@@ -253,7 +262,7 @@ mod tests {
         log
     }
 
-    fn found(log: &mut Log) -> (Vec<Fault>, Vec<usize>) {
+    fn found(log: &mut Log) -> (Vec<Fault>, Vec<(usize, f64)>) {
         let gear = Gear { tooth_pitch_rad: Some(TAU / 200.0), ..Gear::of_ratio(RATIO) };
         let mut findings = Findings::default();
         check(log, &gear, &mut findings);
@@ -285,6 +294,8 @@ mod tests {
         assert!(generator_goes_on(&restarted) && others.is_empty());
         assert!(found(&mut log(true, 0.0, TAU / 200.0)).0.is_empty(), "one pitch");
         let (faults, others) = found(&mut log(true, 0.0, 0.0123));
-        assert_eq!((faults.len(), faults[0].name, others), (1, FaultName::PositionJump, vec![1]));
+        assert_eq!((faults.len(), faults[0].name, others.len(), others[0].0), (1, FaultName::PositionJump, 1, 1));
+        // Eight rows of motion are between the levels that are compared.
+        assert!((others[0].1 - 0.0123).abs() < 1e-4, "{others:?}");
     }
 }

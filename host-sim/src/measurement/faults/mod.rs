@@ -15,6 +15,7 @@
 //! | a unit, sign or exchange of columns that the ratio, a wrap or a limit gives away | converted |
 //! | output or generator frozen | rows left out |
 //! | torque frozen | rows left out, or channel |
+//! | torque repeated, one value in so many rows | a straight line between the new ones |
 //! | temperature frozen | straight line, or channel left out |
 //! | torque in coarse steps | read off where it goes from one to the next |
 //! | single rows out | rows left out (torque, temperature: mended) |
@@ -30,6 +31,7 @@ pub(super) mod clock;
 pub(super) mod coarse_torque;
 pub(super) mod drift;
 pub(super) mod frozen;
+pub(super) mod held;
 pub(super) mod lattice;
 pub(super) mod leaps;
 pub(super) mod missing;

@@ -22,6 +22,9 @@ const UNEVEN: f64 = 0.1;
 /// A generator that goes from stop to stop by the same angle lies on a lattice too, and is exact. What is rounded is in the error, which differs
 /// by 0.4 steps on the mean from one reading to another: where half of them differ by less than this share, nothing is. *Guess*.
 const ROUNDED: f64 = 0.1;
+/// So many rows are from one reading to another. At a speed that is nearly a whole number of steps to a row the next one is rounded by just about
+/// as much, and a later one is not.
+const APART: [usize; 4] = [1, 2, 4, 8];
 
 /// Resolutions that show in the data, in rad at the output.
 pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> Vec<(Quantity, f64)> {
@@ -63,10 +66,14 @@ pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> V
     found
 }
 
-/// By how much the error differs, at the median, from one row to the next where a channel has moved by a step or more, rad.
+/// By how much the error differs, at the median, from one row to another where a channel has moved by a step or more, rad: at that distance of
+/// [`APART`] where it differs most.
 fn differs(channel: &[f64], error: &[f64], step: f64) -> f64 {
-    let moved = (1..channel.len()).filter(|row| (channel[*row] - channel[row - 1]).abs() > 0.5 * step);
-    median_of(&mut moved.map(|row| (error[row] - error[row - 1]).abs()).collect::<Vec<f64>>())
+    let at = |apart: usize| {
+        let moved = (apart..channel.len()).filter(|row| (channel[*row] - channel[row - apart]).abs() > 0.5 * step);
+        median_of(&mut moved.map(|row| (error[row] - error[row - apart]).abs()).collect::<Vec<f64>>())
+    };
+    APART.into_iter().map(at).fold(0.0, f64::max)
 }
 
 /// Names a resolution of output or generator that is coarse at the output; nothing can be done about it but to know that rounding is a noise.
@@ -127,6 +134,19 @@ mod tests {
         // Seven readings at each stop.
         let stops = |k: f64| 1.1 * (k / 7.0).floor();
         assert_eq!(of_generator(session(6000, stops, |psi| psi)), None);
+    }
+
+    #[test]
+    fn a_coarse_encoder_is_one_at_a_speed_of_nearly_whole_steps_to_a_row() {
+        // Of 8 bits a turn, in legs of three and of six steps to a row, and a little more, with rests between.
+        let step = std::f64::consts::TAU / 256.0;
+        let turns = |k: f64| {
+            let (leg, in_leg) = ((k / 400.0).floor(), (k % 400.0).min(330.0));
+            let by = if leg % 2.0 == 0.0 { 3.056 } else { -6.11 };
+            step * (by * in_leg + (leg / 2.0).ceil() * 330.0 * 3.056 - (leg / 2.0).floor() * 330.0 * 6.11)
+        };
+        let found = of_generator(session(6000, turns, |psi| step * (psi / step).round()));
+        assert!((found.expect("coarse") * RATIO - step).abs() < 1e-3 * step, "{found:?}");
     }
 
     #[test]

@@ -163,6 +163,7 @@ fn thinned(session: &Session, every: usize) -> Session {
         orientation_rad: column(&session.orientation_rad),
         loudness: column(&session.loudness),
         own_zero: session.own_zero,
+        zero_off_rad: session.zero_off_rad,
         unsure_s: session.unsure_s,
         coarse_rad: session.coarse_rad,
     }
@@ -855,6 +856,7 @@ mod tests {
             next_experiment: None,
             ratio_proposed: None,
             experiment_for_asked: None,
+            zeros: Vec::new(),
             trace: Trace::default(),
         }
     }
