@@ -166,7 +166,7 @@ fn the_example_is_read_and_mistakes_are_named_by_line_field_value_and_what_is_al
     // What is near, or wide, or of nothing as drawn is as good a tolerance as any.
     for (field, law) in [
         ("generator.w0_mm", "\"normal\"\nmean = 0.51\nstd = 0.0005"),
-        ("generator.w0_mm", "\"normal\"\nmean = 0.56\nstd = 0.01\nlimits = [0.49, 0.51]"),
+        ("generator.w0_mm", "\"normal\"\nmean = 0.56\nstd = 0.02\nlimits = [0.49, 0.51]"),
         ("as_built.flexspline_wear_um", "\"normal\"\nmean = 10\nstd = 0.5"),
     ] {
         tolerances(&format!("[[tolerance]]\nfield = \"{field}\"\ndistribution = {law}\n"));

@@ -449,7 +449,7 @@ fn remarks(drive: &Drive, settings: &StudySettings, study: &Study) -> Vec<String
         let computed = || study.runs.iter().filter(|run| run.generator == *kind && run.basis == Basis::Computed);
         let bear = computed().filter(|run| run.bears_all()).count();
         let found = match computed().count() - bear {
-            0 => format!("every variant computed bears it; tables --torque-n-m {sheet_n_m} spans it"),
+            0 => format!("every variant computed bears it; tables --torque-n-m {sheet_n_m} asks for it"),
             fewer => {
                 format!("{fewer} of {} variants computed do not come to it; --torque-n-m says otherwise", bear + fewer)
             }

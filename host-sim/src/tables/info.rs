@@ -109,7 +109,7 @@ fn short_of_sheet(ends_n_m: f64, rated_n_m: f64, last_n_m: Option<f64>) -> Optio
         Some(last_n_m) if last_n_m < rated_n_m => {
             format!("the last load with an equilibrium under this generator was {} N.m", short(last_n_m))
         }
-        _ => format!("--torque-n-m {rated_n_m} spans it"),
+        _ => format!("--torque-n-m {rated_n_m} asks for it"),
     };
     Some(format!(
         "the table ends at {} N.m, and the data sheet rates the drive {} N.m: beyond its end a table extrapolates; {found}",
@@ -189,9 +189,9 @@ mod tests {
         assert_eq!(short_of_sheet(f64::from(52.1_f32), 52.1, None), None);
         for last_n_m in [None, Some(52.0)] {
             let words = short_of_sheet(32.0, 52.0, last_n_m).unwrap();
-            assert!(words.contains("ends at 32 N.m") && words.ends_with("--torque-n-m 52 spans it"), "{words}");
+            assert!(words.contains("ends at 32 N.m") && words.ends_with("--torque-n-m 52 asks for it"), "{words}");
         }
         let words = short_of_sheet(3.2, 52.0, Some(20.5)).unwrap();
-        assert!(words.ends_with("under this generator was 20.5 N.m") && !words.contains("spans"), "{words}");
+        assert!(words.ends_with("under this generator was 20.5 N.m") && !words.contains("asks for"), "{words}");
     }
 }
