@@ -313,6 +313,8 @@ fn what_a_robot_carries_is_not_taken_for_its_teeth() {
         println!("joint {joint}: {} {:?}", json["verdict"], names(&json));
         // As examples/real_data.md says.
         assert_eq!(json["finding"], "not_understood", "joint {joint}");
+        let missing = json["data_faults"].as_array().unwrap().iter().find(|fault| fault["name"] == "missing_samples");
+        assert_eq!(missing.map(|fault| &fault["rows"]), Some(&Value::from(456)), "joint {joint}");
         let of_teeth =
             ["eccentricity", "runout", "ovality", "pitch_error", "cam_form", "damaged_tooth", "ratcheting", "wear"];
         for cause in names(&json).into_iter().filter(|name| !name.contains("encoder")) {

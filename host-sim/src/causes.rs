@@ -192,7 +192,7 @@ pub enum Need {
     Time,
     /// A generator that moves.
     Motion,
-    /// A speed or a load that changes fast enough to make a load swing.
+    /// A speed or a load that changes fast enough to make a load swing, in rows that are read at one instant.
     Swings,
     /// An output that turns through half a turn.
     HalfOutputTurn,
@@ -215,7 +215,9 @@ impl Need {
             Need::TemperatureSpan => "the temperature stays close to the nominal one",
             Need::Time => "no time was recorded",
             Need::Motion => "the generator does not move",
-            Need::Swings => "speed and load stay as they are: nothing makes a load swing",
+            Need::Swings => {
+                "speed and load stay as they are, or rows are means over some time: no load is seen to swing"
+            }
             Need::HalfOutputTurn => "the output turns through less than half a turn",
             Need::Use => "the drive is used too little for wear in between",
             Need::Jump => "the error has no lasting jump by whole teeth",
@@ -234,7 +236,9 @@ impl Need {
             Need::TemperatureSpan => Some("record sessions at temperatures that differ by 20 K or more"),
             Need::Time => Some("record the time of each row (time_s)"),
             Need::Motion => Some("record the drive in motion, at several speeds"),
-            Need::Swings => Some("record steps of the load, stops and starts, and several speeds"),
+            Need::Swings => {
+                Some("record steps of the load, stops and starts, and several speeds, each row read at one instant")
+            }
             Need::HalfOutputTurn => Some("turn the output through a whole turn"),
             Need::Use => Some("record again after hours of use, with the same zero"),
             Need::Jump => None,

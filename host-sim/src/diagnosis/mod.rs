@@ -13,6 +13,7 @@
 
 mod averaged;
 pub(crate) mod base;
+mod blurred;
 pub(crate) mod candidate;
 pub(crate) mod channels;
 mod experiment;

@@ -19,7 +19,7 @@ use thiserror::Error;
 
 use super::report::{Compensation, Diagnosis};
 use super::{DiagnosisError, Extended, Settings, diagnose_extended};
-use super::{channels, quieted, torque_zero, zeros};
+use super::{blurred, channels, quieted, torque_zero, zeros};
 use crate::causes::CauseName;
 use crate::drive::{Drive, DriveError, GeneratorKind};
 use crate::extension::{
@@ -275,6 +275,7 @@ fn rows_of(
     }
     recording.notes.extend(quieted::torque(&mut recording.sessions, &subject.nominal));
     if recording.unusable.is_none() {
+        blurred::check(&mut recording, &subject.nominal, subject.table.as_ref());
         torque_zero::check(&mut recording, &subject.nominal, subject.table.as_ref());
     }
     recording.average_to(MOST_ROWS);

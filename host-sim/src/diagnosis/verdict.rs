@@ -245,7 +245,12 @@ fn zeros_of_sessions(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Para
         }
         zeros.push(zero);
     }
-    zeros
+    if is_another_one(&zeros) { zeros } else { Vec::new() }
+}
+
+/// Whether the zero of a session is known to be another one: what the laws leave may pass for one that is hardly there.
+fn is_another_one(zeros: &[Parameter]) -> bool {
+    zeros.iter().any(|zero| zero.value.abs() > SIZE_KNOWN * zero.std)
 }
 
 /// Whether a zero moves by one tooth pitch or several, as well as it is known: then teeth may have skipped while nobody recorded.
@@ -686,6 +691,13 @@ mod tests {
         };
         assert!(in_the_dark(false));
         assert!(!in_the_dark(true));
+    }
+
+    #[test]
+    fn a_zero_that_is_hardly_told_from_that_of_the_first_session_is_none() {
+        let zeros = |values: [f64; 3]| values.map(|value| Parameter { value, std: 4.6 });
+        assert!(!is_another_one(&zeros([0.0, -15.0, -15.5])));
+        assert!(is_another_one(&zeros([0.0, -15.0, 130.0])));
     }
 
     #[test]

@@ -53,3 +53,56 @@ pub(super) fn tell(recording: &mut Recording, zeros: &[Parameter]) {
     });
     recording.faults.sort_by_key(|fault| (fault.first_line, fault.name));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurement::Session;
+
+    fn recording() -> Recording {
+        let session = |k: u64| Session {
+            line: (100 * k..100 * k + 50).collect(),
+            generator_rad: vec![0.0; 50],
+            error_rad: vec![0.0; 50],
+            ..Session::default()
+        };
+        Recording {
+            file: "made.csv".into(),
+            rows: 150,
+            sessions: (0..3).map(session).collect(),
+            faults: Vec::new(),
+            tooth_steps: Vec::new(),
+            notes: Vec::new(),
+            unusable: None,
+        }
+    }
+
+    fn zeros(values: [f64; 3]) -> Vec<Parameter> {
+        values.map(|value| Parameter { value, std: 0.4 }).to_vec()
+    }
+
+    #[test]
+    fn the_zero_of_every_session_is_told_with_what_was_taken_off_it_before() {
+        let mut two_far = recording();
+        two_far.sessions[2].own_zero = true;
+        two_far.sessions[2].zero_off_rad = 2000.0 / ARCSEC_PER_RAD;
+        tell(&mut two_far, &zeros([0.0, 120.5, -3.25]));
+        let [fault] = two_far.faults.as_slice() else { panic!("{:?}", two_far.faults) };
+        assert_eq!((fault.name, fault.first_line, fault.last_line), (FaultName::PositionJump, 100, 249));
+        assert!(fault.what.contains("+120.5, +1996.8 arcsec"), "{}", fault.what);
+        assert!((fault.size_arcsec.unwrap() - 1996.75).abs() < 1e-9);
+        assert!(two_far.sessions[1].own_zero && !two_far.sessions[0].own_zero);
+    }
+
+    #[test]
+    fn zeros_that_a_log_says_itself_are_no_fault() {
+        let mut guided = recording();
+        guided.sessions[1].own_zero = true;
+        guided.sessions[2].own_zero = true;
+        tell(&mut guided, &zeros([0.0, 120.5, -3.25]));
+        assert!(guided.faults.is_empty());
+        let mut none = recording();
+        tell(&mut none, &[]);
+        assert!(none.faults.is_empty() && !none.sessions[1].own_zero);
+    }
+}

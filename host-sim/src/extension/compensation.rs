@@ -109,6 +109,7 @@ pub fn split(sessions: &[Session]) -> (Vec<Session>, Vec<bool>) {
                 zero_off_rad: session.zero_off_rad,
                 unsure_s: session.unsure_s,
                 coarse_rad: session.coarse_rad,
+                mean_over_s: session.mean_over_s,
             }
         };
         parts.extend([cut(0, at), cut(at, session.len())]);

@@ -42,6 +42,7 @@ impl Session {
             zero_off_rad: self.zero_off_rad,
             unsure_s: self.unsure_s,
             coarse_rad: self.coarse_rad,
+            mean_over_s: self.mean_over_s,
         }
     }
 

@@ -38,6 +38,8 @@ pub enum FaultName {
     TorqueZero,
     /// The count of an angle leaps by whole turns, or its zero is another one from a session on.
     PositionJump,
+    /// Rows are means over some time.
+    AveragedRows,
 }
 
 impl FaultName {
@@ -60,6 +62,7 @@ impl FaultName {
             FaultName::TorqueScale => "torque_scale",
             FaultName::TorqueZero => "torque_zero",
             FaultName::PositionJump => "position_jump",
+            FaultName::AveragedRows => "averaged_rows",
         }
     }
 
@@ -93,6 +96,9 @@ impl FaultName {
             }
             FaultName::TorqueScale => "log the torque at the output of this drive, in N.m",
             FaultName::TorqueZero => "set the torque sensor to zero while the output bears no load, warm as in use",
+            FaultName::AveragedRows => {
+                "log what is read at one instant, or take means over less time than the output takes to its other flank"
+            }
             FaultName::PositionJump => "log the position unwrapped, and keep its zero from session to session",
         }
     }
@@ -156,7 +162,7 @@ pub struct Measures {
     /// The logger stands still after every so many rows, none where it does so irregularly; or a channel has a new value in one of so many rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_rows: Option<u64>,
-    /// For so long (median), ms.
+    /// For so long (median), ms; or the time over which a row is a mean.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_ms: Option<f64>,
     /// Turns of the motor, with the sign of what the generator's angle lacks; the largest of several.

@@ -68,6 +68,8 @@ pub struct Session {
     pub unsure_s: f64,
     /// Step of the resolution at the output where no noise blurs it, rad; else 0.
     pub coarse_rad: f64,
+    /// Time over which a row is a mean, s; 0 where it is read at one instant.
+    pub mean_over_s: f64,
 }
 
 impl Session {
@@ -301,6 +303,7 @@ fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
         zero_off_rad: 0.0,
         unsure_s: 0.0,
         coarse_rad: 0.0,
+        mean_over_s: 0.0,
     };
     let starts: Vec<usize> = (1..log.session.len()).filter(|row| log.session[*row] != log.session[*row - 1]).collect();
     // From the last session to the first, so that each is cut off the end.

@@ -144,6 +144,10 @@ const fn fault_parameters(fault: FaultName) -> (&'static str, &'static [Paramete
             "the generator's angle leaps by whole turns",
             const { &[number(Name::Turns, "by how many", -1e5, 1e5, Value(16.0)), TIME] },
         ),
+        FaultName::AveragedRows => (
+            "each row is the mean of those about it",
+            const { &[number(Name::DurationS, "over so long", 0.0, 10.0, Value(0.06))] },
+        ),
     }
 }
 
@@ -151,7 +155,7 @@ const fn fault_parameters(fault: FaultName) -> (&'static str, &'static [Paramete
 const CAME_LATER: [ParameterName; 1] = [ParameterName::DeeperArcsec];
 
 /// Data faults in the order of lists.
-const FAULTS: [FaultName; 15] = [
+const FAULTS: [FaultName; 16] = [
     FaultName::EncoderIndexJump,
     FaultName::FrozenChannel,
     FaultName::MissingSamples,
@@ -167,6 +171,7 @@ const FAULTS: [FaultName; 15] = [
     FaultName::TorqueScale,
     FaultName::TorqueZero,
     FaultName::PositionJump,
+    FaultName::AveragedRows,
 ];
 
 /// Everything that can be asked for: the causes of the library, then data faults.

@@ -144,6 +144,25 @@ fn spoil(rows: &mut Vec<[f64; 6]>, fault: FaultName, effect: &Chosen, random: &m
             let (time, off) = (v(Name::TimeS), TAU * v(Name::Turns).round());
             rows.iter_mut().filter(|row| row[TIME] >= time).for_each(|row| row[1] += off);
         }
+        FaultName::AveragedRows => average(rows, 0.5 * v(Name::DurationS)),
+    }
+}
+
+/// Makes angles and torque of each row the mean of those about it, no farther than so long: over a gap no row reaches.
+fn average(rows: &mut [[f64; 6]], half_s: f64) {
+    let read = rows.to_vec();
+    let (mut from, mut to) = (0, 0);
+    for row in rows.iter_mut() {
+        let time = row[TIME];
+        while read[from][TIME] < time - half_s - 1e-9 {
+            from += 1;
+        }
+        while to < read.len() && read[to][TIME] <= time + half_s + 1e-9 {
+            to += 1;
+        }
+        for column in 1..=TORQUE {
+            row[column] = read[from..to].iter().map(|row| row[column]).sum::<f64>() / (to - from) as f64;
+        }
     }
 }
 

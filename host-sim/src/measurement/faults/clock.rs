@@ -6,12 +6,26 @@ use super::{Findings, span};
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::log::Log;
-use crate::measurement::robust::{median_and_std, median_of, quantile_of, sampled};
+use crate::measurement::robust::{least_and_most, median_and_std, median_of, quantile_of, sampled};
 
 /// A gap longer than so many sample periods starts a new session.
 pub const SESSION_GAP_PERIODS: f64 = 10.0;
 /// A step of time above so many periods, jitter aside, has a row missing in it: half way between one lost row and none.
 const LOST_ROW_PERIODS: f64 = 1.5;
+/// A gap of up to so many periods that begins a session may be one of rows that were lost: where the motion goes on over it. *Guess*.
+const LONGEST_HOLE_PERIODS: f64 = 100.0;
+/// The motion goes on where the generator turns over the gap as it does on either side, within this share of the faster pace, and this, rad. *Guess*.
+const GOES_ON: (f64, f64) = (0.3, 0.05);
+/// Rows on either side that say the pace there.
+const PACE_ROWS: usize = 3;
+/// In a column that wraps an angle says nothing that may be off by more than this, rad.
+const WRAPS_RAD: f64 = 1.5;
+/// Of the gaps that may be such holes this share is, with the generator in motion: then those are, too, in which it stands, starts or turns round.
+/// *Guess*.
+const HOLES_IN_MOTION: f64 = 0.5;
+/// The median of many steps scatters by so many times what their mean does (√(π/2) of normal ones, *Source*), and is known to so many of that.
+const MEDIAN_TO_MEAN_STD: f64 = 1.253;
+const MEDIAN_STDS: f64 = 2.0;
 /// Where more steps than this are that long, rows are not evenly spaced by intent, and none is missing.
 const UNEVEN_SHARE: f64 = 0.05;
 /// Where more steps than this are zero, the clock is coarse; where fewer, rows are repeated.
@@ -204,7 +218,18 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
     });
     // Stamps that jitter make single steps long; rows are missing only where the stamps of a whole session count more periods than rows.
     let counts: Vec<Counted> = counted(log, period).collect();
-    let lacking = counts.iter().map(|count| count.lacking).sum::<u64>().saturating_sub(strays.len() as u64);
+    let near_stray = |row: usize| strays.iter().any(|line| line.abs_diff(log.line[row]) <= 2);
+    let holes: Vec<(usize, u64)> = holes(log, &parts, period).into_iter().filter(|hole| !near_stray(hole.0)).collect();
+    // The median step may be shorter than the period that a clock keeps on the mean: no more are missing than its time over that says, as well as
+    // the median is known.
+    let unsure = MEDIAN_STDS * MEDIAN_TO_MEAN_STD * jitter / period / (rows as f64).sqrt();
+    let within = counts.iter().map(|Counted { rows, lacking, .. }| {
+        let beyond = (time[rows.end - 1] - time[rows.start]) / period - (rows.len() as f64 - 1.0);
+        let is_borne_out = *lacking as f64 <= beyond + unsure * rows.len() as f64;
+        if is_borne_out { *lacking } else { beyond.max(0.0).round() as u64 }
+    });
+    let within = within.sum::<u64>();
+    let lacking = within.saturating_sub(strays.len() as u64);
     if jitter > SCATTERS * period {
         let beyond = |count: &Counted, k: usize| count.period[k] - count.period[k - 1] - 1;
         let of = |count: &Counted| -> Vec<(usize, u64)> {
@@ -215,14 +240,28 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
         };
         lost = counts.iter().flat_map(of).collect();
     }
-    let total = lost.iter().map(|(_, rows)| *rows).sum::<u64>().min(lacking);
+    let in_steps = lost.iter().map(|(_, rows)| *rows).sum::<u64>().min(lacking);
+    let in_holes = holes.iter().map(|(_, rows)| *rows).sum::<u64>();
+    let total = in_steps + in_holes;
+    let places = lost.len().min(in_steps as usize) + holes.len();
+    lost.retain(|_| in_steps > 0);
+    lost.extend(&holes);
+    lost.sort_unstable();
     if let (Some(&(first, _)), Some(&(last, _)), 1..) = (lost.first(), lost.last(), total) {
         if long_steps as f64 <= UNEVEN_SHARE * rows as f64 {
             let mut fault = span(log, FaultName::MissingSamples, first, last);
             (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), total, Treatment::Kept);
+            let breaks = match holes.len() {
+                0 => String::new(),
+                1 => format!(
+                    "; one gap, of {in_holes} of them, is so long that a session begins behind it, though the motion goes on"
+                ),
+                n => format!(
+                    "; {n} gaps, with {in_holes} of them, are so long that a session begins behind each, though the motion goes on"
+                ),
+            };
             fault.what = format!(
-                "{total} rows are missing, in up to {} places: time goes on by more than {LOST_ROW_PERIODS} of the usual {period:.6} s",
-                lost.len().min(total as usize)
+                "{total} rows are missing, in up to {places} places: time goes on by more than {LOST_ROW_PERIODS} of the usual {period:.6} s{breaks}"
             );
             findings.faults.push(fault);
         } else {
@@ -244,6 +283,49 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
         }
         log.session = session;
     }
+}
+
+/// Of gaps that begin a session those in which rows were lost, for the motion goes on over them, and how many: the row behind each.
+fn holes(log: &Log, parts: &[usize], period: f64) -> Vec<(usize, u64)> {
+    let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else {
+        return Vec::new();
+    };
+    let (low, high) = least_and_most(generator.iter().copied());
+    let wraps = high - low <= TAU * (1.0 + 1e-6);
+    // The pace over some rows without a gap, rad/s.
+    let pace = |rows: std::ops::Range<usize>| {
+        let (from, to) = (rows.start, rows.end - 1);
+        let gap =
+            (from + 1..=to).any(|row| !log.continues(row) || time[row] - time[row - 1] > SESSION_GAP_PERIODS * period);
+        let turned =
+            (from + 1..=to).map(|row| if wraps { turned(generator, row) } else { generator[row] - generator[row - 1] });
+        (to > from && !gap).then(|| turned.sum::<f64>() / (time[to] - time[from]))
+    };
+    let short = parts.iter().copied().filter(|row| time[*row] - time[*row - 1] <= LONGEST_HOLE_PERIODS * period);
+    let mut of_gaps = 0_usize;
+    // Those over which the motion may go on, and whether it plainly does.
+    let mut found: Vec<(usize, u64, bool)> = Vec::new();
+    for row in short {
+        of_gaps += 1;
+        let before = pace(row.saturating_sub(PACE_ROWS)..row);
+        let after = pace(row..(row + PACE_ROWS).min(log.len()));
+        let Some((before, after)) = before.zip(after) else { continue };
+        let dt = time[row] - time[row - 1];
+        let off = generator[row] - generator[row - 1] - 0.5 * (before + after) * dt;
+        let off = if wraps { off - TAU * (off / TAU).round() } else { off };
+        let way = before.abs().max(after.abs()) * dt;
+        let may_be_off = GOES_ON.0 * way + GOES_ON.1;
+        if off.abs() <= way + GOES_ON.1 {
+            let there = log.line[row] - log.line[row - 1];
+            let rows = ((dt / period).round() as u64).saturating_sub(there);
+            let plainly = off.abs() <= may_be_off && way > 2.0 * GOES_ON.1 && !(wraps && may_be_off > WRAPS_RAD);
+            found.push((row, rows, plainly));
+        }
+    }
+    let in_motion = found.iter().filter(|hole| hole.2).count();
+    let all = in_motion > 0 && in_motion as f64 >= HOLES_IN_MOTION * of_gaps as f64;
+    found.retain(|(_, rows, plainly)| *rows > 0 && (*plainly || all));
+    found.into_iter().map(|(row, rows, _)| (row, rows)).collect()
 }
 
 /// The rows of a session by the periods that its stamps count.
@@ -416,6 +498,36 @@ mod tests {
                 assert!(found <= lost as u64 && found + 2 >= lost as u64, "seed {seed}: {found} of {lost}");
             }
         }
+    }
+
+    #[test]
+    fn rows_lost_in_long_gaps_are_told_where_the_motion_goes_on_and_sessions_are_none() {
+        // Holes of 3, 25 and 40 rows, and a session that begins a minute later.
+        let mut found = log(12_000, |row| {
+            let lost =
+                [(1500, 3), (2500, 40), (4000, 40), (5200, 25)].iter().any(|(at, n)| (*at..at + n).contains(&row));
+            (!lost).then_some(0.002 * row as f64 + if row >= 7000 { 60.0 } else { 0.0 })
+        });
+        assert_eq!(missing(found.clone()), 108);
+        // A bench that stands between its runs, and logs nothing then.
+        let rests = |row: usize| f64::from(u8::try_from(row / 3000).unwrap_or(9));
+        found = log(12_000, |row| Some(0.002 * row as f64 + 0.1 * rests(row)));
+        assert_eq!(missing(found), 0);
+    }
+
+    #[test]
+    fn no_more_rows_are_missing_than_the_median_step_leaves_room_for() {
+        // Stamps of a clock that takes most steps a little short and makes up for it.
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut t = 0.0;
+        let stamped = log(20_000, |row| {
+            let drawn = random.f64();
+            t += 0.002 * if drawn < 0.04 { 1.62 } else { 0.985 + 0.01 * drawn };
+            (row % 1000 != 500).then_some(t)
+        });
+        let time = stamped.get(Quantity::Time).unwrap();
+        let room = (time[time.len() - 1] - time[0]) / period(&stamped).unwrap() - (time.len() as f64 - 1.0);
+        assert!(missing(stamped.clone()) as f64 <= room.max(0.0) + 3.0, "{room}");
     }
 
     #[test]

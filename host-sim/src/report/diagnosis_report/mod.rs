@@ -166,6 +166,7 @@ fn thinned(session: &Session, every: usize) -> Session {
         zero_off_rad: session.zero_off_rad,
         unsure_s: session.unsure_s,
         coarse_rad: session.coarse_rad,
+        mean_over_s: session.mean_over_s,
     }
 }
 

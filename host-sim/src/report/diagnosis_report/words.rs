@@ -111,6 +111,7 @@ pub(super) fn fault(name: FaultName) -> &'static str {
         FaultName::TorqueScale => "torque of another shaft, unit or origin",
         FaultName::TorqueZero => "zero of the torque sensor",
         FaultName::PositionJump => "a position that jumps",
+        FaultName::AveragedRows => "rows that are means",
     }
 }
 
