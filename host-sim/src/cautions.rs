@@ -42,7 +42,7 @@ pub struct Looked {
     pub room_as_built_arcsec: Option<f64>,
     /// Largest von Mises stress at a node, MPa.
     pub max_von_mises_mpa: Option<f64>,
-    /// Largest pressure between flanks, MPa.
+    /// Largest pressure between flanks, MPa, as Hertz has it and the limit means it.
     pub peak_flank_pressure_mpa: Option<f64>,
     /// Bound of the slope of the error over the generator's motion.
     pub slope_bound: Option<f64>,

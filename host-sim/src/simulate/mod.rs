@@ -909,6 +909,25 @@ mod tests {
         assert!((small_elastic / elastic - 1.0).abs() < 0.01, "{small_elastic} {elastic}");
     }
 
+    /// The pressure between flanks is a result of forces and shapes: as stiff as the penalty is, and as large as the drive, it is the same.
+    #[test]
+    fn flanks_press_alike_whatever_the_penalty_and_the_scale() {
+        let of = |scale: f64, flank_penalty: f64| {
+            let mut settings = SimulationSettings { torque_n_m: 100.0 * scale.powi(3), ..coarse(points(&[0.0])) };
+            settings.solver.flank_penalty = flank_penalty;
+            simulate(&at_scale(scale), &settings, &mut |_| ControlFlow::Continue(()))
+                .unwrap()
+                .summary
+                .peak_flank_pressure_mpa
+        };
+        let usual = of(1.0, 5e7);
+        assert!((300.0..900.0).contains(&usual), "{usual}");
+        for (scale, penalty) in [(1.0, 5e6), (1.0, 5e8), (0.3, 5e7), (3.0, 5e7)] {
+            let other = of(scale, penalty);
+            assert!((other / usual - 1.0).abs() < 0.05, "{scale} {penalty}: {other} {usual}");
+        }
+    }
+
     #[test]
     fn a_path_by_points_has_a_row_for_each_and_crosses_its_clearance_at_a_reversal() {
         let there: Vec<f64> = (0..=10).map(|i| 0.01 * f64::from(i)).collect();
