@@ -61,7 +61,7 @@ fn a_run_writes_the_columns_and_fields_that_others_rely_on() {
     // At no load the output lags by half the clearance, under a forward load it leads.
     assert!(rows[2][3] < -20.0 && rows[3][3] > 20.0, "{rows:?}");
     let pressure = header.split(',').position(|name| name == "peak_flank_pressure_mpa").unwrap();
-    assert!(rows[3][5] >= 2.0 && rows[3][pressure] > 2.0 * rows[2][pressure], "{rows:?}");
+    assert!(rows[3][5] >= 2.0 && rows[3][pressure] > 1.5 * rows[2][pressure], "{rows:?}");
 
     let summary: Value = serde_json::from_str(&desk.read("out/summary.json")).unwrap();
     assert_eq!(run.json(), summary, "--json prints what it writes");
@@ -272,7 +272,7 @@ fn teeth_that_interfere_and_stress_that_no_steel_bears_are_said() {
     let binds = format!("{base} --set circular_spline.profile_shift=2.95");
     let cautions = desk.line(&format!("{binds} --json")).done().json()["cautions"].clone();
     let figures: Vec<&str> = cautions.as_array().unwrap().iter().map(|c| c["figure"].as_str().unwrap()).collect();
-    assert_eq!(figures, ["rigid_gap_um", "max_von_mises_mpa", "peak_flank_pressure_mpa"]);
+    assert_eq!(figures, ["rigid_gap_um", "max_von_mises_mpa"]);
     let text = desk.line(&binds).done().stdout;
     assert!(text.contains("caution: the teeth of the drawing interfere by 8.9 um"), "{text}");
     let tables = "tables --generator cam --mesh coarse --torque-n-m 20 --most-nodes 5 --positions 4 --temperatures-c 20 \

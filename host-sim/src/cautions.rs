@@ -46,7 +46,7 @@ pub struct Looked {
     /// Largest von Mises stress in the root fillets by the strain of their surface, MPa. In a fillet the nodal value of a mesh is too low, by a
     /// third and more; on bore and flanks it is all there is. So the larger of both is looked at.
     pub root_fillet_mpa: Option<f64>,
-    /// Largest pressure between flanks, MPa.
+    /// Largest pressure between flanks, MPa, as Hertz has it and the limit means it.
     pub peak_flank_pressure_mpa: Option<f64>,
     /// Bound of the slope of the error over the generator's motion.
     pub slope_bound: Option<f64>,

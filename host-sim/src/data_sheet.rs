@@ -12,6 +12,7 @@ use serde::Serialize;
 use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
 use crate::drive::{Drive, GeneratorKind};
 use crate::motion::Motion;
+use crate::pitch_wave::peak_to_peak;
 use crate::simulate::peak_stress;
 use crate::stepping::{Problem, SolveError, SolverSettings};
 use crate::units::ARCSEC_PER_RAD;
@@ -109,7 +110,8 @@ pub struct DataSheet {
     pub k3_n_m_per_rad: Option<f64>,
     /// Turn of the output from first contact to the largest load, arcsec.
     pub wind_up_arcsec: Option<f64>,
-    /// Kinematic error over a tooth pitch under the largest load, peak to peak, arcsec.
+    /// Kinematic error over a tooth pitch under the largest load, peak to peak, arcsec: of the wave through the positions, of a drive that repeats
+    /// with the pitch.
     pub kinematic_error_pp_arcsec: Option<f64>,
     /// Largest von Mises stress under the largest load, MPa: a nodal value, which grows with the mesh at roots and contacts.
     pub max_von_mises_mpa: Option<f64>,
@@ -290,14 +292,17 @@ fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize
 
     motion.settle(motion.pitch() / positions as f64)?;
     let places = motion.turn_in(motion.pitch(), positions)?;
-    let (low, high) = places
-        .iter()
-        .map(|place| place.error_arcsec)
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), error| (low.min(error), high.max(error)));
+    let errors: Vec<f64> = places.iter().map(|place| place.error_arcsec).collect();
     let most = |of: fn(&crate::stepping::Increment) -> f64| {
         places.iter().map(|place| of(&place.increment)).fold(0.0, f64::max)
     };
-    sheet.kinematic_error_pp_arcsec = Some(high - low);
+    sheet.kinematic_error_pp_arcsec = Some(if drive.as_built.first_not_uniform().is_none() {
+        peak_to_peak(&errors)
+    } else {
+        let (low, high) =
+            errors.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
+        high - low
+    });
     sheet.peak_flank_pressure_mpa = Some(most(|increment| increment.peak_pressure_mpa[0]));
     sheet.peak_generator_pressure_mpa = Some(most(|increment| increment.peak_pressure_mpa[1]));
     sheet.lobe_force_n = Some(most(|increment| increment.lobe_force_n));

@@ -57,6 +57,7 @@ pub mod look;
 pub mod measurement;
 pub mod nominal;
 pub mod output;
+pub mod pitch_wave;
 mod progress;
 pub mod report;
 pub mod reproduce;

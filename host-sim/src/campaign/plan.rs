@@ -15,7 +15,7 @@ use super::model::{Model, Parabola, Response, SHEET, displaces};
 use super::tolerance::{Acts, Tolerance, Tolerances};
 use crate::data_sheet::{FIGURES, Loads, data_sheet};
 use crate::drive::{Drive, GeneratorKind};
-use crate::kernels::{KernelPlan, Kernels, make};
+use crate::kernels::{KernelError, KernelPlan, Kernels, make};
 use crate::mesh::MeshLevel;
 use crate::stepping::{Method, SolveError, SolverSettings};
 
@@ -29,8 +29,11 @@ const OUTER_SHARE: f64 = 0.05;
 const LIGHT: [f64; 2] = [0.04, 0.5];
 /// Positions over the tooth pitch of a data sheet.
 const SHEET_POSITIONS: usize = 4;
-/// Displacement and directions of kernels that no tolerance asks for: the fewest there may be.
-const UNUSED: (f64, usize) = (10.0, 4);
+/// Share of the drives whose displacements kernels must reach. Where teeth wedge further out, as they may at limits that one drive in millions meets,
+/// kernels go on as they ended, and `reduce` counts the drives beyond.
+const NEARLY_ALL: f64 = 0.99;
+/// Displacement (µm for a millimetre of module) and directions of kernels that no tolerance asks for: the fewest there may be.
+const UNUSED: (f64, usize) = (20.0, 4);
 
 /// What to plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -136,7 +139,7 @@ pub fn plan(of: &Tolerances, settings: PlanSettings, progress: &PlanProgress<'_>
             progress(before + done, steps, &format!("kernels, {kind}"));
             ControlFlow::Continue(())
         })
-        .map_err(|error| PlanError::Failed(format!("{kind}: kernels: {error}")))?;
+        .map_err(|error| kernels_failed(of, *kind, &error))?;
         before += kernel_plan(*kind).steps();
         let at = Conditions { kind: *kind, temperature_c: of.temperature_c, torque_n_m: torques_n_m[0], solver };
         let response =
@@ -177,21 +180,39 @@ fn with_alike(of: &Tolerances, drawn: &Drawn) -> Result<Drive, PlanError> {
 
 /// Kernels at the loads of the campaign, and displacements as far as its tolerances go.
 fn kernel_plan(of: &Tolerances, kind: GeneratorKind, [torque, light]: [f64; 2]) -> KernelPlan {
-    let usual = KernelPlan::for_generator(kind);
+    let usual = KernelPlan::for_drive(&of.drive, kind);
     let reach: f64 = of.list.iter().filter(|t| displaces(t)).map(|t| t.distribution.limits[1]).sum();
     let (sizes_um, directions) = if reach > 0.0 {
-        let enough = usual.sizes_um.iter().position(|size| *size >= reach).unwrap_or(usual.sizes_um.len() - 1);
-        (usual.sizes_um[..=enough].to_vec(), usual.directions)
+        (usual.sizes_to(reach), usual.directions)
     } else {
-        (vec![UNUSED.0], UNUSED.1)
+        (vec![UNUSED.0 * of.drive.flexspline.module_mm], UNUSED.1)
     };
+    let nearly_all = |t: &Tolerance| t.distribution.quantile(NEARLY_ALL);
     KernelPlan {
         torques_n_m: vec![light, torque],
         sizes_um,
+        enough_um: Some(of.list.iter().filter(|t| displaces(t)).map(nearly_all).sum()),
         directions,
         temperature_c: Some(of.temperature_c),
         ..usual
     }
+}
+
+/// What is told of kernels that failed: the tolerances that ask for a displacement, and what to do about them.
+fn kernels_failed(of: &Tolerances, kind: GeneratorKind, error: &KernelError) -> PlanError {
+    let KernelError::Displaced { reached_um, .. } = error else {
+        return PlanError::Failed(format!("{kind}: kernels of the drive as drawn: {error}"));
+    };
+    let told = |t: &Tolerance| {
+        let most = t.distribution.quantile(NEARLY_ALL);
+        format!("{} (99 of 100 drives up to {most:.1} um)", t.field)
+    };
+    let which: Vec<String> = of.list.iter().filter(|t| displaces(t)).map(told).collect();
+    PlanError::Failed(format!(
+        "{kind}: {}: {error}. The teeth wedge: give narrower limits (limits = [0, {reached_um:.3}] together), or the drive more clearance \
+         (flanks.preload_um below 0), or a generator bearing that yields (generator.bearing_stiffness_n_per_mm3)",
+        which.join(" and ")
+    ))
 }
 
 /// State of the middle drive, and a parabola for each tolerance of something alike everywhere.
@@ -338,5 +359,34 @@ impl Plan {
     /// Teeth of flexspline and circular spline.
     pub fn teeth(&self) -> [u32; 2] {
         self.generators.first().map_or([0; 2], |one| one.kernels.teeth)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Who is told that teeth wedge has to know which line of the file to change, and to what.
+    #[test]
+    fn kernels_that_fail_name_the_tolerance_and_how_far_it_may_go() {
+        let text = "drive = \"HHD-95\"\ngenerator = \"cam\"\ntorque_n_m = 5\n[[tolerance]]\n\
+                    field = \"as_built.circular_spline_eccentricity_um\"\ndistribution = \"rayleigh\"\nstd = 5\n";
+        let of = Tolerances::read("t.toml", text, |name| Drive::built_in(name).ok_or_else(String::new)).unwrap();
+        let reason = SolveError::NotConverged {
+            generator_rad: 0.0,
+            torque_n_m: 0.0,
+            reached_n_m: 0.0,
+            reason: "the iterations ran out",
+            history: Vec::new(),
+        };
+        let error = KernelError::Displaced { size_um: 27.5, reached_um: 17.0, reason };
+        let told = kernels_failed(&of, GeneratorKind::Cam, &error).to_string();
+        for words in [
+            "as_built.circular_spline_eccentricity_um (99 of 100 drives up to 15.2 um)",
+            "limits = [0, 17",
+            "27.5 um beside its axis",
+        ] {
+            assert!(told.contains(words), "{words}: {told}");
+        }
     }
 }

@@ -71,7 +71,7 @@ impl KernelsCommand {
         let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
         let out = context.out()?;
         let progress = Mutex::new(context.progress("kernels"));
-        let plans: Vec<KernelPlan> = kinds.iter().map(|kind| KernelPlan::for_generator(*kind)).collect();
+        let plans: Vec<KernelPlan> = kinds.iter().map(|kind| KernelPlan::for_drive(&drive, *kind)).collect();
         let steps: usize = plans.iter().map(KernelPlan::steps).sum();
         let mut before = 0;
         let mut told = Vec::new();
@@ -86,7 +86,7 @@ impl KernelsCommand {
             .map_err(|error| match error {
                 KernelError::NotIdeal { .. } => Failure::BadInput(error.to_string()),
                 KernelError::Stopped => Failure::Failed("stopped; nothing was written".into()),
-                KernelError::Solve(_) => Failure::Failed(format!("{kind}: {error}")),
+                KernelError::Solve(_) | KernelError::Displaced { .. } => Failure::Failed(format!("{kind}: {error}")),
             })?;
             let path = out.join(format!("{kind}.kernels.json"));
             outputs.json(&path, &kernels)?;

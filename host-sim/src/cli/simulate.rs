@@ -53,7 +53,7 @@ pub(super) struct Simulate {
     /// (settled, then one turn), or a CSV file
     #[arg(long, value_name = "paper|pitch|turn|FILE", default_value = "paper", value_hint = ValueHint::FilePath)]
     path: String,
-    /// Largest increment of the generator, rad [default: 0.01 on paper, an eighth of a tooth pitch on pitch and turn]
+    /// Largest increment of the generator, rad [default: 0.01 on paper, 1/24 of a tooth pitch on pitch, 1/8 on turn]
     #[arg(long, value_name = "RAD", allow_negative_numbers = true)]
     increment: Option<f64>,
     /// Which way pitch and turn go [default: forward]
@@ -88,7 +88,7 @@ pub(super) struct ModelOptions {
     /// Solver: fast condenses the teeth onto the nodes that touch something, reference keeps every node; they agree to 0.1 arcsec
     #[arg(long, value_name = "SOLVER", default_value = "fast", value_parser = names::solver(), hide_possible_values = true)]
     pub(super) solver: Method,
-    /// Contact penalty on the flanks, N/mm^3
+    /// Contact penalty on the flanks, N/mm^3; the pressure that is told is found from the forces and does not hang on it
     #[arg(long, value_name = "K", default_value_t = SolverSettings::default().flank_penalty, allow_negative_numbers = true, help_heading = "Numerical method")]
     flank_penalty: f64,
     /// Contact penalty on the bore, N/mm^3 [default: 1e7 under rollers, 1e6 under discs and cam]

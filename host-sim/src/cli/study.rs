@@ -82,8 +82,8 @@ pub(super) struct StudyCommand {
     /// A figure of which more is better [default: k2_n_m_per_rad]
     #[arg(long, value_name = "FIGURE")]
     most: Vec<String>,
-    /// Positions over the tooth pitch, 4 to 32
-    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u8).range(4..=32))]
+    /// Positions over the tooth pitch, 4 to 32: fewer take less time, and see less of the transmission error
+    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u8).range(4..=32))]
     positions: u8,
     /// Compute every variant, however many there are [default: estimate most of many]
     #[arg(long)]

@@ -200,6 +200,8 @@ impl Tables {
         let settings = SimulationSettings {
             torque_n_m: table.info.torque_nodes_n_m.iter().copied().map(f64::from).fold(0.0, f64::max),
             solver: SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() },
+            // Stress needs no more places.
+            increment_rad: Some(std::f64::consts::TAU / f64::from(drive.flexspline.teeth) / 8.0),
             ..SimulationSettings::new(table.kind, Path::Pitch)
         };
         let run = simulate(drive, &settings, &mut |_| ControlFlow::Continue(())).map_err(refused_or_failed)?;

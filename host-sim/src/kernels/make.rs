@@ -12,7 +12,7 @@ use crate::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
 use crate::drive::{AsBuilt, Drive, GeneratorKind, Side};
 use crate::mesh::rotate;
 use crate::motion::Motion;
-use crate::stepping::{Problem, SolveError, SolverSettings, State};
+use crate::stepping::{Problem, SolveError, Solver, SolverSettings, State};
 use crate::units::ARCSEC_PER_RAD;
 
 /// What to compute.
@@ -22,6 +22,9 @@ pub struct KernelPlan {
     pub torques_n_m: Vec<f64>,
     /// Displacements of the circular spline, µm, ascending.
     pub sizes_um: Vec<f64>,
+    /// Displacement up to which there must be an equilibrium, µm: sizes beyond it are left out from the first that has none. Without it there
+    /// must be one at all sizes.
+    pub enough_um: Option<f64>,
     /// Directions of the displacement over half a turn (a turn, where only that repeats).
     pub directions: usize,
     /// Samples to a tooth pitch.
@@ -42,10 +45,39 @@ impl KernelPlan {
         KernelPlan {
             torques_n_m: [0.0025, 0.0075].map(|share| share * largest).into_iter().chain(even).collect(),
             sizes_um: vec![2.5, 5.0, 7.0, 9.0, 12.0, 17.0, 30.0],
+            enough_um: None,
             directions: 19,
             positions: 8,
             temperature_c: None,
         }
+    }
+
+    /// The same for a drive: loads as it is rated, displacements in terms of its module.
+    #[must_use]
+    pub fn for_drive(drive: &Drive, kind: GeneratorKind) -> KernelPlan {
+        let usual = KernelPlan::for_generator(kind);
+        let load = drive.rated_torque_n_m(kind) / kind.rated_torque_n_m();
+        let size = drive.flexspline.module_mm / Drive::hhd_95().flexspline.module_mm;
+        KernelPlan {
+            torques_n_m: usual.torques_n_m.iter().map(|torque| load * torque).collect(),
+            sizes_um: usual.sizes_um.iter().map(|um| size * um).collect(),
+            ..usual
+        }
+    }
+
+    /// Displacements of this plan as far as `reach_um`, and where they do not go so far, on to it.
+    #[must_use]
+    pub fn sizes_to(&self, reach_um: f64) -> Vec<f64> {
+        let mut sizes = self.sizes_um.clone();
+        if let Some(enough) = sizes.iter().position(|size| *size >= reach_um) {
+            sizes.truncate(enough + 1);
+            return sizes;
+        }
+        while let Some(last) = sizes.last().copied().filter(|last| *last < reach_um) {
+            // What is left of a step of more than half the usual one is one step.
+            sizes.push(if GROWS * GROWS.sqrt() * last < reach_um { GROWS * last } else { reach_um });
+        }
+        sizes
     }
 
     /// Steps that progress counts.
@@ -70,6 +102,18 @@ pub enum KernelError {
     /// The FEM did not converge.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// It did not with the circular spline displaced.
+    #[error(
+        "with the circular spline {size_um:.1} um beside its axis no equilibrium is found ({reason}); the largest displacement that has one is {reached_um:.1} um"
+    )]
+    Displaced {
+        /// Displacement, µm.
+        size_um: f64,
+        /// The largest displacement with an equilibrium, µm.
+        reached_um: f64,
+        /// What the solver says.
+        reason: SolveError,
+    },
     /// The observer asked for it.
     #[error("stopped")]
     Stopped,
@@ -81,6 +125,10 @@ const LOAD_STEP: f64 = 0.04;
 const DRAG_N_M: f64 = 0.02;
 /// Flanks closer than this (mm) may touch.
 const NEAR_MM: f64 = 0.01;
+/// Growth of displacements beyond the usual ones: as the last two of them.
+const GROWS: f64 = 1.8;
+/// Halvings of a growing displacement on the way to one that is not found from nothing.
+const DISPLACEMENT_HALVINGS: usize = 4;
 
 /// Kernels of a drive without deviations that act place by place (uniform wear and temperature may be there). Friction is left out.
 ///
@@ -109,6 +157,8 @@ pub fn make(
     let teeth = [problem.flexspline.teeth, problem.circular_spline.teeth];
     let repeats = if teeth.iter().all(|z| z.is_multiple_of(2)) { 2 } else { 1 };
 
+    // First, since it is where a drive may have no equilibrium.
+    let eccentric = eccentric(&smooth, kind, plan, repeats, settings, &told)?;
     let stepped: Vec<f64> =
         plan.torques_n_m.iter().flat_map(|t| [t * (1.0 - LOAD_STEP), t * (1.0 + LOAD_STEP)]).collect();
     let forces = stepped
@@ -124,7 +174,6 @@ pub fn make(
         .zip(forces.chunks_exact(2))
         .map(|(torque, pair)| pair[0].kernels(&pair[1], *torque, 2.0 * LOAD_STEP * torque, repeats))
         .collect();
-    let eccentric = eccentric(&smooth, kind, plan, repeats, settings, &told)?;
     Ok(Kernels {
         schema_version: KERNELS_SCHEMA,
         generator: kind,
@@ -259,7 +308,7 @@ impl Forces {
 }
 
 /// The drive with its circular spline displaced, deformed afresh for each direction, whole flexspline pitches apart so that the teeth
-/// stand alike, and loaded step by step.
+/// stand alike, and loaded step by step. What a displacement that is too large does is told before the rest is computed.
 fn eccentric(
     drive: &Drive,
     kind: GeneratorKind,
@@ -272,41 +321,137 @@ fn eccentric(
     let pitches = f64::from(drive.circular_spline.teeth) / repeats as f64;
     let whole = |direction: usize| (pitches * direction as f64 / plan.directions as f64).round();
     let temperature_c = plan.temperature_c.unwrap_or(drive.temperature.reference_c);
-    let sizes = [0.0].into_iter().chain(plan.sizes_um.iter().copied());
-    let problems = sizes
-        .map(|size_um| {
-            let as_built = AsBuilt { circular_spline_eccentricity_um: size_um, ..drive.as_built.clone() };
-            Problem::new(&Drive { as_built, ..drive.clone() }, kind, temperature_c, settings)
-        })
-        .collect::<Result<Vec<_>, SolveError>>()?;
+    let problem = |size_um: f64| {
+        let as_built = AsBuilt { circular_spline_eccentricity_um: size_um, ..drive.as_built.clone() };
+        Problem::new(&Drive { as_built, ..drive.clone() }, kind, temperature_c, settings)
+    };
+    let displaced = Displaced {
+        sizes_um: &plan.sizes_um,
+        torques_n_m: &plan.torques_n_m,
+        problem: &problem,
+        stands: AtomicUsize::new(plan.sizes_um.len()),
+        told,
+    };
+    let problems = plan.sizes_um.iter().map(|size| problem(*size)).collect::<Result<Vec<_>, SolveError>>()?;
     // The ideal drive stands alike after whole pitches: once is enough.
-    let runs: Vec<(usize, usize)> = std::iter::once((0, 0))
-        .chain((1..problems.len()).flat_map(|size| (0..plan.directions).map(move |d| (size, d))))
-        .collect();
-    let errors = runs
-        .par_iter()
-        .map(|&(size, direction)| {
-            // Seen from the major axis the axis of a spline displaced towards its angle 0 stands at minus the generator angle.
-            let psi = -whole(direction) * TAU / f64::from(drive.flexspline.teeth);
-            let errors = loaded(&problems[size], psi, &plan.torques_n_m)?;
-            told().map(|()| errors)
-        })
-        .collect::<Result<Vec<_>, KernelError>>()?;
-    let (ideal, displaced) = (&errors[0], &errors[1..]);
-    let deviation_arcsec = displaced
-        .chunks_exact(plan.directions)
+    let ideal = loaded(Motion::deformed_or_turned_in(&problem(0.0)?, 0.0)?, &plan.torques_n_m)?;
+    told()?;
+    let enough = plan.sizes_um.iter().position(|size| plan.enough_um.is_some_and(|enough| *size >= enough));
+    let least = enough.map_or(plan.sizes_um.len(), |k| k + 1);
+    let towards = |direction: usize| {
+        // Seen from the major axis the axis of a spline displaced towards its angle 0 stands at minus the generator angle.
+        let psi = -whole(direction) * TAU / f64::from(drive.flexspline.teeth);
+        let (errors, reason) = displaced.errors(&problems, psi)?;
+        match reason {
+            Some(reason) if errors.len() < least => Err(KernelError::Displaced {
+                size_um: plan.sizes_um[errors.len()],
+                reached_um: errors.len().checked_sub(1).map_or(0.0, |last| plan.sizes_um[last]),
+                reason,
+            }),
+            _ => Ok(errors),
+        }
+    };
+    // [direction][size][load]; the first alone.
+    let first = towards(0)?;
+    let others = (1..plan.directions).into_par_iter().with_max_len(1).map(towards);
+    let others = others.collect::<Result<Vec<_>, KernelError>>()?;
+    let errors: Vec<_> = std::iter::once(first).chain(others).collect();
+    let stands = errors.iter().map(Vec::len).min().unwrap_or(0);
+    let deviation_arcsec = (0..stands)
         .map(|size| {
             (0..plan.torques_n_m.len())
-                .map(|load| size.iter().map(|errors| rounded(errors[load] - ideal[load])).collect())
+                .map(|load| errors.iter().map(|errors| rounded(errors[size][load] - ideal[load])).collect())
                 .collect()
         })
         .collect();
     Ok(Eccentric {
-        sizes_um: plan.sizes_um.clone(),
+        sizes_um: plan.sizes_um[..stands].to_vec(),
         torques_n_m: plan.torques_n_m.clone(),
         directions: plan.directions,
         deviation_arcsec,
     })
+}
+
+/// A circular spline displaced further and further.
+struct Displaced<'a, P> {
+    sizes_um: &'a [f64],
+    torques_n_m: &'a [f64],
+    problem: &'a P,
+    /// So many of the sizes have an equilibrium in the directions looked at so far.
+    stands: AtomicUsize,
+    told: &'a (dyn Fn() -> Result<(), KernelError> + Sync),
+}
+
+/// Errors of each size under each load, arcsec, and why there are no more.
+type Errors = (Vec<Vec<f64>>, Option<SolveError>);
+
+impl<P: Fn(f64) -> Result<Problem, SolveError>> Displaced<'_, P> {
+    /// Errors at a generator angle under the loads, of each size up to the first that has no equilibrium.
+    fn errors(&self, problems: &[Problem], generator_rad: f64) -> Result<Errors, KernelError> {
+        let mut stood: Option<(f64, State)> = None;
+        let mut errors = Vec::new();
+        // Where one size was not found from nothing, those beyond it are not either.
+        let mut from_nothing = true;
+        for (problem, size_um) in problems.iter().zip(self.sizes_um) {
+            if errors.len() >= self.stands.load(Ordering::Relaxed) {
+                break;
+            }
+            let found = if from_nothing { Some(Motion::deformed_or_turned_in(problem, generator_rad)) } else { None };
+            let motion = match (found, &stood) {
+                (None | Some(Err(SolveError::NotConverged { .. })), Some(stood)) => {
+                    from_nothing = false;
+                    self.grown(problem, *size_um, stood)
+                }
+                (Some(found), _) => found,
+                (None, None) => unreachable!("what stands nowhere is sought from nothing"),
+            };
+            let here = motion.and_then(|motion| {
+                stood = Some((*size_um, motion.state().clone()));
+                loaded(motion, self.torques_n_m)
+            });
+            match here {
+                Ok(here) => errors.push(here),
+                Err(reason) if reason.is_bad_input() => return Err(reason.into()),
+                Err(reason) => {
+                    self.stands.fetch_min(errors.len(), Ordering::Relaxed);
+                    return Ok((errors, Some(reason)));
+                }
+            }
+            (self.told)()?;
+        }
+        Ok((errors, None))
+    }
+
+    /// The drive under a displacement, from its state under a smaller one; in parts where one part is too much.
+    fn grown<'p>(
+        &self,
+        problem: &'p Problem,
+        size_um: f64,
+        (from_um, from): &(f64, State),
+    ) -> Result<Motion<'p>, SolveError> {
+        let (mut at_um, mut state) = (*from_um, from.clone());
+        let (mut part, mut halvings) = (size_um - from_um, 0);
+        loop {
+            let last = at_um + part > size_um - 1e-9;
+            let to_um = if last { size_um } else { at_um + part };
+            let between;
+            let here = if last {
+                problem
+            } else {
+                between = (self.problem)(to_um)?;
+                &between
+            };
+            match Solver::new(here).increment(&state, state.generator_rad, state.torque_n_m) {
+                Ok((state, increment)) if last => return Ok(Motion::taken_over(problem, state, increment)),
+                Ok((next, _)) => (at_um, state) = (to_um, next),
+                Err(SolveError::NotConverged { .. }) if halvings < DISPLACEMENT_HALVINGS => {
+                    part *= 0.5;
+                    halvings += 1;
+                }
+                Err(reason) => return Err(reason),
+            }
+        }
+    }
 }
 
 /// To a millionth of an arc-second, which keeps files short.
@@ -314,9 +459,8 @@ fn rounded(arcsec: f64) -> f64 {
     (arcsec * 1e6).round() * 1e-6 + 0.0
 }
 
-/// Error of the drive deformed at a generator angle, under one load after the other, arcsec.
-fn loaded(problem: &Problem, generator_rad: f64, torques_n_m: &[f64]) -> Result<Vec<f64>, SolveError> {
-    let mut motion = Motion::deformed_or_turned_in(problem, generator_rad)?;
+/// Errors of a drive that stands without load, under one load after the other, arcsec.
+fn loaded(mut motion: Motion<'_>, torques_n_m: &[f64]) -> Result<Vec<f64>, SolveError> {
     torques_n_m
         .iter()
         .map(|torque| {
@@ -362,7 +506,10 @@ mod tests {
     /// What FEM says of a drive with a deviation, beyond the ideal one, at whole pitches under a load.
     fn beyond_ideal(change: impl Fn(&mut AsBuilt), pitches: &[f64], torque_n_m: f64) -> Vec<f64> {
         static IDEAL: LazyLock<Problem> = LazyLock::new(|| problem(|_| {}));
-        let at = |problem: &Problem, k: f64| loaded(problem, k * TAU / 188.0, &[torque_n_m]).unwrap()[0];
+        let at = |problem: &Problem, k: f64| {
+            let motion = Motion::deformed_or_turned_in(problem, k * TAU / 188.0).unwrap();
+            loaded(motion, &[torque_n_m]).unwrap()[0]
+        };
         // All whole pitches are one to it.
         let ideal = at(&IDEAL, 0.0);
         let built = problem(change);
@@ -478,6 +625,64 @@ mod tests {
         assert_eq!(again.drive_blake3, cam().drive_blake3);
         let wrong = text.replacen("\"positions\":8", "\"positions\":9", 1);
         assert!(Kernels::from_json(&wrong).unwrap_err().contains("allowed"));
+    }
+
+    #[test]
+    fn displacements_go_as_far_as_is_asked_and_no_further_than_needed() {
+        let plan = KernelPlan::for_drive(&Drive::hhd_95(), GeneratorKind::Cam);
+        assert_eq!(plan, KernelPlan::for_generator(GeneratorKind::Cam));
+        assert_eq!(plan.sizes_to(10.0), [2.5, 5.0, 7.0, 9.0, 12.0]);
+        assert_eq!(plan.sizes_to(30.0), plan.sizes_um);
+        assert_eq!(plan.sizes_to(31.0)[6..], [30.0, 31.0]);
+        // A third of the module: a third of the clearance that a displacement takes up.
+        let mut small = Drive::hhd_95();
+        small.flexspline.module_mm *= 0.3;
+        let plan = KernelPlan::for_drive(&small, GeneratorKind::Cam);
+        let sizes = plan.sizes_to(27.5);
+        assert!((plan.sizes_um[6] - 9.0).abs() < 1e-9 && sizes[..7] == plan.sizes_um);
+        assert_eq!(sizes.last(), Some(&27.5));
+        assert!(sizes.windows(2).all(|w| w[0] < w[1] && w[1] < 2.5 * w[0]), "{sizes:?}");
+    }
+
+    /// What is not found from nothing is reached from a smaller displacement: where both go they come to the same.
+    #[test]
+    fn a_displacement_that_grows_comes_to_where_it_is_found_from_nothing() {
+        let at = |size_um: f64| {
+            let mut drive = Drive::hhd_95();
+            drive.as_built.circular_spline_eccentricity_um = size_um;
+            Problem::new(&drive, GeneratorKind::Cam, drive.temperature.reference_c, coarse())
+        };
+        let [small, large] = [5.0, 8.0].map(|size| at(size).unwrap());
+        let of = |motion: Motion<'_>| loaded(motion, &[5.0]).unwrap()[0];
+        let from = Motion::deformed_or_turned_in(&small, 0.0).unwrap().state().clone();
+        let directly = of(Motion::deformed_or_turned_in(&large, 0.0).unwrap());
+        let displaced =
+            Displaced { sizes_um: &[], torques_n_m: &[], problem: &at, stands: AtomicUsize::new(0), told: &|| Ok(()) };
+        let grown = of(displaced.grown(&large, 8.0, &(5.0, from)).unwrap());
+        assert!((grown - directly).abs() < 0.01, "{grown} {directly}");
+    }
+
+    /// Far beyond the clearance teeth reach the root of the other wheel, here 55 µm away, and no more is computed than stands.
+    #[test]
+    fn displacements_that_do_not_stand_are_left_out_or_told() {
+        let plan = |enough_um| KernelPlan {
+            torques_n_m: vec![5.0],
+            sizes_um: vec![5.0, 100.0],
+            directions: 4,
+            enough_um,
+            ..KernelPlan::for_generator(GeneratorKind::Cam)
+        };
+        let mut drive = Drive::hhd_95();
+        drive.circular_spline.root_radius_mm = 49.38;
+        let of = |plan: &KernelPlan| {
+            eccentric(&drive, GeneratorKind::Cam, plan, 2, coarse(), &|| Ok(())).map(|found| found.sizes_um)
+        };
+        assert_eq!(of(&plan(Some(4.0))).unwrap(), [5.0]);
+        let refused = of(&plan(None)).unwrap_err();
+        assert!(
+            matches!(refused, KernelError::Displaced { size_um, reached_um, .. } if size_um == 100.0 && reached_um == 5.0),
+            "{refused}"
+        );
     }
 
     #[test]

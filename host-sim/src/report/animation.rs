@@ -20,7 +20,7 @@ use crate::simulate::{Direction, Observation, Path, Row, SimulateError, Simulati
 use crate::stepping::{Problem, SolveError, SolverSettings, State};
 use std::ops::ControlFlow;
 
-/// Frames to a flexspline pitch, which are also the increments of [`Path::Pitch`].
+/// Frames to a flexspline pitch.
 pub const FRAMES: usize = 8;
 /// Step (mm) in which displacements are stored: 0.1 µm.
 const DISPLACEMENT_STEP_MM: f64 = 1e-4;
@@ -112,6 +112,7 @@ pub fn animate(
         torque_n_m,
         solver,
         direction: Direction::Forward,
+        increment_rad: Some(std::f64::consts::TAU / f64::from(drive.flexspline.teeth) / FRAMES as f64),
         ..SimulationSettings::new(kind, Path::Pitch)
     };
     let mut passing = Passing::new(drive);

@@ -247,7 +247,10 @@ impl Known<'_> {
 
     /// Whether all of the path is in the pitch that is shown in motion.
     fn is_all_in_motion(&self) -> bool {
-        self.motion.is_some_and(|motion| motion.rows.len() == self.rows.len())
+        let Some(motion) = self.motion else { return false };
+        let turn = |rows: &[Row]| rows.iter().map(|row| row.turn_rad.abs()).sum::<f64>();
+        turn(self.rows) < 1.5 * std::f64::consts::TAU / f64::from(self.drive.flexspline.teeth)
+            && motion.rows.len() <= self.rows.len()
     }
 
     /// The error along the path: over the generator, and over the torque where that goes through a range.
@@ -264,7 +267,8 @@ impl Known<'_> {
         };
         let mut blocks = Vec::new();
         let turns = one_way(self.rows, |row| row.generator_rad);
-        if !turns.is_empty() && !self.is_all_in_motion() {
+        // Rows between those that are shown in motion say more of the ripple.
+        if !turns.is_empty() && self.motion.is_none_or(|motion| motion.rows.len() < self.rows.len()) {
             let series =
                 of_stretches(self.rows, &turns, |row| row.generator_rad.to_degrees(), error, ["forward", "backward"]);
             blocks.push(figure(

@@ -10,6 +10,7 @@ use super::row::Row;
 use super::stress::PeakStress;
 use crate::cautions::Caution;
 use crate::mesh::WheelKind;
+use crate::pitch_wave::peak_to_peak;
 use crate::stated::SheetBeside;
 use crate::units::ARCSEC_PER_RAD;
 
@@ -61,8 +62,11 @@ pub struct Summary {
     pub rows: usize,
 
     /// Ripple: largest minus smallest error of a settled one-way stretch at constant load and temperature; the largest if
-    /// there are several. Needs a whole tooth pitch and eight rows.
+    /// there are several. Needs a whole tooth pitch and eight rows. Where these are equal parts of a pitch and the drive repeats with it,
+    /// it is that of the wave through the rows of the last pitch ([`crate::pitch_wave`]), whose ends lie between rows.
     pub kinematic_error_pp_arcsec: Option<f64>,
+    /// The same of the rows alone.
+    pub kinematic_error_pp_of_rows_arcsec: Option<f64>,
     /// Mean error while the generator turns forward (the first such stretch).
     pub mean_error_forward_arcsec: Option<f64>,
     /// Mean error while it turns backward.
@@ -80,10 +84,11 @@ pub struct Summary {
     /// Error under load relative to the middle of the backlash at zero load: what a joint that was zeroed in the middle
     /// of its play turns when it is loaded, the usual reading of a torsion curve. It includes half the backlash. The error
     /// under load is the mean of both directions where both are known, so that the drag drops out, else of the one. The
-    /// middle is that of two light touches (twice the drag, at least 0.02 N m) either way on the freshly deformed drive.
-    /// `null` when the load changes or does not exceed the drag.
+    /// middle is that of two light touches either way on the freshly deformed drive: twice the drag, more where that is less than 2e-5 of the
+    /// load, less where the load is not some times the drag. `null` when the load changes or does not exceed the drag.
     pub wind_up_arcsec: Option<f64>,
-    /// The elastic part: the same error relative to the light touch on the side that the load pushes to.
+    /// The elastic part: the same error relative to the light touch on the side that the load pushes to. The touch is at one place of the
+    /// tooth pitch and the error a mean over it, so that it is known to about the ripple, which counts where the wind-up is no more than that.
     pub wind_up_elastic_arcsec: Option<f64>,
     /// Middle of the backlash at zero load on which `wind_up_arcsec` rests.
     pub backlash_middle_arcsec: Option<f64>,
@@ -106,8 +111,8 @@ pub struct Summary {
     /// interval; left out where it was not asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stress: Vec<PlaceStress>,
-    /// Largest pressure between flanks; where they do not bear evenly along the face, the mean pressure times
-    /// `load_across_face_peak_over_mean`.
+    /// Largest pressure between flanks, by their force and the shape of their gap
+    /// ([`crate::contact::FlankContact::peak_pressure_mpa`]); where they do not bear evenly along the face, under the largest load there.
     pub peak_flank_pressure_mpa: f64,
     /// Largest force of the generator along its major axis on one half of the rim, outward, N.
     pub lobe_force_n: f64,
@@ -123,8 +128,12 @@ pub struct Summary {
     pub peak_generator_pressure_mpa: f64,
     /// Mean torque of the generator over the first settled stretch.
     pub generator_torque_mean_n_m: Option<f64>,
-    /// What that mean is without friction, by virtual work: minus load and drag, over the ratio.
+    /// What that mean is without friction, by virtual work: minus load and drag, over the ratio. Of a drive without friction it is the better
+    /// number: the mean of rows has what the rows miss between them.
     pub generator_torque_virtual_work_n_m: Option<f64>,
+    /// Whether the flanks have no friction.
+    #[serde(skip)]
+    pub without_friction: bool,
     /// Largest sum of load, drag and flank torques on the output of all rows: what equilibrium leaves.
     pub torque_balance_worst_n_m: f64,
     /// Largest residual of all rows, relative to the largest contact force.
@@ -175,7 +184,11 @@ impl Summary {
         let (arcsec, mpa) = (("arcsec", 3), ("MPa", 1));
         put("load torque", self.torque_n_m, ("N.m", 3), "", "on the output, positive turns it forward");
         let ripple = "largest less smallest error of a settled stretch one way under one load";
-        put("kinematic error, peak to peak", self.kinematic_error_pp_arcsec, arcsec, "", ripple);
+        let between = self.kinematic_error_pp_arcsec.zip(self.kinematic_error_pp_of_rows_arcsec);
+        let of_rows = between
+            .filter(|(wave, rows)| wave != rows)
+            .map_or_else(String::new, |(_, rows)| format!("of the wave through the rows; of the rows alone {rows:.3}"));
+        put("kinematic error, peak to peak", self.kinematic_error_pp_arcsec, arcsec, &of_rows, ripple);
         let mean = "output less generator over the ratio, over whole tooth pitches";
         put("mean error forward", self.mean_error_forward_arcsec, arcsec, "", mean);
         put("mean error backward", self.mean_error_backward_arcsec, arcsec, "", mean);
@@ -211,8 +224,13 @@ impl Summary {
         let lobe = "of the generator along its major axis on one half of the rim";
         put("largest force of a lobe", Some(self.lobe_force_n), ("N", 1), "", lobe);
         let virtual_work = self.generator_torque_virtual_work_n_m;
-        let without =
-            virtual_work.map_or_else(String::new, |torque| format!("without friction it would be {torque:.4}"));
+        let without = virtual_work.map_or_else(String::new, |torque| {
+            if self.without_friction {
+                format!("by virtual work {torque:.4}; the rest is what rows miss between them")
+            } else {
+                format!("without friction it would be {torque:.4}")
+            }
+        });
         let mean = "on the flexspline, positive turns it forward; over whole tooth pitches";
         put("mean torque of the generator", self.generator_torque_mean_n_m, ("N.m", 4), &without, mean);
         let leans = self.tilt_mrad != 0.0 || self.load_across_face_peak_over_mean != 1.0;
@@ -239,6 +257,7 @@ pub(super) struct Touches {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Metrics {
     pub kinematic_error_pp: Option<f64>,
+    pub kinematic_error_pp_of_rows: Option<f64>,
     pub mean_forward: Option<f64>,
     pub mean_backward: Option<f64>,
     /// Error backward minus forward at the first reversal.
@@ -284,6 +303,20 @@ impl<'a> Stretch<'a> {
         let errors = || self.rows.iter().map(|row| row.error_arcsec);
         let enough = !self.whole.is_empty() && self.rows.len() >= ROWS_OF_A_RIPPLE;
         enough.then(|| errors().fold(f64::MIN, f64::max) - errors().fold(f64::MAX, f64::min))
+    }
+
+    /// Ripple of the wave through the rows of the last pitch, where they are equal parts of it.
+    fn ripple_of_wave(&self, pitch: f64) -> Option<f64> {
+        let of_rows = self.ripple()?;
+        let turn = self.rows.last()?.turn_rad.abs();
+        let count = (pitch / turn).round() as usize;
+        let last = &self.rows[self.rows.len().checked_sub(count)?..];
+        let equal = |row: &Row| (row.turn_rad.abs() * count as f64 / pitch - 1.0).abs() < 1e-6;
+        if count < ROWS_OF_A_RIPPLE || !last.iter().all(equal) {
+            return None;
+        }
+        let errors: Vec<f64> = last.iter().map(|row| row.error_arcsec).collect();
+        Some(peak_to_peak(&errors).max(of_rows))
     }
 }
 
@@ -335,7 +368,8 @@ fn dwell(rows: &[Row], at: usize, ratio: f64) -> Option<f64> {
 }
 
 impl Metrics {
-    pub(super) fn new(rows: &[Row], pitch: f64, ratio: f64) -> Metrics {
+    /// `repeats`: the drive passes through the same states after every pitch.
+    pub(super) fn new(rows: &[Row], pitch: f64, ratio: f64, repeats: bool) -> Metrics {
         let stretches = stretches(rows, pitch);
         let error = |stretch: &Stretch| stretch.mean(|row| row.error_arcsec);
         let mean_of = |forward: bool| stretches.iter().filter(|stretch| stretch.forward() == forward).find_map(error);
@@ -356,7 +390,11 @@ impl Metrics {
         });
         let measured = stretches.iter().find(|stretch| !stretch.whole.is_empty());
         Metrics {
-            kinematic_error_pp: stretches.iter().filter_map(Stretch::ripple).reduce(f64::max),
+            kinematic_error_pp: stretches
+                .iter()
+                .filter_map(|stretch| stretch.ripple_of_wave(pitch).filter(|_| repeats).or(stretch.ripple()))
+                .reduce(f64::max),
+            kinematic_error_pp_of_rows: stretches.iter().filter_map(Stretch::ripple).reduce(f64::max),
             mean_forward: mean_of(true),
             mean_backward: mean_of(false),
             reversal,
@@ -471,7 +509,7 @@ mod tests {
     #[test]
     fn backlash_dwell_and_ripple_of_a_drive_that_has_them() {
         let rows = TOY.walk(&paper(0.01, 0.0));
-        let metrics = Metrics::new(&rows, PITCH, RATIO);
+        let metrics = Metrics::new(&rows, PITCH, RATIO, true);
         // 0.01 rad is a third of a pitch: means over whole pitches leave a few hundredths.
         assert!((metrics.mean_forward.unwrap() + 30.0).abs() < 0.02, "{metrics:?}");
         assert!((metrics.mean_backward.unwrap() - 30.0).abs() < 0.02);
@@ -481,21 +519,21 @@ mod tests {
         let dwell = metrics.dwell_rad.unwrap() * ARCSEC_PER_RAD / RATIO;
         assert!((dwell - 60.0).abs() < 0.8, "{dwell}");
         // Much finer than the increment of 0.01 rad, which is 21.7″.
-        let fine = Metrics::new(&TOY.walk(&paper(0.001, 0.0)), PITCH, RATIO).dwell_rad.unwrap();
+        let fine = Metrics::new(&TOY.walk(&paper(0.001, 0.0)), PITCH, RATIO, true).dwell_rad.unwrap();
         assert!((fine * ARCSEC_PER_RAD / RATIO - dwell).abs() < 0.8);
     }
 
     #[test]
     fn a_reversal_the_other_way_gives_the_same_backlash() {
         let mirrored: Vec<_> = paper(0.01, 0.0).iter().map(|(g, t)| (-g, *t)).collect();
-        let metrics = Metrics::new(&TOY.walk(&mirrored), PITCH, RATIO);
+        let metrics = Metrics::new(&TOY.walk(&mirrored), PITCH, RATIO, true);
         assert!((metrics.reversal.unwrap() - 60.0).abs() < 0.04);
     }
 
     #[test]
     fn under_load_nothing_is_lost_at_the_reversal_and_the_error_is_wound_up() {
         let rows = TOY.walk(&paper(0.01, 50.0));
-        let metrics = Metrics::new(&rows, PITCH, RATIO);
+        let metrics = Metrics::new(&rows, PITCH, RATIO, true);
         assert!(metrics.reversal.unwrap().abs() < 0.04);
         assert!(metrics.dwell_rad.unwrap() < 1e-3);
         assert!((metrics.mean_error().unwrap() - (30.0 + 15.0)).abs() < 0.02);
@@ -510,11 +548,11 @@ mod tests {
         let rows = TOY.walk(&path);
         let last_pitch = &rows[17..];
         assert_eq!(last_pitch.len(), 8);
-        let metrics = Metrics::new(last_pitch, PITCH, RATIO);
+        let metrics = Metrics::new(last_pitch, PITCH, RATIO, true);
         assert!((metrics.mean_forward.unwrap() + 30.0).abs() < 1e-9);
         assert!((metrics.kinematic_error_pp.unwrap() - 0.8).abs() < 1e-9);
         assert_eq!((metrics.reversal, metrics.dwell_rad, metrics.mean_backward), (None, None, None));
-        let short = Metrics::new(&rows[18..], PITCH, RATIO);
+        let short = Metrics::new(&rows[18..], PITCH, RATIO, true);
         assert_eq!((short.mean_forward, short.kinematic_error_pp), (None, None));
     }
 
@@ -525,12 +563,12 @@ mod tests {
         let rows = wide.walk(&paper(0.01, 0.0));
         let first = rows.iter().find(|row| row.settled).unwrap();
         assert!((first.error_arcsec + 150.0).abs() < 0.5, "{}", first.error_arcsec);
-        let metrics = Metrics::new(&rows, PITCH, RATIO);
+        let metrics = Metrics::new(&rows, PITCH, RATIO, true);
         assert!((metrics.reversal.unwrap() - 300.0).abs() < 0.04);
         assert!(metrics.kinematic_error_pp.unwrap() < 0.81);
         // Where the load changes in every row nothing settles.
         let changing: Vec<_> = (0..200).map(|i| (0.01 * f64::from(i), f64::from(i))).collect();
-        let metrics = Metrics::new(&TOY.walk(&changing), PITCH, RATIO);
+        let metrics = Metrics::new(&TOY.walk(&changing), PITCH, RATIO, true);
         assert_eq!(metrics, Metrics::default());
     }
 
@@ -538,7 +576,7 @@ mod tests {
     fn a_load_that_changes_at_the_reversal_gives_no_backlash() {
         let mut path = paper(0.01, 0.0);
         path.iter_mut().skip(101).for_each(|point| point.1 = 5.0);
-        let metrics = Metrics::new(&TOY.walk(&path), PITCH, RATIO);
+        let metrics = Metrics::new(&TOY.walk(&path), PITCH, RATIO, true);
         assert_eq!((metrics.reversal, metrics.dwell_rad), (None, None));
     }
 }

@@ -20,6 +20,7 @@ use crate::fem::element::edge_shape;
 use crate::mesh::{FlankMesh, WheelMesh, rotate};
 
 use super::face::{Across, Bearing, FaceLaw, Lean};
+use super::hertz::{Place, peak_pressure_mpa};
 use super::quadrature::gauss_legendre;
 use crate::drive::{ActiveFlank, FlankDeviations, Foot, Placement, Side, golden};
 
@@ -587,6 +588,28 @@ impl<'a> FlankContact<'a> {
                 (point.arc, traction(law, pressure, point, foot.arc).0)
             })
             .collect()
+    }
+
+    /// Largest pressure of a pair, MPa, by its force and the shape of its gap ([`super::contact_modulus_mpa`]); where the load along the face is
+    /// largest. Nothing of a pair that is open.
+    pub fn peak_pressure_mpa(
+        &self,
+        pair: FlankPair,
+        at: Configuration,
+        law: FlankLaw,
+        points: &[FlankPoint],
+        modulus_mpa: f64,
+    ) -> f64 {
+        let field = self.local_field(pair, at);
+        let Some(bearing) = self.bearing(pair, &field, law, points) else { return 0.0 };
+        let place = |point: &FlankPoint| {
+            let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
+            let gap = self.foot(pair, &field, x).distance + bearing.later_mm;
+            Place { arc: point.arc, gap, force: law.stiffness * point.weight * (-gap).max(0.0) }
+        };
+        let places: Vec<Place> = points.iter().map(place).collect();
+        let least_radius = 1.0 / (1.0 / self.tooth.rounding_radius + 1.0 / self.space.rounding_radius);
+        peak_pressure_mpa(&places, bearing.peak_over_mean, modulus_mpa, least_radius)
     }
 
     /// Gap of every integration point where the face is nearest, how it changes as the output alone turns (mm/rad), and its weight; with

@@ -5,11 +5,13 @@
 //! flank, which facets would drown.
 //!
 //! Signs: `gap > 0` open; `pressure >= 0` compressive. A penalty law `pressure = stiffness * <-gap>` with a stiffness
-//! (N/mm³) so high that the answer does not depend on it; a generator bearing of finite stiffness acts in series.
+//! (N/mm³) so high that the answer does not depend on it; a generator bearing of finite stiffness acts in series. The pressure itself does depend
+//! on it where a corner bears: what is told of flanks is that of two elastic bodies under the force that was found (`hertz`).
 
 mod bore;
 mod face;
 mod flank;
+mod hertz;
 mod quadrature;
 
 pub use bore::{BoreContact, BoreLaw, BorePressure, OpenEdges};
@@ -18,4 +20,5 @@ pub use flank::{
     AlongFace, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPoint, FrictionHistory,
     PairContribution, SlipPoint,
 };
+pub use hertz::contact_modulus_mpa;
 pub use quadrature::gauss_legendre;

@@ -107,6 +107,15 @@ impl NearPairs {
         }
     }
 
+    /// Largest pressure between flanks, MPa, by the forces of a state and the shape of its gaps.
+    pub fn peak_pressure_mpa(&self, flanks: &FlankContact, at: Configuration, law: FlankLaw, modulus_mpa: f64) -> f64 {
+        let touching = self.pairs.iter().filter(|(_, near)| self.moved >= near.open_until);
+        let peak = |(pair, near): (&FlankPair, &NearPair)| {
+            flanks.peak_pressure_mpa(*pair, at, law, &near.layout.points, modulus_mpa)
+        };
+        touching.map(peak).fold(0.0, f64::max)
+    }
+
     /// Whether the corners of the spaces still face the places they were laid out for.
     pub fn layouts_fit(&self, flanks: &FlankContact, at: Configuration) -> bool {
         let touching = self

@@ -120,7 +120,8 @@ pub struct Increment {
     pub compliance_rad_per_n_m: f64,
     /// Force of the generator along its major axis on the half of the rim at 0°, outward, N.
     pub lobe_force_n: f64,
-    /// Largest contact pressure on a flank and on the bore, MPa; on a flank where the load along the face is largest.
+    /// Largest contact pressure on a flank and on the bore, MPa; on a flank that of two elastic bodies under its force, where the load along the
+    /// face is largest ([`FlankContact::peak_pressure_mpa`]); on the bore that of the penalty.
     pub peak_pressure_mpa: [f64; 2],
     /// The teeth and the load along the face.
     pub face: Face,
@@ -446,7 +447,12 @@ impl<'p> Solver<'p> {
                     let Some(compliance) = self.compliance(&residual) else {
                         return Err(failed(history, "the stiffness matrix is not positive definite"));
                     };
-                    let increment = self.report(&state, &residual, compliance, history.len() - 1);
+                    let mut increment = self.report(&state, &residual, compliance, history.len() - 1);
+                    if self.softening == 1.0 {
+                        let (at, law) = (configuration(&state), self.flank_law());
+                        let modulus_mpa = self.problem.contact_modulus_mpa();
+                        increment.peak_pressure_mpa[0] = near.peak_pressure_mpa(&self.flanks, at, law, modulus_mpa);
+                    }
                     self.wheels.complete(&mut state);
                     self.finish(&mut state, from, &near);
                     if generator_rad != from.generator_rad && self.softening == 1.0 {
@@ -643,7 +649,7 @@ impl<'p> Solver<'p> {
                 wheels.add_bore(contact);
                 residual.generator_moment += contact.moment;
                 residual.generator_contacts += 1;
-                residual.peak[1] = residual.peak[1].max(contact.peak);
+                residual.bore_peak = residual.bore_peak.max(contact.peak);
             },
         );
         self.slipping.clear();
@@ -670,7 +676,6 @@ impl<'p> Solver<'p> {
             residual.flank_torque += contact.torque;
             residual.torque_scale += contact.torque.abs();
             residual.flank_contacts += 1;
-            residual.peak[0] = residual.peak[0].max(contact.peak);
             if let Some(along) = &contact.along_face {
                 leaning.add(problem, &mut self.border, pair, along, |i| 2 * nodes[i / 2] + i % 2);
                 if contact.load * along.peak_over_mean > residual.line_load {
@@ -866,7 +871,8 @@ impl<'p> Solver<'p> {
             // Per width: rad per (N mm/mm); a torque in N m is 1 / to_n_m of that.
             compliance_rad_per_n_m: compliance / to_n_m,
             lobe_force_n: residual.lobe_force * self.problem.drive.flexspline.width_mm,
-            peak_pressure_mpa: residual.peak,
+            // Of flanks: where contact is as hard as it is, looked at later.
+            peak_pressure_mpa: [0.0, residual.bore_peak],
             face: self.face(state, residual),
         }
     }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::fmt;
 use std::str::FromStr;
 
-use crate::contact::{BoreContact, BoreLaw, FaceLaw, FlankContact, FlankLaw, Lean};
+use crate::contact::{BoreContact, BoreLaw, FaceLaw, FlankContact, FlankLaw, Lean, contact_modulus_mpa};
 use crate::drive::{
     ActiveFlank, Drive, FaceLoad, FlankDeviations, GeneratorKind, GeneratorOutline, RimVariation, Side, ToothFlank,
 };
@@ -342,6 +342,12 @@ impl Problem {
     /// Slope of the offsets of a flank along its face, for a tooth that leans.
     pub(super) fn face_slope(&self, lean: Lean, side: Side) -> f64 {
         self.face.map_or(0.0, |face| face.slope(lean, side))
+    }
+
+    /// Modulus of two flanks that touch, MPa.
+    pub(super) fn contact_modulus_mpa(&self) -> f64 {
+        let material = &self.drive.material;
+        contact_modulus_mpa(material.youngs_modulus_mpa, material.poissons_ratio)
     }
 
     /// Drag torque on the output (N mm/mm) at a displacement from its anchor, and the stiffness with which it holds.

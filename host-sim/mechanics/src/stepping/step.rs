@@ -29,7 +29,8 @@ pub(super) struct Residual {
     pub drag_torque: f64,
     /// What rounding of the output angle leaves of the torque at worst.
     pub torque_round_off: f64,
-    pub peak: [f64; 2],
+    /// Largest pressure on the bore, MPa.
+    pub bore_peak: f64,
     /// Largest load for the width anywhere along the face of a flank, N/mm; of that flank peak over mean, and the share that bears.
     pub line_load: f64,
     pub peak_over_mean: f64,
@@ -52,7 +53,7 @@ impl Residual {
             flank_torque: 0.0,
             drag_torque: 0.0,
             torque_round_off: 0.0,
-            peak: [0.0; 2],
+            bore_peak: 0.0,
             line_load: 0.0,
             peak_over_mean: 1.0,
             face_share: 1.0,

@@ -278,7 +278,7 @@ def study(
     keep: Sequence[str] = (),
     least: Sequence[str] = (),
     most: Sequence[str] = (),
-    positions: int = 6,
+    positions: int = 24,
     compute_all: bool = False,
     mesh: Mesh = "coarse",
     threads: int | None = None,
