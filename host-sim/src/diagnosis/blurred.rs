@@ -77,6 +77,15 @@ impl<'a> Held<'a> {
             columns.extend(waves(order, &rows.on_flexspline, &held.places));
             columns.extend(waves(order, &rows.on_circular_spline, &held.places));
         }
+        // The form of a generator repeats from tooth to tooth, another one on each flank, and is as large as what means take.
+        if let Some(teeth) = nominal.teeth {
+            let mesh = waves(f64::from(teeth.flexspline), &rows.on_flexspline, &held.places);
+            let by_side = |wave: &Vec<f64>| -> Vec<f64> {
+                wave.iter().zip(&held.places).map(|(v, k)| v * rows.torque[*k].signum()).collect()
+            };
+            columns.extend(mesh.iter().map(by_side).collect::<Vec<_>>());
+            columns.extend(mesh);
+        }
         for column in columns {
             held.free.extend(unit(&column, held.freed(column.clone())));
         }
