@@ -11,7 +11,8 @@ use super::base::PlayLaw;
 use super::channels::{fault_throughout, floating, sample, waves};
 use super::flank_lag::behind;
 use super::linear::{Gram, Prior, solve};
-use super::rows::{Rows, combined, mean, rms};
+use super::rows::{Rows, combined, rms};
+use super::torque_zero::{by_block, is_certain, sum};
 use crate::measurement::{FaultName, Measures, Recording, Treatment};
 use crate::nominal::Nominal;
 use crate::units::ARCSEC_PER_RAD;
@@ -20,8 +21,6 @@ use crate::units::ARCSEC_PER_RAD;
 const SAMPLE: usize = 8000;
 /// Fewest rows.
 const LEAST_ROWS: usize = 1000;
-/// Blocks of rows that say how certain a gain is.
-const BLOCKS: usize = 24;
 /// Times that are tried, s: from the shortest to the longest, each so many times the one before. *Guess*.
 const TIMES_S: [f64; 2] = [5e-3, 0.2];
 const LONGER: f64 = 1.19;
@@ -146,7 +145,7 @@ impl<'a> Held<'a> {
                 before.push(rest);
             }
         }
-        left.chunks(left.len().div_ceil(BLOCKS).max(1)).map(|block| block.iter().map(|v| v.abs()).sum()).collect()
+        by_block(&left)
     }
 
     /// What means over `s` seconds take of what the model says, in all rows, arcsec; sizes are those that the rows tell.
@@ -222,18 +221,6 @@ fn shifted(rows: &Rows, s: f64) -> Vec<f64> {
     shifted
 }
 
-fn sum(values: &[f64]) -> f64 {
-    values.iter().sum()
-}
-
-/// Whether less is left in the second than in the first, for certain.
-fn is_certain(first: &[f64], second: &[f64]) -> bool {
-    let gains: Vec<f64> = first.iter().zip(second).map(|(first, second)| first - second).collect();
-    let (gain, blocks) = (mean(&gains), gains.len() as f64);
-    let spread = (gains.iter().map(|of| (of - gain).powi(2)).sum::<f64>() / (blocks - 1.0) / blocks).sqrt();
-    gain > CERTAIN * spread
-}
-
 /// The time over which rows are means, s, and the law of the play that tells them so.
 fn find(held: &Held<'_>) -> Option<(f64, PlayLaw)> {
     let laws = [PlayLaw::Held, PlayLaw::Pushed, PlayLaw::Sign];
@@ -262,7 +249,7 @@ fn find(held: &Held<'_>) -> Option<(f64, PlayLaw)> {
     }
     // Flanks and waves have to say it each by itself.
     let (of_load, of_waves) = (held.left(law, Read::MeanOfLoad(s)), held.left(law, Read::MeanOfWaves(s)));
-    let says = |without: &[f64]| sum(&means) <= LEAVE_OF_EACH * sum(without) && is_certain(without, &means);
+    let says = |without: &[f64]| sum(&means) <= LEAVE_OF_EACH * sum(without) && is_certain(without, &means, CERTAIN);
     (says(&of_load) && says(&of_waves)).then_some((s, law))
 }
 

@@ -213,20 +213,20 @@ fn take_away(column: &mut [f64], other: &[f64]) {
 }
 
 /// How much is left in each block of rows: the sum of the magnitudes, which the rows of a flank turned over too early do not rule.
-fn by_block(left: &[f64]) -> Vec<f64> {
+pub(super) fn by_block(left: &[f64]) -> Vec<f64> {
     left.chunks(left.len().div_ceil(BLOCKS).max(1)).map(|block| block.iter().map(|v| v.abs()).sum()).collect()
 }
 
-fn sum(values: &[f64]) -> f64 {
+pub(super) fn sum(values: &[f64]) -> f64 {
     values.iter().sum()
 }
 
-/// Whether less is left in the second than in the first, by [`CERTAIN`] standard deviations of the blocks' mean.
-fn is_certain(first: &[f64], second: &[f64]) -> bool {
+/// Whether less is left in the second than in the first, by so many standard deviations of the blocks' mean.
+pub(super) fn is_certain(first: &[f64], second: &[f64], stds: f64) -> bool {
     let gains: Vec<f64> = first.iter().zip(second).map(|(first, second)| first - second).collect();
     let (gain, blocks) = (mean(&gains), gains.len() as f64);
     let spread = (gains.iter().map(|of| (of - gain).powi(2)).sum::<f64>() / (blocks - 1.0) / blocks).sqrt();
-    gain > CERTAIN * spread
+    gain > stds * spread
 }
 
 /// A zero that was tried, N·m, and what it leaves in each block.
@@ -274,7 +274,7 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     let gain = sum(none) - sum(there);
     let gains = gain >= LEAST_GAIN * sum(none) && sum(there) <= (1.0 - LEAST_GAIN) * without_any;
     let tried = LEAST_SHARE * load..LARGEST_SHARE * load;
-    if !tried.contains(&zero.abs()) || !gains || !is_certain(none, there) {
+    if !tried.contains(&zero.abs()) || !gains || !is_certain(none, there, CERTAIN) {
         return None;
     }
     // Jackknife; no finer than the steps.
@@ -291,7 +291,7 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     // They have three numbers to its one: they are there only where they leave less, for certain, and by more than the lag of flanks and other
     // trifles, of which three numbers always tell a part.
     let better = |than: &[f64], share: f64| {
-        sum(than) < share * least && is_certain(there, than) && least - sum(than) > NO_TRIFLE * gain
+        sum(than) < share * least && is_certain(there, than, CERTAIN) && least - sum(than) > NO_TRIFLE * gain
     };
     if better(&by_rivals, RIVALS_LEAVE)
         || better(&held.by_sign(0.0), RIVALS_LEAVE)
