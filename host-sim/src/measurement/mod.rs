@@ -8,19 +8,16 @@
 //! drive.
 
 mod averages;
-mod clock_text;
 mod columns;
 mod csv_rows;
 mod fault;
 mod faults;
 mod gear;
-mod layout;
 mod log;
 mod phd2;
-pub mod raw;
+pub mod reader;
 pub(crate) mod robust;
 mod rollover;
-mod slower;
 mod unit;
 
 use std::fs::File;
@@ -32,7 +29,7 @@ pub use csv_rows::{CsvRows, NotANumber, Row, TableProblem};
 pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
 pub use faults::clock::SESSION_GAP_PERIODS;
 pub use gear::Gear;
-pub use layout::{Layout, Separator};
+pub use reader::{Layout, Separator, Sheet, raw};
 pub use log::{FEWEST_ROWS, MeasuredError};
 pub use robust::{MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, sampled, white_noise};
 

@@ -13,7 +13,7 @@
 use std::f64::consts::TAU;
 use std::io::{BufRead, BufReader, Read};
 
-use super::clock_text;
+use super::reader::clock;
 use super::columns::{Quantity, Unit};
 use super::csv_rows::TableProblem;
 use super::log::Log;
@@ -71,7 +71,7 @@ pub(super) fn read(source: impl Read, ratio: f64) -> Result<(Log, Vec<String>), 
         let line = line.trim();
         if let Some(at) = line.strip_prefix("Guiding Begins at ") {
             session += 1;
-            section = Some(Section { begins_s: clock_text::seconds(at).unwrap_or(0.0), ..Section::default() });
+            section = Some(Section { begins_s: clock::seconds(at).unwrap_or(0.0), ..Section::default() });
             continue;
         }
         if line.starts_with("Guiding Ends") || line.starts_with("Calibration Begins") {
