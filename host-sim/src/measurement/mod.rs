@@ -35,6 +35,7 @@ pub use gear::Gear;
 pub use layout::{Layout, Separator};
 pub use log::{FEWEST_ROWS, MeasuredError};
 pub use robust::{MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, sampled, white_noise};
+pub(crate) use rollover::{Anew, begins_anew, continued, registers};
 
 use faults::Findings;
 use faults::drift::Stretches;

@@ -1,7 +1,11 @@
 //! Units, signs and columns taken for others.
+//!
+//! An angle is converted where something proves its unit: the ratio, which is the user's word, or the turn after which a column begins anew.
+//! A torque or a temperature that cannot be in the unit given is in another one, but its size does not say in which: it is left out, with the
+//! units that it may have and how to say them.
 
 use super::{Findings, span};
-use crate::measurement::columns::{Column, Quantity, Unit};
+use crate::measurement::columns::{Column, Quantity, Reading, Unit};
 use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
@@ -21,7 +25,7 @@ const TELLS_WHEELS_APART_RAD: f64 = 0.2;
 const OTHER_WHEEL: f64 = 1e-3;
 /// Errors that spread by more (robust, 10°) or less (a thousandth of an arc-second) are not errors of a drive in the unit given.
 const SPREADS_RAD: [f64; 2] = [0.174_5, 1e-3 / 206_265.0];
-/// Temperatures at which a drive exists, °C; kelvins taken for them lie beyond.
+/// Temperatures at which a drive exists, °C.
 const TEMPERATURES_C: [f64; 2] = [-180.0, 180.0];
 
 /// Finds and repairs units; an error says what cannot be told.
@@ -31,8 +35,8 @@ pub(in crate::measurement) fn check(
     gear: &Gear,
     findings: &mut Findings,
 ) -> Result<(), String> {
-    torque(log, gear, findings)?;
-    temperature(log, findings);
+    torque(log, columns, gear, findings)?;
+    temperature(log, columns, findings);
     if log.output_or_error() == Quantity::Output {
         ratio(log, columns, gear, findings)
     } else {
@@ -61,43 +65,65 @@ fn unit(columns: &[Column], quantity: Quantity) -> Unit {
     columns.iter().find(|column| column.quantity == quantity).map_or(quantity.default_column().1, |column| column.unit)
 }
 
-fn torque(log: &mut Log, gear: &Gear, findings: &mut Findings) -> Result<(), String> {
+/// Units that have no gain to be said, in which a value of `unit` lies within `allowed`, with the value there.
+fn may_be(value: f64, unit: Unit, units: &[Unit], allowed: impl Fn(f64) -> bool) -> Vec<(Unit, f64)> {
+    let number = (value - unit.zero()) / unit.factor();
+    let plain = units.iter().filter(|other| !matches!(other, Unit::Ampere | Unit::Milliampere | Unit::Volt));
+    plain.map(|other| (*other, Reading::of(*other).value(number))).filter(|(_, value)| allowed(*value)).collect()
+}
+
+/// How to say a unit that a column may have.
+fn say_it(quantity: Quantity, column: &str, may_be: &[(Unit, f64)], inside: &str) -> String {
+    let read: Vec<String> = may_be.iter().map(|(unit, value)| format!("{unit} ({value:.4} {inside})")).collect();
+    let first = may_be.first().map_or("UNIT", |(unit, _)| unit.name());
+    format!("its size does not say in which; it may be in {}: --columns {quantity}={column}:{first}", read.join(" or "))
+}
+
+/// A torque beyond what a drive bears is in another unit, and is not used.
+fn torque(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings) -> Result<(), String> {
     let limit = gear.largest_torque_n_m;
-    let Some(values) = log.get_mut(Quantity::Torque) else { return Ok(()) };
+    let Some(values) = log.get(Quantity::Torque) else { return Ok(()) };
     let mut sizes: Vec<f64> = sampled(values).into_iter().filter(|t| t.is_finite()).map(f64::abs).collect();
     let size = quantile_of(&mut sizes, 0.95);
     if size <= limit {
         return Ok(());
     }
-    if size * 1e-3 > limit {
+    let units = may_be(size, unit(columns, Quantity::Torque), Quantity::Torque.units(), |torque| torque <= limit);
+    if units.is_empty() {
         return Err(format!("torque: found {size:e} N.m in a twentieth of the rows, allowed: at most {limit:e} N.m"));
     }
-    values.iter_mut().for_each(|t| *t *= 1e-3);
-    let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
-    (fault.channel, fault.treatment) = (Some(Quantity::Torque), Treatment::Repaired);
-    fault.what = format!("torque of {size:.0} N.m, where {limit:.0} N.m is the most: it is read in mN.m");
-    findings.faults.push(fault);
+    let say_it = say_it(Quantity::Torque, name(columns, Quantity::Torque), &units, "N.m");
+    let what = format!(
+        "torque of {size:.0} N.m, where {limit:.0} N.m is the most: it is in another unit, and is not used; {say_it}"
+    );
+    leave_out(log, Quantity::Torque, what, findings);
     Ok(())
 }
 
-fn temperature(log: &mut Log, findings: &mut Findings) {
-    let Some(values) = log.get_mut(Quantity::Temperature) else { return };
+/// A temperature at which no drive exists is in another unit, and is not used.
+fn temperature(log: &mut Log, columns: &[Column], findings: &mut Findings) {
+    let Some(values) = log.get(Quantity::Temperature) else { return };
     let mut some: Vec<f64> = sampled(values).into_iter().filter(|t| t.is_finite()).collect();
     let median = median_of(&mut some);
-    if (TEMPERATURES_C[0]..=TEMPERATURES_C[1]).contains(&median) {
+    let exists = |celsius: f64| (TEMPERATURES_C[0]..=TEMPERATURES_C[1]).contains(&celsius);
+    if exists(median) {
         return;
     }
-    let kelvin = (TEMPERATURES_C[0] + 273.15..=TEMPERATURES_C[1] + 273.15).contains(&median);
-    if kelvin {
-        values.iter_mut().for_each(|t| *t -= 273.15);
+    let units = may_be(median, unit(columns, Quantity::Temperature), Quantity::Temperature.units(), exists);
+    let say_it = if units.is_empty() {
+        String::new()
     } else {
-        log.take(Quantity::Temperature);
-    }
+        format!("; {}", say_it(Quantity::Temperature, name(columns, Quantity::Temperature), &units, "C"))
+    };
+    let what = format!("a temperature of {median:.1} degrees C is not plausible: it is not used{say_it}");
+    leave_out(log, Quantity::Temperature, what, findings);
+}
+
+/// Leaves out a column that is in another unit than the one given.
+fn leave_out(log: &mut Log, quantity: Quantity, what: String, findings: &mut Findings) {
+    log.take(quantity);
     let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
-    fault.channel = Some(Quantity::Temperature);
-    fault.treatment = if kelvin { Treatment::Repaired } else { Treatment::Masked };
-    let done = if kelvin { "it is read in kelvin" } else { "it is not used" };
-    fault.what = format!("a temperature of {median:.1} degrees C is not plausible: {done}");
+    (fault.channel, fault.treatment, fault.what) = (Some(quantity), Treatment::Masked, what);
     findings.faults.push(fault);
 }
 
@@ -196,23 +222,36 @@ fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings
         }
         return Ok(());
     }
-    // One column in a unit other than the one given.
+    // One column in a unit other than the one given: proved by the ratio if one reading alone gives it.
+    let mut fits: Vec<(Quantity, Unit, f64)> = Vec::new();
     for channel in [Quantity::Generator, Quantity::Output] {
         let given = unit(columns, channel);
         for candidate in Unit::ANGLES.into_iter().filter(|candidate| *candidate != given) {
             let scale = candidate.factor() / given.factor();
-            let gives = if channel == Quantity::Generator { scale } else { scale.recip() };
-            if near(gives) {
-                fault.channel = Some(channel);
-                let column = name(columns, channel);
-                fault.what = format!("{seen}: {column} is in {candidate}, not in {given}, and was converted");
-                findings.faults.push(fault);
-                if let Some(values) = log.get_mut(channel) {
-                    values.iter_mut().for_each(|angle| *angle *= scale);
-                }
-                return Ok(());
+            if near(if channel == Quantity::Generator { scale } else { scale.recip() }) {
+                fits.push((channel, candidate, scale));
             }
         }
+    }
+    match fits[..] {
+        [(channel, candidate, scale)] => {
+            fault.channel = Some(channel);
+            let (column, given) = (name(columns, channel), unit(columns, channel));
+            fault.what = format!("{seen}: {column} is in {candidate}, not in {given}, and was converted");
+            findings.faults.push(fault);
+            if let Some(values) = log.get_mut(channel) {
+                values.iter_mut().for_each(|angle| *angle *= scale);
+            }
+            return Ok(());
+        }
+        [_, _, ..] => {
+            let say = fits.iter().map(|(channel, unit, _)| format!("{channel}={}:{unit}", name(columns, *channel)));
+            let say = say.collect::<Vec<_>>().join(", or ");
+            return Err(format!(
+                "{seen}: one of the two is in another unit, and the ratio does not say which; allowed: --columns {say}"
+            ));
+        }
+        [] => {}
     }
     // Clearance and wind-up of a small motion change the ratio by more than units are apart; none of them is what was found.
     if (RATIO_ERROR[0]..=RATIO_ERROR[1]).contains(&exchanged) {
