@@ -315,6 +315,84 @@ fn error_size(log: &Log, columns: &[Column]) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::typical_slope;
+    use crate::measurement::{ColumnMap, FaultName, Gear, Quantity, Recording, Treatment, parse};
+
+    /// A drive of ratio 50 to and fro under a load in N·m at a temperature in °C, each times and plus something; angles in radians times some number.
+    fn read(columns: &str, torque: f64, celsius: f64, angles: [f64; 2]) -> Result<Recording, String> {
+        let mut text = "time_s,generator_rad,output_rad,torque_n_m,temperature_c\n".to_owned();
+        for k in 0..1200 {
+            let x = f64::from(k);
+            let psi = 40.0 * (0.01 * x).sin();
+            let load = 30.0 * (0.004 * x).sin();
+            let output = psi / 50.0 + load / 3e4 + 2e-5 * (2.0 * psi).sin();
+            let fields =
+                [0.01 * x, angles[0] * psi, angles[1] * output, torque * load, 21.0 + 0.3 * (0.01 * x).sin() + celsius];
+            text += &(fields.map(|field| format!("{field:.9}")).join(",") + "\n");
+        }
+        let map = if columns.is_empty() { ColumnMap::default() } else { ColumnMap::parse(columns).unwrap() };
+        parse("m.csv", text.as_bytes(), &map, &Gear::of_ratio(50.0)).map_err(|error| error.to_string())
+    }
+
+    /// The channel of the unit fault, what was done, and what is said.
+    fn unit_fault(recording: &Recording) -> Option<(Option<Quantity>, Treatment, &str)> {
+        let fault = recording.faults.iter().find(|fault| fault.name == FaultName::UnitMismatch)?;
+        Some((fault.channel, fault.treatment, fault.what.as_str()))
+    }
+
+    #[test]
+    fn a_torque_is_converted_on_the_word_of_the_user_alone() {
+        // 30 N·m in mN·m and in N·cm of a very large drive: beyond what any drive bears, and not used.
+        for (scale, units) in [(1e3, "mN.m (30.0000 N.m)"), (2e3, "N.cm (600.0000 N.m)")] {
+            let found = read("", scale, 0.0, [1.0; 2]).unwrap();
+            let (channel, treatment, what) = unit_fault(&found).unwrap();
+            assert_eq!((channel, treatment), (Some(Quantity::Torque), Treatment::Masked));
+            assert!(found.sessions[0].torque_n_m.is_none());
+            assert!(what.contains("--columns torque=torque_n_m:N.cm"), "{what}");
+            assert!(what.contains(units.split_once(' ').unwrap().0), "{what}");
+        }
+        let said = read("torque=torque_n_m:mN.m", 1e3, 0.0, [1.0; 2]).unwrap();
+        assert_eq!(unit_fault(&said), None);
+        let torque = said.sessions[0].torque_n_m.as_ref().unwrap();
+        assert!((torque[392] - 30.0).abs() < 0.01, "{}", torque[392]);
+        // One that a drive may bear stays as it is, however soft the drive then looks.
+        let soft = read("", 0.112_985, 0.0, [1.0; 2]).unwrap();
+        assert_eq!(unit_fault(&soft), None);
+        assert!((soft.sessions[0].torque_n_m.as_ref().unwrap()[392] - 3.389_55).abs() < 1e-3);
+        assert!(read("", 1e9, 0.0, [1.0; 2]).unwrap_err().contains("at most 1e4"));
+    }
+
+    #[test]
+    fn a_temperature_is_converted_on_the_word_of_the_user_alone() {
+        for (off, unit) in [(273.15, ":K"), (600.0, "")] {
+            let found = read("", 1.0, off, [1.0; 2]).unwrap();
+            let (channel, treatment, what) = unit_fault(&found).unwrap();
+            assert_eq!((channel, treatment), (Some(Quantity::Temperature), Treatment::Masked));
+            assert!(found.sessions[0].temperature_c.is_none());
+            assert!(
+                what.contains("is not used") && what.contains(&format!("temperature_c{unit}")) == !unit.is_empty(),
+                "{what}"
+            );
+        }
+        let said = read("temperature=temperature_c:K", 1.0, 273.15, [1.0; 2]).unwrap();
+        assert_eq!(unit_fault(&said), None);
+        assert!((said.sessions[0].temperature_c.as_ref().unwrap()[0] - 21.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_angle_is_converted_where_the_ratio_proves_its_unit_alone() {
+        let deg = 1f64.to_degrees();
+        let found = read("", 1.0, 0.0, [deg, 1.0]).unwrap();
+        assert!(matches!(unit_fault(&found), Some((Some(Quantity::Generator), Treatment::Repaired, _))));
+        // Both are in degrees, one is said to be in radians; or both are in radians, and one is said to be in degrees: no ratio tells.
+        for (angles, columns) in [
+            ([deg; 2], "generator=generator_rad:rad,output=output_rad:deg"),
+            ([1.0; 2], "generator=generator_rad:deg,output=output_rad:rad"),
+        ] {
+            let said = read(columns, 1.0, 0.0, angles).unwrap_err();
+            assert!(said.contains("does not say which") && said.contains("generator=generator_rad:"), "{said}");
+            assert!(said.contains("or output=output_rad:"), "{said}");
+        }
+    }
 
     #[test]
     fn one_leap_of_a_generator_that_froze_does_not_change_the_ratio() {
