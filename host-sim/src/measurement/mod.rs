@@ -32,6 +32,7 @@ pub use gear::Gear;
 pub use reader::{Layout, Separator, Sheet, raw};
 pub use log::{FEWEST_ROWS, MeasuredError};
 pub use robust::{MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, sampled, white_noise};
+pub(crate) use rollover::{Anew, begins_anew, continued, registers};
 
 use faults::Findings;
 use faults::drift::Stretches;

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
+use super::turns_off::{TurnsOff, about_mean, turns_off};
 use super::validate::generator_of;
 use crate::measurement::{CsvRows, NotANumber, TableProblem};
 use crate::suggest::question;
@@ -70,6 +71,8 @@ pub struct ReplaySummary {
     pub mean_residual_arcsec: f64,
     /// Rows by quality: in range, uncertain, extrapolated, disabled.
     pub rows_by_quality: [usize; 4],
+    /// Whole turns of the motor by which the generator zero of the rows is off the table's, where the rows show that.
+    pub generator_zero_off: Option<TurnsOff>,
     /// Whose rows they are, where that is known.
     pub rows_of: Option<RowsOf>,
     /// What has to be known of them: that they are another drive's, or nobody's.
@@ -136,7 +139,22 @@ impl ReplaySummary {
             None => vec![OF_NOBODY.to_owned()],
             Some(rows) => rows.check(table).err().iter().map(ToString::to_string).collect(),
         };
+        self.remarks.extend(self.of_gain());
         self.rows_of = rows_of;
+    }
+
+    /// What has to be said where the table gains less than it could, or nothing.
+    fn of_gain(&self) -> Option<String> {
+        let (measured, left) = (self.rms_measured_arcsec, self.rms_residual_arcsec);
+        if let Some(off) = &self.generator_zero_off {
+            return Some(off.text(left));
+        }
+        (left > measured).then(|| {
+            format!(
+                "the table leaves {left:.1} arcsec rms where the rows have {measured:.1} without it: it gains nothing here, and no whole turns of the \
+                 motor change that; is it the table of this unit, and its generator zero that of the rows?"
+            )
+        })
     }
 }
 
@@ -250,14 +268,10 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
             }
         })
         .collect();
+    let about = |value: fn(&ReplayedRow) -> f64| about_mean(&replayed.iter().map(value).collect::<Vec<_>>());
     let count = replayed.len().max(1) as f64;
-    let mean = |value: fn(&ReplayedRow) -> f64| replayed.iter().map(value).sum::<f64>() / count;
-    let about = |value: fn(&ReplayedRow) -> f64| {
-        let mean = mean(value);
-        (replayed.iter().map(|row| (value(row) - mean).powi(2)).sum::<f64>() / count).sqrt()
-    };
-    let mean_residual = mean(|row| row.residual_arcsec);
-    let summary = ReplaySummary {
+    let mean_residual = replayed.iter().map(|row| row.residual_arcsec).sum::<f64>() / count;
+    let mut summary = ReplaySummary {
         schema_version: 1,
         status: if by_quality[2] + by_quality[3] == 0 { "in range" } else { "extrapolated" },
         table_id: table.id().to_string(),
@@ -269,10 +283,12 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
             .fold(0.0, |m, row| f64::max(m, (row.residual_arcsec - mean_residual).abs())),
         mean_residual_arcsec: mean_residual,
         rows_by_quality: by_quality,
+        generator_zero_off: turns_off(table, rows),
         rows_of: None,
-        remarks: vec![OF_NOBODY.to_owned()],
+        remarks: Vec::new(),
         command: String::new(),
     };
+    summary.of_rows(None, table);
     (replayed, summary)
 }
 
