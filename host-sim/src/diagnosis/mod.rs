@@ -248,7 +248,7 @@ impl<'a> Search<'a> {
         let mut bests = Bests::default();
         let mut thinned = Thinned::of(on, stride);
         // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
-        for round in 0.. {
+        for round in 0..=MOST_ROUNDS {
             fast.clear();
             let mut scope = Scope::Everything;
             if let Some(thinned) = &thinned {
