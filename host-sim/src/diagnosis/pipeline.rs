@@ -41,6 +41,10 @@ use crate::units::ARCSEC_PER_RAD;
 /// Rows that are diagnosed at most: 1.5 GB of memory.
 const MOST_ROWS: usize = 1_000_000;
 
+/// What to look at where an error leaps so often that no row counts.
+const IS_IT_THIS_DRIVE: &str =
+    "see that ratio, units and zeros of both angles are right and that the rows are of this drive; record it under a load that keeps one flank";
+
 /// What the FEM of an extended drive may differ by from the causes found, as a share of them, for these to be taken for shapes of it.
 const WORST_AGREEMENT: f64 = 0.5;
 
@@ -318,6 +322,10 @@ pub fn diagnose_rows(
         let advice =
             recording.faults.iter().rfind(masked).map_or(FaultName::TorqueScale.advice(), |fault| fault.advice);
         diagnosis.say_nothing_of_the_unit(advice);
+    } else if let Some(why) = diagnosis.set_aside.take() {
+        recording.notes.push(why.clone());
+        recording.unusable = Some(why);
+        diagnosis.say_nothing_of_the_unit(IS_IT_THIS_DRIVE);
     }
     progress(4, 5, "compensation by the core");
     let table_subject = subject.table_subject();
