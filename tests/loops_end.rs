@@ -42,9 +42,19 @@ const BOUNDED: &[(&str, &str, usize, Bound)] = &[
     ("mechanics/src/condense/dense.rs", "eliminate", 2, Shrinks("columns that are left, four or one at a time")),
     ("mechanics/src/drive/as_built.rs", "greatest_common_divisor", 1, Shrinks("the remainder of two whole numbers")),
     ("mechanics/src/drive/interference.rs", "scan", 1, Shrinks("places of a cycle, from stretch to stretch")),
-    ("mechanics/src/motion.rs", "settle", 1, Shrinks("pitches until MOST_PITCHES, where `settle_on` ends with an error")),
+    (
+        "mechanics/src/motion.rs",
+        "settle",
+        1,
+        Shrinks("pitches until MOST_PITCHES, where `settle_on` ends with an error"),
+    ),
     ("mechanics/src/stepping/fast.rs", "low_rank", 1, Shrinks("columns that a matrix of this order lacks")),
-    ("mechanics/src/stepping/newton.rs", "newton", 1, Shrinks("`max_iterations`, again for each of MOST_LAYOUTS layouts")),
+    (
+        "mechanics/src/stepping/newton.rs",
+        "newton",
+        1,
+        Shrinks("`max_iterations`, again for each of MOST_LAYOUTS layouts"),
+    ),
     ("mechanics/src/stepping/slip.rs", "gmres", 1, Most("MOST_VECTORS")),
     ("mechanics/src/toml_file.rs", "refuse_unknown_keys_in", 1, Shrinks("tables within a table of a file")),
     ("motion/src/scenario.rs", "next", 1, Shrinks("legs of a scenario; it ends where there is none")),
@@ -61,7 +71,12 @@ const BOUNDED: &[(&str, &str, usize, Bound)] = &[
     ("src/cli/say.rs", "suggestions_styled", 1, Shrinks("the rest of a message")),
     ("src/closed_loop/flight/profile.rs", "next", 1, Shrinks("legs of a profile; it ends where there is none")),
     ("src/closed_loop/map.rs", "plane", 1, Shrinks("pitches until MOST_PITCHES, where `settle_on` ends with an error")),
-    ("src/diagnosis/blurred.rs", "find", 1, Shrinks("times from TIMES_S[0] to TIMES_S[1], each LONGER than the one before")),
+    (
+        "src/diagnosis/blurred.rs",
+        "find",
+        1,
+        Shrinks("times from TIMES_S[0] to TIMES_S[1], each LONGER than the one before"),
+    ),
     ("src/diagnosis/flank_lag.rs", "flank_lag", 1, Shrinks("lags up to LONGEST_S, each LONGER than the one before")),
     ("src/diagnosis/held_out.rs", "proved", 1, Shrinks("terms: one is set aside")),
     ("src/diagnosis/linear.rs", "products", 1, Most("BLOCK_ROWS")),
@@ -76,17 +91,32 @@ const BOUNDED: &[(&str, &str, usize, Bound)] = &[
     ("src/measurement/faults/steps.rs", "lasting", 2, Shrinks("steps: those that are taken back go")),
     ("src/measurement/unit.rs", "leading_number", 1, Shrinks("bytes that are left")),
     ("src/report/diagnosis_report/thin.rs", "stretches", 1, Shrinks("rows of a session, one or more at a time")),
-    ("src/residual/spectrum.rs", "order_spectrum", 1, Shrinks("lines up to `most_peaks`: each round finds one or ends")),
+    (
+        "src/residual/spectrum.rs",
+        "order_spectrum",
+        1,
+        Shrinks("lines up to `most_peaks`: each round finds one or ends"),
+    ),
     ("src/residual/spectrum.rs", "remembering", 1, Shrinks("a lag that doubles up to a quarter of the rows")),
     ("src/simulate/mod.rs", "change_temperature", 1, Shrinks("halvings that are left, one fewer in each call")),
-    ("src/simulate/mod.rs", "settle_and_turn", 1, Shrinks("pitches until MOST_PITCHES, where `settle_on` ends with an error")),
+    (
+        "src/simulate/mod.rs",
+        "settle_and_turn",
+        1,
+        Shrinks("pitches until MOST_PITCHES, where `settle_on` ends with an error"),
+    ),
     ("src/simulate/summary.rs", "stretches", 1, Shrinks("rows, from stretch to stretch")),
     ("src/study/estimate.rs", "furthest_first", 1, Shrinks("places that are not chosen")),
     ("src/synthesize/data_fault.rs", "average", 1, Shrinks("rows before the one that is made")),
     ("src/tables/positions.rs", "places_that_tell_apart", 1, Shrinks("divisors up to the root of a number")),
     ("src/tables/sweep.rs", "sample", 1, Shrinks("pitches until MOST_PITCHES, where `settle_on` ends with an error")),
     ("src/tables/torque_nodes.rs", "refined", 1, Shrinks("torque nodes up to `most`: each round adds one or ends")),
-    ("src/tables/validate.rs", "settle", 1, Shrinks("pitches until MOST_PITCHES, where `settle_on` ends with an error")),
+    (
+        "src/tables/validate.rs",
+        "settle",
+        1,
+        Shrinks("pitches until MOST_PITCHES, where `settle_on` ends with an error"),
+    ),
 ];
 
 /// Methods that take from what they are called on.
@@ -107,8 +137,12 @@ fn is_taken(expr: &Expr) -> bool {
 /// The names that a condition compares with `<` or `<=`, as `k` in `k < n && more`.
 fn below(condition: &Expr) -> Vec<String> {
     match condition {
-        Expr::Binary(binary) if matches!(binary.op, BinOp::And(_)) => [below(&binary.left), below(&binary.right)].concat(),
-        Expr::Binary(binary) if matches!(binary.op, BinOp::Lt(_) | BinOp::Le(_)) => counted(&binary.left).into_iter().collect(),
+        Expr::Binary(binary) if matches!(binary.op, BinOp::And(_)) => {
+            [below(&binary.left), below(&binary.right)].concat()
+        }
+        Expr::Binary(binary) if matches!(binary.op, BinOp::Lt(_) | BinOp::Le(_)) => {
+            counted(&binary.left).into_iter().collect()
+        }
         _ => Vec::new(),
     }
 }
@@ -124,10 +158,13 @@ fn counted(expr: &Expr) -> Option<String> {
 
 /// Whether a statement of the body itself, which every round comes to, counts one of these up by a whole number.
 fn counts_up(body: &syn::Block, names: &[String]) -> bool {
-    let whole = |expr: &Expr| matches!(expr, Expr::Lit(lit) if matches!(&lit.lit, Lit::Int(n) if n.base10_digits() != "0"));
+    let whole =
+        |expr: &Expr| matches!(expr, Expr::Lit(lit) if matches!(&lit.lit, Lit::Int(n) if n.base10_digits() != "0"));
     let counts = |stmt: &Stmt| match stmt {
         Stmt::Expr(Expr::Binary(binary), _) => {
-            matches!(binary.op, BinOp::AddAssign(_)) && whole(&binary.right) && counted(&binary.left).is_some_and(|k| names.contains(&k))
+            matches!(binary.op, BinOp::AddAssign(_))
+                && whole(&binary.right)
+                && counted(&binary.left).is_some_and(|k| names.contains(&k))
         }
         _ => false,
     };
@@ -206,7 +243,8 @@ impl<'a> Visit<'a> for Calls {
 /// Whether attributes say that this is for tests alone.
 fn for_tests(attributes: &[syn::Attribute]) -> bool {
     attributes.iter().any(|attribute| {
-        attribute.path().is_ident("test") || attribute.path().is_ident("cfg") && has_word(attribute.to_token_stream(), &["test"])
+        attribute.path().is_ident("test")
+            || attribute.path().is_ident("cfg") && has_word(attribute.to_token_stream(), &["test"])
     })
 }
 
@@ -233,7 +271,9 @@ impl<'a> Visit<'a> for Finder {
 
     fn visit_impl_item_fn(&mut self, function: &'a syn::ImplItemFn) {
         if !for_tests(&function.attrs) {
-            self.within(&function.sig.ident, true, &function.block, |finder| visit::visit_impl_item_fn(finder, function));
+            self.within(&function.sig.ident, true, &function.block, |finder| {
+                visit::visit_impl_item_fn(finder, function)
+            });
         }
     }
 

@@ -6,14 +6,14 @@ use std::sync::Arc;
 use flexspline::Table;
 use rayon::prelude::*;
 
+use super::LEAST_ROWS;
 use super::averaged::{Averaged, Grain};
 use super::base::{Base, Floating, NEAR_FRICTION, few};
 use super::candidate::{Column, Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
-use super::LEAST_ROWS;
 use super::model::{Problem, Term};
-use super::report::Finding;
 use super::noise::{Noise, Whitener, white_level};
+use super::report::Finding;
 use super::rows::{Rows, quantile, rms, robust_std};
 use crate::nominal::Nominal;
 use crate::units::ARCSEC_PER_TURN;

@@ -186,8 +186,16 @@ fn slewed(begins: &'static str, pointing: &'static str, axis_h: f64) -> Part<'st
 #[test]
 fn after_a_slew_the_generator_stands_where_the_hour_angle_has_it() {
     let three = [
-        slewed("2026-11-01 20:20:00", "RA = 5.00 hr, Dec = 35.0 deg, Hour angle = -3.10 hr, Pier side = West", -3.1 + 12.0),
-        slewed("2026-11-01 21:03:20", "RA = 3.00 hr, Dec = 35.0 deg, Hour angle = -0.37 hr, Pier side = West", -0.37 + 12.0),
+        slewed(
+            "2026-11-01 20:20:00",
+            "RA = 5.00 hr, Dec = 35.0 deg, Hour angle = -3.10 hr, Pier side = West",
+            -3.1 + 12.0,
+        ),
+        slewed(
+            "2026-11-01 21:03:20",
+            "RA = 3.00 hr, Dec = 35.0 deg, Hour angle = -0.37 hr, Pier side = West",
+            -0.37 + 12.0,
+        ),
         slewed("2026-11-01 22:40:10", "RA = 6.00 hr, Dec = 35.0 deg, Hour angle = 2.21 hr, Pier side = East", 2.21),
     ];
     let recording = read_night(&night(&three));
@@ -210,7 +218,10 @@ fn on_one_target_the_clock_says_more_than_an_hour_angle_that_is_rounded() {
     assert_one_wave(&[read_night(&night(&two))], AMPLITUDE, 0.1);
     // Nobody says an hour angle, as KStars: two files of a night agree by their clocks.
     let files = two.map(|part| {
-        read_night(&night(&[Part { pointing: "RA = 5 hr, Dec = 35.0 deg, Hour angle = N/A hr, Pier side = East", ..part }]))
+        read_night(&night(&[Part {
+            pointing: "RA = 5 hr, Dec = 35.0 deg, Hour angle = N/A hr, Pier side = East",
+            ..part
+        }]))
     });
     assert!(files[0].notes.iter().any(|note| note.contains("no hour angle")));
     assert_one_wave(&files, AMPLITUDE, 0.1);
@@ -254,7 +265,10 @@ fn with_commas(text: &str) -> String {
 
 #[test]
 fn decimal_commas_are_read_as_points_however_fields_are_parted() {
-    for part in [PART, Part { guided: false, pointing: "Dec = -12.5 deg, Hour angle = 1.00 hr", declination_deg: -12.5, ..PART }] {
+    for part in [
+        PART,
+        Part { guided: false, pointing: "Dec = -12.5 deg, Hour angle = 1.00 hr", declination_deg: -12.5, ..PART },
+    ] {
         let text = night(&[part]);
         let due = read_night(&text);
         let commas = with_commas(&text);
@@ -268,7 +282,9 @@ fn decimal_commas_are_read_as_points_however_fields_are_parted() {
         };
         let semicolons = rows(&|line| with_commas(&line.replace(',', ";")));
         let quoted = rows(&|line| {
-            let field = |field: &str| if field.contains('.') { format!("\"{}\"", with_commas(field)) } else { field.to_owned() };
+            let field = |field: &str| {
+                if field.contains('.') { format!("\"{}\"", with_commas(field)) } else { field.to_owned() }
+            };
             line.split(',').map(field).collect::<Vec<_>>().join(",")
         });
         for other in [commas, semicolons, quoted] {
@@ -280,7 +296,8 @@ fn decimal_commas_are_read_as_points_however_fields_are_parted() {
 
 #[test]
 fn a_clock_that_is_set_back_within_the_night_is_set_forward() {
-    let with_hour_angle = slewed("2026-11-01 20:50:00", "Dec = 35.0 deg, Hour angle = 2.50 hr", 1.0 + 5400.0 * HOURS_A_S);
+    let with_hour_angle =
+        slewed("2026-11-01 20:50:00", "Dec = 35.0 deg, Hour angle = 2.50 hr", 1.0 + 5400.0 * HOURS_A_S);
     let without = Part { pointing: "Dec = 35.0 deg, Hour angle = N/A hr", ..with_hour_angle };
     let end_of_summer = Part { rows: 1800, begins: "2026-11-01 20:20:00", ..PART };
     for (first, second) in [
