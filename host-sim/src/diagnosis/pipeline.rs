@@ -534,3 +534,44 @@ fn tables_of<'a>(subject: &'a Subject<'_>, of: &'a TableSubject, sessions: &[Ses
         },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::report::Finding;
+    use crate::synthesize::catalogue_drive;
+
+    /// The finding, the notes and the diagnosis on terminal of a drive under 12 N·m, one way, with this error beside what its model says, arcsec.
+    fn found(error_arcsec: impl Fn(f64) -> f64) -> (Finding, Vec<String>, String) {
+        let nominal = catalogue_drive();
+        let model = Model { nominal: nominal.clone(), causes: Vec::new() };
+        let subject = Subject::of_model(model, Drive::hhd_95(), GeneratorKind::Cam);
+        let mut text = "time_s,generator_rad,error_arcsec,torque_n_m\n".to_owned();
+        let mut random = fastrand::Rng::with_seed(5);
+        for k in 0..1800 {
+            let psi = 0.06 * f64::from(k);
+            let load = nominal.wind_up_arcsec(12.0) + 0.5 * nominal.backlash_arcsec + nominal.harmonics_arcsec(psi);
+            let error = load + error_arcsec(psi) + 2.0 * (random.f64() - 0.5);
+            text += &format!("{:.2},{psi:.6},{error:.4},12\n", 0.01 * f64::from(k));
+        }
+        let recording = parse_rows("gear.csv", text.as_bytes(), &ColumnMap::default(), &subject).unwrap();
+        let done = diagnose_rows(recording, &subject, &Options::default(), |_, _, _| {}).unwrap();
+        (done.diagnosis.finding, done.recording.notes.clone(), done.diagnosis.text())
+    }
+
+    #[test]
+    fn rows_that_are_all_set_aside_are_no_sound_drive() {
+        let spur = |amplitude: f64, rad: f64| move |psi: f64| amplitude * (psi / rad * std::f64::consts::PI).sin().signum();
+        for (amplitude, rad) in [(1280.0, 6.0), (1280.0, 2.0), (4000.0, 9.0)] {
+            let (finding, notes, text) = found(spur(amplitude, rad));
+            if finding != Finding::NotUnderstood && finding != Finding::FaultFound {
+                assert_eq!(finding, Finding::DataUnusable, "{text}");
+                assert!(notes.iter().any(|note| note.contains("rows are left to judge by")), "{notes:?}");
+                assert!(!text.contains("-0.00"), "{text}");
+            }
+        }
+        let (finding, notes, _) = found(|_| 0.0);
+        assert_eq!(finding, Finding::NothingFound);
+        assert!(!notes.iter().any(|note| note.contains("judge by")), "{notes:?}");
+    }
+}
