@@ -308,7 +308,16 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
         ("nothing", Vec::new(), NoTable(&["log.txt:1: ", "no rows of numbers"])),
         ("prose", b"Measured on Tuesday.\nAll went well.\n".to_vec(), NoTable(&["no rows of numbers"])),
         ("a workbook", b"PK\x03\x04\x14\0".to_vec(), NoTable(&["workbook", "save it as CSV"])),
-        ("UTF-16", vec![0xFF, 0xFE, b'a', 0], NoTable(&["UTF-16"])),
+        (
+            "UTF-16",
+            gear(file("Zeit;Motor;Abtrieb;Drehmoment\n", ";", |t, k| commas(plain(t, k))))
+                .iter()
+                .fold(vec![0xFF, 0xFE], |mut bytes, byte| {
+                    bytes.extend([*byte, 0]);
+                    bytes
+                }),
+            Proposed,
+        ),
         ("binary", (0..=255_u8).cycle().take(5000).collect(), NoTable(&["binary"])),
         (
             "ten rows",

@@ -276,10 +276,9 @@ impl Sheet {
     /// Commas between fields and before decimals, which no reader tells apart.
     fn refuse_commas_of_two_kinds(&self) -> Result<(), TableProblem> {
         let width = self.layout.names.len();
-        let wide = |row: &&RowAt| self.fields(**row).len() > width + 1;
         let some = &self.rows[..self.rows.len().min(100)];
-        let all_wide = self.layout.has_names && width > 0 && some.len() > 1 && some.iter().all(|row| wide(&row));
-        match some.first().filter(|_| all_wide) {
+        let torn = |row: &RowAt| torn_by_commas(&self.fields(*row), width);
+        match some.first().filter(|_| self.layout.separator == Separator::Comma && width > 0 && some.iter().all(torn)) {
             Some(row) => Err(TableProblem { line: row.line, what: too_wide(&self.fields(*row), width) }),
             None => Ok(()),
         }
@@ -593,15 +592,19 @@ fn end_of_quotes(text: &[u8], begin: usize, end: usize, line: u64) -> (usize, u6
 /// What is to be said of a row with more fields than names.
 pub(super) fn too_wide(fields: &[String], width: usize) -> String {
     let mut what = format!("{} fields, but the header has {width}", fields.len());
-    // Whole numbers on both sides of commas are what decimal commas leave.
+    if torn_by_commas(fields, width) {
+        what.push_str("; numbers are written with a point, not with a comma");
+    }
+    what
+}
+
+/// Whether a row has whole numbers on both sides of its commas, and more of them than names: what decimal commas leave.
+fn torn_by_commas(fields: &[String], width: usize) -> bool {
     let whole = |text: &String| {
         let digits = text.trim_start_matches(['-', '+']);
         !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())
     };
-    if fields.len() > width + 1 && fields.iter().all(whole) {
-        what.push_str("; numbers are written with a point, not with a comma");
-    }
-    what
+    fields.len() > width + 1 && fields.iter().all(whole)
 }
 
 #[cfg(test)]
