@@ -42,8 +42,7 @@ use crate::units::ARCSEC_PER_RAD;
 const MOST_ROWS: usize = 1_000_000;
 
 /// What to look at where an error leaps so often that no row counts.
-const IS_IT_THIS_DRIVE: &str =
-    "see that ratio, units and zeros of both angles are right and that the rows are of this drive; record it under a load that keeps one flank";
+const IS_IT_THIS_DRIVE: &str = "see that ratio, units and zeros of both angles are right and that the rows are of this drive; record it under a load that keeps one flank";
 
 /// What the FEM of an extended drive may differ by from the causes found, as a share of them, for these to be taken for shapes of it.
 const WORST_AGREEMENT: f64 = 0.5;
@@ -561,7 +560,8 @@ mod tests {
 
     #[test]
     fn rows_that_are_all_set_aside_are_no_sound_drive() {
-        let spur = |amplitude: f64, rad: f64| move |psi: f64| amplitude * (psi / rad * std::f64::consts::PI).sin().signum();
+        let spur =
+            |amplitude: f64, rad: f64| move |psi: f64| amplitude * (psi / rad * std::f64::consts::PI).sin().signum();
         for (amplitude, rad) in [(1280.0, 6.0), (1280.0, 2.0), (4000.0, 9.0)] {
             let (finding, notes, text) = found(spur(amplitude, rad));
             if finding != Finding::NotUnderstood && finding != Finding::FaultFound {

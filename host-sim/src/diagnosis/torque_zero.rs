@@ -462,7 +462,8 @@ mod tests {
         let nominal = catalogue_drive();
         // Exact rows at one load, there and back or one way, as anybody writes who tries the program on numbers of his own; and what is no number.
         for (back, backlash, error) in [(true, 1.0, 0.0), (false, 1.0, 0.0), (true, 0.0, 0.0), (true, 1.0, f64::NAN)] {
-            let mut session = Session { time_s: Some(Vec::new()), torque_n_m: Some(vec![1.0; 2000]), ..Session::default() };
+            let mut session =
+                Session { time_s: Some(Vec::new()), torque_n_m: Some(vec![1.0; 2000]), ..Session::default() };
             for k in 0..2000 {
                 let psi = 0.05 * f64::from(if back && k >= 1000 { 2000 - k } else { k });
                 session.line.push(k as u64 + 2);

@@ -17,6 +17,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 
 use crate::measurement::raw::RawFile;
+use crate::measurement::stamps;
 use crate::measurement::{SESSION_GAP_PERIODS, Unit, median_of, sampled};
 use column::{Facts, unwrapped};
 pub use coverage::Coverage;
@@ -199,6 +200,15 @@ impl Guess {
         }
     }
 
+    /// Whether a time is in days as spreadsheets count them: a date from 1954 to 2119, and rows at most a quarter of an hour apart.
+    fn is_in_days(&self) -> bool {
+        (20_000.0..=80_000.0).contains(&self.facts.least)
+            && self.facts.most <= 80_000.0
+            && self.facts.most - self.facts.least < 1000.0
+            && !self.facts.whole
+            && self.facts.step < 0.01
+    }
+
     fn moves(&self) -> bool {
         self.facts.finite >= 16 && !self.facts.constant()
     }
@@ -239,9 +249,10 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
             ));
         }
     }
-    let mut notes = Vec::new();
+    let mut notes = reading_notes(files);
     let mut guesses: Vec<Guess> = first.columns.iter().enumerate().map(|(place, _)| guess(files, place)).collect();
     time(&mut guesses, files);
+    in_order(&mut guesses, files, &mut notes);
     units_of_counts(&mut guesses);
     let names: Vec<String> = (0..guesses.len()).map(|place| name_in_mapping(first, place)).collect();
     let (ratio, rivals) = pair(&mut guesses, &names, &mut notes);
@@ -255,7 +266,8 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
         ));
     }
     let (kind, period_s, starts) = clock(&guesses, files);
-    let columns_option = option(&guesses, &names, &mut notes);
+    let columns_option =
+        option(&guesses, &names, &mut notes).filter(|columns| is_accepted(files, &guesses, columns, &mut notes));
     let coverage = coverage::of(&guesses, ratio, &starts);
     let columns = guesses
         .into_iter()
@@ -294,6 +306,64 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
     })
 }
 
+/// What the reader says of the files, each sentence once; of several files with the name of the file.
+fn reading_notes(files: &[RawFile]) -> Vec<String> {
+    let named =
+        |file: &RawFile, note: &String| if files.len() > 1 { format!("{}: {note}", file.file) } else { note.clone() };
+    files.iter().flat_map(|file| file.notes.iter().map(move |note| named(file, note))).collect()
+}
+
+/// Rows in the order of their time, file by file.
+fn in_order(guesses: &mut [Guess], files: &[RawFile], notes: &mut Vec<String>) {
+    let Some(time) = guesses.iter().find(|guess| guess.used && guess.role == Role::Time) else { return };
+    let mut order: Vec<usize> = Vec::with_capacity(time.values.len());
+    let mut begins = 0;
+    let before = notes.len();
+    for file in files {
+        let rows = begins..begins + file.rows;
+        match stamps::order(&time.values[rows.clone()]) {
+            Some((sorted, note)) => {
+                order.extend(sorted.iter().map(|row| begins + row));
+                notes.push(note);
+            }
+            None => order.extend(rows),
+        }
+        begins += file.rows;
+    }
+    // A row without a time has no place among sorted rows.
+    if notes.len() > before && order.len() == begins {
+        for guess in guesses {
+            guess.values = order.iter().map(|row| guess.values[*row]).collect();
+        }
+    }
+}
+
+/// Whether the reader takes the files by this mapping: a cell in use that is no number, or a row of another width, is for people to mend.
+fn is_accepted(files: &[RawFile], guesses: &[Guess], columns: &str, notes: &mut Vec<String>) -> bool {
+    let mut refused = Vec::new();
+    for file in files {
+        for (guess, raw) in guesses.iter().zip(&file.columns).filter(|(guess, _)| guess.used) {
+            let times = raw.first_time.as_ref().filter(|_| guess.role != Role::Time);
+            if let Some(cell) = raw.first_word.iter().chain(times).min_by_key(|cell| cell.line) {
+                let others = (raw.words + times.map_or(0, |_| raw.times)).saturating_sub(1);
+                refused.push(format!(
+                    "{}:{}: {}: found \"{}\"{}, which is no number",
+                    file.file,
+                    cell.line,
+                    raw.name,
+                    cell.text,
+                    if others == 0 { String::new() } else { format!(" ({others} more in this column)") }
+                ));
+            }
+        }
+        refused.extend(file.refused.iter().map(|row| format!("{}:{}: {}", file.file, row.line, row.text)));
+    }
+    for what in &refused {
+        notes.push(format!("{what}: mend it or take it out; then --columns {columns}"));
+    }
+    refused.is_empty()
+}
+
 /// What a column says by its name and by its numbers alone.
 fn guess(files: &[RawFile], place: usize) -> Guess {
     let mut raw = files[0].columns[place].clone();
@@ -330,6 +400,10 @@ fn guess(files: &[RawFile], place: usize) -> Guess {
         guess.because("its name", if said.commanded { 0.6 } else { 0.8 });
     } else if said.angle {
         guess.because("its name: an angle", 0.5);
+    }
+    if let Some(cell) = &raw.first_word {
+        let what = if raw.words == 1 { "1 cell is".to_owned() } else { format!("{} cells are", raw.words) };
+        guess.why.push(format!("{what} no number: line {}, \"{}\"", cell.line, cell.text));
     }
     if guess.facts.constant() {
         guess.because(format!("keeps the value {}", guess.facts.least), 0.3);
@@ -425,6 +499,7 @@ fn time(guesses: &mut [Guess], files: &[RawFile]) {
                 s if s > 1e14 => (Unit::Microsecond, "microseconds since 1970"),
                 s if s > 1e11 => (Unit::Millisecond, "milliseconds since 1970"),
                 s if s > 1e9 => (Unit::Second, "seconds since 1970"),
+                _ if guess.is_in_days() => (Unit::Day, "days since 1900, as spreadsheets count"),
                 _ => (Unit::Second, "s, for want of a unit"),
             };
             guess.unit = Some(unit);

@@ -310,12 +310,13 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
         ("a workbook", b"PK\x03\x04\x14\0".to_vec(), NoTable(&["workbook", "save it as CSV"])),
         (
             "UTF-16",
-            gear(file("Zeit;Motor;Abtrieb;Drehmoment\n", ";", |t, k| commas(plain(t, k))))
-                .iter()
-                .fold(vec![0xFF, 0xFE], |mut bytes, byte| {
+            gear(file("Zeit;Motor;Abtrieb;Drehmoment\n", ";", |t, k| commas(plain(t, k)))).iter().fold(
+                vec![0xFF, 0xFE],
+                |mut bytes, byte| {
                     bytes.extend([*byte, 0]);
                     bytes
-                }),
+                },
+            ),
             Proposed,
         ),
         ("binary", (0..=255_u8).cycle().take(5000).collect(), NoTable(&["binary"])),

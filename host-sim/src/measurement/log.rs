@@ -173,8 +173,8 @@ fn guide_log(file: &str, bytes: Vec<u8>, map: &ColumnMap, ratio: f64) -> Result<
     let refuse =
         |problem: TableProblem| MeasuredError { file: file.to_owned(), line: Some(problem.line), what: problem.what };
     if *map != ColumnMap::default() {
-        let what =
-            "a guide log of PHD2 has columns and times of its own, found --columns or --rate; allowed: neither".to_owned();
+        let what = "a guide log of PHD2 has columns and times of its own, found --columns or --rate; allowed: neither"
+            .to_owned();
         return Err(refuse(TableProblem { line: 1, what }));
     }
     let (log, notes) = phd2::read(Cursor::new(bytes), ratio).map_err(refuse)?;
@@ -207,7 +207,8 @@ fn broken_off(sheet: &Sheet, columns: &[Column], read: &mut Columns) -> Result<O
             too_wide(&sheet.row(*row), width)
         } else {
             let beyond = columns.iter().find(|column| column.place >= *fields);
-            let (name, place) = beyond.map_or(("a column in use", width), |column| (column.name.as_str(), column.place));
+            let (name, place) =
+                beyond.map_or(("a column in use", width), |column| (column.name.as_str(), column.place));
             format!("{fields} fields, but {name} is field {}", place + 1)
         };
         return Err(TableProblem { line, what });

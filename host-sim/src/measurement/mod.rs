@@ -29,8 +29,9 @@ pub use csv_rows::{CsvRows, NotANumber, Row, TableProblem};
 pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
 pub use faults::clock::SESSION_GAP_PERIODS;
 pub use gear::Gear;
-pub use reader::{Layout, Separator, Sheet, raw};
 pub use log::{FEWEST_ROWS, MeasuredError};
+pub(crate) use reader::stamps;
+pub use reader::{Layout, Separator, Sheet, raw};
 pub use robust::{MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, sampled, white_noise};
 pub(crate) use rollover::{Anew, begins_anew, continued, registers};
 

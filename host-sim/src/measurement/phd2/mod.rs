@@ -18,10 +18,10 @@ mod text;
 use std::f64::consts::TAU;
 use std::io::{BufRead, BufReader, Read};
 
-use super::reader::clock;
 use super::columns::{Quantity, Unit};
 use super::csv_rows::TableProblem;
 use super::log::Log;
+use super::reader::clock;
 use crate::units::ARCSEC_PER_RAD;
 use axis::Pointing;
 use text::{Header, Written, number, said, word_of};

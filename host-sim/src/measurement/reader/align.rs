@@ -22,8 +22,12 @@ pub fn apart(a: &[f64], b: &[f64]) -> bool {
 /// A channel at these instants: cubic between four values that follow one another, straight beside a gap, nothing in one. Gives the largest
 /// distance to a value of its own, in the unit of the instants.
 pub fn at(instants: &[f64], own: &[f64], values: &[f64]) -> (Vec<f64>, f64) {
-    let mut known: Vec<(f64, f64)> =
-        own.iter().copied().zip(values.iter().copied()).filter(|(t, value)| t.is_finite() && value.is_finite()).collect();
+    let mut known: Vec<(f64, f64)> = own
+        .iter()
+        .copied()
+        .zip(values.iter().copied())
+        .filter(|(t, value)| t.is_finite() && value.is_finite())
+        .collect();
     known.sort_by(|a, b| a.0.total_cmp(&b.0));
     known.dedup_by(|a, b| a.0 == b.0);
     if known.len() < 2 {

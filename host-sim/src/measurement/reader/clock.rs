@@ -65,8 +65,11 @@ pub(super) fn stamp(text: &str, order: Order) -> Option<Stamp> {
     let clock_ends = |from: usize| text[from..].find([' ', '\t']).map_or(text.len(), |at| from + at);
     let colon = text.find(':')?;
     let begins = text[..colon].rfind([' ', '\t', 'T', '_']).map_or(0, |at| at + 1);
-    let (before, clock, after) =
-        (text[..begins].trim_end_matches(['T', ' ', '\t', '_', ',']), &text[begins..clock_ends(begins)], text[clock_ends(begins)..].trim());
+    let (before, clock, after) = (
+        text[..begins].trim_end_matches(['T', ' ', '\t', '_', ',']),
+        &text[begins..clock_ends(begins)],
+        text[clock_ends(begins)..].trim(),
+    );
     let (clock, zone_s) = zone(clock)?;
     let (mut half_day_s, mut zone_s, mut date) = (None, zone_s, before.trim().to_owned());
     for word in after.split_whitespace() {
@@ -77,7 +80,9 @@ pub(super) fn stamp(text: &str, order: Order) -> Option<Stamp> {
             other => match zone(word) {
                 Some(("", Some(ahead))) => zone_s = Some(ahead),
                 // The name of a zone (CET, PST): all stamps of a log have the same, or the clock is set back, which is looked for.
-                _ if (3..=5).contains(&other.len()) && other.bytes().all(|b| b.is_ascii_alphabetic()) && month(other).is_none() => {}
+                _ if (3..=5).contains(&other.len())
+                    && other.bytes().all(|b| b.is_ascii_alphabetic())
+                    && month(other).is_none() => {}
                 _ => date = format!("{date} {word}"),
             },
         }
@@ -169,7 +174,8 @@ fn compact(text: &str) -> Option<Stamp> {
     let digits = |text: &str, from: usize, to: usize| {
         text.get(from..to).filter(|part| part.bytes().all(|byte| byte.is_ascii_digit()))?.parse::<i16>().ok()
     };
-    let sound = date.len() == 8 && (clock.len() == 6 || clock.as_bytes().get(6).is_some_and(|byte| matches!(byte, b'.' | b',')));
+    let sound = date.len() == 8
+        && (clock.len() == 6 || clock.as_bytes().get(6).is_some_and(|byte| matches!(byte, b'.' | b',')));
     if !sound {
         return None;
     }
@@ -181,8 +187,11 @@ fn compact(text: &str) -> Option<Stamp> {
 
 /// Days since 1970-01-01 of `2026-11-22`, `2026/11/22`, `22.11.2026`, `22/11/2026`, `22-Nov-2026`, `Nov 22, 2026`.
 fn days(text: &str, order: Order) -> Option<f64> {
-    let parts: Vec<&str> =
-        text.split(['-', '/', '.', ' ', ',']).filter(|part| !part.is_empty()).filter(|part| !is_weekday(part)).collect();
+    let parts: Vec<&str> = text
+        .split(['-', '/', '.', ' ', ','])
+        .filter(|part| !part.is_empty())
+        .filter(|part| !is_weekday(part))
+        .collect();
     let [a, b, c] = parts.as_slice() else { return None };
     let number = |part: &str| part.parse::<i16>().ok().filter(|_| part.bytes().all(|byte| byte.is_ascii_digit()));
     let year = |part: &str| number(part).map(|year| if part.len() == 2 { 2000 + year } else { year });

@@ -93,7 +93,11 @@ impl Separator {
             if rest.get(blank) == Some(&b'"') && from <= blank {
                 let closes = |at: &usize| rest[*at] == b'"' && rest.get(at + 1) != Some(&b'"') && rest[at - 1] != b'"';
                 let empty = rest.get(blank + 1) == Some(&b'"');
-                from = if empty { blank + 2 } else { (blank + 2..rest.len()).find(closes).map_or(rest.len(), |at| at + 1) };
+                from = if empty {
+                    blank + 2
+                } else {
+                    (blank + 2..rest.len()).find(closes).map_or(rest.len(), |at| at + 1)
+                };
             }
             let found = rest[from.min(rest.len())..].iter().position(|byte| *byte == separator).map(|at| at + from);
             match found {
@@ -275,7 +279,9 @@ impl Layout {
         let Guess { separator, width, commas, kinds } = guess;
         let fields: Vec<Vec<String>> = lines.iter().map(|line| separator.fields(line.text.as_bytes())).collect();
         let rows_from = (0..lines.len())
-            .find(|k| fields[*k].len() >= width && is_row(&fields[*k], &commas) && !begins_with_a_word(&fields[*k], &kinds))
+            .find(|k| {
+                fields[*k].len() >= width && is_row(&fields[*k], &commas) && !begins_with_a_word(&fields[*k], &kinds)
+            })
             .unwrap_or(0);
         let begins = lines[rows_from].number;
         let mut layout = Layout {
@@ -315,7 +321,8 @@ impl Layout {
         let others: Vec<usize> =
             (header.block..rows_from).filter(|k| *k != header.names && Some(*k) != header.units).collect();
         let (Some(first), Some(last)) = (others.first(), others.last()) else { return };
-        let words: Vec<&str> = others.iter().filter_map(|k| fields[*k].iter().find(|f| !f.is_empty())).map(String::as_str).collect();
+        let words: Vec<&str> =
+            others.iter().filter_map(|k| fields[*k].iter().find(|f| !f.is_empty())).map(String::as_str).collect();
         self.notes.push(format!(
             "lines {} to {} above the rows are neither names nor units ({}): they are left out",
             lines[*first].number,
@@ -357,7 +364,11 @@ impl Layout {
         let width = self.names.len();
         let timely = |name: &str| {
             let word = name.to_lowercase();
-            let word = word.split(['[', '(', '_', ' ', '.']).next().unwrap_or_default().trim_end_matches(|c: char| c.is_ascii_digit());
+            let word = word
+                .split(['[', '(', '_', ' ', '.'])
+                .next()
+                .unwrap_or_default()
+                .trim_end_matches(|c: char| c.is_ascii_digit());
             ["time", "t", "x", "zeit", "timestamp"].contains(&word)
         };
         let pairs = width >= 4 && width % 2 == 0 && self.has_names;
@@ -572,7 +583,8 @@ pub(super) fn looks_like_names(fields: &[String]) -> bool {
 /// Whether fields are units.
 fn looks_like_units(fields: &[String]) -> bool {
     let words = || fields.iter().map(|field| unit_word(field)).filter(|word| !word.is_empty());
-    let known = |word: &str| Unit::in_brackets(word).is_some() || ["-", "1", "rpm", "deg/s", "rad/s", "%"].contains(&word);
+    let known =
+        |word: &str| Unit::in_brackets(word).is_some() || ["-", "1", "rpm", "deg/s", "rad/s", "%"].contains(&word);
     words().count() > 0 && words().all(known)
 }
 
@@ -621,7 +633,12 @@ impl Header {
 }
 
 /// `numpy.savetxt` and gnuplot write the names as a comment.
-fn comment_with_names(comments: &[Line], begins: u64, separator: Separator, width: usize) -> Option<(u64, Vec<String>)> {
+fn comment_with_names(
+    comments: &[Line],
+    begins: u64,
+    separator: Separator,
+    width: usize,
+) -> Option<(u64, Vec<String>)> {
     comments
         .iter()
         .rev()
@@ -636,7 +653,8 @@ fn header_names(line: &str, separator: Separator, width: usize) -> Vec<String> {
     if own.len() == width {
         return own;
     }
-    let other = Separator::ALL.into_iter().map(|other| other.fields(line.as_bytes())).find(|names| names.len() == width);
+    let other =
+        Separator::ALL.into_iter().map(|other| other.fields(line.as_bytes())).find(|names| names.len() == width);
     other.filter(|_| width > 1).unwrap_or(own)
 }
 

@@ -10,7 +10,7 @@ mod layout;
 mod number;
 pub mod raw;
 pub(super) mod slower;
-pub(super) mod stamps;
+pub(crate) mod stamps;
 mod text;
 
 use std::collections::HashMap;
@@ -21,8 +21,8 @@ use rayon::prelude::*;
 use super::csv_rows::TableProblem;
 use super::unit::Unit;
 pub(super) use layout::unit_word;
-pub use layout::{Layout, Separator};
 use layout::{Field, Shape, StampParts, begins_with_a_word, looks_like_names, shortened};
+pub use layout::{Layout, Separator};
 use number::Cell;
 pub(super) use text::known_format;
 
@@ -309,7 +309,9 @@ impl Sheet {
         self.layout.has_names = true;
         self.layout.units = if unit.is_some() || self.layout.units.len() > time {
             let of_time = self.layout.units.get(time).cloned().unwrap_or_default();
-            std::iter::once(of_time).chain((1..width).map(|_| unit.map_or_else(String::new, |unit| unit.name().to_owned()))).collect()
+            std::iter::once(of_time)
+                .chain((1..width).map(|_| unit.map_or_else(String::new, |unit| unit.name().to_owned())))
+                .collect()
         } else {
             Vec::new()
         };
@@ -348,9 +350,11 @@ impl Sheet {
                 return times.clone();
             }
             let of = |row: usize| if of_row[row] == place { values.values[row] } else { f64::NAN };
-            let mine = |cell: &Option<FoundCell>| cell.clone().filter(|cell| {
-                lines.iter().position(|line| *line == cell.line).is_some_and(|row| of_row[row] == place)
-            });
+            let mine = |cell: &Option<FoundCell>| {
+                cell.clone().filter(|cell| {
+                    lines.iter().position(|line| *line == cell.line).is_some_and(|row| of_row[row] == place)
+                })
+            };
             let (first_word, first_over) = (mine(&values.first_word), mine(&values.first_over));
             Cells {
                 values: (0..of_row.len()).map(of).collect(),
@@ -554,15 +558,21 @@ impl Found {
         if let Some(first) = self.restarts.first() {
             let times =
                 if self.restarts.len() == 1 { "once".to_owned() } else { format!("{} times", self.restarts.len()) };
-            notes.push(format!("the names of the columns are repeated {times}, first in line {first}: these lines are left out"));
+            notes.push(format!(
+                "the names of the columns are repeated {times}, first in line {first}: these lines are left out"
+            ));
         }
         if let Some(line) = self.reordered.first() {
             notes.push(format!("from line {line} on the columns stand in another order: they are read by their names"));
         }
         if let Some((first, last, word)) = &self.summary {
             let lines = if first == last { format!("line {first}") } else { format!("lines {first} to {last}") };
-            notes.push(format!("{lines} at the end, from \"{}\" on, {} no row{}: left out",
-                shortened(word), if first == last { "is" } else { "are" }, if first == last { "" } else { "s" }));
+            notes.push(format!(
+                "{lines} at the end, from \"{}\" on, {} no row{}: left out",
+                shortened(word),
+                if first == last { "is" } else { "are" },
+                if first == last { "" } else { "s" }
+            ));
         }
     }
 }

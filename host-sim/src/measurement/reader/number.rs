@@ -58,8 +58,7 @@ const OVER: [&str; 17] = [
 /// SCPI-99, volume 1, 7.2.1.4: 9.9E37 is infinity, 9.91E37 no number; some instruments write 9.9E36. The largest single float is another.
 const OVER_NUMBERS: [(f64, f64); 2] = [(9.89e36, 1.0e38), (3.402e38, 3.404e38)];
 /// Units of cells that no column of a mapping has.
-const OTHER_UNITS: [&str; 12] =
-    ["rpm", "1/min", "%", "deg/s", "°/s", "rad/s", "mm", "um", "µm", "Hz", "W", "bar"];
+const OTHER_UNITS: [&str; 12] = ["rpm", "1/min", "%", "deg/s", "°/s", "rad/s", "mm", "um", "µm", "Hz", "W", "bar"];
 /// Between thousands, besides the decimal sign that is not in use: apostrophes, blanks of three widths.
 const GROUPS: [char; 6] = ['\'', '\u{2019}', ' ', '\u{A0}', '\u{202F}', '\u{2009}'];
 
@@ -85,7 +84,11 @@ fn of_value(value: f64) -> Cell {
         return Cell::Nothing;
     }
     let size = value.abs();
-    if OVER_NUMBERS.iter().any(|(from, to)| (*from..=*to).contains(&size)) { Cell::Over } else { Cell::Number(value, None) }
+    if OVER_NUMBERS.iter().any(|(from, to)| (*from..=*to).contains(&size)) {
+        Cell::Over
+    } else {
+        Cell::Number(value, None)
+    }
 }
 
 fn odd_cell(text: &str, comma: bool) -> Cell {
@@ -134,7 +137,11 @@ fn numeric(text: &str, comma: bool) -> Option<f64> {
     let (whole, fraction) = mantissa.split_once(decimal).unwrap_or((mantissa, ""));
     let digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
     let whole = ungrouped(whole, if comma { '.' } else { ',' })?;
-    if !digits(fraction) || (whole.is_empty() && fraction.is_empty()) || !digits(unsigned(exponent)) || exponent.is_empty() {
+    if !digits(fraction)
+        || (whole.is_empty() && fraction.is_empty())
+        || !digits(unsigned(exponent))
+        || exponent.is_empty()
+    {
         return None;
     }
     format!("{sign}{whole}.{fraction}e{exponent}").parse().ok()
@@ -217,10 +224,14 @@ mod tests {
         for text in ["", " ", "NaN", "-nan", "inf", "N/A", "-", "null", "1.#QNAN"] {
             assert_eq!(cell(text.as_bytes(), false), Cell::Nothing, "{text}");
         }
-        for text in ["OVER", "-Over", "+OL", "9.9E37", "+9.9E+37", "-9.9e37", "9.91E37", "3.4028235e38", "*****", "#NUM!"] {
+        for text in
+            ["OVER", "-Over", "+OL", "9.9E37", "+9.9E+37", "-9.9e37", "9.91E37", "3.4028235e38", "*****", "#NUM!"]
+        {
             assert_eq!(cell(text.as_bytes(), false), Cell::Over, "{text}");
         }
-        for text in ["high", "1,5", "1,00", "01,234", "1,0005", "1.2.3", "1e", "e5", ".", "-", "12 34", "5 apples", "ERR"] {
+        for text in
+            ["high", "1,5", "1,00", "01,234", "1,0005", "1.2.3", "1e", "e5", ".", "-", "12 34", "5 apples", "ERR"]
+        {
             let found = cell(text.as_bytes(), false);
             assert!(found == Cell::Word || text == "-", "{text}: {found:?}");
         }

@@ -46,8 +46,8 @@ pub struct RawColumn {
     pub values: Vec<f64>,
     /// Fields that are times written as text.
     pub times: usize,
-    /// Whether these have a date and no zone.
-    pub local_time: bool,
+    /// The first of them.
+    pub first_time: Option<FoundCell>,
     /// Fields in which nothing was recorded.
     pub empty: usize,
     /// Fields beyond the range of the instrument.
@@ -99,7 +99,7 @@ pub fn parse(file: &str, mut source: impl Read) -> Result<RawFile, MeasuredError
             unit: sheet.layout.units.get(place).filter(|unit| !unit.is_empty()).cloned(),
             values: cells.values,
             times: cells.times,
-            local_time: cells.local_time,
+            first_time: cells.first_time,
             empty: cells.empty,
             over: cells.over,
             words: cells.words,
@@ -161,8 +161,11 @@ impl RawFile {
         let sparse: Vec<usize> = (0..self.columns.len())
             .filter(|k| count(&self.columns[*k]) >= FEWEST_ROWS && !full(&self.columns[*k]))
             .collect();
-        let Some(base) = sparse.iter().copied().max_by_key(|k| (count(&self.columns[*k]), usize::MAX - k)) else { return };
-        let other = sparse.iter().any(|k| *k != base && align::apart(&self.columns[base].values, &self.columns[*k].values));
+        let Some(base) = sparse.iter().copied().max_by_key(|k| (count(&self.columns[*k]), usize::MAX - k)) else {
+            return;
+        };
+        let other =
+            sparse.iter().any(|k| *k != base && align::apart(&self.columns[base].values, &self.columns[*k].values));
         if !other {
             return;
         }

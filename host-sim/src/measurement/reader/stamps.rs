@@ -49,7 +49,8 @@ pub fn twice(columns: &[&[f64]]) -> Option<(Vec<bool>, String)> {
         (0..rows).map(|row| row > 0 && columns.iter().all(|values| same(values[row], values[row - 1]))).collect();
     let count = repeats.iter().filter(|repeats| **repeats).count();
     (count >= FEWEST && count as f64 > TWICE * rows as f64).then(|| {
-        let what = format!("{count} of {rows} rows repeat the row before in every column, its time too: they are left out");
+        let what =
+            format!("{count} of {rows} rows repeat the row before in every column, its time too: they are left out");
         (repeats, what)
     })
 }
@@ -117,7 +118,9 @@ mod tests {
         let run = |jump: f64, at: f64| -> Vec<f64> {
             (0..200).map(|k| at + 0.1 * f64::from(k) + if k >= 100 { jump } else { 0.0 }).collect()
         };
-        for (jump, at, changes) in [(-3600.0, 3.0 * HOUR_S, 1), (3600.0, SPRING_S - 10.0, 1), (3600.0, 5e4, 0), (-60.0, 5e4, 0)] {
+        for (jump, at, changes) in
+            [(-3600.0, 3.0 * HOUR_S, 1), (3600.0, SPRING_S - 10.0, 1), (3600.0, 5e4, 0), (-60.0, 5e4, 0)]
+        {
             let mut time = run(jump, at);
             let mut notes = Vec::new();
             daylight_saving(&mut time, &mut notes);
