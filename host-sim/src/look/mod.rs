@@ -679,6 +679,18 @@ fn clock(guesses: &[Guess], files: &[RawFile]) -> (TimeKind, Option<f64>, Vec<us
 fn option(guesses: &[Guess], names: &[String], notes: &mut Vec<String>) -> Option<String> {
     let used = |role: Role| guesses.iter().any(|guess| guess.used && guess.role == role && guess.written().is_some());
     if !(used(Role::Generator) && (used(Role::Output) || used(Role::Error))) {
+        let open = |guess: &&Guess| guess.used && guess.written().is_none() && guess.role.is_angle();
+        if let Some(count) = guesses.iter().filter(open).count().checked_sub(1) {
+            let angles = guesses.iter().zip(names).filter(|(guess, _)| guess.used && guess.role.is_angle());
+            let entries = angles.filter_map(|(guess, name)| {
+                let unit = guess.written().unwrap_or_else(|| "count/COUNTS".to_owned());
+                Some(format!("{}={name}:{unit}", guess.role.in_mapping()?))
+            });
+            let entries = entries.collect::<Vec<_>>().join(",");
+            let which = if count == 0 { "that column" } else { "these columns" };
+            notes.push(format!("give the counts of a turn of {which} in place of COUNTS: --columns {entries}"));
+            return None;
+        }
         let what = match (used(Role::Generator), used(Role::Output) || used(Role::Error)) {
             (true, false) => "which column is the output (or the error)",
             (false, true) => "which column is the generator",

@@ -674,6 +674,13 @@ fn the_columns_of_one_joint_are_proposed_together() {
         let joint = |name: &str| name.rsplit_once('_').unwrap().1.to_owned();
         assert!(joint(&generator) == joint(&output) && joint(&output) == joint(&torque), "{}", text(&looked));
         assert!((looked.ratio_found.unwrap() - 101.0).abs() < 0.5, "{}", text(&looked));
+        // What is missing is said, not that nothing is known.
+        let due = format!("--columns generator={generator}:count/COUNTS,output={output}:count/COUNTS");
+        assert!(
+            looked.columns_option.is_none() && looked.notes.iter().any(|note| note.ends_with(&due)),
+            "{}",
+            text(&looked)
+        );
         // The other two joints, and no pair of two joints.
         assert_eq!(looked.rivals.len(), 2, "{:?}", looked.rivals);
         assert!(

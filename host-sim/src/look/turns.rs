@@ -128,19 +128,20 @@ pub(super) struct Units {
 }
 
 impl Units {
-    /// How sure the two units are, the less sure one first; of units of angle the usual one goes first.
-    fn level(&self) -> (By, By, usize) {
+    /// How sure the less sure of the two units is, how usual they are, and how sure the other one is.
+    fn level(&self) -> (By, usize, By) {
         let by = [self.generator.by, self.output.by];
         let usual = |unit: Unit| Unit::ANGLES.iter().position(|usual| *usual == unit).unwrap_or(0);
-        (by[0].max(by[1]), by[0].min(by[1]), usual(self.generator.unit) + usual(self.output.unit))
+        (by[0].max(by[1]), usual(self.generator.unit) + usual(self.output.unit), by[0].min(by[1]))
     }
 
-    /// The surest first; then ratios of catalogues, then those that are nearest to a whole number.
-    fn rank(&self) -> ((By, By, usize), bool, f64) {
+    /// The surest first; then ratios of catalogues, usual units, and ratios that are nearest to a whole number.
+    fn rank(&self) -> (By, bool, usize, By, f64) {
         let whole = self.ratio.abs().round();
         let off = (self.ratio.abs() / whole - 1.0).abs();
         let listed = CATALOGUE.iter().any(|ratio| whole == *ratio || whole == ratio + 1.0);
-        (self.level(), !listed, off)
+        let (surest, usual, other) = self.level();
+        (surest, !listed, usual, other, off)
     }
 
     /// Whether it is as likely as another reading, for all that the file says.

@@ -17,8 +17,8 @@ pub(super) const COVERED: f64 = 0.75;
 pub(super) const UNAMBIGUOUS: f64 = 0.4;
 /// A step longer than this share of the span is a leap: 1 less what is unambiguous. *Guess*.
 pub(super) const LEAPS: f64 = 0.6;
-/// A known span is that of the leaps within this share, whatever the motion is like. *Guess*: motion changes by less from row to row.
-const NEARLY: f64 = 0.1;
+/// A known span is that of the leaps within this share, or within their scatter. *Guess*: it is for motion that bends beside a leap.
+const NEARLY: f64 = 0.005;
 /// Rows on each side of a leap that show how the values go on.
 const ROWS_BESIDE: usize = 8;
 /// Standard deviation of a value that is rounded to whole counts: 1/√12.
@@ -94,11 +94,11 @@ pub(crate) fn begins_anew(values: &[f64], spans: &[f64], counts: bool, along: Op
     };
     let (nearest, off) = (seen.span.round(), known.map(|span| (seen.span - span).abs() / seen.std));
     match (known, off) {
-        // The register that the values fill fits as well as any number.
-        (Some(span), Some(off)) if off <= 0.5 * EXCLUDED || span == nearest => found(span, None),
-        (Some(span), Some(off)) if off <= EXCLUDED || !seen.tells_counts() => {
-            found(span, (seen.std < IN_DOUBT).then_some(nearest))
+        // The register that the values fill is believed until the leaps exclude it.
+        (Some(span), Some(off)) if off <= if seen.tells_counts() { EXCLUDED } else { 0.5 * EXCLUDED } => {
+            found(span, None)
         }
+        (Some(span), Some(_)) if !seen.tells_counts() => found(span, (seen.std < IN_DOUBT).then_some(nearest)),
         _ if seen.std < IN_DOUBT => {
             let next = nearest + if seen.span > nearest { 1.0 } else { -1.0 };
             found(nearest, (!seen.tells_counts()).then_some(next))
@@ -303,12 +303,12 @@ mod tests {
     #[test]
     fn a_counter_may_have_any_number_of_states() {
         for states in [65_536.0, 32_768.0, 32_767.0, 32_766.0, 65_535.0, 10_000.0, 14_400.0] {
-            let values: Vec<f64> = motion(16_000).iter().map(|at| at.round().rem_euclid(states)).collect();
+            let values: Vec<f64> = motion(32_000).iter().map(|at| at.round().rem_euclid(states)).collect();
             assert_eq!(span(&values), Some((states, None)), "{states}");
             // From minus half to plus half.
             let half = (states / 2.0).floor();
             let values: Vec<f64> =
-                motion(16_000).iter().map(|at| (at.round() + half).rem_euclid(states) - half).collect();
+                motion(32_000).iter().map(|at| (at.round() + half).rem_euclid(states) - half).collect();
             assert_eq!(span(&values), Some((states, None)), "{states}, about zero");
         }
     }
@@ -317,7 +317,7 @@ mod tests {
     fn a_counter_that_is_set_to_zero_at_both_ends_is_continued() {
         // A pulse counter with the limits ±32 767: it is set to zero where it reaches either.
         let limit = 32_767.0;
-        let mut motion = motion(16_000);
+        let mut motion = motion(32_000);
         motion.iter_mut().for_each(|at| *at = (*at - 60_000.0).round());
         let values: Vec<f64> = motion.iter().map(|at| at % limit).collect();
         assert!(values.iter().any(|at| *at < -32_000.0) && values.iter().any(|at| *at > 10_000.0));
