@@ -17,7 +17,7 @@ pub(super) struct Facts {
     pub most: f64,
     /// Smallest change from row to row that is not zero.
     pub step: f64,
-    /// Whether all numbers are whole.
+    /// Whether all numbers are whole, and written without decimals.
     pub whole: bool,
     /// Whether it never falls.
     pub rises: bool,
@@ -40,7 +40,7 @@ impl Facts {
         let range = most - least;
         let moved: Vec<f64> = steps.iter().map(|step| step.abs()).filter(|step| *step > 0.0).collect();
         let count = steps.len().max(1) as f64;
-        let whole = !values.is_empty() && values.iter().all(|value| value.fract() == 0.0);
+        let whole = !column.decimals && !values.is_empty() && values.iter().all(|value| value.fract() == 0.0);
         Facts {
             finite: values.len(),
             least,

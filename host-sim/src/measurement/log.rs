@@ -109,12 +109,13 @@ pub(super) struct Found {
     pub own_zeros: bool,
 }
 
-/// Reads a file called `file`; `ratio` is that of the axis of a guide log, which says no generator angle.
+/// Reads a file called `file`, of at least `fewest` rows; `ratio` is that of the axis of a guide log, which says no generator angle.
 pub(super) fn read(
     file: &str,
     mut source: impl Read,
     map: &ColumnMap,
     ratio: f64,
+    fewest: usize,
 ) -> Result<(Log, Found), MeasuredError> {
     let refuse =
         |problem: TableProblem| MeasuredError { file: file.to_owned(), line: Some(problem.line), what: problem.what };
@@ -148,12 +149,11 @@ pub(super) fn read(
     }
     log.line = read.lines;
     let header_line = layout.header_line;
-    if log.len() < FEWEST_ROWS {
+    if log.len() < fewest {
+        let are = if fewest == 1 { "is" } else { "are" };
         let what = match log.len() {
-            0 => format!("no rows after the header; at least {FEWEST_ROWS} are needed"),
-            n => {
-                format!("{n} row{} after the header; at least {FEWEST_ROWS} are needed", if n == 1 { "" } else { "s" })
-            }
+            0 => format!("no rows after the header; at least {fewest} {are} needed"),
+            n => format!("{n} row{} after the header; at least {fewest} {are} needed", if n == 1 { "" } else { "s" }),
         };
         return Err(refuse(TableProblem { line: header_line, what }));
     }

@@ -12,8 +12,7 @@ use thiserror::Error;
 
 use super::turns_off::{TurnsOff, about_mean, turns_off};
 use super::validate::generator_of;
-use crate::measurement::{CsvRows, NotANumber, TableProblem};
-use crate::suggest::question;
+use crate::measurement::{MeasuredError, plain_rows};
 use crate::units::ARCSEC_PER_RAD;
 
 /// A measured row.
@@ -185,58 +184,21 @@ pub struct MeasurementError {
 
 /// Reads measured rows; `temperature_c` stands where the file has no such column.
 pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result<Vec<MeasuredRow>, MeasurementError> {
-    let refuse = |TableProblem { line, what }| MeasurementError { file: file.to_owned(), line, what };
-    let mut rows = CsvRows::new(bytes).map_err(refuse)?;
-    let column = |name: &str| rows.find(name).map_err(refuse);
-    let generator = rows.need("generator_rad").map_err(refuse)?;
-    let output = column("output_rad")?;
-    let error = column("error_arcsec")?;
-    if output.or(error).is_none() {
-        let like = rows.like("output_rad").or_else(|| rows.like("error_arcsec"));
-        let hint = like.map_or_else(String::new, |name| format!("; {}", question(name)));
-        let what = format!("neither column output_rad nor error_arcsec is there; one is needed{hint}");
-        return Err(refuse(rows.header_problem(what)));
-    }
-    // One that was meant but misspelt would silently not act.
-    for wanted in ["torque_n_m", "temperature_c"] {
-        if let (None, Some(like)) = (column(wanted)?, rows.like(wanted)) {
-            let what = format!("column {like} is not read; {} Rename it, or take it out", question(wanted));
-            return Err(refuse(rows.header_problem(what)));
-        }
-    }
-    let (torque, temperature) = (column("torque_n_m")?, column("temperature_c")?);
-    let header = rows.header().to_vec();
-    let mut measured = Vec::new();
-    while let Some(row) = rows.next_row().map_err(refuse)? {
-        let number = |place: usize| -> Result<f64, MeasurementError> {
-            let name = &header[place];
-            let what = match row.number(place) {
-                Ok(value) if value.is_finite() && value.abs() < 1e9 => return Ok(value),
-                Err(NotANumber::Absent(fields)) => format!("{name} is missing: {fields} fields"),
-                _ => {
-                    let text = row.text(place).unwrap_or_default();
-                    format!("{name}: found \"{text}\", allowed: a finite number below 1e9")
-                }
-            };
-            Err(refuse(TableProblem { line: row.line, what }))
-        };
-        let generator_rad = number(generator)?;
-        let error_arcsec = match (output, error) {
-            (Some(output), _) => (number(output)? - generator_rad / ratio) * ARCSEC_PER_RAD,
-            (None, Some(error)) => number(error)?,
-            (None, None) => 0.0,
-        };
-        measured.push(MeasuredRow {
-            generator_rad,
-            error_arcsec,
-            torque_n_m: torque.map_or(Ok(0.0), number)?,
-            temperature_c: temperature.map_or(Ok(temperature_c), number)?,
-        });
-    }
-    if measured.is_empty() {
-        return Err(refuse(rows.header_problem("no rows after the header".to_owned())));
-    }
-    Ok(measured)
+    let refuse = |error: MeasuredError| MeasurementError {
+        file: file.to_owned(),
+        line: error.line.unwrap_or(1),
+        what: error.what,
+    };
+    let rows = plain_rows(file, bytes, ratio).map_err(refuse)?;
+    let at = |values: &Option<Vec<f64>>, row: usize, usual: f64| values.as_ref().map_or(usual, |values| values[row]);
+    Ok((0..rows.generator_rad.len())
+        .map(|row| MeasuredRow {
+            generator_rad: rows.generator_rad[row],
+            error_arcsec: rows.error_rad[row] * ARCSEC_PER_RAD,
+            torque_n_m: at(&rows.torque_n_m, row, 0.0),
+            temperature_c: at(&rows.temperature_c, row, temperature_c),
+        })
+        .collect())
 }
 
 /// Runs the core over the rows, from a state it does not know.
@@ -331,9 +293,9 @@ mod tests {
             ("generator_rad,torque_n_m\n1,2\n", "neither column output_rad nor error_arcsec"),
             ("generator_rad,generator_rad,output_rad\n1,1,1\n", "generator_rad is there twice"),
             ("generator_rad,output_rad\n", "no rows"),
-            ("generator_rad,output_rad\n1\n", "output_rad is missing: 1 fields"),
+            ("generator_rad,output_rad\n1\n", "no rows after the header"),
             ("generator_rad,output_rad\n1,abc\n", "output_rad: found \"abc\""),
-            ("generator_rad,output_rad\n1,nan\n", "output_rad: found \"nan\""),
+            ("generator_rad,output_rad\n1,nan\n", "output_rad: nothing is recorded"),
             ("generator_rad,output_rad\n1e12,0\n", "generator_rad: found \"1e12\""),
         ] {
             let error = parse("m.csv", text.as_bytes(), 95.0, 20.0).unwrap_err().to_string();

@@ -232,10 +232,13 @@ impl Layout {
         }
         lines.retain(|line| !line.text.trim().is_empty());
         let (comments, lines): (Vec<Line>, Vec<Line>) = lines.into_iter().partition(|line| line.text.starts_with('#'));
-        // This project's own form is read as it is: what does not fit is for the reader to refuse.
-        match guess(&lines) {
-            Some(guess) if !is_own(&lines, &guess, known) => Layout::guessed(&comments, &lines, guess, known),
-            guess => Layout::own(&lines, guess),
+        // Names that are looked for, in the first line with commas, are a header whatever stands below: what does not fit is for the reader to
+        // refuse.
+        let own = is_own(&lines, known);
+        let guessed = guess(&lines).map(|guess| Layout::guessed(&comments, &lines, guess, known));
+        match guessed {
+            Some(layout) if !own || layout.header_line == lines[0].number => layout,
+            _ => Layout::own(&lines),
         }
     }
 
@@ -250,11 +253,10 @@ impl Layout {
     }
 
     /// Commas, a point, and the names in the first line.
-    fn own(lines: &[Line], guess: Option<Guess>) -> Layout {
+    fn own(lines: &[Line]) -> Layout {
         let names = lines.first().map_or_else(Vec::new, |line| Separator::Comma.fields(line.text.as_bytes()));
         let header_line = lines.first().map_or(1, |line| line.number);
         let width = names.len();
-        let kinds = guess.filter(|guess| guess.separator == Separator::Comma && guess.width == width);
         let mut layout = Layout {
             separator: Separator::Comma,
             decimal_comma: false,
@@ -262,7 +264,7 @@ impl Layout {
             units: Vec::new(),
             header_line,
             first_row_line: header_line + 1,
-            kinds: kinds.map_or_else(|| vec![Field::Number; width], |guess| guess.kinds),
+            kinds: vec![Field::Number; width],
             commas: vec![false; width],
             cell_units: vec![None; width],
             stamp: None,
@@ -487,15 +489,10 @@ fn rows_of(lines: &[Line], separator: Separator, from: u64) -> Vec<Vec<String>> 
     lines.iter().filter(|line| line.number >= from).map(|line| separator.fields(line.text.as_bytes())).collect()
 }
 
-/// Whether the file has this project's form: commas, one of its names or of the mapping in the first line, rows of as many fields below.
-fn is_own(lines: &[Line], guess: &Guess, known: &[&str]) -> bool {
-    let Some(first) = lines.first() else { return true };
-    let names = Separator::Comma.fields(first.text.as_bytes());
-    let second = lines.get(1).map_or_else(Vec::new, |line| Separator::Comma.fields(line.text.as_bytes()));
-    guess.separator == Separator::Comma
-        && (names.len() == guess.width || (names.len() > 1 && guess.width % names.len() != 0))
-        && names.iter().any(|name| known.contains(&name.as_str()))
-        && !looks_like_units(&second)
+/// Whether the first line has one of the names that are looked for, between commas.
+fn is_own(lines: &[Line], known: &[&str]) -> bool {
+    let names = lines.first().map_or_else(Vec::new, |line| Separator::Comma.fields(line.text.as_bytes()));
+    names.len() > 1 && names.iter().any(|name| known.contains(&name.as_str()))
 }
 
 /// The separator with which most fields are numbers, and what it makes of the rows.

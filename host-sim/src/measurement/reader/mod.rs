@@ -79,6 +79,8 @@ pub struct Cells {
     pub time_of_day: bool,
     /// Whether the times have a date and no zone: a clock on the wall, which is set forward and back in spring and autumn.
     pub local_time: bool,
+    /// Whether a number is written with decimals: then they are no counts, though all may be whole.
+    pub decimals: bool,
     /// Cells in which nothing was recorded.
     pub empty: usize,
     /// Cells that say that the value was beyond the range.
@@ -213,12 +215,13 @@ impl Sheet {
             self.rows.append(&mut group);
         } else if let (Some(first), Some(last)) = (group.first(), group.last()) {
             let fields = |at: &RowAt| self.layout.separator.fields(&text[at.begin..at.end]);
-            if group.iter().any(|at| self.order_of(&fields(at)).is_some()) {
-                found.restarts.extend(group.iter().map(|at| at.line));
-            } else {
-                found.summary = Some((first.line, last.line, fields(first)[0].clone()));
+            match group.iter().find(|at| self.order_of(&fields(at)).is_some()) {
+                Some(at) => found.restarts.push(at.line),
+                None => found.summary = Some((first.line, last.line, fields(first)[0].clone())),
             }
         }
+        // Zeros behind the last line: room that was kept for rows that were never written.
+        found.holes.extend(zeros.map(|(line, _)| *line).filter(|zero| *zero > line));
         self.text = text;
         found.say(&mut self.notes);
         Ok(())
@@ -245,7 +248,7 @@ impl Sheet {
         let header = (0..group.len()).rev().find_map(|k| Some((k, self.order_of(&fields[k])?)));
         match header {
             Some((k, order)) => {
-                found.restarts.extend(group.iter().map(|at| at.line));
+                found.restarts.push(group[k].line);
                 let as_it_was = order.iter().enumerate().all(|(place, at)| *at == Some(place));
                 let before = self.segments.last().map(|(_, order)| order.clone());
                 let same = before.as_ref().map_or(as_it_was, |before| *before == order);
@@ -358,6 +361,7 @@ impl Sheet {
             let (first_word, first_over) = (mine(&values.first_word), mine(&values.first_over));
             Cells {
                 values: (0..of_row.len()).map(of).collect(),
+                decimals: values.decimals,
                 words: first_word.as_ref().map_or(0, |_| values.words),
                 over: first_over.as_ref().map_or(0, |_| values.over),
                 first_word,
@@ -448,7 +452,10 @@ impl Sheet {
         let comma = self.layout.commas.get(place).copied().unwrap_or(false);
         let found = || Some(FoundCell { line, text: String::from_utf8_lossy(field).into_owned() });
         let value = match number::cell(field, comma) {
-            Cell::Number(value, None) => value,
+            Cell::Number(value, None) => {
+                cells.decimals = cells.decimals || field.iter().any(|byte| matches!(byte, b'.' | b','));
+                value
+            }
             Cell::Number(value, Some(unit)) => match self.in_unit_of_column(value, unit, place) {
                 Some(value) => value,
                 None => {
@@ -515,6 +522,7 @@ impl Cells {
         self.first_time = self.first_time.take().or(more.first_time);
         self.time_of_day |= more.time_of_day;
         self.local_time |= more.local_time;
+        self.decimals |= more.decimals;
         self.empty += more.empty;
         self.over += more.over;
         self.first_over = self.first_over.take().or(more.first_over);

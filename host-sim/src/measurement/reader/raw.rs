@@ -48,6 +48,8 @@ pub struct RawColumn {
     pub times: usize,
     /// The first of them.
     pub first_time: Option<FoundCell>,
+    /// Whether a number is written with decimals.
+    pub decimals: bool,
     /// Fields in which nothing was recorded.
     pub empty: usize,
     /// Fields beyond the range of the instrument.
@@ -100,6 +102,7 @@ pub fn parse(file: &str, mut source: impl Read) -> Result<RawFile, MeasuredError
             values: cells.values,
             times: cells.times,
             first_time: cells.first_time,
+            decimals: cells.decimals,
             empty: cells.empty,
             over: cells.over,
             words: cells.words,
