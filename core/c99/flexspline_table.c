@@ -135,8 +135,9 @@ static inline bool is_finite(float value)
 /* Towards zero; the end of the range beyond it; 0 of NaN. */
 static inline int32_t to_i32(float value)
 {
-    if (value >= -2147483648.0f && value < 2147483648.0f)
+    if (value >= -2147483648.0f && value < 2147483648.0f) {
         return (int32_t)value;
+    }
     return value > 0.0f ? INT32_MAX : value < 0.0f ? INT32_MIN : 0;
 }
 
@@ -160,8 +161,9 @@ static inline float root_of(float value)
     const float x = float_of(bits);
     const float half = 0.5f * x;
     float inverse = float_of(0x5f3759dfu - (bits >> 1));
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++) {
         inverse = inverse * (1.5f - half * inverse * inverse);
+    }
     return x * inverse;
 }
 
@@ -186,8 +188,9 @@ static inline uint32_t word_from(const uint8_t *at)
 static inline void words_from(const uint8_t *image, uint32_t bytes, uint32_t at, uint32_t count, uint32_t *words)
 {
     const bool there = at <= bytes && bytes - at >= 4u * count;
-    for (uint32_t i = 0; i < count; i++)
+    for (uint32_t i = 0; i < count; i++) {
         words[i] = there ? word_from(image + at + 4u * i) : 0u;
+    }
 }
 
 /* Words of the body. */
@@ -308,8 +311,9 @@ static int64_t nominal_generator(const fxt_table *table, int64_t output)
 static inline int32_t minus_near(int64_t a, int64_t b)
 {
     const int64_t counts = minus(a, b);
-    if (counts >= INT32_MIN && counts <= INT32_MAX)
+    if (counts >= INT32_MIN && counts <= INT32_MAX) {
         return (int32_t)counts;
+    }
     return counts < 0 ? ~(INT32_MAX >> 1) : INT32_MAX >> 1;
 }
 
@@ -343,9 +347,11 @@ typedef struct {
 static inline uint32_t search(const fxt_table *table, uint32_t first, uint32_t step, float value)
 {
     uint32_t found = 0;
-    for (; step > 0; step >>= 1)
-        if (number_at(table, first + (found | step)) <= value)
+    for (; step > 0; step >>= 1) {
+        if (number_at(table, first + (found | step)) <= value) {
             found |= step;
+        }
+    }
     return found;
 }
 
@@ -389,8 +395,9 @@ static point locate(const fxt_table *table, float torque_n_m, float temperature_
     const int32_t t = to_i32(weight * 16384.0f), w = to_i32(warm * 16384.0f);
     const int32_t both = mul(t, w) >> 14;
     const int32_t shares[4] = {add(sub(sub(16384, t), w), both), sub(t, both), sub(w, both), both};
-    for (int i = 0; i < 4; i++)
+    for (int i = 0; i < 4; i++) {
         at.shares[i] = i32((uint32_t)shares[i] << 16);
+    }
     const bool inside = (uint32_t)t - 1u < 16383u;
     at.jump = jump && inside ? to_i32(magnitude(rise) + magnitude(widening)) : 0;
     at.mean = to_i32(here[0] + weight * rise + bend);
@@ -407,10 +414,12 @@ static point locate(const fxt_table *table, float torque_n_m, float temperature_
 
 static fxt_quality quality_of(const point *at, bool sane, bool known)
 {
-    if (!sane)
+    if (!sane) {
         return FXT_DISABLED;
-    if (!at->in_range)
+    }
+    if (!at->in_range) {
         return FXT_EXTRAPOLATED;
+    }
     return known && at->jump == 0 ? FXT_IN_RANGE : FXT_UNCERTAIN;
 }
 
@@ -476,15 +485,17 @@ static int32_t curves_at(const fxt_table *table, const phases *where)
     int32_t sum = 0;
     for (uint32_t curve = 0; curve < 3; curve++) {
         const uint32_t nodes = table->curves[curve] >> 16, first = table->curves[curve] & 0xffffu;
-        if (nodes == 0u)
+        if (nodes == 0u) {
             continue;
+        }
         const cell at = cell_at(nodes, phase[curve]);
         uint32_t words[3];
         int32_t weights[3];
         words_at(table, first + at.node, 3, words);
         weights_q15(at, weights);
-        for (int i = 0; i < 3; i++)
+        for (int i = 0; i < 3; i++) {
             sum = add(sum, mul_high(i32(words[i]), i32((uint32_t)weights[i] << 16)));
+        }
     }
     return sum;
 }
@@ -502,8 +513,9 @@ static void ripple_at(const fxt_table *table, const point *at, uint32_t tooth, i
     const uint32_t backward_row = ripple_row(table->ripple_nodes), rows = rows_of(at);
     int32_t weights[3];
     weights_q15(where, weights);
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++) {
         weights[i] = (int16_t)weights[i];
+    }
     ripple[0] = ripple[1] = 0;
     for (uint32_t row = 0; row < rows; row++) {
         for (uint32_t side = 0; side < 2; side++) {
@@ -514,8 +526,9 @@ static void ripple_at(const fxt_table *table, const point *at, uint32_t tooth, i
             ripple[side] = add(ripple[side], mul_high(own, at->shares[row]));
         }
     }
-    for (int side = 0; side < 2; side++)
+    for (int side = 0; side < 2; side++) {
         ripple[side] = mul_high(ripple[side], i32(table->ripple_unit));
+    }
 }
 
 /* Centre and half-width of the play, counts; false where they are not what an accepted table can give. */
@@ -529,8 +542,9 @@ static bool play_at(const fxt_table *table, const point *at, const phases *where
         *centre = add(*centre, add(ripple[0], ripple[1]) >> 1);
         *half = add(*half, sub(ripple[1], ripple[0]) >> 1);
     }
-    if (has_curves(table))
+    if (has_curves(table)) {
         *centre = add(*centre, curves_at(table, where));
+    }
     *half = *half < 0 ? 0 : *half;
     return allows(table, *centre, *half);
 }
@@ -552,8 +566,9 @@ static int32_t to_solution(const fxt_table *table, const point *at, uint32_t too
         sums[3] = add(sums[3], mul(high(words[1]), share));
         sums[4] = add(sums[4], mul(low(words[2]), share));
     }
-    for (int i = 0; i < 5; i++)
+    for (int i = 0; i < 5; i++) {
         sums[i] = mul_high(sums[i], table->ripple_cells);
+    }
     const int32_t place = sub(i32(guess.fraction ^ 0x80000000u) >> 8, ahead);
     /* What is missing at either end of the node's cell tells whether the solution is in it, before or after. */
     int which = sub(add(sums[1], sums[2]) >> 1, place) <= CELL / 2 ? 1 : 0;
@@ -616,8 +631,9 @@ static const play_state unknown_state = {0, 0, INT32_MIN, INT32_MAX, -1};
 static inline play_state state_of(const fxt_play *play)
 {
     play_state is = unknown_state;
-    if (play == NULL)
+    if (play == NULL) {
         return is;
+    }
     is.nominal = play->nominal;
     is.error = play->error;
     is.lower = i32(play->lower ^ 0x80000000u);
@@ -718,8 +734,9 @@ static fxt_command aim_from(const fxt_table *table, const point *at, int64_t tar
     const int32_t away = ahead == INT32_MIN ? INT32_MAX : ahead < 0 ? -ahead : ahead;
     const int32_t unknown = play_uncertainty(play);
     const bool sane = solve(table, at, target, ahead <= 0, &error);
-    if (away <= table->hold)
+    if (away <= table->hold) {
         return commanded(table, at, target, sane, play->nominal, play->error, unknown);
+    }
     /* A target inside the interval may lie on the other side of the output: then the whole play is in doubt. */
     const int32_t guess = away <= unknown && unknown > 0 ? mul(at->half_width, 2) : 0;
     return commanded(table, at, target, sane, minus(target, error), error, guess);
@@ -752,8 +769,9 @@ static bool finite_is(check *is, fxt_field field, uint32_t index, float value)
 
 static bool in_range(check *is, fxt_field field, uint32_t index, float value, float least, float most)
 {
-    if (!finite_is(is, field, index, value))
+    if (!finite_is(is, field, index, value)) {
         return false;
+    }
     return (value >= least && value <= most) || refuse(is, FXT_OUT_OF_RANGE, field, 0, 0);
 }
 
@@ -770,31 +788,40 @@ static uint32_t u16_at(const uint8_t *image, uint32_t at)
 static bool check_envelope(check *is, const uint8_t *image, size_t bytes)
 {
     static const uint8_t magic[8] = {0x89, 'F', 'X', 'T', 0x0d, 0x0a, 0x1a, 0x0a};
-    if (image == NULL || bytes < LEAST_BYTES)
+    if (image == NULL || bytes < LEAST_BYTES) {
         return refuse(is, FXT_TOO_SHORT, FXT_NO_FIELD, 0, 0);
-    for (int i = 0; i < 8; i++)
-        if (image[i] != magic[i])
+    }
+    for (int i = 0; i < 8; i++) {
+        if (image[i] != magic[i]) {
             return refuse(is, FXT_MAGIC, FXT_NO_FIELD, 0, 0);
-    if (u16_at(image, 10) != 0xfeffu)
+        }
+    }
+    if (u16_at(image, 10) != 0xfeffu) {
         return refuse(is, FXT_BYTE_ORDER, FXT_NO_FIELD, u16_at(image, 10), 0);
-    if (u16_at(image, 8) != FXT_FORMAT_VERSION)
+    }
+    if (u16_at(image, 8) != FXT_FORMAT_VERSION) {
         return refuse(is, FXT_VERSION, FXT_NO_FIELD, u16_at(image, 8), 0);
+    }
     const uint32_t stated = word_from(image + 12);
-    if (stated != bytes)
+    if (stated != bytes) {
         return refuse(is, FXT_LENGTH, FXT_NO_FIELD, stated, 0);
+    }
     const uint32_t computed = crc32_of(image, stated - 4u);
-    if (computed != word_from(image + stated - 4u))
+    if (computed != word_from(image + stated - 4u)) {
         return refuse(is, FXT_CRC, FXT_NO_FIELD, computed, 0);
+    }
     return true;
 }
 
 static bool check_text(check *is, const uint8_t *text, fxt_field field)
 {
     uint32_t length = 0;
-    while (length < TEXT_BYTES && text[length] >= 0x20 && text[length] < 0x7f)
+    while (length < TEXT_BYTES && text[length] >= 0x20 && text[length] < 0x7f) {
         length++;
-    while (length < TEXT_BYTES && text[length] == 0)
+    }
+    while (length < TEXT_BYTES && text[length] == 0) {
         length++;
+    }
     return length == TEXT_BYTES || refuse(is, FXT_TEXT, field, 0, 0);
 }
 
@@ -802,11 +829,13 @@ static bool check_drive(check *is, const uint8_t *image)
 {
     fxt_table *table = is->table;
     const uint32_t flexspline = u16_at(image, 106), circular = u16_at(image, 108);
-    if (image[105] > 1)
+    if (image[105] > 1) {
         return refuse(is, FXT_FIXED_MEMBER, FXT_NO_FIELD, image[105], 0);
+    }
     const uint32_t waves = circular > flexspline ? circular - flexspline : 0u;
-    if (flexspline == 0u || waves == 0u || waves > flexspline)
+    if (flexspline == 0u || waves == 0u || waves > flexspline) {
         return refuse(is, FXT_TEETH, FXT_NO_FIELD, flexspline, 0);
+    }
     table->reversed = image[105] == 1;
     const uint32_t teeth = table->reversed ? flexspline : circular;
     table->ripple_order = table->reversed ? circular : flexspline;
@@ -835,25 +864,31 @@ static uint32_t stored(uint32_t nodes)
 /* What an image is for, and its sizes. */
 static bool check_identity(check *is, const uint8_t *image)
 {
-    for (uint32_t at = 200; at < HEADER_BYTES; at++)
-        if (image[at] != 0)
+    for (uint32_t at = 200; at < HEADER_BYTES; at++) {
+        if (image[at] != 0) {
             return refuse(is, FXT_RESERVED, FXT_NO_FIELD, at, 0);
-    if (!check_text(is, image + 56, FXT_TOOL_VERSION) || !check_text(is, image + 80, FXT_MESH_LEVEL) || !check_drive(is, image))
+        }
+    }
+    if (!check_text(is, image + 56, FXT_TOOL_VERSION) || !check_text(is, image + 80, FXT_MESH_LEVEL) || !check_drive(is, image)) {
         return false;
-    if (image[104] > 4)
+    }
+    if (image[104] > 4) {
         return refuse(is, FXT_GENERATOR_KIND, FXT_NO_FIELD, image[104], 0);
+    }
     is->torques = image[110];
     is->temperatures = image[111];
     is->ripple_nodes = image[112];
     if (!count_is(is, FXT_TORQUE_NODES, is->torques, 1, TORQUE_SLOTS) ||
         !count_is(is, FXT_TEMPERATURE_NODES, is->temperatures, 1, TEMPERATURE_SLOTS) ||
-        !count_is(is, FXT_RIPPLE_NODES, is->ripple_nodes, LEAST_PERIODIC_NODES, MOST_RIPPLE_NODES))
+        !count_is(is, FXT_RIPPLE_NODES, is->ripple_nodes, LEAST_PERIODIC_NODES, MOST_RIPPLE_NODES)) {
         return false;
+    }
     uint32_t next = AT_CURVES;
     for (uint32_t i = 0; i < 3; i++) {
         is->curve_nodes[i] = image[113u + i];
-        if (!count_is(is, (fxt_field)((uint32_t)FXT_GENERATOR_CURVE + i), is->curve_nodes[i], LEAST_PERIODIC_NODES, MOST_PERIODIC_NODES))
+        if (!count_is(is, (fxt_field)((uint32_t)FXT_GENERATOR_CURVE + i), is->curve_nodes[i], LEAST_PERIODIC_NODES, MOST_PERIODIC_NODES)) {
             return false;
+        }
         is->curves[i] = next;
         next += stored(is->curve_nodes[i]);
     }
@@ -894,11 +929,14 @@ static bool check_places(check *is)
         pair(is->curves[1], is->curve_nodes[1]),
         pair(is->curves[2], is->curve_nodes[2]),
     };
-    if (!derived_is(is, AT_BODY, is->end) || !derived_is(is, AT_CELL_WIDTH, bits_of(cell_width)))
+    if (!derived_is(is, AT_BODY, is->end) || !derived_is(is, AT_CELL_WIDTH, bits_of(cell_width))) {
         return false;
-    for (uint32_t i = 0; i < 7; i++)
-        if (!derived_is(is, AT_LAST + i, plan[i]))
+    }
+    for (uint32_t i = 0; i < 7; i++) {
+        if (!derived_is(is, AT_LAST + i, plan[i])) {
             return false;
+        }
+    }
     is->table->cell_width = cell_width;
     const float limit = number_at(is->table, 38);
     return in_range(is, FXT_ERROR_LIMIT, 0, limit, FLT_MIN, 0.05f) &&
@@ -910,14 +948,17 @@ static bool check_axis(check *is, fxt_field field, uint32_t first, uint32_t node
     for (uint32_t i = 0; i < slots; i++) {
         const float node = number_at(is->table, first + i);
         if (i >= nodes) {
-            if (!derived_is(is, first + i, bits_of(FLT_MAX)))
+            if (!derived_is(is, first + i, bits_of(FLT_MAX))) {
                 return false;
+            }
             continue;
         }
-        if (!in_range(is, field, i, node, -1e6f, 1e6f))
+        if (!in_range(is, field, i, node, -1e6f, 1e6f)) {
             return false;
-        if (i > 0u && node <= number_at(is->table, first + i - 1u))
+        }
+        if (i > 0u && node <= number_at(is->table, first + i - 1u)) {
             return refuse(is, FXT_NOT_INCREASING, field, i, 0);
+        }
     }
     return true;
 }
@@ -938,8 +979,9 @@ static bool check_header_numbers(check *is)
     if (!check_range(is, FXT_TORQUE_RANGE, AT_TORQUE_RANGE, AT_TORQUE_NODES, is->torques) ||
         !check_range(is, FXT_TEMPERATURE_RANGE, AT_TEMPERATURE_RANGE, AT_TEMPERATURE_NODES, is->temperatures) ||
         !in_range(is, FXT_SOLVER_RESIDUAL, 0, residual, 0.0f, FLT_MAX) || !in_range(is, FXT_PROJECTION_WORST, 0, worst, 0.0f, 0.05f) ||
-        !in_range(is, FXT_PROJECTION_RMS, 0, rms, 0.0f, worst))
+        !in_range(is, FXT_PROJECTION_RMS, 0, rms, 0.0f, worst)) {
         return false;
+    }
     /* So that the ripple in cells, and in counts, fits the integers of a step. */
     const float widest = magnitude(table->cell_width) * 255.0f;
     const float most = is->ripple_nodes == 0u || widest > 2147483648.0f ? 2147483648.0f : widest;
@@ -955,8 +997,9 @@ static float torque_at(const check *is, uint32_t node)
 static bool jump_at(const check *is, uint32_t node)
 {
     const uint32_t intervals = is->torques - 1u;
-    if (node >= intervals || intervals <= 1u)
+    if (node >= intervals || intervals <= 1u) {
         return false;
+    }
     const float own = (torque_at(is, node + 1u) - torque_at(is, node)) * 8.0f;
     return (node == 0u || torque_at(is, node) - torque_at(is, node - 1u) >= own) &&
            (node + 1u == intervals || torque_at(is, node + 2u) - torque_at(is, node + 1u) >= own);
@@ -981,16 +1024,21 @@ static bool check_nodes(check *is)
         const uint32_t node = index % is->torques, at = node_at(is, index);
         const float mean = number_at(is->table, at), slope = number_at(is->table, at + 1u), half = number_at(is->table, at + 2u);
         if (!in_range(is, FXT_MEAN, index, mean, -most, most) || !finite_is(is, FXT_MEAN_SLOPE, index, slope) ||
-            !in_range(is, FXT_HALF_WIDTH, index, half, 0.0f, most))
+            !in_range(is, FXT_HALF_WIDTH, index, half, 0.0f, most)) {
             return false;
-        if (((bits_of(half) & 1u) != 0u) != is_jump(is, node))
+        }
+        if (((bits_of(half) & 1u) != 0u) != is_jump(is, node)) {
             return refuse(is, FXT_DERIVED, FXT_NO_FIELD, 4u * (at + 2u), 0);
+        }
         if (is->torques == 1u) {
-            for (uint32_t i = 0; i < NODE_WORDS; i++)
-                if (!derived_is(is, at + NODE_WORDS + i, word_at(is->table, at + i)))
+            for (uint32_t i = 0; i < NODE_WORDS; i++) {
+                if (!derived_is(is, at + NODE_WORDS + i, word_at(is->table, at + i))) {
                     return false;
-            if (!in_range(is, FXT_MEAN_SLOPE, index, slope, 0.0f, 0.0f))
+                }
+            }
+            if (!in_range(is, FXT_MEAN_SLOPE, index, slope, 0.0f, 0.0f)) {
                 return false;
+            }
         }
         const float torque = torque_at(is, node);
         is->error_rad = larger(is->error_rad, rad_of(magnitude(mean) + half));
@@ -1011,16 +1059,18 @@ static bool check_nodes(check *is)
 static uint32_t leading_zeros(uint64_t bits)
 {
     uint32_t zeros = 0;
-    while (zeros < 64u && (bits >> (63u - zeros) & 1u) == 0u)
+    while (zeros < 64u && (bits >> (63u - zeros) & 1u) == 0u) {
         zeros++;
+    }
     return zeros;
 }
 
 static uint32_t trailing_zeros(uint64_t bits)
 {
     uint32_t zeros = 0;
-    while (zeros < 64u && (bits >> zeros & 1u) == 0u)
+    while (zeros < 64u && (bits >> zeros & 1u) == 0u) {
         zeros++;
+    }
     return zeros;
 }
 
@@ -1058,10 +1108,12 @@ static bool check_rise(check *is)
             least = change < least ? change : least;
         }
         const bool lets_go = first < below && below < last && !jump;
-        if (least < -(lets_go ? 0.5f * pitch_rad : 5.0e-5f))
+        if (least < -(lets_go ? 0.5f * pitch_rad : 5.0e-5f)) {
             return refuse(is, FXT_FALLS, FXT_NO_FIELD, torque, temperature);
-        if (most > allowed + 5.0e-5f)
+        }
+        if (most > allowed + 5.0e-5f) {
             return refuse(is, FXT_STEEP, FXT_NO_FIELD, torque, temperature);
+        }
     }
     return true;
 }
@@ -1082,8 +1134,9 @@ static int32_t half_at(const fxt_table *table, uint32_t words, uint32_t half)
 
 static float curve_rad(const curve *of, uint32_t i)
 {
-    if (of->is_ripple)
+    if (of->is_ripple) {
         return rad_of((float)half_at(of->table, of->words, of->halves + i) * of->unit);
+    }
     return rad_of((float)i32(word_at(of->table, of->words + i)) * 0.5f);
 }
 
@@ -1113,8 +1166,9 @@ static bool check_record(check *is, uint32_t index)
     for (uint32_t i = 0; i < 2u * is->record; i++) {
         const uint32_t first = i < is->record ? 0u : is->record;
         const uint32_t node = (i - first + nodes - 1u) % nodes + 1u;
-        if (half_at(table, words, i) != half_at(table, words, first + node))
+        if (half_at(table, words, i) != half_at(table, words, first + node)) {
             return refuse(is, FXT_NOT_CLOSED, FXT_MEAN_RIPPLE, i, 0);
+        }
     }
     const float half = number_at(table, node_at(is, index) + 2u);
     float least = half;
@@ -1123,8 +1177,9 @@ static bool check_record(check *is, uint32_t index)
         const float play = half + 0.5f * (backward * unit - forward * unit);
         least = play < least ? play : least;
     }
-    if (least < -(3.0f + unit))
+    if (least < -(3.0f + unit)) {
         return refuse(is, FXT_NEGATIVE_HALF_WIDTH, FXT_NO_FIELD, index % is->torques, index / is->torques);
+    }
     const float cells_per_rad = (float)nodes * magnitude(is->tooth_periods) / tau_f32;
     for (uint32_t side = 0; side < 2; side++) {
         const curve of = {table, words, side * is->record, true, unit};
@@ -1143,20 +1198,25 @@ static bool check_curve(check *is, uint32_t index)
     const fxt_field field = (fxt_field)((uint32_t)FXT_GENERATOR_CURVE + index);
     const uint32_t nodes = is->curve_nodes[index], count = stored(nodes), at = is->curves[index];
     const curve of = {is->table, at, 0, false, 0.0f};
-    for (uint32_t i = 0; i < count; i++)
-        if (!in_range(is, field, i, curve_rad(&of, i), -0.05f, 0.05f))
+    for (uint32_t i = 0; i < count; i++) {
+        if (!in_range(is, field, i, curve_rad(&of, i), -0.05f, 0.05f)) {
             return false;
+        }
+    }
     if (count > 0u) {
         const uint32_t repeats[3] = {0, nodes + 1u, nodes + 2u}, own[3] = {nodes, 1, 2};
-        for (int i = 0; i < 3; i++)
-            if (word_at(is->table, at + repeats[i]) != word_at(is->table, at + own[i]))
+        for (int i = 0; i < 3; i++) {
+            if (word_at(is->table, at + repeats[i]) != word_at(is->table, at + own[i])) {
                 return refuse(is, FXT_NOT_CLOSED, field, repeats[i], 0);
+            }
+        }
     }
     float most[3];
     extremes(&of, count, most);
     const float periods = index == 0u ? is->ratio : index == 1u ? is->ratio - 1.0f : 1.0f;
-    if (index == 0u)
+    if (index == 0u) {
         is->error_rad = is->error_rad + is->periodic_rad;
+    }
     const float slope = most[1] * (float)nodes * magnitude(periods) / tau_f32;
     is->rounding_rad = is->rounding_rad + 2.0f * weight_rounding * most[1];
     is->error_rad = is->error_rad + most[0];
@@ -1179,13 +1239,15 @@ static bool check_inverse(check *is)
         left = left * rate + beyond;
         away = left * (1.0f + rate);
         iterations++;
-        if (left <= 1.0e-7f)
+        if (left <= 1.0e-7f) {
             break;
+        }
     }
     const float place = is_finite(cell_rad) ? 4.0f * FLT_EPSILON * cell_rad : 0.0f;
     left = left + (is->rounding_rad + place) / (1.0f - is->slope);
-    if (!(left <= 1.0e-6f))
+    if (!(left <= 1.0e-6f)) {
         return refuse(is, FXT_INVERSE, FXT_NO_FIELD, 0, 0);
+    }
     table->inverse_error_rad = left;
     const int32_t hold = add((int32_t)counts_of_rad((double)left), HOLD_COUNTS);
     return derived_is(is, AT_ITERATIONS, iterations) && derived_is(is, AT_HOLD, (uint32_t)hold);
@@ -1195,23 +1257,33 @@ static bool check_numbers(check *is)
 {
     if (!check_places(is) || !check_axis(is, FXT_TORQUE_NODES, AT_TORQUE_NODES, is->torques, TORQUE_SLOTS) ||
         !check_axis(is, FXT_TEMPERATURE_NODES, AT_TEMPERATURE_NODES, is->temperatures, TEMPERATURE_SLOTS) ||
-        !check_header_numbers(is))
+        !check_header_numbers(is)) {
         return false;
-    for (uint32_t i = 0; i < is->torques; i++)
+    }
+    for (uint32_t i = 0; i < is->torques; i++) {
         is->jumps |= (uint64_t)(jump_at(is, i) ? 1u : 0u) << i;
-    if (!check_nodes(is))
+    }
+    if (!check_nodes(is)) {
         return false;
-    if (is->ripple_nodes > 0u)
-        for (uint32_t i = 0; i < is->torques * is->temperatures; i++)
-            if (!check_record(is, i))
+    }
+    if (is->ripple_nodes > 0u) {
+        for (uint32_t i = 0; i < is->torques * is->temperatures; i++) {
+            if (!check_record(is, i)) {
                 return false;
-    for (uint32_t i = 0; i < 3; i++)
-        if (!check_curve(is, i))
+            }
+        }
+    }
+    for (uint32_t i = 0; i < 3; i++) {
+        if (!check_curve(is, i)) {
             return false;
-    if (!(is->error_rad <= number_at(is->table, 38)))
+        }
+    }
+    if (!(is->error_rad <= number_at(is->table, 38))) {
         return refuse(is, FXT_ERROR_BOUND, FXT_NO_FIELD, 0, 0);
-    if (!(is->slope < 1.0f))
+    }
+    if (!(is->slope < 1.0f)) {
         return refuse(is, FXT_SLOPE, FXT_NO_FIELD, 0, 0);
+    }
     return check_rise(is) && check_inverse(is);
 }
 
@@ -1251,21 +1323,24 @@ fxt_verdict fxt_open(fxt_table *table, const void *image, size_t bytes)
         table->image = at;
         table->bytes = (uint32_t)bytes;
         bool whole = check_identity(&is, at);
-        for (uint32_t page = 0; whole && page < fxt_page_count(table); page++)
+        for (uint32_t page = 0; whole && page < fxt_page_count(table); page++) {
             whole = fxt_page_intact(table, page) || refuse(&is, FXT_PAGE_CRC, FXT_NO_FIELD, page, 0);
+        }
         if (whole && check_numbers(&is)) {
             /* What a step needs of it: as the core's plan. */
             table->ripple_nodes = word_at(table, AT_RECORD_STEP) >> 16;
             table->ripple_unit = word_at(table, AT_RIPPLE_UNIT);
             table->ripple_cells = to_i32((float)table->ripple_unit * (8388608.0f / table->cell_width));
-            for (uint32_t i = 0; i < 3; i++)
+            for (uint32_t i = 0; i < 3; i++) {
                 table->curves[i] = word_at(table, AT_CURVE_WORDS + i);
+            }
             table->limit = i32(word_at(table, AT_LIMIT));
             table->iterations = word_at(table, AT_ITERATIONS);
             table->hold = i32(word_at(table, AT_HOLD));
             const float bounds[6] = {is.error_rad, is.periodic_rad, is.slope, is.curve_slope, is.cells, is.rounding_rad};
-            for (int i = 0; i < 6; i++)
+            for (int i = 0; i < 6; i++) {
                 table->bounds[i] = bounds[i];
+            }
             return is.verdict;
         }
     }
@@ -1297,12 +1372,15 @@ fxt_info fxt_tell(const fxt_table *table)
     static const fxt_info none;
     fxt_info info = none;
     const uint8_t *image = given(table)->image;
-    if (image == NULL)
+    if (image == NULL) {
         return info;
-    for (uint32_t i = 0; i < 8; i++)
+    }
+    for (uint32_t i = 0; i < 8; i++) {
         info.table_id[i] = image[48u + i];
-    for (uint32_t i = 0; i < 32; i++)
+    }
+    for (uint32_t i = 0; i < 32; i++) {
         info.drive_hash[i] = image[16u + i];
+    }
     for (uint32_t i = 0; i < TEXT_BYTES; i++) {
         info.tool_version[i] = (char)image[56u + i];
         info.mesh_level[i] = (char)image[80u + i];
@@ -1314,8 +1392,9 @@ fxt_info fxt_tell(const fxt_table *table)
     info.torque_nodes = image[110];
     info.temperature_nodes = image[111];
     info.ripple_nodes = image[112];
-    for (uint32_t i = 0; i < 3; i++)
+    for (uint32_t i = 0; i < 3; i++) {
         info.curve_nodes[i] = image[113u + i];
+    }
     for (uint32_t i = 0; i < 2; i++) {
         info.torque_range_n_m[i] = number_at(table, AT_TORQUE_RANGE + i);
         info.temperature_range_c[i] = number_at(table, AT_TEMPERATURE_RANGE + i);
@@ -1340,8 +1419,9 @@ uint32_t fxt_page_count(const fxt_table *table)
 
 bool fxt_page_intact(const fxt_table *table, uint32_t page)
 {
-    if (page >= fxt_page_count(table))
+    if (page >= fxt_page_count(table)) {
         return false;
+    }
     const uint32_t at = page * FXT_PAGE_BYTES, left = table->body_bytes - at;
     uint32_t sum;
     words_from(table->image, table->bytes, table->body_bytes + 4u * page, 1, &sum);
@@ -1369,8 +1449,9 @@ bool fxt_play_known(const fxt_play *play)
 bool fxt_play_output(const fxt_play *play, int64_t *output)
 {
     const play_state is = state_of(play);
-    if (output == NULL)
+    if (output == NULL) {
         return false;
+    }
     *output = plus(is.nominal, is.error);
     return is.half >= 0;
 }
@@ -1389,15 +1470,17 @@ float fxt_play_uncertainty_rad(const fxt_play *play)
 
 static void put_word(uint8_t *to, uint32_t word)
 {
-    for (uint32_t i = 0; i < 4; i++)
+    for (uint32_t i = 0; i < 4; i++) {
         to[i] = (uint8_t)(word >> 8u * i & 0xffu);
+    }
 }
 
 void fxt_play_save(const fxt_play *play, uint8_t saved[FXT_SAVED_PLAY_BYTES])
 {
     const play_state is = state_of(play);
-    if (saved == NULL)
+    if (saved == NULL) {
         return;
+    }
     put_word(saved, (uint32_t)is.nominal);
     put_word(saved + 4, (uint32_t)((uint64_t)is.nominal >> 32));
     put_word(saved + 8, (uint32_t)is.error);
@@ -1409,8 +1492,9 @@ void fxt_play_save(const fxt_play *play, uint8_t saved[FXT_SAVED_PLAY_BYTES])
 
 bool fxt_play_restore(fxt_play *play, const uint8_t saved[FXT_SAVED_PLAY_BYTES])
 {
-    if (play == NULL || saved == NULL)
+    if (play == NULL || saved == NULL) {
         return false;
+    }
     const uint64_t nominal = (uint64_t)word_from(saved + 4) << 32 | word_from(saved);
     const play_state found = {(int64_t)nominal, i32(word_from(saved + 8)), i32(word_from(saved + 12)), i32(word_from(saved + 16)),
                               i32(word_from(saved + 20))};
@@ -1419,8 +1503,9 @@ bool fxt_play_restore(fxt_play *play, const uint8_t saved[FXT_SAVED_PLAY_BYTES])
         found.half >= 0 && found.half <= MOST_PLAY && found.lower >= -found.half && found.upper <= found.half;
     const bool fresh = found.half == -1 && (found.lower == INT32_MIN || found.lower == INT32_MAX);
     const bool possible = found.lower <= found.upper && size <= MOST_KEPT && (started || fresh);
-    if (!possible || word_from(saved + 24) != crc32_of(saved, 24))
+    if (!possible || word_from(saved + 24) != crc32_of(saved, 24)) {
         return false;
+    }
     *play = kept(&found);
     return true;
 }
@@ -1438,8 +1523,9 @@ fxt_prediction fxt_forward(const fxt_table *table, fxt_play *play, int64_t gener
     const point at = locate_with(given(table), torque_n_m, temperature_c, play);
     play_state is = state_of(play);
     const fxt_prediction now = follow(given(table), &at, &is, generator);
-    if (play != NULL)
+    if (play != NULL) {
         *play = kept(&is);
+    }
     return now;
 }
 
@@ -1462,19 +1548,23 @@ void fxt_step(const fxt_table *table, fxt_play *play, int64_t measured, int64_t 
     const point at = locate_with(given(table), torque_n_m, temperature_c, play);
     play_state is = state_of(play);
     const fxt_prediction now = follow(given(table), &at, &is, measured);
-    if (play != NULL)
+    if (play != NULL) {
         *play = kept(&is);
-    if (prediction != NULL)
+    }
+    if (prediction != NULL) {
         *prediction = now;
-    if (command != NULL)
+    }
+    if (command != NULL) {
         *command = aim_from(given(table), &at, target, &is);
+    }
 }
 
 bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_m, float temperature_c, fxt_direction direction,
                       float *error_rad)
 {
-    if (given(table)->image == NULL || error_rad == NULL)
+    if (given(table)->image == NULL || error_rad == NULL) {
         return false;
+    }
     const point at = locate(table, torque_n_m, temperature_c);
     const phases where = phases_at(table, generator, nominal_output(table, generator));
     int32_t centre, half;
@@ -1486,11 +1576,13 @@ bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_
 bool fxt_from_rad(double rad, int64_t *counts)
 {
     const double exact = rad / TAU * TURN;
-    if (counts == NULL)
+    if (counts == NULL) {
         return false;
+    }
     *counts = 0;
-    if (!(exact > -9.223372e18 && exact < 9.223372e18))
+    if (!(exact > -9.223372e18 && exact < 9.223372e18)) {
         return false;
+    }
     *counts = (int64_t)(exact + (exact < 0.0 ? -0.5 : 0.5));
     return true;
 }
