@@ -111,17 +111,29 @@ void play_contains_every_truth(void)
     END;
 }
 
+/* After an update the error is the centre plus the offset (play_is_what_it_was_given); so this is that of a step. */
 void error_of_a_step_is_within_the_limit(void)
 {
     fxt_table table;
     table.limit = nondet_int();
     __ESBMC_assume(table.limit >= 16 && table.limit <= MOST_LIMIT);
-    play_state play = any_play();
-    const int32_t centre = nondet_int(), half = nondet_int();
+    const play_state play = any_play();
+    const int32_t centre = nondet_int();
     /* What play_at says of any memory. */
-    __ESBMC_assume(half >= 0 && allows(&table, centre, half));
-    const int32_t error = play_update(&play, nondet_long(), centre, half, true);
+    __ESBMC_assume(play.half >= 0 && allows(&table, centre, play.half));
+    const int32_t error = add(centre, play_offset(&play));
     PROMISE(error >= -table.limit && error <= table.limit);
+    END;
+}
+
+void play_is_what_it_was_given(void)
+{
+    play_state play = any_play();
+    const int64_t nominal = nondet_long();
+    const int32_t centre = nondet_int(), half = nondet_int();
+    __ESBMC_assume(half >= 0 && half <= MOST_PLAY);
+    const int32_t error = play_update(&play, nominal, centre, half, true);
+    PROMISE(play.half == half && play.nominal == nominal && play.error == error && error == add(centre, play_offset(&play)));
     END;
 }
 
