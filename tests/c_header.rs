@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Files of the C interface, in the order of the header.
-const SOURCES: [&str; 8] = [
+const SOURCES: [&str; 9] = [
     "c_api.rs",
     "c_api/names.rs",
     "c_api/encoder.rs",
@@ -16,6 +16,7 @@ const SOURCES: [&str; 8] = [
     "c_api/learn.rs",
     "c_api/telemetry.rs",
     "c_api/beside.rs",
+    "c_api/safe.rs",
 ];
 
 fn core() -> PathBuf {

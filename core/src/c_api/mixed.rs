@@ -441,8 +441,10 @@ fn each_number_has_its_name() {
         assert_eq!((text(name(0)), text(name(3)), text(name(0x8000))), ("?", "?", "?"));
         found.join(", ")
     };
-    let flags = "sample lost, glitch, overrun, held back, not corrected, table doubt, state torn, joint torn, safe, other images";
+    let flags = "sample lost, glitch, overrun, held back, not corrected, table doubt, state torn, joint torn, safe, other images, bounded";
     assert_eq!(bits(flexspline_flag_name), flags);
+    let implausible = "generator lost, generator still, generator sign, generator ratio, output still, output sign, output ratio, torque still, torque sign, torque ratio, lost";
+    assert_eq!(bits(flexspline_implausible_name), implausible);
     let events = "mode, health, page damaged, table doubt, fallback, recovered, overrun, state torn";
     assert_eq!(bits(flexspline_event_name), events);
     let texts: Vec<_> = (0..=18).map(|status| text(flexspline_status_text(status))).collect();
@@ -575,7 +577,10 @@ fn what_is_not_allowed_is_refused() {
 
     let mut slip = room!(FlexsplineSlip);
     let init = |slip: &mut FlexsplineSlip, variable, spring| flexspline_slip_init(slip, variable, &spring, 1);
-    let wide = FlexsplineSpring { width: 0.06, gain: 1.0 };
+    let wide = FlexsplineSpring { width: 0.06, gain: 0.5 };
+    // Together more than an adjustment can be.
+    let strong = FlexsplineSpring { width: 0.06, gain: 1.0 };
+    assert_eq!(init(&mut slip, FLEXSPLINE_SLIP_OF_TORQUE, strong), Argument);
     assert_eq!((init(&mut slip, 0, wide), init(&mut slip, 2, SPRINGS[0])), (Argument, Argument));
     assert_eq!(flexspline_slip_set(&mut slip, 0), NotInitialised);
     assert_eq!(init(&mut slip, FLEXSPLINE_SLIP_OF_TORQUE, wide), Done);
@@ -584,7 +589,7 @@ fn what_is_not_allowed_is_refused() {
     assert_eq!(flexspline_slip_save(&slip, bytes.as_mut_ptr(), 200, &mut written), TooLarge);
     assert_eq!(flexspline_slip_update_torque(&mut slip, 0.1, &mut report), Done);
     assert_eq!(flexspline_slip_save(&slip, bytes.as_mut_ptr(), 200, &mut written), Done);
-    assert_eq!((written, flexspline_slip_set(&mut slip, 2)), (24, Argument));
+    assert_eq!((written, flexspline_slip_set(&mut slip, 2)), (44, Argument));
 
     let mut path = room!(FlexsplineTorquePath);
     let mut torque = 0.0;

@@ -11,6 +11,7 @@ mod rate_group;
 mod runtime;
 mod signals;
 mod slip;
+mod start_up;
 mod state;
 mod torque_path;
 
@@ -36,6 +37,9 @@ pub use slip::{
     FittedSlip, LoadTorque, NominalOutput, Slip, SlipBank, SlipElement, SlipState, SlipVariable, TorqueSlipElement,
     saved_slip_bytes,
 };
+#[cfg(feature = "c-api")]
+pub(crate) use slip::{NOBODY, owner};
+pub use start_up::{Implausible, Readings, StartUp, StartUpSettings, StartUpStep};
 #[cfg(any(test, feature = "std"))]
 pub use state::JOINT_STATE_WORDS;
 pub use state::{JointState, RestoreError, SAVED_JOINT_BYTES};
