@@ -222,6 +222,23 @@ impl<T: Words> Sealed<T> {
         if self.is_whole() { Some(self.kept) } else { self.mended() }
     }
 
+    /// Looks at what is kept, mended if it has to be; `None` if it is lost.
+    #[inline(always)]
+    pub(crate) fn with<R>(&self, look: impl FnOnce(&T) -> R) -> Option<R> {
+        if self.is_whole() { Some(look(&self.kept)) } else { self.mended().map(|kept| look(&kept)) }
+    }
+
+    /// Changes what is kept, where it lies, mended if it has to be; `None`, and nothing is changed, if it is lost.
+    #[inline(always)]
+    pub(crate) fn change<R>(&mut self, change: impl FnOnce(&mut T) -> R) -> Option<R> {
+        if !self.is_whole() {
+            self.kept = self.mended()?;
+        }
+        let result = change(&mut self.kept);
+        self.sums = pair(Self::found(&self.kept));
+        Some(result)
+    }
+
     /// Keeps another value.
     #[inline(always)]
     pub(crate) fn close(&mut self, kept: T) {

@@ -4,6 +4,7 @@ mod adapt;
 mod adjustment;
 mod aged;
 mod feed_forward;
+mod learning;
 mod limits;
 mod mode;
 mod predictor;
@@ -18,12 +19,12 @@ mod torque_path;
 #[cfg(feature = "c-api")]
 pub(crate) use adapt::NO_COEFFICIENT;
 pub use adapt::{
-    AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Coefficient, Learning, Seen, Term, Verdict,
-    saved_adapt_bytes,
+    AdaptCounters, AdaptError, AdaptSettings, Adapted, Coefficient, Learning, Seen, Term, Verdict, saved_adapt_bytes,
 };
 pub use adjustment::Adjustment;
 pub use aged::Aged;
 pub use feed_forward::MotionAhead;
+pub use learning::{AdaptState, Adapter};
 pub use limits::{Limits, SettingError};
 pub use mode::{Mode, ModeError, Overrun};
 pub use predictor::{

@@ -299,16 +299,21 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
 
     /// `None` moves nothing.
     fn follow(&self, state: &mut SlipState<N, V>, at: Option<i64>) -> Slip {
-        let Some(springs) = self.springs.open() else {
-            return Slip { error_rad: 0.0, uncertainty_rad: Adjustment::MAX_RAD };
-        };
-        let mut deflections = state.deflections.open().unwrap_or(Deflections::of(false));
-        let to = at.unwrap_or(deflections.at);
-        springs.follow(&mut deflections, to);
-        if at.is_some() {
-            state.deflections.close(deflections);
+        if !state.deflections.is_whole() && !state.deflections.mend() {
+            *state = SlipState::unknown();
         }
-        springs.told(&deflections)
+        let move_on = |springs: &Springs<N>, deflections: &mut Deflections<N>| {
+            if let Some(at) = at {
+                springs.follow(deflections, at);
+            }
+            springs.told(deflections)
+        };
+        let deflections = &mut state.deflections;
+        let slip = match self.springs.is_whole() {
+            true => deflections.change(|deflections| move_on(self.springs.kept(), deflections)),
+            false => self.springs.open().and_then(|springs| deflections.change(|to| move_on(&springs, to))),
+        };
+        slip.unwrap_or(Slip { error_rad: 0.0, uncertainty_rad: Adjustment::MAX_RAD })
     }
 
     /// Writes the state with a CRC-32, for storage across a reset: the first [`saved_slip_bytes`]`(N)` bytes. `None` if there are

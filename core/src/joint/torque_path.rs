@@ -85,10 +85,12 @@ struct Path {
     settle: u32,
     /// Ticks for which a reading may be the same, 0 for any number, and for which it was, in the upper half.
     frozen: u32,
+    /// Ticks without a reading that was believed since the last one.
+    gap: u32,
     /// Readings in a row that were not believed, in the upper half; flags.
     marks: u32,
 }
-words!([] Path { set, behind, believed, doubted, settle, frozen, marks });
+words!([] Path { set, behind, believed, doubted, settle, frozen, gap, marks });
 
 /// Readings in a row near each other that are not believed where they begin too far from the last one: the third is. A spike of one or two ticks is none
 /// of the torque, and a step that is one comes two ticks late. A guess.
@@ -166,7 +168,7 @@ impl TorquePath {
         let none = f32::NAN.to_bits();
         // Long enough ago that the flank may change.
         let settle = halves(settle as u32, u32::MAX);
-        Ok(Path { set, behind: none, believed: none, doubted: none, settle, frozen: 0, marks: 0 }.sealed())
+        Ok(Path { set, behind: none, believed: none, doubted: none, settle, frozen: 0, gap: 0, marks: 0 }.sealed())
     }
 
     /// With other limits of what a sensor can read: the largest change from one tick to the next, N·m (above 0; a reading that changes by more is
@@ -187,17 +189,17 @@ impl TorquePath {
     /// What changes from tick to tick, for a simulation that goes on from here.
     #[cfg(any(test, feature = "std"))]
     #[must_use]
-    pub const fn kept(&self) -> [u32; 6] {
-        let Path { behind, believed, doubted, settle, frozen, marks, .. } = *self.path.kept();
-        [behind, believed, doubted, upper(settle), upper(frozen), marks]
+    pub const fn kept(&self) -> [u32; 7] {
+        let Path { behind, believed, doubted, settle, frozen, gap, marks, .. } = *self.path.kept();
+        [behind, believed, doubted, upper(settle), upper(frozen), gap, marks]
     }
 
     /// Goes on from what [`Self::kept`] gave.
     #[cfg(any(test, feature = "std"))]
-    pub const fn go_on(&mut self, [behind, believed, doubted, since, same, marks]: [u32; 6]) {
+    pub const fn go_on(&mut self, [behind, believed, doubted, since, same, gap, marks]: [u32; 7]) {
         let path = *self.path.kept();
         let (settle, frozen) = (halves(path.settle & FLAGS, since), halves(path.frozen & FLAGS, same));
-        *self = Path { behind, believed, doubted, settle, frozen, marks, ..path }.sealed();
+        *self = Path { behind, believed, doubted, settle, frozen, gap, marks, ..path }.sealed();
     }
 
     /// Whether an upset hit more of it than can be mended: make it anew.
@@ -223,9 +225,9 @@ const LEAST_N_M: f64 = 1e-6;
 
 impl Path {
     const fn sealed(self) -> TorquePath {
-        let Self { set: [a, b, c, d, e, f], behind, believed, doubted, settle, frozen, marks } = self;
+        let Self { set: [a, b, c, d, e, f], behind, believed, doubted, settle, frozen, gap, marks } = self;
         TorquePath {
-            path: Sealed::of(self, sum_of(&[a, b, c, d, e, f, behind, believed, doubted, settle, frozen, marks])),
+            path: Sealed::of(self, sum_of(&[a, b, c, d, e, f, behind, believed, doubted, settle, frozen, gap, marks])),
         }
     }
 
@@ -268,8 +270,13 @@ impl Path {
         };
         // Nothing that is not a number is within.
         if !(-largest_n_m..=largest_n_m).contains(&read) || !self.believes(read, jump_n_m) {
+            self.gap = self.gap.saturating_add(1);
             return f32::NAN;
         }
+        // Over a gap the low-pass goes on by all the time that went.
+        let gap = self.gap as f32;
+        let share = (1.0 + gap) * share / (1.0 + gap * share);
+        self.gap = 0;
         let late = behind + share * (on_load - behind);
         let behind = if behind.is_finite() { late } else { on_load };
         let mesh = behind - drag;
@@ -291,7 +298,7 @@ impl Path {
 #[cfg(test)]
 crate::upset::upsets!(TorquePath { path });
 #[cfg(test)]
-crate::upset::upsets!(Path { set, behind, believed, doubted, settle, frozen, marks });
+crate::upset::upsets!(Path { set, behind, believed, doubted, settle, frozen, gap, marks });
 
 #[cfg(test)]
 mod tests {
@@ -358,7 +365,7 @@ mod tests {
         }
         assert!((last - 2.63).abs() < 0.02, "{last}");
         assert!(path.tick(TorqueReading::InMesh(f32::NAN), Direction::Forward).is_nan());
-        assert!((path.tick(TorqueReading::InMesh(3.0), Direction::Forward) - last).abs() < 0.02);
+        assert!((path.tick(TorqueReading::InMesh(3.0), Direction::Forward) - last).abs() < 0.03);
     }
 
     #[test]
@@ -458,6 +465,29 @@ mod tests {
             assert!(tick(if k % 2 == 0 { -90.0 } else { 20.0 }).is_nan());
         }
         assert!(tick(83.0) > 82.0);
+    }
+
+    /// A ramp with readings missing: afterwards the low-pass is where it would be, to what the ramp did meanwhile.
+    #[test]
+    fn over_a_gap_the_low_pass_goes_on() {
+        for missing in [1, 5, 20, 100] {
+            let mut path = TorquePath::new(TorqueSettings { drag_n_m: 0.0, ..SETTINGS }).unwrap();
+            let mut whole = path;
+            let (mut found, mut expected) = (0.0, 0.0);
+            for tick in 0..400u32 {
+                let torque = 2.0 + 0.02 * tick as f32;
+                expected = whole.tick(TorqueReading::OnLoad(torque), Direction::Forward);
+                let lost = (200..200 + missing).contains(&tick);
+                let reading = TorqueReading::OnLoad(if lost { f32::NAN } else { torque });
+                found = path.tick(reading, Direction::Forward);
+                assert_eq!(found.is_nan(), lost);
+                if tick == 200 + missing {
+                    // Without what went meanwhile it would be off by 0.02 N·m for each tick.
+                    assert!((found - expected).abs() < 0.25, "{missing}: {found} {expected}");
+                }
+            }
+            assert!((found - expected).abs() < 0.02);
+        }
     }
 
     #[test]

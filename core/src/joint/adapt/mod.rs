@@ -38,6 +38,7 @@ mod settings;
 mod state;
 #[cfg(test)]
 mod tests;
+mod words;
 
 pub use settings::{AdaptError, AdaptSettings, Coefficient, Term};
 pub use state::{AdaptCounters, AdaptState, Learning, Verdict};
