@@ -33,6 +33,9 @@
 
 #![allow(clippy::arithmetic_side_effects)] // Floating-point numbers: nothing overflows. Integers are handled by name.
 
+mod consistency;
+#[cfg(test)]
+mod faults;
 mod factors;
 mod settings;
 mod state;
@@ -49,7 +52,8 @@ use crate::crc::crc32;
 use crate::num;
 use crate::play::PlayState;
 use crate::table::Quality;
-use factors::{dot, measure, transform, wander_by};
+use consistency::{Consistency, Finding, Judged, per_window};
+use factors::{dot, measure, spread_of, transform, wander_by};
 
 /// One tick as the adapter sees it.
 #[derive(Clone, Copy, Debug)]
@@ -89,6 +93,8 @@ pub struct Adapter<const N: usize> {
     /// 1/M, and the square of the gate.
     forget: f32,
     gate: f32,
+    /// 1/W.
+    per_window: f32,
     settle: i32,
     /// Half-width that is in doubt while the side is not known, in units of the noise.
     half_limit: f32,
@@ -187,6 +193,7 @@ impl<const N: usize> Adapter<N> {
             per_noise: coefficients.map(|c| c.limit / noise_rad),
             noise_counts: noise_rad * COUNTS_PER_RAD,
             forget: 1.0 / memory_measurements,
+            per_window: per_window(1.0 / memory_measurements),
             gate: square(gate),
             settle: counts_from_rad(4.0 * half_limit).saturating_add(counts_from_rad(settle_rad)),
             half_limit: half_limit / noise_rad,
@@ -219,6 +226,7 @@ impl<const N: usize> Adapter<N> {
             touched: OutputAngle::ZERO,
             side: 0,
             run: 0,
+            consistency: Consistency::NEW,
         }
     }
 
@@ -304,6 +312,8 @@ impl<const N: usize> Adapter<N> {
         let trusted = matches!(out.quality, Quality::InRange | Quality::Uncertain)
             && seen.input.generator.is_some()
             && seen.input.torque_n_m.is_finite()
+            && out.uncertainty_rad >= 0.0
+            && out.uncertainty_rad.is_finite()
             && !doubtful.iter().any(|&flag| out.flags.contains(flag));
         if !trusted {
             return Verdict::Untrusted;
@@ -319,8 +329,8 @@ impl<const N: usize> Adapter<N> {
             return Verdict::Unexcited;
         }
         if !state.is_sound() {
-            self.reset(state);
-            state.counters.restarts = state.counters.restarts.saturating_add(1);
+            self.forget_all(state);
+            state.consistency = Consistency::NEW;
         }
         // What the table alone missed, less what is known of it already.
         let most = Adjustment::MAX_COUNTS;
@@ -328,25 +338,41 @@ impl<const N: usize> Adapter<N> {
         let Adjustment { mean_counts, half_width_counts } = seen.input.adjustment;
         let half = side.wrapping_mul(applied(half_width_counts));
         let beside = applied(mean_counts).wrapping_sub(half) as i64;
-        let missed = measured.offset_counts(beside).minus_small_counts(out.output) as f32;
-        let innovation = missed / self.noise_counts - dot(&row, &state.x);
+        let missed = measured.offset_counts(beside).minus_small_counts(out.output) as f32 / self.noise_counts;
+        let innovation = missed - dot(&row, &state.x);
         let open = out.uncertainty_rad * COUNTS_PER_RAD / self.noise_counts;
         let open = if side == 0 { open + self.half_limit } else { open };
-        let excess = innovation.abs() - open;
-        if !(open >= 0.0 && (excess > 0.0 || open == 0.0)) {
+        let beyond = |missed: f32| num::larger(missed.abs() - open, 0.0);
+        let excess = beyond(innovation);
+        if open > 0.0 && excess == 0.0 {
             return Verdict::Quiet;
         }
-        let noise = 1.0 + open * open;
-        let (seen_as, expected) = (transform(&state.u, &row), state.d);
-        let spread = noise + seen_as.iter().zip(expected).map(|(f, d)| d * f * f).sum::<f32>();
-        let plausible = excess * excess <= self.gate * spread;
-        if !plausible {
+        let scale = state.consistency.noise();
+        let noise = scale + open * open;
+        let spread = noise + spread_of(&transform(&state.u, &row), &state.d);
+        let without = beyond(missed);
+        let judged = Judged {
+            with: excess * excess,
+            without: without * without,
+            noise,
+            spread,
+            prior_spread: noise + spread_of(&row, &self.first),
+        };
+        match state.consistency.judge(&judged, self.gate, self.per_window) {
+            Finding::Sensor => return Verdict::Outlier,
+            Finding::Anew => {
+                self.forget_all(state);
+                return Verdict::Outlier;
+            }
+            Finding::Fade(by) => state.x.iter_mut().for_each(|x| *x *= by),
+        }
+        if judged.with > self.gate * spread {
             return Verdict::Outlier;
         }
         let gains = measure(&mut state.d, &mut state.u, &row, noise);
         let excess = if innovation < 0.0 { -excess } else { excess };
         // What was learnt is forgotten in the direction of the measurement.
-        let (share, mut wander) = (self.forget / strength, row);
+        let (share, mut wander) = (self.forget * num::sqrt(scale) / strength, row);
         for ((x, gain), wander) in state.x.iter_mut().zip(gains).zip(&mut wander) {
             let free = *x + gain * excess;
             let held = num::within(free, [-1.0, 1.0]);
@@ -358,6 +384,12 @@ impl<const N: usize> Adapter<N> {
         wander_by(&mut state.d, &mut state.u, wander);
         self.bound_variances(state);
         Verdict::Used
+    }
+
+    /// Starts from the prior: coefficients 0, with the covariance of the settings.
+    fn forget_all(&self, state: &mut AdaptState<N>) {
+        (state.x, state.d, state.u) = ([0.0; N], self.first, [[0.0; N]; N]);
+        state.counters.restarts = state.counters.restarts.saturating_add(1);
     }
 
     /// Scales rows and columns so that no variance exceeds its first one: what is symmetric and positive stays so.
@@ -385,7 +417,8 @@ impl<const N: usize> Adapter<N> {
             }
         }
         let noise_rad = self.noise_counts * RAD_PER_COUNT;
-        let variance: f32 = transform(&state.u, row).iter().zip(state.d).map(|(f, d)| d * f * f).sum();
+        let learnt = spread_of(&transform(&state.u, row), &state.d);
+        let variance = learnt + state.consistency.doubt(spread_of(row, &self.first));
         Adapted {
             adjustment: Adjustment::from_rad(mean * noise_rad, half * noise_rad),
             uncertainty_rad: num::sqrt(variance) * noise_rad,

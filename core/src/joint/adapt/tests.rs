@@ -5,7 +5,7 @@ use std::vec::Vec;
 const HALF_RAD: f64 = 1.5e-4;
 const COUNTS: f64 = COUNTS_PER_RAD as f64;
 
-const SETTINGS: AdaptSettings<7> = AdaptSettings {
+pub(super) const SETTINGS: AdaptSettings<7> = AdaptSettings {
     coefficients: [
         Coefficient { term: Term::Mean, limit: 2e-4, initial_std: 1e-4 },
         Coefficient { term: Term::WindUp, limit: 1e-5, initial_std: 5e-6 },
@@ -23,7 +23,7 @@ const SETTINGS: AdaptSettings<7> = AdaptSettings {
 };
 
 /// Numbers that look random, of unit variance and within ±1.8.
-struct Noise(u64);
+pub(super) struct Noise(u64);
 
 impl Noise {
     fn next(&mut self) -> f64 {
@@ -33,7 +33,7 @@ impl Noise {
 }
 
 /// A drive that differs from its table in the seven coefficients; own arithmetic.
-struct Plant {
+pub(super) struct Plant {
     hidden: [f64; 7],
     /// Where the output rests, rad.
     contact: f64,
@@ -53,21 +53,22 @@ impl Plant {
 }
 
 /// Table, adapter and plant in a loop: the table is flat but for wind-up and play.
-struct Loop<const N: usize> {
+pub(super) struct Loop<const N: usize> {
     adapter: Adapter<N>,
-    state: AdaptState<N>,
+    pub(super) state: AdaptState<N>,
     play: PlayState,
     plant: Plant,
     noise: Noise,
     applied: Adjustment,
-    /// What the adjusted table missed of the truth in the last tick, rad.
-    missed: f64,
+    /// What the adjusted table missed of the truth in the last tick, and what was stated of it, rad.
+    pub(super) missed: f64,
+    pub(super) stated: f32,
     last: Adapted,
     adjusted: i32,
 }
 
 impl<const N: usize> Loop<N> {
-    fn new(settings: &AdaptSettings<N>, hidden: [f64; 7], seed: u64) -> Self {
+    pub(super) fn new(settings: &AdaptSettings<N>, hidden: [f64; 7], seed: u64) -> Self {
         let adapter = Adapter::new(settings).unwrap();
         let mut state = adapter.start();
         state.set_learning(Learning::On);
@@ -75,14 +76,25 @@ impl<const N: usize> Loop<N> {
         let applied = Adjustment::default();
         let last = Adapted { adjustment: applied, uncertainty_rad: 0.0, verdict: Verdict::Idle };
         let play = PlayState::unknown();
-        Self { adapter, state, play, plant, noise: Noise(seed), applied, missed: 0.0, last, adjusted: 0 }
+        let noise = Noise(seed);
+        Self { adapter, state, play, plant, noise, applied, missed: 0.0, stated: 0.0, last, adjusted: 0 }
     }
 
     /// `off` is what the sensor is off by; `None` if there is no measurement.
     fn tick(&mut self, generator: f64, torque: f64, off: Option<f64>) {
+        self.tick_as(generator, [torque; 2], |truth| off.map(|off| truth + off));
+    }
+
+    /// The torque that there is and the one that is seen; what the sensor says of the truth, to which noise is added.
+    pub(super) fn tick_as(
+        &mut self,
+        generator: f64,
+        [torque, seen]: [f64; 2],
+        sensor: impl FnOnce(f64) -> Option<f64>,
+    ) {
         let angle = GeneratorAngle::from_rad(generator).unwrap();
         let nominal = OutputAngle::from_rad(generator / 95.0).unwrap();
-        let centre = ((torque / 3e4 * COUNTS) as i32).saturating_add(self.applied.mean_counts);
+        let centre = ((seen / 3e4 * COUNTS) as i32).saturating_add(self.applied.mean_counts);
         let half = ((HALF_RAD * COUNTS) as i32 + self.applied.half_width_counts).max(0);
         self.play.shift(self.applied.mean_counts.wrapping_sub(self.adjusted));
         self.adjusted = self.applied.mean_counts;
@@ -100,12 +112,13 @@ impl<const N: usize> Loop<N> {
             flags: Flags::default(),
         };
         self.missed = truth - estimated.to_rad();
+        self.stated = self.last.uncertainty_rad + output.uncertainty_rad;
         let noise = 2e-6 * self.noise.next();
-        let measured = off.map(|off| OutputAngle::from_rad(truth + noise + off).unwrap_or_default());
+        let measured = sensor(truth).map(|value| OutputAngle::from_rad(value + noise).unwrap_or_default());
         let input = Input {
             generator: Some(angle),
             target: estimated,
-            torque_n_m: torque as f32,
+            torque_n_m: seen as f32,
             missed_ticks: 0,
             adjustment: self.applied,
         };
@@ -127,9 +140,9 @@ impl<const N: usize> Loop<N> {
     }
 }
 
-const HIDDEN: [f64; 7] = [8e-5, -4e-6, 2.5e-5, 2e-5, -3e-5, -1e-5, 1.5e-5];
+pub(super) const HIDDEN: [f64; 7] = [8e-5, -4e-6, 2.5e-5, 2e-5, -3e-5, -1e-5, 1.5e-5];
 
-fn mixed(time: f64) -> f64 {
+pub(super) fn mixed(time: f64) -> f64 {
     15.0 * (2.3 * time).sin() + 5.0 * (0.7 * time).cos()
 }
 
