@@ -348,15 +348,15 @@ impl<const N: usize> Adapter<N> {
             return Verdict::Quiet;
         }
         let scale = state.consistency.noise();
-        let noise = scale + open * open;
-        let spread = noise + spread_of(&transform(&state.u, &row), &state.d);
-        let without = beyond(missed);
+        let (stated, without) = (1.0 + open * open, beyond(missed));
+        let noise = stated + (scale - 1.0);
         let judged = Judged {
             with: excess * excess,
             without: without * without,
             noise,
-            spread,
-            prior_spread: noise + spread_of(&row, &self.first),
+            stated,
+            learnt: spread_of(&transform(&state.u, &row), &state.d),
+            prior: spread_of(&row, &self.first),
         };
         match state.consistency.judge(&judged, self.gate, self.per_window) {
             Finding::Sensor => return Verdict::Outlier,
@@ -366,7 +366,7 @@ impl<const N: usize> Adapter<N> {
             }
             Finding::Fade(by) => state.x.iter_mut().for_each(|x| *x *= by),
         }
-        if judged.with > self.gate * spread {
+        if judged.with > self.gate * (noise + judged.learnt) {
             return Verdict::Outlier;
         }
         let gains = measure(&mut state.d, &mut state.u, &row, noise);
