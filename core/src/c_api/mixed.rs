@@ -562,13 +562,13 @@ fn what_is_not_allowed_is_refused() {
     let inside = (&raw mut learner).cast::<FlexsplineAdapted>().wrapping_add(2);
     assert_eq!(update(&mut learner, &out, inside), Overlap);
     let (mut bytes, mut written) = ([0; 200], 77);
-    assert_eq!(flexspline_learner_save(&learner, bytes.as_mut_ptr(), 87, &mut written), TooLarge);
-    assert_eq!((flexspline_learner_save(&learner, bytes.as_mut_ptr(), 88, &mut written), written), (Done, 88));
+    assert_eq!(flexspline_learner_save(&learner, bytes.as_mut_ptr(), 111, &mut written), TooLarge);
+    assert_eq!((flexspline_learner_save(&learner, bytes.as_mut_ptr(), 112, &mut written), written), (Done, 112));
     bytes[3] ^= 1;
-    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 88), Saved);
+    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 112), Saved);
     bytes[3] ^= 1;
-    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 87), Saved);
-    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 88), Done);
+    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 111), Saved);
+    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 112), Done);
     assert_eq!(flexspline_learner_reset(&mut learner), Done);
     let other: Option<AdaptState<5>> = adapter().restore(&bytes);
     assert!(other.is_some());

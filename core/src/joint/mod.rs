@@ -17,8 +17,8 @@ mod torque_path;
 #[cfg(feature = "c-api")]
 pub(crate) use adapt::NO_COEFFICIENT;
 pub use adapt::{
-    AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Coefficient, Learning, Seen, Term, Verdict,
-    saved_adapt_bytes,
+    AdaptCounters, AdaptError, AdaptRestoreError, AdaptSettings, AdaptState, Adapted, Adapter, Coefficient, Learning,
+    Seen, Term, Verdict, saved_adapt_bytes,
 };
 pub use adjustment::Adjustment;
 pub use aged::Aged;

@@ -21,7 +21,7 @@
 //!
 //!   with `[·]ₘ` bounded by `m`: one measurement has a bounded part in it, and a burst of outliers shorter than W/2 does nothing. As soon as
 //!   there is evidence, the stated variance has its share of the prior one: `(e/8W)·hᵀP₀h`.
-//! * **Noise.** `r ← r·(1 + ([q₁]₂₅ − 1)/10W)`, Huber's M-estimate of scale as a recursion. It is the noise of the filter, so that a
+//! * **Noise.** `r ← r·(1 + ([q₁]₄ − 0.92)/10W)`, Huber's M-estimate of scale as a recursion. It is the noise of the filter, so that a
 //!   sensor that is worse than stated is neither believed too much nor locked out, and what exceeds 1 of it is model error, by
 //!   so much the stated variance is larger.
 //! * **Worth.** `w ← w + ([ν₁²/r]₂₅ − [ν₀²/r]₂₅ − w)/W`: above 0 the table alone does better than the table with the coefficients; then
@@ -43,6 +43,10 @@ const MOST: f32 = 25.0;
 /// which contradict what was learnt are evidence for a start anew whatever the prior is.
 const MOST_ANEW: f32 = 6.0;
 const MOST_COST: f32 = 12.0;
+/// Most that one measurement is taken for noise, and the mean of what is bounded by it of the square of a normal number: a quarter of
+/// the measurements may be outliers before the noise is.
+const MOST_NOISE: f32 = 4.0;
+const MEAN_NOISE: f32 = 0.920_5;
 /// Evidence for a start anew in each measurement of a window, on average. At least 7 is what a contradicted one has, 16 is usual.
 const EVIDENCE: f32 = 8.0;
 /// The noise adapts in so many windows: slower than what was learnt is found to be wrong, or that would be taken for noise. Guess.
@@ -140,7 +144,8 @@ impl Consistency {
         let cost = num::within(logarithm(prior_spread / spread), [0.0, MOST_COST]);
         let evidence = learnt - at_most(seen.without / prior_spread, MOST_ANEW) - cost;
         self.anew = num::larger(self.anew + evidence * (per_window * (1.0 / EVIDENCE)), 0.0);
-        self.noise = num::within(self.noise * (1.0 + (learnt - 1.0) * (per_window / NOISE_WINDOWS)), NOISE);
+        let taken = at_most(learnt, MOST_NOISE) - MEAN_NOISE;
+        self.noise = num::within(self.noise * (1.0 + taken * (per_window / NOISE_WINDOWS)), NOISE);
         let bounded = |square: f32| at_most(square / seen.noise, MOST);
         self.worse += (bounded(seen.with) - bounded(seen.without) - self.worse) * per_window;
         if self.anew >= 1.0 {

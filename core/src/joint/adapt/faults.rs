@@ -5,6 +5,7 @@
 
 use super::tests::{HIDDEN, Loop, SETTINGS, mixed};
 use super::*;
+use proptest::prelude::*;
 use std::collections::VecDeque;
 
 pub(super) const ARCSEC: f64 = core::f64::consts::PI / 648_000.0;
@@ -35,6 +36,8 @@ struct Pair {
     past: VecDeque<f64>,
     frozen: f64,
     tick: usize,
+    /// A measurement every so many ticks.
+    every: usize,
     /// Speed of the swing, rad/s, and its amplitude at the generator, rad.
     swing: [f64; 2],
 }
@@ -43,7 +46,7 @@ impl Pair {
     fn new(hidden: [f64; 7], seed: u64) -> Self {
         let [learns, mut twin] = [seed; 2].map(|seed| Loop::new(&SETTINGS, hidden, seed));
         twin.state.set_learning(Learning::Off);
-        Self { learns, twin, past: VecDeque::new(), frozen: 0.0, tick: 0, swing: [0.9, 30.0] }
+        Self { learns, twin, past: VecDeque::new(), frozen: 0.0, tick: 0, every: 1, swing: [0.9, 30.0] }
     }
 
     /// One tick; `since` counts from the beginning of the fault.
@@ -53,14 +56,15 @@ impl Pair {
         let (generator, torque) = (amplitude * (speed * time).sin(), mixed(time));
         let seen = if let Some((Fault::Torque(by), _)) = fault { by * torque } else { torque };
         let (past, frozen) = (&mut self.past, &mut self.frozen);
+        let measures = self.tick % self.every == 0;
         self.learns.tick_as(generator, [torque, seen], |truth| {
             past.push_front(truth);
             past.truncate(100);
-            let Some((fault, since)) = fault else { return Some(truth) };
+            let Some((fault, since)) = fault else { return measures.then_some(truth) };
             if since == 0 {
                 *frozen = truth;
             }
-            Some(match fault {
+            measures.then_some(match fault {
                 Fault::Off(off) => truth + off,
                 Fault::Slide(rate) => truth + rate * since as f64 * 1e-3,
                 Fault::Jump(by, half) => truth + if since / half % 2 == 0 { by } else { -by },
@@ -181,4 +185,36 @@ fn a_load_sensor_with_another_gain() {
 #[test]
 fn a_load_sensor_that_was_dead() {
     recovers(Fault::Torque(0.0), 9.0);
+}
+
+prop_compose! {
+    fn any_fault()(kind in 0..7, size in -1.0f64..1.0, part in 0.0f64..1.0) -> Fault {
+        match kind {
+            0 => Fault::Off(size * 40.0 * ARCSEC),
+            1 => Fault::Slide(size * 10.0 * ARCSEC),
+            2 => Fault::Jump(size * 100.0 * ARCSEC, 10 + (part * 5000.0) as usize),
+            3 => Fault::Frozen,
+            4 => Fault::Late(1 + (part * 50.0) as usize),
+            5 => Fault::OtherSign,
+            _ => Fault::Torque(2.0 * size),
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+
+    /// Once the sensor is right, learning is worse than no learning beyond what it states for no longer than T.
+    #[test]
+    fn whatever_was_wrong_it_recovers(
+        fault in any_fault(), parts in prop::array::uniform7(-0.25f64..0.25), scale in 0.0f64..1.0, seed in any::<u64>(),
+        before in 0usize..20_000, lasts in 100usize..20_000, every in prop::sample::select(&[1usize, 7][..]),
+        speed in 0.3f64..2.0, amplitude in 3.0f64..30.0,
+    ) {
+        let mut hidden = parts;
+        hidden.iter_mut().zip(SETTINGS.coefficients).for_each(|(h, of)| *h *= scale * of.limit as f64);
+        let pair = Pair { every, swing: [speed, amplitude], ..Pair::new(hidden, seed) };
+        let found = story(pair, before, fault, lasts);
+        prop_assert!(found.astray <= T * every, "{:?}", found);
+    }
 }

@@ -34,23 +34,25 @@
 #![allow(clippy::arithmetic_side_effects)] // Floating-point numbers: nothing overflows. Integers are handled by name.
 
 mod consistency;
+mod factors;
 #[cfg(test)]
 mod faults;
-mod factors;
 mod settings;
 mod state;
 #[cfg(test)]
 mod tests;
 
-pub use settings::{AdaptError, AdaptSettings, Coefficient, Term};
+pub use settings::{AdaptError, AdaptRestoreError, AdaptSettings, Coefficient, Term};
 pub use state::{AdaptCounters, AdaptState, Learning, Verdict};
 
 use super::adjustment::Adjustment;
+use super::runtime::Joint;
 use super::signals::{Flags, Input, Output};
 use crate::angle::{COUNTS_PER_RAD, GeneratorAngle, OutputAngle, RAD_PER_COUNT, counts_from_rad};
 use crate::crc::crc32;
 use crate::num;
 use crate::play::PlayState;
+use crate::store::Store;
 use crate::table::Quality;
 use consistency::{Consistency, Finding, Judged, per_window};
 use factors::{dot, measure, spread_of, transform, wander_by};
@@ -101,13 +103,14 @@ pub struct Adapter<const N: usize> {
     torque_limit: f32,
     /// Of the settings: a saved state of others is not taken.
     sum: u32,
+    owner: Owner,
 }
 
 /// Bytes of the saved state of `coefficients` coefficients.
 #[must_use]
 pub const fn saved_adapt_bytes(coefficients: usize) -> usize {
     let upper = coefficients.saturating_mul(coefficients.saturating_sub(1)) >> 1;
-    coefficients.saturating_mul(2).saturating_add(upper).saturating_add(2).saturating_mul(4)
+    coefficients.saturating_mul(2).saturating_add(upper).saturating_add(HEADING).saturating_add(1).saturating_mul(4)
 }
 
 /// Takes a place and adds nothing: the sine of no period is 0 at every angle.
@@ -199,7 +202,24 @@ impl<const N: usize> Adapter<N> {
             half_limit: half_limit / noise_rad,
             torque_limit: torque_limit_n_m,
             sum,
+            owner: Owner::default(),
         })
+    }
+
+    /// The same adapter of this joint with the table in use. Saved states carry both and are restored only where they belong.
+    ///
+    /// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0 if there is one.
+    /// Make it anew after another table was activated, and [`Self::reset`] the state: what was learnt belongs to the table before.
+    #[must_use]
+    pub fn owned_by(mut self, joint: &Joint, store: &Store, unit: u32) -> Self {
+        self.owner = Owner::of(joint, store, unit);
+        self
+    }
+
+    /// Whether it has another owner than `other`.
+    #[cfg(feature = "c-api")]
+    pub(crate) fn has_other_owner(&self, other: &Self) -> bool {
+        self.owner != other.owner
     }
 
     /// A state in which nothing is learnt yet, [`Learning::Off`].
@@ -442,10 +462,13 @@ impl<const N: usize> Adapter<N> {
     ///
     /// | bytes | what, little endian |
     /// |---|---|
+    /// | 4 | `FXA`, version 2 |
+    /// | 8 | id of the table, as [`Self::owned_by`] found it; else zeros |
+    /// | 8, 4 | sums of the joint's settings, number of the unit; else zeros |
+    /// | 4 | sum of the settings |
     /// | 4·N | coefficients in units of their limits, `f32` |
     /// | 4·N | `D`, `f32` |
     /// | 2·N·(N−1) | `U` above its diagonal, by columns, `f32` |
-    /// | 4 | sum of the settings |
     /// | 4 | CRC-32 of all before |
     pub fn save(&self, state: &AdaptState<N>, bytes: &mut [u8]) -> Option<usize> {
         self.save_first(state, N, bytes)
@@ -457,31 +480,95 @@ impl<const N: usize> Adapter<N> {
         let (contents, crc) = bytes.split_last_chunk_mut::<4>()?;
         let above = state.u.iter().take(used).enumerate().flat_map(|(j, column)| column.iter().take(j));
         let numbers = state.x.iter().take(used).chain(state.d.iter().take(used)).chain(above);
-        let numbers = numbers.map(|number| number.to_bits());
-        for (to, from) in contents.as_chunks_mut::<4>().0.iter_mut().zip(numbers.chain([self.sum])) {
+        let words = self.heading().into_iter().chain(numbers.map(|number| number.to_bits()));
+        for (to, from) in contents.as_chunks_mut::<4>().0.iter_mut().zip(words) {
             *to = from.to_le_bytes();
         }
         *crc = crc32(contents).to_le_bytes();
         Some(saved_adapt_bytes(used))
     }
 
-    /// A state from [`Self::save`], in [`Learning::Off`]; `None` if the bytes are damaged or were saved with other coefficients.
+    /// A state from [`Self::save`], in [`Learning::Off`]; `None` where [`Self::try_restore`] has an error.
     #[must_use]
     pub fn restore(&self, bytes: &[u8]) -> Option<AdaptState<N>> {
+        self.try_restore(bytes).ok()
+    }
+
+    /// A state from [`Self::save`], in [`Learning::Off`], of the same coefficients and the same owner.
+    ///
+    /// Nobody knows what happened meanwhile. Until measurements agree, the stated variance has half of the prior one, and half of
+    /// the evidence that is needed otherwise starts it anew.
+    ///
+    /// # Errors
+    /// [`AdaptRestoreError`] says why the bytes are no state of this adapter.
+    pub fn try_restore(&self, bytes: &[u8]) -> Result<AdaptState<N>, AdaptRestoreError> {
         self.restore_first(N, bytes)
     }
 
     /// The same of the first so many coefficients.
-    pub(crate) fn restore_first(&self, used: usize, bytes: &[u8]) -> Option<AdaptState<N>> {
-        let bytes = bytes.get(..saved_adapt_bytes(used))?;
-        let (contents, crc) = bytes.split_last_chunk::<4>()?;
-        let mut words = contents.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word));
-        let mut state = self.start();
-        let above = state.u.iter_mut().take(used).enumerate().flat_map(|(j, column)| column.iter_mut().take(j));
-        for to in state.x.iter_mut().take(used).chain(state.d.iter_mut().take(used)).chain(above) {
-            *to = f32::from_bits(words.next()?);
+    pub(crate) fn restore_first(&self, used: usize, bytes: &[u8]) -> Result<AdaptState<N>, AdaptRestoreError> {
+        let needed = saved_adapt_bytes(used);
+        let short = AdaptRestoreError::Short { found: bytes.len(), needed };
+        let (contents, crc) = bytes.get(..needed).and_then(|bytes| bytes.split_last_chunk::<4>()).ok_or(short)?;
+        let (heading, numbers) = contents.as_chunks::<4>().0.split_first_chunk::<HEADING>().ok_or(short)?;
+        let [mark, ..] = *heading;
+        if mark != SAVED_MARK {
+            return Err(AdaptRestoreError::Version { found: mark });
         }
-        let same = words.next()? == self.sum && u32::from_le_bytes(*crc) == crc32(contents);
-        (same && state.is_sound()).then_some(state)
+        if u32::from_le_bytes(*crc) != crc32(contents) {
+            return Err(AdaptRestoreError::Crc);
+        }
+        let (found, wanted) = (heading.map(u32::from_le_bytes), self.heading());
+        let (_, table, joint, sum) = parts(&found);
+        let (_, own_table, own_joint, own_sum) = parts(&wanted);
+        if table != own_table {
+            return Err(AdaptRestoreError::OtherTable);
+        }
+        if joint != own_joint {
+            return Err(AdaptRestoreError::OtherJoint);
+        }
+        if sum != own_sum {
+            return Err(AdaptRestoreError::OtherCoefficients);
+        }
+        let mut state = AdaptState { consistency: Consistency::RESTORED, ..self.start() };
+        let above = state.u.iter_mut().take(used).enumerate().flat_map(|(j, column)| column.iter_mut().take(j));
+        let places = state.x.iter_mut().take(used).chain(state.d.iter_mut().take(used)).chain(above);
+        for (to, from) in places.zip(numbers) {
+            *to = f32::from_le_bytes(*from);
+        }
+        if state.is_sound() { Ok(state) } else { Err(AdaptRestoreError::Impossible) }
+    }
+
+    /// What a saved state begins with.
+    fn heading(&self) -> [u32; HEADING] {
+        let Owner { table: [a, b], joint: [c, d], unit } = self.owner;
+        [u32::from_le_bytes(SAVED_MARK), a, b, c, d, unit, self.sum]
+    }
+}
+
+/// Words before the numbers of a saved state.
+const HEADING: usize = 7;
+/// What it begins with; the last byte is the version. Version 1 had no mark and no owner.
+const SAVED_MARK: [u8; 4] = *b"FXA\x02";
+
+/// Mark, table, joint with unit, and settings.
+const fn parts(heading: &[u32; HEADING]) -> (u32, [u32; 2], [u32; 3], u32) {
+    let [mark, a, b, c, d, unit, sum] = *heading;
+    (mark, [a, b], [c, d, unit], sum)
+}
+
+/// Whose coefficients they are; zeros if nobody said.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Owner {
+    table: [u32; 2],
+    joint: [u32; 2],
+    unit: u32,
+}
+
+impl Owner {
+    fn of(joint: &Joint, store: &Store, unit: u32) -> Self {
+        let [a, b, c, d, e, f, g, h] = store.id().0;
+        let table = [[a, b, c, d], [e, f, g, h]].map(u32::from_le_bytes);
+        Self { table, joint: joint.sums(), unit }
     }
 }
