@@ -569,6 +569,21 @@ fn what_is_not_allowed_is_refused() {
     bytes[3] ^= 1;
     assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 111), Saved);
     assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 112), Done);
+    // Bound to a joint, a table and a unit; refused, the learner is as it was.
+    let nothing = room!(FlexsplineJoint);
+    assert_eq!(flexspline_learner_bind(&mut learner, &nothing, &*o.store, 1), NotInitialised);
+    assert_eq!(flexspline_learner_bind(&mut learner, &o.joint, (&raw const learner).cast(), 1), Overlap);
+    let mut bound = [[0; 200]; 2];
+    for (bytes, unit) in bound.iter_mut().zip([1, 2]) {
+        assert_eq!(flexspline_learner_bind(&mut learner, &o.joint, &*o.store, unit), Done);
+        assert_eq!(flexspline_learner_save(&learner, bytes.as_mut_ptr(), 112, &mut written), Done);
+    }
+    for (saved, expected) in [(&bytes, OtherTable), (&bound[0], OtherJoint), (&bound[1], Done)] {
+        assert_eq!(flexspline_learner_restore(&mut learner, saved.as_ptr(), 112), expected);
+        let mut after = [0; 200];
+        assert_eq!(flexspline_learner_save(&learner, after.as_mut_ptr(), 112, &mut written), Done);
+        assert_eq!(after, bound[1]);
+    }
     assert_eq!(flexspline_learner_reset(&mut learner), Done);
     let other: Option<AdaptState<5>> = adapter().restore(&bytes);
     assert!(other.is_some());

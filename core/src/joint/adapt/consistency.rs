@@ -7,7 +7,7 @@
 //!
 //! ```text
 //! learnt:  S₁ = r + hᵀP h,    q₁ = ν₁²/S₁        what was learnt holds
-//! anew:    S₀ = r + hᵀP₀h,    q₀ = ν₀²/S₀        it does not; coefficients are as expected before anything was learnt
+//! anew:    S₀ = r + hᵀP₀h,    q₀ = ν₀²/S₀        it does not; coefficients are anything that was expected at first
 //! sensor:  ν₀² > gate²·(1 + hᵀP₀h)               the measurement is impossible, whatever the coefficients are
 //! ```
 //!
@@ -19,8 +19,8 @@
 //!   e ← max(0, e + [q₁]₂₅ − [q₀]₆ − [ln S₀/S₁]₁₂),      start anew at e = 8·W
 //!   ```
 //!
-//!   with `[·]ₘ` bounded by `m`: one measurement has a bounded part in it, and a burst of outliers shorter than W/2 does nothing. As soon as
-//!   there is evidence, the stated variance has its share of the prior one: `(e/8W)·hᵀP₀h`.
+//!   with `[·]ₘ` bounded by `m`: one measurement has a bounded part in it, and a burst of outliers shorter than W/3 does nothing. Then the
+//!   covariance is P₀ again, and the next measurements correct the coefficients in their direction; others stay. As soon as there is evidence, the stated variance has its share of the prior one: `(e/8W)·hᵀP₀h`.
 //! * **Noise.** `r ← r·(1 + ([q₁]₄ − 0.92)/10W)`, Huber's M-estimate of scale as a recursion. It is the noise of the filter, so that a
 //!   sensor that is worse than stated is neither believed too much nor locked out, and what exceeds 1 of it is model error, by
 //!   so much the stated variance is larger.
@@ -86,7 +86,7 @@ pub(super) struct Judged {
 pub(super) enum Finding {
     /// The sensor is not to be believed.
     Sensor,
-    /// What was learnt is to be forgotten.
+    /// What was learnt is not to be believed any more.
     Anew,
     /// Coefficients fade by this factor.
     Fade(f32),

@@ -16,18 +16,29 @@
 //! Estimation*, 1977, ch. V: the measurement; Agee and Turner 1972: the wandering). `D ≥ 0` holds whatever the rounding, so the
 //! covariance stays symmetric and positive in `f32`, for any number of updates.
 //!
+//! * Measurements are judged over windows, see [`consistency`]: where they contradict what was learnt the covariance goes back to the
+//!   first one, where the table alone does better the coefficients fade, and what is not explained is in the stated uncertainty.
 //! * Forgetting is directional: a measurement in direction `h` adds `h·hᵀ/(|h|⁴·M²)` to the covariance first, `M` the
 //!   [memory](AdaptSettings::memory_measurements). In directions in which nothing is measured nothing is forgotten, so nothing
 //!   drifts there and no variance winds up; a correlation learnt long ago fades where only one of the two is excited.
 //! * No variance grows beyond its first one.
-//! * An innovation beyond so many standard deviations is an outlier: counted, not used.
+//! * An innovation beyond so many standard deviations is an outlier: counted, not used. So is every one while the sensor is impossible.
 //! * Where the error is known to within ± an interval only (side of the play unknown, torque inside a jump), that much of an
 //!   innovation says nothing: only what exceeds it is used (a dead zone), with the interval added to the noise.
 //! * After a reversal, from where contact is lost until the play has moved on by four times the limit of the half-width (it is taken
 //!   up later or earlier than estimated by no more) and [`AdaptSettings::settle_rad`], nothing is learnt.
 //! * Every coefficient stays within its limit.
 //!
+//! # What it promises
+//! From when the sensors are right, learning is worse than no learning by more than three times the stated uncertainty for no longer
+//! than T, half of the memory (500 to 1000 measurements at the memories of 1000 to 2000; never less than five windows of 10, nor more than
+//! five of 1000). Measured: 1 to 139 measurements after offsets, jumps, delays, wrong gains and signs, 570 after a sensor that slid
+//! by 50″ a second (`faults`).
+//!
 //! # Not in here
+//! While a sensor is off by something that coefficients could be, the estimate is off by as much: nothing here can see it. The stated
+//! uncertainty has no bias of the sensor.
+//!
 //! The measurement must be of the same moment as the generator sample of the tick. What a delay does looks like an offset that
 //! changes with the direction, and would be taken for play.
 
@@ -349,8 +360,8 @@ impl<const N: usize> Adapter<N> {
             return Verdict::Unexcited;
         }
         if !state.is_sound() {
-            self.forget_all(state);
-            state.consistency = Consistency::NEW;
+            (state.x, state.consistency) = ([0.0; N], Consistency::NEW);
+            self.open_up(state);
         }
         // What the table alone missed, less what is known of it already.
         let most = Adjustment::MAX_COUNTS;
@@ -381,7 +392,7 @@ impl<const N: usize> Adapter<N> {
         match state.consistency.judge(&judged, self.gate, self.per_window) {
             Finding::Sensor => return Verdict::Outlier,
             Finding::Anew => {
-                self.forget_all(state);
+                self.open_up(state);
                 return Verdict::Outlier;
             }
             Finding::Fade(by) => state.x.iter_mut().for_each(|x| *x *= by),
@@ -406,9 +417,9 @@ impl<const N: usize> Adapter<N> {
         Verdict::Used
     }
 
-    /// Starts from the prior: coefficients 0, with the covariance of the settings.
-    fn forget_all(&self, state: &mut AdaptState<N>) {
-        (state.x, state.d, state.u) = ([0.0; N], self.first, [[0.0; N]; N]);
+    /// Goes back to the covariance of the settings: the next measurements decide.
+    fn open_up(&self, state: &mut AdaptState<N>) {
+        (state.d, state.u) = (self.first, [[0.0; N]; N]);
         state.counters.restarts = state.counters.restarts.saturating_add(1);
     }
 

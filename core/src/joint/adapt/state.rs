@@ -56,7 +56,7 @@ pub struct AdaptCounters {
     pub untrusted: u32,
     /// Coefficients held at their limit, once for each and each measurement.
     pub limited: u32,
-    /// Starts from zero: measurements contradicted what was learnt for a window, or the state was hit by an upset.
+    /// Starts with the first variances: measurements contradicted what was learnt for a window, or, from zero, the state was hit by an upset.
     pub restarts: u32,
 }
 
