@@ -1,23 +1,24 @@
 //! What is added to the table: what measurements of the output teach, and springs that slip.
 
 use super::{
-    FlexsplineInput, FlexsplineOutput, FlexsplineState, FlexsplineStatus, Marked, STATE_MARK, apart, bytes, bytes_mut,
-    clear, copied, get, get_mut, give, given, list, put, restore_status, span, status, told, usable,
+    FlexsplineInput, FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, JOINT_MARK,
+    Marked, STATE_MARK, STORE_MARK, apart, bytes, bytes_mut, clear, copied, get, get_mut, give, given, list, put,
+    restore_status, span, status, told, usable,
 };
 use crate::joint::{NO_COEFFICIENT, NOBODY};
 use crate::{
-    AdaptCounters, AdaptSettings, AdaptState, Adapter, Adjustment, Coefficient, JointState, Learning, LoadTorque,
-    OutputAngle, Seen, Slip, SlipBank, SlipElement, SlipState, Term, TorqueSlipElement, Verdict, saved_adapt_bytes,
-    saved_slip_bytes,
+    AdaptCounters, AdaptRestoreError, AdaptSettings, AdaptState, Adapter, Adjustment, Coefficient, Joint, JointState,
+    Learning, LoadTorque, OutputAngle, Seen, Slip, SlipBank, SlipElement, SlipState, Store, Term, TorqueSlipElement,
+    Verdict, saved_adapt_bytes, saved_slip_bytes,
 };
 use core::mem::{MaybeUninit, align_of, size_of};
 
 /// Largest number of coefficients of a learner.
 pub const FLEXSPLINE_LEARNER_COEFFICIENTS: usize = 7;
 /// Eight-byte words of a [`FlexsplineLearner`].
-pub const FLEXSPLINE_LEARNER_WORDS: usize = 64;
-/// Bytes of a saved learner with the largest number of coefficients; n of them take 2 n (n - 1) + 8 n + 8.
-pub const FLEXSPLINE_SAVED_LEARNER_BYTES: usize = 148;
+pub const FLEXSPLINE_LEARNER_WORDS: usize = 68;
+/// Bytes of a saved learner with the largest number of coefficients; n of them take 2 n (n - 1) + 8 n + 32.
+pub const FLEXSPLINE_SAVED_LEARNER_BYTES: usize = 172;
 /// Largest number of springs.
 pub const FLEXSPLINE_SLIP_SPRINGS: usize = 8;
 /// Eight-byte words of a [`FlexsplineSlip`].
@@ -141,7 +142,7 @@ pub struct FlexsplineLearnerReport {
     pub untrusted: u32,
     /// Coefficients held at their limit, once for each and each measurement.
     pub limited: u32,
-    /// Starts from zero because the state was hit by an upset.
+    /// Starts with the first variances: measurements contradicted what was learnt for a window, or, from zero, the state was hit by an upset.
     pub restarts: u32,
     /// `FLEXSPLINE_LEARNING_...`.
     pub learning: u8,
@@ -275,6 +276,33 @@ pub extern "C" fn flexspline_learner_set(learner: *mut FlexsplineLearner, learni
         Ok(())
     };
     status(set())
+}
+
+/// Says whose coefficients are learnt: of this joint with the table in use. Saved learners carry both, and are restored only where they belong.
+/// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0 if there is one. After `flexspline_learner_init`
+/// and the table, before `flexspline_learner_restore`; again after another table was activated: what was learnt for another owner is forgotten.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_learner_bind(
+    learner: *mut FlexsplineLearner,
+    joint: *const FlexsplineJoint,
+    store: *const FlexsplineStore,
+    unit: u32,
+) -> FlexsplineStatus {
+    let bind = || {
+        for object in [span(joint), span(store)] {
+            apart([span(learner), object])?;
+        }
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let store: &Store = get(store, STORE_MARK)?;
+        let Learner { adapter, state, .. } = get_mut(learner, LEARNER_MARK)?;
+        let before = *adapter;
+        *adapter = before.owned_by(joint, store, unit);
+        if adapter.has_other_owner(&before) {
+            adapter.reset(state);
+        }
+        Ok(())
+    };
+    status(bind())
 }
 
 /// Forgets what was learnt; counters and `FLEXSPLINE_LEARNING_...` stay. The limiter of the joint takes the adjustment out.
@@ -418,8 +446,9 @@ pub extern "C" fn flexspline_learner_save(
     status(save())
 }
 
-/// Takes back what a learner of the same coefficients saved, and is off; `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, or were saved with other
-/// coefficients. The learner is made first, by `flexspline_learner_init`.
+/// Takes back what a learner of the same coefficients and the same owner (`flexspline_learner_bind`) saved, and is off. `FLEXSPLINE_STATUS_SAVED` if the bytes
+/// are damaged, fewer, of another version, or were saved with other coefficients; `FLEXSPLINE_STATUS_OTHER_TABLE`, `FLEXSPLINE_STATUS_OTHER_JOINT` if they
+/// belong elsewhere. Then the learner is as it was. It is made first, by `flexspline_learner_init`, and bound.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_restore(
     learner: *mut FlexsplineLearner,
@@ -431,7 +460,11 @@ pub extern "C" fn flexspline_learner_restore(
         let kept = bytes(saved, saved_bytes)?;
         let learner: &mut Learner = get_mut(learner, LEARNER_MARK)?;
         let found = learner.adapter.restore_first(learner.used as usize, kept);
-        learner.state = found.ok_or(FlexsplineStatus::Saved)?;
+        learner.state = found.map_err(|error| match error {
+            AdaptRestoreError::OtherTable => FlexsplineStatus::OtherTable,
+            AdaptRestoreError::OtherJoint => FlexsplineStatus::OtherJoint,
+            _ => FlexsplineStatus::Saved,
+        })?;
         Ok(())
     };
     status(restore())

@@ -9,7 +9,9 @@ use crate::{
     Seen, SlipBank, SlipElement, SlipState, Table, Term, TorquePath, TorqueReading, TorqueSettings, TorqueSlipElement,
     Verdict, fixture, saved_adapt_bytes, saved_slip_bytes,
 };
-use FlexsplineStatus::{Argument, Mode as NoMode, NotInitialised, Ok as Done, Overlap, Pointer, Saved, TooLarge};
+use FlexsplineStatus::{
+    Argument, Mode as NoMode, NotInitialised, Ok as Done, OtherJoint, OtherTable, Overlap, Pointer, Saved, TooLarge,
+};
 use core::ffi::{CStr, c_char};
 use core::ptr::{null, null_mut};
 use std::string::ToString;
@@ -564,13 +566,28 @@ fn what_is_not_allowed_is_refused() {
     let inside = (&raw mut learner).cast::<FlexsplineAdapted>().wrapping_add(2);
     assert_eq!(update(&mut learner, &out, inside), Overlap);
     let (mut bytes, mut written) = ([0; 200], 77);
-    assert_eq!(flexspline_learner_save(&learner, bytes.as_mut_ptr(), 87, &mut written), TooLarge);
-    assert_eq!((flexspline_learner_save(&learner, bytes.as_mut_ptr(), 88, &mut written), written), (Done, 88));
+    assert_eq!(flexspline_learner_save(&learner, bytes.as_mut_ptr(), 111, &mut written), TooLarge);
+    assert_eq!((flexspline_learner_save(&learner, bytes.as_mut_ptr(), 112, &mut written), written), (Done, 112));
     bytes[3] ^= 1;
-    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 88), Saved);
+    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 112), Saved);
     bytes[3] ^= 1;
-    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 87), Saved);
-    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 88), Done);
+    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 111), Saved);
+    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 112), Done);
+    // Bound to a joint, a table and a unit; refused, the learner is as it was.
+    let nothing = room!(FlexsplineJoint);
+    assert_eq!(flexspline_learner_bind(&mut learner, &nothing, &*o.store, 1), NotInitialised);
+    assert_eq!(flexspline_learner_bind(&mut learner, &o.joint, (&raw const learner).cast(), 1), Overlap);
+    let mut bound = [[0; 200]; 2];
+    for (bytes, unit) in bound.iter_mut().zip([1, 2]) {
+        assert_eq!(flexspline_learner_bind(&mut learner, &o.joint, &*o.store, unit), Done);
+        assert_eq!(flexspline_learner_save(&learner, bytes.as_mut_ptr(), 112, &mut written), Done);
+    }
+    for (saved, expected) in [(&bytes, OtherTable), (&bound[0], OtherJoint), (&bound[1], Done)] {
+        assert_eq!(flexspline_learner_restore(&mut learner, saved.as_ptr(), 112), expected);
+        let mut after = [0; 200];
+        assert_eq!(flexspline_learner_save(&learner, after.as_mut_ptr(), 112, &mut written), Done);
+        assert_eq!(after, bound[1]);
+    }
     assert_eq!(flexspline_learner_reset(&mut learner), Done);
     let other: Option<AdaptState<5>> = adapter().restore(&bytes);
     assert!(other.is_some());

@@ -2,8 +2,12 @@
 //! are lost add nothing ([`Verdict::Untrusted`]); what was learnt and is lost begins anew from zero, off, and is counted
 //! ([`AdaptCounters::restarts`]). What it adds is bounded by the limits of the coefficients, whatever the state.
 
-use super::adapt::{self, AdaptCounters, AdaptError, AdaptSettings, Adapted, Learning, Seen, Verdict};
+use super::adapt::{
+    self, AdaptCounters, AdaptError, AdaptRestoreError, AdaptSettings, Adapted, Learning, Seen, Verdict,
+};
 use super::adjustment::Adjustment;
+use super::runtime::Joint;
+use crate::store::Store;
 use crate::whole::Sealed;
 
 /// Estimates `N` coefficients: all that does not change while it runs.
@@ -91,15 +95,33 @@ impl<const N: usize> Adapter<N> {
         self.adapter.with(look).flatten().unwrap_or([(f32::NAN, f32::NAN); N])
     }
 
+    /// Says whose coefficients are learnt: of this joint, with the table that is in use now. Saved states carry both, and are restored only where they belong.
+    ///
+    /// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0 if there is one.
+    #[must_use]
+    pub fn owned_by(self, joint: &Joint, store: &Store, unit: u32) -> Self {
+        let owned = self.adapter.open().map(|adapter| adapter.owned_by(joint, store, unit));
+        owned.map_or(self, |adapter| Self { adapter: Sealed::new(adapter) })
+    }
+
+    /// Whether it has another owner than `other`.
+    #[cfg(feature = "c-api")]
+    pub(crate) fn has_other_owner(&self, other: &Self) -> bool {
+        self.adapter.kept().has_other_owner(other.adapter.kept())
+    }
+
     /// Writes what was learnt, with a CRC-32, for storage across a reset: the first [`saved_adapt_bytes`](crate::saved_adapt_bytes)`(N)` bytes.
     /// `None` if there are fewer, or settings or state are lost.
     ///
     /// | bytes | what, little endian |
     /// |---|---|
+    /// | 4 | `FXA`, version 2 |
+    /// | 8 | id of the table, as [`Self::owned_by`] found it; else zeros |
+    /// | 8, 4 | sums of the joint's settings, number of the unit; else zeros |
+    /// | 4 | sum of the settings |
     /// | 4·N | coefficients in units of their limits, `f32` |
     /// | 4·N | `D`, `f32` |
     /// | 2·N·(N−1) | `U` above its diagonal, by columns, `f32` |
-    /// | 4 | sum of the settings |
     /// | 4 | CRC-32 of all before |
     pub fn save(&self, state: &AdaptState<N>, bytes: &mut [u8]) -> Option<usize> {
         self.save_first(state, N, bytes)
@@ -107,22 +129,32 @@ impl<const N: usize> Adapter<N> {
 
     /// The same of the first so many coefficients.
     pub(crate) fn save_first(&self, state: &AdaptState<N>, used: usize, bytes: &mut [u8]) -> Option<usize> {
-        self.adapter
-            .with(|adapter| state.learnt.with(|learnt| adapter.save_first(learnt, used, bytes)))
-            .flatten()
-            .flatten()
+        let save = |adapter: &adapt::Adapter<N>| state.learnt.with(|learnt| adapter.save_first(learnt, used, bytes));
+        self.adapter.with(save).flatten().flatten()
     }
 
-    /// A state from [`Self::save`], in [`Learning::Off`]; `None` if the bytes are damaged or were saved with other coefficients.
+    /// A state from [`Self::save`], in [`Learning::Off`]; `None` where [`Self::try_restore`] has an error.
     #[must_use]
     pub fn restore(&self, bytes: &[u8]) -> Option<AdaptState<N>> {
+        self.try_restore(bytes).ok()
+    }
+
+    /// A state from [`Self::save`], in [`Learning::Off`], of the same coefficients and the same owner.
+    ///
+    /// Nobody knows what happened meanwhile. Until measurements agree, the stated variance has half of the prior one, and half of
+    /// the evidence that is needed otherwise starts it anew.
+    ///
+    /// # Errors
+    /// [`AdaptRestoreError`] says why the bytes are no state of this adapter; one that is lost has other coefficients.
+    pub fn try_restore(&self, bytes: &[u8]) -> Result<AdaptState<N>, AdaptRestoreError> {
         self.restore_first(N, bytes)
     }
 
     /// The same of the first so many coefficients.
-    pub(crate) fn restore_first(&self, used: usize, bytes: &[u8]) -> Option<AdaptState<N>> {
-        let found = self.adapter.with(|adapter| adapter.restore_first(used, bytes)).flatten()?;
-        Some(AdaptState { learnt: Sealed::new(found) })
+    pub(crate) fn restore_first(&self, used: usize, bytes: &[u8]) -> Result<AdaptState<N>, AdaptRestoreError> {
+        let found = self.adapter.with(|adapter| adapter.restore_first(used, bytes));
+        let learnt = found.ok_or(AdaptRestoreError::OtherCoefficients)??;
+        Ok(AdaptState { learnt: Sealed::new(learnt) })
     }
 }
 

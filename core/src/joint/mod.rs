@@ -19,7 +19,8 @@ mod torque_path;
 #[cfg(feature = "c-api")]
 pub(crate) use adapt::NO_COEFFICIENT;
 pub use adapt::{
-    AdaptCounters, AdaptError, AdaptSettings, Adapted, Coefficient, Learning, Seen, Term, Verdict, saved_adapt_bytes,
+    AdaptCounters, AdaptError, AdaptRestoreError, AdaptSettings, Adapted, Coefficient, Learning, Seen, Term, Verdict,
+    saved_adapt_bytes,
 };
 pub use adjustment::Adjustment;
 pub use aged::Aged;

@@ -109,6 +109,7 @@ static AnyCall const volatile others[] = {
     (AnyCall)flexspline_predictor_parts,  (AnyCall)flexspline_predictor_state_bound, (AnyCall)flexspline_learner_reset,
     (AnyCall)flexspline_slip_set,         (AnyCall)flexspline_state_forget_side, (AnyCall)flexspline_store_mend_page,
     (AnyCall)flexspline_nominal_generator, (AnyCall)flexspline_ratio,            (AnyCall)flexspline_encoder_reading,
+    (AnyCall)flexspline_learner_bind,
 };
 
 // What a table says outside the tick.

@@ -57,10 +57,11 @@ macro_rules! words_of_angles {
 words_of_angles!(GeneratorAngle, OutputAngle);
 
 words!([const N: usize] Adapter<N> {
-    terms, limits, first, per_noise, noise_counts, forget, gate, settle, half_limit, torque_limit, sum,
+    terms, limits, first, per_noise, noise_counts, forget, gate, per_window, settle, half_limit, torque_limit, sum,
+    owner,
 });
 words!([const N: usize] AdaptState<N> {
-    x, d, u, learning, counters, generator, contact, touched, side, run,
+    x, d, u, learning, counters, generator, contact, touched, side, run, consistency,
 });
 words!([] AdaptCounters {
     used, quiet, outliers, outliers_in_a_row, unsettled, unexcited, untrusted, limited, restarts,
@@ -140,10 +141,11 @@ mod upset {
     codes!(Term, Learning);
 
     upsets!([const N: usize] Adapter<N> {
-        terms, limits, first, per_noise, noise_counts, forget, gate, settle, half_limit, torque_limit, sum,
+        terms, limits, first, per_noise, noise_counts, forget, gate, per_window, settle, half_limit, torque_limit, sum,
+    owner,
     });
     upsets!([const N: usize] AdaptState<N> {
-        x, d, u, learning, counters, generator, contact, touched, side, run,
+        x, d, u, learning, counters, generator, contact, touched, side, run, consistency,
     });
     upsets!(AdaptCounters {
         used,
