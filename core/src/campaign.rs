@@ -732,6 +732,33 @@ fn a_state_of_another_joint_or_table_is_refused() {
     assert!(matches!(JointState::restore(&[0; crate::SAVED_JOINT_BYTES], joint, store), Err(Version { .. })));
 }
 
+/// Saved springs are for one joint and one table.
+#[test]
+fn springs_are_restored_only_where_they_belong() {
+    use crate::RestoreError::{Crc, OtherJoint, OtherTable, Version};
+    let World { joint, store, feed, .. } = World::new();
+    let (bank, mut springs) = (feed.bank, feed.springs);
+    let _ = bank.update(&mut springs, OutputAngle::ZERO);
+    let mut saved = [0; crate::saved_slip_bytes(3)];
+    assert_eq!(bank.save_for(&springs, &joint, &store, &mut saved), Some(saved.len()));
+    assert_eq!(bank.restore_for(&joint, &store, &saved), Ok(springs));
+    assert_eq!(bank.restore(&saved), None);
+    let other = Joint::new(fixture::drive(), fixture::LIMITS, Overrun::SkipAndCount).unwrap();
+    assert_eq!(bank.restore_for(&other, &store, &saved), Err(OtherJoint));
+    let images = [fixture::image(false), fixture::image(false)];
+    let mut second = Store::new();
+    second.activate(&Images::new(&images[0], &images[1]), &fixture::drive(), 20.0).unwrap();
+    assert_eq!(bank.restore_for(&joint, &second, &saved), Err(OtherTable));
+    for bit in 0..8 * saved.len() {
+        let mut damaged = saved;
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        let expected = if bit < 32 { Version { found: *damaged.first_chunk().unwrap() } } else { Crc };
+        assert_eq!(bank.restore_for(&joint, &store, &damaged), Err(expected), "{bit}");
+    }
+    bank.save(&springs, &mut saved).unwrap();
+    assert_eq!(bank.restore_for(&joint, &store, &saved), Err(OtherTable));
+}
+
 /// The order of a start: an encoder that is late by some ticks, after a reset and after a restore.
 #[test]
 fn the_side_stays_unknown_until_motion_has_shown_it() {

@@ -417,6 +417,52 @@ fn an_image_tells_what_it_is() {
     assert_eq!(flexspline_image_report(image.as_ptr(), image.len(), &mut report), FlexsplineStatus::Image);
 }
 
+/// Any bit of the mark of every object of a tick, and of what feeds it: the calls go on, and a call that writes makes the mark anew.
+#[test]
+fn a_bit_of_a_mark_refuses_nothing() {
+    let marks = [
+        STORE_MARK,
+        JOINT_MARK,
+        STATE_MARK,
+        ACTIVATION_MARK,
+        IDENTITY_MARK,
+        0x7855_5446,
+        0x7857_5446,
+        0x7850_5446,
+        0x784f_5446,
+        0x784c_5446,
+        0x7842_5446,
+        0x7845_5446,
+        0x7854_5446,
+        0x7847_5446,
+        0x7852_5446,
+        0x7843_5446,
+    ];
+    for (i, one) in marks.iter().enumerate() {
+        for other in marks[..i].iter().map(|other| spread(*other)).chain([0, u32::MAX, 0x5a5a_5a5a]) {
+            assert!((spread(*one) ^ other).count_ones() >= 4, "{one:x} {other:x}");
+        }
+    }
+    let image = fixture::image(false);
+    let (mut o, table) = (made(), pair(&image));
+    assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), Done);
+    let mut out = FlexsplineOutput::default();
+    for bit in 0..32 {
+        let pointers: [*mut u32; 3] =
+            [(&raw mut *o.store).cast(), (&raw mut o.joint).cast(), (&raw mut o.state).cast()];
+        // SAFETY: the first word of each is its mark.
+        pointers.iter().for_each(|mark| unsafe { **mark ^= 1 << bit });
+        assert_eq!(flexspline_tick(&o.joint, &table, &mut *o.store, &mut o.state, &INPUT, &mut out), Done, "{bit}");
+        assert_eq!(flexspline_joint_mend(&mut o.joint), Done);
+        // SAFETY: as above.
+        let found = pointers.map(|mark| unsafe { *mark });
+        assert_eq!(found, [STORE_MARK, JOINT_MARK, STATE_MARK].map(spread), "{bit}");
+    }
+    // SAFETY: as above.
+    unsafe { *(&raw mut o.state).cast::<u32>() ^= 3 };
+    assert_eq!(flexspline_tick(&o.joint, &table, &mut *o.store, &mut o.state, &INPUT, &mut out), NotInitialised);
+}
+
 #[test]
 fn each_number_has_its_name() {
     // SAFETY: texts of the library.

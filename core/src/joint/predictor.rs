@@ -923,6 +923,34 @@ mod tests {
         assert!(shares.iter().all(|&share| share > 0.05), "{shares:?}");
     }
 
+    /// What is not used may be anything; what is used must be a number, of a drive.
+    #[test]
+    fn a_measurement_that_is_no_number_leaves_the_observer_as_it_was() {
+        let good = Measured { torque_n_m: 12.0, speed_rad_s: 0.01, twist_rad: 4e-4 };
+        let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1e9];
+        for noise in [NOISE, Noise { twist_rad: None, ..NOISE }] {
+            let predictor = Predictor::new(INERTIAS, noise, TICK_S).unwrap();
+            let (mut state, mut twin) = (PredictorState::new(), PredictorState::new());
+            for tick in 0..200 {
+                assert!(predictor.step(&mut state, &good) && predictor.step(&mut twin, &good));
+                let wrong = bad[tick % bad.len()];
+                for measured in [Measured { torque_n_m: wrong, ..good }, Measured { speed_rad_s: wrong, ..good }] {
+                    assert!(!predictor.step(&mut state, &measured) && state == twin, "{measured:?}");
+                }
+                let measured = Measured { twist_rad: wrong, ..good };
+                let used = predictor.step(&mut state, &measured);
+                assert_eq!(used, noise.twist_rad.is_none());
+                if used {
+                    assert!(predictor.step(&mut twin, &good));
+                }
+                assert_eq!(state, twin);
+            }
+            // Nor is anything told of what is no number.
+            let ahead = predictor.ahead(&state, f32::NAN, 10, [0.0; 4], &Disturbance::default());
+            assert!(ahead.bound_rad == f32::INFINITY && ahead.load_rad == 0.0);
+        }
+    }
+
     fn good_parts() -> [f32; PREDICTOR_PARTS] {
         Predictor::new(INERTIAS, NOISE, TICK_S).unwrap().parts()
     }
