@@ -9,7 +9,9 @@ use crate::{
     Seen, SlipBank, SlipElement, SlipState, Table, Term, TorquePath, TorqueReading, TorqueSettings, TorqueSlipElement,
     Verdict, fixture, saved_adapt_bytes, saved_slip_bytes,
 };
-use FlexsplineStatus::{Argument, Mode as NoMode, NotInitialised, Ok as Done, Overlap, Pointer, Saved, TooLarge};
+use FlexsplineStatus::{
+    Argument, Mode as NoMode, NotInitialised, Ok as Done, OtherJoint, OtherTable, Overlap, Pointer, Saved, TooLarge,
+};
 use core::ffi::{CStr, c_char};
 use core::ptr::{null, null_mut};
 use std::string::ToString;
