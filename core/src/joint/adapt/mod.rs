@@ -270,8 +270,8 @@ impl<const N: usize> Adapter<N> {
     /// One tick: follows the play, learns from the measurement if there is one, and tells what to add in the next tick.
     ///
     /// Call it every tick, in order, also without a measurement. Nothing that comes in can make the adjustment exceed the limits
-    /// or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement that is used takes 1578
-    /// instructions for five coefficients, whatever the values, and one without at most 445 (counted by `tests/firmware`).
+    /// or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement that is used takes 1834
+    /// instructions for five coefficients, whatever the values, and one without at most 452 (counted by `tests/firmware`).
     pub fn update(&self, state: &mut AdaptState<N>, seen: &Seen<'_>) -> Adapted {
         let contact = self.follow(state, seen.play);
         let generator = seen.input.generator.unwrap_or(state.generator);
