@@ -429,7 +429,12 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             (status as u32, learner.usable && told, false)
         }
         1 => (c::flexspline_learner_set(learner.pointer.cast(), choices.below(4) as u8) as u32, learner.usable, false),
-        2 => (c::flexspline_learner_reset(learner.pointer.cast()) as u32, learner.usable, false),
+        2 if choices.any() => (c::flexspline_learner_reset(learner.pointer.cast()) as u32, learner.usable, false),
+        2 => {
+            let (at, of) = (learner.pointer.cast(), (joint.pointer.cast(), store.pointer.cast()));
+            let status = c::flexspline_learner_bind(at, of.0, of.1, choices.any());
+            (status as u32, all(&[learner, joint, store]), false)
+        }
         3..=6 => {
             let input = [c::FlexsplineInput {
                 generator_counts: choices.any::<i32>().into(),

@@ -51,8 +51,7 @@ const MEAN_NOISE: f32 = 0.920_5;
 const EVIDENCE: f32 = 8.0;
 /// The noise adapts in so many windows: slower than what was learnt is found to be wrong, or that would be taken for noise. Guess.
 const NOISE_WINDOWS: f32 = 10.0;
-/// Limits of the variance of the innovations over the expected one: up to ten times the stated noise. With a hundred times, what comes
-/// after a fault is taken for noise: 2 s after a dead load sensor 6 to 22″ were left, where 0.1 to 1.6″ are (`faults`).
+/// Limits of the variance of the innovations over the expected one: up to ten times the stated noise. Guesses.
 const NOISE: [f32; 2] = [0.5, 100.0];
 
 /// What windows of measurements said.

@@ -56,7 +56,7 @@ impl Pair {
         let (generator, torque) = (amplitude * (speed * time).sin(), mixed(time));
         let seen = if let Some((Fault::Torque(by), _)) = fault { by * torque } else { torque };
         let (past, frozen) = (&mut self.past, &mut self.frozen);
-        let measures = self.tick % self.every == 0;
+        let measures = self.tick.is_multiple_of(self.every);
         self.learns.tick_as(generator, [torque, seen], |truth| {
             past.push_front(truth);
             past.truncate(100);
