@@ -262,7 +262,7 @@ impl StartUp {
             let turned = if forward { back_n_m - there_n_m } else { there_n_m - back_n_m };
             let part = turned / (2.0 * self.drag_n_m);
             let size = part.abs();
-            let (still, wrong_way) = (!(size >= DRAG_STILL), part < 0.0);
+            let (still, wrong_way) = (size.is_nan() || size < DRAG_STILL, part < 0.0);
             let unit = !still && !wrong_way && (size * DRAG_TIMES < 1.0 || size > DRAG_TIMES);
             found = found
                 .with(Implausible::TORQUE_STILL, still)
