@@ -165,10 +165,10 @@
 #define FLEXSPLINE_LEARNER_COEFFICIENTS 7
 
 // Eight-byte words of a [`FlexsplineLearner`].
-#define FLEXSPLINE_LEARNER_WORDS 64
+#define FLEXSPLINE_LEARNER_WORDS 68
 
-// Bytes of a saved learner with the largest number of coefficients; n of them take 2 n (n - 1) + 8 n + 8.
-#define FLEXSPLINE_SAVED_LEARNER_BYTES 148
+// Bytes of a saved learner with the largest number of coefficients; n of them take 2 n (n - 1) + 8 n + 32.
+#define FLEXSPLINE_SAVED_LEARNER_BYTES 172
 
 // Largest number of springs.
 #define FLEXSPLINE_SLIP_SPRINGS 8
@@ -646,7 +646,7 @@ typedef struct FlexsplineLearnerReport {
   uint32_t untrusted;
   // Coefficients held at their limit, once for each and each measurement.
   uint32_t limited;
-  // Starts from zero because the state was hit by an upset.
+  // Starts with the first variances: measurements contradicted what was learnt for a window, or, from zero, the state was hit by an upset.
   uint32_t restarts;
   // `FLEXSPLINE_LEARNING_...`.
   uint8_t learning;
@@ -1172,6 +1172,14 @@ enum FlexsplineStatus flexspline_learner_init(struct FlexsplineLearner *learner,
 // Switches learning (`FLEXSPLINE_LEARNING_...`), from the next update on.
 enum FlexsplineStatus flexspline_learner_set(struct FlexsplineLearner *learner, uint8_t learning);
 
+// Says whose coefficients are learnt: of this joint with the table in use. Saved learners carry both, and are restored only where they belong.
+// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0 if there is one. After `flexspline_learner_init`
+// and the table, before `flexspline_learner_restore`; again after another table was activated: what was learnt for another owner is forgotten.
+enum FlexsplineStatus flexspline_learner_bind(struct FlexsplineLearner *learner,
+                                              const struct FlexsplineJoint *joint,
+                                              const struct FlexsplineStore *store,
+                                              uint32_t unit);
+
 // Forgets what was learnt; counters and `FLEXSPLINE_LEARNING_...` stay. The limiter of the joint takes the adjustment out.
 enum FlexsplineStatus flexspline_learner_reset(struct FlexsplineLearner *learner);
 
@@ -1203,8 +1211,9 @@ enum FlexsplineStatus flexspline_learner_save(const struct FlexsplineLearner *le
                                               size_t saved_bytes,
                                               size_t *written);
 
-// Takes back what a learner of the same coefficients saved, and is off; `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, or were saved with other
-// coefficients. The learner is made first, by `flexspline_learner_init`.
+// Takes back what a learner of the same coefficients and the same owner (`flexspline_learner_bind`) saved, and is off. `FLEXSPLINE_STATUS_SAVED` if the bytes
+// are damaged, fewer, of another version, or were saved with other coefficients; `FLEXSPLINE_STATUS_OTHER_TABLE`, `FLEXSPLINE_STATUS_OTHER_JOINT` if they
+// belong elsewhere. Then the learner is as it was. It is made first, by `flexspline_learner_init`, and bound.
 enum FlexsplineStatus flexspline_learner_restore(struct FlexsplineLearner *learner,
                                                  const uint8_t *saved,
                                                  size_t saved_bytes);

@@ -20,6 +20,7 @@ mod beside;
 mod encoder;
 mod learn;
 mod names;
+mod safe;
 mod telemetry;
 mod torque;
 
@@ -27,7 +28,7 @@ use beside::{given, health_code, quality_code};
 #[cfg(not(feature = "fuzzing"))]
 use names::*;
 #[cfg(feature = "fuzzing")]
-pub use {ask::*, beside::*, encoder::*, learn::*, names::*, telemetry::*, torque::*};
+pub use {ask::*, beside::*, encoder::*, learn::*, names::*, safe::*, telemetry::*, torque::*};
 
 use crate::{
     ActivateError, Activation, Adjustment, Counters, Drive, FixedMember, Flags, GeneratorAngle, Identity,
@@ -104,6 +105,9 @@ pub const FLEXSPLINE_FLAG_JOINT_TORN: u16 = 128;
 pub const FLEXSPLINE_FLAG_SAFE: u16 = 256;
 /// An image is not the one that was activated, or both are the same one.
 pub const FLEXSPLINE_FLAG_OTHER_IMAGES: u16 = 512;
+
+/// The adjustment of the input was larger than any may be, and was taken at its largest: what made it is not sound.
+pub const FLEXSPLINE_FLAG_BOUNDED: u16 = 1024;
 
 /// Eight-byte words of a [`FlexsplineStore`].
 pub const FLEXSPLINE_STORE_WORDS: usize = 1072;
@@ -303,6 +307,18 @@ const _: () = {
     assert!(FLEXSPLINE_SAVED_BYTES == SAVED_JOINT_BYTES);
 };
 
+/// Marks as they are kept: any two differ in so many bits (a test counts them) that one bit of one may flip.
+const fn spread(mark: u32) -> u32 {
+    mark.wrapping_mul(0x9e37_79b1)
+}
+
+/// Whether a mark is this one, but for a bit that an upset turned: a call that writes the object makes it anew.
+#[inline(always)]
+const fn is_marked(found: u32, mark: u32) -> bool {
+    let off = found ^ spread(mark);
+    off & off.wrapping_sub(1) == 0
+}
+
 fn usable<T>(pointer: *const T) -> Result<usize, FlexsplineStatus> {
     let address = pointer as usize;
     let aligned = address.checked_rem(align_of::<T>()) == Some(0);
@@ -326,7 +342,7 @@ fn put<O, T>(object: *mut O, mark: u32, value: T) -> Result<(), FlexsplineStatus
     usable(object)?;
     // SAFETY: not null, aligned for `O`, whose size and alignment are at least those of the value (asserted above); the
     // caller owns it.
-    unsafe { object.cast::<Marked<T>>().write(Marked { mark, value }) };
+    unsafe { object.cast::<Marked<T>>().write(Marked { mark: spread(mark), value }) };
     Ok(())
 }
 
@@ -336,7 +352,7 @@ fn get<'a, O, T>(object: *const O, mark: u32) -> Result<&'a T, FlexsplineStatus>
     // SAFETY: not null and aligned; all bytes of the mark are a number whatever they are. The value is only used if the mark
     // says that `put` wrote it. The reference does not outlive the call it is made in.
     let marked = unsafe { &*object.cast::<Marked<MaybeUninit<T>>>() };
-    if marked.mark != mark {
+    if !is_marked(marked.mark, mark) {
         return Err(FlexsplineStatus::NotInitialised);
     }
     // SAFETY: marked, so written by `put`.
@@ -347,7 +363,10 @@ fn get<'a, O, T>(object: *const O, mark: u32) -> Result<&'a T, FlexsplineStatus>
 fn get_mut<'a, O, T>(object: *mut O, mark: u32) -> Result<&'a mut T, FlexsplineStatus> {
     get::<O, T>(object, mark)?;
     // SAFETY: as in `get`; the callers see to it that nothing else refers to it during the call.
-    Ok(unsafe { &mut (*object.cast::<Marked<T>>()).value })
+    let marked = unsafe { &mut *object.cast::<Marked<T>>() };
+    // A bit of it may have flipped.
+    marked.mark = spread(mark);
+    Ok(&mut marked.value)
 }
 
 /// A plain structure of the caller, copied.
@@ -446,7 +465,7 @@ pub extern "C" fn flexspline_store_init(store: *mut FlexsplineStore) -> Flexspli
             marked.write_bytes(0, 1);
             &mut *marked
         };
-        marked.mark = STORE_MARK;
+        marked.mark = spread(STORE_MARK);
         Ok(())
     };
     status(init())
@@ -787,14 +806,19 @@ pub extern "C" fn flexspline_state_restore(
         }
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &Store = get(store, STORE_MARK)?;
-        let restored = JointState::restore(&copied(saved)?, joint, store).map_err(|error| match error {
-            RestoreError::OtherTable => FlexsplineStatus::OtherTable,
-            RestoreError::OtherJoint => FlexsplineStatus::OtherJoint,
-            RestoreError::Version { .. } | RestoreError::Crc | RestoreError::Impossible => FlexsplineStatus::Saved,
-        })?;
+        let restored = JointState::restore(&copied(saved)?, joint, store).map_err(restore_status)?;
         put(state, STATE_MARK, restored)
     };
     status(restore())
+}
+
+/// Why saved bytes are not restored.
+fn restore_status(error: RestoreError) -> FlexsplineStatus {
+    match error {
+        RestoreError::OtherTable => FlexsplineStatus::OtherTable,
+        RestoreError::OtherJoint => FlexsplineStatus::OtherJoint,
+        RestoreError::Version { .. } | RestoreError::Crc | RestoreError::Impossible => FlexsplineStatus::Saved,
+    }
 }
 
 /// What a tick is given.

@@ -4,7 +4,11 @@
 //! that counts edges, a multi-turn encoder). An [`Encoder`] says which; an [`EncoderState`] follows it. What is kept is the whole number of
 //! counts since the zero, and the angle is made anew of that each time, to the nearest 2⁻³² turn: nothing drifts however long a
 //! joint turns, also where the counts in a turn are no power of two, and a count more never is an angle less.
+//!
+//! Settings and state are kept as words under a sum ([`whole`](../whole.rs)): where one word was hit by an upset it is mended in the next call; what is
+//! lost gives no angle.
 
+use crate::whole::{Sealed, high, low, sum_of};
 use core::fmt;
 
 /// Where a register begins anew.
@@ -49,15 +53,60 @@ impl core::error::Error for EncoderError {}
 /// An encoder: all that does not change while it turns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Encoder {
-    settings: EncoderSettings,
+    /// Counts in a turn; bits of the register (0: a turn) and in the byte above whether it is reversed; the zero, low and high word.
+    settings: Sealed<[u32; 4]>,
 }
 
 /// Where an encoder is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EncoderState {
-    /// The last reading, and the counts since the zero, as the register counts.
+    /// The last reading, and the counts since the zero, as the register counts: low and high words.
+    at: Sealed<[u32; 4]>,
+}
+
+impl EncoderSettings {
+    const fn words(&self) -> [u32; 4] {
+        let bits = match self.wrap {
+            EncoderWrap::Turn => 0,
+            EncoderWrap::Bits(bits) => bits as u32,
+        };
+        [self.counts_per_turn, bits | (self.reversed as u32) << 8, low(self.zero_counts), high(self.zero_counts)]
+    }
+
+    const fn of([counts_per_turn, marks, low, high]: [u32; 4]) -> Self {
+        let bits = marks as u8;
+        let wrap = if bits == 0 { EncoderWrap::Turn } else { EncoderWrap::Bits(bits) };
+        Self { counts_per_turn, wrap, reversed: marks >> 8 != 0, zero_counts: (high as i64) << 32 | low as i64 }
+    }
+}
+
+/// The last reading, and the counts since the zero.
+#[derive(Clone, Copy)]
+struct At {
     reading: u64,
     since_zero: i64,
+}
+
+impl EncoderState {
+    /// Nowhere: it is not whole.
+    #[cfg(feature = "c-api")]
+    pub(crate) const NOWHERE: Self = Self { at: Sealed::of([0; 4], 0) };
+
+    fn of(At { reading, since_zero }: At) -> Self {
+        Self { at: Sealed::new([low(reading as i64), high(reading as i64), low(since_zero), high(since_zero)]) }
+    }
+
+    fn open(&self) -> Option<At> {
+        let [low, high, since_low, since_high] = self.at.open()?;
+        let long = |low: u32, high: u32| (high as u64) << 32 | low as u64;
+        Some(At { reading: long(low, high), since_zero: long(since_low, since_high) as i64 })
+    }
+
+    /// Whether it is lost to an upset that cannot be mended: [`Encoder::start`] it again.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        self.at.open().is_none()
+    }
 }
 
 /// Largest zero, counts: what is left of 64 bits is for the way from it.
@@ -81,34 +130,81 @@ impl Encoder {
         if zero_counts < -MOST_ZERO || zero_counts > MOST_ZERO {
             return Err(EncoderError { name: "zero_counts", found: zero_counts });
         }
-        Ok(Self { settings })
+        let words = settings.words();
+        Ok(Self { settings: Sealed::of(words, sum_of(&words)) })
+    }
+
+    fn settings(&self) -> Option<EncoderSettings> {
+        self.settings.open().map(EncoderSettings::of)
+    }
+
+    /// Makes the settings whole, where they lie in memory and an upset hit a word of them; false if they are lost, and the encoder has to be made
+    /// anew. For a slow rate group: until then each call mends a copy.
+    pub fn mend(&mut self) -> bool {
+        self.settings.mend()
+    }
+
+    /// Whether the settings are lost to an upset that cannot be mended.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        self.settings.open().is_none()
     }
 
     /// Where it is by its first reading: of all angles with this reading the one nearest to `near_counts` (2⁻³² turn), which is 0 or
-    /// what was known before a reset. `None` if the register cannot read that.
+    /// what was known before a reset. `None` if the register cannot read that, or the settings are lost.
     #[must_use]
     pub fn start(&self, reading: u64, near_counts: i64) -> Option<EncoderState> {
-        let near = self.since_zero(near_counts);
-        let there = self.register(near.wrapping_add(self.settings.zero_counts));
-        let way = self.way(there, reading)?;
-        Some(EncoderState { reading, since_zero: near.wrapping_add(way) })
+        let settings = self.settings()?;
+        let near = settings.since_zero(near_counts);
+        let there = settings.register(near.wrapping_add(settings.zero_counts));
+        let way = settings.way(there, reading)?;
+        Some(EncoderState::of(At { reading, since_zero: near.wrapping_add(way) }))
     }
 
     /// Takes a reading: less than half of what the register counts since the one before, or half of it backward. False, and nothing
-    /// has changed, if the register cannot read that.
+    /// has changed, if the register cannot read that, or settings or state are lost: give the tick no sample then.
     #[must_use]
     pub fn read(&self, state: &mut EncoderState, reading: u64) -> bool {
-        let Some(way) = self.way(state.reading, reading) else { return false };
-        *state = EncoderState { reading, since_zero: state.since_zero.wrapping_add(way) };
-        true
+        let read = || {
+            let (settings, at) = (self.settings()?, state.open()?);
+            let way = settings.way(at.reading, reading)?;
+            Some(EncoderState::of(At { reading, since_zero: at.since_zero.wrapping_add(way) }))
+        };
+        let next = read();
+        *state = next.unwrap_or(*state);
+        next.is_some()
     }
 
     /// The angle, 2⁻³² turn, to the nearest: for [`GeneratorAngle::from_counts`](crate::GeneratorAngle::from_counts) or
-    /// [`OutputAngle::from_counts`](crate::OutputAngle::from_counts).
+    /// [`OutputAngle::from_counts`](crate::OutputAngle::from_counts). 0 if settings or state are lost ([`Self::angle`]).
     #[must_use]
     pub fn angle_counts(&self, state: &EncoderState) -> i64 {
-        let per_turn = self.settings.counts_per_turn;
-        let counts = self.signed(state.since_zero);
+        self.angle(state).unwrap_or(0)
+    }
+
+    /// As [`Self::angle_counts`]; `None` if settings or state are lost.
+    #[must_use]
+    pub fn angle(&self, state: &EncoderState) -> Option<i64> {
+        let (settings, at) = (self.settings()?, state.open()?);
+        Some(settings.angle(at.since_zero))
+    }
+
+    /// What the register reads at an angle, to the nearest count: for a drive that is commanded in counts of its encoder. 0 if the settings are lost
+    /// ([`Self::mend`]).
+    #[must_use]
+    pub fn reading(&self, angle_counts: i64) -> u64 {
+        let there = |settings: EncoderSettings| {
+            settings.register(settings.since_zero(angle_counts).wrapping_add(settings.zero_counts))
+        };
+        self.settings().map_or(0, there)
+    }
+}
+
+impl EncoderSettings {
+    /// The angle of so many counts since the zero, 2⁻³² turn, to the nearest.
+    fn angle(&self, since_zero: i64) -> i64 {
+        let per_turn = self.counts_per_turn;
+        let counts = self.signed(since_zero);
         let turns = counts.checked_div_euclid(per_turn as i64).unwrap_or(0);
         let within = counts.checked_rem_euclid(per_turn as i64).unwrap_or(0) as u64;
         // Below 2³¹ turns in 32 bits: rounding up at the end of a turn carries into the next.
@@ -116,37 +212,31 @@ impl Encoder {
         (turns << 32).wrapping_add(fraction as i64)
     }
 
-    /// What the register reads at an angle (2⁻³² turn), to the nearest count.
-    #[must_use]
-    pub fn reading(&self, angle_counts: i64) -> u64 {
-        self.register(self.since_zero(angle_counts).wrapping_add(self.settings.zero_counts))
-    }
-
     /// Counts since the zero at an angle, as the register counts.
     fn since_zero(&self, angle_counts: i64) -> i64 {
-        let per_turn = self.settings.counts_per_turn;
+        let per_turn = self.counts_per_turn;
         let whole = (angle_counts >> 32).wrapping_mul(per_turn as i64);
         let part = (angle_counts as u32 as u64).wrapping_mul(per_turn as u64).wrapping_add(1 << 31) >> 32;
         self.signed(whole.wrapping_add(part as i64))
     }
 
     const fn signed(&self, counts: i64) -> i64 {
-        if self.settings.reversed { counts.wrapping_neg() } else { counts }
+        if self.reversed { counts.wrapping_neg() } else { counts }
     }
 
     /// What the register reads where it has counted so far.
     fn register(&self, counts: i64) -> u64 {
-        match self.settings.wrap {
-            EncoderWrap::Turn => counts.checked_rem_euclid(self.settings.counts_per_turn as i64).unwrap_or(0) as u64,
+        match self.wrap {
+            EncoderWrap::Turn => counts.checked_rem_euclid(self.counts_per_turn as i64).unwrap_or(0) as u64,
             EncoderWrap::Bits(bits) => counts as u64 & mask(bits),
         }
     }
 
     /// The shorter way from a reading to another; `None` if the register cannot read the other.
     fn way(&self, from: u64, to: u64) -> Option<i64> {
-        match self.settings.wrap {
+        match self.wrap {
             EncoderWrap::Turn => {
-                let turn = self.settings.counts_per_turn as i64;
+                let turn = self.counts_per_turn as i64;
                 let to = i64::try_from(to).ok().filter(|&to| to < turn)?;
                 let way = to.wrapping_sub(from as i64);
                 let twice = way.wrapping_shl(1);
@@ -171,6 +261,11 @@ impl Encoder {
 const fn mask(bits: u8) -> u64 {
     u64::MAX.wrapping_shr(64u32.saturating_sub(bits as u32))
 }
+
+#[cfg(test)]
+crate::upset::upsets!(Encoder { settings });
+#[cfg(test)]
+crate::upset::upsets!(EncoderState { at });
 
 #[cfg(test)]
 mod tests {
@@ -260,17 +355,19 @@ mod tests {
             let counts = counts.clamp(-i64::from(per_turn) << 30, i64::from(per_turn) << 30);
             let wrap = EncoderWrap::Bits(bits);
             let encoder = made(EncoderSettings { counts_per_turn: per_turn, wrap, reversed, zero_counts: 0 });
-            let state = EncoderState { reading: encoder.register(counts), since_zero: counts };
+            let settings = encoder.settings().unwrap();
+            let at = At { reading: settings.register(counts), since_zero: counts };
+            let state = EncoderState::of(at);
             let angle = encoder.angle_counts(&state);
-            prop_assert_eq!(encoder.since_zero(angle), counts);
-            prop_assert_eq!(encoder.reading(angle), state.reading);
+            prop_assert_eq!(settings.since_zero(angle), counts);
+            prop_assert_eq!(encoder.reading(angle), at.reading);
             let sign = if reversed { -1 } else { 1 };
             let exact = (i128::from(sign * counts) << 32) as f64 / f64::from(per_turn);
             prop_assert!((angle as f64 - exact).abs() <= 0.5 + 1e-15 * exact.abs());
             // A count more is more.
-            let next = EncoderState { since_zero: counts + sign, ..state };
+            let next = EncoderState::of(At { since_zero: counts + sign, ..at });
             prop_assert!(encoder.angle_counts(&next) > angle);
-            prop_assert_eq!(encoder.start(state.reading, angle), Some(state));
+            prop_assert_eq!(encoder.start(at.reading, angle), Some(state));
         }
     }
 }

@@ -214,6 +214,7 @@ mod self_test;
 mod store;
 mod table;
 mod tell;
+mod unit;
 #[cfg(test)]
 mod upset;
 mod whole;
@@ -225,12 +226,12 @@ pub use error::{DriveError, Field, ImageError};
 #[cfg(any(test, feature = "std"))]
 pub use joint::JOINT_STATE_WORDS;
 pub use joint::{
-    AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Aged, Ahead, Coefficient,
-    Disturbance, FittedSlip, Flags, Inertias, Input, Joint, JointState, Learning, Limits, LoadTorque, Measured, Mode,
-    ModeError, MotionAhead, Noise, NominalOutput, Now, Output, OutputAhead, Overrun, PREDICTOR_PARTS, Predictor,
-    PredictorError, PredictorState, RateGroup, RestoreError, SAVED_JOINT_BYTES, Seen, SettingError, Slip, SlipBank,
-    SlipElement, SlipState, SlipVariable, Term, TorquePath, TorqueReading, TorqueSettings, TorqueSlipElement, Verdict,
-    saved_adapt_bytes, saved_slip_bytes,
+    AdaptCounters, AdaptError, AdaptRestoreError, AdaptSettings, AdaptState, Adapted, Adapter, Adjustment, Aged, Ahead,
+    Coefficient, Disturbance, FittedSlip, Flags, Implausible, Inertias, Input, Joint, JointState, Learning, Limits,
+    LoadTorque, Measured, Mode, ModeError, MotionAhead, Noise, NominalOutput, Now, Output, OutputAhead, Overrun,
+    PREDICTOR_PARTS, Predictor, PredictorError, PredictorState, RateGroup, Readings, RestoreError, SAVED_JOINT_BYTES,
+    Seen, SettingError, Slip, SlipBank, SlipElement, SlipState, SlipVariable, StartUp, StartUpSettings, StartUpStep,
+    Term, TorquePath, TorqueReading, TorqueSettings, TorqueSlipElement, Verdict, saved_adapt_bytes, saved_slip_bytes,
 };
 pub use play::{Direction, PlayState, SAVED_STATE_BYTES};
 pub use self_test::{SelfTestError, self_test};
@@ -248,3 +249,4 @@ pub use table::{
     grid, image_bytes, write_image,
 };
 pub use tell::{Event, Events, Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Watch, Writer};
+pub use unit::{Arcsec, Degrees, Rad};

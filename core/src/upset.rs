@@ -91,6 +91,14 @@ impl Upset for crate::TableId {
     }
 }
 
+impl<T> Upset for core::marker::PhantomData<T> {
+    fn bits(&self) -> usize {
+        0
+    }
+
+    fn flip(&mut self, _: usize, _: &mut String) {}
+}
+
 /// Only told.
 impl Upset for crate::GeneratorKind {
     fn bits(&self) -> usize {
@@ -116,8 +124,8 @@ impl<T: Upset, const N: usize> Upset for [T; N] {
 }
 
 macro_rules! upsets {
-    ($type:ty { $($field:ident),* $(,)? }) => {
-        impl $crate::upset::Upset for $type {
+    ([$($generic:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
+        impl<$($generic)*> $crate::upset::Upset for $type {
             fn bits(&self) -> usize {
                 let Self { $($field),* } = self;
                 [$($crate::upset::Upset::bits($field)),*].into_iter().sum()
@@ -137,5 +145,23 @@ macro_rules! upsets {
             }
         }
     };
+    ($type:ty { $($field:ident),* $(,)? }) => {
+        $crate::upset::upsets!([] $type { $($field),* });
+    };
 }
 pub(crate) use upsets;
+
+macro_rules! matrices {
+    ($($matrix:ident),*) => {$(
+        impl Upset for nalgebra::$matrix<f32> {
+            fn bits(&self) -> usize {
+                32 * self.len()
+            }
+
+            fn flip(&mut self, bit: usize, path: &mut String) {
+                self.as_mut_slice()[bit / 32].flip(bit % 32, path);
+            }
+        }
+    )*};
+}
+matrices!(Matrix4, Matrix4x2, Vector4, RowVector4);

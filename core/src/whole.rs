@@ -8,6 +8,13 @@
 //! [`SUMS_START`]. A cyclic check of the same words would take six times the instructions.
 //!
 //! What is summed up is a call of its own for each structure: inlined, the compiler moves the words to the stack and back.
+//!
+//! # One sum, and what it mends
+//! [`Sealed`] keeps a value with its sum: settings and states of all that feeds a tick. Because the sum is linear modulo p, the
+//! difference between the sum that is kept and the sum that is found, multiplied by 2³² once for each word behind a place, is what
+//! that word has to change by. If that is a change of neighbouring bits of one word ([`BURST_BITS`]), the word is mended and the sum
+//! taken again; it must then be equal. So a value with one sum survives what a value with two copies survives, as long as one word was hit,
+//! for 8 bytes instead of its own size. Anything else is reported and not used.
 
 /// The sums of words: so that a constant can be made of them, and nothing is a loop.
 macro_rules! sums {
@@ -55,6 +62,243 @@ pub(crate) const fn same([a, b]: [u32; 2], [c, d]: [u32; 2]) -> bool {
     ((a ^ c) | (b ^ d)) == 0
 }
 
+/// The sum before the first word.
+pub(crate) const START: u64 = SUMS_START[0] as u64 | (SUMS_START[1] as u64) << 32;
+
+/// A sum with one more word.
+#[inline(always)]
+pub(crate) const fn add(sum: u64, word: u32) -> u64 {
+    // Fits: (2³² − 1)² + 2·(2³² − 1) = 2⁶⁴ − 1.
+    (sum as u32 as u64).wrapping_mul(FACTOR as u64).wrapping_add(sum >> 32).wrapping_add(word as u64)
+}
+
+/// The sum of a few words, as a constant.
+pub(crate) const fn sum_of(mut words: &[u32]) -> u64 {
+    let mut sum = START;
+    while let [word, rest @ ..] = words {
+        sum = add(sum, *word);
+        words = rest;
+    }
+    add(sum, 0)
+}
+
+/// Something that is kept as words under one sum.
+pub(crate) trait Words: Copy {
+    /// Goes on with a sum over its words, in order.
+    fn sum(&self, sum: u64) -> u64;
+    /// Shows every word in the same order, and takes what is to stand in its place.
+    fn each(&mut self, see: &mut dyn FnMut(u32) -> u32);
+}
+
+macro_rules! words_of {
+    ($($number:ty: $to:expr, $back:expr;)*) => {$(
+        impl Words for $number {
+            #[inline(always)]
+            fn sum(&self, sum: u64) -> u64 {
+                add(sum, $to(*self))
+            }
+
+            fn each(&mut self, see: &mut dyn FnMut(u32) -> u32) {
+                *self = $back(see($to(*self)));
+            }
+        }
+    )*};
+}
+words_of! {
+    u32: |word: u32| word, |word: u32| word;
+    i32: |number: i32| number as u32, |word: u32| word as i32;
+    f32: f32::to_bits, f32::from_bits;
+}
+
+impl Words for i64 {
+    #[inline(always)]
+    fn sum(&self, sum: u64) -> u64 {
+        add(add(sum, low(*self)), high(*self))
+    }
+
+    fn each(&mut self, see: &mut dyn FnMut(u32) -> u32) {
+        let (low, high) = (see(low(*self)), see(high(*self)));
+        *self = (high as i64) << 32 | low as i64;
+    }
+}
+
+impl<T: Words, const N: usize> Words for [T; N] {
+    #[inline(always)]
+    fn sum(&self, sum: u64) -> u64 {
+        self.iter().fold(sum, |sum, part| part.sum(sum))
+    }
+
+    fn each(&mut self, see: &mut dyn FnMut(u32) -> u32) {
+        self.iter_mut().for_each(|part| part.each(see));
+    }
+}
+
+/// The words of a structure: those of its fields, in this order. Takes it apart without `..`, so that no field is left out.
+macro_rules! words {
+    ([$($generic:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
+        impl<$($generic)*> $crate::whole::Words for $type {
+            #[inline(always)]
+            fn sum(&self, sum: u64) -> u64 {
+                let Self { $($field),* } = self;
+                $(let sum = $crate::whole::Words::sum($field, sum);)*
+                sum
+            }
+
+            fn each(&mut self, see: &mut dyn FnMut(u32) -> u32) {
+                let Self { $($field),* } = self;
+                $($crate::whole::Words::each($field, see);)*
+            }
+        }
+    };
+}
+pub(crate) use words;
+
+/// Most neighbouring bits of a word, or of the sum, of which a change is mended: cells that one particle flips lie next to each other. The bound
+/// is a guess. Each bit more doubles the number of changes that may be mistaken for one: 2¹³ of 2⁶⁴ for every word.
+const BURST_BITS: u32 = 8;
+
+/// Whether these are neighbouring bits, as many as are mended.
+const fn is_burst(changed: u64) -> bool {
+    changed.wrapping_shr(changed.trailing_zeros()) >> BURST_BITS == 0
+}
+
+/// `2³²·f − 1`, a prime.
+const PRIME: u64 = ((FACTOR as u64) << 32).wrapping_sub(1);
+
+/// `s·2⁻³²` modulo the prime.
+const fn shorter(s: u64) -> u64 {
+    reduced(add(s, 0))
+}
+
+/// `s·2³²` modulo the prime: a step back.
+const fn longer(s: u64) -> u64 {
+    (s / FACTOR as u64) | (s % FACTOR as u64) << 32
+}
+
+const fn reduced(s: u64) -> u64 {
+    if s >= PRIME { s.wrapping_sub(PRIME) } else { s }
+}
+
+/// A value under a sum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Sealed<T> {
+    kept: T,
+    sums: [u32; 2],
+}
+
+impl<T> Sealed<T> {
+    /// A value with its sum, for constants: that of all its words ([`sum_of`]).
+    pub(crate) const fn of(kept: T, sum: u64) -> Self {
+        Self { kept, sums: pair(sum) }
+    }
+
+    /// What is kept, checked or not.
+    pub(crate) const fn kept(&self) -> &T {
+        &self.kept
+    }
+}
+
+impl<T: Words> Sealed<T> {
+    /// A value with its sum.
+    #[inline(always)]
+    pub(crate) fn new(kept: T) -> Self {
+        Self { sums: pair(Self::found(&kept)), kept }
+    }
+
+    #[inline(never)]
+    fn found(kept: &T) -> u64 {
+        add(kept.sum(START), 0)
+    }
+
+    /// Whether nothing changed since it was kept.
+    #[inline(always)]
+    pub(crate) fn is_whole(&self) -> bool {
+        same(pair(Self::found(&self.kept)), self.sums)
+    }
+
+    /// What is kept, mended if it has to be; `None` if it is lost.
+    #[inline(always)]
+    pub(crate) fn open(&self) -> Option<T> {
+        if self.is_whole() { Some(self.kept) } else { self.mended() }
+    }
+
+    /// Looks at what is kept, mended if it has to be; `None` if it is lost.
+    #[inline(always)]
+    pub(crate) fn with<R>(&self, look: impl FnOnce(&T) -> R) -> Option<R> {
+        if self.is_whole() { Some(look(&self.kept)) } else { self.mended().map(|kept| look(&kept)) }
+    }
+
+    /// Changes what is kept, where it lies, mended if it has to be; `None`, and nothing is changed, if it is lost.
+    #[inline(always)]
+    pub(crate) fn change<R>(&mut self, change: impl FnOnce(&mut T) -> R) -> Option<R> {
+        if !self.is_whole() {
+            self.kept = self.mended()?;
+        }
+        let result = change(&mut self.kept);
+        self.sums = pair(Self::found(&self.kept));
+        Some(result)
+    }
+
+    /// Keeps another value.
+    #[inline(always)]
+    pub(crate) fn close(&mut self, kept: T) {
+        *self = Self::new(kept);
+    }
+
+    /// Makes it whole; false if it is lost.
+    pub(crate) fn mend(&mut self) -> bool {
+        let found = self.open();
+        if let Some(kept) = found {
+            self.close(kept);
+        }
+        found.is_some()
+    }
+
+    /// The value before neighbouring bits of one of its words, or of its sum, changed.
+    #[cold]
+    #[inline(never)]
+    fn mended(&self) -> Option<T> {
+        let [low, high] = self.sums;
+        let (wanted, found) = (low as u64 | (high as u64) << 32, Self::found(&self.kept));
+        if is_burst(wanted ^ found) {
+            return Some(self.kept);
+        }
+        let mut kept = self.kept;
+        let (one, other) = (reduced(wanted), reduced(found));
+        let mut missing =
+            if one >= other { one.wrapping_sub(other) } else { PRIME.wrapping_sub(other.wrapping_sub(one)) };
+        // What the first word has to change by: it went through a step for each word, and the last.
+        kept.each(&mut |word| {
+            missing = longer(missing);
+            word
+        });
+        kept.each(&mut |word| {
+            let less = PRIME.wrapping_sub(missing);
+            let better = if missing >> 32 == 0 { word.checked_add(missing as u32) } else { None };
+            let better = if less >> 32 == 0 { word.checked_sub(less as u32) } else { better };
+            missing = shorter(missing);
+            better.filter(|better| is_burst((better ^ word) as u64)).unwrap_or(word)
+        });
+        (Self::found(&kept) == wanted).then_some(kept)
+    }
+}
+
+#[cfg(test)]
+impl<T: crate::upset::Upset> crate::upset::Upset for Sealed<T> {
+    fn bits(&self) -> usize {
+        let Self { kept, sums } = self;
+        kept.bits().wrapping_add(sums.bits())
+    }
+
+    fn flip(&mut self, bit: usize, path: &mut std::string::String) {
+        let Self { kept, sums } = self;
+        match bit.checked_sub(kept.bits()) {
+            None => kept.flip(bit, path),
+            Some(bit) => sums.flip(bit, path),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -100,6 +344,66 @@ mod tests {
                 }
             }
         }
+    }
+
+    fn mixed() -> [u32; 24] {
+        core::array::from_fn(|i| (i as u32).wrapping_mul(0x9e37_79b9) ^ 0x1234_5678)
+    }
+
+    #[test]
+    fn one_sum_is_the_same_however_it_is_taken() {
+        let words = mixed();
+        assert_eq!(pair(sum_of(&words)), of(&words));
+        assert_eq!(Sealed::new(words), Sealed::of(words, sum_of(&words)));
+        assert_eq!(Sealed::<[u32; 0]>::new([]), Sealed::of([], sum_of(&[])));
+        for s in [0, 1, 0xffff_ffff, 1 << 32, PRIME - 1, 0x1234_5678_9abc_def0] {
+            assert_eq!((shorter(longer(s)), longer(shorter(s))), (s, s));
+        }
+    }
+
+    /// Every change of neighbouring bits, of every word and of the sum, with words of all zeros, all ones and mixed.
+    #[test]
+    fn what_hit_one_word_is_mended() {
+        for words in [[0; 24], [u32::MAX; 24], mixed()] {
+            let sealed = Sealed::new(words);
+            assert!(sealed.is_whole() && sealed.open() == Some(words));
+            for bit in 0..26 * 32 {
+                // One bit, and all changes of up to eight that begin with it and stay in its word.
+                for more in (1..1u32 << BURST_BITS).step_by(2).filter(|more| more.leading_zeros() >= bit as u32 % 32) {
+                    let mut hit = sealed;
+                    let by = more << (bit % 32);
+                    match bit / 32 {
+                        word @ 0..24 => hit.kept[word] ^= by,
+                        sum => hit.sums[sum - 24] ^= by,
+                    }
+                    assert!(!hit.is_whole() && hit.open() == Some(words), "{bit} {more:b}");
+                    assert!(hit.mend() && hit == sealed);
+                }
+            }
+        }
+    }
+
+    /// Two words, each bit of one with each bit of the other; and a word hit beyond what is mended.
+    #[test]
+    fn what_hit_two_words_is_lost() {
+        let sealed = Sealed::new(mixed());
+        for one in 0..26 * 32 {
+            for other in 0..one / 32 * 32 {
+                let mut hit = sealed;
+                for bit in [one, other] {
+                    match bit / 32 {
+                        word @ 0..24 => hit.kept[word] ^= 1 << (bit % 32),
+                        sum => hit.sums[sum - 24] ^= 1 << (bit % 32),
+                    }
+                }
+                // Neighbours on either side of the border of the two words of the sum are one change.
+                let neighbours = one / 32 == 25 && other / 32 == 24 && one - other < BURST_BITS as usize;
+                assert_eq!(hit.open().is_some(), neighbours, "{one} {other}");
+            }
+        }
+        let mut hit = sealed;
+        hit.kept[5] ^= 0x101;
+        assert_eq!((hit.open(), hit.mend()), (None, false));
     }
 
     #[test]

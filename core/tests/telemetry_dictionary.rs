@@ -37,7 +37,8 @@ const PARAMETERS: &[(&str, usize, Kind, &str, &str)] = &[
     ("overrun", 1, Flag, "", "the tick came late"),
     ("glitch", 1, Flag, "", "the sample was not believed"),
     ("sample_lost", 1, Flag, "", "there was no sample"),
-    ("reserved_6", 6, Unsigned, "", "zero"),
+    ("reserved_5", 5, Unsigned, "", "zero"),
+    ("bounded", 1, Flag, "", "the adjustment was larger than any may be"),
     ("other_images", 1, Flag, "", "an image is not the one that was activated"),
     ("safe", 1, Flag, "", "the joint is in mode safe"),
     ("missed_ticks", 16, Unsigned, "", "ticks missed since the start; wraps"),
@@ -186,6 +187,7 @@ fn a_record_is_read_by_the_dictionary_alone() {
         ("joint_torn", Flags::JOINT_TORN),
         ("safe", Flags::SAFE),
         ("other_images", Flags::OTHER_IMAGES),
+        ("bounded", Flags::BOUNDED),
     ];
     let healths = [Health::Sound, Health::OneImage, Health::Lost, Health::Empty, Health::Torn];
     let modes = [Mode::Off, Mode::Tracking, Mode::Hold, Mode::Safe];

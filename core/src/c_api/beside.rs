@@ -21,9 +21,9 @@ pub const FLEXSPLINE_UPLOAD_WORDS: usize = 3;
 /// Eight-byte words of a [`FlexsplineWatch`].
 pub const FLEXSPLINE_WATCH_WORDS: usize = 6;
 /// Eight-byte words of a [`FlexsplinePredictor`].
-pub const FLEXSPLINE_PREDICTOR_WORDS: usize = 18;
+pub const FLEXSPLINE_PREDICTOR_WORDS: usize = 19;
 /// Eight-byte words of a [`FlexsplineObserver`].
-pub const FLEXSPLINE_OBSERVER_WORDS: usize = 3;
+pub const FLEXSPLINE_OBSERVER_WORDS: usize = 4;
 
 /// The mode changed: `mode_before`, `mode`.
 pub const FLEXSPLINE_EVENT_MODE: u16 = 1;
@@ -517,7 +517,8 @@ pub extern "C" fn flexspline_observer_init(observer: *mut FlexsplineObserver) ->
     status(put(observer, OBSERVER_MARK, PredictorState::new()))
 }
 
-/// One tick of the observer.
+/// One tick of the observer. `FLEXSPLINE_STATUS_ARGUMENT` if a number that is used is not finite or beyond any drive, and the estimate stays;
+/// `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of observer or predictor (one is mended): make them anew. What is told then is NaN.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_observer_step(
     observer: *mut FlexsplineObserver,
@@ -529,8 +530,11 @@ pub extern "C" fn flexspline_observer_step(
         let FlexsplineMeasured { torque_n_m, speed_rad_s, twist_rad } = copied(measured)?;
         let predictor: &Predictor = get(predictor, PREDICTOR_MARK)?;
         let observer: &mut PredictorState = get_mut(observer, OBSERVER_MARK)?;
-        predictor.step(observer, &Measured { torque_n_m, speed_rad_s, twist_rad });
-        Ok(())
+        if observer.is_lost() || predictor.is_lost() {
+            return Err(FlexsplineStatus::NotInitialised);
+        }
+        let used = predictor.step(observer, &Measured { torque_n_m, speed_rad_s, twist_rad });
+        if used { Ok(()) } else { Err(FlexsplineStatus::Argument) }
     };
     status(step())
 }
@@ -558,7 +562,7 @@ pub extern "C" fn flexspline_observer_report(
 }
 
 /// Tells where the output will be some ticks from now, with the table as the output map of the two inertias. The work grows with the
-/// ticks; call it in a slow rate group.
+/// ticks; call it in a slow rate group. `FLEXSPLINE_STATUS_ARGUMENT` if a number of `now` is not finite.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_predict(
     predictor: *const FlexsplinePredictor,
@@ -577,6 +581,14 @@ pub extern "C" fn flexspline_predict(
         let from = copied(now)?;
         let predictor: &Predictor = get(predictor, PREDICTOR_MARK)?;
         let observer: &PredictorState = get(observer, OBSERVER_MARK)?;
+        if observer.is_lost() || predictor.is_lost() {
+            return Err(FlexsplineStatus::NotInitialised);
+        }
+        let numbers = [from.torque_n_m, from.torque_off_n_m, from.load_change_n_m];
+        let bound = if from.has_measured != 0 { from.measured_bound_rad } else { 0.0 };
+        if !numbers.iter().chain(&from.state_bound).chain([&bound]).all(|number| number.is_finite()) {
+            return Err(FlexsplineStatus::Argument);
+        }
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &Store = get(store, STORE_MARK)?;
         let state: &JointState = get(state, STATE_MARK)?;

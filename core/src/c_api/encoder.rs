@@ -33,7 +33,8 @@ pub struct FlexsplineEncoderSettings {
 #[derive(Clone, Copy)]
 struct Followed {
     encoder: Encoder,
-    at: Option<EncoderState>,
+    /// Nowhere before the start.
+    at: EncoderState,
 }
 
 const ENCODER_MARK: u32 = 0x7845_5446;
@@ -60,7 +61,7 @@ pub extern "C" fn flexspline_encoder_init(
             zero_counts: s.zero_counts,
         };
         let made = Encoder::new(settings).map_err(|_| FlexsplineStatus::Argument)?;
-        put(encoder, ENCODER_MARK, Followed { encoder: made, at: None })
+        put(encoder, ENCODER_MARK, Followed { encoder: made, at: EncoderState::NOWHERE })
     };
     status(make())
 }
@@ -75,8 +76,11 @@ pub extern "C" fn flexspline_encoder_start(
 ) -> FlexsplineStatus {
     let start = || {
         let followed: &mut Followed = get_mut(encoder, ENCODER_MARK)?;
+        if !followed.encoder.mend() {
+            return Err(FlexsplineStatus::NotInitialised);
+        }
         let at = followed.encoder.start(reading, near_counts).ok_or(FlexsplineStatus::Argument)?;
-        followed.at = Some(at);
+        followed.at = at;
         Ok(())
     };
     status(start())
@@ -84,7 +88,7 @@ pub extern "C" fn flexspline_encoder_start(
 
 /// Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two readings it may move by less than half of what the
 /// register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick no sample then),
-/// `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`.
+/// `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and after an upset of more than a word (one word is mended): make it and start it again.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_encoder_read(
     encoder: *mut FlexsplineEncoder,
@@ -95,7 +99,9 @@ pub extern "C" fn flexspline_encoder_read(
         apart([span(encoder), span(angle_counts)])?;
         usable(angle_counts)?;
         let Followed { encoder, at } = get_mut(encoder, ENCODER_MARK)?;
-        let at = at.as_mut().ok_or(FlexsplineStatus::NotInitialised)?;
+        if !encoder.mend() || at.is_lost() {
+            return Err(FlexsplineStatus::NotInitialised);
+        }
         if !encoder.read(at, reading) {
             return Err(FlexsplineStatus::Argument);
         }
@@ -114,6 +120,9 @@ pub extern "C" fn flexspline_encoder_reading(
     let tell = || {
         apart([span(encoder), span(reading)])?;
         let followed: &Followed = get(encoder, ENCODER_MARK)?;
+        if followed.encoder.is_lost() {
+            return Err(FlexsplineStatus::NotInitialised);
+        }
         give(reading, followed.encoder.reading(angle_counts))
     };
     status(tell())

@@ -1,29 +1,30 @@
 //! What is added to the table: what measurements of the output teach, and springs that slip.
 
 use super::{
-    FlexsplineInput, FlexsplineOutput, FlexsplineState, FlexsplineStatus, Marked, STATE_MARK, apart, bytes, bytes_mut,
-    clear, copied, get, get_mut, give, given, list, put, span, status, told, usable,
+    FlexsplineInput, FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, JOINT_MARK,
+    Marked, STATE_MARK, STORE_MARK, apart, bytes, bytes_mut, clear, copied, get, get_mut, give, given, list, put,
+    restore_status, span, status, told, usable,
 };
-use crate::joint::NO_COEFFICIENT;
+use crate::joint::{NO_COEFFICIENT, NOBODY};
 use crate::{
-    AdaptCounters, AdaptSettings, AdaptState, Adapter, Adjustment, Coefficient, JointState, Learning, LoadTorque,
-    OutputAngle, Seen, Slip, SlipBank, SlipElement, SlipState, Term, TorqueSlipElement, Verdict, saved_adapt_bytes,
-    saved_slip_bytes,
+    AdaptCounters, AdaptRestoreError, AdaptSettings, AdaptState, Adapter, Adjustment, Coefficient, Joint, JointState,
+    Learning, LoadTorque, OutputAngle, Seen, Slip, SlipBank, SlipElement, SlipState, Store, Term, TorqueSlipElement,
+    Verdict, saved_adapt_bytes, saved_slip_bytes,
 };
 use core::mem::{MaybeUninit, align_of, size_of};
 
 /// Largest number of coefficients of a learner.
 pub const FLEXSPLINE_LEARNER_COEFFICIENTS: usize = 7;
 /// Eight-byte words of a [`FlexsplineLearner`].
-pub const FLEXSPLINE_LEARNER_WORDS: usize = 64;
-/// Bytes of a saved learner with the largest number of coefficients; n of them take 2 n (n - 1) + 8 n + 8.
-pub const FLEXSPLINE_SAVED_LEARNER_BYTES: usize = 148;
+pub const FLEXSPLINE_LEARNER_WORDS: usize = 68;
+/// Bytes of a saved learner with the largest number of coefficients; n of them take 2 n (n - 1) + 8 n + 32.
+pub const FLEXSPLINE_SAVED_LEARNER_BYTES: usize = 172;
 /// Largest number of springs.
 pub const FLEXSPLINE_SLIP_SPRINGS: usize = 8;
 /// Eight-byte words of a [`FlexsplineSlip`].
-pub const FLEXSPLINE_SLIP_WORDS: usize = 21;
-/// Bytes of saved springs with the largest number of them; n of them take 8 n + 16.
-pub const FLEXSPLINE_SAVED_SLIP_BYTES: usize = 80;
+pub const FLEXSPLINE_SLIP_WORDS: usize = 24;
+/// Bytes of saved springs with the largest number of them; n of them take 8 n + 36.
+pub const FLEXSPLINE_SAVED_SLIP_BYTES: usize = 100;
 
 /// Offset of the mean error, rad.
 pub const FLEXSPLINE_TERM_MEAN: u8 = 0;
@@ -141,7 +142,7 @@ pub struct FlexsplineLearnerReport {
     pub untrusted: u32,
     /// Coefficients held at their limit, once for each and each measurement.
     pub limited: u32,
-    /// Starts from zero because the state was hit by an upset.
+    /// Starts with the first variances: measurements contradicted what was learnt for a window, or, from zero, the state was hit by an upset.
     pub restarts: u32,
     /// `FLEXSPLINE_LEARNING_...`.
     pub learning: u8,
@@ -275,6 +276,33 @@ pub extern "C" fn flexspline_learner_set(learner: *mut FlexsplineLearner, learni
         Ok(())
     };
     status(set())
+}
+
+/// Says whose coefficients are learnt: of this joint with the table in use. Saved learners carry both, and are restored only where they belong.
+/// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0 if there is one. After `flexspline_learner_init`
+/// and the table, before `flexspline_learner_restore`; again after another table was activated: what was learnt for another owner is forgotten.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_learner_bind(
+    learner: *mut FlexsplineLearner,
+    joint: *const FlexsplineJoint,
+    store: *const FlexsplineStore,
+    unit: u32,
+) -> FlexsplineStatus {
+    let bind = || {
+        for object in [span(joint), span(store)] {
+            apart([span(learner), object])?;
+        }
+        let joint: &Joint = get(joint, JOINT_MARK)?;
+        let store: &Store = get(store, STORE_MARK)?;
+        let Learner { adapter, state, .. } = get_mut(learner, LEARNER_MARK)?;
+        let before = *adapter;
+        *adapter = before.owned_by(joint, store, unit);
+        if adapter.has_other_owner(&before) {
+            adapter.reset(state);
+        }
+        Ok(())
+    };
+    status(bind())
 }
 
 /// Forgets what was learnt; counters and `FLEXSPLINE_LEARNING_...` stay. The limiter of the joint takes the adjustment out.
@@ -418,8 +446,9 @@ pub extern "C" fn flexspline_learner_save(
     status(save())
 }
 
-/// Takes back what a learner of the same coefficients saved, and is off; `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, or were saved with other
-/// coefficients. The learner is made first, by `flexspline_learner_init`.
+/// Takes back what a learner of the same coefficients and the same owner (`flexspline_learner_bind`) saved, and is off. `FLEXSPLINE_STATUS_SAVED` if the bytes
+/// are damaged, fewer, of another version, or were saved with other coefficients; `FLEXSPLINE_STATUS_OTHER_TABLE`, `FLEXSPLINE_STATUS_OTHER_JOINT` if they
+/// belong elsewhere. Then the learner is as it was. It is made first, by `flexspline_learner_init`, and bound.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_restore(
     learner: *mut FlexsplineLearner,
@@ -431,7 +460,11 @@ pub extern "C" fn flexspline_learner_restore(
         let kept = bytes(saved, saved_bytes)?;
         let learner: &mut Learner = get_mut(learner, LEARNER_MARK)?;
         let found = learner.adapter.restore_first(learner.used as usize, kept);
-        learner.state = found.ok_or(FlexsplineStatus::Saved)?;
+        learner.state = found.map_err(|error| match error {
+            AdaptRestoreError::OtherTable => FlexsplineStatus::OtherTable,
+            AdaptRestoreError::OtherJoint => FlexsplineStatus::OtherJoint,
+            _ => FlexsplineStatus::Saved,
+        })?;
         Ok(())
     };
     status(restore())
@@ -496,7 +529,8 @@ fn slip_report(slip: Slip, is_known: bool) -> FlexsplineSlipReport {
 }
 
 /// One tick of springs that slip with the nominal output (`flexspline_nominal_output`), counts of 2^-32 turn: what they add in the next.
-/// `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the torque.
+/// `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the torque; `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of the springs (one is mended).
+/// Deflections of which more was hit are unknown again, as after a reset.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_slip_update(
     slip: *mut FlexsplineSlip,
@@ -509,6 +543,9 @@ pub extern "C" fn flexspline_slip_update(
         let Springs { bank: Bank::Output(bank, state), .. } = get_mut(slip, SLIP_MARK)? else {
             return Err(FlexsplineStatus::Argument);
         };
+        if !bank.mend() {
+            return Err(FlexsplineStatus::NotInitialised);
+        }
         let found = bank.update(state, OutputAngle::from_counts(nominal_counts));
         give(report, slip_report(found, state.is_known()))
     };
@@ -529,6 +566,9 @@ pub extern "C" fn flexspline_slip_update_torque(
         let Springs { bank: Bank::Torque(bank, state), .. } = get_mut(slip, SLIP_MARK)? else {
             return Err(FlexsplineStatus::Argument);
         };
+        if !bank.mend() {
+            return Err(FlexsplineStatus::NotInitialised);
+        }
         let found = bank.update(state, torque_n_m);
         give(report, slip_report(found, state.is_known()))
     };
@@ -536,7 +576,7 @@ pub extern "C" fn flexspline_slip_update_torque(
 }
 
 /// Writes the deflections with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_SLIP_BYTES` at most. `FLEXSPLINE_STATUS_TOO_LARGE` if there is less room,
-/// or before the first update. The same bytes as in Rust.
+/// or before the first update. They belong to no joint and no table: those of `flexspline_slip_save_for` do. The same bytes as in Rust.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_slip_save(
     slip: *const FlexsplineSlip,
@@ -544,40 +584,61 @@ pub extern "C" fn flexspline_slip_save(
     saved_bytes: usize,
     written: *mut usize,
 ) -> FlexsplineStatus {
-    let save = || {
-        usable(written)?;
-        apart([span(slip), (saved as usize, saved_bytes), span(written)])?;
-        let &Springs { ref bank, used } = get(slip, SLIP_MARK)?;
-        let (room, used) = (bytes_mut(saved, saved_bytes)?, used as usize);
-        let took = match bank {
-            Bank::Output(bank, state) => bank.save_first(state, used, room),
-            Bank::Torque(bank, state) => bank.save_first(state, used, room),
-        };
-        give(written, took.ok_or(FlexsplineStatus::TooLarge)?)
+    status(save_slip(slip, NOBODY, saved, saved_bytes, written))
+}
+
+/// Springs as bytes, that belong to somebody or nobody.
+pub(super) fn save_slip(
+    slip: *const FlexsplineSlip,
+    owner: [u32; 4],
+    saved: *mut u8,
+    saved_bytes: usize,
+    written: *mut usize,
+) -> Result<(), FlexsplineStatus> {
+    usable(written)?;
+    apart([span(slip), (saved as usize, saved_bytes), span(written)])?;
+    let &Springs { ref bank, used } = get(slip, SLIP_MARK)?;
+    let (room, used) = (bytes_mut(saved, saved_bytes)?, used as usize);
+    let (took, is_lost) = match bank {
+        Bank::Output(bank, state) => (bank.save_first(state, owner, used, room), bank.is_lost() || state.is_lost()),
+        Bank::Torque(bank, state) => (bank.save_first(state, owner, used, room), bank.is_lost() || state.is_lost()),
     };
-    status(save())
+    let refused = if is_lost { FlexsplineStatus::NotInitialised } else { FlexsplineStatus::TooLarge };
+    give(written, took.ok_or(refused)?)
 }
 
 /// Takes back the deflections that the same springs saved; only if the joint (of springs on the torque: the load) cannot have moved meanwhile.
-/// `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, or of other springs. The springs are made first, by `flexspline_slip_init`.
+/// `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, of other springs, or were saved for a joint (`flexspline_slip_restore_for`). The springs are made first, by `flexspline_slip_init`.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_slip_restore(
     slip: *mut FlexsplineSlip,
     saved: *const u8,
     saved_bytes: usize,
 ) -> FlexsplineStatus {
-    let restore = || {
-        apart([span(slip), (saved as usize, saved_bytes)])?;
-        let kept = bytes(saved, saved_bytes)?;
-        let Springs { bank, used } = get_mut(slip, SLIP_MARK)?;
-        let used = *used as usize;
-        match bank {
-            Bank::Output(bank, state) => *state = bank.restore_first(used, kept).ok_or(FlexsplineStatus::Saved)?,
-            Bank::Torque(bank, state) => *state = bank.restore_first(used, kept).ok_or(FlexsplineStatus::Saved)?,
-        }
-        Ok(())
+    // Of whom they are is not asked, so it is not said either.
+    let not_whose = |error| match error {
+        FlexsplineStatus::OtherTable | FlexsplineStatus::OtherJoint => FlexsplineStatus::Saved,
+        error => error,
     };
-    status(restore())
+    status(restore_slip(slip, NOBODY, saved, saved_bytes).map_err(not_whose))
+}
+
+/// Springs of bytes that belong to somebody or nobody.
+pub(super) fn restore_slip(
+    slip: *mut FlexsplineSlip,
+    owner: [u32; 4],
+    saved: *const u8,
+    saved_bytes: usize,
+) -> Result<(), FlexsplineStatus> {
+    apart([span(slip), (saved as usize, saved_bytes)])?;
+    let kept = bytes(saved, saved_bytes)?;
+    let Springs { bank, used } = get_mut(slip, SLIP_MARK)?;
+    let used = *used as usize;
+    match bank {
+        Bank::Output(bank, state) => *state = bank.restore_first(owner, used, kept).map_err(restore_status)?,
+        Bank::Torque(bank, state) => *state = bank.restore_first(owner, used, kept).map_err(restore_status)?,
+    }
+    Ok(())
 }
 
 /// Adds to the adjustment of an input, counts of 2^-32 turn at the output: what a learner, springs or a friction model of your own say. Each sum is held within

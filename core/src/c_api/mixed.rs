@@ -9,7 +9,9 @@ use crate::{
     Seen, SlipBank, SlipElement, SlipState, Table, Term, TorquePath, TorqueReading, TorqueSettings, TorqueSlipElement,
     Verdict, fixture, saved_adapt_bytes, saved_slip_bytes,
 };
-use FlexsplineStatus::{Argument, Mode as NoMode, NotInitialised, Ok as Done, Overlap, Pointer, Saved, TooLarge};
+use FlexsplineStatus::{
+    Argument, Mode as NoMode, NotInitialised, Ok as Done, OtherJoint, OtherTable, Overlap, Pointer, Saved, TooLarge,
+};
 use core::ffi::{CStr, c_char};
 use core::ptr::{null, null_mut};
 use std::string::ToString;
@@ -415,6 +417,52 @@ fn an_image_tells_what_it_is() {
     assert_eq!(flexspline_image_report(image.as_ptr(), image.len(), &mut report), FlexsplineStatus::Image);
 }
 
+/// Any bit of the mark of every object of a tick, and of what feeds it: the calls go on, and a call that writes makes the mark anew.
+#[test]
+fn a_bit_of_a_mark_refuses_nothing() {
+    let marks = [
+        STORE_MARK,
+        JOINT_MARK,
+        STATE_MARK,
+        ACTIVATION_MARK,
+        IDENTITY_MARK,
+        0x7855_5446,
+        0x7857_5446,
+        0x7850_5446,
+        0x784f_5446,
+        0x784c_5446,
+        0x7842_5446,
+        0x7845_5446,
+        0x7854_5446,
+        0x7847_5446,
+        0x7852_5446,
+        0x7843_5446,
+    ];
+    for (i, one) in marks.iter().enumerate() {
+        for other in marks[..i].iter().map(|other| spread(*other)).chain([0, u32::MAX, 0x5a5a_5a5a]) {
+            assert!((spread(*one) ^ other).count_ones() >= 4, "{one:x} {other:x}");
+        }
+    }
+    let image = fixture::image(false);
+    let (mut o, table) = (made(), pair(&image));
+    assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), Done);
+    let mut out = FlexsplineOutput::default();
+    for bit in 0..32 {
+        let pointers: [*mut u32; 3] =
+            [(&raw mut *o.store).cast(), (&raw mut o.joint).cast(), (&raw mut o.state).cast()];
+        // SAFETY: the first word of each is its mark.
+        pointers.iter().for_each(|mark| unsafe { **mark ^= 1 << bit });
+        assert_eq!(flexspline_tick(&o.joint, &table, &mut *o.store, &mut o.state, &INPUT, &mut out), Done, "{bit}");
+        assert_eq!(flexspline_joint_mend(&mut o.joint), Done);
+        // SAFETY: as above.
+        let found = pointers.map(|mark| unsafe { *mark });
+        assert_eq!(found, [STORE_MARK, JOINT_MARK, STATE_MARK].map(spread), "{bit}");
+    }
+    // SAFETY: as above.
+    unsafe { *(&raw mut o.state).cast::<u32>() ^= 3 };
+    assert_eq!(flexspline_tick(&o.joint, &table, &mut *o.store, &mut o.state, &INPUT, &mut out), NotInitialised);
+}
+
 #[test]
 fn each_number_has_its_name() {
     // SAFETY: texts of the library.
@@ -441,8 +489,10 @@ fn each_number_has_its_name() {
         assert_eq!((text(name(0)), text(name(3)), text(name(0x8000))), ("?", "?", "?"));
         found.join(", ")
     };
-    let flags = "sample lost, glitch, overrun, held back, not corrected, table doubt, state torn, joint torn, safe, other images";
+    let flags = "sample lost, glitch, overrun, held back, not corrected, table doubt, state torn, joint torn, safe, other images, bounded";
     assert_eq!(bits(flexspline_flag_name), flags);
+    let implausible = "generator lost, generator still, generator sign, generator ratio, output still, output sign, output ratio, torque still, torque sign, torque ratio, lost";
+    assert_eq!(bits(flexspline_implausible_name), implausible);
     let events = "mode, health, page damaged, table doubt, fallback, recovered, overrun, state torn";
     assert_eq!(bits(flexspline_event_name), events);
     let texts: Vec<_> = (0..=18).map(|status| text(flexspline_status_text(status))).collect();
@@ -562,20 +612,38 @@ fn what_is_not_allowed_is_refused() {
     let inside = (&raw mut learner).cast::<FlexsplineAdapted>().wrapping_add(2);
     assert_eq!(update(&mut learner, &out, inside), Overlap);
     let (mut bytes, mut written) = ([0; 200], 77);
-    assert_eq!(flexspline_learner_save(&learner, bytes.as_mut_ptr(), 87, &mut written), TooLarge);
-    assert_eq!((flexspline_learner_save(&learner, bytes.as_mut_ptr(), 88, &mut written), written), (Done, 88));
+    assert_eq!(flexspline_learner_save(&learner, bytes.as_mut_ptr(), 111, &mut written), TooLarge);
+    assert_eq!((flexspline_learner_save(&learner, bytes.as_mut_ptr(), 112, &mut written), written), (Done, 112));
     bytes[3] ^= 1;
-    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 88), Saved);
+    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 112), Saved);
     bytes[3] ^= 1;
-    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 87), Saved);
-    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 88), Done);
+    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 111), Saved);
+    assert_eq!(flexspline_learner_restore(&mut learner, bytes.as_ptr(), 112), Done);
+    // Bound to a joint, a table and a unit; refused, the learner is as it was.
+    let nothing = room!(FlexsplineJoint);
+    assert_eq!(flexspline_learner_bind(&mut learner, &nothing, &*o.store, 1), NotInitialised);
+    assert_eq!(flexspline_learner_bind(&mut learner, &o.joint, (&raw const learner).cast(), 1), Overlap);
+    let mut bound = [[0; 200]; 2];
+    for (bytes, unit) in bound.iter_mut().zip([1, 2]) {
+        assert_eq!(flexspline_learner_bind(&mut learner, &o.joint, &*o.store, unit), Done);
+        assert_eq!(flexspline_learner_save(&learner, bytes.as_mut_ptr(), 112, &mut written), Done);
+    }
+    for (saved, expected) in [(&bytes, OtherTable), (&bound[0], OtherJoint), (&bound[1], Done)] {
+        assert_eq!(flexspline_learner_restore(&mut learner, saved.as_ptr(), 112), expected);
+        let mut after = [0; 200];
+        assert_eq!(flexspline_learner_save(&learner, after.as_mut_ptr(), 112, &mut written), Done);
+        assert_eq!(after, bound[1]);
+    }
     assert_eq!(flexspline_learner_reset(&mut learner), Done);
     let other: Option<AdaptState<5>> = adapter().restore(&bytes);
     assert!(other.is_some());
 
     let mut slip = room!(FlexsplineSlip);
     let init = |slip: &mut FlexsplineSlip, variable, spring| flexspline_slip_init(slip, variable, &spring, 1);
-    let wide = FlexsplineSpring { width: 0.06, gain: 1.0 };
+    let wide = FlexsplineSpring { width: 0.06, gain: 0.5 };
+    // Together more than an adjustment can be.
+    let strong = FlexsplineSpring { width: 0.06, gain: 1.0 };
+    assert_eq!(init(&mut slip, FLEXSPLINE_SLIP_OF_TORQUE, strong), Argument);
     assert_eq!((init(&mut slip, 0, wide), init(&mut slip, 2, SPRINGS[0])), (Argument, Argument));
     assert_eq!(flexspline_slip_set(&mut slip, 0), NotInitialised);
     assert_eq!(init(&mut slip, FLEXSPLINE_SLIP_OF_TORQUE, wide), Done);
@@ -584,7 +652,7 @@ fn what_is_not_allowed_is_refused() {
     assert_eq!(flexspline_slip_save(&slip, bytes.as_mut_ptr(), 200, &mut written), TooLarge);
     assert_eq!(flexspline_slip_update_torque(&mut slip, 0.1, &mut report), Done);
     assert_eq!(flexspline_slip_save(&slip, bytes.as_mut_ptr(), 200, &mut written), Done);
-    assert_eq!((written, flexspline_slip_set(&mut slip, 2)), (24, Argument));
+    assert_eq!((written, flexspline_slip_set(&mut slip, 2)), (44, Argument));
 
     let mut path = room!(FlexsplineTorquePath);
     let mut torque = 0.0;

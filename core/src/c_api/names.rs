@@ -1,14 +1,14 @@
 //! Versions, and numbers that have a name.
 
 use super::{
-    FLEXSPLINE_FLAG_GLITCH, FLEXSPLINE_FLAG_HELD_BACK, FLEXSPLINE_FLAG_JOINT_TORN, FLEXSPLINE_FLAG_NOT_CORRECTED,
-    FLEXSPLINE_FLAG_OTHER_IMAGES, FLEXSPLINE_FLAG_OVERRUN, FLEXSPLINE_FLAG_SAFE, FLEXSPLINE_FLAG_SAMPLE_LOST,
-    FLEXSPLINE_FLAG_STATE_TORN, FLEXSPLINE_FLAG_TABLE_DOUBT,
+    FLEXSPLINE_FLAG_BOUNDED, FLEXSPLINE_FLAG_GLITCH, FLEXSPLINE_FLAG_HELD_BACK, FLEXSPLINE_FLAG_JOINT_TORN,
+    FLEXSPLINE_FLAG_NOT_CORRECTED, FLEXSPLINE_FLAG_OTHER_IMAGES, FLEXSPLINE_FLAG_OVERRUN, FLEXSPLINE_FLAG_SAFE,
+    FLEXSPLINE_FLAG_SAMPLE_LOST, FLEXSPLINE_FLAG_STATE_TORN, FLEXSPLINE_FLAG_TABLE_DOUBT,
 };
 use super::{FlexsplineActivation, FlexsplineIdentity, FlexsplineImages, FlexsplineInput, FlexsplineJoint};
 use super::{FlexsplineOutput, FlexsplineSettings, FlexsplineState, FlexsplineStateReport, FlexsplineStatus};
 use super::{FlexsplineStore, FlexsplineStoreReport};
-use super::{ask::*, beside::*, encoder::*, learn::*, telemetry::*, torque::*};
+use super::{ask::*, beside::*, encoder::*, learn::*, safe::*, telemetry::*, torque::*};
 use crate::{FORMAT_VERSION, Mode};
 use core::ffi::{CStr, c_char, c_int};
 use core::mem::size_of;
@@ -103,7 +103,7 @@ const _: () = {
 };
 
 /// Sizes of all that goes between C and the library: what `FLEXSPLINE_LAYOUT` of the header adds up.
-const SIZES: [usize; 46] = [
+const SIZES: [usize; 50] = [
     size_of::<FlexsplineStatus>(),
     size_of::<usize>(),
     size_of::<FlexsplineStore>(),
@@ -150,6 +150,10 @@ const SIZES: [usize; 46] = [
     size_of::<FlexsplineRecord>(),
     size_of::<FlexsplineEncoderSettings>(),
     size_of::<FlexsplineEncoder>(),
+    size_of::<FlexsplineStartUp>(),
+    size_of::<FlexsplineStartUpSettings>(),
+    size_of::<FlexsplineReadings>(),
+    size_of::<FlexsplineStartUpStep>(),
 ];
 
 /// A sum of the sizes of all types of this header, as the library has them. Where it is not `FLEXSPLINE_LAYOUT` the program was compiled
@@ -256,6 +260,7 @@ pub extern "C" fn flexspline_flag_name(flag: u16) -> *const c_char {
         FLEXSPLINE_FLAG_JOINT_TORN => c"joint torn",
         FLEXSPLINE_FLAG_SAFE => c"safe",
         FLEXSPLINE_FLAG_OTHER_IMAGES => c"other images",
+        FLEXSPLINE_FLAG_BOUNDED => c"bounded",
         _ => c"?",
     };
     name.as_ptr()
@@ -273,6 +278,26 @@ pub extern "C" fn flexspline_event_name(event: u16) -> *const c_char {
         FLEXSPLINE_EVENT_RECOVERED => c"recovered",
         FLEXSPLINE_EVENT_OVERRUN => c"overrun",
         FLEXSPLINE_EVENT_STATE_TORN => c"state torn",
+        _ => c"?",
+    };
+    name.as_ptr()
+}
+
+/// Name of what is implausible: of `FLEXSPLINE_IMPLAUSIBLE_...`, one bit at a time.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_implausible_name(implausible: u16) -> *const c_char {
+    let name = match implausible {
+        FLEXSPLINE_IMPLAUSIBLE_GENERATOR_LOST => c"generator lost",
+        FLEXSPLINE_IMPLAUSIBLE_GENERATOR_STILL => c"generator still",
+        FLEXSPLINE_IMPLAUSIBLE_GENERATOR_SIGN => c"generator sign",
+        FLEXSPLINE_IMPLAUSIBLE_GENERATOR_RATIO => c"generator ratio",
+        FLEXSPLINE_IMPLAUSIBLE_OUTPUT_STILL => c"output still",
+        FLEXSPLINE_IMPLAUSIBLE_OUTPUT_SIGN => c"output sign",
+        FLEXSPLINE_IMPLAUSIBLE_OUTPUT_RATIO => c"output ratio",
+        FLEXSPLINE_IMPLAUSIBLE_TORQUE_STILL => c"torque still",
+        FLEXSPLINE_IMPLAUSIBLE_TORQUE_SIGN => c"torque sign",
+        FLEXSPLINE_IMPLAUSIBLE_TORQUE_RATIO => c"torque ratio",
+        FLEXSPLINE_IMPLAUSIBLE_LOST => c"lost",
         _ => c"?",
     };
     name.as_ptr()

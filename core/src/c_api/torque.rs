@@ -8,7 +8,7 @@ use crate::{Aged, Direction, Joint, MotionAhead, OutputAngle, Store, TorquePath,
 use core::mem::{MaybeUninit, align_of, size_of};
 
 /// Eight-byte words of a [`FlexsplineTorquePath`].
-pub const FLEXSPLINE_TORQUE_PATH_WORDS: usize = 5;
+pub const FLEXSPLINE_TORQUE_PATH_WORDS: usize = 8;
 /// Eight-byte words of a [`FlexsplineAged`].
 pub const FLEXSPLINE_AGED_WORDS: usize = 4;
 
@@ -108,8 +108,8 @@ pub extern "C" fn flexspline_torque_init_sensor(
 }
 
 /// One tick: a reading, N m, positive where it turns the output forward, where it was measured (`FLEXSPLINE_TORQUE_...`), and the direction in which
-/// the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite, or larger than the sensor's largest, gives NaN
-/// and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit it: make the path anew.
+/// the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite, larger than the sensor's largest, frozen, or too far
+/// from the last one gives NaN and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit more than a word of it (one is mended): make the path anew.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_torque_tick(
     path: *mut FlexsplineTorquePath,
@@ -136,6 +136,27 @@ pub extern "C" fn flexspline_torque_tick(
         give(torque_n_m, torque)
     };
     status(tick())
+}
+
+/// Other limits of what a sensor can read, after `flexspline_torque_init_sensor`: the largest change from one tick to the next, N m (a quarter of the largest
+/// reading and twice the drag without this call; a reading that changes by more is believed once three in a row are near each other), and the number of ticks
+/// after which a reading that stays the same to the last bit is frozen (0 for never, as without this call: what comes from a model may stand still, a sensor has
+/// noise). `FLEXSPLINE_STATUS_ARGUMENT` if the change is not finite or below 1e-6 N m.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_torque_set_sensor(
+    path: *mut FlexsplineTorquePath,
+    jump_n_m: f32,
+    frozen_ticks: u16,
+) -> FlexsplineStatus {
+    let set = || {
+        let path: &mut TorquePath = get_mut(path, TORQUE_PATH_MARK)?;
+        if path.is_damaged() {
+            return Err(FlexsplineStatus::NotInitialised);
+        }
+        *path = path.with_sensor(jump_n_m, frozen_ticks).map_err(|_| FlexsplineStatus::Argument)?;
+        Ok(())
+    };
+    status(set())
 }
 
 /// Nothing measured yet; what is older than `most_ticks` is not used.

@@ -15,7 +15,7 @@ impl fmt::Display for SettingError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} = {}: must be finite and above zero (hold_rad: or zero), and not beyond what one tick can do",
+            "{} = {}: must be finite and above zero (hold_rad: or zero), and neither beyond what one tick can do nor too small to matter in it",
             self.name, self.found
         )
     }
@@ -42,6 +42,9 @@ pub struct Limits {
     /// It costs up to this much where a motion turns back by less. Some three times the peak of the noise at the output is enough.
     pub hold_rad: f32,
 }
+
+/// Least tick, s: no loop closes ten million times a second. A guess.
+pub(super) const LEAST_TICK_S: f64 = 1e-7;
 
 /// A positive, finite number of counts, at least `least`.
 pub(super) const fn checked(

@@ -4,6 +4,7 @@ mod adapt;
 mod adjustment;
 mod aged;
 mod feed_forward;
+mod learning;
 mod limits;
 mod mode;
 mod predictor;
@@ -11,18 +12,20 @@ mod rate_group;
 mod runtime;
 mod signals;
 mod slip;
+mod start_up;
 mod state;
 mod torque_path;
 
 #[cfg(feature = "c-api")]
 pub(crate) use adapt::NO_COEFFICIENT;
 pub use adapt::{
-    AdaptCounters, AdaptError, AdaptSettings, AdaptState, Adapted, Adapter, Coefficient, Learning, Seen, Term, Verdict,
+    AdaptCounters, AdaptError, AdaptRestoreError, AdaptSettings, Adapted, Coefficient, Learning, Seen, Term, Verdict,
     saved_adapt_bytes,
 };
 pub use adjustment::Adjustment;
 pub use aged::Aged;
 pub use feed_forward::MotionAhead;
+pub use learning::{AdaptState, Adapter};
 pub use limits::{Limits, SettingError};
 pub use mode::{Mode, ModeError, Overrun};
 pub use predictor::{
@@ -36,6 +39,9 @@ pub use slip::{
     FittedSlip, LoadTorque, NominalOutput, Slip, SlipBank, SlipElement, SlipState, SlipVariable, TorqueSlipElement,
     saved_slip_bytes,
 };
+#[cfg(feature = "c-api")]
+pub(crate) use slip::{NOBODY, owner};
+pub use start_up::{Implausible, Readings, StartUp, StartUpSettings, StartUpStep};
 #[cfg(any(test, feature = "std"))]
 pub use state::JOINT_STATE_WORDS;
 pub use state::{JointState, RestoreError, SAVED_JOINT_BYTES};

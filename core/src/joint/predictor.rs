@@ -23,6 +23,9 @@
 //! the load). So the play is followed, ripple and curves are those of the angle then, and the wind-up is the table's, not that of a straight
 //! spring. With an encoder at the output what it measures now takes the place of the table's error now, and only its change comes from the table.
 //!
+//! Model and estimate are each kept under a sum ([`whole`](../../whole.rs)): where an upset hit one word it is mended in the next step. An estimate or a
+//! model that is lost says NaN, and a bound without end.
+//!
 //! Not in here: friction other than the table's.
 
 #![allow(clippy::arithmetic_side_effects)] // Matrices of floating-point numbers: nothing overflows.
@@ -33,6 +36,7 @@ use crate::num::larger;
 use crate::play::PlayState;
 use crate::store::Store;
 use crate::table::{Prediction, Quality};
+use crate::whole::{Sealed, Words, words};
 use core::fmt;
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Matrix4x2, RowVector4, Vector2, Vector4};
 
@@ -76,6 +80,11 @@ pub struct Measured {
 /// A predictor: all that does not change while it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Predictor {
+    model: Sealed<Model>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Model {
     a: Matrix4<f32>,
     b: Vector4<f32>,
     gain: Matrix4x2<f32>,
@@ -85,10 +94,28 @@ pub struct Predictor {
     stiffness: f32,
 }
 
+words!([] Model { a, b, gain, turn, turn_push, stiffness });
+
+macro_rules! words_of_matrices {
+    ($($matrix:ident),*) => {$(
+        impl Words for $matrix<f32> {
+            #[inline(always)]
+            fn sum(&self, sum: u64) -> u64 {
+                self.iter().fold(sum, |sum, value| value.sum(sum))
+            }
+
+            fn each(&mut self, see: &mut dyn FnMut(u32) -> u32) {
+                self.iter_mut().for_each(|value| value.each(see));
+            }
+        }
+    )*};
+}
+words_of_matrices!(Matrix4, Matrix4x2, Vector4, RowVector4);
+
 /// φ, ω_m, ω_l, τ as estimated.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PredictorState {
-    x: Vector4<f32>,
+    x: Sealed<Vector4<f32>>,
 }
 
 /// How far what is measured and assumed can be off: bounds, each ±.
@@ -153,14 +180,14 @@ pub struct Now<'s> {
 /// Why there is no predictor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PredictorError {
-    /// A number is not finite or not positive.
+    /// A number is not within 1e-12 to 1e12.
     Setting {
         /// Which.
         name: &'static str,
         /// Value found.
         found: f64,
     },
-    /// The observer does not contract: its error after a thousand ticks, as a factor.
+    /// The observer does not contract: its error after a thousand ticks, as a factor. NaN where the model is lost.
     Observer {
         /// Factor found; below 1 is needed.
         factor: f32,
@@ -170,7 +197,7 @@ pub enum PredictorError {
 impl fmt::Display for PredictorError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::Setting { name, found } => write!(f, "{name} = {found}: must be finite and above zero"),
+            Self::Setting { name, found } => write!(f, "{name} = {found}: must be within 1e-12 to 1e12"),
             Self::Observer { factor } => write!(f, "the observer's error grows to {factor} times in 1024 ticks"),
         }
     }
@@ -246,7 +273,7 @@ impl Predictor {
             ("twist_rad", twist_noise),
             ("tick_s", tick_s),
         ] {
-            if !(found > 0.0 && found < 1e12) {
+            if !allowed(found) {
                 return Err(PredictorError::Setting { name, found });
             }
         }
@@ -290,7 +317,7 @@ impl Predictor {
             p = (p + p.transpose()) * 0.5;
         }
         let turn: RowVector4<f64> = integral.fixed_rows::<1>(2).into_owned();
-        let predictor = Self {
+        let model = Model {
             a: a.cast(),
             b: b.cast(),
             gain: gain.cast(),
@@ -298,16 +325,29 @@ impl Predictor {
             turn_push: (second * push).z as f32,
             stiffness: k as f32,
         };
-        predictor.check()
+        model.checked()
+    }
+
+    /// Makes the model whole, where it lies in memory and an upset hit a word of it; false if it is lost, and the predictor has to be made anew. For a
+    /// slow rate group: until then each step mends a copy.
+    pub fn mend(&mut self) -> bool {
+        self.model.mend()
+    }
+
+    /// Whether the model is lost to an upset that cannot be mended.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        self.model.open().is_none()
     }
 
     /// All numbers of a predictor, for the image of the firmware: the matrices by columns, what the load turns in a tick, the
-    /// stiffness.
+    /// stiffness. NaN where the model is lost.
     #[must_use]
     pub fn parts(&self) -> [f32; PREDICTOR_PARTS] {
-        let mut parts = [0.0; PREDICTOR_PARTS];
-        let numbers = self.a.iter().chain(self.b.iter()).chain(self.gain.iter()).chain(self.turn.iter());
-        let numbers = numbers.chain([&self.turn_push, &self.stiffness]);
+        let mut parts = [f32::NAN; PREDICTOR_PARTS];
+        let Some(model) = self.model.open() else { return parts };
+        let numbers = model.a.iter().chain(model.b.iter()).chain(model.gain.iter()).chain(model.turn.iter());
+        let numbers = numbers.chain([&model.turn_push, &model.stiffness]);
         parts.iter_mut().zip(numbers).for_each(|(to, from)| *to = *from);
         parts
     }
@@ -317,7 +357,7 @@ impl Predictor {
     /// # Errors
     /// As [`Self::check`].
     pub fn from_parts(parts: &[f32; PREDICTOR_PARTS]) -> Result<Self, PredictorError> {
-        let mut predictor = Self {
+        let mut model = Model {
             a: Matrix4::zeros(),
             b: Vector4::zeros(),
             gain: Matrix4x2::zeros(),
@@ -325,20 +365,20 @@ impl Predictor {
             turn_push: 0.0,
             stiffness: 0.0,
         };
-        let numbers = predictor.a.iter_mut().chain(predictor.b.iter_mut()).chain(predictor.gain.iter_mut());
-        let numbers = numbers.chain(predictor.turn.iter_mut());
-        let numbers = numbers.chain([&mut predictor.turn_push, &mut predictor.stiffness]);
+        let numbers = model.a.iter_mut().chain(model.b.iter_mut()).chain(model.gain.iter_mut());
+        let numbers = numbers.chain(model.turn.iter_mut());
+        let numbers = numbers.chain([&mut model.turn_push, &mut model.stiffness]);
         numbers.zip(parts).for_each(|(to, from)| *to = *from);
-        let stiffness = predictor.stiffness as f64;
-        if !(stiffness > 0.0 && stiffness < 1e12) {
+        let stiffness = model.stiffness as f64;
+        if !allowed(stiffness) {
             return Err(PredictorError::Setting { name: "stiffness_n_m_per_rad", found: stiffness });
         }
-        let pushes = predictor.b.iter().map(|value| ("b", *value));
-        let turns = predictor.turn.iter().chain([&predictor.turn_push]).map(|value| ("turn", *value));
+        let pushes = model.b.iter().map(|value| ("b", *value));
+        let turns = model.turn.iter().chain([&model.turn_push]).map(|value| ("turn", *value));
         if let Some((name, bad)) = pushes.chain(turns).find(|(_, value)| !value.is_finite()) {
             return Err(PredictorError::Setting { name, found: bad as f64 });
         }
-        predictor.check()
+        model.checked()
     }
 
     /// Proves that the observer contracts: the error of an estimate is less than before after 1024 ticks, whatever it is.
@@ -346,39 +386,44 @@ impl Predictor {
     /// # Errors
     /// [`PredictorError::Observer`].
     pub fn check(self) -> Result<Self, PredictorError> {
-        let c = Matrix2x4::new(0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0);
-        let gain: Matrix4x2<f64> = self.gain.cast();
-        let mut error = (Matrix4::identity() - gain * c) * self.a.cast::<f64>();
-        // Scaled to one tick's units, so that rows of different units are alike.
-        let scale = Vector4::new(1e4, 1e2, 1e2, 1e-1);
-        error = Matrix4::from_diagonal(&scale) * error * Matrix4::from_diagonal(&scale.map(|s| 1.0 / s));
-        for _ in 0..SQUARINGS {
-            error *= error;
-        }
-        let factor = row_sum(&error) as f32;
-        if factor < 1.0 { Ok(self) } else { Err(PredictorError::Observer { factor }) }
+        self.model.open().ok_or(PredictorError::Observer { factor: f32::NAN })?.checked()
     }
 
     /// One tick: what the last estimate leads to, corrected by what was measured. The same work for all values.
+    ///
+    /// False, and the estimate stays, if a number that is used is not finite or beyond any drive ([`MOST`]), or the estimate would come to be; and if model or
+    /// estimate are lost: make them anew.
     #[inline]
-    pub fn step(&self, state: &mut PredictorState, measured: &Measured) {
-        let expected = self.a * state.x + self.b * measured.torque_n_m;
-        let missed = Vector2::new(measured.speed_rad_s, measured.twist_rad) - measured_of(&expected);
-        state.x = expected + self.gain * missed;
+    pub fn step(&self, state: &mut PredictorState, measured: &Measured) -> bool {
+        let (Some(model), Some(x)) = (self.model.open(), state.x.open()) else { return false };
+        let gain = &model.gain;
+        // Without an encoder at the output whatever stands there for the twist is not read.
+        let twist_used = gain.column(1).iter().any(|gain| *gain != 0.0);
+        let Measured { torque_n_m, speed_rad_s, twist_rad } = *measured;
+        let expected = model.a * x + model.b * torque_n_m;
+        let twist_rad = if twist_used { twist_rad } else { expected.x };
+        let missed = Vector2::new(speed_rad_s, twist_rad) - measured_of(&expected);
+        let next = expected + gain * missed;
+        let sound = is_possible(&Vector4::new(twist_rad, speed_rad_s, 0.0, torque_n_m)) & is_possible(&next);
+        if sound {
+            state.x.close(next);
+        }
+        sound
     }
 
     /// What the estimate can be off by when the disturbances stay within these bounds, once the start is forgotten: φ rad,
-    /// ω_m, ω_l rad/s, τ N·m. For start-up and the host: 10 000 ticks of the observer in double precision.
+    /// ω_m, ω_l rad/s, τ N·m. For start-up and the host: 10 000 ticks of the observer in double precision. Infinite where the model is lost.
     #[must_use]
     pub fn state_bound(&self, disturbance: &Disturbance) -> [f32; 4] {
+        let Some(model) = self.model.open() else { return [f32::INFINITY; 4] };
         let c = Matrix2x4::new(0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0);
-        let gain: Matrix4x2<f64> = self.gain.cast();
+        let gain: Matrix4x2<f64> = model.gain.cast();
         let kept = Matrix4::identity() - gain * c;
-        let contract = kept * self.a.cast::<f64>();
+        let contract = kept * model.a.cast::<f64>();
         let Disturbance { torque_n_m, load_change_n_m, speed_rad_s, twist_rad } = *disturbance;
         // What a disturbance of each kind leaves in the estimate after its tick: by columns.
         let mut left = Matrix4::from_columns(&[
-            kept * self.b.cast::<f64>() * torque_n_m as f64,
+            kept * model.b.cast::<f64>() * torque_n_m as f64,
             kept.column(3) * load_change_n_m as f64,
             gain.column(0) * speed_rad_s as f64,
             gain.column(1) * twist_rad as f64,
@@ -397,7 +442,7 @@ impl Predictor {
     /// ± `state_bound` at most (φ rad, ω_m, ω_l rad/s, τ N·m) and torque and load from what is assumed (the load: that it stays) by
     /// `disturbance` (what is measured does not matter here).
     ///
-    /// The work grows with `ticks` and with nothing else. The rounding of `f32` is in the bounds, with 1.2e-7 of the angle turned for each
+    /// Where model or estimate are lost, or a number given is not finite, the bounds are infinite. The work grows with `ticks` and with nothing else. The rounding of `f32` is in the bounds, with 1.2e-7 of the angle turned for each
     /// tick. The torque is held during a tick.
     #[must_use]
     pub fn ahead(
@@ -410,7 +455,7 @@ impl Predictor {
     ) -> Ahead {
         let off = Vector4::from(state_bound);
         let Disturbance { torque_n_m: torque_off, load_change_n_m: load_off, .. } = *disturbance;
-        let start = state.x;
+        let (Some(model), Some(start)) = (self.model.open(), state.x.open()) else { return Ahead::UNKNOWN };
         let (mut x, mut ahead) = (start, Ahead::default());
         // Rows: load, motor and twist then, as they follow from a state so many ticks before.
         let twist_now = RowVector4::new(1.0, 0.0, 0.0, 0.0);
@@ -420,17 +465,17 @@ impl Predictor {
         let (mut most, mut least) = ((0.0, 0u16), (0.0, 0u16));
         for tick in 1..=ticks {
             // What disturbs in the first of the remaining ticks.
-            let load_by_torque = load.transpose().dot(&self.b) + self.turn_push;
-            let twist_by_torque = twist.transpose().dot(&self.b);
+            let load_by_torque = load.transpose().dot(&model.b) + model.turn_push;
+            let twist_by_torque = twist.transpose().dot(&model.b);
             let (load_by_load, twist_by_load) = (load.w, twist.w);
             load_pushed += load_by_torque.abs() * torque_off + load_by_load.abs() * load_off;
             motor_pushed +=
                 (load_by_torque - twist_by_torque).abs() * torque_off + (load_by_load - twist_by_load).abs() * load_off;
             twist_pushed += twist_by_torque.abs() * torque_off + twist_by_load.abs() * load_off;
-            load = load * self.a + self.turn;
-            twist *= self.a;
-            ahead.load_rad += self.turn.transpose().dot(&x) + self.turn_push * torque_n_m;
-            x = self.a * x + self.b * torque_n_m;
+            load = load * model.a + model.turn;
+            twist *= model.a;
+            ahead.load_rad += model.turn.transpose().dot(&x) + model.turn_push * torque_n_m;
+            x = model.a * x + model.b * torque_n_m;
             let motor = ahead.load_rad - (x.x - start.x);
             turned += (motor - ahead.motor_rad).abs();
             ahead.motor_rad = motor;
@@ -444,7 +489,10 @@ impl Predictor {
         ahead.twist_bound_rad = through(twist) + twist_pushed + ROUNDING * ticks as f32 * (x.x.abs() + start.x.abs());
         (ahead.twist_rad, ahead.twist_now_bound_rad) = (x.x, off.x);
         ahead.turning_rad = if most.1 < least.1 { [most.0, least.0] } else { [least.0, most.0] };
-        ahead
+        // What is no number in is none out.
+        let known = [ahead.load_rad, ahead.motor_rad, ahead.twist_rad, ahead.bound_rad, ahead.motor_bound_rad];
+        let known = known.into_iter().chain([ahead.twist_bound_rad, ahead.twist_now_bound_rad]).all(f32::is_finite);
+        if known { ahead } else { Ahead::UNKNOWN }
     }
 
     /// Where the output will be after what [`Self::ahead`] says, with the table as the output map.
@@ -462,11 +510,21 @@ impl Predictor {
         ahead: &Ahead,
         now: &Now<'_>,
     ) -> OutputAhead {
+        let unknown = OutputAhead {
+            output: joint.drive().nominal_output(now.generator),
+            bound_rad: f32::INFINITY,
+            quality: Quality::Disabled,
+        };
+        let (Some(Model { stiffness, .. }), Some(x)) = (self.model.open(), state.x.open()) else { return unknown };
+        let measured_sound = now.measured.is_none() || now.measured_bound_rad.is_finite();
+        if !(ahead.bound_rad.is_finite() && ahead.motor_bound_rad.is_finite() && measured_sound) {
+            return unknown;
+        }
         let to_generator = |motor_rad: f32| {
             let nominal = OutputAngle::ZERO.offset_rad(motor_rad);
             now.generator.offset_counts(joint.drive().nominal_generator(nominal).counts())
         };
-        let torque = self.stiffness * ahead.twist_rad;
+        let torque = stiffness * ahead.twist_rad;
         let through = |motor_off: f32, torque_off: f32| -> Prediction {
             let (mut play, torque) = (*now.play, torque + torque_off);
             for turning in ahead.turning_rad {
@@ -475,7 +533,7 @@ impl Predictor {
             joint.forward(store, &mut play, to_generator(ahead.motor_rad + motor_off), torque)
         };
         let resting = |torque_off: f32| -> Prediction {
-            let torque = self.stiffness * state.x.x + torque_off;
+            let torque = stiffness * x.x + torque_off;
             joint.forward(store, &mut now.play.clone(), now.generator, torque)
         };
         let spread = |middle: &Prediction, ends: [Prediction; 2]| {
@@ -483,10 +541,10 @@ impl Predictor {
                 larger(bound, end.output.minus_rad(middle.output).abs() + end.uncertainty_rad)
             })
         };
-        let (motor_off, torque_off) = (ahead.motor_bound_rad, self.stiffness * ahead.twist_bound_rad);
+        let (motor_off, torque_off) = (ahead.motor_bound_rad, stiffness * ahead.twist_bound_rad);
         let then = through(0.0, 0.0);
         let bound_rad = spread(&then, [through(-motor_off, -torque_off), through(motor_off, torque_off)]);
-        let torque_off = self.stiffness * ahead.twist_now_bound_rad;
+        let torque_off = stiffness * ahead.twist_now_bound_rad;
         let here = resting(0.0);
         let here_bound_rad = spread(&here, [resting(-torque_off), resting(torque_off)]);
         let quality = if here.quality > then.quality { here.quality } else { then.quality };
@@ -501,31 +559,103 @@ impl Predictor {
     }
 }
 
+/// A number of two inertias, or of their noise, that can be.
+fn allowed(found: f64) -> bool {
+    (1e-12..=1e12).contains(&found)
+}
+
+/// No twist, rad, speed of motor and load, rad/s, or torque, N·m, of a joint is larger: a whole radian, a thousand turns a second, ten times the rating of
+/// the largest drives. Guesses; they only keep what is no measurement out.
+const MOST: [f32; 4] = [1.0, 6.3e3, 6.3e3, 1e6];
+
+/// Whether all four are numbers, and not larger than any drive's.
+fn is_possible(x: &Vector4<f32>) -> bool {
+    x.iter().zip(MOST).fold(true, |possible, (value, most)| possible & (value.abs() <= most))
+}
+
+impl Ahead {
+    /// Nothing is known.
+    const UNKNOWN: Self = Self {
+        load_rad: 0.0,
+        bound_rad: f32::INFINITY,
+        motor_rad: 0.0,
+        motor_bound_rad: f32::INFINITY,
+        twist_rad: 0.0,
+        twist_bound_rad: f32::INFINITY,
+        twist_now_bound_rad: f32::INFINITY,
+        turning_rad: [0.0; 2],
+    };
+}
+
+impl Model {
+    /// See [`Predictor::check`].
+    fn checked(self) -> Result<Predictor, PredictorError> {
+        let c = Matrix2x4::new(0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0);
+        let gain: Matrix4x2<f64> = self.gain.cast();
+        let mut error = (Matrix4::identity() - gain * c) * self.a.cast::<f64>();
+        // Scaled to one tick's units, so that rows of different units are alike.
+        let scale = Vector4::new(1e4, 1e2, 1e2, 1e-1);
+        error = Matrix4::from_diagonal(&scale) * error * Matrix4::from_diagonal(&scale.map(|s| 1.0 / s));
+        for _ in 0..SQUARINGS {
+            error *= error;
+        }
+        let factor = row_sum(&error) as f32;
+        if factor < 1.0 { Ok(Predictor { model: Sealed::new(self) }) } else { Err(PredictorError::Observer { factor }) }
+    }
+}
+
+impl Default for PredictorState {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl PredictorState {
     /// At rest, without load.
     #[must_use]
     pub fn new() -> Self {
-        Self::default()
+        Self::of([0.0; 4])
+    }
+
+    fn of(x: [f32; 4]) -> Self {
+        Self { x: Sealed::new(x.into()) }
+    }
+
+    fn open(&self) -> Vector4<f32> {
+        self.x.open().unwrap_or(Vector4::repeat(f32::NAN))
+    }
+
+    /// Whether it is lost to an upset that cannot be mended: begin at rest again. Until then all that it says is NaN.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        self.x.open().is_none()
     }
 
     /// Twist: load ahead of the motor, rad.
     #[must_use]
     pub fn twist_rad(&self) -> f32 {
-        self.x.x
+        self.open().x
     }
 
     /// Load speed, rad/s.
     #[must_use]
     pub fn load_speed_rad_s(&self) -> f32 {
-        self.x.z
+        self.open().z
     }
 
     /// Torque on the load, N·m: what the table is asked with where no sensor measures it.
     #[must_use]
     pub fn load_torque_n_m(&self) -> f32 {
-        self.x.w
+        self.open().w
     }
 }
+
+#[cfg(test)]
+crate::upset::upsets!(Predictor { model });
+#[cfg(test)]
+crate::upset::upsets!(Model { a, b, gain, turn, turn_push, stiffness });
+#[cfg(test)]
+crate::upset::upsets!(PredictorState { x });
 
 #[cfg(test)]
 mod tests {
@@ -590,7 +720,7 @@ mod tests {
     fn the_discrete_model_is_the_continuous_one() {
         let predictor = Predictor::new(INERTIAS, NOISE, TICK_S).unwrap();
         let mut plant = Plant { x: [1e-3, 0.02, -0.01], load_rad: 0.0 };
-        let state = PredictorState { x: Vector4::new(1e-3, 0.02, -0.01, -7.0) };
+        let state = PredictorState::of([1e-3, 0.02, -0.01, -7.0]);
         for _ in 0..200 {
             plant.tick(9.0, -7.0);
         }
@@ -644,7 +774,7 @@ mod tests {
             let mut farthest = Vector4::zeros();
             for tick in 0..20_000 {
                 let sign = if tick < 5000 { 1.0 } else { (tick as f32 * 0.2).sin().signum() };
-                truth = predictor.a * truth + predictor.b * (10.0 + sign * off.torque_n_m);
+                truth = predictor.model.kept().a * truth + predictor.model.kept().b * (10.0 + sign * off.torque_n_m);
                 truth.w += if tick % 2 == 0 { off.load_change_n_m } else { -off.load_change_n_m };
                 truth.w = truth.w.clamp(-50.0, 50.0);
                 let measured = Measured {
@@ -653,7 +783,7 @@ mod tests {
                     twist_rad: truth.x - sign * off.twist_rad,
                 };
                 predictor.step(&mut state, &measured);
-                let away = (truth - state.x).abs();
+                let away = (truth - state.open()).abs();
                 // Speeds grow without end here; their rounding does too.
                 let rounding = Vector4::new(1e-9, 1e-6, 1e-6, 1e-4) * (1.0 + truth.y.abs());
                 for (away, (bound, rounding)) in away.iter().zip(bound.iter().zip(rounding.iter())) {
@@ -737,8 +867,8 @@ mod tests {
                     motor_rad: 0.02 * mixed.part(),
                     contact_rad: 1.0,
                 };
-                let (mut state, mut play) = (PredictorState::new(), PlayState::unknown());
-                state.x = Vector4::new((load / 3e4) as f32, 0.0, 0.0, load as f32);
+                let mut state = PredictorState::of([(load / 3e4) as f32, 0.0, 0.0, load as f32]);
+                let mut play = PlayState::unknown();
                 let start = load;
                 let mut output = 0.0;
                 let ticks = 600 + (seed % 50);
@@ -793,6 +923,34 @@ mod tests {
         assert!(shares.iter().all(|&share| share > 0.05), "{shares:?}");
     }
 
+    /// What is not used may be anything; what is used must be a number, of a drive.
+    #[test]
+    fn a_measurement_that_is_no_number_leaves_the_observer_as_it_was() {
+        let good = Measured { torque_n_m: 12.0, speed_rad_s: 0.01, twist_rad: 4e-4 };
+        let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1e9];
+        for noise in [NOISE, Noise { twist_rad: None, ..NOISE }] {
+            let predictor = Predictor::new(INERTIAS, noise, TICK_S).unwrap();
+            let (mut state, mut twin) = (PredictorState::new(), PredictorState::new());
+            for tick in 0..200 {
+                assert!(predictor.step(&mut state, &good) && predictor.step(&mut twin, &good));
+                let wrong = bad[tick % bad.len()];
+                for measured in [Measured { torque_n_m: wrong, ..good }, Measured { speed_rad_s: wrong, ..good }] {
+                    assert!(!predictor.step(&mut state, &measured) && state == twin, "{measured:?}");
+                }
+                let measured = Measured { twist_rad: wrong, ..good };
+                let used = predictor.step(&mut state, &measured);
+                assert_eq!(used, noise.twist_rad.is_none());
+                if used {
+                    assert!(predictor.step(&mut twin, &good));
+                }
+                assert_eq!(state, twin);
+            }
+            // Nor is anything told of what is no number.
+            let ahead = predictor.ahead(&state, f32::NAN, 10, [0.0; 4], &Disturbance::default());
+            assert!(ahead.bound_rad == f32::INFINITY && ahead.load_rad == 0.0);
+        }
+    }
+
     fn good_parts() -> [f32; PREDICTOR_PARTS] {
         Predictor::new(INERTIAS, NOISE, TICK_S).unwrap().parts()
     }
@@ -815,10 +973,10 @@ mod tests {
             assert!(Predictor::from_parts(&parts).is_err(), "{place}");
         }
         // One that was damaged on its way, or made for another machine.
-        let good = Predictor::new(INERTIAS, NOISE, TICK_S).unwrap();
-        let wild = Predictor { gain: good.gain * -3.0, ..good };
-        assert!(matches!(wild.check(), Err(PredictorError::Observer { factor }) if factor.is_nan() || factor > 1.0));
-        let undefined = Predictor { a: good.a * f32::NAN, ..good };
-        assert!(undefined.check().is_err());
+        let good = *Predictor::new(INERTIAS, NOISE, TICK_S).unwrap().model.kept();
+        let wild = Model { gain: good.gain * -3.0, ..good };
+        assert!(matches!(wild.checked(), Err(PredictorError::Observer { factor }) if factor.is_nan() || factor > 1.0));
+        let undefined = Model { a: good.a * f32::NAN, ..good };
+        assert!(undefined.checked().is_err());
     }
 }

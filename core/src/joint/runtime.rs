@@ -10,6 +10,7 @@
 //! | no sample | keeps the last generator angle: the play does not move | [`Flags::SAMPLE_LOST`] |
 //! | a sample further from the last one than a tick allows | takes it for a glitch, as no sample; if it stays for `patience` ticks, takes it as true, with the side of the play unknown | [`Flags::GLITCH`] |
 //! | torque or temperature not finite, or the table in doubt | keeps the last correction for `patience` ticks, then fades it out | [`Flags::NOT_CORRECTED`] |
+//! | an adjustment larger than any may be | takes the largest one | [`Flags::BOUNDED`] |
 //! | torque or temperature out of range | corrects with the value at the edge | [`Quality::Extrapolated`](crate::Quality::Extrapolated) |
 //! | a tick came late | by [`Overrun`] | [`Flags::OVERRUN`] |
 //! | a reversal, or anything else that wants a faster correction | the limiter holds it back; by how much is in [`Output::held_back_rad`] | [`Flags::HELD_BACK`] |
@@ -21,7 +22,7 @@
 //! | reset | [`JointState::restore`] goes on where it was, [`JointState::new`] starts with no correction and the side of the play unknown; both within the limits | |
 
 use super::adjustment::{Adjustment, bounded};
-use super::limits::{Limits, SettingError, checked};
+use super::limits::{LEAST_TICK_S, Limits, SettingError, checked};
 use super::mode::{Mode, Overrun};
 use super::signals::{Flags, Input, Output};
 use super::state::{FINE, FLANK, FLANK_BACKWARD, FLANK_FORWARD, Found, JointState, Kept, MENDED, MODE, SAMPLED, SEEN};
@@ -74,7 +75,8 @@ impl Joint {
     ///
     /// # Errors
     /// [`SettingError`]: a limit that is not finite and positive, or beyond 0.05 rad (rate, hold) or half a turn (generator) in a tick,
-    /// or a rate below 9e-11 rad in a tick.
+    /// or a rate below 1.8e-10 rad in a tick, an acceleration below that in a tick more each tick, a fastest generator below 1.5e-9 rad in a tick, a hold below
+    /// that, or a tick below 1e-7 s.
     pub const fn new(drive: Drive, limits: Limits, overrun: Overrun) -> Result<Self, SettingError> {
         match Settings::new(drive, limits, overrun) {
             Ok(settings) => Ok(Self { copies: [settings; 2] }),
@@ -183,7 +185,7 @@ impl Settings {
     const fn new(drive: Drive, limits: Limits, overrun: Overrun) -> Result<Self, SettingError> {
         let Limits { tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, patience, hold_rad } = limits;
         let tick = tick_s as f64;
-        let tick_ok = checked("tick_s", tick_s, tick, [0.0, 1.0e3]);
+        let tick_ok = checked("tick_s", tick_s, tick, [LEAST_TICK_S, 1.0e3]);
         if let Err(error) = tick_ok {
             return Err(error);
         }
@@ -195,21 +197,21 @@ impl Settings {
             Err(error) => return Err(error),
         };
         let per_tick = num::counts(acceleration_rad_s2 as f64 * tick * tick) * FINE as f64;
-        let acceleration = match checked("acceleration_rad_s2", acceleration_rad_s2, per_tick, [0.0, 1.0e12]) {
+        let acceleration = match checked("acceleration_rad_s2", acceleration_rad_s2, per_tick, [1.0, 1.0e12]) {
             Ok(acceleration) => acceleration,
             Err(error) => return Err(error),
         };
         // More than from full speed to full speed back is not needed, and would drown what is left to go in rounding.
         let acceleration = if acceleration < 2.0 * rate { acceleration } else { 2.0 * rate };
         let per_tick = num::counts(generator_rate_rad_s as f64 * tick);
-        let largest_move = match checked("generator_rate_rad_s", generator_rate_rad_s, per_tick, [0.0, 2_147_483_000.0])
+        let largest_move = match checked("generator_rate_rad_s", generator_rate_rad_s, per_tick, [1.0, 2_147_483_000.0])
         {
             Ok(counts) => counts as i32,
             Err(error) => return Err(error),
         };
         let hold = num::counts(hold_rad as f64);
         if hold_rad != 0.0
-            && let Err(error) = checked("hold_rad", hold_rad, hold, [0.0, num::counts(0.05)])
+            && let Err(error) = checked("hold_rad", hold_rad, hold, [1.0, num::counts(0.05)])
         {
             return Err(error);
         }
@@ -277,8 +279,10 @@ impl Settings {
     ) -> Output {
         let (mut now, found) = state.open();
         let Adjustment { mean_counts, half_width_counts } = input.adjustment;
-        let mean_counts = bounded(mean_counts);
-        let point = store.locate(input.torque_n_m, mean_counts, bounded(half_width_counts));
+        let (mean_given, half_given) = (mean_counts, half_width_counts);
+        let (mean_counts, half_width_counts) = (bounded(mean_given), bounded(half_given));
+        let is_bounded = (mean_counts ^ mean_given) | (half_width_counts ^ half_given) != 0;
+        let point = store.locate(input.torque_n_m, mean_counts, half_width_counts);
         // An adjustment is learnt, not moved.
         now.play.shift(mean_counts.wrapping_sub(now.adjusted));
         now.adjusted = mean_counts;
@@ -336,6 +340,7 @@ impl Settings {
             .with(Flags::STATE_TORN, (found != Found::Whole) | (before & MENDED != 0))
             .with(Flags::SAFE, now.marks & MODE == MODE)
             .with(Flags::OTHER_IMAGES, other_images)
+            .with(Flags::BOUNDED, is_bounded)
             .with(Flags::AGAIN, again & !second);
         let counts = correction >> FINE.trailing_zeros();
         Output {
@@ -835,10 +840,13 @@ mod tests {
         };
         let closed = |counts| Adjustment { mean_counts: 0, half_width_counts: counts };
         for (wild, bounded) in [(i32::MIN, least), (i32::MAX, most)] {
-            assert_eq!(tick(closed(wild)).0, tick(closed(bounded)).0);
             let mean = |counts| Adjustment { mean_counts: counts, half_width_counts: 0 };
             let (found, same) = (tick(mean(wild)).0, tick(mean(bounded)).0);
-            assert_eq!(found, same);
+            // The same, and only what is beyond is reported.
+            for (found, same) in [(tick(closed(wild)).0, tick(closed(bounded)).0), (found, same)] {
+                assert!(found.flags.contains(Flags::BOUNDED) && !same.flags.contains(Flags::BOUNDED));
+                assert_eq!(Output { flags: same.flags, ..found }, same);
+            }
             assert!(found.quality == Quality::InRange && found.transmission_error_rad.abs() > 0.048);
         }
         // No play is left but what the ripple needs, 0.1″, and forward and backward differ by no more.
@@ -863,6 +871,12 @@ mod tests {
         // Not a part of a count in a tick: the correction would never move.
         assert_eq!(named(Limits { rate_rad_s: 9.0e-8, ..LIMITS }), "rate_rad_s");
         assert_eq!(named(Limits { acceleration_rad_s2: -1.0, ..LIMITS }), "acceleration_rad_s2");
+        // Too small to matter in a tick.
+        assert_eq!(named(Limits { tick_s: 1e-40, ..LIMITS }), "tick_s");
+        assert_eq!(named(Limits { rate_rad_s: 1e-40, ..LIMITS }), "rate_rad_s");
+        assert_eq!(named(Limits { acceleration_rad_s2: 1e-40, ..LIMITS }), "acceleration_rad_s2");
+        assert_eq!(named(Limits { generator_rate_rad_s: 1e-40, ..LIMITS }), "generator_rate_rad_s");
+        assert_eq!(named(Limits { hold_rad: 1e-40, ..LIMITS }), "hold_rad");
         assert_eq!(named(Limits { generator_rate_rad_s: f32::INFINITY, ..LIMITS }), "generator_rate_rad_s");
     }
 

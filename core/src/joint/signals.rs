@@ -48,6 +48,9 @@ impl Flags {
     pub const SAFE: Self = Self(256);
     /// An image is not the one that was activated, or both are the same one: copies are made anew from the other, or not at all.
     pub const OTHER_IMAGES: Self = Self(512);
+    /// The adjustment of the input was larger than [`Adjustment::MAX_COUNTS`](crate::Adjustment::MAX_COUNTS) and was taken at that: what made it
+    /// (learning, springs, a model) is not sound.
+    pub const BOUNDED: Self = Self(1024);
     /// Within a tick: it has to be done again.
     pub(super) const AGAIN: Self = Self(1 << 15);
 

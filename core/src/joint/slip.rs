@@ -13,12 +13,19 @@
 //!
 //! After a reset no deflection is known. Each is an interval, moved at both ends by the same operator: motion brings the ends
 //! together, and one stroke of `2wᵢ` makes them one.
+//!
+//! Springs and deflections are each kept under a sum ([`whole`](../../whole.rs)): where an upset hit one word it is mended in the next update. Deflections that
+//! are lost are unknown, as after a reset; springs that are lost add nothing, with an uncertainty of [`Adjustment::MAX_RAD`].
 
 use super::adjustment::Adjustment;
+use super::runtime::Joint;
+use super::state::RestoreError;
 use crate::angle::{COUNTS_PER_RAD, OutputAngle, RAD_PER_COUNT, counts_from_rad};
 use crate::crc::crc32;
 use crate::num;
 use crate::play::MAX_HALF_COUNTS;
+use crate::store::Store;
+use crate::whole::{START, Sealed, add, words};
 use core::marker::PhantomData;
 
 /// One spring that slips with the nominal output.
@@ -69,23 +76,36 @@ const MAX_N_M: f32 = 10_000.0;
 /// A bank of springs: the settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlipBank<const N: usize, V = NominalOutput> {
+    springs: Sealed<Springs<N>>,
+    variable: PhantomData<V>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Springs<const N: usize> {
     widths: [i32; N],
     /// Rad per count.
     gains: [f32; N],
     /// Of the settings: a saved state of others is not taken.
     sum: u32,
-    variable: PhantomData<V>,
 }
+words!([const N: usize] Springs<N> { widths, gains, sum });
 
 /// Deflections of a bank: all that must survive a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SlipState<const N: usize, V = NominalOutput> {
-    at: i64,
-    started: bool,
-    lower: [i32; N],
-    upper: [i32; N],
+    deflections: Sealed<Deflections<N>>,
     variable: PhantomData<V>,
 }
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Deflections<const N: usize> {
+    at: i64,
+    /// 1 after the first update, else 0.
+    started: u32,
+    lower: [i32; N],
+    upper: [i32; N],
+}
+words!([const N: usize] Deflections<N> { at, started, lower, upper });
 
 /// What a bank adds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,17 +146,20 @@ impl Slip {
 }
 
 impl<const N: usize> SlipBank<N, NominalOutput> {
-    /// A bank on the nominal output; `None` if a width is not within 0 to 0.05 rad or a gain not finite.
+    /// A bank on the nominal output; `None` if a width is not within 0 to 0.05 rad, a gain not finite, or all of them
+    /// together give more than [`Adjustment::MAX_RAD`].
     #[must_use]
     pub fn new(elements: [SlipElement; N]) -> Option<Self> {
         let sound = |e: &SlipElement| e.width_rad >= 0.0 && e.width_rad <= 0.05 && e.gain.is_finite();
         let width = |e: SlipElement| counts_from_rad(e.width_rad).min(MAX_HALF_COUNTS);
-        elements.iter().all(sound).then(|| Self::of(elements.map(width), elements.map(|e| e.gain * RAD_PER_COUNT), N))
+        let most = elements.iter().map(|e| e.width_rad * e.gain.abs()).sum::<f32>();
+        let sound = elements.iter().all(sound) && most <= Adjustment::MAX_RAD;
+        sound.then(|| Self::of(elements.map(width), elements.map(|e| e.gain * RAD_PER_COUNT), N))
     }
 
     /// Follows the motion to `nominal`, once each tick. The same work for all values.
     pub fn update(&self, state: &mut SlipState<N>, nominal: OutputAngle) -> Slip {
-        self.follow(state, nominal.counts())
+        self.follow(state, Some(nominal.counts()))
     }
 
     /// Gains at given widths from samples of error, rad, at nominal outputs along a path, in its order: a curve of first loading
@@ -154,21 +177,23 @@ impl<const N: usize> SlipBank<N, NominalOutput> {
 }
 
 impl<const N: usize> SlipBank<N, LoadTorque> {
-    /// A bank on the load torque; `None` if a width is not within 0 to 10 000 N·m or a gain not finite.
+    /// A bank on the load torque; `None` if a width is not within 0 to 10 000 N·m, a gain not finite, or all of them
+    /// together give more than [`Adjustment::MAX_RAD`].
     #[must_use]
     pub fn of_torque(elements: [TorqueSlipElement; N]) -> Option<Self> {
         let sound =
             |e: &TorqueSlipElement| e.width_n_m >= 0.0 && e.width_n_m <= MAX_N_M && e.gain_rad_per_n_m.is_finite();
         let width = |e: TorqueSlipElement| (e.width_n_m * PER_N_M) as i32;
         let gain = |e: TorqueSlipElement| e.gain_rad_per_n_m / PER_N_M;
-        elements.iter().all(sound).then(|| Self::of(elements.map(width), elements.map(gain), N))
+        let most = elements.iter().map(|e| e.width_n_m * e.gain_rad_per_n_m.abs()).sum::<f32>();
+        let sound = elements.iter().all(sound) && most <= Adjustment::MAX_RAD;
+        sound.then(|| Self::of(elements.map(width), elements.map(gain), N))
     }
 
     /// Follows the load torque, N·m, once each tick: beyond ±10 000 N·m it is taken there, and one that is not finite moves
     /// nothing. The same work for all values.
     pub fn update(&self, state: &mut SlipState<N, LoadTorque>, torque_n_m: f32) -> Slip {
-        let counts = torque_counts(torque_n_m).unwrap_or(state.at);
-        if torque_n_m.is_finite() { self.follow(state, counts) } else { self.told(state) }
+        self.follow(state, torque_counts(torque_n_m))
     }
 
     /// As [`SlipBank::fit`], at torques in N·m; samples at a torque that is not finite are left out.
@@ -189,37 +214,27 @@ fn torque_counts(torque_n_m: f32) -> Option<i64> {
 /// Bytes of the saved state of `elements` springs.
 #[must_use]
 pub const fn saved_slip_bytes(elements: usize) -> usize {
-    elements.saturating_mul(8).saturating_add(16)
+    elements.saturating_mul(8).saturating_add(36)
 }
 
-impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
-    /// The sum is over the first so many springs.
-    fn of(widths: [i32; N], gains: [f32; N], used: usize) -> Self {
-        let gains_used = gains.into_iter().take(used).map(f32::to_le_bytes);
-        let words = widths.into_iter().take(used).map(i32::to_le_bytes).chain(gains_used);
-        let sum = words.fold(V::KIND, |sum, word| sum.rotate_left(7) ^ crc32(&word));
-        Self { widths, gains, sum, variable: PhantomData }
-    }
+/// What a saved state begins with; the last byte is the version.
+const SAVED_MARK: [u8; 4] = *b"FXS\x02";
+/// Table and joint of a state that was saved without them.
+pub(crate) const NOBODY: [u32; 4] = [0; 4];
 
-    /// A bank of the first so many springs: those after them, of no width and no gain, are in no sum and no saved state.
-    #[cfg(feature = "c-api")]
-    pub(crate) fn of_first(self, used: usize) -> Self {
-        Self::of(self.widths, self.gains, used)
-    }
-
-    fn follow(&self, state: &mut SlipState<N, V>, at: i64) -> Slip {
+impl<const N: usize> Springs<N> {
+    fn follow(&self, state: &mut Deflections<N>, at: i64) {
         let moved = OutputAngle::from_counts(at).minus_small_counts(OutputAngle::from_counts(state.at));
-        let moved = if state.started { moved } else { 0 };
-        (state.at, state.started) = (at, true);
+        let moved = if state.started == 0 { 0 } else { moved };
+        (state.at, state.started) = (at, 1);
         let ends = state.lower.iter_mut().zip(state.upper.iter_mut());
         for ((lower, upper), &width) in ends.zip(&self.widths) {
             let clamped = |z: i32| z.saturating_add(moved).max(width.wrapping_neg()).min(width);
             (*lower, *upper) = (clamped(*lower), clamped(*upper));
         }
-        self.told(state)
     }
 
-    fn told(&self, state: &SlipState<N, V>) -> Slip {
+    fn told(&self, state: &Deflections<N>) -> Slip {
         let mut slip = Slip { error_rad: 0.0, uncertainty_rad: 0.0 };
         for ((lower, upper), (gain, &width)) in
             state.lower.iter().zip(&state.upper).zip(self.gains.iter().zip(&self.widths))
@@ -232,22 +247,105 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         }
         slip
     }
+}
+
+impl<const N: usize> Deflections<N> {
+    const fn of(known: bool) -> Self {
+        let (least, most) = if known { (0, 0) } else { (i32::MIN, i32::MAX) };
+        Self { at: 0, started: 0, lower: [least; N], upper: [most; N] }
+    }
+
+    /// As [`Sealed::new`], for constants.
+    const fn sealed(self) -> Sealed<Self> {
+        let mut sum = add(add(add(START, self.at as u32), (self.at >> 32) as u32), self.started);
+        let (mut lower, mut upper) = (self.lower.as_slice(), self.upper.as_slice());
+        while let [end, rest @ ..] = lower {
+            (sum, lower) = (add(sum, *end as u32), rest);
+        }
+        while let [end, rest @ ..] = upper {
+            (sum, upper) = (add(sum, *end as u32), rest);
+        }
+        Sealed::of(self, add(sum, 0))
+    }
+}
+
+impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
+    /// The sum is over the first so many springs.
+    fn of(widths: [i32; N], gains: [f32; N], used: usize) -> Self {
+        let gains_used = gains.into_iter().take(used).map(f32::to_le_bytes);
+        let words = widths.into_iter().take(used).map(i32::to_le_bytes).chain(gains_used);
+        let sum = words.fold(V::KIND, |sum, word| sum.rotate_left(7) ^ crc32(&word));
+        Self { springs: Sealed::new(Springs { widths, gains, sum }), variable: PhantomData }
+    }
+
+    /// A bank of the first so many springs: those after them, of no width and no gain, are in no sum and no saved state.
+    #[cfg(feature = "c-api")]
+    pub(crate) fn of_first(self, used: usize) -> Self {
+        let Springs { widths, gains, .. } = *self.springs.kept();
+        Self::of(widths, gains, used)
+    }
+
+    /// Makes the springs whole, where they lie in memory and an upset hit a word of them; false if they are lost, and the bank has to be made anew. For a
+    /// slow rate group: until then each update mends a copy.
+    pub fn mend(&mut self) -> bool {
+        self.springs.mend()
+    }
+
+    /// Whether the springs are lost to an upset that cannot be mended.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        self.springs.open().is_none()
+    }
+
+    /// `None` moves nothing.
+    fn follow(&self, state: &mut SlipState<N, V>, at: Option<i64>) -> Slip {
+        if !state.deflections.is_whole() && !state.deflections.mend() {
+            *state = SlipState::unknown();
+        }
+        let move_on = |springs: &Springs<N>, deflections: &mut Deflections<N>| {
+            if let Some(at) = at {
+                springs.follow(deflections, at);
+            }
+            springs.told(deflections)
+        };
+        let deflections = &mut state.deflections;
+        let slip = match self.springs.is_whole() {
+            true => deflections.change(|deflections| move_on(self.springs.kept(), deflections)),
+            false => self.springs.open().and_then(|springs| deflections.change(|to| move_on(&springs, to))),
+        };
+        slip.unwrap_or(Slip { error_rad: 0.0, uncertainty_rad: Adjustment::MAX_RAD })
+    }
 
     /// Writes the state with a CRC-32, for storage across a reset: the first [`saved_slip_bytes`]`(N)` bytes. `None` if there are
-    /// fewer, or before the first update.
+    /// fewer, before the first update, or if springs or deflections are lost. It belongs to no joint: [`Self::save_for`] has one.
     ///
-    /// Little endian: variable (`i64`), lower ends, upper ends (`i32`), sum of the settings, CRC-32.
+    /// Little endian: `FXS` and the version 2, id of the table (8 bytes), sums of the joint's settings (2 × `u32`), variable (`i64`), lower ends, upper
+    /// ends (`i32`), sum of the springs, CRC-32 of all before. Table and joint are zeros if they are not known.
     pub fn save(&self, state: &SlipState<N, V>, bytes: &mut [u8]) -> Option<usize> {
-        self.save_first(state, N, bytes)
+        self.save_first(state, NOBODY, N, bytes)
+    }
+
+    /// As [`Self::save`], with joint and table: it is restored for the same ones alone.
+    pub fn save_for(&self, state: &SlipState<N, V>, joint: &Joint, store: &Store, bytes: &mut [u8]) -> Option<usize> {
+        self.save_first(state, owner(joint, store), N, bytes)
     }
 
     /// The same of the first so many springs.
-    pub(crate) fn save_first(&self, state: &SlipState<N, V>, used: usize, bytes: &mut [u8]) -> Option<usize> {
-        let bytes = bytes.get_mut(..saved_slip_bytes(used)).filter(|_| state.started)?;
+    pub(crate) fn save_first(
+        &self,
+        state: &SlipState<N, V>,
+        owner: [u32; 4],
+        used: usize,
+        bytes: &mut [u8],
+    ) -> Option<usize> {
+        let springs = self.springs.open()?;
+        let state = state.deflections.open().filter(|state| state.started != 0)?;
+        let bytes = bytes.get_mut(..saved_slip_bytes(used))?;
         let (contents, crc) = bytes.split_last_chunk_mut::<4>()?;
-        let at = [state.at as i32, (state.at >> 32) as i32];
+        let head = [u32::from_le_bytes(SAVED_MARK)].into_iter().chain(owner);
+        let at = [state.at as u32, (state.at >> 32) as u32];
         let ends = state.lower.iter().take(used).chain(state.upper.iter().take(used));
-        let words = at.iter().chain(ends).copied().chain([self.sum as i32]);
+        let words = head.chain(at).chain(ends.map(|end| *end as u32)).chain([springs.sum]);
         for (to, from) in contents.as_chunks_mut::<4>().0.iter_mut().zip(words) {
             *to = from.to_le_bytes();
         }
@@ -255,45 +353,77 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         Some(saved_slip_bytes(used))
     }
 
-    /// A state from [`Self::save`]; `None` if the bytes are damaged or were saved with other springs. Only if the joint cannot have
+    /// A state from [`Self::save`]; `None` if the bytes are damaged, were saved with other springs, or belong to a joint. Only if the joint cannot have
     /// moved (for a bank on the torque: the load cannot have changed) meanwhile, else [`SlipState::unknown`].
     #[must_use]
     pub fn restore(&self, bytes: &[u8]) -> Option<SlipState<N, V>> {
-        self.restore_first(N, bytes)
+        self.restore_first(NOBODY, N, bytes).ok()
+    }
+
+    /// As [`Self::restore`], from [`Self::save_for`], for the same joint with the same table.
+    ///
+    /// # Errors
+    /// [`RestoreError`]; other springs count as another joint. Then start from [`SlipState::unknown`].
+    pub fn restore_for(&self, joint: &Joint, store: &Store, bytes: &[u8]) -> Result<SlipState<N, V>, RestoreError> {
+        self.restore_first(owner(joint, store), N, bytes)
     }
 
     /// The same of the first so many springs.
-    pub(crate) fn restore_first(&self, used: usize, bytes: &[u8]) -> Option<SlipState<N, V>> {
-        let bytes = bytes.get(..saved_slip_bytes(used))?;
-        let (contents, crc) = bytes.split_last_chunk::<4>()?;
-        let mut words = contents.as_chunks::<4>().0.iter().map(|word| i32::from_le_bytes(*word));
-        let (low, high) = (words.next()?, words.next()?);
-        let mut state = SlipState::relaxed();
-        state.at = (high as i64) << 32 | low as u32 as i64;
-        state.started = true;
-        for to in state.lower.iter_mut().take(used).chain(state.upper.iter_mut().take(used)) {
-            *to = words.next()?;
+    pub(crate) fn restore_first(
+        &self,
+        owner: [u32; 4],
+        used: usize,
+        bytes: &[u8],
+    ) -> Result<SlipState<N, V>, RestoreError> {
+        let springs = self.springs.open().ok_or(RestoreError::OtherJoint)?;
+        let bytes = bytes.get(..saved_slip_bytes(used)).ok_or(RestoreError::Crc)?;
+        let (contents, crc) = bytes.split_last_chunk::<4>().ok_or(RestoreError::Crc)?;
+        let words = contents.as_chunks::<4>().0;
+        let found = words.first().copied().unwrap_or_default();
+        if found != SAVED_MARK {
+            return Err(RestoreError::Version { found });
         }
-        let intact = words.next()? == self.sum as i32 && u32::from_le_bytes(*crc) == crc32(contents);
-        let mut ends = state.lower.iter().zip(&state.upper).zip(&self.widths);
+        if u32::from_le_bytes(*crc) != crc32(contents) {
+            return Err(RestoreError::Crc);
+        }
+        let mut words = words.iter().skip(1).map(|word| u32::from_le_bytes(*word));
+        let mut next = || words.next().unwrap_or_default();
+        let [low, high, joint_low, joint_high] = owner;
+        if [next(), next()] != [low, high] {
+            return Err(RestoreError::OtherTable);
+        }
+        if [next(), next()] != [joint_low, joint_high] {
+            return Err(RestoreError::OtherJoint);
+        }
+        let (low, high) = (next(), next());
+        let mut state = Deflections { at: (high as i64) << 32 | low as i64, started: 1, ..Deflections::of(true) };
+        for to in state.lower.iter_mut().take(used).chain(state.upper.iter_mut().take(used)) {
+            *to = next() as i32;
+        }
+        if next() != springs.sum {
+            return Err(RestoreError::OtherJoint);
+        }
+        let mut ends = state.lower.iter().zip(&state.upper).zip(&springs.widths);
         let possible =
             ends.all(|((&lower, &upper), &width)| lower >= width.wrapping_neg() && lower <= upper && upper <= width);
-        (intact && possible).then_some(state)
+        let state = SlipState { deflections: Sealed::new(state), variable: PhantomData };
+        if possible { Ok(state) } else { Err(RestoreError::Impossible) }
     }
 
     /// Gains of these widths by non-negative least squares, one coordinate after another.
     #[allow(clippy::arithmetic_side_effects)] // Floating-point numbers.
-    fn fitted(self, mut state: SlipState<N, V>, samples: impl Iterator<Item = (i64, f64)>) -> Option<FittedSlip<N, V>> {
+    fn fitted(self, state: SlipState<N, V>, samples: impl Iterator<Item = (i64, f64)>) -> Option<FittedSlip<N, V>> {
+        let (springs, mut state) = (self.springs.open()?, state.deflections.open()?);
         let (mut gram, mut toward, mut sums) = ([[0.0; N]; N], [0.0; N], [0.0; N]);
         let (mut errors, mut squares, mut used) = (0.0, 0.0, 0usize);
         for (at, error) in samples {
-            self.follow(&mut state, at);
-            if !state.is_known() || !error.is_finite() {
+            springs.follow(&mut state, at);
+            if state.lower != state.upper || !error.is_finite() {
                 continue;
             }
             // In parts of the width: all alike.
             let mut parts = state.lower.map(f64::from);
-            parts.iter_mut().zip(self.widths).for_each(|(z, width)| *z /= f64::from(width.max(1)));
+            parts.iter_mut().zip(springs.widths).for_each(|(z, width)| *z /= f64::from(width.max(1)));
             for ((row, toward), (sum, z)) in gram.iter_mut().zip(&mut toward).zip(sums.iter_mut().zip(parts)) {
                 row.iter_mut().zip(parts).for_each(|(cell, other)| *cell += z * other);
                 *toward += z * error;
@@ -326,9 +456,9 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         for (row, gain) in gram.iter().zip(gains) {
             left += gain * of_parts(*row);
         }
-        let mut per_count = self.widths.map(|width| 1.0 / f64::from(width.max(1)));
+        let mut per_count = springs.widths.map(|width| 1.0 / f64::from(width.max(1)));
         per_count.iter_mut().zip(gains).for_each(|(per_count, gain)| *per_count *= gain);
-        let bank = Self::of(self.widths, per_count.map(|gain| gain as f32), N);
+        let bank = Self::of(springs.widths, per_count.map(|gain| gain as f32), N);
         Some(FittedSlip { bank, offset_rad, rms_rad: libm::sqrt((left / number).max(0.0)), used })
     }
 }
@@ -341,7 +471,8 @@ impl<const N: usize> SlipBank<N, NominalOutput> {
     #[must_use]
     pub fn elements(&self) -> [SlipElement; N] {
         let mut elements = [SlipElement::default(); N];
-        for (to, (width, gain)) in elements.iter_mut().zip(self.widths.iter().zip(self.gains)) {
+        let Springs { widths, gains, .. } = self.springs.open().unwrap_or(*self.springs.kept());
+        for (to, (width, gain)) in elements.iter_mut().zip(widths.iter().zip(gains)) {
             *to = SlipElement { width_rad: *width as f32 * RAD_PER_COUNT, gain: gain * COUNTS_PER_RAD };
         }
         elements
@@ -353,7 +484,8 @@ impl<const N: usize> SlipBank<N, LoadTorque> {
     #[must_use]
     pub fn elements(&self) -> [TorqueSlipElement; N] {
         let mut elements = [TorqueSlipElement::default(); N];
-        for (to, (width, gain)) in elements.iter_mut().zip(self.widths.iter().zip(self.gains)) {
+        let Springs { widths, gains, .. } = self.springs.open().unwrap_or(*self.springs.kept());
+        for (to, (width, gain)) in elements.iter_mut().zip(widths.iter().zip(gains)) {
             *to = TorqueSlipElement { width_n_m: *width as f32 / PER_N_M, gain_rad_per_n_m: gain * PER_N_M };
         }
         elements
@@ -370,21 +502,43 @@ impl<const N: usize, V> SlipState<N, V> {
     /// After a reset: any deflection.
     #[must_use]
     pub const fn unknown() -> Self {
-        Self { at: 0, started: false, lower: [i32::MIN; N], upper: [i32::MAX; N], variable: PhantomData }
+        Self { deflections: Deflections::of(false).sealed(), variable: PhantomData }
     }
 
     /// No deflection, as before the first motion, or after strokes that died away.
     #[must_use]
     pub const fn relaxed() -> Self {
-        Self { at: 0, started: false, lower: [0; N], upper: [0; N], variable: PhantomData }
+        Self { deflections: Deflections::of(true).sealed(), variable: PhantomData }
+    }
+
+    /// Whether it is lost to an upset that cannot be mended: the next update begins with no deflection known.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        self.deflections.open().is_none()
     }
 
     /// Whether every deflection is known.
     #[must_use]
     pub fn is_known(&self) -> bool {
-        self.lower == self.upper
+        self.deflections.open().is_some_and(|state| state.lower == state.upper)
     }
 }
+
+/// Who a saved state belongs to: the table and the joint.
+pub(crate) fn owner(joint: &Joint, store: &Store) -> [u32; 4] {
+    let [a, b, c, d, e, f, g, h] = store.id().0;
+    let [low, high] = joint.sums();
+    [u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]), low, high]
+}
+
+#[cfg(test)]
+crate::upset::upsets!([const N: usize, V] SlipBank<N, V> { springs, variable });
+#[cfg(test)]
+crate::upset::upsets!([const N: usize] Springs<N> { widths, gains, sum });
+#[cfg(test)]
+crate::upset::upsets!([const N: usize, V] SlipState<N, V> { deflections, variable });
+#[cfg(test)]
+crate::upset::upsets!([const N: usize] Deflections<N> { at, started, lower, upper });
 
 #[cfg(test)]
 mod tests {
@@ -398,6 +552,10 @@ mod tests {
         let element =
             |share: f64, gain| SlipElement { width_rad: (share * WIDTH as f64 * RAD_PER_COUNT as f64) as f32, gain };
         SlipBank::new([element(0.2, 0.05), element(0.5, 0.03), element(1.0, 0.02)]).unwrap()
+    }
+
+    fn of(deflections: Deflections<3>) -> SlipState<3> {
+        SlipState { deflections: Sealed::new(deflections), variable: PhantomData }
     }
 
     fn run(state: &mut SlipState<3>, from: i64, path: &[i32]) -> (i64, Slip) {
@@ -446,20 +604,20 @@ mod tests {
         let mut saved = [0; saved_slip_bytes(3)];
         assert_eq!(bank().save(&state, &mut saved), None);
         run(&mut state, i64::MIN / 3, &[WIDTH / 2, -7, 19]);
-        assert_eq!(bank().save(&state, &mut saved), Some(40));
-        assert_eq!(bank().save(&state, &mut saved[..39]), None);
+        assert_eq!(bank().save(&state, &mut saved), Some(60));
+        assert_eq!(bank().save(&state, &mut saved[..59]), None);
         assert_eq!(bank().restore(&saved), Some(state));
         for bit in 0..saved.len() * 8 {
             let mut damaged = saved;
             damaged[bit / 8] ^= 1 << (bit % 8);
             assert_eq!(bank().restore(&damaged), None, "bit {bit}");
         }
-        let mut other = bank();
+        let mut other = *bank().springs.kept();
         other.gains[1] *= 2.0;
         assert_eq!(SlipBank::<3>::of(other.widths, other.gains, 3).restore(&saved), None);
         for (lower, upper) in [(1, 0), (-WIDTH, 0), (0, WIDTH)] {
-            let impossible = SlipState { lower: [lower, 0, 0], upper: [upper, 0, 0], ..state };
-            bank().save(&impossible, &mut saved).unwrap();
+            let impossible = Deflections { lower: [lower, 0, 0], upper: [upper, 0, 0], ..*state.deflections.kept() };
+            bank().save(&of(impossible), &mut saved).unwrap();
             assert_eq!(bank().restore(&saved), None);
         }
     }
@@ -624,9 +782,9 @@ mod tests {
         ) {
             let mut interval = SlipState::unknown();
             let (_, first) = run(&mut interval, 0, &[]);
-            let mut deflections = bank().widths;
+            let mut deflections = bank().springs.kept().widths;
             deflections.iter_mut().zip(start).for_each(|(z, share)| *z = (*z as f64 * share) as i32);
-            let mut truth = SlipState { started: true, lower: deflections, upper: deflections, ..SlipState::unknown() };
+            let mut truth = of(Deflections { at: 0, started: 1, lower: deflections, upper: deflections });
             let (mut x, mut open) = (0, first.uncertainty_rad);
             for step in path {
                 let (_, real) = run(&mut truth, x, &[step]);

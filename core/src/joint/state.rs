@@ -134,9 +134,9 @@ const SAVED_MARK: [u8; 4] = *b"FXJ\x01";
 /// Why saved bytes are no state of this joint with this table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RestoreError {
-    /// Not of this version.
+    /// Of another kind or version.
     Version {
-        /// The first bytes; `FXJ` and 1 are read.
+        /// The first bytes; of a joint `FXJ` and 1 are read, of springs `FXS` and 2.
         found: [u8; 4],
     },
     /// The CRC-32 does not match: damaged, or not written to the end.
@@ -152,7 +152,9 @@ pub enum RestoreError {
 impl fmt::Display for RestoreError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Version { found } => write!(f, "saved state begins with {found:02x?}, {SAVED_MARK:02x?} is read"),
+            Self::Version { found } => {
+                write!(f, "saved state begins with {found:02x?}: it is of another kind or version")
+            }
             Self::Crc => f.write_str("the saved state is damaged"),
             Self::OtherTable => f.write_str("the state was saved with another table"),
             Self::OtherJoint => f.write_str("the state was saved by another joint"),

@@ -21,11 +21,17 @@
 //! torque in the mesh again. That loop is closed on +1, and above the resonance of the load on the held motor only the
 //! low-pass keeps it from ringing. `flexspline_motion::loops` finds the widest one that keeps a margin; a torque on the
 //! load has no such loop.
+//!
+//! A reading is refused (NaN, and the tick keeps its correction) where it is no number, beyond the sensor, too far from the last one that was believed, or,
+//! if that is asked for, the same for too long. Settings and state are kept under one sum ([`whole`](../../whole.rs)): where an upset hit one word it is mended in
+//! the next tick.
 
 use core::f64::consts::TAU;
 
-use super::limits::{SettingError, checked};
+use super::limits::{LEAST_TICK_S, SettingError, checked};
+use crate::num;
 use crate::play::Direction;
+use crate::whole::{Sealed, sum_of, words};
 
 /// Where a torque was measured, N·m, positive where it turns the output forward.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,18 +65,49 @@ pub struct TorqueSettings {
 
 /// From a reading to the torque that a table is asked with.
 ///
-/// It holds a check over all of itself. Where an upset hit it every tick gives NaN, until the path is made anew.
+/// Where an upset hit more of it than can be mended every tick gives NaN, until the path is made anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TorquePath {
-    /// Bits of drag, drag of the table, hold, largest reading, and the share of a reading that a tick believes.
-    set: [u32; 5],
+    path: Sealed<Path>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Path {
+    /// Bits of drag, drag of the table, hold, largest reading, the share of a reading that a tick believes, and the largest change from one reading to
+    /// the next.
+    set: [u32; 6],
     /// Bits of the torque on the load behind the low-pass; NaN before the first.
     behind: u32,
-    /// Ticks between changes of the flank, and since the last.
-    settle: u16,
-    since: u16,
-    /// Flags, and above them the check.
+    /// Bits of the last reading that was believed, NaN before the first, and of the last that was not, or that too.
+    believed: u32,
+    doubted: u32,
+    /// Ticks between changes of the flank, and since the last, in the upper half.
+    settle: u32,
+    /// Ticks for which a reading may be the same, 0 for any number, and for which it was, in the upper half.
+    frozen: u32,
+    /// Ticks without a reading that was believed since the last one.
+    gap: u32,
+    /// Readings in a row that were not believed, in the upper half; flags.
     marks: u32,
+}
+words!([] Path { set, behind, believed, doubted, settle, frozen, gap, marks });
+
+/// Readings in a row near each other that are not believed where they begin too far from the last one: the third is. A spike of one or two ticks is none
+/// of the torque, and a step that is one comes two ticks late. A guess.
+const DOUBTED: u32 = 2;
+/// A reading that changes by more than this share of the largest in a tick, and twice the drag, is too far where no other limit is set: of a sinusoid
+/// from end to end of the sensor that is a fortieth of the rate of ticks. A guess.
+const JUMP_SHARE: f32 = 0.25;
+
+/// The upper half of a word.
+const fn upper(word: u32) -> u32 {
+    word >> 16
+}
+
+/// Two halves, each held at its largest value.
+const fn halves(low: u32, high: u32) -> u32 {
+    const MOST: u32 = u16::MAX as u32;
+    (if low > MOST { MOST } else { low }) | (if high > MOST { MOST } else { high }) << 16
 }
 
 /// The flank that carried last is the one of negative torques.
@@ -78,18 +115,18 @@ const NEGATIVE: u32 = 1;
 /// There was a tick, and the direction in it was backward.
 const SEEN: u32 = 2;
 const BACKWARD: u32 = 4;
-const FLAGS: u32 = 0xff;
+const FLAGS: u32 = 0xffff;
 
 impl TorquePath {
     /// A path that has seen nothing yet.
     ///
     /// # Errors
     /// [`SettingError`]: a time, bandwidth or largest reading that is not finite and positive, a drag, a hold or a time to settle that is not finite or
-    /// below 0.
+    /// below 0; a bandwidth of which a tick sees less than 1e-7, or a largest reading below 1e-6 N·m.
     pub const fn new(settings: TorqueSettings) -> Result<Self, SettingError> {
         let TorqueSettings { tick_s, bandwidth_hz, drag_n_m, table_drag_n_m, hold_n_m, settle_s, largest_n_m } =
             settings;
-        if let Err(error) = checked("tick_s", tick_s, tick_s as f64, [0.0, 1e3]) {
+        if let Err(error) = checked("tick_s", tick_s, tick_s as f64, [LEAST_TICK_S, 1e3]) {
             return Err(error);
         }
         if let Err(error) = checked("bandwidth_hz", bandwidth_hz, bandwidth_hz as f64, [0.0, 1e9]) {
@@ -108,68 +145,118 @@ impl TorquePath {
         if let Err(error) = checked("settle_s", settle_s, settle_s as f64 + 1.0, [1.0, 1e6]) {
             return Err(error);
         }
-        if let Err(error) = checked("largest_n_m", largest_n_m, largest_n_m as f64, [0.0, 1e9]) {
+        if let Err(error) = checked("largest_n_m", largest_n_m, largest_n_m as f64, [LEAST_N_M, 1e9]) {
             return Err(error);
         }
         let along = TAU * bandwidth_hz as f64 * tick_s as f64;
+        // Less is lost in the rounding of what it is added to.
+        if let Err(error) = checked("bandwidth_hz", bandwidth_hz, along, [1e-7, f64::MAX]) {
+            return Err(error);
+        }
         let share = (along / (1.0 + along)) as f32;
         // To the next whole tick, but for rounding, and no more than a count holds.
         let settle = (settle_s as f64 / tick_s as f64 + 0.999) as u16;
-        let set =
-            [drag_n_m.to_bits(), table_drag_n_m.to_bits(), hold_n_m.to_bits(), largest_n_m.to_bits(), share.to_bits()];
+        let jump = JUMP_SHARE * largest_n_m + 2.0 * drag_n_m;
+        let set = [
+            drag_n_m.to_bits(),
+            table_drag_n_m.to_bits(),
+            hold_n_m.to_bits(),
+            largest_n_m.to_bits(),
+            share.to_bits(),
+            jump.to_bits(),
+        ];
+        let none = f32::NAN.to_bits();
         // Long enough ago that the flank may change.
-        let path = Self { set, behind: f32::NAN.to_bits(), settle, since: u16::MAX, marks: 0 };
-        Ok(path.sealed(0))
+        let settle = halves(settle as u32, u32::MAX);
+        Ok(Path { set, behind: none, believed: none, doubted: none, settle, frozen: 0, gap: 0, marks: 0 }.sealed())
+    }
+
+    /// With other limits of what a sensor can read: the largest change from one tick to the next, N·m (above 0; a reading that changes by more is
+    /// believed once three in a row are near each other), and the number of ticks after which a reading that stays the same to the last bit is frozen (0 for
+    /// never: what comes from a model may stand still, a sensor has noise).
+    ///
+    /// # Errors
+    /// [`SettingError`]: a change that is not finite or below 1e-6 N·m, or a path that is lost to an upset.
+    pub fn with_sensor(self, jump_n_m: f32, frozen_ticks: u16) -> Result<Self, SettingError> {
+        checked("jump_n_m", jump_n_m, jump_n_m as f64, [LEAST_N_M, 1e9])?;
+        let mut path = self.path.open().ok_or(SettingError { name: "path", found: f32::NAN })?;
+        let [.., jump] = &mut path.set;
+        *jump = jump_n_m.to_bits();
+        path.frozen = halves(frozen_ticks as u32, 0);
+        Ok(path.sealed())
     }
 
     /// What changes from tick to tick, for a simulation that goes on from here.
     #[cfg(any(test, feature = "std"))]
     #[must_use]
-    pub const fn kept(&self) -> [u32; 3] {
-        [self.behind, self.since as u32, self.marks & FLAGS]
+    pub const fn kept(&self) -> [u32; 7] {
+        let Path { behind, believed, doubted, settle, frozen, gap, marks, .. } = *self.path.kept();
+        [behind, believed, doubted, upper(settle), upper(frozen), gap, marks]
     }
 
     /// Goes on from what [`Self::kept`] gave.
     #[cfg(any(test, feature = "std"))]
-    pub const fn go_on(&mut self, [behind, since, flags]: [u32; 3]) {
-        self.behind = behind;
-        self.since = since as u16;
-        *self = self.sealed(flags);
+    pub const fn go_on(&mut self, [behind, believed, doubted, since, same, gap, marks]: [u32; 7]) {
+        let path = *self.path.kept();
+        let (settle, frozen) = (halves(path.settle & FLAGS, since), halves(path.frozen & FLAGS, same));
+        *self = Path { behind, believed, doubted, settle, frozen, gap, marks, ..path }.sealed();
     }
 
-    /// With these flags, and the check over it all.
-    const fn sealed(self, flags: u32) -> Self {
-        let mut path = self;
-        path.marks = flags & FLAGS;
-        path.marks |= path.check();
-        path
-    }
-
-    /// Over all but itself: each step turns what differs into what differs.
-    const fn check(&self) -> u32 {
-        const fn with(sum: u32, word: u32) -> u32 {
-            (sum ^ word).wrapping_mul(0x9e37_79b1).rotate_left(13)
-        }
-        let [a, b, c, d, e] = self.set;
-        let ticks = (self.settle as u32) << 16 | self.since as u32;
-        let sum = with(with(with(with(with(0x5eed_0001, a), b), c), d), e);
-        with(with(with(sum, self.behind), ticks), self.marks & FLAGS) & !FLAGS
-    }
-
-    /// Whether it was hit by an upset: make it anew.
+    /// Whether an upset hit more of it than can be mended: make it anew.
     #[must_use]
-    pub const fn is_damaged(&self) -> bool {
-        self.marks & !FLAGS != self.check()
+    pub fn is_damaged(&self) -> bool {
+        self.path.open().is_none()
     }
 
     /// One tick: a reading, and the direction in which the output moves or moved last; what to give to
-    /// [`Input::torque_n_m`](crate::Input::torque_n_m). A reading that is not finite, or larger than the sensor's largest, gives NaN and is forgotten.
+    /// [`Input::torque_n_m`](crate::Input::torque_n_m). A reading that is not finite, larger than the sensor's largest, frozen, or too far from the last one,
+    /// gives NaN and is forgotten.
     #[must_use]
     pub fn tick(&mut self, reading: TorqueReading, direction: Direction) -> f32 {
-        if self.is_damaged() {
-            return f32::NAN;
+        let Some(mut path) = self.path.open() else { return f32::NAN };
+        let torque = path.tick(reading, direction);
+        *self = path.sealed();
+        torque
+    }
+}
+
+/// Least size of the largest reading and of the largest change of one, N·m: what is below is no joint's. A guess.
+const LEAST_N_M: f64 = 1e-6;
+
+impl Path {
+    const fn sealed(self) -> TorquePath {
+        let Self { set: [a, b, c, d, e, f], behind, believed, doubted, settle, frozen, gap, marks } = self;
+        TorquePath {
+            path: Sealed::of(self, sum_of(&[a, b, c, d, e, f, behind, believed, doubted, settle, frozen, gap, marks])),
         }
-        let [drag_n_m, table_drag_n_m, hold_n_m, largest_n_m, share] = self.set.map(f32::from_bits);
+    }
+
+    /// Whether a reading within the sensor is to be believed.
+    fn believes(&mut self, read: f32, jump_n_m: f32) -> bool {
+        let (believed, doubted) = (f32::from_bits(self.believed), f32::from_bits(self.doubted));
+        let near = |other: f32| num::finite(other) && (read - other).abs() <= jump_n_m;
+        let same = if read.to_bits() == self.doubted { upper(self.frozen).saturating_add(1) } else { 0 };
+        let most = self.frozen & FLAGS;
+        self.frozen = halves(most, same);
+        let first = !num::finite(believed);
+        let number = if near(believed) || first {
+            0
+        } else if near(doubted) {
+            upper(self.marks).saturating_add(1)
+        } else {
+            1
+        };
+        self.doubted = read.to_bits();
+        // Those that are believed count from there.
+        let soon = number > 0 && number <= DOUBTED;
+        self.marks = halves(self.marks & FLAGS, if soon { number } else { 0 });
+        let believes = !soon && (most == 0 || same < most);
+        self.believed = if believes { read.to_bits() } else { self.believed };
+        believes
+    }
+
+    fn tick(&mut self, reading: TorqueReading, direction: Direction) -> f32 {
+        let [drag_n_m, table_drag_n_m, hold_n_m, largest_n_m, share, jump_n_m] = self.set.map(f32::from_bits);
         let behind = f32::from_bits(self.behind);
         let flank = if self.marks & NEGATIVE == 0 { 1.0 } else { -1.0 };
         let backward = direction == Direction::Backward;
@@ -182,28 +269,36 @@ impl TorquePath {
             TorqueReading::InMesh(torque) => (torque, torque + drag, true),
         };
         // Nothing that is not a number is within.
-        if !(-largest_n_m..=largest_n_m).contains(&read) {
+        if !(-largest_n_m..=largest_n_m).contains(&read) || !self.believes(read, jump_n_m) {
+            self.gap = self.gap.saturating_add(1);
             return f32::NAN;
         }
+        // Over a gap the low-pass goes on by all the time that went.
+        let gap = self.gap as f32;
+        let share = (1.0 + gap) * share / (1.0 + gap * share);
+        self.gap = 0;
         let late = behind + share * (on_load - behind);
         let behind = if behind.is_finite() { late } else { on_load };
         let mesh = behind - drag;
         let size = if mesh < 0.0 { -mesh } else { mesh };
         let carries = if mesh < 0.0 { -1.0 } else { 1.0 };
         // Where the motion turns back the drag tells the flank, however small the torque.
-        let told = turned_back || (size >= hold_n_m && (!in_mesh || self.since >= self.settle));
+        let told = turned_back || (size >= hold_n_m && (!in_mesh || upper(self.settle) >= self.settle & FLAGS));
         let changes = told && carries != flank;
         let flank = if changes { carries } else { flank };
-        self.since = if changes && !turned_back { 0 } else { self.since.saturating_add(1) };
+        let since = if changes && !turned_back { 0 } else { upper(self.settle).saturating_add(1) };
+        self.settle = halves(self.settle & FLAGS, since);
         self.behind = behind.to_bits();
         let sides = [(flank < 0.0, NEGATIVE), (true, SEEN), (backward, BACKWARD)];
-        *self = self.sealed(sides.iter().fold(0, |flags, (there, flag)| if *there { flags | flag } else { flags }));
+        self.marks = sides.iter().fold(0, |flags, (there, flag)| if *there { flags | flag } else { flags });
         flank * size + way * table_drag_n_m
     }
 }
 
 #[cfg(test)]
-crate::upset::upsets!(TorquePath { set, behind, settle, since, marks });
+crate::upset::upsets!(TorquePath { path });
+#[cfg(test)]
+crate::upset::upsets!(Path { set, behind, believed, doubted, settle, frozen, gap, marks });
 
 #[cfg(test)]
 mod tests {
@@ -270,7 +365,7 @@ mod tests {
         }
         assert!((last - 2.63).abs() < 0.02, "{last}");
         assert!(path.tick(TorqueReading::InMesh(f32::NAN), Direction::Forward).is_nan());
-        assert!((path.tick(TorqueReading::InMesh(3.0), Direction::Forward) - last).abs() < 0.02);
+        assert!((path.tick(TorqueReading::InMesh(3.0), Direction::Forward) - last).abs() < 0.03);
     }
 
     #[test]
@@ -281,6 +376,12 @@ mod tests {
         assert_eq!(named(TorqueSettings { hold_n_m: f32::NAN, ..SETTINGS }), "hold_n_m");
         assert_eq!(named(TorqueSettings { settle_s: -1.0, ..SETTINGS }), "settle_s");
         assert_eq!(named(TorqueSettings { largest_n_m: 0.0, ..SETTINGS }), "largest_n_m");
+        assert_eq!(named(TorqueSettings { largest_n_m: 1e-40, ..SETTINGS }), "largest_n_m");
+        assert_eq!(named(TorqueSettings { bandwidth_hz: 1e-40, ..SETTINGS }), "bandwidth_hz");
+        assert_eq!(named(TorqueSettings { tick_s: 1e-40, ..SETTINGS }), "tick_s");
+        let path = TorquePath::new(SETTINGS).unwrap();
+        assert_eq!(path.with_sensor(1e-40, 5).unwrap_err().name, "jump_n_m");
+        assert_eq!(path.with_sensor(f32::NAN, 5).unwrap_err().name, "jump_n_m");
         assert!(TorquePath::new(TorqueSettings { hold_n_m: 0.0, ..SETTINGS }).is_ok());
     }
 
@@ -310,19 +411,93 @@ mod tests {
     }
 
     #[test]
-    fn no_single_bit_turned_gives_a_torque() {
+    fn no_single_bit_of_a_torque_path_gives_another_torque() {
         use crate::upset::Upset;
         let mut sound = TorquePath::new(TorqueSettings { bandwidth_hz: 1.0, ..SETTINGS }).unwrap();
         for _ in 0..10 {
             let _ = sound.tick(TorqueReading::OnLoad(2.0), Direction::Forward);
         }
         for bit in 0..sound.bits() {
-            let (mut hit, mut name) = (sound, std::string::String::new());
+            let (mut hit, mut twin, mut name) = (sound, sound, std::string::String::new());
             hit.flip(bit, &mut name);
-            for _ in 0..3 {
-                let found = hit.tick(TorqueReading::OnLoad(2.0), Direction::Forward);
-                assert!(found.is_nan() && hit.is_damaged(), "{name} {bit}: {found}");
+            for torque in [2.0, 2.5, -2.0] {
+                let reading = TorqueReading::OnLoad(torque);
+                let found = hit.tick(reading, Direction::Forward);
+                assert_eq!(found, twin.tick(reading, Direction::Forward), "{name} {bit}");
             }
+            assert_eq!(hit, twin);
+            // Two bits of two words cannot be mended: nothing is said any more.
+            let mut lost = sound;
+            lost.flip(bit, &mut name);
+            lost.flip((bit + 40) % sound.bits(), &mut name);
+            assert!(lost.is_damaged() && lost.tick(TorqueReading::OnLoad(2.0), Direction::Forward).is_nan(), "{bit}");
         }
+    }
+
+    /// A thousand ticks a second for twenty seconds, a light load on one flank and noise, and one reading of a hundred that is a spike.
+    #[test]
+    fn spikes_of_a_sensor_change_no_flank() {
+        for (place, jump) in
+            [(TorqueReading::OnLoad as fn(f32) -> TorqueReading, None), (TorqueReading::InMesh, Some(5.0))]
+        {
+            let mut path = TorquePath::new(TorqueSettings { settle_s: 0.02, ..SETTINGS }).unwrap();
+            if let Some(jump) = jump {
+                path = path.with_sensor(jump, 0).unwrap();
+            }
+            let (mut changes, mut refused, mut last) = (0, 0, f32::NAN);
+            for tick in 0..20_000u32 {
+                let noise = 0.02 * ((tick * 37 % 21) as f32 - 10.0) / 10.0;
+                let spike = if tick % 100 == 50 { if tick % 200 == 50 { -90.0 } else { 90.0 } } else { 0.0 };
+                let torque = path.tick(place(1.5 + noise + spike), Direction::Forward);
+                refused += u32::from(torque.is_nan());
+                changes += u32::from(torque * last < 0.0);
+                last = if torque.is_nan() { last } else { torque };
+            }
+            assert_eq!((changes, refused), (0, 200));
+        }
+        // A step that stays is the torque, two ticks late.
+        let mut path = TorquePath::new(TorqueSettings { bandwidth_hz: 1e6, drag_n_m: 0.0, ..SETTINGS }).unwrap();
+        let mut tick = |torque| path.tick(TorqueReading::OnLoad(torque), Direction::Forward);
+        assert!(tick(1.0) > 0.9 && tick(80.0).is_nan() && tick(81.0).is_nan());
+        assert!((tick(82.0) - 82.02).abs() < 0.05 && (tick(83.0) - 83.02).abs() < 0.05);
+        // Spikes in a row that are not near each other are none.
+        for k in 0..20 {
+            assert!(tick(if k % 2 == 0 { -90.0 } else { 20.0 }).is_nan());
+        }
+        assert!(tick(83.0) > 82.0);
+    }
+
+    /// A ramp with readings missing: afterwards the low-pass is where it would be, to what the ramp did meanwhile.
+    #[test]
+    fn over_a_gap_the_low_pass_goes_on() {
+        for missing in [1, 5, 20, 100] {
+            let mut path = TorquePath::new(TorqueSettings { drag_n_m: 0.0, ..SETTINGS }).unwrap();
+            let mut whole = path;
+            let (mut found, mut expected) = (0.0, 0.0);
+            for tick in 0..400u32 {
+                let torque = 2.0 + 0.02 * tick as f32;
+                expected = whole.tick(TorqueReading::OnLoad(torque), Direction::Forward);
+                let lost = (200..200 + missing).contains(&tick);
+                let reading = TorqueReading::OnLoad(if lost { f32::NAN } else { torque });
+                found = path.tick(reading, Direction::Forward);
+                assert_eq!(found.is_nan(), lost);
+                if tick == 200 + missing {
+                    // Without what went meanwhile it would be off by 0.02 N·m for each tick.
+                    assert!((found - expected).abs() < 0.25, "{missing}: {found} {expected}");
+                }
+            }
+            assert!((found - expected).abs() < 0.02);
+        }
+    }
+
+    #[test]
+    fn a_reading_that_stands_still_is_frozen() {
+        let mut path = TorquePath::new(SETTINGS).unwrap().with_sensor(25.0, 10).unwrap();
+        let mut tick = |torque| path.tick(TorqueReading::OnLoad(torque), Direction::Forward).is_nan();
+        assert!((0..10).all(|_| !tick(2.0)) && (0..1000).all(|_| tick(2.0)));
+        assert!(!tick(2.001) && (0..1000).all(|k| !tick(2.0 + (k % 2) as f32)));
+        // And where nobody asked for it a model may stand still.
+        let mut model = TorquePath::new(SETTINGS).unwrap();
+        assert!((0..100_000).all(|_| !model.tick(TorqueReading::OnLoad(2.0), Direction::Forward).is_nan()));
     }
 }

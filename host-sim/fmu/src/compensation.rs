@@ -269,7 +269,7 @@ impl Model for Compensation {
         let mut words = [0_u32; JOINT_STATE_WORDS];
         words[..].take(from)?;
         self.state = JointState::of_words(&words)?;
-        let mut bits = [0_u32; 3];
+        let mut bits = [0_u32; 7];
         bits[..].take(from)?;
         self.path.go_on(bits);
         let mut temperature = 0_u32;

@@ -109,6 +109,8 @@ static AnyCall const volatile others[] = {
     (AnyCall)flexspline_predictor_parts,  (AnyCall)flexspline_predictor_state_bound, (AnyCall)flexspline_learner_reset,
     (AnyCall)flexspline_slip_set,         (AnyCall)flexspline_state_forget_side, (AnyCall)flexspline_store_mend_page,
     (AnyCall)flexspline_nominal_generator, (AnyCall)flexspline_ratio,            (AnyCall)flexspline_encoder_reading,
+    (AnyCall)flexspline_torque_set_sensor, (AnyCall)flexspline_implausible_name,
+    (AnyCall)flexspline_learner_bind,
 };
 
 // What a table says outside the tick.
@@ -162,11 +164,38 @@ static int save(void)
         return 4;
     for (size_t i = 0; i < written; i++)
         take(saved[i]);
+    if (flexspline_slip_save_for(&slip, &joint, &store, saved, sizeof saved, &written) ||
+        flexspline_slip_restore(&slip, saved, written) != FLEXSPLINE_STATUS_SAVED ||
+        flexspline_slip_restore_for(&slip, &joint, &store, saved, written))
+        return 5;
     if (flexspline_slip_save(&slip, saved, sizeof saved, &written) || flexspline_slip_restore(&slip, saved, written))
         return 5;
     for (size_t i = 0; i < written; i++)
         take(saved[i]);
     return flexspline_slip_restore(&torque_slip, saved, written) == FLEXSPLINE_STATUS_SAVED ? 0 : 6;
+}
+
+// The motor goes where it is commanded, and its encoder counts the wrong way.
+static int start_up(void)
+{
+    static FlexsplineStartUp test;
+    const FlexsplineStartUpSettings way = {.way_rad = 20.0f, .output_error_rad = 1e-3f, .drag_n_m = 1.0f, .ticks = 40};
+    for (int wrong = 0; wrong < 2; wrong++) {
+        FlexsplineStartUpStep step = {0, 0, 0};
+        if (flexspline_start_up_init(&test, &joint, 0, &way))
+            return 9;
+        while (!step.is_done) {
+            const FlexsplineReadings readings = {
+                .generator_counts = wrong ? -step.command_counts : step.command_counts,
+                .has_generator = 1,
+            };
+            if (flexspline_start_up_step(&test, &readings, &step))
+                return 9;
+        }
+        if (step.implausible != (wrong ? FLEXSPLINE_IMPLAUSIBLE_GENERATOR_SIGN : 0))
+            return 9;
+    }
+    return 0;
 }
 
 // A record out of the list, as bytes and back.
@@ -270,6 +299,8 @@ int beside(const FlexsplineImages *table, int ticks, uint32_t *found)
             failed = ask(generator, nominal, torque);
         if (!failed && tick == ticks / 2)
             failed = save();
+        if (!failed && tick == ticks / 3)
+            failed = start_up();
         if (failed)
             return failed;
     }

@@ -134,7 +134,7 @@ const OTHER_WORDS: usize = 24;
 /// Words of the objects beside a tick, two of each: the largest is that of an activation.
 const BESIDE_WORDS: usize = 88;
 /// Kinds of these objects.
-const BESIDE: usize = 12;
+const BESIDE: usize = 13;
 /// Records in the list of a recorder.
 const RECORDS: usize = 8;
 const RECORDS_WORDS: usize = RECORDS * size_of::<c::FlexsplineRecord>() / 8;
@@ -334,6 +334,9 @@ struct Objects {
     tables_usable: bool,
 }
 
+const START_UP: c::FlexsplineStartUpSettings =
+    c::FlexsplineStartUpSettings { way_rad: 20.0, output_error_rad: 1e-3, drag_n_m: 1.0, ticks: 8 };
+
 /// Makes one of each object beside a tick, so that what is chosen then finds them.
 fn begin_beside(memory: &Memory) {
     let at = |kind: usize| memory.at(PLACES.beside + 2 * kind * BESIDE_WORDS);
@@ -370,6 +373,7 @@ fn begin_beside(memory: &Memory) {
         c::flexspline_watch_init(at(9).cast()),
         c::flexspline_activation_begin(at(10).cast(), memory.at(PLACES.joints[0]).cast(), 20.0),
         c::flexspline_identity_begin(at(11).cast()),
+        c::flexspline_start_up_init(at(12).cast(), memory.at(PLACES.joints[0]).cast(), 0, &START_UP),
     ];
     assert!(begun.iter().all(|begun| *begun as u32 == OK), "{begun:?}");
 }
@@ -386,6 +390,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
     let [learner, slip, path, aged, encoder, recorder] = [0, 1, 2, 3, 4, 5].map(|kind| memory.beside(choices, kind));
     let [predictor, observer, upload, watch, activation, identity] =
         [6, 7, 8, 9, 10, 11].map(|kind| memory.beside(choices, kind));
+    let start_up = memory.beside(choices, 12);
     let (store, joint, state) = (o.store, o.joint, o.state);
     let all = |objects: &[Given]| objects.iter().all(|object| object.usable);
     let records: *mut c::FlexsplineRecord = memory.at(PLACES.records).cast();
@@ -402,7 +407,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
     }; 2];
     let (output, output_usable) = plain(choices, &output);
     let number = choices.below(10) as u8;
-    match choices.below(46) {
+    match choices.below(50) {
         0 => {
             let settings = [c::FlexsplineLearnSettings {
                 noise_rad: if choices.below(4) == 0 { choices.wild() } else { 2e-6 },
@@ -424,7 +429,12 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             (status as u32, learner.usable && told, false)
         }
         1 => (c::flexspline_learner_set(learner.pointer.cast(), choices.below(4) as u8) as u32, learner.usable, false),
-        2 => (c::flexspline_learner_reset(learner.pointer.cast()) as u32, learner.usable, false),
+        2 if choices.any() => (c::flexspline_learner_reset(learner.pointer.cast()) as u32, learner.usable, false),
+        2 => {
+            let (at, of) = (learner.pointer.cast(), (joint.pointer.cast(), store.pointer.cast()));
+            let status = c::flexspline_learner_bind(at, of.0, of.1, choices.any());
+            (status as u32, all(&[learner, joint, store]), false)
+        }
         3..=6 => {
             let input = [c::FlexsplineInput {
                 generator_counts: choices.any::<i32>().into(),
@@ -774,6 +784,49 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 (status as u32, store.usable, false)
             }
         },
+        45 => {
+            let settings = [c::FlexsplineStartUpSettings {
+                way_rad: if choices.below(4) == 0 { choices.wild() } else { 20.0 },
+                drag_n_m: if choices.below(4) == 0 { choices.wild() } else { 1.0 },
+                ticks: if choices.below(4) == 0 { choices.any() } else { 8 },
+                ..START_UP
+            }; 2];
+            let (settings, told) = plain(choices, &settings);
+            let (at, from) = (start_up.pointer.cast(), choices.any());
+            let status = c::flexspline_start_up_init(at, joint.pointer.cast(), from, settings);
+            (status as u32, all(&[start_up, joint]) && told, false)
+        }
+        46 => {
+            let readings = [c::FlexsplineReadings {
+                generator_counts: choices.any(),
+                output_counts: choices.any(),
+                torque_n_m: choices.wild(),
+                has_generator: choices.below(3) as u8,
+                has_output: choices.below(3) as u8,
+                has_torque: choices.below(3) as u8,
+            }; 2];
+            let (readings, told) = plain(choices, &readings);
+            let to = memory.answer::<c::FlexsplineStartUpStep>(choices, &[start_up]);
+            let status = c::flexspline_start_up_step(start_up.pointer.cast(), readings, to.pointer);
+            (status as u32, start_up.usable && to.usable && told, to.overlaps)
+        }
+        47 => {
+            let saved: *mut u8 = memory.at(PLACES.saved).cast();
+            let room = choices.below(8 * OTHER_WORDS);
+            let (slip_at, joint_at, store_at) = (slip.pointer.cast(), joint.pointer.cast(), store.pointer.cast());
+            if choices.any() {
+                let status = c::flexspline_slip_restore_for(slip_at, joint_at, store_at, saved, room);
+                return (status as u32, all(&[slip, joint, store]), false);
+            }
+            let to = memory.answer(choices, &[slip, joint, store]);
+            let status = c::flexspline_slip_save_for(slip_at, joint_at, store_at, saved, room, to.pointer);
+            (status as u32, all(&[slip, joint, store]) && to.usable, to.overlaps)
+        }
+        48 => {
+            let jump = if choices.any() { 5.0 } else { choices.wild() };
+            let status = c::flexspline_torque_set_sensor(path.pointer.cast(), jump, choices.any());
+            (status as u32, path.usable, false)
+        }
         _ => {
             let announced = choices.below(8 * BUFFER_WORDS + 20);
             match choices.below(6) {
@@ -818,6 +871,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                     ];
                     assert!(names.iter().all(|name| is_text(name(code))));
                     assert!(is_text(c::flexspline_flag_name(bits)) && is_text(c::flexspline_event_name(bits)));
+                    assert!(is_text(c::flexspline_implausible_name(bits)));
                     assert!(is_text(c::flexspline_status_text(choices.any())) && is_text(c::flexspline_version()));
                     assert!(c::flexspline_mode_may_become(code, code) <= 1 && c::flexspline_is_due(7, 3, 1) == 1);
                     assert!(c::flexspline_version_number() > 0 && c::flexspline_layout() != 0);

@@ -32,6 +32,11 @@ pub(super) fn wander_by<const N: usize>(d: &mut [f32; N], u: &mut [[f32; N]; N],
     }
 }
 
+/// `Σ dᵢ·fᵢ²`: the variance of `h·x`, of `Uᵀ·h` and `D`, or of `h` and a diagonal covariance.
+pub(super) fn spread_of<const N: usize>(f: &[f32; N], d: &[f32; N]) -> f32 {
+    f.iter().zip(d).map(|(f, d)| d * f * f).sum()
+}
+
 /// One measurement with this row and noise (Bierman); returns the gains.
 pub(super) fn measure<const N: usize>(d: &mut [f32; N], u: &mut [[f32; N]; N], row: &[f32; N], noise: f32) -> [f32; N] {
     let f = transform(u, row);

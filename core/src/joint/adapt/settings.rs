@@ -64,3 +64,47 @@ impl fmt::Display for AdaptError {
 }
 
 impl core::error::Error for AdaptError {}
+
+/// Why saved bytes are no state of this adapter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum AdaptRestoreError {
+    /// Fewer bytes than so many coefficients take.
+    Short {
+        /// Bytes found.
+        found: usize,
+        /// Bytes that they take.
+        needed: usize,
+    },
+    /// Not of this version.
+    Version {
+        /// The first bytes; `FXA` and 2 are read.
+        found: [u8; 4],
+    },
+    /// The CRC-32 does not match: damaged, or not written to the end.
+    Crc,
+    /// Learnt with another table.
+    OtherTable,
+    /// Learnt by a joint with other settings, or by another unit.
+    OtherJoint,
+    /// Saved with other coefficients.
+    OtherCoefficients,
+    /// Numbers that no adapter can have saved.
+    Impossible,
+}
+
+impl fmt::Display for AdaptRestoreError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Short { found, needed } => write!(f, "{found} bytes of a saved learner, {needed} are needed"),
+            Self::Version { found } => write!(f, "a saved learner begins with {found:02x?}, FXA and 2 are read"),
+            Self::Crc => f.write_str("the saved learner is damaged"),
+            Self::OtherTable => f.write_str("the coefficients were learnt with another table"),
+            Self::OtherJoint => f.write_str("the coefficients were learnt by another joint"),
+            Self::OtherCoefficients => f.write_str("other coefficients were saved"),
+            Self::Impossible => f.write_str("no adapter can have saved this state"),
+        }
+    }
+}
+
+impl core::error::Error for AdaptRestoreError {}

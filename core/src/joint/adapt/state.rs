@@ -1,5 +1,6 @@
 //! What is learnt, and what became of the measurements.
 
+use super::consistency::Consistency;
 use crate::angle::{GeneratorAngle, OutputAngle};
 
 /// Whether measurements change anything.
@@ -55,7 +56,7 @@ pub struct AdaptCounters {
     pub untrusted: u32,
     /// Coefficients held at their limit, once for each and each measurement.
     pub limited: u32,
-    /// Starts from zero because the state was hit by an upset.
+    /// Starts with the first variances: measurements contradicted what was learnt for a window, or, from zero, the state was hit by an upset.
     pub restarts: u32,
 }
 
@@ -74,6 +75,7 @@ pub struct AdaptState<const N: usize> {
     pub(super) touched: OutputAngle,
     pub(super) side: i32,
     pub(super) run: i32,
+    pub(super) consistency: Consistency,
 }
 
 impl<const N: usize> AdaptState<N> {
@@ -99,6 +101,7 @@ impl<const N: usize> AdaptState<N> {
         self.x.iter().all(|x| x.abs() <= 1.0)
             && self.d.iter().all(|d| *d >= 0.0 && *d < 1e6)
             && self.u.as_flattened().iter().all(|u| u.is_finite())
+            && self.consistency.is_sound()
     }
 
     /// The diagonal of `U·D·Uᵀ`.

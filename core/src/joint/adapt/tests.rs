@@ -5,7 +5,7 @@ use std::vec::Vec;
 const HALF_RAD: f64 = 1.5e-4;
 const COUNTS: f64 = COUNTS_PER_RAD as f64;
 
-const SETTINGS: AdaptSettings<7> = AdaptSettings {
+pub(super) const SETTINGS: AdaptSettings<7> = AdaptSettings {
     coefficients: [
         Coefficient { term: Term::Mean, limit: 2e-4, initial_std: 1e-4 },
         Coefficient { term: Term::WindUp, limit: 1e-5, initial_std: 5e-6 },
@@ -23,7 +23,7 @@ const SETTINGS: AdaptSettings<7> = AdaptSettings {
 };
 
 /// Numbers that look random, of unit variance and within ±1.8.
-struct Noise(u64);
+pub(super) struct Noise(u64);
 
 impl Noise {
     fn next(&mut self) -> f64 {
@@ -33,7 +33,7 @@ impl Noise {
 }
 
 /// A drive that differs from its table in the seven coefficients; own arithmetic.
-struct Plant {
+pub(super) struct Plant {
     hidden: [f64; 7],
     /// Where the output rests, rad.
     contact: f64,
@@ -53,21 +53,24 @@ impl Plant {
 }
 
 /// Table, adapter and plant in a loop: the table is flat but for wind-up and play.
-struct Loop<const N: usize> {
+pub(super) struct Loop<const N: usize> {
     adapter: Adapter<N>,
-    state: AdaptState<N>,
+    pub(super) state: AdaptState<N>,
     play: PlayState,
     plant: Plant,
     noise: Noise,
     applied: Adjustment,
-    /// What the adjusted table missed of the truth in the last tick, rad.
-    missed: f64,
+    /// What the adjusted table missed of the truth in the last tick, and what was stated of it, rad.
+    pub(super) missed: f64,
+    pub(super) stated: f32,
     last: Adapted,
     adjusted: i32,
+    /// Instead of what the play says, what the tick says of its own uncertainty.
+    uncertain_rad: Option<f32>,
 }
 
 impl<const N: usize> Loop<N> {
-    fn new(settings: &AdaptSettings<N>, hidden: [f64; 7], seed: u64) -> Self {
+    pub(super) fn new(settings: &AdaptSettings<N>, hidden: [f64; 7], seed: u64) -> Self {
         let adapter = Adapter::new(settings).unwrap();
         let mut state = adapter.start();
         state.set_learning(Learning::On);
@@ -75,14 +78,37 @@ impl<const N: usize> Loop<N> {
         let applied = Adjustment::default();
         let last = Adapted { adjustment: applied, uncertainty_rad: 0.0, verdict: Verdict::Idle };
         let play = PlayState::unknown();
-        Self { adapter, state, play, plant, noise: Noise(seed), applied, missed: 0.0, last, adjusted: 0 }
+        let noise = Noise(seed);
+        Self {
+            adapter,
+            state,
+            play,
+            plant,
+            noise,
+            applied,
+            missed: 0.0,
+            stated: 0.0,
+            last,
+            adjusted: 0,
+            uncertain_rad: None,
+        }
     }
 
     /// `off` is what the sensor is off by; `None` if there is no measurement.
     fn tick(&mut self, generator: f64, torque: f64, off: Option<f64>) {
+        self.tick_as(generator, [torque; 2], |truth| off.map(|off| truth + off));
+    }
+
+    /// The torque that there is and the one that is seen; what the sensor says of the truth, to which noise is added.
+    pub(super) fn tick_as(
+        &mut self,
+        generator: f64,
+        [torque, seen]: [f64; 2],
+        sensor: impl FnOnce(f64) -> Option<f64>,
+    ) {
         let angle = GeneratorAngle::from_rad(generator).unwrap();
         let nominal = OutputAngle::from_rad(generator / 95.0).unwrap();
-        let centre = ((torque / 3e4 * COUNTS) as i32).saturating_add(self.applied.mean_counts);
+        let centre = ((seen / 3e4 * COUNTS) as i32).saturating_add(self.applied.mean_counts);
         let half = ((HALF_RAD * COUNTS) as i32 + self.applied.half_width_counts).max(0);
         self.play.shift(self.applied.mean_counts.wrapping_sub(self.adjusted));
         self.adjusted = self.applied.mean_counts;
@@ -93,19 +119,20 @@ impl<const N: usize> Loop<N> {
             command: angle,
             output: estimated,
             transmission_error_rad: error as f32 * RAD_PER_COUNT,
-            uncertainty_rad: self.play.uncertainty_rad(),
+            uncertainty_rad: self.uncertain_rad.unwrap_or(self.play.uncertainty_rad()),
             correction_rad: 0.0,
             held_back_rad: 0.0,
             quality: if self.play.is_known() { Quality::InRange } else { Quality::Uncertain },
             flags: Flags::default(),
         };
         self.missed = truth - estimated.to_rad();
+        self.stated = self.last.uncertainty_rad + output.uncertainty_rad;
         let noise = 2e-6 * self.noise.next();
-        let measured = off.map(|off| OutputAngle::from_rad(truth + noise + off).unwrap_or_default());
+        let measured = sensor(truth).map(|value| OutputAngle::from_rad(value + noise).unwrap_or_default());
         let input = Input {
             generator: Some(angle),
             target: estimated,
-            torque_n_m: torque as f32,
+            torque_n_m: seen as f32,
             missed_ticks: 0,
             adjustment: self.applied,
         };
@@ -127,9 +154,9 @@ impl<const N: usize> Loop<N> {
     }
 }
 
-const HIDDEN: [f64; 7] = [8e-5, -4e-6, 2.5e-5, 2e-5, -3e-5, -1e-5, 1.5e-5];
+pub(super) const HIDDEN: [f64; 7] = [8e-5, -4e-6, 2.5e-5, 2e-5, -3e-5, -1e-5, 1.5e-5];
 
-fn mixed(time: f64) -> f64 {
+pub(super) fn mixed(time: f64) -> f64 {
     15.0 * (2.3 * time).sin() + 5.0 * (0.7 * time).cos()
 }
 
@@ -199,6 +226,12 @@ fn outliers_and_what_is_no_number_change_nothing() {
         run.tick(1.0, torque, Some(0.0));
         assert_eq!(run.last.verdict, Verdict::Untrusted);
     }
+    for number in [f32::NAN, f32::INFINITY, -1.0] {
+        run.uncertain_rad = Some(number);
+        run.tick(1.0, 10.0, Some(0.0));
+        assert_eq!(run.last.verdict, Verdict::Untrusted, "{number}");
+    }
+    run.uncertain_rad = None;
     assert_eq!(run.adapter.coefficients(&run.state), before);
     // An offset that stays, beyond the gate, stays out, and is told.
     for i in 0..3000 {
@@ -206,6 +239,56 @@ fn outliers_and_what_is_no_number_change_nothing() {
     }
     assert_eq!(run.adapter.coefficients(&run.state), before);
     assert!(run.state.counters().outliers_in_a_row > 2500);
+}
+
+/// However long it measures, the variance stays at what the memory allows, and what is stated covers a sensor that is worse than
+/// its settings say.
+#[test]
+fn the_variance_stays_above_what_the_memory_allows() {
+    for times in [1.0, 3.0] {
+        let mut settings = SETTINGS;
+        settings.noise_rad /= times;
+        let mut run = Loop::new(&settings, HIDDEN, 15);
+        let mut squares = [0.0; 2];
+        for i in 0..100_000 {
+            let time = i as f64 * 1e-3;
+            run.tick(30.0 * (0.9 * time).sin(), mixed(time), Some(0.0));
+            if i > 50_000 && run.last.verdict == Verdict::Used {
+                let least = 2e-6 / 2000f32.sqrt();
+                assert!(run.last.uncertainty_rad > 0.5 * least, "{i}: {:e} {least:e}", run.last.uncertainty_rad);
+                squares[0] += run.missed.powi(2);
+                squares[1] += f64::from(run.stated).powi(2);
+            }
+        }
+        let counters = run.state.counters();
+        assert!(squares[0] < squares[1], "{times}: {squares:?}");
+        assert_eq!(counters.restarts, 0, "{times}: {counters:?}");
+        let (mean, _) = run.adapter.coefficients(&run.state)[0];
+        assert!((mean - 8e-5).abs() < 1e-6, "{times}: {mean:e}");
+    }
+}
+
+/// A burst of bad measurements that is shorter than a third of a window changes nothing.
+#[test]
+fn a_burst_of_bad_measurements_does_nothing() {
+    let mut run = Loop::new(&SETTINGS, HIDDEN, 16);
+    run.swing(30_000, mixed);
+    for i in 0..50 {
+        let before = run.adapter.coefficients(&run.state);
+        for j in 0..60 {
+            let time = 30.0 + (300 * i + j) as f64 * 1e-3;
+            run.tick(30.0 * (0.9 * time).sin(), mixed(time), Some(1e-4));
+        }
+        let after = run.adapter.coefficients(&run.state);
+        let moved = |i: usize| (before[i].0 - after[i].0).abs() / SETTINGS.coefficients[i].limit;
+        assert!((0..7).all(|i| moved(i) < 1e-3), "{before:?} {after:?}");
+        for j in 60..300 {
+            let time = 30.0 + (300 * i + j) as f64 * 1e-3;
+            run.tick(30.0 * (0.9 * time).sin(), mixed(time), Some(0.0));
+        }
+    }
+    let counters = run.state.counters();
+    assert!(counters.restarts == 0 && counters.outliers > 1000, "{counters:?}");
 }
 
 /// What the motion does not excite stays, whatever else moves.
@@ -340,8 +423,8 @@ fn states_come_back_from_bytes_or_not_at_all() {
     let mut run = Loop::new(&SETTINGS, HIDDEN, 9);
     run.swing(3000, mixed);
     let mut bytes = [0; saved_adapt_bytes(7)];
-    assert_eq!(run.adapter.save(&run.state, &mut bytes), Some(148));
-    assert_eq!(run.adapter.save(&run.state, &mut bytes[..147]), None);
+    assert_eq!(run.adapter.save(&run.state, &mut bytes), Some(172));
+    assert_eq!(run.adapter.save(&run.state, &mut bytes[..171]), None);
     let restored = run.adapter.restore(&bytes).unwrap();
     assert_eq!((restored.x, restored.d, restored.u), (run.state.x, run.state.d, run.state.u));
     assert_eq!(restored.learning(), Learning::Off);
@@ -350,9 +433,78 @@ fn states_come_back_from_bytes_or_not_at_all() {
         damaged[bit / 8] ^= 1 << (bit % 8);
         assert_eq!(run.adapter.restore(&damaged), None, "bit {bit}");
     }
+    assert_eq!(run.adapter.try_restore(&bytes[..171]), Err(AdaptRestoreError::Short { found: 171, needed: 172 }));
     let mut other = SETTINGS;
     other.coefficients[1].limit *= 2.0;
-    assert_eq!(Adapter::new(&other).unwrap().restore(&bytes), None);
+    assert_eq!(Adapter::new(&other).unwrap().try_restore(&bytes), Err(AdaptRestoreError::OtherCoefficients));
+    // Version 1 had neither mark nor owner.
+    assert_eq!(run.adapter.try_restore(&bytes[28..]), Err(AdaptRestoreError::Short { found: 144, needed: 172 }));
+    let mut old = bytes;
+    old[3] = 1;
+    assert_eq!(run.adapter.try_restore(&old), Err(AdaptRestoreError::Version { found: *b"FXA\x01" }));
+    // Right sums over what no adapter saves.
+    let mut wrong = run.state;
+    wrong.x[0] = f32::NAN;
+    run.adapter.save(&wrong, &mut bytes);
+    assert_eq!(run.adapter.try_restore(&bytes), Err(AdaptRestoreError::Impossible));
+}
+
+/// Coefficients belong to a table, a joint and a unit.
+#[test]
+fn coefficients_come_back_only_where_they_belong() {
+    use crate::{Images, Limits, Overrun, fixture};
+    let limits = Limits { rate_rad_s: 0.5, ..fixture::LIMITS };
+    let stores = [true, false].map(|plain| {
+        let image = fixture::image(plain);
+        let twin = image.clone();
+        let mut store = Store::new();
+        store.activate(&Images::new(&image, &twin), &fixture::drive(), 20.0).unwrap();
+        store
+    });
+    let joints = [limits, fixture::LIMITS].map(|l| Joint::new(fixture::drive(), l, Overrun::SkipAndCount).unwrap());
+    let adapter = Adapter::new(&SETTINGS).unwrap();
+    let mut run = Loop::new(&SETTINGS, HIDDEN, 9);
+    run.swing(3000, mixed);
+    let own = adapter.owned_by(&joints[0], &stores[0], 1);
+    let mut bytes = [0; saved_adapt_bytes(7)];
+    own.save(&run.state, &mut bytes).unwrap();
+    assert_eq!(bytes[4..12], stores[0].id().0);
+    assert_eq!(own.try_restore(&bytes).unwrap().x, run.state.x);
+    for (other, error) in [
+        (adapter.owned_by(&joints[0], &stores[1], 1), AdaptRestoreError::OtherTable),
+        (adapter.owned_by(&joints[1], &stores[0], 1), AdaptRestoreError::OtherJoint),
+        (adapter.owned_by(&joints[0], &stores[0], 2), AdaptRestoreError::OtherJoint),
+        (adapter, AdaptRestoreError::OtherTable),
+    ] {
+        assert_eq!(other.try_restore(&bytes), Err(error));
+    }
+}
+
+/// Where nobody said whose they are, they are stated as uncertain as before anything was learnt, and the first window of
+/// measurements decides.
+#[test]
+fn restored_coefficients_that_are_wrong_are_stated_and_forgotten() {
+    let mut run = Loop::new(&SETTINGS, [1.45e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 13);
+    run.swing(30_000, mixed);
+    let mut bytes = [0; saved_adapt_bytes(7)];
+    run.adapter.save(&run.state, &mut bytes).unwrap();
+    let mut elsewhere = Loop::new(&SETTINGS, [0.0; 7], 14);
+    elsewhere.swing(2000, mixed);
+    elsewhere.state = elsewhere.adapter.restore(&bytes).unwrap();
+    elsewhere.state.set_learning(Learning::Frozen);
+    elsewhere.swing(100, mixed);
+    let (missed, stated) = (elsewhere.missed.abs(), elsewhere.stated as f64);
+    assert!(missed > 1.3e-4 && missed < 3.0 * stated, "{missed:e} {stated:e}");
+    elsewhere.state.set_learning(Learning::On);
+    elsewhere.swing(1000, mixed);
+    assert!(elsewhere.missed.abs() < 2e-6, "{:e}", elsewhere.missed);
+    assert_eq!(elsewhere.state.counters().restarts, 1);
+    // On their own unit they stay, and are soon stated as well as they were.
+    run.state = run.adapter.restore(&bytes).unwrap();
+    run.state.set_learning(Learning::On);
+    run.swing(1000, mixed);
+    assert!(run.missed.abs() < 1e-6 && run.stated < 1e-6, "{:e} {:e}", run.missed, run.stated);
+    assert_eq!(run.state.counters().restarts, 0);
 }
 
 #[test]
@@ -504,7 +656,7 @@ fn fewer_coefficients_take_fewer_numbers() {
     let mut run = Loop::new(&settings, [8e-5, 0.0, 2.5e-5, 0.0, 0.0, 0.0, 0.0], 12);
     assert!(run.swing(10_000, |_| 3.0) < 1e-6);
     let sizes: Vec<usize> = [1, 2, 3, 7].map(saved_adapt_bytes).into();
-    assert_eq!(sizes, [16, 28, 44, 148]);
+    assert_eq!(sizes, [40, 52, 68, 172]);
 }
 
 /// Found by chance: early on, coefficients that are not yet told apart swing beyond their limits and are held there. What was taken

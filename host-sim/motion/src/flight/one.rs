@@ -140,7 +140,7 @@ impl Kept for OneJoint {
             let mut words = [0_u32; JOINT_STATE_WORDS];
             words[..].take(from)?;
             core.on_board.state = JointState::of_words(&words)?;
-            let mut bits = [0_u32; 3];
+            let mut bits = [0_u32; 7];
             bits[..].take(from)?;
             core.on_board.path.go_on(bits);
         }

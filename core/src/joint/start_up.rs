@@ -1,0 +1,405 @@
+//! Whether the sensors of a joint say what its motor does: units, signs and dead wires, before the first tick.
+//!
+//! The motor turns the generator a little forward and back. What each sensor says of that is held against what must come of it: the generator's encoder
+//! against the command, an encoder at the output against the ratio, a torque in the mesh against the drag, which turns over with the direction. A wrong unit is a wrong
+//! ratio, a wrong sign a wrong sign, a frozen sensor says nothing.
+//!
+//! ```
+//! use flexspline::*;
+//!
+//! # const JOINT: Joint = {
+//! #     let Ok(drive) = Drive::new(188, 190, FixedMember::Flexspline) else { panic!() };
+//! #     let limits = Limits { tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, patience: 5, hold_rad: 1e-6 };
+//! #     let Ok(joint) = Joint::new(drive, limits, Overrun::SkipAndCount) else { panic!() };
+//! #     joint
+//! # };
+//! let settings = StartUpSettings { way_rad: Degrees(1080.0).rad(), ticks: 1000, output_error_rad: 1e-3, drag_n_m: 1.5 };
+//! let mut start_up = StartUp::new(&JOINT, GeneratorAngle::ZERO, &settings)?;
+//! let mut generator = GeneratorAngle::ZERO; // what the encoder says
+//! let found = loop {
+//!     let readings = Readings { generator: Some(generator), output: None, torque_n_m: None };
+//!     let step = start_up.step(&readings);
+//!     generator = step.command; // the motor follows
+//!     if let Some(found) = step.found {
+//!         break found;
+//!     }
+//! };
+//! assert!(found.is_plausible());
+//! # Ok::<(), SettingError>(())
+//! ```
+
+use super::limits::{SettingError, checked};
+use super::runtime::Joint;
+use crate::angle::{GeneratorAngle, OutputAngle};
+use crate::drive::Drive;
+
+/// How far the motor moves, and what is expected of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StartUpSettings {
+    /// Way of the generator, there and back, rad: positive turns it counter-clockwise. At the output it must be ten times `output_error_rad` at least, and
+    /// half a turn at most.
+    pub way_rad: f32,
+    /// Ticks for each way, 8 or more; the last half of each is for the servo to settle.
+    pub ticks: u16,
+    /// What the output may be off by in a way, rad: twice the error that the table states ([`Table::error_limit_rad`](crate::Table::error_limit_rad)) is enough.
+    pub output_error_rad: f32,
+    /// Coulomb drag of the output that a torque in the mesh turns over by, N·m; it may be wrong by three times. Above 0.
+    pub drag_n_m: f32,
+}
+
+/// What the sensors say in a tick; `None` for one that is not there.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Readings {
+    /// The generator's encoder.
+    pub generator: Option<GeneratorAngle>,
+    /// An encoder at the output.
+    pub output: Option<OutputAngle>,
+    /// A torque that is measured in the mesh, N·m. (One on the load says nothing about a motion.)
+    pub torque_n_m: Option<f32>,
+}
+
+/// What sensors say that cannot be; a set of the constants.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Implausible(u16);
+
+impl Implausible {
+    /// The generator's encoder gave no sample.
+    pub const GENERATOR_LOST: Self = Self(1);
+    /// The generator's encoder did not move.
+    pub const GENERATOR_STILL: Self = Self(2);
+    /// The generator's encoder moved the other way.
+    pub const GENERATOR_SIGN: Self = Self(4);
+    /// The generator's encoder moved by another way: counts in a turn, unit, or a motor that does not follow.
+    pub const GENERATOR_RATIO: Self = Self(8);
+    /// The output did not move.
+    pub const OUTPUT_STILL: Self = Self(16);
+    /// The output moved the other way.
+    pub const OUTPUT_SIGN: Self = Self(32);
+    /// The output moved by another way than the ratio says: unit, ratio, or the member that is fixed.
+    pub const OUTPUT_RATIO: Self = Self(64);
+    /// The torque did not change with the direction.
+    pub const TORQUE_STILL: Self = Self(128);
+    /// The torque changed the other way.
+    pub const TORQUE_SIGN: Self = Self(256);
+    /// The torque changed by less than a third or more than three times what the drag says: a unit.
+    pub const TORQUE_RATIO: Self = Self(512);
+    /// A reading came and went, or was no number.
+    pub const LOST: Self = Self(1024);
+
+    /// Whether nothing is wrong.
+    #[must_use]
+    pub const fn is_plausible(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Whether all of `other` are set.
+    #[must_use]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// As bits.
+    #[must_use]
+    pub const fn bits(self) -> u16 {
+        self.0
+    }
+
+    const fn with(self, other: Self, set: bool) -> Self {
+        Self(self.0 | if set { other.0 } else { 0 })
+    }
+}
+
+/// What to do in a tick of the test.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StartUpStep {
+    /// The generator angle to command.
+    pub command: GeneratorAngle,
+    /// With the last tick what was found: [`Implausible::is_plausible`] or not.
+    pub found: Option<Implausible>,
+}
+
+/// What was seen at the end of a way.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Place {
+    generator: Option<GeneratorAngle>,
+    output: Option<OutputAngle>,
+    torque_n_m: Option<f32>,
+}
+
+/// A test of the sensors under way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StartUp {
+    drive: Drive,
+    from: GeneratorAngle,
+    way: i64,
+    ticks: u16,
+    output_error: i64,
+    drag_n_m: f32,
+    tick: u32,
+    /// At the start, at the end of the way there, and of that back.
+    places: [Place; 3],
+    /// Sum of the torques in the moving half of the way, and how many.
+    torque: (f32, u16),
+    lost: bool,
+}
+
+/// An encoder's way may differ from the commanded one by this share: a servo's lag, not a unit. A guess.
+const WAY_SHARE: i64 = 10;
+/// A way below 2⁻⁸ of the expected one is none: noise of a sensor that stands. A guess.
+const STILL_SHIFT: u32 = 8;
+/// Of the output's, beside the error that is stated: a hundredth.
+const RATIO_SHARE: i64 = 100;
+/// The torque turns over by this part of what the drag says, and by so many times, at least and at most; below a tenth it does not change. Drag differs from
+/// unit to unit and with the temperature by two or three times ([motion.md](https://docs.rs/crate/flexspline)); the nearest unit is 8.9 times off (N·m and lbf·in).
+const DRAG_TIMES: f32 = 3.0;
+const DRAG_STILL: f32 = 0.1;
+
+impl StartUp {
+    /// A test that moves the generator from where it is.
+    ///
+    /// # Errors
+    /// [`SettingError`]: a number that is not finite, a way that is too short or too long for what the output may be off by, too few ticks, a drag of 0.
+    pub fn new(joint: &Joint, from: GeneratorAngle, settings: &StartUpSettings) -> Result<Self, SettingError> {
+        let StartUpSettings { way_rad, ticks, output_error_rad, drag_n_m } = *settings;
+        let error = checked("output_error_rad", output_error_rad, output_error_rad as f64, [1e-7, 0.1])?;
+        let least = 10.0 * error as f64;
+        let at_output = way_rad as f64 / joint.drive().exact_ratio();
+        checked("way_rad", way_rad, at_output.abs(), [least, core::f64::consts::PI])?;
+        checked("ticks", ticks as f32, ticks as f64, [8.0, 65_535.0])?;
+        checked("drag_n_m", drag_n_m, drag_n_m as f64, [1e-6, 1e9])?;
+        let counts = |rad: f64| crate::num::counts(rad) as i64;
+        Ok(Self {
+            drive: *joint.drive(),
+            from,
+            way: counts(way_rad as f64),
+            ticks,
+            output_error: counts(output_error_rad as f64),
+            drag_n_m,
+            tick: 0,
+            places: [Place::default(); 3],
+            torque: (0.0, 0),
+            lost: false,
+        })
+    }
+
+    /// One tick: what the sensors say, with the command of the tick before; what to command now.
+    #[must_use]
+    pub fn step(&mut self, readings: &Readings) -> StartUpStep {
+        let Self { from, way, ticks, tick, .. } = *self;
+        let ticks = ticks as u32;
+        let moving = ticks >> 1;
+        let (leg, within) = if tick < ticks { (0u8, tick) } else { (1, tick.wrapping_sub(ticks)) };
+        let finite = readings.torque_n_m.is_none_or(f32::is_finite);
+        let Place { generator, output, torque_n_m } = self.places.first().copied().unwrap_or_default();
+        let same = generator.is_some() == readings.generator.is_some()
+            && output.is_some() == readings.output.is_some()
+            && torque_n_m.is_some() == readings.torque_n_m.is_some();
+        if tick == 0 {
+            self.place(0, readings);
+        }
+        self.lost |= !finite || (tick > 0 && !same);
+        // Where it moves, but for its beginning and its end.
+        if within > moving >> 2 && within < moving {
+            let (sum, number) = self.torque;
+            self.torque = (sum + readings.torque_n_m.unwrap_or(0.0), number.saturating_add(1));
+        }
+        if within == moving
+            && let (sum, Some(number)) = (self.torque.0, core::num::NonZeroU16::new(self.torque.1))
+        {
+            let place = if leg == 0 { 1 } else { 2 };
+            if let Some(place) = self.places.get_mut(place) {
+                place.torque_n_m = readings.torque_n_m.map(|_| sum / number.get() as f32);
+            }
+            self.torque = (0.0, 0);
+        }
+        let last = within.wrapping_add(1) >= ticks;
+        if last {
+            self.place(if leg == 0 { 1 } else { 2 }, readings);
+        }
+        self.tick = tick.saturating_add(1);
+        let share = |within: u32| {
+            let within = within.wrapping_add(1).min(moving) as i64;
+            way.wrapping_mul(within).checked_div(moving as i64).unwrap_or(0)
+        };
+        let along = if leg == 0 { share(within) } else { way.wrapping_sub(share(within)) };
+        let done = last && leg == 1;
+        StartUpStep { command: from.offset_counts(if done { 0 } else { along }), found: done.then(|| self.judge()) }
+    }
+
+    fn place(&mut self, number: usize, readings: &Readings) {
+        if let Some(place) = self.places.get_mut(number) {
+            place.generator = readings.generator;
+            place.output = readings.output;
+            if number == 0 {
+                place.torque_n_m = readings.torque_n_m;
+            }
+        }
+    }
+
+    fn judge(&self) -> Implausible {
+        let [start, there, back] = self.places;
+        let mut found = Implausible::default().with(Implausible::LOST, self.lost);
+        for (one, other, way) in [(start, there, self.way), (there, back, self.way.wrapping_neg())] {
+            let moved = one.generator.zip(other.generator).map(|(one, other)| other.minus_counts(one));
+            let faults = [Implausible::GENERATOR_STILL, Implausible::GENERATOR_SIGN, Implausible::GENERATOR_RATIO];
+            let share = way.unsigned_abs().checked_div(WAY_SHARE as u64).unwrap_or(0);
+            found = match moved {
+                None => found.with(Implausible::GENERATOR_LOST, true),
+                Some(moved) => differs(found, moved, way, share, faults),
+            };
+            let nominal = self.drive.nominal_output(GeneratorAngle::from_counts(way)).counts();
+            if let Some((one, other)) = one.output.zip(other.output) {
+                let faults = [Implausible::OUTPUT_STILL, Implausible::OUTPUT_SIGN, Implausible::OUTPUT_RATIO];
+                let allowed = self.output_error.unsigned_abs();
+                let allowed =
+                    allowed.saturating_add(nominal.unsigned_abs().checked_div(RATIO_SHARE as u64).unwrap_or(0));
+                found = differs(found, other.minus_counts(one), nominal, allowed, faults);
+            }
+        }
+        if let Some((there_n_m, back_n_m)) = there.torque_n_m.zip(back.torque_n_m) {
+            // Forward the mesh carries the load less the drag, backward the load and the drag.
+            let forward = self.drive.nominal_output(GeneratorAngle::from_counts(self.way)).counts() > 0;
+            let turned = if forward { back_n_m - there_n_m } else { there_n_m - back_n_m };
+            let part = turned / (2.0 * self.drag_n_m);
+            let size = part.abs();
+            let (still, wrong_way) = (size.is_nan() || size < DRAG_STILL, part < 0.0);
+            let unit = !still && !wrong_way && (size * DRAG_TIMES < 1.0 || size > DRAG_TIMES);
+            found = found
+                .with(Implausible::TORQUE_STILL, still)
+                .with(Implausible::TORQUE_SIGN, !still && wrong_way)
+                .with(Implausible::TORQUE_RATIO, unit);
+        }
+        found
+    }
+}
+
+/// How a way differs from the one that it must be.
+fn differs(
+    found: Implausible,
+    moved: i64,
+    expected: i64,
+    allowed: u64,
+    [still, sign, ratio]: [Implausible; 3],
+) -> Implausible {
+    if moved.abs_diff(expected) <= allowed {
+        found
+    } else if moved.unsigned_abs() <= allowed.min(expected.unsigned_abs() >> STILL_SHIFT) {
+        found.with(still, true)
+    } else {
+        // Both may be: another way in another unit.
+        let wrong_way = (moved < 0) != (expected < 0);
+        let off = moved.unsigned_abs().abs_diff(expected.unsigned_abs()) > allowed;
+        found.with(sign, wrong_way).with(ratio, off)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::joint::{Limits, Overrun};
+    use crate::{Degrees, FixedMember};
+
+    const SETTINGS: StartUpSettings =
+        StartUpSettings { way_rad: Degrees(1080.0).rad(), ticks: 400, output_error_rad: 1e-3, drag_n_m: 1.5 };
+    const LIMITS: Limits = crate::fixture::LIMITS;
+
+    fn joint(fixed: FixedMember) -> Joint {
+        Joint::new(Drive::new(188, 190, fixed).unwrap(), LIMITS, Overrun::SkipAndCount).unwrap()
+    }
+
+    /// A servo that lags, a drive with play and wind-up, a mesh with drag; each sensor as it is given to be.
+    fn tested(
+        fixed: FixedMember,
+        way_rad: f32,
+        generator: impl Fn(GeneratorAngle) -> Option<GeneratorAngle>,
+        output: impl Fn(OutputAngle) -> Option<OutputAngle>,
+        torque: impl Fn(f32) -> Option<f32>,
+    ) -> Implausible {
+        let joint = joint(fixed);
+        let from = GeneratorAngle::of(Degrees(777.0)).unwrap();
+        let mut test = StartUp::new(&joint, from, &StartUpSettings { way_rad, ..SETTINGS }).unwrap();
+        let (mut at, mut command, mut rests) = (from, from, joint.drive().nominal_output(from).counts());
+        for tick in 0..800u32 {
+            let lag = command.minus_counts(at);
+            at = at.offset_counts(lag / 8);
+            let (nominal, half) = (joint.drive().nominal_output(at).counts(), 100_000);
+            let before = rests;
+            rests = rests.clamp(nominal - half, nominal + half);
+            // The load is 4 N·m; standing the mesh keeps what it had.
+            let way = (rests - before).signum() as f32;
+            let noise = 0.05 * ((tick * 37 % 21) as f32 - 10.0) / 10.0;
+            let mesh = 4.0 - 1.2 * way + noise;
+            let readings = Readings {
+                generator: generator(at),
+                output: output(OutputAngle::from_counts(rests)),
+                torque_n_m: torque(mesh),
+            };
+            let step = test.step(&readings);
+            command = step.command;
+            assert_eq!(step.found.is_some(), tick == 799, "{tick}");
+            assert!(command.minus_counts(from).unsigned_abs() <= test.way.unsigned_abs());
+            if let Some(found) = step.found {
+                assert_eq!(command, from);
+                return found;
+            }
+        }
+        unreachable!()
+    }
+
+    #[test]
+    fn sensors_that_are_right_are_plausible() {
+        for fixed in [FixedMember::Flexspline, FixedMember::CircularSpline] {
+            for way in [SETTINGS.way_rad, -SETTINGS.way_rad] {
+                assert!(tested(fixed, way, Some, Some, Some).is_plausible());
+                assert!(tested(fixed, way, Some, |_| None, |_| None).is_plausible());
+            }
+        }
+    }
+
+    #[test]
+    fn wrong_units_and_signs_and_dead_sensors_are_found_at_start_up() {
+        let scaled = |counts: i64, by: f64| (counts as f64 * by) as i64;
+        let generator = |by: f64| move |at: GeneratorAngle| Some(GeneratorAngle::from_counts(scaled(at.counts(), by)));
+        let output = |by: f64| move |at: OutputAngle| Some(OutputAngle::from_counts(scaled(at.counts(), by)));
+        let torque = |by: f32| move |torque: f32| Some(by * torque);
+        for fixed in [FixedMember::Flexspline, FixedMember::CircularSpline] {
+            for way in [SETTINGS.way_rad, -SETTINGS.way_rad] {
+                let of_generator = |by: f64| tested(fixed, way, generator(by), |_| None, |_| None);
+                assert_eq!(of_generator(-1.0), Implausible::GENERATOR_SIGN);
+                // Degrees for radians and the other way, lines for counts, the output's encoder for the generator's.
+                for by in [57.3, 1.0 / 57.3, 4.0, 0.25, 0.5, 95.0] {
+                    assert_eq!(of_generator(by), Implausible::GENERATOR_RATIO, "{by}");
+                }
+                assert_eq!(of_generator(0.0), Implausible::GENERATOR_STILL);
+                assert_eq!(tested(fixed, way, |_| None, Some, Some), Implausible::GENERATOR_LOST);
+                let of_output = |by: f64| tested(fixed, way, Some, output(by), |_| None);
+                assert_eq!(of_output(-1.0), Implausible::OUTPUT_SIGN);
+                for by in [57.3, 4.0, 0.25, 0.5] {
+                    assert_eq!(of_output(by), Implausible::OUTPUT_RATIO, "{by}");
+                }
+                assert_eq!(of_output(0.0), Implausible::OUTPUT_STILL);
+                let of_torque = |by: f32| tested(fixed, way, Some, |_| None, torque(by));
+                assert_eq!(of_torque(-1.0), Implausible::TORQUE_SIGN);
+                // N·mm, lbf·in, kgf·cm and lbf·ft for N·m.
+                for by in [1000.0, 8.85, 10.2] {
+                    assert_eq!(of_torque(by), Implausible::TORQUE_RATIO, "{by}");
+                }
+                assert_eq!(of_torque(0.0), Implausible::TORQUE_STILL);
+                assert!(tested(fixed, way, Some, Some, |_| Some(f32::NAN)).contains(Implausible::LOST));
+            }
+        }
+    }
+
+    #[test]
+    fn a_way_that_tells_nothing_is_refused() {
+        let named = |settings: StartUpSettings| {
+            StartUp::new(&joint(FixedMember::Flexspline), GeneratorAngle::ZERO, &settings).unwrap_err().name
+        };
+        for way_rad in [0.0, f32::NAN, 0.9, 400.0] {
+            assert_eq!(named(StartUpSettings { way_rad, ..SETTINGS }), "way_rad");
+        }
+        assert_eq!(named(StartUpSettings { ticks: 7, ..SETTINGS }), "ticks");
+        assert_eq!(named(StartUpSettings { drag_n_m: 0.0, ..SETTINGS }), "drag_n_m");
+        assert_eq!(named(StartUpSettings { output_error_rad: 1e-40, ..SETTINGS }), "output_error_rad");
+    }
+}
