@@ -186,7 +186,7 @@ fn every_damaged_file_is_refused_clearly_or_its_fault_is_named_and_no_physics_bl
                 bytes.extend(c.to_le_bytes());
                 bytes
             }),
-            Refused(&["UTF-16"]),
+            Faults(&[]),
         ),
         (
             "no header",

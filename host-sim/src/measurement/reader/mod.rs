@@ -405,25 +405,23 @@ impl Sheet {
 
     /// Reads some rows, the first of which is row `from` of the file.
     fn chunk(&self, places: &[usize], from: usize, rows: &[RowAt]) -> Columns {
-        let width = self.layout.names.len().max(self.layout.kinds.len());
+        let width = self.layout.names.len();
         let mut read = Columns { cells: vec![Cells::default(); places.len()], ..Columns::default() };
         read.cells.iter_mut().for_each(|cells| cells.values.reserve_exact(rows.len()));
-        let mut at: Vec<Option<usize>> = vec![None; width];
         let as_they_stand: Vec<Option<usize>> = places.iter().map(|place| Some(*place)).collect();
         let mut segment = self.segments.partition_point(|(begins, _)| *begins <= from);
         let mut order = self.order_in(segment, places, &as_they_stand);
-        let mut ends: Vec<&[u8]> = Vec::new();
+        let mut fields: Vec<&[u8]> = Vec::new();
         for (k, row) in rows.iter().enumerate() {
             while self.segments.get(segment).is_some_and(|(begins, _)| *begins <= from + k) {
                 segment += 1;
                 order = self.order_in(segment, places, &as_they_stand);
             }
-            ends.clear();
-            at.iter_mut().for_each(|place| *place = None);
+            fields.clear();
             let mut beyond = false;
             let count = self.layout.separator.split(&self.text[row.begin..row.end], |place, field| {
                 beyond |= place >= width && !field.is_empty();
-                ends.push(field);
+                fields.push(field);
             });
             if beyond {
                 read.wide.push((from + k, count));
@@ -432,8 +430,8 @@ impl Sheet {
                 read.short.push((from + k, count));
             }
             for ((cells, place), asked) in read.cells.iter_mut().zip(&order).zip(places) {
-                let field = place.and_then(|place| ends.get(place)).copied().unwrap_or_default();
-                self.read_cell(cells, *asked, field, &ends, row.line);
+                let field = place.and_then(|place| fields.get(place)).copied().unwrap_or_default();
+                self.read_cell(cells, *asked, field, &fields, row.line);
             }
             read.lines.push(row.line);
         }
