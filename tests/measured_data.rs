@@ -627,7 +627,6 @@ fn what_is_repaired_is_as_it_was_and_its_place_is_said() {
     // Units: the same data as with the right ones.
     for (name, text) in [
         ("degrees", changed(|b| scaled(&mut b.generator_rad, 180.0 / std::f64::consts::PI))),
-        ("kelvin", changed(|b| b.temperature_c.as_mut().unwrap().iter_mut().for_each(|t| *t += 273.15))),
         (
             "exchanged",
             Bench::plain(4000, 1.0, 5).csv().replacen("generator_rad,output_rad", "output_rad,generator_rad", 1),
@@ -643,6 +642,11 @@ fn what_is_repaired_is_as_it_was_and_its_place_is_said() {
             assert!((warm(session) - warm(clean)).abs() < 1e-4, "{name}");
         }
     }
+    // What its size alone says of a unit converts nothing: the column is left out, and all else is as it was.
+    let kelvin = changed(|b| b.temperature_c.as_mut().unwrap().iter_mut().for_each(|t| *t += 273.15));
+    let kelvin = read(kelvin.as_bytes()).unwrap();
+    assert!(kelvin.sessions[0].temperature_c.is_none() && kelvin.sessions[0].error_rad == clean.error_rad);
+    assert!(kelvin.faults[0].what.contains("temperature=temperature_c:K"), "{:?}", kelvin.faults);
     // A drift: its size, and gone.
     let text = changed(|b| (0..b.rows()).for_each(|k| b.output_rad[k] += 0.008 * k as f64 * ARCSEC));
     let fault = &read(text.as_bytes()).unwrap().faults[0];
