@@ -162,8 +162,11 @@ const fn is_burst(changed: u64) -> bool {
     changed.wrapping_shr(changed.trailing_zeros()) >> BURST_BITS == 0
 }
 
+/// The factor in as many bits as the sum has.
+const WIDE_FACTOR: u64 = FACTOR as u64;
+
 /// `2³²·f − 1`, a prime.
-const PRIME: u64 = ((FACTOR as u64) << 32).wrapping_sub(1);
+const PRIME: u64 = (WIDE_FACTOR << 32).wrapping_sub(1);
 
 /// `s·2⁻³²` modulo the prime.
 const fn shorter(s: u64) -> u64 {
@@ -172,7 +175,7 @@ const fn shorter(s: u64) -> u64 {
 
 /// `s·2³²` modulo the prime: a step back.
 const fn longer(s: u64) -> u64 {
-    (s / FACTOR as u64) | (s % FACTOR as u64) << 32
+    (s / WIDE_FACTOR) | (s % WIDE_FACTOR) << 32
 }
 
 const fn reduced(s: u64) -> u64 {

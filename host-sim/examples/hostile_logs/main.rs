@@ -27,7 +27,7 @@ use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::extension::Model;
 use flexspline_sim::look::look;
 use flexspline_sim::measurement::{ColumnMap, parse, raw};
-use flexspline_sim::tables::replay;
+use flexspline_sim::tables::{parse_measured, replay};
 
 use made::{MODEL, RATIO};
 
@@ -128,9 +128,9 @@ impl Bench {
             Ok(table) => table,
             Err(error) => return (101, error.to_string()),
         };
-        match replay::parse("log.csv", bytes, table.drive().exact_ratio(), 20.0) {
+        match parse_measured("log.csv", bytes, table.drive().exact_ratio(), 20.0) {
             Ok(rows) => {
-                let (replayed, summary) = replay::replay(&table, &rows);
+                let (replayed, summary) = replay(&table, &rows);
                 let whole = replayed.len() == rows.len() && summary.rows == rows.len();
                 (if whole { 0 } else { 101 }, "replayed".to_owned())
             }

@@ -341,7 +341,7 @@ impl Layout {
             fields[k].len() == width && keys.len() > 1 && !keys[0].is_empty() && keys.iter().all(|key| *key == keys[0])
         };
         let lines: Vec<usize> = (header.block..rows_from).filter(|k| keyed(*k)).collect();
-        if width % 2 != 0 || lines.is_empty() {
+        if !width.is_multiple_of(2) || lines.is_empty() {
             return;
         }
         let distinct = |k: usize| fields[k].iter().skip(1).step_by(2).collect::<BTreeSet<_>>().len();
@@ -373,7 +373,7 @@ impl Layout {
                 .trim_end_matches(|c: char| c.is_ascii_digit());
             ["time", "t", "x", "zeit", "timestamp"].contains(&word)
         };
-        let pairs = width >= 4 && width % 2 == 0 && self.has_names;
+        let pairs = width >= 4 && width.is_multiple_of(2) && self.has_names;
         if pairs && (0..width).all(|k| timely(&self.names[k]) == (k % 2 == 0)) {
             self.shape = Shape::Pairs;
         }
