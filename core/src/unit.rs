@@ -88,7 +88,7 @@ mod tests {
         assert_eq!(OutputAngle::of(Rad(core::f64::consts::FRAC_PI_2)), quarter);
         assert_eq!(GeneratorAngle::of(Degrees(-90.0)), Some(GeneratorAngle::new(-1, 3 << 30)));
         assert_eq!(GeneratorAngle::of(Degrees(f64::NAN)), None);
-        assert!((Arcsec(1.0).rad() - 4.848_136_8e-6).abs() < 1e-12);
+        assert!((Arcsec(1.0).rad() - 4.848_137e-6).abs() < 1e-12);
         assert_eq!((Degrees(1.0).rad(), Rad(0.5).rad()), (Arcsec(3600.0).rad(), 0.5));
     }
 }
