@@ -173,7 +173,7 @@ const fn shorter(s: u64) -> u64 {
 }
 
 /// `s·2³²` modulo the prime: a step back.
-const fn longer(s: u64) -> u64 {
+fn longer(s: u64) -> u64 {
     const BY: NonZeroU64 = match NonZeroU64::new(FACTOR as u64) {
         Some(by) => by,
         None => NonZeroU64::MIN,
