@@ -43,6 +43,9 @@
 // An image is not the one that was activated, or both are the same one.
 #define FLEXSPLINE_FLAG_OTHER_IMAGES 512
 
+// The adjustment of the input was larger than any may be, and was taken at its largest: what made it is not sound.
+#define FLEXSPLINE_FLAG_BOUNDED 1024
+
 // Eight-byte words of a [`FlexsplineStore`].
 #define FLEXSPLINE_STORE_WORDS 1072
 
@@ -149,7 +152,7 @@
 #define FLEXSPLINE_ENCODER_WORDS 7
 
 // Eight-byte words of a [`FlexsplineTorquePath`].
-#define FLEXSPLINE_TORQUE_PATH_WORDS 5
+#define FLEXSPLINE_TORQUE_PATH_WORDS 8
 
 // Eight-byte words of a [`FlexsplineAged`].
 #define FLEXSPLINE_AGED_WORDS 4
@@ -174,10 +177,10 @@
 #define FLEXSPLINE_SLIP_SPRINGS 8
 
 // Eight-byte words of a [`FlexsplineSlip`].
-#define FLEXSPLINE_SLIP_WORDS 21
+#define FLEXSPLINE_SLIP_WORDS 24
 
-// Bytes of saved springs with the largest number of them; n of them take 8 n + 16.
-#define FLEXSPLINE_SAVED_SLIP_BYTES 80
+// Bytes of saved springs with the largest number of them; n of them take 8 n + 36.
+#define FLEXSPLINE_SAVED_SLIP_BYTES 100
 
 // Offset of the mean error, rad.
 #define FLEXSPLINE_TERM_MEAN 0
@@ -252,10 +255,10 @@
 #define FLEXSPLINE_WATCH_WORDS 6
 
 // Eight-byte words of a [`FlexsplinePredictor`].
-#define FLEXSPLINE_PREDICTOR_WORDS 18
+#define FLEXSPLINE_PREDICTOR_WORDS 19
 
 // Eight-byte words of a [`FlexsplineObserver`].
-#define FLEXSPLINE_OBSERVER_WORDS 3
+#define FLEXSPLINE_OBSERVER_WORDS 4
 
 // The mode changed: `mode_before`, `mode`.
 #define FLEXSPLINE_EVENT_MODE 1
@@ -280,6 +283,42 @@
 
 // The state was not whole.
 #define FLEXSPLINE_EVENT_STATE_TORN 128
+
+// Eight-byte words of a [`FlexsplineStartUp`].
+#define FLEXSPLINE_START_UP_WORDS 32
+
+// The generator's encoder gave no sample.
+#define FLEXSPLINE_IMPLAUSIBLE_GENERATOR_LOST 1
+
+// It did not move.
+#define FLEXSPLINE_IMPLAUSIBLE_GENERATOR_STILL 2
+
+// It moved the other way.
+#define FLEXSPLINE_IMPLAUSIBLE_GENERATOR_SIGN 4
+
+// It moved by another way: counts in a turn, unit, or a motor that does not follow.
+#define FLEXSPLINE_IMPLAUSIBLE_GENERATOR_RATIO 8
+
+// The output did not move.
+#define FLEXSPLINE_IMPLAUSIBLE_OUTPUT_STILL 16
+
+// It moved the other way.
+#define FLEXSPLINE_IMPLAUSIBLE_OUTPUT_SIGN 32
+
+// It moved by another way than the ratio says: unit, ratio, or the member that is fixed.
+#define FLEXSPLINE_IMPLAUSIBLE_OUTPUT_RATIO 64
+
+// The torque did not change with the direction.
+#define FLEXSPLINE_IMPLAUSIBLE_TORQUE_STILL 128
+
+// It changed the other way.
+#define FLEXSPLINE_IMPLAUSIBLE_TORQUE_SIGN 256
+
+// It changed by less than a third or more than three times what the drag says: a unit.
+#define FLEXSPLINE_IMPLAUSIBLE_TORQUE_RATIO 512
+
+// A reading came and went, or was no number.
+#define FLEXSPLINE_IMPLAUSIBLE_LOST 1024
 
 // What a call came to.
 typedef enum FlexsplineStatus {
@@ -858,6 +897,49 @@ typedef struct FlexsplineAhead {
   uint8_t quality;
 } FlexsplineAhead;
 
+// A test of the sensors under way.
+typedef struct FlexsplineStartUp {
+  uint64_t opaque[FLEXSPLINE_START_UP_WORDS];
+} FlexsplineStartUp;
+
+// How far the motor moves, and what is expected of it.
+typedef struct FlexsplineStartUpSettings {
+  // Way of the generator, there and back, rad. At the output it must be ten times `output_error_rad` at least, and half a turn at most.
+  float way_rad;
+  // What the output may be off by in a way, rad: twice the error that the table states is enough.
+  float output_error_rad;
+  // Coulomb drag of the output that a torque in the mesh turns over by, N m; it may be wrong by three times. Above 0.
+  float drag_n_m;
+  // Ticks for each way, 8 or more; the last half of each is for the servo to settle.
+  uint16_t ticks;
+} FlexsplineStartUpSettings;
+
+// What the sensors say in a tick of the test. Angles are counts of 2^-32 turn.
+typedef struct FlexsplineReadings {
+  // The generator's encoder.
+  int64_t generator_counts;
+  // An encoder at the output.
+  int64_t output_counts;
+  // A torque that is measured in the mesh, N m. (One on the load says nothing about a motion.)
+  float torque_n_m;
+  // 1 if there is a sample of the generator, else 0; likewise below.
+  uint8_t has_generator;
+  // Of the output.
+  uint8_t has_output;
+  // Of the torque.
+  uint8_t has_torque;
+} FlexsplineReadings;
+
+// What to do in a tick of the test.
+typedef struct FlexsplineStartUpStep {
+  // Generator angle to command, counts of 2^-32 turn.
+  int64_t command_counts;
+  // `FLEXSPLINE_IMPLAUSIBLE_...` once it is done: 0 if every sensor says what it must.
+  uint16_t implausible;
+  // 1 with the last tick of the test, else 0.
+  uint8_t is_done;
+} FlexsplineStartUpStep;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -998,6 +1080,9 @@ const char *flexspline_flag_name(uint16_t flag);
 // Name of one event: of `FLEXSPLINE_EVENT_...`, one bit at a time.
 const char *flexspline_event_name(uint16_t event);
 
+// Name of what is implausible: of `FLEXSPLINE_IMPLAUSIBLE_...`, one bit at a time.
+const char *flexspline_implausible_name(uint16_t implausible);
+
 // Name of what is done in a tick that came late: of `FLEXSPLINE_OVERRUN_...`.
 const char *flexspline_overrun_name(uint8_t overrun);
 
@@ -1034,7 +1119,7 @@ enum FlexsplineStatus flexspline_encoder_start(struct FlexsplineEncoder *encoder
 
 // Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two readings it may move by less than half of what the
 // register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick no sample then),
-// `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`.
+// `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and after an upset of more than a word (one word is mended): make it and start it again.
 enum FlexsplineStatus flexspline_encoder_read(struct FlexsplineEncoder *encoder,
                                               uint64_t reading,
                                               int64_t *angle_counts);
@@ -1076,13 +1161,21 @@ enum FlexsplineStatus flexspline_torque_init_sensor(struct FlexsplineTorquePath 
                                                     float largest_n_m);
 
 // One tick: a reading, N m, positive where it turns the output forward, where it was measured (`FLEXSPLINE_TORQUE_...`), and the direction in which
-// the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite, or larger than the sensor's largest, gives NaN
-// and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit it: make the path anew.
+// the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite, larger than the sensor's largest, frozen, or too far
+// from the last one gives NaN and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit more than a word of it (one is mended): make the path anew.
 enum FlexsplineStatus flexspline_torque_tick(struct FlexsplineTorquePath *path,
                                              uint8_t place,
                                              float reading_n_m,
                                              int8_t direction,
                                              float *torque_n_m);
+
+// Other limits of what a sensor can read, after `flexspline_torque_init_sensor`: the largest change from one tick to the next, N m (a quarter of the largest
+// reading and twice the drag without this call; a reading that changes by more is believed once three in a row are near each other), and the number of ticks
+// after which a reading that stays the same to the last bit is frozen (0 for never, as without this call: what comes from a model may stand still, a sensor has
+// noise). `FLEXSPLINE_STATUS_ARGUMENT` if the change is not finite or below 1e-6 N m.
+enum FlexsplineStatus flexspline_torque_set_sensor(struct FlexsplineTorquePath *path,
+                                                   float jump_n_m,
+                                                   uint16_t frozen_ticks);
 
 // Nothing measured yet; what is older than `most_ticks` is not used.
 enum FlexsplineStatus flexspline_aged_init(struct FlexsplineAged *aged, uint16_t most_ticks);
@@ -1231,7 +1324,8 @@ enum FlexsplineStatus flexspline_slip_set(struct FlexsplineSlip *slip,
                                           uint8_t is_relaxed);
 
 // One tick of springs that slip with the nominal output (`flexspline_nominal_output`), counts of 2^-32 turn: what they add in the next.
-// `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the torque.
+// `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the torque; `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of the springs (one is mended).
+// Deflections of which more was hit are unknown again, as after a reset.
 enum FlexsplineStatus flexspline_slip_update(struct FlexsplineSlip *slip,
                                              int64_t nominal_counts,
                                              struct FlexsplineSlipReport *report);
@@ -1243,14 +1337,14 @@ enum FlexsplineStatus flexspline_slip_update_torque(struct FlexsplineSlip *slip,
                                                     struct FlexsplineSlipReport *report);
 
 // Writes the deflections with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_SLIP_BYTES` at most. `FLEXSPLINE_STATUS_TOO_LARGE` if there is less room,
-// or before the first update. The same bytes as in Rust.
+// or before the first update. They belong to no joint and no table: those of `flexspline_slip_save_for` do. The same bytes as in Rust.
 enum FlexsplineStatus flexspline_slip_save(const struct FlexsplineSlip *slip,
                                            uint8_t *saved,
                                            size_t saved_bytes,
                                            size_t *written);
 
 // Takes back the deflections that the same springs saved; only if the joint (of springs on the torque: the load) cannot have moved meanwhile.
-// `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, or of other springs. The springs are made first, by `flexspline_slip_init`.
+// `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, of other springs, or were saved for a joint (`flexspline_slip_restore_for`). The springs are made first, by `flexspline_slip_init`.
 enum FlexsplineStatus flexspline_slip_restore(struct FlexsplineSlip *slip,
                                               const uint8_t *saved,
                                               size_t saved_bytes);
@@ -1362,7 +1456,8 @@ enum FlexsplineStatus flexspline_predictor_state_bound(const struct FlexsplinePr
 // Makes an observer at rest, without load.
 enum FlexsplineStatus flexspline_observer_init(struct FlexsplineObserver *observer);
 
-// One tick of the observer.
+// One tick of the observer. `FLEXSPLINE_STATUS_ARGUMENT` if a number that is used is not finite or beyond any drive, and the estimate stays;
+// `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of observer or predictor (one is mended): make them anew. What is told then is NaN.
 enum FlexsplineStatus flexspline_observer_step(struct FlexsplineObserver *observer,
                                                const struct FlexsplinePredictor *predictor,
                                                const struct FlexsplineMeasured *measured);
@@ -1372,7 +1467,7 @@ enum FlexsplineStatus flexspline_observer_report(const struct FlexsplineObserver
                                                  struct FlexsplineObserverReport *report);
 
 // Tells where the output will be some ticks from now, with the table as the output map of the two inertias. The work grows with the
-// ticks; call it in a slow rate group.
+// ticks; call it in a slow rate group. `FLEXSPLINE_STATUS_ARGUMENT` if a number of `now` is not finite.
 enum FlexsplineStatus flexspline_predict(const struct FlexsplinePredictor *predictor,
                                          const struct FlexsplineObserver *observer,
                                          const struct FlexsplineJoint *joint,
@@ -1380,6 +1475,35 @@ enum FlexsplineStatus flexspline_predict(const struct FlexsplinePredictor *predi
                                          const struct FlexsplineState *state,
                                          const struct FlexsplineNow *now,
                                          struct FlexsplineAhead *ahead);
+
+// Begins a test of the sensors that moves the generator from where it is and back, before the first tick. `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite, the
+// way too short to tell or too long, or the ticks too few.
+enum FlexsplineStatus flexspline_start_up_init(struct FlexsplineStartUp *start_up,
+                                               const struct FlexsplineJoint *joint,
+                                               int64_t generator_counts,
+                                               const struct FlexsplineStartUpSettings *settings);
+
+// One tick of the test: what the sensors say, with the command of the tick before; what to command now, and with the last one what was found. Where something is
+// implausible do not let the joint correct: its numbers are not what they are taken for.
+enum FlexsplineStatus flexspline_start_up_step(struct FlexsplineStartUp *start_up,
+                                               const struct FlexsplineReadings *readings,
+                                               struct FlexsplineStartUpStep *step);
+
+// As `flexspline_slip_save`, with joint and table: the bytes are restored for the same ones alone.
+enum FlexsplineStatus flexspline_slip_save_for(const struct FlexsplineSlip *slip,
+                                               const struct FlexsplineJoint *joint,
+                                               const struct FlexsplineStore *store,
+                                               uint8_t *saved,
+                                               size_t saved_bytes,
+                                               size_t *written);
+
+// As `flexspline_slip_restore`, of bytes that the same springs saved for the same joint with the same table: `FLEXSPLINE_STATUS_OTHER_TABLE` or
+// `FLEXSPLINE_STATUS_OTHER_JOINT` (or other springs) if not.
+enum FlexsplineStatus flexspline_slip_restore_for(struct FlexsplineSlip *slip,
+                                                  const struct FlexsplineJoint *joint,
+                                                  const struct FlexsplineStore *store,
+                                                  const uint8_t *saved,
+                                                  size_t saved_bytes);
 
 #ifdef __cplusplus
 }  // extern "C"
@@ -1392,7 +1516,7 @@ enum FlexsplineStatus flexspline_predict(const struct FlexsplinePredictor *predi
 // What `flexspline_layout` says where program and library agree on the size of all types above: `if (flexspline_layout() != FLEXSPLINE_LAYOUT) stop();`
 #define FLEXSPLINE_AND_SIZE_(type) * 31u + (uint32_t)sizeof(type))
 #define FLEXSPLINE_LAYOUT \
-  ((((((((((((((((((((((((((((((((((((((((((((((0u \
+  ((((((((((((((((((((((((((((((((((((((((((((((((((0u \
   FLEXSPLINE_AND_SIZE_(FlexsplineStatus) \
   FLEXSPLINE_AND_SIZE_(size_t) \
   FLEXSPLINE_AND_SIZE_(FlexsplineStore) \
@@ -1438,7 +1562,11 @@ enum FlexsplineStatus flexspline_predict(const struct FlexsplinePredictor *predi
   FLEXSPLINE_AND_SIZE_(FlexsplineRecorder) \
   FLEXSPLINE_AND_SIZE_(FlexsplineRecord) \
   FLEXSPLINE_AND_SIZE_(FlexsplineEncoderSettings) \
-  FLEXSPLINE_AND_SIZE_(FlexsplineEncoder)
+  FLEXSPLINE_AND_SIZE_(FlexsplineEncoder) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineStartUp) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineStartUpSettings) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineReadings) \
+  FLEXSPLINE_AND_SIZE_(FlexsplineStartUpStep)
 
 // Sizes and alignments that the compiler can check without the library.
 #if defined(__cplusplus)
@@ -1474,6 +1602,7 @@ FLEXSPLINE_OBJECT_(FlexsplineRecorder, FLEXSPLINE_RECORDER_WORDS);
 FLEXSPLINE_OBJECT_(FlexsplineTorquePath, FLEXSPLINE_TORQUE_PATH_WORDS);
 FLEXSPLINE_OBJECT_(FlexsplineAged, FLEXSPLINE_AGED_WORDS);
 FLEXSPLINE_OBJECT_(FlexsplineEncoder, FLEXSPLINE_ENCODER_WORDS);
+FLEXSPLINE_OBJECT_(FlexsplineStartUp, FLEXSPLINE_START_UP_WORDS);
 FLEXSPLINE_CHECK_(packed_structures, sizeof(FlexsplineStateReport) == 8);
 FLEXSPLINE_CHECK_(FlexsplineWord_, sizeof(uint64_t) == 8 && sizeof(float) == 4 && sizeof(double) == 8);
 #endif

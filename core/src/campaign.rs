@@ -283,7 +283,7 @@ impl Story {
         Raw {
             register,
             // New in every third tick.
-            torque_n_m: (tick.is_multiple_of(3)).then_some(load),
+            torque_n_m: tick.is_multiple_of(3).then_some(load),
             direction: if tick < 200 { Direction::Forward } else { Direction::Backward },
             motor: Measured { torque_n_m: -load, speed_rad_s, twist_rad: load / 3e4 },
             observed: self == Self::Observed,

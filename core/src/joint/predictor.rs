@@ -101,7 +101,7 @@ macro_rules! words_of_matrices {
         impl Words for $matrix<f32> {
             #[inline(always)]
             fn sum(&self, sum: u64) -> u64 {
-                self.iter().fold(sum, |sum, value| value.sum(sum))
+                self.as_slice().iter().fold(sum, |sum, value| value.sum(sum))
             }
 
             fn each(&mut self, see: &mut dyn FnMut(u32) -> u32) {
@@ -395,20 +395,7 @@ impl Predictor {
     /// estimate are lost: make them anew.
     #[inline]
     pub fn step(&self, state: &mut PredictorState, measured: &Measured) -> bool {
-        let (Some(model), Some(x)) = (self.model.open(), state.x.open()) else { return false };
-        let gain = &model.gain;
-        // Without an encoder at the output whatever stands there for the twist is not read.
-        let twist_used = gain.column(1).iter().any(|gain| *gain != 0.0);
-        let Measured { torque_n_m, speed_rad_s, twist_rad } = *measured;
-        let expected = model.a * x + model.b * torque_n_m;
-        let twist_rad = if twist_used { twist_rad } else { expected.x };
-        let missed = Vector2::new(speed_rad_s, twist_rad) - measured_of(&expected);
-        let next = expected + gain * missed;
-        let sound = is_possible(&Vector4::new(twist_rad, speed_rad_s, 0.0, torque_n_m)) & is_possible(&next);
-        if sound {
-            state.x.close(next);
-        }
-        sound
+        self.model.with(|model| model.step(state, measured)).unwrap_or(false)
     }
 
     /// What the estimate can be off by when the disturbances stay within these bounds, once the start is forgotten: φ rad,
@@ -588,6 +575,24 @@ impl Ahead {
 }
 
 impl Model {
+    /// See [`Predictor::step`].
+    #[inline(always)]
+    fn step(&self, state: &mut PredictorState, measured: &Measured) -> bool {
+        let Some(x) = state.x.open() else { return false };
+        // Without an encoder at the output whatever stands there for the twist is not read.
+        let twist_used = self.gain.column(1).iter().any(|gain| *gain != 0.0);
+        let Measured { torque_n_m, speed_rad_s, twist_rad } = *measured;
+        let expected = self.a * x + self.b * torque_n_m;
+        let twist_rad = if twist_used { twist_rad } else { expected.x };
+        let missed = Vector2::new(speed_rad_s, twist_rad) - measured_of(&expected);
+        let next = expected + self.gain * missed;
+        let sound = is_possible(&Vector4::new(twist_rad, speed_rad_s, 0.0, torque_n_m)) & is_possible(&next);
+        if sound {
+            state.x.close(next);
+        }
+        sound
+    }
+
     /// See [`Predictor::check`].
     fn checked(self) -> Result<Predictor, PredictorError> {
         let c = Matrix2x4::new(0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0);
