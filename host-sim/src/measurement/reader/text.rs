@@ -151,7 +151,7 @@ mod tests {
     fn line_ends_and_zeros() {
         let text = of(b"a,b\r1,2\r3,4\r".to_vec()).unwrap();
         assert_eq!((text.bytes.as_slice(), text.notes.len()), (&b"a,b\n1,2\n3,4\n"[..], 1));
-        let text = of(b"a,b\n1,2\n\0\0\0\0 3,\0004\n5,6\n".to_vec()).unwrap();
+        let text = of(b"a,b\n1,2\n\0\0\0\0 3,\x00004\n5,6\n".to_vec()).unwrap();
         assert_eq!((text.bytes.as_slice(), text.zeros), (&b"a,b\n1,2\n 3,004\n5,6\n"[..], vec![(3, 5)]));
         assert_eq!(of(b"1,2\n\x1A".to_vec()).unwrap().bytes, b"1,2\n");
     }
