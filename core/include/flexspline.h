@@ -1268,6 +1268,7 @@ enum FlexsplineStatus flexspline_learner_set(struct FlexsplineLearner *learner, 
 // Says whose coefficients are learnt: of this joint with the table in use. Saved learners carry both, and are restored only where they belong.
 // `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0 if there is one. After `flexspline_learner_init`
 // and the table, before `flexspline_learner_restore`; again after another table was activated: what was learnt for another owner is forgotten.
+// `FLEXSPLINE_STATUS_ARGUMENT` if no table is in use.
 enum FlexsplineStatus flexspline_learner_bind(struct FlexsplineLearner *learner,
                                               const struct FlexsplineJoint *joint,
                                               const struct FlexsplineStore *store,

@@ -8,8 +8,8 @@ use super::{
 use crate::joint::{NO_COEFFICIENT, NOBODY};
 use crate::{
     AdaptCounters, AdaptRestoreError, AdaptSettings, AdaptState, Adapter, Adjustment, Coefficient, Joint, JointState,
-    Learning, LoadTorque, OutputAngle, Seen, Slip, SlipBank, SlipElement, SlipState, Store, Term, TorqueSlipElement,
-    Verdict, saved_adapt_bytes, saved_slip_bytes,
+    Learning, LoadTorque, OutputAngle, Seen, Slip, SlipBank, SlipElement, SlipState, Store, TableId, Term,
+    TorqueSlipElement, Verdict, saved_adapt_bytes, saved_slip_bytes,
 };
 use core::mem::{MaybeUninit, align_of, size_of};
 
@@ -281,6 +281,7 @@ pub extern "C" fn flexspline_learner_set(learner: *mut FlexsplineLearner, learni
 /// Says whose coefficients are learnt: of this joint with the table in use. Saved learners carry both, and are restored only where they belong.
 /// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0 if there is one. After `flexspline_learner_init`
 /// and the table, before `flexspline_learner_restore`; again after another table was activated: what was learnt for another owner is forgotten.
+/// `FLEXSPLINE_STATUS_ARGUMENT` if no table is in use.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_bind(
     learner: *mut FlexsplineLearner,
@@ -295,6 +296,9 @@ pub extern "C" fn flexspline_learner_bind(
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &Store = get(store, STORE_MARK)?;
         let Learner { adapter, state, .. } = get_mut(learner, LEARNER_MARK)?;
+        if store.id() == TableId::default() {
+            return Err(FlexsplineStatus::Argument);
+        }
         let before = *adapter;
         *adapter = before.owned_by(joint, store, unit);
         if adapter.has_other_owner(&before) {

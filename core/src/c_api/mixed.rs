@@ -623,6 +623,9 @@ fn what_is_not_allowed_is_refused() {
     let nothing = room!(FlexsplineJoint);
     assert_eq!(flexspline_learner_bind(&mut learner, &nothing, &*o.store, 1), NotInitialised);
     assert_eq!(flexspline_learner_bind(&mut learner, &o.joint, (&raw const learner).cast(), 1), Overlap);
+    assert_eq!(flexspline_learner_bind(&mut learner, &o.joint, &*o.store, 1), Argument);
+    let (image, mut o) = (fixture::image(false), o);
+    assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &pair(&image), 20.0), Done);
     let mut bound = [[0; 200]; 2];
     for (bytes, unit) in bound.iter_mut().zip([1, 2]) {
         assert_eq!(flexspline_learner_bind(&mut learner, &o.joint, &*o.store, unit), Done);

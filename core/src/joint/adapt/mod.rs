@@ -222,7 +222,7 @@ impl<const N: usize> Adapter<N> {
     /// The same adapter of this joint with the table in use. Saved states carry both and are restored only where they belong.
     ///
     /// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0 if there is one.
-    /// Make it anew after another table was activated, and [`Self::reset`] the state: what was learnt belongs to the table before.
+    /// Activate the table first; without one there is no owner. Make it anew after another table was activated, and [`Self::reset`] the state: what was learnt belongs to the table before.
     #[must_use]
     pub fn owned_by(mut self, joint: &Joint, store: &Store, unit: u32) -> Self {
         self.owner = Owner::of(joint, store, unit);
@@ -589,6 +589,6 @@ impl Owner {
     fn of(joint: &Joint, store: &Store, unit: u32) -> Self {
         let [a, b, c, d, e, f, g, h] = store.id().0;
         let table = [[a, b, c, d], [e, f, g, h]].map(u32::from_le_bytes);
-        Self { table, joint: joint.sums(), unit }
+        if table == [0; 2] { Self::default() } else { Self { table, joint: joint.sums(), unit } }
     }
 }
